@@ -1,0 +1,56 @@
+# kerfpath: `make demo` and `make test` are all a new user needs; each sets up its own .venv first.
+PYTHON ?= python3
+BIN := .venv/bin
+DEMO_OUT ?= demo-out
+
+.PHONY: demo test check bench figures lock clean
+
+demo: .venv/run.stamp
+	$(BIN)/kerfpath demo --out $(DEMO_OUT)
+
+test: .venv/dev.stamp
+	$(BIN)/pytest -n auto
+
+check: .venv/dev.stamp
+	$(BIN)/ruff check
+	$(BIN)/ruff format --check
+	$(BIN)/mypy
+	$(BIN)/lint-imports
+
+bench: .venv/bench.stamp
+	$(BIN)/python -m benchmarks
+
+figures: .venv/run.stamp
+	$(BIN)/python examples/known_against_proposed.py
+
+# One environment, filled in steps: what running needs, what developing adds, what benchmarks add.
+.venv/tools.stamp: requirements/build.txt
+	$(PYTHON) -c 'import sys; sys.exit("kerfpath needs Python 3.11 or newer, this is " + sys.version.split()[0] if sys.version_info < (3, 11) else 0)'
+	$(PYTHON) -m venv .venv
+	$(BIN)/python -m pip install --quiet --require-hashes -r requirements/build.txt
+	touch $@
+
+.venv/run.stamp: requirements/run.txt pyproject.toml .venv/tools.stamp
+	VIRTUAL_ENV=.venv $(BIN)/uv pip install --quiet --require-hashes -r requirements/run.txt
+	VIRTUAL_ENV=.venv $(BIN)/uv pip install --quiet --no-deps --no-build-isolation --editable .
+	touch $@
+
+.venv/dev.stamp: requirements/dev.txt .venv/run.stamp
+	VIRTUAL_ENV=.venv $(BIN)/uv pip install --quiet --require-hashes -r requirements/dev.txt
+	touch $@
+
+.venv/bench.stamp: requirements/bench.txt .venv/dev.stamp
+	VIRTUAL_ENV=.venv $(BIN)/uv pip install --quiet --require-hashes -r requirements/bench.txt
+	touch $@
+
+# Resolve the pinned requirement files again (they name no host).
+LOCK := $(BIN)/uv pip compile --quiet --universal --generate-hashes --no-header --no-annotate --python-version 3.11
+lock: .venv/tools.stamp
+	$(LOCK) requirements/build.in -o requirements/build.txt
+	$(LOCK) --extra dev pyproject.toml -c requirements/build.txt -o requirements/dev.txt
+	$(LOCK) pyproject.toml -c requirements/dev.txt -o requirements/run.txt
+	$(LOCK) --extra bench pyproject.toml -c requirements/dev.txt -o requirements/bench.txt
+
+clean:
+	rm -rf .venv $(DEMO_OUT) build dist .mypy_cache .pytest_cache .ruff_cache .import_linter_cache
+	find . -name __pycache__ -type d -prune -exec rm -rf {} +

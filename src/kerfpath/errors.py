@@ -1,0 +1,45 @@
+"""The exceptions of kerfpath: bad input, no feasible path, a failed audit."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+__all__ = ["AuditFailed", "InputError", "KerfpathError", "NoFeasiblePath"]
+
+
+class KerfpathError(Exception):
+    """Base of every exception that kerfpath raises on purpose."""
+
+
+class InputError(KerfpathError, ValueError):
+    """Bad input: one line that says what was expected, what came, where, and what to do."""
+
+
+class NoFeasiblePath(KerfpathError):
+    """No admissible path was found: an answer with a reason, not a fault of the input.
+
+    Parameters
+    ----------
+    message : str
+        One line: where the path breaks and what each test removed there.
+    proved : bool
+        True when no admissible path exists on this graph; False when the method cannot tell
+        (the paper's acceleration test is greedy).
+    node : int
+        The last node that any admissible path reaches, 0-based; -1 when layer 0 is empty.
+    counts : mapping of str to int
+        What each test removed where the path breaks: candidates of the empty layer by reason, or
+        edges into the unreached layer by the test that forbids them.
+    """
+
+    def __init__(
+        self, message: str, *, proved: bool, node: int, counts: Mapping[str, int] | None = None
+    ) -> None:
+        super().__init__(message)
+        self.proved = proved
+        self.node = node
+        self.counts = dict(counts or {})
+
+
+class AuditFailed(KerfpathError):
+    """A plan or program that its audit refuses; nothing is written from it."""

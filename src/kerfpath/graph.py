@@ -1,0 +1,165 @@
+"""The layered graph: every admissible pose of every node, with a count of every loss."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from kerfpath._arrays import Array, Ints, freeze, scalar
+from kerfpath.errors import InputError
+from kerfpath.kernels import kinematics, turns
+from kerfpath.robots import Robot
+
+__all__ = ["LayeredGraph", "build", "gamma_grid"]
+
+_POSES_AT_ONCE = 100_000
+"""Poses solved per piece of work: large against the overhead, small against the memory."""
+
+_WHOLE_STEPS = 1e-9
+"""How far 2 pi / step may be from a whole number, relative, and still count as one."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class LayeredGraph:
+    """Vertices (11) of all layers; the edges (12) between neighbouring layers are implied.
+
+    Parameters
+    ----------
+    q : (N, 6) rad
+        Joint vectors, layer after layer; within a layer by gamma, posture, turn.
+    start : (K+1,) int
+        Layer k is ``q[start[k]:start[k+1]]``.
+    gamma : (m,) rad
+        The samples of gamma.
+    sample, posture : (N,) int
+        Index into `gamma`, and posture mu, of each vertex.
+    turn : (N, 6) int
+        Turns of 2 pi of each joint of each vertex.
+    reason : (K, m, 8) uint8
+        What became of each candidate: an index into `reasons`.
+    reasons : tuple of str
+        Words for the reason codes; code 0 is "admitted".
+    """
+
+    q: Array
+    start: Ints
+    gamma: Array
+    sample: Ints
+    posture: Ints
+    turn: Ints
+    reason: NDArray[np.uint8]
+    reasons: tuple[str, ...]
+
+    def counts(self, node: int | None = None) -> dict[str, int]:
+        """Count the candidates (node, gamma, posture) by reason, over all nodes or at one."""
+        codes = self.reason if node is None else self.reason[node]
+        number = np.bincount(codes.ravel(), minlength=len(self.reasons))
+        return {word: int(c) for word, c in zip(self.reasons, number, strict=True) if c}
+
+    def counts_by_node(self) -> Ints:
+        """Return the candidates of each node by reason code, (K, len(reasons))."""
+        K, codes = len(self.reason), len(self.reasons)
+        flat = self.reason.reshape(K, -1) + (np.arange(K) * codes)[:, None]
+        return np.bincount(flat.ravel(), minlength=K * codes).reshape(K, codes)
+
+
+def gamma_grid(step: float) -> Array:
+    """Return the samples of gamma in (-pi, pi], at most `step` rad apart (section 3.1).
+
+    Raises
+    ------
+    InputError
+        A step that is not in (0, 2 pi].
+    """
+    step = scalar(step, "gamma_step", unit="rad", above=0.0)
+    if step > 2 * np.pi * (1 + _WHOLE_STEPS):
+        raise InputError(f"gamma_step: expected at most one turn (2 pi rad), got {step:g} rad")
+    m = int(np.ceil(2 * np.pi / step * (1 - _WHOLE_STEPS)))
+    return freeze(-np.pi + 2 * np.pi / m * np.arange(1, m + 1))
+
+
+def build(
+    frames: Array,
+    robot: Robot,
+    *,
+    T_flange_tip: Array,
+    gamma: Array,
+    progress: Callable[[int], None] | None = None,
+) -> LayeredGraph:
+    """Return the vertices of every node: all samples of gamma, postures and turns (Eq. 10).
+
+    Parameters
+    ----------
+    frames : (K, 4, 4)
+        Task frames H_k in the robot base, m.
+    robot : Robot
+        Kinematics and joint limits.
+    T_flange_tip : (4, 4)
+        Tool: tip frame in the flange.
+    gamma : (m,) rad
+        Samples of gamma, see `gamma_grid`.
+    progress : callable, optional
+        Called with the number of nodes done since the last call.
+
+    Raises
+    ------
+    InputError
+        The robot's joint limits are not known.
+    """
+    limits, arm = robot.joint_limits(), robot.arm()
+    T_tip_flange = np.linalg.inv(T_flange_tip)
+    reason = np.empty((len(frames), len(gamma), kinematics.POSTURES), np.uint8)
+
+    def layers_of(first: int, last: int) -> _Piece:
+        """Solve nodes first..last-1 and keep what the limits admit."""
+        size = (last - first, len(gamma), kinematics.POSTURES)
+        q, reach = np.empty((*size, 6)), np.empty(size, np.bool_)
+        kinematics.inverse_nodes(arm, frames[first:last], gamma, T_tip_flange, q, reach)
+        count = np.empty(last - first, np.int64)
+        turns.count_admissible(q, reach, limits, count, reason[first:last])
+        n = int(count.sum())
+        piece = _Piece(
+            count=count,
+            q=np.empty((n, 6)),
+            sample=np.empty(n, np.int64),
+            posture=np.empty(n, np.int64),
+            turn=np.empty((n, 6), np.int64),
+        )
+        turns.fill_admissible(
+            q, reason[first:last], limits, piece.q, piece.sample, piece.posture, piece.turn
+        )
+        if progress is not None:
+            progress(last - first)
+        return piece
+
+    nodes = max(1, _POSES_AT_ONCE // len(gamma))
+    firsts = range(0, len(frames), nodes)
+    with ThreadPoolExecutor(os.cpu_count()) as pool:
+        pieces = list(pool.map(lambda f: layers_of(f, min(f + nodes, len(frames))), firsts))
+    count = np.concatenate([p.count for p in pieces])
+    return LayeredGraph(
+        q=freeze(np.concatenate([p.q for p in pieces])),
+        start=freeze(np.concatenate([[0], np.cumsum(count)])),
+        gamma=gamma,
+        sample=freeze(np.concatenate([p.sample for p in pieces])),
+        posture=freeze(np.concatenate([p.posture for p in pieces])),
+        turn=freeze(np.concatenate([p.turn for p in pieces])),
+        reason=freeze(reason),
+        reasons=robot.reasons(),
+    )
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class _Piece:
+    """The vertices of a run of nodes."""
+
+    count: Ints
+    q: Array
+    sample: Ints
+    posture: Ints
+    turn: Ints

@@ -1,0 +1,35 @@
+"""Velocity and acceleration limits as bounds on finite differences, (5) and (6)."""
+
+from __future__ import annotations
+
+from kerfpath._arrays import Array
+from kerfpath.kernels._jit import jit
+
+__all__ = ["LIMIT_TOLERANCE", "acceleration_excess", "velocity_excess"]
+
+LIMIT_TOLERANCE = 1e-9
+"""Slack on (5) and (6), rad: a thousandth of what any encoder resolves, far above rounding."""
+
+
+@jit
+def velocity_excess(dq: Array, bound: Array) -> int:
+    """First joint with |q_k - q_{k-1}| > eta_v dq^(v), or -1: the test f_v (Eq. 5).
+
+    dq (n,) is the increment, bound (n,) is eta_v q'max dt, both rad.
+    """
+    for i in range(len(dq)):
+        if abs(dq[i]) > bound[i] + LIMIT_TOLERANCE:
+            return i
+    return -1
+
+
+@jit
+def acceleration_excess(dq: Array, dq_before: Array, bound: Array) -> int:
+    """First joint with |q_k - 2 q_{k-1} + q_{k-2}| > eta_a dq^(a), or -1: the test f_a (Eq. 6).
+
+    dq, dq_before (n,) are successive increments, bound (n,) is eta_a q''max dt^2, all rad.
+    """
+    for i in range(len(dq)):
+        if abs(dq[i] - dq_before[i]) > bound[i] + LIMIT_TOLERANCE:
+            return i
+    return -1

@@ -1,0 +1,148 @@
+"""Admissible turns of a posture: joint limits q_min <= q <= q_max over I_q (section 2.2).
+
+A joint with a finite range admits every representative q + 2 pi t inside it, each a vertex of its
+own; an endless joint has one representative, compared modulo 2 pi by (13).
+
+Reason codes: 0 admitted, 1 unreachable, 2 + 2 i joint i below its range, 3 + 2 i above it,
+2 + 2 n + 2 r coupling r below its range, 3 + 2 n + 2 r above it.
+"""
+
+from __future__ import annotations
+
+from math import ceil, floor, pi
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from kerfpath._arrays import Array, Bools, Ints
+from kerfpath.kernels._jit import jit
+
+__all__ = [
+    "ADMITTED",
+    "UNREACHABLE",
+    "JointLimits",
+    "admissible_turns",
+    "count_admissible",
+    "fill_admissible",
+]
+
+ADMITTED, UNREACHABLE = 0, 1
+
+EDGE = 1e-9
+"""Slack on joint limits, rad, so that rounding does not drop a pose that sits on a limit."""
+
+MOST_TURNS = 4096
+"""Room for the combinations of turns of one posture; six joints of 4 turns each."""
+
+
+class JointLimits(NamedTuple):
+    """Ranges of the joints and of linear couplings of them, rad."""
+
+    lower: Array
+    """(n,)"""
+    upper: Array
+    """(n,)"""
+    endless: Bools
+    """(n,)"""
+    rows: Array
+    """(m, n): coupling r bounds rows[r] @ q."""
+    row_lower: Array
+    """(m,)"""
+    row_upper: Array
+    """(m,)"""
+
+
+@jit
+def _broken_coupling(q: Array, turn: Ints, limits: JointLimits) -> int:
+    """Reason code of the first coupling that q + 2 pi turn breaks, or 0."""
+    n = len(q)
+    for r in range(len(limits.rows)):
+        value = 0.0
+        for i in range(n):
+            value += limits.rows[r, i] * (q[i] + 2.0 * pi * turn[i])
+        if value < limits.row_lower[r] - EDGE:
+            return 2 + 2 * n + 2 * r
+        if value > limits.row_upper[r] + EDGE:
+            return 3 + 2 * n + 2 * r
+    return ADMITTED
+
+
+@jit
+def admissible_turns(q: Array, limits: JointLimits, out_turn: Ints) -> tuple[int, int]:
+    """Fill out_turn (MOST_TURNS, n) with every admissible turn of q (n,) in (-pi, pi].
+
+    Returns their number and, if there is none, the reason code (the first joint without a turn,
+    else the coupling that turned the last combination away).
+    """
+    n = len(q)
+    first, last = np.zeros(n, np.int64), np.zeros(n, np.int64)
+    for i in range(n):
+        if not limits.endless[i]:
+            first[i] = ceil((limits.lower[i] - EDGE - q[i]) / (2.0 * pi))
+            last[i] = floor((limits.upper[i] + EDGE - q[i]) / (2.0 * pi))
+            if last[i] < first[i]:
+                below = limits.lower[i] - (q[i] + 2.0 * pi * last[i])
+                above = q[i] + 2.0 * pi * first[i] - limits.upper[i]
+                return 0, 2 + 2 * i if below <= above else 3 + 2 * i
+    turn, count, reason = first.copy(), 0, ADMITTED
+    while True:
+        broken = _broken_coupling(q, turn, limits)
+        if broken == ADMITTED:
+            out_turn[count] = turn
+            count += 1
+        else:
+            reason = broken
+        i = n - 1
+        while i >= 0 and turn[i] == last[i]:
+            turn[i] = first[i]
+            i -= 1
+        if i < 0 or count == MOST_TURNS:
+            return count, (ADMITTED if count else reason)
+        turn[i] += 1
+
+
+@jit
+def count_admissible(
+    q: Array, reach: Bools, limits: JointLimits, out_count: Ints, out_reason: NDArray[np.uint8]
+) -> None:
+    """Count the turns of q (K, m, P, n) per node, out_count (K,), and why poses drop, (K, m, P)."""
+    K, m, P, n = q.shape
+    turn = np.empty((MOST_TURNS, n), np.int64)
+    for k in range(K):
+        out_count[k] = 0
+        for j in range(m):
+            for mu in range(P):
+                if not reach[k, j, mu]:
+                    out_reason[k, j, mu] = UNREACHABLE
+                    continue
+                count, reason = admissible_turns(q[k, j, mu], limits, turn)
+                out_count[k] += count
+                out_reason[k, j, mu] = reason
+
+
+@jit
+def fill_admissible(
+    q: Array,
+    reason: NDArray[np.uint8],
+    limits: JointLimits,
+    out_q: Array,
+    out_sample: Ints,
+    out_posture: Ints,
+    out_turn: Ints,
+) -> None:
+    """Write the admitted vertices of q (K, m, P, n) one after the other, with where they came from."""
+    K, m, P, n = q.shape
+    turn, v = np.empty((MOST_TURNS, n), np.int64), 0
+    for k in range(K):
+        for j in range(m):
+            for mu in range(P):
+                if reason[k, j, mu] != ADMITTED:
+                    continue
+                count, _ = admissible_turns(q[k, j, mu], limits, turn)
+                for t in range(count):
+                    for i in range(n):
+                        out_q[v, i] = q[k, j, mu, i] + 2.0 * pi * turn[t, i]
+                    out_turn[v] = turn[t]
+                    out_sample[v], out_posture[v] = j, mu
+                    v += 1

@@ -1,0 +1,219 @@
+"""plan(): from a contour and a robot to a plan, through the layered graph and the search."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from kerfpath._arrays import Array, as_pose, floats, freeze, scalar
+from kerfpath.contour import Contour, FrameKind
+from kerfpath.errors import InputError, NoFeasiblePath
+from kerfpath.graph import LayeredGraph, build, gamma_grid
+from kerfpath.plans import Plan, Proof, Settings
+from kerfpath.robots import Robot
+from kerfpath.search import Method, Metric, ObjectiveKind, shortest_path
+
+__all__ = ["layered_graph", "node_interval", "plan"]
+
+UNEVEN = 0.01
+"""Largest relative difference of node distances that still counts as evenly spaced."""
+
+
+def plan(
+    contour: Contour,
+    robot: Robot,
+    *,
+    tool: ArrayLike,
+    placement: ArrayLike,
+    speed: float | None = None,
+    gamma_step: float = np.pi / 180,
+    frames: FrameKind = "rotation-minimising",
+    method: Method = "paper",
+    objective: ObjectiveKind = "sum",
+    metric: Metric = "manhattan",
+    weights: ArrayLike | None = None,
+    eta_v: float = 1.0,
+    eta_a: float = 1.0,
+    graph: LayeredGraph | None = None,
+    progress: Callable[[int], None] | None = None,
+) -> Plan:
+    """Return the best joint motion along the contour at constant speed.
+
+    Parameters
+    ----------
+    contour : Contour
+        Nodes in the part frame, evenly spaced (see `Contour.resample`).
+    robot : Robot
+        With joint limits, velocities and accelerations.
+    tool : (4, 4)
+        T_flange_tip, m: tip frame in the flange, z along the beam into the part.
+    placement : (4, 4)
+        T_base_part, m: part frame in the robot base.
+    speed : float m/s
+        Speed along the path; left out where the contour carries its own times.
+    gamma_step : float rad
+        Step of the free rotation about the beam.
+    frames : {"rotation-minimising", "tangent"}
+        Task frames that gamma is measured in.
+    method, objective, metric, weights, eta_v, eta_a
+        As in `shortest_path`.
+    graph : LayeredGraph, optional
+        The layered graph of this very task, kept from `layered_graph`.
+    progress : callable, optional
+        Called with the number of nodes whose poses have been solved since the last call.
+
+    Raises
+    ------
+    NoFeasiblePath
+        Says the first node where the path breaks, and what each test removed there.
+    InputError
+        Limits that are not known, nodes unevenly spaced, values out of range.
+    """
+    velocity, acceleration = robot.speed_limits()
+    T_flange_tip, T_base_part = as_pose(tool, "tool"), as_pose(placement, "placement")
+    dt = node_interval(contour, speed)
+    weight = 1 / (velocity * dt) if weights is None else floats(weights, "weights", (6,))
+    settings = Settings(
+        gamma_step=scalar(gamma_step, "gamma_step", unit="rad", above=0.0),
+        frames=frames,
+        method=method,
+        objective=objective,
+        metric=metric,
+        weights=freeze(weight),
+        eta_v=scalar(eta_v, "eta_v", above=0.0),
+        eta_a=scalar(eta_a, "eta_a", above=0.0),
+    )
+    graph = graph or layered_graph(
+        contour,
+        robot,
+        tool=T_flange_tip,
+        placement=T_base_part,
+        gamma_step=gamma_step,
+        frames=frames,
+        progress=progress,
+    )
+    if len(graph.start) != len(contour) + 1:
+        raise InputError(
+            f"graph: has {len(graph.start) - 1} layers, but the contour has {len(contour)} nodes"
+        )
+    _require_no_empty_layer(contour, graph)
+    try:
+        path = shortest_path(
+            graph.q,
+            graph.start,
+            dt=dt,
+            velocity=velocity,
+            acceleration=acceleration,
+            endless=robot.endless,
+            posture=graph.posture,
+            weights=weight,
+            metric=metric,
+            objective=objective,
+            method=method,
+            eta_v=eta_v,
+            eta_a=eta_a,
+        )
+    except NoFeasiblePath as broken:
+        raise NoFeasiblePath(
+            f"contour {contour.name!r}: {broken}",
+            proved=broken.proved,
+            node=broken.node,
+            counts=broken.counts,
+        ) from None
+    vertex = graph.start[:-1] + path.index
+    return Plan(
+        contour=contour,
+        robot=robot,
+        T_flange_tip=T_flange_tip,
+        T_base_part=T_base_part,
+        q=graph.q[vertex],
+        gamma=graph.gamma[graph.sample[vertex]],
+        posture=graph.posture[vertex],
+        turn=graph.turn[vertex],
+        time=np.arange(len(contour)) * dt,
+        settings=settings,
+        cost=path.cost,
+        proof=_proof(method, path.optimal),
+        counts=graph.counts(),
+    )
+
+
+def layered_graph(
+    contour: Contour,
+    robot: Robot,
+    *,
+    tool: ArrayLike,
+    placement: ArrayLike,
+    gamma_step: float = np.pi / 180,
+    frames: FrameKind = "rotation-minimising",
+    progress: Callable[[int], None] | None = None,
+) -> LayeredGraph:
+    """Return the layered graph that `plan` searches; arguments as there."""
+    H = np.ascontiguousarray(as_pose(placement, "placement") @ contour.frames(frames))
+    return build(
+        H,
+        robot,
+        T_flange_tip=as_pose(tool, "tool"),
+        gamma=gamma_grid(gamma_step),
+        progress=progress,
+    )
+
+
+def node_interval(contour: Contour, speed: float | None) -> float:
+    """Return the time between neighbouring nodes, s, from the speed (m/s) or the contour's times.
+
+    Raises
+    ------
+    InputError
+        No speed at all, or two; a speed that is not positive; nodes unevenly spaced.
+    """
+    if contour.time is not None:
+        if speed is not None:
+            raise InputError(
+                f"speed: contour {contour.name!r} carries its own times; give no speed, or resample "
+                "it by spacing"
+            )
+        _require_even(contour, np.diff(contour.time), "s")
+        return float(contour.time[-1] - contour.time[0]) / (len(contour) - 1)
+    if speed is None:
+        raise InputError(f"speed: contour {contour.name!r} carries no times, give a speed in m/s")
+    speed = scalar(speed, "speed", unit="m/s", above=0.0)
+    _require_even(contour, np.diff(contour.s), "m")
+    return contour.length / (len(contour) - 1) / speed
+
+
+def _require_even(contour: Contour, steps: Array, unit: str) -> None:
+    low, high = float(steps.min()), float(steps.max())
+    if high - low > UNEVEN * high:
+        raise InputError(
+            f"contour {contour.name!r}: nodes must be evenly spaced, but their steps run from "
+            f"{low:.6g} to {high:.6g} {unit}; resample it first, for example with "
+            f"contour.resample(count={len(contour)})"
+        )
+
+
+def _require_no_empty_layer(contour: Contour, graph: LayeredGraph) -> None:
+    empty = np.flatnonzero(np.diff(graph.start) == 0)
+    if empty.size:
+        k = int(empty[0])
+        counts = graph.counts(k)
+        told = ", ".join(f"{word}: {number}" for word, number in counts.items())
+        raise NoFeasiblePath(
+            f"contour {contour.name!r}: no admissible pose at node {k} of {len(contour)} "
+            f"({empty.size} such nodes); of {sum(counts.values())} candidates there, {told}",
+            proved=True,
+            node=k - 1,
+            counts=counts,
+        )
+
+
+def _proof(method: Method, optimal: bool) -> Proof:
+    if optimal:
+        claim = "best path on this graph: the acceleration test never turned a better edge away"
+    elif method == "known":
+        claim = "no claim: the known technique tests neither velocity nor acceleration"
+    else:
+        claim = "no claim: the acceleration test of the paper's procedure is greedy"
+    return Proof(optimal=optimal, statement=claim)

@@ -1,0 +1,188 @@
+"""The plan: what the robot does at every node, by which criteria, and what has been proved."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from kerfpath._arrays import Array, Ints, as_pose, floats, freeze, integers, scalar
+from kerfpath.contour import Contour, FrameKind
+from kerfpath.errors import InputError
+from kerfpath.kernels import metric
+from kerfpath.robots import Robot
+from kerfpath.search import Method, Metric, ObjectiveKind
+
+__all__ = ["Criteria", "Plan", "Proof", "Settings"]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Settings:
+    """How a plan was asked for.
+
+    Parameters
+    ----------
+    gamma_step : float rad
+        Step of the free rotation.
+    frames : {"tangent", "rotation-minimising"}
+        Task frames that gamma is measured in.
+    method, objective, metric : str
+        As in `kerfpath.shortest_path`.
+    weights : (6,) 1/rad
+        Weights of the joint-space distance.
+    eta_v, eta_a : float
+        Share of the velocity and acceleration limits that may be used.
+    """
+
+    gamma_step: float
+    frames: FrameKind
+    method: Method
+    objective: ObjectiveKind
+    metric: Metric
+    weights: Array
+    eta_v: float
+    eta_a: float
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Proof:
+    """What is proved about a plan: whether it is the best on its graph, and the claim in words."""
+
+    optimal: bool
+    statement: str
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Criteria:
+    """Smoothness of a plan, each (6,), joint by joint.
+
+    Parameters
+    ----------
+    displacement : rad
+        Total displacement (7).
+    largest_increment : rad
+        Largest increment between nodes (8).
+    range : rad
+        Coordinate range (9).
+    peak_velocity, peak_acceleration : share of the limit
+        Largest finite difference over the joint's limit, before eta.
+    """
+
+    displacement: Array
+    largest_increment: Array
+    range: Array
+    peak_velocity: Array
+    peak_acceleration: Array
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Plan:
+    """Joint motion along one contour.
+
+    Parameters
+    ----------
+    contour : Contour
+        The nodes, in the part frame, evenly spaced in time.
+    robot : Robot
+        With the limits that the plan keeps.
+    T_flange_tip, T_base_part : (4, 4)
+        Tool and placement of the part, m.
+    q : (K, 6) rad
+        Joints at the nodes.
+    gamma : (K,) rad
+        Free rotation about the tool axis at the nodes.
+    posture : (K,) int
+        Posture mu; see `kerfpath.robots.posture_name`.
+    turn : (K, 6) int
+        Turns of 2 pi of each joint away from (-pi, pi].
+    time : (K,) s
+        Time of each node, from 0.
+    settings : Settings
+    cost : float
+        Objective (14) or (15).
+    proof : Proof
+    counts : mapping of str to int
+        Candidates (node, gamma, posture) of the layered graph by what became of them.
+    """
+
+    contour: Contour
+    robot: Robot
+    T_flange_tip: Array
+    T_base_part: Array
+    q: Array
+    gamma: Array
+    posture: Ints
+    turn: Ints
+    time: Array
+    settings: Settings
+    cost: float
+    proof: Proof
+    counts: Mapping[str, int]
+
+    def __post_init__(self) -> None:
+        K = len(self.contour)
+        cast: dict[str, Any] = {
+            "T_flange_tip": as_pose(self.T_flange_tip, "T_flange_tip"),
+            "T_base_part": as_pose(self.T_base_part, "T_base_part"),
+            "q": floats(self.q, "q", (K, 6)),
+            "gamma": floats(self.gamma, "gamma", (K,)),
+            "posture": integers(self.posture, "posture", (K,)),
+            "turn": integers(self.turn, "turn", (K, 6)),
+            "time": floats(self.time, "time", (K,)),
+            "cost": scalar(self.cost, "cost"),
+        }
+        if (np.diff(cast["time"]) <= 0).any():
+            raise InputError("time: must increase from node to node")
+        for name, value in cast.items():
+            object.__setattr__(self, name, value)
+
+    @property
+    def name(self) -> str:
+        """Name of the contour."""
+        return self.contour.name
+
+    @property
+    def dt(self) -> float:
+        """Time from node to node, s."""
+        return float(self.time[-1] - self.time[0]) / (len(self.time) - 1)
+
+    @property
+    def points(self) -> Array:
+        """Tool-tip positions asked for at the nodes, robot base frame, (K, 3) m."""
+        rotation, origin = self.T_base_part[:3, :3], self.T_base_part[:3, 3]
+        return freeze(self.contour.points @ rotation.T + origin)
+
+    @property
+    def axes(self) -> Array:
+        """Tool axes asked for at the nodes, robot base frame, (K, 3)."""
+        return freeze(self.contour.axes @ self.T_base_part[:3, :3].T)
+
+    @property
+    def increments(self) -> Array:
+        """Joint increments between nodes, (K-1, 6) rad; endless joints the short way (13)."""
+        return freeze(metric.increments(self.q, self.robot.endless))
+
+    @property
+    def velocity_share(self) -> Array:
+        """Joint speed between nodes over its limit, (K-1, 6), signed."""
+        return freeze(self.increments / self.dt / self.robot.speed_limits()[0])
+
+    @property
+    def acceleration_share(self) -> Array:
+        """Second difference at the inner nodes over the acceleration limit, (K-2, 6), signed."""
+        change = np.diff(self.increments, axis=0)
+        return freeze(change / self.dt**2 / self.robot.speed_limits()[1])
+
+    @property
+    def criteria(self) -> Criteria:
+        """The criteria (7) to (9) and the peak shares of the limits."""
+        dq = self.increments
+        return Criteria(
+            displacement=metric.total_displacement(dq),
+            largest_increment=metric.largest_increment(dq),
+            range=metric.coordinate_range(dq),
+            peak_velocity=np.abs(self.velocity_share).max(axis=0),
+            peak_acceleration=np.abs(self.acceleration_share).max(axis=0, initial=0.0),
+        )

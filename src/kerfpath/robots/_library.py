@@ -1,0 +1,118 @@
+"""The robots that kerfpath knows, one TOML file each, with their sources and warnings."""
+
+from __future__ import annotations
+
+import tomllib
+from dataclasses import replace
+from difflib import get_close_matches
+from functools import cache
+from importlib.resources import files
+from typing import Any
+
+import numpy as np
+
+from kerfpath._arrays import Array
+from kerfpath.errors import InputError
+from kerfpath.robots._robot import Coupling, Robot
+
+__all__ = ["acceleration_ratios", "robot", "robot_ids"]
+
+_HERE = files("kerfpath.robots")
+
+
+@cache
+def robot_ids() -> tuple[str, ...]:
+    """Return the ids of all robots of the library, sorted."""
+    names = (f.name for f in (_HERE / "library").iterdir())
+    return tuple(sorted(n.removesuffix(".toml") for n in names if n.endswith(".toml")))
+
+
+@cache
+def acceleration_ratios() -> dict[str, tuple[float, ...]]:
+    """Return the named ratios of acceleration to velocity, 1/s, joints 1 to 6.
+
+    Stand-ins for robots whose maker publishes no accelerations; see the file for their source.
+    """
+    text = (_HERE / "acceleration_ratios.toml").read_text(encoding="utf-8")
+    return {name: tuple(values) for name, values in tomllib.loads(text).items()}
+
+
+def robot(name: str, *, acceleration_ratio: str | None = None) -> Robot:
+    """Return a robot of the library by its id.
+
+    Parameters
+    ----------
+    name : str
+        One of `robot_ids()`.
+    acceleration_ratio : str, optional
+        Take the accelerations as this ratio (one of `acceleration_ratios()`) times the speeds.
+
+    Raises
+    ------
+    InputError
+        An unknown robot or ratio; the message names the nearest ones.
+    """
+    if name not in robot_ids():
+        raise InputError(
+            f"robot {name!r} is not in the library of {len(robot_ids())}; "
+            f"{_nearest(name, robot_ids())}; 'kerfpath robots' lists all"
+        )
+    text = (_HERE / "library" / f"{name}.toml").read_text(encoding="utf-8")
+    known = _read(tomllib.loads(text))
+    if acceleration_ratio is None:
+        return known
+    ratios = acceleration_ratios()
+    if acceleration_ratio not in ratios:
+        raise InputError(
+            f"acceleration_ratio: {acceleration_ratio!r} is not one of {', '.join(ratios)}"
+        )
+    if known.velocity is None:
+        raise InputError(f"robot {name!r}: its speeds are not known, so no ratio can apply to them")
+    return replace(
+        known,
+        acceleration=np.multiply(ratios[acceleration_ratio], known.velocity),
+        acceleration_source=f"assumed: ratio {acceleration_ratio} times the speeds",
+    )
+
+
+def _read(data: dict[str, Any]) -> Robot:
+    joints = data["joints"]
+    return Robot(
+        id=data["id"],
+        manufacturer=data["manufacturer"],
+        model=data["model"],
+        geometry=data["geometry_m"],
+        sign=np.array(joints["sign"], dtype=float),
+        offset=np.radians(joints["offset_deg"]),
+        lower=_radians(joints.get("lower_deg")),
+        upper=_radians(joints.get("upper_deg")),
+        velocity=_radians(joints.get("velocity_deg_s")),
+        acceleration=_radians(joints.get("acceleration_deg_s2")),
+        endless=np.isin(np.arange(1, 7), joints["endless"]),
+        couplings=tuple(
+            Coupling(
+                row=np.array(c["row"], dtype=float),
+                lower=float(np.radians(c["lower_deg"])),
+                upper=float(np.radians(c["upper_deg"])),
+                note=c["note"],
+            )
+            for c in data.get("coupling", ())
+        ),
+        payload=data["payload_kg"],
+        reach=data["reach_m"],
+        acceleration_source=joints.get("acceleration_source", ""),
+        acceleration_ratio=joints["acceleration_ratio"],
+        limits_missing=data.get("limits_missing", ""),
+        notes=tuple(data.get("notes", ())),
+        frames=data["frames"],
+        sources=data["source"],
+    )
+
+
+def _radians(values: list[float] | None) -> Array | None:
+    return None if values is None else np.radians(values)
+
+
+def _nearest(name: str, known: tuple[str, ...]) -> str:
+    near = get_close_matches(name, known, n=3, cutoff=0.4)
+    return f"nearest: {', '.join(near)}" if near else "nothing there is called like it"

@@ -1,0 +1,251 @@
+"""The best path through a layered graph given as bare arrays (section 3.2 of the paper)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal, get_args
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from kerfpath._arrays import Array, Bools, Ints, bools, floats, freeze, integers, positive, scalar
+from kerfpath.errors import InputError, NoFeasiblePath
+from kerfpath.kernels import metric as metrics
+from kerfpath.kernels import search as kernel
+from kerfpath.kernels.limits import LIMIT_TOLERANCE
+
+__all__ = ["LayeredPath", "Metric", "Method", "ObjectiveKind", "shortest_path"]
+
+Metric = Literal["manhattan", "chebychev", "euclid"]
+ObjectiveKind = Literal["sum", "max"]
+Method = Literal["exact", "paper", "known"]
+Closure = Literal["free", "periodic"]
+
+_METRIC_CODES: dict[str, int] = {
+    "euclid": metrics.EUCLID,
+    "manhattan": metrics.MANHATTAN,
+    "chebychev": metrics.CHEBYCHEV,
+}
+_LAYERS_SAMPLED = 32
+"""Layers looked at to choose the joint that sorts them: enough to rank the joints."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class LayeredPath:
+    """One vertex per layer, and what the path costs.
+
+    Parameters
+    ----------
+    index : (K,) int
+        Vertex of each layer, 0-based inside its layer.
+    cost : float
+        Objective (14) or (15), vertex costs included.
+    optimal : bool
+        True only when the path is proved to be the best on this graph under (5) and (6).
+    """
+
+    index: Ints
+    cost: float
+    optimal: bool
+
+
+def shortest_path(
+    q: ArrayLike,
+    start: ArrayLike,
+    *,
+    dt: float,
+    velocity: ArrayLike,
+    acceleration: ArrayLike,
+    endless: ArrayLike | None = None,
+    posture: ArrayLike | None = None,
+    vertex_cost: ArrayLike | None = None,
+    weights: ArrayLike | None = None,
+    metric: Metric = "manhattan",
+    objective: ObjectiveKind = "sum",
+    method: Method = "exact",
+    closure: Closure = "free",
+    eta_v: float = 1.0,
+    eta_a: float = 1.0,
+) -> LayeredPath:
+    """Return the best path that takes one vertex of each layer, in order.
+
+    Parameters
+    ----------
+    q : (N, n) rad
+        Joint vectors of all vertices, layer after layer.
+    start : (K+1,) int
+        Layer k is ``q[start[k]:start[k+1]]``.
+    dt : float s
+        Time from layer to layer.
+    velocity, acceleration : (n,) rad/s, rad/s^2
+        Limits of each joint, used in (5) and (6) with `eta_v` and `eta_a`.
+    endless : (n,) bool, optional
+        Joints that turn without end, compared modulo 2 pi (13); default none.
+    posture : (N,) int, optional
+        Posture of each vertex; the "known" method stays on one.
+    vertex_cost : (N,), optional
+        Added for each visited vertex (with objective "max": maximised).
+    weights : (n,) 1/rad, optional
+        Weights of the distance; default 1 / (velocity dt).
+    metric : {"manhattan", "chebychev", "euclid"}
+        Distance rho_a in the weighted joint space.
+    objective : {"sum", "max"}
+        (14) or (15).
+    method : {"exact", "paper", "known"}
+        "paper": the procedure of section 3.2, whose acceleration test sees only the best
+        predecessor. "known": the technique of 2004, without (5) and (6), on one posture.
+        "exact": not available yet.
+    closure : {"free", "periodic"}
+        "periodic" is not available yet.
+    eta_v, eta_a : float
+        Share of the velocity and acceleration limits that may be used.
+
+    Raises
+    ------
+    NoFeasiblePath
+        No admissible path was found; says where and what forbids it.
+    InputError
+        Arrays that do not fit each other, NaN, limits or dt that are not positive, unknown names.
+    NotImplementedError
+        method="exact" or closure="periodic".
+    """
+    q = floats(q, "q", (None, None))
+    start = _offsets(start, len(q))
+    n = q.shape[1]
+    dt = scalar(dt, "dt", unit="s", above=0.0)
+    velocity = positive(velocity, "velocity", (n,))
+    acceleration = positive(acceleration, "acceleration", (n,))
+    endless = bools(np.zeros(n, bool) if endless is None else endless, "endless", (n,))
+    _one_of("metric", metric, tuple(_METRIC_CODES))
+    _one_of("objective", objective, get_args(ObjectiveKind))
+    _one_of("method", method, get_args(Method))
+    _one_of("closure", closure, get_args(Closure))
+    bound_v = scalar(eta_v, "eta_v", above=0.0) * velocity * dt
+    bound_a = scalar(eta_a, "eta_a", above=0.0) * acceleration * dt**2
+    weight = 1.0 / (velocity * dt) if weights is None else floats(weights, "weights", (n,))
+    if (weight < 0).any():
+        raise InputError(f"weights: must not be negative, got {weight.tolist()}")
+    cost = np.zeros(len(q)) if vertex_cost is None else floats(vertex_cost, "vertex_cost", (len(q),))
+    if posture is not None:
+        posture = integers(posture, "posture", (len(q),))
+    if method == "exact":
+        raise NotImplementedError('method="exact" comes with the exact search; use method="paper"')
+    if closure == "periodic":
+        raise NotImplementedError('closure="periodic" comes with the exact search; use "free"')
+
+    if method == "known":
+        bound_v = bound_a = np.full(n, np.inf)
+        key = np.zeros(len(q)) if posture is None else posture.astype(float)
+        window, circular = 0.5, False
+    else:
+        key, window, circular = _narrowest_key(q, start, bound_v, endless)
+    order = np.lexsort((key, np.repeat(np.arange(len(start) - 1), np.diff(start))))
+    layers = kernel.Layers(
+        q=np.ascontiguousarray(_reduced(q, endless)[order].T),
+        start=start,
+        rank=order - np.repeat(start[:-1], np.diff(start)),
+        key=key[order],
+        window=window,
+        circular=circular,
+        endless=endless,
+    )
+    aim = kernel.Objective(
+        weight=np.ascontiguousarray(weight),
+        metric=_METRIC_CODES[metric],
+        minimax=objective == "max",
+        vertex_cost=cost[order],
+        velocity=bound_v,
+        acceleration=bound_a,
+    )
+    return _search(layers, aim, may_prove=method == "paper")
+
+
+def _search(layers: kernel.Layers, aim: kernel.Objective, *, may_prove: bool) -> LayeredPath:
+    """Run steps (1) to (5) of the procedure and read the path back (or say where it breaks)."""
+    start = layers.start
+    sizes = np.diff(start)
+    filled = int(np.argmin(sizes)) if (sizes == 0).any() else len(sizes)
+    if filled == 0:
+        raise NoFeasiblePath("layer 0 is empty: no path can start", proved=True, node=-1)
+    dist, before = np.full(len(layers.key), np.inf), np.full(len(layers.key), -1)
+    to_search = layers._replace(start=start[: filled + 1])
+    reached, turned_away = kernel.path_planning(to_search, aim, dist, before)
+    if reached < filled:
+        raise _closed_at(layers, aim, dist, before, reached, proved=not turned_away)
+    if filled < len(sizes):
+        raise NoFeasiblePath(
+            f"layer {filled} is empty: no admissible pose at that node",
+            proved=True,
+            node=filled - 1,
+        )
+    a, b = start[-2], start[-1]
+    best = np.flatnonzero(dist[a:b] == dist[a:b].min()) + a
+    j = int(best[np.argmin(layers.rank[best])])
+    cost = float(dist[j])
+    path = np.empty(len(sizes), dtype=np.int64)
+    for k in range(len(sizes) - 1, -1, -1):
+        path[k] = layers.rank[j]
+        j = int(before[j])
+    return LayeredPath(index=freeze(path), cost=cost, optimal=may_prove and not turned_away)
+
+
+def _closed_at(
+    layers: kernel.Layers, aim: kernel.Objective, dist: Array, before: Ints, k: int, *, proved: bool
+) -> NoFeasiblePath:
+    forbidden = kernel.closing_counts(layers, aim, dist, before, k)
+    counts = {
+        f"{test}, joint {i + 1}": int(number)
+        for test, row in zip(("velocity", "acceleration"), forbidden, strict=True)
+        for i, number in enumerate(row)
+        if number
+    }
+    told = ", ".join(f"{name}: {number}" for name, number in counts.items())
+    total = int(sum(counts.values()))
+    return NoFeasiblePath(
+        f"no admissible edge from node {k - 1} to node {k}; of {total} edges, forbidden by {told}",
+        proved=proved,
+        node=k - 1,
+        counts=counts,
+    )
+
+
+def _narrowest_key(
+    q: Array, start: Ints, bound: Array, endless: Bools
+) -> tuple[Array, float, bool]:
+    """Choose the joint whose velocity window leaves the fewest vertices, to sort the layers by."""
+    angles = _reduced(q, endless)
+    pairs = np.zeros(q.shape[1])
+    layers = np.unique(np.linspace(0, max(len(start) - 3, 0), _LAYERS_SAMPLED).astype(int))
+    for i in range(q.shape[1]):
+        for k in layers[layers + 2 < len(start)]:
+            here = angles[start[k] : start[k + 1], i]
+            there = np.sort(angles[start[k + 1] : start[k + 2], i])
+            shifts = (-2 * np.pi, 0.0, 2 * np.pi) if endless[i] and bound[i] < np.pi else (0.0,)
+            reach = bound[i] if bound[i] < np.pi or not endless[i] else np.inf
+            for shift in shifts:
+                low = np.searchsorted(there, here + shift - reach, side="left")
+                pairs[i] += (np.searchsorted(there, here + shift + reach, side="right") - low).sum()
+    best = int(np.argmin(pairs))
+    # Twice the slack of (5): the key must never exclude what the test itself would pass.
+    return angles[:, best], float(bound[best] + 2 * LIMIT_TOLERANCE), bool(endless[best])
+
+
+def _reduced(q: Array, endless: Bools) -> Array:
+    """Bring the endless joints of q (N, n) into (-pi, pi]."""
+    turned = q - 2 * np.pi * np.ceil((q - np.pi) / (2 * np.pi))
+    return np.where(endless, turned, q)
+
+
+def _offsets(start: ArrayLike, vertices: int) -> Ints:
+    start = integers(start, "start", (None,))
+    if len(start) < 2 or start[0] != 0 or start[-1] != vertices or (np.diff(start) < 0).any():
+        raise InputError(
+            "start: expected K+1 offsets that begin with 0, never decrease and end with the number "
+            f"of vertices ({vertices}), got {start.tolist() if len(start) < 12 else '...'}"
+        )
+    return start
+
+
+def _one_of(name: str, value: str, known: tuple[str, ...]) -> None:
+    if value not in known:
+        raise InputError(f"{name}: expected one of {', '.join(known)}, got {value!r}")
