@@ -1,1 +1,55 @@
-"""kerfpath."""
+"""kerfpath: from a CAD drawing to an audited robot program.
+
+The free rotation about the laser beam is resolved under joint velocity and acceleration limits.
+Names load when they are first used, so that ``kerfpath --help`` does not wait for the kernels.
+"""
+
+from importlib import import_module
+from typing import TYPE_CHECKING
+
+__version__ = "0.1.0"
+
+if TYPE_CHECKING:
+    from kerfpath.auditor import audit as audit
+    from kerfpath.contour import Contour as Contour
+    from kerfpath.contour import join as join
+    from kerfpath.errors import AuditFailed as AuditFailed
+    from kerfpath.errors import InputError as InputError
+    from kerfpath.errors import KerfpathError as KerfpathError
+    from kerfpath.errors import NoFeasiblePath as NoFeasiblePath
+    from kerfpath.planner import plan as plan
+    from kerfpath.plans import Plan as Plan
+    from kerfpath.robots import Robot as Robot
+    from kerfpath.robots import robot as robot
+    from kerfpath.search import LayeredPath as LayeredPath
+    from kerfpath.search import shortest_path as shortest_path
+
+_HOME = {
+    "AuditFailed": "errors",
+    "Contour": "contour",
+    "InputError": "errors",
+    "KerfpathError": "errors",
+    "LayeredPath": "search",
+    "NoFeasiblePath": "errors",
+    "Plan": "plans",
+    "Robot": "robots",
+    "audit": "auditor",
+    "join": "contour",
+    "plan": "planner",
+    "robot": "robots",
+    "shortest_path": "search",
+}
+
+__all__ = sorted([*_HOME, "__version__"])
+
+
+def __getattr__(name: str) -> object:
+    if name not in _HOME:
+        raise AttributeError(f"module 'kerfpath' has no attribute {name!r}")
+    value = getattr(import_module(f"kerfpath.{_HOME[name]}"), name)
+    globals()[name] = value
+    return value
+
+
+def __dir__() -> list[str]:
+    return list(__all__)

@@ -31,7 +31,7 @@ Bools = NDArray[np.bool_]
 _A = TypeVar("_A", bound=NDArray[Any])
 
 _ROTATION_TOLERANCE = 1e-6
-"""How far R^T R may be from the identity: five printed decimals of a rotation pass, a typo fails."""
+"""How far R^T R may be from the identity: seven printed decimals pass, a typo fails."""
 
 
 def freeze(array: _A) -> _A:

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from itertools import pairwise
 from typing import Literal
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from kerfpath._arrays import Array, floats, freeze, positive, scalar
+from kerfpath._arrays import Array, Ints, floats, freeze, positive, scalar
 from kerfpath.errors import InputError
 from kerfpath.kernels.frames import closing_twist, rotation_minimising_x, tangent_x
 
@@ -35,7 +36,7 @@ class Contour:
     points : (K, 3) m
         Tool-tip positions; K >= 2, consecutive points distinct.
     axes : (K, 3)
-        Tool axes, pointing from the nozzle into the part; any length but zero, kept as unit vectors.
+        Tool axes, pointing from the nozzle into the part; any length but zero, kept at length one.
     closed : bool
         True when the path returns to its start. The first node is then repeated at the end
         (p_0 = p_n); it is added when the last point differs from the first.
@@ -162,7 +163,9 @@ class Contour:
         if dt is not None or speed is not None:
             return self._in_time(dt, speed)
         position = np.inf if tolerance is None else scalar(tolerance, "tolerance", above=0.0)
-        angle = np.inf if axis_tolerance is None else scalar(axis_tolerance, "axis_tolerance", above=0)
+        angle = (
+            np.inf if axis_tolerance is None else scalar(axis_tolerance, "axis_tolerance", above=0)
+        )
         return self._at_nodes(self._fewest(position, angle))
 
     def frames(self, kind: FrameKind = "tangent") -> Array:
@@ -218,7 +221,9 @@ class Contour:
         # Within a segment s(t) solves ds/dt = v: exponential where the speed changes.
         rate = np.append(change, 0.0)[k] / np.diff(self.s)[k]
         tau = time - t[k]
-        grown = np.where(np.abs(rate * tau) < 1e-12, tau, np.expm1(rate * tau) / np.where(rate, rate, 1))
+        grown = np.where(
+            np.abs(rate * tau) < 1e-12, tau, np.expm1(rate * tau) / np.where(rate, rate, 1)
+        )
         s = self.s[k] + v[k] * grown
         s[0], s[-1] = self.s[0], self.s[-1]
         return self._at_nodes(s, freeze(time))
@@ -239,17 +244,21 @@ class Contour:
             "round the sharp corners of the contour"
         )
 
-    def _keeps(self, s: Array, nodes: Array, tolerance: float, axis_tolerance: float) -> int:
-        """Return -1 if chords over `s` stay close at `nodes` of this contour, else the worst node."""
+    def _keeps(self, s: Array, nodes: Ints, tolerance: float, axis_tolerance: float) -> int:
+        """Return -1 if chords over `s` stay close at these nodes, or the worst of them."""
         cell = np.clip(np.searchsorted(s, self.s[nodes], side="right") - 1, 0, len(s) - 2)
         p0, n0 = self.at(s[cell])
         p1, n1 = self.at(s[cell + 1])
         part = ((self.s[nodes] - s[cell]) / (s[cell + 1] - s[cell]))[:, None]
         chord, there = p1 - p0, self.points[nodes]
-        along = ((there - p0) * chord).sum(1) / np.maximum((chord * chord).sum(1), REPEATED_POINT**2)
+        along = ((there - p0) * chord).sum(1) / np.maximum(
+            (chord * chord).sum(1), REPEATED_POINT**2
+        )
         off = np.linalg.norm(p0 + np.clip(along, 0, 1)[:, None] * chord - there, axis=1)
-        sine = np.linalg.norm(np.cross(_turned(n0, n1, part), self.axes[nodes]), axis=1)
-        excess = np.maximum(off / tolerance, np.arcsin(np.minimum(sine, 1)) / axis_tolerance)
+        axis = _turned(n0, n1, part)
+        sine = np.linalg.norm(np.cross(axis, self.axes[nodes]), axis=1)
+        angle = np.arctan2(sine, (axis * self.axes[nodes]).sum(1))
+        excess = np.maximum(off / tolerance, angle / axis_tolerance)
         worst = int(np.argmax(excess))
         return -1 if excess[worst] <= 1.0 else int(nodes[worst])
 
@@ -286,7 +295,7 @@ def join(
         if c.closed and len(contours) > 1:
             raise InputError(f"join: contour {c.name!r} is closed, nothing can be joined to it")
     points, axes = [contours[0].points], [contours[0].axes]
-    for before, after in zip(contours, contours[1:], strict=False):
+    for before, after in pairwise(contours):
         gap = _distance(before.points[-1], after.points[0])
         if gap > gap_tolerance:
             raise InputError(

@@ -26,7 +26,7 @@ _WHOLE_STEPS = 1e-9
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class LayeredGraph:
-    """Vertices (11) of all layers; the edges (12) between neighbouring layers are implied.
+    """The vertices of all layers (Eq. 11); the edges (12) are implied by neighbouring layers.
 
     Parameters
     ----------
@@ -80,7 +80,7 @@ def gamma_grid(step: float) -> Array:
     if step > 2 * np.pi * (1 + _WHOLE_STEPS):
         raise InputError(f"gamma_step: expected at most one turn (2 pi rad), got {step:g} rad")
     m = int(np.ceil(2 * np.pi / step * (1 - _WHOLE_STEPS)))
-    return freeze(-np.pi + 2 * np.pi / m * np.arange(1, m + 1))
+    return freeze(-np.pi + 2 * np.pi / m * np.arange(1, m + 1, dtype=float))
 
 
 def build(
@@ -112,7 +112,7 @@ def build(
         The robot's joint limits are not known.
     """
     limits, arm = robot.joint_limits(), robot.arm()
-    T_tip_flange = np.linalg.inv(T_flange_tip)
+    T_tip_flange = np.asarray(np.linalg.inv(T_flange_tip), dtype=np.float64)
     reason = np.empty((len(frames), len(gamma), kinematics.POSTURES), np.uint8)
 
     def layers_of(first: int, last: int) -> _Piece:

@@ -74,7 +74,7 @@ def plan(
     velocity, acceleration = robot.speed_limits()
     T_flange_tip, T_base_part = as_pose(tool, "tool"), as_pose(placement, "placement")
     dt = node_interval(contour, speed)
-    weight = 1 / (velocity * dt) if weights is None else floats(weights, "weights", (6,))
+    weight: Array = 1 / (velocity * dt) if weights is None else floats(weights, "weights", (6,))
     settings = Settings(
         gamma_step=scalar(gamma_step, "gamma_step", unit="rad", above=0.0),
         frames=frames,
@@ -132,7 +132,7 @@ def plan(
         gamma=graph.gamma[graph.sample[vertex]],
         posture=graph.posture[vertex],
         turn=graph.turn[vertex],
-        time=np.arange(len(contour)) * dt,
+        time=dt * np.arange(len(contour), dtype=float),
         settings=settings,
         cost=path.cost,
         proof=_proof(method, path.optimal),
@@ -172,8 +172,8 @@ def node_interval(contour: Contour, speed: float | None) -> float:
     if contour.time is not None:
         if speed is not None:
             raise InputError(
-                f"speed: contour {contour.name!r} carries its own times; give no speed, or resample "
-                "it by spacing"
+                f"speed: contour {contour.name!r} carries its own times; give no speed, or "
+                "resample it by spacing"
             )
         _require_even(contour, np.diff(contour.time), "s")
         return float(contour.time[-1] - contour.time[0]) / (len(contour) - 1)

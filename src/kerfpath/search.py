@@ -14,7 +14,7 @@ from kerfpath.kernels import metric as metrics
 from kerfpath.kernels import search as kernel
 from kerfpath.kernels.limits import LIMIT_TOLERANCE
 
-__all__ = ["LayeredPath", "Metric", "Method", "ObjectiveKind", "shortest_path"]
+__all__ = ["LayeredPath", "Method", "Metric", "ObjectiveKind", "shortest_path"]
 
 Metric = Literal["manhattan", "chebychev", "euclid"]
 ObjectiveKind = Literal["sum", "max"]
@@ -125,7 +125,9 @@ def shortest_path(
     weight = 1.0 / (velocity * dt) if weights is None else floats(weights, "weights", (n,))
     if (weight < 0).any():
         raise InputError(f"weights: must not be negative, got {weight.tolist()}")
-    cost = np.zeros(len(q)) if vertex_cost is None else floats(vertex_cost, "vertex_cost", (len(q),))
+    cost = (
+        np.zeros(len(q)) if vertex_cost is None else floats(vertex_cost, "vertex_cost", (len(q),))
+    )
     if posture is not None:
         posture = integers(posture, "posture", (len(q),))
     if method == "exact":

@@ -10,7 +10,7 @@ import hashlib
 import os
 from collections.abc import Callable
 from pathlib import Path
-from typing import ParamSpec, TypeVar
+from typing import Any, ParamSpec, TypeVar
 
 import numba
 import platformdirs
@@ -41,12 +41,13 @@ CACHE = _cache_folder()
 
 
 def _compiled(function: Callable[_P, _R], flags: set[str] | bool) -> Callable[_P, _R]:
-    kept = numba.config.CACHE_DIR
-    numba.config.CACHE_DIR = kept or str(CACHE)
+    config: Any = numba.config
+    kept = config.CACHE_DIR
+    config.CACHE_DIR = kept or str(CACHE)
     try:
         compiled: Callable[_P, _R] = numba.njit(cache=True, nogil=True, fastmath=flags)(function)
     finally:
-        numba.config.CACHE_DIR = kept
+        config.CACHE_DIR = kept
     return compiled
 
 

@@ -89,7 +89,7 @@ def _wrap(angle: float) -> float:
 
 @jit
 def _wrist(arm: Arm, R: Array, s1: float, k1: float, s23: float, k23: float, out_q: Array) -> None:
-    """Fill joints 4 to 6 of both wrist postures, out_q (2, 6), for the forearm given by q1 and q2+q3."""
+    """Fill joints 4 to 6 of both wrist postures, out_q (2, 6), for a forearm given by q1, q2+q3."""
     x0, x1, x2 = k23 * k1, k23 * s1, -s23
     x = R[0, 2] * x0 + R[1, 2] * x1 + R[2, 2] * x2
     y = R[1, 2] * k1 - R[0, 2] * s1
@@ -99,7 +99,9 @@ def _wrist(arm: Arm, R: Array, s1: float, k1: float, s23: float, k23: float, out
     v0, v1, v2 = -s4 * x0 - k4 * s1, -s4 * x1 + k4 * k1, -s4 * x2
     q4 = atan2(s4, k4)
     q5 = atan2(s5, z)
-    q6 = atan2(v0 * R[0, 0] + v1 * R[1, 0] + v2 * R[2, 0], v0 * R[0, 1] + v1 * R[1, 1] + v2 * R[2, 1])
+    q6 = atan2(
+        v0 * R[0, 0] + v1 * R[1, 0] + v2 * R[2, 0], v0 * R[0, 1] + v1 * R[1, 1] + v2 * R[2, 1]
+    )
     out_q[0, 3] = _wrap(arm.sign[3] * (q4 + arm.offset[3]))
     out_q[0, 4] = _wrap(arm.sign[4] * (q5 + arm.offset[4]))
     out_q[0, 5] = _wrap(arm.sign[5] * (q6 + arm.offset[5]))
@@ -175,7 +177,7 @@ def inverse_all(arm: Arm, T: Array, out_q: Array, out_reach: Bools) -> None:
 def inverse_nodes(
     arm: Arm, H: Array, gamma: Array, T_tip_flange: Array, out_q: Array, out_reach: Bools
 ) -> None:
-    """All postures (K, m, 8, 6) of task frames H (K, 4, 4) turned by each gamma (m,), tool applied."""
+    """All postures (K, m, 8, 6) of task frames H (K, 4, 4) turned by each gamma (m,), with tool."""
     L = np.zeros((4, 4))
     T = np.zeros((4, 4))
     for j in range(len(gamma)):

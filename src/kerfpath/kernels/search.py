@@ -20,7 +20,7 @@ __all__ = ["Layers", "Objective", "closing_counts", "path_planning"]
 
 
 class Layers(NamedTuple):
-    """A sorted layered graph, (11) and (12): vertices by column, edges implied."""
+    """A sorted layered graph: vertices by column, edges implied."""
 
     q: Array
     """(n, N) rad, endless joints reduced to (-pi, pi]."""
@@ -50,7 +50,11 @@ class Objective(NamedTuple):
 
 @jit
 def _window(layers: Layers, k: int, key: float, out_run: Ints) -> int:
-    """Find the runs of layer k within the window about `key`; return how many (0, 1 or 2)."""
+    """Find the edges into a vertex: the runs of layer k within the window about `key` (Eq. 12).
+
+    Of the edges that (12) allows, all others break the velocity limit. Returns how many runs there
+    are, 1 or 2.
+    """
     a, b = layers.start[k], layers.start[k + 1]
     keys = layers.key[a:b]
     low, high = key - layers.window, key + layers.window
@@ -104,7 +108,7 @@ def _increment(layers: Layers, p: int, j: int, out_dq: Array) -> None:
 def path_planning(
     layers: Layers, aim: Objective, out_dist: Array, out_before: Ints
 ) -> tuple[int, bool]:
-    """Fill d*_{k,j} = min over p of d*_{k-1,p} + rho(p, j), and the best p, layer by layer (Eq. 16).
+    """Fill d*_{k,j} = min over p of d*_{k-1,p} + rho(p, j), and the best p, by layers (Eq. 16).
 
     Steps (1) and (2) of the procedure, with (5) in (2b-beta) and, greedily, (6) in (2b-gamma): the
     acceleration is tested against the best predecessor of p only. Returns the number of layers

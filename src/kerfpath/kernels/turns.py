@@ -131,7 +131,7 @@ def fill_admissible(
     out_posture: Ints,
     out_turn: Ints,
 ) -> None:
-    """Write the admitted vertices of q (K, m, P, n) one after the other, with where they came from."""
+    """Write the admitted vertices of q (K, m, P, n) one after the other, with their origin."""
     K, m, P, n = q.shape
     turn, v = np.empty((MOST_TURNS, n), np.int64), 0
     for k in range(K):

@@ -14,6 +14,7 @@ from kerfpath.kernels import kinematics, turns
 __all__ = ["Coupling", "Robot", "Solutions", "posture_name"]
 
 JOINTS = 6
+LENGTHS = ("a1", "a2", "b", "c1", "c2", "c3", "c4")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -39,8 +40,8 @@ class Coupling:
         object.__setattr__(self, "row", floats(self.row, "coupling row", (JOINTS,)))
         if not self.lower < self.upper:
             raise InputError(
-                f"coupling {self.row.tolist()}: the lower bound {np.degrees(self.lower):g} deg must "
-                f"be below the upper bound {np.degrees(self.upper):g} deg"
+                f"coupling {self.row.tolist()}: the lower bound {np.degrees(self.lower):g} deg "
+                f"must be below the upper bound {np.degrees(self.upper):g} deg"
             )
 
     @property
@@ -136,7 +137,7 @@ class Robot:
 
     def __post_init__(self) -> None:
         _set = object.__setattr__
-        missing = [k for k in kinematics.Arm._fields[:7] if k not in self.geometry]
+        missing = [k for k in LENGTHS if k not in self.geometry]
         if missing:
             raise InputError(f"robot {self.id!r}: geometry lacks {', '.join(missing)} (m)")
         _set(self, "sign", floats(self.sign, "sign", (JOINTS,)))
@@ -234,8 +235,8 @@ class Robot:
 
     def arm(self) -> kinematics.Arm:
         """Return the geometry as the kernels take it."""
-        lengths = (float(self.geometry[k]) for k in kinematics.Arm._fields[:7])
-        return kinematics.Arm(*lengths, self.sign, self.offset)
+        lengths = {k: float(self.geometry[k]) for k in LENGTHS}
+        return kinematics.Arm(**lengths, sign=self.sign, offset=self.offset)
 
     def joint_limits(self) -> turns.JointLimits:
         """Return the position limits as the kernels take them.

@@ -1,0 +1,8 @@
+"""The audit: a re-check of a plan by kinematics that share no code with the planner."""
+
+from kerfpath.auditor._audit import audit as audit
+from kerfpath.auditor._audit import checks as checks
+from kerfpath.auditor._chain import JointChain as JointChain
+from kerfpath.auditor._chain import chain_of as chain_of
+from kerfpath.auditor._table import Check as Check
+from kerfpath.auditor._table import Issue as Issue

@@ -1,0 +1,253 @@
+"""The checks of a plan: tool against contour, joints against limits, at the nodes and between."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from kerfpath._arrays import Array, Ints, scalar
+from kerfpath.auditor._chain import chain_of
+from kerfpath.auditor._motion import Interpolation, Motion, joint_increments, motion_of
+from kerfpath.auditor._table import Check, Issue, Unit
+from kerfpath.contour import Contour
+from kerfpath.errors import InputError
+from kerfpath.plans import Plan
+
+__all__ = ["audit", "checks"]
+
+TIP_AT_NODES = 1e-6
+"""m: two kinematics in double precision agree far better; a wrong tool or frame is far worse."""
+AXIS_AT_NODES = 1e-5
+"""rad, for the same reason."""
+SHARE_SLACK = 1e-6
+"""Relative slack on limits that the planner may use up to the last digit."""
+LIMIT_SLACK = 1e-8
+"""rad: slack on joint positions, for the same reason."""
+LENGTH_AGREES = 1e-6
+"""Relative difference of path lengths between a plan's contour and the reference it came from."""
+
+
+def audit(
+    plan: Plan,
+    *,
+    reference: Contour | None = None,
+    interpolation: Interpolation = "linear",
+    path_tolerance: float = 1e-4,
+    axis_tolerance: float = np.pi / 180,
+    parts: int = 8,
+) -> list[Issue]:
+    """Return what is wrong with a plan; an empty list means that it passes. Arguments: `checks`."""
+    table = checks(
+        plan,
+        reference=reference,
+        interpolation=interpolation,
+        path_tolerance=path_tolerance,
+        axis_tolerance=axis_tolerance,
+        parts=parts,
+    )
+    return [check.issue() for check in table if not check.ok]
+
+
+def checks(
+    plan: Plan,
+    *,
+    reference: Contour | None = None,
+    interpolation: Interpolation = "linear",
+    path_tolerance: float = 1e-4,
+    axis_tolerance: float = np.pi / 180,
+    parts: int = 8,
+) -> list[Check]:
+    """Return the whole table of checks.
+
+    Parameters
+    ----------
+    plan : Plan
+    reference : Contour, optional
+        The path that the plan's contour was sampled from, part frame; with it, the deviation
+        between nodes is measured against the drawing and not against the polyline of the nodes.
+    interpolation : {"linear", "joint"}
+        How the controller moves between nodes.
+    path_tolerance : float m
+        Largest distance of the tool tip from the path between nodes.
+    axis_tolerance : float rad
+        Largest angle of the tool axis from the path's between nodes.
+    parts : int
+        Into how many parts the way between two nodes is divided.
+
+    Raises
+    ------
+    InputError
+        A reference of another length, an unknown interpolation, limits that are not known.
+    """
+    if interpolation not in ("linear", "joint"):
+        raise InputError(f"interpolation: expected linear or joint, got {interpolation!r}")
+    if not (isinstance(parts, int) and parts >= 1):
+        raise InputError(f"parts: expected a whole number >= 1, got {parts!r}")
+    path_tolerance = scalar(path_tolerance, "path_tolerance", unit="m", above=0.0)
+    axis_tolerance = scalar(axis_tolerance, "axis_tolerance", unit="rad", above=0.0)
+    chain = chain_of(plan.robot)
+    motion = motion_of(plan, chain, interpolation, parts)
+    path = plan.contour if reference is None else reference
+    if abs(path.length - plan.contour.length) > LENGTH_AGREES * path.length:
+        raise InputError(
+            f"reference: {path.length:.6f} m long, but the plan's contour was sampled from a path "
+            f"of {plan.contour.length:.6f} m"
+        )
+    return [
+        *_at_nodes(plan, chain.forward(plan.q) @ plan.T_flange_tip),
+        *_between_nodes(plan, motion, path, path_tolerance, axis_tolerance),
+        *_positions(plan, motion),
+        *_rates(plan, motion),
+    ]
+
+
+def _at_nodes(plan: Plan, tool: Array) -> list[Check]:
+    tip = np.linalg.norm(tool[:, :3, 3] - plan.points, axis=1)
+    axis = _angle(tool[:, :3, 2], plan.axes)
+    return [
+        _worst("tip-at-nodes", "tool tip at the nodes", tip, TIP_AT_NODES, "m"),
+        _worst("axis-at-nodes", "tool axis at the nodes", axis, AXIS_AT_NODES, "rad"),
+    ]
+
+
+def _between_nodes(
+    plan: Plan, motion: Motion, path: Contour, path_tolerance: float, axis_tolerance: float
+) -> list[Check]:
+    """Compare points of the path with the motion of the cell between nodes that they fall in."""
+    s = plan.contour.s - plan.contour.s[0] + path.s[0]
+    parts = motion.q.shape[1] - 1
+    fine = np.interp(np.arange((len(s) - 1) * parts + 1) / parts, np.arange(len(s)), s)
+    at = np.unique(np.concatenate([fine, path.s]))
+    cell = np.clip(np.searchsorted(s, at, side="right") - 1, 0, len(s) - 2)
+    points, axes = path.at(at)
+    rotation, origin = plan.T_base_part[:3, :3], plan.T_base_part[:3, 3]
+    points, axes = points @ rotation.T + origin, axes @ rotation.T
+    tip, axis = motion.tip[cell], motion.axis[cell]
+    chord = np.diff(tip, axis=1)
+    along = ((points[:, None] - tip[:, :-1]) * chord).sum(-1) / np.maximum(
+        (chord**2).sum(-1), 1e-24
+    )
+    along = np.clip(along, 0.0, 1.0)
+    off = np.linalg.norm(tip[:, :-1] + along[..., None] * chord - points[:, None], axis=-1)
+    near = np.argmin(off, axis=1)
+    row = np.arange(len(at))
+    part = along[row, near, None]
+    there = (1 - part) * axis[row, near] + part * axis[row, near + 1]
+    turned = _angle(there / np.linalg.norm(there, axis=1, keepdims=True), axes)
+    advice = "sample the contour more finely"
+    return [
+        _worst(
+            "tip-between-nodes",
+            "tool tip between the nodes",
+            off[row, near],
+            path_tolerance,
+            "m",
+            cell,
+            advice=advice,
+        ),
+        _worst(
+            "axis-between-nodes",
+            "tool axis between the nodes",
+            turned,
+            axis_tolerance,
+            "rad",
+            cell,
+            advice=advice,
+        ),
+        _worst(
+            "straight-move",
+            "pose that the joints miss on a straight move",
+            motion.residual.max(axis=1),
+            1e-6,
+            "m",
+            advice="the robot cannot follow a straight move there: it passes a singularity or "
+            "changes posture",
+        ),
+    ]
+
+
+def _positions(plan: Plan, motion: Motion) -> list[Check]:
+    limits = plan.robot.joint_limits()
+    bound = ~plan.robot.endless
+    rows = []
+    if bound.any():
+        excess = np.maximum(limits.lower - motion.q, motion.q - limits.upper)[..., bound]
+        joint = np.flatnonzero(bound)[np.unravel_index(np.argmax(excess), excess.shape)[-1]] + 1
+        rows.append(
+            _worst(
+                "joint-limits",
+                f"excess over the joint limits (nearest: joint {joint})",
+                excess.max(axis=(1, 2)),
+                LIMIT_SLACK,
+                "rad",
+            )
+        )
+    for coupling in plan.robot.couplings:
+        value = motion.q @ coupling.row
+        over = np.maximum(coupling.lower - value, value - coupling.upper).max(axis=1)
+        title = f"excess over the limits of {coupling.name}"
+        rows.append(_worst("coupled-limits", title, over, LIMIT_SLACK, "rad"))
+    step = np.abs(joint_increments(plan)).max(axis=1)
+    rows.append(_worst("joint-step", "joint step between nodes", step, np.pi * (1 - 1e-9), "rad"))
+    return rows
+
+
+def _rates(plan: Plan, motion: Motion) -> list[Check]:
+    velocity, acceleration = plan.robot.speed_limits()
+    eta_v, eta_a = plan.settings.eta_v, plan.settings.eta_a
+    dt = np.diff(plan.time)
+    dq = joint_increments(plan)
+    speed = np.abs(dq / dt[:, None]) / velocity
+    parts = motion.q.shape[1] - 1
+    fine = np.abs(np.diff(motion.q, axis=1)) / (dt[:, None, None] / parts) / velocity
+    rows = [
+        _per_joint("velocity", "joint velocity from node to node", speed, eta_v),
+        _per_joint("velocity-between", "joint velocity between the nodes", fine.max(axis=1), 1.0),
+    ]
+    if len(dq) > 1:
+        change = np.diff(dq / dt[:, None], axis=0) / ((dt[1:] + dt[:-1]) / 2)[:, None]
+        share = np.abs(change) / acceleration
+        rows.append(_per_joint("acceleration", "joint acceleration at the nodes", share, eta_a, 1))
+    return rows
+
+
+def _per_joint(code: str, title: str, share: Array, limit: float, first: int = 0) -> Check:
+    """Check shares (rows, joints) of a limit; row 0 belongs to node `first`."""
+    joint = int(np.argmax(share.max(axis=0))) + 1
+    node = np.arange(first, first + len(share))
+    return _worst(
+        code,
+        f"{title} (highest: joint {joint})",
+        share.max(axis=1),
+        limit * (1 + SHARE_SLACK),
+        "share",
+        node,
+        advice="lower the speed or eta, or move the part",
+    )
+
+
+def _worst(
+    code: str,
+    title: str,
+    values: Array,
+    limit: float,
+    unit: Unit,
+    nodes: Ints | None = None,
+    *,
+    advice: str = "",
+) -> Check:
+    """Return the check of the largest of `values`, NaN counting as the worst of all."""
+    i = int(np.argmax(np.where(np.isnan(values), np.inf, values)))
+    return Check(
+        code=code,
+        title=title,
+        value=float(values[i]),
+        limit=limit,
+        unit=unit,
+        node=i if nodes is None else int(nodes[i]),
+        advice=advice,
+    )
+
+
+def _angle(a: Array, b: Array) -> Array:
+    sine = np.linalg.norm(np.cross(a, b), axis=-1)
+    return np.asarray(np.arctan2(sine, (a * b).sum(-1)))

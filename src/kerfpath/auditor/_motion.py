@@ -1,0 +1,116 @@
+"""What the controller does between the nodes of a plan, by its own way of interpolating."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from kerfpath._arrays import Array
+from kerfpath.auditor._chain import JointChain
+from kerfpath.plans import Plan
+
+__all__ = ["Interpolation", "Motion", "joint_increments", "motion_of"]
+
+Interpolation = Literal["linear", "joint"]
+
+NEWTON_STEPS = 12
+"""Newton's method doubles its digits each step; a pose not reached by then is not reached."""
+
+REACHED = 1e-9
+"""Residual (m and rad) below which a pose counts as reached."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Motion:
+    """Joints and tool at f = 0, 1/m, ..., 1 of the way from each node to the next.
+
+    Parameters
+    ----------
+    q : (K-1, m+1, 6) rad
+    tip : (K-1, m+1, 3) m
+        Tool tip in the robot base.
+    axis : (K-1, m+1, 3)
+        Tool axis in the robot base.
+    residual : (K-1, m+1)
+        What the robot's joints miss of the commanded pose, the larger of m and rad.
+    """
+
+    q: Array
+    tip: Array
+    axis: Array
+    residual: Array
+
+
+def joint_increments(plan: Plan) -> Array:
+    """Return joint increments (K-1, 6) rad; an endless joint goes the short way round (13)."""
+    dq = np.diff(plan.q, axis=0)
+    short = np.remainder(dq + np.pi, 2 * np.pi) - np.pi
+    return np.where(plan.robot.endless, short, dq)
+
+
+def motion_of(plan: Plan, chain: JointChain, interpolation: Interpolation, parts: int) -> Motion:
+    """Return the motion between the nodes, `parts` equal parts in time each.
+
+    "linear": the tip runs straight and the tool turns evenly about one axis from pose to pose, as
+    linear moves do; the joints follow by inverse kinematics. "joint": the joints run evenly.
+    """
+    K, dq = len(plan.q), joint_increments(plan)
+    f = np.linspace(0.0, 1.0, parts + 1)
+    q = plan.q[:-1, None, :] + f[None, :, None] * dq[:, None, :]
+    flat = q.reshape(-1, 6)
+    if interpolation == "joint":
+        tool = chain.forward(flat) @ plan.T_flange_tip
+        residual = np.zeros(len(flat))
+    else:
+        wanted = _straight(chain.forward(plan.q) @ plan.T_flange_tip, f)
+        flat, residual = _follow(chain, wanted @ np.linalg.inv(plan.T_flange_tip), flat)
+        tool = chain.forward(flat) @ plan.T_flange_tip
+    shape = (K - 1, parts + 1)
+    return Motion(
+        q=flat.reshape(*shape, 6),
+        tip=tool[:, :3, 3].reshape(*shape, 3),
+        axis=tool[:, :3, 2].reshape(*shape, 3),
+        residual=residual.reshape(shape),
+    )
+
+
+def _straight(poses: Array, f: Array) -> Array:
+    """Interpolate poses (K, 4, 4) as linear moves do: (K-1)(m+1) poses, cell after cell."""
+    R0, R1 = poses[:-1, :3, :3], poses[1:, :3, :3]
+    turn = Rotation.from_matrix(R0.transpose(0, 2, 1) @ R1).as_rotvec()
+    part = Rotation.from_rotvec((f[None, :, None] * turn[:, None, :]).reshape(-1, 3)).as_matrix()
+    T = np.zeros((len(R0) * len(f), 4, 4))
+    T[:, :3, :3] = np.repeat(R0, len(f), axis=0) @ part
+    step = poses[1:, :3, 3] - poses[:-1, :3, 3]
+    T[:, :3, 3] = (poses[:-1, None, :3, 3] + f[None, :, None] * step[:, None, :]).reshape(-1, 3)
+    T[:, 3, 3] = 1.0
+    return T
+
+
+def _follow(chain: JointChain, wanted: Array, q: Array) -> tuple[Array, Array]:
+    """Solve the flange poses `wanted` (B, 4, 4) by Newton's method from the joints q (B, 6).
+
+    Returns the joints and what they miss of the pose (B,).
+    """
+    q = q.copy()
+    residual = np.full(len(q), np.inf)
+    open_ = np.arange(len(q))
+    for _ in range(NEWTON_STEPS):
+        T, J = chain.jacobian(q[open_])
+        error = np.empty((len(open_), 6))
+        error[:, :3] = wanted[open_, :3, 3] - T[:, :3, 3]
+        turn = wanted[open_, :3, :3] @ T[:, :3, :3].transpose(0, 2, 1)
+        error[:, 3:] = Rotation.from_matrix(turn).as_rotvec()
+        residual[open_] = np.abs(error).max(axis=1)
+        late = residual[open_] > REACHED
+        if not late.any():
+            break
+        open_, J, error = open_[late], J[late], error[late]
+        # Damped least squares: at a singularity the step stays bounded and the residual tells.
+        Jt = J.transpose(0, 2, 1)
+        step = np.linalg.solve(Jt @ J + 1e-12 * np.eye(6), Jt @ error[..., None])[..., 0]
+        q[open_] += np.clip(step, -0.5, 0.5)
+    return q, residual

@@ -1,0 +1,81 @@
+"""What an audit says: its table of checks, and the issues among them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+
+__all__ = ["Check", "Issue", "Level", "Unit"]
+
+Unit = Literal["m", "rad", "share", "count"]
+Level = Literal["error", "warning"]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Check:
+    """One line of the audit's table.
+
+    Parameters
+    ----------
+    code : str
+        Stable name of the check, such as "tip-at-nodes".
+    title : str
+        What is checked, in words.
+    value, limit : float
+        Worst value found and what is allowed, in `unit`.
+    unit : {"m", "rad", "share", "count"}
+    node : int
+        Where the worst value stands (for a check between nodes: the node before it).
+    level : {"error", "warning"}
+        What a failure means.
+    advice : str
+        What to do about a failure.
+    """
+
+    code: str
+    title: str
+    value: float
+    limit: float
+    unit: Unit
+    node: int
+    level: Level = "error"
+    advice: str = ""
+
+    @property
+    def ok(self) -> bool:
+        """True when the value keeps the limit; False for NaN."""
+        return self.value <= self.limit
+
+    def issue(self) -> Issue:
+        """Return the issue that a failure of this check is."""
+        message = (
+            f"{self.title}: {in_words(self.value, self.unit)} at node {self.node}, "
+            f"allowed {in_words(self.limit, self.unit)}"
+        )
+        if self.advice:
+            message += f"; {self.advice}"
+        return Issue(level=self.level, code=self.code, message=message, node=self.node)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Issue:
+    """A check that failed: how bad, which, what was found, and at which node."""
+
+    level: Level
+    code: str
+    message: str
+    node: int
+
+    def __str__(self) -> str:
+        return f"{self.level}: {self.message} [{self.code}]"
+
+
+def in_words(value: float, unit: Unit) -> str:
+    """Say a value for people: mm, degrees, per cent or a number."""
+    if unit == "m":
+        return f"{value * 1e3:.4g} mm"
+    if unit == "rad":
+        return f"{np.degrees(value):.4g} deg"
+    return f"{value * 100:.4g} %" if unit == "share" else f"{value:g}"

@@ -1,0 +1,44 @@
+"""Fixtures shared by the tests: a robot with all limits, a tool, a placement, a contour."""
+
+import numpy as np
+import pytest
+
+from kerfpath.contour import Contour
+from kerfpath.robots import robot
+
+
+def pose(xyz, rotation=None):
+    T = np.eye(4)
+    T[:3, 3] = xyz
+    if rotation is not None:
+        T[:3, :3] = rotation
+    return T
+
+
+@pytest.fixture(scope="session")
+def arm():
+    """An IRB 4600 with stated accelerations, axes 4 and 6 endless."""
+    return robot("abb_irb4600_60_205").with_limits(
+        acceleration=np.radians([320, 270, 420, 1300, 1400, 2000]), endless=[0, 0, 0, 1, 0, 1]
+    )
+
+
+@pytest.fixture(scope="session")
+def tool():
+    """A head whose beam leaves the flange axis by 45 degrees, so that gamma moves every joint."""
+    c = np.sqrt(0.5)
+    return pose([0.15, 0, 0.30], [[c, 0, c], [0, 1, 0], [-c, 0, c]])
+
+
+@pytest.fixture(scope="session")
+def placement():
+    return pose([1.2, 0.0, 0.4])
+
+
+@pytest.fixture(scope="session")
+def circle():
+    """A closed circle of radius 0.15 m on a gentle dome, tool pointing down into it, 121 nodes."""
+    t = np.linspace(0, 2 * np.pi, 4001)
+    points = np.c_[0.15 * np.cos(t), 0.15 * np.sin(t), 0.02 * np.cos(2 * t)]
+    axes = np.c_[-0.2 * np.cos(t), -0.2 * np.sin(t), -np.ones_like(t)]
+    return Contour(points, axes, closed=True, name="circle").resample(count=121)

@@ -1,0 +1,61 @@
+"""The rules of the house that a machine can check."""
+
+import importlib
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from kerfpath.kernels import EQUATIONS
+
+ROOT = Path(__file__).parent.parent
+SOURCES = sorted((ROOT / "src").rglob("*.py"))
+
+
+def test_every_numbered_equation_of_the_paper_is_in_the_index():
+    assert sorted(EQUATIONS) == list(range(1, 17))
+
+
+@pytest.mark.parametrize("number", sorted(EQUATIONS))
+def test_an_equation_is_where_the_index_says_and_only_there(number):
+    module, _, name = EQUATIONS[number].partition(":")
+    found = importlib.import_module(module)
+    for part in name.split("."):
+        found = getattr(found, part)
+    lines = [line.strip() for line in found.__doc__.splitlines()]
+    assert f"(Eq. {number})" in " ".join(lines[:2])
+    mentions = [f for f in SOURCES for _ in re.findall(rf"\(Eq\. {number}\)", f.read_text())]
+    assert [f.stem for f in mentions] == [module.rpartition(".")[2]]
+
+
+@pytest.mark.parametrize("number", sorted(EQUATIONS))
+def test_every_equation_has_a_test_that_names_it(number):
+    tests = "".join(f.read_text() for f in (ROOT / "tests").glob("test_*.py"))
+    assert f"@pytest.mark.equation({number})" in tests
+
+
+@pytest.mark.parametrize("source", SOURCES, ids=lambda f: str(f.relative_to(ROOT)))
+def test_a_module_stays_under_400_lines_and_keeps_the_house_rules(source):
+    text = source.read_text()
+    assert len(text.splitlines()) <= 400
+    assert not re.search(r"fastmath *= *True|prange|except Exception|except:", text)
+    if "cli" not in source.parts:
+        assert not re.search(r"(?<![\w.])print\(", text)
+    if "kernels" not in source.parts:
+        assert not re.search(r"^\s*(import|from) numba", text, re.MULTILINE)
+
+
+def test_asking_for_help_does_not_load_the_kernels():
+    code = "import kerfpath.cli, sys; sys.exit('numba' in sys.modules or 'OCP' in sys.modules)"
+    assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0
+
+
+def test_every_public_name_loads():
+    import kerfpath
+
+    for name in kerfpath.__all__:
+        assert getattr(kerfpath, name) is not None
+    with pytest.raises(AttributeError, match="no attribute 'nonsense'"):
+        _ = kerfpath.nonsense
