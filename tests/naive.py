@@ -1,0 +1,98 @@
+"""Slow and obvious versions of what the kernels do, written from the paper alone."""
+
+import numpy as np
+
+TOLERANCE = 1e-9
+
+
+def difference(a, b, endless):
+    """Joint increment from a to b, the short way round for endless joints (13)."""
+    d = b - a
+    return np.where(endless, d - 2 * np.pi * np.round(d / (2 * np.pi)), d)
+
+
+def distance(d, weights, metric):
+    part = np.abs(d) * weights
+    return {"manhattan": part.sum(), "chebychev": part.max(), "euclid": np.sqrt((part**2).sum())}[
+        metric
+    ]
+
+
+def path_planning(
+    q, start, *, dt, velocity, acceleration, endless, posture, vertex_cost, weights, metric,
+    objective, method, eta_v, eta_a,
+):  # fmt: skip
+    """The procedure of section 3.2, line by line; returns (index, cost) or None."""
+    layers = [list(range(start[k], start[k + 1])) for k in range(len(start) - 1)]
+    join = (lambda a, b: a + b) if objective == "sum" else max
+    known = method == "known"
+    bound_v = eta_v * velocity * dt + TOLERANCE
+    bound_a = eta_a * acceleration * dt**2 + TOLERANCE
+    M_dist = {j: vertex_cost[j] for j in layers[0]}
+    M_ind = {}
+    for k in range(1, len(layers)):
+        for j in layers[k]:
+            d_min, j_opt = np.inf, None
+            for p in layers[k - 1]:
+                if M_dist[p] == np.inf:
+                    continue
+                dq = difference(q[p], q[j], endless)
+                d_cur = join(M_dist[p], distance(dq, weights, metric))
+                if known:
+                    if posture[p] != posture[j]:
+                        d_cur = np.inf
+                else:
+                    if (np.abs(dq) > bound_v).any():
+                        d_cur = np.inf
+                    if k > 1:
+                        before = difference(q[M_ind[p]], q[p], endless)
+                        if (np.abs(dq - before) > bound_a).any():
+                            d_cur = np.inf
+                if d_cur < d_min:
+                    d_min, j_opt = d_cur, p
+            M_dist[j] = join(d_min, vertex_cost[j])
+            M_ind[j] = j_opt
+    if not layers[-1] or min(M_dist[j] for j in layers[-1]) == np.inf:
+        return None
+    j = min(layers[-1], key=lambda j: (M_dist[j], j))
+    cost, path = M_dist[j], []
+    for k in range(len(layers) - 1, -1, -1):
+        path.append(j - start[k])
+        j = M_ind.get(j)
+    return np.array(path[::-1]), cost
+
+
+def first_order(q, start, **options):
+    """The optimum without the acceleration limit: what the greedy test can only make worse."""
+    return path_planning(q, start, **{**options, "acceleration": np.full(q.shape[1], 1e12)})
+
+
+def random_instance(rng, *, layers=(1, 9), size=(1, 9)):
+    """A ragged graph whose limits bind: set from quantiles of its own increments."""
+    n, K = int(rng.integers(1, 7)), int(rng.integers(*layers))
+    sizes = rng.integers(*size, K)
+    drift = rng.normal(0, 0.15, (K, n)).cumsum(axis=0)
+    q = np.concatenate([drift[k] + rng.normal(0, 0.5, (s, n)) for k, s in enumerate(sizes)])
+    endless = rng.random(n) < 0.4
+    q = np.where(endless, q + 2 * np.pi * rng.integers(-1, 2, q.shape), q)
+    start = np.concatenate([[0], np.cumsum(sizes)])
+    dt = float(rng.uniform(0.01, 0.1))
+    pairs = rng.integers(0, len(q), (200, 2))
+    step = np.abs([difference(q[a], q[b], endless) for a, b in pairs]) + 1e-3
+    # One joint in four, also one that is endless, gets a limit that never binds.
+    loose = np.where(rng.random(n) < 0.25, 100.0, 1.0)
+    options = {
+        "dt": dt,
+        "velocity": loose * np.quantile(step, rng.uniform(0.6, 1), axis=0) / dt,
+        "acceleration": np.quantile(step, rng.uniform(0.4, 1), axis=0) * 1.5 / dt**2,
+        "endless": endless,
+        "posture": rng.integers(0, 3, len(q)),
+        "vertex_cost": rng.choice([0.0, 1.0]) * rng.random(len(q)),
+        "weights": rng.uniform(0.2, 3, n),
+        "metric": str(rng.choice(["manhattan", "chebychev", "euclid"])),
+        "objective": str(rng.choice(["sum", "max"])),
+        "method": str(rng.choice(["paper", "paper", "known"])),
+        "eta_v": float(rng.uniform(0.5, 1.2)),
+        "eta_a": float(rng.uniform(0.5, 1.2)),
+    }
+    return q, start, options
