@@ -55,9 +55,10 @@ def test_the_reason_names_the_joint_that_is_out_of_range(frames, arm, tool):
     upper[4] = -0.5
     narrow = arm.with_limits(lower=-turns, upper=upper, endless=[0] * 6)
     graph = build(frames[:3], narrow, T_flange_tip=tool, gamma=gamma)
-    assert set(graph.counts()) == {"admitted", "unreachable", "joint 5 high"} - (
-        {"unreachable"} - set(graph.counts())
-    )
+    counts = graph.counts()
+    assert set(counts) <= {"admitted", "unreachable", "joint 5 low", "joint 5 high"}
+    assert counts["joint 5 high"] > 0
+    assert counts["admitted"] > 0
 
 
 def test_pieces_and_threads_leave_no_trace(frames, arm, tool, monkeypatch):
