@@ -14,7 +14,7 @@ from kerfpath._arrays import Array, Ints, floats, freeze, positive, scalar
 from kerfpath.errors import InputError
 from kerfpath.kernels.frames import closing_twist, rotation_minimising_x, tangent_x
 
-__all__ = ["Contour", "FrameKind", "join"]
+__all__ = ["FRAME_KINDS", "Contour", "FrameKind", "join"]
 
 FrameKind = Literal["tangent", "rotation-minimising"]
 FRAME_KINDS: tuple[FrameKind, ...] = ("tangent", "rotation-minimising")

@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
-from kerfpath._arrays import Array, Ints, freeze, scalar
+from kerfpath._arrays import Array, Bools, Ints, freeze, scalar
 from kerfpath.errors import InputError
 from kerfpath.kernels import kinematics, turns
 from kerfpath.robots import Robot
@@ -89,6 +89,7 @@ def build(
     *,
     T_flange_tip: Array,
     gamma: Array,
+    postures: Sequence[int] | None = None,
     progress: Callable[[int], None] | None = None,
 ) -> LayeredGraph:
     """Return the vertices of every node: all samples of gamma, postures and turns (Eq. 10).
@@ -103,14 +104,17 @@ def build(
         Tool: tip frame in the flange.
     gamma : (m,) rad
         Samples of gamma, see `gamma_grid`.
+    postures : sequence of int, optional
+        The postures that may be used; default all. See `kerfpath.robots.postures_named`.
     progress : callable, optional
         Called with the number of nodes done since the last call.
 
     Raises
     ------
     InputError
-        The robot's joint limits are not known.
+        The robot's joint limits are not known, or a posture that does not exist.
     """
+    wanted = _wanted(postures)
     limits, arm = robot.joint_limits(), robot.arm()
     T_tip_flange = np.asarray(np.linalg.inv(T_flange_tip), dtype=np.float64)
     reason = np.empty((len(frames), len(gamma), kinematics.POSTURES), np.uint8)
@@ -121,7 +125,7 @@ def build(
         q, reach = np.empty((*size, 6)), np.empty(size, np.bool_)
         kinematics.inverse_nodes(arm, frames[first:last], gamma, T_tip_flange, q, reach)
         count = np.empty(last - first, np.int64)
-        turns.count_admissible(q, reach, limits, count, reason[first:last])
+        turns.count_admissible(q, reach, wanted, limits, count, reason[first:last])
         n = int(count.sum())
         piece = _Piece(
             count=count,
@@ -163,3 +167,11 @@ class _Piece:
     sample: Ints
     posture: Ints
     turn: Ints
+
+
+def _wanted(postures: Sequence[int] | None) -> Bools:
+    every = range(kinematics.POSTURES)
+    chosen = every if postures is None else tuple(postures)
+    if not chosen or any(mu not in every for mu in chosen):
+        raise InputError(f"postures: expected some of 0 to 7, got {list(chosen)}")
+    return freeze(np.isin(every, chosen))

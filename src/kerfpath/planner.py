@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -30,6 +30,7 @@ def plan(
     speed: float | None = None,
     gamma_step: float = np.pi / 180,
     frames: FrameKind = "rotation-minimising",
+    postures: Sequence[int] | None = None,
     method: Method = "paper",
     objective: ObjectiveKind = "sum",
     metric: Metric = "manhattan",
@@ -57,6 +58,8 @@ def plan(
         Step of the free rotation about the beam.
     frames : {"rotation-minimising", "tangent"}
         Task frames that gamma is measured in.
+    postures : sequence of int, optional
+        The postures that may be used; default all. See `kerfpath.robots.postures_named`.
     method, objective, metric, weights, eta_v, eta_a
         As in `shortest_path`.
     graph : LayeredGraph, optional
@@ -92,6 +95,7 @@ def plan(
         placement=T_base_part,
         gamma_step=gamma_step,
         frames=frames,
+        postures=postures,
         progress=progress,
     )
     if len(graph.start) != len(contour) + 1:
@@ -148,6 +152,7 @@ def layered_graph(
     placement: ArrayLike,
     gamma_step: float = np.pi / 180,
     frames: FrameKind = "rotation-minimising",
+    postures: Sequence[int] | None = None,
     progress: Callable[[int], None] | None = None,
 ) -> LayeredGraph:
     """Return the layered graph that `plan` searches; arguments as there."""
@@ -157,6 +162,7 @@ def layered_graph(
         robot,
         T_flange_tip=as_pose(tool, "tool"),
         gamma=gamma_grid(gamma_step),
+        postures=postures,
         progress=progress,
     )
 

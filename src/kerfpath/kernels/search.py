@@ -49,6 +49,18 @@ class Objective(NamedTuple):
 
 
 @jit
+def _place(key: Array, a: int, b: int, value: float) -> int:
+    """First place in the sorted key[a:b] that is not below `value`; b if there is none."""
+    while a < b:
+        middle = (a + b) // 2
+        if key[middle] < value:
+            a = middle + 1
+        else:
+            b = middle
+    return a
+
+
+@jit
 def _window(layers: Layers, k: int, key: float, out_run: Ints) -> int:
     """Find the edges into a vertex: the runs of layer k within the window about `key` (Eq. 12).
 
@@ -56,43 +68,44 @@ def _window(layers: Layers, k: int, key: float, out_run: Ints) -> int:
     are, 1 or 2.
     """
     a, b = layers.start[k], layers.start[k + 1]
-    keys = layers.key[a:b]
     low, high = key - layers.window, key + layers.window
     if layers.circular and (low < -pi or high > pi):
         if high - low >= 2 * pi:
             out_run[0, 0], out_run[0, 1] = a, b
             return 1
         low, high = (low + 2 * pi, high) if low < -pi else (low, high - 2 * pi)
-        out_run[0, 0], out_run[0, 1] = a, a + np.searchsorted(keys, high, side="right")
-        out_run[1, 0], out_run[1, 1] = a + np.searchsorted(keys, low, side="left"), b
+        out_run[0, 0], out_run[0, 1] = a, _place(layers.key, a, b, high)
+        out_run[1, 0], out_run[1, 1] = _place(layers.key, a, b, low), b
         return 2
-    out_run[0, 0] = a + np.searchsorted(keys, low, side="left")
-    out_run[0, 1] = a + np.searchsorted(keys, high, side="right")
+    out_run[0, 0] = _place(layers.key, a, b, low)
+    out_run[0, 1] = _place(layers.key, a, b, high)
     return 1
 
 
 @jit_vector
-def _distances(
-    layers: Layers, aim: Objective, j: int, a: int, b: int, out_c: Array, out_fast: Bools
-) -> None:
-    """Distances rho from vertices a..b to vertex j, and which of them break the velocity limit."""
+def _distances(layers: Layers, aim: Objective, j: int, a: int, b: int, out_c: Array) -> None:
+    """Distances rho from vertices a..b to vertex j; infinite where the velocity limit breaks."""
     m = b - a
     out_c[:m] = 0.0
-    out_fast[:m] = False
     for i in range(len(layers.endless)):
         x, w, bound = layers.q[i, j], aim.weight[i], aim.velocity[i] + LIMIT_TOLERANCE
         row = layers.q[i, a:b]
         turn = 2 * pi if layers.endless[i] else np.inf
-        for p in range(m):
-            y = abs(x - row[p])
-            y = min(y, turn - y)
-            out_fast[p] |= y > bound
-            if aim.metric == MANHATTAN:
-                out_c[p] += w * y
-            elif aim.metric == EUCLID:
-                out_c[p] += w * y * w * y
-            else:
-                out_c[p] = max(out_c[p], w * y)
+        if aim.metric == MANHATTAN:
+            for p in range(m):
+                y = abs(x - row[p])
+                y = min(y, turn - y)
+                out_c[p] += np.inf if y > bound else w * y
+        elif aim.metric == EUCLID:
+            for p in range(m):
+                y = abs(x - row[p])
+                y = min(y, turn - y)
+                out_c[p] += np.inf if y > bound else w * y * w * y
+        else:
+            for p in range(m):
+                y = abs(x - row[p])
+                y = min(y, turn - y)
+                out_c[p] = max(out_c[p], np.inf if y > bound else w * y)
     if aim.metric == EUCLID:
         for p in range(m):
             out_c[p] = sqrt(out_c[p])
@@ -119,7 +132,7 @@ def path_planning(
     for j in range(first, last):
         out_dist[j], out_before[j] = aim.vertex_cost[j], -1
     n, size = len(layers.endless), np.max(np.diff(layers.start))
-    c, fast = np.empty(size), np.empty(size, np.bool_)
+    c = np.empty(size)
     run, dq, dq_before = np.empty((2, 2), np.int64), np.empty(n), np.empty(n)
     turned_away = False
     for k in range(1, len(layers.start) - 1):
@@ -128,12 +141,12 @@ def path_planning(
             best, first_order, best_p = np.inf, np.inf, -1
             for r in range(_window(layers, k - 1, layers.key[j], run)):
                 a, b = run[r, 0], run[r, 1]
-                _distances(layers, aim, j, a, b, c, fast)
+                _distances(layers, aim, j, a, b, c)
                 for p in range(a, b):
                     d = out_dist[p]
                     d = max(d, c[p - a]) if aim.minimax else d + c[p - a]
                     tie = d == best and best_p >= 0 and layers.rank[p] < layers.rank[best_p]
-                    if fast[p - a] or not (d < best or tie):
+                    if not (d < best or tie):
                         continue
                     first_order = min(first_order, d)
                     if k > 1:

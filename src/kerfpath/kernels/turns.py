@@ -4,7 +4,8 @@ A joint with a finite range admits every representative q + 2 pi t inside it, ea
 own; an endless joint has one representative, compared modulo 2 pi by (13).
 
 Reason codes: 0 admitted, 1 unreachable, 2 + 2 i joint i below its range, 3 + 2 i above it,
-2 + 2 n + 2 r coupling r below its range, 3 + 2 n + 2 r above it.
+2 + 2 n + 2 r coupling r below its range, 3 + 2 n + 2 r above it; one more than the last of these:
+the posture is not wanted.
 """
 
 from __future__ import annotations
@@ -104,17 +105,26 @@ def admissible_turns(q: Array, limits: JointLimits, out_turn: Ints) -> tuple[int
 
 @jit
 def count_admissible(
-    q: Array, reach: Bools, limits: JointLimits, out_count: Ints, out_reason: NDArray[np.uint8]
+    q: Array,
+    reach: Bools,
+    wanted: Bools,
+    limits: JointLimits,
+    out_count: Ints,
+    out_reason: NDArray[np.uint8],
 ) -> None:
-    """Count the turns of q (K, m, P, n) per node, out_count (K,), and why poses drop, (K, m, P)."""
+    """Count the turns of q (K, m, P, n) per node, out_count (K,), and why poses drop, (K, m, P).
+
+    wanted (P,) says which postures may be used.
+    """
     K, m, P, n = q.shape
     turn = np.empty((MOST_TURNS, n), np.int64)
     for k in range(K):
         out_count[k] = 0
         for j in range(m):
             for mu in range(P):
-                if not reach[k, j, mu]:
-                    out_reason[k, j, mu] = UNREACHABLE
+                if not (wanted[mu] and reach[k, j, mu]):
+                    unwanted = 2 + 2 * n + 2 * len(limits.rows)
+                    out_reason[k, j, mu] = UNREACHABLE if wanted[mu] else unwanted
                     continue
                 count, reason = admissible_turns(q[k, j, mu], limits, turn)
                 out_count[k] += count

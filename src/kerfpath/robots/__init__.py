@@ -7,3 +7,4 @@ from kerfpath.robots._robot import Coupling as Coupling
 from kerfpath.robots._robot import Robot as Robot
 from kerfpath.robots._robot import Solutions as Solutions
 from kerfpath.robots._robot import posture_name as posture_name
+from kerfpath.robots._robot import postures_named as postures_named

@@ -11,7 +11,7 @@ from kerfpath._arrays import Array, Bools, Ints, bools, floats, freeze, positive
 from kerfpath.errors import InputError
 from kerfpath.kernels import kinematics, turns
 
-__all__ = ["Coupling", "Robot", "Solutions", "posture_name"]
+__all__ = ["Coupling", "Robot", "Solutions", "posture_name", "postures_named"]
 
 JOINTS = 6
 LENGTHS = ("a1", "a2", "b", "c1", "c2", "c3", "c4")
@@ -221,7 +221,8 @@ class Robot:
             )
         limits = self.joint_limits()
         count, reason = np.empty(len(poses), np.int64), np.empty(reach.shape, np.uint8)
-        turns.count_admissible(q, reach, limits, count, reason)
+        every = np.ones(kinematics.POSTURES, np.bool_)
+        turns.count_admissible(q, reach, every, limits, count, reason)
         total = int(count.sum())
         found, turn = np.empty((total, JOINTS)), np.empty((total, JOINTS), np.int64)
         sample, posture = np.empty(total, np.int64), np.empty(total, np.int64)
@@ -279,7 +280,7 @@ class Robot:
         words = ["admitted", "unreachable"]
         for name in [f"joint {i + 1}" for i in range(JOINTS)] + [c.name for c in self.couplings]:
             words += [f"{name} low", f"{name} high"]
-        return tuple(words)
+        return (*words, "posture not wanted")
 
     def _lacks(self, what: str, keys: str, hint: str = "") -> InputError:
         why = f" ({self.limits_missing})" if self.limits_missing else ""
@@ -298,3 +299,25 @@ def posture_name(posture: int) -> str:
             ("plus", "minus")[posture % 2],
         )
     )
+
+
+def postures_named(words: str) -> tuple[int, ...]:
+    """Return the postures that fit some words: "front/up" fits 0 and 1, "rear" fits 4 to 7.
+
+    Raises
+    ------
+    InputError
+        A word that names no shoulder, elbow or wrist, or two that exclude each other.
+    """
+    wanted = [word for word in words.split("/") if word]
+    fitting = [
+        mu
+        for mu in range(kinematics.POSTURES)
+        if all(word in posture_name(mu).split("/") for word in wanted)
+    ]
+    if not fitting:
+        raise InputError(
+            f"posture {words!r}: expected words of front|rear / up|down / plus|minus, "
+            'such as "front/up"'
+        )
+    return tuple(fitting)

@@ -1,0 +1,183 @@
+"""The loops of a face: its wires without seams, each edge in the direction of travel."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Literal
+
+import numpy as np
+from OCP.BRep import BRep_Tool
+from OCP.BRepAdaptor import BRepAdaptor_Surface
+from OCP.BRepTools import BRepTools, BRepTools_WireExplorer
+from OCP.gp import gp_Pnt, gp_Vec
+from OCP.TopAbs import TopAbs_Orientation, TopAbs_ShapeEnum
+from OCP.TopExp import TopExp_Explorer
+from OCP.TopoDS import TopoDS, TopoDS_Edge, TopoDS_Face, TopoDS_Iterator, TopoDS_Wire
+
+from kerfpath._arrays import Array
+from kerfpath.errors import InputError
+
+__all__ = ["Kind", "OrientedEdge", "loops_of"]
+
+Kind = Literal["outer", "inner"]
+
+FORWARD, REVERSED = TopAbs_Orientation.TopAbs_FORWARD, TopAbs_Orientation.TopAbs_REVERSED
+
+SINGULAR = 1e-9
+"""Sine of the angle between the surface's two directions below which they leave no normal, as at
+a pole or the tip of a cone."""
+LARGEST = 1e7
+"""No part reaches further than this, mm; a damaged number or a wrong unit soon makes it so."""
+NUDGE = 1e-4
+"""How far from such a point the normal is taken, as a part of the edge."""
+
+
+class OrientedEdge:
+    """An edge of a face in the direction of travel, evaluated on the face.
+
+    Travel keeps the face on the left, seen with its outward normal up.
+
+    Parameters
+    ----------
+    edge : TopoDS_Edge
+        As it lies in the face taken FORWARD.
+    face : TopoDS_Face
+        The face in its own orientation.
+    """
+
+    def __init__(self, edge: TopoDS_Edge, face: TopoDS_Face) -> None:
+        self.edge, self.face = edge, face
+        self.surface = BRepAdaptor_Surface(face)
+        self._outward = -1.0 if face.Orientation() == REVERSED else 1.0
+        first, last = BRep_Tool.Range_s(edge, face)
+        # A REVERSED face shows its other side, about which its wires run the other way round.
+        backward = (edge.Orientation() == REVERSED) != (face.Orientation() == REVERSED)
+        self.start, self.end = (last, first) if backward else (first, last)
+        self._curve = BRep_Tool.CurveOnSurface_s(edge, face, first, last)
+        if self._curve is None:
+            raise InputError("an edge has no curve on its face; repair the part in CAD")
+        self.ends = self.evaluate(np.array([self.start, self.end]))[0]
+
+    def evaluate(self, t: Array) -> tuple[Array, Array]:
+        """Return points (K, 3) mm and outward unit normals (K, 3) of the face at `t` (K,)."""
+        points, normals = np.empty((len(t), 3)), np.empty((len(t), 3))
+        for k, parameter in enumerate(t.tolist()):
+            point, normal = self._at(parameter)
+            if normal is None:
+                inwards = NUDGE * (self.start + self.end - 2 * parameter)
+                normal = self._at(parameter + inwards)[1]
+            if normal is None:
+                raise InputError(f"a face has no normal at {point} mm; repair the part in CAD")
+            points[k], normals[k] = point, normal
+        if not (np.abs(points) <= LARGEST).all():
+            raise InputError(
+                f"an edge strays further than {LARGEST / 1e6:g} km from the origin; the file is "
+                "damaged, or its unit is wrong"
+            )
+        return points, normals
+
+    def in_parameters(self) -> Array:
+        """Return how far (2,) the edge goes in the parameters (u, v) of its surface."""
+        start, end = self._curve.Value(self.start), self._curve.Value(self.end)
+        return np.array([end.X() - start.X(), end.Y() - start.Y()])
+
+    def _at(self, parameter: float) -> tuple[tuple[float, float, float], Array | None]:
+        uv = self._curve.Value(parameter)
+        point, du, dv = gp_Pnt(), gp_Vec(), gp_Vec()
+        self.surface.D1(uv.X(), uv.Y(), point, du, dv)
+        normal = du.Crossed(dv)
+        size = normal.Magnitude()
+        at = (point.X(), point.Y(), point.Z())
+        if not size > SINGULAR * du.Magnitude() * dv.Magnitude():
+            return at, None
+        return at, np.array([normal.X(), normal.Y(), normal.Z()]) * (self._outward / size)
+
+
+def loops_of(face: TopoDS_Face) -> list[tuple[Kind, list[OrientedEdge]]]:
+    """Return the loops of `face`, each edge in the direction of travel.
+
+    Outer ones run counter-clockwise about its outward normal, inner ones clockwise. Seams are no
+    cut: without them a tube has two outer loops, and a hole across the seam is an inner one.
+    """
+    forward = TopoDS.Face(face.Oriented(FORWARD))
+    outer_wire = BRepTools.OuterWire_s(forward)
+    loops: list[tuple[Kind, list[OrientedEdge]]] = []
+    wires = TopExp_Explorer(forward, TopAbs_ShapeEnum.TopAbs_WIRE)
+    while wires.More():
+        wire = TopoDS.Wire(wires.Current())
+        runs, has_seam = _runs(wire, forward, face)
+        for edges in _chained(runs):
+            outer = _winds(edges) or (wire.IsSame(outer_wire) and not has_seam)
+            loops.append(("outer" if outer else "inner", edges))
+        wires.Next()
+    return loops
+
+
+def _runs(
+    wire: TopoDS_Wire, forward: TopoDS_Face, face: TopoDS_Face
+) -> tuple[list[list[OrientedEdge]], bool]:
+    """Return the edges of `wire` as travelled, broken at each seam, and whether it has a seam."""
+    ordered = list(_in_order(wire, forward))
+    everything = list(_edges(wire))
+    connected = len(ordered) == len(everything)
+    runs: list[list[OrientedEdge]] = [[]]
+    has_seam = False
+    for edge in ordered if connected else everything:
+        if BRep_Tool.IsClosed_s(edge, forward):
+            has_seam = True
+            runs.append([])
+        elif not BRep_Tool.Degenerated_s(edge):
+            runs[-1].append(OrientedEdge(edge, face))
+        if not connected:
+            runs.append([])
+    if face.Orientation() == REVERSED:
+        runs = [run[::-1] for run in runs[::-1]]
+    return [run for run in runs if run], has_seam
+
+
+def _in_order(wire: TopoDS_Wire, face: TopoDS_Face) -> Iterator[TopoDS_Edge]:
+    explorer = BRepTools_WireExplorer(wire, face)
+    while explorer.More():
+        yield explorer.Current()
+        explorer.Next()
+
+
+def _edges(wire: TopoDS_Wire) -> Iterator[TopoDS_Edge]:
+    iterator = TopoDS_Iterator(wire)
+    while iterator.More():
+        if iterator.Value().Orientation() in (FORWARD, REVERSED):
+            yield TopoDS.Edge(iterator.Value())
+        iterator.Next()
+
+
+def _chained(runs: list[list[OrientedEdge]]) -> Iterator[list[OrientedEdge]]:
+    """Join runs into closed chains: each end goes on at the nearest start, its own included."""
+    runs = list(runs)
+    while runs:
+        chain = runs.pop(0)
+        while runs:
+            end = chain[-1].ends[1]
+            gaps = [float(np.linalg.norm(run[0].ends[0] - end)) for run in [chain, *runs]]
+            nearest = int(np.argmin(gaps))
+            if nearest == 0:
+                break
+            chain = chain + runs.pop(nearest - 1)
+        yield chain
+
+
+def _winds(edges: list[OrientedEdge]) -> bool:
+    """Return whether the loop goes around its surface, as the rim of a tube does."""
+    surface = edges[0].surface
+    around = np.sum([edge.in_parameters() for edge in edges], axis=0)
+    u = surface.UPeriod() if surface.IsUPeriodic() else _width(surface, "U")
+    v = surface.VPeriod() if surface.IsVPeriodic() else _width(surface, "V")
+    return bool((np.abs(around) > np.array([u, v]) / 2).any())
+
+
+def _width(surface: BRepAdaptor_Surface, direction: Literal["U", "V"]) -> float:
+    """Return the parameter range of a surface closed in `direction`, else infinity."""
+    if direction == "U":
+        closed, width = surface.IsUClosed(), surface.LastUParameter() - surface.FirstUParameter()
+    else:
+        closed, width = surface.IsVClosed(), surface.LastVParameter() - surface.FirstVParameter()
+    return width if closed else float("inf")

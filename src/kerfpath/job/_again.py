@@ -1,0 +1,84 @@
+"""Work with a plan.json again: audit it, and write its program."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+from pydantic import ValidationError
+
+from kerfpath.auditor import Check, checks
+from kerfpath.cad import read_step
+from kerfpath.contour import Contour
+from kerfpath.errors import AuditFailed, InputError
+from kerfpath.job._files import program_of
+from kerfpath.job._model import ProgramTable
+from kerfpath.job._planfile import PlanFile, read_plan_file
+from kerfpath.job._read import ProgramOptions, program_options, read_job
+
+__all__ = ["audit_file", "program_from_file"]
+
+
+def audit_file(
+    plan_file: Path, job_file: Path | None = None
+) -> tuple[dict[str, list[Check]], tuple[str, ...]]:
+    """Return the audit's table of each contour of a plan.json, and the contours without a plan.
+
+    Parameters
+    ----------
+    plan_file : Path
+    job_file : Path, optional
+        Its job; the deviation between nodes is then measured against the drawing.
+
+    Raises
+    ------
+    InputError
+        A file cannot be read, or the job does not have a contour of the plan.
+    """
+    file = read_plan_file(plan_file)
+    drawn = {} if job_file is None else _drawn(file, job_file)
+    return {p.name: checks(p, reference=drawn.get(p.name)) for p in file.plans}, file.missing
+
+
+def program_from_file(plan_file: Path, language: str) -> tuple[str, list[str]]:
+    """Return the program of a plan.json in a language, and the warnings of its preflight.
+
+    Raises
+    ------
+    AuditFailed
+        A contour has no plan, or its plan fails the audit, which is run again here.
+    InputError
+        The file cannot be read, an unknown language, or a program that its preflight refuses.
+    """
+    file = read_plan_file(plan_file)
+    if file.missing:
+        raise AuditFailed(f"no program: {', '.join(file.missing)} has no plan")
+    for p in file.plans:
+        for check in checks(p):
+            if check.level == "error" and not check.ok:
+                raise AuditFailed(
+                    f"no program: contour {p.name!r} fails its audit: {check.issue()}"
+                )
+    return program_of(file.plans, _options(file, language))
+
+
+def _options(file: PlanFile, language: str) -> ProgramOptions:
+    table: Any = file.job.get("program", {})
+    try:
+        parsed = ProgramTable.model_validate({**table, "language": language})
+    except (ValidationError, TypeError) as error:
+        said = " ".join(str(error).split())
+        raise InputError(f"{file.path}: its [program] table is not valid ({said})") from None
+    return program_options(parsed, file.path.stem)
+
+
+def _drawn(file: PlanFile, job_file: Path) -> dict[str, Contour]:
+    job = read_job(job_file)
+    part = read_step(job.part_file, unit=job.part_unit)
+    picks = {task.name: task.pick for task in job.contours}
+    unknown = [p.name for p in file.plans if p.name not in picks]
+    if unknown:
+        raise InputError(
+            f"{job_file}: has no contour {unknown[0]!r} of {file.path}; give the job of that plan"
+        )
+    return {p.name: part.contour(picks[p.name]) for p in file.plans}

@@ -1,0 +1,179 @@
+"""What a run leaves on disk: plan.json, trajectory.csv, report.html and the program."""
+
+from __future__ import annotations
+
+import csv
+import io
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from kerfpath.errors import AuditFailed, InputError
+from kerfpath.job._planfile import broken_entry, plan_entry, plan_text
+from kerfpath.job._read import ProgramOptions
+from kerfpath.job._run import Outcome
+from kerfpath.plans import Plan
+from kerfpath.post import build_program, language, post, preflight, write_program
+from kerfpath.report import ContourSection, render
+
+__all__ = ["Written", "program_of", "trajectory_text", "write_outcome"]
+
+NOT_CHECKED = (
+    "Collisions are not checked, neither along the contours nor on the way between them: "
+    "simulate the program in the cell before running it."
+)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Written:
+    """The files of a run, and what their reader must know.
+
+    Parameters
+    ----------
+    files : tuple of Path
+        Written, in this order.
+    stale : Path or None
+        A program of an earlier run that lies in the folder and does not belong to this one.
+    notes : tuple of str
+        Warnings of the program's preflight, and what nobody has checked.
+    """
+
+    files: tuple[Path, ...]
+    stale: Path | None
+    notes: tuple[str, ...]
+
+
+def write_outcome(outcome: Outcome, folder: Path) -> Written:
+    """Write the files of a run into `folder`; the program only if every audit has passed.
+
+    Raises
+    ------
+    InputError
+        The folder cannot be made or written to, or the program's preflight refuses.
+    """
+    job = outcome.job
+    chosen = language(job.program.language)
+    target = folder / f"{job.program.name}{chosen.suffix}"
+    texts, notes = {}, [NOT_CHECKED]
+    if outcome.passed:
+        texts[target], warnings = program_of(outcome.plans, job.program)
+        notes += warnings
+    entries = []
+    for cut in outcome.cuts:
+        if cut.plan is not None:
+            entries.append(plan_entry(cut.plan, cut.checks))
+        elif cut.broken is not None:
+            entries.append(broken_entry(cut.task.name, cut.broken))
+    texts[folder / "plan.json"] = plan_text(job.robot, job.tool, job.placement, entries, job.source)
+    texts[folder / "trajectory.csv"] = trajectory_text(outcome.plans)
+    texts[folder / "report.html"] = report_text(outcome, notes)
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise InputError(f"{folder}: cannot be made a folder ({error.strerror})") from None
+    for path, text in texts.items():
+        write_program(path, text)
+    stale = target if not outcome.passed and target.exists() else None
+    return Written(files=tuple(texts), stale=stale, notes=tuple(notes))
+
+
+def program_of(plans: Sequence[Plan], options: ProgramOptions) -> tuple[str, list[str]]:
+    """Return the text of the program that cuts `plans`, and the warnings of its preflight.
+
+    The caller answers for the audit.
+
+    Raises
+    ------
+    AuditFailed
+        There is no plan.
+    InputError
+        The preflight refuses.
+    """
+    if not plans:
+        raise AuditFailed("no program: there is no plan to write one from")
+    program = build_program(
+        plans,
+        name=options.name,
+        retract=options.retract,
+        zone=options.zone,
+        laser_output=options.laser_output,
+        lead_time=options.lead_time,
+        work_object=options.work_object,
+        tool_name=options.tool_name,
+    )
+    text = post(program, options.language)
+    issues = preflight(program, options.language)
+    return text, [str(issue) for issue in issues if issue.level == "warning"]
+
+
+def trajectory_text(plans: Sequence[Plan]) -> str:
+    """Return the text of trajectory.csv: one row per node, in mm and degrees, base frame."""
+    joints = range(1, 7)
+    header = ["contour", "node", "kind", "t_s", *(f"q{i}_deg" for i in joints)]
+    header += ["x_mm", "y_mm", "z_mm", "axis_x", "axis_y", "axis_z", "gamma_deg", "posture"]
+    out = io.StringIO()
+    writer = csv.writer(out, lineterminator="\n")
+    writer.writerow(header)
+    for plan in plans:
+        numbers = np.column_stack(
+            [
+                plan.time,
+                np.degrees(plan.q),
+                plan.points * 1000,
+                plan.axes,
+                np.degrees(plan.gamma),
+            ]
+        )
+        for k, (row, posture) in enumerate(zip(numbers.tolist(), plan.posture, strict=True)):
+            writer.writerow([plan.name, k, "cut", *row, int(posture)])
+    return out.getvalue()
+
+
+def report_text(outcome: Outcome, notes: Sequence[str]) -> str:
+    """Return the HTML report of a run."""
+    job = outcome.job
+    sections = [
+        ContourSection(
+            name=cut.task.name,
+            graph=cut.graph,
+            path=cut.nodes,
+            plan=cut.plan,
+            checks=cut.checks,
+            failure=str(cut.broken) if cut.broken is not None else "",
+            broken_at=None if cut.broken is None else cut.broken.node + 1,
+        )
+        for cut in outcome.cuts
+    ]
+    speeds = sorted({task.speed * 60 for task in job.contours})
+    robot, options = job.robot, job.plan_options
+    velocity, acceleration = (np.degrees(v).round(1) for v in robot.speed_limits())
+    facts = [
+        ("Job", job.path.name),
+        ("Part", job.part_file.name),
+        ("Robot", f"{robot.manufacturer} {robot.model}"),
+        ("Cutting speed", f"{' / '.join(f'{v:g}' for v in speeds)} m/min"),
+        ("Gamma step", f"{np.degrees(options['gamma_step']):g} deg"),
+        ("Objective", f"{options['objective']}, {options['metric']} metric"),
+        ("Method", f"{options['method']}, {options['frames']} frames"),
+        ("Limits used", f"{options['eta_v']:.0%} velocity, {options['eta_a']:.0%} acceleration"),
+        ("Joint velocity limits", f"{_row(velocity)} deg/s"),
+        (
+            "Joint acceleration limits",
+            f"{_row(acceleration)} deg/s^2 ({robot.acceleration_source})",
+        ),
+        ("Endless axes", _row(np.flatnonzero(robot.endless) + 1) or "none"),
+    ]
+    return render(
+        f"{job.part_file.stem.replace('_', ' ')}",
+        sections,
+        mesh=outcome.mesh,
+        facts=facts,
+        notes=notes,
+        job_text=job.path.read_text(encoding="utf-8-sig"),
+    )
+
+
+def _row(values: object) -> str:
+    return " ".join(f"{v:g}" for v in np.asarray(values).tolist())

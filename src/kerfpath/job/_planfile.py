@@ -1,0 +1,259 @@
+"""plan.json: everything about the plans of a job, so that other programs can rely on it."""
+
+from __future__ import annotations
+
+import json
+import re
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from kerfpath import __version__
+from kerfpath.auditor import Check
+from kerfpath.contour import Contour
+from kerfpath.errors import InputError, NoFeasiblePath
+from kerfpath.plans import Plan, Proof, Settings
+from kerfpath.robots import Coupling, Robot
+
+__all__ = ["SCHEMA", "PlanFile", "broken_entry", "plan_entry", "plan_text", "read_plan_file"]
+
+SCHEMA = 1
+"""Version of the layout of plan.json; it grows when a reader of the old one would go wrong."""
+
+_NUMBERS = re.compile(r"\[\s+([-+.\deE,\s]+?)\s+\]")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class PlanFile:
+    """A plan.json, read back.
+
+    Parameters
+    ----------
+    path : Path
+    job : dict
+        The job file as it was read; empty when the plan was not made from one.
+    plans : tuple of Plan
+        One for each contour, in the order of cutting.
+    missing : tuple of str
+        Names of the contours that have no plan.
+    """
+
+    path: Path
+    job: dict[str, Any]
+    plans: tuple[Plan, ...]
+    missing: tuple[str, ...]
+
+
+def plan_text(
+    robot: Robot,
+    T_flange_tip: np.ndarray[Any, Any],
+    T_base_part: np.ndarray[Any, Any],
+    contours: Sequence[dict[str, Any]],
+    job: dict[str, Any],
+) -> str:
+    """Return the text of a plan.json; the same input gives the same bytes.
+
+    Parameters
+    ----------
+    robot : Robot
+        With the limits used.
+    T_flange_tip, T_base_part : (4, 4) m
+    contours : sequence of dict
+        From `plan_entry` and `broken_entry`.
+    job : dict
+        The job file as read.
+    """
+    data = {
+        "schema": SCHEMA,
+        "kerfpath": __version__,
+        "job": job,
+        "robot": _robot_entry(robot),
+        "T_flange_tip": T_flange_tip.tolist(),
+        "T_base_part": T_base_part.tolist(),
+        "limits": _limits_entry(robot),
+        "contours": list(contours),
+    }
+    text = json.dumps(data, indent=1, allow_nan=False)
+    # One row of numbers to a line: a person can still read it, and a diff shows a node.
+    return _NUMBERS.sub(lambda m: "[" + re.sub(r"\s+", " ", m[1]) + "]", text) + "\n"
+
+
+def plan_entry(plan: Plan, checks: Sequence[Check]) -> dict[str, Any]:
+    """Return what plan.json says of a planned and audited contour."""
+    criteria, settings = plan.criteria, plan.settings
+    return {
+        "name": plan.name,
+        "feasible": True,
+        "closed": plan.contour.closed,
+        "method": settings.method,
+        "objective": settings.objective,
+        "metric": settings.metric,
+        "weights_per_rad": settings.weights.tolist(),
+        "eta_v": settings.eta_v,
+        "eta_a": settings.eta_a,
+        "gamma_step_rad": settings.gamma_step,
+        "frames": settings.frames,
+        "dt": plan.dt,
+        "cost": plan.cost,
+        "optimal": plan.proof.optimal,
+        "proof": plan.proof.statement,
+        "criteria": {
+            "displacement_rad": criteria.displacement.tolist(),
+            "largest_increment_rad": criteria.largest_increment.tolist(),
+            "range_rad": criteria.range.tolist(),
+            "peak_velocity_share": criteria.peak_velocity.tolist(),
+            "peak_acceleration_share": criteria.peak_acceleration.tolist(),
+        },
+        "counts": dict(plan.counts),
+        "audit": {
+            "passed": all(c.ok or c.level == "warning" for c in checks),
+            "checks": [asdict(c) | {"ok": c.ok} for c in checks],
+        },
+        "nodes": {
+            "s_m": plan.contour.s.tolist(),
+            "time_s": plan.time.tolist(),
+            "points_m": plan.contour.points.tolist(),
+            "axes": plan.contour.axes.tolist(),
+            "q_rad": plan.q.tolist(),
+            "gamma_rad": plan.gamma.tolist(),
+            "posture": plan.posture.tolist(),
+            "turn": plan.turn.tolist(),
+        },
+    }
+
+
+def broken_entry(name: str, broken: NoFeasiblePath) -> dict[str, Any]:
+    """Return what plan.json says of a contour without a feasible path."""
+    return {
+        "name": name,
+        "feasible": False,
+        "reason": str(broken),
+        "proved": broken.proved,
+        "last_node_reached": broken.node,
+        "counts": broken.counts,
+    }
+
+
+def read_plan_file(path: str | Path) -> PlanFile:
+    """Return the plans of a plan.json.
+
+    Raises
+    ------
+    InputError
+        No such file, not JSON, another schema, or something missing or of the wrong kind.
+    """
+    path = Path(path)
+    try:
+        data = json.loads(path.read_text(encoding="utf-8"))
+    except OSError as error:
+        raise InputError(f"{path}: cannot be read ({error.strerror}); give a plan.json") from None
+    except (UnicodeDecodeError, json.JSONDecodeError, RecursionError) as error:
+        raise InputError(f"{path}: not a plan.json: {' '.join(str(error).split())}") from None
+    if not isinstance(data, dict) or data.get("schema") != SCHEMA:
+        got = data.get("schema") if isinstance(data, dict) else type(data).__name__
+        raise InputError(
+            f"{path}: expected a plan.json with schema {SCHEMA}, got {got!r}; plan the job again"
+        )
+    try:
+        robot = _read_robot(data["robot"], data["limits"])
+        tool, placement = data["T_flange_tip"], data["T_base_part"]
+        entries = data["contours"]
+        return PlanFile(
+            path=path,
+            job=dict(data["job"]),
+            plans=tuple(_read_plan(e, robot, tool, placement) for e in entries if e["feasible"]),
+            missing=tuple(str(e["name"]) for e in entries if not e["feasible"]),
+        )
+    except InputError as error:
+        raise InputError(f"{path}: {error}") from None
+    except KeyError as error:
+        raise InputError(f"{path}: the key {error} is missing; plan the job again") from None
+    except (TypeError, ValueError, AttributeError) as error:
+        said = " ".join(str(error).split())
+        raise InputError(f"{path}: something in it is of the wrong kind ({said})") from None
+
+
+def _robot_entry(robot: Robot) -> dict[str, Any]:
+    return {
+        "id": robot.id,
+        "manufacturer": robot.manufacturer,
+        "model": robot.model,
+        "geometry_m": dict(robot.geometry),
+        "sign": robot.sign.tolist(),
+        "offset_rad": robot.offset.tolist(),
+    }
+
+
+def _limits_entry(robot: Robot) -> dict[str, Any]:
+    limits = robot.joint_limits()
+    velocity, acceleration = robot.speed_limits()
+    return {
+        "lower_rad": limits.lower.tolist(),
+        "upper_rad": limits.upper.tolist(),
+        "endless": robot.endless.tolist(),
+        "velocity_rad_s": velocity.tolist(),
+        "acceleration_rad_s2": acceleration.tolist(),
+        "acceleration_source": robot.acceleration_source,
+        "couplings": [
+            {"row": c.row.tolist(), "lower_rad": c.lower, "upper_rad": c.upper, "note": c.note}
+            for c in robot.couplings
+        ],
+    }
+
+
+def _read_robot(robot: dict[str, Any], limits: dict[str, Any]) -> Robot:
+    return Robot(
+        id=str(robot["id"]),
+        manufacturer=str(robot["manufacturer"]),
+        model=str(robot["model"]),
+        geometry={k: float(v) for k, v in robot["geometry_m"].items()},
+        sign=robot["sign"],
+        offset=robot["offset_rad"],
+        lower=limits["lower_rad"],
+        upper=limits["upper_rad"],
+        endless=limits["endless"],
+        velocity=limits["velocity_rad_s"],
+        acceleration=limits["acceleration_rad_s2"],
+        acceleration_source=str(limits["acceleration_source"]),
+        couplings=tuple(
+            Coupling(row=c["row"], lower=c["lower_rad"], upper=c["upper_rad"], note=c["note"])
+            for c in limits["couplings"]
+        ),
+    )
+
+
+def _read_plan(entry: dict[str, Any], robot: Robot, tool: Any, placement: Any) -> Plan:
+    nodes = entry["nodes"]
+    return Plan(
+        contour=Contour(
+            nodes["points_m"],
+            nodes["axes"],
+            closed=entry["closed"],
+            s=nodes["s_m"],
+            name=str(entry["name"]),
+        ),
+        robot=robot,
+        T_flange_tip=tool,
+        T_base_part=placement,
+        q=nodes["q_rad"],
+        gamma=nodes["gamma_rad"],
+        posture=nodes["posture"],
+        turn=nodes["turn"],
+        time=nodes["time_s"],
+        settings=Settings(
+            gamma_step=float(entry["gamma_step_rad"]),
+            frames=entry["frames"],
+            method=entry["method"],
+            objective=entry["objective"],
+            metric=entry["metric"],
+            weights=np.array(entry["weights_per_rad"], dtype=float),
+            eta_v=float(entry["eta_v"]),
+            eta_a=float(entry["eta_a"]),
+        ),
+        cost=entry["cost"],
+        proof=Proof(optimal=bool(entry["optimal"]), statement=str(entry["proof"])),
+        counts=dict(entry["counts"]),
+    )

@@ -1,0 +1,158 @@
+"""The run of a job: read the part, plan every contour, audit every plan."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from kerfpath._arrays import Array, Ints
+from kerfpath.auditor import Check, checks
+from kerfpath.cad import read_step
+from kerfpath.contour import FRAME_KINDS, Contour
+from kerfpath.errors import NoFeasiblePath
+from kerfpath.graph import LayeredGraph
+from kerfpath.job._read import ContourTask, Job
+from kerfpath.kernels._jit import CACHE
+from kerfpath.planner import layered_graph, plan
+from kerfpath.plans import Plan
+from kerfpath.robots import robot
+
+__all__ = ["Cut", "Outcome", "Progress", "run_job", "warm_up"]
+
+Progress = Callable[[str, int, int], None]
+"""Called with what is being done, how much of it is done, and how much there is."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Cut:
+    """What came of one contour of a job.
+
+    Parameters
+    ----------
+    task : ContourTask
+    drawn : Contour
+        The loop as drawn, densely sampled, part frame.
+    nodes : Contour
+        Its nodes, part frame.
+    graph : LayeredGraph
+    plan : Plan or None
+        None when no feasible path was found.
+    broken : NoFeasiblePath or None
+        Why there is no plan.
+    checks : tuple of Check
+        The audit's table; empty without a plan.
+    """
+
+    task: ContourTask
+    drawn: Contour
+    nodes: Contour
+    graph: LayeredGraph
+    plan: Plan | None
+    broken: NoFeasiblePath | None
+    checks: tuple[Check, ...]
+
+    @property
+    def passed(self) -> bool:
+        """True when there is a plan and its audit finds no error."""
+        return self.plan is not None and not any(
+            c.level == "error" and not c.ok for c in self.checks
+        )
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Outcome:
+    """What came of a job: every cut, in order, and the part's mesh for pictures."""
+
+    job: Job
+    cuts: tuple[Cut, ...]
+    mesh: tuple[Array, Ints]
+
+    @property
+    def passed(self) -> bool:
+        """True when every contour has a plan that passes its audit."""
+        return all(cut.passed for cut in self.cuts)
+
+    @property
+    def plans(self) -> tuple[Plan, ...]:
+        """The plans there are, in the order of cutting."""
+        return tuple(cut.plan for cut in self.cuts if cut.plan is not None)
+
+
+def run_job(job: Job, *, progress: Progress = lambda what, done, total: None) -> Outcome:
+    """Return what comes of planning and auditing every contour of a job.
+
+    A contour without a feasible path does not stop the others; it is reported as such.
+
+    Raises
+    ------
+    InputError
+        The part cannot be read, a loop does not exist, a contour cannot be sampled.
+    """
+    part = read_step(job.part_file, unit=job.part_unit)
+    for task in job.contours:  # a misspelt name shall not wait for the contours before it
+        part.loop(task.pick)
+    cuts = tuple(_cut(job, task, part.contour(task.pick), progress) for task in job.contours)
+    return Outcome(job=job, cuts=cuts, mesh=part.mesh())
+
+
+def _cut(job: Job, task: ContourTask, drawn: Contour, progress: Progress) -> Cut:
+    nodes = task.sample(drawn)
+    options, done = job.plan_options, 0
+
+    def solved(count: int) -> None:
+        nonlocal done
+        done += count
+        progress(task.name, done, len(nodes))
+
+    progress(task.name, 0, len(nodes))
+    graph = layered_graph(
+        nodes,
+        job.robot,
+        tool=job.tool,
+        placement=job.placement,
+        gamma_step=options["gamma_step"],
+        frames=options["frames"],
+        postures=options["postures"],
+        progress=solved,
+    )
+    made, broken = None, None
+    table: tuple[Check, ...] = ()
+    try:
+        made = plan(
+            nodes,
+            job.robot,
+            tool=job.tool,
+            placement=job.placement,
+            speed=task.speed,
+            graph=graph,
+            **options,
+        )
+    except NoFeasiblePath as error:
+        broken = error
+    else:
+        table = tuple(checks(made, reference=drawn))
+    return Cut(
+        task=task, drawn=drawn, nodes=nodes, graph=graph, plan=made, broken=broken, checks=table
+    )
+
+
+def warm_up() -> bool:
+    """Compile the kernels if this copy never has; return whether that was needed."""
+    if CACHE.is_dir():
+        return False
+    arm = robot("abb_irb4600_60_205", acceleration_ratio="iontec_20_to_70kg")
+    points = np.linspace([1.2, 0.0, 0.5], [1.2, 0.001, 0.5], 4)
+    contour = Contour(points, np.tile([0.0, 0.0, -1.0], (4, 1)))
+    for frames in FRAME_KINDS:
+        _ = plan(
+            contour,
+            arm,
+            tool=np.eye(4),
+            placement=np.eye(4),
+            speed=0.001,
+            gamma_step=np.pi / 2,
+            frames=frames,
+        ).criteria
+    return True

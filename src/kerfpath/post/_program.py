@@ -1,0 +1,352 @@
+"""The neutral program: what the robot does, in order, before any language formats it."""
+
+from __future__ import annotations
+
+import re
+import unicodedata
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from kerfpath._arrays import Array, as_pose, floats, freeze, scalar
+from kerfpath.errors import InputError
+from kerfpath.plans import Plan
+from kerfpath.robots import Robot, posture_name
+
+__all__ = [
+    "LONGEST_NAME",
+    "Comment",
+    "JointMove",
+    "LaserOff",
+    "LaserOn",
+    "LinearMove",
+    "Program",
+    "Section",
+    "Step",
+    "build_program",
+]
+
+LONGEST_NAME = 32
+"""Characters that a name keeps when it is made from a contour's name; ABB's bound."""
+PLAN_AND_CONTOUR = 1e-5
+"""Distance (m) and sine of an angle by which the planned joints may miss the contour."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class JointMove:
+    """Move all joints at once to a joint vector; the tip's way there is not a straight line.
+
+    Parameters
+    ----------
+    q : (6,) rad
+        Joints of the target.
+    speed : float
+        Share of the full speed, from 0.01 to 1.
+    zone : float m
+        Radius in which the corner may be rounded; 0 = stop at the target.
+    """
+
+    q: Array
+    speed: float
+    zone: float = 0.0
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "q", floats(self.q, "q", (6,)))
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class LinearMove:
+    """Move the tool tip in a straight line, the tool turning evenly, the posture kept.
+
+    Parameters
+    ----------
+    T_part_tip : (4, 4)
+        Tip pose in the part frame, m.
+    q : (6,) rad
+        Joints that the robot has on arrival; endless joints unrolled along the contour.
+    speed : float m/s
+        Speed of the tip.
+    zone : float m
+        Radius in which the corner may be rounded; 0 = stop at the target.
+    """
+
+    T_part_tip: Array
+    q: Array
+    speed: float
+    zone: float = 0.0
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "T_part_tip", as_pose(self.T_part_tip, "T_part_tip"))
+        object.__setattr__(self, "q", floats(self.q, "q", (6,)))
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class LaserOn:
+    """Set the laser output on the path, at the end of the linear move just before this step.
+
+    Parameters
+    ----------
+    lead_time : float s
+        How long before the tip arrives there; makes up for the delay of output and laser.
+    """
+
+    lead_time: float
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class LaserOff:
+    """Reset the laser output on the path, at the end of the linear move just before this step.
+
+    Parameters
+    ----------
+    lead_time : float s
+        How long before the tip arrives there.
+    """
+
+    lead_time: float
+
+
+@dataclass(frozen=True, slots=True)
+class Comment:
+    """A remark for the person who reads the program."""
+
+    text: str
+
+
+Step = JointMove | LinearMove | LaserOn | LaserOff | Comment
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Section:
+    """The steps of one contour, under an identifier."""
+
+    name: str
+    steps: tuple[Step, ...]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Program:
+    """What one robot does with one tool on one part, contour by contour.
+
+    Parameters
+    ----------
+    name : str
+        Identifier of the program.
+    robot : Robot
+    T_flange_tip, T_base_part : (4, 4)
+        Tool and placement of the part (the work object), m.
+    tool_name, work_object, laser_output : str
+        What the controller calls the tool, the work object and the output of the laser.
+    sections : tuple of Section
+        One for each contour, in order.
+    """
+
+    name: str
+    robot: Robot
+    T_flange_tip: Array
+    T_base_part: Array
+    tool_name: str
+    work_object: str
+    laser_output: str
+    sections: tuple[Section, ...]
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "T_flange_tip", as_pose(self.T_flange_tip, "T_flange_tip"))
+        object.__setattr__(self, "T_base_part", as_pose(self.T_base_part, "T_base_part"))
+
+    @property
+    def steps(self) -> tuple[Step, ...]:
+        """All steps in order, over all sections."""
+        return tuple(step for section in self.sections for step in section.steps)
+
+
+def build_program(
+    plans: Sequence[Plan],
+    *,
+    name: str | None = None,
+    retract: float = 0.05,
+    zone: float = 0.0003,
+    laser_output: str = "doLaser",
+    lead_time: float = 0.02,
+    work_object: str = "wPart",
+    tool_name: str = "tLaser",
+    approach_speed: float = 0.1,
+    air_speed: float = 0.25,
+) -> Program:
+    """Return the program that cuts the planned contours one after the other.
+
+    For each contour: a joint move to a pose backed off the start along the tool axis, a straight
+    move to the start with a stop, laser on, straight moves through all nodes with a stop at the
+    last, laser off, and a straight move back along the tool axis.
+
+    Parameters
+    ----------
+    plans : sequence of Plan
+        In the order of cutting; same robot, tool and placement.
+    name : str, optional
+        Name of the program, made an identifier; default: "cut" and the first contour.
+    retract : float m
+        How far the tool backs off before and after a contour.
+    zone : float m
+        Radius in which the corners at the inner nodes may be rounded.
+    laser_output, work_object, tool_name : str
+        What the controller calls them.
+    lead_time : float s
+        How long before the tip arrives the laser is switched.
+    approach_speed : float m/s
+        Speed along the tool axis before and after a contour.
+    air_speed : float
+        Share of the full speed for the joint moves between contours.
+
+    Raises
+    ------
+    InputError
+        No plans, plans that do not belong together, joints that do not lead the tool along the
+        contour, or no way to back off by `retract`.
+    """
+    if not plans:
+        raise InputError("build_program: expected at least one plan, got none")
+    first = plans[0]
+    for plan in plans[1:]:
+        _require_same_cell(first, plan)
+    retract = scalar(retract, "retract", unit="m", above=0.0)
+    title = _identifier(f"cut {first.name}" if name is None else name)
+    names = _identifiers(
+        (plan.name for plan in plans), taken=(title, tool_name, work_object, laser_output)
+    )
+    sections = []
+    for plan, section_name in zip(plans, names, strict=True):
+        q = plan.q[0] + np.vstack([np.zeros(6), np.cumsum(plan.increments, axis=0)])
+        T_part_tip = _tip_poses(plan, q)
+        _, q_in = _backed_off(plan, T_part_tip[0], q[0], 0, retract)
+        T_out, q_out = _backed_off(plan, T_part_tip[-1], q[-1], len(q) - 1, retract)
+        zones = np.append(np.full(len(q) - 2, zone), 0.0)
+        cut = [
+            LinearMove(T_part_tip=T, q=q_k, speed=float(speed_k), zone=float(zone_k))
+            for T, q_k, speed_k, zone_k in zip(
+                T_part_tip[1:], q[1:], _cutting_speed(plan), zones, strict=True
+            )
+        ]
+        steps: tuple[Step, ...] = (
+            Comment(
+                f"{plan.name}: {len(q)} nodes, {plan.contour.length * 1e3:.1f} mm, "
+                f"posture {posture_name(int(plan.posture[0]))}"
+            ),
+            JointMove(q=q_in, speed=air_speed),
+            LinearMove(T_part_tip=T_part_tip[0], q=q[0], speed=approach_speed),
+            LaserOn(lead_time=lead_time),
+            *cut,
+            LaserOff(lead_time=lead_time),
+            LinearMove(T_part_tip=T_out, q=q_out, speed=approach_speed),
+        )
+        sections.append(Section(name=section_name, steps=steps))
+    return Program(
+        name=title,
+        robot=first.robot,
+        T_flange_tip=first.T_flange_tip,
+        T_base_part=first.T_base_part,
+        tool_name=tool_name,
+        work_object=work_object,
+        laser_output=laser_output,
+        sections=tuple(sections),
+    )
+
+
+def _require_same_cell(first: Plan, plan: Plan) -> None:
+    same = {
+        "robot": _kinematics(first.robot) == _kinematics(plan.robot),
+        "tool (T_flange_tip)": np.allclose(first.T_flange_tip, plan.T_flange_tip, 0, 1e-9),
+        "placement (T_base_part)": np.allclose(first.T_base_part, plan.T_base_part, 0, 1e-9),
+    }
+    if differing := [what for what, is_same in same.items() if not is_same]:
+        raise InputError(
+            f"contours {first.name!r} and {plan.name!r} differ in {', '.join(differing)}; write "
+            "one program for each"
+        )
+
+
+def _kinematics(robot: Robot) -> tuple[object, ...]:
+    *lengths, sign, offset = robot.arm()
+    return robot.id, *lengths, *sign.tolist(), *offset.tolist()
+
+
+def _tip_poses(plan: Plan, q: Array) -> Array:
+    """Return tip poses (K, 4, 4) in the part frame: point of the contour, orientation of FK(q)."""
+    T = _inverse(plan.T_base_part) @ plan.robot.forward(q) @ plan.T_flange_tip
+    off = np.linalg.norm(T[:, :3, 3] - plan.contour.points, axis=1)
+    tilt = np.linalg.norm(np.cross(T[:, :3, 2], plan.contour.axes), axis=1)
+    tilt[(T[:, :3, 2] * plan.contour.axes).sum(axis=1) < 0] = 1.0
+    k = int(np.argmax(np.maximum(off, tilt)))
+    if max(off[k], tilt[k]) > PLAN_AND_CONTOUR:
+        raise InputError(
+            f"contour {plan.name!r}, node {k}: the planned joints put the tool tip "
+            f"{off[k] * 1e3:.4f} mm and {np.degrees(np.arcsin(tilt[k])):.4f} deg off the contour; "
+            "the plan belongs to another contour, tool or placement"
+        )
+    # A placement of few printed decimals is not quite a rotation; a quaternion can say only one.
+    T[:, :3, :3] = Rotation.from_matrix(T[:, :3, :3]).as_matrix()
+    T[:, :3, 3], T[:, 3] = plan.contour.points, (0.0, 0.0, 0.0, 1.0)
+    return freeze(T)
+
+
+def _backed_off(
+    plan: Plan, T_part_tip: Array, q: Array, node: int, retract: float
+) -> tuple[Array, Array]:
+    """Return pose and joints after backing off a node along the tool axis, posture kept."""
+    T = T_part_tip.copy()
+    T[:3, 3] -= retract * T[:3, 2]
+    found = plan.robot.inverse(plan.T_base_part @ T @ _inverse(plan.T_flange_tip))
+    q_found = found.q[found.posture == plan.posture[node]]
+    if not len(q_found):
+        raise InputError(
+            f"contour {plan.name!r}, node {node}: the tool cannot back off by {retract * 1e3:g} mm "
+            f"in posture {posture_name(int(plan.posture[node]))} within the joint limits; lower "
+            "the retract"
+        )
+    # An endless joint is solved within one turn: bring it onto the turn that the contour is on.
+    turns = np.round((q - q_found) / (2 * np.pi)) * plan.robot.endless
+    q_found = q_found + 2 * np.pi * turns
+    nearest = int(np.argmin(np.abs(q_found - q).max(axis=1)))
+    return freeze(T), freeze(q_found[nearest])
+
+
+def _cutting_speed(plan: Plan) -> Array:
+    """Return the speed (K-1,) m/s from node to node."""
+    contour = plan.contour
+    if contour.time is None:
+        duration = float(plan.time[-1] - plan.time[0])
+        return np.full(len(contour) - 1, contour.length / duration)
+    return np.asarray(np.diff(contour.s) / np.diff(contour.time))
+
+
+def _inverse(T: Array) -> Array:
+    inverse = np.eye(4)
+    inverse[:3, :3] = T[:3, :3].T
+    inverse[:3, 3] = -T[:3, :3].T @ T[:3, 3]
+    return inverse
+
+
+def _identifiers(texts: Iterable[str], taken: Iterable[str]) -> list[str]:
+    """Return an identifier for each text, unique also where a language ignores capitals."""
+    used = {name.lower() for name in taken}
+    names = []
+    for text in texts:
+        name = plain = _identifier(text)
+        number = 1
+        while name.lower() in used:
+            number += 1
+            suffix = f"_{number}"
+            name = plain[: LONGEST_NAME - len(suffix)] + suffix
+        used.add(name.lower())
+        names.append(name)
+    return names
+
+
+def _identifier(text: str) -> str:
+    plain = unicodedata.normalize("NFKD", text).encode("ascii", "ignore").decode()
+    name = re.sub(r"[^A-Za-z0-9]+", "_", plain).strip("_")
+    if not name or name[0].isdigit():
+        name = f"c_{name}".rstrip("_")
+    return name[:LONGEST_NAME]

@@ -1,0 +1,352 @@
+r"""Read back the RAPID that `rapid` writes, and nothing else: what it does not know, it refuses."""
+
+from __future__ import annotations
+
+import json
+import re
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from kerfpath._arrays import Array, Ints, freeze
+from kerfpath.errors import InputError
+
+__all__ = [
+    "ReadJointMove",
+    "ReadLaser",
+    "ReadLinearMove",
+    "ReadProgram",
+    "ReadSection",
+    "read_rapid",
+]
+
+UNIT = 1e-6
+"""How far the length of a quaternion may be from one: eight printed decimals pass."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class ReadJointMove:
+    """A joint move: the controller's axes (6,) rad, tip speed m/s, zone m, line of the text."""
+
+    axes: Array
+    speed: float
+    zone: float
+    line: int
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class ReadLinearMove:
+    """A linear move: tip pose in the part (4, 4) m, confdata (4,), speed m/s, zone m, line."""
+
+    T_part_tip: Array
+    conf: Ints
+    speed: float
+    zone: float
+    line: int
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ReadLaser:
+    """A switch of the laser `lead_time` (s) before the end of the move that stands before it."""
+
+    on: bool
+    lead_time: float
+    line: int
+
+
+ReadStep = ReadJointMove | ReadLinearMove | ReadLaser
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ReadSection:
+    """One routine of the module and its steps."""
+
+    name: str
+    steps: tuple[ReadStep, ...]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class ReadProgram:
+    """A program as its text says it; units SI.
+
+    Parameters
+    ----------
+    name, tool_name, work_object, laser_output : str
+    T_flange_tip, T_base_part : (4, 4)
+        Tool and work object, m.
+    speeds : dict of str to float
+        Tip speeds by name, m/s.
+    zones : dict of str to float
+        Path zones by name, m.
+    sections : tuple of ReadSection
+        In the order in which main calls them.
+    """
+
+    name: str
+    tool_name: str
+    T_flange_tip: Array
+    work_object: str
+    T_base_part: Array
+    laser_output: str
+    speeds: dict[str, float]
+    zones: dict[str, float]
+    sections: tuple[ReadSection, ...]
+
+
+def read_rapid(text: str) -> ReadProgram:
+    """Return the program that a RAPID module of ours says.
+
+    Raises
+    ------
+    InputError
+        A line that is not of our making, or that does not fit the lines before it, with its number.
+    """
+    reader = _Reader()
+    for number, line in enumerate(text.splitlines(), 1):
+        reader.read(number, line.strip())
+    return reader.program()
+
+
+_NAME = r"([A-Za-z]\w*)"
+_FRAMES = rf"{_NAME}\\WObj:={_NAME}"
+_LINES = {
+    kind: re.compile(pattern)
+    for kind, pattern in {
+        "blank": r"(?:!.*)?",
+        "module": rf"MODULE {_NAME}",
+        "end_module": "ENDMODULE",
+        "tool": rf"PERS tooldata {_NAME}:=(\[.*\]);",
+        "work_object": rf"PERS wobjdata {_NAME}:=(\[.*\]);",
+        "speed": rf"CONST speeddata {_NAME}:=(\[.*\]);",
+        "zone": rf"CONST zonedata {_NAME}:=(\[.*\]);",
+        "trigger": rf"VAR triggdata {_NAME};",
+        "routine": rf"PROC {_NAME}\(\)",
+        "end_routine": "ENDPROC",
+        "no_supervision": r"ConfL\\Off;",
+        "laser_off": rf"SetDO {_NAME},0;",
+        "set_trigger": rf"TriggIO {_NAME},([\d.]+)\\Time\\DOp:={_NAME},([01]);",
+        "call": rf"{_NAME};",
+        "joint_move": rf"MoveAbsJ (\[.*\]),{_NAME},{_NAME},{_FRAMES};",
+        "linear_move": rf"MoveL (\[.*\]),{_NAME},{_NAME},{_FRAMES};",
+        "switching_move": rf"TriggL (\[.*\]),{_NAME},{_NAME},{_NAME},{_FRAMES};",
+    }.items()
+}
+_OUTSIDE = {"tool", "work_object", "speed", "zone", "trigger", "routine", "end_module"}
+_IN_MAIN = {"no_supervision", "laser_off", "set_trigger", "call", "end_routine"}
+_IN_ROUTINE = {"joint_move", "linear_move", "switching_move", "end_routine"}
+
+
+class _Reader:
+    """Reads line by line; each kind of line has a method of its name."""
+
+    def __init__(self) -> None:
+        self.line = 0
+        self.name = ""
+        self.routine_name: str | None = None
+        self.ended = False
+        self.frames: dict[str, tuple[str, Array]] = {}
+        self.speeds: dict[str, float] = {}
+        self.zones: dict[str, float] = {"fine": 0.0}
+        self.triggers: dict[str, tuple[bool, float] | None] = {}
+        self.output = ""
+        self.calls: list[str] = []
+        self.routines: dict[str, list[ReadStep]] = {}
+
+    def read(self, number: int, line: str) -> None:
+        self.line = number
+        if _LINES["blank"].fullmatch(line):
+            return
+        if self.ended:
+            raise self.fault("nothing may follow ENDMODULE")
+        if not self.name:
+            expected = {"module"}
+        elif self.routine_name is None:
+            expected = _OUTSIDE
+        else:
+            expected = _IN_MAIN if self.routine_name == "main" else _IN_ROUTINE
+        for kind in expected:
+            if match := _LINES[kind].fullmatch(line):
+                getattr(self, kind)(*match.groups())
+                return
+        raise self.fault(f"not expected here: {line[:60]!r}")
+
+    def program(self) -> ReadProgram:
+        self.line += 1
+        if not self.ended:
+            raise self.fault("ENDMODULE is missing")
+        for kind in ("tool", "work_object"):
+            if kind not in self.frames:
+                raise self.fault(f"the module declares no {kind.replace('_', ' ')}")
+        unknown = set(self.calls) ^ (set(self.routines) - {"main"})
+        if unknown or "main" not in self.routines:
+            raise self.fault(f"main and routines do not match: {', '.join(sorted(unknown))}")
+        return ReadProgram(
+            name=self.name,
+            tool_name=self.frames["tool"][0],
+            T_flange_tip=self.frames["tool"][1],
+            work_object=self.frames["work_object"][0],
+            T_base_part=self.frames["work_object"][1],
+            laser_output=self.output,
+            speeds=self.speeds,
+            zones={name: zone for name, zone in self.zones.items() if name != "fine"},
+            sections=tuple(
+                ReadSection(name=name, steps=tuple(self.routines[name])) for name in self.calls
+            ),
+        )
+
+    def module(self, name: str) -> None:
+        self.name = name
+
+    def end_module(self) -> None:
+        self.ended = True
+
+    def tool(self, name: str, text: str) -> None:
+        held, pose, load = self.values(text, 3)
+        if held is not True or not isinstance(load, list) or len(load) != 6:
+            raise self.fault("expected a tool held by the robot, with its load")
+        self.declare("tool", name, pose)
+
+    def work_object(self, name: str, text: str) -> None:
+        held, fixed, unit, pose, inner = self.values(text, 5)
+        if [held, fixed, unit] != [False, True, ""] or inner != [[0, 0, 0], [1, 0, 0, 0]]:
+            raise self.fault("expected a fixed work object without an object frame")
+        self.declare("work_object", name, pose)
+
+    def declare(self, kind: str, name: str, pose: Any) -> None:
+        if kind in self.frames:
+            raise self.fault(f"a second {kind.replace('_', ' ')}")
+        self.frames[kind] = (name, self.pose(pose))
+
+    def speed(self, name: str, text: str) -> None:
+        speed_mm_s = self.numbers(self.values(text, 4), 4)[0]
+        self.unused(name, self.speeds)
+        self.speeds[name] = float(speed_mm_s) * 1e-3
+
+    def zone(self, name: str, text: str) -> None:
+        stop, *sizes = self.values(text, 7)
+        if stop is not False:
+            raise self.fault("expected a zone to pass through, FALSE first")
+        self.unused(name, self.zones)
+        self.zones[name] = float(self.numbers(sizes, 6)[0]) * 1e-3
+
+    def trigger(self, name: str) -> None:
+        self.unused(name, self.triggers)
+        self.triggers[name] = None
+
+    def routine(self, name: str) -> None:
+        self.unused(name, self.routines)
+        self.routine_name, self.routines[name] = name, []
+
+    def end_routine(self) -> None:
+        self.routine_name = None
+
+    def no_supervision(self) -> None:
+        """Keep nothing: configurations are not supervised along linear moves."""
+
+    def laser_off(self, output: str) -> None:
+        self.require_output(output)
+
+    def set_trigger(self, name: str, lead_time: str, output: str, value: str) -> None:
+        if self.triggers.get(name, (False, 0.0)) is not None:
+            raise self.fault(f"{name} must be declared once and set once")
+        self.require_output(output)
+        self.triggers[name] = value == "1", float(self.numbers([float(lead_time)], 1)[0])
+
+    def require_output(self, output: str) -> None:
+        if self.output not in ("", output):
+            raise self.fault(f"a second output {output}, {self.output} before")
+        self.output = output
+
+    def call(self, name: str) -> None:
+        if name in self.calls:
+            raise self.fault(f"{name} is called twice")
+        self.calls.append(name)
+
+    def joint_move(self, text: str, speed: str, zone: str, tool: str, work_object: str) -> None:
+        axes_deg, external = self.values(text, 2)
+        self.require_frames(tool, work_object, external)
+        self.append(
+            ReadJointMove(
+                axes=freeze(np.radians(self.numbers(axes_deg, 6))),
+                speed=self.named(speed, self.speeds),
+                zone=self.named(zone, self.zones),
+                line=self.line,
+            )
+        )
+
+    def linear_move(self, text: str, speed: str, zone: str, tool: str, work_object: str) -> None:
+        point, wxyz, conf, external = self.values(text, 4)
+        self.require_frames(tool, work_object, external)
+        quarters = self.numbers(conf, 4)
+        if (quarters != np.round(quarters)).any():
+            raise self.fault(f"configuration {conf} must be whole numbers")
+        self.append(
+            ReadLinearMove(
+                T_part_tip=self.pose([point, wxyz]),
+                conf=freeze(quarters.astype(np.int64)),
+                speed=self.named(speed, self.speeds),
+                zone=self.named(zone, self.zones),
+                line=self.line,
+            )
+        )
+
+    def switching_move(
+        self, text: str, speed: str, trigger: str, zone: str, tool: str, work_object: str
+    ) -> None:
+        self.linear_move(text, speed, zone, tool, work_object)
+        switch = self.triggers.get(trigger)
+        if switch is None:
+            raise self.fault(f"{trigger} has not been set")
+        self.append(ReadLaser(on=switch[0], lead_time=switch[1], line=self.line))
+
+    def append(self, step: ReadStep) -> None:
+        assert self.routine_name is not None
+        self.routines[self.routine_name].append(step)
+
+    def require_frames(self, tool: str, work_object: str, external: Any) -> None:
+        known = [self.frames[kind][0] for kind in ("tool", "work_object") if kind in self.frames]
+        if [tool, work_object] != known:
+            raise self.fault(f"tool {tool} and work object {work_object} are not the module's")
+        if external != [9e9] * 6:
+            raise self.fault("external axes are not expected")
+
+    def named(self, name: str, known: dict[str, float]) -> float:
+        if name not in known:
+            raise self.fault(f"{name} is not declared")
+        return known[name]
+
+    def unused(self, name: str, known: dict[str, Any]) -> None:
+        if name in known:
+            raise self.fault(f"{name} is declared twice")
+
+    def values(self, text: str, count: int) -> list[Any]:
+        """Return the `count` parts of an aggregate; RAPID writes it almost as JSON does."""
+        try:
+            values = json.loads(text.replace("TRUE", "true").replace("FALSE", "false"))
+        except json.JSONDecodeError as error:
+            raise self.fault(f"not an aggregate: {error}") from None
+        if not isinstance(values, list) or len(values) != count:
+            raise self.fault(f"expected {count} values, got {text[:60]!r}")
+        return values
+
+    def numbers(self, values: Any, count: int) -> Array:
+        is_list = isinstance(values, list) and len(values) == count
+        if not is_list or any(type(value) not in (int, float) for value in values):
+            raise self.fault(f"expected {count} numbers, got {values!r}")
+        return np.array(values, dtype=np.float64)
+
+    def pose(self, value: Any) -> Array:
+        if not isinstance(value, list) or len(value) != 2:
+            raise self.fault(f"expected a position and a quaternion, got {value!r}")
+        point_mm, wxyz = self.numbers(value[0], 3), self.numbers(value[1], 4)
+        if abs(np.linalg.norm(wxyz) - 1) > UNIT:
+            raise self.fault(f"the quaternion {value[1]} must have length 1")
+        T = np.eye(4)
+        T[:3, :3] = Rotation.from_quat(wxyz, scalar_first=True).as_matrix()
+        T[:3, 3] = point_mm * 1e-3
+        return freeze(T)
+
+    def fault(self, message: str) -> InputError:
+        return InputError(f"line {self.line}: {message}")

@@ -1,0 +1,99 @@
+"""Colours and the common layout of all figures."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from itertools import cycle
+from typing import Any
+
+import plotly.graph_objects as go
+
+__all__ = [
+    "ACCENT",
+    "ALERT",
+    "FAINT",
+    "GRID",
+    "INK",
+    "JOINT_COLOURS",
+    "QUIET",
+    "band",
+    "base_layout",
+    "reason_colours",
+]
+
+INK, QUIET, FAINT, GRID = "#1d2530", "#5b6675", "#98a1ad", "#e6e9ee"
+ACCENT, ALERT = "#0b6b66", "#b3261e"
+
+# Six hues, and a light and a dark shade of each, found by a search that keeps all pairs apart
+# for normal, protan and deutan sight (Machado, Oliveira, Fernandes 2009; CIELAB distance 12).
+JOINT_COLOURS = ("#0061cc", "#f4a918", "#0ea069", "#df5ac2", "#f05d16", "#55bdff")
+_LOW = ("#4089d9", "#fce3b4", "#6bc5a3", "#f6ceed", "#f6a076", "#86d0ff")
+_HIGH = ("#003875", "#be8313", "#09603f", "#c34fa9", "#742d0b", "#2f688d")
+_REASONS = {"admitted": "#eef7ee", "unreachable": "#b4bac4", "posture not wanted": "#d9d4e2"}
+_REASONS |= {f"joint {i + 1} low": colour for i, colour in enumerate(_LOW)}
+_REASONS |= {f"joint {i + 1} high": colour for i, colour in enumerate(_HIGH)}
+_OTHER_REASONS = ("#7a7f88", "#33373e")
+
+FONT = 'system-ui, -apple-system, "Segoe UI", Roboto, "Helvetica Neue", Arial, sans-serif'
+
+
+def reason_colours(reasons: Sequence[str]) -> tuple[str, ...]:
+    """Return one colour per reason: a joint's light shade below its limits, dark above them.
+
+    Reasons without a colour of their own (couplings, low and high) take two greys in turn.
+    """
+    greys = cycle(_OTHER_REASONS)
+    return tuple(_REASONS[word] if word in _REASONS else next(greys) for word in reasons)
+
+
+def base_layout(height: int, **more: Any) -> go.Layout:
+    """Return a calm white layout of `height` px, without plotly's default template."""
+    look: dict[str, Any] = {
+        "template": go.layout.Template(),
+        "height": height,
+        "font": {"family": FONT, "size": 12, "color": INK},
+        "paper_bgcolor": "white",
+        "plot_bgcolor": "white",
+        "margin": {"l": 62, "r": 16, "t": 24, "b": 46},
+        "hoverlabel": {
+            "bgcolor": "white",
+            "bordercolor": FAINT,
+            "font": {"family": FONT, "size": 12, "color": INK},
+        },
+    }
+    return go.Layout(**(look | more))
+
+
+def axis(**more: Any) -> dict[str, Any]:
+    """Return the look of a plot axis."""
+    return {
+        "showgrid": True,
+        "gridcolor": GRID,
+        "zeroline": False,
+        "showline": True,
+        "linecolor": FAINT,
+        "ticks": "outside",
+        "ticklen": 4,
+        "tickcolor": FAINT,
+        "tickfont": {"size": 11, "color": QUIET},
+        "title": {"font": {"size": 12, "color": QUIET}},
+    } | more
+
+
+def axis_title(text: str) -> dict[str, Any]:
+    """Return an axis title."""
+    return {"text": text, "font": {"size": 12, "color": QUIET}, "standoff": 8}
+
+
+def band(x0: float, x1: float, **where: Any) -> dict[str, Any]:
+    """Return a pale vertical band from x0 to x1, below the lines."""
+    return {
+        "type": "rect",
+        "x0": x0,
+        "x1": x1,
+        "y0": 0,
+        "y1": 1,
+        "fillcolor": "#eef2f6",
+        "line": {"width": 0},
+        "layer": "below",
+    } | where

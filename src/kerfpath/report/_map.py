@@ -1,0 +1,284 @@
+"""The feasibility map: node times gamma, one panel per posture, coloured by what became of it."""
+
+from __future__ import annotations
+
+from itertools import product
+
+import numpy as np
+import plotly.graph_objects as go
+
+from kerfpath._arrays import Array
+from kerfpath.graph import LayeredGraph
+from kerfpath.plans import Plan
+from kerfpath.report._look import (
+    ALERT,
+    INK,
+    QUIET,
+    axis,
+    axis_title,
+    base_layout,
+    reason_colours,
+)
+from kerfpath.robots import posture_name
+
+__all__ = ["chosen_line", "feasibility_map", "hidden_postures", "shown_postures"]
+
+ROW, GAP, TOP, BOTTOM = 150, 34, 48, 50
+"""Height of a panel, of the space between two, and of the margins (the upper with buttons), px."""
+
+ADMITTED = 0
+"""The reason code of a candidate that is not dropped, see `LayeredGraph`."""
+
+
+def feasibility_map(
+    graph: LayeredGraph,
+    plan: Plan | None = None,
+    *,
+    s: Array | None = None,
+    broken_at: int | None = None,
+) -> go.Figure:
+    """Return the feasibility map of a layered graph, with the chosen gamma drawn on it.
+
+    One panel for each posture that has an admitted candidate; in it one pixel for each node
+    (horizontal) and gamma (vertical), coloured by what became of that candidate. The panels share
+    their axes, so that zooming one zooms all.
+
+    Parameters
+    ----------
+    graph : LayeredGraph
+        Its `reason` is drawn.
+    plan : Plan, optional
+        Its gamma is drawn as a line on the posture in use, broken where the posture changes and
+        where gamma passes from 180 to -180 deg.
+    s : (K,) m, optional
+        Arc length of the nodes, for the hover text; default: the plan's.
+    broken_at : int, optional
+        Node to mark as the first that no admissible path reaches.
+
+    Returns
+    -------
+    plotly.graph_objects.Figure
+        ``layout.meta`` holds `reasons`, `postures` and `s_mm` for hover handlers.
+    """
+    postures = shown_postures(graph)
+    gamma = np.degrees(graph.gamma)
+    step = 360.0 / len(gamma)
+    height = TOP + BOTTOM + len(postures) * ROW + (len(postures) - 1) * GAP
+    figure = go.Figure(layout=base_layout(height, hovermode="closest"))
+    figure.update_layout(margin={"l": 62, "r": 16, "t": TOP, "b": BOTTOM})
+    used = set() if plan is None else {int(mu) for mu in plan.posture}
+    for row, mu in enumerate(postures):
+        _add_axes(figure, row, len(postures), height, len(graph.reason))
+        name = posture_name(mu) + (" (in use)" if mu in used else "")
+        figure.add_annotation(
+            text=name,
+            font={"size": 12, "color": INK if mu in used or plan is None else QUIET},
+            x=0,
+            xref="paper",
+            xanchor="left",
+            y=1,
+            yref=f"{_axis('y', row)} domain",
+            yanchor="bottom",
+            showarrow=False,
+        )
+        figure.add_heatmap(
+            z=np.ascontiguousarray(graph.reason[:, :, mu].T),
+            x0=0,
+            dx=1,
+            y0=float(gamma[0]),
+            dy=step,
+            xaxis=_axis("x", row),
+            yaxis=_axis("y", row),
+            zmin=-0.5,
+            zmax=len(graph.reasons) - 0.5,
+            colorscale=_steps(reason_colours(graph.reasons)),
+            showscale=False,
+            name=posture_name(mu),
+            meta={"posture": posture_name(mu)},
+            hovertemplate="node %{x}<br>gamma %{y:.1f}°<extra>%{meta.posture}</extra>",
+        )
+        if plan is not None and mu in used:
+            _add_choice(figure, plan, mu, row)
+    if broken_at is not None:
+        _mark_break(figure, broken_at, len(postures))
+    _add_legend(figure, graph, postures, has_plan=plan is not None)
+    if s is None and plan is not None:
+        s = plan.contour.s
+    figure.update_layout(
+        meta={
+            "reasons": list(graph.reasons),
+            "postures": [posture_name(mu) for mu in postures],
+            "s_mm": [] if s is None else np.round((s - s[0]) * 1e3, 2).tolist(),
+        }
+    )
+    return figure
+
+
+def shown_postures(graph: LayeredGraph) -> list[int]:
+    """Return the postures with an admitted candidate; if there is none, those worth a look."""
+    every = range(graph.reason.shape[2])
+    admitted = [mu for mu in every if (graph.reason[:, :, mu] == ADMITTED).any()]
+    # Where one reason holds everywhere, a word says as much as a panel.
+    mixed = [mu for mu in every if np.ptp(graph.reason[:, :, mu])]
+    return admitted or mixed or list(every)
+
+
+def hidden_postures(graph: LayeredGraph) -> list[str]:
+    """Say of each posture without a panel why its candidates were dropped."""
+    shown, told = shown_postures(graph), []
+    for mu in range(graph.reason.shape[2]):
+        if mu in shown:
+            continue
+        codes = graph.reason[:, :, mu]
+        number = np.bincount(codes.ravel(), minlength=len(graph.reasons))
+        order = [int(c) for c in np.argsort(-number, kind="stable") if number[c]]
+        if len(order) == 1:
+            why = f"{graph.reasons[order[0]]} everywhere"
+        else:
+            shares = [f"{graph.reasons[c]} {_share(number[c] / codes.size)}" for c in order]
+            why = "no admitted candidate (" + ", ".join(shares) + ")"
+        told.append(f"{posture_name(mu)}: {why}")
+    return told
+
+
+def chosen_line(plan: Plan, posture: int) -> list[tuple[Array, Array]]:
+    """Return the chosen gamma on one posture as unbroken pieces of (node, gamma in deg).
+
+    A piece ends where the posture changes and where gamma wraps from 180 to -180 deg.
+    """
+    wraps = np.abs(np.diff(plan.gamma)) > np.pi
+    nodes = np.flatnonzero(plan.posture == posture)
+    if not nodes.size:
+        return []
+    breaks = (np.diff(nodes) > 1) | wraps[nodes[:-1]]
+    pieces = np.split(nodes, np.flatnonzero(breaks) + 1)
+    return [(piece.astype(float), np.degrees(plan.gamma[piece])) for piece in pieces]
+
+
+def _add_axes(figure: go.Figure, row: int, rows: int, height: int, nodes: int) -> None:
+    inner = height - TOP - BOTTOM
+    top = 1 - row * (ROW + GAP) / inner
+    last = row == rows - 1
+    figure.update_layout(
+        {
+            _axis("xaxis", row): axis(
+                anchor=_axis("y", row),
+                matches=None if row == 0 else "x",
+                range=[-0.5, nodes - 0.5],
+                showticklabels=last,
+                showgrid=False,
+                title=axis_title("node along the contour") if last else None,
+            ),
+            _axis("yaxis", row): axis(
+                anchor=_axis("x", row),
+                matches=None if row == 0 else "y",
+                domain=[max(0.0, top - ROW / inner), min(1.0, top)],
+                range=[-180, 180],
+                tickvals=[-180, -90, 0, 90, 180],
+                ticktext=["\N{MINUS SIGN}180°", "\N{MINUS SIGN}90°", "0°", "90°", "180°"],
+                showgrid=False,
+                title=axis_title("gamma"),
+            ),
+        }
+    )
+
+
+def _add_choice(figure: go.Figure, plan: Plan, posture: int, row: int) -> None:
+    pieces = chosen_line(plan, posture)
+    gap = np.array([np.nan])
+    # NaN only here: it is plotly's sign for a break in a line.
+    x = np.concatenate([part for piece in pieces for part in (piece[0], gap)])[:-1]
+    y = np.concatenate([part for piece in pieces for part in (piece[1], gap)])[:-1]
+    where = {"xaxis": _axis("x", row), "yaxis": _axis("y", row), "showlegend": False}
+    template = "node %{x}<br>gamma %{y:.1f}°<extra>chosen</extra>"
+    for colour, width in (("white", 4.5), (INK, 2)):
+        figure.add_scatter(
+            x=x,
+            y=y,
+            mode="lines",
+            line={"color": colour, "width": width},
+            name="chosen gamma",
+            hoverinfo="skip" if colour == "white" else None,
+            hovertemplate=None if colour == "white" else template,
+            **where,
+        )
+    ends = [(piece[0][i], piece[1][i]) for piece in pieces for i in (0, -1)]
+    figure.add_scatter(
+        x=[end[0] for end in ends],
+        y=[end[1] for end in ends],
+        mode="markers",
+        marker={"color": INK, "size": 6, "line": {"color": "white", "width": 1}},
+        name="chosen gamma",
+        hoverinfo="skip",
+        cliponaxis=False,
+        **where,
+    )
+
+
+def _mark_break(figure: go.Figure, node: int, rows: int) -> None:
+    halo, mark = {"color": "white", "width": 4}, {"color": ALERT, "width": 2, "dash": "dot"}
+    for row, line in product(range(rows), (halo, mark)):
+        figure.add_shape(
+            type="line",
+            x0=node,
+            x1=node,
+            xref=_axis("x", row),
+            y0=0,
+            y1=1,
+            yref=f"{_axis('y', row)} domain",
+            line=line,
+        )
+    figure.add_annotation(
+        text=f"┊ path breaks at node {node}",
+        font={"size": 12, "color": ALERT},
+        x=1,
+        xref="paper",
+        xanchor="right",
+        y=1,
+        yref="y domain",
+        yanchor="bottom",
+        showarrow=False,
+    )
+
+
+def _add_legend(
+    figure: go.Figure, graph: LayeredGraph, postures: list[int], *, has_plan: bool
+) -> None:
+    colours = reason_colours(graph.reasons)
+    for code in np.unique(graph.reason[:, :, postures]):
+        figure.add_scatter(
+            x=[None],
+            y=[None],
+            mode="markers",
+            marker={
+                "symbol": "square",
+                "size": 12,
+                "color": colours[code],
+                "line": {"color": QUIET, "width": 0.5},
+            },
+            name=graph.reasons[code],
+            hoverinfo="skip",
+        )
+    if has_plan:
+        figure.add_scatter(
+            x=[None],
+            y=[None],
+            mode="lines",
+            line={"color": INK, "width": 2},
+            name="chosen gamma",
+            hoverinfo="skip",
+        )
+
+
+def _steps(colours: tuple[str, ...]) -> list[tuple[float, str]]:
+    """Return a colour scale of equal steps, one per reason code."""
+    n = len(colours)
+    return [(edge, c) for i, c in enumerate(colours) for edge in (i / n, (i + 1) / n)]
+
+
+def _axis(kind: str, row: int) -> str:
+    return kind if row == 0 else f"{kind}{row + 1}"
+
+
+def _share(part: float) -> str:
+    return f"{part * 100:.0f} %" if part >= 0.01 else "< 1 %"

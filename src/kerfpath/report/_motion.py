@@ -1,0 +1,231 @@
+"""Joint motion over time: positions within their limits, speeds and accelerations as shares."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import plotly.graph_objects as go
+
+from kerfpath._arrays import Array
+from kerfpath.plans import Plan
+from kerfpath.report._look import (
+    FAINT,
+    INK,
+    JOINT_COLOURS,
+    QUIET,
+    axis,
+    axis_title,
+    band,
+    base_layout,
+)
+from kerfpath.robots import posture_name
+
+__all__ = ["joint_positions", "limit_shares", "posture_runs"]
+
+ROW, GAP, TOP, BOTTOM = 130, 36, 48, 48
+SHARE_ROW, SHARE_TOP = 210, 74
+
+
+def posture_runs(plan: Plan) -> list[tuple[int, int, int]]:
+    """Return the postures in turn as (posture, first node, last node)."""
+    change = np.flatnonzero(np.diff(plan.posture)) + 1
+    firsts = [0, *change.tolist()]
+    lasts = [*(change - 1).tolist(), len(plan.posture) - 1]
+    return [(int(plan.posture[a]), a, b) for a, b in zip(firsts, lasts, strict=True)]
+
+
+def joint_positions(plan: Plan) -> go.Figure:
+    """Return six panels, one per joint: position over time, deg, between its limits."""
+    height = TOP + BOTTOM + 3 * ROW + 2 * GAP
+    figure = go.Figure(layout=base_layout(height, hovermode="x unified", showlegend=False))
+    figure.update_layout(margin={"l": 54, "r": 16, "t": TOP, "b": BOTTOM})
+    _add_posture_bands(figure, plan, panels=6, labelled=range(2))
+    limits = plan.robot.joint_limits()
+    for joint in range(6):
+        row, column = divmod(joint, 2)
+        x, y = _axis("x", joint), _axis("y", joint)
+        top = 1 - row * (ROW + GAP) / (height - TOP - BOTTOM)
+        low, high = np.degrees(limits.lower[joint]), np.degrees(limits.upper[joint])
+        endless = bool(limits.endless[joint])
+        room = 0.08 * (high - low)
+        figure.update_layout(
+            {
+                _axis("xaxis", joint): axis(
+                    anchor=y,
+                    domain=[0, 0.46] if column == 0 else [0.54, 1],
+                    matches=None if joint == 0 else "x",
+                    showticklabels=row == 2,
+                    title=axis_title("time, s") if row == 2 else None,
+                    unifiedhovertitle={"text": "%{x:.3f} s"},
+                ),
+                _axis("yaxis", joint): axis(
+                    anchor=x,
+                    domain=[max(0.0, top - ROW / (height - TOP - BOTTOM)), min(1.0, top)],
+                    ticksuffix="°",
+                    range=None if endless else [low - room, high + room],
+                    nticks=6,
+                ),
+            }
+        )
+        t, q = _without_wraps(plan, joint)
+        figure.add_scatter(
+            x=_short(t),
+            y=_short(q),
+            mode="lines",
+            line={"color": JOINT_COLOURS[joint], "width": 2},
+            name=f"joint {joint + 1}",
+            hovertemplate="%{y:.2f}°",
+            xaxis=x,
+            yaxis=y,
+        )
+        span = "endless" if endless else f"limits {_deg(low)} to {_deg(high)}"
+        figure.add_annotation(
+            text=f"joint {joint + 1} <span style='color:{QUIET}'>· {span}</span>",
+            font={"size": 12, "color": INK},
+            x=0,
+            xref=f"{x} domain",
+            xanchor="left",
+            y=1,
+            yref=f"{y} domain",
+            yanchor="bottom",
+            showarrow=False,
+        )
+        for bound in () if endless else (low, high):
+            figure.add_shape(_level(float(bound), x, y, QUIET, "solid"))
+    return figure
+
+
+def limit_shares(plan: Plan) -> go.Figure:
+    """Return two panels: joint speeds and accelerations over time, % of their limits."""
+    height = SHARE_TOP + BOTTOM + 2 * SHARE_ROW + GAP
+    figure = go.Figure(layout=base_layout(height, hovermode="x unified"))
+    figure.update_layout(
+        margin={"l": 62, "r": 44, "t": SHARE_TOP, "b": BOTTOM},
+        legend={"orientation": "h", "x": 0, "y": 1.03, "yanchor": "bottom", "font": {"size": 12}},
+    )
+    _add_posture_bands(figure, plan, panels=2, labelled=())
+    middle = plan.time[:-1] + plan.dt / 2
+    panels = (
+        ("velocity", middle, plan.velocity_share, plan.settings.eta_v),
+        ("acceleration", plan.time[1:-1], plan.acceleration_share, plan.settings.eta_a),
+    )
+    for row, (what, time, share, eta) in enumerate(panels):
+        x, y = _axis("x", row), _axis("y", row)
+        bottom = 0.0 if row else (SHARE_ROW + GAP) / (2 * SHARE_ROW + GAP)
+        figure.update_layout(
+            {
+                _axis("xaxis", row): axis(
+                    anchor=y,
+                    matches=None if row == 0 else "x",
+                    showticklabels=row == 1,
+                    title=axis_title("time, s") if row else None,
+                    unifiedhovertitle={"text": "%{x:.3f} s"},
+                ),
+                _axis("yaxis", row): axis(
+                    anchor=x,
+                    domain=[bottom, bottom + SHARE_ROW / (2 * SHARE_ROW + GAP)],
+                    ticksuffix=" %",
+                    title=axis_title(f"{what}, % of limit"),
+                    range=_share_range(share),
+                ),
+            }
+        )
+        for joint in range(6):
+            figure.add_scatter(
+                x=_short(time),
+                y=_short(share[:, joint] * 100),
+                mode="lines",
+                line={"color": JOINT_COLOURS[joint], "width": 1.6},
+                name=f"joint {joint + 1}",
+                legendgroup=f"joint {joint + 1}",
+                showlegend=row == 0,
+                hovertemplate="%{y:.1f} %",
+                xaxis=x,
+                yaxis=y,
+            )
+        for sign in (-1, 1):
+            figure.add_shape(_level(100.0 * sign, x, y, INK, "solid"))
+            if eta != 1:
+                figure.add_shape(_level(100.0 * eta * sign, x, y, QUIET, "dash"))
+        if eta != 1:
+            figure.add_annotation(
+                text=f"η {eta * 100:g} %",
+                font={"size": 11, "color": QUIET},
+                x=1,
+                xref=f"{x} domain",
+                xanchor="left",
+                y=100 * eta,
+                yref=y,
+                showarrow=False,
+            )
+    return figure
+
+
+def _add_posture_bands(figure: go.Figure, plan: Plan, *, panels: int, labelled: Any) -> None:
+    """Shade every second run of one posture, and name the runs that are wide enough to read.
+
+    To be called before other shapes are added: later ones lie on top.
+    """
+    runs = posture_runs(plan)
+    if len(runs) == 1:
+        return
+    whole = plan.time[-1] - plan.time[0]
+    for number, (mu, first, last) in enumerate(runs):
+        t0 = plan.time[first] - (plan.dt / 2 if first else 0.0)
+        t1 = plan.time[last] + (plan.dt / 2 if last < len(plan.time) - 1 else 0.0)
+        for panel in range(panels):
+            x, y = _axis("x", panel), _axis("y", panel)
+            if number % 2:
+                figure.add_shape(band(t0, t1, xref=x, yref=f"{y} domain"))
+            if panel in labelled and t1 - t0 > 0.18 * whole:
+                figure.add_annotation(
+                    text=posture_name(mu),
+                    font={"size": 10, "color": QUIET},
+                    x=(t0 + t1) / 2,
+                    xref=x,
+                    y=0.1,
+                    yref=f"{y} domain",
+                    yanchor="bottom",
+                    showarrow=False,
+                )
+
+
+def _without_wraps(plan: Plan, joint: int) -> tuple[Array, Array]:
+    """Return time and position (deg), with a gap where an endless joint passes 180 deg."""
+    q = np.degrees(plan.q[:, joint])
+    wraps = np.flatnonzero((np.abs(np.diff(q)) > 180) & plan.robot.endless[joint]) + 1
+    return np.insert(plan.time, wraps, np.nan), np.insert(q, wraps, np.nan)
+
+
+def _share_range(share: Array) -> list[float]:
+    """Return an axis range, %, that always shows the limit lines."""
+    most = 100 * max(1.0, float(np.abs(share).max(initial=0.0)))
+    return [-1.08 * most, 1.08 * most]
+
+
+def _level(value: float, x: str, y: str, colour: str, dash: str) -> dict[str, Any]:
+    return {
+        "type": "line",
+        "x0": 0,
+        "x1": 1,
+        "xref": f"{x} domain",
+        "y0": value,
+        "y1": value,
+        "yref": y,
+        "line": {"color": colour if dash == "solid" else FAINT, "width": 1, "dash": dash},
+        "layer": "below",
+    }
+
+
+def _short(values: Array) -> Any:
+    """Return `values` in single precision: seven digits are plenty for a screen."""
+    return values.astype(np.float32)
+
+
+def _axis(kind: str, panel: int) -> str:
+    return kind if panel == 0 else f"{kind}{panel + 1}"
+
+
+def _deg(value: float) -> str:
+    return f"{round(float(value), 2):g}°".replace("-", "\N{MINUS SIGN}")

@@ -1,0 +1,261 @@
+"""The HTML page: its skeleton, and the figures packed into it."""
+
+from __future__ import annotations
+
+import base64
+import zlib
+from collections.abc import Sequence
+from html import escape
+from importlib.metadata import version
+from importlib.resources import files
+
+import plotly.graph_objects as go
+from numpy.typing import ArrayLike
+from plotly.offline import get_plotlyjs
+
+from kerfpath.plans import Plan
+from kerfpath.report import _map, _motion, _tables
+from kerfpath.report._scene import scene
+from kerfpath.report._section import ContourSection
+from kerfpath.report._tables import FAIL, PASS, WARN, sign
+from kerfpath.robots import posture_name
+
+__all__ = ["render"]
+
+
+def render(
+    title: str,
+    sections: Sequence[ContourSection],
+    *,
+    mesh: tuple[ArrayLike, ArrayLike] | None = None,
+    facts: Sequence[tuple[str, str]] = (),
+    notes: Sequence[str] = (),
+    job_text: str = "",
+) -> str:
+    """Return the report as one self-contained HTML page; the same input gives the same text.
+
+    Parameters
+    ----------
+    title : str
+        Heading of the page.
+    sections : sequence of ContourSection
+        The contours, in cutting order.
+    mesh : (vertices (V, 3) m, triangles (F, 3)), optional
+        The part, in the part frame.
+    facts : sequence of (what, value)
+        Rows such as ("Robot", "ABB IRB 4600-60/2.05").
+    notes : sequence of str
+        Warnings, shown at the top.
+    job_text : str
+        The job file as read.
+    """
+    figures = _Figures()
+    state, verdict = _verdict(sections)
+    body = [
+        "<header>",
+        '<p class="kind">Cutting plan</p>',
+        f"<h1>{escape(title)}</h1>",
+        f'<p class="verdict {state}">{sign(state, verdict)}</p>',
+        _tables.facts_list(facts),
+        "".join(f'<p class="note"><b>Note</b> {escape(note)}</p>' for note in notes),
+        "</header>",
+        "<section><h2>Part and contours</h2>",
+        '<p class="caption">Part frame, all axes to the same scale. Dot and cone mark start and '
+        "direction; short lines are tool axes, on the side of the nozzle. Drag to turn, scroll to "
+        "zoom.</p>",
+        figures.place(scene(sections, mesh), "scene"),
+        "</section>",
+        "<section><h2>Contours</h2>",
+        _tables.summary_table(sections),
+        "</section>",
+        '<section class="contours"><h2>Contour by contour</h2>',
+        *(_contour(i, section, figures) for i, section in enumerate(sections)),
+        "</section>",
+        _job(job_text),
+        f"<footer>{_origin(sections)}</footer>",
+    ]
+    return _SKELETON.format(
+        title=escape(title),
+        style=_resource("page.css"),
+        body="\n".join(part for part in body if part),
+        data="\n".join(figures.data),
+        plotly=get_plotlyjs(),
+        script=_resource("page.js"),
+    )
+
+
+_SKELETON = """<!DOCTYPE html>
+<html lang="en">
+<head>
+<meta charset="utf-8">
+<meta name="viewport" content="width=device-width, initial-scale=1">
+<meta name="generator" content="kerfpath">
+<title>{title}</title>
+<style>
+{style}</style>
+</head>
+<body>
+<main>
+{body}
+</main>
+{data}
+<script>{plotly}</script>
+<script>
+{script}</script>
+</body>
+</html>
+"""
+
+
+class _Figures:
+    """The figures of a page: each is packed once, and drawn when it first comes into view."""
+
+    def __init__(self) -> None:
+        self.data: list[str] = []
+
+    def place(self, figure: go.Figure, kind: str) -> str:
+        """Pack `figure` and return the element that it is drawn into."""
+        number = len(self.data) + 1
+        # A map of 1500 x 360 x 8 codes has long runs: deflated, a report with many stays small.
+        packed = base64.b64encode(zlib.compress(figure.to_json().encode(), 9)).decode()
+        self.data.append(
+            f'<script type="application/octet-stream" id="figure-{number}">{packed}</script>'
+        )
+        return (
+            f'<div class="figure {kind}" data-figure="figure-{number}" '
+            f'style="min-height:{figure.layout.height}px"></div>'
+        )
+
+
+def _contour(number: int, section: ContourSection, figures: _Figures) -> str:
+    plan = section.plan
+    result = _tables.audit_sign(section) if plan else sign(FAIL, "no feasible path")
+    size = f"{_tables.number(section.path.length * 1e3, 1)} mm, {len(section.path)} nodes"
+    parts = [
+        f'<details id="contour-{number + 1}"{" open" if number == 0 else ""}>',
+        f'<summary><h3>{escape(section.name)}</h3><span class="quiet">{size}</span>'
+        f"{result}</summary>",
+    ]
+    if plan is None:
+        parts.append(_failure(section))
+    else:
+        parts.append(f'<p class="caption">{escape(_in_words(plan))}</p>')
+    parts += _map_part(section, figures)
+    if plan is not None:
+        parts += [
+            "<h4>Joint positions</h4>",
+            f'<p class="caption">{escape(_postures_in_words(plan))}</p>',
+            figures.place(_motion.joint_positions(plan), "positions"),
+            "<h4>Joint velocity and acceleration</h4>",
+            '<p class="caption">As shares of the limits of the joints, from differences of nodes. '
+            f"Solid lines: the limits; dashed: the share η that planning may use "
+            f"(velocity {plan.settings.eta_v * 100:g} %, acceleration "
+            f"{plan.settings.eta_a * 100:g} %).</p>",
+            figures.place(_motion.limit_shares(plan), "shares"),
+            "<h4>Criteria by joint</h4>",
+            _tables.criteria_table(plan),
+            "<h4>Audit</h4>",
+            '<p class="caption">An independent re-check of the plan, with its own kinematics.</p>',
+            _tables.audit_table(section.checks),
+        ]
+    parts += [
+        "<h4>What became of the candidates</h4>",
+        '<p class="caption">A candidate is one gamma in one posture at one node.</p>',
+        _tables.counts_table(section.graph),
+        "</details>",
+    ]
+    return "\n".join(parts)
+
+
+def _map_part(section: ContourSection, figures: _Figures) -> list[str]:
+    graph, plan = section.graph, section.plan
+    figure = _map.feasibility_map(graph, plan, s=section.path.s, broken_at=section.broken_at)
+    # The page has a legend of its own, which wraps, and a hover text that knows the reason.
+    figure.update_layout(showlegend=False)
+    figure.update_traces(hovertemplate=None, hoverinfo="none", selector={"type": "heatmap"})
+    hidden = _map.hidden_postures(graph)
+    others = "".join(f"<li>{escape(text)}</li>" for text in hidden)
+    return [
+        "<h4>Feasibility map</h4>",
+        '<p class="caption">Which rotations gamma about the beam the robot can take at each node, '
+        "one panel per posture (shoulder / elbow / wrist); elsewhere the colour says which limit "
+        "forbids it.</p>",
+        _tables.reason_legend(graph, _map.shown_postures(graph), has_plan=plan is not None),
+        figures.place(figure, "map"),
+        f'<ul class="others">{others}</ul>' if others else "",
+    ]
+
+
+def _failure(section: ContourSection) -> str:
+    where = "" if section.broken_at is None else f" The path breaks at node {section.broken_at}."
+    reason = section.failure or "The search found no admissible path."
+    return (
+        f'<div class="failure">{sign(FAIL, "No feasible path")}<p>{escape(reason)}</p>'
+        f"<p>{escape(where.strip())}</p></div>"
+    )
+
+
+def _in_words(plan: Plan) -> str:
+    s = plan.settings
+    claim = plan.proof.statement
+    return (
+        f"Objective: {s.objective} of {s.metric} distances, method “{s.method}”, "
+        f"cost {plan.cost:.5g}. {claim[:1].upper()}{claim[1:]}."
+    )
+
+
+def _postures_in_words(plan: Plan) -> str:
+    runs = _motion.posture_runs(plan)
+    if len(runs) == 1:
+        return f"Posture {posture_name(runs[0][0])} throughout."
+    told = [f"{posture_name(mu)} (nodes {a} to {b})" for mu, a, b in runs[:6]]
+    more = f", and {len(runs) - 6} more" if len(runs) > 6 else ""
+    return f"{len(runs) - 1} changes of posture, shaded: {', '.join(told)}{more}."
+
+
+def _verdict(sections: Sequence[ContourSection]) -> tuple[str, str]:
+    count = len(sections)
+    contours = "1 contour" if count == 1 else f"{count} contours"
+    unplanned = sum(section.plan is None for section in sections)
+    failed = sum(bool(section.errors) for section in sections)
+    unchecked = sum(not section.checks for section in sections)
+    noted = sum(len(section.warnings) for section in sections)
+    if not count:
+        return WARN, "Nothing was planned"
+    if unplanned:
+        audit = f"; the audit failed for {failed}" if failed else ""
+        return FAIL, f"No feasible path for {unplanned} of {contours}{audit}"
+    if failed:
+        return FAIL, f"Planned, but the audit failed for {failed} of {contours}"
+    whole = "The contour is planned" if count == 1 else f"All {contours} are planned"
+    if unchecked:
+        return WARN, f"{whole}; {unchecked} not audited"
+    if noted:
+        return PASS, f"{whole} and the audit passed, with {noted} to note"
+    return PASS, f"{whole} and the audit passed"
+
+
+def _job(text: str) -> str:
+    if not text:
+        return ""
+    return (
+        "<section><h2>Job</h2><details><summary><h3>Job file as read</h3></summary>"
+        f"<pre>{escape(text)}</pre></details></section>"
+    )
+
+
+def _origin(sections: Sequence[ContourSection]) -> str:
+    told = [f"kerfpath {version('kerfpath')}"]
+    plan = next((section.plan for section in sections if section.plan is not None), None)
+    if plan is not None:
+        told.append(f"robot {plan.robot.id}")
+        source = plan.robot.acceleration_source or "source not stated"
+        told.append(f"joint acceleration limits: {source}")
+        if "geometry_limits_velocity" in plan.robot.sources:
+            limits = plan.robot.sources["geometry_limits_velocity"]
+            told.append(f"geometry, joint and velocity limits: {limits}")
+    return escape(" · ".join(told))
+
+
+def _resource(name: str) -> str:
+    return (files("kerfpath.report") / name).read_text(encoding="utf-8")

@@ -1,0 +1,193 @@
+"""The part and its contours in three dimensions."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from html import escape
+from typing import Any
+
+import numpy as np
+import plotly.graph_objects as go
+from numpy.typing import ArrayLike
+
+from kerfpath._arrays import Array, floats, integers
+from kerfpath.errors import InputError
+from kerfpath.report._look import ACCENT, ALERT, FAINT, GRID, INK, QUIET, base_layout
+from kerfpath.report._section import ContourSection
+
+__all__ = ["scene"]
+
+HEIGHT = 560
+AXES_DRAWN = 48
+"""Tool axes drawn per contour."""
+LABELS = 12
+"""With more contours than this, names only show on hover."""
+
+
+def scene(
+    sections: Sequence[ContourSection], mesh: tuple[ArrayLike, ArrayLike] | None
+) -> go.Figure:
+    """Return the part (if given as a mesh, m) and its contours, in mm, all axes alike."""
+    figure = go.Figure(layout=base_layout(HEIGHT, showlegend=False))
+    corners = [section.path.points * 1e3 for section in sections]
+    if mesh is not None:
+        vertices, triangles = _checked(mesh)
+        corners.append(vertices * 1e3)
+        _add_part(figure, vertices * 1e3, triangles)
+    size = float(np.linalg.norm(np.ptp(np.vstack(corners), axis=0))) if corners else 1.0
+    for section in sections:
+        _add_contour(figure, section, size)
+    figure.update_layout(
+        margin={"l": 0, "r": 0, "t": 0, "b": 0},
+        scene={
+            "aspectmode": "data",
+            "dragmode": "turntable",
+            "camera": _camera(sections),
+            "annotations": _labels(sections) if len(sections) <= LABELS else [],
+            **{f"{a}axis": _axis(a) for a in "xyz"},
+        },
+    )
+    return figure
+
+
+def _add_part(figure: go.Figure, vertices: Array, triangles: Any) -> None:
+    figure.add_mesh3d(
+        **dict(zip("xyz", vertices.T.astype(np.float32), strict=True)),
+        **dict(zip("ijk", triangles.T.astype(np.uint32), strict=True)),
+        color="#e4e7ec",
+        flatshading=False,
+        lighting={
+            "ambient": 0.5,
+            "diffuse": 0.52,
+            "specular": 0.06,
+            "roughness": 0.9,
+            "fresnel": 0.05,
+        },
+        # In the orthographic view the light turns with the camera, and -z is towards the viewer:
+        # a lamp over the left shoulder lights the part however it is turned.
+        lightposition={"x": -2e4, "y": 6e4, "z": -1e5},
+        hoverinfo="skip",
+        name="part",
+    )
+
+
+def _add_contour(figure: go.Figure, section: ContourSection, size: float) -> None:
+    path, name = section.path, escape(section.name)
+    # Lifted towards the nozzle by a hair, or the part's own surface would cover half of the line.
+    points = path.points * 1e3 - path.axes * (0.002 * size)
+    colour = ACCENT if section.plan is not None else ALERT
+    some = np.unique(np.linspace(0, len(path) - 1, min(AXES_DRAWN, len(path))).round().astype(int))
+    feet, tips = points[some], points[some] - path.axes[some] * (0.035 * size)
+    figure.add_scatter3d(
+        **_lines(feet, tips),
+        mode="lines",
+        line={"color": QUIET, "width": 1.5},
+        hoverinfo="skip",
+        name=f"{name}: tool axes",
+    )
+    figure.add_scatter3d(
+        **_xyz(points),
+        mode="lines",
+        line={"color": colour, "width": 6},
+        customdata=np.round((path.s - path.s[0]) * 1e3, 1).astype(np.float32),
+        hovertemplate=(
+            "node %{pointNumber}, %{customdata:.1f} mm<br>"
+            "x %{x:.1f} y %{y:.1f} z %{z:.1f} mm<extra>" + name + "</extra>"
+        ),
+        name=name,
+    )
+    along = points[min(3, len(points) - 1)] - points[0]
+    along = along / np.linalg.norm(along)
+    figure.add_cone(
+        **_xyz(points[:1]),
+        **dict(zip("uvw", along[:, None], strict=True)),
+        anchor="tail",
+        sizemode="raw",
+        sizeref=0.03 * size,
+        colorscale=[[0, INK], [1, INK]],
+        showscale=False,
+        hoverinfo="skip",
+        name=f"{name}: direction",
+    )
+    figure.add_scatter3d(
+        **_xyz(points[:1]),
+        mode="markers",
+        marker={"color": INK, "size": 4},
+        hovertemplate="start<extra>" + name + "</extra>",
+        name=f"{name}: start",
+    )
+    if section.broken_at is not None and 0 <= section.broken_at < len(points):
+        figure.add_scatter3d(
+            **_xyz(points[section.broken_at][None]),
+            mode="markers",
+            marker={"color": ALERT, "size": 6, "symbol": "x"},
+            hovertemplate=f"path breaks at node {section.broken_at}<extra>{name}</extra>",
+            name=f"{name}: break",
+        )
+
+
+def _labels(sections: Sequence[ContourSection]) -> list[dict[str, Any]]:
+    """Name each contour at its start; alternate heights keep neighbouring names apart."""
+    return [
+        {
+            **dict(zip("xyz", (section.path.points[0] * 1e3).tolist(), strict=True)),
+            "text": escape(section.name),
+            "font": {"size": 13, "color": INK},
+            "bgcolor": "rgba(255, 255, 255, 0.8)",
+            "showarrow": True,
+            "arrowhead": 0,
+            "arrowwidth": 1,
+            "arrowcolor": FAINT,
+            "ax": 34,
+            "ay": (-34, 34, -66, 66)[i % 4],
+            "xanchor": "left",
+        }
+        for i, section in enumerate(sections)
+    ]
+
+
+def _camera(sections: Sequence[ContourSection]) -> dict[str, Any]:
+    """Look at the part from the side of the nozzle, a little from above and from the side."""
+    axes = [section.path.axes.mean(axis=0) for section in sections]
+    towards = -np.mean(axes, axis=0) if axes else np.zeros(3)
+    if np.linalg.norm(towards) < 0.3:
+        towards = np.zeros(3)
+    eye = towards / max(1.0, float(np.linalg.norm(towards))) + np.array([0.55, -0.75, 0.45])
+    eye *= 1.85 / float(np.linalg.norm(eye))
+    return {
+        "eye": dict(zip("xyz", np.round(eye, 4).tolist(), strict=True)),
+        "projection": {"type": "orthographic"},
+    }
+
+
+def _axis(name: str) -> dict[str, Any]:
+    return {
+        "title": {"text": f"{name}, mm", "font": {"size": 12, "color": QUIET}},
+        "tickfont": {"size": 10, "color": QUIET},
+        "nticks": 6,
+        "backgroundcolor": "white",
+        "gridcolor": GRID,
+        "zerolinecolor": GRID,
+        "showspikes": False,
+    }
+
+
+def _checked(mesh: tuple[ArrayLike, ArrayLike]) -> tuple[Array, Any]:
+    vertices = floats(mesh[0], "mesh vertices", (None, 3))
+    triangles = integers(mesh[1], "mesh triangles", (None, 3))
+    if triangles.size and not (triangles.min() >= 0 and triangles.max() < len(vertices)):
+        raise InputError(
+            f"mesh triangles: expected indices from 0 to {len(vertices) - 1}, "
+            f"got {triangles.min()} to {triangles.max()}"
+        )
+    return vertices, triangles
+
+
+def _xyz(points: Array) -> dict[str, Any]:
+    return dict(zip("xyz", points.T.astype(np.float32), strict=True))
+
+
+def _lines(starts: Array, ends: Array) -> dict[str, Any]:
+    """Return many separate lines as one trace; NaN is plotly's sign for a break."""
+    breaks = np.full_like(starts, np.nan)
+    return _xyz(np.stack([starts, ends, breaks], axis=1).reshape(-1, 3))

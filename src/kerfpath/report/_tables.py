@@ -1,0 +1,219 @@
+"""The tables of the report, as HTML; every text from outside is escaped here."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from html import escape
+
+import numpy as np
+
+from kerfpath.auditor import Check
+from kerfpath.graph import LayeredGraph
+from kerfpath.plans import Plan
+from kerfpath.report._look import JOINT_COLOURS, reason_colours
+from kerfpath.report._section import ContourSection
+
+__all__ = [
+    "FAIL",
+    "PASS",
+    "WARN",
+    "audit_table",
+    "counts_table",
+    "criteria_table",
+    "facts_list",
+    "number",
+    "reason_legend",
+    "sign",
+    "summary_table",
+]
+
+PASS, FAIL, WARN = "pass", "fail", "warn"
+_SIGNS = {PASS: "✓", FAIL: "✗", WARN: "!"}
+_UNITS = {
+    "m": (1e3, " mm"),
+    "rad": (180.0 / math.pi, "°"),
+    "share": (100.0, " %"),
+    "count": (1.0, ""),
+}
+
+
+def facts_list(facts: Sequence[tuple[str, str]]) -> str:
+    """Return the facts as a definition list."""
+    rows = "".join(
+        f"<div><dt>{escape(what)}</dt><dd>{escape(value)}</dd></div>" for what, value in facts
+    )
+    return f'<dl class="facts">{rows}</dl>' if rows else ""
+
+
+def summary_table(sections: Sequence[ContourSection]) -> str:
+    """Return one row per contour: its size, its cost and how close it comes to the limits."""
+    heads = (
+        ("Contour", ""),
+        ("Length", "mm"),
+        ("Nodes", ""),
+        ("Speed", "m/min"),
+        ("Time", "s"),
+        ("Cost", ""),
+        ("Proof", ""),
+        ("Peak velocity", "% of limit"),
+        ("Peak accel.", "% of limit"),
+        ("Audit", ""),
+    )
+    rows = []
+    for i, section in enumerate(sections):
+        plan, length = section.plan, section.path.length
+        cells = [
+            f'<th scope="row"><a href="#contour-{i + 1}">{escape(section.name)}</a></th>',
+            _td(number(length * 1e3, 1)),
+            _td(str(len(section.path))),
+        ]
+        if plan is None:
+            cells.append(f'<td colspan="7">{sign(FAIL, "no feasible path")}</td>')
+        else:
+            duration, criteria = float(plan.time[-1] - plan.time[0]), plan.criteria
+            cells += [
+                _td(number(length / duration * 60, 2)),
+                _td(number(duration, 2)),
+                _td(f"{plan.cost:.5g}"),
+                f"<td>{'best on this graph' if plan.proof.optimal else 'not proved'}</td>",
+                _td(_peak(criteria.peak_velocity)),
+                _td(_peak(criteria.peak_acceleration)),
+                f"<td>{audit_sign(section)}</td>",
+            ]
+        rows.append(f"<tr>{''.join(cells)}</tr>")
+    return _table(heads, rows, text_columns=(0, 6, 9))
+
+
+def criteria_table(plan: Plan) -> str:
+    """Return the criteria (7) to (9) and the peak shares, joint by joint."""
+    heads = (
+        ("Joint", ""),
+        ("Displacement", "deg"),
+        ("Largest increment", "deg per node"),
+        ("Range", "deg"),
+        ("Peak velocity", "% of limit"),
+        ("Peak acceleration", "% of limit"),
+    )
+    c, rows = plan.criteria, []
+    for i in range(6):
+        values = (
+            number(math.degrees(c.displacement[i]), 1),
+            number(math.degrees(c.largest_increment[i]), 3),
+            number(math.degrees(c.range[i]), 1),
+            number(c.peak_velocity[i] * 100, 1),
+            number(c.peak_acceleration[i] * 100, 1),
+        )
+        head = f'<th scope="row">{_chip(JOINT_COLOURS[i])}joint {i + 1}</th>'
+        rows.append(f"<tr>{head}{''.join(map(_td, values))}</tr>")
+    return _table(heads, rows)
+
+
+def audit_table(checks: Sequence[Check]) -> str:
+    """Return the audit: what was checked, the worst value, what is allowed, where, the verdict."""
+    if not checks:
+        return '<p class="quiet">The audit was not run.</p>'
+    heads = (("Check", ""), ("Worst", ""), ("Allowed", ""), ("At node", ""), ("Result", ""))
+    rows = []
+    for check in checks:
+        state = PASS if check.ok else FAIL if check.level == "error" else WARN
+        # What to do is of interest only where something has to be done.
+        wanted = check.advice and not check.ok
+        advice = f" <small>{escape(check.advice)}</small>" if wanted else ""
+        words = {PASS: "passed", FAIL: "failed", WARN: "warning"}
+        rows.append(
+            f'<tr class="{state}"><th scope="row">{escape(check.title)}{advice}</th>'
+            + _td(_measured(check.value, check.unit))
+            + _td("≤ " + _measured(check.limit, check.unit))
+            + _td(str(check.node) if check.node >= 0 else "&ndash;")
+            + f"<td>{sign(state, words[state])}</td></tr>"
+        )
+    return _table(heads, rows, text_columns=(0, 4))
+
+
+def counts_table(graph: LayeredGraph) -> str:
+    """Return what became of the candidates, in numbers, per cent and as bars."""
+    counts, colours = graph.counts(), reason_colours(graph.reasons)
+    whole, rows = sum(counts.values()), []
+    for word, count in counts.items():
+        share = 100 * count / whole
+        colour = colours[graph.reasons.index(word)]
+        rows.append(
+            f'<tr><th scope="row">{_chip(colour)}{escape(word)}</th>'
+            + _td(f"{count:,}".replace(",", "\N{THIN SPACE}"))
+            + _td(f"{share:.1f} %")
+            + f'<td class="bar"><i style="width:{share:.2f}%;background:{colour}"></i></td></tr>'
+        )
+    return _table((("Candidate", ""), ("Number", ""), ("Share", ""), ("", "")), rows)
+
+
+def reason_legend(graph: LayeredGraph, postures: Sequence[int], *, has_plan: bool) -> str:
+    """Return the legend of the feasibility map: only the reasons that occur in it."""
+    colours = reason_colours(graph.reasons)
+    items = [
+        f"<li>{_chip(colours[code])}{escape(graph.reasons[code])}</li>"
+        for code in np.unique(graph.reason[:, :, list(postures)])
+    ]
+    if has_plan:
+        items.append('<li><i class="line"></i>chosen gamma</li>')
+    return f'<ul class="legend">{"".join(items)}</ul>'
+
+
+def audit_sign(section: ContourSection) -> str:
+    """Return what the audit says of a section, with a sign."""
+    if not section.checks:
+        return sign(WARN, "not audited")
+    if section.errors:
+        return sign(FAIL, f"{len(section.errors)} of {len(section.checks)} failed")
+    if section.warnings:
+        return sign(WARN, f"passed, {len(section.warnings)} to note")
+    return sign(PASS, "passed")
+
+
+def sign(state: str, words: str) -> str:
+    """Return `words` with the sign and colour of `state` (pass, fail or warn)."""
+    return f'<span class="sign {state}"><b>{_SIGNS[state]}</b> {escape(words)}</span>'
+
+
+def number(value: float, digits: int) -> str:
+    """Return `value` with `digits` decimals, in words where it is not finite."""
+    if math.isnan(value):
+        return "not a number"
+    if math.isinf(value):
+        return "∞" if value > 0 else "&minus;∞"
+    return f"{value:.{digits}f}".replace("-", "&minus;")
+
+
+def _measured(value: float, unit: str) -> str:
+    factor, suffix = _UNITS[unit]
+    scaled = value * factor
+    if not math.isfinite(scaled) or unit == "count":
+        return number(scaled, 0) + suffix
+    if scaled and abs(scaled) < 1e-3:
+        return f"{scaled:.1e}".replace("-", "&minus;") + suffix
+    return f"{scaled:.4g}".replace("-", "&minus;") + suffix
+
+
+def _peak(shares: np.ndarray) -> str:
+    return f"{number(float(shares.max()) * 100, 1)} <small>J{int(shares.argmax()) + 1}</small>"
+
+
+def _td(text: str) -> str:
+    return f'<td class="n">{text}</td>'
+
+
+def _chip(colour: str) -> str:
+    return f'<i class="chip" style="background:{colour}"></i>'
+
+
+def _table(
+    heads: Sequence[tuple[str, str]], rows: Sequence[str], text_columns: Sequence[int] = (0,)
+) -> str:
+    """Return a table; `heads` are pairs of title and unit, all but `text_columns` flush right."""
+    head = ""
+    for i, (title, unit) in enumerate(heads):
+        side = "" if i in text_columns else ' class="n"'
+        small = f" <small>{unit}</small>" if unit else ""
+        head += f'<th{side} scope="col">{title}{small}</th>'
+    inner = f"<thead><tr>{head}</tr></thead><tbody>{''.join(rows)}</tbody>"
+    return f'<div class="table"><table>{inner}</table></div>'

@@ -1,0 +1,85 @@
+"use strict";
+// Figures are stored deflated; each is unpacked and drawn when its section is first opened.
+const CONFIG = {
+  responsive: true,
+  displaylogo: false,
+  modeBarButtonsToRemove: ["lasso2d", "select2d"],
+  // plotly's "Share chart" button would send the customer's data to plotly's servers.
+  showSendToCloud: false,
+  plotlyServerURL: "",
+};
+const PAPER = { width: 700, height: 620 }; // px, on A4 and Letter, below a heading
+
+async function unpacked(id) {
+  const bytes = Uint8Array.from(atob(document.getElementById(id).textContent), (c) => c.charCodeAt(0));
+  const stream = new Blob([bytes]).stream().pipeThrough(new DecompressionStream("deflate"));
+  return JSON.parse(await new Response(stream).text());
+}
+
+async function draw(element) {
+  if (element.dataset.state) return;
+  element.dataset.state = "drawing";
+  try {
+    const figure = await unpacked(element.dataset.figure);
+    await Plotly.newPlot(element, figure.data, figure.layout, CONFIG);
+    if (element.classList.contains("map")) explain(element);
+    element.dataset.state = "drawn";
+  } catch (error) {
+    element.dataset.state = "failed";
+    const note = document.createElement("p");
+    note.className = "trouble";
+    const old = typeof DecompressionStream === "undefined";
+    note.textContent = `This figure could not be drawn: ${old ? "it needs a browser from 2023 or newer" : error}.`;
+    element.replaceChildren(note);
+  }
+}
+
+// Words for the pixel under the pointer: a text per pixel would make the file many times larger.
+function explain(element) {
+  const { reasons, s_mm } = element.layout.meta;
+  element.on("plotly_hover", ({ points: [point], event }) => {
+    if (point.data.type !== "heatmap") return;
+    const node = Math.round(point.x);
+    const s = s_mm.length ? `, ${s_mm[node].toFixed(1)} mm` : "";
+    const tip = document.getElementById("tip") || document.body.appendChild(document.createElement("div"));
+    tip.id = "tip";
+    tip.innerHTML = "<b></b><span></span>";
+    tip.firstChild.textContent = reasons[point.z];
+    tip.lastChild.textContent = `node ${node}${s}, gamma ${point.y.toFixed(1)}°, ${point.data.meta.posture}`;
+    const left = Math.min(event.clientX + 14, window.innerWidth - tip.offsetWidth - 8);
+    tip.style.left = `${left}px`;
+    tip.style.top = `${event.clientY + 16}px`;
+  });
+  element.on("plotly_unhover", () => document.getElementById("tip")?.remove());
+}
+
+function drawIn(root) {
+  root.querySelectorAll("[data-figure]").forEach((element) => {
+    const section = element.closest("details");
+    if (!section || section.open) draw(element);
+  });
+}
+
+function openTarget() {
+  const target = location.hash && document.getElementById(location.hash.slice(1));
+  if (target && target.tagName === "DETAILS") target.open = true;
+}
+
+document.querySelectorAll("details").forEach((section) => {
+  section.addEventListener("toggle", () => section.open && drawIn(section));
+});
+window.addEventListener("hashchange", openTarget);
+// What is open is printed, at the width of the paper and no higher than a page.
+window.addEventListener("beforeprint", () => {
+  for (const plot of document.querySelectorAll(".js-plotly-plot")) {
+    plot.dataset.height ??= plot.layout.height;
+    Plotly.relayout(plot, { width: PAPER.width, height: Math.min(plot.dataset.height, PAPER.height) });
+  }
+});
+window.addEventListener("afterprint", () => {
+  for (const plot of document.querySelectorAll(".js-plotly-plot")) {
+    Plotly.relayout(plot, { width: null, height: Number(plot.dataset.height), autosize: true });
+  }
+});
+openTarget();
+drawIn(document);

@@ -1,0 +1,484 @@
+"""The job file: what it means, and one clear line for everything that can be wrong with it."""
+
+import json
+import re
+
+import numpy as np
+import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+
+from kerfpath.contour import Contour
+from kerfpath.errors import InputError
+from kerfpath.job import read_job
+from kerfpath.job._heads import heads, pose
+from kerfpath.job._lines import Places
+from kerfpath.robots import acceleration_ratios, robot
+
+# Every test of a line number counts from the first line here.
+JOB = """\
+[robot]
+model = "abb_irb4600_60_205"
+endless = [4, 6]
+acceleration_deg_s2 = [320, 270, 420, 1300, 1400, 2000]
+[tool]
+head = "laser-head-straight"
+[part]
+file = "b_pillar.step"
+xyz_mm = [1450, -600, 450]
+rpy_deg = [0, 0, 90]
+[[contour]]
+pick = "trim"
+speed_m_min = 9
+spacing_mm = 2
+[plan]
+gamma_step_deg = 1
+objective = "sum"
+metric = "manhattan"
+eta_velocity = 0.95
+eta_acceleration = 0.9
+[program]
+language = "rapid"
+"""
+ACCELERATION = "acceleration_deg_s2 = [320, 270, 420, 1300, 1400, 2000]"
+HEAD = 'head = "laser-head-straight"'
+
+
+@pytest.fixture(scope="session")
+def folder(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("jobs")
+    (folder / "b_pillar.step").write_text("a made-up part")
+    return folder
+
+
+@pytest.fixture
+def read(folder):
+    def read(text, name="job.toml"):
+        path = folder / name
+        path.write_bytes(text if isinstance(text, bytes) else text.encode())
+        return read_job(path)
+
+    return read
+
+
+def changed(old, new):
+    assert JOB.count(old) >= 1
+    return JOB.replace(old, new, 1)
+
+
+def test_the_example_is_read_into_si(read, folder):
+    job = read(JOB)
+    assert job.path == folder / "job.toml"
+    assert job.part_file == folder / "b_pillar.step"
+    assert job.part_unit is None
+    assert job.robot.id == "abb_irb4600_60_205"
+    assert job.robot.endless.tolist() == [False, False, False, True, False, True]
+    np.testing.assert_allclose(
+        np.degrees(job.robot.acceleration), [320, 270, 420, 1300, 1400, 2000], rtol=1e-14
+    )
+    np.testing.assert_allclose(job.tool, pose([0, 0, 350], [0, 0, 0]))
+    expected = [[0, -1, 0, 1.45], [1, 0, 0, -0.6], [0, 0, 1, 0.45], [0, 0, 0, 1]]
+    np.testing.assert_allclose(job.placement, expected, atol=1e-15)
+    (task,) = job.contours
+    assert (task.pick, task.name, task.speed, task.spacing) == ("trim", "trim", 0.15, 0.002)
+    assert (task.count, task.tolerance, task.axis_tolerance) == (None, None, None)
+    assert job.plan_options == {
+        "gamma_step": np.pi / 180,
+        "frames": "rotation-minimising",
+        "method": "paper",
+        "objective": "sum",
+        "metric": "manhattan",
+        "weights": None,
+        "eta_v": 0.95,
+        "eta_a": 0.9,
+    }
+    assert json.loads(json.dumps(job.source)) == job.source
+    assert job.source["contour"][0] == {"pick": "trim", "speed_m_min": 9, "spacing_mm": 2}
+
+
+def test_plan_and_program_may_be_left_out(read):
+    job = read(JOB[: JOB.index("[plan]")], "9 side-panel.toml")
+    assert job.plan_options["gamma_step"] == np.pi / 180
+    assert (job.plan_options["eta_v"], job.plan_options["eta_a"]) == (1, 1)
+    program = job.program
+    assert (program.language, program.name) == ("rapid", "job_9_side_panel")
+    assert (program.retract, program.zone, program.lead_time) == (0.05, 0.0003, 0.02)
+    assert (program.laser_output, program.work_object) == ("doLaser", "wPart")
+    assert program.tool_name == "tLaser"
+
+
+def test_the_plan_options_are_what_the_planner_takes(read):
+    import inspect
+
+    from kerfpath.planner import plan
+
+    assert set(read(JOB).plan_options) <= set(inspect.signature(plan).parameters)
+
+
+def test_limits_of_the_job_replace_those_of_the_library(read):
+    job = read(changed("endless = [4, 6]", "endless = []\nvelocity_deg_s = [1, 2, 3, 4, 5, 6]"))
+    assert not job.robot.endless.any()
+    np.testing.assert_allclose(np.degrees(job.robot.velocity), [1, 2, 3, 4, 5, 6])
+    np.testing.assert_array_equal(job.robot.lower, robot(job.robot.id).lower)
+
+
+def test_a_ratio_gives_accelerations_from_the_speeds_of_the_job(read):
+    name = "iontec_20_to_70kg"
+    job = read(changed(ACCELERATION, f'acceleration_ratio = "{name}"'))
+    np.testing.assert_allclose(
+        job.robot.acceleration, job.robot.velocity * acceleration_ratios()[name]
+    )
+    assert name in job.robot.acceleration_source
+
+
+def test_a_robot_without_limits_can_be_given_them(read):
+    bare = changed("abb_irb4600_60_205", "kuka_kr120_r2500_pro")
+    with pytest.raises(InputError, match=r"robot\.lower_deg: .*data sheet"):
+        read(bare)
+    limits = (
+        "lower_deg = [-185, -140, -120, -350, -125, -350]\n"
+        "upper_deg = [185, -5, 155, 350, 125, 350]\n"
+        "velocity_deg_s = [136, 130, 120, 292, 258, 284]\n[tool]"
+    )
+    assert read(bare.replace("[tool]", limits)).robot.joint_limits().upper[1] < 0
+
+
+def test_angles_turn_about_fixed_axes_as_in_urdf():
+    def turn(axis, angle):
+        R, i, j = np.eye(3), (axis + 1) % 3, (axis + 2) % 3
+        R[i, i] = R[j, j] = np.cos(angle)
+        R[j, i], R[i, j] = np.sin(angle), -np.sin(angle)
+        return R
+
+    roll, pitch, yaw = np.radians([10, 20, 30])
+    T = pose([1, 2, 3], [10, 20, 30])
+    np.testing.assert_allclose(T[:3, :3], turn(2, yaw) @ turn(1, pitch) @ turn(0, roll), atol=1e-15)
+    np.testing.assert_allclose(T[:3, 3], [0.001, 0.002, 0.003])
+
+
+def test_the_heads_point_their_beam_where_their_names_say():
+    beams = {name: pose(*head)[:3, 2] for name, head in heads().items()}
+    half = np.sqrt(0.5)
+    np.testing.assert_allclose(beams["laser-head-straight"], [0, 0, 1], atol=1e-15)
+    np.testing.assert_allclose(beams["laser-head-45"], [half, 0, half], atol=1e-15)
+    np.testing.assert_allclose(beams["laser-head-90"], [1, 0, 0], atol=1e-15)
+
+
+def test_a_tool_can_be_given_by_its_tip(read):
+    tip = "xyz_mm = [10, 20, 30]\nrpy_deg = [0, 90, 0]"
+    T = read(changed(HEAD, tip)).tool
+    np.testing.assert_allclose(T[:3, 2:], [[1, 0.01], [0, 0.02], [0, 0.03]], atol=1e-15)
+
+
+def test_a_task_samples_and_names_its_contour(read, circle):
+    lines = {
+        "spacing_mm = 2": None,
+        "count = 50": 50,
+        "tolerance_mm = 0.05": None,
+        "tolerance_mm = 1\naxis_tolerance_deg = 1": None,
+    }
+    for line, count in lines.items():
+        (task,) = read(changed("spacing_mm = 2", f'name = "rim"\n{line}')).contours
+        sampled = task.sample(circle)
+        assert isinstance(sampled, Contour)
+        assert (sampled.name, sampled.closed) == ("rim", True)
+        assert count in (None, len(sampled))
+        if task.spacing:
+            assert np.diff(sampled.s).max() <= 0.002
+
+
+def test_a_spacing_that_no_memory_holds_is_refused(read, circle):
+    (task,) = read(changed("spacing_mm = 2", "spacing_mm = 1e-9")).contours
+    with pytest.raises(InputError, match="raise spacing_mm"):
+        task.sample(circle)
+
+
+# What is changed, into what, the line, and what the message says.
+FAULTS = [
+    # keys
+    ("model =", "modle =", 2, "robot.modle: expected a key of .robot., .*nearest: model"),
+    ("[tool]", "[tol]", 5, "tol: expected a known table, .*nearest: tool .and 1 more"),
+    ("speed_m_min", "speed_mm_min", 13, "contour.speed_mm_min: .*nearest: speed_m_min"),
+    ('model = "abb_irb4600_60_205"', "", 1, "robot.model: .*got nothing; add, .*model = "),
+    ("speed_m_min = 9", "", 11, "contour.speed_m_min: .*got nothing"),
+    ("rpy_deg = [0, 0, 90]", "", 7, "part.rpy_deg: .*got nothing"),
+    ("[tool]\n" + HEAD, "", 1, r"tool: expected a table \[tool\], got none"),
+    ("[[contour]]", "[contour]", 11, r"contour: .*write it as \[\[contour\]\]"),
+    ("[plan]", "[other.plan]", 15, "other: expected a known table"),
+    # robot
+    ("abb_irb4600_60_205", "abb_irb4600", 2, "robot.model: .*nearest: abb_irb4600_20_250"),
+    ("[4, 6]", "[4, 7]", 3, "robot.endless: .* from 1 to 6.* got 7 as number 2"),
+    ("[4, 6]", "[4, 4]", 3, "robot.endless: expected each axis once"),
+    ("[4, 6]", "4", 3, "robot.endless: .*got 4;"),
+    (ACCELERATION, "", 1, "robot.acceleration_deg_s2: .*ratio = .iontec_20_to_70kg"),
+    ("1300, ", "", 4, "robot.acceleration_deg_s2: expected 6 numbers"),
+    ("1300", "true", 4, "got true as number 4"),
+    ("1300", '"1300"', 4, 'got "1300" as number 4'),
+    ("1300", "nan", 4, "got nan as number 4"),
+    ("1300", "-inf", 4, "got -inf as number 4"),
+    ("1300", "0", 4, "above 0.*got 0 as number 4"),
+    ("1300", "1e9", 4, r"at most 1e\+06, got 1000000000.0"),
+    ("1300,", "\n\n-1300,\n", 6, "got -1300 as number 4"),
+    ("endless", 'acceleration_ratio = "iontec_20_to_70kg"\nendless', 3, "got both; remove one"),
+    (ACCELERATION, 'acceleration_ratio = "iontec"', 4, "nearest: iontec_20_to_70kg"),
+    ("endless", "lower_deg = [0, 0, 0, 0, 200, 0]\nendless", 3, "lower_deg: .*joint 5"),
+    ("endless", "upper_deg = [0, -90, 1, 1, 1, 1]\nendless", 3, "upper_deg: .*joint 2"),
+    # tool
+    ("laser-head-straight", "laser-head-30", 6, "tool.head: .*nearest: laser-head"),
+    (HEAD, "", 5, "tool.head: expected a cutting head, got none; add head .laser-head-"),
+    (HEAD, HEAD + "\nrpy_deg = [0, 0, 0]", 7, "tool.rpy_deg: expected head alone, got both"),
+    (HEAD, "xyz_mm = [0, 0, 1]", 5, "tool.rpy_deg: expected rpy_deg together with xyz_mm"),
+    (HEAD, "xyz_mm = [0, 1]\nrpy_deg = [0, 0, 0]", 6, r"tool.xyz_mm: .* got \[0, 1\]"),
+    # part
+    ("b_pillar.step", "c_pillar.step", 8, 'part.file: .* got "c_pillar.step"; it is not in'),
+    ("b_pillar.step", ".", 8, "part.file: .*it is not a file"),
+    ("b_pillar.step", "a\\u0000b", 8, "part.file: .*it is not in"),
+    ("b_pillar.step", "x" * 5000, 8, "part.file: .*it is not in"),
+    ("b_pillar.step", "", 8, "part.file: .*the path of the part's CAD file"),
+    ("xyz_mm", 'unit = "foot"\nxyz_mm', 9, "part.unit: expected 'mm', 'cm', 'm' or 'in'"),
+    ("[0, 0, 90]", "{ yaw = 90 }", 10, "part.rpy_deg: .*got a table"),
+    # contour
+    ('"trim"', "3", 12, "contour.pick: .*got 3"),
+    ('"trim"', '""', 12, "contour.pick: "),
+    ('"trim"', '"a\\nb"', 12, "contour.pick: "),
+    ("= 9", "= -9", 13, "contour.speed_m_min: .*above 0.*got -9"),
+    ("= 9", "= 1e-30", 13, "contour.speed_m_min: .*at least 1e-09"),
+    ("= 9", "= 2026-09-01", 13, "got 2026-09-01"),
+    ("= 9", "= 0x" + "f" * 6000, 13, "more than 20 digits"),
+    ("spacing_mm = 2", "", 11, "expected one of spacing_mm, count and tolerance_mm, got none"),
+    ("spacing_mm = 2", "spacing_mm = 2\ncount = 9", 15, "got spacing_mm and count; keep one"),
+    ("spacing_mm = 2", "count = 1", 14, "contour.count: expected a whole number"),
+    ("spacing_mm = 2", "count = 20.0", 14, "contour.count: expected a whole number"),
+    ("spacing_mm = 2", "count = 9\naxis_tolerance_deg = 1", 15, "only with tolerance_mm"),
+    (
+        "[plan]",
+        '[[contour]]\npick = "trim"\nspeed_m_min = 1\ncount = 3\n[plan]',
+        16,
+        "contour.pick: expected a name that no other contour has",
+    ),
+    (
+        "[plan]",
+        '[[contour]]\npick = "a"\nname = "trim"\nspeed_m_min = 1\ncount = 3\n[plan]',
+        17,
+        "contour.name: expected a name that no other contour has",
+    ),
+    ("[plan]", '[[contour]]\npick = "b"\nspeed_m_min = 0\ncount = 3\n[plan]', 17, "got 0;"),
+    # plan and program
+    ("gamma_step_deg = 1", "gamma_step_deg = 361", 16, "at most 360"),
+    ("gamma_step_deg = 1", "gamma_step_deg = 0", 16, "above 0"),
+    ('"sum"', '"mean"', 17, "plan.objective: expected 'sum' or 'max', got \"mean\""),
+    ("0.95", "1.5", 19, "plan.eta_velocity: .*at most 1"),
+    ("[program]", "weights = [1, 1, 1, 1, 1, -1]\n[program]", 21, "got -1 as number 6"),
+    ('"rapid"', '"cobol"', 22, "program.language: expected 'rapid'"),
+    ("language", 'work_object = "w part"\nlanguage', 22, "program.work_object: .*letters, digits"),
+    ("language", "retract_mm = 0\nlanguage", 22, "program.retract_mm: expected a number above 0"),
+    # not TOML
+    ("= 9", "= nine", 13, r"not valid TOML: Invalid value \(at line 13, column 15\)"),
+    ("spacing_mm = 2", "speed_m_min = 2", 14, "not valid TOML: Cannot overwrite a value"),
+    ('"rapid"\n', '"""rapid\n', 22, "not valid TOML: .*end of document"),
+]
+
+
+@pytest.mark.parametrize(("old", "new", "line", "message"), FAULTS)
+def test_a_fault_is_told_with_its_line(read, folder, old, new, line, message):
+    with pytest.raises(InputError, match=message) as told:
+        read(changed(old, new))
+    text = str(told.value)
+    assert text.startswith(f"{folder / 'job.toml'}:{line}: ")
+    assert one_line(text)
+
+
+def one_line(text):
+    return text.isprintable() and len(text) < 1000
+
+
+def test_line_numbers_hold_with_windows_line_ends_and_byte_order_mark(read):
+    text = "\ufeff" + changed("= 9", "= -9").replace("\n", "\r\n")
+    with pytest.raises(InputError, match=r"job\.toml:13: contour\.speed_m_min"):
+        read(text)
+    assert read("\ufeff" + JOB.replace("\n", "\r\n")).contours[0].speed == 0.15
+
+
+def test_a_nested_fault_is_found_in_inline_and_dotted_tables(read):
+    text = """\
+contour = [
+  { pick = "a", speed_m_min = 1, count = 9 },
+  { pick = "b", speed_m_min = 1, count = 9.5 },
+]
+tool.head = "laser-head-90"
+part.file = "b_pillar.step"
+part . xyz_mm = [
+  0,
+  0,
+  nan ]
+part.'rpy_deg' = [0, 0, 0]
+[robot]
+model = "abb_irb4600_60_205"
+acceleration_ratio = "iontec_20_to_70kg"
+"""
+    with pytest.raises(InputError, match=r":3: contour\.count: .* \(and 1 more\)$"):
+        read(text)
+    with pytest.raises(InputError, match=r":10: part\.xyz_mm: .* got nan as number 3; [^(]*$"):
+        read(text.replace("9.5", "9"))
+    assert len(read(text.replace("9.5", "9").replace("nan", "1")).contours) == 2
+
+
+@pytest.mark.parametrize(
+    ("raw", "message"),
+    [
+        (b"", r":1: expected \[robot\], .* got an empty file"),
+        (b"# only this\n\n", r":1: expected \[robot\], .* got an empty file"),
+        (b"[robot]\nmodel = '\xff'\n", ":2: expected UTF-8 text, got the byte 0xff"),
+        (JOB.encode("utf-16"), ":1: expected UTF-8 text"),
+        (b"a = " + b"9" * 6000, "an integer is too long"),
+        (b"a = " + b"[" * 3000 + b"]" * 3000, "nested too deeply"),
+    ],
+)
+def test_a_file_that_is_no_job_at_all_is_refused(read, raw, message):
+    with pytest.raises(InputError, match=message) as told:
+        read(raw)
+    assert one_line(str(told.value))
+
+
+@pytest.mark.parametrize(
+    ("name", "message"),
+    [
+        ("", "got a folder"),
+        ("missing.toml", "no such file"),
+        ("b_pillar.step/job.toml", "cannot be read"),
+        ("x" * 300, "cannot be read"),
+        ("a\0b\n", "cannot be read"),
+    ],
+)
+def test_a_path_without_a_job_is_refused(folder, name, message):
+    with pytest.raises(InputError, match=message) as told:
+        read_job(folder / name)
+    assert one_line(str(told.value))
+
+
+def test_places_are_found_however_the_document_is_written():
+    text = """\
+top."x y".'z' = [1, [2, 3], # note
+  4]
+[a.b]
+c = 1
+[a]
+d = {e.f = 1, g = [{h=1}]}
+[[t]]
+k = 1
+[t.sub]
+m = 1
+[[t]]
+  k = 1
+[[t.inner]]
+[[t.inner]]
+"\\u00e9" = {"é1" = 0, n = 0}
+"""
+    places = Places(text)
+    found = {
+        (): (1, 1),
+        ("top", "x y", "z", 1, 1): (1, 25),
+        ("top", "x y", "z", 2): (2, 3),
+        ("a",): (5, 1),
+        ("a", "b", "c"): (4, 1),
+        ("a", "d", "e", "f"): (6, 6),
+        ("a", "d", "g", 0, "h"): (6, 21),
+        ("t", 0, "k"): (8, 1),
+        ("t", 0, "sub", "m"): (10, 1),
+        ("t", 1, "k"): (12, 3),
+        ("t", 1, "inner", 1): (14, 1),
+        ("t", 1, "inner", 1, "é", "é1"): (15, 13),
+        ("t", 1, "inner", 1, "é", "n"): (15, 23),
+        # what is missing is where it should be
+        ("a", "b", "nothing"): (3, 1),
+        ("t", 0, "nothing"): (7, 1),
+        ("t", 7): (7, 1),
+        ("nothing", "at all"): (1, 1),
+    }
+    for where, position in found.items():
+        assert tuple(places.locate(where)) == position, where
+
+
+MODEST = settings(
+    derandomize=True,
+    max_examples=150,
+    deadline=None,
+    suppress_health_check=[HealthCheck.function_scoped_fixture],
+)
+LINES = JOB.splitlines()
+KEYS = sorted({line.split(" = ")[0] for line in LINES if " = " in line})
+SCALARS = st.one_of(
+    st.integers(),
+    st.integers(1, 9).map(lambda n: n * 1e-320),
+    st.floats().map(repr),
+    st.booleans().map(lambda b: str(b).lower()),
+    st.text().map(lambda s: json.dumps(s, ensure_ascii=True)),
+    st.sampled_from(["2026-01-01", "07:32:00", "1979-05-27T07:32:00Z", "0xff", "'''\n'''", "{}"]),
+).map(str)
+VALUES = st.recursive(
+    SCALARS,
+    lambda inner: st.one_of(
+        st.lists(inner, max_size=7).map(lambda v: f"[{', '.join(v)}]"),
+        inner.map(lambda v: f"{{ a = {v} }}"),
+    ),
+    max_leaves=8,
+)
+
+
+def is_a_job_or_one_clear_line(folder, raw):
+    path = folder / "mutated.toml"
+    path.write_bytes(raw)
+    try:
+        read_job(path)
+    except InputError as error:
+        text = str(error)
+        assert one_line(text), text
+        at = re.match(rf"{re.escape(str(path))}(?::(\d+))?: ", text)
+        assert at, text
+        assert 1 <= int(at[1] or 1) <= raw.count(b"\n") + 1
+
+
+@MODEST
+@given(gone=st.sets(st.integers(0, len(LINES) - 1), min_size=1, max_size=12))
+def test_deleted_lines_are_survived(folder, gone):
+    kept = [line for i, line in enumerate(LINES) if i not in gone]
+    is_a_job_or_one_clear_line(folder, "\n".join(kept).encode())
+
+
+@MODEST
+@given(order=st.permutations(LINES))
+def test_shuffled_lines_are_survived(folder, order):
+    is_a_job_or_one_clear_line(folder, "\n".join(order).encode())
+
+
+@MODEST
+@given(i=st.integers(0, len(LINES) - 1), j=st.integers(0, len(LINES) - 1))
+def test_swapped_values_are_survived(folder, i, j):
+    lines = [line.partition("=") for line in LINES]
+    (a, is_a, x), (b, is_b, y) = lines[i], lines[j]
+    lines[i], lines[j] = (a, is_a, y), (b, is_b, x)
+    is_a_job_or_one_clear_line(folder, "\n".join("".join(line) for line in lines).encode())
+
+
+@MODEST
+@given(changes=st.dictionaries(st.integers(0, len(LINES) - 1), VALUES, min_size=1, max_size=3))
+def test_random_values_are_survived(folder, changes):
+    lines = list(LINES)
+    for i, value in changes.items():
+        lines[i] = f"{lines[i].partition('=')[0]}= {value}" if "=" in lines[i] else lines[i]
+    is_a_job_or_one_clear_line(folder, "\n".join(lines).encode())
+
+
+@MODEST
+@given(i=st.integers(0, len(LINES)), key=st.sampled_from(KEYS) | st.text(), value=VALUES)
+def test_random_keys_are_survived(folder, i, key, value):
+    line = f"{json.dumps(key)} = {value}"
+    is_a_job_or_one_clear_line(folder, "\n".join([*LINES[:i], line, *LINES[i:]]).encode())
+
+
+@MODEST
+@given(at=st.integers(0, len(JOB)), inserted=st.binary(max_size=20), cut=st.integers(0, 20))
+def test_random_bytes_are_survived(folder, at, inserted, cut):
+    raw = JOB.encode()
+    is_a_job_or_one_clear_line(folder, raw[:at] + inserted + raw[at + cut :])
+    is_a_job_or_one_clear_line(folder, inserted)

@@ -1,0 +1,523 @@
+"""The neutral program, its preflight, the RAPID formatter, and the reader that checks it."""
+
+import re
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from scipy.spatial.transform import Rotation
+
+from kerfpath import Contour, InputError, plan, robot
+from kerfpath.plans import Plan, Proof, Settings
+from kerfpath.post import (
+    LANGUAGES,
+    Comment,
+    JointMove,
+    LaserOff,
+    LaserOn,
+    LinearMove,
+    Section,
+    axes_from_joints,
+    build_program,
+    confdata,
+    joints_from_axes,
+    post,
+    preflight,
+    rapid,
+    read_rapid,
+    write_program,
+)
+from kerfpath.post._rapid_reader import ReadJointMove, ReadLaser, ReadLinearMove
+
+GOLDEN = Path(__file__).parent / "data" / "golden_rapid.mod"
+STEEP = np.radians(20.0)
+
+
+def hand_plan(contour, arm, tool, placement, speed=0.1, posture=0):
+    """A plan at gamma 0, each node solved next to the one before; no search that might change."""
+    T = placement @ contour.frames() @ np.linalg.inv(tool)
+    q = []
+    for k, pose in enumerate(T):
+        found = arm.inverse(pose)
+        near = found.q[found.posture == posture]
+        before = q[-1] if q else np.radians([0, 0, 0, 0, 45, 0])
+        assert len(near), k
+        q.append(near[np.argmin(np.abs(near - before).max(axis=1))])
+    K = len(contour)
+    return Plan(
+        contour=contour,
+        robot=arm,
+        T_flange_tip=tool,
+        T_base_part=placement,
+        q=np.array(q),
+        gamma=np.zeros(K),
+        posture=np.full(K, posture),
+        turn=np.zeros((K, 6), int),
+        time=np.arange(K) * contour.length / (K - 1) / speed,
+        settings=Settings(
+            gamma_step=0.1,
+            frames="tangent",
+            method="paper",
+            objective="sum",
+            metric="manhattan",
+            weights=np.ones(6),
+            eta_v=1.0,
+            eta_a=1.0,
+        ),
+        cost=0.0,
+        proof=Proof(optimal=False, statement="made by hand"),
+        counts={},
+    )
+
+
+@pytest.fixture(scope="module")
+def cell():
+    arm = robot("abb_irb4600_60_205")
+    tool, placement = np.eye(4), np.eye(4)
+    tool[:3, :3] = Rotation.from_euler("y", 35, degrees=True).as_matrix()
+    tool[:3, 3] = 0.0513, 0.0, 0.2487
+    placement[:3, :3] = Rotation.from_euler("zyx", [31, 3, -2], degrees=True).as_matrix()
+    placement[:3, 3] = 1.0537, -0.1511, 0.6123
+    return arm, tool, placement
+
+
+def arc(name="skin/outer", count=8, radius=0.0871):
+    t = np.linspace(0.2, 1.9, 200)
+    points = np.c_[radius * np.cos(t), radius * np.sin(t), 0.0123 * np.cos(3 * t)]
+    axes = np.c_[-np.sin(STEEP) * np.cos(t), -np.sin(STEEP) * np.sin(t), -np.ones_like(t)]
+    return Contour(points, axes, name=name).resample(count=count)
+
+
+@pytest.fixture(scope="module")
+def small(cell):
+    return hand_plan(arc(), *cell, speed=0.12)
+
+
+@pytest.fixture(scope="module")
+def program(small):
+    return build_program([small])
+
+
+def changed(program, number, **changes):
+    """The program with one step of its first section replaced in part."""
+    steps = list(program.sections[0].steps)
+    steps[number] = replace(steps[number], **changes)
+    return with_steps(program, steps)
+
+
+def with_steps(program, steps):
+    return replace(program, sections=(Section(name=program.sections[0].name, steps=tuple(steps)),))
+
+
+def codes(program, level=None, language="rapid"):
+    return [i.code for i in preflight(program, language) if level in (None, i.level)]
+
+
+def moves_of(section, kind):
+    return [step for step in section.steps if isinstance(step, kind)]
+
+
+# The text.
+
+
+def test_the_golden_program_is_written_byte_for_byte(small):
+    assert post([small]) == GOLDEN.read_bytes().decode("ascii")
+
+
+def test_the_golden_program_is_plain_text_in_short_names():
+    lines = GOLDEN.read_text().splitlines()
+    assert max(len(line) for line in lines) < 200
+    assert all(re.fullmatch(r"[ -~]*", line) for line in lines)
+    assert not any(line.endswith(" ") for line in lines)
+
+
+def test_the_same_plans_give_the_same_bytes(cell):
+    assert post([hand_plan(arc(), *cell)]) == post([hand_plan(arc(), *cell)])
+
+
+# The law: what is read back is what was planned.
+
+
+def reads_back(plans, program):
+    """Check that the text says tool, placement, path, configuration, speeds and switches."""
+    text = rapid(program)
+    read = read_rapid(text)
+    first = plans[0]
+    assert (read.name, read.tool_name, read.work_object) == (program.name, "tLaser", "wPart")
+    assert read.laser_output == "doLaser"
+    # Four decimals of mm and eight of a unit quaternion.
+    np.testing.assert_allclose(read.T_flange_tip, first.T_flange_tip, atol=1e-7)
+    np.testing.assert_allclose(read.T_base_part, first.T_base_part, atol=1e-7)
+    assert [section.name for section in read.sections] == [s.name for s in program.sections]
+    for made, section in zip(plans, read.sections, strict=True):
+        joint = moves_of(section, ReadJointMove)
+        linear = moves_of(section, ReadLinearMove)
+        assert len(joint) == 1
+        assert len(linear) == len(made.q) + 1
+        T_base_tip = read.T_base_part @ np.array([move.T_part_tip for move in linear[:-1]])
+        planned = made.robot.forward(made.q) @ made.T_flange_tip
+        off = np.linalg.norm(T_base_tip[:, :3, 3] - planned[:, :3, 3], axis=1)
+        turned = np.swapaxes(T_base_tip[:, :3, :3], 1, 2) @ planned[:, :3, :3]
+        assert off.max() < 1e-6  # 1e-3 mm
+        assert np.degrees(Rotation.from_matrix(turned).magnitude()).max() < 1e-3
+        # The joint move leads, through the robot's kinematics, to the backed-off start.
+        q_in = joints_from_axes(made.robot, [joint[0].axes])[0]
+        T_in = made.robot.forward(q_in) @ made.T_flange_tip
+        back = T_in[:3, 3] - planned[0, :3, 3]
+        np.testing.assert_allclose(back, -0.05 * planned[0, :3, 2], atol=2e-6)
+        T_out = read.T_base_part @ linear[-1].T_part_tip
+        back = T_out[:3, 3] - planned[-1, :3, 3]
+        np.testing.assert_allclose(back, -0.05 * planned[-1, :3, 2], atol=2e-6)
+        check_configurations(made, linear[:-1])
+        check_motion(made, section, linear)
+    return read
+
+
+def check_configurations(made, linear):
+    """cf1, cf4, cf6 by quarter turns; cfx from the posture that the kernels solved for."""
+    q = made.q[0] + np.vstack([np.zeros(6), np.cumsum(made.increments, axis=0)])
+    conf = np.array([move.conf for move in linear])
+    quarters = np.floor(np.degrees(q[:, [0, 3, 5]]) / 90)
+    np.testing.assert_array_equal(conf[:, :3], quarters)
+    # For ABB arms every sign is +, so that axis 5 negative is the kernels' wrist "minus"; behind
+    # axis 1 the elbow of the kernels changes its sense, the lower arm's bit does not.
+    rear, down, minus = made.posture // 4, made.posture // 2 % 2, made.posture % 2
+    np.testing.assert_array_equal(conf[:, 3], 4 * rear + 2 * (rear ^ down) + minus)
+
+
+def check_motion(made, section, linear):
+    speed = made.contour.length / made.time[-1]
+    cut, out = linear[1:-1], linear[-1]
+    assert linear[0].speed == out.speed == pytest.approx(0.1)
+    assert all(move.speed == pytest.approx(speed, abs=1e-5) for move in cut)
+    assert [move.zone for move in (linear[0], cut[-1], out)] == [0, 0, 0]
+    assert all(move.zone == pytest.approx(0.0003) for move in cut[:-1])
+    kinds = [type(step) for step in section.steps]
+    assert kinds[:3] == [ReadJointMove, ReadLinearMove, ReadLaser]
+    assert kinds[-3:] == [ReadLinearMove, ReadLaser, ReadLinearMove]
+    assert set(kinds[3:-2]) == {ReadLinearMove}
+    on, off = moves_of(section, ReadLaser)
+    assert (on.on, off.on) == (True, False)
+    assert on.lead_time == off.lead_time == 0.02
+    assert section.steps[1].line == on.line  # switched on the move into the start
+
+
+def test_the_golden_program_reads_back_as_planned(small, program):
+    assert read_rapid(GOLDEN.read_text()).sections[0].name == "skin_outer"
+    read = reads_back([small], program)
+    assert read.speeds == {"vAir": 0.25, "vApproach": 0.1, "vCut": 0.12}
+    assert read.zones == {"zCorner": pytest.approx(0.0003)}
+
+
+def test_a_planned_circle_with_endless_joints_reads_back(circle, arm, tool, placement):
+    step = np.radians(10)
+    made = plan(circle, arm, tool=tool, placement=placement, speed=0.1, gamma_step=step)
+    program = build_program([made])
+    reads_back([made], program)
+    assert codes(program) == ["air-moves"]
+    q = np.array([move.q for move in moves_of(program.sections[0], LinearMove)])
+    assert np.abs(np.diff(q, axis=0)).max() < np.pi  # unrolled: no jump of a turn
+
+
+def test_several_contours_become_routines_called_in_order(cell):
+    plans = [
+        hand_plan(arc(name), *cell)
+        for name in ("skin/outer", "skin outer", "7. Bohrung ø12", "hole" * 12)
+    ]
+    program = build_program(plans, name="B-pillar 4711")
+    names = ["skin_outer", "skin_outer_2", "c_7_Bohrung_12", ("hole" * 12)[:32]]
+    assert program.name == "B_pillar_4711"
+    assert [section.name for section in program.sections] == names
+    reads_back(plans, program)
+    text = post(program)
+    assert text.index("    skin_outer;") < text.index("    skin_outer_2;")
+    assert "! 7. Bohrung ?12: 8 nodes" in text
+
+
+@pytest.mark.parametrize("posture", range(8))
+def test_configurations_follow_the_posture_in_all_eight_postures(cell, posture):
+    """The kernels' postures are an independent account of front/rear, elbow and wrist."""
+    arm, tool, _ = cell
+    arm = arm.with_limits(lower=np.full(6, -7.0), upper=np.full(6, 7.0))
+    placement = np.eye(4)
+    placement[:3, 3] = 0.55, 0.1, 0.9
+    made = hand_plan(arc(count=20, radius=0.03), arm, tool, placement, posture=posture)
+    reads_back([made], build_program([made]))
+
+
+def test_quaternions_do_not_jump_in_sign_along_the_path(cell):
+    arm, tool, placement = cell
+    made = hand_plan(arc(count=40), arm, tool, placement)
+    rows = re.findall(r"(?:MoveL|TriggL) \[\[[^]]*\],\[([^]]*)\]", post([made]))
+    wxyz = np.array([[float(x) for x in row.split(",")] for row in rows])
+    assert ((wxyz[1:] * wxyz[:-1]).sum(axis=1) > 0).all()
+    np.testing.assert_allclose(np.linalg.norm(wxyz, axis=1), 1, atol=2e-8)
+
+
+@settings(max_examples=60, deadline=None)
+@given(st.lists(st.floats(-6, 6), min_size=6, max_size=6))
+def test_configuration_bits_agree_with_a_construction_from_points(q):
+    """The lower arm's line and axis 1 drawn as points, on an arm without lateral offset."""
+    arm = robot("abb_irb6700_200_260")
+    a1, c1, c2 = (arm.geometry[k] for k in ("a1", "c1", "c2"))
+    flange = arm.forward(np.array(q))
+    wrist = flange[:3, 3] - arm.geometry["c4"] * flange[:3, 2]
+    ahead = np.array([np.cos(q[0]), np.sin(q[0]), 0.0])
+    shoulder = a1 * ahead + [0, 0, c1]
+    lower = c2 * (np.sin(q[1]) * ahead + [0, 0, np.cos(q[1])])
+    left = np.array([-np.sin(q[0]), np.cos(q[0]), 0.0])
+    side = np.cross(lower, wrist - shoulder) @ left  # positive: in front, turning nose down
+    reach, axis_5 = wrist @ ahead, np.degrees(q[4])
+    if min(abs(side), abs(reach), abs(axis_5)) < 1e-5:
+        return
+    expected = 4 * (reach < 0) + 2 * (side < 0) + (axis_5 < 0)
+    assert confdata(arm, [q])[0, 3] == expected
+
+
+def test_the_elbow_bit_turns_over_at_the_stretched_arm():
+    """IRB 6700 with 1392.5 mm and 200 mm: the elbow is singular at axis 3 = -81.83 deg."""
+    arm = robot("abb_irb6700_200_260")
+    arm = replace(arm, geometry={**arm.geometry, "c3": 1.3925, "a2": -0.2})
+    axis_3 = np.array([60, 0, -60, -81.5, -82.2, -90, -150])
+    q = np.zeros((len(axis_3), 6))
+    q[:, 2], q[:, 4] = np.radians(axis_3), np.radians(90)
+    np.testing.assert_array_equal(confdata(arm, q)[:, 3] & 2, [0, 0, 0, 0, 2, 2, 2])
+
+
+def test_quarter_turns_count_in_both_directions_and_ignore_rounding():
+    arm = robot("abb_irb4600_60_205")
+    q = np.zeros((5, 6))
+    q[:, 5] = np.radians([0, 89.9, 90, -0.1, 750])
+    np.testing.assert_array_equal(confdata(arm, q)[:, 2], [0, 0, 1, -1, 8])
+    q[:, 5] = -1e-15
+    assert (confdata(arm, q)[:, 2] == 0).all()
+
+
+# The parallel rod.
+
+
+def test_a_parallel_rod_converts_axis_3_both_ways():
+    arm = robot("abb_irb2400_155")
+    q = np.radians([[10.0, 40, -30, 5, 6, 7]])
+    axes = axes_from_joints(arm, q)
+    np.testing.assert_allclose(np.degrees(axes), [[10, 40, 10, 5, 6, 7]])
+    np.testing.assert_allclose(joints_from_axes(arm, axes), q, atol=1e-15)
+    plain = robot("abb_irb4600_60_205")
+    np.testing.assert_array_equal(axes_from_joints(plain, q), q)
+
+
+def test_a_program_for_a_parallel_rod_arm_reads_back(cell):
+    arm, (_, tool, placement) = robot("abb_irb2400_155"), cell
+    made = hand_plan(arc(), arm, tool, placement)
+    program = build_program([made])
+    read = reads_back([made], program)
+    axes = moves_of(read.sections[0], ReadJointMove)[0].axes
+    q_in = moves_of(program.sections[0], JointMove)[0].q
+    assert axes[2] == pytest.approx(q_in[1] + q_in[2], abs=1e-7)
+
+
+# Preflight.
+
+
+def test_a_good_program_has_only_the_warning_about_air_moves(program):
+    assert [(i.level, i.code) for i in preflight(program)] == [("warning", "air-moves")]
+
+
+@pytest.mark.parametrize(
+    ("change", "code"),
+    [
+        ({"name": "a" * 33}, "name-length"),
+        ({"tool_name": "t-laser"}, "name-identifier"),
+        ({"laser_output": "Reset"}, "name-reserved"),
+        ({"work_object": "v100"}, "name-reserved"),
+        ({"work_object": "TLASER"}, "name-collision"),
+        ({"name": "main"}, "name-collision"),
+        ({"sections": ()}, "empty"),
+    ],
+)
+def test_preflight_refuses_what_concerns_the_whole_program(program, change, code):
+    assert codes(replace(program, **change), "error") == [code]
+
+
+def test_preflight_refuses_a_robot_of_another_maker(program):
+    other = replace(program.robot, manufacturer="KUKA")
+    assert codes(replace(program, robot=other), "error") == ["wrong-robot"]
+
+
+@pytest.mark.parametrize(
+    ("number", "change", "code"),
+    [
+        (2, {"speed": 0.0}, "speed"),
+        (2, {"speed": -0.1}, "speed"),
+        (2, {"speed": float("nan")}, "speed"),
+        (1, {"speed": 1.5}, "speed"),
+        (2, {"zone": -1e-3}, "zone"),
+        (3, {"lead_time": 0.6}, "lead-time"),
+    ],
+)
+def test_preflight_refuses_numbers_out_of_range(program, number, change, code):
+    assert codes(changed(program, number, **change), "error") == [code]
+
+
+def test_preflight_refuses_a_joint_step_of_half_a_turn(program):
+    q = program.sections[0].steps[5].q + 3.5 * np.eye(6)[3]
+    bad = changed(program, 5, q=q)
+    issues = [i for i in preflight(bad) if i.code == "joint-step"]
+    assert [i.place for i in issues] == ["skin_outer, move 3", "skin_outer, move 4"]
+    assert "joint 4 turns 2" in issues[0].message
+
+
+def test_preflight_refuses_a_turn_of_the_tool_by_a_right_angle(program):
+    T = program.sections[0].steps[-1].T_part_tip.copy()
+    T[:3, :3] = T[:3, :3] @ Rotation.from_euler("z", 91, degrees=True).as_matrix()
+    assert codes(changed(program, -1, T_part_tip=T), "error") == ["orientation-step"]
+
+
+def test_preflight_refuses_axes_beyond_their_limits(program):
+    upper = program.robot.upper.copy()
+    upper[1] = program.sections[0].steps[2].q[1] - 0.01
+    tight = replace(program, robot=program.robot.with_limits(upper=upper))
+    issues = [i for i in preflight(tight) if i.code == "axis-limit"]
+    assert issues[0].place.startswith("skin_outer, move")
+    assert all("joint 2 high" in i.message for i in issues)
+
+
+def test_preflight_checks_the_sum_that_a_parallel_rod_bounds(cell):
+    _, tool, placement = cell
+    program = build_program([hand_plan(arc(), robot("abb_irb2400_155"), tool, placement)])
+    q = program.sections[0].steps[1].q.copy()
+    q[1:3] = np.radians([50, 40])
+    issues = [i for i in preflight(changed(program, 1, q=q)) if i.code == "axis-limit"]
+    assert "joint 2 + joint 3 high: 25.000 deg" in issues[0].message
+
+
+def test_preflight_refuses_a_laser_that_is_not_switched_in_turn(program):
+    steps = list(program.sections[0].steps)
+    on, off = steps[3], steps[-2]
+    assert isinstance(on, LaserOn)
+    assert isinstance(off, LaserOff)
+    orders = {
+        "still on": steps[:-2] + steps[-1:],
+        "twice on": [*steps[:5], on, *steps[5:]],
+        "after a joint move": [*steps[:2], on, off, *steps[2:3], *steps[4:]],
+        "joint move": [*steps[:5], steps[1], *steps[5:]],
+    }
+    for order in orders.values():
+        assert "laser-order" in codes(with_steps(program, order), "error")
+    assert codes(with_steps(program, [*steps[:3], Comment("x"), *steps[3:]]), "error") == []
+
+
+def test_preflight_warns_of_zones_that_overlap(small):
+    found = [i for i in preflight(build_program([small], zone=0.02)) if i.code == "zone-overlap"]
+    assert len(found) == 1
+    assert found[0].level == "warning"
+    assert "at 6 of 10 targets" in found[0].message  # all inner nodes, none of the stops
+
+
+def test_preflight_warns_of_a_lead_longer_than_its_move(small):
+    found = [i for i in preflight(build_program([small], lead_time=0.4)) if i.code == "short-lead"]
+    assert [i.place for i in found] == ["skin_outer, move 8"]
+    assert "400 ms ahead" in found[0].message
+
+
+def test_preflight_warns_where_turning_the_tool_would_slow_it_down(cell):
+    quick = hand_plan(arc(), *cell, speed=2.0)
+    assert "turning-speed" in codes(build_program([quick], lead_time=0.0), "warning")
+
+
+def test_what_preflight_refuses_is_not_written(program):
+    with pytest.raises(InputError, match="tool: 't-laser' must be a letter"):
+        post(replace(program, tool_name="t-laser"))
+
+
+# Bad input.
+
+
+def test_plans_that_do_not_belong_together_are_refused(cell, small):
+    arm, tool, placement = cell
+    moved = placement.copy()
+    moved[0, 3] += 0.01
+    other = hand_plan(arc("hole"), arm, tool, moved)
+    with pytest.raises(InputError, match=r"'skin/outer' and 'hole' differ in placement"):
+        build_program([small, other])
+    with pytest.raises(InputError, match="differ in robot"):
+        build_program([small, replace(small, robot=replace(arm, id="another"))])
+    with pytest.raises(InputError, match="at least one plan"):
+        build_program([])
+
+
+def test_joints_that_miss_the_contour_are_refused(small):
+    with pytest.raises(InputError, match=r"node 3: the planned joints put the tool tip \d"):
+        build_program([replace(small, q=small.q + np.where(np.arange(8) == 3, 1e-3, 0)[:, None])])
+
+
+def test_a_retract_out_of_reach_says_to_lower_it(small):
+    with pytest.raises(InputError, match=r"back off by 5000 mm .* lower the retract"):
+        build_program([small], retract=5.0)
+    with pytest.raises(InputError, match="retract: expected a number above 0 m"):
+        build_program([small], retract=0.0)
+
+
+def test_an_unknown_language_lists_those_known(small):
+    with pytest.raises(InputError, match="'basic' is not known; expected rapid"):
+        post([small], "basic")
+    assert LANGUAGES["rapid"].suffix == ".mod"
+
+
+def test_writing_replaces_the_file_at_one_stroke(tmp_path):
+    target = tmp_path / "cut.mod"
+    write_program(target, "first\n")
+    write_program(target, "second\n")
+    assert target.read_bytes() == b"second\n"
+    assert list(tmp_path.iterdir()) == [target]
+    for bad in (tmp_path / "missing" / "cut.mod", tmp_path, target / "x.mod", ""):
+        with pytest.raises(InputError, match="cannot write the program"):
+            write_program(bad, "text")
+    assert list(tmp_path.iterdir()) == [target]
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "message"),
+    [
+        ("MODULE cut_skin_outer", "SYSMODULE x", "line 1: not expected here"),
+        ("ENDMODULE", "", "ENDMODULE is missing"),
+        ("ENDMODULE", "ENDMODULE\nx;", "nothing may follow"),
+        (r"ConfL\Off;", r"ConfJ\On;", "line 17: not expected"),
+        ("    skin_outer;", "", "do not match: skin_outer"),
+        ("    skin_outer;", "    skin_outer;\n    skin_outer;", "called twice"),
+        (",trOff,fine", ",trX,fine", "trX has not been set"),
+        (",fine,tLaser", ",z10,tLaser", "z10 is not declared"),
+        (r"fine,tLaser\WObj", r"fine,tool0\WObj", "are not the module's"),
+        ("[FALSE,TRUE,", "[TRUE,TRUE,", "line 8: expected a fixed work object"),
+        ("tLaser:=[TRUE,", "tLaser:=[FALSE,", "expected a tool held by the robot"),
+        ("zCorner:=[FALSE,", "zCorner:=[TRUE,", "expected a zone"),
+        ("vAir:=[250.00,", "vAir:=[", "expected 4 values"),
+        ("vAir:=[250.00,", "vAir:=[TRUE,", "expected 4 numbers"),
+        ("vAir:=[250.00,", "vAir:=[25O,", "not an aggregate"),
+        ("speeddata vCut", "speeddata vAir", "vAir is declared twice"),
+        ("SetDO doLaser", "SetDO doOther", "a second output"),
+        ("TriggIO trOff", "TriggIO trOn", "set once"),
+        ("9E9]],vAir", "0]],vAir", "external axes"),
+        ("[0,-1,0,0]", "[0.5,-1,0,0]", "must be whole numbers"),
+    ],
+)
+def test_the_reader_refuses_what_it_does_not_know(old, new, message):
+    text = GOLDEN.read_text()
+    assert old in text
+    with pytest.raises(InputError, match=re.escape(message)):
+        read_rapid(text.replace(old, new, 1))
+
+
+def test_the_reader_refuses_a_quaternion_that_is_none():
+    text = re.sub(r"(TriggL \[\[[^]]*\],\[)[\d.-]+", r"\g<1>0.9", GOLDEN.read_text(), count=1)
+    with pytest.raises(InputError, match=r"line \d+: the quaternion .* must have length 1"):
+        read_rapid(text)
+
+
+def test_the_reader_refuses_a_module_without_a_tool():
+    lines = [line for line in GOLDEN.read_text().splitlines() if "tooldata" not in line]
+    with pytest.raises(InputError, match="tool tLaser and work object wPart are not the module's"):
+        read_rapid("\n".join(lines))

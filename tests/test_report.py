@@ -1,0 +1,389 @@
+"""The report: one page that stands alone, says what it knows, and draws in a browser."""
+
+import base64
+import json
+import re
+import subprocess
+import zlib
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from plotly.offline import get_plotlyjs
+
+from kerfpath.auditor import Check
+from kerfpath.contour import Contour
+from kerfpath.errors import InputError
+from kerfpath.graph import LayeredGraph
+from kerfpath.planner import layered_graph, plan
+from kerfpath.report import ContourSection, feasibility_map, render
+from kerfpath.report._look import JOINT_COLOURS, reason_colours
+from kerfpath.report._map import chosen_line, hidden_postures, shown_postures
+from kerfpath.report._motion import joint_positions, limit_shares, posture_runs
+from kerfpath.report._scene import scene
+from kerfpath.report._tables import audit_table, counts_table, criteria_table, summary_table
+from kerfpath.robots import posture_name, robot
+
+CHROMIUM = Path("/usr/bin/chromium")
+NODES = 41
+
+TOOL = np.eye(4)
+TOOL[:3, :3] = [[0.8, 0, 0.6], [0, 1, 0], [-0.6, 0, 0.8]]
+TOOL[:3, 3] = [0.12, 0, 0.35]
+PLACEMENT = np.eye(4)
+PLACEMENT[:3, 3] = [1.35, -0.35, 0.6]
+
+CHECKS = [
+    Check(code="a", title="tool tip", value=2e-5, limit=1e-4, unit="m", node=3),
+    Check(code="b", title="joint velocity", value=0.145, limit=0.95, unit="share", node=7),
+]
+
+
+def _section(name: str = "outer trim") -> ContourSection:
+    angle = np.linspace(0, 2 * np.pi, 400, endpoint=False)
+    points = np.stack([0.15 * np.cos(angle), 0.1 * np.sin(angle), 0 * angle], axis=1)
+    axes = np.tile([0.0, 0.0, -1.0], (400, 1))
+    contour = Contour(points, axes, closed=True, name=name).resample(count=NODES)
+    arm = robot("abb_irb4600_60_205").with_limits(
+        acceleration=np.radians([320, 270, 420, 1300, 1400, 2000])
+    )
+    where = {"tool": TOOL, "placement": PLACEMENT, "gamma_step": np.radians(15)}
+    graph = layered_graph(contour, arm, **where)
+    found = plan(contour, arm, **where, graph=graph, speed=0.05, eta_v=0.95, eta_a=0.9)
+    return ContourSection(name=name, graph=graph, plan=found, checks=CHECKS, path=contour)
+
+
+@pytest.fixture(scope="module")
+def section() -> ContourSection:
+    return _section()
+
+
+@pytest.fixture(scope="module")
+def infeasible(section: ContourSection) -> ContourSection:
+    return replace(
+        section, name="slot", plan=None, checks=(), failure="no edge <here>", broken_at=7
+    )
+
+
+def _own(html: str) -> str:
+    """Return the page without plotly's own code."""
+    assert html.count(get_plotlyjs()) == 1
+    return html.replace(get_plotlyjs(), "")
+
+
+def _figures(html: str) -> list[dict]:
+    packed = re.findall(r'<script type="application/octet-stream" id="[^"]+">([^<]+)<', html)
+    return [json.loads(zlib.decompress(base64.b64decode(text))) for text in packed]
+
+
+def _codes(trace: dict) -> np.ndarray:
+    z = trace["z"]
+    assert z["dtype"] == "u1", "codes must travel as bytes, not as numbers in words"
+    shape = [int(n) for n in z["shape"].split(",")]
+    return np.frombuffer(base64.b64decode(z["bdata"]), np.uint8).reshape(shape)
+
+
+def test_page_asks_nothing_of_the_network(section: ContourSection) -> None:
+    html = _own(render("Part", [section], job_text="x = 1"))
+    for fetch in ("http://", "https://", "<link", "src=", "@import", "url(", "<iframe"):
+        assert fetch not in html
+    assert "fetch(" not in html
+    assert "XMLHttpRequest" not in html
+
+
+def test_the_same_input_gives_the_same_page(section: ContourSection) -> None:
+    pages = [render("Part", [section], facts=[("Robot", "ABB")]) for _ in range(2)]
+    assert pages[0] == pages[1]
+    assert render("Part", [_section()], facts=[("Robot", "ABB")]) == pages[0]
+
+
+def test_every_text_from_outside_is_escaped(section: ContourSection) -> None:
+    bad = "<b>&\"'</b><script>alert(1)</script>"
+    check = Check(code="c", title=bad, value=2, limit=1, unit="count", node=0, advice=bad)
+    sections = [
+        replace(section, name=bad, checks=[check]),
+        replace(section, name=bad, plan=None, failure=bad, broken_at=2),
+    ]
+    html = render(bad, sections, facts=[(bad, bad)], notes=[bad], job_text=bad)
+    own = _own(html)
+    assert "<b>&\"'" not in own
+    assert "<script>alert" not in own
+    assert own.count("&lt;script&gt;alert(1)") >= 9
+    assert bad not in json.dumps(_figures(html)[0])
+
+
+@pytest.mark.parametrize(
+    ("change", "verdict"),
+    [
+        ({}, "The contour is planned and the audit passed"),
+        ({"checks": ()}, "The contour is planned; 1 not audited"),
+        ({"plan": None}, "No feasible path for 1 of 1 contour"),
+        (
+            {"checks": [replace(CHECKS[0], value=1.0)]},
+            "Planned, but the audit failed for 1 of 1 contour",
+        ),
+        (
+            {"checks": [replace(CHECKS[0], value=np.nan)]},
+            "Planned, but the audit failed for 1 of 1 contour",
+        ),
+        (
+            {"checks": [replace(CHECKS[0], value=1.0, level="warning")]},
+            "The contour is planned and the audit passed, with 1 to note",
+        ),
+    ],
+)
+def test_verdict_fails_closed(section: ContourSection, change: dict, verdict: str) -> None:
+    assert f"</b> {verdict}</span>" in render("Part", [replace(section, **change)])
+
+
+def test_no_contour_is_not_a_success() -> None:
+    html = render("Part", [])
+    assert "Nothing was planned" in html
+    assert "✓" not in _own(html)
+
+
+def test_infeasible_section_says_where_and_why(infeasible: ContourSection) -> None:
+    html = render("Part", [infeasible])
+    assert "no edge &lt;here&gt;" in html
+    assert "The path breaks at node 7." in html
+    assert "Joint positions" not in html
+    figures = _figures(html)
+    assert len(figures) == 2, "the scene and the map, no motion"
+    marks = [shape for shape in figures[1]["layout"]["shapes"] if shape["x0"] == 7]
+    assert {shape["xref"] for shape in marks} == {
+        axis.replace("axis", "") for axis in figures[1]["layout"] if axis.startswith("xaxis")
+    }
+
+
+def test_map_shows_the_codes_of_the_graph_in_the_colours_of_its_reasons(
+    section: ContourSection,
+) -> None:
+    graph = section.graph
+    figure = json.loads(feasibility_map(graph, section.plan).to_json())
+    maps = [trace for trace in figure["data"] if trace["type"] == "heatmap"]
+    postures = shown_postures(graph)
+    assert [trace["name"] for trace in maps] == [posture_name(mu) for mu in postures]
+    colours = reason_colours(graph.reasons)
+    for mu, trace in zip(postures, maps, strict=True):
+        np.testing.assert_array_equal(_codes(trace), graph.reason[:, :, mu].T)
+        scale = trace["colorscale"]
+        for code, colour in enumerate(colours):
+            share = (code - trace["zmin"]) / (trace["zmax"] - trace["zmin"])
+            below = [c for edge, c in scale if edge <= share]
+            above = [c for edge, c in scale if edge >= share]
+            assert below[-1] == above[0] == colour
+
+
+def test_legend_names_only_reasons_that_occur(section: ContourSection) -> None:
+    graph = section.graph
+    figure = feasibility_map(graph, section.plan)
+    named = {
+        t.name: t.marker.color for t in figure.data if t.type == "scatter" and t.showlegend is None
+    }
+    present = np.unique(graph.reason[:, :, shown_postures(graph)])
+    colours = reason_colours(graph.reasons)
+    expected = {graph.reasons[code]: colours[code] for code in present}
+    assert {name: colour for name, colour in named.items() if name != "chosen gamma"} == expected
+
+
+def test_postures_without_an_admitted_candidate_are_told_in_words(
+    section: ContourSection,
+) -> None:
+    reason = np.ones_like(section.graph.reason)
+    reason[:, :, 0] = 0
+    reason[:2, :, 1] = 4
+    graph = replace(section.graph, reason=reason)
+    assert shown_postures(graph) == [0]
+    told = hidden_postures(graph)
+    assert len(told) == 7
+    assert told[0] == ("front/up/minus: no admitted candidate (unreachable 95 %, joint 2 low 5 %)")
+    assert told[1] == "front/down/plus: unreachable everywhere"
+
+
+def test_graph_without_any_admitted_candidate_still_has_a_map(section: ContourSection) -> None:
+    reason = np.ones_like(section.graph.reason)
+    assert len(shown_postures(replace(section.graph, reason=reason))) == 8
+    reason[:, :, 2] = 5
+    reason[3:, :, 3] = 5
+    assert shown_postures(replace(section.graph, reason=reason)) == [3]
+
+
+def test_chosen_line_breaks_where_gamma_wraps_and_where_the_posture_changes(
+    section: ContourSection,
+) -> None:
+    gamma = np.radians(np.linspace(100, 260, NODES))
+    gamma = np.where(gamma > np.pi, gamma - 2 * np.pi, gamma)
+    posture = np.full(NODES, 1)
+    posture[30:33] = 0
+    made_up = replace(section.plan, gamma=gamma, posture=posture)
+    wrap = int(np.flatnonzero(np.diff(gamma) < 0)[0])
+    pieces = chosen_line(made_up, 1)
+    assert [(p[0][0], p[0][-1]) for p in pieces] == [(0, wrap), (wrap + 1, 29), (33, NODES - 1)]
+    assert [list(p[0]) for p in chosen_line(made_up, 0)] == [[30, 31, 32]]
+    assert chosen_line(made_up, 7) == []
+    assert all(np.abs(np.diff(g)).max() < 180 for _, g in pieces)
+    figure = feasibility_map(section.graph, made_up)
+    lines = [
+        t for t in figure.data if t.type == "scatter" and t.mode == "lines" and t.x[0] is not None
+    ]
+    assert {int(np.isnan(t.y).sum()) for t in lines if len(t.x) > 10} == {2}
+
+
+def test_colours_tell_the_reasons_apart() -> None:
+    for name in ("abb_irb4600_60_205", "abb_irb2400_155"):  # the second has a coupling
+        reasons = robot(name).reasons()
+        colours = dict(zip(reasons, reason_colours(reasons), strict=True))
+        assert len(set(colours.values())) == len(reasons)
+        for joint in range(1, 7):
+            low, high = colours[f"joint {joint} low"], colours[f"joint {joint} high"]
+            assert _lightness(low) > _lightness(high)
+    assert len(set(JOINT_COLOURS)) == 6
+
+
+def test_every_joint_has_its_colour_everywhere(section: ContourSection) -> None:
+    shares = limit_shares(section.plan)
+    assert tuple(t.line.color for t in shares.data) == JOINT_COLOURS * 2
+    assert tuple(t.line.color for t in joint_positions(section.plan).data) == JOINT_COLOURS
+    table = criteria_table(section.plan)
+    assert all(table.count(colour) == 1 for colour in JOINT_COLOURS)
+
+
+def test_shares_show_the_limits_and_what_planning_may_use(section: ContourSection) -> None:
+    figure = limit_shares(section.plan)
+    levels = {shape.y0 for shape in figure.layout.shapes}
+    assert levels == {100.0, -100.0, 95.0, -95.0, 90.0, -90.0}
+    assert figure.layout.yaxis.range[1] > 100
+    np.testing.assert_allclose(
+        figure.data[2].y, section.plan.velocity_share[:, 2] * 100, rtol=1e-6, atol=1e-6
+    )
+
+
+def test_positions_show_finite_limits_and_leave_gaps_where_an_endless_joint_wraps(
+    section: ContourSection,
+) -> None:
+    arm = section.plan.robot.with_limits(endless=[0, 0, 0, 0, 0, 1])
+    q = section.plan.q.copy()
+    q[:, 5] = np.angle(np.exp(1j * np.linspace(2, 8, NODES)))
+    figure = joint_positions(replace(section.plan, robot=arm, q=q))
+    assert len(figure.layout.shapes) == 10, "two limits for each of the five other joints"
+    assert int(np.isnan(figure.data[5].y).sum()) == 1
+    np.testing.assert_allclose(
+        figure.data[0].y, np.degrees(section.plan.q[:, 0]), rtol=1e-6, atol=1e-5
+    )
+
+
+def test_changes_of_posture_are_shaded_and_told(section: ContourSection) -> None:
+    posture = np.zeros(NODES, int)
+    posture[10:20] = 1
+    made_up = replace(section.plan, posture=posture)
+    assert posture_runs(made_up) == [(0, 0, 9), (1, 10, 19), (0, 20, NODES - 1)]
+    bands = [s for s in limit_shares(made_up).layout.shapes if s.type == "rect"]
+    assert len(bands) == 2
+    assert "2 changes of posture" in render("Part", [replace(section, plan=made_up)])
+
+
+def test_scene_draws_part_and_contour_in_millimetres(
+    section: ContourSection, infeasible: ContourSection
+) -> None:
+    vertices = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0.0]])
+    figure = scene([section, infeasible], (vertices, [[0, 1, 2]]))
+    part = figure.data[0]
+    assert part.type == "mesh3d"
+    assert max(part.x) == 1000.0
+    assert figure.layout.scene.aspectmode == "data"
+    assert figure.layout.scene.xaxis.title.text == "x, mm"
+    assert [t.name for t in figure.data].count("slot: break") == 1
+    with pytest.raises(InputError, match="mesh triangles: expected indices from 0 to 2"):
+        scene([section], (vertices, [[0, 1, 3]]))
+
+
+def test_audit_table_speaks_millimetres_degrees_and_per_cent() -> None:
+    table = audit_table(
+        [
+            *CHECKS,
+            Check(code="d", title="axis", value=np.pi, limit=np.pi / 180, unit="rad", node=-1),
+        ]
+    )
+    assert "0.02 mm" in table
+    assert "≤ 0.1 mm" in table
+    assert "14.5 %" in table
+    assert "180°" in table
+    assert "≤ 1°" in table
+    assert table.count("passed") == 2
+    assert table.count("</b> failed") == 1
+
+
+def test_tables_add_up(section: ContourSection) -> None:
+    counts = section.graph.counts()
+    table = counts_table(section.graph)
+    assert sum(counts.values()) == section.graph.reason.size
+    assert all(word in table for word in counts)
+    row = summary_table([section])
+    assert "3.00" in row, "0.05 m/s is 3 m/min"
+    assert f"{section.path.length * 1e3:.1f}" in row
+
+
+def test_section_refuses_parts_of_different_length(section: ContourSection) -> None:
+    with pytest.raises(
+        InputError, match="expected the same nodes throughout, got graph 41, path 11"
+    ):
+        replace(section, plan=None, path=section.path.resample(count=11))
+
+
+def test_fine_maps_stay_small(section: ContourSection) -> None:
+    # The budget: eight contours of 1500 x 360 x 8 candidates in 12 MB, plotly (5 MB) included.
+    K, m = 1500, 360
+    x, y = np.meshgrid(np.linspace(0, 9, K), np.linspace(0, 2 * np.pi, m), indexing="ij")
+    reason = np.empty((K, m, 8), np.uint8)
+    for mu in range(8):
+        reason[:, :, mu] = np.floor(3 + 2.9 * np.sin(x + mu) * np.cos(2 * y + x))
+    graph = LayeredGraph(
+        q=np.zeros((0, 6)),
+        start=np.zeros(K + 1, int),
+        gamma=np.linspace(-np.pi, np.pi, m + 1)[1:],
+        sample=np.zeros(0, int),
+        posture=np.zeros(0, int),
+        turn=np.zeros((0, 6), int),
+        reason=reason,
+        reasons=section.graph.reasons,
+    )
+    path = section.path.resample(count=K)
+    fine = ContourSection(name="fine", graph=graph, path=path, failure="made up")
+    assert len(_own(render("Part", [fine]))) < 0.8e6
+
+
+@pytest.mark.skipif(not CHROMIUM.exists(), reason="needs the Chromium browser")
+def test_browser_draws_every_figure_in_view(
+    section: ContourSection, infeasible: ContourSection, tmp_path: Path
+) -> None:
+    page = tmp_path / "report.html"
+    page.write_text(render("Part", [section, infeasible, infeasible]), encoding="utf-8")
+    command = [
+        str(CHROMIUM),
+        *("--headless", "--no-sandbox", "--disable-quic", "--no-first-run"),
+        *("--disable-background-networking", "--disable-component-update", "--disable-sync"),
+        *("--use-angle=swiftshader", "--enable-unsafe-swiftshader"),
+        f"--user-data-dir={tmp_path / 'profile'}",
+        *("--virtual-time-budget=8000", "--dump-dom", page.as_uri() + "#contour-2"),
+    ]
+    done = subprocess.run(command, capture_output=True, text=True, timeout=120, check=True)
+    dom = _without_scripts(done.stdout)
+    # The scene, three figures of the first contour and the map of the second, which the address
+    # names; the third is closed.
+    assert dom.count('data-state="drawn"') == 5
+    assert dom.count("data-figure=") == 6
+    assert dom.count('class="main-svg"') >= 5
+    assert 'data-state="failed"' not in dom
+    assert 'class="trouble"' not in dom
+    assert "WebGL is not supported" not in dom
+    assert "Share chart" not in dom, "the button that uploads the data to plotly"
+    assert "Download plot" in dom
+
+
+def _lightness(colour: str) -> int:
+    return sum(int(colour[i : i + 2], 16) for i in (1, 3, 5))
+
+
+def _without_scripts(dom: str) -> str:
+    return re.sub(r"<script.*?</script>", "", dom, flags=re.DOTALL)
