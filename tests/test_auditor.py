@@ -4,11 +4,11 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from test_robots import pinocchio_pose, random_joints
 
 from kerfpath import Contour, InputError, audit, plan, robot
 from kerfpath.auditor import chain_of, checks
 from kerfpath.robots import Coupling, robot_ids
+from test_robots import pinocchio_pose, random_joints
 
 STEP = np.radians(5)
 
@@ -144,5 +144,5 @@ def test_bad_arguments_are_refused(good, drawn):
     with pytest.raises(InputError, match="path_tolerance"):
         audit(good, path_tolerance=-1.0)
     half = Contour(drawn.points[:2000], drawn.axes[:2000])
-    with pytest.raises(InputError, match="reference: .* m long"):
+    with pytest.raises(InputError, match=r"reference: .* m long"):
         audit(good, reference=half)

@@ -85,6 +85,7 @@ def test_the_example_is_read_into_si(read, folder):
     assert job.plan_options == {
         "gamma_step": np.pi / 180,
         "frames": "rotation-minimising",
+        "postures": None,
         "method": "paper",
         "objective": "sum",
         "metric": "manhattan",
@@ -482,3 +483,14 @@ def test_random_bytes_are_survived(folder, at, inserted, cut):
     raw = JOB.encode()
     is_a_job_or_one_clear_line(folder, raw[:at] + inserted + raw[at + cut :])
     is_a_job_or_one_clear_line(folder, inserted)
+
+
+def test_a_posture_in_words_becomes_those_it_fits(read):
+    job = read(JOB.replace("gamma_step_deg = 1", 'posture = "front/up"\ngamma_step_deg = 1'))
+    assert job.plan_options["postures"] == (0, 1)
+
+
+@pytest.mark.parametrize("words", ["front/rear", "sideways", "front up"])
+def test_a_posture_that_does_not_exist_is_refused_at_its_line(read, words):
+    with pytest.raises(InputError, match=r"job.toml:16: plan.posture: expected a posture in words"):
+        read(JOB.replace("gamma_step_deg = 1", f'posture = "{words}"\ngamma_step_deg = 1'))

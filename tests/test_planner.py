@@ -18,7 +18,9 @@ def test_the_tool_is_on_the_contour_at_every_node(made, circle, tool):
     T = made.robot.forward(made.q) @ tool
     np.testing.assert_allclose(T[:, :3, 3], made.points, atol=1e-9)
     np.testing.assert_allclose(T[:, :3, 2], made.axes, atol=1e-9)
-    np.testing.assert_allclose(made.points, circle.points + [1.2, 0, 0.4], atol=1e-12)
+    np.testing.assert_allclose(
+        made.points - circle.points, np.tile([1.2, 0, 0.4], (121, 1)), atol=1e-12
+    )
 
 
 def test_gamma_is_the_angle_from_the_task_frame(made, circle, tool, placement):
@@ -83,7 +85,7 @@ def test_times_of_the_contour_are_used_and_a_second_speed_refused(circle, arm, t
 
 def test_uneven_nodes_are_refused_with_what_to_do(arm, tool, placement):
     c = Contour([[0, 0, 0], [0.01, 0, 0], [0.03, 0, 0]], np.tile([0, 0, -1.0], (3, 1)))
-    with pytest.raises(InputError, match="steps run from 0.01 to 0.02 m.*resample"):
+    with pytest.raises(InputError, match=r"steps run from 0.01 to 0.02 m.*resample"):
         plan(c, arm, tool=tool, placement=placement, speed=0.1)
 
 
@@ -100,7 +102,7 @@ def test_a_part_out_of_reach_is_an_answer_with_node_and_counts(circle, arm, tool
 
 
 def test_too_fast_is_an_answer_with_the_joint(circle, arm, tool, placement):
-    with pytest.raises(NoFeasiblePath, match="contour 'circle': no admissible edge") as caught:
+    with pytest.raises(NoFeasiblePath, match=r"contour 'circle': no admissible edge") as caught:
         plan(circle, arm, tool=tool, placement=placement, speed=20.0, gamma_step=STEP)
     assert any(reason.startswith("velocity, joint") for reason in caught.value.counts)
 

@@ -229,7 +229,7 @@ def test_an_endless_joint_has_one_vertex_and_no_limits():
 
 def test_accelerations_that_nobody_publishes_must_be_named():
     r = robot("abb_irb4600_60_205")
-    with pytest.raises(InputError, match="joint accelerations are not known.*acceleration_ratio="):
+    with pytest.raises(InputError, match=r"joint accelerations are not known.*acceleration_ratio="):
         r.speed_limits()
     assumed = robot("abb_irb4600_60_205", acceleration_ratio="iontec_20_to_70kg")
     np.testing.assert_allclose(
@@ -240,7 +240,7 @@ def test_accelerations_that_nobody_publishes_must_be_named():
 
 def test_a_robot_without_limits_is_refused_until_they_are_given():
     r = robot("kuka_kr120_r2500_pro")
-    with pytest.raises(InputError, match="joint limits are not known .*copy error"):
+    with pytest.raises(InputError, match=r"joint limits are not known .*copy error"):
         r.inverse(np.eye(4))
     other = robot("kuka_kr120_r2700_2")
     given = r.with_limits(lower=other.lower, upper=other.upper, velocity=other.velocity)

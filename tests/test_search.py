@@ -2,13 +2,13 @@
 
 import itertools
 
-import naive
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as hnp
 
+import naive
 from kerfpath import InputError, NoFeasiblePath, shortest_path
 from kerfpath.kernels import limits, metric
 

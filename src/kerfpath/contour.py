@@ -313,10 +313,11 @@ def join(
 
 
 def _unit(axes: Array) -> Array:
-    size = np.linalg.norm(axes, axis=1)
+    size = np.abs(axes).max(axis=1, initial=0.0)
     if (zero := np.flatnonzero(size <= ZERO_AXIS)).size:
         raise InputError(f"axes: the tool axis of node {zero[0]} is zero; it needs a direction")
-    return np.asarray(axes / size[:, None])
+    scaled = axes / size[:, None]  # no square overflows
+    return np.asarray(scaled / np.linalg.norm(scaled, axis=1)[:, None])
 
 
 def _turned(n0: Array, n1: Array, part: Array) -> Array:

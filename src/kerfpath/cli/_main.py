@@ -2,17 +2,17 @@
 
 from __future__ import annotations
 
+import os
 import sys
 from importlib.resources import as_file, files
 from pathlib import Path
 from typing import Annotated, Any
 
-import click
 import typer
 from rich.markup import escape
 
 from kerfpath import __version__
-from kerfpath.cli._show import errors, out, print_json, progress_bars, table
+from kerfpath.cli._show import busy, errors, out, print_json, progress_bars, table
 from kerfpath.errors import AuditFailed, KerfpathError, NoFeasiblePath
 
 __all__ = ["app", "main"]
@@ -39,24 +39,17 @@ PlanFileArgument = Annotated[Path, typer.Argument(metavar="PLAN.json", help="A p
 def main() -> None:
     """Run the command line and leave with its exit code."""
     try:
-        code = app(standalone_mode=False)
-    except click.ClickException as error:
-        error.show()
-        code = 2
+        app()
     except (NoFeasiblePath, AuditFailed) as error:
         errors.print(f"kerfpath: {escape(str(error))}")
-        code = 1
+        sys.exit(1)
     except KerfpathError as error:
         errors.print(f"[bold red]kerfpath: error:[/] {escape(str(error))}")
-        code = 2
-    except (KeyboardInterrupt, click.Abort):
-        errors.print("kerfpath: interrupted; files are written whole or not at all")
-        code = 130
+        sys.exit(2)
     except BrokenPipeError:
-        # The reader of a pipe has gone, as in `kerfpath robots | head`.
-        sys.stderr.close()
-        code = 0
-    sys.exit(code if isinstance(code, int) else 0)
+        # The reader of a pipe has gone, as in `kerfpath robots | head`; leave stdout unflushed.
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        sys.exit(0)
 
 
 def _version(asked: bool) -> None:
@@ -101,14 +94,15 @@ def plan(
 
 
 def _plan(job_file: Path, folder: Path, as_json: bool) -> None:
-    from kerfpath.job import read_job, run_job, warm_up, write_outcome
+    from kerfpath.job import read_job, require_folder, run_job, warm_up, write_outcome
 
+    require_folder(folder)
     job = read_job(job_file)
-    with errors.status("compiling the kernels, first run only"):
+    with busy("compiling the kernels, first run only"):
         warm_up()
     with progress_bars() as progress:
         outcome = run_job(job, progress=progress)
-    with errors.status("writing"):
+    with busy("writing"):
         written = write_outcome(outcome, folder)
     if as_json:
         print_json(
@@ -179,8 +173,9 @@ def _show_cuts(cuts: Any) -> None:
                 "passed" if cut.passed else "FAILED",
             ]
         )
-    columns = ["contour", "mm", "nodes", "m/min", "s", "cost", "velocity", "acceleration", "audit"]
-    table(columns, rows, right="mm nodes m/min s cost velocity acceleration")
+    columns = ["contour", "mm", "nodes", "m/min", "s", "cost", "vel", "acc", "audit"]
+    table(columns, rows, numbers=columns[1:-1])
+    out.print("vel, acc: highest share of a joint's velocity and acceleration limit")
 
 
 @app.command()
@@ -270,7 +265,12 @@ def audit(
                 ]
                 for c in checks
             ]
-            table(["check", "worst", "allowed", "node", ""], rows, title=escape(name), right="node")
+            table(
+                ["check", "worst", "allowed", "node", ""],
+                rows,
+                title=escape(name),
+                numbers=["worst", "allowed", "node"],
+            )
         for name in missing:
             out.print(f"{escape(name)}: no plan")
         out.print("audit passed" if passed else "audit FAILED")
@@ -342,7 +342,7 @@ def contours(
             ]
         )
     columns = ["loop", "surface", "length mm", "diameter mm", "edges", "gap mm", "middle mm", ""]
-    table(columns, rows, right="length mm diameter mm edges gap mm")
+    table(columns, rows, numbers=columns[2:6])
 
 
 @app.command()

@@ -47,7 +47,7 @@ def list_robots(*, as_json: bool) -> None:
         for r in known
     ]
     columns = ["robot", "model", "payload kg", "reach m", "acceleration", "limits"]
-    table(columns, rows, right="payload kg reach m")
+    table(columns, rows, numbers=["payload kg", "reach m"])
     out.print(
         f"{len(known)} robots. Where it says 'name it' the maker publishes no accelerations: give "
         "acceleration_deg_s2 or acceleration_ratio in the job."
@@ -106,7 +106,8 @@ def show_robot(name: str, *, as_json: bool) -> None:
         [what, *(["not known"] if values is None else [f"{v:g}" for v in values])]
         for what, values in limits.items()
     ]
-    table(["limit", *(f"joint {i}" for i in range(1, 7))], rows, right="joint 1 2 3 4 5 6")
+    joints = [f"joint {i}" for i in range(1, 7)]
+    table(["limit", *joints], rows, numbers=joints)
     for c in couplings:
         out.print(
             f"{c['what']}: {c['lower_deg']:g} to {c['upper_deg']:g} deg ({escape(str(c['note']))})"

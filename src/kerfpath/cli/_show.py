@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Iterator, Sequence
+import sys
+from collections.abc import Callable, Collection, Iterator, Sequence
 from contextlib import contextmanager
 from typing import Any
 
@@ -11,9 +12,12 @@ from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 from rich.table import Table
 
-__all__ = ["errors", "out", "print_json", "progress_bars", "table"]
+__all__ = ["busy", "errors", "out", "print_json", "progress_bars", "table"]
 
-out = Console(highlight=False, soft_wrap=True)
+_PIPED = 200
+"""Columns for output that goes to a file or another program: nothing is cut off there."""
+
+out = Console(highlight=False, soft_wrap=True, width=None if sys.stdout.isatty() else _PIPED)
 errors = Console(stderr=True, highlight=False, soft_wrap=True)
 
 
@@ -23,12 +27,17 @@ def print_json(data: dict[str, Any]) -> None:
 
 
 def table(
-    columns: Sequence[str], rows: Sequence[Sequence[str]], *, title: str = "", right: str = ""
+    columns: Sequence[str],
+    rows: Sequence[Sequence[str]],
+    *,
+    title: str = "",
+    numbers: Collection[str] = (),
 ) -> None:
-    """Print a table; columns whose heading is in `right` are aligned to the right."""
+    """Print a table; columns named in `numbers` stand to the right and are never folded."""
     shown = Table(title=title or None, title_justify="left", box=None, pad_edge=False)
     for column in columns:
-        shown.add_column(column, justify="right" if column in right else "left", no_wrap=True)
+        number = column in numbers
+        shown.add_column(column, justify="right" if number else "left", no_wrap=number)
     for row in rows:
         shown.add_row(*row)
     out.print(shown)
@@ -44,7 +53,8 @@ def progress_bars() -> Iterator[Callable[[str, int, int], None]]:
         TextColumn("nodes"),
         TimeRemainingColumn(),
     )
-    with Progress(*columns, console=errors, transient=True) as bars:
+    watched = errors.is_terminal
+    with Progress(*columns, console=errors, transient=True, disable=not watched) as bars:
         tasks: dict[str, Any] = {}
 
         def advance(what: str, done: int, total: int) -> None:
@@ -53,3 +63,13 @@ def progress_bars() -> Iterator[Callable[[str, int, int], None]]:
             bars.update(tasks[what], completed=done)
 
         yield advance
+
+
+@contextmanager
+def busy(what: str) -> Iterator[None]:
+    """Show that something is being done that has no measure; silent where nobody looks."""
+    if errors.is_terminal:
+        with errors.status(what):
+            yield
+    else:
+        yield

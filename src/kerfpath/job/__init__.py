@@ -4,6 +4,7 @@ from kerfpath.job._again import audit_file as audit_file
 from kerfpath.job._again import program_from_file as program_from_file
 from kerfpath.job._files import Written as Written
 from kerfpath.job._files import program_of as program_of
+from kerfpath.job._files import require_folder as require_folder
 from kerfpath.job._files import write_outcome as write_outcome
 from kerfpath.job._planfile import PlanFile as PlanFile
 from kerfpath.job._planfile import read_plan_file as read_plan_file

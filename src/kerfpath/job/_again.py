@@ -15,6 +15,7 @@ from kerfpath.job._files import program_of
 from kerfpath.job._model import ProgramTable
 from kerfpath.job._planfile import PlanFile, read_plan_file
 from kerfpath.job._read import ProgramOptions, program_options, read_job
+from kerfpath.post import language as find_language
 
 __all__ = ["audit_file", "program_from_file"]
 
@@ -64,6 +65,7 @@ def program_from_file(plan_file: Path, language: str) -> tuple[str, list[str]]:
 
 def _options(file: PlanFile, language: str) -> ProgramOptions:
     table: Any = file.job.get("program", {})
+    find_language(language)
     try:
         parsed = ProgramTable.model_validate({**table, "language": language})
     except (ValidationError, TypeError) as error:

@@ -18,7 +18,7 @@ from kerfpath.plans import Plan
 from kerfpath.post import build_program, language, post, preflight, write_program
 from kerfpath.report import ContourSection, render
 
-__all__ = ["Written", "program_of", "trajectory_text", "write_outcome"]
+__all__ = ["Written", "program_of", "require_folder", "trajectory_text", "write_outcome"]
 
 NOT_CHECKED = (
     "Collisions are not checked, neither along the contours nor on the way between them: "
@@ -77,6 +77,21 @@ def write_outcome(outcome: Outcome, folder: Path) -> Written:
         write_program(path, text)
     stale = target if not outcome.passed and target.exists() else None
     return Written(files=tuple(texts), stale=stale, notes=tuple(notes))
+
+
+def require_folder(folder: Path) -> None:
+    """Refuse a place for the files that cannot be a folder, before any work is done for it.
+
+    Raises
+    ------
+    InputError
+        Something else than a folder is there, or on the way there.
+    """
+    for place in (folder, *folder.parents):
+        if place.is_dir():
+            return
+        if place.exists():
+            raise InputError(f"{folder}: expected a folder, but {place} is a file; name another")
 
 
 def program_of(plans: Sequence[Plan], options: ProgramOptions) -> tuple[str, list[str]]:

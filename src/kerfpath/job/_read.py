@@ -16,19 +16,9 @@ from pydantic_core import ErrorDetails
 from kerfpath._arrays import Array
 from kerfpath.contour import Contour
 from kerfpath.errors import InputError
+from kerfpath.job._keys import FAULT, LARGEST, MOST_NODES, SMALLEST, nearest
 from kerfpath.job._lines import Places
-from kerfpath.job._model import (
-    FAULT,
-    LARGEST,
-    MOST_NODES,
-    SMALLEST,
-    TABLES,
-    ContourTable,
-    JobFile,
-    PlanTable,
-    ProgramTable,
-    nearest,
-)
+from kerfpath.job._model import TABLES, ContourTable, JobFile, PlanTable, ProgramTable
 from kerfpath.robots import Robot, postures_named
 
 __all__ = ["ContourTask", "Job", "ProgramOptions", "program_options", "read_job"]

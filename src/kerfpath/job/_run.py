@@ -14,7 +14,7 @@ from kerfpath.contour import FRAME_KINDS, Contour
 from kerfpath.errors import NoFeasiblePath
 from kerfpath.graph import LayeredGraph
 from kerfpath.job._read import ContourTask, Job
-from kerfpath.kernels._jit import CACHE
+from kerfpath.kernels import is_compiled
 from kerfpath.planner import layered_graph, plan
 from kerfpath.plans import Plan
 from kerfpath.robots import robot
@@ -140,7 +140,7 @@ def _cut(job: Job, task: ContourTask, drawn: Contour, progress: Progress) -> Cut
 
 def warm_up() -> bool:
     """Compile the kernels if this copy never has; return whether that was needed."""
-    if CACHE.is_dir():
+    if is_compiled():
         return False
     arm = robot("abb_irb4600_60_205", acceleration_ratio="iontec_20_to_70kg")
     points = np.linspace([1.2, 0.0, 0.5], [1.2, 0.001, 0.5], 4)

@@ -15,7 +15,9 @@ M_dist, M_ind         out_dist and out_before: cost and best predecessor
 ====================  ===============================================================
 """
 
-__all__ = ["EQUATIONS"]
+from kerfpath.kernels._jit import is_compiled
+
+__all__ = ["EQUATIONS", "is_compiled"]
 
 EQUATIONS = {
     1: "kerfpath.contour:Contour.resample",

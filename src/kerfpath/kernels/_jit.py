@@ -15,7 +15,7 @@ from typing import Any, ParamSpec, TypeVar
 import numba
 import platformdirs
 
-__all__ = ["CACHE", "VECTOR_FLAGS", "jit", "jit_vector"]
+__all__ = ["CACHE", "VECTOR_FLAGS", "is_compiled", "jit", "jit_vector"]
 
 _P = ParamSpec("_P")
 _R = TypeVar("_R")
@@ -26,6 +26,9 @@ A kernel that takes them never meets NaN: the border refuses it."""
 
 
 def _cache_folder() -> Path:
+    config: Any = numba.config
+    if config.CACHE_DIR:
+        return Path(config.CACHE_DIR)
     here = Path(__file__).parent
     digest = hashlib.sha256(numba.__version__.encode())
     for source in sorted(here.glob("*.py")):
@@ -37,13 +40,18 @@ def _cache_folder() -> Path:
 
 
 CACHE = _cache_folder()
-"""Where the compiled kernels of exactly these sources are kept."""
+"""Where the compiled kernels of exactly these sources are kept (or NUMBA_CACHE_DIR, if set)."""
+
+
+def is_compiled() -> bool:
+    """Return whether kernels have been compiled into the cache before."""
+    return any(CACHE.rglob("*.nbi"))
 
 
 def _compiled(function: Callable[_P, _R], flags: set[str] | bool) -> Callable[_P, _R]:
     config: Any = numba.config
     kept = config.CACHE_DIR
-    config.CACHE_DIR = kept or str(CACHE)
+    config.CACHE_DIR = str(CACHE)
     try:
         compiled: Callable[_P, _R] = numba.njit(cache=True, nogil=True, fastmath=flags)(function)
     finally:

@@ -1,0 +1,101 @@
+"""What the values of a job file may be, and how a message says what was expected instead."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Collection
+from difflib import get_close_matches
+from typing import Annotated, Any
+
+from pydantic import AfterValidator, Field
+from pydantic_core import PydanticCustomError
+
+from kerfpath.errors import InputError
+from kerfpath.job._heads import heads
+from kerfpath.robots import acceleration_ratios, postures_named
+
+__all__ = [
+    "FAULT", "LARGEST", "MOST_NODES", "SMALLEST", "Axis", "Head", "Identifier", "NotNegative",
+    "Number", "Positive", "Posture", "Ratio", "Six", "SixNotNegative", "SixPositive", "Text",
+    "Three", "fault", "key", "nearest", "one_of",
+]  # fmt: skip
+
+LARGEST = 1e6
+"""No number of a job is larger, in the unit of its key: a kilometre in mm is a slip of the pen."""
+SMALLEST = 1e-9
+"""What must be positive is at least this: smaller numbers vanish when units are converted."""
+MOST_NODES = 1_000_000
+"""More nodes than any contour needs, few enough to fit into memory."""
+FAULT = "kerfpath"
+"""Error type of the rules below that pydantic cannot state itself."""
+_LISTED = 12
+"""Known names are listed in a message up to this many."""
+
+
+def nearest(name: str, known: Collection[str]) -> str:
+    """Say which of the `known` names are most like `name`, or which there are."""
+    within = [k for k in known if name and name.lower() in k.lower()]
+    if near := within[:3] or get_close_matches(name, known, n=3, cutoff=0.5):
+        return f"nearest: {', '.join(near)}"
+    return f"known: {', '.join(known)}" if len(known) <= _LISTED else "none is called like it"
+
+
+def key(expected: str, example: str, **bounds: Any) -> Any:
+    """Return a field's bounds, with what a message says was expected and how to write it."""
+    return Field(description=expected, examples=[example], **bounds)
+
+
+def fault(
+    expected: str, got: str | None, remedy: str, where: tuple[str | int, ...] = ()
+) -> PydanticCustomError:
+    """Return an error at the key that `where` leads to from here; `got` None: the value itself."""
+    said = {"expected": expected, "got": got, "remedy": remedy, "where": where}
+    return PydanticCustomError(FAULT, "expected {expected}, got {got}; {remedy}", said)
+
+
+def one_of(what: str, names: Callable[[], Collection[str]], hint: str = "") -> AfterValidator:
+    """Return a validator that admits only one of `names`."""
+
+    def check(value: str) -> str:
+        if value not in names():
+            raise fault(what, None, f"{nearest(value, names())}{hint}")
+        return value
+
+    return AfterValidator(check)
+
+
+Number = Annotated[float, Field(allow_inf_nan=False, ge=-LARGEST, le=LARGEST)]
+Positive = Annotated[float, Field(allow_inf_nan=False, ge=SMALLEST, le=LARGEST)]
+NotNegative = Annotated[float, Field(allow_inf_nan=False, ge=0, le=LARGEST)]
+Axis = Annotated[int, Field(ge=1, le=6)]
+# TOML arrays arrive as lists: not strict about that, while their elements stay strict.
+Three = Annotated[tuple[Number, ...], Field(strict=False, min_length=3, max_length=3)]
+Six = Annotated[tuple[Number, ...], Field(strict=False, min_length=6, max_length=6)]
+SixPositive = Annotated[tuple[Positive, ...], Field(strict=False, min_length=6, max_length=6)]
+SixNotNegative = Annotated[tuple[NotNegative, ...], Field(strict=False, min_length=6, max_length=6)]
+# One printable line that is not blank.
+Text = Annotated[str, Field(pattern=r"^[^\p{C}\p{Zl}\p{Zp}]*\S[^\p{C}\p{Zl}\p{Zp}]*$")]
+Identifier = Annotated[
+    str,
+    key(
+        "a name of letters, digits and _, a letter first, at most 32 characters",
+        '"trim_1"',
+        pattern=r"^[A-Za-z][A-Za-z0-9_]{0,31}$",
+    ),
+]
+Head = Annotated[str, one_of("a cutting head", heads)]
+Ratio = Annotated[str, one_of("a known ratio", acceleration_ratios)]
+
+
+def _posture(words: str) -> str:
+    try:
+        postures_named(words)
+    except InputError:
+        raise fault(
+            "a posture in words of front|rear / up|down / plus|minus",
+            None,
+            'write, for example, posture = "front/up"',
+        ) from None
+    return words
+
+
+Posture = Annotated[str, AfterValidator(_posture)]

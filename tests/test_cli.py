@@ -1,0 +1,288 @@
+"""The command line as a user meets it: summaries, JSON, files, exit codes, bad input."""
+
+import csv
+import io
+import json
+import re
+import shutil
+import subprocess
+import sys
+from contextlib import redirect_stderr, redirect_stdout
+from importlib.resources import files
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+import pytest
+
+from kerfpath import robot
+from kerfpath.cli import main
+from kerfpath.job import read_plan_file
+from kerfpath.post import read_rapid
+
+DEMO = Path(str(files("kerfpath") / "demo"))
+SMALL = (DEMO / "b_pillar.toml").read_text()
+# Two small contours at a coarse step: everything the demo does, in a second.
+HEAD, *CONTOURS, TAIL = re.split(r"(?=\[\[contour\]\]|\[plan\])", SMALL)
+SMALL = "".join(
+    [HEAD, CONTOURS[4], CONTOURS[2], TAIL.replace("gamma_step_deg = 1", "gamma_step_deg = 3")]
+)
+
+
+class Result(NamedTuple):
+    returncode: int
+    stdout: str
+    stderr: str
+
+
+def run(*arguments, cwd="."):
+    """Run the command in this process, as its entry point would."""
+    stdout, stderr = io.StringIO(), io.StringIO()
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(sys, "argv", ["kerfpath", *map(str, arguments)])
+        patch.chdir(cwd)
+        with redirect_stdout(stdout), redirect_stderr(stderr):
+            try:
+                main()
+                code = 0
+            except SystemExit as leaving:
+                code = leaving.code or 0
+    return Result(code, stdout.getvalue(), stderr.getvalue())
+
+
+def refused(result, *words):
+    """Assert bad input: exit code 2, one line on stderr, nothing on stdout."""
+    assert result.returncode == 2, result.stderr
+    assert result.stdout == ""
+    assert len(result.stderr.strip().splitlines()) == 1, result.stderr
+    assert result.stderr.startswith("kerfpath: error: ")
+    for word in words:
+        assert word in result.stderr
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("job")
+    shutil.copy(DEMO / "b_pillar.step", folder)
+    (folder / "small.toml").write_text(SMALL)
+    return folder
+
+
+@pytest.fixture(scope="module")
+def planned(folder):
+    result = run("plan", "small.toml", "--json", cwd=folder)
+    assert result.returncode == 0, result.stderr
+    return json.loads(result.stdout)
+
+
+def test_the_demo_leaves_all_four_files(tmp_path):
+    command = [
+        Path(sys.executable).parent / "kerfpath",
+        "demo",
+        "--out",
+        tmp_path / "deep" / "demo",
+    ]
+    result = subprocess.run(command, capture_output=True, text=True, check=True)
+    assert result.stdout.count("passed") == 7
+    assert "Collisions are not checked" in result.stdout
+    names = {p.name for p in (tmp_path / "deep" / "demo").iterdir()}
+    assert names == {"plan.json", "trajectory.csv", "report.html", "b_pillar.mod"}
+
+
+def test_a_plan_says_what_it_did(planned, folder):
+    assert planned["passed"]
+    assert [c["name"] for c in planned["contours"]] == ["hole 10", "slot"]
+    assert {Path(f).name for f in planned["files"]} == {
+        "small.mod", "plan.json", "trajectory.csv", "report.html"
+    }  # fmt: skip
+    assert all((folder / f).exists() for f in planned["files"])
+    for contour in planned["contours"]:
+        assert 0 < contour["peak_velocity_share"] <= 0.95
+        assert contour["issues"] == []
+
+
+def test_the_trajectory_is_the_plan_in_degrees_and_millimetres(planned, folder):
+    text = (folder / "small-plan" / "trajectory.csv").read_text()
+    rows = list(csv.DictReader(text.splitlines()))
+    plans = {p.name: p for p in read_plan_file(folder / "small-plan" / "plan.json").plans}
+    assert len(rows) == sum(len(p.q) for p in plans.values())
+    header = "contour,node,kind,t_s,q1_deg,q2_deg,q3_deg,q4_deg,q5_deg,q6_deg,x_mm,y_mm,z_mm"
+    header += ",axis_x,axis_y,axis_z,gamma_deg,posture"
+    assert list(rows[0]) == header.split(",")
+    for row in rows[:: len(rows) // 50]:
+        plan, k = plans[row["contour"]], int(row["node"])
+        q = np.radians([float(row[f"q{i}_deg"]) for i in range(1, 7)])
+        np.testing.assert_allclose(q, plan.q[k], atol=1e-12)
+        np.testing.assert_allclose(
+            [float(row[c]) for c in ("x_mm", "y_mm", "z_mm")], plan.points[k] * 1000, atol=1e-9
+        )
+        assert row["kind"] == "cut"
+        assert float(row["t_s"]) == pytest.approx(plan.time[k])
+
+
+def test_plan_json_carries_everything_and_round_trips(planned, folder):
+    data = json.loads((folder / "small-plan" / "plan.json").read_text())
+    assert data["schema"] == 1
+    assert data["robot"]["id"] == "abb_irb4600_60_205"
+    assert data["job"]["tool"]["head"] == "laser-head-45"
+    assert np.array(data["T_flange_tip"]).shape == (4, 4)
+    assert data["limits"]["acceleration_source"] == "given by the user"
+    for contour in data["contours"]:
+        assert {"method", "objective", "metric", "eta_v", "eta_a", "dt", "cost"} <= set(contour)
+        assert {"optimal", "criteria", "counts", "audit"} <= set(contour)
+        assert contour["audit"]["passed"]
+    plan = read_plan_file(folder / "small-plan" / "plan.json").plans[0]
+    assert plan.q.tolist() == data["contours"][0]["nodes"]["q_rad"]
+    np.testing.assert_array_equal(plan.robot.lower, robot("abb_irb4600_60_205").lower)
+
+
+def test_the_same_job_gives_the_same_bytes(planned, folder):
+    again = run("plan", "small.toml", "--out", "again", cwd=folder)
+    assert again.returncode == 0
+    for name in ("plan.json", "trajectory.csv", "report.html", "small.mod"):
+        assert (folder / "again" / name).read_bytes() == (folder / "small-plan" / name).read_bytes()
+
+
+def test_post_writes_the_program_that_plan_wrote(planned, folder):
+    printed = run("post", "small-plan/plan.json", cwd=folder)
+    assert printed.returncode == 0
+    # Only the module's name differs: plan.json does not keep the file name of its job.
+    written = (folder / "small-plan" / "small.mod").read_text()
+    assert printed.stdout.replace("MODULE plan", "MODULE small") == written
+    read_rapid(printed.stdout)
+    to_file = run("post", "small-plan/plan.json", "-o", "again.mod", cwd=folder)
+    assert to_file.returncode == 0
+    assert (folder / "again.mod").read_text() == printed.stdout
+
+
+def test_audit_shows_the_table_and_passes(planned, folder):
+    result = run("audit", "small-plan/plan.json", "--job", "small.toml", cwd=folder)
+    assert result.returncode == 0, result.stderr
+    assert "audit passed" in result.stdout
+    assert "tool tip between the nodes" in result.stdout
+    table = json.loads(run("audit", "small-plan/plan.json", "--json", cwd=folder).stdout)
+    assert table["passed"]
+    assert set(table["contours"]) == {"hole 10", "slot"}
+
+
+def test_a_plan_that_was_tampered_with_fails_and_gets_no_program(planned, folder):
+    data = json.loads((folder / "small-plan" / "plan.json").read_text())
+    data["contours"][1]["nodes"]["q_rad"][30][2] += 0.01
+    (folder / "bent.json").write_text(json.dumps(data))
+    result = run("audit", "bent.json", cwd=folder)
+    assert result.returncode == 1
+    assert "ERROR" in result.stdout
+    assert "audit FAILED" in result.stdout
+    refusal = run("post", "bent.json", "-o", "bent.mod", cwd=folder)
+    assert refusal.returncode == 1
+    assert "fails its audit" in refusal.stderr
+    assert not (folder / "bent.mod").exists()
+
+
+def test_a_part_out_of_reach_is_reported_without_a_program(folder):
+    (folder / "far.toml").write_text(SMALL.replace("xyz_mm = [1200", "xyz_mm = [3200"))
+    result = run("plan", "far.toml", cwd=folder)
+    assert result.returncode == 1
+    assert "no admissible pose at node 0" in result.stdout
+    assert "unreachable" in result.stdout
+    names = {p.name for p in (folder / "far-plan").iterdir()}
+    assert names == {"plan.json", "trajectory.csv", "report.html"}
+    data = json.loads((folder / "far-plan" / "plan.json").read_text())
+    assert not data["contours"][0]["feasible"]
+    assert data["contours"][0]["proved"]
+    assert run("audit", "far-plan/plan.json", cwd=folder).returncode == 1
+    assert run("post", "far-plan/plan.json", cwd=folder).returncode == 1
+
+
+def test_an_older_program_in_the_folder_is_pointed_out(folder):
+    (folder / "stale").mkdir()
+    (folder / "stale" / "far.mod").write_text("MODULE old\nENDMODULE\n")
+    (folder / "far.toml").write_text(SMALL.replace("xyz_mm = [1200", "xyz_mm = [3200"))
+    result = run("plan", "far.toml", "--out", "stale", cwd=folder)
+    assert result.returncode == 1
+    assert "is from an earlier run and does not belong to this plan" in result.stderr
+
+
+def test_contours_lists_the_loops_by_name():
+    result = run("contours", DEMO / "b_pillar.step")
+    assert result.returncode == 0
+    assert "1200.0 x 325.2 x 116.8 mm" in result.stdout
+    assert re.search(r"skin/outer +\S+ +2906\.13", result.stdout)
+    data = json.loads(run("contours", DEMO / "b_pillar.step", "--json").stdout)
+    outer = next(loop for loop in data["loops"] if loop["name"] == "skin/outer")
+    assert outer["length_m"] == pytest.approx(2.906, abs=1e-3)
+    scaled = json.loads(run("contours", DEMO / "b_pillar.step", "--unit", "in", "--json").stdout)
+    size = np.ptp(scaled["bounding_box_m"], axis=0)
+    np.testing.assert_allclose(size, 25.4 * np.ptp(data["bounding_box_m"], axis=0), rtol=1e-6)
+
+
+def test_robots_lists_the_library_and_shows_sources():
+    assert "60 robots" in run("robots").stdout
+    shown = run("robots", "abb_irb2400_155").stdout
+    assert "joint 2 + joint 3: -60 to 65 deg" in shown
+    assert "source of geometry limits velocity: ros-industrial/abb" in shown
+    data = json.loads(run("robots", "kuka_kr120_r2500_pro", "--json").stdout)
+    assert data["lower_deg"] is None
+    assert "copy error" in data["limits_missing"]
+    assert len(json.loads(run("robots", "--json").stdout)["robots"]) == 60
+
+
+def test_help_teaches():
+    for command in ("demo", "plan", "post", "audit", "contours", "robots"):
+        result = run(command, "--help")
+        assert result.returncode == 0
+        assert f"Example: kerfpath {command}" in result.stdout
+    assert "kerfpath demo" in run("--help").stdout
+    assert run("--version").stdout == "kerfpath 0.1.0\n"
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (("plan", "none.toml"), ["none.toml", "no such file"]),
+        (("plan", "."), ["got a folder"]),
+        (("post", "none.json"), ["none.json", "cannot be read"]),
+        (("post", "small.toml"), ["not a plan.json"]),
+        (("post", "list.json"), ["expected a plan.json with schema 1, got 'list'"]),
+        (("post", "old.json"), ["schema 1, got 0"]),
+        (("post", "short.json"), ["the key 'robot' is missing"]),
+        (("audit", "none.json"), ["cannot be read"]),
+        (("audit", "small-plan/plan.json", "--job", "none.toml"), ["no such file"]),
+        (
+            ("post", "small-plan/plan.json", "--language", "karel"),
+            ["'karel' is not known", "rapid"],
+        ),
+        (("post", "small-plan/plan.json", "-o", "no/such/folder/x.mod"), ["cannot write"]),
+        (("contours", "none.step"), ["none.step"]),
+        (("contours", "small.toml"), ["small.toml"]),
+        (("contours", "b_pillar.step", "--unit", "ell"), ["ell"]),
+        (("robots", "abb_irb9999"), ["not in the library"]),
+        (("plan", "wrong-loop.toml", "--out", "wrong"), ["no loop 'skin/hole99'", "skin/hole9"]),
+        (("plan", "slow.toml", "--out", "wrong"), ["slow.toml:", "speed_m_min"]),
+        (("plan", "small.toml", "--out", "small.toml"), ["small.toml", "folder"]),
+    ],
+)
+def test_bad_input_is_one_line_and_nothing_is_written(planned, folder, arguments, words):
+    (folder / "list.json").write_text("[]")
+    (folder / "old.json").write_text('{"schema": 0}')
+    (folder / "short.json").write_text('{"schema": 1}')
+    (folder / "wrong-loop.toml").write_text(SMALL.replace("skin/hole9", "skin/hole99"))
+    (folder / "slow.toml").write_text(SMALL.replace("speed_m_min = 3", "speed_m_min = -3", 1))
+    before = sorted(folder.iterdir())
+    refused(run(*arguments, cwd=folder), *words)
+    assert sorted(folder.iterdir()) == before
+
+
+@pytest.mark.parametrize("arguments", [("nonsense",), ("plan",), ("robots", "--colour")])
+def test_wrong_usage_has_exit_code_two_and_no_traceback(arguments):
+    result = run(*arguments)
+    assert result.returncode == 2
+    assert "Traceback" not in result.stderr
+    assert "--help" in result.stderr
+
+
+def test_a_reader_that_leaves_early_is_no_error():
+    code = "from kerfpath.cli import main; main()"
+    pipe = f"{sys.executable} -c '{code}' contours {DEMO / 'b_pillar.step'} --json | head -c 10"
+    result = subprocess.run(pipe, shell=True, capture_output=True, text=True, check=False)
+    assert "Traceback" not in result.stderr
