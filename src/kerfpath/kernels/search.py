@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 
 from kerfpath._arrays import Array, Bools, Ints
-from kerfpath.kernels._jit import jit, jit_vector
+from kerfpath.kernels._jit import jit
 from kerfpath.kernels.limits import LIMIT_TOLERANCE, acceleration_excess, velocity_excess
 from kerfpath.kernels.metric import EUCLID, MANHATTAN, increment
 
@@ -82,33 +82,24 @@ def _window(layers: Layers, k: int, key: float, out_run: Ints) -> int:
     return 1
 
 
-@jit_vector
-def _distances(layers: Layers, aim: Objective, j: int, a: int, b: int, out_c: Array) -> None:
-    """Distances rho from vertices a..b to vertex j; infinite where the velocity limit breaks."""
-    m = b - a
-    out_c[:m] = 0.0
+@jit
+def _distance(layers: Layers, aim: Objective, p: int, j: int) -> float:
+    """Distance rho from vertex p to vertex j; infinite where it breaks the velocity limit (5)."""
+    total = 0.0
     for i in range(len(layers.endless)):
-        x, w, bound = layers.q[i, j], aim.weight[i], aim.velocity[i] + LIMIT_TOLERANCE
-        row = layers.q[i, a:b]
-        turn = 2 * pi if layers.endless[i] else np.inf
+        y = abs(layers.q[i, j] - layers.q[i, p])
+        if layers.endless[i]:
+            y = min(y, 2 * pi - y)
+        if y > aim.velocity[i] + LIMIT_TOLERANCE:
+            return np.inf
+        part = aim.weight[i] * y
         if aim.metric == MANHATTAN:
-            for p in range(m):
-                y = abs(x - row[p])
-                y = min(y, turn - y)
-                out_c[p] += np.inf if y > bound else w * y
+            total += part
         elif aim.metric == EUCLID:
-            for p in range(m):
-                y = abs(x - row[p])
-                y = min(y, turn - y)
-                out_c[p] += np.inf if y > bound else w * y * w * y
+            total += part * part
         else:
-            for p in range(m):
-                y = abs(x - row[p])
-                y = min(y, turn - y)
-                out_c[p] = max(out_c[p], np.inf if y > bound else w * y)
-    if aim.metric == EUCLID:
-        for p in range(m):
-            out_c[p] = sqrt(out_c[p])
+            total = max(total, part)
+    return sqrt(total) if aim.metric == EUCLID else total
 
 
 @jit
@@ -131,8 +122,7 @@ def path_planning(
     first, last = layers.start[0], layers.start[1]
     for j in range(first, last):
         out_dist[j], out_before[j] = aim.vertex_cost[j], -1
-    n, size = len(layers.endless), np.max(np.diff(layers.start))
-    c = np.empty(size)
+    n = len(layers.endless)
     run, dq, dq_before = np.empty((2, 2), np.int64), np.empty(n), np.empty(n)
     turned_away = False
     for k in range(1, len(layers.start) - 1):
@@ -140,11 +130,11 @@ def path_planning(
         for j in range(layers.start[k], layers.start[k + 1]):
             best, first_order, best_p = np.inf, np.inf, -1
             for r in range(_window(layers, k - 1, layers.key[j], run)):
-                a, b = run[r, 0], run[r, 1]
-                _distances(layers, aim, j, a, b, c)
-                for p in range(a, b):
-                    d = out_dist[p]
-                    d = max(d, c[p - a]) if aim.minimax else d + c[p - a]
+                for p in range(run[r, 0], run[r, 1]):
+                    if out_dist[p] > best:
+                        continue
+                    c = _distance(layers, aim, p, j)
+                    d = max(out_dist[p], c) if aim.minimax else out_dist[p] + c
                     tie = d == best and best_p >= 0 and layers.rank[p] < layers.rank[best_p]
                     if not (d < best or tie):
                         continue
