@@ -46,6 +46,8 @@ class Objective(NamedTuple):
     vertex_cost: Array
     velocity: Array
     acceleration: Array
+    cap: float
+    """Largest distance, and largest cost of a vertex, that is allowed."""
 
 
 @jit
@@ -84,7 +86,7 @@ def _window(layers: Layers, k: int, key: float, out_run: Ints) -> int:
 
 @jit
 def _distance(layers: Layers, aim: Objective, p: int, j: int) -> float:
-    """Distance rho from vertex p to vertex j; infinite where it breaks the velocity limit (5)."""
+    """Distance rho from vertex p to vertex j; infinite where (5) or the cap forbids it."""
     total = 0.0
     for i in range(len(layers.endless)):
         y = abs(layers.q[i, j] - layers.q[i, p])
@@ -99,7 +101,8 @@ def _distance(layers: Layers, aim: Objective, p: int, j: int) -> float:
             total += part * part
         else:
             total = max(total, part)
-    return sqrt(total) if aim.metric == EUCLID else total
+    total = sqrt(total) if aim.metric == EUCLID else total
+    return total if total <= aim.cap else np.inf
 
 
 @jit

@@ -13,8 +13,9 @@ from kerfpath.errors import InputError, NoFeasiblePath
 from kerfpath.kernels import metric as metrics
 from kerfpath.kernels import search as kernel
 from kerfpath.kernels.limits import LIMIT_TOLERANCE
+from kerfpath.search._exact import Best, best_closed_path, best_path
 
-__all__ = ["LayeredPath", "Method", "Metric", "ObjectiveKind", "shortest_path"]
+__all__ = ["Closure", "LayeredPath", "Method", "Metric", "ObjectiveKind", "shortest_path"]
 
 Metric = Literal["manhattan", "chebychev", "euclid"]
 ObjectiveKind = Literal["sum", "max"]
@@ -26,6 +27,8 @@ _METRIC_CODES: dict[str, int] = {
     "manhattan": metrics.MANHATTAN,
     "chebychev": metrics.CHEBYCHEV,
 }
+SAME_END = 1e-6
+"""Joint difference (rad) up to which the ends of a closed contour count as the same vertex."""
 _LAYERS_SAMPLED = 32
 """Layers looked at to choose the joint that sorts them: enough to rank the joints."""
 
@@ -94,9 +97,11 @@ def shortest_path(
     method : {"exact", "paper", "known"}
         "paper": the procedure of section 3.2, whose acceleration test sees only the best
         predecessor. "known": the technique of 2004, without (5) and (6), on one posture.
-        "exact": not available yet.
+        "exact": the optimum under (5) and (6), proved; of several with the same maximum, the one
+        with the least sum.
     closure : {"free", "periodic"}
-        "periodic" is not available yet.
+        "periodic": the last layer repeats the first, the path returns to the vertex it left
+        (endless joints modulo 2 pi), and (6) holds across the seam; exact method only.
     eta_v, eta_a : float
         Share of the velocity and acceleration limits that may be used.
 
@@ -105,9 +110,8 @@ def shortest_path(
     NoFeasiblePath
         No admissible path was found; says where and what forbids it.
     InputError
-        Arrays that do not fit each other, NaN, limits or dt that are not positive, unknown names.
-    NotImplementedError
-        method="exact" or closure="periodic".
+        Arrays that do not fit each other, NaN, limits or dt that are not positive, unknown names,
+        a periodic closure whose end layers differ.
     """
     q = floats(q, "q", (None, None))
     start = _offsets(start, len(q))
@@ -130,10 +134,8 @@ def shortest_path(
     )
     if posture is not None:
         posture = integers(posture, "posture", (len(q),))
-    if method == "exact":
-        raise NotImplementedError('method="exact" comes with the exact search; use method="paper"')
-    if closure == "periodic":
-        raise NotImplementedError('closure="periodic" comes with the exact search; use "free"')
+    if closure == "periodic" and method != "exact":
+        raise InputError(f'closure: "periodic" needs method="exact", got method={method!r}')
 
     if method == "known":
         bound_v = bound_a = np.full(n, np.inf)
@@ -158,28 +160,56 @@ def shortest_path(
         vertex_cost=cost[order],
         velocity=bound_v,
         acceleration=bound_a,
+        cap=np.inf,
     )
-    return _search(layers, aim, may_prove=method == "paper")
+    filled = int(np.argmin(np.diff(start))) if (np.diff(start) == 0).any() else len(start) - 1
+    if filled == 0:
+        raise NoFeasiblePath("layer 0 is empty: no path can start", proved=True, node=-1)
+    if method == "exact":
+        return _exactly(layers, aim, filled, closure)
+    return _search(layers, aim, filled, may_prove=method == "paper")
 
 
-def _search(layers: kernel.Layers, aim: kernel.Objective, *, may_prove: bool) -> LayeredPath:
+def _exactly(
+    layers: kernel.Layers, aim: kernel.Objective, filled: int, closure: Closure
+) -> LayeredPath:
+    """Return the proved optimum, or prove that there is no path (and say where it breaks)."""
+    whole = filled == len(layers.start) - 1
+    to_search = layers._replace(start=layers.start[: filled + 1])
+    if closure == "periodic" and whole:
+        _require_same_ends(layers)
+        found = best_closed_path(layers, aim)
+    else:
+        found = best_path(to_search, aim)
+    if isinstance(found, Best):
+        if not whole:
+            raise _empty_layer(filled)
+        index = layers.rank[found.path]
+        return LayeredPath(index=freeze(index), cost=found.cost, optimal=True)
+    if closure == "periodic" and found.layers >= filled - 1 and not found.counts.any():
+        raise NoFeasiblePath(
+            "paths reach the last node, but none returns to the vertex that it left"
+            " with its acceleration across the seam admissible",
+            proved=True,
+            node=len(layers.start) - 2,
+        )
+    raise _broken_edge(found.layers, found.counts, proved=True)
+
+
+def _search(
+    layers: kernel.Layers, aim: kernel.Objective, filled: int, *, may_prove: bool
+) -> LayeredPath:
     """Run steps (1) to (5) of the procedure and read the path back (or say where it breaks)."""
     start = layers.start
     sizes = np.diff(start)
-    filled = int(np.argmin(sizes)) if (sizes == 0).any() else len(sizes)
-    if filled == 0:
-        raise NoFeasiblePath("layer 0 is empty: no path can start", proved=True, node=-1)
     dist, before = np.full(len(layers.key), np.inf), np.full(len(layers.key), -1)
     to_search = layers._replace(start=start[: filled + 1])
     reached, turned_away = kernel.path_planning(to_search, aim, dist, before)
     if reached < filled:
-        raise _closed_at(layers, aim, dist, before, reached, proved=not turned_away)
+        counts = kernel.closing_counts(layers, aim, dist, before, reached)
+        raise _broken_edge(reached, counts, proved=not turned_away)
     if filled < len(sizes):
-        raise NoFeasiblePath(
-            f"layer {filled} is empty: no admissible pose at that node",
-            proved=True,
-            node=filled - 1,
-        )
+        raise _empty_layer(filled)
     a, b = start[-2], start[-1]
     best = np.flatnonzero(dist[a:b] == dist[a:b].min()) + a
     j = int(best[np.argmin(layers.rank[best])])
@@ -191,10 +221,14 @@ def _search(layers: kernel.Layers, aim: kernel.Objective, *, may_prove: bool) ->
     return LayeredPath(index=freeze(path), cost=cost, optimal=may_prove and not turned_away)
 
 
-def _closed_at(
-    layers: kernel.Layers, aim: kernel.Objective, dist: Array, before: Ints, k: int, *, proved: bool
-) -> NoFeasiblePath:
-    forbidden = kernel.closing_counts(layers, aim, dist, before, k)
+def _empty_layer(k: int) -> NoFeasiblePath:
+    return NoFeasiblePath(
+        f"layer {k} is empty: no admissible pose at that node", proved=True, node=k - 1
+    )
+
+
+def _broken_edge(k: int, forbidden: Ints, *, proved: bool) -> NoFeasiblePath:
+    """Say that no admissible edge leads into layer k, and which limits forbid how many."""
     counts = {
         f"{test}, joint {i + 1}": int(number)
         for test, row in zip(("velocity", "acceleration"), forbidden, strict=True)
@@ -209,6 +243,26 @@ def _closed_at(
         node=k - 1,
         counts=counts,
     )
+
+
+def _require_same_ends(layers: kernel.Layers) -> None:
+    first, last = slice(0, layers.start[1]), slice(layers.start[-2], layers.start[-1])
+    sizes = int(layers.start[1]), int(layers.start[-1] - layers.start[-2])
+    if sizes[0] != sizes[1]:
+        raise InputError(
+            "closure: periodic needs a last layer that repeats the first, but they have "
+            f"{sizes[0]} and {sizes[1]} vertices"
+        )
+    a = layers.q[:, first][:, np.argsort(layers.rank[first])]
+    b = layers.q[:, last][:, np.argsort(layers.rank[last])]
+    gap = np.abs(a - b)
+    gap = np.where(layers.endless[:, None], np.minimum(gap, 2 * np.pi - gap), gap)
+    if gap.max(initial=0.0) > SAME_END:
+        i = int(np.argmax(gap.max(axis=0)))
+        raise InputError(
+            "closure: periodic needs a last layer that repeats the first, but their vertices "
+            f"{i} differ by {gap[:, i].max():.3g} rad"
+        )
 
 
 def _narrowest_key(

@@ -1,0 +1,261 @@
+"""Recursion (16) made exact under the acceleration limit (6).
+
+The procedure of section 3.2 tests the acceleration against the best predecessor alone and can lose
+the optimum. Here the state is an edge (p, j): (5) is then a test on a state and (6) one on two
+neighbouring states, and the recursion
+
+    d(p, j) = rho(p, j) + min over l of d(l, p), with (6) for l, p, j
+
+is exact. The first-order problem solved backwards is a bound h(j) on what is still to come: with a
+bound on the cost, only states with d + h inside it are ever kept.
+"""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple, TypeVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from kerfpath._arrays import Array, Bools, Ints
+from kerfpath.kernels._jit import jit
+from kerfpath.kernels.limits import acceleration_excess, velocity_excess
+from kerfpath.kernels.search import Layers, Objective, _distance, _increment, _window
+
+__all__ = ["Reached", "cost_to_go", "count_closing", "recursion", "trace"]
+
+_T = TypeVar("_T", bound="np.generic[Any]")
+
+
+class States(NamedTuple):
+    """The edges into one layer that are kept, by the vertex they lead to, cheapest first."""
+
+    vertex: Ints
+    """(S,): the vertex j that the edge leads to."""
+    d: Array
+    """(S,): cost of the best path that ends with this edge, vertex j included."""
+    dq: Array
+    """(S, n): increment along the edge."""
+    parent: Ints
+    """(S,): place, among the states of the layer before, of the edge that comes before."""
+    first: Ints
+    """(m+1,): states of vertex start[k] + i are first[i]:first[i+1]."""
+
+
+class Reached(NamedTuple):
+    """What a recursion under a bound came to."""
+
+    layers: int
+    """Number of layers that some state reached."""
+    cost: float
+    """Cost of the best path, infinite if none kept the bound."""
+    lowest: float
+    """Least cost bound among what was dropped for its cost; infinite if nothing was."""
+    state: int
+    """The best state of the last layer, -1 if none."""
+    offset: Ints
+    """(K+1,): states of layer k in the record are offset[k]:offset[k+1]."""
+    vertex: Ints
+    """The record: vertex of every state kept,"""
+    parent: Ints
+    """and its parent within the layer before."""
+    last: States
+    """The states of the last layer that some state reached."""
+
+
+@jit
+def _joined(aim: Objective, a: float, b: float) -> float:
+    return max(a, b) if aim.minimax else a + b
+
+
+@jit
+def cost_to_go(layers: Layers, aim: Objective, allowed: Bools, out_h: Array) -> None:
+    """First-order bound h (N,): least cost from each vertex to the last layer, its own left out.
+
+    Vertices that are not allowed, or from which no edges within (5) lead to the end, get infinity.
+    """
+    run = np.empty((2, 2), np.int64)
+    last = len(layers.start) - 2
+    for j in range(layers.start[last], layers.start[last + 1]):
+        out_h[j] = 0.0 if allowed[j] else np.inf
+    for k in range(last - 1, -1, -1):
+        for p in range(layers.start[k], layers.start[k + 1]):
+            best = np.inf
+            if allowed[p]:
+                for r in range(_window(layers, k + 1, layers.key[p], run)):
+                    for j in range(run[r, 0], run[r, 1]):
+                        if out_h[j] < best:
+                            c = _joined(aim, _distance(layers, aim, p, j), aim.vertex_cost[j])
+                            best = min(best, _joined(aim, c, out_h[j]))
+            out_h[p] = best
+
+
+@jit
+def _grown(old: NDArray[_T]) -> NDArray[_T]:
+    new = np.empty((2 * len(old), *old.shape[1:]), old.dtype)
+    new[: len(old)] = old
+    return new
+
+
+@jit
+def _begin(layers: Layers, aim: Objective, h: Array, bound: float) -> tuple[States, float]:
+    """States of layer 0, one per vertex, with no edge before them; and the least cost dropped."""
+    m, lowest, count = layers.start[1], np.inf, 0
+    vertex, first = np.empty(m, np.int64), np.zeros(m + 1, np.int64)
+    for j in range(m):
+        f = _joined(aim, aim.vertex_cost[j], h[j])
+        if f <= bound:
+            vertex[count] = j
+            count += 1
+        else:
+            lowest = min(lowest, f)
+        first[j + 1] = count
+    vertex = vertex[:count]
+    none = np.empty((count, len(layers.endless)))
+    return States(vertex, aim.vertex_cost[vertex], none, np.full(count, -1), first), lowest
+
+
+@jit
+def _cheapest(
+    states: States,
+    a: int,
+    b: int,
+    aim: Objective,
+    step: float,
+    dq: Array,
+    rest: float,
+    bound: float,
+) -> tuple[int, float]:
+    """First of the states a..b, cheapest first, that (6) lets go on by dq; -1 if none in the bound.
+
+    Also returns the cost bound of the state at which the search was given up, or infinity.
+    """
+    for s in range(a, b):
+        f = _joined(aim, _joined(aim, states.d[s], step), rest)
+        if f > bound:
+            return -1, f
+        if states.parent[s] < 0 or acceleration_excess(dq, states.dq[s], aim.acceleration) < 0:
+            return s, np.inf
+    return -1, np.inf
+
+
+@jit
+def _extend(
+    layers: Layers, aim: Objective, h: Array, bound: float, seam: Array, k: int, states: States
+) -> tuple[States, float]:
+    """States of layer k + 1 from those of layer k, sorted; and the least cost dropped."""
+    n, count, lowest = len(layers.endless), 0, np.inf
+    vertex, parent = np.empty(256, np.int64), np.empty(256, np.int64)
+    d, dq = np.empty(256), np.empty((256, n))
+    step_dq, run = np.empty(n), np.empty((2, 2), np.int64)
+    closes = len(seam) > 0 and k == len(layers.start) - 3
+    for i in range(len(states.first) - 1):
+        a, b, p = states.first[i], states.first[i + 1], layers.start[k] + i
+        if a == b:
+            continue
+        for r in range(_window(layers, k + 1, layers.key[p], run)):
+            for j in range(run[r, 0], run[r, 1]):
+                if h[j] == np.inf:
+                    continue
+                step = _joined(aim, _distance(layers, aim, p, j), aim.vertex_cost[j])
+                if step == np.inf:
+                    continue
+                _increment(layers, p, j, step_dq)
+                if closes and acceleration_excess(seam, step_dq, aim.acceleration) >= 0:
+                    continue
+                s, dropped = _cheapest(states, a, b, aim, step, step_dq, h[j], bound)
+                lowest = min(lowest, dropped)
+                if s < 0:
+                    continue
+                if count == len(vertex):
+                    vertex, parent, d, dq = _grown(vertex), _grown(parent), _grown(d), _grown(dq)
+                vertex[count], parent[count] = j, s
+                d[count], dq[count] = _joined(aim, states.d[s], step), step_dq
+                count += 1
+    unsorted = States(vertex[:count], d[:count], dq[:count], parent[:count], states.first)
+    return _sorted(unsorted, layers.start[k + 1], layers.start[k + 2]), lowest
+
+
+@jit
+def _sorted(states: States, a: int, b: int) -> States:
+    """Group states by their vertex a..b-1, cheapest first; ties keep the order of their making."""
+    first = np.zeros(b - a + 1, np.int64)
+    for j in states.vertex:
+        first[j - a + 1] += 1
+    first = np.cumsum(first)
+    place, order = first.copy(), np.empty(len(states.vertex), np.int64)
+    for s in np.argsort(states.d, kind="mergesort"):
+        i = states.vertex[s] - a
+        order[place[i]] = s
+        place[i] += 1
+    return States(
+        states.vertex[order], states.d[order], states.dq[order], states.parent[order], first
+    )
+
+
+@jit
+def recursion(
+    layers: Layers, aim: Objective, h: Array, bound: float, seam: Array, record: bool
+) -> Reached:
+    """Best path whose cost keeps `bound`, exactly, under (5) and (6).
+
+    h (N,) is `cost_to_go`; seam (n,) is the increment that the last one must go on to by (6), or
+    (0,). Only with `record` are the states of all layers kept, for `trace`.
+    """
+    K = len(layers.start) - 1
+    offset = np.zeros(K + 1, np.int64)
+    vertex, parent = np.empty(1024, np.int64), np.empty(1024, np.int64)
+    states, lowest = _begin(layers, aim, h, bound)
+    before = states
+    for k in range(K):
+        size = len(states.vertex)
+        if size == 0:
+            return Reached(k, np.inf, lowest, -1, offset, vertex, parent, before)
+        if record:
+            offset[k + 1] = offset[k] + size
+            while offset[k + 1] > len(vertex):
+                vertex, parent = _grown(vertex), _grown(parent)
+            vertex[offset[k] : offset[k + 1]] = states.vertex
+            parent[offset[k] : offset[k + 1]] = states.parent
+        if k < K - 1:
+            before = states
+            states, dropped = _extend(layers, aim, h, bound, seam, k, states)
+            lowest = min(lowest, dropped)
+    best = int(np.argmin(states.d))
+    return Reached(K, states.d[best], lowest, best, offset, vertex, parent, states)
+
+
+@jit
+def trace(found: Reached, out_path: Ints) -> None:
+    """Read the best path (K,) back from a record, as vertices of the sorted graph."""
+    s = found.state
+    for k in range(len(out_path) - 1, -1, -1):
+        i = found.offset[k] + s
+        out_path[k], s = found.vertex[i], found.parent[i]
+
+
+@jit
+def count_closing(layers: Layers, aim: Objective, states: States, k: int) -> Ints:
+    """Count, for ways from the states of layer k-1 into layer k, what forbids them.
+
+    Row 0: edges whose first velocity excess (5) is at joint i; row 1: of the others, the pairs of
+    state and edge whose first acceleration excess (6) is at joint i.
+    """
+    n = len(layers.endless)
+    counts, dq = np.zeros((2, n), np.int64), np.empty(n)
+    for i in range(len(states.first) - 1):
+        a, b, p = states.first[i], states.first[i + 1], layers.start[k - 1] + i
+        if a == b:
+            continue
+        for j in range(layers.start[k], layers.start[k + 1]):
+            _increment(layers, p, j, dq)
+            excess = velocity_excess(dq, aim.velocity)
+            if excess >= 0:
+                counts[0, excess] += 1
+                continue
+            for s in range(a, b):
+                if states.parent[s] >= 0:
+                    excess = acceleration_excess(dq, states.dq[s], aim.acceleration)
+                    if excess >= 0:
+                        counts[1, excess] += 1
+    return counts

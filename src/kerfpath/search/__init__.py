@@ -1,0 +1,8 @@
+"""The best path through a layered graph given as bare arrays."""
+
+from kerfpath.search._shortest import Closure as Closure
+from kerfpath.search._shortest import LayeredPath as LayeredPath
+from kerfpath.search._shortest import Method as Method
+from kerfpath.search._shortest import Metric as Metric
+from kerfpath.search._shortest import ObjectiveKind as ObjectiveKind
+from kerfpath.search._shortest import shortest_path as shortest_path
