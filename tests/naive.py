@@ -1,5 +1,7 @@
 """Slow and obvious versions of what the kernels do, written from the paper alone."""
 
+import itertools
+
 import numpy as np
 
 TOLERANCE = 1e-9
@@ -62,9 +64,55 @@ def path_planning(
     return np.array(path[::-1]), cost
 
 
-def first_order(q, start, **options):
-    """The optimum without the acceleration limit: what the greedy test can only make worse."""
-    return path_planning(q, start, **{**options, "acceleration": np.full(q.shape[1], 1e12)})
+def second_order(q, start, closure, **o):
+    """Optimal (cost, tie-breaking sum) under (5) and (6), or None: every pair of edges is tried."""
+    layers = [q[a:b] for a, b in itertools.pairwise(start)]
+    vertex = [o["vertex_cost"][a:b] for a, b in itertools.pairwise(start)]
+    if len(layers) == 1:
+        return (vertex[0].min(), vertex[0].min()) if len(vertex[0]) else None
+    D = [difference(a[:, None], b[None], o["endless"]) for a, b in itertools.pairwise(layers)]
+    slow = [(np.abs(d) <= o["eta_v"] * o["velocity"] * o["dt"] + TOLERANCE).all(-1) for d in D]
+    bound_a = o["eta_a"] * o["acceleration"] * o["dt"] ** 2 + TOLERANCE
+    R = [_distances(d, o["weights"], o["metric"]) for d in D]
+
+    def best(objective, cap):
+        join = np.add if objective == "sum" else np.maximum
+        step = [
+            np.where(s & (r <= cap), join(r, v[None]), np.inf)
+            for s, r, v in zip(slow, R, vertex[1:], strict=True)
+        ]
+        step = [np.where(v[None] <= cap, s, np.inf) for s, v in zip(step, vertex[1:], strict=True)]
+        enter = np.where(vertex[0] <= cap, vertex[0], np.inf)[:, None]
+
+        def run(first):
+            d = first
+            for k in range(1, len(D)):
+                ok = (np.abs(D[k][None] - D[k - 1][:, :, None]) <= bound_a).all(-1)
+                d = join(np.where(ok, d[:, :, None], np.inf).min(axis=0, initial=np.inf), step[k])
+            return d
+
+        first = join(enter, step[0])
+        if closure == "free":
+            return run(first).min(initial=np.inf)
+        least = np.inf
+        for i, j in zip(*np.nonzero(np.isfinite(first)), strict=True):
+            only = np.full_like(first, np.inf)
+            only[i, j] = first[i, j]
+            seam = (np.abs(D[0][i, j] - D[-1][:, i]) <= bound_a).all(-1)
+            least = min(least, run(only)[seam, i].min(initial=np.inf))
+        return least
+
+    cost = best(o["objective"], np.inf)
+    if cost == np.inf:
+        return None
+    return cost, best("sum", np.inf if o["objective"] == "sum" else cost * (1 + 1e-12))
+
+
+def _distances(d, weights, metric):
+    part = np.abs(d) * weights
+    if metric == "euclid":
+        return np.sqrt((part**2).sum(-1))
+    return part.sum(-1) if metric == "manhattan" else part.max(-1)
 
 
 def random_instance(rng, *, layers=(1, 9), size=(1, 9)):

@@ -86,12 +86,13 @@ def test_the_example_is_read_into_si(read, folder):
         "gamma_step": np.pi / 180,
         "frames": "rotation-minimising",
         "postures": None,
-        "method": "paper",
+        "method": "exact",
         "objective": "sum",
         "metric": "manhattan",
         "weights": None,
         "eta_v": 0.95,
         "eta_a": 0.9,
+        "closure": "free",
     }
     assert json.loads(json.dumps(job.source)) == job.source
     assert job.source["contour"][0] == {"pick": "trim", "speed_m_min": 9, "spacing_mm": 2}

@@ -130,3 +130,31 @@ def test_bad_input_is_refused(change, message, circle, arm, tool, placement):
 def test_a_robot_without_accelerations_is_refused(circle, tool, placement):
     with pytest.raises(InputError, match="joint accelerations are not known"):
         plan(circle, robot("abb_irb4600_60_205"), tool=tool, placement=placement, speed=0.1)
+
+
+def test_the_default_is_the_proved_optimum(made, circle, arm, tool, placement):
+    assert made.proof.optimal
+    assert made.settings.method == "exact"
+    options = {"tool": tool, "placement": placement, "speed": 0.1, "gamma_step": STEP}
+    greedy = plan(circle, arm, method="paper", **options)
+    assert made.cost <= greedy.cost * (1 + 1e-12)
+    known = plan(circle, arm, method="known", **options)
+    assert not known.proof.optimal
+    assert "tests neither velocity nor acceleration" in known.proof.statement
+
+
+def test_a_periodic_plan_returns_to_where_it_began(made, circle, arm, tool, placement):
+    options = {"tool": tool, "placement": placement, "speed": 0.1, "gamma_step": STEP}
+    closed = plan(circle, arm, closure="periodic", **options)
+    turns = (closed.q[-1] - closed.q[0]) / (2 * np.pi)
+    np.testing.assert_allclose(turns, np.round(turns) * closed.robot.endless, atol=1e-9)
+    assert closed.cost >= made.cost * (1 - 1e-12)
+    seam = (closed.increments[0] - closed.increments[-1]) / closed.dt**2
+    assert (np.abs(seam) <= closed.robot.acceleration * (1 + 1e-6)).all()
+    with pytest.raises(InputError, match="is open and cannot be periodic"):
+        plan(
+            Contour(circle.points[:60], circle.axes[:60], name="half").resample(count=60),
+            arm,
+            closure="periodic",
+            **options,
+        )

@@ -263,6 +263,7 @@ def test_a_greedy_refusal_is_not_called_a_proof():
         ({"objective": "mean"}, "objective: expected one of sum, max"),
         ({"method": "magic"}, "method: expected one of"),
         ({"closure": "open"}, "closure: expected one of"),
+        ({"closure": "periodic"}, '"periodic" needs method="exact"'),
         ({"eta_v": 0}, "eta_v: expected a number above 0"),
         ({"eta_a": np.nan}, "eta_a"),
     ],
@@ -271,12 +272,6 @@ def test_bad_input_is_refused(change, message):
     arguments = {"q": [[0.0], [0.5]], "start": [0, 1, 2], **ONE} | change
     with pytest.raises(InputError, match=message):
         shortest_path(arguments.pop("q"), arguments.pop("start"), **arguments)
-
-
-@pytest.mark.parametrize("later", [{"method": "exact"}, {"closure": "periodic"}])
-def test_what_is_not_there_yet_says_so(later):
-    with pytest.raises(NotImplementedError, match="comes with the exact search"):
-        shortest_path([[0.0], [0.5]], [0, 1, 2], **(ONE | later))
 
 
 @settings(derandomize=True, max_examples=150, deadline=None)

@@ -40,16 +40,22 @@ def freeze(array: _A) -> _A:
     return array
 
 
-def floats(value: ArrayLike, name: str, shape: tuple[int | None, ...]) -> Array:
+def floats(
+    value: ArrayLike, name: str, shape: tuple[int | None, ...], *, copy: bool = True
+) -> Array:
     """Return `value` as a read-only float64 array of `shape` (None: any length), all finite.
+
+    Without `copy` the numbers of a fitting array are looked at where they are: for arrays that are
+    not kept.
 
     Raises
     ------
     InputError
         Not numbers, another shape, NaN or infinity; the message names the first bad index.
     """
-    array = np.array(_converted(value, name, np.float64), dtype=np.float64, order="C")
+    array = np.asarray(_converted(value, name, np.float64), order="C")
     _require_shape(array, name, shape)
+    array = array.copy() if copy else array.view()
     if not np.isfinite(array).all():
         index = tuple(int(i) for i in np.argwhere(~np.isfinite(array))[0])
         raise InputError(

@@ -13,7 +13,7 @@ from kerfpath.errors import InputError, NoFeasiblePath
 from kerfpath.graph import LayeredGraph, build, gamma_grid
 from kerfpath.plans import Plan, Proof, Settings
 from kerfpath.robots import Robot
-from kerfpath.search import Method, Metric, ObjectiveKind, shortest_path
+from kerfpath.search import Closure, Method, Metric, ObjectiveKind, shortest_path
 
 __all__ = ["layered_graph", "node_interval", "plan"]
 
@@ -31,12 +31,13 @@ def plan(
     gamma_step: float = np.pi / 180,
     frames: FrameKind = "rotation-minimising",
     postures: Sequence[int] | None = None,
-    method: Method = "paper",
+    method: Method = "exact",
     objective: ObjectiveKind = "sum",
     metric: Metric = "manhattan",
     weights: ArrayLike | None = None,
     eta_v: float = 1.0,
     eta_a: float = 1.0,
+    closure: Closure = "free",
     graph: LayeredGraph | None = None,
     progress: Callable[[int], None] | None = None,
 ) -> Plan:
@@ -60,8 +61,8 @@ def plan(
         Task frames that gamma is measured in.
     postures : sequence of int, optional
         The postures that may be used; default all. See `kerfpath.robots.postures_named`.
-    method, objective, metric, weights, eta_v, eta_a
-        As in `shortest_path`.
+    method, objective, metric, weights, eta_v, eta_a, closure
+        As in `shortest_path`; "periodic" closure needs a closed contour.
     graph : LayeredGraph, optional
         The layered graph of this very task, kept from `layered_graph`.
     progress : callable, optional
@@ -77,6 +78,8 @@ def plan(
     velocity, acceleration = robot.speed_limits()
     T_flange_tip, T_base_part = as_pose(tool, "tool"), as_pose(placement, "placement")
     dt = node_interval(contour, speed)
+    if closure == "periodic" and not contour.closed:
+        raise InputError(f"closure: contour {contour.name!r} is open and cannot be periodic")
     weight: Array = 1 / (velocity * dt) if weights is None else floats(weights, "weights", (6,))
     settings = Settings(
         gamma_step=scalar(gamma_step, "gamma_step", unit="rad", above=0.0),
@@ -87,6 +90,7 @@ def plan(
         weights=freeze(weight),
         eta_v=scalar(eta_v, "eta_v", above=0.0),
         eta_a=scalar(eta_a, "eta_a", above=0.0),
+        closure=closure,
     )
     graph = graph or layered_graph(
         contour,
@@ -118,6 +122,7 @@ def plan(
             method=method,
             eta_v=eta_v,
             eta_a=eta_a,
+            closure=closure,
         )
     except NoFeasiblePath as broken:
         raise NoFeasiblePath(
@@ -217,7 +222,7 @@ def _require_no_empty_layer(contour: Contour, graph: LayeredGraph) -> None:
 
 def _proof(method: Method, optimal: bool) -> Proof:
     if optimal:
-        claim = "best path on this graph: the acceleration test never turned a better edge away"
+        claim = "the best path on this graph under the velocity and acceleration limits"
     elif method == "known":
         claim = "no claim: the known technique tests neither velocity nor acceleration"
     else:

@@ -13,7 +13,7 @@ from kerfpath.contour import Contour, FrameKind
 from kerfpath.errors import InputError
 from kerfpath.kernels import metric
 from kerfpath.robots import Robot
-from kerfpath.search import Method, Metric, ObjectiveKind
+from kerfpath.search import Closure, Method, Metric, ObjectiveKind
 
 __all__ = ["Criteria", "Plan", "Proof", "Settings"]
 
@@ -34,6 +34,7 @@ class Settings:
         Weights of the joint-space distance.
     eta_v, eta_a : float
         Share of the velocity and acceleration limits that may be used.
+    closure : {"free", "periodic"}
     """
 
     gamma_step: float
@@ -44,6 +45,7 @@ class Settings:
     weights: Array
     eta_v: float
     eta_a: float
+    closure: Closure = "free"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -37,7 +37,7 @@ from kerfpath.job._keys import (
     one_of,
 )
 from kerfpath.robots import Robot, acceleration_ratios, robot, robot_ids
-from kerfpath.search import Metric, ObjectiveKind
+from kerfpath.search import Closure, Method, Metric, ObjectiveKind
 
 __all__ = ["TABLES", "ContourTable", "JobFile", "PlanTable", "ProgramTable"]
 
@@ -270,7 +270,8 @@ class PlanTable(_Table):
     ] = 1.0
     objective: ObjectiveKind = "sum"
     metric: Metric = "manhattan"
-    method: Literal["paper", "known"] = "paper"
+    method: Method = "exact"
+    closure: Closure = "free"
     frames: FrameKind = "rotation-minimising"
     posture: Posture | None = None
     eta_velocity: Annotated[Positive, key("a number above 0, at most 1", "0.95", le=1)] = 1.0

@@ -250,6 +250,7 @@ def _plan_options(table: PlanTable) -> dict[str, Any]:
         "weights": table.weights,
         "eta_v": table.eta_velocity,
         "eta_a": table.eta_acceleration,
+        "closure": table.closure,
     }
 
 

@@ -31,7 +31,7 @@ EQUATIONS = {
     9: "kerfpath.kernels.metric:coordinate_range",
     10: "kerfpath.graph:build",
     11: "kerfpath.graph:LayeredGraph",
-    12: "kerfpath.kernels.search:_window",
+    12: "kerfpath.kernels.search:windows",
     13: "kerfpath.kernels.metric:increment",
     14: "kerfpath.kernels.metric:total_distance",
     15: "kerfpath.kernels.metric:maximum_distance",

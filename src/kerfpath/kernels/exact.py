@@ -12,15 +12,24 @@ bound on the cost, only states with d + h inside it are ever kept.
 
 from __future__ import annotations
 
+from math import sqrt
 from typing import Any, NamedTuple, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 from kerfpath._arrays import Array, Bools, Ints
-from kerfpath.kernels._jit import jit
-from kerfpath.kernels.limits import acceleration_excess, velocity_excess
-from kerfpath.kernels.search import Layers, Objective, _distance, _increment, _window
+from kerfpath.kernels._jit import jit, jit_vector
+from kerfpath.kernels.limits import LIMIT_TOLERANCE, acceleration_excess, velocity_excess
+from kerfpath.kernels.metric import EUCLID, MANHATTAN
+from kerfpath.kernels.search import (
+    Layers,
+    Objective,
+    _distance,
+    _increment,
+    joined,
+    runs,
+)
 
 __all__ = ["Reached", "cost_to_go", "count_closing", "recursion", "trace"]
 
@@ -55,17 +64,14 @@ class Reached(NamedTuple):
     """The best state of the last layer, -1 if none."""
     offset: Ints
     """(K+1,): states of layer k in the record are offset[k]:offset[k+1]."""
-    vertex: Ints
+    vertex: NDArray[np.int32]
     """The record: vertex of every state kept,"""
-    parent: Ints
+    parent: NDArray[np.int32]
     """and its parent within the layer before."""
     last: States
     """The states of the last layer that some state reached."""
-
-
-@jit
-def _joined(aim: Objective, a: float, b: float) -> float:
-    return max(a, b) if aim.minimax else a + b
+    recorded: bool
+    """The record is whole."""
 
 
 @jit
@@ -74,20 +80,62 @@ def cost_to_go(layers: Layers, aim: Objective, allowed: Bools, out_h: Array) -> 
 
     Vertices that are not allowed, or from which no edges within (5) lead to the end, get infinity.
     """
-    run = np.empty((2, 2), np.int64)
-    last = len(layers.start) - 2
+    last, bound = len(layers.start) - 2, aim.velocity + LIMIT_TOLERANCE
+    c, tail = np.empty(np.max(np.diff(layers.start))), np.empty(len(layers.low))
     for j in range(layers.start[last], layers.start[last + 1]):
         out_h[j] = 0.0 if allowed[j] else np.inf
-    for k in range(last - 1, -1, -1):
+    for k in range(last, -1, -1):
+        if k < last:
+            _layer_to_go(
+                layers.q, layers.turn, bound, aim.weight, aim.metric, aim.cap, aim.minimax,
+                layers.start, layers.low, layers.high, k, tail, c, out_h,
+            )  # fmt: skip
         for p in range(layers.start[k], layers.start[k + 1]):
-            best = np.inf
-            if allowed[p]:
-                for r in range(_window(layers, k + 1, layers.key[p], run)):
-                    for j in range(run[r, 0], run[r, 1]):
-                        if out_h[j] < best:
-                            c = _joined(aim, _distance(layers, aim, p, j), aim.vertex_cost[j])
-                            best = min(best, _joined(aim, c, out_h[j]))
-            out_h[p] = best
+            out_h[p] = out_h[p] if allowed[p] else np.inf
+            tail[p] = joined(aim.minimax, aim.vertex_cost[p], out_h[p])
+
+
+@jit_vector
+def _layer_to_go(
+    q: Array, turn: Array, bound: Array, weight: Array, metric: int, cap: float, minimax: bool,
+    start: Ints, low: Ints, high: Ints, k: int, tail: Array, c: Array, out_h: Array,
+) -> None:  # fmt: skip
+    """For each vertex p of layer k the least of its distance to a next vertex joined with its tail.
+
+    The innermost loops of the first-order problem, so over bare arrays and in one piece: handing
+    them to a function costs as much as a run of twenty vertices. Joint by joint, every loop
+    vectorises.
+    """
+    for p in range(start[k], start[k + 1]):
+        best = np.inf
+        for a, b in runs(start, low, high, k, p):
+            m = b - a
+            c[:m] = 0.0
+            for i in range(len(q) if m else 0):
+                x, t, limit, w = q[i, p], turn[i], bound[i], weight[i]
+                if metric == MANHATTAN:
+                    for v in range(m):
+                        y = min(abs(x - q[i, a + v]), t - abs(x - q[i, a + v]))
+                        c[v] += np.inf if y > limit else w * y
+                elif metric == EUCLID:
+                    for v in range(m):
+                        y = min(abs(x - q[i, a + v]), t - abs(x - q[i, a + v]))
+                        c[v] += np.inf if y > limit else w * y * w * y
+                else:
+                    for v in range(m):
+                        y = min(abs(x - q[i, a + v]), t - abs(x - q[i, a + v]))
+                        c[v] = max(c[v], np.inf if y > limit else w * y)
+            if metric == EUCLID or cap < np.inf:
+                for v in range(m):
+                    r = sqrt(c[v]) if metric == EUCLID else c[v]
+                    c[v] = r if r <= cap else np.inf
+            if minimax:
+                for v in range(m):
+                    best = min(best, max(c[v], tail[a + v]))
+            else:
+                for v in range(m):
+                    best = min(best, c[v] + tail[a + v])
+        out_h[p] = best
 
 
 @jit
@@ -103,7 +151,7 @@ def _begin(layers: Layers, aim: Objective, h: Array, bound: float) -> tuple[Stat
     m, lowest, count = layers.start[1], np.inf, 0
     vertex, first = np.empty(m, np.int64), np.zeros(m + 1, np.int64)
     for j in range(m):
-        f = _joined(aim, aim.vertex_cost[j], h[j])
+        f = joined(aim.minimax, aim.vertex_cost[j], h[j])
         if f <= bound:
             vertex[count] = j
             count += 1
@@ -131,7 +179,7 @@ def _cheapest(
     Also returns the cost bound of the state at which the search was given up, or infinity.
     """
     for s in range(a, b):
-        f = _joined(aim, _joined(aim, states.d[s], step), rest)
+        f = joined(aim.minimax, joined(aim.minimax, states.d[s], step), rest)
         if f > bound:
             return -1, f
         if states.parent[s] < 0 or acceleration_excess(dq, states.dq[s], aim.acceleration) < 0:
@@ -147,31 +195,32 @@ def _extend(
     n, count, lowest = len(layers.endless), 0, np.inf
     vertex, parent = np.empty(256, np.int64), np.empty(256, np.int64)
     d, dq = np.empty(256), np.empty((256, n))
-    step_dq, run = np.empty(n), np.empty((2, 2), np.int64)
+    step_dq = np.empty(n)
     closes = len(seam) > 0 and k == len(layers.start) - 3
     for i in range(len(states.first) - 1):
         a, b, p = states.first[i], states.first[i + 1], layers.start[k] + i
         if a == b:
             continue
-        for r in range(_window(layers, k + 1, layers.key[p], run)):
-            for j in range(run[r, 0], run[r, 1]):
-                if h[j] == np.inf:
-                    continue
-                step = _joined(aim, _distance(layers, aim, p, j), aim.vertex_cost[j])
-                if step == np.inf:
-                    continue
-                _increment(layers, p, j, step_dq)
-                if closes and acceleration_excess(seam, step_dq, aim.acceleration) >= 0:
-                    continue
-                s, dropped = _cheapest(states, a, b, aim, step, step_dq, h[j], bound)
-                lowest = min(lowest, dropped)
-                if s < 0:
-                    continue
-                if count == len(vertex):
-                    vertex, parent, d, dq = _grown(vertex), _grown(parent), _grown(d), _grown(dq)
-                vertex[count], parent[count] = j, s
-                d[count], dq[count] = _joined(aim, states.d[s], step), step_dq
-                count += 1
+        (low, high), (low2, high2) = runs(layers.start, layers.low, layers.high, k, p)
+        for j in range(low, high + high2 - low2):
+            j = j if j < high else j - high + low2
+            if h[j] == np.inf:
+                continue
+            step = joined(aim.minimax, _distance(layers, aim, p, j), aim.vertex_cost[j])
+            if step == np.inf:
+                continue
+            _increment(layers, p, j, step_dq)
+            if closes and acceleration_excess(seam, step_dq, aim.acceleration) >= 0:
+                continue
+            s, dropped = _cheapest(states, a, b, aim, step, step_dq, h[j], bound)
+            lowest = min(lowest, dropped)
+            if s < 0:
+                continue
+            if count == len(vertex):
+                vertex, parent, d, dq = _grown(vertex), _grown(parent), _grown(d), _grown(dq)
+            vertex[count], parent[count] = j, s
+            d[count], dq[count] = joined(aim.minimax, states.d[s], step), step_dq
+            count += 1
     unsorted = States(vertex[:count], d[:count], dq[:count], parent[:count], states.first)
     return _sorted(unsorted, layers.start[k + 1], layers.start[k + 2]), lowest
 
@@ -195,24 +244,25 @@ def _sorted(states: States, a: int, b: int) -> States:
 
 @jit
 def recursion(
-    layers: Layers, aim: Objective, h: Array, bound: float, seam: Array, record: bool
+    layers: Layers, aim: Objective, h: Array, bound: float, seam: Array, room: int
 ) -> Reached:
     """Best path whose cost keeps `bound`, exactly, under (5) and (6).
 
     h (N,) is `cost_to_go`; seam (n,) is the increment that the last one must go on to by (6), or
-    (0,). Only with `record` are the states of all layers kept, for `trace`.
+    (0,). The states of all layers are recorded for `trace` as long as they are no more than `room`.
     """
     K = len(layers.start) - 1
     offset = np.zeros(K + 1, np.int64)
-    vertex, parent = np.empty(1024, np.int64), np.empty(1024, np.int64)
+    vertex, parent = np.empty(1024, np.int32), np.empty(1024, np.int32)
     states, lowest = _begin(layers, aim, h, bound)
-    before = states
+    before, recorded = states, True
     for k in range(K):
         size = len(states.vertex)
         if size == 0:
-            return Reached(k, np.inf, lowest, -1, offset, vertex, parent, before)
-        if record:
-            offset[k + 1] = offset[k] + size
+            return Reached(k, np.inf, lowest, -1, offset, vertex, parent, before, recorded)
+        offset[k + 1] = offset[k] + size
+        recorded = recorded and offset[k + 1] <= room
+        if recorded:
             while offset[k + 1] > len(vertex):
                 vertex, parent = _grown(vertex), _grown(parent)
             vertex[offset[k] : offset[k + 1]] = states.vertex
@@ -222,7 +272,7 @@ def recursion(
             states, dropped = _extend(layers, aim, h, bound, seam, k, states)
             lowest = min(lowest, dropped)
     best = int(np.argmin(states.d))
-    return Reached(K, states.d[best], lowest, best, offset, vertex, parent, states)
+    return Reached(K, states.d[best], lowest, best, offset, vertex, parent, states, recorded)
 
 
 @jit

@@ -6,7 +6,7 @@ vertices of the layer before that can pass the velocity test lie in one or two s
 
 from __future__ import annotations
 
-from math import pi, sqrt
+from math import ceil, pi, sqrt
 from typing import NamedTuple
 
 import numpy as np
@@ -16,7 +16,17 @@ from kerfpath.kernels._jit import jit
 from kerfpath.kernels.limits import LIMIT_TOLERANCE, acceleration_excess, velocity_excess
 from kerfpath.kernels.metric import EUCLID, MANHATTAN, increment
 
-__all__ = ["Layers", "Objective", "closing_counts", "path_planning"]
+__all__ = [
+    "Layers",
+    "Objective",
+    "arrange",
+    "closing_counts",
+    "joined",
+    "path_planning",
+    "reduced",
+    "runs",
+    "windows",
+]
 
 
 class Layers(NamedTuple):
@@ -28,13 +38,13 @@ class Layers(NamedTuple):
     """(K+1,): layer k is q[:, start[k]:start[k+1]]."""
     rank: Ints
     """(N,): place of each vertex in its layer as the user gave it; breaks ties."""
-    key: Array
-    """(N,): what each layer is sorted by."""
-    window: float
-    """Largest difference of the key along an admissible edge."""
-    circular: bool
-    """The key is an angle modulo 2 pi."""
+    low: Ints
+    """(N,): edges from vertex p can lead to the vertices low[p]..high[p]-1 of the next layer;"""
+    high: Ints
+    """(N,): where high[p] < low[p], the run goes on at the beginning of that layer."""
     endless: Bools
+    turn: Array
+    """(n,): 2 pi for endless joints, infinity for the others."""
 
 
 class Objective(NamedTuple):
@@ -51,37 +61,62 @@ class Objective(NamedTuple):
 
 
 @jit
-def _place(key: Array, a: int, b: int, value: float) -> int:
-    """First place in the sorted key[a:b] that is not below `value`; b if there is none."""
-    while a < b:
-        middle = (a + b) // 2
-        if key[middle] < value:
-            a = middle + 1
-        else:
-            b = middle
-    return a
+def reduced(angle: float) -> float:
+    """Bring an angle into (-pi, pi]."""
+    return angle - 2.0 * pi * ceil((angle - pi) / (2.0 * pi))
 
 
 @jit
-def _window(layers: Layers, k: int, key: float, out_run: Ints) -> int:
-    """Find the edges into a vertex: the runs of layer k within the window about `key` (Eq. 12).
+def arrange(
+    q: Array, key: Array, start: Ints, endless: Bools, out_q: Array, out_key: Array, out_rank: Ints
+) -> None:
+    """Sort each layer by its keys, ties in the order given, and lay the joints out by column."""
+    for k in range(len(start) - 1):
+        a = start[k]
+        for v, rank in enumerate(np.argsort(key[a : start[k + 1]], kind="mergesort")):
+            out_key[a + v], out_rank[a + v] = key[a + rank], rank
+            for i in range(len(endless)):
+                x = q[a + rank, i]
+                out_q[i, a + v] = reduced(x) if endless[i] else x
 
-    Of the edges that (12) allows, all others break the velocity limit. Returns how many runs there
-    are, 1 or 2.
+
+@jit
+def windows(
+    key: Array, start: Ints, width: float, circular: bool, out_low: Ints, out_high: Ints
+) -> None:
+    """Find the edges that may be admissible, from each vertex a run of the next layer (Eq. 12).
+
+    Each layer is sorted by `key` (N,), and along an admissible edge the key changes by `width` at
+    most (modulo 2 pi if `circular`): all other edges of (12) break the velocity limit. As the key
+    grows, both ends of the run move on, and start again where the circle closes.
     """
-    a, b = layers.start[k], layers.start[k + 1]
-    low, high = key - layers.window, key + layers.window
-    if layers.circular and (low < -pi or high > pi):
-        if high - low >= 2 * pi:
-            out_run[0, 0], out_run[0, 1] = a, b
-            return 1
-        low, high = (low + 2 * pi, high) if low < -pi else (low, high - 2 * pi)
-        out_run[0, 0], out_run[0, 1] = a, _place(layers.key, a, b, high)
-        out_run[1, 0], out_run[1, 1] = _place(layers.key, a, b, low), b
-        return 2
-    out_run[0, 0] = _place(layers.key, a, b, low)
-    out_run[0, 1] = _place(layers.key, a, b, high)
-    return 1
+    for k in range(len(start) - 2):
+        a, b = start[k + 1], start[k + 2]
+        low, high, was_first, was_last = a, a, -np.inf, -np.inf
+        for p in range(start[k], start[k + 1]):
+            first, last = key[p] - width, key[p] + width
+            if circular and width < pi:
+                first = first + 2 * pi if first < -pi else first
+                last = last - 2 * pi if last > pi else last
+            low = a if first < was_first else low
+            high = a if last < was_last else high
+            while low < b and key[low] < first:
+                low += 1
+            while high < b and key[high] < last:
+                high += 1
+            was_first, was_last = first, last
+            every = (circular and width >= pi) or (last < first and low <= high)
+            out_low[p], out_high[p] = (a, b) if every else (low, high)
+
+
+@jit
+def runs(
+    start: Ints, low: Ints, high: Ints, k: int, p: int
+) -> tuple[tuple[int, int], tuple[int, int]]:
+    """Return the two runs a..b of layer k + 1 that vertex p can lead to; one may be empty."""
+    if low[p] <= high[p]:
+        return (low[p], high[p]), (high[p], high[p])
+    return (start[k + 1], high[p]), (low[p], start[k + 2])
 
 
 @jit
@@ -90,8 +125,7 @@ def _distance(layers: Layers, aim: Objective, p: int, j: int) -> float:
     total = 0.0
     for i in range(len(layers.endless)):
         y = abs(layers.q[i, j] - layers.q[i, p])
-        if layers.endless[i]:
-            y = min(y, 2 * pi - y)
+        y = min(y, layers.turn[i] - y)
         if y > aim.velocity[i] + LIMIT_TOLERANCE:
             return np.inf
         part = aim.weight[i] * y
@@ -103,6 +137,12 @@ def _distance(layers: Layers, aim: Objective, p: int, j: int) -> float:
             total = max(total, part)
     total = sqrt(total) if aim.metric == EUCLID else total
     return total if total <= aim.cap else np.inf
+
+
+@jit
+def joined(minimax: bool, a: float, b: float) -> float:
+    """Costs put together: added by (14), or the larger by (15)."""
+    return max(a, b) if minimax else a + b
 
 
 @jit
@@ -122,37 +162,36 @@ def path_planning(
     reached, and whether the greedy test ever turned away a better edge (if not, the recursion was
     exact).
     """
-    first, last = layers.start[0], layers.start[1]
-    for j in range(first, last):
-        out_dist[j], out_before[j] = aim.vertex_cost[j], -1
-    n = len(layers.endless)
-    run, dq, dq_before = np.empty((2, 2), np.int64), np.empty(n), np.empty(n)
-    turned_away = False
+    n, turned_away = len(layers.endless), False
+    dq, dq_before = np.empty(n), np.empty(n)
+    first_order = np.full(len(layers.low), np.inf)
+    for j in range(layers.start[1]):
+        out_dist[j] = aim.vertex_cost[j]
     for k in range(1, len(layers.start) - 1):
+        for p in range(layers.start[k - 1], layers.start[k]):
+            if out_dist[p] == np.inf:
+                continue
+            if k > 1:
+                _increment(layers, out_before[p], p, dq_before)
+            (a, b), (c, d) = runs(layers.start, layers.low, layers.high, k - 1, p)
+            for j in range(a, b + d - c):
+                j = j if j < b else j - b + c
+                cost = joined(aim.minimax, out_dist[p], _distance(layers, aim, p, j))
+                best, best_p = out_dist[j], out_before[j]
+                tie = cost == best and best_p >= 0 and layers.rank[p] < layers.rank[best_p]
+                if not (cost < best or tie):
+                    continue
+                first_order[j] = min(first_order[j], cost)
+                if k > 1:
+                    _increment(layers, p, j, dq)
+                    if acceleration_excess(dq, dq_before, aim.acceleration) >= 0:
+                        continue
+                out_dist[j], out_before[j] = cost, p
         reached = False
         for j in range(layers.start[k], layers.start[k + 1]):
-            best, first_order, best_p = np.inf, np.inf, -1
-            for r in range(_window(layers, k - 1, layers.key[j], run)):
-                for p in range(run[r, 0], run[r, 1]):
-                    if out_dist[p] > best:
-                        continue
-                    c = _distance(layers, aim, p, j)
-                    d = max(out_dist[p], c) if aim.minimax else out_dist[p] + c
-                    tie = d == best and best_p >= 0 and layers.rank[p] < layers.rank[best_p]
-                    if not (d < best or tie):
-                        continue
-                    first_order = min(first_order, d)
-                    if k > 1:
-                        _increment(layers, p, j, dq)
-                        _increment(layers, out_before[p], p, dq_before)
-                        if acceleration_excess(dq, dq_before, aim.acceleration) >= 0:
-                            continue
-                    best, best_p = d, p
-            turned_away |= first_order < best
-            cost = aim.vertex_cost[j]
-            out_dist[j] = max(best, cost) if aim.minimax else best + cost
-            out_before[j] = best_p
-            reached |= best_p >= 0
+            turned_away |= first_order[j] < out_dist[j]
+            reached |= out_before[j] >= 0
+            out_dist[j] = joined(aim.minimax, out_dist[j], aim.vertex_cost[j])
         if not reached:
             return k, turned_away
     return len(layers.start) - 1, turned_away

@@ -11,7 +11,7 @@ import numpy as np
 from kerfpath._arrays import Array, Bools, Ints
 from kerfpath.kernels import exact
 from kerfpath.kernels.limits import acceleration_excess
-from kerfpath.kernels.search import Layers, Objective
+from kerfpath.kernels.search import Layers, Objective, path_planning
 
 __all__ = ["Best", "Dead", "best_closed_path", "best_path"]
 
@@ -19,6 +19,9 @@ ROUNDING = 1e-12
 """Relative slack on a bound, so that rounding never drops the path that the bound came from."""
 FIRST_GAP = 1e-3
 """First growth of the bound over the first-order optimum, relative; it doubles from there."""
+ROOM = 10_000_000
+"""States that a search under a loose bound may remember: 80 MB."""
+UNLIMITED = 2**62
 NO_SEAM = np.empty(0)
 
 
@@ -60,7 +63,7 @@ class Best:
 
 def best_path(layers: Layers, aim: Objective) -> Best | Dead:
     """Return the best path, or how far any goes."""
-    every = np.ones(len(layers.key), np.bool_)
+    every = np.ones(len(layers.low), np.bool_)
     return _lexicographic(layers, aim, every, NO_SEAM, 0.0) or _dead_end(layers, aim)
 
 
@@ -78,14 +81,14 @@ def best_closed_path(layers: Layers, aim: Objective) -> Best | Dead:
 
     def look(starts: Ints, firsts: Ints, floor: float) -> None:
         """Put the best path that leaves by `starts` and `firsts` in the queue."""
-        allowed = np.ones(len(layers.key), np.bool_)
+        allowed = np.ones(len(layers.low), np.bool_)
         allowed[: layers.start[1]] = False
         allowed[starts] = True
         allowed[layers.start[1] : layers.start[2]] &= np.isin(
             np.arange(layers.start[1], layers.start[2]), firsts
         )
         allowed[layers.start[K - 1] :] &= np.isin(
-            np.arange(layers.start[K - 1], len(layers.key)), twin[starts]
+            np.arange(layers.start[K - 1], len(layers.low)), twin[starts]
         )
         one = len(starts) == len(firsts) == 1
         seam = _increments(layers, np.append(starts, firsts))[0] if one else NO_SEAM
@@ -133,33 +136,46 @@ def _grow(
     layers: Layers, aim: Objective, allowed: Bools, seam: Array, floor: float
 ) -> tuple[Ints, float] | None:
     """Raise the bound until the recursion comes through, or drops nothing for its cost."""
-    h = np.empty(len(layers.key))
+    h = np.empty(len(layers.low))
     exact.cost_to_go(layers, aim, allowed, h)
     entry = h[: layers.start[1]]
     enter = aim.vertex_cost[: layers.start[1]]
     least = float((np.maximum(enter, entry) if aim.minimax else enter + entry).min(initial=np.inf))
     if least == np.inf:
         return None
-    bound = max(least, floor) * (1 + ROUNDING)
+    bound, ceiling = max(least, floor) * (1 + ROUNDING), None
     while True:
-        reached = exact.recursion(layers, aim, h, bound, seam, False)
+        reached = exact.recursion(layers, aim, h, bound, seam, ROOM)
         if reached.state >= 0:
             break
         if reached.lowest == np.inf:
             return None
+        if ceiling is None:
+            ceiling = _greedy_cost(layers, aim, allowed, seam) * (1 + ROUNDING)
         grown = least + max(2 * (bound - least), FIRST_GAP * least)
-        bound = max(grown, reached.lowest * (1 + ROUNDING))
-    # Once more at the tightest bound, with a record: few states are left to remember.
-    kept = exact.recursion(layers, aim, h, reached.cost * (1 + ROUNDING), seam, True)
+        bound = max(min(grown, ceiling), reached.lowest * (1 + ROUNDING))
+    if not reached.recorded:
+        # Once more at the tightest bound: few states are left to remember.
+        bound = reached.cost * (1 + ROUNDING)
+        reached = exact.recursion(layers, aim, h, bound, seam, UNLIMITED)
     path = np.empty(len(layers.start) - 1, np.int64)
-    exact.trace(kept, path)
-    return path, float(kept.cost)
+    exact.trace(reached, path)
+    return path, float(reached.cost)
+
+
+def _greedy_cost(layers: Layers, aim: Objective, allowed: Bools, seam: Array) -> float:
+    """Return a cost that some admissible path keeps, infinity if the greedy test finds none."""
+    if len(seam) or not allowed.all():
+        return np.inf
+    dist, before = np.full(len(layers.low), np.inf), np.full(len(layers.low), -1)
+    path_planning(layers, aim, dist, before)
+    return float(dist[layers.start[-2] :].min())
 
 
 def _dead_end(layers: Layers, aim: Objective) -> Dead:
     """Go as far as any admissible path goes, whatever it costs."""
-    free = np.zeros(len(layers.key))
-    reached = exact.recursion(layers, aim, free, np.inf, NO_SEAM, False)
+    free = np.zeros(len(layers.low))
+    reached = exact.recursion(layers, aim, free, np.inf, NO_SEAM, 0)
     K, n = len(layers.start) - 1, len(layers.endless)
     if reached.layers in (0, K):
         return Dead(layers=reached.layers, counts=np.zeros((2, n), np.int64))
@@ -171,7 +187,7 @@ def _twins(layers: Layers) -> Ints:
     """Return, for each vertex of the first layer, the same vertex of the last one."""
     first, last = layers.start[1], layers.start[-2]
     by_rank = np.empty(first, np.int64)
-    by_rank[layers.rank[last:]] = np.arange(last, len(layers.key))
+    by_rank[layers.rank[last:]] = np.arange(last, len(layers.low))
     return by_rank[layers.rank[:first]]
 
 

@@ -113,7 +113,7 @@ def shortest_path(
         Arrays that do not fit each other, NaN, limits or dt that are not positive, unknown names,
         a periodic closure whose end layers differ.
     """
-    q = floats(q, "q", (None, None))
+    q = floats(q, "q", (None, None), copy=False)
     start = _offsets(start, len(q))
     n = q.shape[1]
     dt = scalar(dt, "dt", unit="s", above=0.0)
@@ -143,16 +143,7 @@ def shortest_path(
         window, circular = 0.5, False
     else:
         key, window, circular = _narrowest_key(q, start, bound_v, endless)
-    order = np.lexsort((key, np.repeat(np.arange(len(start) - 1), np.diff(start))))
-    layers = kernel.Layers(
-        q=np.ascontiguousarray(_reduced(q, endless)[order].T),
-        start=start,
-        rank=order - np.repeat(start[:-1], np.diff(start)),
-        key=key[order],
-        window=window,
-        circular=circular,
-        endless=endless,
-    )
+    layers, order = _sorted_layers(q, start, key, window, circular, endless)
     aim = kernel.Objective(
         weight=np.ascontiguousarray(weight),
         metric=_METRIC_CODES[metric],
@@ -202,7 +193,7 @@ def _search(
     """Run steps (1) to (5) of the procedure and read the path back (or say where it breaks)."""
     start = layers.start
     sizes = np.diff(start)
-    dist, before = np.full(len(layers.key), np.inf), np.full(len(layers.key), -1)
+    dist, before = np.full(len(layers.low), np.inf), np.full(len(layers.low), -1)
     to_search = layers._replace(start=start[: filled + 1])
     reached, turned_away = kernel.path_planning(to_search, aim, dist, before)
     if reached < filled:
@@ -265,25 +256,47 @@ def _require_same_ends(layers: kernel.Layers) -> None:
         )
 
 
+def _sorted_layers(
+    q: Array, start: Ints, key: Array, window: float, circular: bool, endless: Bools
+) -> tuple[kernel.Layers, Ints]:
+    """Return the graph as the kernels take it, and where each of its vertices stands in q."""
+    N, n = q.shape
+    columns, keys, rank = np.empty((n, N)), np.empty(N), np.empty(N, np.int64)
+    kernel.arrange(q, key, start, endless, columns, keys, rank)
+    low, high = np.zeros(N, np.int64), np.zeros(N, np.int64)
+    kernel.windows(keys, start, window, circular, low, high)
+    layers = kernel.Layers(
+        q=columns,
+        start=start,
+        rank=rank,
+        low=low,
+        high=high,
+        endless=endless,
+        turn=np.where(endless, 2 * np.pi, np.inf),
+    )
+    return layers, rank + np.repeat(start[:-1], np.diff(start))
+
+
 def _narrowest_key(
     q: Array, start: Ints, bound: Array, endless: Bools
 ) -> tuple[Array, float, bool]:
     """Choose the joint whose velocity window leaves the fewest vertices, to sort the layers by."""
-    angles = _reduced(q, endless)
     pairs = np.zeros(q.shape[1])
     layers = np.unique(np.linspace(0, max(len(start) - 3, 0), _LAYERS_SAMPLED).astype(int))
-    for i in range(q.shape[1]):
-        for k in layers[layers + 2 < len(start)]:
-            here = angles[start[k] : start[k + 1], i]
-            there = np.sort(angles[start[k + 1] : start[k + 2], i])
-            shifts = (-2 * np.pi, 0.0, 2 * np.pi) if endless[i] and bound[i] < np.pi else (0.0,)
-            reach = bound[i] if bound[i] < np.pi or not endless[i] else np.inf
-            for shift in shifts:
-                low = np.searchsorted(there, here + shift - reach, side="left")
-                pairs[i] += (np.searchsorted(there, here + shift + reach, side="right") - low).sum()
+    for k in layers[layers + 2 < len(start)]:
+        here, there = (_reduced(q[start[i] : start[i + 1]], endless) for i in (k, k + 1))
+        for i in range(q.shape[1]):
+            sorted_ = np.sort(there[:, i])
+            around = endless[i] and bound[i] < np.pi
+            reach = np.inf if endless[i] and not around else bound[i]
+            for shift in (-2 * np.pi, 0.0, 2 * np.pi) if around else (0.0,):
+                low = np.searchsorted(sorted_, here[:, i] + shift - reach, side="left")
+                high = np.searchsorted(sorted_, here[:, i] + shift + reach, side="right")
+                pairs[i] += (high - low).sum()
     best = int(np.argmin(pairs))
+    key = _reduced(q[:, [best]], endless[[best]])[:, 0]
     # Twice the slack of (5): the key must never exclude what the test itself would pass.
-    return angles[:, best], float(bound[best] + 2 * LIMIT_TOLERANCE), bool(endless[best])
+    return key, float(bound[best] + 2 * LIMIT_TOLERANCE), bool(endless[best])
 
 
 def _reduced(q: Array, endless: Bools) -> Array:

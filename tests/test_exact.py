@@ -1,0 +1,201 @@
+"""The exact search against trying every pair of edges; its answers, its edges, bad input."""
+
+import itertools
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from hypothesis.extra import numpy as hnp
+
+import naive
+from kerfpath import InputError, NoFeasiblePath, shortest_path
+
+ONE = {"dt": 1.0, "velocity": [1.0], "acceleration": [1.0]}
+
+
+def instance(rng, closure, **sizes):
+    q, start, options = naive.random_instance(rng, **sizes)
+    options |= {"method": "exact"}
+    if closure == "periodic":
+        # The last layer repeats the first, endless joints turned once more.
+        first = q[: start[1]] + 2 * np.pi * options["endless"]
+        q = np.vstack([q, first])
+        start = np.append(start, len(q))
+        for name in ("posture", "vertex_cost"):
+            options[name] = np.concatenate([options[name], options[name][: start[1]]])
+    return q, start, options
+
+
+def admissible(q, o, closure):
+    d = naive.difference(q[:-1], q[1:], o["endless"])
+    ok = (np.abs(d) <= o["eta_v"] * o["velocity"] * o["dt"] + 2e-9).all()
+    changes = np.diff(d, axis=0)
+    if closure == "periodic":
+        changes = np.vstack([changes, d[0] - d[-1]])
+    return ok and (np.abs(changes) <= o["eta_a"] * o["acceleration"] * o["dt"] ** 2 + 2e-9).all()
+
+
+def cost_of(q, start, index, o):
+    d = naive.difference(q[:-1], q[1:], o["endless"])
+    parts = [naive.distance(r, o["weights"], o["metric"]) for r in d]
+    parts += list(o["vertex_cost"][start[:-1] + index])
+    return max(parts), sum(parts)
+
+
+def agree(rng, closure, **sizes):
+    """Compare one random instance with the oracle; return whether there was a path."""
+    q, start, o = instance(rng, closure, **sizes)
+    want = naive.second_order(q, start, closure, **o)
+    if want is None:
+        with pytest.raises(NoFeasiblePath) as caught:
+            shortest_path(q, start, closure=closure, **o)
+        assert caught.value.proved
+        return False
+    got = shortest_path(q, start, closure=closure, **o)
+    assert got.optimal
+    path = q[start[:-1] + got.index]
+    assert len(path) < 2 or admissible(path, o, closure)
+    largest, total = cost_of(path, start, got.index, o)
+    # Rounding only: sums of the same numbers in another order.
+    assert got.cost == pytest.approx(want[0], rel=1e-10, abs=1e-12)
+    assert got.cost == pytest.approx(largest if o["objective"] == "max" else total, rel=1e-10)
+    assert total == pytest.approx(want[1], rel=1e-10, abs=1e-12)
+    if closure == "periodic":
+        assert got.index[0] == got.index[-1]
+    return True
+
+
+@pytest.mark.parametrize("closure", ["free", "periodic"])
+def test_the_optimum_agrees_with_trying_every_pair_of_edges(closure):
+    rng = np.random.default_rng(21)
+    feasible = sum(agree(rng, closure) for _ in range(1500))
+    assert 300 < feasible < 1450
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("seed", range(4))
+def test_the_optimum_agrees_on_ten_thousand_instances(seed):
+    rng = np.random.default_rng(100 + seed)
+    for _ in range(2500):
+        agree(rng, str(rng.choice(["free", "free", "periodic"])), layers=(1, 8), size=(1, 8))
+
+
+def test_the_oracle_itself_agrees_with_enumeration():
+    rng = np.random.default_rng(22)
+    for closure in ("free", "periodic"):
+        for _ in range(150):
+            q, start, o = instance(rng, closure, layers=(2, 5), size=(1, 4))
+            best = (np.inf, np.inf)
+            for path in itertools.product(*[range(a, b) for a, b in itertools.pairwise(start)]):
+                index = np.array(path) - start[:-1]
+                if closure == "periodic" and index[0] != index[-1]:
+                    continue
+                if admissible(q[list(path)], o, closure):
+                    largest, total = cost_of(q[list(path)], start, index, o)
+                    best = min(best, (largest if o["objective"] == "max" else total, total))
+            want = naive.second_order(q, start, closure, **o)
+            assert (want is None) == (best[0] == np.inf)
+            if want is not None:
+                np.testing.assert_allclose(want, best, rtol=1e-9)
+
+
+def test_the_exact_path_is_never_worse_than_the_greedy_one_and_sometimes_better():
+    rng = np.random.default_rng(23)
+    better = found = 0
+    for _ in range(400):
+        q, start, o = instance(rng, "free", layers=(4, 9), size=(4, 14))
+        try:
+            greedy = shortest_path(q, start, **(o | {"method": "paper"})).cost
+        except NoFeasiblePath:
+            greedy = np.inf
+        try:
+            exact = shortest_path(q, start, **o).cost
+        except NoFeasiblePath:
+            assert greedy == np.inf
+            continue
+        assert exact <= greedy * (1 + 1e-12)
+        better += exact < greedy * (1 - 1e-9) < np.inf
+        found += greedy == np.inf
+    assert better > 0
+    assert found > 0
+
+
+def test_the_path_that_the_greedy_test_cannot_see():
+    q = [[0.0], [0.4], [0.5], [1.0]]
+    path = shortest_path(q, [0, 1, 3, 4], dt=1.0, velocity=[1.0], acceleration=[0.05])
+    np.testing.assert_array_equal(path.index, [0, 1, 0])
+    assert path.optimal
+
+
+def test_a_dead_end_says_how_far_any_path_goes_and_what_forbids_the_rest():
+    # Both ways to 0.5 go fast; neither may stop at once: acceleration closes the way to node 3.
+    q = [[0.0], [0.5], [0.95], [0.95]]
+    with pytest.raises(NoFeasiblePath, match="from node 2 to node 3") as caught:
+        shortest_path(q, [0, 1, 2, 3, 4], dt=1.0, velocity=[1.0], acceleration=[0.1])
+    assert caught.value.proved
+    assert caught.value.node == 2
+    assert caught.value.counts == {"acceleration, joint 1": 1}
+
+
+@pytest.mark.parametrize(
+    ("start", "node"), [([0, 0, 1, 2], -1), ([0, 1, 1, 2], 0), ([0, 1, 2, 2], 1)]
+)
+def test_an_empty_layer_is_an_answer_with_its_node(start, node):
+    with pytest.raises(NoFeasiblePath, match="is empty") as caught:
+        shortest_path([[0.0], [0.1]], start, **ONE)
+    assert (caught.value.node, caught.value.proved) == (node, True)
+
+
+def test_a_break_before_an_empty_layer_is_where_it_is():
+    with pytest.raises(NoFeasiblePath, match="from node 0 to node 1") as caught:
+        shortest_path([[0.0], [9.0]], [0, 1, 2, 2], **ONE)
+    assert caught.value.node == 0
+
+
+def test_a_loop_that_cannot_close_says_so():
+    # From either vertex paths reach the end, but none the vertex it left: joint 1 moves one way.
+    q = [[0.0], [0.3], [0.4], [0.6], [0.0], [0.3]]
+    with pytest.raises(NoFeasiblePath) as caught:
+        shortest_path(
+            q, [0, 2, 4, 6], dt=1.0, velocity=[0.5], acceleration=[0.01], closure="periodic"
+        )
+    assert caught.value.proved
+
+
+def test_an_endless_joint_may_close_a_turn_later():
+    t = np.linspace(0, 2 * np.pi, 9)
+    q = t[:, None]
+    options = {"dt": 1.0, "velocity": [1.0], "acceleration": [0.01], "closure": "periodic"}
+    path = shortest_path(q, np.arange(10), endless=[True], weights=[1.0], **options)
+    assert path.cost == pytest.approx(2 * np.pi)
+    with pytest.raises(InputError, match=r"their vertices 0 differ by 6.28 rad"):
+        shortest_path(q, np.arange(10), **options)
+
+
+def test_ends_that_do_not_repeat_are_refused():
+    with pytest.raises(InputError, match="they have 1 and 2 vertices"):
+        shortest_path([[0.0], [0.1], [0.2]], [0, 1, 3], closure="periodic", **ONE)
+
+
+def test_the_bound_cannot_hide_a_dear_optimum(monkeypatch):
+    # Forgetting what it recorded must not change the answer.
+    monkeypatch.setattr("kerfpath.search._exact.ROOM", 3)
+    rng = np.random.default_rng(24)
+    assert sum(agree(rng, "free") for _ in range(200)) > 50
+
+
+@settings(derandomize=True, max_examples=150, deadline=None)
+@given(
+    q=hnp.arrays(float, st.tuples(st.integers(0, 6), st.integers(0, 3)), elements=st.floats(-4, 4)),
+    start=st.lists(st.integers(-1, 7), max_size=5),
+    limit=st.floats(),
+    closure=st.sampled_from(["free", "periodic"]),
+)
+def test_whatever_comes_no_crash(q, start, limit, closure):
+    limits = {"velocity": [limit] * q.shape[1], "acceleration": [limit] * q.shape[1]}
+    try:
+        path = shortest_path(q, start, dt=0.1, closure=closure, **limits)
+    except (InputError, NoFeasiblePath):
+        return
+    assert len(path.index) == len(start) - 1

@@ -1,0 +1,131 @@
+"""The example behind the paper's figures 1 and 2: what it writes, and that what is kept agrees."""
+
+import csv
+import importlib.util
+import sys
+import xml.etree.ElementTree as ET
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+EXAMPLES = Path(__file__).parent.parent / "examples"
+KEPT = EXAMPLES / "known_against_proposed"
+
+
+@pytest.fixture(scope="module")
+def example():
+    name = "known_against_proposed"
+    spec = importlib.util.spec_from_file_location(name, EXAMPLES / f"{name}.py")
+    module = importlib.util.module_from_spec(spec)
+    sys.modules[name] = module
+    spec.loader.exec_module(module)
+    yield module
+    del sys.modules[name]
+
+
+@pytest.fixture(scope="module")
+def written(example, tmp_path_factory):
+    folder = tmp_path_factory.mktemp("example")
+    example.main(["--quick", "--out", str(folder)])
+    return folder
+
+
+def rows_of(folder):
+    with (folder / "table.csv").open(encoding="utf-8", newline="") as file:
+        return list(csv.DictReader(file))
+
+
+def test_the_reduced_example_writes_a_table_an_account_and_pictures(written):
+    assert {f.name for f in written.iterdir()} == {
+        "README.md",
+        "table.csv",
+        "figure.svg",
+        "figure-worst.svg",
+    }
+    rows = rows_of(written)
+    assert {row["technique"] for row in rows} == {"known", "proposed"}
+    for name in ("figure.svg", "figure-worst.svg"):
+        lines = ET.parse(written / name).getroot().iter("{http://www.w3.org/2000/svg}polyline")
+        # Left and right: six joints, the heading, six velocities and six accelerations.
+        assert sum(1 for _ in lines) == 2 * (6 + 1 + 6 + 6)
+
+
+@pytest.mark.parametrize("place", ["new", "kept"])
+def test_proposed_plans_keep_eta_and_pass_the_audit(written, place):
+    found = [
+        row
+        for row in rows_of(written if place == "new" else KEPT)
+        if row["technique"] == "proposed" and row["found"] == "yes"
+    ]
+    assert found
+    for row in found:
+        # The table rounds shares to three places.
+        assert float(row["peak_velocity"]) <= float(row["eta_v"]) + 5e-4
+        assert float(row["peak_acceleration"]) <= float(row["eta_a"]) + 5e-4
+        assert row["acceptable"] == "yes"
+
+
+@pytest.mark.parametrize("place", ["new", "kept"])
+def test_a_plan_over_a_limit_is_never_called_acceptable(written, place):
+    for row in rows_of(written if place == "new" else KEPT):
+        if row["acceptable"] == "yes":
+            assert max(float(row["peak_velocity"]), float(row["peak_acceleration"])) <= 1.0
+
+
+def test_the_kept_account_states_the_figures_of_the_kept_table(example):
+    kept = (KEPT / "README.md").read_text(encoding="utf-8")
+    assert kept == example.readme(example.TASKS, rows_of(KEPT))
+
+
+def test_the_short_answer_of_the_account_is_what_the_table_says(example):
+    said = {
+        task.name: [
+            "**shows**" in line
+            for line in example.verdict(rows_of(KEPT), task)
+            if line.startswith("- ")
+        ]
+        for task in example.TASKS
+        if task.name in ("main", "coarse")
+    }
+    # Acceptable plans; heading, joint 6, shake; balance.
+    assert said == {
+        "main": [True, False, False, True, False],
+        "coarse": [True, True, True, True, False],
+    }
+
+
+def test_the_kept_pictures_are_there_and_small(example):
+    named = {f"{pair.file}.svg" for pair in example.pairs_of(rows_of(KEPT))}
+    assert named == {f.name for f in KEPT.glob("*.svg")}
+    assert all((KEPT / name).stat().st_size < 150_000 for name in named)
+
+
+def test_every_choice_is_planned_by_both_techniques(example):
+    rows = rows_of(KEPT)
+    for task in example.TASKS:
+        choices = [
+            {
+                (row["objective"], row["weights"])
+                for row in rows
+                if (row["task"], row["technique"]) == (task.name, technique)
+            }
+            for technique in ("known", "proposed")
+        ]
+        assert choices[0] == choices[1]
+        assert len(choices[0]) == 2 * len(example.weight_factors())
+
+
+def test_the_sheet_is_closed_flat_and_as_large_as_stated(example):
+    contour = example.sheet(0.004)
+    size = np.ptp(contour.points, axis=0)
+    assert contour.closed
+    # The rounding of the nodes may miss the extreme points by a fraction of the spacing.
+    assert size == pytest.approx([0.5, 0.3, 0.0], abs=1e-4)
+
+
+def test_turning_back_is_counted_only_beyond_the_threshold(example):
+    x = np.array([0.0, 3.0, 2.0, 5.0, 1.0, 1.5, 0.5, 4.0])
+    assert example.reversals(x, 2.0) == 2
+    assert example.reversals(x, 0.4) == 6
+    assert example.reversals(np.zeros(4), 2.0) == 0
