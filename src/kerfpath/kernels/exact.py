@@ -202,8 +202,8 @@ def _extend(
         if a == b:
             continue
         (low, high), (low2, high2) = runs(layers.start, layers.low, layers.high, k, p)
-        for j in range(low, high + high2 - low2):
-            j = j if j < high else j - high + low2
+        for v in range(low, high + high2 - low2):
+            j = v if v < high else v - high + low2
             if h[j] == np.inf:
                 continue
             step = joined(aim.minimax, _distance(layers, aim, p, j), aim.vertex_cost[j])

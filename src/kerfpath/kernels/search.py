@@ -152,6 +152,40 @@ def _increment(layers: Layers, p: int, j: int, out_dq: Array) -> None:
 
 
 @jit
+def _offer(
+    layers: Layers,
+    aim: Objective,
+    k: int,
+    p: int,
+    out_dist: Array,
+    out_before: Ints,
+    out_free: Array,
+) -> None:
+    """Offer vertex p of layer k as predecessor to the vertices its edges lead to, step (2b).
+
+    out_free keeps the best offer whatever its acceleration.
+    """
+    n = len(layers.endless)
+    dq, dq_before = np.empty(n), np.empty(n)
+    if k > 0:
+        _increment(layers, out_before[p], p, dq_before)
+    (a, b), (c, d) = runs(layers.start, layers.low, layers.high, k, p)
+    for v in range(a, b + d - c):
+        j = v if v < b else v - b + c
+        cost = joined(aim.minimax, out_dist[p], _distance(layers, aim, p, j))
+        best, best_p = out_dist[j], out_before[j]
+        tie = cost == best and best_p >= 0 and layers.rank[p] < layers.rank[best_p]
+        if not (cost < best or tie):
+            continue
+        out_free[j] = min(out_free[j], cost)
+        if k > 0:
+            _increment(layers, p, j, dq)
+            if acceleration_excess(dq, dq_before, aim.acceleration) >= 0:
+                continue
+        out_dist[j], out_before[j] = cost, p
+
+
+@jit
 def path_planning(
     layers: Layers, aim: Objective, out_dist: Array, out_before: Ints
 ) -> tuple[int, bool]:
@@ -162,34 +196,16 @@ def path_planning(
     reached, and whether the greedy test ever turned away a better edge (if not, the recursion was
     exact).
     """
-    n, turned_away = len(layers.endless), False
-    dq, dq_before = np.empty(n), np.empty(n)
-    first_order = np.full(len(layers.low), np.inf)
+    free, turned_away = np.full(len(layers.low), np.inf), False
     for j in range(layers.start[1]):
         out_dist[j] = aim.vertex_cost[j]
     for k in range(1, len(layers.start) - 1):
         for p in range(layers.start[k - 1], layers.start[k]):
-            if out_dist[p] == np.inf:
-                continue
-            if k > 1:
-                _increment(layers, out_before[p], p, dq_before)
-            (a, b), (c, d) = runs(layers.start, layers.low, layers.high, k - 1, p)
-            for j in range(a, b + d - c):
-                j = j if j < b else j - b + c
-                cost = joined(aim.minimax, out_dist[p], _distance(layers, aim, p, j))
-                best, best_p = out_dist[j], out_before[j]
-                tie = cost == best and best_p >= 0 and layers.rank[p] < layers.rank[best_p]
-                if not (cost < best or tie):
-                    continue
-                first_order[j] = min(first_order[j], cost)
-                if k > 1:
-                    _increment(layers, p, j, dq)
-                    if acceleration_excess(dq, dq_before, aim.acceleration) >= 0:
-                        continue
-                out_dist[j], out_before[j] = cost, p
+            if out_dist[p] < np.inf:
+                _offer(layers, aim, k - 1, p, out_dist, out_before, free)
         reached = False
         for j in range(layers.start[k], layers.start[k + 1]):
-            turned_away |= first_order[j] < out_dist[j]
+            turned_away |= free[j] < out_dist[j]
             reached |= out_before[j] >= 0
             out_dist[j] = joined(aim.minimax, out_dist[j], aim.vertex_cost[j])
         if not reached:

@@ -116,6 +116,8 @@ def shortest_path(
     q = floats(q, "q", (None, None), copy=False)
     start = _offsets(start, len(q))
     n = q.shape[1]
+    if n == 0:
+        raise InputError("q: expected at least one joint, got shape " + str(q.shape))
     dt = scalar(dt, "dt", unit="s", above=0.0)
     velocity = positive(velocity, "velocity", (n,))
     acceleration = positive(acceleration, "acceleration", (n,))
