@@ -20,10 +20,7 @@ from kerfpath.report import ContourSection, render
 
 __all__ = ["Written", "program_of", "require_folder", "trajectory_text", "write_outcome"]
 
-NOT_CHECKED = (
-    "Collisions are not checked, neither along the contours nor on the way between them: "
-    "simulate the program in the cell before running it."
-)
+NOT_CHECKED = "Collisions are not checked: simulate the program in the cell before running it."
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
