@@ -203,6 +203,24 @@ def test_an_older_program_in_the_folder_is_pointed_out(folder):
     assert "is from an earlier run and does not belong to this plan" in result.stderr
 
 
+def test_speed_names_the_fastest_and_what_binds(folder):
+    result = run("speed", "small.toml", cwd=folder)
+    assert result.returncode == 0, result.stderr
+    assert re.search(r"hole 10 +3 +\d+\.\d+ +\d+ +joint \d acceleration", result.stdout)
+    data = json.loads(run("speed", "small.toml", "--json", cwd=folder).stdout)
+    hole = data["contours"][0]
+    assert hole["fastest_m_min"] > hole["asked_m_min"] == pytest.approx(3)
+    # A job at that speed is feasible, one a little over it is not.
+    for share, code in ((0.999, 0), (1.01, 1)):
+        asked = f"speed_m_min = {hole['fastest_m_min'] * share}"
+        (folder / "edge.toml").write_text(SMALL.replace("speed_m_min = 3", asked, 1))
+        assert run("plan", "edge.toml", "--out", "edge", cwd=folder).returncode == code
+    (folder / "far.toml").write_text(SMALL.replace("xyz_mm = [1200", "xyz_mm = [3200"))
+    far = run("speed", "far.toml", cwd=folder)
+    assert far.returncode == 1
+    assert "no admissible pose" in far.stdout
+
+
 def test_contours_lists_the_loops_by_name():
     result = run("contours", DEMO / "b_pillar.step")
     assert result.returncode == 0
@@ -228,7 +246,7 @@ def test_robots_lists_the_library_and_shows_sources():
 
 
 def test_help_teaches():
-    for command in ("demo", "plan", "post", "audit", "contours", "robots"):
+    for command in ("demo", "plan", "speed", "post", "audit", "contours", "robots"):
         result = run(command, "--help")
         assert result.returncode == 0
         assert f"Example: kerfpath {command}" in result.stdout

@@ -17,6 +17,7 @@ if TYPE_CHECKING:
     from kerfpath.errors import InputError as InputError
     from kerfpath.errors import KerfpathError as KerfpathError
     from kerfpath.errors import NoFeasiblePath as NoFeasiblePath
+    from kerfpath.planner import fastest_speed as fastest_speed
     from kerfpath.planner import plan as plan
     from kerfpath.plans import Plan as Plan
     from kerfpath.robots import Robot as Robot
@@ -34,6 +35,7 @@ _HOME = {
     "Plan": "plans",
     "Robot": "robots",
     "audit": "auditor",
+    "fastest_speed": "planner",
     "join": "contour",
     "plan": "planner",
     "robot": "robots",

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Literal
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -13,9 +15,9 @@ from kerfpath.errors import InputError, NoFeasiblePath
 from kerfpath.graph import LayeredGraph, build, gamma_grid
 from kerfpath.plans import Plan, Proof, Settings
 from kerfpath.robots import Robot
-from kerfpath.search import Closure, Method, Metric, ObjectiveKind, shortest_path
+from kerfpath.search import Closure, Method, Metric, ObjectiveKind, least_interval, shortest_path
 
-__all__ = ["layered_graph", "node_interval", "plan"]
+__all__ = ["FastestSpeed", "fastest_speed", "layered_graph", "node_interval", "plan"]
 
 UNEVEN = 0.01
 """Largest relative difference of node distances that still counts as evenly spaced."""
@@ -146,6 +148,80 @@ def plan(
         cost=path.cost,
         proof=_proof(method, path.optimal),
         counts=graph.counts(),
+    )
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class FastestSpeed:
+    """The largest constant cutting speed at which a path exists on the graph, and what binds.
+
+    Parameters
+    ----------
+    speed : float m/s
+    joint : int
+        The joint that binds, 0-based.
+    node : int
+        The node where it binds.
+    limit : {"velocity", "acceleration"}
+        Which of its limits binds there.
+    """
+
+    speed: float
+    joint: int
+    node: int
+    limit: Literal["velocity", "acceleration"]
+
+
+def fastest_speed(
+    contour: Contour,
+    robot: Robot,
+    *,
+    tool: ArrayLike,
+    placement: ArrayLike,
+    gamma_step: float = np.pi / 180,
+    frames: FrameKind = "rotation-minimising",
+    postures: Sequence[int] | None = None,
+    eta_v: float = 1.0,
+    eta_a: float = 1.0,
+    graph: LayeredGraph | None = None,
+    progress: Callable[[int], None] | None = None,
+) -> FastestSpeed:
+    """Return the largest constant speed at which a path exists on the graph, exactly.
+
+    A second-order minimax problem on the layered graph; arguments as in `plan`.
+
+    Raises
+    ------
+    NoFeasiblePath
+        Some node has no admissible pose at all.
+    InputError
+        Limits that are not known, nodes unevenly spaced, values out of range.
+    """
+    velocity, acceleration = robot.speed_limits()
+    _require_even(contour, np.diff(contour.s), "m")
+    graph = graph or layered_graph(
+        contour,
+        robot,
+        tool=tool,
+        placement=placement,
+        gamma_step=gamma_step,
+        frames=frames,
+        postures=postures,
+        progress=progress,
+    )
+    _require_no_empty_layer(contour, graph)
+    least = least_interval(
+        graph.q,
+        graph.start,
+        velocity=velocity,
+        acceleration=acceleration,
+        endless=robot.endless,
+        eta_v=eta_v,
+        eta_a=eta_a,
+    )
+    spacing = contour.length / (len(contour) - 1)
+    return FastestSpeed(
+        speed=spacing / least.dt, joint=least.joint, node=least.node, limit=least.limit
     )
 
 

@@ -179,6 +179,30 @@ def _show_cuts(cuts: Any) -> None:
 
 
 @app.command()
+def speed(
+    job: Annotated[Path, typer.Argument(metavar="JOB.toml", help="The job file.")],
+    as_json: Json = False,
+) -> None:
+    """Find the fastest constant cutting speed of each contour, and what binds where.
+
+    Exact on the graph that the job describes (its spacing, gamma step, limits and eta); the speeds
+    that the job asks for play no part.
+
+    Example: kerfpath speed door.toml
+    """
+    from kerfpath.cli._speed import show_speeds
+    from kerfpath.job import fastest_speeds, read_job, warm_up
+
+    read = read_job(job)
+    with busy("compiling the kernels, first run only"):
+        warm_up()
+    with progress_bars("contours") as progress:
+        answers = fastest_speeds(read, progress=progress)
+    if not show_speeds(answers, as_json=as_json):
+        raise typer.Exit(1)
+
+
+@app.command()
 def post(
     plan_file: PlanFileArgument,
     language: Annotated[str, typer.Option(help="Robot language; known: rapid.")] = "rapid",

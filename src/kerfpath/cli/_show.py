@@ -44,13 +44,13 @@ def table(
 
 
 @contextmanager
-def progress_bars() -> Iterator[Callable[[str, int, int], None]]:
+def progress_bars(unit: str = "nodes") -> Iterator[Callable[[str, int, int], None]]:
     """Give a function that shows how far each piece of work is; silent where nobody looks."""
     columns = (
         TextColumn("{task.description}"),
         BarColumn(),
         MofNCompleteColumn(),
-        TextColumn("nodes"),
+        TextColumn(unit),
         TimeRemainingColumn(),
     )
     watched = errors.is_terminal

@@ -15,11 +15,11 @@ from kerfpath.errors import NoFeasiblePath
 from kerfpath.graph import LayeredGraph
 from kerfpath.job._read import ContourTask, Job
 from kerfpath.kernels import is_compiled
-from kerfpath.planner import layered_graph, plan
+from kerfpath.planner import FastestSpeed, fastest_speed, layered_graph, plan
 from kerfpath.plans import Plan
 from kerfpath.robots import robot
 
-__all__ = ["Cut", "Outcome", "Progress", "run_job", "warm_up"]
+__all__ = ["Cut", "Outcome", "Progress", "fastest_speeds", "run_job", "warm_up"]
 
 Progress = Callable[[str, int, int], None]
 """Called with what is being done, how much of it is done, and how much there is."""
@@ -138,15 +138,48 @@ def _cut(job: Job, task: ContourTask, drawn: Contour, progress: Progress) -> Cut
     )
 
 
+def fastest_speeds(
+    job: Job, *, progress: Progress = lambda what, done, total: None
+) -> list[tuple[ContourTask, Contour, FastestSpeed | NoFeasiblePath]]:
+    """Return, for each contour of a job, its task, its nodes and the fastest constant speed.
+
+    The speeds that the job asks for play no part.
+
+    Raises
+    ------
+    InputError
+        As `run_job`.
+    """
+    part = read_step(job.part_file, unit=job.part_unit)
+    options = job.plan_options
+    keys = ("gamma_step", "frames", "postures", "eta_v", "eta_a")
+    answers: list[tuple[ContourTask, Contour, FastestSpeed | NoFeasiblePath]] = []
+    for i, task in enumerate(job.contours):
+        progress("contours", i, len(job.contours))
+        nodes = task.sample(part.contour(task.pick))
+        try:
+            found: FastestSpeed | NoFeasiblePath = fastest_speed(
+                nodes,
+                job.robot,
+                tool=job.tool,
+                placement=job.placement,
+                **{key: options[key] for key in keys},
+            )
+        except NoFeasiblePath as broken:
+            found = broken
+        answers.append((task, nodes, found))
+    return answers
+
+
 def warm_up() -> bool:
     """Compile the kernels if this copy never has; return whether that was needed."""
     if is_compiled():
         return False
     arm = robot("abb_irb4600_60_205", acceleration_ratio="iontec_20_to_70kg")
-    points = np.linspace([1.2, 0.0, 0.5], [1.2, 0.001, 0.5], 4)
-    contour = Contour(points, np.tile([0.0, 0.0, -1.0], (4, 1)))
+    corners = np.array([[1.2, 0.0, 0.5], [1.2, 0.001, 0.5], [1.201, 0.001, 0.5], [1.201, 0.0, 0.5]])
+    contour = Contour(corners, np.tile([0.0, 0.0, -1.0], (4, 1)), closed=True)
     for frames in FRAME_KINDS:
-        _ = plan(
+        made = plan(
             contour,
             arm,
             tool=np.eye(4),
@@ -154,5 +187,7 @@ def warm_up() -> bool:
             speed=0.001,
             gamma_step=np.pi / 2,
             frames=frames,
-        ).criteria
+        )
+        _ = made.criteria
+    arm.inverse(arm.forward(made.q))
     return True

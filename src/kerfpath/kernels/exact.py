@@ -20,7 +20,12 @@ from numpy.typing import NDArray
 
 from kerfpath._arrays import Array, Bools, Ints
 from kerfpath.kernels._jit import jit, jit_vector
-from kerfpath.kernels.limits import LIMIT_TOLERANCE, acceleration_excess, velocity_excess
+from kerfpath.kernels.limits import (
+    LIMIT_TOLERANCE,
+    acceleration_excess,
+    acceleration_time,
+    velocity_excess,
+)
 from kerfpath.kernels.metric import EUCLID, MANHATTAN
 from kerfpath.kernels.search import (
     Layers,
@@ -188,6 +193,29 @@ def _cheapest(
 
 
 @jit
+def _quickest(
+    states: States, a: int, b: int, aim: Objective, dq: Array, least: float, bound: float
+) -> tuple[int, float, float]:
+    """Find which of the states a..b, cheapest first, goes on by dq in the least node interval.
+
+    `least` is the interval that the step and what is to come ask for. Returns the state, -1 if none
+    keeps the bound; the interval up to and with the step; and the least one over the bound.
+    """
+    best, best_d, over = -1, np.inf, np.inf
+    for s in range(a, b):
+        if states.d[s] >= best_d:
+            break
+        d = states.d[s]
+        if states.parent[s] >= 0:
+            d = max(d, acceleration_time(dq, states.dq[s], aim.acceleration))
+        if max(d, least) > bound:
+            over = min(over, max(d, least))
+        elif d < best_d:
+            best, best_d = s, d
+    return best, best_d, over
+
+
+@jit
 def _extend(
     layers: Layers, aim: Objective, h: Array, bound: float, seam: Array, k: int, states: States
 ) -> tuple[States, float]:
@@ -212,14 +240,20 @@ def _extend(
             _increment(layers, p, j, step_dq)
             if closes and acceleration_excess(seam, step_dq, aim.acceleration) >= 0:
                 continue
-            s, dropped = _cheapest(states, a, b, aim, step, step_dq, h[j], bound)
+            if aim.timed:
+                least = max(step, h[j])
+                s, cost, dropped = _quickest(states, a, b, aim, step_dq, least, bound)
+                cost = max(cost, step)
+            else:
+                s, dropped = _cheapest(states, a, b, aim, step, step_dq, h[j], bound)
+                cost = joined(aim.minimax, states.d[s], step) if s >= 0 else np.inf
             lowest = min(lowest, dropped)
             if s < 0:
                 continue
             if count == len(vertex):
                 vertex, parent, d, dq = _grown(vertex), _grown(parent), _grown(d), _grown(dq)
             vertex[count], parent[count] = j, s
-            d[count], dq[count] = joined(aim.minimax, states.d[s], step), step_dq
+            d[count], dq[count] = cost, step_dq
             count += 1
     unsorted = States(vertex[:count], d[:count], dq[:count], parent[:count], states.first)
     return _sorted(unsorted, layers.start[k + 1], layers.start[k + 2]), lowest

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from math import sqrt
+
 from kerfpath._arrays import Array
 from kerfpath.kernels._jit import jit
 
-__all__ = ["LIMIT_TOLERANCE", "acceleration_excess", "velocity_excess"]
+__all__ = ["LIMIT_TOLERANCE", "acceleration_excess", "acceleration_time", "velocity_excess"]
 
 LIMIT_TOLERANCE = 1e-9
 """Slack on (5) and (6), rad: a thousandth of what any encoder resolves, far above rounding."""
@@ -33,3 +35,15 @@ def acceleration_excess(dq: Array, dq_before: Array, bound: Array) -> int:
         if abs(dq[i] - dq_before[i]) > bound[i] + LIMIT_TOLERANCE:
             return i
     return -1
+
+
+@jit
+def acceleration_time(dq: Array, dq_before: Array, acceleration: Array) -> float:
+    """Least node interval, s, in which (6) holds: largest sqrt(|ddq_i| / q''max_i).
+
+    dq, dq_before (n,) are successive increments, rad; acceleration (n,) rad/s^2.
+    """
+    least = 0.0
+    for i in range(len(dq)):
+        least = max(least, abs(dq[i] - dq_before[i]) / acceleration[i])
+    return sqrt(least)

@@ -58,6 +58,8 @@ class Objective(NamedTuple):
     acceleration: Array
     cap: float
     """Largest distance, and largest cost of a vertex, that is allowed."""
+    timed: bool
+    """Costs are times: (6) does not forbid, it takes the time in which it would hold."""
 
 
 @jit

@@ -209,9 +209,10 @@ class Robot:
         """
         poses = np.asarray(T, dtype=float)
         poses = floats(poses[None] if poses.ndim == 2 else poses, "T", (None, 4, 4))
-        q = np.empty((len(poses), 1, kinematics.POSTURES, JOINTS))
-        reach = np.empty(q.shape[:3], dtype=np.bool_)
-        kinematics.inverse_all(self.arm(), poses, q[:, 0], reach[:, 0])
+        q = np.empty((len(poses), kinematics.POSTURES, JOINTS))
+        reach = np.empty(q.shape[:2], dtype=np.bool_)
+        kinematics.inverse_all(self.arm(), poses, q, reach)
+        q, reach = q[:, None], reach[:, None]  # one node a pose, one sample of gamma
         if not within_limits:
             pose, _, posture = np.nonzero(reach)
             found = q[reach]

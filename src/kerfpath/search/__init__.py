@@ -1,5 +1,7 @@
 """The best path through a layered graph given as bare arrays."""
 
+from kerfpath.search._fastest import LeastInterval as LeastInterval
+from kerfpath.search._fastest import least_interval as least_interval
 from kerfpath.search._shortest import Closure as Closure
 from kerfpath.search._shortest import LayeredPath as LayeredPath
 from kerfpath.search._shortest import Method as Method

@@ -13,7 +13,7 @@ from kerfpath.kernels import exact
 from kerfpath.kernels.limits import acceleration_excess
 from kerfpath.kernels.search import Layers, Objective, path_planning
 
-__all__ = ["Best", "Dead", "best_closed_path", "best_path"]
+__all__ = ["Best", "Dead", "best_closed_path", "best_path", "quickest_path"]
 
 ROUNDING = 1e-12
 """Relative slack on a bound, so that rounding never drops the path that the bound came from."""
@@ -116,6 +116,13 @@ def best_closed_path(layers: Layers, aim: Objective) -> Best | Dead:
     return Dead(layers=K - 1, counts=np.zeros((2, len(layers.endless)), np.int64))
 
 
+def quickest_path(layers: Layers, aim: Objective, ceiling: float) -> Best | None:
+    """Return the path of least node interval, if that is `ceiling` or less (a timed objective)."""
+    every = np.ones(len(layers.low), np.bool_)
+    found = _grow(layers, aim, every, NO_SEAM, 0.0, ceiling)
+    return None if found is None else Best(path=found[0], cost=found[1], total=found[1])
+
+
 def _lexicographic(
     layers: Layers, aim: Objective, allowed: Bools, seam: Array, floor: float
 ) -> Best | None:
@@ -133,9 +140,17 @@ def _lexicographic(
 
 
 def _grow(
-    layers: Layers, aim: Objective, allowed: Bools, seam: Array, floor: float
+    layers: Layers,
+    aim: Objective,
+    allowed: Bools,
+    seam: Array,
+    floor: float,
+    ceiling: float = np.inf,
 ) -> tuple[Ints, float] | None:
-    """Raise the bound until the recursion comes through, or drops nothing for its cost."""
+    """Raise the bound until the recursion comes through, or drops nothing for its cost.
+
+    No path dearer than `ceiling` is looked for.
+    """
     h = np.empty(len(layers.low))
     exact.cost_to_go(layers, aim, allowed, h)
     entry = h[: layers.start[1]]
@@ -143,17 +158,17 @@ def _grow(
     least = float((np.maximum(enter, entry) if aim.minimax else enter + entry).min(initial=np.inf))
     if least == np.inf:
         return None
-    bound, ceiling = max(least, floor) * (1 + ROUNDING), None
+    bound, greedy = max(least, floor) * (1 + ROUNDING), None
     while True:
         reached = exact.recursion(layers, aim, h, bound, seam, ROOM)
         if reached.state >= 0:
             break
-        if reached.lowest == np.inf:
+        if reached.lowest == np.inf or reached.lowest > ceiling:
             return None
-        if ceiling is None:
-            ceiling = _greedy_cost(layers, aim, allowed, seam) * (1 + ROUNDING)
+        if greedy is None:
+            greedy = _greedy_cost(layers, aim, allowed, seam) * (1 + ROUNDING)
         grown = least + max(2 * (bound - least), FIRST_GAP * least)
-        bound = max(min(grown, ceiling), reached.lowest * (1 + ROUNDING))
+        bound = max(min(grown, greedy), reached.lowest * (1 + ROUNDING))
     if not reached.recorded:
         # Once more at the tightest bound: few states are left to remember.
         bound = reached.cost * (1 + ROUNDING)
@@ -165,7 +180,7 @@ def _grow(
 
 def _greedy_cost(layers: Layers, aim: Objective, allowed: Bools, seam: Array) -> float:
     """Return a cost that some admissible path keeps, infinity if the greedy test finds none."""
-    if len(seam) or not allowed.all():
+    if aim.timed or len(seam) or not allowed.all():
         return np.inf
     dist, before = np.full(len(layers.low), np.inf), np.full(len(layers.low), -1)
     path_planning(layers, aim, dist, before)

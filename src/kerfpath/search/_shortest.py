@@ -8,12 +8,12 @@ from typing import Literal, get_args
 import numpy as np
 from numpy.typing import ArrayLike
 
-from kerfpath._arrays import Array, Bools, Ints, bools, floats, freeze, integers, positive, scalar
+from kerfpath._arrays import Ints, bools, floats, freeze, integers, positive, scalar
 from kerfpath.errors import InputError, NoFeasiblePath
 from kerfpath.kernels import metric as metrics
 from kerfpath.kernels import search as kernel
-from kerfpath.kernels.limits import LIMIT_TOLERANCE
 from kerfpath.search._exact import Best, best_closed_path, best_path
+from kerfpath.search._layers import narrowest_key, offsets, sorted_layers
 
 __all__ = ["Closure", "LayeredPath", "Method", "Metric", "ObjectiveKind", "shortest_path"]
 
@@ -29,8 +29,6 @@ _METRIC_CODES: dict[str, int] = {
 }
 SAME_END = 1e-6
 """Joint difference (rad) up to which the ends of a closed contour count as the same vertex."""
-_LAYERS_SAMPLED = 32
-"""Layers looked at to choose the joint that sorts them: enough to rank the joints."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -114,7 +112,7 @@ def shortest_path(
         a periodic closure whose end layers differ.
     """
     q = floats(q, "q", (None, None), copy=False)
-    start = _offsets(start, len(q))
+    start = offsets(start, len(q))
     n = q.shape[1]
     if n == 0:
         raise InputError("q: expected at least one joint, got shape " + str(q.shape))
@@ -144,8 +142,8 @@ def shortest_path(
         key = np.zeros(len(q)) if posture is None else posture.astype(float)
         window, circular = 0.5, False
     else:
-        key, window, circular = _narrowest_key(q, start, bound_v, endless)
-    layers, order = _sorted_layers(q, start, key, window, circular, endless)
+        key, window, circular = narrowest_key(q, start, bound_v, endless)
+    layers, order = sorted_layers(q, start, key, window, circular, endless)
     aim = kernel.Objective(
         weight=np.ascontiguousarray(weight),
         metric=_METRIC_CODES[metric],
@@ -154,6 +152,7 @@ def shortest_path(
         velocity=bound_v,
         acceleration=bound_a,
         cap=np.inf,
+        timed=False,
     )
     filled = int(np.argmin(np.diff(start))) if (np.diff(start) == 0).any() else len(start) - 1
     if filled == 0:
@@ -256,65 +255,6 @@ def _require_same_ends(layers: kernel.Layers) -> None:
             "closure: periodic needs a last layer that repeats the first, but their vertices "
             f"{i} differ by {gap[:, i].max():.3g} rad"
         )
-
-
-def _sorted_layers(
-    q: Array, start: Ints, key: Array, window: float, circular: bool, endless: Bools
-) -> tuple[kernel.Layers, Ints]:
-    """Return the graph as the kernels take it, and where each of its vertices stands in q."""
-    N, n = q.shape
-    columns, keys, rank = np.empty((n, N)), np.empty(N), np.empty(N, np.int64)
-    kernel.arrange(q, key, start, endless, columns, keys, rank)
-    low, high = np.zeros(N, np.int64), np.zeros(N, np.int64)
-    kernel.windows(keys, start, window, circular, low, high)
-    layers = kernel.Layers(
-        q=columns,
-        start=start,
-        rank=rank,
-        low=low,
-        high=high,
-        endless=endless,
-        turn=np.where(endless, 2 * np.pi, np.inf),
-    )
-    return layers, rank + np.repeat(start[:-1], np.diff(start))
-
-
-def _narrowest_key(
-    q: Array, start: Ints, bound: Array, endless: Bools
-) -> tuple[Array, float, bool]:
-    """Choose the joint whose velocity window leaves the fewest vertices, to sort the layers by."""
-    pairs = np.zeros(q.shape[1])
-    layers = np.unique(np.linspace(0, max(len(start) - 3, 0), _LAYERS_SAMPLED).astype(int))
-    for k in layers[layers + 2 < len(start)]:
-        here, there = (_reduced(q[start[i] : start[i + 1]], endless) for i in (k, k + 1))
-        for i in range(q.shape[1]):
-            sorted_ = np.sort(there[:, i])
-            around = endless[i] and bound[i] < np.pi
-            reach = np.inf if endless[i] and not around else bound[i]
-            for shift in (-2 * np.pi, 0.0, 2 * np.pi) if around else (0.0,):
-                low = np.searchsorted(sorted_, here[:, i] + shift - reach, side="left")
-                high = np.searchsorted(sorted_, here[:, i] + shift + reach, side="right")
-                pairs[i] += (high - low).sum()
-    best = int(np.argmin(pairs))
-    key = _reduced(q[:, [best]], endless[[best]])[:, 0]
-    # Twice the slack of (5): the key must never exclude what the test itself would pass.
-    return key, float(bound[best] + 2 * LIMIT_TOLERANCE), bool(endless[best])
-
-
-def _reduced(q: Array, endless: Bools) -> Array:
-    """Bring the endless joints of q (N, n) into (-pi, pi]."""
-    turned = q - 2 * np.pi * np.ceil((q - np.pi) / (2 * np.pi))
-    return np.where(endless, turned, q)
-
-
-def _offsets(start: ArrayLike, vertices: int) -> Ints:
-    start = integers(start, "start", (None,))
-    if len(start) < 2 or start[0] != 0 or start[-1] != vertices or (np.diff(start) < 0).any():
-        raise InputError(
-            "start: expected K+1 offsets that begin with 0, never decrease and end with the number "
-            f"of vertices ({vertices}), got {start.tolist() if len(start) < 12 else '...'}"
-        )
-    return start
 
 
 def _one_of(name: str, value: str, known: tuple[str, ...]) -> None:

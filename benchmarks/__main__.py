@@ -1,0 +1,63 @@
+"""Run benchmarks and print their tables: ``python -m benchmarks [kinematics] [demo] [search]``."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from pathlib import Path
+
+from rich.console import Console
+
+from benchmarks._figures import Report, machine, markdown, show
+
+RESULTS = Path(__file__).parent / "RESULTS.md"
+NAMES = ("kinematics", "demo", "search")
+
+
+def main() -> None:
+    """Read the arguments, run what they name, print, and write if asked."""
+    parser = argparse.ArgumentParser(prog="python -m benchmarks", description=__doc__)
+    parser.add_argument("names", nargs="*", metavar="NAME", help=f"of {', '.join(NAMES)}; all")
+    parser.add_argument("--quick", action="store_true", help="small problems, few runs: a try")
+    parser.add_argument("--write", action="store_true", help=f"write {RESULTS.name} beside this")
+    parser.add_argument("--date", default="", help="date that the written file bears")
+    parser.add_argument("--note", default="", help="what else to say of the run, as its commit")
+    given = parser.parse_args()
+    if unknown := set(given.names) - set(NAMES):
+        parser.error(f"unknown benchmark {', '.join(sorted(unknown))}; known: {', '.join(NAMES)}")
+    facts, reports = machine(), list[Report]()
+    if given.note:
+        facts["note"] = given.note
+    console = Console() if sys.stdout.isatty() else Console(width=140)
+    for name, value in facts.items():
+        console.print(f"{name}: {value}", highlight=False)
+    for name in NAMES:
+        if given.names and name not in given.names:
+            continue
+        with console.status(name):
+            made = _run(name, quick=given.quick)
+        for report in made:
+            show(report, console)
+        reports += made
+    if given.write:
+        RESULTS.write_text(markdown(reports, facts, given.date), encoding="utf-8")
+        console.print(f"wrote {RESULTS}")
+
+
+def _run(name: str, *, quick: bool) -> list[Report]:
+    """Import a benchmark and run it; each brings libraries that the others do without."""
+    if name == "kinematics":
+        from benchmarks import kinematics
+
+        return [kinematics.run(quick=quick)]
+    if name == "demo":
+        from benchmarks import demo
+
+        return [demo.run(quick=quick)]
+    from benchmarks import search
+
+    return search.run(quick=quick)
+
+
+if __name__ == "__main__":
+    main()

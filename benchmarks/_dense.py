@@ -1,0 +1,107 @@
+"""The yardstick of the search: the first-order recursion over every edge, plainly written.
+
+No windows, no sorting, no acceleration: for each vertex, the cost of all edges into it from the
+whole layer before, and the least of them. Layers lie by joint and the six joints are written out,
+so that the loop over the predecessors is vectorised and stores nothing; which joints are endless,
+and the metric, are constants of the compiled code.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import cache
+from math import pi, sqrt
+from typing import Literal, ParamSpec, TypeVar
+
+import numba
+import numpy as np
+
+from kerfpath._arrays import Array, Bools, Ints
+
+__all__ = ["Metric", "dense_cost"]
+
+_P = ParamSpec("_P")
+_R = TypeVar("_R")
+Metric = Literal["manhattan", "euclid", "squared"]
+_Forward = Callable[[Array, Ints, Array, Array], float]
+
+SLACK = 1e-9
+"""Slack on the velocity bound, rad, as in kerfpath."""
+
+
+def _jit(function: Callable[_P, _R]) -> Callable[_P, _R]:
+    flags = {"nnan", "nsz", "reassoc", "contract"}
+    compiled: Callable[_P, _R] = numba.njit(nogil=True, fastmath=flags)(function)
+    return compiled
+
+
+@_jit
+def _step(angle: float, to: float, endless: bool) -> float:
+    step = abs(angle - to)
+    return min(step, 2 * pi - step) if endless else step
+
+
+@cache
+def _recursion(endless: tuple[bool, ...], metric: Metric) -> _Forward:
+    manhattan, squared = metric == "manhattan", metric == "squared"
+
+    @_jit
+    def least(dist: Array, q: Array, to: Array, w: Array, most: Array) -> float:
+        """Return the least dist[p] + rho(p, to) over the columns p of q (6, m)."""
+        q0, q1, q2, q3, q4, q5 = q[0], q[1], q[2], q[3], q[4], q[5]
+        best = np.inf
+        for p in range(len(dist)):
+            y0, y1 = _step(q0[p], to[0], endless[0]), _step(q1[p], to[1], endless[1])
+            y2, y3 = _step(q2[p], to[2], endless[2]), _step(q3[p], to[3], endless[3])
+            y4, y5 = _step(q4[p], to[4], endless[4]), _step(q5[p], to[5], endless[5])
+            far = (y0 > most[0]) | (y1 > most[1]) | (y2 > most[2])
+            far |= (y3 > most[3]) | (y4 > most[4]) | (y5 > most[5])
+            y0, y1, y2, y3, y4, y5 = (
+                w[0] * y0,
+                w[1] * y1,
+                w[2] * y2,
+                w[3] * y3,
+                w[4] * y4,
+                w[5] * y5,
+            )
+            if manhattan:
+                rho = y0 + y1 + y2 + y3 + y4 + y5
+            else:
+                rho = y0 * y0 + y1 * y1 + y2 * y2 + y3 * y3 + y4 * y4 + y5 * y5
+                rho = rho if squared else sqrt(rho)
+            best = min(best, np.inf if far else dist[p] + rho)
+        return best
+
+    @_jit
+    def forward(q: Array, start: Ints, weights: Array, bound: Array) -> float:
+        dist = np.zeros(start[1])
+        for k in range(1, len(start) - 1):
+            before = q[:, start[k - 1] : start[k]]
+            reached = np.empty(start[k + 1] - start[k])
+            for j in range(len(reached)):
+                reached[j] = least(dist, before, q[:, start[k] + j], weights, bound)
+            dist = reached
+        return float(dist.min())
+
+    return forward
+
+
+def dense_cost(
+    q: Array,
+    start: Ints,
+    *,
+    dt: float,
+    velocity: Array,
+    endless: Bools,
+    weights: Array,
+    metric: Metric,
+) -> float:
+    """Return the least cost of a path through the layers, inf if there is none.
+
+    Arguments as of `kerfpath.shortest_path`, six joints; the metric "squared" is Descartes' own:
+    the squares of the Euclidean steps.
+    """
+    turned = q - 2 * np.pi * np.ceil((q - np.pi) / (2 * np.pi))
+    columns = np.ascontiguousarray(np.where(endless, turned, q).T)
+    forward = _recursion(tuple(bool(e) for e in endless), metric)
+    return float(forward(columns, start, weights, velocity * dt + SLACK))

@@ -1,0 +1,179 @@
+"""How figures are taken and shown: runs in turn, medians, peak memory, tables, machine facts."""
+
+from __future__ import annotations
+
+import ctypes
+import os
+import platform
+import re
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from importlib.metadata import PackageNotFoundError, version
+from pathlib import Path
+from statistics import median
+from time import perf_counter
+
+from rich.console import Console
+from rich.markup import escape
+from rich.table import Table
+
+__all__ = [
+    "Figure",
+    "Report",
+    "available_gigabytes",
+    "in_turn",
+    "machine",
+    "markdown",
+    "peak_megabytes",
+    "show",
+]
+
+PACKAGES = (
+    "kerfpath",
+    "numpy",
+    "numba",
+    "scipy",
+    "eaik",
+    "py-opw-kinematics",
+    "tesseract-robotics",
+)
+COLUMNS = ("figure", "median", "min", "max", "runs", "unit", "note")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Figure:
+    """One row of a table: the runs of one thing that was measured.
+
+    Parameters
+    ----------
+    what : str
+    values : sequence of float
+        One number per run; empty when it was not run, and then `note` says why.
+    unit : str
+    note : str
+    """
+
+    what: str
+    values: Sequence[float] = ()
+    unit: str = "s"
+    note: str = ""
+
+    def cells(self) -> tuple[str, ...]:
+        """Return the row in words, by `COLUMNS`."""
+        if not self.values:
+            return (self.what, "-", "-", "-", "0", "", f"not run: {self.note}")
+        middle = (median(self.values), min(self.values), max(self.values))
+        numbers = [f"{v:.0f}" if v >= 1000 else f"{v:.3g}" for v in middle]
+        return (self.what, *numbers, str(len(self.values)), self.unit, self.note)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Report:
+    """The figures of one benchmark.
+
+    Parameters
+    ----------
+    title : str
+    how : str
+        What is measured, and how.
+    figures : list of Figure
+    findings : list of str
+        What was checked beside the clock: agreement, errors, ratios.
+    """
+
+    title: str
+    how: str
+    figures: list[Figure] = field(default_factory=list)
+    findings: list[str] = field(default_factory=list)
+
+
+def in_turn(
+    calls: Mapping[str, Callable[[], object]], runs: int, *, unmeasured: int = 1
+) -> dict[str, list[float]]:
+    """Return the seconds of each run of each call, all calls one after the other in every round.
+
+    Taking turns lets a busy spell of a shared machine fall on all alike; the first rounds, which
+    compile and fill caches, are not measured.
+    """
+    seconds: dict[str, list[float]] = {name: [] for name in calls}
+    for turn in range(unmeasured + runs):
+        for name, call in calls.items():
+            start = perf_counter()
+            call()
+            if turn >= unmeasured:
+                seconds[name].append(perf_counter() - start)
+    return seconds
+
+
+def peak_megabytes(call: Callable[[], object]) -> float:
+    """Return by how much resident memory peaks above its level before a call, MB.
+
+    Linux only: free pages are given back and the kernel's high-water mark is set back before.
+    """
+    ctypes.CDLL(None).malloc_trim(0)
+    Path("/proc/self/clear_refs").write_text("5")
+    before = _resident("VmRSS")
+    call()
+    return (_resident("VmHWM") - before) / 1024
+
+
+def _resident(name: str) -> int:
+    found = re.search(rf"{name}:\s*(\d+) kB", Path("/proc/self/status").read_text())
+    assert found is not None
+    return int(found[1])
+
+
+def available_gigabytes() -> float:
+    """Return how much memory is free for a new process, GB."""
+    found = re.search(r"MemAvailable:\s*(\d+) kB", Path("/proc/meminfo").read_text())
+    assert found is not None
+    return int(found[1]) * 1024e-9
+
+
+def machine() -> dict[str, str]:
+    """Return the facts about this machine that figures depend on."""
+    cpu = re.search(r"model name\s*: (.*)", Path("/proc/cpuinfo").read_text())
+    memory = re.search(r"MemTotal:\s*(\d+) kB", Path("/proc/meminfo").read_text())
+    facts = {
+        "CPU": cpu[1] if cpu else platform.processor(),
+        "cores": str(os.cpu_count()),
+        "memory": f"{int(memory[1]) / 2**20:.0f} GiB" if memory else "?",
+        "system": f"{platform.system()} {platform.machine()}, Python {platform.python_version()}",
+        "load when started": " ".join(f"{v:.1f}" for v in os.getloadavg()) + " (1, 5, 15 min)",
+    }
+    for package in PACKAGES:
+        try:
+            facts[package] = version(package)
+        except PackageNotFoundError:
+            facts[package] = "not installed"
+    return facts
+
+
+def show(report: Report, console: Console) -> None:
+    """Print one report as a table."""
+    table = Table(title=report.title, title_justify="left", caption_justify="left")
+    for column in COLUMNS:
+        number = column in COLUMNS[1:5]
+        table.add_column(column, justify="right" if number else "left", no_wrap=column != "note")
+    for figure in report.figures:
+        table.add_row(*(escape(cell) for cell in figure.cells()))
+    console.print(table)
+    for finding in report.findings:
+        console.print(f"  - {escape(finding)}")
+
+
+def markdown(reports: Sequence[Report], facts: Mapping[str, str], date: str) -> str:
+    """Return the text of RESULTS.md."""
+    lines = ["# Benchmark results", ""]
+    lines += ["Written by `python -m benchmarks --write`; do not edit.", ""]
+    lines += [f"- date: {date}"] if date else []
+    lines += [f"- {name}: {value}" for name, value in facts.items()]
+    for report in reports:
+        lines += ["", f"## {report.title}", "", report.how, ""]
+        lines += [
+            "| " + " | ".join(COLUMNS) + " |",
+            "| --- | ---: | ---: | ---: | ---: | --- | --- |",
+        ]
+        lines += ["| " + " | ".join(figure.cells()) + " |" for figure in report.figures]
+        lines += ["", *(f"- {finding}" for finding in report.findings)]
+    return "\n".join(lines) + "\n"

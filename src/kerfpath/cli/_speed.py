@@ -1,0 +1,49 @@
+"""`kerfpath speed`: the fastest constant speed of each contour, and what binds where."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+from rich.markup import escape
+
+from kerfpath.cli._show import print_json, table
+from kerfpath.contour import Contour
+from kerfpath.errors import NoFeasiblePath
+from kerfpath.job import ContourTask
+from kerfpath.planner import FastestSpeed
+
+__all__ = ["show_speeds"]
+
+
+def show_speeds(
+    answers: Sequence[tuple[ContourTask, Contour, FastestSpeed | NoFeasiblePath]], *, as_json: bool
+) -> bool:
+    """Print the answers; return whether every contour has a speed."""
+    entries: list[dict[str, Any]] = []
+    rows = []
+    for task, nodes, found in answers:
+        entry: dict[str, Any] = {"name": task.name, "asked_m_min": task.speed * 60}
+        row = [escape(task.name), f"{task.speed * 60:g}"]
+        if isinstance(found, FastestSpeed):
+            place = (nodes.points[found.node] * 1000).round(1).tolist()
+            entry |= {
+                "fastest_m_min": found.speed * 60,
+                "joint": found.joint + 1,
+                "limit": found.limit,
+                "node": found.node,
+                "point_mm": place,
+            }
+            what = f"joint {found.joint + 1} {found.limit}"
+            at = " ".join(f"{v:g}" for v in place)
+            rows.append([*row, f"{found.speed * 60:.3f}", str(found.node), what, at])
+        else:
+            entry |= {"fastest_m_min": None, "reason": str(found)}
+            rows.append([*row, "-", str(found.node + 1), "no admissible pose", ""])
+        entries.append(entry)
+    if as_json:
+        print_json({"contours": entries})
+    else:
+        columns = ["contour", "asked m/min", "fastest m/min", "node", "what binds", "at x y z mm"]
+        table(columns, rows, numbers=columns[1:4])
+    return all(entry["fastest_m_min"] is not None for entry in entries)

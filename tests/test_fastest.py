@@ -1,0 +1,98 @@
+"""The least node interval against bisection, and by its own optimality."""
+
+import itertools
+
+import numpy as np
+import pytest
+
+import naive
+from kerfpath import InputError, NoFeasiblePath, fastest_speed, plan, shortest_path
+from kerfpath.search import least_interval
+
+
+def interval_of(q, v, a, endless):
+    """Least interval of one path (K, n)."""
+    d = naive.difference(q[:-1], q[1:], endless)
+    sharp = np.sqrt(np.abs(np.diff(d, axis=0)) / a)
+    return max((np.abs(d) / v).max(), sharp.max(initial=0.0))
+
+
+def instance(rng):
+    q, start, o = naive.random_instance(rng, layers=(2, 8), size=(1, 8))
+    return q, start, {k: o[k] for k in ("velocity", "acceleration", "endless", "eta_v", "eta_a")}
+
+
+def test_the_interval_agrees_with_bisection_over_shortest_path():
+    rng = np.random.default_rng(31)
+    for _ in range(150):
+        q, start, o = instance(rng)
+        found = least_interval(q, start, **o)
+
+        def feasible(dt, q=q, start=start, o=o):
+            try:
+                shortest_path(q, start, dt=dt, **o)
+            except NoFeasiblePath:
+                return False
+            return True
+
+        low, high = 0.0, 4 * found.dt + 1e-6
+        assert feasible(high)
+        for _ in range(40):
+            middle = (low + high) / 2
+            low, high = (low, middle) if feasible(middle) else (middle, high)
+        # shortest_path grants 1e-9 rad on both limits; what that is in time depends on the limits.
+        slack = 1e-9 / (o["eta_v"] * o["velocity"]).min()
+        slack += 1e-9 / (2 * found.dt * (o["eta_a"] * o["acceleration"]).min())
+        assert high == pytest.approx(found.dt, rel=1e-9, abs=2 * slack)
+
+
+def test_the_path_keeps_the_interval_and_no_other_does_better():
+    rng = np.random.default_rng(32)
+    for _ in range(200):
+        q, start, o = instance(rng)
+        v, a = o["eta_v"] * o["velocity"], o["eta_a"] * o["acceleration"]
+        found = least_interval(q, start, **o)
+        path = q[start[:-1] + found.index]
+        assert interval_of(path, v, a, o["endless"]) == pytest.approx(found.dt, rel=1e-12)
+        for _ in range(20):
+            other = q[[rng.integers(a_, b_) for a_, b_ in itertools.pairwise(start)]]
+            assert found.dt <= interval_of(other, v, a, o["endless"]) * (1 + 1e-12)
+
+
+def test_what_binds_is_named():
+    q = [[0.0, 0.0], [0.1, 0.4], [0.2, 0.0]]
+    options = {"velocity": [1.0, 1.0], "endless": [False, False]}
+    sharp = least_interval(q, [0, 1, 2, 3], acceleration=[1.0, 1.0], **options)
+    assert (sharp.joint, sharp.node, sharp.limit) == (1, 1, "acceleration")
+    assert sharp.dt == pytest.approx(np.sqrt(0.8))
+    fast = least_interval(q, [0, 1, 2, 3], acceleration=[100.0, 100.0], **options)
+    assert (fast.joint, fast.node, fast.limit) == (1, 1, "velocity")
+    assert fast.dt == pytest.approx(0.4)
+
+
+def test_a_graph_that_stands_still_takes_no_time():
+    assert least_interval(
+        [[1.0], [1.0]], [0, 1, 2], velocity=[1.0], acceleration=[1.0]
+    ).dt == pytest.approx(0.0)
+
+
+def test_an_empty_layer_and_bad_input_are_refused():
+    limits = {"velocity": [1.0], "acceleration": [1.0]}
+    with pytest.raises(NoFeasiblePath, match="layer 1 is empty") as caught:
+        least_interval([[0.0], [0.1]], [0, 1, 1, 2], **limits)
+    assert caught.value.node == 0
+    with pytest.raises(InputError, match="velocity: must be positive"):
+        least_interval([[0.0], [0.1]], [0, 1, 2], velocity=[0.0], acceleration=[1.0])
+    with pytest.raises(InputError, match="at least two layers"):
+        least_interval([[0.0]], [0, 1], **limits)
+
+
+def test_a_contour_is_feasible_at_its_fastest_speed_and_not_above(circle, arm, tool, placement):
+    options = {"tool": tool, "placement": placement, "gamma_step": np.radians(5)}
+    found = fastest_speed(circle, arm, **options)
+    made = plan(circle, arm, speed=found.speed * (1 - 1e-6), **options)
+    assert made.criteria.peak_velocity.max() <= 1 + 1e-6
+    with pytest.raises(NoFeasiblePath):
+        plan(circle, arm, speed=found.speed * 1.001, **options)
+    assert 0 <= found.joint < 6
+    assert 0 <= found.node < len(circle)
