@@ -194,6 +194,18 @@ def test_a_part_out_of_reach_is_reported_without_a_program(folder):
     assert run("post", "far-plan/plan.json", cwd=folder).returncode == 1
 
 
+def test_a_contour_that_is_too_fast_is_told_how_fast_it_could_be(folder):
+    (folder / "fast.toml").write_text(SMALL.replace("speed_m_min = 3", "speed_m_min = 30", 1))
+    result = run("plan", "fast.toml", cwd=folder)
+    assert result.returncode == 1
+    told = re.search(r"a path exists up to ([\d.]+) m/min, where the acceleration", result.stdout)
+    assert 3 < float(told[1]) < 30
+    data = json.loads((folder / "fast-plan" / "plan.json").read_text())["contours"][0]
+    assert data["fastest_speed_m_s"] * 60 == pytest.approx(float(told[1]), rel=1e-3)
+    assert data["proved"]
+    assert "a path exists up to" in (folder / "fast-plan" / "report.html").read_text()
+
+
 def test_an_older_program_in_the_folder_is_pointed_out(folder):
     (folder / "stale").mkdir()
     (folder / "stale" / "far.mod").write_text("MODULE old\nENDMODULE\n")

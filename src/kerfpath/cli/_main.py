@@ -117,7 +117,7 @@ def _plan(job_file: Path, folder: Path, as_json: bool) -> None:
         _show_cuts(outcome.cuts)
         for cut in outcome.cuts:
             if cut.broken is not None:
-                out.print(f"[bold]{escape(cut.task.name)}[/]: {escape(str(cut.broken))}")
+                out.print(f"[bold]{escape(cut.task.name)}[/]: {escape(cut.failure)}")
             for check in cut.checks:
                 if not check.ok:
                     out.print(f"[bold]{escape(cut.task.name)}[/]: {escape(str(check.issue()))}")
@@ -138,7 +138,13 @@ def _cut_entry(cut: Any) -> dict[str, Any]:
     entry: dict[str, Any] = {"name": cut.task.name, "passed": cut.passed}
     entry |= {"length_m": cut.drawn.length, "nodes": len(cut.nodes), "speed_m_s": cut.task.speed}
     if cut.plan is None:
-        return entry | {"reason": str(cut.broken), "last_node_reached": cut.broken.node}
+        fastest = None if cut.fastest is None else cut.fastest.speed
+        return entry | {
+            "reason": cut.failure,
+            "last_node_reached": cut.broken.node,
+            "proved": cut.broken.proved,
+            "fastest_speed_m_s": fastest,
+        }
     criteria = cut.plan.criteria
     return entry | {
         "time_s": float(cut.plan.time[-1]),

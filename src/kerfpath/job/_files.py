@@ -62,7 +62,7 @@ def write_outcome(outcome: Outcome, folder: Path) -> Written:
         if cut.plan is not None:
             entries.append(plan_entry(cut.plan, cut.checks))
         elif cut.broken is not None:
-            entries.append(broken_entry(cut.task.name, cut.broken))
+            entries.append(broken_entry(cut.task.name, cut.broken, cut.fastest))
     texts[folder / "plan.json"] = plan_text(job.robot, job.tool, job.placement, entries, job.source)
     texts[folder / "trajectory.csv"] = trajectory_text(outcome.plans)
     texts[folder / "report.html"] = report_text(outcome, notes)
@@ -153,7 +153,7 @@ def report_text(outcome: Outcome, notes: Sequence[str]) -> str:
             path=cut.nodes,
             plan=cut.plan,
             checks=cut.checks,
-            failure=str(cut.broken) if cut.broken is not None else "",
+            failure=cut.failure,
             broken_at=None if cut.broken is None else cut.broken.node + 1,
         )
         for cut in outcome.cuts

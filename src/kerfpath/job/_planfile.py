@@ -15,6 +15,7 @@ from kerfpath import __version__
 from kerfpath.auditor import Check
 from kerfpath.contour import Contour
 from kerfpath.errors import InputError, NoFeasiblePath
+from kerfpath.planner import FastestSpeed
 from kerfpath.plans import Plan, Proof, Settings
 from kerfpath.robots import Coupling, Robot
 
@@ -126,7 +127,7 @@ def plan_entry(plan: Plan, checks: Sequence[Check]) -> dict[str, Any]:
     }
 
 
-def broken_entry(name: str, broken: NoFeasiblePath) -> dict[str, Any]:
+def broken_entry(name: str, broken: NoFeasiblePath, fastest: FastestSpeed | None) -> dict[str, Any]:
     """Return what plan.json says of a contour without a feasible path."""
     return {
         "name": name,
@@ -135,6 +136,7 @@ def broken_entry(name: str, broken: NoFeasiblePath) -> dict[str, Any]:
         "proved": broken.proved,
         "last_node_reached": broken.node,
         "counts": broken.counts,
+        "fastest_speed_m_s": None if fastest is None else fastest.speed,
     }
 
 

@@ -41,6 +41,8 @@ class Cut:
         None when no feasible path was found.
     broken : NoFeasiblePath or None
         Why there is no plan.
+    fastest : FastestSpeed or None
+        Where there is no plan but a slower one exists: up to which speed.
     checks : tuple of Check
         The audit's table; empty without a plan.
     """
@@ -51,6 +53,7 @@ class Cut:
     graph: LayeredGraph
     plan: Plan | None
     broken: NoFeasiblePath | None
+    fastest: FastestSpeed | None
     checks: tuple[Check, ...]
 
     @property
@@ -58,6 +61,20 @@ class Cut:
         """True when there is a plan and its audit finds no error."""
         return self.plan is not None and not any(
             c.level == "error" and not c.ok for c in self.checks
+        )
+
+    @property
+    def failure(self) -> str:
+        """Why there is no plan, and what would help; empty where there is one."""
+        if self.broken is None:
+            return ""
+        if self.fastest is None:
+            return str(self.broken)
+        node = self.nodes.points[self.fastest.node] * 1000
+        return (
+            f"{self.broken}; a path exists up to {self.fastest.speed * 60:.4g} m/min, where the "
+            f"{self.fastest.limit} of joint {self.fastest.joint + 1} binds at node "
+            f"{self.fastest.node}, {' '.join(f'{v:.1f}' for v in node)} mm"
         )
 
 
@@ -117,7 +134,7 @@ def _cut(job: Job, task: ContourTask, drawn: Contour, progress: Progress) -> Cut
         postures=options["postures"],
         progress=solved,
     )
-    made, broken = None, None
+    made, broken, fastest = None, None, None
     table: tuple[Check, ...] = ()
     try:
         made = plan(
@@ -131,10 +148,28 @@ def _cut(job: Job, task: ContourTask, drawn: Contour, progress: Progress) -> Cut
         )
     except NoFeasiblePath as error:
         broken = error
+        if np.diff(graph.start).all():  # poses everywhere: slower would do
+            progress(f"{task.name}: fastest speed", 0, 1)
+            fastest = fastest_speed(
+                nodes,
+                job.robot,
+                tool=job.tool,
+                placement=job.placement,
+                graph=graph,
+                eta_v=options["eta_v"],
+                eta_a=options["eta_a"],
+            )
     else:
         table = tuple(checks(made, reference=drawn))
     return Cut(
-        task=task, drawn=drawn, nodes=nodes, graph=graph, plan=made, broken=broken, checks=table
+        task=task,
+        drawn=drawn,
+        nodes=nodes,
+        graph=graph,
+        plan=made,
+        broken=broken,
+        fastest=fastest,
+        checks=table,
     )
 
 
