@@ -206,6 +206,22 @@ def test_a_contour_that_is_too_fast_is_told_how_fast_it_could_be(folder):
     assert "a path exists up to" in (folder / "fast-plan" / "report.html").read_text()
 
 
+def test_the_tolerance_between_nodes_is_the_jobs(folder):
+    tight = SMALL.replace("path_tolerance_mm = 0.1", "path_tolerance_mm = 0.001")
+    (folder / "tight.toml").write_text(tight)
+    result = run("plan", "tight.toml", cwd=folder)
+    assert result.returncode == 1
+    assert "tool tip between the nodes" in result.stdout
+    assert "sample the contour more finely" in result.stdout
+    assert not (folder / "tight-plan" / "tight.mod").exists()
+    again = run("audit", "tight-plan/plan.json", "--job", "tight.toml", cwd=folder)
+    assert again.returncode == 1
+    data = json.loads((folder / "tight-plan" / "plan.json").read_text())
+    assert not data["contours"][0]["audit"]["passed"]
+    # Without the drawing post could not see it again: it takes the plan's word.
+    assert run("post", "tight-plan/plan.json", cwd=folder).returncode == 1
+
+
 def test_an_older_program_in_the_folder_is_pointed_out(folder):
     (folder / "stale").mkdir()
     (folder / "stale" / "far.mod").write_text("MODULE old\nENDMODULE\n")

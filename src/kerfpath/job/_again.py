@@ -2,22 +2,26 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
-from pydantic import ValidationError
+from pydantic import BaseModel, ValidationError
 
 from kerfpath.auditor import Check, checks
 from kerfpath.cad import read_step
 from kerfpath.contour import Contour
 from kerfpath.errors import AuditFailed, InputError
 from kerfpath.job._files import program_of
-from kerfpath.job._model import ProgramTable
+from kerfpath.job._model import AuditTable, ProgramTable
 from kerfpath.job._planfile import PlanFile, read_plan_file
-from kerfpath.job._read import ProgramOptions, program_options, read_job
+from kerfpath.job._read import ProgramOptions, audit_options, program_options, read_job
 from kerfpath.post import language as find_language
 
 __all__ = ["audit_file", "program_from_file"]
+
+_M = TypeVar("_M", bound=BaseModel)
+_R = TypeVar("_R")
 
 
 def audit_file(
@@ -38,7 +42,9 @@ def audit_file(
     """
     file = read_plan_file(plan_file)
     drawn = {} if job_file is None else _drawn(file, job_file)
-    return {p.name: checks(p, reference=drawn.get(p.name)) for p in file.plans}, file.missing
+    asked = _table(file, "audit", AuditTable, audit_options)
+    table = {p.name: checks(p, reference=drawn.get(p.name), **asked) for p in file.plans}
+    return table, file.missing
 
 
 def program_from_file(plan_file: Path, language: str) -> tuple[str, list[str]]:
@@ -54,8 +60,14 @@ def program_from_file(plan_file: Path, language: str) -> tuple[str, list[str]]:
     file = read_plan_file(plan_file)
     if file.missing:
         raise AuditFailed(f"no program: {', '.join(file.missing)} has no plan")
+    if file.failed:
+        raise AuditFailed(
+            f"no program: {', '.join(file.failed)} failed the audit against the drawing when it "
+            "was planned; mend the job and plan it again"
+        )
+    asked = _table(file, "audit", AuditTable, audit_options)
     for p in file.plans:
-        for check in checks(p):
+        for check in checks(p, **asked):
             if check.level == "error" and not check.ok:
                 raise AuditFailed(
                     f"no program: contour {p.name!r} fails its audit: {check.issue()}"
@@ -64,14 +76,26 @@ def program_from_file(plan_file: Path, language: str) -> tuple[str, list[str]]:
 
 
 def _options(file: PlanFile, language: str) -> ProgramOptions:
-    table: Any = file.job.get("program", {})
     find_language(language)
+    return _table(
+        file,
+        "program",
+        ProgramTable,
+        lambda table: program_options(table, file.path.stem),
+        language=language,
+    )
+
+
+def _table(
+    file: PlanFile, name: str, model: type[_M], read: Callable[[_M], _R], **changes: str
+) -> _R:
+    """Return a table of the job that a plan was made from, read as the job's own would be."""
+    table: Any = file.job.get(name, {})
     try:
-        parsed = ProgramTable.model_validate({**table, "language": language})
+        return read(model.model_validate({**table, **changes}))
     except (ValidationError, TypeError) as error:
         said = " ".join(str(error).split())
-        raise InputError(f"{file.path}: its [program] table is not valid ({said})") from None
-    return program_options(parsed, file.path.stem)
+        raise InputError(f"{file.path}: its [{name}] table is not valid ({said})") from None
 
 
 def _drawn(file: PlanFile, job_file: Path) -> dict[str, Contour]:

@@ -39,7 +39,7 @@ from kerfpath.job._keys import (
 from kerfpath.robots import Robot, acceleration_ratios, robot, robot_ids
 from kerfpath.search import Closure, Method, Metric, ObjectiveKind
 
-__all__ = ["TABLES", "ContourTable", "JobFile", "PlanTable", "ProgramTable"]
+__all__ = ["TABLES", "AuditTable", "ContourTable", "JobFile", "PlanTable", "ProgramTable"]
 
 
 class _Table(BaseModel):
@@ -294,6 +294,13 @@ class ProgramTable(_Table):
     tool_name: Identifier = "tLaser"
 
 
+class AuditTable(_Table):
+    """[audit]: how far the tool may leave the path between the nodes."""
+
+    path_tolerance_mm: Annotated[Positive, key("a number above 0, in mm", "0.1")] = 0.1
+    axis_tolerance_deg: Annotated[Positive, key("a number above 0, in deg", "1")] = 1.0
+
+
 class JobFile(_Table):
     """The whole job file: cell, contours, process and objective."""
 
@@ -302,6 +309,7 @@ class JobFile(_Table):
     part: PartTable
     contour: Annotated[tuple[ContourTable, ...], Field(strict=False, min_length=1)]
     plan: PlanTable = PlanTable()
+    audit: AuditTable = AuditTable()
     program: ProgramTable = ProgramTable()
 
     @model_validator(mode="after")
@@ -326,6 +334,7 @@ TABLES: dict[str, type[BaseModel]] = {
     "part": PartTable,
     "contour": ContourTable,
     "plan": PlanTable,
+    "audit": AuditTable,
     "program": ProgramTable,
 }
 """The model of each table of the file."""

@@ -40,12 +40,15 @@ class PlanFile:
         One for each contour, in the order of cutting.
     missing : tuple of str
         Names of the contours that have no plan.
+    failed : tuple of str
+        Names of the contours whose plan failed its audit when it was made.
     """
 
     path: Path
     job: dict[str, Any]
     plans: tuple[Plan, ...]
     missing: tuple[str, ...]
+    failed: tuple[str, ...]
 
 
 def plan_text(
@@ -169,6 +172,11 @@ def read_plan_file(path: str | Path) -> PlanFile:
             job=dict(data["job"]),
             plans=tuple(_read_plan(e, robot, tool, placement) for e in entries if e["feasible"]),
             missing=tuple(str(e["name"]) for e in entries if not e["feasible"]),
+            failed=tuple(
+                str(e["name"])
+                for e in entries
+                if e["feasible"] and e["audit"]["passed"] is not True
+            ),
         )
     except InputError as error:
         raise InputError(f"{path}: {error}") from None

@@ -18,10 +18,10 @@ from kerfpath.contour import Contour
 from kerfpath.errors import InputError
 from kerfpath.job._keys import FAULT, LARGEST, MOST_NODES, SMALLEST, nearest
 from kerfpath.job._lines import Places
-from kerfpath.job._model import TABLES, ContourTable, JobFile, PlanTable, ProgramTable
+from kerfpath.job._model import TABLES, AuditTable, ContourTable, JobFile, PlanTable, ProgramTable
 from kerfpath.robots import Robot, postures_named
 
-__all__ = ["ContourTask", "Job", "ProgramOptions", "program_options", "read_job"]
+__all__ = ["ContourTask", "Job", "ProgramOptions", "audit_options", "program_options", "read_job"]
 
 _LONGEST = 60
 """Characters of a wrong value that a message shows."""
@@ -134,6 +134,8 @@ class Job:
         In the order of cutting.
     plan_options : dict
         Keyword arguments of `kerfpath.planner.plan`, in SI.
+    audit_options : dict
+        Keyword arguments of `kerfpath.auditor.checks`, in SI.
     program : ProgramOptions
         For the robot program.
     source : dict
@@ -148,6 +150,7 @@ class Job:
     part_unit: str | None
     contours: tuple[ContourTask, ...]
     plan_options: dict[str, Any]
+    audit_options: dict[str, Any]
     program: ProgramOptions
     source: dict[str, Any]
 
@@ -177,6 +180,7 @@ def read_job(path: str | Path) -> Job:
         part_unit=file.part.unit,
         contours=tuple(_task(table) for table in file.contour),
         plan_options=_plan_options(file.plan),
+        audit_options=audit_options(file.audit),
         program=program_options(file.program, path.stem),
         source=source,
     )
@@ -251,6 +255,14 @@ def _plan_options(table: PlanTable) -> dict[str, Any]:
         "eta_v": table.eta_velocity,
         "eta_a": table.eta_acceleration,
         "closure": table.closure,
+    }
+
+
+def audit_options(table: AuditTable) -> dict[str, Any]:
+    """Return what an [audit] table asks for, as `kerfpath.auditor.checks` takes it."""
+    return {
+        "path_tolerance": table.path_tolerance_mm / 1000,
+        "axis_tolerance": float(np.radians(table.axis_tolerance_deg)),
     }
 
 

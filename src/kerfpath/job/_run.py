@@ -160,7 +160,7 @@ def _cut(job: Job, task: ContourTask, drawn: Contour, progress: Progress) -> Cut
                 eta_a=options["eta_a"],
             )
     else:
-        table = tuple(checks(made, reference=drawn))
+        table = tuple(checks(made, reference=drawn, **job.audit_options))
     return Cut(
         task=task,
         drawn=drawn,
