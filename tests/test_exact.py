@@ -136,6 +136,31 @@ def test_a_dead_end_says_how_far_any_path_goes_and_what_forbids_the_rest():
     assert caught.value.proved
     assert caught.value.node == 2
     assert caught.value.counts == {"acceleration, joint 1": 1}
+    assert caught.value.back == 2
+
+
+def test_a_cut_is_bracketed_from_both_ends():
+    rng = np.random.default_rng(25)
+    seen = 0
+    for _ in range(300):
+        q, start, o = instance(rng, "free", layers=(3, 8), size=(1, 6))
+        if naive.second_order(q, start, "free", **o) is not None:
+            continue
+        with pytest.raises(NoFeasiblePath) as caught:
+            shortest_path(q, start, **o)
+        broken, K = caught.value, len(start) - 1
+
+        def passable(a, b, q=q, start=start, o=o):
+            part = slice(start[a], start[b + 1])
+            cut = o | {k: o[k][part] for k in ("posture", "vertex_cost")}
+            return naive.second_order(q[part], start[a : b + 2] - start[a], "free", **cut)
+
+        assert passable(0, broken.node) is not None
+        assert passable(0, broken.node + 1) is None
+        assert passable(broken.back, K - 1) is not None
+        assert passable(broken.back - 1, K - 1) is None
+        seen += 1
+    assert seen > 50
 
 
 @pytest.mark.parametrize(

@@ -27,17 +27,27 @@ class NoFeasiblePath(KerfpathError):
         (the paper's acceleration test is greedy).
     node : int
         The last node that any admissible path reaches, 0-based; -1 when layer 0 is empty.
+    back : int or None
+        The first node from which an admissible path reaches the end, where that is known: with
+        `node` it brackets the cut. The number of nodes when the last layer is empty.
     counts : mapping of str to int
         What each test removed where the path breaks: candidates of the empty layer by reason, or
         edges into the unreached layer by the test that forbids them.
     """
 
     def __init__(
-        self, message: str, *, proved: bool, node: int, counts: Mapping[str, int] | None = None
+        self,
+        message: str,
+        *,
+        proved: bool,
+        node: int,
+        back: int | None = None,
+        counts: Mapping[str, int] | None = None,
     ) -> None:
         super().__init__(message)
         self.proved = proved
         self.node = node
+        self.back = back
         self.counts = dict(counts or {})
 
 

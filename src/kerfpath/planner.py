@@ -15,9 +15,25 @@ from kerfpath.errors import InputError, NoFeasiblePath
 from kerfpath.graph import LayeredGraph, build, gamma_grid
 from kerfpath.plans import Plan, Proof, Settings
 from kerfpath.robots import Robot
-from kerfpath.search import Closure, Method, Metric, ObjectiveKind, least_interval, shortest_path
+from kerfpath.search import (
+    Closure,
+    Method,
+    Metric,
+    ObjectiveKind,
+    Relaxations,
+    least_interval,
+    least_relaxations,
+    shortest_path,
+)
 
-__all__ = ["FastestSpeed", "fastest_speed", "layered_graph", "node_interval", "plan"]
+__all__ = [
+    "FastestSpeed",
+    "fastest_speed",
+    "layered_graph",
+    "node_interval",
+    "plan",
+    "relaxations",
+]
 
 UNEVEN = 0.01
 """Largest relative difference of node distances that still counts as evenly spaced."""
@@ -128,9 +144,10 @@ def plan(
         )
     except NoFeasiblePath as broken:
         raise NoFeasiblePath(
-            f"contour {contour.name!r}: {broken}",
+            f"contour {contour.name!r}: {broken}{_bracket(broken)}",
             proved=broken.proved,
             node=broken.node,
+            back=broken.back,
             counts=broken.counts,
         ) from None
     vertex = graph.start[:-1] + path.index
@@ -225,6 +242,32 @@ def fastest_speed(
     )
 
 
+def relaxations(
+    contour: Contour,
+    robot: Robot,
+    graph: LayeredGraph,
+    speed: float | None = None,
+    *,
+    eta_v: float = 1.0,
+    eta_a: float = 1.0,
+) -> Relaxations:
+    """Return the least eta_v, eta_a and node interval, each on its own, with which a path exists.
+
+    Arguments as in `plan`; what to ask after a `NoFeasiblePath` whose node has poses.
+    """
+    velocity, acceleration = robot.speed_limits()
+    return least_relaxations(
+        graph.q,
+        graph.start,
+        dt=node_interval(contour, speed),
+        velocity=velocity,
+        acceleration=acceleration,
+        endless=robot.endless,
+        eta_v=eta_v,
+        eta_a=eta_a,
+    )
+
+
 def layered_graph(
     contour: Contour,
     robot: Robot,
@@ -292,8 +335,15 @@ def _require_no_empty_layer(contour: Contour, graph: LayeredGraph) -> None:
             f"({empty.size} such nodes); of {sum(counts.values())} candidates there, {told}",
             proved=True,
             node=k - 1,
+            back=int(empty[-1]) + 1,
             counts=counts,
         )
+
+
+def _bracket(broken: NoFeasiblePath) -> str:
+    if broken.back is None or broken.back <= broken.node + 1:
+        return ""
+    return f"; from the back, paths reach the end from node {broken.back} on"
 
 
 def _proof(method: Method, optimal: bool) -> Proof:

@@ -15,9 +15,10 @@ from kerfpath.errors import NoFeasiblePath
 from kerfpath.graph import LayeredGraph
 from kerfpath.job._read import ContourTask, Job
 from kerfpath.kernels import is_compiled
-from kerfpath.planner import FastestSpeed, fastest_speed, layered_graph, plan
+from kerfpath.planner import FastestSpeed, fastest_speed, layered_graph, plan, relaxations
 from kerfpath.plans import Plan
 from kerfpath.robots import robot
+from kerfpath.search import Relaxations
 
 __all__ = ["Cut", "Outcome", "Progress", "fastest_speeds", "run_job", "warm_up"]
 
@@ -43,6 +44,8 @@ class Cut:
         Why there is no plan.
     fastest : FastestSpeed or None
         Where there is no plan but a slower one exists: up to which speed.
+    relaxations : Relaxations or None
+        With it: the least change of each limit that would do at the speed asked.
     checks : tuple of Check
         The audit's table; empty without a plan.
     """
@@ -54,6 +57,7 @@ class Cut:
     plan: Plan | None
     broken: NoFeasiblePath | None
     fastest: FastestSpeed | None
+    relaxations: Relaxations | None
     checks: tuple[Check, ...]
 
     @property
@@ -68,13 +72,22 @@ class Cut:
         """Why there is no plan, and what would help; empty where there is one."""
         if self.broken is None:
             return ""
-        if self.fastest is None:
+        if self.fastest is None or self.relaxations is None:
             return str(self.broken)
+        ways = [
+            f"{name} {share:.4g}"
+            for name, share in (
+                ("eta_velocity", self.relaxations.eta_v),
+                ("eta_acceleration", self.relaxations.eta_a),
+            )
+            if share is not None
+        ]
         node = self.nodes.points[self.fastest.node] * 1000
         return (
             f"{self.broken}; a path exists up to {self.fastest.speed * 60:.4g} m/min, where the "
             f"{self.fastest.limit} of joint {self.fastest.joint + 1} binds at node "
             f"{self.fastest.node}, {' '.join(f'{v:.1f}' for v in node)} mm"
+            f"{'; or from ' + ' or from '.join(ways) + ' on' if ways else ''}"
         )
 
 
@@ -134,7 +147,7 @@ def _cut(job: Job, task: ContourTask, drawn: Contour, progress: Progress) -> Cut
         postures=options["postures"],
         progress=solved,
     )
-    made, broken, fastest = None, None, None
+    made, broken, fastest, least = None, None, None, None
     table: tuple[Check, ...] = ()
     try:
         made = plan(
@@ -159,6 +172,9 @@ def _cut(job: Job, task: ContourTask, drawn: Contour, progress: Progress) -> Cut
                 eta_v=options["eta_v"],
                 eta_a=options["eta_a"],
             )
+            least = relaxations(
+                nodes, job.robot, graph, task.speed, eta_v=options["eta_v"], eta_a=options["eta_a"]
+            )
     else:
         table = tuple(checks(made, reference=drawn, **job.audit_options))
     return Cut(
@@ -169,6 +185,7 @@ def _cut(job: Job, task: ContourTask, drawn: Contour, progress: Progress) -> Cut
         plan=made,
         broken=broken,
         fastest=fastest,
+        relaxations=least,
         checks=table,
     )
 

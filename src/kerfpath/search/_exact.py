@@ -13,7 +13,7 @@ from kerfpath.kernels import exact
 from kerfpath.kernels.limits import acceleration_excess
 from kerfpath.kernels.search import Layers, Objective, path_planning
 
-__all__ = ["Best", "Dead", "best_closed_path", "best_path", "quickest_path"]
+__all__ = ["Best", "Dead", "best_closed_path", "best_path", "dead_end", "quickest_path"]
 
 ROUNDING = 1e-12
 """Relative slack on a bound, so that rounding never drops the path that the bound came from."""
@@ -64,7 +64,7 @@ class Best:
 def best_path(layers: Layers, aim: Objective) -> Best | Dead:
     """Return the best path, or how far any goes."""
     every = np.ones(len(layers.low), np.bool_)
-    return _lexicographic(layers, aim, every, NO_SEAM, 0.0) or _dead_end(layers, aim)
+    return _lexicographic(layers, aim, every, NO_SEAM, 0.0) or dead_end(layers, aim)
 
 
 def best_closed_path(layers: Layers, aim: Objective) -> Best | Dead:
@@ -100,7 +100,7 @@ def best_closed_path(layers: Layers, aim: Objective) -> Best | Dead:
         return best_path(layers, aim)
     look(np.arange(layers.start[1]), np.arange(layers.start[1], layers.start[2]), 0.0)
     if not queue:
-        return _dead_end(layers, aim)
+        return dead_end(layers, aim)
     while queue:
         cost, _, _, found, starts, firsts = heapq.heappop(queue)
         path = found.path
@@ -187,7 +187,7 @@ def _greedy_cost(layers: Layers, aim: Objective, allowed: Bools, seam: Array) ->
     return float(dist[layers.start[-2] :].min())
 
 
-def _dead_end(layers: Layers, aim: Objective) -> Dead:
+def dead_end(layers: Layers, aim: Objective) -> Dead:
     """Go as far as any admissible path goes, whatever it costs."""
     free = np.zeros(len(layers.low))
     reached = exact.recursion(layers, aim, free, np.inf, NO_SEAM, 0)

@@ -10,7 +10,7 @@ from kerfpath.errors import InputError
 from kerfpath.kernels import search as kernel
 from kerfpath.kernels.limits import LIMIT_TOLERANCE
 
-__all__ = ["narrowest_key", "offsets", "sorted_layers"]
+__all__ = ["backwards", "narrowest_key", "offsets", "sorted_layers"]
 
 _LAYERS_SAMPLED = 32
 """Layers looked at to choose the joint that sorts them: enough to rank the joints."""
@@ -45,6 +45,15 @@ def sorted_layers(
         turn=np.where(endless, 2 * np.pi, np.inf),
     )
     return layers, rank + np.repeat(start[:-1], np.diff(start))
+
+
+def backwards(q: Array, start: Ints) -> tuple[Array, Ints]:
+    """Return the same graph with its layers in reverse order: q (N, n), start (K+1,)."""
+    sizes = np.diff(start)[::-1]
+    begin = np.concatenate([[0], np.cumsum(sizes)])
+    # Vertex i of reversed layer k comes from where that layer stood.
+    order = np.arange(len(q)) + np.repeat(start[:-1][::-1] - begin[:-1], sizes)
+    return q[order], begin
 
 
 def narrowest_key(q: Array, start: Ints, bound: Array, endless: Bools) -> tuple[Array, float, bool]:

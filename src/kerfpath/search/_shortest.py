@@ -8,12 +8,12 @@ from typing import Literal, get_args
 import numpy as np
 from numpy.typing import ArrayLike
 
-from kerfpath._arrays import Ints, bools, floats, freeze, integers, positive, scalar
+from kerfpath._arrays import Array, Bools, Ints, bools, floats, freeze, integers, positive, scalar
 from kerfpath.errors import InputError, NoFeasiblePath
 from kerfpath.kernels import metric as metrics
 from kerfpath.kernels import search as kernel
-from kerfpath.search._exact import Best, best_closed_path, best_path
-from kerfpath.search._layers import narrowest_key, offsets, sorted_layers
+from kerfpath.search._exact import Best, best_closed_path, best_path, dead_end
+from kerfpath.search._layers import backwards, narrowest_key, offsets, sorted_layers
 
 __all__ = ["Closure", "LayeredPath", "Method", "Metric", "ObjectiveKind", "shortest_path"]
 
@@ -158,7 +158,11 @@ def shortest_path(
     if filled == 0:
         raise NoFeasiblePath("layer 0 is empty: no path can start", proved=True, node=-1)
     if method == "exact":
-        return _exactly(layers, aim, filled, closure)
+        try:
+            return _exactly(layers, aim, filled, closure)
+        except NoFeasiblePath as broken:
+            broken.back = _first_from_the_back(q, start, aim, endless)
+            raise
     return _search(layers, aim, filled, may_prove=method == "paper")
 
 
@@ -186,6 +190,23 @@ def _exactly(
             node=len(layers.start) - 2,
         )
     raise _broken_edge(found.layers, found.counts, proved=True)
+
+
+def _first_from_the_back(q: Array, start: Ints, aim: kernel.Objective, endless: Bools) -> int:
+    """Return the first node from which an admissible path reaches the end.
+
+    (5) and (6) hold for a path and its reverse alike, so that it is as far as any path goes from
+    the last layer backwards.
+    """
+    q, start = backwards(q, start)
+    sizes = np.diff(start)
+    filled = int(np.argmin(sizes)) if (sizes == 0).any() else len(sizes)
+    if filled == 0:
+        return len(sizes)
+    key, window, circular = narrowest_key(q, start, aim.velocity, endless)
+    layers, _ = sorted_layers(q, start, key, window, circular, endless)
+    free = aim._replace(vertex_cost=np.zeros(len(q)))
+    return len(sizes) - dead_end(layers._replace(start=start[: filled + 1]), free).layers
 
 
 def _search(
