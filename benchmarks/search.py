@@ -29,8 +29,7 @@ STEPPING = 3.0
 
 HOW_LIMITED = """\
 A closed wavy contour on a cylinder, IRB 2400, all postures, axes 4 and 6 endless, 10 m/min,
-velocity limits on. First-order: `shortest_path(method="paper")` with acceleration limits that
-never bind, which makes it exact. Dense: the plain recursion over every edge in
+velocity limits on. First-order: `shortest_path` with acceleration limits that never bind. Dense: the plain recursion over every edge in
 `benchmarks/_dense.py`, which yields the cost but no path. Both search on one core, time their
 preparation of the arrays with it, and take turns; the graph is built on all cores. The paper's
 method and the exact one are given three times the assumed 600 to 3000 deg/s^2: at this spacing of
@@ -63,7 +62,7 @@ class _Problem:
     weights: Array
 
     def search(
-        self, metric: Searched, acceleration: Array, method: Method = "paper"
+        self, metric: Searched, acceleration: Array, method: Method = "exact"
     ) -> LayeredPath:
         return shortest_path(
             self.graph.q,
@@ -118,7 +117,7 @@ def _limited(nodes: int, samples: int, *, quick: bool) -> Report:
     proved: dict[str, bool] = {}
 
     def path(
-        name: str, metric: Searched, limit: Array, method: Method = "paper"
+        name: str, metric: Searched, limit: Array, method: Method = "exact"
     ) -> Callable[[], None]:
         def call() -> None:
             found = problem.search(metric, limit, method)

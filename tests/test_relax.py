@@ -29,7 +29,7 @@ def test_each_relaxation_is_just_enough():
         # (5) and (6) grant 1e-9 rad; a share changed by a thousandth is far more than that.
         for name, value in (("eta_v", least.eta_v), ("eta_a", least.eta_a), ("dt", least.dt)):
             if value is None:
-                assert not is_feasible(q, start, **(o | {name: o[name] * 50}))
+                assert not is_feasible(q, start, **(o | {name: 1.9 if name == "eta_v" else 1e6}))
                 continue
             assert value > o[name]
             assert is_feasible(q, start, **(o | {name: value * (1 + 1e-6)}))

@@ -19,6 +19,8 @@ ROUNDING = 1e-12
 """Relative slack on a bound, so that rounding never drops the path that the bound came from."""
 FIRST_GAP = 1e-3
 """First growth of the bound over the first-order optimum, relative; it doubles from there."""
+WORTH_A_CEILING = 0.25
+"""States per vertex from which on the greedy path, as a ceiling, costs less than it saves."""
 ROOM = 10_000_000
 """States that a search under a loose bound may remember: 80 MB."""
 UNLIMITED = 2**62
@@ -158,14 +160,14 @@ def _grow(
     least = float((np.maximum(enter, entry) if aim.minimax else enter + entry).min(initial=np.inf))
     if least == np.inf:
         return None
-    bound, greedy = max(least, floor) * (1 + ROUNDING), None
+    bound, greedy = max(least, floor) * (1 + ROUNDING), np.inf
     while True:
         reached = exact.recursion(layers, aim, h, bound, seam, ROOM)
         if reached.state >= 0:
             break
         if reached.lowest == np.inf or reached.lowest > ceiling:
             return None
-        if greedy is None:
+        if greedy == np.inf and reached.offset.max() > WORTH_A_CEILING * len(layers.low):
             greedy = _greedy_cost(layers, aim, allowed, seam) * (1 + ROUNDING)
         grown = least + max(2 * (bound - least), FIRST_GAP * least)
         bound = max(min(grown, greedy), reached.lowest * (1 + ROUNDING))

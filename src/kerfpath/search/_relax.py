@@ -18,7 +18,7 @@ from kerfpath.search._shortest import shortest_path
 
 __all__ = ["Relaxations", "least_relaxations"]
 
-LARGEST_ETA_V = 64.0
+LARGEST_ETA_V = 2.0
 """Velocity limits are not raised further than this: beyond it no robot goes."""
 
 
@@ -29,7 +29,7 @@ class Relaxations:
     Parameters
     ----------
     eta_v : float or None
-        Least share of the velocity limits; None where no share up to 64 opens the way.
+        Least share of the velocity limits; None where no share up to 2 opens the way.
     eta_a : float or None
         Least share of the acceleration limits; None where velocity alone closes the way.
     dt : float s
