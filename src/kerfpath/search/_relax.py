@@ -105,7 +105,7 @@ def _least_eta_v(
 ) -> float | None:
     """Return the least largest share of the velocity limits over paths that keep (6)."""
     tried = eta_v
-    while tried <= LARGEST_ETA_V:
+    while True:
         try:
             # Within the share tried, the share itself is a Chebychev distance to be minimised.
             return shortest_path(
@@ -121,5 +121,6 @@ def _least_eta_v(
                 eta_a=eta_a,
             ).cost
         except NoFeasiblePath:
-            tried *= 2
-    return None
+            if tried >= LARGEST_ETA_V:
+                return None
+            tried = min(2 * tried, LARGEST_ETA_V)
