@@ -30,11 +30,11 @@ STEPPING = 3.0
 HOW_LIMITED = """\
 A closed wavy contour on a cylinder, IRB 2400, all postures, axes 4 and 6 endless, 10 m/min,
 velocity limits on. First-order: `shortest_path` with acceleration limits that never bind. Dense:
-the plain recursion over every edge in `benchmarks/_dense.py`, which yields the cost but no path. Both search on one core, time their
-preparation of the arrays with it, and take turns; the graph is built on all cores. The paper's
-method and the exact one are given three times the assumed 600 to 3000 deg/s^2: at this spacing of
-nodes and gamma less would never let gamma step. Memory: by how much the process peaks above its
-level before the call."""
+the plain recursion over every edge in `benchmarks/_dense.py`, which yields the cost but no path.
+Both search on one core, time their preparation of the arrays with it, and take turns; the graph is
+built on all cores. The paper's method and the exact one are given three times the assumed 600 to
+3000 deg/s^2: at this spacing of nodes and gamma less would never let gamma step. Memory: by how
+much the process peaks above its level before the call."""
 
 HOW_PEER = """\
 The same contour as Descartes can pose it: joints in plain ranges of at most one turn, no coupling
