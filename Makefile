@@ -21,6 +21,7 @@ bench: .venv/bench.stamp
 	$(BIN)/python -m benchmarks
 
 figures: .venv/run.stamp
+	$(BIN)/python examples/feasibility_map.py
 	$(BIN)/python examples/known_against_proposed.py
 
 # One environment, filled in steps: what running needs, what developing adds, what benchmarks add.

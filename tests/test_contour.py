@@ -116,6 +116,18 @@ def test_tolerance_gives_the_fewest_even_nodes_that_keep_it(position, angle):
     assert not any(keeps(n, slack=0) for n in range(2, fewest))
 
 
+def test_sharp_corners_get_the_nodes_that_the_tolerance_asks_for(monkeypatch):
+    side = np.sqrt(0.5)  # even nodes never hit all corners
+    sheet = polyline([[0, 0, 0], [1, 0, 0], [1, side, 0], [0, side, 0]], closed=True)
+    # Across a square corner a chord of length h leaves it by h / sqrt(8) at most.
+    assert 5 < len(sheet.resample(tolerance=1e-3)) <= sheet.length / (np.sqrt(8) * 1e-3) + 2
+    turning = Contour([[0, 0, 0], [1, 0, 0], [2, 0, 0]], [DOWN, DOWN, (0, np.sin(1), -np.cos(1))])
+    assert 2 < len(turning.resample(axis_tolerance=1e-3)) < 2001
+    monkeypatch.setattr("kerfpath.contour.MOST_NODES", 20)
+    with pytest.raises(InputError, match="more than 20 nodes"):
+        sheet.resample(tolerance=1e-3)
+
+
 @pytest.mark.equation(1)
 def test_sampling_in_time_follows_the_speed():
     c = helix()

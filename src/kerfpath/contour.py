@@ -21,6 +21,8 @@ FRAME_KINDS: tuple[FrameKind, ...] = ("tangent", "rotation-minimising")
 
 REPEATED_POINT = 1e-9
 """Consecutive nodes closer than this (m) are one point: they leave no direction of travel."""
+MOST_NODES = 200_000
+"""Nodes that a tolerance may ask for; a sharp corner asks for its length over the tolerance."""
 ZERO_AXIS = 1e-9
 """A tool axis shorter than this (any unit) has no direction."""
 
@@ -230,8 +232,13 @@ class Contour:
 
     def _fewest(self, tolerance: float, axis_tolerance: float) -> Array:
         """Return the arc lengths of the fewest evenly spaced nodes that keep both tolerances."""
+        # Cells this short keep both: in one, path and axis move less than is allowed.
+        n0, n1 = self.axes[:-1], self.axes[1:]
+        turn = np.arctan2(np.linalg.norm(np.cross(n0, n1), axis=1), (n0 * n1).sum(1))
+        rate = float((turn / np.diff(self.s)).max())
+        enough = self.length * max(1 / tolerance, rate / axis_tolerance) + 1
         witness = len(self) // 2
-        for cells in range(1, len(self) * 64):
+        for cells in range(1, int(min(enough, MOST_NODES)) + 1):
             s = np.linspace(self.s[0], self.s[-1], cells + 1)
             # A node that spoilt the coarser sampling most likely spoils this one: try it first.
             if self._keeps(s, np.array([witness]), tolerance, axis_tolerance) < 0:
@@ -240,7 +247,7 @@ class Contour:
                     return s
                 witness = bad
         raise InputError(
-            f"tolerance: {tolerance:g} m would need more than {len(self) * 64} nodes; relax it, or "
+            f"tolerance: {tolerance:g} m would need more than {MOST_NODES} nodes; relax it, or "
             "round the sharp corners of the contour"
         )
 
