@@ -161,7 +161,8 @@ def _cut(job: Job, task: ContourTask, drawn: Contour, progress: Progress) -> Cut
         )
     except NoFeasiblePath as error:
         broken = error
-        if np.diff(graph.start).all():  # poses everywhere: slower would do
+        # With poses everywhere slower would do; for a loop that cannot close it need not.
+        if np.diff(graph.start).all() and options["closure"] == "free":
             progress(f"{task.name}: fastest speed", 0, 1)
             fastest = fastest_speed(
                 nodes,
