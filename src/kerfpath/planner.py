@@ -17,6 +17,7 @@ from kerfpath.plans import Plan, Proof, Settings
 from kerfpath.robots import Robot
 from kerfpath.search import (
     Closure,
+    LeastInterval,
     Method,
     Metric,
     ObjectiveKind,
@@ -188,6 +189,12 @@ class FastestSpeed:
     node: int
     limit: Literal["velocity", "acceleration"]
 
+    @classmethod
+    def of(cls, contour: Contour, least: LeastInterval) -> FastestSpeed:
+        """Return what a least node interval is as a speed along a contour."""
+        spacing = contour.length / (len(contour) - 1)
+        return cls(speed=spacing / least.dt, joint=least.joint, node=least.node, limit=least.limit)
+
 
 def fastest_speed(
     contour: Contour,
@@ -236,10 +243,7 @@ def fastest_speed(
         eta_v=eta_v,
         eta_a=eta_a,
     )
-    spacing = contour.length / (len(contour) - 1)
-    return FastestSpeed(
-        speed=spacing / least.dt, joint=least.joint, node=least.node, limit=least.limit
-    )
+    return FastestSpeed.of(contour, least)
 
 
 def relaxations(

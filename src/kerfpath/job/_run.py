@@ -164,18 +164,10 @@ def _cut(job: Job, task: ContourTask, drawn: Contour, progress: Progress) -> Cut
         # With poses everywhere slower would do; for a loop that cannot close it need not.
         if np.diff(graph.start).all() and options["closure"] == "free":
             progress(f"{task.name}: fastest speed", 0, 1)
-            fastest = fastest_speed(
-                nodes,
-                job.robot,
-                tool=job.tool,
-                placement=job.placement,
-                graph=graph,
-                eta_v=options["eta_v"],
-                eta_a=options["eta_a"],
-            )
             least = relaxations(
                 nodes, job.robot, graph, task.speed, eta_v=options["eta_v"], eta_a=options["eta_a"]
             )
+            fastest = FastestSpeed.of(nodes, least.slower)
     else:
         table = tuple(checks(made, reference=drawn, **job.audit_options))
     return Cut(

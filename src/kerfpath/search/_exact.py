@@ -11,6 +11,7 @@ import numpy as np
 from kerfpath._arrays import Array, Bools, Ints
 from kerfpath.kernels import exact
 from kerfpath.kernels.limits import acceleration_excess
+from kerfpath.kernels.metric import increments
 from kerfpath.kernels.search import Layers, Objective, path_planning
 
 __all__ = ["Best", "Dead", "best_closed_path", "best_path", "dead_end", "quickest_path"]
@@ -106,6 +107,8 @@ def best_closed_path(layers: Layers, aim: Objective) -> Best | Dead:
     while queue:
         cost, _, _, found, starts, firsts = heapq.heappop(queue)
         path = found.path
+        if len(starts) == len(firsts) == 1:
+            return found  # the recursion has kept the seam
         if twin[path[0]] == path[-1] and _passes_seam(layers, aim, path):
             return found
         if len(starts) > 1:
@@ -160,17 +163,18 @@ def _grow(
     least = float((np.maximum(enter, entry) if aim.minimax else enter + entry).min(initial=np.inf))
     if least == np.inf:
         return None
-    bound, greedy = max(least, floor) * (1 + ROUNDING), np.inf
+    bound, greedy = max(least, floor) * (1 + ROUNDING), None
     while True:
         reached = exact.recursion(layers, aim, h, bound, seam, ROOM)
         if reached.state >= 0:
             break
         if reached.lowest == np.inf or reached.lowest > ceiling:
             return None
-        if greedy == np.inf and reached.offset.max() > WORTH_A_CEILING * len(layers.low):
+        if greedy is None and reached.offset.max() > WORTH_A_CEILING * len(layers.low):
             greedy = _greedy_cost(layers, aim, allowed, seam) * (1 + ROUNDING)
         grown = least + max(2 * (bound - least), FIRST_GAP * least)
-        bound = max(min(grown, greedy), reached.lowest * (1 + ROUNDING))
+        grown = grown if greedy is None else min(grown, greedy)
+        bound = max(grown, reached.lowest * (1 + ROUNDING))
     if not reached.recorded:
         # Once more at the tightest bound: few states are left to remember.
         bound = reached.cost * (1 + ROUNDING)
@@ -209,9 +213,7 @@ def _twins(layers: Layers) -> Ints:
 
 
 def _increments(layers: Layers, path: Ints) -> Array:
-    dq = np.diff(layers.q[:, path].T, axis=0)
-    short = dq - 2 * np.pi * np.round(dq / (2 * np.pi))
-    return np.ascontiguousarray(np.where(layers.endless, short, dq))
+    return increments(np.ascontiguousarray(layers.q[:, path].T), layers.endless)
 
 
 def _passes_seam(layers: Layers, aim: Objective, path: Ints) -> bool:

@@ -9,13 +9,13 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from kerfpath._arrays import Array, Bools, Ints, bools, floats, freeze, positive, scalar
-from kerfpath.errors import InputError, NoFeasiblePath
+from kerfpath.errors import InputError
 from kerfpath.kernels import search as kernel
 from kerfpath.kernels.metric import CHEBYCHEV, increments
 from kerfpath.search._exact import quickest_path
-from kerfpath.search._layers import narrowest_key, offsets, sorted_layers
+from kerfpath.search._layers import empty_layer, narrowest_key, offsets, sorted_layers
 
-__all__ = ["LeastInterval", "least_interval"]
+__all__ = ["LeastInterval", "least_interval", "quickest"]
 
 _LAYERS_SAMPLED = 8
 """Layers whose nearest pairs give the first guess of the interval; any guess ends right."""
@@ -81,30 +81,46 @@ def least_interval(
         raise InputError("start: a node interval needs at least two layers, got 1")
     empty = np.flatnonzero(np.diff(start) == 0)
     if empty.size:
-        k = int(empty[0])
-        raise NoFeasiblePath(
-            f"layer {k} is empty: no admissible pose at that node", proved=True, node=k - 1
-        )
+        raise empty_layer(int(empty[0]))
     ceiling = _guess(q, start, v, endless)
     while True:
         # Edges that take longer than the ceiling are not looked at: right if a path keeps it.
-        key, width, circular = narrowest_key(q, start, ceiling * v, endless)
-        layers, _ = sorted_layers(q, start, key, width, circular, endless)
-        aim = kernel.Objective(
-            weight=1 / v,
-            metric=CHEBYCHEV,
-            minimax=True,
-            vertex_cost=np.zeros(len(q)),
-            velocity=ceiling * v,
-            acceleration=a,
-            cap=ceiling,
-            timed=True,
-        )
-        best = quickest_path(layers, aim, ceiling)
-        if best is not None:
-            index = layers.rank[best.path]
+        found = quickest(q, start, endless, 1 / v, ceiling * v, a, ceiling)
+        if found is not None:
+            index, _ = found
             return _binding(q[start[:-1] + index], index, v, a, endless)
         ceiling *= 2
+
+
+def quickest(
+    q: Array,
+    start: Ints,
+    endless: Bools,
+    weight: Array,
+    bound: Array,
+    acceleration: Array,
+    ceiling: float,
+) -> tuple[Ints, float] | None:
+    """Return the path whose steps and changes ask for the least time at most, and that time.
+
+    A step asks for its Chebychev distance under `weight` (n,) s/rad and may not exceed `bound` (n,)
+    rad; a change asks for the time in which `acceleration` (n,) rad/s^2 allows it. None where more
+    than `ceiling` s is asked for, or no path keeps the bound.
+    """
+    key, width, circular = narrowest_key(q, start, bound, endless)
+    layers, _ = sorted_layers(q, start, key, width, circular, endless)
+    aim = kernel.Objective(
+        weight=weight,
+        metric=CHEBYCHEV,
+        minimax=True,
+        vertex_cost=np.zeros(len(q)),
+        velocity=bound,
+        acceleration=acceleration,
+        cap=ceiling,
+        timed=True,
+    )
+    best = quickest_path(layers, aim, ceiling)
+    return None if best is None else (layers.rank[best.path], best.cost)
 
 
 def _guess(q: Array, start: Ints, v: Array, endless: Bools) -> float:
@@ -126,6 +142,7 @@ def _binding(path: Array, index: Ints, v: Array, a: Array, endless: Bools) -> Le
     dq = increments(np.ascontiguousarray(path), endless)
     fast = np.abs(dq) / v
     sharp = np.sqrt(np.abs(np.diff(dq, axis=0)) / a)
+    limit: Literal["velocity", "acceleration"]
     if sharp.size and sharp.max() > fast.max():
         k, joint = np.unravel_index(np.argmax(sharp), sharp.shape)
         dt, node, limit = float(sharp.max()), int(k) + 1, "acceleration"
@@ -137,5 +154,5 @@ def _binding(path: Array, index: Ints, v: Array, a: Array, endless: Bools) -> Le
         index=freeze(index),
         joint=int(joint),
         node=node,
-        limit=limit,  # type: ignore[arg-type]  # one of the two words above
+        limit=limit,
     )

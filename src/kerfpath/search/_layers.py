@@ -6,11 +6,11 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from kerfpath._arrays import Array, Bools, Ints, integers
-from kerfpath.errors import InputError
+from kerfpath.errors import InputError, NoFeasiblePath
 from kerfpath.kernels import search as kernel
 from kerfpath.kernels.limits import LIMIT_TOLERANCE
 
-__all__ = ["backwards", "narrowest_key", "offsets", "sorted_layers"]
+__all__ = ["backwards", "empty_layer", "narrowest_key", "offsets", "sorted_layers"]
 
 _LAYERS_SAMPLED = 32
 """Layers looked at to choose the joint that sorts them: enough to rank the joints."""
@@ -45,6 +45,15 @@ def sorted_layers(
         turn=np.where(endless, 2 * np.pi, np.inf),
     )
     return layers, rank + np.repeat(start[:-1], np.diff(start))
+
+
+def empty_layer(k: int) -> NoFeasiblePath:
+    """Return the answer for a graph whose layer k has no vertex."""
+    if k == 0:
+        return NoFeasiblePath("layer 0 is empty: no path can start", proved=True, node=-1)
+    return NoFeasiblePath(
+        f"layer {k} is empty: no admissible pose at that node", proved=True, node=k - 1
+    )
 
 
 def backwards(q: Array, start: Ints) -> tuple[Array, Ints]:

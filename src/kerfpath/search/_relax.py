@@ -9,11 +9,8 @@ from numpy.typing import ArrayLike
 
 from kerfpath._arrays import bools, floats, positive, scalar
 from kerfpath.errors import NoFeasiblePath
-from kerfpath.kernels import search as kernel
-from kerfpath.kernels.metric import CHEBYCHEV
-from kerfpath.search._exact import quickest_path
-from kerfpath.search._fastest import least_interval
-from kerfpath.search._layers import narrowest_key, offsets, sorted_layers
+from kerfpath.search._fastest import LeastInterval, least_interval, quickest
+from kerfpath.search._layers import offsets
 from kerfpath.search._shortest import shortest_path
 
 __all__ = ["Relaxations", "least_relaxations"]
@@ -22,7 +19,7 @@ LARGEST_ETA_V = 2.0
 """Velocity limits are not raised further than this: beyond it no robot goes."""
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Relaxations:
     """The least change of each limit with which a path exists, the other limits as they are.
 
@@ -32,13 +29,18 @@ class Relaxations:
         Least share of the velocity limits; None where no share up to 2 opens the way.
     eta_a : float or None
         Least share of the acceleration limits; None where velocity alone closes the way.
-    dt : float s
-        Least node interval.
+    slower : LeastInterval
+        Least node interval, and what binds there.
     """
 
     eta_v: float | None
     eta_a: float | None
-    dt: float
+    slower: LeastInterval
+
+    @property
+    def dt(self) -> float:
+        """Least node interval, s."""
+        return self.slower.dt
 
 
 def least_relaxations(
@@ -73,23 +75,11 @@ def least_relaxations(
         q, start, velocity=v, acceleration=a, endless=turning, eta_v=eta_v, eta_a=eta_a
     )
     # Velocity as it is, and of all paths the one whose sharpest change asks for the least time.
-    key, width, circular = narrowest_key(q, start, eta_v * v * dt, turning)
-    layers, _ = sorted_layers(q, start, key, width, circular, turning)
-    aim = kernel.Objective(
-        weight=np.zeros(n),
-        metric=CHEBYCHEV,
-        minimax=True,
-        vertex_cost=np.zeros(len(q)),
-        velocity=eta_v * v * dt,
-        acceleration=a,
-        cap=np.inf,
-        timed=True,
-    )
-    sharpest = quickest_path(layers, aim, np.inf)
+    sharpest = quickest(q, start, turning, np.zeros(n), eta_v * v * dt, a, np.inf)
     return Relaxations(
         eta_v=_least_eta_v(q, start, dt, v, a, turning, eta_v, eta_a),
-        eta_a=None if sharpest is None else (sharpest.cost / dt) ** 2,
-        dt=slower.dt,
+        eta_a=None if sharpest is None else (sharpest[1] / dt) ** 2,
+        slower=slower,
     )
 
 

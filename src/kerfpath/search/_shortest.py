@@ -13,7 +13,7 @@ from kerfpath.errors import InputError, NoFeasiblePath
 from kerfpath.kernels import metric as metrics
 from kerfpath.kernels import search as kernel
 from kerfpath.search._exact import Best, best_closed_path, best_path, dead_end
-from kerfpath.search._layers import backwards, narrowest_key, offsets, sorted_layers
+from kerfpath.search._layers import backwards, empty_layer, narrowest_key, offsets, sorted_layers
 
 __all__ = ["Closure", "LayeredPath", "Method", "Metric", "ObjectiveKind", "shortest_path"]
 
@@ -156,7 +156,7 @@ def shortest_path(
     )
     filled = int(np.argmin(np.diff(start))) if (np.diff(start) == 0).any() else len(start) - 1
     if filled == 0:
-        raise NoFeasiblePath("layer 0 is empty: no path can start", proved=True, node=-1)
+        raise empty_layer(0)
     if method == "exact":
         try:
             return _exactly(layers, aim, filled, closure)
@@ -179,7 +179,7 @@ def _exactly(
         found = best_path(to_search, aim)
     if isinstance(found, Best):
         if not whole:
-            raise _empty_layer(filled)
+            raise empty_layer(filled)
         index = layers.rank[found.path]
         return LayeredPath(index=freeze(index), cost=found.cost, optimal=True)
     if closure == "periodic" and found.layers >= filled - 1 and not found.counts.any():
@@ -222,7 +222,7 @@ def _search(
         counts = kernel.closing_counts(layers, aim, dist, before, reached)
         raise _broken_edge(reached, counts, proved=not turned_away)
     if filled < len(sizes):
-        raise _empty_layer(filled)
+        raise empty_layer(filled)
     a, b = start[-2], start[-1]
     best = np.flatnonzero(dist[a:b] == dist[a:b].min()) + a
     j = int(best[np.argmin(layers.rank[best])])
@@ -232,12 +232,6 @@ def _search(
         path[k] = layers.rank[j]
         j = int(before[j])
     return LayeredPath(index=freeze(path), cost=cost, optimal=may_prove and not turned_away)
-
-
-def _empty_layer(k: int) -> NoFeasiblePath:
-    return NoFeasiblePath(
-        f"layer {k} is empty: no admissible pose at that node", proved=True, node=k - 1
-    )
 
 
 def _broken_edge(k: int, forbidden: Ints, *, proved: bool) -> NoFeasiblePath:
