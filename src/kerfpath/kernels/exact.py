@@ -12,31 +12,28 @@ bound on the cost, only states with d + h inside it are ever kept.
 
 from __future__ import annotations
 
-from math import sqrt
 from typing import Any, NamedTuple, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
-from kerfpath._arrays import Array, Bools, Ints
-from kerfpath.kernels._jit import jit, jit_vector
+from kerfpath._arrays import Array, Ints
+from kerfpath.kernels._jit import jit
 from kerfpath.kernels.limits import (
-    LIMIT_TOLERANCE,
     acceleration_excess,
     acceleration_time,
     velocity_excess,
 )
-from kerfpath.kernels.metric import EUCLID, MANHATTAN
 from kerfpath.kernels.search import (
     Layers,
     Objective,
-    _distance,
-    _increment,
+    distance,
+    fill_increment,
     joined,
     runs,
 )
 
-__all__ = ["Reached", "cost_to_go", "count_closing", "recursion", "trace"]
+__all__ = ["Reached", "count_closing", "recursion", "trace"]
 
 _T = TypeVar("_T", bound="np.generic[Any]")
 
@@ -77,70 +74,6 @@ class Reached(NamedTuple):
     """The states of the last layer that some state reached."""
     recorded: bool
     """The record is whole."""
-
-
-@jit
-def cost_to_go(layers: Layers, aim: Objective, allowed: Bools, out_h: Array) -> None:
-    """First-order bound h (N,): least cost from each vertex to the last layer, its own left out.
-
-    Vertices that are not allowed, or from which no edges within (5) lead to the end, get infinity.
-    """
-    last, bound = len(layers.start) - 2, aim.velocity + LIMIT_TOLERANCE
-    c, tail = np.empty(np.max(np.diff(layers.start))), np.empty(len(layers.low))
-    for j in range(layers.start[last], layers.start[last + 1]):
-        out_h[j] = 0.0 if allowed[j] else np.inf
-    for k in range(last, -1, -1):
-        if k < last:
-            _layer_to_go(
-                layers.q, layers.turn, bound, aim.weight, aim.metric, aim.cap, aim.minimax,
-                layers.start, layers.low, layers.high, k, tail, c, out_h,
-            )  # fmt: skip
-        for p in range(layers.start[k], layers.start[k + 1]):
-            out_h[p] = out_h[p] if allowed[p] else np.inf
-            tail[p] = joined(aim.minimax, aim.vertex_cost[p], out_h[p])
-
-
-@jit_vector
-def _layer_to_go(
-    q: Array, turn: Array, bound: Array, weight: Array, metric: int, cap: float, minimax: bool,
-    start: Ints, low: Ints, high: Ints, k: int, tail: Array, c: Array, out_h: Array,
-) -> None:  # fmt: skip
-    """For each vertex p of layer k the least of its distance to a next vertex joined with its tail.
-
-    The innermost loops of the first-order problem, so over bare arrays and in one piece: handing
-    them to a function costs as much as a run of twenty vertices. Joint by joint, every loop
-    vectorises.
-    """
-    for p in range(start[k], start[k + 1]):
-        best = np.inf
-        for a, b in runs(start, low, high, k, p):
-            m = b - a
-            c[:m] = 0.0
-            for i in range(len(q) if m else 0):
-                x, t, limit, w = q[i, p], turn[i], bound[i], weight[i]
-                if metric == MANHATTAN:
-                    for v in range(m):
-                        y = min(abs(x - q[i, a + v]), t - abs(x - q[i, a + v]))
-                        c[v] += np.inf if y > limit else w * y
-                elif metric == EUCLID:
-                    for v in range(m):
-                        y = min(abs(x - q[i, a + v]), t - abs(x - q[i, a + v]))
-                        c[v] += np.inf if y > limit else w * y * w * y
-                else:
-                    for v in range(m):
-                        y = min(abs(x - q[i, a + v]), t - abs(x - q[i, a + v]))
-                        c[v] = max(c[v], np.inf if y > limit else w * y)
-            if metric == EUCLID or cap < np.inf:
-                for v in range(m):
-                    r = sqrt(c[v]) if metric == EUCLID else c[v]
-                    c[v] = r if r <= cap else np.inf
-            if minimax:
-                for v in range(m):
-                    best = min(best, max(c[v], tail[a + v]))
-            else:
-                for v in range(m):
-                    best = min(best, c[v] + tail[a + v])
-        out_h[p] = best
 
 
 @jit
@@ -234,10 +167,10 @@ def _extend(
             j = v if v < high else v - high + low2
             if h[j] == np.inf:
                 continue
-            step = joined(aim.minimax, _distance(layers, aim, p, j), aim.vertex_cost[j])
+            step = joined(aim.minimax, distance(layers, aim, p, j), aim.vertex_cost[j])
             if step == np.inf:
                 continue
-            _increment(layers, p, j, step_dq)
+            fill_increment(layers, p, j, step_dq)
             if closes and acceleration_excess(seam, step_dq, aim.acceleration) >= 0:
                 continue
             if aim.timed:
@@ -332,7 +265,7 @@ def count_closing(layers: Layers, aim: Objective, states: States, k: int) -> Int
         if a == b:
             continue
         for j in range(layers.start[k], layers.start[k + 1]):
-            _increment(layers, p, j, dq)
+            fill_increment(layers, p, j, dq)
             excess = velocity_excess(dq, aim.velocity)
             if excess >= 0:
                 counts[0, excess] += 1

@@ -21,6 +21,8 @@ __all__ = [
     "Objective",
     "arrange",
     "closing_counts",
+    "distance",
+    "fill_increment",
     "joined",
     "path_planning",
     "reduced",
@@ -122,7 +124,7 @@ def runs(
 
 
 @jit
-def _distance(layers: Layers, aim: Objective, p: int, j: int) -> float:
+def distance(layers: Layers, aim: Objective, p: int, j: int) -> float:
     """Distance rho from vertex p to vertex j; infinite where (5) or the cap forbids it."""
     total = 0.0
     for i in range(len(layers.endless)):
@@ -148,7 +150,8 @@ def joined(minimax: bool, a: float, b: float) -> float:
 
 
 @jit
-def _increment(layers: Layers, p: int, j: int, out_dq: Array) -> None:
+def fill_increment(layers: Layers, p: int, j: int, out_dq: Array) -> None:
+    """Fill the joint increment (n,) from vertex p to vertex j."""
     for i in range(len(layers.endless)):
         out_dq[i] = increment(layers.q[i, j] - layers.q[i, p], layers.endless[i])
 
@@ -170,18 +173,18 @@ def _offer(
     n = len(layers.endless)
     dq, dq_before = np.empty(n), np.empty(n)
     if k > 0:
-        _increment(layers, out_before[p], p, dq_before)
+        fill_increment(layers, out_before[p], p, dq_before)
     (a, b), (c, d) = runs(layers.start, layers.low, layers.high, k, p)
     for v in range(a, b + d - c):
         j = v if v < b else v - b + c
-        cost = joined(aim.minimax, out_dist[p], _distance(layers, aim, p, j))
+        cost = joined(aim.minimax, out_dist[p], distance(layers, aim, p, j))
         best, best_p = out_dist[j], out_before[j]
         tie = cost == best and best_p >= 0 and layers.rank[p] < layers.rank[best_p]
         if not (cost < best or tie):
             continue
         out_free[j] = min(out_free[j], cost)
         if k > 0:
-            _increment(layers, p, j, dq)
+            fill_increment(layers, p, j, dq)
             if acceleration_excess(dq, dq_before, aim.acceleration) >= 0:
                 continue
         out_dist[j], out_before[j] = cost, p
@@ -229,9 +232,9 @@ def closing_counts(layers: Layers, aim: Objective, dist: Array, before: Ints, k:
         if dist[p] == np.inf:
             continue
         if k > 1:
-            _increment(layers, before[p], p, dq_before)
+            fill_increment(layers, before[p], p, dq_before)
         for j in range(layers.start[k], layers.start[k + 1]):
-            _increment(layers, p, j, dq)
+            fill_increment(layers, p, j, dq)
             i = velocity_excess(dq, aim.velocity)
             if i >= 0:
                 counts[0, i] += 1

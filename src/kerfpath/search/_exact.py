@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from kerfpath._arrays import Array, Bools, Ints
-from kerfpath.kernels import exact
+from kerfpath.kernels import exact, to_go
 from kerfpath.kernels.limits import acceleration_excess
 from kerfpath.kernels.metric import increments
 from kerfpath.kernels.search import Layers, Objective, path_planning
@@ -157,7 +157,7 @@ def _grow(
     No path dearer than `ceiling` is looked for.
     """
     h = np.empty(len(layers.low))
-    exact.cost_to_go(layers, aim, allowed, h)
+    to_go.cost_to_go(layers, aim, allowed, h)
     entry = h[: layers.start[1]]
     enter = aim.vertex_cost[: layers.start[1]]
     least = float((np.maximum(enter, entry) if aim.minimax else enter + entry).min(initial=np.inf))
