@@ -50,10 +50,21 @@ class Settings:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Proof:
-    """What is proved about a plan: whether it is the best on its graph, and the claim in words."""
+    """What is proved about a plan.
+
+    Parameters
+    ----------
+    optimal : bool
+        No path on its graph is better.
+    statement : str
+        The claim in words.
+    grid_cost : float or None
+        Where the plan is refined: the cost of the path on the graph that it was refined from.
+    """
 
     optimal: bool
     statement: str
+    grid_cost: float | None = None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)

@@ -4,6 +4,7 @@ from kerfpath.search._fastest import LeastInterval as LeastInterval
 from kerfpath.search._fastest import least_interval as least_interval
 from kerfpath.search._relax import Relaxations as Relaxations
 from kerfpath.search._relax import least_relaxations as least_relaxations
+from kerfpath.search._shortest import METRIC_CODES as METRIC_CODES
 from kerfpath.search._shortest import Closure as Closure
 from kerfpath.search._shortest import LayeredPath as LayeredPath
 from kerfpath.search._shortest import Method as Method

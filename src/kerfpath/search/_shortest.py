@@ -15,14 +15,22 @@ from kerfpath.kernels import search as kernel
 from kerfpath.search._exact import Best, best_closed_path, best_path, dead_end
 from kerfpath.search._layers import backwards, empty_layer, narrowest_key, offsets, sorted_layers
 
-__all__ = ["Closure", "LayeredPath", "Method", "Metric", "ObjectiveKind", "shortest_path"]
+__all__ = [
+    "METRIC_CODES",
+    "Closure",
+    "LayeredPath",
+    "Method",
+    "Metric",
+    "ObjectiveKind",
+    "shortest_path",
+]
 
 Metric = Literal["manhattan", "chebychev", "euclid"]
 ObjectiveKind = Literal["sum", "max"]
 Method = Literal["exact", "paper", "known"]
 Closure = Literal["free", "periodic"]
 
-_METRIC_CODES: dict[str, int] = {
+METRIC_CODES: dict[str, int] = {
     "euclid": metrics.EUCLID,
     "manhattan": metrics.MANHATTAN,
     "chebychev": metrics.CHEBYCHEV,
@@ -120,7 +128,7 @@ def shortest_path(
     velocity = positive(velocity, "velocity", (n,))
     acceleration = positive(acceleration, "acceleration", (n,))
     endless = bools(np.zeros(n, bool) if endless is None else endless, "endless", (n,))
-    _one_of("metric", metric, tuple(_METRIC_CODES))
+    _one_of("metric", metric, tuple(METRIC_CODES))
     _one_of("objective", objective, get_args(ObjectiveKind))
     _one_of("method", method, get_args(Method))
     _one_of("closure", closure, get_args(Closure))
@@ -146,7 +154,7 @@ def shortest_path(
     layers, order = sorted_layers(q, start, key, window, circular, endless)
     aim = kernel.Objective(
         weight=np.ascontiguousarray(weight),
-        metric=_METRIC_CODES[metric],
+        metric=METRIC_CODES[metric],
         minimax=objective == "max",
         vertex_cost=cost[order],
         velocity=bound_v,
