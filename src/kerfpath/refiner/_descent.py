@@ -8,12 +8,12 @@ from typing import NamedTuple
 import numpy as np
 
 from kerfpath._arrays import Array
-from kerfpath.kernels import metric as metrics
 from kerfpath.kernels.turns import JointLimits
+from kerfpath.plans import path_cost
 from kerfpath.refiner._curves import JointCurves
 from kerfpath.refiner._program import MARGIN, Aim, Model, solve
 from kerfpath.refiner._rates import Rates
-from kerfpath.search import METRIC_CODES, Metric, ObjectiveKind
+from kerfpath.search import Metric, ObjectiveKind
 
 __all__ = ["Descent", "Stand"]
 
@@ -88,9 +88,7 @@ class Descent:
 
     def cost(self, q: Array) -> float:
         """Return the objective (14) or (15) of joints (K, 6), not wrapped."""
-        dq = np.ascontiguousarray(np.diff(q, axis=0))
-        total = metrics.total_distance if self.objective == "sum" else metrics.maximum_distance
-        return float(total(dq, self.weight, METRIC_CODES[self.metric]))
+        return path_cost(np.diff(q, axis=0), self.weight, self.metric, self.objective)
 
     def admitted(self, at: Stand) -> Stand:
         """Return the first motion found that keeps every limit, or the one that breaks them least.
@@ -153,7 +151,9 @@ class Descent:
 
     def _model(self, at: Stand, radius: float) -> Model:
         slope = self.curves.slope(at.gamma, at.q)
-        movable = np.asarray(np.isfinite(slope).all(axis=1))  # at the edge of reach a node stays where it is
+        movable = np.asarray(
+            np.isfinite(slope).all(axis=1)
+        )  # at the edge of reach a node stays where it is
         endless = self.limits.endless
         return Model(
             q=at.q,
@@ -180,7 +180,6 @@ class Descent:
         over = np.maximum(limits.row_lower - value, value - limits.row_upper)
         worst.append(float(over.max(initial=-1)))
         if self.cap < np.inf:
-            dq = np.ascontiguousarray(np.diff(q, axis=0))
-            longest = metrics.maximum_distance(dq, self.weight, METRIC_CODES[self.metric])
+            longest = path_cost(np.diff(q, axis=0), self.weight, self.metric, "max")
             worst.append(longest / self.cap - 1)
         return max(worst)

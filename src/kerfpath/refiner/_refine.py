@@ -94,24 +94,29 @@ def refine(
         return _unrefined(plan, _closest(descent, begun))
     found, programs = descent.best(begun)
     refined = _moved(asked, found)
-    claim = plan.proof.statement
-    if np.isfinite(start.excess) and start.excess <= 0 and plan.cost >= found.cost:
-        statement = f"refined off the grid from {claim}: cost {start.cost:.6g} to {found.cost:.6g}"
-        proof = replace(plan.proof, statement=statement, grid_cost=plan.cost)
-    else:
-        statement = (
-            f"refined off the grid, cost {found.cost:.6g}, to limits that the motion it began from "
-            f"does not keep ({claim}, cost {plan.cost:.6g})"
-        )
-        proof = Proof(optimal=False, statement=statement, grid_cost=plan.cost)
+    grid_cost = plan.cost if plan.proof.grid_cost is None else plan.proof.grid_cost
+    proof = Proof(
+        optimal=plan.proof.optimal and start.excess <= 0 and found.cost <= grid_cost,
+        statement=f"{plan.proof.statement}; {_done(plan, asked, start, found)}",
+        grid_cost=grid_cost,
+    )
     return Refinement(
         plan=replace(refined, proof=proof),
         done=True,
         cost_before=start.cost,
         cost_after=refined.cost,
         programs=programs,
-        statement=statement,
+        statement=proof.statement,
     )
+
+
+def _done(plan: Plan, asked: Plan, start: Stand, found: Stand) -> str:
+    """Say what was done, and what it did to the cost."""
+    parts = (len(asked.q) - 1) // (len(plan.q) - 1)
+    what = "refined off the grid" if parts == 1 else f"held at {parts} parts of every interval"
+    if start.excess > 0:
+        what = f"brought inside limits that it did not keep and {what}"
+    return f"{what}: cost {plan.cost:.6g} to {found.cost:.6g}"
 
 
 def _unrefined(plan: Plan, why: str) -> Refinement:
