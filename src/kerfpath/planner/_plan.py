@@ -3,19 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import replace
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from kerfpath import refiner
-from kerfpath._arrays import Array, Ints, as_pose, floats, freeze, scalar
 from kerfpath.contour import Contour, FrameKind
-from kerfpath.errors import InputError, NoFeasiblePath
+from kerfpath.errors import NoFeasiblePath
 from kerfpath.graph import LayeredGraph
 from kerfpath.kernels.metric import increments
-from kerfpath.planner._graph import layered_graph, node_interval, require_no_empty_layer
-from kerfpath.plans import Plan, Proof, Settings, path_cost
+from kerfpath.planner._task import Task, refined, task_of
+from kerfpath.plans import Plan, Proof, path_cost
 from kerfpath.refiner import Refinement
 from kerfpath.robots import Robot
 from kerfpath.search import Closure, Method, Metric, ObjectiveKind, least_interval, shortest_path
@@ -84,81 +82,34 @@ def plan(
     InputError
         Limits that are not known, nodes unevenly spaced, values out of range.
     """
-    velocity, acceleration = robot.speed_limits()
-    T_flange_tip, T_base_part = as_pose(tool, "tool"), as_pose(placement, "placement")
-    dt = node_interval(contour, speed)
-    if closure == "periodic" and not contour.closed:
-        raise InputError(f"closure: contour {contour.name!r} is open and cannot be periodic")
-    weight: Array = 1 / (velocity * dt) if weights is None else floats(weights, "weights", (6,))
-    settings = Settings(
-        gamma_step=scalar(gamma_step, "gamma_step", unit="rad", above=0.0),
-        frames=frames,
-        method=method,
-        objective=objective,
-        metric=metric,
-        weights=freeze(weight),
-        eta_v=scalar(eta_v, "eta_v", above=0.0),
-        eta_a=scalar(eta_a, "eta_a", above=0.0),
-        closure=closure,
-    )
-    graph = graph or layered_graph(
+    task = task_of(
         contour,
         robot,
-        tool=T_flange_tip,
-        placement=T_base_part,
+        tool=tool,
+        placement=placement,
+        speed=speed,
         gamma_step=gamma_step,
         frames=frames,
         postures=postures,
+        method=method,
+        objective=objective,
+        metric=metric,
+        weights=weights,
+        eta_v=eta_v,
+        eta_a=eta_a,
+        closure=closure,
+        graph=graph,
         progress=progress,
     )
-    if len(graph.start) != len(contour) + 1:
-        raise InputError(
-            f"graph: has {len(graph.start) - 1} layers, but the contour has {len(contour)} nodes"
-        )
-    require_no_empty_layer(contour, graph)
-
-    def on_grid(index: Ints, cost: float, proof: Proof) -> Plan:
-        vertex = graph.start[:-1] + index
-        return Plan(
-            contour=contour,
-            robot=robot,
-            T_flange_tip=T_flange_tip,
-            T_base_part=T_base_part,
-            q=graph.q[vertex],
-            gamma=graph.gamma[graph.sample[vertex]],
-            posture=graph.posture[vertex],
-            turn=graph.turn[vertex],
-            time=dt * np.arange(len(contour), dtype=float),
-            settings=settings,
-            cost=cost,
-            proof=proof,
-            counts=graph.counts(),
-        )
-
     try:
         path = shortest_path(
-            graph.q,
-            graph.start,
-            dt=dt,
-            velocity=velocity,
-            acceleration=acceleration,
-            endless=robot.endless,
-            posture=graph.posture,
-            weights=weight,
-            metric=metric,
-            objective=objective,
-            method=method,
-            closure=closure,
-            eta_v=eta_v,
-            eta_a=eta_a,
+            **task.limits, **task.aim, posture=task.graph.posture, method=method, closure=closure
         )
     except NoFeasiblePath as broken:
-        tried = ""
-        if refine and closure == "free":
-            found = _off_grid(graph, robot, settings, dt, on_grid)
-            if found is not None and found.done:
-                return found.plan
-            tried = "" if found is None else f"; off the grid {found.statement}"
+        off_grid = _off_grid(task) if refine and closure == "free" else None
+        if off_grid is not None and off_grid.done:
+            return off_grid.plan
+        tried = "" if off_grid is None else f"; off the grid {off_grid.statement}"
         raise NoFeasiblePath(
             f"contour {contour.name!r}: {broken}{_bracket(broken)}{tried}",
             proved=broken.proved,
@@ -166,46 +117,24 @@ def plan(
             back=broken.back,
             counts=broken.counts,
         ) from None
-    made = on_grid(path.index, path.cost, _proof(method, path.optimal))
-    return _refined(made) if refine else made
+    made = task.plan(path.index, path.cost, _proof(method, path.optimal))
+    return refined(made) if refine else made
 
 
-def _refined(made: Plan) -> Plan:
-    found = refiner.refine(made)
-    if found.done:
-        return found.plan
-    statement = f"{made.proof.statement}; {found.statement}"
-    return replace(made, proof=replace(made.proof, statement=statement))
-
-
-def _off_grid(
-    graph: LayeredGraph,
-    robot: Robot,
-    settings: Settings,
-    dt: float,
-    on_grid: Callable[[Ints, float, Proof], Plan],
-) -> Refinement | None:
+def _off_grid(task: Task) -> Refinement | None:
     """Refine the path that asks for the least time, where that is not far from what it has.
 
     The grid quantises the acceleration: of a path that breaks (6) because gamma can only step, the
     continuous one close by may not.
     """
-    velocity, acceleration = robot.speed_limits()
-    least = least_interval(
-        graph.q,
-        graph.start,
-        velocity=velocity,
-        acceleration=acceleration,
-        endless=robot.endless,
-        eta_v=settings.eta_v,
-        eta_a=settings.eta_a,
-    )
-    if least.dt > TOO_SLOW * dt:
+    least = least_interval(**task.limits)
+    if least.dt > TOO_SLOW * task.dt:
         return None
-    claim = Proof(optimal=False, statement="the fastest path on this graph")
-    dq = increments(graph.q[graph.start[:-1] + least.index], robot.endless)
+    settings = task.settings
+    dq = increments(task.graph.q[task.graph.start[:-1] + least.index], task.robot.endless)
     cost = path_cost(dq, settings.weights, settings.metric, settings.objective)
-    return refiner.refine(on_grid(least.index, cost, claim))
+    claim = Proof(optimal=False, statement="the fastest path on this graph")
+    return refiner.refine(task.plan(least.index, cost, claim))
 
 
 def _bracket(broken: NoFeasiblePath) -> str:
