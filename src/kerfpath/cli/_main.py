@@ -196,8 +196,9 @@ def speed(
 ) -> None:
     """Find the fastest constant cutting speed of each contour, and what binds where.
 
-    Exact on the graph that the job describes (its spacing, gamma step, limits and eta); the speeds
-    that the job asks for play no part.
+    On the grid: exact on the graph that the job describes (its spacing, gamma step, limits and
+    eta). Fastest: with gamma moved off the grid from there, if the job refines; what binds is said
+    of that. The speeds that the job asks for play no part.
 
     Example: kerfpath speed door.toml
     """

@@ -210,7 +210,7 @@ def fastest_speeds(
     """
     part = read_step(job.part_file, unit=job.part_unit)
     options = job.plan_options
-    keys = ("gamma_step", "frames", "postures", "eta_v", "eta_a")
+    keys = ("gamma_step", "frames", "postures", "eta_v", "eta_a", "refine")
     answers: list[tuple[ContourTask, Contour, FastestSpeed | NoFeasiblePath]] = []
     for i, task in enumerate(job.contours):
         progress("contours", i, len(job.contours))

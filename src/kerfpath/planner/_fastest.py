@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
@@ -11,12 +11,10 @@ from numpy.typing import ArrayLike
 
 from kerfpath.contour import Contour, FrameKind
 from kerfpath.graph import LayeredGraph
-from kerfpath.planner._graph import (
-    layered_graph,
-    node_interval,
-    require_even,
-    require_no_empty_layer,
-)
+from kerfpath.planner._graph import node_interval, require_even
+from kerfpath.planner._task import task_of
+from kerfpath.plans import Proof
+from kerfpath.refiner import quicken
 from kerfpath.robots import Robot
 from kerfpath.search import LeastInterval, Relaxations, least_interval, least_relaxations
 
@@ -25,7 +23,7 @@ __all__ = ["FastestSpeed", "fastest_speed", "relaxations"]
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class FastestSpeed:
-    """The largest constant cutting speed at which a path exists on the graph, and what binds.
+    """The largest constant cutting speed at which a path exists, and what binds.
 
     Parameters
     ----------
@@ -36,12 +34,15 @@ class FastestSpeed:
         The node where it binds.
     limit : {"velocity", "acceleration"}
         Which of its limits binds there.
+    on_grid : float m/s, optional
+        Where gamma was moved off its grid: the largest speed on it.
     """
 
     speed: float
     joint: int
     node: int
     limit: Literal["velocity", "acceleration"]
+    on_grid: float | None = None
 
     @classmethod
     def of(cls, contour: Contour, least: LeastInterval) -> FastestSpeed:
@@ -61,12 +62,15 @@ def fastest_speed(
     postures: Sequence[int] | None = None,
     eta_v: float = 1.0,
     eta_a: float = 1.0,
+    refine: bool = False,
     graph: LayeredGraph | None = None,
     progress: Callable[[int], None] | None = None,
 ) -> FastestSpeed:
     """Return the largest constant speed at which a path exists on the graph, exactly.
 
-    A second-order minimax problem on the layered graph; arguments as in `plan`.
+    A second-order minimax problem on the layered graph; arguments as in `plan`. The grid quantises
+    the acceleration: `refine` moves gamma off it, from the fastest path, to what is then faster
+    still (the nearest optimum, which is not proved to be the best one).
 
     Raises
     ------
@@ -75,29 +79,34 @@ def fastest_speed(
     InputError
         Limits that are not known, nodes unevenly spaced, values out of range.
     """
-    velocity, acceleration = robot.speed_limits()
     require_even(contour, np.diff(contour.s), "m")
-    graph = graph or layered_graph(
-        contour,
+    task = task_of(
+        replace(contour, time=None),
         robot,
         tool=tool,
         placement=placement,
+        speed=1.0,
         gamma_step=gamma_step,
         frames=frames,
         postures=postures,
-        progress=progress,
-    )
-    require_no_empty_layer(contour, graph)
-    least = least_interval(
-        graph.q,
-        graph.start,
-        velocity=velocity,
-        acceleration=acceleration,
-        endless=robot.endless,
         eta_v=eta_v,
         eta_a=eta_a,
+        graph=graph,
+        progress=progress,
     )
-    return FastestSpeed.of(contour, least)
+    least = least_interval(**task.limits)
+    found = FastestSpeed.of(contour, least)
+    if not refine:
+        return found
+    claim = Proof(optimal=False, statement="the fastest path on this graph")
+    quick, at = quicken(replace(task, dt=least.dt).plan(least.index, 0.0, claim))
+    return FastestSpeed(
+        speed=contour.length / float(quick.time[-1]),
+        joint=at.joint,
+        node=at.node,
+        limit=at.limit,
+        on_grid=found.speed,
+    )
 
 
 def relaxations(

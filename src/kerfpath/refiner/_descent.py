@@ -25,22 +25,42 @@ CONVERGED = 1e-4
 """Relative gain that the model promises below which a descent has converged."""
 SMALLEST_RADIUS = 1e-7
 """rad: no controller resolves a smaller change."""
+AWAY = 1e3
+"""1/rad: being out of a range counts for more than any share of a limit."""
 ENOUGH = 0.1
 """Share of the gain promised that a step must bring to be taken."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Stand:
-    """A motion by its true kinematics: gamma (K,), joints q (K, 6), cost, and largest excess."""
+    """A motion by its true kinematics.
+
+    Parameters
+    ----------
+    gamma : (K,) rad
+    q : (K, 6) rad
+        Joints, not wrapped.
+    cost : float
+    excess : float
+        Largest share of a limit in time, or of the cap, less one.
+    outside : float rad
+        By how much a joint or a coupling is out of its range; negative inside.
+    """
 
     gamma: Array
     q: Array
     cost: float
     excess: float
+    outside: float
+
+    @property
+    def admitted(self) -> bool:
+        """Every limit is kept."""
+        return self.excess <= 0 and self.outside <= 0
 
     def value(self, aim: Aim) -> float:
         """Return what is brought down: the excess, or the cost."""
-        return self.excess if aim == "excess" else self.cost
+        return self.excess + AWAY * max(self.outside, 0) if aim == "excess" else self.cost
 
 
 class _Step(NamedTuple):
@@ -80,11 +100,16 @@ class Descent:
     cap: float = np.inf
 
     def stand(self, gamma: Array, near: Array) -> Stand:
-        """Return where `gamma` brings the joints; infinite excess where it is out of reach."""
+        """Return where `gamma` brings the joints; infinite where it is out of reach."""
         q = self.curves.at(gamma, near)
         if not np.isfinite(q).all():
-            return Stand(gamma=gamma, q=q, cost=np.inf, excess=np.inf)
-        return Stand(gamma=gamma, q=q, cost=self.cost(q), excess=self._excess(q))
+            return Stand(gamma=gamma, q=q, cost=np.inf, excess=np.inf, outside=np.inf)
+        excess = self.rates.excess(np.diff(q, axis=0))
+        if self.cap < np.inf:
+            longest = path_cost(np.diff(q, axis=0), self.weight, self.metric, "max")
+            excess = max(excess, longest / self.cap - 1)
+        cost = self.cost(q)
+        return Stand(gamma=gamma, q=q, cost=cost, excess=excess, outside=self._outside(q))
 
     def cost(self, q: Array) -> float:
         """Return the objective (14) or (15) of joints (K, 6), not wrapped."""
@@ -95,6 +120,10 @@ class Descent:
 
         The cap, where there is one, is not a limit here.
         """
+        return self._run(at, "excess", enough=0.0)[0]
+
+    def gentlest(self, at: Stand) -> Stand:
+        """Return the motion whose largest share of a limit is least."""
         return self._run(at, "excess")[0]
 
     def best(self, at: Stand) -> tuple[Stand, int]:
@@ -109,7 +138,7 @@ class Descent:
             found, programs = self.stand(smooth.gamma, smooth.q), programs + more
         return found, programs
 
-    def _run(self, at: Stand, aim: Aim) -> tuple[Stand, int]:
+    def _run(self, at: Stand, aim: Aim, enough: float = -np.inf) -> tuple[Stand, int]:
         """Go down in steps of at most a radius, which grows and shrinks as the model proves."""
         radius, programs = self.radius, 0
         while radius > SMALLEST_RADIUS and programs < MOST_PROGRAMS:
@@ -119,7 +148,7 @@ class Descent:
                 break
             if step.to is not None and at.value(aim) - step.to.value(aim) > ENOUGH * step.promised:
                 at = step.to
-                if aim == "excess" and at.excess <= 0:
+                if at.value(aim) <= enough:
                     break
                 radius *= 2 if step.programs == 1 else 1
             else:
@@ -137,9 +166,9 @@ class Descent:
                 promised = at.value(aim) - self._modelled(model, delta, aim)
             longest = float(np.abs(delta).max())
             there = self.stand(at.gamma + delta, at.q)
-            if there.excess <= 0 or (aim == "excess" and np.isfinite(there.excess)):
+            if there.admitted or (aim == "excess" and there.outside <= max(at.outside, 0)):
                 return _Step(there, promised, longest, programs)
-            if there.excess == np.inf:
+            if there.outside == np.inf:
                 break
             model = self._model(there, radius)
             model = replace(model, q=there.q - model.slope * delta[:, None])
@@ -169,17 +198,9 @@ class Descent:
             cap=self.cap,
         )
 
-    def _excess(self, q: Array) -> float:
-        """Return by how much the motion breaks a limit: a share of (5), (6) and cap, or rad."""
-        limits, bound = self.limits, ~self.limits.endless
-        worst = [self.rates.excess(np.diff(q, axis=0))]
-        worst.append(
-            float(np.maximum(limits.lower - q, q - limits.upper)[:, bound].max(initial=-1))
-        )
+    def _outside(self, q: Array) -> float:
+        limits = self.limits
+        beyond = np.where(limits.endless, -np.inf, np.maximum(limits.lower - q, q - limits.upper))
         value = q @ limits.rows.T
         over = np.maximum(limits.row_lower - value, value - limits.row_upper)
-        worst.append(float(over.max(initial=-1)))
-        if self.cap < np.inf:
-            longest = path_cost(np.diff(q, axis=0), self.weight, self.metric, "max")
-            worst.append(longest / self.cap - 1)
-        return max(worst)
+        return float(max(beyond.max(), over.max(initial=-np.inf)))

@@ -55,8 +55,12 @@ class Rates:
         v = self.velocities(dq)
         return (v[self.after] - v[self.before]) / self.span[:, None]
 
+    def shares(self, dq: Array) -> tuple[Array, Array]:
+        """Return the shares of the velocity limits (K-1, n) and the acceleration limits (M, n)."""
+        fast = np.abs(self.velocities(dq)) / self.velocity
+        return fast, np.abs(self.accelerations(dq)) / self.acceleration
+
     def excess(self, dq: Array) -> float:
         """Return the largest share of a limit that increments (K-1, n) rad ask for, less one."""
-        fast = np.abs(self.velocities(dq)) / self.velocity
-        sharp = np.abs(self.accelerations(dq)) / self.acceleration
+        fast, sharp = self.shares(dq)
         return float(max(fast.max(), sharp.max(initial=0.0))) - 1

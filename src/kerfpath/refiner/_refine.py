@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from typing import Literal, NamedTuple
 
 import numpy as np
 from scipy.interpolate import CubicSpline
@@ -15,12 +16,25 @@ from kerfpath.refiner._curves import JointCurves
 from kerfpath.refiner._descent import Descent, Stand
 from kerfpath.refiner._rates import Rates
 
-__all__ = ["Refinement", "refine"]
+__all__ = ["Binding", "Refinement", "quicken", "refine"]
+
+MOST_INTERVALS = 10
+"""Times that the interval is shortened; each gets nearer to the least by its square."""
+SAME_INTERVAL = 1e-4
+"""Relative change of the interval below which it is the least."""
 
 FIRST_STEPS = 2
 """Grid steps that gamma may move by in the first iteration; what is gained sets it from then on."""
 SAME_NODE = 1e-6
 """m: a node of a finer contour counts as one of the plan's up to this distance."""
+
+
+class Binding(NamedTuple):
+    """What is used up: which limit of which joint (0-based) at which node."""
+
+    joint: int
+    node: int
+    limit: Literal["velocity", "acceleration"]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -89,14 +103,14 @@ def refine(
             return _unrefined(plan, divided)
         asked = divided
     descent, start = _descent(asked)
-    begun = start if start.excess <= 0 else descent.admitted(start)
-    if begun.excess > 0:
+    begun = start if start.admitted else descent.admitted(start)
+    if not begun.admitted:
         return _unrefined(plan, _closest(descent, begun))
     found, programs = descent.best(begun)
     refined = _moved(asked, found)
     grid_cost = plan.cost if plan.proof.grid_cost is None else plan.proof.grid_cost
     proof = Proof(
-        optimal=plan.proof.optimal and start.excess <= 0 and found.cost <= grid_cost,
+        optimal=plan.proof.optimal and start.admitted and found.cost <= grid_cost,
         statement=f"{plan.proof.statement}; {_done(plan, asked, start, found)}",
         grid_cost=grid_cost,
     )
@@ -110,11 +124,39 @@ def refine(
     )
 
 
+def quicken(plan: Plan) -> tuple[Plan, Binding]:
+    """Return the plan with gamma moved so that the interval between its nodes is the least.
+
+    All intervals change alike; also says where a limit is then used up. The cost is what it comes
+    to.
+    """
+    binding = Binding(0, 0, "velocity")
+    for _ in range(MOST_INTERVALS):
+        descent, start = _descent(plan)
+        found = descent.gentlest(start)
+        fast, sharp = descent.rates.shares(np.diff(found.q, axis=0))
+        shorter, binding = _binding(descent, fast, sharp)
+        plan = replace(_moved(plan, found), time=plan.time * shorter)
+        if shorter > 1 - SAME_INTERVAL:
+            break
+    return plan, binding
+
+
+def _binding(descent: Descent, fast: Array, sharp: Array) -> tuple[float, Binding]:
+    """Return the share of the interval that would do, and what asks for it."""
+    velocity, acceleration = float(fast.max()), float(np.sqrt(sharp.max(initial=0.0)))
+    if velocity >= acceleration:
+        edge, joint = np.unravel_index(np.argmax(fast), fast.shape)
+        return velocity, Binding(int(joint), int(edge) + 1, "velocity")
+    change, joint = np.unravel_index(np.argmax(sharp), sharp.shape)
+    return acceleration, Binding(int(joint), int(descent.rates.after[change]), "acceleration")
+
+
 def _done(plan: Plan, asked: Plan, start: Stand, found: Stand) -> str:
     """Say what was done, and what it did to the cost."""
     parts = (len(asked.q) - 1) // (len(plan.q) - 1)
     what = "refined off the grid" if parts == 1 else f"held at {parts} parts of every interval"
-    if start.excess > 0:
+    if not start.admitted:
         what = f"brought inside limits that it did not keep and {what}"
     return f"{what}: cost {plan.cost:.6g} to {found.cost:.6g}"
 
@@ -212,19 +254,14 @@ def _divided(plan: Plan, nodes: Contour) -> Plan | str:
 
 def _closest(descent: Descent, at: Stand) -> str:
     """Say which limit the motion that breaks them least still breaks, and where."""
-    if not np.isfinite(at.excess):
+    if at.outside == np.inf:
         return "the motion leaves the reach of its posture between the nodes"
-    rates, dq = descent.rates, np.diff(at.q, axis=0)
-    fast = np.abs(rates.velocities(dq)) / rates.velocity
-    sharp = np.abs(rates.accelerations(dq)) / rates.acceleration
-    if fast.max() >= sharp.max(initial=0.0):
-        (node, joint), what = np.unravel_index(np.argmax(fast), fast.shape), "velocity"
-    else:
-        (node, joint), what = np.unravel_index(np.argmax(sharp), sharp.shape), "acceleration"
-        node = rates.after[node]
-    if max(fast.max(), sharp.max(initial=0.0)) <= 1:
-        return f"a joint stays out of its range by {np.degrees(at.excess):.3g} deg"
+    rates = descent.rates
+    fast, sharp = rates.shares(np.diff(at.q, axis=0))
+    if at.outside > 0:
+        return f"a joint stays out of its range by {np.degrees(at.outside):.3g} deg"
+    _, worst = _binding(descent, fast, sharp)
     return (
-        f"the {what} of joint {joint + 1} at node {node} could not be brought below "
-        f"{1 + at.excess:.4f} of its limit"
+        f"the {worst.limit} of joint {worst.joint + 1} at node {worst.node} could not be brought "
+        f"below {1 + at.excess:.4f} of its limit"
     )
