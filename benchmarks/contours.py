@@ -21,7 +21,7 @@ from kerfpath import NoFeasiblePath, plan
 from kerfpath._arrays import Array
 from kerfpath.planner import layered_graph
 from kerfpath.plans import Plan
-from kerfpath.refine import refine
+from kerfpath import refine
 
 __all__ = ["run"]
 

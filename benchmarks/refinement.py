@@ -21,7 +21,7 @@ from kerfpath.graph import LayeredGraph
 from kerfpath.job import Job, read_job
 from kerfpath.planner import layered_graph
 from kerfpath.plans import Plan
-from kerfpath.refine import refine
+from kerfpath import refine
 
 __all__ = ["run"]
 
