@@ -17,11 +17,10 @@ from benchmarks._figures import Report
 from benchmarks._following import Follower
 from benchmarks._random_contours import ROBOTS, Cut, cut
 from benchmarks._tally import Outcome, sheet
-from kerfpath import NoFeasiblePath, plan
+from kerfpath import NoFeasiblePath, plan, refine
 from kerfpath._arrays import Array
 from kerfpath.planner import layered_graph
 from kerfpath.plans import Plan
-from kerfpath import refine
 
 __all__ = ["run"]
 

@@ -14,14 +14,13 @@ import numpy as np
 from benchmarks import _arm
 from benchmarks._descartes import NotRun, Task, solve
 from benchmarks._figures import Figure, Report, Sheet, in_turn, peak_megabytes
-from kerfpath import Contour, NoFeasiblePath, Robot, plan
+from kerfpath import Contour, NoFeasiblePath, Robot, plan, refine
 from kerfpath._arrays import Array
 from kerfpath.cad import read_step
 from kerfpath.graph import LayeredGraph
 from kerfpath.job import Job, read_job
 from kerfpath.planner import layered_graph
 from kerfpath.plans import Plan
-from kerfpath import refine
 
 __all__ = ["run"]
 
