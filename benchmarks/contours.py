@@ -17,7 +17,7 @@ from benchmarks._figures import Report
 from benchmarks._following import Follower
 from benchmarks._random_contours import ROBOTS, Cut, cut
 from benchmarks._tally import Outcome, sheet
-from kerfpath import NoFeasiblePath, plan, refine
+from kerfpath import NoFeasiblePath, plan
 from kerfpath._arrays import Array
 from kerfpath.planner import layered_graph
 from kerfpath.plans import Plan
@@ -44,9 +44,9 @@ deg steps of gamma, the search uses 1 deg: nodes that far apart and steps that f
 under the acceleration limits on most cuts; a grid of 5 deg froze it on nearly all. Manhattan
 metric, sum (14). All methods search the same layered graph. paper: section 3.2, greedy.
 first-order: the optimum under (5) alone, feasible only where its path keeps (6) by itself. exact:
-proved. refined: gamma off the grid, from the exact plan; its time includes the exact search, which
-where there is nothing to refine proves so. Not counted in any time: the graph. Two processes,
-one core each."""
+proved. refined: plan(refine=True), gamma off the grid from the exact path and from the best one
+without (6); its time includes the exact search. "Beyond the grid": feasible where the graph is
+proved to have no path. Not counted in any time: the graph. Two processes, one core each."""
 
 HOW_COMPARED = """\
 The first cuts of each robot again, with the two comparators of the paper's introduction. Neither
@@ -61,7 +61,7 @@ sampling (Yao and Gupta 2007): OMPL's RRT* over node and gamma in each posture, 
 only and within (5); then smoothed by Gaussian filters of 11 widths, the cheapest that keeps (6)
 too taken, or none. 80 000 edges are tried per cut instead of a time limit, so that runs repeat
 (1 to 2 s). RRTConnect found paths in less than 0.1 s, but several times as long; of the ranges 6,
-15 and 40 and goal biases 0.05 and 0.2, the best are kept. BIT* did not end within minutes."""
+15 and 40 and goal biases 0.05 and 0.2, the best are kept."""
 
 
 _Key = tuple[str, int]
@@ -152,18 +152,13 @@ def _search(key: _Key) -> _Searched:
     layered_graph(task.contour, task.robot, **task.options)
     graph_seconds = perf_counter() - start
     follower, outcomes = Follower(task), list[Outcome]()
-    made: Plan | None = None
+    exact: Plan | None = None
     for method in METHODS:
         start = perf_counter()
-        if method != "refined":
-            made = _planned(task, method)
-        elif made is not None:
-            made = refine(made).plan
+        made = _planned(task, method)
         seconds = perf_counter() - start
         if method == "exact":
             exact = made
-        if method == "refined":
-            seconds += outcomes[-1].seconds
         outcomes.append(_outcome(key, follower, method, seconds, made.q if made else None))
     return _Searched(
         outcomes=outcomes,
@@ -185,6 +180,7 @@ def _planned(task: Cut, method: str) -> Plan | None:
             speed=task.speed,
             graph=task.graph,
             method="paper" if method == "paper" else "exact",
+            refine=method == "refined",
             **task.options,
         )
     except NoFeasiblePath:

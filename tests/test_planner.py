@@ -172,4 +172,4 @@ def test_where_the_grid_has_no_path_one_is_found_off_it(circle, arm, tool, place
     assert "brought inside limits" in made.proof.statement
     assert audit(made) == []
     with pytest.raises(NoFeasiblePath, match="off the grid not refined: the "):
-        plan(circle, arm, refine=True, **options | {"speed": 0.5, "eta_a": 0.3})
+        plan(circle, arm, refine=True, **options | {"speed": 0.7, "eta_a": 0.3})

@@ -7,21 +7,16 @@ from collections.abc import Callable, Sequence
 import numpy as np
 from numpy.typing import ArrayLike
 
-from kerfpath import refiner
 from kerfpath.contour import Contour, FrameKind
 from kerfpath.errors import NoFeasiblePath
 from kerfpath.graph import LayeredGraph
-from kerfpath.kernels.metric import increments
-from kerfpath.planner._task import Task, refined, task_of
-from kerfpath.plans import Plan, Proof, path_cost
-from kerfpath.refiner import Refinement
+from kerfpath.planner._refined import off_grid, refined
+from kerfpath.planner._task import task_of
+from kerfpath.plans import Plan, Proof
 from kerfpath.robots import Robot
-from kerfpath.search import Closure, Method, Metric, ObjectiveKind, least_interval, shortest_path
+from kerfpath.search import Closure, Method, Metric, ObjectiveKind, shortest_path
 
 __all__ = ["plan"]
-
-TOO_SLOW = 2.0
-"""Multiple of the node interval up to which the fastest path is worth an attempt off the grid."""
 
 
 def plan(
@@ -106,10 +101,10 @@ def plan(
             **task.limits, **task.aim, posture=task.graph.posture, method=method, closure=closure
         )
     except NoFeasiblePath as broken:
-        off_grid = _off_grid(task) if refine and closure == "free" else None
-        if off_grid is not None and off_grid.done:
-            return off_grid.plan
-        tried = "" if off_grid is None else f"; off the grid {off_grid.statement}"
+        found = off_grid(task) if refine and closure == "free" else None
+        if found is not None and found.done:
+            return found.plan
+        tried = "" if found is None else f"; off the grid {found.statement}"
         raise NoFeasiblePath(
             f"contour {contour.name!r}: {broken}{_bracket(broken)}{tried}",
             proved=broken.proved,
@@ -118,23 +113,7 @@ def plan(
             counts=broken.counts,
         ) from None
     made = task.plan(path.index, path.cost, _proof(method, path.optimal))
-    return refined(made) if refine else made
-
-
-def _off_grid(task: Task) -> Refinement | None:
-    """Refine the path that asks for the least time, where that is not far from what it has.
-
-    The grid quantises the acceleration: of a path that breaks (6) because gamma can only step, the
-    continuous one close by may not.
-    """
-    least = least_interval(**task.limits)
-    if least.dt > TOO_SLOW * task.dt:
-        return None
-    settings = task.settings
-    dq = increments(task.graph.q[task.graph.start[:-1] + least.index], task.robot.endless)
-    cost = path_cost(dq, settings.weights, settings.metric, settings.objective)
-    claim = Proof(optimal=False, statement="the fastest path on this graph")
-    return refiner.refine(task.plan(least.index, cost, claim))
+    return refined(task, made) if refine else made
 
 
 def _bracket(broken: NoFeasiblePath) -> str:

@@ -9,7 +9,6 @@ from typing import Any, Required, TypedDict
 import numpy as np
 from numpy.typing import ArrayLike
 
-from kerfpath import refiner
 from kerfpath._arrays import Array, Ints, as_pose, floats, freeze, scalar
 from kerfpath.contour import Contour, FrameKind
 from kerfpath.errors import InputError
@@ -19,7 +18,7 @@ from kerfpath.plans import Plan, Proof, Settings
 from kerfpath.robots import Robot
 from kerfpath.search import Closure, Method, Metric, ObjectiveKind
 
-__all__ = ["Options", "Task", "refined", "task_of"]
+__all__ = ["Options", "Task", "task_of"]
 
 
 class Options(TypedDict, total=False):
@@ -179,12 +178,3 @@ def task_of(
         settings=settings,
         graph=graph,
     )
-
-
-def refined(made: Plan) -> Plan:
-    """Return the plan off its grid; where that cannot be, the plan, which then says so."""
-    found = refiner.refine(made)
-    if found.done:
-        return found.plan
-    statement = f"{made.proof.statement}; {found.statement}"
-    return replace(made, proof=replace(made.proof, statement=statement))
