@@ -14,7 +14,7 @@ import numpy as np
 from benchmarks import _arm
 from benchmarks._descartes import NotRun, Task, solve
 from benchmarks._figures import Figure, Report, Sheet, in_turn, peak_megabytes
-from kerfpath import Contour, NoFeasiblePath, Robot, plan, refine
+from kerfpath import Contour, NoFeasiblePath, Robot, plan
 from kerfpath._arrays import Array
 from kerfpath.cad import read_step
 from kerfpath.graph import LayeredGraph
@@ -30,6 +30,8 @@ STEPS = (8.0, 4.0, 2.0, 1.0, 0.5)
 """Steps of gamma, deg."""
 SPEED = 10 / 60
 """Cutting speed of the whole plan, m/s."""
+FREE = 1e6
+"""Multiple of the accelerations that never binds."""
 STEPPING = 3.0
 """Multiple of the arm's accelerations at which they bind, and still let gamma step."""
 COLUMNS = (
@@ -39,6 +41,7 @@ COLUMNS = (
     "vertices",
     "grid optimum",
     "refined",
+    "no limit",
     "graph s",
     "search s",
     "refine s",
@@ -49,8 +52,10 @@ PEER_STEP = 2.0
 HOW_STEPS = """\
 The trim line and two holes of the shipped demo job (`kerfpath/demo/b_pillar.toml`, IRB 4600-60,
 its speeds, spacings, posture and limits), planned on grids of gamma from coarse to fine. Grid:
-the proved optimum of that grid. Refined: `refine` from that plan. One run each, kernels warm; the
-graph is built on all cores."""
+the proved optimum of that grid. Refined: `plan(refine=True)`, which begins from that path and from
+the best one without acceleration limits; where the grid has no path, from the latter alone. No
+limit: the same without acceleration limits, at most that much can be gained by raising them. One
+run each, kernels warm; the graph is built on all cores."""
 
 HOW_WHOLE = """\
 The wavy closed contour of the search benchmark on the IRB 2400: 1000 nodes, gamma in steps of 1
@@ -99,11 +104,12 @@ class _Row:
     search_seconds: float
     grid: float | None = None
     refined: float | None = None
+    free: float | None = None
     refine_seconds: float | None = None
 
     def cells(self, name: str, nodes: int) -> tuple[str, ...]:
         """Return the row in words, by `COLUMNS`."""
-        costs = (_words(self.grid, "{:.4f}"), _words(self.refined, "{:.4f}"))
+        costs = (_words(cost, "{:.4f}") for cost in (self.grid, self.refined, self.free))
         seconds = (self.graph_seconds, self.search_seconds, self.refine_seconds)
         return (
             name,
@@ -121,26 +127,32 @@ def _words(value: float | None, pattern: str) -> str:
 
 def _step_row(job: Job, nodes: Contour, speed: float, step: float) -> _Row:
     """Plan a contour of the job on a grid of this step, deg, and refine the plan."""
-    options = job.plan_options | {"gamma_step": np.radians(step)}
+    options = job.plan_options | {"gamma_step": np.radians(step), "refine": False}
     space: dict[str, Any] = {"tool": job.tool, "placement": job.placement}
     grid: dict[str, Any] = {key: options[key] for key in ("gamma_step", "frames", "postures")}
     start = perf_counter()
     graph = layered_graph(nodes, job.robot, **space, **grid)
     built = perf_counter()
-    made: Plan | None = None
-    with suppress(NoFeasiblePath):
-        made = plan(nodes, job.robot, speed=speed, graph=graph, **space, **options)
+    free = job.robot.with_limits(acceleration=FREE * job.robot.speed_limits()[1])
+
+    def made(robot: Robot, **changes: bool) -> float | None:
+        with suppress(NoFeasiblePath):
+            return plan(nodes, robot, speed=speed, graph=graph, **space, **options | changes).cost
+        return None
+
+    grid_cost = made(job.robot)
     searched = perf_counter()
-    refined = None if made is None else refine(made)
+    refined = made(job.robot, refine=True)
     done = perf_counter()
     return _Row(
         step=step,
         vertices=len(graph.q),
         graph_seconds=built - start,
         search_seconds=searched - built,
-        grid=None if made is None else made.cost,
-        refined=None if refined is None else refined.cost_after,
-        refine_seconds=None if refined is None else done - searched,
+        grid=grid_cost,
+        refined=refined,
+        free=made(free, refine=True),
+        refine_seconds=done - searched - (searched - built),
     )
 
 
@@ -177,8 +189,8 @@ class _Wave:
     def graph(self) -> LayeredGraph:
         return layered_graph(self.contour, self.robot, **self.space)
 
-    def plan(self, graph: LayeredGraph | None = None) -> Plan:
-        return plan(self.contour, self.robot, speed=SPEED, graph=graph, **self.space)
+    def plan(self, graph: LayeredGraph | None = None, *, refine: bool = True) -> Plan:
+        return plan(self.contour, self.robot, speed=SPEED, graph=graph, refine=refine, **self.space)
 
 
 def _whole(*, quick: bool) -> Report:
@@ -213,21 +225,20 @@ def _whole(*, quick: bool) -> Report:
 
 def _ours(name: str, wave: _Wave, runs: int) -> tuple[list[Figure], str]:
     """Return the times of a whole plan and of its parts, and what the graph is like."""
-    whole = in_turn({name: lambda: refine(wave.plan())}, runs)[name]
+    whole = in_turn({name: wave.plan}, runs)[name]
     graph = wave.graph()
-    made = wave.plan(graph)
-    refined = refine(made)
+    made, refined = wave.plan(graph, refine=False), wave.plan(graph)
     parts = in_turn(
         {
             "  of which frames, kinematics and graph": wave.graph,
-            "  of which exact search": lambda: wave.plan(graph),
-            "  of which refinement": lambda: refine(made),
+            "  of which exact search": lambda: wave.plan(graph, refine=False),
+            "  search and refinement": lambda: wave.plan(graph),
         },
         runs,
     )
     vertices = len(graph.q)
-    peak = peak_megabytes(lambda: refine(wave.plan()))
-    note = f"cost {made.cost:.4f} on the grid, {refined.cost_after:.4f} refined, +{peak:.0f} MB"
+    peak = peak_megabytes(wave.plan)
+    note = f"cost {made.cost:.4f} on the grid, {refined.cost:.4f} refined, +{peak:.0f} MB"
     figures = [
         Figure(what=f"kerfpath, {name}", values=whole, note=note),
         *(Figure(what=part, values=taken) for part, taken in parts.items()),
