@@ -36,6 +36,8 @@ PACKAGES = (
     "eaik",
     "py-opw-kinematics",
     "tesseract-robotics",
+    "clarabel",
+    "toppra",
 )
 COLUMNS = ("figure", "median", "min", "max", "runs", "unit", "note")
 
