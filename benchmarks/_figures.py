@@ -41,6 +41,7 @@ PACKAGES = (
     "pymoo",
     "ompl",
     "clarabel",
+    "toppra",
 )
 COLUMNS = ("figure", "median", "min", "max", "runs", "unit", "note")
 

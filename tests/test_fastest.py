@@ -109,3 +109,13 @@ def test_off_the_grid_it_is_faster_and_the_motion_keeps_the_limits(circle, arm, 
     assert np.abs(made.acceleration_share).max() <= 1
     # What binds is used up: at that speed nothing is left of it.
     assert found.limit == "acceleration"
+
+
+def test_an_interval_found_past_the_ceiling_of_a_search_is_not_believed():
+    # The search leaves out edges beyond its ceiling: up to 8 % of these intervals was given away.
+    rng = np.random.default_rng(777)
+    for _ in range(1500):
+        q, start, o = instance(rng)
+        found = least_interval(q, start, **o)
+        with pytest.raises(NoFeasiblePath):
+            shortest_path(q, start, dt=found.dt * (1 - 1e-4), **o)

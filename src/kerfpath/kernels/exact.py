@@ -12,6 +12,7 @@ bound on the cost, only states with d + h inside it are ever kept.
 
 from __future__ import annotations
 
+from math import sqrt
 from typing import Any, NamedTuple, TypeVar
 
 import numpy as np
@@ -23,6 +24,7 @@ from kerfpath.kernels.limits import (
     acceleration_excess,
     acceleration_time,
     velocity_excess,
+    velocity_time,
 )
 from kerfpath.kernels.search import (
     Layers,
@@ -30,12 +32,16 @@ from kerfpath.kernels.search import (
     distance,
     fill_increment,
     joined,
+    late,
     runs,
 )
 
 __all__ = ["Reached", "count_closing", "recursion", "trace"]
 
 _T = TypeVar("_T", bound="np.generic[Any]")
+
+LEAPT = -2
+"""Parent of a state that a step beyond `aim.velocity` has led to, from anywhere."""
 
 
 class States(NamedTuple):
@@ -86,16 +92,16 @@ def _grown(old: NDArray[_T]) -> NDArray[_T]:
 @jit
 def _begin(layers: Layers, aim: Objective, h: Array, bound: float) -> tuple[States, float]:
     """States of layer 0, one per vertex, with no edge before them; and the least cost dropped."""
-    m, lowest, count = layers.start[1], np.inf, 0
+    m, lowest, count = layers.start[1] - layers.start[0], np.inf, 0
     vertex, first = np.empty(m, np.int64), np.zeros(m + 1, np.int64)
-    for j in range(m):
+    for j in range(layers.start[0], layers.start[1]):
         f = joined(aim.minimax, aim.vertex_cost[j], h[j])
         if f <= bound:
             vertex[count] = j
             count += 1
         else:
             lowest = min(lowest, f)
-        first[j + 1] = count
+        first[j - layers.start[0] + 1] = count
     vertex = vertex[:count]
     none = np.empty((count, len(layers.endless)))
     return States(vertex, aim.vertex_cost[vertex], none, np.full(count, -1), first), lowest
@@ -127,25 +133,71 @@ def _cheapest(
 
 @jit
 def _quickest(
-    states: States, a: int, b: int, aim: Objective, dq: Array, least: float, bound: float
-) -> tuple[int, float, float]:
-    """Find which of the states a..b, cheapest first, goes on by dq in the least node interval.
+    states: States, a: int, b: int, aim: Objective, step: float, paid: float, dq: Array,
+    rest: float, bound: float,
+) -> tuple[int, float, float]:  # fmt: skip
+    """Find which of the states a..b, cheapest first, goes on by dq at the least cost (timed).
 
-    `least` is the interval that the step and what is to come ask for. Returns the state, -1 if none
-    keeps the bound; the interval up to and with the step; and the least one over the bound.
+    `step` is the cost of the step on its own, with `paid` for lost time, `rest` that of what is to
+    come. Returns the state, -1 if none keeps the bound; the cost up to and with the step; and the
+    least one over the bound.
     """
     best, best_d, over = -1, np.inf, np.inf
     for s in range(a, b):
-        if states.d[s] >= best_d:
+        d = joined(aim.minimax, states.d[s], step)
+        if d >= best_d:
             break
-        d = states.d[s]
+        if joined(aim.minimax, d, rest) > bound:
+            over = min(over, joined(aim.minimax, d, rest))
+            break
+        time = 0.0
         if states.parent[s] >= 0:
-            d = max(d, acceleration_time(dq, states.dq[s], aim.acceleration))
-        if max(d, least) > bound:
-            over = min(over, max(d, least))
+            time = acceleration_time(dq, states.dq[s], aim.acceleration)
+        elif states.parent[s] == LEAPT:
+            time = _braking_time(dq, aim)
+        d = max(d, time) if aim.minimax else d + max(0.0, late(aim, time) - paid)
+        f = joined(aim.minimax, d, rest)
+        if f > bound:
+            over = min(over, f)
         elif d < best_d:
             best, best_d = s, d
     return best, best_d, over
+
+
+@jit
+def _braking_time(dq: Array, aim: Objective) -> float:
+    """Least time that the change between dq and any step beyond `aim.velocity` asks for."""
+    least = np.inf
+    for i in range(len(dq)):
+        least = min(least, max(0.0, aim.velocity[i] - abs(dq[i])) / aim.acceleration[i])
+    return sqrt(least)
+
+
+@jit
+def _with_leaps(
+    aim: Objective, h: Array, bound: float, before: States, states: States, a: int, b: int
+) -> tuple[States, float]:
+    """Add to the states of vertices a..b-1 those that steps beyond `aim.velocity` may lead to.
+
+    They cost no more than any such step from the states before, wherever from and to.
+    """
+    d, lowest, paid = np.inf, np.inf, late(aim, aim.stretch)
+    for s in range(len(before.vertex)):
+        time = _braking_time(before.dq[s], aim) if before.parent[s] >= 0 else 0.0
+        d = min(d, before.d[s] + aim.leap + max(0.0, late(aim, time) - paid))
+    f = d + aim.vertex_cost[a:b] + h[a:b]
+    leapt = a + np.flatnonzero(f <= bound)
+    m = len(leapt)
+    for v in range(b - a):
+        lowest = min(lowest, f[v]) if f[v] > bound else lowest
+    together = States(
+        np.concatenate((states.vertex, leapt)),
+        np.concatenate((states.d, d + aim.vertex_cost[leapt])),
+        np.concatenate((states.dq, np.zeros((m, states.dq.shape[1])))),
+        np.concatenate((states.parent, np.full(m, LEAPT))),
+        states.first,
+    )
+    return _sorted(together, a, b), lowest
 
 
 @jit
@@ -170,13 +222,20 @@ def _extend(
             step = joined(aim.minimax, distance(layers, aim, p, j), aim.vertex_cost[j])
             if step == np.inf:
                 continue
+            f = joined(aim.minimax, joined(aim.minimax, states.d[a], step), h[j])
+            if f > bound:
+                lowest = min(lowest, f)
+                continue
             fill_increment(layers, p, j, step_dq)
             if closes and acceleration_excess(seam, step_dq, aim.acceleration) >= 0:
                 continue
             if aim.timed:
-                least = max(step, h[j])
-                s, cost, dropped = _quickest(states, a, b, aim, step_dq, least, bound)
-                cost = max(cost, step)
+                paid = 0.0
+                if aim.penalty > 0:
+                    paid = late(aim, aim.stretch * velocity_time(step_dq, aim.velocity))
+                s, cost, dropped = _quickest(
+                    states, a, b, aim, step + paid, paid, step_dq, h[j], bound
+                )
             else:
                 s, dropped = _cheapest(states, a, b, aim, step, step_dq, h[j], bound)
                 cost = joined(aim.minimax, states.d[s], step) if s >= 0 else np.inf
@@ -238,17 +297,26 @@ def recursion(
             before = states
             states, dropped = _extend(layers, aim, h, bound, seam, k, states)
             lowest = min(lowest, dropped)
+            if aim.leap < np.inf:
+                first, end = layers.start[k + 1], layers.start[k + 2]
+                states, dropped = _with_leaps(aim, h, bound, before, states, first, end)
+                lowest = min(lowest, dropped)
     best = int(np.argmin(states.d))
     return Reached(K, states.d[best], lowest, best, offset, vertex, parent, states, recorded)
 
 
 @jit
 def trace(found: Reached, out_path: Ints) -> None:
-    """Read the best path (K,) back from a record, as vertices of the sorted graph."""
-    s = found.state
+    """Read the best path (K,) back from a record, as vertices of the sorted graph.
+
+    Before a leap the path is not known: -1.
+    """
+    s, out_path[:] = found.state, -1
     for k in range(len(out_path) - 1, -1, -1):
         i = found.offset[k] + s
         out_path[k], s = found.vertex[i], found.parent[i]
+        if s == LEAPT:
+            break
 
 
 @jit

@@ -11,3 +11,5 @@ from kerfpath.search._shortest import Method as Method
 from kerfpath.search._shortest import Metric as Metric
 from kerfpath.search._shortest import ObjectiveKind as ObjectiveKind
 from kerfpath.search._shortest import shortest_path as shortest_path
+from kerfpath.search._slowed import SlowedPath as SlowedPath
+from kerfpath.search._slowed import slowed_path as slowed_path
