@@ -173,3 +173,46 @@ def test_where_the_grid_has_no_path_one_is_found_off_it(circle, arm, tool, place
     assert audit(made) == []
     with pytest.raises(NoFeasiblePath, match="off the grid not refined: the "):
         plan(circle, arm, refine=True, **options | {"speed": 0.7, "eta_a": 0.3})
+
+
+@pytest.fixture(scope="module")
+def corner():
+    """Two straight lines that meet at a right angle, the axis turning there too: 81 nodes."""
+    along = np.linspace(0, 0.16, 81)
+    points = np.stack([np.minimum(along, 0.08), np.maximum(along - 0.08, 0), 0 * along], axis=1)
+    lean = 0.3 / (1 + np.exp((0.08 - along) / 0.004))
+    return Contour(points, np.c_[lean, 0 * along, -np.ones(81)], name="corner")
+
+
+@pytest.mark.parametrize("refine", [False, True])
+def test_the_feed_dips_where_the_limits_ask_for_it(corner, arm, tool, placement, refine):
+    options = {"tool": tool, "placement": placement, "gamma_step": STEP, "speed": 0.4}
+    with pytest.raises(NoFeasiblePath):
+        plan(corner, arm, refine=refine, **options)
+    made = plan(corner, arm, feed="dip", refine=refine, **options)
+    assert audit(made) == []
+    assert np.abs(made.velocity_share).max() <= 1 + 1e-9
+    assert np.abs(made.acceleration_share).max() <= 1 + 1e-6
+    tau, dt = np.diff(made.time), 0.002 / 0.4
+    assert (tau >= dt * (1 - 1e-9)).all()
+    at_speed = tau <= dt * (1 + 1e-9)
+    assert made.feed.full == pytest.approx(at_speed.mean(), abs=1e-9)
+    assert 0.2 < made.feed.full < 1
+    assert made.feed.slowest == pytest.approx((dt / tau).min())
+    assert abs(made.feed.node - 40) < 10  # at the corner
+    assert f"joint {made.feed.joint + 1} binds" in str(made.feed)
+
+
+def test_off_the_grid_the_feed_dips_less(corner, arm, tool, placement):
+    options = {"tool": tool, "placement": placement, "gamma_step": STEP, "speed": 0.4}
+    grid, off = (plan(corner, arm, feed="dip", refine=r, **options) for r in (False, True))
+    assert off.time[-1] < grid.time[-1]
+
+
+def test_a_feed_that_need_not_dip_is_constant(circle, arm, tool, placement, made):
+    same = plan(circle, arm, tool=tool, placement=placement, speed=0.1, gamma_step=STEP, feed="dip")
+    np.testing.assert_array_equal(same.q, made.q)
+    assert same.feed is None
+    for wrong in ({"feed": "dips"}, {"feed": "dip", "objective": "max"}):
+        with pytest.raises(InputError, match="feed: "):
+            plan(circle, arm, tool=tool, placement=placement, speed=0.1, **wrong)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 
@@ -15,7 +15,7 @@ from kerfpath.kernels import metric
 from kerfpath.robots import Robot
 from kerfpath.search import METRIC_CODES, Closure, Method, Metric, ObjectiveKind
 
-__all__ = ["Criteria", "Plan", "Proof", "Settings", "path_cost"]
+__all__ = ["Criteria", "Feed", "Plan", "Proof", "Settings", "path_cost"]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -65,6 +65,40 @@ class Proof:
     optimal: bool
     statement: str
     grid_cost: float | None = None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Feed:
+    """Where a retimed path keeps the commanded speed, where it is slowest, and what binds there.
+
+    Parameters
+    ----------
+    full : float
+        Share of the path length at the commanded speed.
+    slowest : float
+        Speed of the slowest interval as a share of the commanded speed; 1 where none is slowed.
+    node : int
+        The node that the slowest interval starts from; -1 where none is slowed.
+    joint : int
+        The joint nearest to its limit in that interval or at its ends, 0-based; -1 for none.
+    limit : {"velocity", "acceleration"} or None
+        Which limit that is.
+    """
+
+    full: float
+    slowest: float
+    node: int
+    joint: int
+    limit: Literal["velocity", "acceleration"] | None
+
+    def __str__(self) -> str:
+        """Say it in one line."""
+        if self.limit is None:
+            return "full speed throughout"
+        return (
+            f"full speed on {self.full:.1%} of the length; slowest, {self.slowest:.1%} of it, from "
+            f"node {self.node} on, where the {self.limit} of joint {self.joint + 1} binds"
+        )
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -122,6 +156,8 @@ class Plan:
     cost : float
         Objective (14) or (15).
     proof : Proof
+    feed : Feed or None
+        Where the speed dips; None at constant speed.
     counts : mapping of str to int
         Candidates (node, gamma, posture) of the layered graph by what became of them.
     """
@@ -139,6 +175,7 @@ class Plan:
     cost: float
     proof: Proof
     counts: Mapping[str, int]
+    feed: Feed | None = None
 
     def __post_init__(self) -> None:
         K = len(self.contour)

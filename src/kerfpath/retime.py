@@ -13,8 +13,7 @@ slower (the convex-concave procedure).
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import Literal, NamedTuple
+from typing import NamedTuple
 
 import clarabel
 import numpy as np
@@ -23,8 +22,9 @@ from scipy import sparse
 
 from kerfpath._arrays import Array, Ints, floats, freeze, positive
 from kerfpath.errors import InputError
+from kerfpath.plans import Feed
 
-__all__ = ["Feed", "feed", "retime"]
+__all__ = ["feed", "retime"]
 
 SLACK = 1e-9
 """Relative slack on the limits that the result keeps: rounding."""
@@ -36,34 +36,6 @@ GAIN = 1e-5
 """Relative gain in total time below which the procedure has arrived."""
 ITERATIONS = 50
 """At most: each about halves how much too slow the start is, and the last ones are few."""
-
-
-@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class Feed:
-    """Where a retimed path keeps the commanded speed, where it is slowest, and what binds there.
-
-    Parameters
-    ----------
-    tau : (K-1,) s
-        Time of each interval.
-    full : float
-        Share of the path length at the commanded speed.
-    slowest : float
-        Speed of the slowest interval as a share of the commanded speed; 1 where none is slowed.
-    node : int
-        The node that the slowest interval starts from; -1 where none is slowed.
-    joint : int
-        The joint nearest to its limit in that interval or at its ends, 0-based; -1 for none.
-    limit : {"velocity", "acceleration"} or None
-        Which limit that is.
-    """
-
-    tau: Array
-    full: float
-    slowest: float
-    node: int
-    joint: int
-    limit: Literal["velocity", "acceleration"] | None
 
 
 class _Rows(NamedTuple):
@@ -162,7 +134,7 @@ def feed(
     at_speed = tau <= dt * (1 + SLACK)
     full = float(length[at_speed].sum() / length.sum()) if length.any() else float(at_speed.mean())
     if at_speed.all():
-        return Feed(tau=tau, full=full, slowest=1.0, node=-1, joint=-1, limit=None)
+        return Feed(full=full, slowest=1.0, node=-1, joint=-1, limit=None)
     k = int(np.argmin(dt / tau))
     speed = np.abs(dq[k] / tau[k]) / velocity
     change = np.zeros_like(speed)
@@ -172,7 +144,6 @@ def feed(
             change = np.maximum(change, np.abs(rate) * 2 / (tau[before] + tau[after]))
     fast = speed.max() >= change.max()
     return Feed(
-        tau=tau,
         full=full,
         slowest=float(dt[k] / tau[k]),
         node=k,

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import sys
+from dataclasses import asdict
 from importlib.resources import as_file, files
 from pathlib import Path
 from typing import Annotated, Any
@@ -118,6 +119,8 @@ def _plan(job_file: Path, folder: Path, as_json: bool) -> None:
         for cut in outcome.cuts:
             if cut.broken is not None:
                 out.print(f"[bold]{escape(cut.task.name)}[/]: {escape(cut.failure)}")
+            if cut.plan is not None and cut.plan.feed is not None:
+                out.print(f"[bold]{escape(cut.task.name)}[/]: {cut.plan.feed}")
             for check in cut.checks:
                 if not check.ok:
                     out.print(f"[bold]{escape(cut.task.name)}[/]: {escape(str(check.issue()))}")
@@ -151,6 +154,7 @@ def _cut_entry(cut: Any) -> dict[str, Any]:
         "cost": cut.plan.cost,
         "grid_cost": cut.plan.proof.grid_cost,
         "optimal": cut.plan.proof.optimal,
+        "feed": None if cut.plan.feed is None else asdict(cut.plan.feed),
         "peak_velocity_share": float(criteria.peak_velocity.max()),
         "peak_acceleration_share": float(criteria.peak_acceleration.max()),
         "issues": [str(c.issue()) for c in cut.checks if not c.ok],
@@ -277,8 +281,6 @@ def audit(
         check.ok or check.level == "warning" for checks in tables.values() for check in checks
     )
     if as_json:
-        from dataclasses import asdict
-
         print_json(
             {
                 "passed": passed,

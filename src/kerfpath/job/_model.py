@@ -36,6 +36,7 @@ from kerfpath.job._keys import (
     key,
     one_of,
 )
+from kerfpath.planner import FeedKind
 from kerfpath.robots import Robot, acceleration_ratios, robot, robot_ids
 from kerfpath.search import Closure, Method, Metric, ObjectiveKind
 
@@ -274,6 +275,7 @@ class PlanTable(_Table):
     closure: Closure = "free"
     frames: FrameKind = "rotation-minimising"
     posture: Posture | None = None
+    feed: FeedKind = "constant"
     refine: bool | None = None
     refine_parts: Annotated[
         int, key("a whole number of parts from 1 to 100", "4", ge=1, le=100)

@@ -16,7 +16,7 @@ from kerfpath.auditor import Check
 from kerfpath.contour import Contour
 from kerfpath.errors import InputError, NoFeasiblePath
 from kerfpath.planner import FastestSpeed
-from kerfpath.plans import Plan, Proof, Settings
+from kerfpath.plans import Feed, Plan, Proof, Settings
 from kerfpath.robots import Coupling, Robot
 
 __all__ = ["SCHEMA", "PlanFile", "broken_entry", "plan_entry", "plan_text", "read_plan_file"]
@@ -113,6 +113,7 @@ def plan_entry(plan: Plan, checks: Sequence[Check]) -> dict[str, Any]:
             "peak_velocity_share": criteria.peak_velocity.tolist(),
             "peak_acceleration_share": criteria.peak_acceleration.tolist(),
         },
+        "feed": None if plan.feed is None else asdict(plan.feed),
         "counts": dict(plan.counts),
         "audit": {
             "passed": all(c.ok or c.level == "warning" for c in checks),
@@ -273,4 +274,5 @@ def _read_plan(entry: dict[str, Any], robot: Robot, tool: Any, placement: Any) -
             grid_cost=entry["grid_cost"],
         ),
         counts=dict(entry["counts"]),
+        feed=None if entry["feed"] is None else Feed(**entry["feed"]),
     )

@@ -259,6 +259,7 @@ def _plan_options(table: PlanTable) -> dict[str, Any]:
         "eta_v": table.eta_velocity,
         "eta_a": table.eta_acceleration,
         "closure": table.closure,
+        "feed": table.feed,
         "refine": table.method == "exact" if table.refine is None else table.refine,
     }
 

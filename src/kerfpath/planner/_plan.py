@@ -3,20 +3,24 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from typing import Literal, get_args
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from kerfpath.contour import Contour, FrameKind
-from kerfpath.errors import NoFeasiblePath
+from kerfpath.errors import InputError, NoFeasiblePath
 from kerfpath.graph import LayeredGraph
+from kerfpath.planner._dip import slowed
 from kerfpath.planner._refined import off_grid, refined
 from kerfpath.planner._task import task_of
 from kerfpath.plans import Plan, Proof
 from kerfpath.robots import Robot
 from kerfpath.search import Closure, Method, Metric, ObjectiveKind, shortest_path
 
-__all__ = ["plan"]
+__all__ = ["FeedKind", "plan"]
+
+FeedKind = Literal["constant", "dip"]
 
 
 def plan(
@@ -36,11 +40,12 @@ def plan(
     eta_v: float = 1.0,
     eta_a: float = 1.0,
     closure: Closure = "free",
+    feed: FeedKind = "constant",
     refine: bool = False,
     graph: LayeredGraph | None = None,
     progress: Callable[[int], None] | None = None,
 ) -> Plan:
-    """Return the best joint motion along the contour at constant speed.
+    """Return the best joint motion along the contour.
 
     Parameters
     ----------
@@ -62,6 +67,10 @@ def plan(
         The postures that may be used; default all. See `kerfpath.robots.postures_named`.
     method, objective, metric, weights, eta_v, eta_a, closure
         As in `shortest_path`; "periodic" closure needs a closed contour.
+    feed : {"constant", "dip"}
+        Where the limits do not let the speed be held: "constant" refuses, "dip" holds it wherever
+        they do and slows down elsewhere, in the least time; `Plan.feed` says where. Needs
+        objective "sum" and closure "free".
     refine : bool
         Move gamma off its grid afterwards, see `kerfpath.refine`. Where the grid has no path (it
         quantises acceleration), one is looked for off it.
@@ -77,6 +86,13 @@ def plan(
     InputError
         Limits that are not known, nodes unevenly spaced, values out of range.
     """
+    if feed not in get_args(FeedKind):
+        raise InputError(f"feed: expected one of {', '.join(get_args(FeedKind))}, got {feed!r}")
+    if feed == "dip" and (objective != "sum" or closure != "free"):
+        raise InputError(
+            'feed: "dip" needs objective "sum" and closure "free", got '
+            f'objective "{objective}" and closure "{closure}"'
+        )
     task = task_of(
         contour,
         robot,
@@ -101,6 +117,8 @@ def plan(
             **task.limits, **task.aim, posture=task.graph.posture, method=method, closure=closure
         )
     except NoFeasiblePath as broken:
+        if feed == "dip":
+            return slowed(task, refine=refine)
         found = off_grid(task) if refine and closure == "free" else None
         if found is not None and found.done:
             return found.plan

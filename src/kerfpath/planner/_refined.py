@@ -12,7 +12,7 @@ from kerfpath.plans import Plan, Proof, path_cost
 from kerfpath.refiner import Refinement
 from kerfpath.search import least_interval, shortest_path
 
-__all__ = ["off_grid", "refined"]
+__all__ = ["first_order", "off_grid", "refined"]
 
 FREE = 1e6
 """Multiple of the acceleration limits that never binds."""
@@ -27,7 +27,7 @@ def refined(task: Task, made: Plan) -> Plan:
     path under (6) may lie far from the best motion, and its best path without (6) close by: both
     are begun from.
     """
-    first = _first_order(task)
+    first = first_order(task)
     found = [refiner.refine(start) for start in (made, first) if start is not None]
     done = [f for f in found if f.done and f.cost_after <= made.cost]
     if not done:
@@ -49,7 +49,7 @@ def off_grid(task: Task) -> Refinement | None:
     Of a path that breaks (6) because gamma can only step, the motion close by may not. Begun from
     the best path without (6), and from the one that asks for the least time.
     """
-    first = _first_order(task)
+    first = first_order(task)
     found = None if first is None else refiner.refine(first)
     if found is not None and found.done:
         return found
@@ -63,7 +63,7 @@ def off_grid(task: Task) -> Refinement | None:
     return refiner.refine(task.plan(least.index, cost, claim))
 
 
-def _first_order(task: Task) -> Plan | None:
+def first_order(task: Task) -> Plan | None:
     """Return the best path without (6); None where (5) alone closes the way."""
     limits = task.limits | {"acceleration": FREE * task.limits["acceleration"]}
     try:

@@ -11,7 +11,7 @@ from kerfpath._arrays import Array
 from kerfpath.kernels.turns import JointLimits
 from kerfpath.plans import path_cost
 from kerfpath.refiner._curves import JointCurves
-from kerfpath.refiner._program import MARGIN, Aim, Model, solve
+from kerfpath.refiner._program import MARGIN, PRICE, Aim, Model, solve
 from kerfpath.refiner._rates import Rates
 from kerfpath.search import Metric, ObjectiveKind
 
@@ -43,6 +43,8 @@ class Stand:
     cost : float
     excess : float
         Largest share of a limit in time, or of the cap, less one.
+    lost : float
+        What all intervals and nodes ask for beyond the limits in time, in shares of them.
     outside : float rad
         By how much a joint or a coupling is out of its range; negative inside.
     """
@@ -51,6 +53,7 @@ class Stand:
     q: Array
     cost: float
     excess: float
+    lost: float
     outside: float
 
     @property
@@ -60,7 +63,10 @@ class Stand:
 
     def value(self, aim: Aim) -> float:
         """Return what is brought down: the excess, or the cost."""
-        return self.excess + AWAY * max(self.outside, 0) if aim == "excess" else self.cost
+        away = AWAY * max(self.outside, 0)
+        if aim == "excess":
+            return self.excess + away
+        return self.cost + PRICE * self.lost + away if aim == "lost" else self.cost
 
 
 class _Step(NamedTuple):
@@ -103,13 +109,19 @@ class Descent:
         """Return where `gamma` brings the joints; infinite where it is out of reach."""
         q = self.curves.at(gamma, near)
         if not np.isfinite(q).all():
-            return Stand(gamma=gamma, q=q, cost=np.inf, excess=np.inf, outside=np.inf)
+            return Stand(gamma=gamma, q=q, cost=np.inf, excess=np.inf, lost=np.inf, outside=np.inf)
         excess = self.rates.excess(np.diff(q, axis=0))
         if self.cap < np.inf:
             longest = path_cost(np.diff(q, axis=0), self.weight, self.metric, "max")
             excess = max(excess, longest / self.cap - 1)
-        cost = self.cost(q)
-        return Stand(gamma=gamma, q=q, cost=cost, excess=excess, outside=self._outside(q))
+        return Stand(
+            gamma=gamma,
+            q=q,
+            cost=self.cost(q),
+            excess=excess,
+            lost=self.rates.lost(np.diff(q, axis=0)),
+            outside=self._outside(q),
+        )
 
     def cost(self, q: Array) -> float:
         """Return the objective (14) or (15) of joints (K, 6), not wrapped."""
@@ -125,6 +137,10 @@ class Descent:
     def gentlest(self, at: Stand) -> Stand:
         """Return the motion whose largest share of a limit is least."""
         return self._run(at, "excess")[0]
+
+    def eased(self, at: Stand) -> Stand:
+        """Return a motion of little cost that asks for little beyond the limits, here and there."""
+        return self._run(at, "lost")[0]
 
     def best(self, at: Stand) -> tuple[Stand, int]:
         """Return the best motion found from an admissible one, and how many programs it took.
@@ -166,7 +182,8 @@ class Descent:
                 promised = at.value(aim) - self._modelled(model, delta, aim)
             longest = float(np.abs(delta).max())
             there = self.stand(at.gamma + delta, at.q)
-            if there.admitted or (aim == "excess" and there.outside <= max(at.outside, 0)):
+            soft = aim in ("excess", "lost")
+            if there.admitted or (soft and there.outside <= max(at.outside, 0)):
                 return _Step(there, promised, longest, programs)
             if there.outside == np.inf:
                 break
@@ -176,7 +193,10 @@ class Descent:
 
     def _modelled(self, model: Model, delta: Array, aim: Aim) -> float:
         q = model.q + model.slope * delta[:, None]
-        return self.rates.excess(np.diff(q, axis=0)) if aim == "excess" else self.cost(q)
+        dq = np.diff(q, axis=0)
+        if aim == "excess":
+            return self.rates.excess(dq)
+        return self.cost(q) + (PRICE * self.rates.lost(dq) if aim == "lost" else 0.0)
 
     def _model(self, at: Stand, radius: float) -> Model:
         slope = self.curves.slope(at.gamma, at.q)

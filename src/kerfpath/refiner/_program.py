@@ -19,10 +19,14 @@ from kerfpath.refiner._rates import Rates
 from kerfpath.refiner._rows import Rows, Sparse, wide
 from kerfpath.search import Metric
 
-__all__ = ["MARGIN", "Aim", "Model", "solve"]
+__all__ = ["MARGIN", "PRICE", "Aim", "Model", "solve"]
 
-Aim = Literal["sum", "max", "excess"]
-"""(14), (15), or the largest share of the limits (5) and (6), whatever the distances."""
+Aim = Literal["sum", "max", "excess", "lost"]
+"""(14); (15); the largest share of the limits (5) and (6), whatever the distances; or (14) and, at
+`PRICE` each, what every interval and every node asks for beyond them."""
+
+PRICE = 100.0
+"""Price of once a limit beyond the limits, against distances that rarely come to 1 an interval."""
 
 MARGIN = 1e-8
 """Share of a limit, or rad, that is kept free against rounding."""
@@ -66,13 +70,18 @@ def solve(model: Model, rates: Rates, aim: Aim) -> Array | None:
     K = len(model.q)
     rows = Rows(K)
     dq, D = np.diff(model.q, axis=0), _increments(model)
-    excess = rows.new(1) if aim == "excess" else None
-    _limits(rows, dq, D, rates, excess)
+    beyond = None
+    if aim in ("excess", "lost"):
+        beyond = rows.new(1 if aim == "excess" else len(rates.tau) + len(rates.span))
+    _limits(rows, dq, D, rates, beyond)
     _ranges(rows, model)
     for sign in (1.0, -1.0):
         rows.hold(sign * sparse.eye_array(K, format="csr"), np.ones(K))
-    minimax = aim == "max"
-    cost = _cost(rows, dq, D, model, minimax) if excess is None else excess.sum(axis=0)
+    cost = np.zeros(K) if aim == "excess" else _cost(rows, dq, D, model, minimax=aim == "max")
+    if beyond is not None:
+        price = (1.0 if aim == "excess" else PRICE) * beyond.sum(axis=0)
+        cost = np.pad(cost, (0, rows.variables - len(cost)))
+        cost[: len(price)] += price
     equal = None
     if rates.periodic:
         ends = [0, K - 1]
@@ -104,24 +113,32 @@ def _increments(model: Model) -> Sparse:
     return _matrix(values, np.tile(row, 2), column, (len(row), K))
 
 
-def _limits(rows: Rows, dq: Array, D: Sparse, rates: Rates, excess: Sparse | None) -> None:
-    """Hold (5) and (6); where `excess` is a variable, up to that share above them."""
-    n = dq.shape[1]
+def _limits(rows: Rows, dq: Array, D: Sparse, rates: Rates, beyond: Sparse | None) -> None:
+    """Hold (5) and (6), up to a share beyond them where that is unknown.
+
+    One unknown for all, or one for each interval and then each node, none of these negative.
+    """
+    edges, n = dq.shape
+    owner = np.zeros(edges + len(rates.span), np.int64)
+    if beyond is not None and beyond.shape[0] > 1:
+        owner = np.arange(len(owner))
+        rows.hold(-beyond, np.zeros(len(owner)))
     V = _scaled(np.repeat(1 / rates.tau, n), D)
     joints = np.arange(n)
     before, after = ((joints + n * at[:, None]).ravel() for at in (rates.before, rates.after))
     A = _scaled(np.repeat(1 / rates.span, n), V[after] - V[before])
-    for value, slope, limit in (
-        (rates.velocities(dq), V, rates.velocity),
-        (rates.accelerations(dq), A, rates.acceleration),
+    for value, slope, limit, of in (
+        (rates.velocities(dq), V, rates.velocity, owner[:edges]),
+        (rates.accelerations(dq), A, rates.acceleration, owner[edges:]),
     ):
         share = (value / limit).ravel()
         per_share = _scaled(1 / np.tile(limit, len(value)), slope)
         for sign in (1.0, -1.0):
-            if excess is None:
+            if beyond is None:
                 rows.at_most(sign * share, sign * per_share, 1 - MARGIN)
             else:
-                rows.hold(_less(sign * per_share, excess), 1 - sign * share)
+                spread = beyond[np.repeat(of, n)]
+                rows.hold(wide(sign * per_share, rows.variables) - spread, 1 - sign * share)
 
 
 def _ranges(rows: Rows, model: Model) -> None:

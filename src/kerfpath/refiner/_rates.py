@@ -64,3 +64,7 @@ class Rates:
         """Return the largest share of a limit that increments (K-1, n) rad ask for, less one."""
         fast, sharp = self.shares(dq)
         return float(max(fast.max(), sharp.max(initial=0.0))) - 1
+
+    def lost(self, dq: Array) -> float:
+        """Return what all intervals and nodes ask for beyond the limits, in shares of them."""
+        return float(sum(np.maximum(s.max(axis=1) - 1, 0).sum() for s in self.shares(dq) if len(s)))

@@ -16,7 +16,7 @@ from kerfpath.refiner._curves import JointCurves
 from kerfpath.refiner._descent import Descent, Stand
 from kerfpath.refiner._rates import Rates
 
-__all__ = ["Binding", "Refinement", "quicken", "refine"]
+__all__ = ["Binding", "Refinement", "ease", "quicken", "refine"]
 
 MOST_INTERVALS = 10
 """Times that the interval is shortened; each gets nearer to the least by its square."""
@@ -122,6 +122,15 @@ def refine(
         programs=programs,
         statement=proof.statement,
     )
+
+
+def ease(plan: Plan) -> Plan:
+    """Return the plan with gamma moved so that little is asked for beyond the limits.
+
+    What every interval and every node asks for beyond them has a price; the rest is the cost.
+    """
+    descent, start = _descent(plan)
+    return _moved(plan, descent.eased(start))
 
 
 def quicken(plan: Plan) -> tuple[Plan, Binding]:
