@@ -5,12 +5,19 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike
 
-from kerfpath._arrays import Array, Bools, Ints, integers
+from kerfpath._arrays import Array, Bools, Ints, freeze, integers
 from kerfpath.errors import InputError, NoFeasiblePath
 from kerfpath.kernels import search as kernel
 from kerfpath.kernels.limits import LIMIT_TOLERANCE
 
-__all__ = ["backwards", "empty_layer", "narrowest_key", "offsets", "sorted_layers"]
+__all__ = [
+    "backwards",
+    "broken_edge",
+    "empty_layer",
+    "narrowest_key",
+    "offsets",
+    "sorted_layers",
+]
 
 _LAYERS_SAMPLED = 32
 """Layers looked at to choose the joint that sorts them: enough to rank the joints."""
@@ -56,13 +63,31 @@ def empty_layer(k: int) -> NoFeasiblePath:
     )
 
 
+def broken_edge(k: int, forbidden: Ints, *, proved: bool) -> NoFeasiblePath:
+    """Say that no admissible edge leads into layer k, and which limits forbid how many."""
+    counts = {
+        f"{test}, joint {i + 1}": int(number)
+        for test, row in zip(("velocity", "acceleration"), forbidden, strict=True)
+        for i, number in enumerate(row)
+        if number
+    }
+    told = ", ".join(f"{name}: {number}" for name, number in counts.items())
+    total = int(sum(counts.values()))
+    return NoFeasiblePath(
+        f"no admissible edge from node {k - 1} to node {k}; of {total} edges, forbidden by {told}",
+        proved=proved,
+        node=k - 1,
+        counts=counts,
+    )
+
+
 def backwards(q: Array, start: Ints) -> tuple[Array, Ints]:
     """Return the same graph with its layers in reverse order: q (N, n), start (K+1,)."""
     sizes = np.diff(start)[::-1]
     begin = np.concatenate([[0], np.cumsum(sizes)])
     # Vertex i of reversed layer k comes from where that layer stood.
     order = np.arange(len(q)) + np.repeat(start[:-1][::-1] - begin[:-1], sizes)
-    return q[order], begin
+    return freeze(q[order]), freeze(begin)
 
 
 def narrowest_key(q: Array, start: Ints, bound: Array, endless: Bools) -> tuple[Array, float, bool]:

@@ -8,25 +8,24 @@ from typing import Literal, get_args
 import numpy as np
 from numpy.typing import ArrayLike
 
-from kerfpath._arrays import Array, Bools, Ints, bools, floats, freeze, integers, positive, scalar
+from kerfpath._arrays import Array, Bools, Ints, freeze, integers
 from kerfpath.errors import InputError, NoFeasiblePath
-from kerfpath.kernels import metric as metrics
 from kerfpath.kernels import search as kernel
 from kerfpath.search._exact import Best, best_closed_path, best_path, dead_end
-from kerfpath.search._layers import backwards, empty_layer, narrowest_key, offsets, sorted_layers
+from kerfpath.search._layers import (
+    backwards,
+    broken_edge,
+    empty_layer,
+    narrowest_key,
+    sorted_layers,
+)
+from kerfpath.search._problem import Metric, ObjectiveKind, checked, one_of
 
-__all__ = ["Closure", "LayeredPath", "Method", "Metric", "ObjectiveKind", "shortest_path"]
+__all__ = ["Closure", "LayeredPath", "Method", "shortest_path"]
 
-Metric = Literal["manhattan", "chebychev", "euclid"]
-ObjectiveKind = Literal["sum", "max"]
 Method = Literal["exact", "paper", "known"]
 Closure = Literal["free", "periodic"]
 
-_METRIC_CODES: dict[str, int] = {
-    "euclid": metrics.EUCLID,
-    "manhattan": metrics.MANHATTAN,
-    "chebychev": metrics.CHEBYCHEV,
-}
 SAME_END = 1e-6
 """Joint difference (rad) up to which the ends of a closed contour count as the same vertex."""
 
@@ -111,26 +110,21 @@ def shortest_path(
         Arrays that do not fit each other, NaN, limits or dt that are not positive, unknown names,
         a periodic closure whose end layers differ.
     """
-    q = floats(q, "q", (None, None), copy=False)
-    start = offsets(start, len(q))
-    n = q.shape[1]
-    if n == 0:
-        raise InputError("q: expected at least one joint, got shape " + str(q.shape))
-    dt = scalar(dt, "dt", unit="s", above=0.0)
-    velocity = positive(velocity, "velocity", (n,))
-    acceleration = positive(acceleration, "acceleration", (n,))
-    endless = bools(np.zeros(n, bool) if endless is None else endless, "endless", (n,))
-    _one_of("metric", metric, tuple(_METRIC_CODES))
-    _one_of("objective", objective, get_args(ObjectiveKind))
-    _one_of("method", method, get_args(Method))
-    _one_of("closure", closure, get_args(Closure))
-    bound_v = scalar(eta_v, "eta_v", above=0.0) * velocity * dt
-    bound_a = scalar(eta_a, "eta_a", above=0.0) * acceleration * dt**2
-    weight = 1.0 / (velocity * dt) if weights is None else floats(weights, "weights", (n,))
-    if (weight < 0).any():
-        raise InputError(f"weights: must not be negative, got {weight.tolist()}")
-    cost = (
-        np.zeros(len(q)) if vertex_cost is None else floats(vertex_cost, "vertex_cost", (len(q),))
+    one_of("method", method, get_args(Method))
+    one_of("closure", closure, get_args(Closure))
+    q, start, endless, aim = checked(
+        q,
+        start,
+        dt=dt,
+        velocity=velocity,
+        acceleration=acceleration,
+        endless=endless,
+        vertex_cost=vertex_cost,
+        weights=weights,
+        metric=metric,
+        objective=objective,
+        eta_v=eta_v,
+        eta_a=eta_a,
     )
     if posture is not None:
         posture = integers(posture, "posture", (len(q),))
@@ -138,22 +132,14 @@ def shortest_path(
         raise InputError(f'closure: "periodic" needs method="exact", got method={method!r}')
 
     if method == "known":
-        bound_v = bound_a = np.full(n, np.inf)
+        free = np.full(q.shape[1], np.inf)
+        aim = aim._replace(velocity=free, acceleration=free)
         key = np.zeros(len(q)) if posture is None else posture.astype(float)
         window, circular = 0.5, False
     else:
-        key, window, circular = narrowest_key(q, start, bound_v, endless)
+        key, window, circular = narrowest_key(q, start, aim.velocity, endless)
     layers, order = sorted_layers(q, start, key, window, circular, endless)
-    aim = kernel.Objective(
-        weight=np.ascontiguousarray(weight),
-        metric=_METRIC_CODES[metric],
-        minimax=objective == "max",
-        vertex_cost=cost[order],
-        velocity=bound_v,
-        acceleration=bound_a,
-        cap=np.inf,
-        timed=False,
-    )
+    aim = aim._replace(vertex_cost=aim.vertex_cost[order])
     filled = int(np.argmin(np.diff(start))) if (np.diff(start) == 0).any() else len(start) - 1
     if filled == 0:
         raise empty_layer(0)
@@ -189,7 +175,7 @@ def _exactly(
             proved=True,
             node=len(layers.start) - 2,
         )
-    raise _broken_edge(found.layers, found.counts, proved=True)
+    raise broken_edge(found.layers, found.counts, proved=True)
 
 
 def _first_from_the_back(q: Array, start: Ints, aim: kernel.Objective, endless: Bools) -> int:
@@ -220,7 +206,7 @@ def _search(
     reached, turned_away = kernel.path_planning(to_search, aim, dist, before)
     if reached < filled:
         counts = kernel.closing_counts(layers, aim, dist, before, reached)
-        raise _broken_edge(reached, counts, proved=not turned_away)
+        raise broken_edge(reached, counts, proved=not turned_away)
     if filled < len(sizes):
         raise empty_layer(filled)
     a, b = start[-2], start[-1]
@@ -232,24 +218,6 @@ def _search(
         path[k] = layers.rank[j]
         j = int(before[j])
     return LayeredPath(index=freeze(path), cost=cost, optimal=may_prove and not turned_away)
-
-
-def _broken_edge(k: int, forbidden: Ints, *, proved: bool) -> NoFeasiblePath:
-    """Say that no admissible edge leads into layer k, and which limits forbid how many."""
-    counts = {
-        f"{test}, joint {i + 1}": int(number)
-        for test, row in zip(("velocity", "acceleration"), forbidden, strict=True)
-        for i, number in enumerate(row)
-        if number
-    }
-    told = ", ".join(f"{name}: {number}" for name, number in counts.items())
-    total = int(sum(counts.values()))
-    return NoFeasiblePath(
-        f"no admissible edge from node {k - 1} to node {k}; of {total} edges, forbidden by {told}",
-        proved=proved,
-        node=k - 1,
-        counts=counts,
-    )
 
 
 def _require_same_ends(layers: kernel.Layers) -> None:
@@ -270,8 +238,3 @@ def _require_same_ends(layers: kernel.Layers) -> None:
             "closure: periodic needs a last layer that repeats the first, but their vertices "
             f"{i} differ by {gap[:, i].max():.3g} rad"
         )
-
-
-def _one_of(name: str, value: str, known: tuple[str, ...]) -> None:
-    if value not in known:
-        raise InputError(f"{name}: expected one of {', '.join(known)}, got {value!r}")
