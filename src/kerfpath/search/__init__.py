@@ -2,6 +2,9 @@
 
 from kerfpath.search._fastest import LeastInterval as LeastInterval
 from kerfpath.search._fastest import least_interval as least_interval
+from kerfpath.search._interrupted import InterruptedPath as InterruptedPath
+from kerfpath.search._interrupted import Piece as Piece
+from kerfpath.search._interrupted import interrupted_path as interrupted_path
 from kerfpath.search._problem import Metric as Metric
 from kerfpath.search._problem import ObjectiveKind as ObjectiveKind
 from kerfpath.search._relax import Relaxations as Relaxations

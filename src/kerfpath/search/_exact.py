@@ -14,7 +14,15 @@ from kerfpath.kernels.limits import acceleration_excess
 from kerfpath.kernels.metric import increments
 from kerfpath.kernels.search import Layers, Objective, path_planning
 
-__all__ = ["Best", "Dead", "best_closed_path", "best_path", "dead_end", "quickest_path"]
+__all__ = [
+    "Best",
+    "Dead",
+    "best_closed_path",
+    "best_path",
+    "dead_end",
+    "layers_reached",
+    "quickest_path",
+]
 
 ROUNDING = 1e-12
 """Relative slack on a bound, so that rounding never drops the path that the bound came from."""
@@ -166,7 +174,7 @@ def _grow(
     bound, greedy = max(least, floor) * (1 + ROUNDING), None
     while True:
         reached = exact.recursion(layers, aim, h, bound, seam, ROOM)
-        if reached.state >= 0:
+        if reached.best[-1] >= 0:
             break
         if reached.lowest == np.inf or reached.lowest > ceiling:
             return None
@@ -180,7 +188,7 @@ def _grow(
         bound = reached.cost * (1 + ROUNDING)
         reached = exact.recursion(layers, aim, h, bound, seam, UNLIMITED)
     path = np.empty(len(layers.start) - 1, np.int64)
-    exact.trace(reached, path)
+    exact.trace(layers, reached, path)
     return path, float(reached.cost)
 
 
@@ -194,14 +202,24 @@ def _greedy_cost(layers: Layers, aim: Objective, allowed: Bools, seam: Array) ->
 
 
 def dead_end(layers: Layers, aim: Objective) -> Dead:
-    """Go as far as any admissible path goes, whatever it costs."""
-    free = np.zeros(len(layers.low))
-    reached = exact.recursion(layers, aim, free, np.inf, NO_SEAM, 0)
+    """Go as far as any admissible path goes, and count what forbids to go on."""
+    reached = _as_far_as_any(layers, aim)
     K, n = len(layers.start) - 1, len(layers.endless)
     if reached.layers in (0, K):
         return Dead(layers=reached.layers, counts=np.zeros((2, n), np.int64))
     counts = exact.count_closing(layers, aim, reached.last, reached.layers)
     return Dead(layers=reached.layers, counts=counts)
+
+
+def layers_reached(layers: Layers, aim: Objective) -> int:
+    """Return the number of layers that some admissible path reaches."""
+    return int(_as_far_as_any(layers, aim).layers)
+
+
+def _as_far_as_any(layers: Layers, aim: Objective) -> exact.Reached:
+    """Go as far as any admissible path goes, whatever it costs."""
+    free = np.zeros(len(layers.low))
+    return exact.recursion(layers, aim, free, np.inf, NO_SEAM, 0)
 
 
 def _twins(layers: Layers) -> Ints:

@@ -50,6 +50,7 @@ def sorted_layers(
         high=high,
         endless=endless,
         turn=np.where(endless, 2 * np.pi, np.inf),
+        after=np.full(len(start) - 1, -1),
     )
     return layers, rank + np.repeat(start[:-1], np.diff(start))
 
