@@ -11,7 +11,8 @@ from numpy.typing import ArrayLike
 from kerfpath._arrays import Array, Bools, Ints, freeze, integers
 from kerfpath.errors import InputError, NoFeasiblePath
 from kerfpath.kernels import search as kernel
-from kerfpath.search._exact import Best, best_closed_path, best_path, dead_end
+from kerfpath.search._branch import best_closed_path
+from kerfpath.search._exact import Best, best_path, dead_end
 from kerfpath.search._layers import (
     backwards,
     broken_edge,
