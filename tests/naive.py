@@ -134,6 +134,28 @@ def interrupted(q, start, **o):
     return fewest, cost[fewest], best("sum", cap)[fewest]
 
 
+def rotated(q, start, closure, rotation, **o):
+    """Optimal (cost, tie-breaking sum) that keeps `rotation` too, or None: every path is tried."""
+    ranges = [np.arange(a, b) for a, b in itertools.pairwise(start)]
+    paths = np.array(list(itertools.product(*ranges)), dtype=int).reshape(-1, len(ranges))
+    if closure == "periodic":
+        paths = paths[paths[:, 0] == paths[:, -1] - start[-2]]
+    d = difference(q[paths[:, :-1]], q[paths[:, 1:]], o["endless"])
+    changes = np.diff(d, axis=1)
+    if closure == "periodic":
+        changes = np.concatenate([changes, d[:, :1] - d[:, -1:]], axis=1)
+    ok = (np.abs(d) <= o["eta_v"] * o["velocity"] * o["dt"] + TOLERANCE).all((1, 2))
+    ok &= (np.abs(changes) <= o["eta_a"] * o["acceleration"] * o["dt"] ** 2 + TOLERANCE).all((1, 2))
+    ok &= (np.abs(np.cumsum(d, axis=1)) <= rotation + TOLERANCE).all((1, 2))
+    if not ok.any():
+        return None
+    parts = np.hstack([_distances(d, o["weights"], o["metric"]), o["vertex_cost"][paths]])[ok]
+    total, largest = parts.sum(axis=1), parts.max(axis=1)
+    if o["objective"] == "sum":
+        return total.min(), total.min()
+    return largest.min(), total[largest <= largest.min() * (1 + 1e-12)].min()
+
+
 def _edges(layers, vertex, o):
     """Increments of all edges, the bound of (6), and what it costs to enter and to step."""
     D = [difference(a[:, None], b[None], o["endless"]) for a, b in itertools.pairwise(layers)]

@@ -16,6 +16,7 @@ __all__ = [
     "empty_layer",
     "narrowest_key",
     "offsets",
+    "reduced",
     "sorted_layers",
 ]
 
@@ -96,7 +97,7 @@ def narrowest_key(q: Array, start: Ints, bound: Array, endless: Bools) -> tuple[
     pairs = np.zeros(q.shape[1])
     layers = np.unique(np.linspace(0, max(len(start) - 3, 0), _LAYERS_SAMPLED).astype(int))
     for k in layers[layers + 2 < len(start)]:
-        here, there = (_reduced(q[start[i] : start[i + 1]], endless) for i in (k, k + 1))
+        here, there = (reduced(q[start[i] : start[i + 1]], endless) for i in (k, k + 1))
         for i in range(q.shape[1]):
             sorted_ = np.sort(there[:, i])
             around = endless[i] and bound[i] < np.pi
@@ -106,12 +107,12 @@ def narrowest_key(q: Array, start: Ints, bound: Array, endless: Bools) -> tuple[
                 high = np.searchsorted(sorted_, here[:, i] + shift + reach, side="right")
                 pairs[i] += (high - low).sum()
     best = int(np.argmin(pairs))
-    key = _reduced(q[:, [best]], endless[[best]])[:, 0]
+    key = reduced(q[:, [best]], endless[[best]])[:, 0]
     # Twice the slack of (5): the key must never exclude what the test itself would pass.
     return key, float(bound[best] + 2 * LIMIT_TOLERANCE), bool(endless[best])
 
 
-def _reduced(q: Array, endless: Bools) -> Array:
+def reduced(q: Array, endless: Bools) -> Array:
     """Bring the endless joints of q (N, n) into (-pi, pi]."""
     turned = q - 2 * np.pi * np.ceil((q - np.pi) / (2 * np.pi))
     return np.where(endless, turned, q)

@@ -13,7 +13,7 @@ from kerfpath.kernels import metric as metrics
 from kerfpath.kernels.search import Objective
 from kerfpath.search._layers import offsets
 
-__all__ = ["Metric", "ObjectiveKind", "Problem", "checked", "one_of"]
+__all__ = ["Metric", "ObjectiveKind", "Problem", "checked", "one_of", "rotation_limits"]
 
 Metric = Literal["manhattan", "chebychev", "euclid"]
 ObjectiveKind = Literal["sum", "max"]
@@ -85,6 +85,29 @@ def checked(
         timed=False,
     )
     return Problem(q=q, start=start, endless=endless, aim=aim)
+
+
+def rotation_limits(rotation: ArrayLike | None, endless: Bools) -> Array:
+    """Return the largest angle (n,) rad that each joint may turn away, infinity where unlimited.
+
+    Raises
+    ------
+    InputError
+        Negative or NaN; a finite limit of a joint that is not endless.
+    """
+    n = len(endless)
+    if rotation is None:
+        return np.full(n, np.inf)
+    limit = floats(rotation, "rotation", (n,), infinite=True)
+    if (limit < 0).any():
+        raise InputError(f"rotation: must not be negative, got {limit.tolist()}")
+    plain = np.flatnonzero(np.isfinite(limit) & ~endless)
+    if plain.size:
+        raise InputError(
+            f"rotation: joint {plain[0] + 1} is not endless, its range limits it: give infinity, "
+            f"got {limit[plain[0]]:g}"
+        )
+    return limit
 
 
 def one_of(name: str, value: str, known: tuple[str, ...]) -> None:

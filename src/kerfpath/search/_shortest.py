@@ -20,7 +20,15 @@ from kerfpath.search._layers import (
     narrowest_key,
     sorted_layers,
 )
-from kerfpath.search._problem import Metric, ObjectiveKind, checked, one_of
+from kerfpath.search._problem import (
+    Metric,
+    ObjectiveKind,
+    Problem,
+    checked,
+    one_of,
+    rotation_limits,
+)
+from kerfpath.search._rotation import best_within, too_far, why_closed
 
 __all__ = ["Closure", "LayeredPath", "Method", "shortest_path"]
 
@@ -65,6 +73,7 @@ def shortest_path(
     objective: ObjectiveKind = "sum",
     method: Method = "exact",
     closure: Closure = "free",
+    rotation: ArrayLike | None = None,
     eta_v: float = 1.0,
     eta_a: float = 1.0,
 ) -> LayeredPath:
@@ -100,6 +109,9 @@ def shortest_path(
     closure : {"free", "periodic"}
         "periodic": the last layer repeats the first, the path returns to the vertex it left
         (endless joints modulo 2 pi), and (6) holds across the seam; exact method only.
+    rotation : (n,) rad, optional
+        Largest angle that an endless joint may have turned away, either way, from where the path
+        begins; infinity: no limit (default); exact method only.
     eta_v, eta_a : float
         Share of the velocity and acceleration limits that may be used.
 
@@ -109,11 +121,12 @@ def shortest_path(
         No admissible path was found; says where and what forbids it.
     InputError
         Arrays that do not fit each other, NaN, limits or dt that are not positive, unknown names,
-        a periodic closure whose end layers differ.
+        a periodic closure whose end layers differ, a finite rotation of a joint that is not
+        endless.
     """
     one_of("method", method, get_args(Method))
     one_of("closure", closure, get_args(Closure))
-    q, start, endless, aim = checked(
+    problem = checked(
         q,
         start,
         dt=dt,
@@ -127,10 +140,14 @@ def shortest_path(
         eta_v=eta_v,
         eta_a=eta_a,
     )
+    q, start, endless, aim = problem
+    reach = rotation_limits(rotation, endless)
     if posture is not None:
         posture = integers(posture, "posture", (len(q),))
     if closure == "periodic" and method != "exact":
         raise InputError(f'closure: "periodic" needs method="exact", got method={method!r}')
+    if np.isfinite(reach).any() and method != "exact":
+        raise InputError(f'rotation: a limit needs method="exact", got method={method!r}')
 
     if method == "known":
         free = np.full(q.shape[1], np.inf)
@@ -146,10 +163,12 @@ def shortest_path(
         raise empty_layer(0)
     if method == "exact":
         try:
-            return _exactly(layers, aim, filled, closure)
+            found = _exactly(layers, aim, filled, closure)
         except NoFeasiblePath as broken:
             broken.back = _first_from_the_back(q, start, aim, endless)
             raise
+        over = too_far(q[start[:-1] + found.index], endless, reach)
+        return _turning_less(problem, reach, over, closure) if over.any() else found
     return _search(layers, aim, filled, may_prove=method == "paper")
 
 
@@ -177,6 +196,16 @@ def _exactly(
             node=len(layers.start) - 2,
         )
     raise broken_edge(found.layers, found.counts, proved=True)
+
+
+def _turning_less(problem: Problem, rotation: Array, over: Bools, closure: Closure) -> LayeredPath:
+    """Return the proved optimum within the limits that the joints `over` do not keep without."""
+    closed = closure == "periodic"
+    unrolled, found = best_within(problem, rotation, over, closed=closed)
+    if found is None:
+        raise why_closed(problem, rotation, unrolled, closed=closed)
+    index, cost = found
+    return LayeredPath(index=freeze(index), cost=cost, optimal=True)
 
 
 def _first_from_the_back(q: Array, start: Ints, aim: kernel.Objective, endless: Bools) -> int:
