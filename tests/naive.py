@@ -210,3 +210,22 @@ def random_instance(rng, *, layers=(1, 9), size=(1, 9)):
         "eta_a": float(rng.uniform(0.5, 1.2)),
     }
     return q, start, options
+
+
+def slowed(q, start, *, dt, velocity, acceleration, endless, vertex_cost, weights, metric, penalty,
+           eta_v, eta_a):  # fmt: skip
+    """Least cost when time lost has a price: every pair of edges is tried."""
+    layers = [q[a:b] for a, b in itertools.pairwise(start)]
+    vertex = [vertex_cost[a:b] for a, b in itertools.pairwise(start)]
+    if len(layers) == 1:
+        return vertex[0].min()
+    D = [difference(a[:, None], b[None], endless) for a, b in itertools.pairwise(layers)]
+    alone = [(np.abs(d) / (eta_v * velocity * dt)).max(-1) for d in D]
+    R = [_distances(d, weights, metric) + v for d, v in zip(D, vertex[1:], strict=True)]
+    d = vertex[0][:, None] + R[0] + penalty * np.maximum(0, alone[0] - 1)
+    for k in range(1, len(D)):
+        change = np.abs(D[k][None] - D[k - 1][:, :, None])
+        asked = np.sqrt((change / (eta_a * acceleration * dt**2)).max(-1))
+        lost = np.maximum(0, np.maximum(asked, alone[k][None]) - 1)
+        d = (d[:, :, None] + R[k][None] + penalty * lost).min(axis=0)
+    return d.min()

@@ -238,10 +238,11 @@ def test_speed_names_the_fastest_and_what_binds(folder):
     data = json.loads(run("speed", "small.toml", "--json", cwd=folder).stdout)
     hole = data["contours"][0]
     assert hole["fastest_m_min"] > hole["asked_m_min"] == pytest.approx(3)
-    # A job at that speed is feasible, one a little over it is not.
-    for share, code in ((0.999, 0), (1.01, 1)):
+    # A job at that speed is feasible, one a little over it is not, unless gamma leaves its grid.
+    for share, refine, code in ((0.999, "false", 0), (1.01, "false", 1), (1.01, "true", 0)):
         asked = f"speed_m_min = {hole['fastest_m_min'] * share}"
-        (folder / "edge.toml").write_text(SMALL.replace("speed_m_min = 3", asked, 1))
+        edge = SMALL.replace("speed_m_min = 3", asked, 1)
+        (folder / "edge.toml").write_text(edge.replace("[plan]", f"[plan]\nrefine = {refine}"))
         assert run("plan", "edge.toml", "--out", "edge", cwd=folder).returncode == code
     (folder / "far.toml").write_text(SMALL.replace("xyz_mm = [1200", "xyz_mm = [3200"))
     far = run("speed", "far.toml", cwd=folder)

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from kerfpath import Contour, InputError, NoFeasiblePath, plan, robot
+from kerfpath import Contour, InputError, NoFeasiblePath, audit, plan, robot
 from kerfpath.planner import layered_graph, node_interval
 
 STEP = np.radians(5)
@@ -158,3 +158,18 @@ def test_a_periodic_plan_returns_to_where_it_began(made, circle, arm, tool, plac
             closure="periodic",
             **options,
         )
+
+
+def test_where_the_grid_has_no_path_one_is_found_off_it(circle, arm, tool, placement):
+    """A coarse grid quantises the acceleration: (6) fails on it and holds beside it."""
+    options = {"tool": tool, "placement": placement, "speed": 0.6, "gamma_step": np.radians(4)}
+    with pytest.raises(NoFeasiblePath) as broken:
+        plan(circle, arm, **options)
+    assert broken.value.proved
+    made = plan(circle, arm, refine=True, **options)
+    assert np.abs(made.acceleration_share).max() <= 1
+    assert not made.proof.optimal
+    assert "brought inside limits" in made.proof.statement
+    assert audit(made) == []
+    with pytest.raises(NoFeasiblePath, match="off the grid not refined: the "):
+        plan(circle, arm, refine=True, **options | {"speed": 0.7, "eta_a": 0.3})

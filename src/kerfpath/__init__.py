@@ -20,6 +20,8 @@ if TYPE_CHECKING:
     from kerfpath.planner import fastest_speed as fastest_speed
     from kerfpath.planner import plan as plan
     from kerfpath.plans import Plan as Plan
+    from kerfpath.refiner import Refinement as Refinement
+    from kerfpath.refiner import refine as refine
     from kerfpath.robots import Robot as Robot
     from kerfpath.robots import robot as robot
     from kerfpath.search import LayeredPath as LayeredPath
@@ -33,11 +35,13 @@ _HOME = {
     "LayeredPath": "search",
     "NoFeasiblePath": "errors",
     "Plan": "plans",
+    "Refinement": "refiner",
     "Robot": "robots",
     "audit": "auditor",
     "fastest_speed": "planner",
     "join": "contour",
     "plan": "planner",
+    "refine": "refiner",
     "robot": "robots",
     "shortest_path": "search",
 }

@@ -13,9 +13,9 @@ from kerfpath.contour import Contour, FrameKind
 from kerfpath.errors import InputError
 from kerfpath.kernels import metric
 from kerfpath.robots import Robot
-from kerfpath.search import Closure, Method, Metric, ObjectiveKind
+from kerfpath.search import METRIC_CODES, Closure, Method, Metric, ObjectiveKind
 
-__all__ = ["Criteria", "Plan", "Proof", "Settings"]
+__all__ = ["Criteria", "Plan", "Proof", "Settings", "path_cost"]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -50,10 +50,21 @@ class Settings:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Proof:
-    """What is proved about a plan: whether it is the best on its graph, and the claim in words."""
+    """What is proved about a plan.
+
+    Parameters
+    ----------
+    optimal : bool
+        No path on its graph is better.
+    statement : str
+        The claim in words.
+    grid_cost : float or None
+        Where the plan is refined: the cost of the path on the graph that it was refined from.
+    """
 
     optimal: bool
     statement: str
+    grid_cost: float | None = None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -79,6 +90,12 @@ class Criteria:
     peak_acceleration: Array
 
 
+def path_cost(dq: Array, weights: Array, metric_name: Metric, objective: ObjectiveKind) -> float:
+    """Return the objective (14) or (15) of joint increments (K-1, 6) rad."""
+    total = metric.total_distance if objective == "sum" else metric.maximum_distance
+    return float(total(np.ascontiguousarray(dq), weights, METRIC_CODES[metric_name]))
+
+
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Plan:
     """Joint motion along one contour.
@@ -86,7 +103,7 @@ class Plan:
     Parameters
     ----------
     contour : Contour
-        The nodes, in the part frame, evenly spaced in time.
+        The nodes, in the part frame.
     robot : Robot
         With the limits that the plan keeps.
     T_flange_tip, T_base_part : (4, 4)
@@ -147,7 +164,7 @@ class Plan:
 
     @property
     def dt(self) -> float:
-        """Time from node to node, s."""
+        """Mean time from node to node, s."""
         return float(self.time[-1] - self.time[0]) / (len(self.time) - 1)
 
     @property
@@ -169,13 +186,14 @@ class Plan:
     @property
     def velocity_share(self) -> Array:
         """Joint speed between nodes over its limit, (K-1, 6), signed."""
-        return freeze(self.increments / self.dt / self.robot.speed_limits()[0])
+        return freeze(self.increments / np.diff(self.time)[:, None] / self.robot.speed_limits()[0])
 
     @property
     def acceleration_share(self) -> Array:
         """Second difference at the inner nodes over the acceleration limit, (K-2, 6), signed."""
-        change = np.diff(self.increments, axis=0)
-        return freeze(change / self.dt**2 / self.robot.speed_limits()[1])
+        tau = np.diff(self.time)[:, None]
+        change = np.diff(self.increments / tau, axis=0)
+        return freeze(change / ((tau[1:] + tau[:-1]) / 2) / self.robot.speed_limits()[1])
 
     @property
     def criteria(self) -> Criteria:

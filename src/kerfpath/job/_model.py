@@ -274,6 +274,10 @@ class PlanTable(_Table):
     closure: Closure = "free"
     frames: FrameKind = "rotation-minimising"
     posture: Posture | None = None
+    refine: bool | None = None
+    refine_parts: Annotated[
+        int, key("a whole number of parts from 1 to 100", "4", ge=1, le=100)
+    ] = 1
     eta_velocity: Annotated[Positive, key("a number above 0, at most 1", "0.95", le=1)] = 1.0
     eta_acceleration: Annotated[Positive, key("a number above 0, at most 1", "0.9", le=1)] = 1.0
     weights: Annotated[

@@ -105,6 +105,7 @@ def plan_entry(plan: Plan, checks: Sequence[Check]) -> dict[str, Any]:
         "cost": plan.cost,
         "optimal": plan.proof.optimal,
         "proof": plan.proof.statement,
+        "grid_cost": plan.proof.grid_cost,
         "criteria": {
             "displacement_rad": criteria.displacement.tolist(),
             "largest_increment_rad": criteria.largest_increment.tolist(),
@@ -266,6 +267,10 @@ def _read_plan(entry: dict[str, Any], robot: Robot, tool: Any, placement: Any) -
             closure=entry["closure"],
         ),
         cost=entry["cost"],
-        proof=Proof(optimal=bool(entry["optimal"]), statement=str(entry["proof"])),
+        proof=Proof(
+            optimal=bool(entry["optimal"]),
+            statement=str(entry["proof"]),
+            grid_cost=entry["grid_cost"],
+        ),
         counts=dict(entry["counts"]),
     )

@@ -134,6 +134,8 @@ class Job:
         In the order of cutting.
     plan_options : dict
         Keyword arguments of `kerfpath.planner.plan`, in SI.
+    refine_parts : int
+        Parts into which the refinement divides every interval between nodes.
     audit_options : dict
         Keyword arguments of `kerfpath.auditor.checks`, in SI.
     program : ProgramOptions
@@ -150,6 +152,7 @@ class Job:
     part_unit: str | None
     contours: tuple[ContourTask, ...]
     plan_options: dict[str, Any]
+    refine_parts: int
     audit_options: dict[str, Any]
     program: ProgramOptions
     source: dict[str, Any]
@@ -180,6 +183,7 @@ def read_job(path: str | Path) -> Job:
         part_unit=file.part.unit,
         contours=tuple(_task(table) for table in file.contour),
         plan_options=_plan_options(file.plan),
+        refine_parts=file.plan.refine_parts,
         audit_options=audit_options(file.audit),
         program=program_options(file.program, path.stem),
         source=source,
@@ -255,6 +259,7 @@ def _plan_options(table: PlanTable) -> dict[str, Any]:
         "eta_v": table.eta_velocity,
         "eta_a": table.eta_acceleration,
         "closure": table.closure,
+        "refine": table.method == "exact" if table.refine is None else table.refine,
     }
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -17,6 +17,7 @@ from kerfpath.job._read import ContourTask, Job
 from kerfpath.kernels import is_compiled
 from kerfpath.planner import FastestSpeed, fastest_speed, layered_graph, plan, relaxations
 from kerfpath.plans import Plan
+from kerfpath.refiner import refine
 from kerfpath.robots import robot
 from kerfpath.search import Relaxations
 
@@ -169,6 +170,8 @@ def _cut(job: Job, task: ContourTask, drawn: Contour, progress: Progress) -> Cut
             )
             fastest = FastestSpeed.of(nodes, least.slower)
     else:
+        if job.refine_parts > 1:
+            made = _divided(made, drawn, job.refine_parts)
         table = tuple(checks(made, reference=drawn, **job.audit_options))
     return Cut(
         task=task,
@@ -181,6 +184,16 @@ def _cut(job: Job, task: ContourTask, drawn: Contour, progress: Progress) -> Cut
         relaxations=least,
         checks=table,
     )
+
+
+def _divided(made: Plan, drawn: Contour, parts: int) -> Plan:
+    """Return the plan on nodes that divide its intervals, where one keeps the limits there."""
+    finer = drawn.resample(count=(len(made.contour) - 1) * parts + 1)
+    found = refine(made, nodes=replace(finer, name=made.name))
+    if found.done:
+        return found.plan
+    statement = f"{made.proof.statement}; at {parts} parts of an interval {found.statement}"
+    return replace(made, proof=replace(made.proof, statement=statement))
 
 
 def fastest_speeds(
@@ -197,7 +210,7 @@ def fastest_speeds(
     """
     part = read_step(job.part_file, unit=job.part_unit)
     options = job.plan_options
-    keys = ("gamma_step", "frames", "postures", "eta_v", "eta_a")
+    keys = ("gamma_step", "frames", "postures", "eta_v", "eta_a", "refine")
     answers: list[tuple[ContourTask, Contour, FastestSpeed | NoFeasiblePath]] = []
     for i, task in enumerate(job.contours):
         progress("contours", i, len(job.contours))

@@ -12,6 +12,7 @@ bound on the cost, only states with d + h inside it are ever kept.
 
 from __future__ import annotations
 
+from math import sqrt
 from typing import Any, NamedTuple, TypeVar
 
 import numpy as np
@@ -23,6 +24,7 @@ from kerfpath.kernels.limits import (
     acceleration_excess,
     acceleration_time,
     velocity_excess,
+    velocity_time,
 )
 from kerfpath.kernels.search import (
     Layers,
@@ -30,12 +32,16 @@ from kerfpath.kernels.search import (
     distance,
     fill_increment,
     joined,
+    late,
     runs,
 )
 
 __all__ = ["Reached", "count_closing", "recursion", "trace"]
 
 _T = TypeVar("_T", bound="np.generic[Any]")
+
+LEAPT = -2
+"""Parent of a state that a step beyond `aim.velocity` has led to, from anywhere."""
 
 
 class States(NamedTuple):
@@ -133,25 +139,71 @@ def _cheapest(
 
 @jit
 def _quickest(
-    states: States, a: int, b: int, aim: Objective, dq: Array, least: float, bound: float
-) -> tuple[int, float, float]:
-    """Find which of the states a..b, cheapest first, goes on by dq in the least node interval.
+    states: States, a: int, b: int, aim: Objective, step: float, paid: float, dq: Array,
+    rest: float, bound: float,
+) -> tuple[int, float, float]:  # fmt: skip
+    """Find which of the states a..b, cheapest first, goes on by dq at the least cost (timed).
 
-    `least` is the interval that the step and what is to come ask for. Returns the state, -1 if none
-    keeps the bound; the interval up to and with the step; and the least one over the bound.
+    `step` is the cost of the step on its own, with `paid` for lost time, `rest` that of what is to
+    come. Returns the state, -1 if none keeps the bound; the cost up to and with the step; and the
+    least one over the bound.
     """
     best, best_d, over = -1, np.inf, np.inf
     for s in range(a, b):
-        if states.d[s] >= best_d:
+        d = joined(aim.minimax, states.d[s], step)
+        if d >= best_d:
             break
-        d = states.d[s]
+        if joined(aim.minimax, d, rest) > bound:
+            over = min(over, joined(aim.minimax, d, rest))
+            break
+        time = 0.0
         if states.parent[s] >= 0:
-            d = max(d, acceleration_time(dq, states.dq[s], aim.acceleration))
-        if max(d, least) > bound:
-            over = min(over, max(d, least))
+            time = acceleration_time(dq, states.dq[s], aim.acceleration)
+        elif states.parent[s] == LEAPT:
+            time = _braking_time(dq, aim)
+        d = max(d, time) if aim.minimax else d + max(0.0, late(aim, time) - paid)
+        f = joined(aim.minimax, d, rest)
+        if f > bound:
+            over = min(over, f)
         elif d < best_d:
             best, best_d = s, d
     return best, best_d, over
+
+
+@jit
+def _braking_time(dq: Array, aim: Objective) -> float:
+    """Least time that the change between dq and any step beyond `aim.velocity` asks for."""
+    least = np.inf
+    for i in range(len(dq)):
+        least = min(least, max(0.0, aim.velocity[i] - abs(dq[i])) / aim.acceleration[i])
+    return sqrt(least)
+
+
+@jit
+def _with_leaps(
+    aim: Objective, h: Array, bound: float, before: States, states: States, a: int, b: int
+) -> tuple[States, float]:
+    """Add to the states of vertices a..b-1 those that steps beyond `aim.velocity` may lead to.
+
+    They cost no more than any such step from the states before, wherever from and to.
+    """
+    d, lowest, paid = np.inf, np.inf, late(aim, aim.stretch)
+    for s in range(len(before.vertex)):
+        time = _braking_time(before.dq[s], aim) if before.parent[s] >= 0 else 0.0
+        d = min(d, before.d[s] + aim.leap + max(0.0, late(aim, time) - paid))
+    f = d + aim.vertex_cost[a:b] + h[a:b]
+    leapt = a + np.flatnonzero(f <= bound)
+    m = len(leapt)
+    for v in range(b - a):
+        lowest = min(lowest, f[v]) if f[v] > bound else lowest
+    together = States(
+        np.concatenate((states.vertex, leapt)),
+        np.concatenate((states.d, d + aim.vertex_cost[leapt])),
+        np.concatenate((states.dq, np.zeros((m, states.dq.shape[1])))),
+        np.concatenate((states.parent, np.full(m, LEAPT))),
+        states.first,
+    )
+    return _sorted(together, a, b), lowest
 
 
 @jit
@@ -176,13 +228,20 @@ def _extend(
             step = joined(aim.minimax, distance(layers, aim, p, j), aim.vertex_cost[j])
             if step == np.inf:
                 continue
+            f = joined(aim.minimax, joined(aim.minimax, states.d[a], step), h[j])
+            if f > bound:
+                lowest = min(lowest, f)
+                continue
             fill_increment(layers, p, j, step_dq)
             if closes and acceleration_excess(seam, step_dq, aim.acceleration) >= 0:
                 continue
             if aim.timed:
-                least = max(step, h[j])
-                s, cost, dropped = _quickest(states, a, b, aim, step_dq, least, bound)
-                cost = max(cost, step)
+                paid = 0.0
+                if aim.penalty > 0:
+                    paid = late(aim, aim.stretch * velocity_time(step_dq, aim.velocity))
+                s, cost, dropped = _quickest(
+                    states, a, b, aim, step + paid, paid, step_dq, h[j], bound
+                )
             else:
                 s, dropped = _cheapest(states, a, b, aim, step, step_dq, h[j], bound)
                 cost = joined(aim.minimax, states.d[s], step) if s >= 0 else np.inf
@@ -220,11 +279,15 @@ def _next(
     layers: Layers, aim: Objective, h: Array, bound: float, seam: Array, k: int, states: States,
     least: Array,
 ) -> tuple[States, float]:  # fmt: skip
-    """States of layer k + 1, also those that begin anew there; and the least cost dropped.
+    """States of layer k + 1, also leapt to or beginning anew; and the least cost dropped.
 
     least (K,) is the least cost of a state of each layer so far.
     """
+    a, b = layers.start[k + 1], layers.start[k + 2]
     on, lowest = _extend(layers, aim, h, bound, seam, k, states)
+    if aim.leap < np.inf:
+        on, dropped = _with_leaps(aim, h, bound, states, on, a, b)
+        lowest = min(lowest, dropped)
     if layers.after[k + 1] < 0:
         return on, lowest
     anew, dropped = _begin(layers, aim, h, bound, k + 1, least[layers.after[k + 1]])
@@ -235,7 +298,7 @@ def _next(
         np.concatenate((on.parent, anew.parent)),
         on.first,
     )
-    return _sorted(both, layers.start[k + 1], layers.start[k + 2]), min(lowest, dropped)
+    return _sorted(both, a, b), min(lowest, dropped)
 
 
 @jit
@@ -277,7 +340,8 @@ def recursion(
 def trace(layers: Layers, found: Reached, out_path: Ints) -> None:
     """Read the best path (K,) back from a record, as vertices of the sorted graph.
 
-    Layers that it does not go through, between breaking off and beginning anew, get -1.
+    Layers that it does not go through, between breaking off and beginning anew, get -1; before a
+    leap the path is not known: -1.
     """
     out_path[:] = -1
     k = len(out_path) - 1
@@ -285,6 +349,8 @@ def trace(layers: Layers, found: Reached, out_path: Ints) -> None:
     while k >= 0:
         i = found.offset[k] + s
         out_path[k], s = found.vertex[i], found.parent[i]
+        if s == LEAPT:
+            break
         if s >= 0:
             k -= 1
         else:

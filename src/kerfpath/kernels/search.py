@@ -24,6 +24,7 @@ __all__ = [
     "distance",
     "fill_increment",
     "joined",
+    "late",
     "path_planning",
     "reduced",
     "runs",
@@ -64,7 +65,14 @@ class Objective(NamedTuple):
     cap: float
     """Largest distance, and largest cost of a vertex, that is allowed."""
     timed: bool
-    """Costs are times: (6) does not forbid, it takes the time in which it would hold."""
+    """(6) does not forbid, it takes the time in which it would hold. Costs are times, or, where
+    they add up, lost time has a price:"""
+    penalty: float = 0.0
+    """cost of one node interval of lost time; `velocity` and `acceleration` are then in rad,"""
+    stretch: float = 1.0
+    """`velocity` is this many times what a step covers without losing time,"""
+    leap: float = np.inf
+    """and a step beyond it costs this or more; infinite if there are none."""
 
 
 @jit
@@ -150,6 +158,12 @@ def distance(layers: Layers, aim: Objective, p: int, j: int) -> float:
 def joined(minimax: bool, a: float, b: float) -> float:
     """Costs put together: added by (14), or the larger by (15)."""
     return max(a, b) if minimax else a + b
+
+
+@jit
+def late(aim: Objective, time: float) -> float:
+    """Price of a step that asks for `time` node intervals."""
+    return aim.penalty * max(0.0, time - 1.0)
 
 
 @jit

@@ -28,14 +28,19 @@ def cost_to_go(layers: Layers, aim: Objective, allowed: Bools, out_h: Array) -> 
     last, bound = len(layers.start) - 2, aim.velocity + LIMIT_TOLERANCE
     anew = np.full(last + 1, np.inf)  # least cost to go of a path that breaks off at the layer
     c, tail = np.empty(np.max(np.diff(layers.start))), np.empty(len(layers.low))
+    time = np.empty(len(c))
     for j in range(layers.start[last], layers.start[last + 1]):
         out_h[j] = 0.0 if allowed[j] else np.inf
     for k in range(last, -1, -1):
         if k < last:
             _layer_to_go(
                 layers.q, layers.turn, bound, aim.weight, aim.metric, aim.cap, aim.minimax,
-                layers.start, layers.low, layers.high, k, tail, c, out_h,
+                aim.penalty, aim.stretch / aim.velocity,
+                layers.start, layers.low, layers.high, k, tail, c, time, out_h,
             )  # fmt: skip
+            if aim.leap < np.inf:
+                a, b, end = layers.start[k], layers.start[k + 1], layers.start[k + 2]
+                out_h[a:b] = np.minimum(out_h[a:b], aim.leap + tail[b:end].min())
         least = np.inf
         for p in range(layers.start[k], layers.start[k + 1]):
             out_h[p] = min(out_h[p], anew[k]) if allowed[p] else np.inf
@@ -48,7 +53,8 @@ def cost_to_go(layers: Layers, aim: Objective, allowed: Bools, out_h: Array) -> 
 @jit_vector
 def _layer_to_go(
     q: Array, turn: Array, bound: Array, weight: Array, metric: int, cap: float, minimax: bool,
-    start: Ints, low: Ints, high: Ints, k: int, tail: Array, c: Array, out_h: Array,
+    penalty: float, slowness: Array,
+    start: Ints, low: Ints, high: Ints, k: int, tail: Array, c: Array, time: Array, out_h: Array,
 ) -> None:  # fmt: skip
     """For each vertex p of layer k the least of its distance to a next vertex joined with its tail.
 
@@ -79,6 +85,15 @@ def _layer_to_go(
                 for v in range(m):
                     r = sqrt(c[v]) if metric == EUCLID else c[v]
                     c[v] = r if r <= cap else np.inf
+            if penalty > 0:
+                time[:m] = 1.0
+                for i in range(len(q)):
+                    x, t, s = q[i, p], turn[i], slowness[i]
+                    for v in range(m):
+                        y = min(abs(x - q[i, a + v]), t - abs(x - q[i, a + v]))
+                        time[v] = max(time[v], s * y)
+                for v in range(m):
+                    c[v] += penalty * (time[v] - 1.0)
             if minimax:
                 for v in range(m):
                     best = min(best, max(c[v], tail[a + v]))

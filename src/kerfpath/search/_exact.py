@@ -80,7 +80,11 @@ def quickest_path(layers: Layers, aim: Objective, ceiling: float) -> Best | None
     """Return the path of least node interval, if that is `ceiling` or less (a timed objective)."""
     every = np.ones(len(layers.low), np.bool_)
     found = _grow(layers, aim, every, NO_SEAM, 0.0, ceiling)
-    return None if found is None else Best(path=found[0], cost=found[1], total=found[1])
+    # A bound that grew past the ceiling can let a path through, but not prove it: edges beyond the
+    # ceiling may have been left out.
+    if found is None or found[1] > ceiling:
+        return None
+    return Best(path=found[0], cost=found[1], total=found[1])
 
 
 def best_allowed(

@@ -13,12 +13,20 @@ from kerfpath.kernels import metric as metrics
 from kerfpath.kernels.search import Objective
 from kerfpath.search._layers import offsets
 
-__all__ = ["Metric", "ObjectiveKind", "Problem", "checked", "one_of", "rotation_limits"]
+__all__ = [
+    "METRIC_CODES",
+    "Metric",
+    "ObjectiveKind",
+    "Problem",
+    "checked",
+    "one_of",
+    "rotation_limits",
+]
 
 Metric = Literal["manhattan", "chebychev", "euclid"]
 ObjectiveKind = Literal["sum", "max"]
 
-_METRIC_CODES: dict[str, int] = {
+METRIC_CODES: dict[str, int] = {
     "euclid": metrics.EUCLID,
     "manhattan": metrics.MANHATTAN,
     "chebychev": metrics.CHEBYCHEV,
@@ -68,7 +76,7 @@ def checked(
     velocity = positive(velocity, "velocity", (n,))
     acceleration = positive(acceleration, "acceleration", (n,))
     endless = bools(np.zeros(n, bool) if endless is None else endless, "endless", (n,))
-    one_of("metric", metric, tuple(_METRIC_CODES))
+    one_of("metric", metric, tuple(METRIC_CODES))
     one_of("objective", objective, get_args(ObjectiveKind))
     weight = 1.0 / (velocity * dt) if weights is None else floats(weights, "weights", (n,))
     if (weight < 0).any():
@@ -76,7 +84,7 @@ def checked(
     cost = np.zeros(len(q)) if vertex_cost is None else vertex_cost
     aim = Objective(
         weight=np.ascontiguousarray(weight),
-        metric=_METRIC_CODES[metric],
+        metric=METRIC_CODES[metric],
         minimax=objective == "max",
         vertex_cost=floats(cost, "vertex_cost", (len(q),)),
         velocity=scalar(eta_v, "eta_v", above=0.0) * velocity * dt,

@@ -1,0 +1,8 @@
+"""plan(): layers, search and refinement in one; the fastest speed; what opens a closed way."""
+
+from kerfpath.planner._fastest import FastestSpeed as FastestSpeed
+from kerfpath.planner._fastest import fastest_speed as fastest_speed
+from kerfpath.planner._fastest import relaxations as relaxations
+from kerfpath.planner._graph import layered_graph as layered_graph
+from kerfpath.planner._graph import node_interval as node_interval
+from kerfpath.planner._plan import plan as plan
