@@ -68,8 +68,8 @@ class Reached(NamedTuple):
     """Cost of the best path, infinite if none kept the bound."""
     lowest: float
     """Least cost bound among what was dropped for its cost; infinite if nothing was."""
-    state: int
-    """The best state of the last layer, -1 if none."""
+    best: Ints
+    """(K,): the best state of each layer, -1 if none."""
     offset: Ints
     """(K+1,): states of layer k in the record are offset[k]:offset[k+1]."""
     vertex: NDArray[np.int32]
@@ -90,21 +90,27 @@ def _grown(old: NDArray[_T]) -> NDArray[_T]:
 
 
 @jit
-def _begin(layers: Layers, aim: Objective, h: Array, bound: float) -> tuple[States, float]:
-    """States of layer 0, one per vertex, with no edge before them; and the least cost dropped."""
-    m, lowest, count = layers.start[1] - layers.start[0], np.inf, 0
-    vertex, first = np.empty(m, np.int64), np.zeros(m + 1, np.int64)
-    for j in range(layers.start[0], layers.start[1]):
-        f = joined(aim.minimax, aim.vertex_cost[j], h[j])
+def _begin(
+    layers: Layers, aim: Objective, h: Array, bound: float, k: int, cost: float
+) -> tuple[States, float]:
+    """States of layer k, one per vertex, with no edge before them; and the least cost dropped.
+
+    `cost` is that of what came before.
+    """
+    a, count, lowest = layers.start[k], 0, np.inf
+    m = layers.start[k + 1] - a
+    vertex, d, first = np.empty(m, np.int64), np.empty(m), np.zeros(m + 1, np.int64)
+    for i in range(m):
+        enter = joined(aim.minimax, cost, aim.vertex_cost[a + i])
+        f = joined(aim.minimax, enter, h[a + i])
         if f <= bound:
-            vertex[count] = j
+            vertex[count], d[count] = a + i, enter
             count += 1
         else:
             lowest = min(lowest, f)
-        first[j - layers.start[0] + 1] = count
-    vertex = vertex[:count]
+        first[i + 1] = count
     none = np.empty((count, len(layers.endless)))
-    return States(vertex, aim.vertex_cost[vertex], none, np.full(count, -1), first), lowest
+    return States(vertex[:count], d[:count], none, np.full(count, -1), first), lowest
 
 
 @jit
@@ -269,6 +275,33 @@ def _sorted(states: States, a: int, b: int) -> States:
 
 
 @jit
+def _next(
+    layers: Layers, aim: Objective, h: Array, bound: float, seam: Array, k: int, states: States,
+    least: Array,
+) -> tuple[States, float]:  # fmt: skip
+    """States of layer k + 1, also leapt to or beginning anew; and the least cost dropped.
+
+    least (K,) is the least cost of a state of each layer so far.
+    """
+    a, b = layers.start[k + 1], layers.start[k + 2]
+    on, lowest = _extend(layers, aim, h, bound, seam, k, states)
+    if aim.leap < np.inf:
+        on, dropped = _with_leaps(aim, h, bound, states, on, a, b)
+        lowest = min(lowest, dropped)
+    if layers.after[k + 1] < 0:
+        return on, lowest
+    anew, dropped = _begin(layers, aim, h, bound, k + 1, least[layers.after[k + 1]])
+    both = States(
+        np.concatenate((on.vertex, anew.vertex)),
+        np.concatenate((on.d, anew.d)),
+        np.concatenate((on.dq, anew.dq)),
+        np.concatenate((on.parent, anew.parent)),
+        on.first,
+    )
+    return _sorted(both, a, b), min(lowest, dropped)
+
+
+@jit
 def recursion(
     layers: Layers, aim: Objective, h: Array, bound: float, seam: Array, room: int
 ) -> Reached:
@@ -278,14 +311,14 @@ def recursion(
     (0,). The states of all layers are recorded for `trace` as long as they are no more than `room`.
     """
     K = len(layers.start) - 1
-    offset = np.zeros(K + 1, np.int64)
+    offset, best, least = np.zeros(K + 1, np.int64), np.full(K, -1), np.full(K, np.inf)
     vertex, parent = np.empty(1024, np.int32), np.empty(1024, np.int32)
-    states, lowest = _begin(layers, aim, h, bound)
+    states, lowest = _begin(layers, aim, h, bound, 0, -np.inf if aim.minimax else 0.0)
     before, recorded = states, True
     for k in range(K):
         size = len(states.vertex)
-        if size == 0:
-            return Reached(k, np.inf, lowest, -1, offset, vertex, parent, before, recorded)
+        if size == 0 and (layers.after[k:] < 0).all():
+            return Reached(k, np.inf, lowest, best, offset, vertex, parent, before, recorded)
         offset[k + 1] = offset[k] + size
         recorded = recorded and offset[k + 1] <= room
         if recorded:
@@ -293,30 +326,36 @@ def recursion(
                 vertex, parent = _grown(vertex), _grown(parent)
             vertex[offset[k] : offset[k + 1]] = states.vertex
             parent[offset[k] : offset[k + 1]] = states.parent
+        if size > 0:
+            best[k] = np.argmin(states.d)
+            least[k] = states.d[best[k]]
         if k < K - 1:
             before = states
-            states, dropped = _extend(layers, aim, h, bound, seam, k, states)
+            states, dropped = _next(layers, aim, h, bound, seam, k, states, least)
             lowest = min(lowest, dropped)
-            if aim.leap < np.inf:
-                first, end = layers.start[k + 1], layers.start[k + 2]
-                states, dropped = _with_leaps(aim, h, bound, before, states, first, end)
-                lowest = min(lowest, dropped)
-    best = int(np.argmin(states.d))
-    return Reached(K, states.d[best], lowest, best, offset, vertex, parent, states, recorded)
+    return Reached(K, least[K - 1], lowest, best, offset, vertex, parent, states, recorded)
 
 
 @jit
-def trace(found: Reached, out_path: Ints) -> None:
+def trace(layers: Layers, found: Reached, out_path: Ints) -> None:
     """Read the best path (K,) back from a record, as vertices of the sorted graph.
 
-    Before a leap the path is not known: -1.
+    Layers that it does not go through, between breaking off and beginning anew, get -1; before a
+    leap the path is not known: -1.
     """
-    s, out_path[:] = found.state, -1
-    for k in range(len(out_path) - 1, -1, -1):
+    out_path[:] = -1
+    k = len(out_path) - 1
+    s = found.best[k]
+    while k >= 0:
         i = found.offset[k] + s
         out_path[k], s = found.vertex[i], found.parent[i]
         if s == LEAPT:
             break
+        if s >= 0:
+            k -= 1
+        else:
+            k = layers.after[k]
+            s = found.best[k]
 
 
 @jit

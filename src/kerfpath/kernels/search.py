@@ -48,6 +48,9 @@ class Layers(NamedTuple):
     endless: Bools
     turn: Array
     """(n,): 2 pi for endless joints, infinity for the others."""
+    after: Ints
+    """(K,): a path may break off at layer after[k], an earlier one, and begin anew at layer k, for
+    the cost up to there; -1: it may not."""
 
 
 class Objective(NamedTuple):

@@ -26,6 +26,7 @@ def cost_to_go(layers: Layers, aim: Objective, allowed: Bools, out_h: Array) -> 
     Vertices that are not allowed, or from which no edges within (5) lead to the end, get infinity.
     """
     last, bound = len(layers.start) - 2, aim.velocity + LIMIT_TOLERANCE
+    anew = np.full(last + 1, np.inf)  # least cost to go of a path that breaks off at the layer
     c, tail = np.empty(np.max(np.diff(layers.start))), np.empty(len(layers.low))
     time = np.empty(len(c))
     for j in range(layers.start[last], layers.start[last + 1]):
@@ -40,9 +41,13 @@ def cost_to_go(layers: Layers, aim: Objective, allowed: Bools, out_h: Array) -> 
             if aim.leap < np.inf:
                 a, b, end = layers.start[k], layers.start[k + 1], layers.start[k + 2]
                 out_h[a:b] = np.minimum(out_h[a:b], aim.leap + tail[b:end].min())
+        least = np.inf
         for p in range(layers.start[k], layers.start[k + 1]):
-            out_h[p] = out_h[p] if allowed[p] else np.inf
+            out_h[p] = min(out_h[p], anew[k]) if allowed[p] else np.inf
             tail[p] = joined(aim.minimax, aim.vertex_cost[p], out_h[p])
+            least = min(least, tail[p])
+        if layers.after[k] >= 0:
+            anew[layers.after[k]] = least
 
 
 @jit_vector

@@ -5,12 +5,20 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike
 
-from kerfpath._arrays import Array, Bools, Ints, integers
+from kerfpath._arrays import Array, Bools, Ints, freeze, integers
 from kerfpath.errors import InputError, NoFeasiblePath
 from kerfpath.kernels import search as kernel
 from kerfpath.kernels.limits import LIMIT_TOLERANCE
 
-__all__ = ["backwards", "empty_layer", "narrowest_key", "offsets", "sorted_layers"]
+__all__ = [
+    "backwards",
+    "broken_edge",
+    "empty_layer",
+    "narrowest_key",
+    "offsets",
+    "reduced",
+    "sorted_layers",
+]
 
 _LAYERS_SAMPLED = 32
 """Layers looked at to choose the joint that sorts them: enough to rank the joints."""
@@ -43,6 +51,7 @@ def sorted_layers(
         high=high,
         endless=endless,
         turn=np.where(endless, 2 * np.pi, np.inf),
+        after=np.full(len(start) - 1, -1),
     )
     return layers, rank + np.repeat(start[:-1], np.diff(start))
 
@@ -56,13 +65,31 @@ def empty_layer(k: int) -> NoFeasiblePath:
     )
 
 
+def broken_edge(k: int, forbidden: Ints, *, proved: bool) -> NoFeasiblePath:
+    """Say that no admissible edge leads into layer k, and which limits forbid how many."""
+    counts = {
+        f"{test}, joint {i + 1}": int(number)
+        for test, row in zip(("velocity", "acceleration"), forbidden, strict=True)
+        for i, number in enumerate(row)
+        if number
+    }
+    told = ", ".join(f"{name}: {number}" for name, number in counts.items())
+    total = int(sum(counts.values()))
+    return NoFeasiblePath(
+        f"no admissible edge from node {k - 1} to node {k}; of {total} edges, forbidden by {told}",
+        proved=proved,
+        node=k - 1,
+        counts=counts,
+    )
+
+
 def backwards(q: Array, start: Ints) -> tuple[Array, Ints]:
     """Return the same graph with its layers in reverse order: q (N, n), start (K+1,)."""
     sizes = np.diff(start)[::-1]
     begin = np.concatenate([[0], np.cumsum(sizes)])
     # Vertex i of reversed layer k comes from where that layer stood.
     order = np.arange(len(q)) + np.repeat(start[:-1][::-1] - begin[:-1], sizes)
-    return q[order], begin
+    return freeze(q[order]), freeze(begin)
 
 
 def narrowest_key(q: Array, start: Ints, bound: Array, endless: Bools) -> tuple[Array, float, bool]:
@@ -70,7 +97,7 @@ def narrowest_key(q: Array, start: Ints, bound: Array, endless: Bools) -> tuple[
     pairs = np.zeros(q.shape[1])
     layers = np.unique(np.linspace(0, max(len(start) - 3, 0), _LAYERS_SAMPLED).astype(int))
     for k in layers[layers + 2 < len(start)]:
-        here, there = (_reduced(q[start[i] : start[i + 1]], endless) for i in (k, k + 1))
+        here, there = (reduced(q[start[i] : start[i + 1]], endless) for i in (k, k + 1))
         for i in range(q.shape[1]):
             sorted_ = np.sort(there[:, i])
             around = endless[i] and bound[i] < np.pi
@@ -80,12 +107,12 @@ def narrowest_key(q: Array, start: Ints, bound: Array, endless: Bools) -> tuple[
                 high = np.searchsorted(sorted_, here[:, i] + shift + reach, side="right")
                 pairs[i] += (high - low).sum()
     best = int(np.argmin(pairs))
-    key = _reduced(q[:, [best]], endless[[best]])[:, 0]
+    key = reduced(q[:, [best]], endless[[best]])[:, 0]
     # Twice the slack of (5): the key must never exclude what the test itself would pass.
     return key, float(bound[best] + 2 * LIMIT_TOLERANCE), bool(endless[best])
 
 
-def _reduced(q: Array, endless: Bools) -> Array:
+def reduced(q: Array, endless: Bools) -> Array:
     """Bring the endless joints of q (N, n) into (-pi, pi]."""
     turned = q - 2 * np.pi * np.ceil((q - np.pi) / (2 * np.pi))
     return np.where(endless, turned, q)

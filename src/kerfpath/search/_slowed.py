@@ -3,19 +3,17 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import get_args
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from kerfpath._arrays import Array, Bools, Ints, bools, floats, freeze, positive, scalar
-from kerfpath.errors import InputError
+from kerfpath._arrays import Array, Bools, Ints, freeze, scalar
 from kerfpath.kernels import exact, to_go
 from kerfpath.kernels import search as kernel
 from kerfpath.kernels.metric import increments
 from kerfpath.search._exact import FIRST_GAP, NO_SEAM, ROOM, ROUNDING, UNLIMITED
-from kerfpath.search._layers import empty_layer, narrowest_key, offsets, sorted_layers
-from kerfpath.search._shortest import METRIC_CODES, Metric, _one_of
+from kerfpath.search._layers import empty_layer, narrowest_key, sorted_layers
+from kerfpath.search._problem import Metric, checked
 
 __all__ = ["SlowedPath", "slowed_path"]
 
@@ -83,36 +81,25 @@ def slowed_path(
     InputError
         As `shortest_path`; a penalty that is not positive.
     """
-    q = floats(q, "q", (None, None), copy=False)
-    start, n = offsets(start, len(q)), q.shape[1]
-    if n == 0:
-        raise InputError("q: expected at least one joint, got shape " + str(q.shape))
-    dt = scalar(dt, "dt", unit="s", above=0.0)
-    velocity = positive(velocity, "velocity", (n,))
-    acceleration = positive(acceleration, "acceleration", (n,))
-    endless = bools(np.zeros(n, bool) if endless is None else endless, "endless", (n,))
-    _one_of("metric", metric, get_args(Metric))
-    penalty = scalar(penalty, "penalty", above=0.0)
-    weight = 1.0 / (velocity * dt) if weights is None else floats(weights, "weights", (n,))
-    if (weight < 0).any():
-        raise InputError(f"weights: must not be negative, got {weight.tolist()}")
-    cost = (
-        np.zeros(len(q)) if vertex_cost is None else floats(vertex_cost, "vertex_cost", (len(q),))
+    q, start, endless, aim = checked(
+        q,
+        start,
+        dt=dt,
+        velocity=velocity,
+        acceleration=acceleration,
+        endless=endless,
+        vertex_cost=vertex_cost,
+        weights=weights,
+        metric=metric,
+        objective="sum",
+        eta_v=eta_v,
+        eta_a=eta_a,
     )
+    penalty = scalar(penalty, "penalty", above=0.0)
     empty = np.flatnonzero(np.diff(start) == 0)
     if empty.size:
         raise empty_layer(int(empty[0]))
-    aim = kernel.Objective(
-        weight=np.ascontiguousarray(weight),
-        metric=METRIC_CODES[metric],
-        minimax=False,
-        vertex_cost=cost,
-        velocity=scalar(eta_v, "eta_v", above=0.0) * velocity * dt,
-        acceleration=scalar(eta_a, "eta_a", above=0.0) * acceleration * dt**2,
-        cap=np.inf,
-        timed=True,
-        penalty=penalty,
-    )
+    aim = aim._replace(timed=True, penalty=penalty)
     index, least = _least(q, start, endless, aim)
     path = np.ascontiguousarray(q[start[:-1] + index])
     return SlowedPath(index=freeze(index), cost=least, lost=freeze(_lost(path, endless, aim)))
@@ -152,14 +139,14 @@ def _best(layers: kernel.Layers, aim: kernel.Objective) -> tuple[Ints, float]:
     _add_corners(layers, aim, h)
     least = float((aim.vertex_cost + h)[: layers.start[1]].min())
     bound = least * (1 + ROUNDING)
-    while (reached := exact.recursion(layers, aim, h, bound, NO_SEAM, ROOM)).state < 0:
+    while (reached := exact.recursion(layers, aim, h, bound, NO_SEAM, ROOM)).best[-1] < 0:
         gap = max(2 * (bound - least), FIRST_GAP * least)
         bound = max(least + gap, reached.lowest * (1 + ROUNDING))
     if not reached.recorded:
         bound = reached.cost * (1 + ROUNDING)
         reached = exact.recursion(layers, aim, h, bound, NO_SEAM, UNLIMITED)
     path = np.empty(K, np.int64)
-    exact.trace(reached, path)
+    exact.trace(layers, reached, path)
     return path, float(reached.cost)
 
 
@@ -179,7 +166,7 @@ def _add_corners(layers: kernel.Layers, aim: kernel.Objective, h: Array) -> None
             break
         first, at = max(stuck - AROUND, at), min(stuck + AROUND, last)
         gap = CORNER * aim.penalty
-        while (reached := _through(layers, aim, h, first, at, gap)).state < 0:
+        while (reached := _through(layers, aim, h, first, at, gap)).best[-1] < 0:
             gap = max(2 * gap, reached.lowest * (1 + ROUNDING))
         prices.append((layers.start[first + 1], reached.cost))
     for end, price in prices:
