@@ -93,6 +93,7 @@ def test_the_example_is_read_into_si(read, folder):
         "eta_v": 0.95,
         "eta_a": 0.9,
         "closure": "free",
+        "rotation": None,
         "feed": "constant",
         "refine": True,
     }

@@ -1,9 +1,12 @@
 """plan(): the whole way from contour to plan, and its answers when there is none."""
 
+import itertools
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
-from kerfpath import Contour, InputError, NoFeasiblePath, audit, plan, robot
+from kerfpath import Contour, InputError, NoFeasiblePath, audit, plan, plan_in_pieces, robot
 from kerfpath.planner import layered_graph, node_interval
 
 STEP = np.radians(5)
@@ -207,6 +210,47 @@ def test_off_the_grid_the_feed_dips_less(corner, arm, tool, placement):
     options = {"tool": tool, "placement": placement, "gamma_step": STEP, "speed": 0.4}
     grid, off = (plan(corner, arm, feed="dip", refine=r, **options) for r in (False, True))
     assert off.time[-1] < grid.time[-1]
+
+
+def test_the_pieces_of_an_interrupted_cut(corner, arm, tool, placement):
+    options = {"tool": tool, "placement": placement, "gamma_step": STEP, "speed": 0.1}
+    pieces = plan_in_pieces(corner, arm, **options)
+    assert len(pieces) > 1
+    assert pieces[0].name == f"corner, piece 1 of {len(pieces)}"
+    for p in pieces:
+        assert audit(p, reference=corner.between(p.contour.s[0], p.contour.s[-1])) == []
+        assert p.proof.optimal
+        # Gamma still counts from the frames of the whole contour.
+        H = p.T_base_part @ p.contour.frames("rotation-minimising")
+        x = (p.robot.forward(p.q) @ tool)[:, :3, 0]
+        angle = np.arctan2((x * H[:, :3, 1]).sum(1), (x * H[:, :3, 0]).sum(1))
+        np.testing.assert_allclose(np.cos(angle - p.gamma), 1, atol=1e-9)
+    for before, after in itertools.pairwise(pieces):
+        np.testing.assert_array_equal(before.contour.points[-1], after.contour.points[0])
+    assert pieces[0].contour.s[0] == corner.s[0]
+    assert pieces[-1].contour.s[-1] == corner.s[-1]
+    refined = plan_in_pieces(corner, arm, refine=True, **options)
+    assert all(r.cost <= p.cost for r, p in zip(refined, pieces, strict=True))
+    whole = plan_in_pieces(corner, arm, **options | {"speed": 0.05})
+    assert [p.name for p in whole] == ["corner"]
+    with pytest.raises(InputError, match='needs method "exact"'):
+        plan_in_pieces(corner, arm, method="paper", **options)
+    with pytest.raises(NoFeasiblePath, match="no number of interruptions helps"):
+        plan_in_pieces(corner, arm, **options | {"speed": 20})
+
+
+def test_a_hose_limits_how_far_an_endless_joint_turns(circle, arm, tool, placement):
+    options = {"tool": tool, "placement": placement, "speed": 0.1, "gamma_step": STEP}
+    free = plan(circle, arm, **options)
+    turned = np.abs(np.cumsum(free.increments, axis=0)).max(axis=0)
+    limit = np.full(6, np.inf)
+    limit[5] = 0.9 * turned[5]
+    held = plan(circle, arm, rotation=limit, refine=True, **options)
+    assert np.abs(np.cumsum(held.increments, axis=0)).max(axis=0)[5] <= limit[5]
+    assert audit(held) == []
+    assert audit(replace(free, settings=held.settings))[0].code == "rotation"
+    with pytest.raises(InputError, match="rotation: joint 1 is not endless"):
+        plan(circle, arm, rotation=np.ones(6), **options)
 
 
 def test_a_feed_that_need_not_dip_is_constant(circle, arm, tool, placement, made):

@@ -148,6 +148,7 @@ def _random_model(rng, metric, *, cap=np.inf):
         radius=np.full(K, 0.3),
         lower=q.min(0) - 0.05,
         upper=q.max(0) + 0.05,
+        rotation=np.array([np.inf, np.abs(q[:, 1] - q[0, 1]).max() + 0.02, np.inf]),
         rows=np.array([[1.0, 1.0, 0.0]]),
         row_lower=np.array([-9.0]),
         row_upper=np.array([(q[:, 0] + q[:, 1]).max() + 0.02]),
@@ -188,6 +189,7 @@ def _margins(model, rates, delta):
         (rates.acceleration - np.abs(a)).ravel(),
         (q - model.lower).ravel(),
         (model.upper - q).ravel(),
+        model.rotation[1] - np.abs(q - q[0])[:, 1],
         coupled - model.row_lower,
         model.row_upper - coupled,
         model.radius - np.abs(delta),
@@ -243,11 +245,14 @@ def test_the_manhattan_program_is_a_linear_program():
         Q = np.kron(np.eye(K), np.ones((n, 1))) * model.slope.ravel()[:, None]
         C = np.diag(model.slope @ model.rows[0])
         c = model.q @ model.rows[0]
+        R = np.diag(model.slope[:, 1]) - model.slope[0, 1] * np.eye(K)[[0] * K]
+        r = model.q[:, 1] - model.q[0, 1]
         sides = [
             (V, v, np.tile(rates.velocity, K - 1), -np.tile(rates.velocity, K - 1)),
             (A, a, np.tile(rates.acceleration, K - 2), -np.tile(rates.acceleration, K - 2)),
             (Q, model.q.ravel(), np.tile(model.upper, K), np.tile(model.lower, K)),
             (C, c, np.full(K, model.row_upper[0]), np.full(K, model.row_lower[0])),
+            (R, r, np.full(K, model.rotation[1]), np.full(K, -model.rotation[1])),
         ]
         w = np.diag(np.tile(model.weight, K - 1))
         T = np.eye((K - 1) * n)

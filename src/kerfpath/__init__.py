@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     from kerfpath.errors import NoFeasiblePath as NoFeasiblePath
     from kerfpath.planner import fastest_speed as fastest_speed
     from kerfpath.planner import plan as plan
+    from kerfpath.planner import plan_in_pieces as plan_in_pieces
     from kerfpath.plans import Plan as Plan
     from kerfpath.refiner import Refinement as Refinement
     from kerfpath.refiner import refine as refine
@@ -41,6 +42,7 @@ _HOME = {
     "fastest_speed": "planner",
     "join": "contour",
     "plan": "planner",
+    "plan_in_pieces": "planner",
     "refine": "refiner",
     "robot": "robots",
     "shortest_path": "search",

@@ -35,6 +35,8 @@ class Settings:
     eta_v, eta_a : float
         Share of the velocity and acceleration limits that may be used.
     closure : {"free", "periodic"}
+    rotation : (6,) rad, optional
+        How far each joint may turn away from where it begins, infinite where that is not limited.
     """
 
     gamma_step: float
@@ -46,6 +48,7 @@ class Settings:
     eta_v: float
     eta_a: float
     closure: Closure = "free"
+    rotation: Array | None = None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -263,6 +263,16 @@ class ContourTable(_Table):
         return self
 
 
+_PLAIN = {
+    "method": "exact",
+    "closure": "free",
+    "rotation_deg": None,
+    "objective": "sum",
+    "interruptions": "none",
+}
+"""What feed = "dip" needs of the other keys of [plan], and the first three interruptions."""
+
+
 class PlanTable(_Table):
     """[plan]: what is searched, and which motion is best."""
 
@@ -273,6 +283,8 @@ class PlanTable(_Table):
     metric: Metric = "manhattan"
     method: Method = "exact"
     closure: Closure = "free"
+    rotation_deg: Annotated[NotNegative | None, key("a number not below 0, in deg", "360")] = None
+    interruptions: Literal["none", "fewest"] = "none"
     frames: FrameKind = "rotation-minimising"
     posture: Posture | None = None
     feed: FeedKind = "constant"
@@ -285,6 +297,22 @@ class PlanTable(_Table):
     weights: Annotated[
         SixNotNegative | None, key("6 numbers not below 0, in 1/rad", "[1, 1, 1, 1, 1, 1]")
     ] = None
+
+    @model_validator(mode="after")
+    def _goes_together(self) -> PlanTable:
+        """Refuse what the planner cannot do together, at its key."""
+        needs = {
+            'feed = "dip"': () if self.feed == "constant" else tuple(_PLAIN),
+            'interruptions = "fewest"': () if self.interruptions == "none" else tuple(_PLAIN)[:3],
+            'closure = "periodic"': () if self.closure == "free" else ("method",),
+        }
+        for why, keys in needs.items():
+            for name in keys:
+                value, plain = getattr(self, name), _PLAIN[name]
+                if value != plain:
+                    expected = f'{name} = "{plain}"' if plain else f"no {name}"
+                    raise fault(f"{expected} with {why}", f"{value!r}", "change one", (name,))
+        return self
 
 
 class ProgramTable(_Table):

@@ -8,10 +8,9 @@ import numpy as np
 
 from kerfpath import refiner
 from kerfpath._arrays import Array
-from kerfpath.kernels.metric import increments
 from kerfpath.planner._refined import first_order
 from kerfpath.planner._task import Task
-from kerfpath.plans import Feed, Plan, Proof, path_cost
+from kerfpath.plans import Feed, Plan, Proof
 from kerfpath.retime import feed, retime
 from kerfpath.search import slowed_path
 
@@ -41,13 +40,11 @@ def slowed(task: Task, *, refine: bool) -> Plan:
 def _least_lost(task: Task) -> Plan:
     s = task.settings
     found = slowed_path(**task.limits, dt=task.dt, weights=s.weights, metric=s.metric)
-    dq = increments(task.graph.q[task.graph.start[:-1] + found.index], task.robot.endless)
-    cost = path_cost(dq, s.weights, s.metric, s.objective)
     claim = (
         "at constant speed the graph has no path; of all its paths this one loses the least time "
         "step by step"
     )
-    return task.plan(found.index, cost, Proof(optimal=False, statement=claim))
+    return task.plan(found.index, task.cost(found.index), Proof(optimal=False, statement=claim))
 
 
 def _timed(task: Task, made: Plan) -> Plan:

@@ -40,6 +40,7 @@ def plan(
     eta_v: float = 1.0,
     eta_a: float = 1.0,
     closure: Closure = "free",
+    rotation: ArrayLike | None = None,
     feed: FeedKind = "constant",
     refine: bool = False,
     graph: LayeredGraph | None = None,
@@ -65,12 +66,12 @@ def plan(
         Task frames that gamma is measured in.
     postures : sequence of int, optional
         The postures that may be used; default all. See `kerfpath.robots.postures_named`.
-    method, objective, metric, weights, eta_v, eta_a, closure
+    method, objective, metric, weights, eta_v, eta_a, closure, rotation
         As in `shortest_path`; "periodic" closure needs a closed contour.
     feed : {"constant", "dip"}
         Where the limits do not let the speed be held: "constant" refuses, "dip" holds it wherever
         they do and slows down elsewhere, in the least time; `Plan.feed` says where. Needs
-        objective "sum" and closure "free".
+        objective "sum", closure "free" and no rotation limit.
     refine : bool
         Move gamma off its grid afterwards, see `kerfpath.refine`. Where the grid has no path (it
         quantises acceleration), one is looked for off it.
@@ -88,10 +89,10 @@ def plan(
     """
     if feed not in get_args(FeedKind):
         raise InputError(f"feed: expected one of {', '.join(get_args(FeedKind))}, got {feed!r}")
-    if feed == "dip" and (objective != "sum" or closure != "free"):
+    if feed == "dip" and (objective != "sum" or closure != "free" or rotation is not None):
         raise InputError(
-            'feed: "dip" needs objective "sum" and closure "free", got '
-            f'objective "{objective}" and closure "{closure}"'
+            'feed: "dip" needs objective "sum", closure "free" and no rotation limit, got '
+            f'objective "{objective}", closure "{closure}" and rotation {rotation!r}'
         )
     task = task_of(
         contour,
@@ -109,12 +110,18 @@ def plan(
         eta_v=eta_v,
         eta_a=eta_a,
         closure=closure,
+        rotation=rotation,
         graph=graph,
         progress=progress,
     )
     try:
         path = shortest_path(
-            **task.limits, **task.aim, posture=task.graph.posture, method=method, closure=closure
+            **task.limits,
+            **task.aim,
+            posture=task.graph.posture,
+            method=method,
+            closure=closure,
+            rotation=task.settings.rotation,
         )
     except NoFeasiblePath as broken:
         if feed == "dip":

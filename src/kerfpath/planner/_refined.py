@@ -6,9 +6,8 @@ from dataclasses import replace
 
 from kerfpath import refiner
 from kerfpath.errors import NoFeasiblePath
-from kerfpath.kernels.metric import increments
 from kerfpath.planner._task import Task
-from kerfpath.plans import Plan, Proof, path_cost
+from kerfpath.plans import Plan, Proof
 from kerfpath.refiner import Refinement
 from kerfpath.search import least_interval, shortest_path
 
@@ -56,18 +55,18 @@ def off_grid(task: Task) -> Refinement | None:
     least = least_interval(**task.limits)
     if least.dt > TOO_SLOW * task.dt:
         return found
-    dq = increments(task.graph.q[task.graph.start[:-1] + least.index], task.robot.endless)
-    s = task.settings
     claim = Proof(optimal=False, statement="the fastest path on this graph")
-    cost = path_cost(dq, s.weights, s.metric, s.objective)
-    return refiner.refine(task.plan(least.index, cost, claim))
+    return refiner.refine(task.plan(least.index, task.cost(least.index), claim))
 
 
 def first_order(task: Task) -> Plan | None:
     """Return the best path without (6); None where (5) alone closes the way."""
     limits = task.limits | {"acceleration": FREE * task.limits["acceleration"]}
     try:
-        path = shortest_path(**limits, **task.aim, closure=task.settings.closure)
+        settings = task.settings
+        path = shortest_path(
+            **limits, **task.aim, closure=settings.closure, rotation=settings.rotation
+        )
     except NoFeasiblePath:
         return None
     claim = "the best path on this graph without acceleration limits"

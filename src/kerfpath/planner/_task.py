@@ -13,10 +13,11 @@ from kerfpath._arrays import Array, Ints, as_pose, floats, freeze, scalar
 from kerfpath.contour import Contour, FrameKind
 from kerfpath.errors import InputError
 from kerfpath.graph import LayeredGraph
+from kerfpath.kernels.metric import increments
 from kerfpath.planner._graph import layered_graph, node_interval, require_no_empty_layer
-from kerfpath.plans import Plan, Proof, Settings
+from kerfpath.plans import Plan, Proof, Settings, path_cost
 from kerfpath.robots import Robot
-from kerfpath.search import Closure, Method, Metric, ObjectiveKind
+from kerfpath.search import Closure, Method, Metric, ObjectiveKind, rotation_limits
 
 __all__ = ["Options", "Task", "task_of"]
 
@@ -36,7 +37,6 @@ class Options(TypedDict, total=False):
     weights: ArrayLike | None
     eta_v: float
     eta_a: float
-    closure: Closure
     graph: LayeredGraph | None
     progress: Callable[[int], None] | None
 
@@ -84,6 +84,11 @@ class Task:
         """What the searches are to minimise."""
         s = self.settings
         return {"dt": self.dt, "weights": s.weights, "metric": s.metric, "objective": s.objective}
+
+    def cost(self, index: Ints) -> float:
+        """Return the objective (14) or (15) of a path through the graph."""
+        s, q = self.settings, self.graph.q[self.graph.start[:-1] + index]
+        return path_cost(increments(q, self.robot.endless), s.weights, s.metric, s.objective)
 
     def plan(self, index: Ints, cost: float, proof: Proof) -> Plan:
         """Return the plan of a path through the graph, at the speed asked for."""
@@ -133,6 +138,7 @@ def task_of(
     eta_v: float = 1.0,
     eta_a: float = 1.0,
     closure: Closure = "free",
+    rotation: ArrayLike | None = None,
     graph: LayeredGraph | None = None,
     progress: Callable[[int], None] | None = None,
 ) -> Task:
@@ -153,6 +159,7 @@ def task_of(
         eta_v=scalar(eta_v, "eta_v", above=0.0),
         eta_a=scalar(eta_a, "eta_a", above=0.0),
         closure=closure,
+        rotation=None if rotation is None else rotation_limits(rotation, robot.endless),
     )
     graph = graph or layered_graph(
         contour,

@@ -87,6 +87,8 @@ class Descent:
     curves : JointCurves
     rates : Rates
     limits : JointLimits
+    rotation : (6,) rad
+        How far a joint may turn away from where it begins.
     weight : (6,) 1/rad
     metric : str
     objective : {"sum", "max"}
@@ -99,6 +101,7 @@ class Descent:
     curves: JointCurves
     rates: Rates
     limits: JointLimits
+    rotation: Array
     weight: Array
     metric: Metric
     objective: ObjectiveKind
@@ -210,6 +213,7 @@ class Descent:
             radius=np.where(movable, radius, 0.0),
             lower=np.where(endless, -np.inf, self.limits.lower + MARGIN),
             upper=np.where(endless, np.inf, self.limits.upper - MARGIN),
+            rotation=self.rotation - MARGIN,
             rows=self.limits.rows,
             row_lower=self.limits.row_lower + MARGIN,
             row_upper=self.limits.row_upper - MARGIN,
@@ -223,4 +227,5 @@ class Descent:
         beyond = np.where(limits.endless, -np.inf, np.maximum(limits.lower - q, q - limits.upper))
         value = q @ limits.rows.T
         over = np.maximum(limits.row_lower - value, value - limits.row_upper)
-        return float(max(beyond.max(), over.max(initial=-np.inf)))
+        turned = np.abs(q - q[0]) - self.rotation
+        return float(max(beyond.max(), over.max(initial=-np.inf), turned.max()))

@@ -44,6 +44,8 @@ class Model:
         Largest change of gamma at each node.
     lower, upper : (n,) rad
         Ranges of the joints; infinite where there is none.
+    rotation : (n,) rad
+        How far a joint may turn away from where it begins; infinite where that is not limited.
     rows, row_lower, row_upper : (m, n), (m,) rad, (m,) rad
         Couplings.
     weight : (n,) 1/rad
@@ -57,6 +59,7 @@ class Model:
     radius: Array
     lower: Array
     upper: Array
+    rotation: Array
     rows: Array
     row_lower: Array
     row_upper: Array
@@ -149,6 +152,11 @@ def _ranges(rows: Rows, model: Model) -> None:
     one = _matrix(slope.ravel(), np.arange(K * n), node, (K * n, K))
     rows.at_most(model.q.ravel(), one, np.tile(model.upper, K))
     rows.at_most(-model.q.ravel(), -one, np.tile(-model.lower, K))
+    if np.isfinite(model.rotation).any():
+        away = one - sparse.vstack([one[:n]] * K, format="csr")
+        for sign in (1.0, -1.0):
+            turned = sign * (model.q - model.q[0]).ravel()
+            rows.at_most(turned, sign * away, np.tile(model.rotation, K))
     for row, lower, upper in zip(model.rows, model.row_lower, model.row_upper, strict=True):
         both = sparse.diags_array(slope @ row).tocsr()
         rows.at_most(model.q @ row, both, upper)

@@ -195,6 +195,7 @@ def _descent(plan: Plan) -> tuple[Descent, Stand]:
             periodic=settings.closure == "periodic",
         ),
         limits=plan.robot.joint_limits(),
+        rotation=np.full(6, np.inf) if settings.rotation is None else settings.rotation,
         weight=settings.weights,
         metric=settings.metric,
         objective=settings.objective,

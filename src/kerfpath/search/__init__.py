@@ -8,6 +8,7 @@ from kerfpath.search._interrupted import interrupted_path as interrupted_path
 from kerfpath.search._problem import METRIC_CODES as METRIC_CODES
 from kerfpath.search._problem import Metric as Metric
 from kerfpath.search._problem import ObjectiveKind as ObjectiveKind
+from kerfpath.search._problem import rotation_limits as rotation_limits
 from kerfpath.search._relax import Relaxations as Relaxations
 from kerfpath.search._relax import least_relaxations as least_relaxations
 from kerfpath.search._shortest import Closure as Closure
