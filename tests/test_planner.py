@@ -163,6 +163,25 @@ def test_a_periodic_plan_returns_to_where_it_began(made, circle, arm, tool, plac
         )
 
 
+def test_a_change_of_posture_that_no_path_can_make_is_named(circle, arm, tool, placement):
+    """A graph that offers one posture in the first half and another in the second."""
+    space = {"tool": tool, "placement": placement, "gamma_step": STEP}
+    graph = layered_graph(circle, arm, postures=(0, 1), **space)
+    node = np.repeat(np.arange(len(circle)), np.diff(graph.start))
+    keep = np.where(node < 60, graph.posture == 0, graph.posture == 1)
+    parted = replace(
+        graph,
+        q=graph.q[keep],
+        start=np.concatenate([[0], np.cumsum(np.bincount(node[keep]))]),
+        sample=graph.sample[keep],
+        posture=graph.posture[keep],
+        turn=graph.turn[keep],
+    )
+    with pytest.raises(NoFeasiblePath, match="change from front/up/plus to front/up/minus") as cut:
+        plan(circle, arm, graph=parted, speed=0.1, **space)
+    assert (cut.value.node, cut.value.back) == (59, 60)
+
+
 def test_where_the_grid_has_no_path_one_is_found_off_it(circle, arm, tool, placement):
     """A coarse grid quantises the acceleration: (6) fails on it and holds beside it."""
     options = {"tool": tool, "placement": placement, "speed": 0.6, "gamma_step": np.radians(4)}

@@ -13,9 +13,9 @@ from kerfpath.errors import InputError, NoFeasiblePath
 from kerfpath.graph import LayeredGraph
 from kerfpath.planner._dip import slowed
 from kerfpath.planner._refined import off_grid, refined
-from kerfpath.planner._task import task_of
+from kerfpath.planner._task import Task, task_of
 from kerfpath.plans import Plan, Proof
-from kerfpath.robots import Robot
+from kerfpath.robots import Robot, posture_name
 from kerfpath.search import Closure, Method, Metric, ObjectiveKind, shortest_path
 
 __all__ = ["FeedKind", "plan"]
@@ -131,20 +131,34 @@ def plan(
             return found.plan
         tried = "" if found is None else f"; off the grid {found.statement}"
         raise NoFeasiblePath(
-            f"contour {contour.name!r}: {broken}{_bracket(broken)}{tried}",
+            f"contour {contour.name!r}: {broken}{_bracket(broken, task)}{tried}",
             proved=broken.proved,
             node=broken.node,
             back=broken.back,
+            reached=broken.reached,
+            leaving=broken.leaving,
             counts=broken.counts,
         ) from None
     made = task.plan(path.index, path.cost, _proof(method, path.optimal))
     return refined(task, made) if refine else made
 
 
-def _bracket(broken: NoFeasiblePath) -> str:
-    if broken.back is None or broken.back <= broken.node + 1:
+def _bracket(broken: NoFeasiblePath, task: Task) -> str:
+    """Say from where on paths reach the end, and which change of posture would join the two."""
+    if broken.back is None:
         return ""
-    return f"; from the back, paths reach the end from node {broken.back} on"
+    said = f"; from the back, paths reach the end from node {broken.back} on"
+    said = said if broken.back > broken.node + 1 else ""
+    if broken.reached is None or broken.leaving is None:
+        return said
+    before, after = (
+        {int(mu) for mu in task.graph.posture[task.graph.start[node] + vertices]}
+        for node, vertices in ((broken.node, broken.reached), (broken.back, broken.leaving))
+    )
+    if before & after:
+        return said
+    names = (", ".join(posture_name(mu) for mu in sorted(group)) for group in (before, after))
+    return f"{said}; the posture would have to change from {' to '.join(names)}"
 
 
 def _proof(method: Method, optimal: bool) -> Proof:

@@ -45,10 +45,13 @@ class Dead:
     counts : (2, n) int
         Of the ways into the next layer, how many each joint's velocity (row 0) and acceleration
         (row 1) forbids.
+    reached : (m,) int
+        Vertices of the sorted graph, in the last layer reached, that some path ends in.
     """
 
     layers: int
     counts: Ints
+    reached: Ints
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -160,10 +163,11 @@ def dead_end(layers: Layers, aim: Objective) -> Dead:
     """Go as far as any admissible path goes, and count what forbids to go on."""
     reached = _as_far_as_any(layers, aim)
     K, n = len(layers.start) - 1, len(layers.endless)
+    ends = np.unique(reached.last.vertex)
     if reached.layers in (0, K):
-        return Dead(layers=reached.layers, counts=np.zeros((2, n), np.int64))
+        return Dead(layers=reached.layers, counts=np.zeros((2, n), np.int64), reached=ends)
     counts = exact.count_closing(layers, aim, reached.last, reached.layers)
-    return Dead(layers=reached.layers, counts=counts)
+    return Dead(layers=reached.layers, counts=counts, reached=ends)
 
 
 def layers_reached(layers: Layers, aim: Objective) -> int:

@@ -165,7 +165,7 @@ def shortest_path(
         try:
             found = _exactly(layers, aim, filled, closure)
         except NoFeasiblePath as broken:
-            broken.back = _first_from_the_back(q, start, aim, endless)
+            broken.back, broken.leaving = _from_the_back(q, start, aim, endless)
             raise
         over = too_far(q[start[:-1] + found.index], endless, reach)
         return _turning_less(problem, reach, over, closure) if over.any() else found
@@ -195,7 +195,9 @@ def _exactly(
             proved=True,
             node=len(layers.start) - 2,
         )
-    raise broken_edge(found.layers, found.counts, proved=True)
+    broken = broken_edge(found.layers, found.counts, proved=True)
+    broken.reached = freeze(layers.rank[found.reached])
+    raise broken
 
 
 def _turning_less(problem: Problem, rotation: Array, over: Bools, closure: Closure) -> LayeredPath:
@@ -208,8 +210,10 @@ def _turning_less(problem: Problem, rotation: Array, over: Bools, closure: Closu
     return LayeredPath(index=freeze(index), cost=cost, optimal=True)
 
 
-def _first_from_the_back(q: Array, start: Ints, aim: kernel.Objective, endless: Bools) -> int:
-    """Return the first node from which an admissible path reaches the end.
+def _from_the_back(
+    q: Array, start: Ints, aim: kernel.Objective, endless: Bools
+) -> tuple[int, Ints | None]:
+    """Return the first node from which admissible paths reach the end, and their vertices there.
 
     (5) and (6) hold for a path and its reverse alike, so that it is as far as any path goes from
     the last layer backwards.
@@ -218,11 +222,12 @@ def _first_from_the_back(q: Array, start: Ints, aim: kernel.Objective, endless: 
     sizes = np.diff(start)
     filled = int(np.argmin(sizes)) if (sizes == 0).any() else len(sizes)
     if filled == 0:
-        return len(sizes)
+        return len(sizes), None
     key, window, circular = narrowest_key(q, start, aim.velocity, endless)
     layers, _ = sorted_layers(q, start, key, window, circular, endless)
     free = aim._replace(vertex_cost=np.zeros(len(q)))
-    return len(sizes) - dead_end(layers._replace(start=start[: filled + 1]), free).layers
+    found = dead_end(layers._replace(start=start[: filled + 1]), free)
+    return len(sizes) - found.layers, freeze(layers.rank[found.reached])
 
 
 def _search(
