@@ -23,7 +23,7 @@ def main() -> None:
     robot = kerfpath.robot("abb_irb4600_60_205", acceleration_ratio="iontec_20_to_70kg")
     robot = robot.with_limits(endless=np.isin(np.arange(1, 7), (4, 6)))
     tool, placement = np.eye(4), np.eye(4)
-    tool[:3, :3] = [[0.8, 0, 0.6], [0, 1, 0], [-0.6, 0, 0.8]]
+    tool[:3, :3] = np.array([[0.8, 0, 0.6], [0, 1, 0], [-0.6, 0, 0.8]])
     tool[:3, 3], placement[:3, 3] = [0.15, 0, 0.30], [1.2, 0, 0.4]
     contour, step = corner(), np.radians(5)
 
