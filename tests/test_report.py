@@ -17,10 +17,11 @@ from kerfpath.contour import Contour
 from kerfpath.errors import InputError
 from kerfpath.graph import LayeredGraph
 from kerfpath.planner import layered_graph, plan
+from kerfpath.plans import Feed
 from kerfpath.report import ContourSection, feasibility_map, render
 from kerfpath.report._look import JOINT_COLOURS, reason_colours
 from kerfpath.report._map import chosen_line, hidden_postures, shown_postures
-from kerfpath.report._motion import joint_positions, limit_shares, posture_runs
+from kerfpath.report._motion import cutting_speed, joint_positions, limit_shares, posture_runs
 from kerfpath.report._scene import scene
 from kerfpath.report._tables import audit_table, counts_table, criteria_table, summary_table
 from kerfpath.robots import posture_name, robot
@@ -387,3 +388,18 @@ def _lightness(colour: str) -> int:
 
 def _without_scripts(dom: str) -> str:
     return re.sub(r"<script.*?</script>", "", dom, flags=re.DOTALL)
+
+
+def test_a_feed_that_dips_is_drawn(section: ContourSection) -> None:
+    plan = section.plan
+    time = plan.time.copy()
+    time[10:] += 0.5
+    feed = Feed(full=0.9, slowest=0.2, node=9, joint=3, limit="acceleration")
+    dipped = replace(plan, time=time, feed=feed)
+    shown = cutting_speed(dipped).data[0]
+    speed = np.diff(plan.contour.s) / np.diff(time) * 60
+    np.testing.assert_allclose(shown.y[:-1], speed, rtol=1e-5)
+    assert np.argmin(shown.y) == 9
+    html = render("x", [replace(section, plan=dipped)], facts=[], notes=[])
+    assert "Full speed on 90.0% of the length" in html
+    assert "Cutting speed" not in render("x", [section], facts=[], notes=[])

@@ -21,10 +21,11 @@ from kerfpath.report._look import (
 )
 from kerfpath.robots import posture_name
 
-__all__ = ["joint_positions", "limit_shares", "posture_runs"]
+__all__ = ["cutting_speed", "joint_positions", "limit_shares", "posture_runs"]
 
 ROW, GAP, TOP, BOTTOM = 130, 36, 48, 48
 SHARE_ROW, SHARE_TOP = 210, 74
+SPEED_HEIGHT = 220
 
 
 def posture_runs(plan: Plan) -> list[tuple[int, int, int]]:
@@ -93,6 +94,26 @@ def joint_positions(plan: Plan) -> go.Figure:
         )
         for bound in () if endless else (low, high):
             figure.add_shape(_level(float(bound), x, y, QUIET, "solid"))
+    return figure
+
+
+def cutting_speed(plan: Plan) -> go.Figure:
+    """Return the speed along the contour, m/min, as steps from node to node."""
+    figure = go.Figure(layout=base_layout(SPEED_HEIGHT, hovermode="x unified", showlegend=False))
+    figure.update_layout(margin={"l": 62, "r": 44, "t": 16, "b": BOTTOM})
+    s = (plan.contour.s - plan.contour.s[0]) * 1e3
+    speed = np.diff(plan.contour.s) / np.diff(plan.time) * 60
+    figure.add_scatter(
+        x=_short(s),
+        y=_short(np.append(speed, speed[-1])),
+        mode="lines",
+        line={"color": INK, "width": 1.6, "shape": "hv"},
+        hovertemplate="%{y:.2f} m/min",
+    )
+    figure.update_layout(
+        xaxis=axis(title=axis_title("length, mm"), unifiedhovertitle={"text": "%{x:.1f} mm"}),
+        yaxis=axis(title=axis_title("speed, m/min"), range=[0, 1.08 * float(speed.max())]),
+    )
     return figure
 
 

@@ -141,6 +141,12 @@ def _contour(number: int, section: ContourSection, figures: _Figures) -> str:
     else:
         parts.append(f'<p class="caption">{escape(_in_words(plan))}</p>')
     parts += _map_part(section, figures)
+    if plan is not None and plan.feed is not None:
+        parts += [
+            "<h4>Cutting speed</h4>",
+            f'<p class="caption">{escape(str(plan.feed).capitalize())}.</p>',
+            figures.place(_motion.cutting_speed(plan), "speed"),
+        ]
     if plan is not None:
         parts += [
             "<h4>Joint positions</h4>",
@@ -198,10 +204,9 @@ def _failure(section: ContourSection) -> str:
 def _in_words(plan: Plan) -> str:
     s = plan.settings
     claim = plan.proof.statement
-    feed = "" if plan.feed is None else f" {str(plan.feed).capitalize()}."
     return (
         f"Objective: {s.objective} of {s.metric} distances, method “{s.method}”, "
-        f"cost {plan.cost:.5g}. {claim[:1].upper()}{claim[1:]}.{feed}"
+        f"cost {plan.cost:.5g}. {claim[:1].upper()}{claim[1:]}."
     )
 
 
