@@ -498,3 +498,27 @@ def test_a_posture_in_words_becomes_those_it_fits(read):
 def test_a_posture_that_does_not_exist_is_refused_at_its_line(read, words):
     with pytest.raises(InputError, match=r"job.toml:16: plan.posture: expected a posture in words"):
         read(JOB.replace("gamma_step_deg = 1", f'posture = "{words}"\ngamma_step_deg = 1'))
+
+
+@pytest.mark.parametrize(
+    ("keys", "said"),
+    [
+        ('feed = "dip"\nclosure = "periodic"', 'plan.closure: expected closure = "free"'),
+        ('feed = "dip"\nrefine_parts = 3', 'expected refine_parts = 1 with feed = "dip", got 3'),
+        ('feed = "dip"\nrotation_deg = 90', 'expected no rotation_deg with feed = "dip", got 90'),
+        ('interruptions = "fewest"\nmethod = "paper"', 'plan.method: expected method = "exact"'),
+        ('closure = "periodic"\nmethod = "known"', 'method = "exact" with closure = "periodic"'),
+        ("refine_parts = 0", "refine_parts: expected a whole number of parts from 1 to 100, got 0"),
+        ("rotation_deg = -1", "rotation_deg: expected a number not below 0, in deg, got -1"),
+    ],
+)
+def test_keys_of_plan_that_do_not_go_together_are_refused_at_their_line(read, keys, said):
+    with pytest.raises(InputError, match="^[^\n]*$") as refused:
+        read(changed("[plan]", f"[plan]\n{keys}"))
+    assert said in str(refused.value)
+
+
+def test_a_rotation_limit_is_one_for_every_endless_axis(read):
+    job = read(changed("[plan]", "[plan]\nrotation_deg = 180"))
+    inf = np.inf
+    assert job.plan_options["rotation"].tolist() == [inf, inf, inf, np.pi, inf, np.pi]

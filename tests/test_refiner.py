@@ -104,6 +104,14 @@ def test_a_finer_time_step_holds_the_limits_too(planned, circle, tool):
     np.testing.assert_allclose(T[:, :3, 3], finer.points, atol=1e-9)
 
 
+def test_the_times_of_a_feed_that_dips_are_not_divided(planned, circle):
+    coarse = planned(circle.resample(count=61), speed=1.2, feed="dip")
+    assert 0 < coarse.feed.full < 1
+    refined = refine(coarse, nodes=circle.resample(count=121))
+    assert not refined.done
+    assert "feed that dips" in refined.statement
+
+
 def test_a_closed_contour_stays_closed(planned):
     refined = refine(planned(closure="periodic"))
     assert refined.done

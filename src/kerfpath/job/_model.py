@@ -269,8 +269,13 @@ _PLAIN = {
     "rotation_deg": None,
     "objective": "sum",
     "interruptions": "none",
+    "refine_parts": 1,
 }
 """What feed = "dip" needs of the other keys of [plan], and the first three interruptions."""
+
+
+def _toml(value: object) -> str:
+    return f'"{value}"' if isinstance(value, str) else f"{value}"
 
 
 class PlanTable(_Table):
@@ -310,8 +315,8 @@ class PlanTable(_Table):
             for name in keys:
                 value, plain = getattr(self, name), _PLAIN[name]
                 if value != plain:
-                    expected = f'{name} = "{plain}"' if plain else f"no {name}"
-                    raise fault(f"{expected} with {why}", f"{value!r}", "change one", (name,))
+                    expected = f"{name} = {_toml(plain)}" if plain else f"no {name}"
+                    raise fault(f"{expected} with {why}", _toml(value), "change one", (name,))
         return self
 
 

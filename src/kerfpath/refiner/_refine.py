@@ -249,6 +249,8 @@ def _divided(plan: Plan, nodes: Contour) -> Plan | str:
         return f"the posture changes after node {changes[0]}, an interval that cannot be divided"
     if parts == 1:
         return plan
+    if plan.feed is not None:
+        return "the times of a feed that dips hold at its own nodes, not between them"
     gamma = CubicSpline(coarse, np.unwrap(plan.gamma + twist))(index)
     near = np.stack([np.interp(index, coarse, q) for q in _unwrapped(plan).T], axis=1)
     return replace(
