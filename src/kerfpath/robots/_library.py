@@ -81,6 +81,7 @@ def _read(data: dict[str, Any]) -> Robot:
         id=data["id"],
         manufacturer=data["manufacturer"],
         model=data["model"],
+        kinematics=data["kinematics"],
         geometry=data["geometry_m"],
         sign=np.array(joints["sign"], dtype=float),
         offset=np.radians(joints["offset_deg"]),
