@@ -63,7 +63,13 @@ class JointChain:
 
 
 def chain_of(robot: Robot) -> JointChain:
-    """Return the joint chain of a robot, built from its lengths and joint convention alone."""
+    """Return the joint chain of a robot: of its description, if it comes from one.
+
+    Otherwise it is built from the lengths and the joint convention alone.
+    """
+    if robot.chain is not None:
+        given = robot.chain
+        return JointChain(origins=given.origins, axes=given.axes, tip=given.end)
     origins, axes, end = _MODELS[robot.kinematics](robot.geometry)
     for i, axis in enumerate(axes):
         # q_model = sign q - offset: the frame at angle zero is turned back by the offset.

@@ -13,7 +13,8 @@ import numpy as np
 
 from kerfpath._arrays import Array
 from kerfpath.errors import InputError
-from kerfpath.robots._robot import Coupling, Robot
+from kerfpath.robots._coupling import Coupling
+from kerfpath.robots._robot import Robot
 
 __all__ = ["acceleration_ratios", "robot", "robot_ids"]
 

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -11,48 +13,11 @@ from numpy.typing import ArrayLike
 from kerfpath._arrays import Array, Bools, Ints, as_pose, bools, floats, freeze, positive
 from kerfpath.errors import InputError
 from kerfpath.kernels import turns
+from kerfpath.robots._coupling import Coupling
 from kerfpath.robots._families import FAMILIES, Family
+from kerfpath.urdf import Body, Chain, read_urdf
 
-__all__ = ["Coupling", "Robot", "Solutions"]
-
-
-@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class Coupling:
-    """A linear bound on several joints at once: lower <= row @ q <= upper.
-
-    Parameters
-    ----------
-    row : (n,)
-        Coefficients of the joints.
-    lower, upper : float rad
-        Bounds of the combination.
-    note : str
-        Where the bound comes from.
-    """
-
-    row: Array
-    lower: float
-    upper: float
-    note: str = ""
-
-    def __post_init__(self) -> None:
-        object.__setattr__(self, "row", floats(self.row, "coupling row", (None,)))
-        if not self.lower < self.upper:
-            raise InputError(
-                f"coupling {self.row.tolist()}: the lower bound {np.degrees(self.lower):g} deg "
-                f"must be below the upper bound {np.degrees(self.upper):g} deg"
-            )
-
-    @property
-    def name(self) -> str:
-        """Say the combination in words, such as "joint 2 + joint 3"."""
-        words = ""
-        for i, c in enumerate(self.row):
-            if c:
-                sign = " - " if c < 0 else " + " if words else ""
-                size = "" if abs(c) == 1 else f"{abs(c):g} "
-                words += f"{sign}{size}joint {i + 1}"
-        return words.strip()
+__all__ = ["Robot", "Solutions"]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -111,6 +76,10 @@ class Robot:
         Joints that turn without end; their limits do not apply.
     couplings : tuple of Coupling
         Bounds on combinations of joints.
+    chain : Chain, optional
+        The joint frames of the description that the robot comes from: the audit's kinematics.
+    bodies : tuple of Body
+        Collision bodies of that description.
 
     Raises
     ------
@@ -131,6 +100,8 @@ class Robot:
     acceleration: Array | None = None
     endless: Bools = field(default_factory=lambda: np.zeros((), bool))
     couplings: tuple[Coupling, ...] = ()
+    chain: Chain | None = None
+    bodies: tuple[Body, ...] = ()
     manufacturer: str = ""
     model: str = ""
     payload: float | None = None
@@ -196,6 +167,42 @@ class Robot:
     def postures(self) -> int:
         """Number of postures, P: mu runs from 0 to P - 1."""
         return len(self.family.postures)
+
+    @classmethod
+    def from_urdf(
+        cls,
+        path: str | Path,
+        *,
+        base: str | None = None,
+        tip: str | None = None,
+        packages: Mapping[str, str | Path] | None = None,
+        meshes: bool = True,
+        snap: float = 0.0,
+        **limits: ArrayLike | None,
+    ) -> Robot:
+        """Return the robot of a description, its family recognised from the joint axes.
+
+        The model that is derived has been compared with the description: 1e-9 m and rad.
+
+        Parameters
+        ----------
+        path, base, tip, packages, meshes, snap
+            As in `kerfpath.urdf.read_urdf`. Poses of the robot are of link `tip` in link `base`.
+        **limits : (n,) rad, rad/s, rad/s^2
+            lower, upper, velocity, acceleration, endless: instead of what is written there. No
+            description states accelerations. Continuous joints are endless.
+
+        Raises
+        ------
+        InputError
+            A bad description; a chain of no family; limits that are missing or zero, and not given.
+        """
+        from kerfpath.robots._described import robot_of
+
+        return robot_of(
+            read_urdf(path, base=base, tip=tip, packages=packages, meshes=meshes, snap=snap),
+            **limits,
+        )
 
     def with_limits(
         self,
