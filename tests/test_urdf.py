@@ -166,7 +166,7 @@ def test_a_continuous_joint_is_endless_and_a_fixed_one_is_merged(tmp_path):
 def test_right_angles_of_few_digits_are_taken_as_meant_only_when_asked(tmp_path):
     path = described(tmp_path, robot("ur_ur10e"))
     path.write_text(path.read_text().replace(repr(np.pi / 2), "1.5708"))
-    with pytest.raises(InputError, match=r"Universal Robots type.*missed by .*e-05.*snap=1e-4"):
+    with pytest.raises(InputError, match=r"Universal Robots type.*e-05 off .*snap=1e-4"):
         Robot.from_urdf(path)
     r = Robot.from_urdf(path, snap=1e-4)
     q = np.random.default_rng(33).uniform(-3, 3, (20, 6))
@@ -327,5 +327,5 @@ def test_an_arm_of_no_family_is_refused(tmp_path):
     T[:, :3, :3], T[:, :3, 3] = Rotation.random(6, rng=rng).as_matrix(), rng.uniform(-1, 1, (6, 3))
     joints = [joint(f"j{i + 1}", names[i], names[i + 1], T[i]) for i in range(6)]
     joints.append(joint("end", "link_6", "tool0", np.eye(4), kind="fixed", inside=""))
-    with pytest.raises(InputError, match="neither those of an ortho-parallel arm"):
+    with pytest.raises(InputError, match="not an ortho-parallel arm with a spherical wrist, as axes 2 and 3"):
         Robot.from_urdf(urdf(tmp_path, joints))

@@ -7,6 +7,7 @@ not argued but measured, against the chain of the description at joint angles of
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -14,6 +15,7 @@ import numpy as np
 
 from kerfpath._arrays import Array
 from kerfpath.errors import InputError
+from kerfpath.robots._families import FAMILIES
 from kerfpath.robots._robot import Robot
 from kerfpath.urdf import Chain
 
@@ -56,13 +58,15 @@ class _Lines:
         """Return the distance of a point from axis i, m."""
         return float(np.linalg.norm(np.cross(point - self.place[i], self.along[i])))
 
-    def parallel(self, i: int, j: int) -> bool:
-        """Whether axes i and j are (nearly) parallel."""
-        return float(np.linalg.norm(np.cross(self.along[i], self.along[j]))) < NEARLY
-
-    def square(self, i: int, j: int) -> bool:
-        """Whether axes i and j are (nearly) at right angles."""
-        return abs(float(self.along[i] @ self.along[j])) < NEARLY
+    def misfit(self, parallel: Sequence[int], square: Sequence[int]) -> str:
+        """Name the first of the joints i that is not parallel, or square, to joint i + 1."""
+        for i in parallel:
+            if float(np.linalg.norm(np.cross(*self.along[i : i + 2]))) > NEARLY:
+                return f"axes {i + 1} and {i + 2} are not parallel"
+        for i in square:
+            if abs(float(np.dot(*self.along[i : i + 2]))) > NEARLY:
+                return f"axes {i + 1} and {i + 2} are not at right angles"
+        return ""
 
 
 def model_of(chain: Chain) -> dict[str, Any]:
@@ -71,7 +75,7 @@ def model_of(chain: Chain) -> dict[str, Any]:
     Raises
     ------
     InputError
-        The chain is of no family; says what is nearest, and by how much it misses.
+        The chain is of no family; says of each why, or of the nearest by how much.
     """
     n = len(chain.axes)
     if n != 6:
@@ -79,22 +83,19 @@ def model_of(chain: Chain) -> dict[str, Any]:
     lines, told = _lines(chain), []
     for name, derive in (("opw", _opw), ("ur", _ur)):
         derived = derive(lines)
-        if derived is None:
+        words = FAMILIES[name].words
+        if isinstance(derived, str):
+            told.append(f"not an {words}, as {derived}")
             continue
         model = _laid(name, lines, *derived)
         miss = _miss(chain, model)
         if miss <= EXACT:
             return model
-        told.append(f"{Robot(id='', **model).family.words}: missed by {miss:.1e}")
-    if told:
         raise InputError(
-            f"nearest to an {'; '.join(told)} (m and rad, allowed {EXACT:g}); where the "
+            f"nearly an {words}, but {miss:.1e} off (m and rad, allowed {EXACT:g}); if the "
             "description prints right angles with few digits, snap=1e-4 takes them as meant"
         )
-    raise InputError(
-        "the joint axes are neither those of an ortho-parallel arm with a spherical wrist nor of "
-        "the Universal Robots type"
-    )
+    raise InputError(f"no family that can be solved: {'; '.join(told)}")
 
 
 def _lines(chain: Chain) -> _Lines:
@@ -114,19 +115,17 @@ def _lines(chain: Chain) -> _Lines:
     return _Lines(foot, (place - foot[:3, 3]) @ R, along @ R, np.linalg.inv(foot) @ T[6], sign)
 
 
-def _opw(at: _Lines) -> tuple[dict[str, float], list[float], list[float]] | None:
-    """Return lengths, signs and model angles at zero of joints 1 to 6, if the axes are OPW's.
+def _opw(at: _Lines) -> tuple[dict[str, float], list[float], list[float]] | str:
+    """Return lengths, signs and model angles at zero, or why the axes are not those of an OPW arm.
 
     Directions are chosen such that a1, c3 and c4 are not negative; c2 never is.
     """
-    if not (
-        at.square(0, 1) and at.parallel(1, 2) and at.square(2, 3)
-        and at.square(3, 4) and at.square(4, 5)
-    ):  # fmt: skip
-        return None
+    if misfit := at.misfit(parallel=(1,), square=(0, 2, 3, 4)):
+        return misfit
     wrist = at.meet(4, 3)
-    if max(at.distance(wrist, 3), at.distance(wrist, 5)) > NEARLY:
-        return None
+    off = max(at.distance(wrist, 3), at.distance(wrist, 5))
+    if off > NEARLY:
+        return f"axes 4, 5 and 6 do not meet in a point, by {off * 1e3:.3g} mm"
     z = np.array([0.0, 0.0, 1.0])
     y, sign_2 = _turned(at.along[1], lambda y: float(at.place[1] @ np.cross(y, z)))
     x = np.cross(y, z)
@@ -157,24 +156,22 @@ def _opw(at: _Lines) -> tuple[dict[str, float], list[float], list[float]] | None
     return lengths, signs, [np.arctan2(x[1], x[0]), q2, q23 - q2, q4, q5, 0.0]
 
 
-def _ur(at: _Lines) -> tuple[dict[str, float], list[float], list[float]] | None:
-    """Return lengths, signs and model angles at zero, if the axes are those of a UR.
+def _ur(at: _Lines) -> tuple[dict[str, float], list[float], list[float]] | str:
+    """Return lengths, signs and model angles at zero, or why the axes are not those of a UR.
 
     Directions are chosen such that d4, d5 and d6 are not negative; a2 and a3 always are, as the
     maker has them.
     """
-    if not (
-        at.square(0, 1) and at.parallel(1, 2) and at.parallel(2, 3)
-        and at.square(3, 4) and at.square(4, 5)
-    ):  # fmt: skip
-        return None
+    if misfit := at.misfit(parallel=(1, 2), square=(0, 3, 4)):
+        return misfit
     fourth, fifth = at.meet(4, 3), at.meet(4, 5)
-    off = (at.distance(fourth, 3), at.distance(fifth, 5), at.distance(np.zeros(3), 1))
     z = np.array([0.0, 0.0, 1.0])
     n, sign_2 = _turned(at.along[1], lambda n: float(fourth @ n))
     x = np.cross(z, n)
-    if max(off[0], off[1], abs(x @ at.place[1])) > NEARLY:
-        return None
+    apart = (abs(x @ at.place[1]), at.distance(fourth, 3), at.distance(fifth, 5))
+    for (i, j), off in zip(((1, 2), (4, 5), (5, 6)), apart, strict=True):
+        if off > NEARLY:
+            return f"axes {i} and {j} do not meet, by {off * 1e3:.3g} mm"
     flat = np.array([x, z])
     upper, fore = np.diff(at.place[1:4] @ flat.T, axis=0)
     e5, sign_5 = _turned(at.along[4], lambda e: float(e @ (fifth - fourth)))
