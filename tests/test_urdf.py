@@ -327,5 +327,5 @@ def test_an_arm_of_no_family_is_refused(tmp_path):
     T[:, :3, :3], T[:, :3, 3] = Rotation.random(6, rng=rng).as_matrix(), rng.uniform(-1, 1, (6, 3))
     joints = [joint(f"j{i + 1}", names[i], names[i + 1], T[i]) for i in range(6)]
     joints.append(joint("end", "link_6", "tool0", np.eye(4), kind="fixed", inside=""))
-    with pytest.raises(InputError, match="not an ortho-parallel arm with a spherical wrist, as axes 2 and 3"):
+    with pytest.raises(InputError, match="not an ortho-parallel arm with"):
         Robot.from_urdf(urdf(tmp_path, joints))
