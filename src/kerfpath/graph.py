@@ -116,7 +116,7 @@ def build(
     T_flange_tip : (4, 4)
         Tool: tip frame in the flange.
     gamma : (m,) rad
-        Samples of gamma, see `gamma_grid`.
+        Samples of gamma, see `gamma_grid`; of a robot that leaves no rotation free, one, at zero.
     postures : sequence of int, optional
         The postures that may be used; default all. See `kerfpath.robots.postures_named`.
     progress : callable, optional
@@ -129,6 +129,8 @@ def build(
     """
     wanted = _wanted(postures, robot.postures)
     limits = robot.joint_limits()
+    if not robot.family.free_rotation:
+        gamma = freeze(np.zeros(1))
     reason = np.empty((len(frames), len(gamma), robot.postures), np.uint8)
 
     def layers_of(first: int, last: int) -> _Piece:

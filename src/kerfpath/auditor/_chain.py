@@ -111,4 +111,10 @@ def _ur(g: dict[str, float]) -> tuple[Array, Array, Array]:
     )
 
 
-_MODELS = {"opw": _opw, "ur": _ur}
+def _five(g: dict[str, float]) -> tuple[Array, Array, Array]:
+    """Return origins, axes and end of an OPW arm without axis 6."""
+    origins, axes, end = _opw(g)
+    return origins[:5], axes[:5], end
+
+
+_MODELS = {"opw": _opw, "ur": _ur, "five": _five}

@@ -7,8 +7,11 @@ from dataclasses import dataclass
 from itertools import product
 from typing import Any
 
+import numpy as np
+
+from kerfpath._arrays import Array
 from kerfpath.errors import InputError
-from kerfpath.kernels import kinematics, ur
+from kerfpath.kernels import five, kinematics, ur
 
 __all__ = ["FAMILIES", "Family", "posture_name", "postures_named"]
 
@@ -16,6 +19,10 @@ EIGHT = tuple(
     "/".join(words) for words in product(("front", "rear"), ("up", "down"), ("plus", "minus"))
 )
 """Postures by shoulder, elbow and wrist: mu = 4 shoulder + 2 elbow + wrist."""
+MORE = tuple(
+    "/".join(words) for words in product(("front", "rear"), ("up", "down"), ("third", "fourth"))
+)
+"""What an offset tool may add to them on a five-axis arm, mu = 8 and on."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -40,6 +47,9 @@ class Family:
         (B, P)), between joints and the model's own base and end frames.
     inverse_nodes : callable, optional
         As `kernels.kinematics.inverse_nodes`, where a family has it in one piece.
+    free_rotation : bool
+        Whether a tool tip and a tool axis leave the rotation about that axis free. If not, a
+        layer has one sample of gamma, and poses ask for the tip and the axis alone.
     """
 
     name: str
@@ -51,6 +61,12 @@ class Family:
     forward_all: Callable[..., None]
     inverse_all: Callable[..., None]
     inverse_nodes: Callable[..., None] | None = None
+    free_rotation: bool = True
+
+
+def _without_sixth(*, sign: Array, offset: Array, **lengths: float) -> kinematics.Arm:
+    """Return the OPW arm whose sixth angle is held at zero."""
+    return kinematics.Arm(**lengths, sign=np.append(sign, 1.0), offset=np.append(offset, 0.0))
 
 
 FAMILIES = {
@@ -77,13 +93,25 @@ FAMILIES = {
             forward_all=ur.forward_all,
             inverse_all=ur.inverse_all,
         ),
+        Family(
+            name="five",
+            words="five-axis arm: three axes to the forearm and a wrist of two",
+            joints=5,
+            lengths=("a1", "a2", "b", "c1", "c2", "c3", "c4"),
+            postures=(*EIGHT, *MORE),
+            model=_without_sixth,
+            forward_all=five.forward_all,
+            inverse_all=five.inverse_all,
+            inverse_nodes=five.inverse_nodes,
+            free_rotation=False,
+        ),
     )
 }
 
 
 def posture_name(posture: int) -> str:
-    """Say a posture in words: shoulder, elbow, wrist, as in "front/up/plus"."""
-    return EIGHT[posture]
+    """Say a posture in words: shoulder, elbow, wrist, as in "front/up/plus" (every family's)."""
+    return (*EIGHT, *MORE)[posture]
 
 
 def postures_named(words: str) -> tuple[int, ...]:

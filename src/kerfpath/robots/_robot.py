@@ -55,10 +55,11 @@ class Robot:
     Parameters
     ----------
     id, manufacturer, model : str
-    kinematics : {"opw", "ur"}
+    kinematics : {"opw", "ur", "five"}
         The family, see `kerfpath.robots.FAMILIES`.
     geometry : mapping
-        Its lengths, m: a1, a2, b, c1, c2, c3, c4 (Brandstoetter, Angerer and Hofbaur 2014), or
+        Its lengths, m: a1, a2, b, c1, c2, c3, c4 (Brandstoetter, Angerer and Hofbaur 2014; of a
+        five-axis arm c4 is that of the head's flange at q5 = 0, along the forearm), or
         d1, a2, a3, d4, d5, d6 (Denavit and Hartenberg's, as Universal Robots publishes them).
     sign : (n,)
         +1 or -1, and
@@ -281,8 +282,12 @@ class Robot:
     def inverse_all(self, T: Array) -> tuple[Array, Bools]:
         """Return every posture of flange poses T (B, 4, 4), limits ignored, as bare arrays.
 
-        q (B, P, n) in (-pi, pi], and reach (B, P): which of its rows are solutions.
+        q (B, P, n) in (-pi, pi], and reach (B, P): which of its rows are solutions. A family
+        without free rotation brings the flange's origin and z-axis there.
         """
+        if not self.family.free_rotation:
+            q, reach = self.inverse_nodes(T, np.zeros(1), np.eye(4))
+            return q[:, 0], reach[:, 0]
         if self._placed:
             T = np.linalg.inv(self.T_base_foot) @ T @ np.linalg.inv(self.T_end_flange)
         q = np.empty((len(T), self.postures, self.joints))
