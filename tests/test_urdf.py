@@ -6,7 +6,9 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from kerfpath import InputError, Robot, audit, plan, robot
-from kerfpath.auditor import chain_of
+from kerfpath.auditor import chain_of, checks
+from kerfpath.job import read_plan_file
+from kerfpath.job._planfile import plan_entry, plan_text
 from kerfpath.robots import robot_ids
 from kerfpath.urdf import read_urdf
 from test_robots import joint_frames
@@ -189,6 +191,13 @@ def test_a_described_robot_is_planned_and_audited(tmp_path, circle, tool, placem
         gamma_step=np.radians(5),
     )
     assert audit(made) == []
+    # The plan file keeps what the audit needs: where the model stands, and the chain.
+    text = plan_text(r, made.T_flange_tip, made.T_base_part, [plan_entry(made, checks(made))], {})
+    (tmp_path / "plan.json").write_text(text)
+    (read,) = read_plan_file(tmp_path / "plan.json").plans
+    np.testing.assert_array_equal(read.robot.chain.origins, r.chain.origins)
+    np.testing.assert_array_equal(read.robot.forward(made.q), r.forward(made.q))
+    assert audit(read) == []
 
 
 def test_bodies_are_where_the_links_are(tmp_path):
