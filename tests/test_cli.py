@@ -289,14 +289,14 @@ def test_contours_lists_the_loops_by_name():
 
 
 def test_robots_lists_the_library_and_shows_sources():
-    assert "60 robots" in run("robots").stdout
+    assert "68 robots" in run("robots").stdout
     shown = run("robots", "abb_irb2400_155").stdout
     assert "joint 2 + joint 3: -60 to 65 deg" in shown
     assert "source of geometry limits velocity: ros-industrial/abb" in shown
     data = json.loads(run("robots", "kuka_kr120_r2500_pro", "--json").stdout)
     assert data["lower_deg"] is None
     assert "copy error" in data["limits_missing"]
-    assert len(json.loads(run("robots", "--json").stdout)["robots"]) == 60
+    assert len(json.loads(run("robots", "--json").stdout)["robots"]) == 68
 
 
 def test_help_teaches():

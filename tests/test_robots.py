@@ -20,25 +20,31 @@ def random_joints(rng, count, near_singular=False):
     return q
 
 
+def joint_frames(r):
+    """Axis and pose of each joint in the frame of the joint before, and the flange in the last."""
+    g, y, z = r.geometry, np.array([0, 1.0, 0]), np.array([0, 0, 1.0])
+    if r.kinematics == "ur":
+        links = [(0, g["d1"], 90), (g["a2"], 0, 0), (g["a3"], 0, 0)]
+        links += [(0, g["d4"], 90), (0, g["d5"], -90), (0, g["d6"], 0)]
+        poses = [
+            pin.SE3(pin.exp3(np.radians(t) * np.eye(3)[0]), np.array([a, 0, d]))
+            for a, d, t in links
+        ]
+        return [z] * 6, [pin.SE3.Identity(), *poses[:5]], poses[5]
+    places = [(0, 0, 0), (g["a1"], g["b"], g["c1"]), (0, 0, g["c2"]), (g["a2"], 0, g["c3"])]
+    places += [(0, 0, 0), (0, 0, 0), (0, 0, g["c4"])]
+    poses = [pin.SE3(np.eye(3), np.array(xyz, dtype=float)) for xyz in places]
+    return [z, y, y, z, y, z], poses[:6], poses[6]
+
+
 def pinocchio_pose(r, q):
     """Flange pose by pinocchio on a model built joint by joint from the robot's lengths."""
-    g, model = r.geometry, pin.Model()
-    y, z = np.array([0, 1.0, 0]), np.array([0, 0, 1.0])
-    places = [
-        (z, (0, 0, 0)),
-        (y, (g["a1"], g["b"], g["c1"])),
-        (y, (0, 0, g["c2"])),
-        (z, (g["a2"], 0, g["c3"])),
-        (y, (0, 0, 0)),
-        (z, (0, 0, 0)),
-    ]
-    parent = 0
-    for i, (axis, xyz) in enumerate(places):
+    model, parent = pin.Model(), 0
+    axes, poses, flange = joint_frames(r)
+    for i, (axis, pose) in enumerate(zip(axes, poses, strict=True)):
         joint = pin.JointModelRevoluteUnaligned(*(r.sign[i] * axis))
-        turned_back = pin.exp3(-r.offset[i] * axis)
-        origin = pin.SE3(turned_back, np.array(xyz, dtype=float))
+        origin = pose * pin.SE3(pin.exp3(-r.offset[i] * axis), np.zeros(3))
         parent = model.addJoint(parent, joint, origin, f"joint_{i + 1}")
-    flange = pin.SE3(np.eye(3), np.array([0, 0, g["c4"]]))
     model.addFrame(pin.Frame("flange", parent, flange, pin.FrameType.OP_FRAME))
     data = model.createData()
     poses = []
@@ -48,8 +54,8 @@ def pinocchio_pose(r, q):
     return np.array(poses)
 
 
-def test_the_library_has_all_sixty_robots_with_sources():
-    assert len(IDS) == 60
+def test_the_library_has_all_robots_with_sources():
+    assert len(IDS) == 68
     for name in IDS:
         r = robot(name)
         assert r.id == name
@@ -252,7 +258,7 @@ def test_a_robot_without_limits_is_refused_until_they_are_given():
 @pytest.mark.parametrize(
     ("call", "message"),
     [
-        (lambda: robot("abb_irb4600"), "not in the library of 60; nearest: .*abb_irb4600_60_205"),
+        (lambda: robot("abb_irb4600"), "not in the library of 68; nearest: .*abb_irb4600_60_205"),
         (lambda: robot("zzz"), "nothing there is called like it"),
         (lambda: robot("staubli_tx60", acceleration_ratio="fast"), "'fast' is not one of"),
         (lambda: robot("staubli_tx60").with_limits(lower=np.full(6, 9.0)), "joint 1 are reversed"),

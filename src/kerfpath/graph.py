@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from kerfpath._arrays import Array, Bools, Ints, freeze, scalar
 from kerfpath.errors import InputError
-from kerfpath.kernels import kinematics, turns
+from kerfpath.kernels import turns
 from kerfpath.robots import Robot
 
 __all__ = ["LayeredGraph", "build", "gamma_grid"]
@@ -30,7 +30,7 @@ class LayeredGraph:
 
     Parameters
     ----------
-    q : (N, 6) rad
+    q : (N, n) rad
         Joint vectors, layer after layer; within a layer by gamma, posture, turn.
     start : (K+1,) int
         Layer k is ``q[start[k]:start[k+1]]``.
@@ -38,9 +38,9 @@ class LayeredGraph:
         The samples of gamma.
     sample, posture : (N,) int
         Index into `gamma`, and posture mu, of each vertex.
-    turn : (N, 6) int
+    turn : (N, n) int
         Turns of 2 pi of each joint of each vertex.
-    reason : (K, m, 8) uint8
+    reason : (K, m, P) uint8
         What became of each candidate: an index into `reasons`.
     reasons : tuple of str
         Words for the reason codes; code 0 is "admitted".
@@ -116,7 +116,7 @@ def build(
     T_flange_tip : (4, 4)
         Tool: tip frame in the flange.
     gamma : (m,) rad
-        Samples of gamma, see `gamma_grid`.
+        Samples of gamma, see `gamma_grid`; of a robot that leaves no rotation free, one, at zero.
     postures : sequence of int, optional
         The postures that may be used; default all. See `kerfpath.robots.postures_named`.
     progress : callable, optional
@@ -127,25 +127,24 @@ def build(
     InputError
         The robot's joint limits are not known, or a posture that does not exist.
     """
-    wanted = _wanted(postures)
-    limits, arm = robot.joint_limits(), robot.arm()
-    T_tip_flange = np.asarray(np.linalg.inv(T_flange_tip), dtype=np.float64)
-    reason = np.empty((len(frames), len(gamma), kinematics.POSTURES), np.uint8)
+    wanted = _wanted(postures, robot.postures)
+    limits = robot.joint_limits()
+    if not robot.family.free_rotation:
+        gamma = freeze(np.zeros(1))
+    reason = np.empty((len(frames), len(gamma), robot.postures), np.uint8)
 
     def layers_of(first: int, last: int) -> _Piece:
         """Solve nodes first..last-1 and keep what the limits admit."""
-        size = (last - first, len(gamma), kinematics.POSTURES)
-        q, reach = np.empty((*size, 6)), np.empty(size, np.bool_)
-        kinematics.inverse_nodes(arm, frames[first:last], gamma, T_tip_flange, q, reach)
+        q, reach = robot.inverse_nodes(frames[first:last], gamma, T_flange_tip)
         count = np.empty(last - first, np.int64)
         turns.count_admissible(q, reach, wanted, limits, count, reason[first:last])
         n = int(count.sum())
         piece = _Piece(
             count=count,
-            q=np.empty((n, 6)),
+            q=np.empty((n, robot.joints)),
             sample=np.empty(n, np.int64),
             posture=np.empty(n, np.int64),
-            turn=np.empty((n, 6), np.int64),
+            turn=np.empty((n, robot.joints), np.int64),
         )
         turns.fill_admissible(
             q, reason[first:last], limits, piece.q, piece.sample, piece.posture, piece.turn
@@ -182,9 +181,9 @@ class _Piece:
     turn: Ints
 
 
-def _wanted(postures: Sequence[int] | None) -> Bools:
-    every = range(kinematics.POSTURES)
+def _wanted(postures: Sequence[int] | None, number: int) -> Bools:
+    every = range(number)
     chosen = every if postures is None else tuple(postures)
     if not chosen or any(mu not in every for mu in chosen):
-        raise InputError(f"postures: expected some of 0 to 7, got {list(chosen)}")
+        raise InputError(f"postures: expected some of 0 to {number - 1}, got {list(chosen)}")
     return freeze(np.isin(every, chosen))

@@ -30,7 +30,7 @@ class Settings:
         Task frames that gamma is measured in.
     method, objective, metric : str
         As in `kerfpath.shortest_path`.
-    weights : (6,) 1/rad
+    weights : (n,) 1/rad
         Weights of the joint-space distance.
     eta_v, eta_a : float
         Share of the velocity and acceleration limits that may be used.
@@ -106,7 +106,7 @@ class Feed:
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Criteria:
-    """Smoothness of a plan, each (6,), joint by joint.
+    """Smoothness of a plan, each (n,), joint by joint.
 
     Parameters
     ----------
@@ -128,7 +128,7 @@ class Criteria:
 
 
 def path_cost(dq: Array, weights: Array, metric_name: Metric, objective: ObjectiveKind) -> float:
-    """Return the objective (14) or (15) of joint increments (K-1, 6) rad."""
+    """Return the objective (14) or (15) of joint increments (K-1, n) rad."""
     total = metric.total_distance if objective == "sum" else metric.maximum_distance
     return float(total(np.ascontiguousarray(dq), weights, METRIC_CODES[metric_name]))
 
@@ -145,13 +145,13 @@ class Plan:
         With the limits that the plan keeps.
     T_flange_tip, T_base_part : (4, 4)
         Tool and placement of the part, m.
-    q : (K, 6) rad
+    q : (K, n) rad
         Joints at the nodes.
     gamma : (K,) rad
         Free rotation about the tool axis at the nodes.
     posture : (K,) int
         Posture mu; see `kerfpath.robots.posture_name`.
-    turn : (K, 6) int
+    turn : (K, n) int
         Turns of 2 pi of each joint away from (-pi, pi].
     time : (K,) s
         Time of each node, from 0.
@@ -181,14 +181,14 @@ class Plan:
     feed: Feed | None = None
 
     def __post_init__(self) -> None:
-        K = len(self.contour)
+        K, n = len(self.contour), self.robot.joints
         cast: dict[str, Any] = {
             "T_flange_tip": as_pose(self.T_flange_tip, "T_flange_tip"),
             "T_base_part": as_pose(self.T_base_part, "T_base_part"),
-            "q": floats(self.q, "q", (K, 6)),
+            "q": floats(self.q, "q", (K, n)),
             "gamma": floats(self.gamma, "gamma", (K,)),
             "posture": integers(self.posture, "posture", (K,)),
-            "turn": integers(self.turn, "turn", (K, 6)),
+            "turn": integers(self.turn, "turn", (K, n)),
             "time": floats(self.time, "time", (K,)),
             "cost": scalar(self.cost, "cost"),
         }
@@ -220,17 +220,17 @@ class Plan:
 
     @property
     def increments(self) -> Array:
-        """Joint increments between nodes, (K-1, 6) rad; endless joints the short way (13)."""
+        """Joint increments between nodes, (K-1, n) rad; endless joints the short way (13)."""
         return freeze(metric.increments(self.q, self.robot.endless))
 
     @property
     def velocity_share(self) -> Array:
-        """Joint speed between nodes over its limit, (K-1, 6), signed."""
+        """Joint speed between nodes over its limit, (K-1, n), signed."""
         return freeze(self.increments / np.diff(self.time)[:, None] / self.robot.speed_limits()[0])
 
     @property
     def acceleration_share(self) -> Array:
-        """Second difference at the inner nodes over the acceleration limit, (K-2, 6), signed."""
+        """Second difference at the inner nodes over the acceleration limit, (K-2, n), signed."""
         tau = np.diff(self.time)[:, None]
         change = np.diff(self.increments / tau, axis=0)
         return freeze(change / ((tau[1:] + tau[:-1]) / 2) / self.robot.speed_limits()[1])

@@ -63,29 +63,58 @@ class JointChain:
 
 
 def chain_of(robot: Robot) -> JointChain:
-    """Return the joint chain of an OPW robot, built from its lengths and joint convention alone.
+    """Return the joint chain of a robot: of its description, if it comes from one.
+
+    Otherwise it is built from the lengths and the joint convention alone.
+    """
+    if robot.chain is not None:
+        given = robot.chain
+        return JointChain(origins=given.origins, axes=given.axes, tip=given.end)
+    origins, axes, end = _MODELS[robot.kinematics](robot.geometry)
+    for i, axis in enumerate(axes):
+        # q_model = sign q - offset: the frame at angle zero is turned back by the offset.
+        back = Rotation.from_rotvec(-robot.offset[i] * axis).as_matrix()
+        origins[i, :3, :3] = origins[i, :3, :3] @ back
+    origins[0] = robot.T_base_foot @ origins[0]
+    return JointChain(
+        origins=origins, axes=robot.sign[:, None] * axes, tip=end @ robot.T_end_flange
+    )
+
+
+def _opw(g: dict[str, float]) -> tuple[Array, Array, Array]:
+    """Return origins (6, 4, 4), axes (6, 3) and end (4, 4) of an OPW arm.
 
     Axis 1 is vertical; axes 2 and 3 are parallel to y, at the shoulder (a1, b, c1) and c2 above
     it; the spherical wrist sits at (a2, 0, c3) from the elbow with axes z, y, z; the flange c4
     further (Brandstoetter, Angerer and Hofbaur 2014, figure 1).
     """
-    g = robot.geometry
     y, z = (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)
-    places = [
-        ((0.0, 0.0, 0.0), z),
-        ((g["a1"], g["b"], g["c1"]), y),
-        ((0.0, 0.0, g["c2"]), y),
-        ((g["a2"], 0.0, g["c3"]), z),
-        ((0.0, 0.0, 0.0), y),
-        ((0.0, 0.0, 0.0), z),
-    ]
-    origins = np.tile(np.eye(4), (6, 1, 1))
-    axes = np.empty((6, 3))
-    for i, (xyz, axis) in enumerate(places):
-        # q_model = sign q - offset: the frame at angle zero is turned back by the offset.
-        origins[i, :3, 3] = xyz
-        origins[i, :3, :3] = Rotation.from_rotvec(-robot.offset[i] * np.array(axis)).as_matrix()
-        axes[i] = robot.sign[i] * np.array(axis)
-    tip = np.eye(4)
-    tip[2, 3] = g["c4"]
-    return JointChain(origins=origins, axes=axes, tip=tip)
+    origins, end = np.tile(np.eye(4), (6, 1, 1)), np.eye(4)
+    origins[1, :3, 3] = g["a1"], g["b"], g["c1"]
+    origins[2, :3, 3] = 0.0, 0.0, g["c2"]
+    origins[3, :3, 3] = g["a2"], 0.0, g["c3"]
+    end[2, 3] = g["c4"]
+    return origins, np.array([z, y, y, z, y, z]), end
+
+
+def _ur(g: dict[str, float]) -> tuple[Array, Array, Array]:
+    """Return origins, axes and end of a UR arm from its Denavit-Hartenberg parameters."""
+    links = np.tile(np.eye(4), (6, 1, 1))
+    links[:, 2, 3] = g["d1"], 0.0, 0.0, g["d4"], g["d5"], g["d6"]
+    links[:, 0, 3] = 0.0, g["a2"], g["a3"], 0.0, 0.0, 0.0
+    alpha = np.radians([90.0, 0.0, 0.0, 90.0, -90.0, 0.0])
+    links[:, :3, :3] = Rotation.from_rotvec(alpha[:, None] * [1.0, 0.0, 0.0]).as_matrix()
+    return (
+        np.concatenate([np.eye(4)[None], links[:-1]]),
+        np.tile([0.0, 0.0, 1.0], (6, 1)),
+        links[-1],
+    )
+
+
+def _five(g: dict[str, float]) -> tuple[Array, Array, Array]:
+    """Return origins, axes and end of an OPW arm without axis 6."""
+    origins, axes, end = _opw(g)
+    return origins[:5], axes[:5], end
+
+
+_MODELS = {"opw": _opw, "ur": _ur, "five": _five}

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
@@ -29,7 +29,7 @@ class Motion:
 
     Parameters
     ----------
-    q : (K-1, m+1, 6) rad
+    q : (K-1, m+1, n) rad
     tip : (K-1, m+1, 3) m
         Tool tip in the robot base.
     axis : (K-1, m+1, 3)
@@ -45,7 +45,7 @@ class Motion:
 
 
 def joint_increments(plan: Plan) -> Array:
-    """Return joint increments (K-1, 6) rad; an endless joint goes the short way round (13)."""
+    """Return joint increments (K-1, n) rad; an endless joint goes the short way round (13)."""
     dq = np.diff(plan.q, axis=0)
     short = np.remainder(dq + np.pi, 2 * np.pi) - np.pi
     return np.where(plan.robot.endless, short, dq)
@@ -60,17 +60,15 @@ def motion_of(plan: Plan, chain: JointChain, interpolation: Interpolation, parts
     K, dq = len(plan.q), joint_increments(plan)
     f = np.linspace(0.0, 1.0, parts + 1)
     q = plan.q[:-1, None, :] + f[None, :, None] * dq[:, None, :]
-    flat = q.reshape(-1, 6)
-    if interpolation == "joint":
-        tool = chain.forward(flat) @ plan.T_flange_tip
-        residual = np.zeros(len(flat))
-    else:
-        wanted = _straight(chain.forward(plan.q) @ plan.T_flange_tip, f)
-        flat, residual = _follow(chain, wanted @ np.linalg.inv(plan.T_flange_tip), flat)
-        tool = chain.forward(flat) @ plan.T_flange_tip
+    flat = q.reshape(-1, plan.q.shape[1])
+    chain = replace(chain, tip=chain.tip @ plan.T_flange_tip)
+    residual = np.zeros(len(flat))
+    if interpolation == "linear":
+        flat, residual = _follow(chain, _straight(chain.forward(plan.q), f), flat)
+    tool = chain.forward(flat)
     shape = (K - 1, parts + 1)
     return Motion(
-        q=flat.reshape(*shape, 6),
+        q=flat.reshape(*shape, -1),
         tip=tool[:, :3, 3].reshape(*shape, 3),
         axis=tool[:, :3, 2].reshape(*shape, 3),
         residual=residual.reshape(shape),
@@ -91,9 +89,9 @@ def _straight(poses: Array, f: Array) -> Array:
 
 
 def _follow(chain: JointChain, wanted: Array, q: Array) -> tuple[Array, Array]:
-    """Solve the flange poses `wanted` (B, 4, 4) by Newton's method from the joints q (B, 6).
+    """Solve the tool poses `wanted` (B, 4, 4) by Newton's method from the joints q (B, n).
 
-    Returns the joints and what they miss of the pose (B,).
+    Five joints are asked for tip and tool axis alone. Returns the joints and what they miss (B,).
     """
     q = q.copy()
     residual = np.full(len(q), np.inf)
@@ -104,6 +102,10 @@ def _follow(chain: JointChain, wanted: Array, q: Array) -> tuple[Array, Array]:
         error[:, :3] = wanted[open_, :3, 3] - T[:, :3, 3]
         turn = wanted[open_, :3, :3] @ T[:, :3, :3].transpose(0, 2, 1)
         error[:, 3:] = Rotation.from_matrix(turn).as_rotvec()
+        if q.shape[1] < 6:
+            z = T[:, :3, 2]
+            error[:, 3:] = np.cross(z, wanted[open_, :3, 2])
+            J[:, 3:] -= z[:, :, None] * np.einsum("bi,bij->bj", z, J[:, 3:])[:, None]
         residual[open_] = np.abs(error).max(axis=1)
         late = residual[open_] > REACHED
         if not late.any():
@@ -111,6 +113,6 @@ def _follow(chain: JointChain, wanted: Array, q: Array) -> tuple[Array, Array]:
         open_, J, error = open_[late], J[late], error[late]
         # Damped least squares: at a singularity the step stays bounded and the residual tells.
         Jt = J.transpose(0, 2, 1)
-        step = np.linalg.solve(Jt @ J + 1e-12 * np.eye(6), Jt @ error[..., None])[..., 0]
+        step = np.linalg.solve(Jt @ J + 1e-12 * np.eye(q.shape[1]), Jt @ error[..., None])[..., 0]
         q[open_] += np.clip(step, -0.5, 0.5)
     return q, residual

@@ -80,6 +80,7 @@ def show_robot(name: str, *, as_json: bool) -> None:
                 "model": r.model,
                 "payload_kg": r.payload,
                 "reach_m": r.reach,
+                "kinematics": r.kinematics,
                 "geometry_m": dict(r.geometry),
                 "sign": r.sign.tolist(),
                 "offset_deg": _degrees(r.offset),
@@ -101,7 +102,7 @@ def show_robot(name: str, *, as_json: bool) -> None:
     out.print(f"[bold]{escape(r.manufacturer)} {escape(r.model)}[/] ({r.id})")
     out.print(f"payload {r.payload:g} kg, reach {r.reach:g} m")
     lengths = ", ".join(f"{k} {v * 1000:g}" for k, v in r.geometry.items())
-    out.print(f"lengths (OPW, mm): {lengths}")
+    out.print(f"lengths ({r.kinematics.upper()}, mm): {lengths}")
     rows = [
         [what, *(["not known"] if values is None else [f"{v:g}" for v in values])]
         for what, values in limits.items()

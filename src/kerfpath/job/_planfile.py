@@ -19,6 +19,7 @@ from kerfpath.errors import InputError, NoFeasiblePath
 from kerfpath.planner import FastestSpeed
 from kerfpath.plans import Feed, Plan, Proof, Settings
 from kerfpath.robots import Coupling, Robot
+from kerfpath.urdf import Chain
 
 __all__ = ["SCHEMA", "PlanFile", "broken_entry", "plan_entry", "plan_text", "read_plan_file"]
 
@@ -211,9 +212,15 @@ def _robot_entry(robot: Robot) -> dict[str, Any]:
         "id": robot.id,
         "manufacturer": robot.manufacturer,
         "model": robot.model,
+        "kinematics": robot.kinematics,
         "geometry_m": dict(robot.geometry),
         "sign": robot.sign.tolist(),
         "offset_rad": robot.offset.tolist(),
+        "T_base_foot": robot.T_base_foot.tolist(),
+        "T_end_flange": robot.T_end_flange.tolist(),
+        "chain": None
+        if robot.chain is None
+        else {name: getattr(robot.chain, name).tolist() for name in ("origins", "axes", "end")},
     }
 
 
@@ -239,9 +246,13 @@ def _read_robot(robot: dict[str, Any], limits: dict[str, Any]) -> Robot:
         id=str(robot["id"]),
         manufacturer=str(robot["manufacturer"]),
         model=str(robot["model"]),
+        kinematics=str(robot.get("kinematics", "opw")),
         geometry={k: float(v) for k, v in robot["geometry_m"].items()},
         sign=robot["sign"],
         offset=robot["offset_rad"],
+        T_base_foot=robot.get("T_base_foot", np.eye(4)),
+        T_end_flange=robot.get("T_end_flange", np.eye(4)),
+        chain=Chain(**robot["chain"]) if robot.get("chain") else None,
         lower=limits["lower_rad"],
         upper=limits["upper_rad"],
         endless=limits["endless"],

@@ -21,7 +21,16 @@ from kerfpath._arrays import Array, Bools
 from kerfpath.kernels._jit import jit
 from kerfpath.kernels.frames import location
 
-__all__ = ["POSTURES", "Arm", "forward", "forward_all", "inverse", "inverse_all", "inverse_nodes"]
+__all__ = [
+    "POSTURES",
+    "Arm",
+    "forward",
+    "forward_all",
+    "inverse",
+    "inverse_all",
+    "inverse_nodes",
+    "wrap",
+]
 
 POSTURES = 8
 
@@ -80,7 +89,7 @@ def forward(arm: Arm, q: Array, out_T: Array) -> None:
 
 
 @jit
-def _wrap(angle: float) -> float:
+def wrap(angle: float) -> float:
     """Bring an angle of (-3 pi, 3 pi) into (-pi, pi]."""
     if angle > pi:
         return angle - 2.0 * pi
@@ -102,12 +111,12 @@ def _wrist(arm: Arm, R: Array, s1: float, k1: float, s23: float, k23: float, out
     q6 = atan2(
         v0 * R[0, 0] + v1 * R[1, 0] + v2 * R[2, 0], v0 * R[0, 1] + v1 * R[1, 1] + v2 * R[2, 1]
     )
-    out_q[0, 3] = _wrap(arm.sign[3] * (q4 + arm.offset[3]))
-    out_q[0, 4] = _wrap(arm.sign[4] * (q5 + arm.offset[4]))
-    out_q[0, 5] = _wrap(arm.sign[5] * (q6 + arm.offset[5]))
-    out_q[1, 3] = _wrap(out_q[0, 3] + pi)
-    out_q[1, 4] = _wrap(arm.sign[4] * (arm.offset[4] - q5))
-    out_q[1, 5] = _wrap(out_q[0, 5] + pi)
+    out_q[0, 3] = wrap(arm.sign[3] * (q4 + arm.offset[3]))
+    out_q[0, 4] = wrap(arm.sign[4] * (q5 + arm.offset[4]))
+    out_q[0, 5] = wrap(arm.sign[5] * (q6 + arm.offset[5]))
+    out_q[1, 3] = wrap(out_q[0, 3] + pi)
+    out_q[1, 4] = wrap(arm.sign[4] * (arm.offset[4] - q5))
+    out_q[1, 5] = wrap(out_q[0, 5] + pi)
 
 
 @jit
@@ -143,14 +152,14 @@ def inverse(arm: Arm, T: Array, out_q: Array, out_reach: Bools) -> None:
         cosine = min(1.0, max(-1.0, cosine))
         sine = sqrt(1.0 - cosine * cosine)
         bend = atan2(sine, cosine)
-        q1 = _wrap(arm.sign[0] * (atan2(s1, k1) + arm.offset[0]))
+        q1 = wrap(arm.sign[0] * (atan2(s1, k1) + arm.offset[0]))
         A = arm.c2 + k * cosine
         for elbow in range(2):
             up = front if elbow == 0 else -front
             B = up * k * sine
             s2, k2 = (x * A - z * B) / reach, (z * A + x * B) / reach
-            q2 = _wrap(arm.sign[1] * (atan2(s2, k2) + arm.offset[1]))
-            q3 = _wrap(arm.sign[2] * (up * bend - psi + arm.offset[2]))
+            q2 = wrap(arm.sign[1] * (atan2(s2, k2) + arm.offset[1]))
+            q3 = wrap(arm.sign[2] * (up * bend - psi + arm.offset[2]))
             su, ku = s2 * cosine + up * k2 * sine, k2 * cosine - up * s2 * sine
             s23, k23 = (su * arm.c3 - ku * arm.a2) / k, (ku * arm.c3 + su * arm.a2) / k
             i = 4 * shoulder + 2 * elbow

@@ -96,7 +96,7 @@ def fastest_speed(
     )
     least = least_interval(**task.limits)
     found = FastestSpeed.of(contour, least)
-    if not refine:
+    if not (refine and robot.family.free_rotation):
         return found
     claim = Proof(optimal=False, statement="the fastest path on this graph")
     quick, at = quicken(replace(task, dt=least.dt).plan(least.index, 0.0, claim))

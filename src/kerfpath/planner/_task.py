@@ -148,7 +148,9 @@ def task_of(
     dt = node_interval(contour, speed)
     if closure == "periodic" and not contour.closed:
         raise InputError(f"closure: contour {contour.name!r} is open and cannot be periodic")
-    weight: Array = 1 / (velocity * dt) if weights is None else floats(weights, "weights", (6,))
+    weight: Array = (
+        1 / (velocity * dt) if weights is None else floats(weights, "weights", velocity.shape)
+    )
     settings = Settings(
         gamma_step=scalar(gamma_step, "gamma_step", unit="rad", above=0.0),
         frames=frames,

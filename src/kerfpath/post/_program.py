@@ -269,7 +269,8 @@ def _require_same_cell(first: Plan, plan: Plan) -> None:
 
 def _kinematics(robot: Robot) -> tuple[object, ...]:
     *lengths, sign, offset = robot.arm()
-    return robot.id, *lengths, *sign.tolist(), *offset.tolist()
+    placed = np.concatenate([sign, offset, robot.T_base_foot.ravel(), robot.T_end_flange.ravel()])
+    return robot.id, robot.kinematics, *lengths, *placed.tolist()
 
 
 def _tip_poses(plan: Plan, q: Array) -> Array:

@@ -5,7 +5,6 @@ from __future__ import annotations
 import numpy as np
 
 from kerfpath._arrays import Array, Ints
-from kerfpath.kernels import kinematics
 from kerfpath.robots import Robot
 
 __all__ = ["JointCurves"]
@@ -29,7 +28,7 @@ class JointCurves:
     """
 
     def __init__(self, robot: Robot, H: Array, T_flange_tip: Array, posture: Ints) -> None:
-        self._arm = robot.arm()
+        self._robot = robot
         self._H = H
         self._T_tip_flange = np.linalg.inv(T_flange_tip)
         self._posture = posture
@@ -44,8 +43,7 @@ class JointCurves:
         spin[:, 0, 0] = spin[:, 1, 1] = np.cos(gamma)
         spin[:, 1, 0] = np.sin(gamma)
         spin[:, 0, 1] = -spin[:, 1, 0]
-        q, reach = np.empty((K, kinematics.POSTURES, 6)), np.empty((K, kinematics.POSTURES), bool)
-        kinematics.inverse_all(self._arm, self._H @ spin @ self._T_tip_flange, q, reach)
+        q, reach = self._robot.inverse_all(self._H @ spin @ self._T_tip_flange)
         node = np.arange(K)
         found = np.where(reach[node, self._posture, None], q[node, self._posture], np.nan)
         return np.asarray(found + 2 * np.pi * np.round((near - found) / (2 * np.pi)))

@@ -96,6 +96,8 @@ def refine(
         eta_v=plan.settings.eta_v if eta_v is None else scalar(eta_v, "eta_v", above=0.0),
         eta_a=plan.settings.eta_a if eta_a is None else scalar(eta_a, "eta_a", above=0.0),
     )
+    if not plan.robot.family.free_rotation:
+        return _unrefined(plan, "the robot leaves no rotation free that could be refined")
     asked = replace(plan, settings=settings)
     if nodes is not None:
         divided = _divided(asked, nodes)
@@ -259,7 +261,7 @@ def _divided(plan: Plan, nodes: Contour) -> Plan | str:
         q=near,
         gamma=gamma,
         posture=np.repeat(plan.posture[:1], len(nodes)),
-        turn=np.zeros((len(nodes), 6), np.int64),
+        turn=np.zeros((len(nodes), plan.robot.joints), np.int64),
         time=np.interp(index, coarse, plan.time),
     )
 

@@ -37,13 +37,13 @@ def posture_runs(plan: Plan) -> list[tuple[int, int, int]]:
 
 
 def joint_positions(plan: Plan) -> go.Figure:
-    """Return six panels, one per joint: position over time, deg, between its limits."""
+    """Return a panel per joint: position over time, deg, between its limits."""
     height = TOP + BOTTOM + 3 * ROW + 2 * GAP
     figure = go.Figure(layout=base_layout(height, hovermode="x unified", showlegend=False))
     figure.update_layout(margin={"l": 54, "r": 16, "t": TOP, "b": BOTTOM})
-    _add_posture_bands(figure, plan, panels=6, labelled=range(2))
+    _add_posture_bands(figure, plan, panels=plan.robot.joints, labelled=range(2))
     limits = plan.robot.joint_limits()
-    for joint in range(6):
+    for joint in range(plan.robot.joints):
         row, column = divmod(joint, 2)
         x, y = _axis("x", joint), _axis("y", joint)
         top = 1 - row * (ROW + GAP) / (height - TOP - BOTTOM)
@@ -152,7 +152,7 @@ def limit_shares(plan: Plan) -> go.Figure:
                 ),
             }
         )
-        for joint in range(6):
+        for joint in range(plan.robot.joints):
             figure.add_scatter(
                 x=_short(time),
                 y=_short(share[:, joint] * 100),

@@ -103,7 +103,7 @@ def criteria_table(plan: Plan) -> str:
         ("Peak acceleration", "% of limit"),
     )
     c, rows = plan.criteria, []
-    for i in range(6):
+    for i in range(plan.robot.joints):
         values = (
             number(math.degrees(c.displacement[i]), 1),
             number(math.degrees(c.largest_increment[i]), 3),

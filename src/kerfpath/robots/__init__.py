@@ -1,10 +1,12 @@
 """Robots: their kinematics in closed form, their limits, and the library of known models."""
 
+from kerfpath.robots._coupling import Coupling as Coupling
+from kerfpath.robots._families import FAMILIES as FAMILIES
+from kerfpath.robots._families import Family as Family
+from kerfpath.robots._families import posture_name as posture_name
+from kerfpath.robots._families import postures_named as postures_named
 from kerfpath.robots._library import acceleration_ratios as acceleration_ratios
 from kerfpath.robots._library import robot as robot
 from kerfpath.robots._library import robot_ids as robot_ids
-from kerfpath.robots._robot import Coupling as Coupling
 from kerfpath.robots._robot import Robot as Robot
 from kerfpath.robots._robot import Solutions as Solutions
-from kerfpath.robots._robot import posture_name as posture_name
-from kerfpath.robots._robot import postures_named as postures_named

@@ -13,7 +13,8 @@ import numpy as np
 
 from kerfpath._arrays import Array
 from kerfpath.errors import InputError
-from kerfpath.robots._robot import Coupling, Robot
+from kerfpath.robots._coupling import Coupling
+from kerfpath.robots._robot import Robot
 
 __all__ = ["acceleration_ratios", "robot", "robot_ids"]
 
@@ -81,6 +82,7 @@ def _read(data: dict[str, Any]) -> Robot:
         id=data["id"],
         manufacturer=data["manufacturer"],
         model=data["model"],
+        kinematics=data["kinematics"],
         geometry=data["geometry_m"],
         sign=np.array(joints["sign"], dtype=float),
         offset=np.radians(joints["offset_deg"]),

@@ -1,59 +1,23 @@
-"""A six-axis robot: geometry, joint convention, limits, and closed-form kinematics in bulk."""
+"""A robot: geometry, joint convention, limits, and closed-form kinematics in bulk."""
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from kerfpath._arrays import Array, Bools, Ints, bools, floats, freeze, positive
+from kerfpath._arrays import Array, Bools, Ints, as_pose, bools, floats, freeze, positive
 from kerfpath.errors import InputError
-from kerfpath.kernels import kinematics, turns
+from kerfpath.kernels import turns
+from kerfpath.robots._coupling import Coupling
+from kerfpath.robots._families import FAMILIES, Family
+from kerfpath.urdf import Body, Chain, read_urdf
 
-__all__ = ["Coupling", "Robot", "Solutions", "posture_name", "postures_named"]
-
-JOINTS = 6
-LENGTHS = ("a1", "a2", "b", "c1", "c2", "c3", "c4")
-
-
-@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class Coupling:
-    """A linear bound on several joints at once: lower <= row @ q <= upper.
-
-    Parameters
-    ----------
-    row : (6,)
-        Coefficients of the joints.
-    lower, upper : float rad
-        Bounds of the combination.
-    note : str
-        Where the bound comes from.
-    """
-
-    row: Array
-    lower: float
-    upper: float
-    note: str = ""
-
-    def __post_init__(self) -> None:
-        object.__setattr__(self, "row", floats(self.row, "coupling row", (JOINTS,)))
-        if not self.lower < self.upper:
-            raise InputError(
-                f"coupling {self.row.tolist()}: the lower bound {np.degrees(self.lower):g} deg "
-                f"must be below the upper bound {np.degrees(self.upper):g} deg"
-            )
-
-    @property
-    def name(self) -> str:
-        """Say the combination in words, such as "joint 2 + joint 3"."""
-        words = ""
-        for i, c in enumerate(self.row):
-            if c:
-                sign = " - " if c < 0 else " + " if words else ""
-                size = "" if abs(c) == 1 else f"{abs(c):g} "
-                words += f"{sign}{size}joint {i + 1}"
-        return words.strip()
+__all__ = ["Robot", "Solutions"]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -62,13 +26,13 @@ class Solutions:
 
     Parameters
     ----------
-    q : (N, 6) rad
+    q : (N, n) rad
         Joint vectors.
     pose : (N,) int
         Which of the B poses each row solves, increasing.
     posture : (N,) int
-        Posture mu of each row, 0 to 7; see `posture_name`.
-    turn : (N, 6) int
+        Posture mu of each row; see `Family.postures`.
+    turn : (N, n) int
         How many turns of 2 pi each joint is away from (-pi, pi].
     """
 
@@ -83,47 +47,62 @@ class Solutions:
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Robot:
-    """An ortho-parallel arm with a spherical wrist (OPW), its limits and where they come from.
+    """An arm of one of the families, its limits and where they come from.
 
     Joint vectors follow the robot's own description (its URDF where `frames` says so); poses are
-    of the flange in the robot base, z along axis 6 and out of the flange.
+    of the flange in the robot base, z along the last axis and out of the flange.
 
     Parameters
     ----------
     id, manufacturer, model : str
+    kinematics : {"opw", "ur", "five"}
+        The family, see `kerfpath.robots.FAMILIES`.
     geometry : mapping
-        Lengths a1, a2, b, c1, c2, c3, c4, m (Brandstoetter, Angerer and Hofbaur 2014).
-    sign : (6,)
+        Its lengths, m: a1, a2, b, c1, c2, c3, c4 (Brandstoetter, Angerer and Hofbaur 2014; of a
+        five-axis arm c4 is that of the head's flange at q5 = 0, along the forearm), or
+        d1, a2, a3, d4, d5, d6 (Denavit and Hartenberg's, as Universal Robots publishes them).
+    sign : (n,)
         +1 or -1, and
-    offset : (6,) rad
+    offset : (n,) rad
         with q_model = sign * q - offset.
-    lower, upper : (6,) rad or None
+    T_base_foot, T_end_flange : (4, 4) m
+        Where the model stands in the robot base, and the flange in the model's own end frame.
+    lower, upper : (n,) rad or None
         Joint limits; None when they are not known, and then nothing is planned.
-    velocity : (6,) rad/s or None
+    velocity : (n,) rad/s or None
         Largest joint speeds.
-    acceleration : (6,) rad/s^2 or None
+    acceleration : (n,) rad/s^2 or None
         Largest joint accelerations; most makers publish none.
-    endless : (6,) bool
+    endless : (n,) bool
         Joints that turn without end; their limits do not apply.
     couplings : tuple of Coupling
         Bounds on combinations of joints.
+    chain : Chain, optional
+        The joint frames of the description that the robot comes from: the audit's kinematics.
+    bodies : tuple of Body
+        Collision bodies of that description.
 
     Raises
     ------
     InputError
-        Limits reversed, a speed that is not positive, a length missing.
+        Limits reversed, a speed that is not positive, a length missing, an unknown family.
     """
 
     id: str
     geometry: dict[str, float]
-    sign: Array = field(default_factory=lambda: np.ones(JOINTS))
-    offset: Array = field(default_factory=lambda: np.zeros(JOINTS))
+    kinematics: str = "opw"
+    sign: Array = field(default_factory=lambda: np.ones(()))
+    offset: Array = field(default_factory=lambda: np.zeros(()))
+    T_base_foot: Array = field(default_factory=lambda: np.eye(4))
+    T_end_flange: Array = field(default_factory=lambda: np.eye(4))
     lower: Array | None = None
     upper: Array | None = None
     velocity: Array | None = None
     acceleration: Array | None = None
-    endless: Bools = field(default_factory=lambda: np.zeros(JOINTS, bool))
+    endless: Bools = field(default_factory=lambda: np.zeros((), bool))
     couplings: tuple[Coupling, ...] = ()
+    chain: Chain | None = None
+    bodies: tuple[Body, ...] = ()
     manufacturer: str = ""
     model: str = ""
     payload: float | None = None
@@ -137,29 +116,94 @@ class Robot:
 
     def __post_init__(self) -> None:
         _set = object.__setattr__
-        missing = [k for k in LENGTHS if k not in self.geometry]
+        if self.kinematics not in FAMILIES:
+            raise InputError(
+                f"robot {self.id!r}: kinematics {self.kinematics!r} is none of "
+                f"{', '.join(FAMILIES)}"
+            )
+        n, lengths = self.joints, self.family.lengths
+        missing = [k for k in lengths if k not in self.geometry]
         if missing:
             raise InputError(f"robot {self.id!r}: geometry lacks {', '.join(missing)} (m)")
-        _set(self, "sign", floats(self.sign, "sign", (JOINTS,)))
+        for name in ("sign", "offset"):
+            _set(self, name, floats(_for_each(getattr(self, name), n), name, (n,)))
         if not (np.abs(self.sign) == 1).all():
             raise InputError(f"robot {self.id!r}: sign must be +1 or -1, got {self.sign.tolist()}")
-        _set(self, "offset", floats(self.offset, "offset", (JOINTS,)))
-        _set(self, "endless", bools(self.endless, "endless", (JOINTS,)))
+        for name in ("T_base_foot", "T_end_flange"):
+            _set(self, name, as_pose(getattr(self, name), name))
+        _set(self, "endless", bools(_for_each(self.endless, n), "endless", (n,)))
+        for coupling in self.couplings:
+            floats(coupling.row, "coupling row", (n,))
         for name in ("lower", "upper"):
             if getattr(self, name) is not None:
-                _set(self, name, floats(getattr(self, name), name, (JOINTS,)))
+                _set(self, name, floats(getattr(self, name), name, (n,)))
         for name in ("velocity", "acceleration"):
             if getattr(self, name) is not None:
-                _set(self, name, positive(getattr(self, name), name, (JOINTS,)))
-        if self.lower is not None and self.upper is not None:
-            reversed_ = np.flatnonzero(~(self.lower < self.upper))
-            if reversed_.size:
-                i = int(reversed_[0])
-                raise InputError(
-                    f"robot {self.id!r}: limits of joint {i + 1} are reversed, lower "
-                    f"{np.degrees(self.lower[i]):g} deg is not below upper "
-                    f"{np.degrees(self.upper[i]):g} deg"
-                )
+                _set(self, name, positive(getattr(self, name), name, (n,)))
+        self._require_limits_in_order()
+
+    def _require_limits_in_order(self) -> None:
+        if self.lower is None or self.upper is None:
+            return
+        reversed_ = np.flatnonzero(~(self.lower < self.upper))
+        if reversed_.size:
+            i = int(reversed_[0])
+            raise InputError(
+                f"robot {self.id!r}: limits of joint {i + 1} are reversed, lower "
+                f"{np.degrees(self.lower[i]):g} deg is not below upper "
+                f"{np.degrees(self.upper[i]):g} deg"
+            )
+
+    @property
+    def family(self) -> Family:
+        """The kind of arm."""
+        return FAMILIES[self.kinematics]
+
+    @property
+    def joints(self) -> int:
+        """Number of joints, n."""
+        return self.family.joints
+
+    @property
+    def postures(self) -> int:
+        """Number of postures, P: mu runs from 0 to P - 1."""
+        return len(self.family.postures)
+
+    @classmethod
+    def from_urdf(
+        cls,
+        path: str | Path,
+        *,
+        base: str | None = None,
+        tip: str | None = None,
+        packages: Mapping[str, str | Path] | None = None,
+        meshes: bool = True,
+        snap: float = 0.0,
+        **limits: ArrayLike | None,
+    ) -> Robot:
+        """Return the robot of a description, its family recognised from the joint axes.
+
+        The model that is derived has been compared with the description: 1e-9 m and rad.
+
+        Parameters
+        ----------
+        path, base, tip, packages, meshes, snap
+            As in `kerfpath.urdf.read_urdf`. Poses of the robot are of link `tip` in link `base`.
+        **limits : (n,) rad, rad/s, rad/s^2
+            lower, upper, velocity, acceleration, endless: instead of what is written there. No
+            description states accelerations. Continuous joints are endless.
+
+        Raises
+        ------
+        InputError
+            A bad description; a chain of no family; limits that are missing or zero, and not given.
+        """
+        from kerfpath.robots._described import robot_of
+
+        return robot_of(
+            read_urdf(path, base=base, tip=tip, packages=packages, meshes=meshes, snap=snap),
+            **limits,
+        )
 
     def with_limits(
         self,
@@ -184,11 +228,13 @@ class Robot:
         return replace(self, **changes)  # type: ignore[arg-type]  # cast by __post_init__
 
     def forward(self, q: ArrayLike) -> Array:
-        """Return the flange poses (..., 4, 4) in the robot base of joint vectors q (..., 6) rad."""
+        """Return the flange poses (..., 4, 4) in the robot base of joint vectors q (..., n) rad."""
         q = np.asarray(q, dtype=float)
-        rows = floats(q.reshape(-1, q.shape[-1]) if q.ndim else q, "q", (None, JOINTS))
+        rows = floats(q.reshape(-1, q.shape[-1]) if q.ndim else q, "q", (None, self.joints))
         T = np.empty((len(rows), 4, 4))
-        kinematics.forward_all(self.arm(), rows, T)
+        self.family.forward_all(self.arm(), rows, T)
+        if self._placed:
+            T = self.T_base_foot @ T @ self.T_end_flange
         return freeze(T.reshape(*q.shape[:-1], 4, 4))
 
     def inverse(self, T: ArrayLike, *, within_limits: bool = True) -> Solutions:
@@ -209,9 +255,7 @@ class Robot:
         """
         poses = np.asarray(T, dtype=float)
         poses = floats(poses[None] if poses.ndim == 2 else poses, "T", (None, 4, 4))
-        q = np.empty((len(poses), kinematics.POSTURES, JOINTS))
-        reach = np.empty(q.shape[:2], dtype=np.bool_)
-        kinematics.inverse_all(self.arm(), poses, q, reach)
+        q, reach = self.inverse_all(poses)
         q, reach = q[:, None], reach[:, None]  # one node a pose, one sample of gamma
         if not within_limits:
             pose, _, posture = np.nonzero(reach)
@@ -222,10 +266,10 @@ class Robot:
             )
         limits = self.joint_limits()
         count, reason = np.empty(len(poses), np.int64), np.empty(reach.shape, np.uint8)
-        every = np.ones(kinematics.POSTURES, np.bool_)
+        every = np.ones(self.postures, np.bool_)
         turns.count_admissible(q, reach, every, limits, count, reason)
         total = int(count.sum())
-        found, turn = np.empty((total, JOINTS)), np.empty((total, JOINTS), np.int64)
+        found, turn = np.empty((total, self.joints)), np.empty((total, self.joints), np.int64)
         sample, posture = np.empty(total, np.int64), np.empty(total, np.int64)
         turns.fill_admissible(q, reason, limits, found, sample, posture, turn)
         return Solutions(
@@ -235,10 +279,54 @@ class Robot:
             turn=freeze(turn),
         )
 
-    def arm(self) -> kinematics.Arm:
-        """Return the geometry as the kernels take it."""
-        lengths = {k: float(self.geometry[k]) for k in LENGTHS}
-        return kinematics.Arm(**lengths, sign=self.sign, offset=self.offset)
+    def inverse_all(self, T: Array) -> tuple[Array, Bools]:
+        """Return every posture of flange poses T (B, 4, 4), limits ignored, as bare arrays.
+
+        q (B, P, n) in (-pi, pi], and reach (B, P): which of its rows are solutions. A family
+        without free rotation brings the flange's origin and z-axis there.
+        """
+        if not self.family.free_rotation:
+            q, reach = self.inverse_nodes(T, np.zeros(1), np.eye(4))
+            return q[:, 0], reach[:, 0]
+        if self._placed:
+            T = np.linalg.inv(self.T_base_foot) @ T @ np.linalg.inv(self.T_end_flange)
+        q = np.empty((len(T), self.postures, self.joints))
+        reach = np.empty(q.shape[:2], dtype=np.bool_)
+        self.family.inverse_all(self.arm(), np.ascontiguousarray(T), q, reach)
+        return q, reach
+
+    def inverse_nodes(self, H: Array, gamma: Array, T_flange_tip: Array) -> tuple[Array, Bools]:
+        """Return every posture of task frames H (K, 4, 4) turned by each gamma (m,), with tool.
+
+        q (K, m, P, n) in (-pi, pi] and reach (K, m, P); frames in the robot base, limits ignored.
+        """
+        T_tip_flange = np.linalg.inv(T_flange_tip)
+        if self.family.inverse_nodes is None:
+            spin = np.tile(np.eye(4), (len(gamma), 1, 1))
+            spin[:, 0, 0] = spin[:, 1, 1] = np.cos(gamma)
+            spin[:, 1, 0] = np.sin(gamma)
+            spin[:, 0, 1] = -spin[:, 1, 0]
+            q, reach = self.inverse_all((H[:, None] @ (spin @ T_tip_flange)).reshape(-1, 4, 4))
+            size = (len(H), len(gamma), self.postures)
+            return q.reshape(*size, self.joints), reach.reshape(size)
+        if self._placed:
+            H = np.linalg.inv(self.T_base_foot) @ H
+            T_tip_flange = T_tip_flange @ np.linalg.inv(self.T_end_flange)
+        q = np.empty((len(H), len(gamma), self.postures, self.joints))
+        reach = np.empty(q.shape[:3], np.bool_)
+        self.family.inverse_nodes(self.arm(), H, gamma, T_tip_flange, q, reach)
+        return q, reach
+
+    def arm(self) -> Any:
+        """Return the geometry as the family's kernels take it."""
+        lengths = {k: float(self.geometry[k]) for k in self.family.lengths}
+        return self.family.model(**lengths, sign=self.sign, offset=self.offset)
+
+    @property
+    def _placed(self) -> bool:
+        """Whether base or flange differ from the model's own."""
+        unmoved = np.eye(4)
+        return not all(np.array_equal(T, unmoved) for T in (self.T_base_foot, self.T_end_flange))
 
     def joint_limits(self) -> turns.JointLimits:
         """Return the position limits as the kernels take them.
@@ -255,7 +343,7 @@ class Robot:
             lower=self.lower,
             upper=self.upper,
             endless=self.endless,
-            rows=np.array(rows).reshape(-1, JOINTS),
+            rows=np.array(rows).reshape(-1, self.joints),
             row_lower=np.array([c.lower for c in self.couplings]),
             row_upper=np.array([c.upper for c in self.couplings]),
         )
@@ -279,7 +367,9 @@ class Robot:
     def reasons(self) -> tuple[str, ...]:
         """Say what each reason code of a dropped pose means, by code."""
         words = ["admitted", "unreachable"]
-        for name in [f"joint {i + 1}" for i in range(JOINTS)] + [c.name for c in self.couplings]:
+        for name in [f"joint {i + 1}" for i in range(self.joints)] + [
+            c.name for c in self.couplings
+        ]:
             words += [f"{name} low", f"{name} high"]
         return (*words, "posture not wanted")
 
@@ -291,34 +381,6 @@ class Robot:
         )
 
 
-def posture_name(posture: int) -> str:
-    """Say a posture in words: shoulder, elbow, wrist, as in "front/up/plus"."""
-    return "/".join(
-        (
-            ("front", "rear")[posture // 4],
-            ("up", "down")[posture // 2 % 2],
-            ("plus", "minus")[posture % 2],
-        )
-    )
-
-
-def postures_named(words: str) -> tuple[int, ...]:
-    """Return the postures that fit some words: "front/up" fits 0 and 1, "rear" fits 4 to 7.
-
-    Raises
-    ------
-    InputError
-        A word that names no shoulder, elbow or wrist, or two that exclude each other.
-    """
-    wanted = [word for word in words.split("/") if word]
-    fitting = [
-        mu
-        for mu in range(kinematics.POSTURES)
-        if all(word in posture_name(mu).split("/") for word in wanted)
-    ]
-    if not fitting:
-        raise InputError(
-            f"posture {words!r}: expected words of front|rear / up|down / plus|minus, "
-            'such as "front/up"'
-        )
-    return tuple(fitting)
+def _for_each(value: ArrayLike, joints: int) -> ArrayLike:
+    """Return one number as that number for each joint; anything longer as it is."""
+    return np.full(joints, value) if np.ndim(value) == 0 else value

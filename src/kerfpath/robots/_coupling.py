@@ -1,0 +1,51 @@
+"""Bounds on several joints at once, as parallel rods and controllers impose them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from kerfpath._arrays import Array, floats
+from kerfpath.errors import InputError
+
+__all__ = ["Coupling"]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Coupling:
+    """A linear bound on several joints at once: lower <= row @ q <= upper.
+
+    Parameters
+    ----------
+    row : (n,)
+        Coefficients of the joints.
+    lower, upper : float rad
+        Bounds of the combination.
+    note : str
+        Where the bound comes from.
+    """
+
+    row: Array
+    lower: float
+    upper: float
+    note: str = ""
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "row", floats(self.row, "coupling row", (None,)))
+        if not self.lower < self.upper:
+            raise InputError(
+                f"coupling {self.row.tolist()}: the lower bound {np.degrees(self.lower):g} deg "
+                f"must be below the upper bound {np.degrees(self.upper):g} deg"
+            )
+
+    @property
+    def name(self) -> str:
+        """Say the combination in words, such as "joint 2 + joint 3"."""
+        words = ""
+        for i, c in enumerate(self.row):
+            if c:
+                sign = " - " if c < 0 else " + " if words else ""
+                size = "" if abs(c) == 1 else f"{abs(c):g} "
+                words += f"{sign}{size}joint {i + 1}"
+        return words.strip()

@@ -1,0 +1,100 @@
+"""A robot from its description: family and model from the geometry, limits as they are written."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from kerfpath._arrays import Array
+from kerfpath.errors import InputError
+from kerfpath.robots._recognise import model_of
+from kerfpath.robots._robot import Robot
+from kerfpath.urdf import Description
+
+__all__ = ["robot_of"]
+
+
+def robot_of(
+    description: Description,
+    *,
+    lower: ArrayLike | None = None,
+    upper: ArrayLike | None = None,
+    velocity: ArrayLike | None = None,
+    acceleration: ArrayLike | None = None,
+    endless: ArrayLike | None = None,
+) -> Robot:
+    """Return the robot of a description; limits given (rad, s) come before those written.
+
+    Raises
+    ------
+    InputError
+        The chain is of no family; a limit that is missing, or zero, and is not given.
+    """
+    where = f"{description.path} ({description.base} to {description.tip})"
+    try:
+        model = model_of(description.chain)
+    except InputError as error:
+        raise InputError(f"{where}: {error}") from None
+    continuous = np.array([joint.kind == "continuous" for joint in description.joints])
+    left_out = ", ".join(description.left_out)
+    return Robot(
+        id=description.name,
+        **model,
+        **_ranges(description, lower, upper, endless),
+        velocity=_velocity(description) if velocity is None else np.asarray(velocity),
+        acceleration=None if acceleration is None else np.asarray(acceleration),
+        acceleration_source="" if acceleration is None else "given by the user",
+        endless=continuous if endless is None else np.asarray(endless),
+        chain=description.chain,
+        bodies=description.bodies,
+        notes=(f"Links on joints outside the chain are left out: {left_out}.",) if left_out else (),
+        frames={"base": description.base, "tip": description.tip},
+        sources={"geometry_limits_velocity": f"URDF {Path(description.path).name}"},
+    )
+
+
+def _ranges(
+    description: Description,
+    lower: ArrayLike | None,
+    upper: ArrayLike | None,
+    endless: ArrayLike | None,
+) -> dict[str, Any]:
+    """Return lower and upper limits; an endless joint, which has none, gets one turn."""
+    n = len(description.joints)
+    free = np.zeros(n, bool) if endless is None else np.asarray(endless, bool)
+    ranges = {"lower": -np.pi * np.ones(n), "upper": np.pi * np.ones(n)}
+    for i, joint in enumerate(description.joints):
+        if joint.kind == "continuous" or free[i]:
+            continue
+        if (joint.lower is None and lower is None) or (joint.upper is None and upper is None):
+            raise _lacks(description, joint.name, "has no position limits", "lower= and upper=")
+        if joint.lower == joint.upper and (lower is None or upper is None):
+            raise _lacks(
+                description,
+                joint.name,
+                f"may only be at {joint.lower:g} rad, so that it cannot move",
+                "lower= and upper=",
+            )
+        ranges["lower"][i], ranges["upper"][i] = joint.lower or 0.0, joint.upper or 0.0
+    given = {"lower": lower, "upper": upper}
+    return {**ranges, **{key: np.asarray(v) for key, v in given.items() if v is not None}}
+
+
+def _velocity(description: Description) -> Array:
+    for joint in description.joints:
+        if joint.velocity is None:
+            raise _lacks(description, joint.name, "has no velocity limit", "velocity=")
+        if joint.velocity <= 0:
+            what = f"has the velocity limit {joint.velocity:g} rad/s, so that it cannot move"
+            raise _lacks(description, joint.name, what, "velocity=")
+    return np.array([joint.velocity for joint in description.joints], dtype=float)
+
+
+def _lacks(description: Description, joint: str, what: str, keys: str) -> InputError:
+    return InputError(
+        f"{description.path}: joint {joint!r} {what}; give {keys} for all "
+        f"{len(description.joints)} joints (rad, rad/s)"
+    )

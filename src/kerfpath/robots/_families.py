@@ -1,0 +1,132 @@
+"""Kinematic families: what a robot's geometry is made of, and the kernels that solve it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from itertools import product
+from typing import Any
+
+import numpy as np
+
+from kerfpath._arrays import Array
+from kerfpath.errors import InputError
+from kerfpath.kernels import five, kinematics, ur
+
+__all__ = ["FAMILIES", "Family", "posture_name", "postures_named"]
+
+EIGHT = tuple(
+    "/".join(words) for words in product(("front", "rear"), ("up", "down"), ("plus", "minus"))
+)
+"""Postures by shoulder, elbow and wrist: mu = 4 shoulder + 2 elbow + wrist."""
+MORE = tuple(
+    "/".join(words) for words in product(("front", "rear"), ("up", "down"), ("third", "fourth"))
+)
+"""What an offset tool may add to them on a five-axis arm, mu = 8 and on."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Family:
+    """One kind of arm with a closed form of its own.
+
+    Parameters
+    ----------
+    name : str
+        As `Robot.kinematics` says it.
+    words : str
+        What it is, in words.
+    joints : int
+    lengths : tuple of str
+        The lengths (m) that a geometry must have.
+    postures : tuple of str
+        Name of every posture mu.
+    model : callable
+        Makes what the kernels take from the lengths, `sign` and `offset`.
+    forward_all, inverse_all : callable
+        (model, q (B, n), out_T (B, 4, 4)) and (model, T (B, 4, 4), out_q (B, P, n), out_reach
+        (B, P)), between joints and the model's own base and end frames.
+    inverse_nodes : callable, optional
+        As `kernels.kinematics.inverse_nodes`, where a family has it in one piece.
+    free_rotation : bool
+        Whether a tool tip and a tool axis leave the rotation about that axis free. If not, a
+        layer has one sample of gamma, and poses ask for the tip and the axis alone.
+    """
+
+    name: str
+    words: str
+    joints: int
+    lengths: tuple[str, ...]
+    postures: tuple[str, ...]
+    model: Callable[..., Any]
+    forward_all: Callable[..., None]
+    inverse_all: Callable[..., None]
+    inverse_nodes: Callable[..., None] | None = None
+    free_rotation: bool = True
+
+
+def _without_sixth(*, sign: Array, offset: Array, **lengths: float) -> kinematics.Arm:
+    """Return the OPW arm whose sixth angle is held at zero."""
+    return kinematics.Arm(**lengths, sign=np.append(sign, 1.0), offset=np.append(offset, 0.0))
+
+
+FAMILIES = {
+    family.name: family
+    for family in (
+        Family(
+            name="opw",
+            words="ortho-parallel arm with a spherical wrist",
+            joints=6,
+            lengths=("a1", "a2", "b", "c1", "c2", "c3", "c4"),
+            postures=EIGHT,
+            model=kinematics.Arm,
+            forward_all=kinematics.forward_all,
+            inverse_all=kinematics.inverse_all,
+            inverse_nodes=kinematics.inverse_nodes,
+        ),
+        Family(
+            name="ur",
+            words="arm of the Universal Robots type, axes 2 to 4 parallel",
+            joints=6,
+            lengths=("d1", "a2", "a3", "d4", "d5", "d6"),
+            postures=EIGHT,
+            model=ur.Arm,
+            forward_all=ur.forward_all,
+            inverse_all=ur.inverse_all,
+        ),
+        Family(
+            name="five",
+            words="five-axis arm: three axes to the forearm and a wrist of two",
+            joints=5,
+            lengths=("a1", "a2", "b", "c1", "c2", "c3", "c4"),
+            postures=(*EIGHT, *MORE),
+            model=_without_sixth,
+            forward_all=five.forward_all,
+            inverse_all=five.inverse_all,
+            inverse_nodes=five.inverse_nodes,
+            free_rotation=False,
+        ),
+    )
+}
+
+
+def posture_name(posture: int) -> str:
+    """Say a posture in words: shoulder, elbow, wrist, as in "front/up/plus" (every family's)."""
+    return (*EIGHT, *MORE)[posture]
+
+
+def postures_named(words: str) -> tuple[int, ...]:
+    """Return the postures that fit some words: "front/up" fits 0 and 1, "rear" fits 4 to 7.
+
+    Raises
+    ------
+    InputError
+        A word that names no shoulder, elbow or wrist, or two that exclude each other.
+    """
+    wanted = [word for word in words.split("/") if word]
+    fitting = [mu for mu, name in enumerate(EIGHT) if all(w in name.split("/") for w in wanted)]
+    if not fitting:
+        raise InputError(
+            f"posture {words!r}: expected words of front|rear / up|down / plus|minus, "
+            'such as "front/up"'
+        )
+    return tuple(fitting)

@@ -1,0 +1,240 @@
+"""Which family an arm belongs to, told from the lines that its joints turn about.
+
+The joint axes at angle zero say everything: the model is laid into them, its lengths are measured
+between them, and its angles at that pose become the joint offsets. Whether it then is the robot is
+not argued but measured, against the chain of the description at joint angles of all kinds.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from kerfpath._arrays import Array
+from kerfpath.errors import InputError
+from kerfpath.robots._families import FAMILIES
+from kerfpath.robots._robot import Robot
+from kerfpath.urdf import Chain
+
+__all__ = ["EXACT", "model_of"]
+
+EXACT = 1e-9
+"""m, and entries of a rotation: how far a model may be from the description it stands for."""
+NEARLY = 1e-3
+"""m, and sine: how far lines may miss each other for a family to be tried at all."""
+NONE = 1e-12
+"""Below this a transform is the identity: rounding has left it."""
+POSES = 64
+
+
+@dataclass(frozen=True, slots=True)
+class _Lines:
+    """The joint axes of a six-axis arm at angle zero, in the frame of its foot.
+
+    The foot stands on axis 1, nearest to the base origin, z along axis 1 and up, x near that of
+    the base.
+    """
+
+    foot: Array
+    """(4, 4) in the base, m."""
+    place: Array
+    """(6, 3) m: a point of each axis."""
+    along: Array
+    """(6, 3): direction of each axis."""
+    tip: Array
+    """(4, 4) m."""
+    sign_1: float
+
+    def meet(self, i: int, j: int) -> Array:
+        """Return the point (3,) of axis i nearest to axis j."""
+        normal = np.cross(self.along[j], np.cross(self.along[i], self.along[j]))
+        gap = self.place[j] - self.place[i]
+        return np.asarray(self.place[i] + self.along[i] * (gap @ normal) / (self.along[i] @ normal))
+
+    def distance(self, point: Array, i: int) -> float:
+        """Return the distance of a point from axis i, m."""
+        return float(np.linalg.norm(np.cross(point - self.place[i], self.along[i])))
+
+    def misfit(self, parallel: Sequence[int], square: Sequence[int]) -> str:
+        """Name the first of the joints i that is not parallel, or square, to joint i + 1."""
+        for i in parallel:
+            if float(np.linalg.norm(np.cross(*self.along[i : i + 2]))) > NEARLY:
+                return f"axes {i + 1} and {i + 2} are not parallel"
+        for i in square:
+            if abs(float(np.dot(*self.along[i : i + 2]))) > NEARLY:
+                return f"axes {i + 1} and {i + 2} are not at right angles"
+        return ""
+
+
+def model_of(chain: Chain) -> dict[str, Any]:
+    """Return family, geometry, joint convention and frames of a chain, as `Robot` takes them.
+
+    Raises
+    ------
+    InputError
+        The chain is of no family; says of each why, or of the nearest by how much.
+    """
+    n = len(chain.axes)
+    if n != 6:
+        raise InputError(f"expected 6 joints between base and tip, got {n}")
+    lines, told = _lines(chain), []
+    for name, derive in (("opw", _opw), ("ur", _ur)):
+        derived = derive(lines)
+        words = FAMILIES[name].words
+        if isinstance(derived, str):
+            told.append(f"not an {words}, as {derived}")
+            continue
+        model = _laid(name, lines, *derived)
+        miss = _miss(chain, model)
+        if miss <= EXACT:
+            return model
+        raise InputError(
+            f"nearly an {words}, but {miss:.1e} off (m and rad, allowed {EXACT:g}); if the "
+            "description prints right angles with few digits, snap=1e-4 takes them as meant"
+        )
+    raise InputError(f"no family that can be solved: {'; '.join(told)}")
+
+
+def _lines(chain: Chain) -> _Lines:
+    T = chain.frames(np.zeros(6))
+    along = np.einsum("nij,nj->ni", T[:6, :3, :3], chain.axes)
+    place = T[:6, :3, 3]
+    sign = -1.0 if along[0, 2] < -NEARLY else 1.0
+    z = sign * along[0]
+    x = np.eye(3)[0] if abs(z[0]) < 0.9 else -np.eye(3)[2]
+    x = x - (x @ z) * z
+    x /= np.linalg.norm(x)
+    foot = np.eye(4)
+    foot[:3, :3] = np.c_[x, np.cross(z, x), z]
+    foot[:3, 3] = place[0] - (place[0] @ z) * z
+    foot = _tidy(foot)
+    R = foot[:3, :3]
+    return _Lines(foot, (place - foot[:3, 3]) @ R, along @ R, np.linalg.inv(foot) @ T[6], sign)
+
+
+def _opw(at: _Lines) -> tuple[dict[str, float], list[float], list[float]] | str:
+    """Return lengths, signs and model angles at zero, or why the axes are not those of an OPW arm.
+
+    Directions are chosen such that a1, c3 and c4 are not negative; c2 never is.
+    """
+    if misfit := at.misfit(parallel=(1,), square=(0, 2, 3, 4)):
+        return misfit
+    wrist = at.meet(4, 3)
+    off = max(at.distance(wrist, 3), at.distance(wrist, 5))
+    if off > NEARLY:
+        return f"axes 4, 5 and 6 do not meet in a point, by {off * 1e3:.3g} mm"
+    z = np.array([0.0, 0.0, 1.0])
+    y, sign_2 = _turned(at.along[1], lambda y: float(at.place[1] @ np.cross(y, z)))
+    x = np.cross(y, z)
+    flat = np.array([x, z])
+    shoulder, elbow = flat @ at.place[1], flat @ at.place[2]
+    upper, fore = elbow - shoulder, flat @ wrist - elbow
+    up, sign_4 = _turned(at.along[3], lambda up: float(flat @ up @ fore))
+    ahead = np.cross(y, up)
+    side, sign_5 = _turned(at.along[4], lambda side: float(side @ y))
+    out, sign_6 = _turned(
+        at.along[5], lambda out: float(out @ (at.tip[:3, 3] - wrist)), lambda out: float(out @ up)
+    )
+    q23 = np.arctan2(*(flat @ up))
+    q2 = np.arctan2(*upper)
+    q4 = np.arctan2(-side @ ahead, side @ y)
+    lengths = {
+        "a1": shoulder[0],
+        "a2": flat @ ahead @ fore,
+        "b": wrist @ y,
+        "c1": shoulder[1],
+        "c2": np.linalg.norm(upper),
+        "c3": flat @ up @ fore,
+        "c4": out @ (at.tip[:3, 3] - wrist),
+    }
+    sign_3 = 1.0 if at.along[2] @ y > 0 else -1.0
+    q5 = np.arctan2(out @ np.cross(side, up), out @ up)
+    signs = [at.sign_1, sign_2, sign_3, sign_4, sign_5, sign_6]
+    return lengths, signs, [np.arctan2(x[1], x[0]), q2, q23 - q2, q4, q5, 0.0]
+
+
+def _ur(at: _Lines) -> tuple[dict[str, float], list[float], list[float]] | str:
+    """Return lengths, signs and model angles at zero, or why the axes are not those of a UR.
+
+    Directions are chosen such that d4, d5 and d6 are not negative; a2 and a3 always are, as the
+    maker has them.
+    """
+    if misfit := at.misfit(parallel=(1, 2), square=(0, 3, 4)):
+        return misfit
+    fourth, fifth = at.meet(4, 3), at.meet(4, 5)
+    z = np.array([0.0, 0.0, 1.0])
+    n, sign_2 = _turned(at.along[1], lambda n: float(fourth @ n))
+    x = np.cross(z, n)
+    apart = (abs(x @ at.place[1]), at.distance(fourth, 3), at.distance(fifth, 5))
+    for (i, j), off in zip(((1, 2), (4, 5), (5, 6)), apart, strict=True):
+        if off > NEARLY:
+            return f"axes {i} and {j} do not meet, by {off * 1e3:.3g} mm"
+    flat = np.array([x, z])
+    upper, fore = np.diff(at.place[1:4] @ flat.T, axis=0)
+    e5, sign_5 = _turned(at.along[4], lambda e: float(e @ (fifth - fourth)))
+    out, sign_6 = _turned(at.along[5], lambda out: float(out @ (at.tip[:3, 3] - fifth)))
+    q2, q23 = (np.arctan2(-v[1], -v[0]) for v in (upper, fore))
+    theta = np.arctan2(x @ e5, -z @ e5)
+    q5 = np.arctan2(-(np.cos(theta) * x + np.sin(theta) * z) @ out, out @ n)
+    lengths = {
+        "d1": at.place[1, 2],
+        "a2": -np.linalg.norm(upper),
+        "a3": -np.linalg.norm(fore),
+        "d4": fourth @ n,
+        "d5": e5 @ (fifth - fourth),
+        "d6": out @ (at.tip[:3, 3] - fifth),
+    }
+    sign_3, sign_4 = (1.0 if at.along[i] @ n > 0 else -1.0 for i in (2, 3))
+    signs = [at.sign_1, sign_2, sign_3, sign_4, sign_5, sign_6]
+    return lengths, signs, [np.arctan2(x[1], x[0]), q2, q23 - q2, theta - q23, q5, 0.0]
+
+
+def _turned(direction: Array, *wanted: Any) -> tuple[Array, float]:
+    """Return a direction or its opposite, and which: whatever makes `wanted` of it positive.
+
+    The first of the functions that is not zero decides; after them, the larger x and then y.
+    """
+    for want in (*wanted, lambda d: d[1], lambda d: d[0], lambda d: d[2]):
+        value = want(direction)
+        if abs(value) > NEARLY:
+            sign = 1.0 if value > 0 else -1.0
+            break
+    return sign * direction, sign
+
+
+def _laid(
+    family: str, at: _Lines, lengths: dict[str, float], signs: list[float], zero: list[float]
+) -> dict[str, Any]:
+    """Return the model with joint 6 and the end turned onto the tip."""
+    model: dict[str, Any] = {
+        "kinematics": family,
+        "geometry": {k: _round(float(v)) for k, v in lengths.items()},
+        "sign": np.array(signs),
+        "offset": np.array([_round(-float(q)) for q in zero]),
+        "T_base_foot": at.foot,
+    }
+    want = at.foot @ at.tip
+    left = np.linalg.inv(Robot(id="", **model).forward(np.zeros(6))) @ want
+    if np.hypot(left[0, 2], left[1, 2]) < NEARLY and left[2, 2] > 0:
+        model["offset"][5] = _round(-float(np.arctan2(left[1, 0], left[0, 0])))
+        left = np.linalg.inv(Robot(id="", **model).forward(np.zeros(6))) @ want
+    return {**model, "T_end_flange": _tidy(left)}
+
+
+def _miss(chain: Chain, model: dict[str, Any]) -> float:
+    """Return the largest entry by which the model's poses differ from the chain's."""
+    q = np.random.default_rng(2008).uniform(-np.pi, np.pi, (POSES, 6))
+    want = np.array([chain.frames(row)[-1] for row in q])
+    return float(np.abs(Robot(id="", **model).forward(q) - want).max())
+
+
+def _round(value: float) -> float:
+    """Return the number without the last digits, which only rounding has written."""
+    return round(value, 13) + 0.0
+
+
+def _tidy(T: Array) -> Array:
+    return np.eye(4) if np.abs(T - np.eye(4)).max() < NONE else T

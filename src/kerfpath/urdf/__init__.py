@@ -1,0 +1,10 @@
+"""Robot descriptions (URDF): the chain of joints from base to tip, its limits and its bodies.
+
+Knows nothing of kinematic families: `kerfpath.Robot.from_urdf` recognises those, and therefore
+this package lies below `robots` and imports nothing of it.
+"""
+
+from kerfpath.urdf._bodies import Body as Body
+from kerfpath.urdf._description import Chain as Chain
+from kerfpath.urdf._description import Description as Description
+from kerfpath.urdf._description import read_urdf as read_urdf

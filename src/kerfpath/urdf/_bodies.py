@@ -1,0 +1,111 @@
+"""The bodies of a description: what collides, in the frame of the joint that moves it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from xml.etree import ElementTree
+
+import numpy as np
+
+from kerfpath._arrays import Array, freeze
+from kerfpath.errors import InputError
+from kerfpath.urdf._xml import Tree, child, numbers, pose_of
+
+__all__ = ["Body", "bodies_of"]
+
+SIZES = {"box": ("size", 3), "cylinder": ("radius length", 1), "sphere": ("radius", 1)}
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Body:
+    """A collision body of a link, rigid on one joint of the chain.
+
+    Parameters
+    ----------
+    link : str
+    joint : int
+        Number of joints of the chain that move it: 0 for the base.
+    pose : (4, 4)
+        In the (turned) frame of that joint, m; in the base frame for joint 0.
+    kind : {"mesh", "box", "cylinder", "sphere"}
+    size : (k,) m
+        Edges of a box; radius and length of a cylinder; radius of a sphere; scale (3,) of a mesh.
+    path : Path or None
+        File of the mesh.
+    """
+
+    link: str
+    joint: int
+    pose: Array
+    kind: str
+    size: Array
+    path: Path | None = None
+
+
+def bodies_of(
+    tree: Tree, link: str, joint: int, T_joint_link: Array, packages: Mapping[str, Path]
+) -> list[Body]:
+    """Return the collision bodies of one link."""
+    found = []
+    for collision in tree.links[link].findall("collision"):
+        where = f"{tree.path}: collision of link {link!r}"
+        geometry = child(collision, "geometry", where)
+        shapes = [] if geometry is None else list(geometry)
+        if len(shapes) != 1 or shapes[0].tag not in ("mesh", *SIZES):
+            tags = ", ".join(f"<{shape.tag}>" for shape in shapes) or "nothing"
+            raise InputError(f"{where}: expected one of mesh, {', '.join(SIZES)}, got {tags}")
+        shape = shapes[0]
+        path = _mesh_file(tree, shape, where, packages) if shape.tag == "mesh" else None
+        found.append(
+            Body(
+                link=link,
+                joint=joint,
+                pose=freeze(T_joint_link @ pose_of(collision, where)),
+                kind=shape.tag,
+                size=freeze(_size(shape, where)),
+                path=path,
+            )
+        )
+    return found
+
+
+def _size(shape: ElementTree.Element, where: str) -> Array:
+    if shape.tag == "mesh":
+        return numbers(shape, "scale", where, (1.0, 1.0, 1.0))
+    keys, count = SIZES[shape.tag]
+    size = np.concatenate([numbers(shape, key, where, (0.0,) * count) for key in keys.split()])
+    if not (size > 0).all():
+        raise InputError(f"{where}: expected a {shape.tag} of positive {keys}, got {size.tolist()}")
+    return size
+
+
+def _mesh_file(
+    tree: Tree, mesh: ElementTree.Element, where: str, packages: Mapping[str, Path]
+) -> Path:
+    name = mesh.get("filename", "")
+    scheme, mark, rest = name.partition("://")
+    here = tree.path.resolve().parent
+    if not mark:
+        file = here / name
+    elif scheme == "file":
+        file = Path(rest)
+    elif scheme == "package":
+        package, _, inside = rest.partition("/")
+        places = [packages[package]] if package in packages else _places(here, package)
+        file = next((p / inside for p in places if (p / inside).is_file()), Path(inside))
+    else:
+        raise InputError(f"{where}: the mesh {name!r} is not a local file")
+    if not name or not file.is_file():
+        raise InputError(
+            f"{where}: the mesh {name!r} is not there; say where its package lies with packages="
+            '{"NAME": "FOLDER"}, or read the kinematics alone with meshes=False'
+        )
+    return file
+
+
+def _places(here: Path, package: str) -> list[Path]:
+    """Return where a package may lie: a folder of its name, here or above, or beside one above."""
+    above = [here, *here.parents]
+    return [folder for folder in above if folder.name == package] + [p / package for p in above]

@@ -1,0 +1,248 @@
+"""The chain of a description: joints from base to tip, fixed joints merged, limits, bodies."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from kerfpath._arrays import Array, floats, freeze
+from kerfpath.errors import InputError
+from kerfpath.urdf._bodies import Body, bodies_of
+from kerfpath.urdf._xml import Joint, Tree, read_tree
+
+__all__ = ["Chain", "Description", "read_urdf"]
+
+SAME_LINE = 1e-9
+"""m, and sine: two neighbouring axes nearer than this turn about the same line."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Chain:
+    """Revolute joints one after the other, as a description states them.
+
+    Parameters
+    ----------
+    origins : (n, 4, 4)
+        Pose of each joint frame at angle zero, in the frame of the joint before it, m.
+    axes : (n, 3)
+        Unit axis of each joint in its own frame.
+    end : (4, 4)
+        Tip in the frame of the last joint, m.
+    """
+
+    origins: Array
+    axes: Array
+    end: Array
+
+    def __post_init__(self) -> None:
+        n = len(self.origins)
+        object.__setattr__(self, "origins", floats(self.origins, "chain origins", (n, 4, 4)))
+        object.__setattr__(self, "axes", floats(self.axes, "chain axes", (n, 3)))
+        object.__setattr__(self, "end", floats(self.end, "chain end", (4, 4)))
+
+    def frames(self, q: Array) -> Array:
+        """Return the joint frames, turned, and the tip in the base, (n+1, 4, 4), at q (n,) rad."""
+        T, found = np.eye(4), []
+        for origin, axis, angle in zip(self.origins, self.axes, q, strict=True):
+            T = T @ origin
+            T[:3, :3] = T[:3, :3] @ Rotation.from_rotvec(angle * axis).as_matrix()
+            found.append(T)
+        return np.array([*found, T @ self.end])
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Description:
+    """What a description says about the chain from `base` to `tip`.
+
+    Parameters
+    ----------
+    path : Path
+    name : str
+        Name of the robot.
+    base, tip : str
+        Links.
+    joints : tuple of Joint
+        The joints that move, in order, as they are written.
+    chain : Chain
+        Their frames, fixed joints merged.
+    bodies : tuple of Body
+        Collision bodies of every link that the chain carries.
+    left_out : tuple of str
+        Links on moving joints outside the chain: where they are is not known, and no body of
+        theirs is in `bodies`.
+    """
+
+    path: Path
+    name: str
+    base: str
+    tip: str
+    joints: tuple[Joint, ...]
+    chain: Chain
+    bodies: tuple[Body, ...]
+    left_out: tuple[str, ...]
+
+
+def read_urdf(
+    path: str | Path,
+    *,
+    base: str | None = None,
+    tip: str | None = None,
+    packages: Mapping[str, str | Path] | None = None,
+    meshes: bool = True,
+    snap: float = 0.0,
+) -> Description:
+    """Read the chain from link `base` (default: the root) to `tip` (default: the only leaf).
+
+    Parameters
+    ----------
+    path : path
+        A URDF file.
+    base, tip : str, optional
+    packages : mapping, optional
+        Folder of each package that mesh names begin with; one that is not named is looked for in
+        the folders above the file.
+    meshes : bool
+        Read the collision bodies too; a missing mesh file is then an error.
+    snap : float rad
+        Angles this near to a multiple of 15 deg are taken as that: many descriptions print right
+        angles as 1.5708.
+
+    Raises
+    ------
+    InputError
+        Not a description, no such link, no chain from base to tip; in the chain a joint that
+        slides, floats or mimics, or two neighbours about the same line; a missing mesh.
+    """
+    tree = read_tree(Path(path), snap)
+    base, tip = _ends(tree, base, tip)
+    written = _between(tree, base, tip)
+    moving = [joint for joint in written if joint.kind != "fixed"]
+    for joint in moving:
+        _require_revolute(tree, joint)
+    if not moving:
+        raise InputError(f"{tree.path}: no joint moves between {base!r} and {tip!r}")
+    origins, T = [], np.eye(4)
+    for joint in written:
+        T = T @ joint.origin
+        if joint.kind != "fixed":
+            origins.append(T)
+            T = np.eye(4)
+    chain = Chain(origins=np.array(origins), axes=np.array([j.axis for j in moving]), end=T)
+    _require_lengths(tree, chain, moving)
+    carried = _carried(tree, base, written)
+    folders = {name: Path(folder) for name, folder in (packages or {}).items()}
+    bodies = (
+        [b for link, (i, T) in carried.items() for b in bodies_of(tree, link, i, T, folders)]
+        if meshes
+        else []
+    )
+    return Description(
+        path=tree.path,
+        name=tree.name,
+        base=base,
+        tip=tip,
+        joints=tuple(moving),
+        chain=chain,
+        bodies=tuple(bodies),
+        left_out=tuple(link for link in tree.links if link not in carried),
+    )
+
+
+def _ends(tree: Tree, base: str | None, tip: str | None) -> tuple[str, str]:
+    roots = [link for link in tree.links if link not in tree.parent]
+    holding = {joint.parent for joint in tree.joints}
+    leaves = [link for link in tree.links if link not in holding]
+    ends = []
+    for key, given, candidates in (("base", base, roots), ("tip", tip, leaves)):
+        if given is None and len(candidates) != 1:
+            some = ", ".join(candidates[:8]) + (", ..." if len(candidates) > 8 else "")
+            raise InputError(
+                f"{tree.path}: {len(candidates)} links can be the {key} ({some}); "
+                f'say which with {key}="..."'
+            )
+        link = candidates[0] if given is None else given
+        if link not in tree.links:
+            raise InputError(
+                f"{tree.path}: {key}: there is no link {link!r}; "
+                f"there are {', '.join(list(tree.links)[:30])}"
+            )
+        ends.append(link)
+    return ends[0], ends[1]
+
+
+def _between(tree: Tree, base: str, tip: str) -> list[Joint]:
+    joints: list[Joint] = []
+    link = tip
+    while link != base:
+        if link not in tree.parent:
+            above = ", ".join(joint.parent for joint in joints) or "no links"
+            raise InputError(
+                f"{tree.path}: no chain of joints leads from base {base!r} to tip {tip!r}; "
+                f"above {tip!r} there are only {above}"
+            )
+        joints.append(tree.parent[link])
+        link = joints[-1].parent
+    return joints[::-1]
+
+
+def _require_revolute(tree: Tree, joint: Joint) -> None:
+    if joint.kind not in ("revolute", "continuous"):
+        raise InputError(
+            f"{tree.path}: joint {joint.name!r} between base and tip is {joint.kind}; only chains "
+            "of revolute joints are planned, choose base= or tip= on this side of it"
+        )
+    if joint.mimics:
+        raise InputError(
+            f"{tree.path}: joint {joint.name!r} between base and tip mimics {joint.mimics!r}: it "
+            "does not move on its own, and such chains are not planned"
+        )
+
+
+def _require_lengths(tree: Tree, chain: Chain, joints: list[Joint]) -> None:
+    """Raise InputError where a link between two joints has no length and no bend."""
+    for i in range(1, len(joints)):
+        T = chain.origins[i]
+        first, second = chain.axes[i - 1], T[:3, :3] @ chain.axes[i]
+        apart = np.linalg.norm(np.cross(first, T[:3, 3]))
+        if np.linalg.norm(np.cross(first, second)) < SAME_LINE and apart < SAME_LINE:
+            raise InputError(
+                f"{tree.path}: joints {joints[i - 1].name!r} and {joints[i].name!r} turn about "
+                f"the same line: link {joints[i].parent!r} between them has no length"
+            )
+
+
+def _carried(tree: Tree, base: str, written: list[Joint]) -> dict[str, tuple[int, Array]]:
+    """Return each link that is rigid on a joint of the chain: how many joints move it, and where.
+
+    The second is its pose (4, 4) in the frame of the last of these joints.
+    """
+    in_chain = {joint.name for joint in written}
+    below: dict[str, list[Joint]] = {}
+    for joint in tree.joints:
+        below.setdefault(joint.parent, []).append(joint)
+    found = {base: (0, freeze(np.eye(4)))}
+    link = base
+    while link in tree.parent and tree.parent[link].kind == "fixed":
+        joint = tree.parent[link]
+        above = found[link][1] @ np.linalg.inv(joint.origin)
+        link = joint.parent
+        found[link] = 0, freeze(above)
+    open_ = list(found)
+    while open_:
+        link = open_.pop()
+        number, T = found[link]
+        for joint in below.get(link, []):
+            if joint.child in found:
+                continue
+            if joint.kind == "fixed":
+                found[joint.child] = number, freeze(T @ joint.origin)
+            elif joint.name in in_chain:
+                found[joint.child] = number + 1, freeze(np.eye(4))
+            else:
+                continue
+            open_.append(joint.child)
+    return found

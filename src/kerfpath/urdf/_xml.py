@@ -1,0 +1,230 @@
+"""The text of a description: safe XML in, links and joints with numbers out."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from xml.etree import ElementTree
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from kerfpath._arrays import Array, freeze
+from kerfpath.errors import InputError
+
+__all__ = ["Joint", "Tree", "child", "numbers", "pose_of", "read_tree"]
+
+XACRO = ("{http://www.ros.org/wiki/xacro}", "{http://wiki.ros.org/xacro}")
+FINE = np.pi / 12
+"""rad: the angles that are meant where a description rounds them are whole multiples of 15 deg."""
+KINDS = ("revolute", "continuous", "fixed", "prismatic", "floating", "planar")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Joint:
+    """A joint as it is written; None where its limits are not.
+
+    Parameters
+    ----------
+    name, kind, parent, child : str
+    origin : (4, 4)
+        Pose of the joint at angle zero in the parent link, m.
+    axis : (3,)
+        Unit axis in the joint's own frame.
+    lower, upper : float rad or None
+    velocity : float rad/s or None
+    mimics : str
+        The joint that it follows, or nothing.
+    """
+
+    name: str
+    kind: str
+    parent: str
+    child: str
+    origin: Array
+    axis: Array
+    lower: float | None
+    upper: float | None
+    velocity: float | None
+    mimics: str
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Tree:
+    """All links and joints of a description."""
+
+    path: Path
+    name: str
+    links: Mapping[str, ElementTree.Element]
+    joints: tuple[Joint, ...]
+    parent: Mapping[str, Joint]
+    """The joint above each link that has one."""
+
+
+class _NoDoctype(ElementTree.TreeBuilder):
+    """A document type may define entities that grow without bound: no description needs one."""
+
+    def doctype(self, name: str, pubid: str | None, system: str | None) -> None:
+        raise InputError("a document type (<!DOCTYPE ...>) is refused; remove that line")
+
+
+def read_tree(path: Path, snap: float) -> Tree:
+    """Return the links and joints of the file.
+
+    Raises
+    ------
+    InputError
+        Not XML or not a description, names twice or missing, a link with two parents, a loop.
+    """
+    root = _root(path)
+    links: dict[str, ElementTree.Element] = {}
+    for link in root.findall("link"):
+        name = _attribute(link, "name", "a link", path)
+        if name in links:
+            raise InputError(f"{path}: link {name!r} is there twice; rename one")
+        links[name] = link
+    joints = tuple(_joint(element, snap, path) for element in root.findall("joint"))
+    names = [joint.name for joint in joints]
+    for i, joint in enumerate(joints):
+        if joint.name in names[:i]:
+            raise InputError(f"{path}: joint {joint.name!r} is there twice; rename one")
+        for link_name in (joint.parent, joint.child):
+            if link_name not in links:
+                raise InputError(
+                    f"{path}: joint {joint.name!r} names the link {link_name!r}, which is not there"
+                )
+    parent: dict[str, Joint] = {}
+    for joint in joints:
+        if joint.child in parent:
+            raise InputError(
+                f"{path}: link {joint.child!r} hangs on two joints, {parent[joint.child].name!r} "
+                f"and {joint.name!r}: a closed loop; only trees are read, remove one joint"
+            )
+        parent[joint.child] = joint
+    _require_no_loop(path, parent)
+    return Tree(
+        path=path, name=root.get("name", path.stem), links=links, joints=joints, parent=parent
+    )
+
+
+def _root(path: Path) -> ElementTree.Element:
+    try:
+        root = ElementTree.fromstring(
+            path.read_bytes(), parser=ElementTree.XMLParser(target=_NoDoctype())
+        )
+    except OSError as error:
+        raise InputError(f"{path}: cannot be read ({error.strerror})") from None
+    except InputError as error:
+        raise InputError(f"{path}: {error}") from None
+    except (ElementTree.ParseError, LookupError, ValueError) as error:
+        raise InputError(f"{path}: expected an XML robot description (URDF), {error}") from None
+    if any(element.tag.startswith(XACRO) for element in root.iter()):
+        raise InputError(
+            f"{path}: holds xacro macros; expand them first, with 'xacro {path.name} > robot.urdf'"
+        )
+    if root.tag != "robot":
+        raise InputError(
+            f"{path}: expected a URDF, whose first element is <robot>, got <{root.tag}>"
+        )
+    return root
+
+
+def _require_no_loop(path: Path, parent: Mapping[str, Joint]) -> None:
+    for link in parent:
+        seen, above = [link], link
+        while above in parent:
+            above = parent[above].parent
+            if above in seen:
+                ring = " - ".join([*seen[seen.index(above) :], above])
+                raise InputError(f"{path}: the links {ring} hang on each other: a closed loop")
+            seen.append(above)
+
+
+def _joint(element: ElementTree.Element, snap: float, path: Path) -> Joint:
+    name = _attribute(element, "name", "a joint", path)
+    where = f"{path}: joint {name!r}"
+    kind = _attribute(element, "type", f"joint {name!r}", path)
+    if kind not in KINDS:
+        raise InputError(f"{where}: type {kind!r} is none of {', '.join(KINDS)}")
+    ends = {}
+    for end in ("parent", "child"):
+        if (found := child(element, end, where)) is None:
+            raise InputError(f"{where}: has no <{end} link=...>")
+        ends[end] = _attribute(found, "link", f"<{end}> of joint {name!r}", path)
+    axis = np.array([1.0, 0.0, 0.0])
+    if kind not in ("fixed", "floating") and (found := child(element, "axis", where)) is not None:
+        axis = numbers(found, "xyz", where, (1.0, 0.0, 0.0))
+        if not np.linalg.norm(axis) > 0:
+            raise InputError(f"{where}: its axis is 0 0 0, which is no direction")
+    limit, mimic = child(element, "limit", where), child(element, "mimic", where)
+    written: dict[str, float | None] = dict.fromkeys(("lower", "upper", "velocity"))
+    if limit is not None:
+        for key in written:
+            if limit.get(key) is not None:
+                written[key] = float(numbers(limit, key, f"{where} <limit>", (0.0,))[0])
+        if written["lower"] is not None or written["upper"] is not None:
+            # The format's own default of the one that is left out.
+            written = {
+                **written,
+                "lower": written["lower"] or 0.0,
+                "upper": written["upper"] or 0.0,
+            }
+    return Joint(
+        name=name,
+        kind=kind,
+        parent=ends["parent"],
+        child=ends["child"],
+        origin=pose_of(element, where, snap),
+        axis=freeze(np.asarray(axis / np.linalg.norm(axis))),
+        mimics="" if mimic is None else mimic.get("joint", "another"),
+        **written,
+    )
+
+
+def pose_of(element: ElementTree.Element, where: str, snap: float = 0.0) -> Array:
+    """Return the <origin> of an element as a pose (4, 4).
+
+    Its angles are roll, pitch and yaw about the fixed x, y and z. Those within `snap` (rad) of a
+    multiple of 15 deg are taken as that.
+    """
+    pose, origin = np.eye(4), child(element, "origin", where)
+    if origin is not None:
+        rpy = numbers(origin, "rpy", f"{where} <origin>", (0.0, 0.0, 0.0))
+        whole = FINE * np.round(rpy / FINE)
+        rpy = np.where(np.abs(rpy - whole) <= snap, whole, rpy)
+        pose[:3, :3] = Rotation.from_euler("xyz", rpy).as_matrix()
+        pose[:3, 3] = numbers(origin, "xyz", f"{where} <origin>", (0.0, 0.0, 0.0))
+    return freeze(pose)
+
+
+def numbers(
+    element: ElementTree.Element, key: str, where: str, default: tuple[float, ...]
+) -> Array:
+    """Return the finite numbers of an attribute, as many as the default has."""
+    text = element.get(key)
+    if text is None:
+        return np.array(default)
+    try:
+        values = np.array([float(word) for word in text.split()])
+    except ValueError:
+        values = np.array([])
+    if len(values) != len(default) or not np.isfinite(values).all():
+        want = "a finite number" if len(default) == 1 else f"{len(default)} finite numbers"
+        raise InputError(f"{where}: expected {key}= as {want}, got {text!r}")
+    return values
+
+
+def child(element: ElementTree.Element, tag: str, where: str) -> ElementTree.Element | None:
+    """Return the only child of that tag, or None."""
+    found = element.findall(tag)
+    if len(found) > 1:
+        raise InputError(f"{where}: has <{tag}> {len(found)} times, expected it once")
+    return found[0] if found else None
+
+
+def _attribute(element: ElementTree.Element, key: str, what: str, path: Path) -> str:
+    value = element.get(key)
+    if not value:
+        raise InputError(f"{path}: {what} has no {key}")
+    return value
