@@ -513,7 +513,7 @@ def test_a_posture_that_does_not_exist_is_refused_at_its_line(read, words):
     ],
 )
 def test_keys_of_plan_that_do_not_go_together_are_refused_at_their_line(read, keys, said):
-    with pytest.raises(InputError, match="^[^\n]*$") as refused:
+    with pytest.raises(InputError, match=r"^[^\n]*$") as refused:
         read(changed("[plan]", f"[plan]\n{keys}"))
     assert said in str(refused.value)
 
