@@ -1,12 +1,13 @@
 """The first-order bound: to the bit what the scalar recursion gives, and vectorised."""
 
+import re
+
 import numba
 import numpy as np
 import pytest
 
 import naive
 from kerfpath.kernels import to_go
-from kerfpath.kernels._jit import VECTOR_FLAGS
 from kerfpath.kernels.search import Objective, distance
 from kerfpath.search._layers import narrowest_key, sorted_layers
 
@@ -67,10 +68,10 @@ def test_the_bound_is_that_of_the_scalar_recursion_to_the_bit(metric, minimax):
 @pytest.mark.skipif(bool(numba.config.BOUNDSCHECK), reason="a loop that checks indices jumps")
 def test_its_innermost_loop_takes_several_numbers_at_once():
     # Python's own min, a sum that may be reordered or a constant infinity would undo it unnoticed.
-    fresh = numba.njit(nogil=True, fastmath=VECTOR_FLAGS)(to_go._least.py_func)
-    layers, aim = graph(np.random.default_rng(0), layers=(3, 4), size=(5, 9))
-    fresh(
-        layers.q, layers.turn, aim.velocity, aim.weight, aim.metric, aim.cap, aim.minimax, 0,
-        int(layers.start[1]), 2, np.zeros(len(layers.low)), (True,) * len(layers.q), np.inf,
-    )  # fmt: skip
-    assert "llvm.vector.reduce.fmin" in next(iter(fresh.inspect_llvm().values()))
+    rng = np.random.default_rng(0)
+    while len((made := graph(rng, layers=(3, 4), size=(5, 9)))[0].q) != to_go.SIX:
+        pass
+    layers, aim = made
+    fresh = numba.njit(nogil=True)(to_go.cost_to_go.py_func)
+    fresh(layers, aim, np.ones(len(layers.low), bool), np.empty(len(layers.low)))
+    assert re.search(r"llvm\.minnum\.v\d+f64", next(iter(fresh.inspect_llvm().values())))

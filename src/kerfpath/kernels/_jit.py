@@ -13,8 +13,10 @@ from pathlib import Path
 from typing import Any, ParamSpec, TypeVar, cast
 
 import numba
+import numpy as np
 import platformdirs
 from llvmlite import ir
+from numba.cpython.unsafe import numbers
 from numba.extending import intrinsic
 
 __all__ = [
@@ -23,9 +25,11 @@ __all__ = [
     "either",
     "is_compiled",
     "jit",
+    "jit_inline",
     "jit_vector",
     "larger",
     "smaller",
+    "trailing_zeros",
 ]
 
 _P = ParamSpec("_P")
@@ -60,12 +64,12 @@ def is_compiled() -> bool:
     return any(CACHE.rglob("*.nbi"))
 
 
-def _compiled(function: Callable[_P, _R], flags: set[str] | bool) -> Callable[_P, _R]:
+def _compiled(function: Callable[_P, _R], **options: Any) -> Callable[_P, _R]:
     config: Any = numba.config
     kept = config.CACHE_DIR
     config.CACHE_DIR = str(CACHE)
     try:
-        compiled: Callable[_P, _R] = numba.njit(cache=True, nogil=True, fastmath=flags)(function)
+        compiled: Callable[_P, _R] = numba.njit(cache=True, nogil=True, **options)(function)
     finally:
         config.CACHE_DIR = kept
     return compiled
@@ -73,12 +77,26 @@ def _compiled(function: Callable[_P, _R], flags: set[str] | bool) -> Callable[_P
 
 def jit(function: Callable[_P, _R]) -> Callable[_P, _R]:
     """Compile `function` with strict IEEE arithmetic; it releases the interpreter lock."""
-    return _compiled(function, False)
+    return _compiled(function)
+
+
+def jit_inline(function: Callable[_P, _R]) -> Callable[_P, _R]:
+    """Compile `function` as `jit` does, to become part of what calls it; it may make no array.
+
+    For what inner loops call. Handing over a tuple of arrays takes a hundred moves, and taking an
+    array out of one counts a reference, at twenty times the cost of a multiplication; without the
+    runtime that could make an array, nothing is counted.
+    """
+    return _compiled(function, forceinline=True, _nrt=False)
 
 
 def jit_vector(function: Callable[_P, _R]) -> Callable[_P, _R]:
-    """Compile `function` with `VECTOR_FLAGS`; for the innermost loops over bare arrays."""
-    return _compiled(function, VECTOR_FLAGS)
+    """Compile `function` as `jit_inline` does, with `VECTOR_FLAGS`; for the innermost loops.
+
+    They vectorise where no index is signed (it would count from the end if negative), where the
+    number of joints is a constant of the caller's, and where nothing jumps.
+    """
+    return _compiled(function, fastmath=VECTOR_FLAGS, forceinline=True, _nrt=False)
 
 
 def _of_two(name: str) -> Callable[[float, float], float]:
@@ -104,6 +122,9 @@ def _of_two(name: str) -> Callable[[float, float], float]:
 
 smaller = _of_two("llvm.minnum")
 """The smaller of two floats, in loops that are to vectorise."""
+
+trailing_zeros = cast("Callable[[np.uint64], np.int64]", numbers.trailing_zeros)
+"""How many bits of an unsigned integer are 0 below the lowest 1."""
 
 larger = _of_two("llvm.maxnum")
 """The larger of two floats, in loops that are to vectorise."""

@@ -18,39 +18,27 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kerfpath._arrays import Array, Ints
-from kerfpath.kernels._jit import jit
+from kerfpath.kernels._jit import jit, jit_inline
 from kerfpath.kernels.limits import (
     acceleration_excess,
     acceleration_time,
     velocity_excess,
 )
+from kerfpath.kernels.reach import Scratch, States, fill_candidates
 from kerfpath.kernels.search import (
     Layers,
     Objective,
     distance,
     fill_increment,
     joined,
-    runs,
 )
 
-__all__ = ["Reached", "count_closing", "recursion", "trace"]
+__all__ = ["Reached", "States", "count_closing", "recursion", "trace"]
+
+LONG = 32
+"""Edges into one vertex from which on sorting them one by one takes longer than by halves."""
 
 _T = TypeVar("_T", bound="np.generic[Any]")
-
-
-class States(NamedTuple):
-    """The edges into one layer that are kept, by the vertex they lead to, cheapest first."""
-
-    vertex: Ints
-    """(S,): the vertex j that the edge leads to."""
-    d: Array
-    """(S,): cost of the best path that ends with this edge, vertex j included."""
-    dq: Array
-    """(S, n): increment along the edge."""
-    parent: Ints
-    """(S,): place, among the states of the layer before, of the edge that comes before."""
-    first: Ints
-    """(m+1,): states of vertex start[k] + i are first[i]:first[i+1]."""
 
 
 class Reached(NamedTuple):
@@ -101,7 +89,7 @@ def _begin(layers: Layers, aim: Objective, h: Array, bound: float) -> tuple[Stat
     return States(vertex, aim.vertex_cost[vertex], none, np.full(count, -1), first), lowest
 
 
-@jit
+@jit_inline
 def _cheapest(
     states: States,
     a: int,
@@ -125,7 +113,7 @@ def _cheapest(
     return -1, np.inf
 
 
-@jit
+@jit_inline
 def _quickest(
     states: States, a: int, b: int, aim: Objective, dq: Array, least: float, bound: float
 ) -> tuple[int, float, float]:
@@ -148,65 +136,110 @@ def _quickest(
     return best, best_d, over
 
 
+@jit_inline
+def _fill_from(
+    layers: Layers, aim: Objective, h: Array, bound: float, seam: Array, k: int, states: States,
+    i: int, count: int, scratch: Scratch, out: States,
+) -> tuple[int, float]:  # fmt: skip
+    """Append the states that leave vertex i of layer k; their number so far, least cost dropped."""
+    a, b, p, lowest = states.first[i], states.first[i + 1], layers.start[k] + i, np.inf
+    if a == b:
+        return count, lowest
+    closes = len(seam) > 0 and k == len(layers.start) - 3
+    some, dq = fill_candidates(layers, aim, states, a, b, k, p, scratch), scratch.dq
+    for v in range(some):
+        j = scratch.vertex[v]
+        if h[j] == np.inf:
+            continue
+        step = joined(aim.minimax, distance(layers, aim, p, j), aim.vertex_cost[j])
+        if step == np.inf:
+            continue
+        fill_increment(layers, p, j, dq)
+        if closes and acceleration_excess(seam, dq, aim.acceleration) >= 0:
+            continue
+        if aim.timed:
+            least = max(step, h[j])
+            s, cost, dropped = _quickest(states, a, b, aim, dq, least, bound)
+            cost = max(cost, step)
+        else:
+            s, dropped = _cheapest(states, a, b, aim, step, dq, h[j], bound)
+            cost = joined(aim.minimax, states.d[s], step) if s >= 0 else np.inf
+        lowest = min(lowest, dropped)
+        if s >= 0:
+            out.vertex[count], out.parent[count], out.d[count] = j, s, cost
+            for x in range(len(dq)):
+                out.dq[count, x] = dq[x]
+            count += 1
+    return count, lowest
+
+
+@jit_inline
+def _fill_states(
+    layers: Layers, aim: Objective, h: Array, bound: float, seam: Array, k: int, states: States,
+    i: int, count: int, scratch: Scratch, out: States,
+) -> tuple[int, int, float]:  # fmt: skip
+    """Append what leaves vertex i of layer k and those after it, while there is room for one more.
+
+    Returns the vertex to go on with, the number of states so far and the least cost dropped.
+    """
+    lowest = np.inf
+    while i < len(states.first) - 1 and count + len(scratch.vertex) <= len(out.vertex):
+        count, dropped = _fill_from(layers, aim, h, bound, seam, k, states, i, count, scratch, out)
+        lowest, i = min(lowest, dropped), i + 1
+    return i, count, lowest
+
+
 @jit
 def _extend(
-    layers: Layers, aim: Objective, h: Array, bound: float, seam: Array, k: int, states: States
-) -> tuple[States, float]:
+    layers: Layers, aim: Objective, h: Array, bound: float, seam: Array, k: int, states: States,
+) -> tuple[States, float]:  # fmt: skip
     """States of layer k + 1 from those of layer k, sorted; and the least cost dropped."""
-    n, count, lowest = len(layers.endless), 0, np.inf
-    vertex, parent = np.empty(256, np.int64), np.empty(256, np.int64)
-    d, dq = np.empty(256), np.empty((256, n))
-    step_dq = np.empty(n)
-    closes = len(seam) > 0 and k == len(layers.start) - 3
-    for i in range(len(states.first) - 1):
-        a, b, p = states.first[i], states.first[i + 1], layers.start[k] + i
-        if a == b:
-            continue
-        (low, high), (low2, high2) = runs(layers.start, layers.low, layers.high, k, p)
-        for v in range(low, high + high2 - low2):
-            j = v if v < high else v - high + low2
-            if h[j] == np.inf:
-                continue
-            step = joined(aim.minimax, distance(layers, aim, p, j), aim.vertex_cost[j])
-            if step == np.inf:
-                continue
-            fill_increment(layers, p, j, step_dq)
-            if closes and acceleration_excess(seam, step_dq, aim.acceleration) >= 0:
-                continue
-            if aim.timed:
-                least = max(step, h[j])
-                s, cost, dropped = _quickest(states, a, b, aim, step_dq, least, bound)
-                cost = max(cost, step)
-            else:
-                s, dropped = _cheapest(states, a, b, aim, step, step_dq, h[j], bound)
-                cost = joined(aim.minimax, states.d[s], step) if s >= 0 else np.inf
-            lowest = min(lowest, dropped)
-            if s < 0:
-                continue
-            if count == len(vertex):
-                vertex, parent, d, dq = _grown(vertex), _grown(parent), _grown(d), _grown(dq)
-            vertex[count], parent[count] = j, s
-            d[count], dq[count] = cost, step_dq
-            count += 1
-    unsorted = States(vertex[:count], d[:count], dq[:count], parent[:count], states.first)
-    return _sorted(unsorted, layers.start[k + 1], layers.start[k + 2]), lowest
+    n, lowest = len(layers.endless), np.inf
+    begin, end, first = layers.start[k + 1], layers.start[k + 2], states.first
+    scratch = Scratch(np.empty(end - begin, np.int64), np.empty(n), np.empty(n), np.empty(n))
+    room = 2 * (end - begin)
+    vertex, parent = np.empty(room, np.int64), np.empty(room, np.int64)
+    out = States(vertex, np.empty(room), np.empty((room, n)), parent, first)
+    i = count = int(first[0])  # 0; a plain 0 would be a type of its own
+    while i < len(first) - 1:
+        if count + end - begin > room:
+            room *= 2
+            out = States(
+                _grown(out.vertex), _grown(out.d), _grown(out.dq), _grown(out.parent), first
+            )
+        i, count, dropped = _fill_states(
+            layers, aim, h, bound, seam, k, states, i, count, scratch, out
+        )
+        lowest = min(lowest, dropped)
+    unsorted = States(out.vertex[:count], out.d[:count], out.dq[:count], out.parent[:count], first)
+    return _sorted(unsorted, begin, end), lowest
 
 
 @jit
 def _sorted(states: States, a: int, b: int) -> States:
     """Group states by their vertex a..b-1, cheapest first; ties keep the order of their making."""
+    vertex, d = states.vertex, states.d
     first = np.zeros(b - a + 1, np.int64)
-    for j in states.vertex:
+    for j in vertex:
         first[j - a + 1] += 1
     first = np.cumsum(first)
-    place, order = first.copy(), np.empty(len(states.vertex), np.int64)
-    for s in np.argsort(states.d, kind="mergesort"):
-        i = states.vertex[s] - a
-        order[place[i]] = s
-        place[i] += 1
-    return States(
-        states.vertex[order], states.d[order], states.dq[order], states.parent[order], first
-    )
+    place, order = first.copy(), np.empty(len(vertex), np.int64)
+    for s, j in enumerate(vertex):
+        order[place[j - a]] = s
+        place[j - a] += 1
+    for i in range(b - a):
+        begin, end = first[i], first[i + 1]
+        if end - begin > LONG:
+            group = order[begin:end]
+            group[:] = group[np.argsort(d[group], kind="mergesort")]
+            continue
+        for v in range(begin + 1, end):
+            s = order[v]
+            while v > begin and d[order[v - 1]] > d[s]:
+                order[v] = order[v - 1]
+                v -= 1
+            order[v] = s
+    return States(vertex[order], d[order], states.dq[order], states.parent[order], first)
 
 
 @jit

@@ -10,47 +10,34 @@ from math import sqrt
 
 import numpy as np
 
-from kerfpath._arrays import Array, Bools, Ints
-from kerfpath.kernels._jit import either, jit, jit_vector, larger, smaller
+from kerfpath._arrays import Array, Bools
+from kerfpath.kernels._jit import either, jit, jit_inline, jit_vector, larger, smaller
 from kerfpath.kernels.limits import LIMIT_TOLERANCE
 from kerfpath.kernels.metric import EUCLID, MANHATTAN
 from kerfpath.kernels.search import Layers, Objective
 
-__all__ = ["cost_to_go"]
+__all__ = ["LANES", "SIX", "cost_to_go"]
 
 LANES = 8
 """Numbers that one instruction works on; runs are made whole multiples of it where they can be."""
+SIX = 6
+"""Joints of a robot arm; with a constant number of them the loop over them is written out."""
 
 
+@jit
 def cost_to_go(layers: Layers, aim: Objective, allowed: Bools, out_h: Array) -> None:
     """First-order bound h (N,): least cost from each vertex to the last layer, its own left out.
 
     Vertices that are not allowed, or from which no edges within (5) lead to the end, get infinity.
     """
-    joints = (True,) * len(layers.q)
-    _to_go(layers, aim, joints, np.inf, allowed, out_h)
-
-
-@jit
-def _to_go(
-    layers: Layers,
-    aim: Objective,
-    joints: tuple[bool, ...],
-    none: float,
-    allowed: Bools,
-    out_h: Array,
-) -> None:
     last, bound = len(layers.start) - 2, aim.velocity + LIMIT_TOLERANCE
     tail = np.empty(len(layers.low))
     out_h[layers.start[last] :] = 0.0
     for k in range(last, -1, -1):
         if k < last:
-            _layer_to_go(
-                layers.q, layers.turn, bound, aim.weight, aim.metric, aim.cap, aim.minimax,
-                layers.start, layers.low, layers.high, k, tail, joints, none, out_h,
-            )  # fmt: skip
-        here = slice(layers.start[k], layers.start[k + 1])
-        _join(aim.minimax, aim.vertex_cost[here], allowed[here], out_h[here], tail[here])
+            _layer_to_go(layers, aim, bound, k, tail, out_h)
+        a, b = layers.start[k], layers.start[k + 1]
+        _join(aim.minimax, aim.vertex_cost[a:b], allowed[a:b], out_h[a:b], tail[a:b])
 
 
 @jit_vector
@@ -62,52 +49,55 @@ def _join(minimax: bool, cost: Array, allowed: Bools, out_h: Array, out_tail: Ar
         out_tail[v] = either(minimax, larger(cost[v], out_h[v]), cost[v] + out_h[v])
 
 
-@jit_vector
+@jit_inline
 def _layer_to_go(
-    q: Array, turn: Array, bound: Array, weight: Array, metric: int, cap: float, minimax: bool,
-    start: Ints, low: Ints, high: Ints, k: int, tail: Array, joints: tuple[bool, ...], none: float,
-    out_h: Array,
-) -> None:  # fmt: skip
+    layers: Layers, aim: Objective, bound: Array, k: int, tail: Array, out_h: Array
+) -> None:
     """For each vertex p of layer k the least of its distance to a next vertex joined with its tail.
 
     A run is lengthened to whole `LANES`: what it takes in breaks (5), or it would be in the run.
     """
-    first, last = start[k + 1], start[k + 2]
-    for p in range(start[k], start[k + 1]):
-        a, b = low[p], high[p]
+    first, last = layers.start[k + 1], layers.start[k + 2]
+    for p in range(layers.start[k], layers.start[k + 1]):
+        a, b = layers.low[p], layers.high[p]
         if a <= b:
             m = min((b - a + LANES - 1) // LANES * LANES, last - first)
-            a = min(a, last - m)
-            out_h[p] = _least(
-                q, turn, bound, weight, metric, cap, minimax, p, a, m, tail, joints, none
-            )
+            out_h[p] = _least(layers, aim, bound, p, min(a, last - m), m, tail)
         else:
-            ahead = _least(
-                q, turn, bound, weight, metric, cap, minimax, p, a, last - a, tail, joints, none
-            )
-            around = _least(
-                q, turn, bound, weight, metric, cap, minimax, p, first, b - first, tail, joints,
-                none,
-            )  # fmt: skip
-            out_h[p] = min(ahead, around)
+            ahead = _least(layers, aim, bound, p, a, last - a, tail)
+            out_h[p] = min(ahead, _least(layers, aim, bound, p, first, b - first, tail))
+
+
+@jit_inline
+def _least(
+    layers: Layers, aim: Objective, bound: Array, p: int, a: int, m: int, tail: Array
+) -> float:
+    """Least of the distances from vertex p to the vertices a..a+m-1, joined with their tails."""
+    none = aim.cap + np.inf  # infinity: a constant would be folded into jumps
+    if len(bound) == SIX:
+        return _least_of(
+            layers.q, layers.turn, bound, aim.weight, aim.metric, aim.cap, aim.minimax, p, a, m,
+            tail, SIX, none,
+        )  # fmt: skip
+    return _least_of(
+        layers.q, layers.turn, bound, aim.weight, aim.metric, aim.cap, aim.minimax, p, a, m,
+        tail, len(bound), none,
+    )  # fmt: skip
 
 
 @jit_vector
-def _least(
+def _least_of(
     q: Array, turn: Array, bound: Array, weight: Array, metric: int, cap: float, minimax: bool,
-    p: int, a: int, m: int, tail: Array, joints: tuple[bool, ...], none: float,
+    p: int, a: int, m: int, tail: Array, n: int, none: float,
 ) -> float:  # fmt: skip
-    """Least of the distances from vertex p to the vertices a..a+m-1, joined with their tails.
+    """As `_least`, of n joints: the innermost loop of the first-order problem.
 
-    The innermost loop of the first-order problem: one straight line of code that vectorises. So
-    the number of joints is that of a tuple, which is known when this is compiled; no index is
-    signed, which would be one counted from the end if negative; and infinity is an argument, as
-    LLVM folds a constant into jumps.
+    The distance is that of `distance`, to the bit, in one straight line of code that vectorises.
     """
     best, begin = np.inf, np.uintp(a)
     for v in range(np.uintp(m)):
         j, r = begin + v, 0.0
-        for i in range(len(joints)):
+        for i in range(n):
             y = abs(q[i, p] - q[i, j])
             y = smaller(y, turn[i] - y)
             y = either(y > bound[i], none, weight[i] * y)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike
 
-from kerfpath._arrays import Array, Bools, Ints, integers
+from kerfpath._arrays import Array, Bools, Ints, freeze, integers
 from kerfpath.errors import InputError, NoFeasiblePath
 from kerfpath.kernels import search as kernel
 from kerfpath.kernels.limits import LIMIT_TOLERANCE
@@ -62,7 +62,7 @@ def backwards(q: Array, start: Ints) -> tuple[Array, Ints]:
     begin = np.concatenate([[0], np.cumsum(sizes)])
     # Vertex i of reversed layer k comes from where that layer stood.
     order = np.arange(len(q)) + np.repeat(start[:-1][::-1] - begin[:-1], sizes)
-    return q[order], begin
+    return freeze(q[order]), freeze(begin)
 
 
 def narrowest_key(q: Array, start: Ints, bound: Array, endless: Bools) -> tuple[Array, float, bool]:

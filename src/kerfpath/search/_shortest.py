@@ -145,12 +145,12 @@ def shortest_path(
         key, window, circular = narrowest_key(q, start, bound_v, endless)
     layers, order = sorted_layers(q, start, key, window, circular, endless)
     aim = kernel.Objective(
-        weight=np.ascontiguousarray(weight),
+        weight=freeze(np.ascontiguousarray(weight)),
         metric=_METRIC_CODES[metric],
         minimax=objective == "max",
-        vertex_cost=cost[order],
-        velocity=bound_v,
-        acceleration=bound_a,
+        vertex_cost=freeze(cost[order]),
+        velocity=freeze(bound_v),
+        acceleration=freeze(bound_a),
         cap=np.inf,
         timed=False,
     )
@@ -205,7 +205,7 @@ def _first_from_the_back(q: Array, start: Ints, aim: kernel.Objective, endless: 
         return len(sizes)
     key, window, circular = narrowest_key(q, start, aim.velocity, endless)
     layers, _ = sorted_layers(q, start, key, window, circular, endless)
-    free = aim._replace(vertex_cost=np.zeros(len(q)))
+    free = aim._replace(vertex_cost=freeze(np.zeros(len(q))))
     return len(sizes) - dead_end(layers._replace(start=start[: filled + 1]), free).layers
 
 
