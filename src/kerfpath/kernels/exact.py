@@ -33,8 +33,10 @@ from kerfpath.kernels.search import (
     joined,
 )
 
-__all__ = ["Reached", "States", "count_closing", "recursion", "trace"]
+__all__ = ["EVERY", "Reached", "States", "count_closing", "recursion", "trace"]
 
+EVERY = 2**62
+"""States of a vertex that are kept: all."""
 LONG = 32
 """Edges into one vertex from which on sorting them one by one takes longer than by halves."""
 
@@ -192,6 +194,7 @@ def _fill_states(
 @jit
 def _extend(
     layers: Layers, aim: Objective, h: Array, bound: float, seam: Array, k: int, states: States,
+    width: int,
 ) -> tuple[States, float]:  # fmt: skip
     """States of layer k + 1 from those of layer k, sorted; and the least cost dropped."""
     n, lowest = len(layers.endless), np.inf
@@ -212,12 +215,15 @@ def _extend(
         )
         lowest = min(lowest, dropped)
     unsorted = States(out.vertex[:count], out.d[:count], out.dq[:count], out.parent[:count], first)
-    return _sorted(unsorted, begin, end), lowest
+    return _sorted(unsorted, begin, end, width), lowest
 
 
 @jit
-def _sorted(states: States, a: int, b: int) -> States:
-    """Group states by their vertex a..b-1, cheapest first; ties keep the order of their making."""
+def _sorted(states: States, a: int, b: int, width: int) -> States:
+    """Group states by their vertex a..b-1, cheapest first; ties keep the order of their making.
+
+    Of each vertex only the `width` cheapest are kept.
+    """
     vertex, d = states.vertex, states.d
     first = np.zeros(b - a + 1, np.int64)
     for j in vertex:
@@ -239,17 +245,29 @@ def _sorted(states: States, a: int, b: int) -> States:
                 order[v] = order[v - 1]
                 v -= 1
             order[v] = s
+    count = 0
+    for i in range(b - a):
+        begin, end = first[i], first[i + 1]
+        first[i] = count
+        for v in range(begin, min(end, begin + width)):
+            order[count] = order[v]
+            count += 1
+    first[b - a] = count
+    order = order[:count]
     return States(vertex[order], d[order], states.dq[order], states.parent[order], first)
 
 
 @jit
 def recursion(
-    layers: Layers, aim: Objective, h: Array, bound: float, seam: Array, room: int
-) -> Reached:
+    layers: Layers, aim: Objective, h: Array, bound: float, seam: Array, room: int,
+    width: int = EVERY,
+) -> Reached:  # fmt: skip
     """Best path whose cost keeps `bound`, exactly, under (5) and (6).
 
     h (N,) is `cost_to_go`; seam (n,) is the increment that the last one must go on to by (6), or
     (0,). The states of all layers are recorded for `trace` as long as they are no more than `room`.
+    With a `width`, only so many states of each vertex are kept: then the path found need not be the
+    best.
     """
     K = len(layers.start) - 1
     offset = np.zeros(K + 1, np.int64)
@@ -269,7 +287,7 @@ def recursion(
             parent[offset[k] : offset[k + 1]] = states.parent
         if k < K - 1:
             before = states
-            states, dropped = _extend(layers, aim, h, bound, seam, k, states)
+            states, dropped = _extend(layers, aim, h, bound, seam, k, states, width)
             lowest = min(lowest, dropped)
     best = int(np.argmin(states.d))
     return Reached(K, states.d[best], lowest, best, offset, vertex, parent, states, recorded)

@@ -21,8 +21,10 @@ __all__ = [
     "Objective",
     "arrange",
     "closing_counts",
+    "count_within",
     "distance",
     "fill_increment",
+    "fill_key",
     "joined",
     "path_planning",
     "reduced",
@@ -68,6 +70,22 @@ class Objective(NamedTuple):
 def reduced(angle: float) -> float:
     """Bring an angle into (-pi, pi]."""
     return angle - 2.0 * pi * ceil((angle - pi) / (2.0 * pi))
+
+
+@jit
+def count_within(here: Array, there: Array, bound: Array, endless: Bools, out_count: Ints) -> None:
+    """Add to out_count (n,), joint by joint, the pairs of vertices within its bound; q (m, n)."""
+    for p in range(len(here)):
+        for j in range(len(there)):
+            for i in range(len(bound)):
+                out_count[i] += abs(increment(there[j, i] - here[p, i], endless[i])) <= bound[i]
+
+
+@jit
+def fill_key(q: Array, joint: int, endless: bool, out_key: Array) -> None:
+    """Fill the angle (N,) of one joint of q (N, n), an endless one brought into (-pi, pi]."""
+    for v in range(len(out_key)):
+        out_key[v] = reduced(q[v, joint]) if endless else q[v, joint]
 
 
 @jit
