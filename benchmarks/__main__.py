@@ -1,4 +1,4 @@
-"""Run benchmarks and print their tables: ``python -m benchmarks [kinematics] [demo] [search]``."""
+"""Run benchmarks and print their tables: ``python -m benchmarks [NAME ...]``."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from rich.console import Console
 from benchmarks._figures import Report, machine, markdown, show
 
 RESULTS = Path(__file__).parent / "RESULTS.md"
-NAMES = ("kinematics", "demo", "search")
+NAMES = ("kinematics", "demo", "search", "retiming", "contours", "refinement")
 
 
 def main() -> None:
@@ -54,6 +54,18 @@ def _run(name: str, *, quick: bool) -> list[Report]:
         from benchmarks import demo
 
         return [demo.run(quick=quick)]
+    if name == "retiming":
+        from benchmarks import retiming
+
+        return retiming.run(quick=quick)
+    if name == "contours":
+        from benchmarks import contours
+
+        return contours.run(quick=quick)
+    if name == "refinement":
+        from benchmarks import refinement
+
+        return refinement.run(quick=quick)
     from benchmarks import search
 
     return search.run(quick=quick)

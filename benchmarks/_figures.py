@@ -12,6 +12,7 @@ from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from statistics import median
 from time import perf_counter
+from typing import Literal
 
 from rich.console import Console
 from rich.markup import escape
@@ -20,6 +21,7 @@ from rich.table import Table
 __all__ = [
     "Figure",
     "Report",
+    "Sheet",
     "available_gigabytes",
     "in_turn",
     "machine",
@@ -36,6 +38,10 @@ PACKAGES = (
     "eaik",
     "py-opw-kinematics",
     "tesseract-robotics",
+    "pymoo",
+    "ompl",
+    "clarabel",
+    "toppra",
 )
 COLUMNS = ("figure", "median", "min", "max", "runs", "unit", "note")
 
@@ -68,6 +74,15 @@ class Figure:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class Sheet:
+    """A table with columns of its own, in words; the columns before `words` hold no numbers."""
+
+    columns: Sequence[str]
+    rows: Sequence[Sequence[str]]
+    words: int = 1
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Report:
     """The figures of one benchmark.
 
@@ -77,6 +92,8 @@ class Report:
     how : str
         What is measured, and how.
     figures : list of Figure
+    sheets : list of Sheet
+        What does not fit the columns of figures.
     findings : list of str
         What was checked beside the clock: agreement, errors, ratios.
     """
@@ -84,6 +101,7 @@ class Report:
     title: str
     how: str
     figures: list[Figure] = field(default_factory=list)
+    sheets: list[Sheet] = field(default_factory=list)
     findings: list[str] = field(default_factory=list)
 
 
@@ -150,16 +168,28 @@ def machine() -> dict[str, str]:
 
 
 def show(report: Report, console: Console) -> None:
-    """Print one report as a table."""
-    table = Table(title=report.title, title_justify="left", caption_justify="left")
-    for column in COLUMNS:
-        number = column in COLUMNS[1:5]
-        table.add_column(column, justify="right" if number else "left", no_wrap=column != "note")
-    for figure in report.figures:
-        table.add_row(*(escape(cell) for cell in figure.cells()))
-    console.print(table)
+    """Print one report as tables."""
+    for i, sheet in enumerate(_sheets(report)):
+        table = Table(title=None if i else report.title, title_justify="left")
+        for j, column in enumerate(sheet.columns):
+            justify: Literal["left", "right"] = "right" if _is_number(sheet, j) else "left"
+            table.add_column(column, justify=justify, no_wrap=column != "note")
+        for row in sheet.rows:
+            table.add_row(*(escape(cell) for cell in row))
+        console.print(table)
     for finding in report.findings:
         console.print(f"  - {escape(finding)}")
+
+
+def _sheets(report: Report) -> list[Sheet]:
+    """Return the tables of a report, that of its figures first."""
+    rows = [figure.cells() for figure in report.figures]
+    return [Sheet(columns=COLUMNS, rows=rows)] * bool(rows) + report.sheets
+
+
+def _is_number(sheet: Sheet, column: int) -> bool:
+    """Say whether a column is set to the right."""
+    return column >= sheet.words and sheet.columns[column] not in ("unit", "note")
 
 
 def markdown(reports: Sequence[Report], facts: Mapping[str, str], date: str) -> str:
@@ -169,11 +199,11 @@ def markdown(reports: Sequence[Report], facts: Mapping[str, str], date: str) -> 
     lines += [f"- date: {date}"] if date else []
     lines += [f"- {name}: {value}" for name, value in facts.items()]
     for report in reports:
-        lines += ["", f"## {report.title}", "", report.how, ""]
-        lines += [
-            "| " + " | ".join(COLUMNS) + " |",
-            "| --- | ---: | ---: | ---: | ---: | --- | --- |",
-        ]
-        lines += ["| " + " | ".join(figure.cells()) + " |" for figure in report.figures]
+        lines += ["", f"## {report.title}", "", report.how]
+        for sheet in _sheets(report):
+            columns = range(len(sheet.columns))
+            rules = ["---:" if _is_number(sheet, j) else "---" for j in columns]
+            lines.append("")
+            lines += ["| " + " | ".join(row) + " |" for row in (sheet.columns, rules, *sheet.rows)]
         lines += ["", *(f"- {finding}" for finding in report.findings)]
     return "\n".join(lines) + "\n"

@@ -70,19 +70,11 @@ def second_order(q, start, closure, **o):
     vertex = [o["vertex_cost"][a:b] for a, b in itertools.pairwise(start)]
     if len(layers) == 1:
         return (vertex[0].min(), vertex[0].min()) if len(vertex[0]) else None
-    D = [difference(a[:, None], b[None], o["endless"]) for a, b in itertools.pairwise(layers)]
-    slow = [(np.abs(d) <= o["eta_v"] * o["velocity"] * o["dt"] + TOLERANCE).all(-1) for d in D]
-    bound_a = o["eta_a"] * o["acceleration"] * o["dt"] ** 2 + TOLERANCE
-    R = [_distances(d, o["weights"], o["metric"]) for d in D]
+    D, bound_a, steps = _edges(layers, vertex, o)
 
     def best(objective, cap):
         join = np.add if objective == "sum" else np.maximum
-        step = [
-            np.where(s & (r <= cap), join(r, v[None]), np.inf)
-            for s, r, v in zip(slow, R, vertex[1:], strict=True)
-        ]
-        step = [np.where(v[None] <= cap, s, np.inf) for s, v in zip(step, vertex[1:], strict=True)]
-        enter = np.where(vertex[0] <= cap, vertex[0], np.inf)[:, None]
+        enter, step = steps(join, cap)
 
         def run(first):
             d = first
@@ -106,6 +98,80 @@ def second_order(q, start, closure, **o):
     if cost == np.inf:
         return None
     return cost, best("sum", np.inf if o["objective"] == "sum" else cost * (1 + 1e-12))
+
+
+def interrupted(q, start, **o):
+    """Fewest interruptions, and of plans with that many the optimal (cost, tie-breaking sum)."""
+    layers = [q[a:b] for a, b in itertools.pairwise(start)]
+    vertex = [o["vertex_cost"][a:b] for a, b in itertools.pairwise(start)]
+    if len(layers) == 1:
+        return (0, vertex[0].min(), vertex[0].min()) if len(vertex[0]) else None
+    D, bound_a, steps = _edges(layers, vertex, o)
+
+    def best(objective, cap):
+        """By the number of interruptions: the least cost."""
+        join = np.add if objective == "sum" else np.maximum
+        enter, step = steps(join, cap)
+        # d[i][p, j]: least cost of a plan with i interruptions whose last edge is p, j.
+        d = [join(enter, step[0])]
+        for k in range(1, len(D)):
+            ok = (np.abs(D[k][None] - D[k - 1][:, :, None]) <= bound_a).all(-1)
+            there = np.where(vertex[k] <= cap, vertex[k], np.inf)[:, None]
+            on = [
+                join(np.where(ok, e[:, :, None], np.inf).min(axis=0, initial=np.inf), step[k])
+                for e in d
+            ]
+            anew = [join(join(e.min(initial=np.inf), there), step[k]) for e in d]
+            never = np.full(step[k].shape, np.inf)
+            d = [np.minimum(a, b) for a, b in zip([*on, never], [never, *anew], strict=True)]
+        return np.array([e.min(initial=np.inf) for e in d])
+
+    cost = best(o["objective"], np.inf)
+    if not np.isfinite(cost).any():
+        return None
+    fewest = int(np.argmax(np.isfinite(cost)))
+    cap = np.inf if o["objective"] == "sum" else cost[fewest] * (1 + 1e-12)
+    return fewest, cost[fewest], best("sum", cap)[fewest]
+
+
+def rotated(q, start, closure, rotation, **o):
+    """Optimal (cost, tie-breaking sum) that keeps `rotation` too, or None: every path is tried."""
+    ranges = [np.arange(a, b) for a, b in itertools.pairwise(start)]
+    paths = np.array(list(itertools.product(*ranges)), dtype=int).reshape(-1, len(ranges))
+    if closure == "periodic":
+        paths = paths[paths[:, 0] == paths[:, -1] - start[-2]]
+    d = difference(q[paths[:, :-1]], q[paths[:, 1:]], o["endless"])
+    changes = np.diff(d, axis=1)
+    if closure == "periodic":
+        changes = np.concatenate([changes, d[:, :1] - d[:, -1:]], axis=1)
+    ok = (np.abs(d) <= o["eta_v"] * o["velocity"] * o["dt"] + TOLERANCE).all((1, 2))
+    ok &= (np.abs(changes) <= o["eta_a"] * o["acceleration"] * o["dt"] ** 2 + TOLERANCE).all((1, 2))
+    ok &= (np.abs(np.cumsum(d, axis=1)) <= rotation + TOLERANCE).all((1, 2))
+    if not ok.any():
+        return None
+    parts = np.hstack([_distances(d, o["weights"], o["metric"]), o["vertex_cost"][paths]])[ok]
+    total, largest = parts.sum(axis=1), parts.max(axis=1)
+    if o["objective"] == "sum":
+        return total.min(), total.min()
+    return largest.min(), total[largest <= largest.min() * (1 + 1e-12)].min()
+
+
+def _edges(layers, vertex, o):
+    """Increments of all edges, the bound of (6), and what it costs to enter and to step."""
+    D = [difference(a[:, None], b[None], o["endless"]) for a, b in itertools.pairwise(layers)]
+    slow = [(np.abs(d) <= o["eta_v"] * o["velocity"] * o["dt"] + TOLERANCE).all(-1) for d in D]
+    bound_a = o["eta_a"] * o["acceleration"] * o["dt"] ** 2 + TOLERANCE
+    R = [_distances(d, o["weights"], o["metric"]) for d in D]
+
+    def steps(join, cap):
+        step = [
+            np.where(s & (r <= cap), join(r, v[None]), np.inf)
+            for s, r, v in zip(slow, R, vertex[1:], strict=True)
+        ]
+        step = [np.where(v[None] <= cap, s, np.inf) for s, v in zip(step, vertex[1:], strict=True)]
+        return np.where(vertex[0] <= cap, vertex[0], np.inf)[:, None], step
+
+    return D, bound_a, steps
 
 
 def _distances(d, weights, metric):
@@ -144,3 +210,22 @@ def random_instance(rng, *, layers=(1, 9), size=(1, 9)):
         "eta_a": float(rng.uniform(0.5, 1.2)),
     }
     return q, start, options
+
+
+def slowed(q, start, *, dt, velocity, acceleration, endless, vertex_cost, weights, metric, penalty,
+           eta_v, eta_a):  # fmt: skip
+    """Least cost when time lost has a price: every pair of edges is tried."""
+    layers = [q[a:b] for a, b in itertools.pairwise(start)]
+    vertex = [vertex_cost[a:b] for a, b in itertools.pairwise(start)]
+    if len(layers) == 1:
+        return vertex[0].min()
+    D = [difference(a[:, None], b[None], endless) for a, b in itertools.pairwise(layers)]
+    alone = [(np.abs(d) / (eta_v * velocity * dt)).max(-1) for d in D]
+    R = [_distances(d, weights, metric) + v for d, v in zip(D, vertex[1:], strict=True)]
+    d = vertex[0][:, None] + R[0] + penalty * np.maximum(0, alone[0] - 1)
+    for k in range(1, len(D)):
+        change = np.abs(D[k][None] - D[k - 1][:, :, None])
+        asked = np.sqrt((change / (eta_a * acceleration * dt**2)).max(-1))
+        lost = np.maximum(0, np.maximum(asked, alone[k][None]) - 1)
+        d = (d[:, :, None] + R[k][None] + penalty * lost).min(axis=0)
+    return d.min()

@@ -69,3 +69,113 @@ def test_the_serial_chain_given_to_the_peers_is_the_robot():
     # Rounding of a dozen products of numbers near one.
     np.testing.assert_allclose(p + R @ origins[6], T[:3, 3], atol=1e-14)
     np.testing.assert_allclose(R @ zero[:3, :3], T[:3, :3], atol=1e-14)
+
+
+@pytest.fixture(scope="module")
+def cut():
+    """A random cut whose grid has a path, and its exact plan."""
+    random = benchmark_module("_random_contours")
+    name = "kuka_kr16_r1610_2"
+    for index in range(10):
+        task = random.cut(name, index)
+        try:
+            made = kerfpath.plan(
+                task.contour, task.robot, speed=task.speed, graph=task.graph, **task.options
+            )
+        except kerfpath.NoFeasiblePath:
+            continue
+        return task, made
+    pytest.fail("none of ten cuts has a path")
+
+
+def test_the_seed_decides_the_random_cuts():
+    random = benchmark_module("_random_contours")
+    for name in random.ROBOTS:
+        one, again, other = (random.cut(name, i) for i in (3, 3, 4))
+        assert np.array_equal(one.contour.points, again.contour.points)
+        assert one.speed == again.speed
+        assert len(one.contour) != len(other.contour) or one.speed != other.speed
+        assert 60 <= len(one.contour) <= 80
+        size = np.linalg.norm(np.ptp(one.contour.points, axis=0))
+        assert size < 0.6
+        assert np.diff(one.graph.start).all()
+
+
+def test_following_the_gamma_of_a_plan_gives_its_cost_and_keeps_its_limits(cut):
+    task, made = cut
+    follower = benchmark_module("_following").Follower(task)
+    found = follower.follow(made.gamma[None])
+    assert found.excess[0] == 0.0
+    # The nearest pose at each node is the plan's own, or one that costs less.
+    assert found.cost[0] <= made.cost * (1 + 1e-12)
+    cost, feasible = follower.weigh(made.q)
+    assert feasible
+    assert cost == pytest.approx(made.cost, rel=1e-12)
+
+
+def test_following_says_by_how_much_the_limits_are_exceeded(cut):
+    task, made = cut
+    follower = benchmark_module("_following").Follower(task)
+    q = np.array(made.q)
+    q[5, 0] += 1.5 * follower.task.bound_v[0] + 2 * abs(q[5, 0] - q[4, 0])
+    assert not follower.weigh(q)[1]
+
+
+def test_edges_add_up_to_the_cost_of_a_plan_of_one_posture(cut):
+    task, made = cut
+    following = benchmark_module("_following")
+    given = following.Follower(task).task
+    if np.ptp(made.posture):
+        pytest.skip("the plan changes its posture")
+    mu, gamma, nodes = int(made.posture[0]), made.gamma, range(len(made.gamma) - 1)
+    cost = sum(following.edge_cost(given, mu, k, gamma[k], k + 1, gamma[k + 1]) for k in nodes)
+    assert cost == pytest.approx(made.cost, rel=1e-9)
+    assert following.edge_cost(given, mu, 4, gamma[4], 4, gamma[4]) == np.inf
+    assert following.edge_cost(given, mu, 4, gamma[4], 3, gamma[3]) == np.inf
+
+
+def test_the_genetic_algorithm_repeats_itself(cut):
+    pytest.importorskip("pymoo")
+    genetic = benchmark_module("_genetic")
+    follower = benchmark_module("_following").Follower(cut[0])
+    gamma, again = (genetic.genetic(follower, seed=1, generations=5) for _ in range(2))
+    assert gamma.shape == (len(cut[0].contour),)
+    assert np.array_equal(gamma, again)
+    basis = genetic.spline_basis(61, 8)
+    np.testing.assert_allclose(basis.sum(axis=1), 1, atol=1e-12)
+
+
+def test_sampling_finds_a_course_that_keeps_the_velocity_limits(cut):
+    pytest.importorskip("ompl")
+    sampling = benchmark_module("_sampling")
+    follower = benchmark_module("_following").Follower(cut[0])
+    sampling.start_generators(1)
+    gamma = sampling.sampled(follower, seed=1, edges=8000)
+    assert gamma is not None
+    assert gamma.shape == (len(cut[0].contour),)
+    assert follower.follow(gamma[None]).excess[0] < 1000  # no node without a pose
+
+
+def test_the_tally_counts_what_is_missed_and_what_lies_beyond_the_grid():
+    tally = benchmark_module("_tally")
+
+    def outcome(index, method, cost):
+        return tally.Outcome(robot="r", index=index, method=method, seconds=2.0, cost=cost)
+
+    outcomes = [
+        *(outcome(i, "exact", cost) for i, cost in enumerate((10.0, 10.0, 10.0, None))),
+        *(outcome(i, "other", cost) for i, cost in enumerate((11.0, 9.0, None, 5.0))),
+    ]
+    exact, other = tally.sheet(outcomes, ("exact", "other")).rows
+    assert exact[1:6] == ("exact", "4", "3", "0", "0")
+    assert other[1:6] == ("other", "4", "3", "1", "1")
+    assert other[6:] == ("0.00", "0.00", "10.00", "1 of 2", "2")
+
+
+def test_a_sheet_is_written_with_its_own_columns():
+    figures = benchmark_module("_figures")
+    sheet = figures.Sheet(columns=("what", "number"), rows=[("this", "1")])
+    report = figures.Report(title="A", how="So.", sheets=[sheet])
+    text = figures.markdown([report], {}, "")
+    assert "| what | number |\n| --- | ---: |\n| this | 1 |" in text
+    assert "median" not in text

@@ -122,7 +122,7 @@ def test_the_trajectory_is_the_plan_in_degrees_and_millimetres(planned, folder):
 
 def test_plan_json_carries_everything_and_round_trips(planned, folder):
     data = json.loads((folder / "small-plan" / "plan.json").read_text())
-    assert data["schema"] == 1
+    assert data["schema"] == 2
     assert data["robot"]["id"] == "abb_irb4600_60_205"
     assert data["job"]["tool"]["head"] == "laser-head-45"
     assert np.array(data["T_flange_tip"]).shape == (4, 4)
@@ -234,19 +234,45 @@ def test_an_older_program_in_the_folder_is_pointed_out(folder):
 def test_speed_names_the_fastest_and_what_binds(folder):
     result = run("speed", "small.toml", cwd=folder)
     assert result.returncode == 0, result.stderr
-    assert re.search(r"hole 10 +3 +\d+\.\d+ +\d+ +joint \d acceleration", result.stdout)
+    assert re.search(r"hole 10 +3 +\d+\.\d+ +\d+\.\d+ +\d+ +joint \d acceleration", result.stdout)
     data = json.loads(run("speed", "small.toml", "--json", cwd=folder).stdout)
     hole = data["contours"][0]
-    assert hole["fastest_m_min"] > hole["asked_m_min"] == pytest.approx(3)
-    # A job at that speed is feasible, one a little over it is not.
-    for share, code in ((0.999, 0), (1.01, 1)):
-        asked = f"speed_m_min = {hole['fastest_m_min'] * share}"
-        (folder / "edge.toml").write_text(SMALL.replace("speed_m_min = 3", asked, 1))
+    assert hole["fastest_m_min"] > hole["on_grid_m_min"] > hole["asked_m_min"]
+    assert hole["asked_m_min"] == pytest.approx(3)
+    # A job at that speed is feasible, one a little over it is not, unless gamma leaves its grid.
+    for share, refine, code in ((0.999, "false", 0), (1.01, "false", 1), (1.01, "true", 0)):
+        asked = f"speed_m_min = {hole['on_grid_m_min'] * share}"
+        edge = SMALL.replace("speed_m_min = 3", asked, 1)
+        (folder / "edge.toml").write_text(edge.replace("[plan]", f"[plan]\nrefine = {refine}"))
         assert run("plan", "edge.toml", "--out", "edge", cwd=folder).returncode == code
     (folder / "far.toml").write_text(SMALL.replace("xyz_mm = [1200", "xyz_mm = [3200"))
     far = run("speed", "far.toml", cwd=folder)
     assert far.returncode == 1
     assert "no admissible pose" in far.stdout
+
+
+def test_a_job_may_dip_or_be_interrupted_and_is_read_back(folder):
+    """Over the fastest speed on the grid: slowed down in places, or cut in pieces."""
+    # The cut stops where a pose is at the edge of what the arm can do: little room to back off.
+    base = SMALL.replace("speed_m_min = 3", "speed_m_min = 3.7", 1).replace("= 50", "= 1", 1)
+    assert "retract_mm = 1" in base
+    for key, word in (
+        ('feed = "dip"', "full speed on"),
+        ('interruptions = "fewest"', "piece 1 of"),
+    ):
+        job = base.replace("[plan]", f"[plan]\nrefine = false\n{key}")
+        (folder / "over.toml").write_text(job)
+        done = run("plan", "over.toml", "--out", "over", cwd=folder)
+        assert done.returncode == 0, done.stdout + done.stderr
+        assert word in done.stdout
+        again = run("audit", "over/plan.json", "--job", "over.toml", cwd=folder)
+        assert again.returncode == 0, again.stdout
+        data = json.loads((folder / "over" / "plan.json").read_text())
+        assert {c["contour"] for c in data["contours"]} == {"hole 10", "slot"}
+        post = run("post", "over/plan.json", "-o", "over/again.mod", cwd=folder)
+        assert post.returncode == 0, post.stderr
+        again, first = ((folder / "over" / f).read_text() for f in ("again.mod", "over.mod"))
+        assert again.replace("MODULE plan", "MODULE over") == first
 
 
 def test_contours_lists_the_loops_by_name():
@@ -289,8 +315,8 @@ def test_help_teaches():
         (("plan", "."), ["got a folder"]),
         (("post", "none.json"), ["none.json", "cannot be read"]),
         (("post", "small.toml"), ["not a plan.json"]),
-        (("post", "list.json"), ["expected a plan.json with schema 1, got 'list'"]),
-        (("post", "old.json"), ["schema 1, got 0"]),
+        (("post", "list.json"), ["expected a plan.json with schema 2, got 'list'"]),
+        (("post", "old.json"), ["schema 2, got 0"]),
         (("post", "short.json"), ["the key 'robot' is missing"]),
         (("audit", "none.json"), ["cannot be read"]),
         (("audit", "small-plan/plan.json", "--job", "none.toml"), ["no such file"]),
@@ -311,7 +337,7 @@ def test_help_teaches():
 def test_bad_input_is_one_line_and_nothing_is_written(planned, folder, arguments, words):
     (folder / "list.json").write_text("[]")
     (folder / "old.json").write_text('{"schema": 0}')
-    (folder / "short.json").write_text('{"schema": 1}')
+    (folder / "short.json").write_text('{"schema": 2}')
     (folder / "wrong-loop.toml").write_text(SMALL.replace("skin/hole9", "skin/hole99"))
     (folder / "slow.toml").write_text(SMALL.replace("speed_m_min = 3", "speed_m_min = -3", 1))
     before = sorted(folder.iterdir())

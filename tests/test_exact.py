@@ -224,3 +224,13 @@ def test_whatever_comes_no_crash(q, start, limit, closure):
     except (InputError, NoFeasiblePath):
         return
     assert len(path.index) == len(start) - 1
+
+
+def test_a_cut_is_bracketed_by_vertices_too():
+    """Both ends reach the middle layer, one in its first vertex, the other in its second."""
+    limits = {"dt": 1.0, "velocity": [1.0], "acceleration": [9.0]}
+    with pytest.raises(NoFeasiblePath) as broken:
+        shortest_path([[0.0], [0.0], [3.0], [3.0]], [0, 1, 3, 4], **limits)
+    assert (broken.value.node, broken.value.back) == (1, 1)
+    assert broken.value.reached.tolist() == [0]
+    assert broken.value.leaving.tolist() == [1]

@@ -129,3 +129,13 @@ def test_turning_back_is_counted_only_beyond_the_threshold(example):
     assert example.reversals(x, 2.0) == 2
     assert example.reversals(x, 0.4) == 6
     assert example.reversals(np.zeros(4), 2.0) == 0
+
+
+def test_no_path_shows_every_way_out(capsys):
+    spec = importlib.util.spec_from_file_location("no_path", EXAMPLES / "no_path.py")
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    module.main()
+    said = capsys.readouterr().out
+    for words in ("proved: True", "dipped on the grid", "dipped off the grid", "pieces of [32"):
+        assert words in said

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import naive
-from kerfpath import InputError, NoFeasiblePath, fastest_speed, plan, shortest_path
+from kerfpath import InputError, NoFeasiblePath, audit, fastest_speed, plan, shortest_path
 from kerfpath.search import least_interval
 
 
@@ -113,3 +113,26 @@ def test_a_contour_is_feasible_at_its_fastest_speed_and_not_above(circle, arm, t
         plan(circle, arm, speed=found.speed * 1.001, **options)
     assert 0 <= found.joint < 6
     assert 0 <= found.node < len(circle)
+
+
+def test_off_the_grid_it_is_faster_and_the_motion_keeps_the_limits(circle, arm, tool, placement):
+    cell = {"tool": tool, "placement": placement, "gamma_step": np.radians(4)}
+    on_grid = fastest_speed(circle, arm, **cell)
+    found = fastest_speed(circle, arm, refine=True, **cell)
+    assert found.on_grid == on_grid.speed
+    assert found.speed > on_grid.speed
+    made = plan(circle, arm, speed=0.99 * found.speed, refine=True, **cell)
+    assert audit(made) == []
+    assert np.abs(made.acceleration_share).max() <= 1
+    # What binds is used up: at that speed nothing is left of it.
+    assert found.limit == "acceleration"
+
+
+def test_an_interval_found_past_the_ceiling_of_a_search_is_not_believed():
+    # The search leaves out edges beyond its ceiling: up to 8 % of these intervals was given away.
+    rng = np.random.default_rng(777)
+    for _ in range(1500):
+        q, start, o = instance(rng)
+        found = least_interval(q, start, **o)
+        with pytest.raises(NoFeasiblePath):
+            shortest_path(q, start, dt=found.dt * (1 - 1e-4), **o)

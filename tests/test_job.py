@@ -93,6 +93,9 @@ def test_the_example_is_read_into_si(read, folder):
         "eta_v": 0.95,
         "eta_a": 0.9,
         "closure": "free",
+        "rotation": None,
+        "feed": "constant",
+        "refine": True,
     }
     assert json.loads(json.dumps(job.source)) == job.source
     assert job.source["contour"][0] == {"pick": "trim", "speed_m_min": 9, "spacing_mm": 2}

@@ -1,9 +1,12 @@
 """plan(): the whole way from contour to plan, and its answers when there is none."""
 
+import itertools
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
-from kerfpath import Contour, InputError, NoFeasiblePath, plan, robot
+from kerfpath import Contour, InputError, NoFeasiblePath, audit, plan, plan_in_pieces, robot
 from kerfpath.planner import layered_graph, node_interval
 
 STEP = np.radians(5)
@@ -158,3 +161,121 @@ def test_a_periodic_plan_returns_to_where_it_began(made, circle, arm, tool, plac
             closure="periodic",
             **options,
         )
+
+
+def test_a_change_of_posture_that_no_path_can_make_is_named(circle, arm, tool, placement):
+    """A graph that offers one posture in the first half and another in the second."""
+    space = {"tool": tool, "placement": placement, "gamma_step": STEP}
+    graph = layered_graph(circle, arm, postures=(0, 1), **space)
+    node = np.repeat(np.arange(len(circle)), np.diff(graph.start))
+    keep = np.where(node < 60, graph.posture == 0, graph.posture == 1)
+    parted = replace(
+        graph,
+        q=graph.q[keep],
+        start=np.concatenate([[0], np.cumsum(np.bincount(node[keep]))]),
+        sample=graph.sample[keep],
+        posture=graph.posture[keep],
+        turn=graph.turn[keep],
+    )
+    with pytest.raises(NoFeasiblePath, match="change from front/up/plus to front/up/minus") as cut:
+        plan(circle, arm, graph=parted, speed=0.1, **space)
+    assert (cut.value.node, cut.value.back) == (59, 60)
+
+
+def test_where_the_grid_has_no_path_one_is_found_off_it(circle, arm, tool, placement):
+    """A coarse grid quantises the acceleration: (6) fails on it and holds beside it."""
+    options = {"tool": tool, "placement": placement, "speed": 0.6, "gamma_step": np.radians(4)}
+    with pytest.raises(NoFeasiblePath) as broken:
+        plan(circle, arm, **options)
+    assert broken.value.proved
+    made = plan(circle, arm, refine=True, **options)
+    assert np.abs(made.acceleration_share).max() <= 1
+    assert not made.proof.optimal
+    assert "brought inside limits" in made.proof.statement
+    assert audit(made) == []
+    with pytest.raises(NoFeasiblePath, match="off the grid not refined: the "):
+        plan(circle, arm, refine=True, **options | {"speed": 0.7, "eta_a": 0.3})
+
+
+@pytest.fixture(scope="module")
+def corner():
+    """Two straight lines that meet at a right angle, the axis turning there too: 81 nodes."""
+    along = np.linspace(0, 0.16, 81)
+    points = np.stack([np.minimum(along, 0.08), np.maximum(along - 0.08, 0), 0 * along], axis=1)
+    lean = 0.3 / (1 + np.exp((0.08 - along) / 0.004))
+    return Contour(points, np.c_[lean, 0 * along, -np.ones(81)], name="corner")
+
+
+@pytest.mark.parametrize("refine", [False, True])
+def test_the_feed_dips_where_the_limits_ask_for_it(corner, arm, tool, placement, refine):
+    options = {"tool": tool, "placement": placement, "gamma_step": STEP, "speed": 0.4}
+    with pytest.raises(NoFeasiblePath):
+        plan(corner, arm, refine=refine, **options)
+    made = plan(corner, arm, feed="dip", refine=refine, **options)
+    assert audit(made) == []
+    assert np.abs(made.velocity_share).max() <= 1 + 1e-9
+    assert np.abs(made.acceleration_share).max() <= 1 + 1e-6
+    tau, dt = np.diff(made.time), 0.002 / 0.4
+    assert (tau >= dt * (1 - 1e-9)).all()
+    at_speed = tau <= dt * (1 + 1e-9)
+    assert made.feed.full == pytest.approx(at_speed.mean(), abs=1e-9)
+    assert 0.2 < made.feed.full < 1
+    assert made.feed.slowest == pytest.approx((dt / tau).min())
+    assert abs(made.feed.node - 40) < 10  # at the corner
+    assert f"joint {made.feed.joint + 1} binds" in str(made.feed)
+
+
+def test_off_the_grid_the_feed_dips_less(corner, arm, tool, placement):
+    options = {"tool": tool, "placement": placement, "gamma_step": STEP, "speed": 0.4}
+    grid, off = (plan(corner, arm, feed="dip", refine=r, **options) for r in (False, True))
+    assert off.time[-1] < grid.time[-1]
+
+
+def test_the_pieces_of_an_interrupted_cut(corner, arm, tool, placement):
+    options = {"tool": tool, "placement": placement, "gamma_step": STEP, "speed": 0.1}
+    pieces = plan_in_pieces(corner, arm, **options)
+    assert len(pieces) > 1
+    assert pieces[0].name == f"corner, piece 1 of {len(pieces)}"
+    for p in pieces:
+        assert audit(p, reference=corner.between(p.contour.s[0], p.contour.s[-1])) == []
+        assert p.proof.optimal
+        # Gamma still counts from the frames of the whole contour.
+        H = p.T_base_part @ p.contour.frames("rotation-minimising")
+        x = (p.robot.forward(p.q) @ tool)[:, :3, 0]
+        angle = np.arctan2((x * H[:, :3, 1]).sum(1), (x * H[:, :3, 0]).sum(1))
+        np.testing.assert_allclose(np.cos(angle - p.gamma), 1, atol=1e-9)
+    for before, after in itertools.pairwise(pieces):
+        np.testing.assert_array_equal(before.contour.points[-1], after.contour.points[0])
+    assert pieces[0].contour.s[0] == corner.s[0]
+    assert pieces[-1].contour.s[-1] == corner.s[-1]
+    refined = plan_in_pieces(corner, arm, refine=True, **options)
+    assert all(r.cost <= p.cost for r, p in zip(refined, pieces, strict=True))
+    whole = plan_in_pieces(corner, arm, **options | {"speed": 0.05})
+    assert [p.name for p in whole] == ["corner"]
+    with pytest.raises(InputError, match='needs method "exact"'):
+        plan_in_pieces(corner, arm, method="paper", **options)
+    with pytest.raises(NoFeasiblePath, match="no number of interruptions helps"):
+        plan_in_pieces(corner, arm, **options | {"speed": 20})
+
+
+def test_a_hose_limits_how_far_an_endless_joint_turns(circle, arm, tool, placement):
+    options = {"tool": tool, "placement": placement, "speed": 0.1, "gamma_step": STEP}
+    free = plan(circle, arm, **options)
+    turned = np.abs(np.cumsum(free.increments, axis=0)).max(axis=0)
+    limit = np.full(6, np.inf)
+    limit[5] = 0.9 * turned[5]
+    held = plan(circle, arm, rotation=limit, refine=True, **options)
+    assert np.abs(np.cumsum(held.increments, axis=0)).max(axis=0)[5] <= limit[5]
+    assert audit(held) == []
+    assert audit(replace(free, settings=held.settings))[0].code == "rotation"
+    with pytest.raises(InputError, match="rotation: joint 1 is not endless"):
+        plan(circle, arm, rotation=np.ones(6), **options)
+
+
+def test_a_feed_that_need_not_dip_is_constant(circle, arm, tool, placement, made):
+    same = plan(circle, arm, tool=tool, placement=placement, speed=0.1, gamma_step=STEP, feed="dip")
+    np.testing.assert_array_equal(same.q, made.q)
+    assert same.feed is None
+    for wrong in ({"feed": "dips"}, {"feed": "dip", "objective": "max"}):
+        with pytest.raises(InputError, match="feed: "):
+            plan(circle, arm, tool=tool, placement=placement, speed=0.1, **wrong)

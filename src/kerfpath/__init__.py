@@ -19,7 +19,10 @@ if TYPE_CHECKING:
     from kerfpath.errors import NoFeasiblePath as NoFeasiblePath
     from kerfpath.planner import fastest_speed as fastest_speed
     from kerfpath.planner import plan as plan
+    from kerfpath.planner import plan_in_pieces as plan_in_pieces
     from kerfpath.plans import Plan as Plan
+    from kerfpath.refiner import Refinement as Refinement
+    from kerfpath.refiner import refine as refine
     from kerfpath.robots import Robot as Robot
     from kerfpath.robots import robot as robot
     from kerfpath.search import LayeredPath as LayeredPath
@@ -33,11 +36,14 @@ _HOME = {
     "LayeredPath": "search",
     "NoFeasiblePath": "errors",
     "Plan": "plans",
+    "Refinement": "refiner",
     "Robot": "robots",
     "audit": "auditor",
     "fastest_speed": "planner",
     "join": "contour",
     "plan": "planner",
+    "plan_in_pieces": "planner",
+    "refine": "refiner",
     "robot": "robots",
     "shortest_path": "search",
 }

@@ -41,12 +41,17 @@ def freeze(array: _A) -> _A:
 
 
 def floats(
-    value: ArrayLike, name: str, shape: tuple[int | None, ...], *, copy: bool = True
+    value: ArrayLike,
+    name: str,
+    shape: tuple[int | None, ...],
+    *,
+    copy: bool = True,
+    infinite: bool = False,
 ) -> Array:
     """Return `value` as a read-only float64 array of `shape` (None: any length), all finite.
 
     Without `copy` the numbers of a fitting array are looked at where they are: for arrays that are
-    not kept.
+    not kept. Where `infinite`, infinity is let pass.
 
     Raises
     ------
@@ -56,10 +61,12 @@ def floats(
     array = np.asarray(_converted(value, name, np.float64), order="C")
     _require_shape(array, name, shape)
     array = array.copy() if copy else array.view()
-    if not np.isfinite(array).all():
-        index = tuple(int(i) for i in np.argwhere(~np.isfinite(array))[0])
+    good = ~np.isnan(array) if infinite else np.isfinite(array)
+    if not good.all():
+        index = tuple(int(i) for i in np.argwhere(~good)[0])
         raise InputError(
-            f"{name}: every number must be finite, but {name}{list(index)} is {array[index]}"
+            f"{name}: every number must be {'a number' if infinite else 'finite'}, "
+            f"but {name}{list(index)} is {array[index]}"
         )
     return freeze(array)
 

@@ -46,6 +46,9 @@ class Contour:
         Arc length of each node along the path that was sampled; default: along the polyline.
     time : (K,) s, optional
         Time of each node, where a speed has been laid on the contour.
+    x : (K, 3), optional
+        Direction at each node that gamma counts from, where that is not to follow from the path
+        alone (see `frames`), as for a part of a contour.
     name : str
         What messages, reports and programs call it.
 
@@ -60,6 +63,7 @@ class Contour:
     closed: bool = False
     s: Array = None  # type: ignore[assignment]  # filled in by __post_init__
     time: Array | None = None
+    x: Array | None = None
     name: str = "contour"
 
     def __post_init__(self) -> None:
@@ -91,6 +95,8 @@ class Contour:
         _set(self, "s", _increasing(s, "s", len(points)))
         if self.time is not None:
             _set(self, "time", _increasing(self.time, "time", len(points)))
+        if self.x is not None:
+            _set(self, "x", floats(self.x, "x", (len(points), 3)))
 
     def __len__(self) -> int:
         return len(self.points)
@@ -185,7 +191,10 @@ class Contour:
         if kind not in FRAME_KINDS:
             raise InputError(f"frames: expected one of {', '.join(FRAME_KINDS)}, got {kind!r}")
         n, x = self.axes, np.empty_like(self.points)
-        if kind == "tangent":
+        if self.x is not None:
+            x = self.x - (self.x * n).sum(axis=1, keepdims=True) * n
+            x, bad = _unit(x, "x"), -1
+        elif kind == "tangent":
             bad = tangent_x(self.points, n, self.closed, x)
         else:
             bad = tangent_x(self.points[:2], n[:2], False, x[:2])
@@ -195,13 +204,39 @@ class Contour:
                 f"contour {self.name!r}, node {bad}: the tool axis {n[bad].round(4).tolist()} is "
                 "parallel to the direction of travel, or reverses; no frame exists there"
             )
-        if kind != "tangent" and self.closed:
+        if kind != "tangent" and self.closed and self.x is None:
             angle = (closing_twist(n, x) * (self.s - self.s[0]) / self.length)[:, None]
             x = np.cos(angle) * x + np.sin(angle) * np.cross(n, x)
         H = np.zeros((len(self), 4, 4))
         H[:, :3, 0], H[:, :3, 1], H[:, :3, 2], H[:, :3, 3] = x, np.cross(n, x), n, self.points
         H[:, 3, 3] = 1.0
         return freeze(H)
+
+    def part(self, first: int, last: int, frames: FrameKind) -> Contour:
+        """Return the nodes first to last as an open contour, gamma counting from the same frames.
+
+        Raises
+        ------
+        InputError
+            Fewer than two nodes, or nodes that do not exist.
+        """
+        if not 0 <= first < last < len(self):
+            raise InputError(f"part: expected 0 <= first < last < {len(self)}, got {first}, {last}")
+        nodes = slice(first, last + 1)
+        return Contour(
+            self.points[nodes],
+            self.axes[nodes],
+            s=self.s[nodes],
+            time=None if self.time is None else self.time[nodes],
+            x=self.frames(frames)[nodes, :3, 0],
+            name=self.name,
+        )
+
+    def between(self, s0: float, s1: float) -> Contour:
+        """Return the open contour between two arc lengths (m), its own nodes kept on the way."""
+        inside = self.s[(self.s > s0 + REPEATED_POINT) & (self.s < s1 - REPEATED_POINT)]
+        s = np.concatenate([[s0], inside, [s1]])
+        return replace(self, closed=False, x=None)._at_nodes(s)
 
     def _at_nodes(self, s: Array, time: Array | None = None) -> Contour:
         points, axes = self.at(s)
@@ -319,10 +354,11 @@ def join(
     return joined if spacing is None else joined.resample(spacing=spacing)
 
 
-def _unit(axes: Array) -> Array:
+def _unit(axes: Array, name: str = "axes") -> Array:
     size = np.abs(axes).max(axis=1, initial=0.0)
     if (zero := np.flatnonzero(size <= ZERO_AXIS)).size:
-        raise InputError(f"axes: the tool axis of node {zero[0]} is zero; it needs a direction")
+        what = "the tool axis" if name == "axes" else "the direction normal to the tool axis"
+        raise InputError(f"{name}: {what} of node {zero[0]} is zero; it needs a direction")
     scaled = axes / size[:, None]  # no square overflows
     return np.asarray(scaled / np.linalg.norm(scaled, axis=1)[:, None])
 

@@ -4,6 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
+import numpy as np
+from numpy.typing import NDArray
+
 __all__ = ["AuditFailed", "InputError", "KerfpathError", "NoFeasiblePath"]
 
 
@@ -30,6 +33,9 @@ class NoFeasiblePath(KerfpathError):
     back : int or None
         The first node from which an admissible path reaches the end, where that is known: with
         `node` it brackets the cut. The number of nodes when the last layer is empty.
+    reached, leaving : (m,) int, optional
+        Vertices, 0-based inside their layers, in which the paths from the front end at `node`, and
+        from which those to the end begin at `back`.
     counts : mapping of str to int
         What each test removed where the path breaks: candidates of the empty layer by reason, or
         edges into the unreached layer by the test that forbids them.
@@ -42,12 +48,16 @@ class NoFeasiblePath(KerfpathError):
         proved: bool,
         node: int,
         back: int | None = None,
+        reached: NDArray[np.int64] | None = None,
+        leaving: NDArray[np.int64] | None = None,
         counts: Mapping[str, int] | None = None,
     ) -> None:
         super().__init__(message)
         self.proved = proved
         self.node = node
         self.back = back
+        self.reached = reached
+        self.leaving = leaving
         self.counts = dict(counts or {})
 
 

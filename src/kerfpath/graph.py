@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -66,6 +66,19 @@ class LayeredGraph:
         K, codes = len(self.reason), len(self.reasons)
         flat = self.reason.reshape(K, -1) + (np.arange(K) * codes)[:, None]
         return np.bincount(flat.ravel(), minlength=K * codes).reshape(K, codes)
+
+    def part(self, first: int, last: int) -> LayeredGraph:
+        """Return the layers of nodes first to last."""
+        vertices = slice(self.start[first], self.start[last + 1])
+        return replace(
+            self,
+            q=self.q[vertices],
+            start=freeze(self.start[first : last + 2] - self.start[first]),
+            sample=self.sample[vertices],
+            posture=self.posture[vertices],
+            turn=self.turn[vertices],
+            reason=self.reason[first : last + 1],
+        )
 
 
 def gamma_grid(step: float) -> Array:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 
@@ -13,9 +13,9 @@ from kerfpath.contour import Contour, FrameKind
 from kerfpath.errors import InputError
 from kerfpath.kernels import metric
 from kerfpath.robots import Robot
-from kerfpath.search import Closure, Method, Metric, ObjectiveKind
+from kerfpath.search import METRIC_CODES, Closure, Method, Metric, ObjectiveKind
 
-__all__ = ["Criteria", "Plan", "Proof", "Settings"]
+__all__ = ["Criteria", "Feed", "Plan", "Proof", "Settings", "path_cost"]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -35,6 +35,8 @@ class Settings:
     eta_v, eta_a : float
         Share of the velocity and acceleration limits that may be used.
     closure : {"free", "periodic"}
+    rotation : (6,) rad, optional
+        How far each joint may turn away from where it begins, infinite where that is not limited.
     """
 
     gamma_step: float
@@ -46,14 +48,60 @@ class Settings:
     eta_v: float
     eta_a: float
     closure: Closure = "free"
+    rotation: Array | None = None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Proof:
-    """What is proved about a plan: whether it is the best on its graph, and the claim in words."""
+    """What is proved about a plan.
+
+    Parameters
+    ----------
+    optimal : bool
+        No path on its graph is better.
+    statement : str
+        The claim in words.
+    grid_cost : float or None
+        Where the plan is refined: the cost of the path on the graph that it was refined from.
+    """
 
     optimal: bool
     statement: str
+    grid_cost: float | None = None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Feed:
+    """Where a retimed path keeps the commanded speed, where it is slowest, and what binds there.
+
+    Parameters
+    ----------
+    full : float
+        Share of the path length at the commanded speed.
+    slowest : float
+        Speed of the slowest interval as a share of the commanded speed; 1 where none is slowed.
+    node : int
+        The node that the slowest interval starts from; -1 where none is slowed.
+    joint : int
+        The joint nearest to its limit in that interval or at its ends, 0-based; -1 for none.
+    limit : {"velocity", "acceleration"} or None
+        Which limit that is.
+    """
+
+    full: float
+    slowest: float
+    node: int
+    joint: int
+    limit: Literal["velocity", "acceleration"] | None
+
+    def __str__(self) -> str:
+        """Say it in one line."""
+        if self.limit is None:
+            return "full speed throughout"
+        return (
+            f"full speed on {self.full:.1%} of the length; slowest, {self.slowest:.1%} of it, from "
+            f"node {self.node} on, where the {self.limit} of joint {self.joint + 1} binds"
+        )
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -79,6 +127,12 @@ class Criteria:
     peak_acceleration: Array
 
 
+def path_cost(dq: Array, weights: Array, metric_name: Metric, objective: ObjectiveKind) -> float:
+    """Return the objective (14) or (15) of joint increments (K-1, 6) rad."""
+    total = metric.total_distance if objective == "sum" else metric.maximum_distance
+    return float(total(np.ascontiguousarray(dq), weights, METRIC_CODES[metric_name]))
+
+
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Plan:
     """Joint motion along one contour.
@@ -86,7 +140,7 @@ class Plan:
     Parameters
     ----------
     contour : Contour
-        The nodes, in the part frame, evenly spaced in time.
+        The nodes, in the part frame.
     robot : Robot
         With the limits that the plan keeps.
     T_flange_tip, T_base_part : (4, 4)
@@ -105,6 +159,8 @@ class Plan:
     cost : float
         Objective (14) or (15).
     proof : Proof
+    feed : Feed or None
+        Where the speed dips; None at constant speed.
     counts : mapping of str to int
         Candidates (node, gamma, posture) of the layered graph by what became of them.
     """
@@ -122,6 +178,7 @@ class Plan:
     cost: float
     proof: Proof
     counts: Mapping[str, int]
+    feed: Feed | None = None
 
     def __post_init__(self) -> None:
         K = len(self.contour)
@@ -147,7 +204,7 @@ class Plan:
 
     @property
     def dt(self) -> float:
-        """Time from node to node, s."""
+        """Mean time from node to node, s."""
         return float(self.time[-1] - self.time[0]) / (len(self.time) - 1)
 
     @property
@@ -169,13 +226,14 @@ class Plan:
     @property
     def velocity_share(self) -> Array:
         """Joint speed between nodes over its limit, (K-1, 6), signed."""
-        return freeze(self.increments / self.dt / self.robot.speed_limits()[0])
+        return freeze(self.increments / np.diff(self.time)[:, None] / self.robot.speed_limits()[0])
 
     @property
     def acceleration_share(self) -> Array:
         """Second difference at the inner nodes over the acceleration limit, (K-2, 6), signed."""
-        change = np.diff(self.increments, axis=0)
-        return freeze(change / self.dt**2 / self.robot.speed_limits()[1])
+        tau = np.diff(self.time)[:, None]
+        change = np.diff(self.increments / tau, axis=0)
+        return freeze(change / ((tau[1:] + tau[:-1]) / 2) / self.robot.speed_limits()[1])
 
     @property
     def criteria(self) -> Criteria:

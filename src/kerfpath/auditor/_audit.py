@@ -186,6 +186,11 @@ def _positions(plan: Plan, motion: Motion) -> list[Check]:
         over = np.maximum(coupling.lower - value, value - coupling.upper).max(axis=1)
         title = f"excess over the limits of {coupling.name}"
         rows.append(_worst("coupled-limits", title, over, LIMIT_SLACK, "rad"))
+    if plan.settings.rotation is not None:
+        turned = np.cumsum(joint_increments(plan), axis=0)
+        over = (np.abs(turned) - plan.settings.rotation).max(axis=1)
+        title = "excess over the limits of accumulated rotation"
+        rows.append(_worst("rotation", title, over, LIMIT_SLACK, "rad"))
     step = np.abs(joint_increments(plan)).max(axis=1)
     rows.append(_worst("joint-step", "joint step between nodes", step, np.pi * (1 - 1e-9), "rad"))
     return rows

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import sys
+from dataclasses import asdict
 from importlib.resources import as_file, files
 from pathlib import Path
 from typing import Annotated, Any
@@ -118,6 +119,8 @@ def _plan(job_file: Path, folder: Path, as_json: bool) -> None:
         for cut in outcome.cuts:
             if cut.broken is not None:
                 out.print(f"[bold]{escape(cut.task.name)}[/]: {escape(cut.failure)}")
+            if cut.plan is not None and cut.plan.feed is not None:
+                out.print(f"[bold]{escape(cut.task.name)}[/]: {cut.plan.feed}")
             for check in cut.checks:
                 if not check.ok:
                     out.print(f"[bold]{escape(cut.task.name)}[/]: {escape(str(check.issue()))}")
@@ -149,7 +152,9 @@ def _cut_entry(cut: Any) -> dict[str, Any]:
     return entry | {
         "time_s": float(cut.plan.time[-1]),
         "cost": cut.plan.cost,
+        "grid_cost": cut.plan.proof.grid_cost,
         "optimal": cut.plan.proof.optimal,
+        "feed": None if cut.plan.feed is None else asdict(cut.plan.feed),
         "peak_velocity_share": float(criteria.peak_velocity.max()),
         "peak_acceleration_share": float(criteria.peak_acceleration.max()),
         "issues": [str(c.issue()) for c in cut.checks if not c.ok],
@@ -166,22 +171,26 @@ def _show_cuts(cuts: Any) -> None:
             f"{cut.task.speed * 60:g}",
         ]
         if cut.plan is None:
-            rows.append([*row, "-", "-", "-", "-", "no feasible path"])
+            rows.append([*row, *"-----", "no feasible path"])
             continue
         criteria = cut.plan.criteria
         rows.append(
             [
                 *row,
                 f"{cut.plan.time[-1]:.2f}",
+                "" if cut.plan.proof.grid_cost is None else f"{cut.plan.proof.grid_cost:.2f}",
                 f"{cut.plan.cost:.2f}",
                 f"{criteria.peak_velocity.max():.0%}",
                 f"{criteria.peak_acceleration.max():.0%}",
                 "passed" if cut.passed else "FAILED",
             ]
         )
-    columns = ["contour", "mm", "nodes", "m/min", "s", "cost", "vel", "acc", "audit"]
+    columns = ["contour", "mm", "nodes", "m/min", "s", "grid", "cost", "vel", "acc", "audit"]
     table(columns, rows, numbers=columns[1:-1])
-    out.print("vel, acc: highest share of a joint's velocity and acceleration limit")
+    out.print(
+        "cost: what is minimised; grid: the best on the gamma grid, before the refinement; "
+        "vel, acc: highest share of a joint's velocity and acceleration limit"
+    )
 
 
 @app.command()
@@ -191,8 +200,9 @@ def speed(
 ) -> None:
     """Find the fastest constant cutting speed of each contour, and what binds where.
 
-    Exact on the graph that the job describes (its spacing, gamma step, limits and eta); the speeds
-    that the job asks for play no part.
+    On the grid: exact on the graph that the job describes (its spacing, gamma step, limits and
+    eta). Fastest: with gamma moved off the grid from there, if the job refines; what binds is said
+    of that. The speeds that the job asks for play no part.
 
     Example: kerfpath speed door.toml
     """
@@ -271,8 +281,6 @@ def audit(
         check.ok or check.level == "warning" for checks in tables.values() for check in checks
     )
     if as_json:
-        from dataclasses import asdict
-
         print_json(
             {
                 "passed": passed,

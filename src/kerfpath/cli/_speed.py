@@ -29,6 +29,7 @@ def show_speeds(
             place = (nodes.points[found.node] * 1000).round(1).tolist()
             entry |= {
                 "fastest_m_min": found.speed * 60,
+                "on_grid_m_min": None if found.on_grid is None else found.on_grid * 60,
                 "joint": found.joint + 1,
                 "limit": found.limit,
                 "node": found.node,
@@ -36,14 +37,15 @@ def show_speeds(
             }
             what = f"joint {found.joint + 1} {found.limit}"
             at = " ".join(f"{v:g}" for v in place)
-            rows.append([*row, f"{found.speed * 60:.3f}", str(found.node), what, at])
+            grid = "" if found.on_grid is None else f"{found.on_grid * 60:.3f}"
+            rows.append([*row, grid, f"{found.speed * 60:.3f}", str(found.node), what, at])
         else:
             entry |= {"fastest_m_min": None, "reason": str(found)}
-            rows.append([*row, "-", str(found.node + 1), "no admissible pose", ""])
+            rows.append([*row, "-", "-", str(found.node + 1), "no admissible pose", ""])
         entries.append(entry)
     if as_json:
         print_json({"contours": entries})
     else:
-        columns = ["contour", "asked m/min", "fastest m/min", "node", "what binds", "at x y z mm"]
-        table(columns, rows, numbers=columns[1:4])
+        columns = ["contour", "asked m/min", "on the grid", "fastest m/min", "node", "what binds"]
+        table([*columns, "at x y z mm"], rows, numbers=columns[1:5])
     return all(entry["fastest_m_min"] is not None for entry in entries)

@@ -102,9 +102,15 @@ def _drawn(file: PlanFile, job_file: Path) -> dict[str, Contour]:
     job = read_job(job_file)
     part = read_step(job.part_file, unit=job.part_unit)
     picks = {task.name: task.pick for task in job.contours}
-    unknown = [p.name for p in file.plans if p.name not in picks]
+    unknown = [name for name in file.contours.values() if name not in picks]
     if unknown:
         raise InputError(
             f"{job_file}: has no contour {unknown[0]!r} of {file.path}; give the job of that plan"
         )
-    return {p.name: part.contour(picks[p.name]) for p in file.plans}
+    drawn: dict[str, Contour] = {}
+    for p in file.plans:
+        whole = part.contour(picks[file.contours[p.name]])
+        piece = p.name != file.contours[p.name]
+        s = p.contour.s
+        drawn[p.name] = whole.between(float(s[0]), float(s[-1])) if piece else whole
+    return drawn

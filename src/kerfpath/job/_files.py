@@ -48,19 +48,24 @@ def write_outcome(outcome: Outcome, folder: Path) -> Written:
     Raises
     ------
     InputError
-        The folder cannot be made or written to, or the program's preflight refuses.
+        The folder cannot be made or written to; or the program is refused, and the other files
+        are written.
     """
     job = outcome.job
     chosen = language(job.program.language)
     target = folder / f"{job.program.name}{chosen.suffix}"
-    texts, notes = {}, [NOT_CHECKED]
+    texts, notes, refused = {}, [NOT_CHECKED], None
     if outcome.passed:
-        texts[target], warnings = program_of(outcome.plans, job.program)
-        notes += warnings
+        try:
+            texts[target], warnings = program_of(outcome.plans, job.program)
+            notes += warnings
+        except InputError as error:
+            refused = error
+            notes.append(f"no program was written: {error}")
     entries = []
     for cut in outcome.cuts:
         if cut.plan is not None:
-            entries.append(plan_entry(cut.plan, cut.checks))
+            entries.append(plan_entry(cut.plan, cut.contour, cut.checks))
         elif cut.broken is not None:
             entries.append(broken_entry(cut.task.name, cut.broken, cut.fastest))
     texts[folder / "plan.json"] = plan_text(job.robot, job.tool, job.placement, entries, job.source)
@@ -72,6 +77,8 @@ def write_outcome(outcome: Outcome, folder: Path) -> Written:
         raise InputError(f"{folder}: cannot be made a folder ({error.strerror})") from None
     for path, text in texts.items():
         write_program(path, text)
+    if refused is not None:
+        raise InputError(f"{refused} ({folder / 'plan.json'} and the report are written)")
     stale = target if not outcome.passed and target.exists() else None
     return Written(files=tuple(texts), stale=stale, notes=tuple(notes))
 

@@ -36,6 +36,7 @@ from kerfpath.job._keys import (
     key,
     one_of,
 )
+from kerfpath.planner import FeedKind
 from kerfpath.robots import Robot, acceleration_ratios, robot, robot_ids
 from kerfpath.search import Closure, Method, Metric, ObjectiveKind
 
@@ -262,6 +263,16 @@ class ContourTable(_Table):
         return self
 
 
+_PLAIN = {
+    "method": "exact",
+    "closure": "free",
+    "rotation_deg": None,
+    "objective": "sum",
+    "interruptions": "none",
+}
+"""What feed = "dip" needs of the other keys of [plan], and the first three interruptions."""
+
+
 class PlanTable(_Table):
     """[plan]: what is searched, and which motion is best."""
 
@@ -272,13 +283,36 @@ class PlanTable(_Table):
     metric: Metric = "manhattan"
     method: Method = "exact"
     closure: Closure = "free"
+    rotation_deg: Annotated[NotNegative | None, key("a number not below 0, in deg", "360")] = None
+    interruptions: Literal["none", "fewest"] = "none"
     frames: FrameKind = "rotation-minimising"
     posture: Posture | None = None
+    feed: FeedKind = "constant"
+    refine: bool | None = None
+    refine_parts: Annotated[
+        int, key("a whole number of parts from 1 to 100", "4", ge=1, le=100)
+    ] = 1
     eta_velocity: Annotated[Positive, key("a number above 0, at most 1", "0.95", le=1)] = 1.0
     eta_acceleration: Annotated[Positive, key("a number above 0, at most 1", "0.9", le=1)] = 1.0
     weights: Annotated[
         SixNotNegative | None, key("6 numbers not below 0, in 1/rad", "[1, 1, 1, 1, 1, 1]")
     ] = None
+
+    @model_validator(mode="after")
+    def _goes_together(self) -> PlanTable:
+        """Refuse what the planner cannot do together, at its key."""
+        needs = {
+            'feed = "dip"': () if self.feed == "constant" else tuple(_PLAIN),
+            'interruptions = "fewest"': () if self.interruptions == "none" else tuple(_PLAIN)[:3],
+            'closure = "periodic"': () if self.closure == "free" else ("method",),
+        }
+        for why, keys in needs.items():
+            for name in keys:
+                value, plain = getattr(self, name), _PLAIN[name]
+                if value != plain:
+                    expected = f'{name} = "{plain}"' if plain else f"no {name}"
+                    raise fault(f"{expected} with {why}", f"{value!r}", "change one", (name,))
+        return self
 
 
 class ProgramTable(_Table):

@@ -12,16 +12,17 @@ from typing import Any
 import numpy as np
 
 from kerfpath import __version__
+from kerfpath._arrays import Array
 from kerfpath.auditor import Check
 from kerfpath.contour import Contour
 from kerfpath.errors import InputError, NoFeasiblePath
 from kerfpath.planner import FastestSpeed
-from kerfpath.plans import Plan, Proof, Settings
+from kerfpath.plans import Feed, Plan, Proof, Settings
 from kerfpath.robots import Coupling, Robot
 
 __all__ = ["SCHEMA", "PlanFile", "broken_entry", "plan_entry", "plan_text", "read_plan_file"]
 
-SCHEMA = 1
+SCHEMA = 2
 """Version of the layout of plan.json; it grows when a reader of the old one would go wrong."""
 
 _NUMBERS = re.compile(r"\[\s+([-+.\deE,\s]+?)\s+\]")
@@ -42,6 +43,8 @@ class PlanFile:
         Names of the contours that have no plan.
     failed : tuple of str
         Names of the contours whose plan failed its audit when it was made.
+    contours : dict of str to str
+        What the job calls the contour of each plan: a plan may be that of a piece.
     """
 
     path: Path
@@ -49,6 +52,7 @@ class PlanFile:
     plans: tuple[Plan, ...]
     missing: tuple[str, ...]
     failed: tuple[str, ...]
+    contours: dict[str, str]
 
 
 def plan_text(
@@ -85,11 +89,12 @@ def plan_text(
     return _NUMBERS.sub(lambda m: "[" + re.sub(r"\s+", " ", m[1]) + "]", text) + "\n"
 
 
-def plan_entry(plan: Plan, checks: Sequence[Check]) -> dict[str, Any]:
-    """Return what plan.json says of a planned and audited contour."""
+def plan_entry(plan: Plan, contour: str, checks: Sequence[Check]) -> dict[str, Any]:
+    """Return what plan.json says of a planned and audited contour, or of a piece of it."""
     criteria, settings = plan.criteria, plan.settings
     return {
         "name": plan.name,
+        "contour": contour,
         "feasible": True,
         "closed": plan.contour.closed,
         "method": settings.method,
@@ -99,12 +104,14 @@ def plan_entry(plan: Plan, checks: Sequence[Check]) -> dict[str, Any]:
         "eta_v": settings.eta_v,
         "eta_a": settings.eta_a,
         "closure": settings.closure,
+        "rotation_rad": _finite(settings.rotation),
         "gamma_step_rad": settings.gamma_step,
         "frames": settings.frames,
         "dt": plan.dt,
         "cost": plan.cost,
         "optimal": plan.proof.optimal,
         "proof": plan.proof.statement,
+        "grid_cost": plan.proof.grid_cost,
         "criteria": {
             "displacement_rad": criteria.displacement.tolist(),
             "largest_increment_rad": criteria.largest_increment.tolist(),
@@ -112,6 +119,7 @@ def plan_entry(plan: Plan, checks: Sequence[Check]) -> dict[str, Any]:
             "peak_velocity_share": criteria.peak_velocity.tolist(),
             "peak_acceleration_share": criteria.peak_acceleration.tolist(),
         },
+        "feed": None if plan.feed is None else asdict(plan.feed),
         "counts": dict(plan.counts),
         "audit": {
             "passed": all(c.ok or c.level == "warning" for c in checks),
@@ -122,6 +130,7 @@ def plan_entry(plan: Plan, checks: Sequence[Check]) -> dict[str, Any]:
             "time_s": plan.time.tolist(),
             "points_m": plan.contour.points.tolist(),
             "axes": plan.contour.axes.tolist(),
+            "x": None if plan.contour.x is None else plan.contour.x.tolist(),
             "q_rad": plan.q.tolist(),
             "gamma_rad": plan.gamma.tolist(),
             "posture": plan.posture.tolist(),
@@ -171,6 +180,7 @@ def read_plan_file(path: str | Path) -> PlanFile:
             path=path,
             job=dict(data["job"]),
             plans=tuple(_read_plan(e, robot, tool, placement) for e in entries if e["feasible"]),
+            contours={str(e["name"]): str(e["contour"]) for e in entries if e["feasible"]},
             missing=tuple(str(e["name"]) for e in entries if not e["feasible"]),
             failed=tuple(
                 str(e["name"])
@@ -185,6 +195,15 @@ def read_plan_file(path: str | Path) -> PlanFile:
     except (TypeError, ValueError, AttributeError) as error:
         said = " ".join(str(error).split())
         raise InputError(f"{path}: something in it is of the wrong kind ({said})") from None
+
+
+def _finite(rotation: Array | None) -> list[float | None] | None:
+    """Return limits with null, which JSON knows, for infinity, which it does not."""
+    return None if rotation is None else [v if np.isfinite(v) else None for v in rotation.tolist()]
+
+
+def _infinite(rotation: list[float | None] | None) -> Array | None:
+    return None if rotation is None else np.array([np.inf if v is None else v for v in rotation])
 
 
 def _robot_entry(robot: Robot) -> dict[str, Any]:
@@ -244,6 +263,7 @@ def _read_plan(entry: dict[str, Any], robot: Robot, tool: Any, placement: Any) -
             nodes["axes"],
             closed=entry["closed"],
             s=nodes["s_m"],
+            x=nodes["x"],
             name=str(entry["name"]),
         ),
         robot=robot,
@@ -264,8 +284,14 @@ def _read_plan(entry: dict[str, Any], robot: Robot, tool: Any, placement: Any) -
             eta_v=float(entry["eta_v"]),
             eta_a=float(entry["eta_a"]),
             closure=entry["closure"],
+            rotation=_infinite(entry["rotation_rad"]),
         ),
         cost=entry["cost"],
-        proof=Proof(optimal=bool(entry["optimal"]), statement=str(entry["proof"])),
+        proof=Proof(
+            optimal=bool(entry["optimal"]),
+            statement=str(entry["proof"]),
+            grid_cost=entry["grid_cost"],
+        ),
         counts=dict(entry["counts"]),
+        feed=None if entry["feed"] is None else Feed(**entry["feed"]),
     )

@@ -13,7 +13,7 @@ import numpy as np
 from pydantic import ValidationError
 from pydantic_core import ErrorDetails
 
-from kerfpath._arrays import Array
+from kerfpath._arrays import Array, Bools
 from kerfpath.contour import Contour
 from kerfpath.errors import InputError
 from kerfpath.job._keys import FAULT, LARGEST, MOST_NODES, SMALLEST, nearest
@@ -134,6 +134,10 @@ class Job:
         In the order of cutting.
     plan_options : dict
         Keyword arguments of `kerfpath.planner.plan`, in SI.
+    refine_parts : int
+        Parts into which the refinement divides every interval between nodes.
+    interruptions : {"none", "fewest"}
+        Whether a contour that cannot be cut in one go is cut in pieces.
     audit_options : dict
         Keyword arguments of `kerfpath.auditor.checks`, in SI.
     program : ProgramOptions
@@ -150,6 +154,8 @@ class Job:
     part_unit: str | None
     contours: tuple[ContourTask, ...]
     plan_options: dict[str, Any]
+    refine_parts: int
+    interruptions: Literal["none", "fewest"]
     audit_options: dict[str, Any]
     program: ProgramOptions
     source: dict[str, Any]
@@ -171,15 +177,18 @@ def read_job(path: str | Path) -> Job:
         file = JobFile.model_validate(source, context={"folder": path.parent})
     except ValidationError as error:
         raise _refusal(path, text, error) from None
+    robot = file.robot.resolve()
     return Job(
         path=path,
-        robot=file.robot.resolve(),
+        robot=robot,
         tool=file.tool.resolve(),
         placement=file.part.resolve(),
         part_file=path.parent / file.part.file,
         part_unit=file.part.unit,
         contours=tuple(_task(table) for table in file.contour),
-        plan_options=_plan_options(file.plan),
+        plan_options=_plan_options(file.plan, robot.endless),
+        refine_parts=file.plan.refine_parts,
+        interruptions=file.plan.interruptions,
         audit_options=audit_options(file.audit),
         program=program_options(file.program, path.stem),
         source=source,
@@ -243,7 +252,11 @@ def _metres(mm: float | None) -> float | None:
     return None if mm is None else mm / 1000
 
 
-def _plan_options(table: PlanTable) -> dict[str, Any]:
+def _rotation(degrees: float | None, endless: Bools) -> Array | None:
+    return None if degrees is None else np.where(endless, np.radians(degrees), np.inf)
+
+
+def _plan_options(table: PlanTable, endless: Bools) -> dict[str, Any]:
     return {
         "gamma_step": float(np.radians(table.gamma_step_deg)),
         "frames": table.frames,
@@ -255,6 +268,9 @@ def _plan_options(table: PlanTable) -> dict[str, Any]:
         "eta_v": table.eta_velocity,
         "eta_a": table.eta_acceleration,
         "closure": table.closure,
+        "rotation": _rotation(table.rotation_deg, endless),
+        "feed": table.feed,
+        "refine": table.method == "exact" if table.refine is None else table.refine,
     }
 
 

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
@@ -15,8 +16,16 @@ from kerfpath.errors import NoFeasiblePath
 from kerfpath.graph import LayeredGraph
 from kerfpath.job._read import ContourTask, Job
 from kerfpath.kernels import is_compiled
-from kerfpath.planner import FastestSpeed, fastest_speed, layered_graph, plan, relaxations
+from kerfpath.planner import (
+    FastestSpeed,
+    fastest_speed,
+    layered_graph,
+    plan,
+    plan_in_pieces,
+    relaxations,
+)
 from kerfpath.plans import Plan
+from kerfpath.refiner import refine
 from kerfpath.robots import robot
 from kerfpath.search import Relaxations
 
@@ -28,10 +37,12 @@ Progress = Callable[[str, int, int], None]
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Cut:
-    """What came of one contour of a job.
+    """What came of one contour of a job, or of one piece of it.
 
     Parameters
     ----------
+    contour : str
+        What the job calls the contour.
     task : ContourTask
     drawn : Contour
         The loop as drawn, densely sampled, part frame.
@@ -50,15 +61,16 @@ class Cut:
         The audit's table; empty without a plan.
     """
 
+    contour: str
     task: ContourTask
     drawn: Contour
     nodes: Contour
     graph: LayeredGraph
-    plan: Plan | None
-    broken: NoFeasiblePath | None
-    fastest: FastestSpeed | None
-    relaxations: Relaxations | None
-    checks: tuple[Check, ...]
+    plan: Plan | None = None
+    broken: NoFeasiblePath | None = None
+    fastest: FastestSpeed | None = None
+    relaxations: Relaxations | None = None
+    checks: tuple[Check, ...] = ()
 
     @property
     def passed(self) -> bool:
@@ -123,11 +135,14 @@ def run_job(job: Job, *, progress: Progress = lambda what, done, total: None) ->
     part = read_step(job.part_file, unit=job.part_unit)
     for task in job.contours:  # a misspelt name shall not wait for the contours before it
         part.loop(task.pick)
-    cuts = tuple(_cut(job, task, part.contour(task.pick), progress) for task in job.contours)
-    return Outcome(job=job, cuts=cuts, mesh=part.mesh())
+    cuts = [
+        cut for task in job.contours for cut in _cut(job, task, part.contour(task.pick), progress)
+    ]
+    return Outcome(job=job, cuts=tuple(cuts), mesh=part.mesh())
 
 
-def _cut(job: Job, task: ContourTask, drawn: Contour, progress: Progress) -> Cut:
+def _cut(job: Job, task: ContourTask, drawn: Contour, progress: Progress) -> tuple[Cut, ...]:
+    """Return what came of a contour: one cut, or several where it is interrupted."""
     nodes = task.sample(drawn)
     options, done = job.plan_options, 0
 
@@ -147,40 +162,64 @@ def _cut(job: Job, task: ContourTask, drawn: Contour, progress: Progress) -> Cut
         postures=options["postures"],
         progress=solved,
     )
-    made, broken, fastest, least = None, None, None, None
-    table: tuple[Check, ...] = ()
+    whole = Cut(contour=task.name, task=task, drawn=drawn, nodes=nodes, graph=graph)
     try:
-        made = plan(
-            nodes,
-            job.robot,
-            tool=job.tool,
-            placement=job.placement,
-            speed=task.speed,
-            graph=graph,
-            **options,
-        )
-    except NoFeasiblePath as error:
-        broken = error
+        plans = _plans(job, task, nodes, graph)
+    except NoFeasiblePath as broken:
         # With poses everywhere slower would do; for a loop that cannot close it need not.
-        if np.diff(graph.start).all() and options["closure"] == "free":
-            progress(f"{task.name}: fastest speed", 0, 1)
-            least = relaxations(
-                nodes, job.robot, graph, task.speed, eta_v=options["eta_v"], eta_a=options["eta_a"]
-            )
-            fastest = FastestSpeed.of(nodes, least.slower)
-    else:
-        table = tuple(checks(made, reference=drawn, **job.audit_options))
-    return Cut(
-        task=task,
+        if not np.diff(graph.start).all() or options["closure"] != "free":
+            return (replace(whole, broken=broken),)
+        progress(f"{task.name}: fastest speed", 0, 1)
+        least = relaxations(
+            nodes, job.robot, graph, task.speed, eta_v=options["eta_v"], eta_a=options["eta_a"]
+        )
+        fastest = FastestSpeed.of(nodes, least.slower)
+        return (replace(whole, broken=broken, fastest=fastest, relaxations=least),)
+    return tuple(_audited(job, whole, made) for made in plans)
+
+
+def _plans(job: Job, task: ContourTask, nodes: Contour, graph: LayeredGraph) -> tuple[Plan, ...]:
+    """Return the plan of a contour, or those of its pieces where the job lets it be interrupted."""
+    options = job.plan_options
+    cell: dict[str, Any] = {"tool": job.tool, "placement": job.placement, "speed": task.speed}
+    cell["graph"] = graph
+    try:
+        return (plan(nodes, job.robot, **cell, **options),)
+    except NoFeasiblePath:
+        if job.interruptions == "none" or not np.diff(graph.start).all():
+            raise
+    plain = {key: value for key, value in options.items() if key not in ("feed", "rotation")}
+    return plan_in_pieces(nodes, job.robot, **cell, **plain)
+
+
+def _audited(job: Job, whole: Cut, made: Plan) -> Cut:
+    """Return the cut of one plan, at finer intervals if the job asks for them, and its audit."""
+    drawn, graph, nodes, s = whole.drawn, whole.graph, whole.nodes, made.contour.s
+    if len(s) < len(nodes):
+        first = int(np.searchsorted(nodes.s, s[0]))
+        drawn, nodes = drawn.between(float(s[0]), float(s[-1])), made.contour
+        graph = graph.part(first, first + len(s) - 1)
+    if job.refine_parts > 1:
+        made = _divided(made, drawn, job.refine_parts)
+    return replace(
+        whole,
+        task=replace(whole.task, name=made.name),
         drawn=drawn,
         nodes=nodes,
         graph=graph,
         plan=made,
-        broken=broken,
-        fastest=fastest,
-        relaxations=least,
-        checks=table,
+        checks=tuple(checks(made, reference=drawn, **job.audit_options)),
     )
+
+
+def _divided(made: Plan, drawn: Contour, parts: int) -> Plan:
+    """Return the plan on nodes that divide its intervals, where one keeps the limits there."""
+    finer = drawn.resample(count=(len(made.contour) - 1) * parts + 1)
+    found = refine(made, nodes=replace(finer, name=made.name))
+    if found.done:
+        return found.plan
+    statement = f"{made.proof.statement}; at {parts} parts of an interval {found.statement}"
+    return replace(made, proof=replace(made.proof, statement=statement))
 
 
 def fastest_speeds(
@@ -197,7 +236,7 @@ def fastest_speeds(
     """
     part = read_step(job.part_file, unit=job.part_unit)
     options = job.plan_options
-    keys = ("gamma_step", "frames", "postures", "eta_v", "eta_a")
+    keys = ("gamma_step", "frames", "postures", "eta_v", "eta_a", "refine")
     answers: list[tuple[ContourTask, Contour, FastestSpeed | NoFeasiblePath]] = []
     for i, task in enumerate(job.contours):
         progress("contours", i, len(job.contours))

@@ -12,7 +12,8 @@ bound on the cost, only states with d + h inside it are ever kept.
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple, TypeVar
+from math import sqrt
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,24 +24,23 @@ from kerfpath.kernels.limits import (
     acceleration_excess,
     acceleration_time,
     velocity_excess,
+    velocity_time,
 )
-from kerfpath.kernels.reach import Scratch, States, fill_candidates
+from kerfpath.kernels.reach import fill_candidates
 from kerfpath.kernels.search import (
     Layers,
     Objective,
     distance,
     fill_increment,
     joined,
+    late,
 )
+from kerfpath.kernels.states import Scratch, States, grown, in_order
 
-__all__ = ["EVERY", "Reached", "States", "count_closing", "recursion", "trace"]
+__all__ = ["Reached", "count_closing", "recursion", "trace"]
 
-EVERY = 2**62
-"""States of a vertex that are kept: all."""
-LONG = 32
-"""Edges into one vertex from which on sorting them one by one takes longer than by halves."""
-
-_T = TypeVar("_T", bound="np.generic[Any]")
+LEAPT = -2
+"""Parent of a state that a step beyond `aim.velocity` has led to, from anywhere."""
 
 
 class Reached(NamedTuple):
@@ -52,8 +52,8 @@ class Reached(NamedTuple):
     """Cost of the best path, infinite if none kept the bound."""
     lowest: float
     """Least cost bound among what was dropped for its cost; infinite if nothing was."""
-    state: int
-    """The best state of the last layer, -1 if none."""
+    best: Ints
+    """(K,): the best state of each layer, -1 if none."""
     offset: Ints
     """(K+1,): states of layer k in the record are offset[k]:offset[k+1]."""
     vertex: NDArray[np.int32]
@@ -67,28 +67,27 @@ class Reached(NamedTuple):
 
 
 @jit
-def _grown(old: NDArray[_T]) -> NDArray[_T]:
-    new = np.empty((2 * len(old), *old.shape[1:]), old.dtype)
-    new[: len(old)] = old
-    return new
+def _begin(
+    layers: Layers, aim: Objective, h: Array, bound: float, k: int, cost: float
+) -> tuple[States, float]:
+    """States of layer k, one per vertex, with no edge before them; and the least cost dropped.
 
-
-@jit
-def _begin(layers: Layers, aim: Objective, h: Array, bound: float) -> tuple[States, float]:
-    """States of layer 0, one per vertex, with no edge before them; and the least cost dropped."""
-    m, lowest, count = layers.start[1], np.inf, 0
-    vertex, first = np.empty(m, np.int64), np.zeros(m + 1, np.int64)
-    for j in range(m):
-        f = joined(aim.minimax, aim.vertex_cost[j], h[j])
+    `cost` is that of what came before.
+    """
+    a, count, lowest = layers.start[k], 0, np.inf
+    m = layers.start[k + 1] - a
+    vertex, d, first = np.empty(m, np.int64), np.empty(m), np.zeros(m + 1, np.int64)
+    for i in range(m):
+        enter = joined(aim.minimax, cost, aim.vertex_cost[a + i])
+        f = joined(aim.minimax, enter, h[a + i])
         if f <= bound:
-            vertex[count] = j
+            vertex[count], d[count] = a + i, enter
             count += 1
         else:
             lowest = min(lowest, f)
-        first[j + 1] = count
-    vertex = vertex[:count]
+        first[i + 1] = count
     none = np.empty((count, len(layers.endless)))
-    return States(vertex, aim.vertex_cost[vertex], none, np.full(count, -1), first), lowest
+    return States(vertex[:count], d[:count], none, np.full(count, -1), first), lowest
 
 
 @jit_inline
@@ -117,25 +116,72 @@ def _cheapest(
 
 @jit_inline
 def _quickest(
-    states: States, a: int, b: int, aim: Objective, dq: Array, least: float, bound: float
-) -> tuple[int, float, float]:
-    """Find which of the states a..b, cheapest first, goes on by dq in the least node interval.
+    states: States, a: int, b: int, aim: Objective, step: float, paid: float, dq: Array,
+    rest: float, bound: float,
+) -> tuple[int, float, float]:  # fmt: skip
+    """Find which of the states a..b, cheapest first, goes on by dq at the least cost (timed).
 
-    `least` is the interval that the step and what is to come ask for. Returns the state, -1 if none
-    keeps the bound; the interval up to and with the step; and the least one over the bound.
+    `step` is the cost of the step on its own, with `paid` for lost time, `rest` that of what is to
+    come. Returns the state, -1 if none keeps the bound; the cost up to and with the step; and the
+    least one over the bound.
     """
     best, best_d, over = -1, np.inf, np.inf
     for s in range(a, b):
-        if states.d[s] >= best_d:
+        d = joined(aim.minimax, states.d[s], step)
+        if d >= best_d:
             break
-        d = states.d[s]
+        if joined(aim.minimax, d, rest) > bound:
+            over = min(over, joined(aim.minimax, d, rest))
+            break
+        time = 0.0
         if states.parent[s] >= 0:
-            d = max(d, acceleration_time(dq, states.dq[s], aim.acceleration))
-        if max(d, least) > bound:
-            over = min(over, max(d, least))
+            time = acceleration_time(dq, states.dq[s], aim.acceleration)
+        elif states.parent[s] == LEAPT:
+            time = _braking_time(dq, aim)
+        d = max(d, time) if aim.minimax else d + max(0.0, late(aim, time) - paid)
+        f = joined(aim.minimax, d, rest)
+        if f > bound:
+            over = min(over, f)
         elif d < best_d:
             best, best_d = s, d
     return best, best_d, over
+
+
+@jit_inline
+def _braking_time(dq: Array, aim: Objective) -> float:
+    """Least time that the change between dq and any step beyond `aim.velocity` asks for."""
+    least = np.inf
+    for i in range(len(dq)):
+        least = min(least, max(0.0, aim.velocity[i] - abs(dq[i])) / aim.acceleration[i])
+    return sqrt(least)
+
+
+@jit
+def _with_leaps(
+    aim: Objective, h: Array, bound: float, before: States, states: States, a: int, b: int,
+    width: int,
+) -> tuple[States, float]:  # fmt: skip
+    """Add to the states of vertices a..b-1 those that steps beyond `aim.velocity` may lead to.
+
+    They cost no more than any such step from the states before, wherever from and to.
+    """
+    d, lowest, paid = np.inf, np.inf, late(aim, aim.stretch)
+    for s in range(len(before.vertex)):
+        time = _braking_time(before.dq[s], aim) if before.parent[s] >= 0 else 0.0
+        d = min(d, before.d[s] + aim.leap + max(0.0, late(aim, time) - paid))
+    f = d + aim.vertex_cost[a:b] + h[a:b]
+    leapt = a + np.flatnonzero(f <= bound)
+    m = len(leapt)
+    for v in range(b - a):
+        lowest = min(lowest, f[v]) if f[v] > bound else lowest
+    together = States(
+        np.concatenate((states.vertex, leapt)),
+        np.concatenate((states.d, d + aim.vertex_cost[leapt])),
+        np.concatenate((states.dq, np.zeros((m, states.dq.shape[1])))),
+        np.concatenate((states.parent, np.full(m, LEAPT))),
+        states.first,
+    )
+    return in_order(together, a, b, width), lowest
 
 
 @jit_inline
@@ -156,13 +202,18 @@ def _fill_from(
         step = joined(aim.minimax, distance(layers, aim, p, j), aim.vertex_cost[j])
         if step == np.inf:
             continue
+        f = joined(aim.minimax, joined(aim.minimax, states.d[a], step), h[j])
+        if f > bound:
+            lowest = min(lowest, f)
+            continue
         fill_increment(layers, p, j, dq)
         if closes and acceleration_excess(seam, dq, aim.acceleration) >= 0:
             continue
         if aim.timed:
-            least = max(step, h[j])
-            s, cost, dropped = _quickest(states, a, b, aim, dq, least, bound)
-            cost = max(cost, step)
+            paid = 0.0
+            if aim.penalty > 0:
+                paid = late(aim, aim.stretch * velocity_time(dq, aim.velocity))
+            s, cost, dropped = _quickest(states, a, b, aim, step + paid, paid, dq, h[j], bound)
         else:
             s, dropped = _cheapest(states, a, b, aim, step, dq, h[j], bound)
             cost = joined(aim.minimax, states.d[s], step) if s >= 0 else np.inf
@@ -207,99 +258,99 @@ def _extend(
     while i < len(first) - 1:
         if count + end - begin > room:
             room *= 2
-            out = States(
-                _grown(out.vertex), _grown(out.d), _grown(out.dq), _grown(out.parent), first
-            )
+            out = States(grown(out.vertex), grown(out.d), grown(out.dq), grown(out.parent), first)
         i, count, dropped = _fill_states(
             layers, aim, h, bound, seam, k, states, i, count, scratch, out
         )
         lowest = min(lowest, dropped)
     unsorted = States(out.vertex[:count], out.d[:count], out.dq[:count], out.parent[:count], first)
-    return _sorted(unsorted, begin, end, width), lowest
+    return in_order(unsorted, begin, end, width), lowest
 
 
 @jit
-def _sorted(states: States, a: int, b: int, width: int) -> States:
-    """Group states by their vertex a..b-1, cheapest first; ties keep the order of their making.
+def _next(
+    layers: Layers, aim: Objective, h: Array, bound: float, seam: Array, k: int, states: States,
+    least: Array, width: int,
+) -> tuple[States, float]:  # fmt: skip
+    """States of layer k + 1, also leapt to or beginning anew; and the least cost dropped.
 
-    Of each vertex only the `width` cheapest are kept.
+    least (K,) is the least cost of a state of each layer so far.
     """
-    vertex, d = states.vertex, states.d
-    first = np.zeros(b - a + 1, np.int64)
-    for j in vertex:
-        first[j - a + 1] += 1
-    first = np.cumsum(first)
-    place, order = first.copy(), np.empty(len(vertex), np.int64)
-    for s, j in enumerate(vertex):
-        order[place[j - a]] = s
-        place[j - a] += 1
-    for i in range(b - a):
-        begin, end = first[i], first[i + 1]
-        if end - begin > LONG:
-            group = order[begin:end]
-            group[:] = group[np.argsort(d[group], kind="mergesort")]
-            continue
-        for v in range(begin + 1, end):
-            s = order[v]
-            while v > begin and d[order[v - 1]] > d[s]:
-                order[v] = order[v - 1]
-                v -= 1
-            order[v] = s
-    count = 0
-    for i in range(b - a):
-        begin, end = first[i], first[i + 1]
-        first[i] = count
-        for v in range(begin, min(end, begin + width)):
-            order[count] = order[v]
-            count += 1
-    first[b - a] = count
-    order = order[:count]
-    return States(vertex[order], d[order], states.dq[order], states.parent[order], first)
+    a, b = layers.start[k + 1], layers.start[k + 2]
+    on, lowest = _extend(layers, aim, h, bound, seam, k, states, width)
+    if aim.leap < np.inf:
+        on, dropped = _with_leaps(aim, h, bound, states, on, a, b, width)
+        lowest = min(lowest, dropped)
+    if layers.after[k + 1] < 0:
+        return on, lowest
+    anew, dropped = _begin(layers, aim, h, bound, k + 1, least[layers.after[k + 1]])
+    both = States(
+        np.concatenate((on.vertex, anew.vertex)),
+        np.concatenate((on.d, anew.d)),
+        np.concatenate((on.dq, anew.dq)),
+        np.concatenate((on.parent, anew.parent)),
+        on.first,
+    )
+    return in_order(both, a, b, width), min(lowest, dropped)
 
 
 @jit
 def recursion(
-    layers: Layers, aim: Objective, h: Array, bound: float, seam: Array, room: int,
-    width: int = EVERY,
-) -> Reached:  # fmt: skip
+    layers: Layers, aim: Objective, h: Array, bound: float, seam: Array, room: int, width: int
+) -> Reached:
     """Best path whose cost keeps `bound`, exactly, under (5) and (6).
 
     h (N,) is `cost_to_go`; seam (n,) is the increment that the last one must go on to by (6), or
     (0,). The states of all layers are recorded for `trace` as long as they are no more than `room`.
-    With a `width`, only so many states of each vertex are kept: then the path found need not be the
-    best.
+    Of the states of each vertex the `width` cheapest are kept; with fewer than `EVERY` the path
+    found need not be the best.
     """
     K = len(layers.start) - 1
-    offset = np.zeros(K + 1, np.int64)
+    offset, best, least = np.zeros(K + 1, np.int64), np.full(K, -1), np.full(K, np.inf)
     vertex, parent = np.empty(1024, np.int32), np.empty(1024, np.int32)
-    states, lowest = _begin(layers, aim, h, bound)
+    states, lowest = _begin(layers, aim, h, bound, 0, -np.inf if aim.minimax else 0.0)
     before, recorded = states, True
     for k in range(K):
         size = len(states.vertex)
-        if size == 0:
-            return Reached(k, np.inf, lowest, -1, offset, vertex, parent, before, recorded)
+        if size == 0 and (layers.after[k:] < 0).all():
+            return Reached(k, np.inf, lowest, best, offset, vertex, parent, before, recorded)
         offset[k + 1] = offset[k] + size
         recorded = recorded and offset[k + 1] <= room
         if recorded:
             while offset[k + 1] > len(vertex):
-                vertex, parent = _grown(vertex), _grown(parent)
+                vertex, parent = grown(vertex), grown(parent)
             vertex[offset[k] : offset[k + 1]] = states.vertex
             parent[offset[k] : offset[k + 1]] = states.parent
+        if size > 0:
+            best[k] = np.argmin(states.d)
+            least[k] = states.d[best[k]]
         if k < K - 1:
             before = states
-            states, dropped = _extend(layers, aim, h, bound, seam, k, states, width)
+            states, dropped = _next(layers, aim, h, bound, seam, k, states, least, width)
             lowest = min(lowest, dropped)
-    best = int(np.argmin(states.d))
-    return Reached(K, states.d[best], lowest, best, offset, vertex, parent, states, recorded)
+    return Reached(K, least[K - 1], lowest, best, offset, vertex, parent, states, recorded)
 
 
 @jit
-def trace(found: Reached, out_path: Ints) -> None:
-    """Read the best path (K,) back from a record, as vertices of the sorted graph."""
-    s = found.state
-    for k in range(len(out_path) - 1, -1, -1):
+def trace(layers: Layers, found: Reached, out_path: Ints) -> None:
+    """Read the best path (K,) back from a record, as vertices of the sorted graph.
+
+    Layers that it does not go through, between breaking off and beginning anew, get -1; before a
+    leap the path is not known: -1.
+    """
+    out_path[:] = -1
+    k = len(out_path) - 1
+    s = found.best[k]
+    while k >= 0:
         i = found.offset[k] + s
         out_path[k], s = found.vertex[i], found.parent[i]
+        if s == LEAPT:
+            break
+        if s >= 0:
+            k -= 1
+        else:
+            k = layers.after[k]
+            s = found.best[k]
 
 
 @jit

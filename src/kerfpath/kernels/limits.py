@@ -7,7 +7,13 @@ from math import sqrt
 from kerfpath._arrays import Array
 from kerfpath.kernels._jit import jit_inline
 
-__all__ = ["LIMIT_TOLERANCE", "acceleration_excess", "acceleration_time", "velocity_excess"]
+__all__ = [
+    "LIMIT_TOLERANCE",
+    "acceleration_excess",
+    "acceleration_time",
+    "velocity_excess",
+    "velocity_time",
+]
 
 LIMIT_TOLERANCE = 1e-9
 """Slack on (5) and (6), rad: a thousandth of what any encoder resolves, far above rounding."""
@@ -35,6 +41,15 @@ def acceleration_excess(dq: Array, dq_before: Array, bound: Array) -> int:
         if abs(dq[i] - dq_before[i]) > bound[i] + LIMIT_TOLERANCE:
             return i
     return -1
+
+
+@jit_inline
+def velocity_time(dq: Array, velocity: Array) -> float:
+    """Least node interval, s, in which (5) holds: largest |dq_i| / q'max_i; dq (n,) rad."""
+    least = 0.0
+    for i in range(len(dq)):
+        least = max(least, abs(dq[i]) / velocity[i])
+    return least
 
 
 @jit_inline

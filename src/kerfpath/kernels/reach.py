@@ -7,45 +7,16 @@ the tests that take one by one.
 
 from __future__ import annotations
 
-from typing import NamedTuple
-
 import numpy as np
 
-from kerfpath._arrays import Array, Ints
+from kerfpath._arrays import Array
 from kerfpath.kernels._jit import jit_inline, jit_vector, larger, smaller, trailing_zeros
 from kerfpath.kernels.limits import LIMIT_TOLERANCE
 from kerfpath.kernels.search import Layers, Objective, reduced, runs
+from kerfpath.kernels.states import Scratch, States
 from kerfpath.kernels.to_go import LANES, SIX
 
-__all__ = ["Scratch", "States", "fill_candidates"]
-
-
-class States(NamedTuple):
-    """The edges into one layer that are kept, by the vertex they lead to, cheapest first."""
-
-    vertex: Ints
-    """(S,): the vertex j that the edge leads to."""
-    d: Array
-    """(S,): cost of the best path that ends with this edge, vertex j included."""
-    dq: Array
-    """(S, n): increment along the edge."""
-    parent: Ints
-    """(S,): place, among the states of the layer before, of the edge that comes before."""
-    first: Ints
-    """(m+1,): states of vertex start[k] + i are first[i]:first[i+1]."""
-
-
-class Scratch(NamedTuple):
-    """Room to work in, made once a layer."""
-
-    vertex: Ints
-    """(m,): vertices of the next layer."""
-    dq: Array
-    """(n,): an increment."""
-    to: Array
-    """(n,): middle of the box,"""
-    by: Array
-    """(n,): and its half width."""
+__all__ = ["fill_candidates"]
 
 
 @jit_inline
@@ -57,9 +28,12 @@ def _fill_reach(
 
     Within it lies all that (5) and, for any of these states, (6) allow.
     """
+    free = aim.timed
+    for s in range(a, b):
+        free |= states.parent[s] < 0
     for i in range(len(out_to)):
         low, high = -aim.velocity[i], aim.velocity[i]
-        if not aim.timed and states.parent[a] >= 0:
+        if not free:
             least = most = states.dq[a, i]
             for s in range(a + 1, b):
                 least, most = min(least, states.dq[s, i]), max(most, states.dq[s, i])

@@ -26,6 +26,7 @@ __all__ = [
     "fill_increment",
     "fill_key",
     "joined",
+    "late",
     "path_planning",
     "reduced",
     "runs",
@@ -49,6 +50,9 @@ class Layers(NamedTuple):
     endless: Bools
     turn: Array
     """(n,): 2 pi for endless joints, infinity for the others."""
+    after: Ints
+    """(K,): a path may break off at layer after[k], an earlier one, and begin anew at layer k, for
+    the cost up to there; -1: it may not."""
 
 
 class Objective(NamedTuple):
@@ -63,7 +67,14 @@ class Objective(NamedTuple):
     cap: float
     """Largest distance, and largest cost of a vertex, that is allowed."""
     timed: bool
-    """Costs are times: (6) does not forbid, it takes the time in which it would hold."""
+    """(6) does not forbid, it takes the time in which it would hold. Costs are times, or, where
+    they add up, lost time has a price:"""
+    penalty: float = 0.0
+    """cost of one node interval of lost time; `velocity` and `acceleration` are then in rad,"""
+    stretch: float = 1.0
+    """`velocity` is this many times what a step covers without losing time,"""
+    leap: float = np.inf
+    """and a step beyond it costs this or more; infinite if there are none."""
 
 
 @jit_inline
@@ -165,6 +176,12 @@ def distance(layers: Layers, aim: Objective, p: int, j: int) -> float:
 def joined(minimax: bool, a: float, b: float) -> float:
     """Costs put together: added by (14), or the larger by (15)."""
     return max(a, b) if minimax else a + b
+
+
+@jit_inline
+def late(aim: Objective, time: float) -> float:
+    """Price of a step that asks for `time` node intervals."""
+    return aim.penalty * max(0.0, time - 1.0)
 
 
 @jit_inline

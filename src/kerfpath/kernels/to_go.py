@@ -31,28 +31,44 @@ def cost_to_go(layers: Layers, aim: Objective, allowed: Bools, out_h: Array) -> 
     Vertices that are not allowed, or from which no edges within (5) lead to the end, get infinity.
     """
     last, bound = len(layers.start) - 2, aim.velocity + LIMIT_TOLERANCE
-    tail = np.empty(len(layers.low))
+    slowness, tail = aim.stretch / aim.velocity, np.empty(len(layers.low))
+    anew = np.full(last + 1, np.inf)  # least cost to go of a path that breaks off at the layer
     out_h[layers.start[last] :] = 0.0
     for k in range(last, -1, -1):
-        if k < last:
-            _layer_to_go(layers, aim, bound, k, tail, out_h)
         a, b = layers.start[k], layers.start[k + 1]
-        _join(aim.minimax, aim.vertex_cost[a:b], allowed[a:b], out_h[a:b], tail[a:b])
+        if k < last:
+            _layer_to_go(layers, aim, bound, slowness, k, tail, out_h)
+            if aim.leap < np.inf:
+                out_h[a:b] = np.minimum(out_h[a:b], aim.leap + tail[b : layers.start[k + 2]].min())
+        least = _join(
+            aim.minimax, aim.vertex_cost[a:b], allowed[a:b], anew[k], out_h[a:b], tail[a:b]
+        )
+        if layers.after[k] >= 0:
+            anew[layers.after[k]] = least
 
 
 @jit_vector
-def _join(minimax: bool, cost: Array, allowed: Bools, out_h: Array, out_tail: Array) -> None:
-    """Close the vertices that are not allowed, and join what is to come with their own cost."""
+def _join(
+    minimax: bool, cost: Array, allowed: Bools, anew: float, out_h: Array, out_tail: Array
+) -> float:
+    """Close the vertices that are not allowed, and join what is to come with their own cost.
+
+    Returns the least of what has been joined.
+    """
+    least = np.inf
     for v in range(len(cost)):
-        out_h[v] = out_h[v] if allowed[v] else np.inf
+        out_h[v] = smaller(out_h[v], anew) if allowed[v] else np.inf
     for v in range(len(cost)):
         out_tail[v] = either(minimax, larger(cost[v], out_h[v]), cost[v] + out_h[v])
+        least = smaller(least, out_tail[v])
+    return least
 
 
 @jit_inline
 def _layer_to_go(
-    layers: Layers, aim: Objective, bound: Array, k: int, tail: Array, out_h: Array
-) -> None:
+    layers: Layers, aim: Objective, bound: Array, slowness: Array, k: int, tail: Array,
+    out_h: Array,
+) -> None:  # fmt: skip
     """For each vertex p of layer k the least of its distance to a next vertex joined with its tail.
 
     A run is lengthened to whole `LANES`: what it takes in breaks (5), or it would be in the run.
@@ -62,33 +78,40 @@ def _layer_to_go(
         a, b = layers.low[p], layers.high[p]
         if a <= b:
             m = min((b - a + LANES - 1) // LANES * LANES, last - first)
-            out_h[p] = _least(layers, aim, bound, p, min(a, last - m), m, tail)
+            out_h[p] = _least(layers, aim, bound, slowness, p, min(a, last - m), m, tail)
         else:
-            ahead = _least(layers, aim, bound, p, a, last - a, tail)
-            out_h[p] = min(ahead, _least(layers, aim, bound, p, first, b - first, tail))
+            ahead = _least(layers, aim, bound, slowness, p, a, last - a, tail)
+            out_h[p] = min(ahead, _least(layers, aim, bound, slowness, p, first, b - first, tail))
 
 
 @jit_inline
 def _least(
-    layers: Layers, aim: Objective, bound: Array, p: int, a: int, m: int, tail: Array
+    layers: Layers,
+    aim: Objective,
+    bound: Array,
+    slowness: Array,
+    p: int,
+    a: int,
+    m: int,
+    tail: Array,
 ) -> float:
     """Least of the distances from vertex p to the vertices a..a+m-1, joined with their tails."""
     none = aim.cap + np.inf  # infinity: a constant would be folded into jumps
     if len(bound) == SIX:
         return _least_of(
-            layers.q, layers.turn, bound, aim.weight, aim.metric, aim.cap, aim.minimax, p, a, m,
-            tail, SIX, none,
+            layers.q, layers.turn, bound, aim.weight, aim.metric, aim.cap, aim.minimax,
+            aim.penalty, slowness, p, a, m, tail, SIX, none,
         )  # fmt: skip
     return _least_of(
-        layers.q, layers.turn, bound, aim.weight, aim.metric, aim.cap, aim.minimax, p, a, m,
-        tail, len(bound), none,
+        layers.q, layers.turn, bound, aim.weight, aim.metric, aim.cap, aim.minimax,
+        aim.penalty, slowness, p, a, m, tail, len(bound), none,
     )  # fmt: skip
 
 
 @jit_vector
 def _least_of(
     q: Array, turn: Array, bound: Array, weight: Array, metric: int, cap: float, minimax: bool,
-    p: int, a: int, m: int, tail: Array, n: int, none: float,
+    penalty: float, slowness: Array, p: int, a: int, m: int, tail: Array, n: int, none: float,
 ) -> float:  # fmt: skip
     """As `_least`, of n joints: the innermost loop of the first-order problem.
 
@@ -96,14 +119,15 @@ def _least_of(
     """
     best, begin = np.inf, np.uintp(a)
     for v in range(np.uintp(m)):
-        j, r = begin + v, 0.0
+        j, r, time = begin + v, 0.0, 1.0
         for i in range(n):
             y = abs(q[i, p] - q[i, j])
             y = smaller(y, turn[i] - y)
+            time = larger(time, slowness[i] * y)
             y = either(y > bound[i], none, weight[i] * y)
             longest = larger(r, y)
             r = either(metric == MANHATTAN, r + y, either(metric == EUCLID, r + y * y, longest))
         r = either(metric == EUCLID, sqrt(r), r)
-        r = either(r <= cap, r, none)
+        r = either(r <= cap, r, none) + penalty * (time - 1.0)
         best = smaller(best, either(minimax, larger(r, tail[j]), r + tail[j]))
     return best

@@ -315,6 +315,8 @@ def _backed_off(
 def _cutting_speed(plan: Plan) -> Array:
     """Return the speed (K-1,) m/s from node to node."""
     contour = plan.contour
+    if plan.feed is not None:
+        return np.asarray(np.diff(contour.s) / np.diff(plan.time))
     if contour.time is None:
         duration = float(plan.time[-1] - plan.time[0])
         return np.full(len(contour) - 1, contour.length / duration)

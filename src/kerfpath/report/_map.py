@@ -98,7 +98,7 @@ def feasibility_map(
             hovertemplate="node %{x}<br>gamma %{y:.1f}°<extra>%{meta.posture}</extra>",
         )
         if plan is not None and mu in used:
-            _add_choice(figure, plan, mu, row)
+            _add_choice(figure, plan, mu, row, (len(plan.q) - 1) // (len(graph.reason) - 1))
     if broken_at is not None:
         _mark_break(figure, broken_at, len(postures))
     _add_legend(figure, graph, postures, has_plan=plan is not None)
@@ -141,10 +141,11 @@ def hidden_postures(graph: LayeredGraph) -> list[str]:
     return told
 
 
-def chosen_line(plan: Plan, posture: int) -> list[tuple[Array, Array]]:
+def chosen_line(plan: Plan, posture: int, parts: int = 1) -> list[tuple[Array, Array]]:
     """Return the chosen gamma on one posture as unbroken pieces of (node, gamma in deg).
 
-    A piece ends where the posture changes and where gamma wraps from 180 to -180 deg.
+    A piece ends where the posture changes and where gamma wraps from 180 to -180 deg; a refined
+    plan may divide the intervals between the nodes into `parts`.
     """
     wraps = np.abs(np.diff(plan.gamma)) > np.pi
     nodes = np.flatnonzero(plan.posture == posture)
@@ -152,7 +153,7 @@ def chosen_line(plan: Plan, posture: int) -> list[tuple[Array, Array]]:
         return []
     breaks = (np.diff(nodes) > 1) | wraps[nodes[:-1]]
     pieces = np.split(nodes, np.flatnonzero(breaks) + 1)
-    return [(piece.astype(float), np.degrees(plan.gamma[piece])) for piece in pieces]
+    return [(piece / parts, np.degrees(plan.gamma[piece])) for piece in pieces]
 
 
 def _add_axes(figure: go.Figure, row: int, rows: int, height: int, nodes: int) -> None:
@@ -183,8 +184,8 @@ def _add_axes(figure: go.Figure, row: int, rows: int, height: int, nodes: int) -
     )
 
 
-def _add_choice(figure: go.Figure, plan: Plan, posture: int, row: int) -> None:
-    pieces = chosen_line(plan, posture)
+def _add_choice(figure: go.Figure, plan: Plan, posture: int, row: int, parts: int) -> None:
+    pieces = chosen_line(plan, posture, parts)
     gap = np.array([np.nan])
     # NaN only here: it is plotly's sign for a break in a line.
     x = np.concatenate([part for piece in pieces for part in (piece[0], gap)])[:-1]

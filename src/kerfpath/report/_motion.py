@@ -105,7 +105,7 @@ def limit_shares(plan: Plan) -> go.Figure:
         legend={"orientation": "h", "x": 0, "y": 1.03, "yanchor": "bottom", "font": {"size": 12}},
     )
     _add_posture_bands(figure, plan, panels=2, labelled=())
-    middle = plan.time[:-1] + plan.dt / 2
+    middle = (plan.time[:-1] + plan.time[1:]) / 2
     panels = (
         ("velocity", middle, plan.velocity_share, plan.settings.eta_v),
         ("acceleration", plan.time[1:-1], plan.acceleration_share, plan.settings.eta_a),
@@ -172,8 +172,8 @@ def _add_posture_bands(figure: go.Figure, plan: Plan, *, panels: int, labelled: 
         return
     whole = plan.time[-1] - plan.time[0]
     for number, (mu, first, last) in enumerate(runs):
-        t0 = plan.time[first] - (plan.dt / 2 if first else 0.0)
-        t1 = plan.time[last] + (plan.dt / 2 if last < len(plan.time) - 1 else 0.0)
+        t0 = (plan.time[max(first - 1, 0)] + plan.time[first]) / 2
+        t1 = (plan.time[last] + plan.time[min(last + 1, len(plan.time) - 1)]) / 2
         for panel in range(panels):
             x, y = _axis("x", panel), _axis("y", panel)
             if number % 2:

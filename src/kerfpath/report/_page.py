@@ -198,9 +198,10 @@ def _failure(section: ContourSection) -> str:
 def _in_words(plan: Plan) -> str:
     s = plan.settings
     claim = plan.proof.statement
+    feed = "" if plan.feed is None else f" {str(plan.feed).capitalize()}."
     return (
         f"Objective: {s.objective} of {s.metric} distances, method “{s.method}”, "
-        f"cost {plan.cost:.5g}. {claim[:1].upper()}{claim[1:]}."
+        f"cost {plan.cost:.5g}. {claim[:1].upper()}{claim[1:]}.{feed}"
     )
 
 

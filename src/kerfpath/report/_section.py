@@ -38,7 +38,7 @@ class ContourSection:
     Raises
     ------
     InputError
-        Graph, path and plan differ in their number of nodes.
+        Graph and path differ in their number of nodes, or the plan does not divide their intervals.
     """
 
     name: str
@@ -53,7 +53,8 @@ class ContourSection:
         nodes = {"graph": len(self.graph.reason), "path": len(self.path)}
         if self.plan is not None:
             nodes["plan"] = len(self.plan.q)
-        if len(set(nodes.values())) > 1:
+        intervals = {count - 1 for count in nodes.values()}
+        if any(count % min(intervals) for count in intervals) or len(self.path) != nodes["graph"]:
             told = ", ".join(f"{name} {count}" for name, count in nodes.items())
             raise InputError(
                 f"section {self.name!r}: expected the same nodes throughout, got {told}"

@@ -76,13 +76,20 @@ def summary_table(sections: Sequence[ContourSection]) -> str:
                 _td(number(length / duration * 60, 2)),
                 _td(number(duration, 2)),
                 _td(f"{plan.cost:.5g}"),
-                f"<td>{'best on this graph' if plan.proof.optimal else 'not proved'}</td>",
+                f"<td>{_proof(plan)}</td>",
                 _td(_peak(criteria.peak_velocity)),
                 _td(_peak(criteria.peak_acceleration)),
                 f"<td>{audit_sign(section)}</td>",
             ]
         rows.append(f"<tr>{''.join(cells)}</tr>")
     return _table(heads, rows, text_columns=(0, 6, 9))
+
+
+def _proof(plan: Plan) -> str:
+    if plan.proof.grid_cost is None:
+        return "best on this graph" if plan.proof.optimal else "not proved"
+    whole = "the best" if plan.proof.optimal else "a path"
+    return f"refined from {whole} on the graph, {plan.proof.grid_cost:.5g}"
 
 
 def criteria_table(plan: Plan) -> str:

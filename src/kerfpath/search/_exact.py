@@ -2,19 +2,25 @@
 
 from __future__ import annotations
 
-import heapq
-import itertools
 from dataclasses import dataclass
 
 import numpy as np
 
 from kerfpath._arrays import Array, Bools, Ints
 from kerfpath.kernels import exact, to_go
-from kerfpath.kernels.limits import acceleration_excess
-from kerfpath.kernels.metric import increments
 from kerfpath.kernels.search import Layers, Objective
+from kerfpath.kernels.states import EVERY
 
-__all__ = ["Best", "Dead", "best_closed_path", "best_path", "dead_end", "quickest_path"]
+__all__ = [
+    "NO_SEAM",
+    "Best",
+    "Dead",
+    "best_allowed",
+    "best_path",
+    "dead_end",
+    "layers_reached",
+    "quickest_path",
+]
 
 ROUNDING = 1e-12
 """Relative slack on a bound, so that rounding never drops the path that the bound came from."""
@@ -28,6 +34,7 @@ ROOM = 10_000_000
 """States that a search under a loose bound may remember: 80 MB."""
 UNLIMITED = 2**62
 NO_SEAM = np.empty(0)
+"""Where the last increment need not go on to any."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -41,10 +48,13 @@ class Dead:
     counts : (2, n) int
         Of the ways into the next layer, how many each joint's velocity (row 0) and acceleration
         (row 1) forbids.
+    reached : (m,) int
+        Vertices of the sorted graph, in the last layer reached, that some path ends in.
     """
 
     layers: int
     counts: Ints
+    reached: Ints
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -69,71 +79,28 @@ class Best:
 def best_path(layers: Layers, aim: Objective) -> Best | Dead:
     """Return the best path, or how far any goes."""
     every = np.ones(len(layers.low), np.bool_)
-    return _lexicographic(layers, aim, every, NO_SEAM, 0.0) or dead_end(layers, aim)
-
-
-def best_closed_path(layers: Layers, aim: Objective) -> Best | Dead:
-    """Return the best path that returns to the vertex it left, with (6) across the seam.
-
-    Branch and bound over the vertex left and the edge it is left by. A relaxation lets a path leave
-    by any vertex of a set and return to any other of it; the cheapest relaxation that happens to
-    close is the answer.
-    """
-    K = len(layers.start) - 1
-    twin = _twins(layers)
-    count = itertools.count()
-    queue: list[tuple[float, float, int, Best, Ints, Ints]] = []
-
-    def look(starts: Ints, firsts: Ints, floor: float) -> None:
-        """Put the best path that leaves by `starts` and `firsts` in the queue."""
-        allowed = np.ones(len(layers.low), np.bool_)
-        allowed[: layers.start[1]] = False
-        allowed[starts] = True
-        allowed[layers.start[1] : layers.start[2]] &= np.isin(
-            np.arange(layers.start[1], layers.start[2]), firsts
-        )
-        allowed[layers.start[K - 1] :] &= np.isin(
-            np.arange(layers.start[K - 1], len(layers.low)), twin[starts]
-        )
-        one = len(starts) == len(firsts) == 1
-        seam = _increments(layers, np.append(starts, firsts))[0] if one else NO_SEAM
-        found = _lexicographic(layers, aim, allowed, seam, floor)
-        if found is not None:
-            heapq.heappush(queue, (found.cost, found.total, next(count), found, starts, firsts))
-
-    if K == 1:
-        return best_path(layers, aim)
-    look(np.arange(layers.start[1]), np.arange(layers.start[1], layers.start[2]), 0.0)
-    if not queue:
-        return dead_end(layers, aim)
-    while queue:
-        cost, _, _, found, starts, firsts = heapq.heappop(queue)
-        path = found.path
-        if len(starts) == len(firsts) == 1:
-            return found  # the recursion has kept the seam
-        if twin[path[0]] == path[-1] and _passes_seam(layers, aim, path):
-            return found
-        if len(starts) > 1:
-            for half in _split(layers, starts, path[0], np.flatnonzero(twin == path[-1])):
-                look(half, firsts, cost)
-        else:
-            look(starts, path[1:2], cost)
-            if len(firsts) > 1:
-                look(starts, firsts[firsts != path[1]], cost)
-    return Dead(layers=K - 1, counts=np.zeros((2, len(layers.endless)), np.int64))
+    return best_allowed(layers, aim, every, NO_SEAM, 0.0) or dead_end(layers, aim)
 
 
 def quickest_path(layers: Layers, aim: Objective, ceiling: float) -> Best | None:
     """Return the path of least node interval, if that is `ceiling` or less (a timed objective)."""
     every = np.ones(len(layers.low), np.bool_)
     found = _grow(layers, aim, every, NO_SEAM, 0.0, ceiling)
-    return None if found is None else Best(path=found[0], cost=found[1], total=found[1])
+    # A bound that grew past the ceiling can let a path through, but not prove it: edges beyond the
+    # ceiling may have been left out.
+    if found is None or found[1] > ceiling:
+        return None
+    return Best(path=found[0], cost=found[1], total=found[1])
 
 
-def _lexicographic(
+def best_allowed(
     layers: Layers, aim: Objective, allowed: Bools, seam: Array, floor: float
 ) -> Best | None:
-    """Return the best path; for a maximum, of all best paths the one with the least sum."""
+    """Return the best path through allowed vertices, (6) across a seam kept; None if there is none.
+
+    Of several with the same maximum, the one with the least sum. `floor` is a cost that none is
+    below.
+    """
     found = _grow(layers, aim, allowed, seam, floor)
     if found is None:
         return None
@@ -167,8 +134,8 @@ def _grow(
         return None
     bound, good, sought = max(least, floor) * (1 + ROUNDING), np.inf, False
     while True:
-        reached = exact.recursion(layers, aim, h, bound, seam, ROOM, exact.EVERY)
-        if reached.state >= 0:
+        reached = exact.recursion(layers, aim, h, bound, seam, ROOM, EVERY)
+        if reached.best[-1] >= 0:
             break
         if reached.lowest == np.inf or reached.lowest > ceiling:
             return None
@@ -180,56 +147,29 @@ def _grow(
     if not reached.recorded:
         # Once more at the tightest bound: few states are left to remember.
         bound = reached.cost * (1 + ROUNDING)
-        reached = exact.recursion(layers, aim, h, bound, seam, UNLIMITED, exact.EVERY)
+        reached = exact.recursion(layers, aim, h, bound, seam, UNLIMITED, EVERY)
     path = np.empty(len(layers.start) - 1, np.int64)
-    exact.trace(reached, path)
+    exact.trace(layers, reached, path)
     return path, float(reached.cost)
 
 
 def dead_end(layers: Layers, aim: Objective) -> Dead:
+    """Go as far as any admissible path goes, and count what forbids to go on."""
+    reached = _as_far_as_any(layers, aim)
+    K, n = len(layers.start) - 1, len(layers.endless)
+    ends = np.unique(reached.last.vertex)
+    if reached.layers in (0, K):
+        return Dead(layers=reached.layers, counts=np.zeros((2, n), np.int64), reached=ends)
+    counts = exact.count_closing(layers, aim, reached.last, reached.layers)
+    return Dead(layers=reached.layers, counts=counts, reached=ends)
+
+
+def layers_reached(layers: Layers, aim: Objective) -> int:
+    """Return the number of layers that some admissible path reaches."""
+    return int(_as_far_as_any(layers, aim).layers)
+
+
+def _as_far_as_any(layers: Layers, aim: Objective) -> exact.Reached:
     """Go as far as any admissible path goes, whatever it costs."""
     free = np.zeros(len(layers.low))
-    reached = exact.recursion(layers, aim, free, np.inf, NO_SEAM, 0, exact.EVERY)
-    K, n = len(layers.start) - 1, len(layers.endless)
-    if reached.layers in (0, K):
-        return Dead(layers=reached.layers, counts=np.zeros((2, n), np.int64))
-    counts = exact.count_closing(layers, aim, reached.last, reached.layers)
-    return Dead(layers=reached.layers, counts=counts)
-
-
-def _twins(layers: Layers) -> Ints:
-    """Return, for each vertex of the first layer, the same vertex of the last one."""
-    first, last = layers.start[1], layers.start[-2]
-    by_rank = np.empty(first, np.int64)
-    by_rank[layers.rank[last:]] = np.arange(last, len(layers.low))
-    return by_rank[layers.rank[:first]]
-
-
-def _increments(layers: Layers, path: Ints) -> Array:
-    return increments(np.ascontiguousarray(layers.q[:, path].T), layers.endless)
-
-
-def _passes_seam(layers: Layers, aim: Objective, path: Ints) -> bool:
-    dq = _increments(layers, path)
-    return acceleration_excess(dq[0], dq[-1], aim.acceleration) < 0
-
-
-def _split(layers: Layers, starts: Ints, left: int, returned: Ints) -> tuple[Ints, Ints]:
-    """Part the vertices by which of two they are nearer to; the two come to lie in different parts.
-
-    Where the path closed and only the seam failed, the vertex left is parted from the others.
-    """
-    a, b = int(left), int(returned[0])
-    if a == b:
-        return starts[starts == a], starts[starts != a]
-    nearer = _gap(layers, starts, a) < _gap(layers, starts, b)
-    nearer |= starts == a
-    nearer &= starts != b
-    return starts[nearer], starts[~nearer]
-
-
-def _gap(layers: Layers, vertices: Ints, v: int) -> Array:
-    """Return the sum of joint differences from vertex v to others of its layer, rad."""
-    gap = np.abs(layers.q[:, vertices] - layers.q[:, [v]])
-    around = np.minimum(gap, 2 * np.pi - gap)
-    return np.asarray(np.where(layers.endless[:, None], around, gap).sum(axis=0))
+    return exact.recursion(layers, aim, free, np.inf, NO_SEAM, 0, EVERY)

@@ -10,7 +10,15 @@ from kerfpath.errors import InputError, NoFeasiblePath
 from kerfpath.kernels import search as kernel
 from kerfpath.kernels.limits import LIMIT_TOLERANCE
 
-__all__ = ["backwards", "empty_layer", "narrowest_key", "offsets", "sorted_layers"]
+__all__ = [
+    "backwards",
+    "broken_edge",
+    "empty_layer",
+    "narrowest_key",
+    "offsets",
+    "reduced",
+    "sorted_layers",
+]
 
 _LAYERS_SAMPLED = 32
 """Layers looked at to choose the joint that sorts them: enough to rank the joints."""
@@ -45,6 +53,7 @@ def sorted_layers(
         high=high,
         endless=endless,
         turn=np.where(endless, 2 * np.pi, np.inf),
+        after=np.full(len(start) - 1, -1),
     )
     return layers, rank + np.repeat(start[:-1], np.diff(start))
 
@@ -55,6 +64,24 @@ def empty_layer(k: int) -> NoFeasiblePath:
         return NoFeasiblePath("layer 0 is empty: no path can start", proved=True, node=-1)
     return NoFeasiblePath(
         f"layer {k} is empty: no admissible pose at that node", proved=True, node=k - 1
+    )
+
+
+def broken_edge(k: int, forbidden: Ints, *, proved: bool) -> NoFeasiblePath:
+    """Say that no admissible edge leads into layer k, and which limits forbid how many."""
+    counts = {
+        f"{test}, joint {i + 1}": int(number)
+        for test, row in zip(("velocity", "acceleration"), forbidden, strict=True)
+        for i, number in enumerate(row)
+        if number
+    }
+    told = ", ".join(f"{name}: {number}" for name, number in counts.items())
+    total = int(sum(counts.values()))
+    return NoFeasiblePath(
+        f"no admissible edge from node {k - 1} to node {k}; of {total} edges, forbidden by {told}",
+        proved=proved,
+        node=k - 1,
+        counts=counts,
     )
 
 
@@ -81,3 +108,9 @@ def narrowest_key(q: Array, start: Ints, bound: Array, endless: Bools) -> tuple[
     kernel.fill_key(q, best, bool(endless[best]), key)
     # Twice the slack of (5): the key must never exclude what the test itself would pass.
     return key, float(bound[best] + 2 * LIMIT_TOLERANCE), bool(endless[best])
+
+
+def reduced(q: Array, endless: Bools) -> Array:
+    """Bring the endless joints of q (N, n) into (-pi, pi]."""
+    turned = q - 2 * np.pi * np.ceil((q - np.pi) / (2 * np.pi))
+    return np.where(endless, turned, q)

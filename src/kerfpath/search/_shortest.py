@@ -8,25 +8,33 @@ from typing import Literal, get_args
 import numpy as np
 from numpy.typing import ArrayLike
 
-from kerfpath._arrays import Array, Bools, Ints, bools, floats, freeze, integers, positive, scalar
+from kerfpath._arrays import Array, Bools, Ints, freeze, integers
 from kerfpath.errors import InputError, NoFeasiblePath
-from kerfpath.kernels import metric as metrics
 from kerfpath.kernels import search as kernel
-from kerfpath.search._exact import Best, best_closed_path, best_path, dead_end
-from kerfpath.search._layers import backwards, empty_layer, narrowest_key, offsets, sorted_layers
+from kerfpath.search._branch import best_closed_path
+from kerfpath.search._exact import Best, best_path, dead_end
+from kerfpath.search._layers import (
+    backwards,
+    broken_edge,
+    empty_layer,
+    narrowest_key,
+    sorted_layers,
+)
+from kerfpath.search._problem import (
+    Metric,
+    ObjectiveKind,
+    Problem,
+    checked,
+    one_of,
+    rotation_limits,
+)
+from kerfpath.search._rotation import best_within, too_far, why_closed
 
-__all__ = ["Closure", "LayeredPath", "Method", "Metric", "ObjectiveKind", "shortest_path"]
+__all__ = ["Closure", "LayeredPath", "Method", "shortest_path"]
 
-Metric = Literal["manhattan", "chebychev", "euclid"]
-ObjectiveKind = Literal["sum", "max"]
 Method = Literal["exact", "paper", "known"]
 Closure = Literal["free", "periodic"]
 
-_METRIC_CODES: dict[str, int] = {
-    "euclid": metrics.EUCLID,
-    "manhattan": metrics.MANHATTAN,
-    "chebychev": metrics.CHEBYCHEV,
-}
 SAME_END = 1e-6
 """Joint difference (rad) up to which the ends of a closed contour count as the same vertex."""
 
@@ -65,6 +73,7 @@ def shortest_path(
     objective: ObjectiveKind = "sum",
     method: Method = "exact",
     closure: Closure = "free",
+    rotation: ArrayLike | None = None,
     eta_v: float = 1.0,
     eta_a: float = 1.0,
 ) -> LayeredPath:
@@ -100,6 +109,9 @@ def shortest_path(
     closure : {"free", "periodic"}
         "periodic": the last layer repeats the first, the path returns to the vertex it left
         (endless joints modulo 2 pi), and (6) holds across the seam; exact method only.
+    rotation : (n,) rad, optional
+        Largest angle that an endless joint may have turned away, either way, from where the path
+        begins; infinity: no limit (default); exact method only.
     eta_v, eta_a : float
         Share of the velocity and acceleration limits that may be used.
 
@@ -109,60 +121,54 @@ def shortest_path(
         No admissible path was found; says where and what forbids it.
     InputError
         Arrays that do not fit each other, NaN, limits or dt that are not positive, unknown names,
-        a periodic closure whose end layers differ.
+        a periodic closure whose end layers differ, a finite rotation of a joint that is not
+        endless.
     """
-    q = floats(q, "q", (None, None), copy=False)
-    start = offsets(start, len(q))
-    n = q.shape[1]
-    if n == 0:
-        raise InputError("q: expected at least one joint, got shape " + str(q.shape))
-    dt = scalar(dt, "dt", unit="s", above=0.0)
-    velocity = positive(velocity, "velocity", (n,))
-    acceleration = positive(acceleration, "acceleration", (n,))
-    endless = bools(np.zeros(n, bool) if endless is None else endless, "endless", (n,))
-    _one_of("metric", metric, tuple(_METRIC_CODES))
-    _one_of("objective", objective, get_args(ObjectiveKind))
-    _one_of("method", method, get_args(Method))
-    _one_of("closure", closure, get_args(Closure))
-    bound_v = scalar(eta_v, "eta_v", above=0.0) * velocity * dt
-    bound_a = scalar(eta_a, "eta_a", above=0.0) * acceleration * dt**2
-    weight = 1.0 / (velocity * dt) if weights is None else floats(weights, "weights", (n,))
-    if (weight < 0).any():
-        raise InputError(f"weights: must not be negative, got {weight.tolist()}")
-    cost = (
-        np.zeros(len(q)) if vertex_cost is None else floats(vertex_cost, "vertex_cost", (len(q),))
+    one_of("method", method, get_args(Method))
+    one_of("closure", closure, get_args(Closure))
+    problem = checked(
+        q,
+        start,
+        dt=dt,
+        velocity=velocity,
+        acceleration=acceleration,
+        endless=endless,
+        vertex_cost=vertex_cost,
+        weights=weights,
+        metric=metric,
+        objective=objective,
+        eta_v=eta_v,
+        eta_a=eta_a,
     )
+    q, start, endless, aim = problem
+    reach = rotation_limits(rotation, endless)
     if posture is not None:
         posture = integers(posture, "posture", (len(q),))
     if closure == "periodic" and method != "exact":
         raise InputError(f'closure: "periodic" needs method="exact", got method={method!r}')
+    if np.isfinite(reach).any() and method != "exact":
+        raise InputError(f'rotation: a limit needs method="exact", got method={method!r}')
 
     if method == "known":
-        bound_v = bound_a = np.full(n, np.inf)
+        free = np.full(q.shape[1], np.inf)
+        aim = aim._replace(velocity=free, acceleration=free)
         key = np.zeros(len(q)) if posture is None else posture.astype(float)
         window, circular = 0.5, False
     else:
-        key, window, circular = narrowest_key(q, start, bound_v, endless)
+        key, window, circular = narrowest_key(q, start, aim.velocity, endless)
     layers, order = sorted_layers(q, start, key, window, circular, endless)
-    aim = kernel.Objective(
-        weight=freeze(np.ascontiguousarray(weight)),
-        metric=_METRIC_CODES[metric],
-        minimax=objective == "max",
-        vertex_cost=freeze(cost[order]),
-        velocity=freeze(bound_v),
-        acceleration=freeze(bound_a),
-        cap=np.inf,
-        timed=False,
-    )
+    aim = aim._replace(vertex_cost=freeze(aim.vertex_cost[order]))
     filled = int(np.argmin(np.diff(start))) if (np.diff(start) == 0).any() else len(start) - 1
     if filled == 0:
         raise empty_layer(0)
     if method == "exact":
         try:
-            return _exactly(layers, aim, filled, closure)
+            found = _exactly(layers, aim, filled, closure)
         except NoFeasiblePath as broken:
-            broken.back = _first_from_the_back(q, start, aim, endless)
+            broken.back, broken.leaving = _from_the_back(q, start, aim, endless)
             raise
+        over = too_far(q[start[:-1] + found.index], endless, reach)
+        return _turning_less(problem, reach, over, closure) if over.any() else found
     return _search(layers, aim, filled, may_prove=method == "paper")
 
 
@@ -189,11 +195,25 @@ def _exactly(
             proved=True,
             node=len(layers.start) - 2,
         )
-    raise _broken_edge(found.layers, found.counts, proved=True)
+    broken = broken_edge(found.layers, found.counts, proved=True)
+    broken.reached = freeze(layers.rank[found.reached])
+    raise broken
 
 
-def _first_from_the_back(q: Array, start: Ints, aim: kernel.Objective, endless: Bools) -> int:
-    """Return the first node from which an admissible path reaches the end.
+def _turning_less(problem: Problem, rotation: Array, over: Bools, closure: Closure) -> LayeredPath:
+    """Return the proved optimum within the limits that the joints `over` do not keep without."""
+    closed = closure == "periodic"
+    unrolled, found = best_within(problem, rotation, over, closed=closed)
+    if found is None:
+        raise why_closed(problem, rotation, unrolled, closed=closed)
+    index, cost = found
+    return LayeredPath(index=freeze(index), cost=cost, optimal=True)
+
+
+def _from_the_back(
+    q: Array, start: Ints, aim: kernel.Objective, endless: Bools
+) -> tuple[int, Ints | None]:
+    """Return the first node from which admissible paths reach the end, and their vertices there.
 
     (5) and (6) hold for a path and its reverse alike, so that it is as far as any path goes from
     the last layer backwards.
@@ -202,11 +222,12 @@ def _first_from_the_back(q: Array, start: Ints, aim: kernel.Objective, endless: 
     sizes = np.diff(start)
     filled = int(np.argmin(sizes)) if (sizes == 0).any() else len(sizes)
     if filled == 0:
-        return len(sizes)
+        return len(sizes), None
     key, window, circular = narrowest_key(q, start, aim.velocity, endless)
     layers, _ = sorted_layers(q, start, key, window, circular, endless)
     free = aim._replace(vertex_cost=freeze(np.zeros(len(q))))
-    return len(sizes) - dead_end(layers._replace(start=start[: filled + 1]), free).layers
+    found = dead_end(layers._replace(start=start[: filled + 1]), free)
+    return len(sizes) - found.layers, freeze(layers.rank[found.reached])
 
 
 def _search(
@@ -220,7 +241,7 @@ def _search(
     reached, turned_away = kernel.path_planning(to_search, aim, dist, before)
     if reached < filled:
         counts = kernel.closing_counts(layers, aim, dist, before, reached)
-        raise _broken_edge(reached, counts, proved=not turned_away)
+        raise broken_edge(reached, counts, proved=not turned_away)
     if filled < len(sizes):
         raise empty_layer(filled)
     a, b = start[-2], start[-1]
@@ -232,24 +253,6 @@ def _search(
         path[k] = layers.rank[j]
         j = int(before[j])
     return LayeredPath(index=freeze(path), cost=cost, optimal=may_prove and not turned_away)
-
-
-def _broken_edge(k: int, forbidden: Ints, *, proved: bool) -> NoFeasiblePath:
-    """Say that no admissible edge leads into layer k, and which limits forbid how many."""
-    counts = {
-        f"{test}, joint {i + 1}": int(number)
-        for test, row in zip(("velocity", "acceleration"), forbidden, strict=True)
-        for i, number in enumerate(row)
-        if number
-    }
-    told = ", ".join(f"{name}: {number}" for name, number in counts.items())
-    total = int(sum(counts.values()))
-    return NoFeasiblePath(
-        f"no admissible edge from node {k - 1} to node {k}; of {total} edges, forbidden by {told}",
-        proved=proved,
-        node=k - 1,
-        counts=counts,
-    )
 
 
 def _require_same_ends(layers: kernel.Layers) -> None:
@@ -270,8 +273,3 @@ def _require_same_ends(layers: kernel.Layers) -> None:
             "closure: periodic needs a last layer that repeats the first, but their vertices "
             f"{i} differ by {gap[:, i].max():.3g} rad"
         )
-
-
-def _one_of(name: str, value: str, known: tuple[str, ...]) -> None:
-    if value not in known:
-        raise InputError(f"{name}: expected one of {', '.join(known)}, got {value!r}")

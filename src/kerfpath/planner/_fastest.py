@@ -1,0 +1,135 @@
+"""The fastest constant speed along a contour, and what opens the way where there is no plan."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from typing import Literal
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from kerfpath.contour import Contour, FrameKind
+from kerfpath.graph import LayeredGraph
+from kerfpath.planner._graph import node_interval, require_even
+from kerfpath.planner._task import task_of
+from kerfpath.plans import Proof
+from kerfpath.refiner import quicken
+from kerfpath.robots import Robot
+from kerfpath.search import LeastInterval, Relaxations, least_interval, least_relaxations
+
+__all__ = ["FastestSpeed", "fastest_speed", "relaxations"]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class FastestSpeed:
+    """The largest constant cutting speed at which a path exists, and what binds.
+
+    Parameters
+    ----------
+    speed : float m/s
+    joint : int
+        The joint that binds, 0-based.
+    node : int
+        The node where it binds.
+    limit : {"velocity", "acceleration"}
+        Which of its limits binds there.
+    on_grid : float m/s, optional
+        Where gamma was moved off its grid: the largest speed on it.
+    """
+
+    speed: float
+    joint: int
+    node: int
+    limit: Literal["velocity", "acceleration"]
+    on_grid: float | None = None
+
+    @classmethod
+    def of(cls, contour: Contour, least: LeastInterval) -> FastestSpeed:
+        """Return what a least node interval is as a speed along a contour."""
+        spacing = contour.length / (len(contour) - 1)
+        return cls(speed=spacing / least.dt, joint=least.joint, node=least.node, limit=least.limit)
+
+
+def fastest_speed(
+    contour: Contour,
+    robot: Robot,
+    *,
+    tool: ArrayLike,
+    placement: ArrayLike,
+    gamma_step: float = np.pi / 180,
+    frames: FrameKind = "rotation-minimising",
+    postures: Sequence[int] | None = None,
+    eta_v: float = 1.0,
+    eta_a: float = 1.0,
+    refine: bool = False,
+    graph: LayeredGraph | None = None,
+    progress: Callable[[int], None] | None = None,
+) -> FastestSpeed:
+    """Return the largest constant speed at which a path exists on the graph, exactly.
+
+    A second-order minimax problem on the layered graph; arguments as in `plan`. The grid quantises
+    the acceleration: `refine` moves gamma off it, from the fastest path, to what is then faster
+    still (the nearest optimum, which is not proved to be the best one).
+
+    Raises
+    ------
+    NoFeasiblePath
+        Some node has no admissible pose at all.
+    InputError
+        Limits that are not known, nodes unevenly spaced, values out of range.
+    """
+    require_even(contour, np.diff(contour.s), "m")
+    task = task_of(
+        replace(contour, time=None),
+        robot,
+        tool=tool,
+        placement=placement,
+        speed=1.0,
+        gamma_step=gamma_step,
+        frames=frames,
+        postures=postures,
+        eta_v=eta_v,
+        eta_a=eta_a,
+        graph=graph,
+        progress=progress,
+    )
+    least = least_interval(**task.limits)
+    found = FastestSpeed.of(contour, least)
+    if not refine:
+        return found
+    claim = Proof(optimal=False, statement="the fastest path on this graph")
+    quick, at = quicken(replace(task, dt=least.dt).plan(least.index, 0.0, claim))
+    return FastestSpeed(
+        speed=contour.length / float(quick.time[-1]),
+        joint=at.joint,
+        node=at.node,
+        limit=at.limit,
+        on_grid=found.speed,
+    )
+
+
+def relaxations(
+    contour: Contour,
+    robot: Robot,
+    graph: LayeredGraph,
+    speed: float | None = None,
+    *,
+    eta_v: float = 1.0,
+    eta_a: float = 1.0,
+) -> Relaxations:
+    """Return the least eta_v, eta_a and node interval, each on its own, with which a path exists.
+
+    Arguments as in `plan`; what to ask after a `NoFeasiblePath` whose node has poses.
+    """
+    velocity, acceleration = robot.speed_limits()
+    return least_relaxations(
+        graph.q,
+        graph.start,
+        dt=node_interval(contour, speed),
+        velocity=velocity,
+        acceleration=acceleration,
+        endless=robot.endless,
+        eta_v=eta_v,
+        eta_a=eta_a,
+    )

@@ -1,0 +1,93 @@
+"""What every planning task begins with: the layered graph, and the time from node to node."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from kerfpath._arrays import Array, as_pose, scalar
+from kerfpath.contour import Contour, FrameKind
+from kerfpath.errors import InputError, NoFeasiblePath
+from kerfpath.graph import LayeredGraph, build, gamma_grid
+from kerfpath.robots import Robot
+
+__all__ = ["layered_graph", "node_interval", "require_even", "require_no_empty_layer"]
+
+UNEVEN = 0.01
+"""Largest relative difference of node distances that still counts as evenly spaced."""
+
+
+def layered_graph(
+    contour: Contour,
+    robot: Robot,
+    *,
+    tool: ArrayLike,
+    placement: ArrayLike,
+    gamma_step: float = np.pi / 180,
+    frames: FrameKind = "rotation-minimising",
+    postures: Sequence[int] | None = None,
+    progress: Callable[[int], None] | None = None,
+) -> LayeredGraph:
+    """Return the layered graph that `plan` searches; arguments as there."""
+    H = np.ascontiguousarray(as_pose(placement, "placement") @ contour.frames(frames))
+    return build(
+        H,
+        robot,
+        T_flange_tip=as_pose(tool, "tool"),
+        gamma=gamma_grid(gamma_step),
+        postures=postures,
+        progress=progress,
+    )
+
+
+def node_interval(contour: Contour, speed: float | None) -> float:
+    """Return the time between neighbouring nodes, s, from the speed (m/s) or the contour's times.
+
+    Raises
+    ------
+    InputError
+        No speed at all, or two; a speed that is not positive; nodes unevenly spaced.
+    """
+    if contour.time is not None:
+        if speed is not None:
+            raise InputError(
+                f"speed: contour {contour.name!r} carries its own times; give no speed, or "
+                "resample it by spacing"
+            )
+        require_even(contour, np.diff(contour.time), "s")
+        return float(contour.time[-1] - contour.time[0]) / (len(contour) - 1)
+    if speed is None:
+        raise InputError(f"speed: contour {contour.name!r} carries no times, give a speed in m/s")
+    speed = scalar(speed, "speed", unit="m/s", above=0.0)
+    require_even(contour, np.diff(contour.s), "m")
+    return contour.length / (len(contour) - 1) / speed
+
+
+def require_even(contour: Contour, steps: Array, unit: str) -> None:
+    """Raise InputError unless the steps (K-1,) between the nodes of a contour are all alike."""
+    low, high = float(steps.min()), float(steps.max())
+    if high - low > UNEVEN * high:
+        raise InputError(
+            f"contour {contour.name!r}: nodes must be evenly spaced, but their steps run from "
+            f"{low:.6g} to {high:.6g} {unit}; resample it first, for example with "
+            f"contour.resample(count={len(contour)})"
+        )
+
+
+def require_no_empty_layer(contour: Contour, graph: LayeredGraph) -> None:
+    """Raise NoFeasiblePath where a node has no admissible pose, with what removed them there."""
+    empty = np.flatnonzero(np.diff(graph.start) == 0)
+    if empty.size:
+        k = int(empty[0])
+        counts = graph.counts(k)
+        told = ", ".join(f"{word}: {number}" for word, number in counts.items())
+        raise NoFeasiblePath(
+            f"contour {contour.name!r}: no admissible pose at node {k} of {len(contour)} "
+            f"({empty.size} such nodes); of {sum(counts.values())} candidates there, {told}",
+            proved=True,
+            node=k - 1,
+            back=int(empty[-1]) + 1,
+            counts=counts,
+        )

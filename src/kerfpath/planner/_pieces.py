@@ -1,0 +1,75 @@
+"""A cut that cannot be made in one go: the fewest interruptions, and a plan for every piece."""
+
+from __future__ import annotations
+
+from typing import Unpack
+
+from kerfpath.contour import Contour
+from kerfpath.errors import InputError, NoFeasiblePath
+from kerfpath.planner._refined import refined
+from kerfpath.planner._task import Options, Task, task_of
+from kerfpath.plans import Plan, Proof
+from kerfpath.robots import Robot
+from kerfpath.search import Piece, interrupted_path
+
+__all__ = ["plan_in_pieces"]
+
+
+def plan_in_pieces(
+    contour: Contour, robot: Robot, *, refine: bool = False, **options: Unpack[Options]
+) -> tuple[Plan, ...]:
+    """Return the plans of the pieces that the contour is cut in, with the fewest interruptions.
+
+    At an interruption the laser goes off, the robot takes another pose at the same node, and the
+    cut goes on from there. No plan has fewer, and on this graph none with as many costs less, both
+    exactly; each piece is then refined on its own, if that is asked for. The moves between the
+    pieces are not planned here and cost nothing.
+
+    Parameters
+    ----------
+    contour, robot, refine, options
+        As in `plan`, with method "exact"; a closed contour need not return to its first pose.
+
+    Returns
+    -------
+    plans : tuple of Plan
+        One for each piece, in order; a single one where nothing interrupts the cut. The contour of
+        each is the part of nodes that it cuts, its arc length `s` that of the whole.
+
+    Raises
+    ------
+    NoFeasiblePath
+        No number of interruptions helps: a node without a pose, or an interval between two nodes
+        that no poses can pass.
+    InputError
+        As `plan`; another method.
+    """
+    if options.get("method", "exact") != "exact":
+        raise InputError(f'plan_in_pieces: needs method "exact", got {options["method"]!r}')
+    task = task_of(contour, robot, **options)
+    try:
+        found = interrupted_path(**task.limits, **task.aim)
+    except NoFeasiblePath as broken:
+        raise NoFeasiblePath(
+            f"contour {contour.name!r}: no number of interruptions helps: {broken}",
+            proved=broken.proved,
+            node=broken.node,
+            back=broken.back,
+            counts=broken.counts,
+        ) from None
+    plans = []
+    for number, piece in enumerate(found.pieces, 1):
+        part, made = _planned(task, piece, number, len(found.pieces))
+        plans.append(refined(part, made) if refine else made)
+    return tuple(plans)
+
+
+def _planned(task: Task, piece: Piece, number: int, count: int) -> tuple[Task, Plan]:
+    """Return the task of one piece, and its plan on the grid."""
+    claim = "the best path on this graph under the velocity and acceleration limits"
+    if count > 1:
+        last = piece.first + len(piece.index) - 1
+        task = task.part(piece.first, last, f"{task.contour.name}, piece {number} of {count}")
+        claim = f"piece {number} of the cheapest cut with the fewest interruptions, {count - 1}"
+    proof = Proof(optimal=True, statement=claim)
+    return task, task.plan(piece.index, task.cost(piece.index), proof)

@@ -1,0 +1,171 @@
+"""plan(): from a contour and a robot to a plan, through the layered graph and the search."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from typing import Literal, get_args
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from kerfpath.contour import Contour, FrameKind
+from kerfpath.errors import InputError, NoFeasiblePath
+from kerfpath.graph import LayeredGraph
+from kerfpath.planner._dip import slowed
+from kerfpath.planner._refined import off_grid, refined
+from kerfpath.planner._task import Task, task_of
+from kerfpath.plans import Plan, Proof
+from kerfpath.robots import Robot, posture_name
+from kerfpath.search import Closure, Method, Metric, ObjectiveKind, shortest_path
+
+__all__ = ["FeedKind", "plan"]
+
+FeedKind = Literal["constant", "dip"]
+
+
+def plan(
+    contour: Contour,
+    robot: Robot,
+    *,
+    tool: ArrayLike,
+    placement: ArrayLike,
+    speed: float | None = None,
+    gamma_step: float = np.pi / 180,
+    frames: FrameKind = "rotation-minimising",
+    postures: Sequence[int] | None = None,
+    method: Method = "exact",
+    objective: ObjectiveKind = "sum",
+    metric: Metric = "manhattan",
+    weights: ArrayLike | None = None,
+    eta_v: float = 1.0,
+    eta_a: float = 1.0,
+    closure: Closure = "free",
+    rotation: ArrayLike | None = None,
+    feed: FeedKind = "constant",
+    refine: bool = False,
+    graph: LayeredGraph | None = None,
+    progress: Callable[[int], None] | None = None,
+) -> Plan:
+    """Return the best joint motion along the contour.
+
+    Parameters
+    ----------
+    contour : Contour
+        Nodes in the part frame, evenly spaced (see `Contour.resample`).
+    robot : Robot
+        With joint limits, velocities and accelerations.
+    tool : (4, 4)
+        T_flange_tip, m: tip frame in the flange, z along the beam into the part.
+    placement : (4, 4)
+        T_base_part, m: part frame in the robot base.
+    speed : float m/s
+        Speed along the path; left out where the contour carries its own times.
+    gamma_step : float rad
+        Step of the free rotation about the beam.
+    frames : {"rotation-minimising", "tangent"}
+        Task frames that gamma is measured in.
+    postures : sequence of int, optional
+        The postures that may be used; default all. See `kerfpath.robots.postures_named`.
+    method, objective, metric, weights, eta_v, eta_a, closure, rotation
+        As in `shortest_path`; "periodic" closure needs a closed contour.
+    feed : {"constant", "dip"}
+        Where the limits do not let the speed be held: "constant" refuses, "dip" holds it wherever
+        they do and slows down elsewhere, in the least time; `Plan.feed` says where. Needs
+        objective "sum", closure "free" and no rotation limit.
+    refine : bool
+        Move gamma off its grid afterwards, see `kerfpath.refine`. Where the grid has no path (it
+        quantises acceleration), one is looked for off it.
+    graph : LayeredGraph, optional
+        The layered graph of this very task, kept from `layered_graph`.
+    progress : callable, optional
+        Called with the number of nodes whose poses have been solved since the last call.
+
+    Raises
+    ------
+    NoFeasiblePath
+        Says the first node where the path breaks, and what each test removed there.
+    InputError
+        Limits that are not known, nodes unevenly spaced, values out of range.
+    """
+    if feed not in get_args(FeedKind):
+        raise InputError(f"feed: expected one of {', '.join(get_args(FeedKind))}, got {feed!r}")
+    if feed == "dip" and (objective != "sum" or closure != "free" or rotation is not None):
+        raise InputError(
+            'feed: "dip" needs objective "sum", closure "free" and no rotation limit, got '
+            f'objective "{objective}", closure "{closure}" and rotation {rotation!r}'
+        )
+    task = task_of(
+        contour,
+        robot,
+        tool=tool,
+        placement=placement,
+        speed=speed,
+        gamma_step=gamma_step,
+        frames=frames,
+        postures=postures,
+        method=method,
+        objective=objective,
+        metric=metric,
+        weights=weights,
+        eta_v=eta_v,
+        eta_a=eta_a,
+        closure=closure,
+        rotation=rotation,
+        graph=graph,
+        progress=progress,
+    )
+    try:
+        path = shortest_path(
+            **task.limits,
+            **task.aim,
+            posture=task.graph.posture,
+            method=method,
+            closure=closure,
+            rotation=task.settings.rotation,
+        )
+    except NoFeasiblePath as broken:
+        if feed == "dip":
+            return slowed(task, refine=refine)
+        found = off_grid(task) if refine and closure == "free" else None
+        if found is not None and found.done:
+            return found.plan
+        tried = "" if found is None else f"; off the grid {found.statement}"
+        raise NoFeasiblePath(
+            f"contour {contour.name!r}: {broken}{_bracket(broken, task)}{tried}",
+            proved=broken.proved,
+            node=broken.node,
+            back=broken.back,
+            reached=broken.reached,
+            leaving=broken.leaving,
+            counts=broken.counts,
+        ) from None
+    made = task.plan(path.index, path.cost, _proof(method, path.optimal))
+    return refined(task, made) if refine else made
+
+
+def _bracket(broken: NoFeasiblePath, task: Task) -> str:
+    """Say from where on paths reach the end, and which change of posture would join the two."""
+    if broken.back is None:
+        return ""
+    said = f"; from the back, paths reach the end from node {broken.back} on"
+    said = said if broken.back > broken.node + 1 else ""
+    if broken.reached is None or broken.leaving is None:
+        return said
+    before, after = (
+        {int(mu) for mu in task.graph.posture[task.graph.start[node] + vertices]}
+        for node, vertices in ((broken.node, broken.reached), (broken.back, broken.leaving))
+    )
+    if before & after:
+        return said
+    names = (", ".join(posture_name(mu) for mu in sorted(group)) for group in (before, after))
+    return f"{said}; the posture would have to change from {' to '.join(names)}"
+
+
+def _proof(method: Method, optimal: bool) -> Proof:
+    if optimal:
+        claim = "the best path on this graph under the velocity and acceleration limits"
+    elif method == "known":
+        claim = "no claim: the known technique tests neither velocity nor acceleration"
+    else:
+        claim = "no claim: the acceleration test of the paper's procedure is greedy"
+    return Proof(optimal=optimal, statement=claim)

@@ -1,0 +1,187 @@
+"""A planning task with everything in it cast and checked, and the plans that answer it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from typing import Any, Required, TypedDict
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from kerfpath._arrays import Array, Ints, as_pose, floats, freeze, scalar
+from kerfpath.contour import Contour, FrameKind
+from kerfpath.errors import InputError
+from kerfpath.graph import LayeredGraph
+from kerfpath.kernels.metric import increments
+from kerfpath.planner._graph import layered_graph, node_interval, require_no_empty_layer
+from kerfpath.plans import Plan, Proof, Settings, path_cost
+from kerfpath.robots import Robot
+from kerfpath.search import Closure, Method, Metric, ObjectiveKind, rotation_limits
+
+__all__ = ["Options", "Task", "task_of"]
+
+
+class Options(TypedDict, total=False):
+    """The keywords that every way of planning takes; see `kerfpath.plan`."""
+
+    tool: Required[ArrayLike]
+    placement: Required[ArrayLike]
+    speed: float | None
+    gamma_step: float
+    frames: FrameKind
+    postures: Sequence[int] | None
+    method: Method
+    objective: ObjectiveKind
+    metric: Metric
+    weights: ArrayLike | None
+    eta_v: float
+    eta_a: float
+    graph: LayeredGraph | None
+    progress: Callable[[int], None] | None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Task:
+    """One contour for one robot, its settings and its layered graph.
+
+    Parameters
+    ----------
+    contour : Contour
+    robot : Robot
+    T_flange_tip, T_base_part : (4, 4) m
+    dt : float s
+        Time from node to node at the speed asked for.
+    settings : Settings
+    graph : LayeredGraph
+        No layer of it is empty.
+    """
+
+    contour: Contour
+    robot: Robot
+    T_flange_tip: Array
+    T_base_part: Array
+    dt: float
+    settings: Settings
+    graph: LayeredGraph
+
+    @property
+    def limits(self) -> dict[str, Any]:
+        """The graph and the limits, as the searches take them."""
+        velocity, acceleration = self.robot.speed_limits()
+        return {
+            "q": self.graph.q,
+            "start": self.graph.start,
+            "velocity": velocity,
+            "acceleration": acceleration,
+            "endless": self.robot.endless,
+            "eta_v": self.settings.eta_v,
+            "eta_a": self.settings.eta_a,
+        }
+
+    @property
+    def aim(self) -> dict[str, Any]:
+        """What the searches are to minimise."""
+        s = self.settings
+        return {"dt": self.dt, "weights": s.weights, "metric": s.metric, "objective": s.objective}
+
+    def cost(self, index: Ints) -> float:
+        """Return the objective (14) or (15) of a path through the graph."""
+        s, q = self.settings, self.graph.q[self.graph.start[:-1] + index]
+        return path_cost(increments(q, self.robot.endless), s.weights, s.metric, s.objective)
+
+    def plan(self, index: Ints, cost: float, proof: Proof) -> Plan:
+        """Return the plan of a path through the graph, at the speed asked for."""
+        graph = self.graph
+        vertex = graph.start[:-1] + index
+        return Plan(
+            contour=self.contour,
+            robot=self.robot,
+            T_flange_tip=self.T_flange_tip,
+            T_base_part=self.T_base_part,
+            q=graph.q[vertex],
+            gamma=graph.gamma[graph.sample[vertex]],
+            posture=graph.posture[vertex],
+            turn=graph.turn[vertex],
+            time=self.dt * np.arange(len(self.contour), dtype=float),
+            settings=self.settings,
+            cost=cost,
+            proof=proof,
+            counts=graph.counts(),
+        )
+
+    def part(self, first: int, last: int, name: str) -> Task:
+        """Return the task of nodes first to last alone."""
+        part = self.contour.part(first, last, self.settings.frames)
+        return replace(
+            self,
+            contour=replace(part, name=name),
+            graph=self.graph.part(first, last),
+            settings=replace(self.settings, closure="free"),
+        )
+
+
+def task_of(
+    contour: Contour,
+    robot: Robot,
+    *,
+    tool: ArrayLike,
+    placement: ArrayLike,
+    speed: float | None = None,
+    gamma_step: float = np.pi / 180,
+    frames: FrameKind = "rotation-minimising",
+    postures: Sequence[int] | None = None,
+    method: Method = "exact",
+    objective: ObjectiveKind = "sum",
+    metric: Metric = "manhattan",
+    weights: ArrayLike | None = None,
+    eta_v: float = 1.0,
+    eta_a: float = 1.0,
+    closure: Closure = "free",
+    rotation: ArrayLike | None = None,
+    graph: LayeredGraph | None = None,
+    progress: Callable[[int], None] | None = None,
+) -> Task:
+    """Return the task that the arguments of `kerfpath.plan` pose; errors as there."""
+    velocity, _ = robot.speed_limits()
+    T_flange_tip, T_base_part = as_pose(tool, "tool"), as_pose(placement, "placement")
+    dt = node_interval(contour, speed)
+    if closure == "periodic" and not contour.closed:
+        raise InputError(f"closure: contour {contour.name!r} is open and cannot be periodic")
+    weight: Array = 1 / (velocity * dt) if weights is None else floats(weights, "weights", (6,))
+    settings = Settings(
+        gamma_step=scalar(gamma_step, "gamma_step", unit="rad", above=0.0),
+        frames=frames,
+        method=method,
+        objective=objective,
+        metric=metric,
+        weights=freeze(weight),
+        eta_v=scalar(eta_v, "eta_v", above=0.0),
+        eta_a=scalar(eta_a, "eta_a", above=0.0),
+        closure=closure,
+        rotation=None if rotation is None else rotation_limits(rotation, robot.endless),
+    )
+    graph = graph or layered_graph(
+        contour,
+        robot,
+        tool=T_flange_tip,
+        placement=T_base_part,
+        gamma_step=gamma_step,
+        frames=frames,
+        postures=postures,
+        progress=progress,
+    )
+    if len(graph.start) != len(contour) + 1:
+        raise InputError(
+            f"graph: has {len(graph.start) - 1} layers, but the contour has {len(contour)} nodes"
+        )
+    require_no_empty_layer(contour, graph)
+    return Task(
+        contour=contour,
+        robot=robot,
+        T_flange_tip=T_flange_tip,
+        T_base_part=T_base_part,
+        dt=dt,
+        settings=settings,
+        graph=graph,
+    )

@@ -1,0 +1,6 @@
+"""Refinement off the grid: gamma continuous, postures and turns fixed."""
+
+from kerfpath.refiner._refine import Refinement as Refinement
+from kerfpath.refiner._refine import ease as ease
+from kerfpath.refiner._refine import quicken as quicken
+from kerfpath.refiner._refine import refine as refine

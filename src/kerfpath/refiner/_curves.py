@@ -1,0 +1,56 @@
+"""The joints as functions of gamma at every node, posture and turns fixed."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from kerfpath._arrays import Array, Ints
+from kerfpath.kernels import kinematics
+from kerfpath.robots import Robot
+
+__all__ = ["JointCurves"]
+
+DERIVATIVE_STEP = 1e-5
+"""rad: the central difference is good to 1e-10 of the curvature, rounding to 1e-11."""
+
+
+class JointCurves:
+    """q_k(gamma) of every node in one posture: the true kinematics, not a model of it.
+
+    Parameters
+    ----------
+    robot : Robot
+    H : (K, 4, 4)
+        Task frames in the robot base, m.
+    T_flange_tip : (4, 4)
+        Tool, m.
+    posture : (K,) int
+        Posture of each node.
+    """
+
+    def __init__(self, robot: Robot, H: Array, T_flange_tip: Array, posture: Ints) -> None:
+        self._arm = robot.arm()
+        self._H = H
+        self._T_tip_flange = np.linalg.inv(T_flange_tip)
+        self._posture = posture
+
+    def at(self, gamma: Array, near: Array) -> Array:
+        """Return the joints (K, 6) rad at `gamma` (K,), each on the turn nearest to `near` (K, 6).
+
+        NaN at the nodes that are out of reach.
+        """
+        K = len(gamma)
+        spin = np.tile(np.eye(4), (K, 1, 1))
+        spin[:, 0, 0] = spin[:, 1, 1] = np.cos(gamma)
+        spin[:, 1, 0] = np.sin(gamma)
+        spin[:, 0, 1] = -spin[:, 1, 0]
+        q, reach = np.empty((K, kinematics.POSTURES, 6)), np.empty((K, kinematics.POSTURES), bool)
+        kinematics.inverse_all(self._arm, self._H @ spin @ self._T_tip_flange, q, reach)
+        node = np.arange(K)
+        found = np.where(reach[node, self._posture, None], q[node, self._posture], np.nan)
+        return np.asarray(found + 2 * np.pi * np.round((near - found) / (2 * np.pi)))
+
+    def slope(self, gamma: Array, q: Array) -> Array:
+        """Return dq/dgamma (K, 6) where the joints are `q`; NaN at the edge of reach."""
+        ahead, behind = (self.at(gamma + h, q) for h in (DERIVATIVE_STEP, -DERIVATIVE_STEP))
+        return np.asarray((ahead - behind) / (2 * DERIVATIVE_STEP))

@@ -1,0 +1,231 @@
+"""Sequential convex programming: solve the linear model, try it on the true kinematics, go on."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import NamedTuple
+
+import numpy as np
+
+from kerfpath._arrays import Array
+from kerfpath.kernels.turns import JointLimits
+from kerfpath.plans import path_cost
+from kerfpath.refiner._curves import JointCurves
+from kerfpath.refiner._program import MARGIN, PRICE, Aim, Model, solve
+from kerfpath.refiner._rates import Rates
+from kerfpath.search import Metric, ObjectiveKind
+
+__all__ = ["Descent", "Stand"]
+
+MOST_PROGRAMS = 60
+"""Of one descent; it ends long before where it converges."""
+CORRECTIONS = 3
+"""Times that a step is solved again through the joints it really led to, before it is shortened."""
+CONVERGED = 1e-4
+"""Relative gain that the model promises below which a descent has converged."""
+SMALLEST_RADIUS = 1e-7
+"""rad: no controller resolves a smaller change."""
+AWAY = 1e3
+"""1/rad: being out of a range counts for more than any share of a limit."""
+ENOUGH = 0.1
+"""Share of the gain promised that a step must bring to be taken."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Stand:
+    """A motion by its true kinematics.
+
+    Parameters
+    ----------
+    gamma : (K,) rad
+    q : (K, 6) rad
+        Joints, not wrapped.
+    cost : float
+    excess : float
+        Largest share of a limit in time, or of the cap, less one.
+    lost : float
+        What all intervals and nodes ask for beyond the limits in time, in shares of them.
+    outside : float rad
+        By how much a joint or a coupling is out of its range; negative inside.
+    """
+
+    gamma: Array
+    q: Array
+    cost: float
+    excess: float
+    lost: float
+    outside: float
+
+    @property
+    def admitted(self) -> bool:
+        """Every limit is kept."""
+        return self.excess <= 0 and self.outside <= 0
+
+    def value(self, aim: Aim) -> float:
+        """Return what is brought down: the excess, or the cost."""
+        away = AWAY * max(self.outside, 0)
+        if aim == "excess":
+            return self.excess + away
+        return self.cost + PRICE * self.lost + away if aim == "lost" else self.cost
+
+
+class _Step(NamedTuple):
+    """Where a step leads, if anywhere admissible; what the model promised; and what it took."""
+
+    to: Stand | None
+    promised: float
+    longest: float
+    programs: int
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Descent:
+    """What is minimised over gamma, and what holds it.
+
+    Parameters
+    ----------
+    curves : JointCurves
+    rates : Rates
+    limits : JointLimits
+    rotation : (6,) rad
+        How far a joint may turn away from where it begins.
+    weight : (6,) 1/rad
+    metric : str
+    objective : {"sum", "max"}
+    radius : float rad
+        Largest change of gamma in the first iteration.
+    cap : float
+        Largest distance that is allowed.
+    """
+
+    curves: JointCurves
+    rates: Rates
+    limits: JointLimits
+    rotation: Array
+    weight: Array
+    metric: Metric
+    objective: ObjectiveKind
+    radius: float
+    cap: float = np.inf
+
+    def stand(self, gamma: Array, near: Array) -> Stand:
+        """Return where `gamma` brings the joints; infinite where it is out of reach."""
+        q = self.curves.at(gamma, near)
+        if not np.isfinite(q).all():
+            return Stand(gamma=gamma, q=q, cost=np.inf, excess=np.inf, lost=np.inf, outside=np.inf)
+        excess = self.rates.excess(np.diff(q, axis=0))
+        if self.cap < np.inf:
+            longest = path_cost(np.diff(q, axis=0), self.weight, self.metric, "max")
+            excess = max(excess, longest / self.cap - 1)
+        return Stand(
+            gamma=gamma,
+            q=q,
+            cost=self.cost(q),
+            excess=excess,
+            lost=self.rates.lost(np.diff(q, axis=0)),
+            outside=self._outside(q),
+        )
+
+    def cost(self, q: Array) -> float:
+        """Return the objective (14) or (15) of joints (K, 6), not wrapped."""
+        return path_cost(np.diff(q, axis=0), self.weight, self.metric, self.objective)
+
+    def admitted(self, at: Stand) -> Stand:
+        """Return the first motion found that keeps every limit, or the one that breaks them least.
+
+        The cap, where there is one, is not a limit here.
+        """
+        return self._run(at, "excess", enough=0.0)[0]
+
+    def gentlest(self, at: Stand) -> Stand:
+        """Return the motion whose largest share of a limit is least."""
+        return self._run(at, "excess")[0]
+
+    def eased(self, at: Stand) -> Stand:
+        """Return a motion of little cost that asks for little beyond the limits, here and there."""
+        return self._run(at, "lost")[0]
+
+    def best(self, at: Stand) -> tuple[Stand, int]:
+        """Return the best motion found from an admissible one, and how many programs it took.
+
+        For a maximum, of those with the same the one with the least sum.
+        """
+        found, programs = self._run(at, self.objective)
+        if self.objective == "max":
+            tie = replace(self, objective="sum", cap=found.cost)
+            smooth, more = tie._run(tie.stand(found.gamma, found.q), "sum")
+            found, programs = self.stand(smooth.gamma, smooth.q), programs + more
+        return found, programs
+
+    def _run(self, at: Stand, aim: Aim, enough: float = -np.inf) -> tuple[Stand, int]:
+        """Go down in steps of at most a radius, which grows and shrinks as the model proves."""
+        radius, programs = self.radius, 0
+        while radius > SMALLEST_RADIUS and programs < MOST_PROGRAMS:
+            step = self._step(at, radius, aim)
+            programs += step.programs
+            if step.to is not None and step.promised <= CONVERGED * abs(at.value(aim)):
+                break
+            if step.to is not None and at.value(aim) - step.to.value(aim) > ENOUGH * step.promised:
+                at = step.to
+                if at.value(aim) <= enough:
+                    break
+                radius *= 2 if step.programs == 1 else 1
+            else:
+                radius = min(radius, step.longest) / 3
+        return at, programs
+
+    def _step(self, at: Stand, radius: float, aim: Aim) -> _Step:
+        """Solve the model, and again laid on where it led, until the true motion is admissible."""
+        model, promised, longest = self._model(at, radius), 0.0, radius
+        for programs in range(1, 2 + CORRECTIONS):
+            delta = solve(model, self.rates, aim)
+            if delta is None:
+                break
+            if programs == 1:
+                promised = at.value(aim) - self._modelled(model, delta, aim)
+            longest = float(np.abs(delta).max())
+            there = self.stand(at.gamma + delta, at.q)
+            soft = aim in ("excess", "lost")
+            if there.admitted or (soft and there.outside <= max(at.outside, 0)):
+                return _Step(there, promised, longest, programs)
+            if there.outside == np.inf:
+                break
+            model = self._model(there, radius)
+            model = replace(model, q=there.q - model.slope * delta[:, None])
+        return _Step(None, promised, longest, programs)
+
+    def _modelled(self, model: Model, delta: Array, aim: Aim) -> float:
+        q = model.q + model.slope * delta[:, None]
+        dq = np.diff(q, axis=0)
+        if aim == "excess":
+            return self.rates.excess(dq)
+        return self.cost(q) + (PRICE * self.rates.lost(dq) if aim == "lost" else 0.0)
+
+    def _model(self, at: Stand, radius: float) -> Model:
+        slope = self.curves.slope(at.gamma, at.q)
+        movable = np.asarray(
+            np.isfinite(slope).all(axis=1)
+        )  # at the edge of reach a node stays where it is
+        endless = self.limits.endless
+        return Model(
+            q=at.q,
+            slope=np.where(movable[:, None], slope, 0.0),
+            radius=np.where(movable, radius, 0.0),
+            lower=np.where(endless, -np.inf, self.limits.lower + MARGIN),
+            upper=np.where(endless, np.inf, self.limits.upper - MARGIN),
+            rotation=self.rotation - MARGIN,
+            rows=self.limits.rows,
+            row_lower=self.limits.row_lower + MARGIN,
+            row_upper=self.limits.row_upper - MARGIN,
+            weight=self.weight,
+            metric=self.metric,
+            cap=self.cap,
+        )
+
+    def _outside(self, q: Array) -> float:
+        limits = self.limits
+        beyond = np.where(limits.endless, -np.inf, np.maximum(limits.lower - q, q - limits.upper))
+        value = q @ limits.rows.T
+        over = np.maximum(limits.row_lower - value, value - limits.row_upper)
+        turned = np.abs(q - q[0]) - self.rotation
+        return float(max(beyond.max(), over.max(initial=-np.inf), turned.max()))

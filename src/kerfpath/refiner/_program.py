@@ -1,0 +1,213 @@
+"""The convex program of one step: limits and ranges linear in the change of gamma, costs convex.
+
+With q_k(gamma_k + delta_k) = q_k + J_k delta_k the limits (5) and (6) and the ranges of the joints
+are linear in delta, and the distances of (14) and (15) are convex: a linear program for the
+Manhattan and Chebychev metrics, a second-order cone program for the Euclidean one. The unknowns are
+x = delta / radius, so that all lie in [-1, 1].
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+from scipy import sparse
+
+from kerfpath._arrays import Array, Ints
+from kerfpath.refiner._rates import Rates
+from kerfpath.refiner._rows import Rows, Sparse, wide
+from kerfpath.search import Metric
+
+__all__ = ["MARGIN", "PRICE", "Aim", "Model", "solve"]
+
+Aim = Literal["sum", "max", "excess", "lost"]
+"""(14); (15); the largest share of the limits (5) and (6), whatever the distances; or (14) and, at
+`PRICE` each, what every interval and every node asks for beyond them."""
+
+PRICE = 100.0
+"""Price of once a limit beyond the limits, against distances that rarely come to 1 an interval."""
+
+MARGIN = 1e-8
+"""Share of a limit, or rad, that is kept free against rounding."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Model:
+    """The joints as linear functions of the change of gamma, and what they are held to.
+
+    Parameters
+    ----------
+    q, slope : (K, n) rad, rad/rad
+        Joints at no change, not wrapped, and their derivatives by gamma.
+    radius : (K,) rad
+        Largest change of gamma at each node.
+    lower, upper : (n,) rad
+        Ranges of the joints; infinite where there is none.
+    rotation : (n,) rad
+        How far a joint may turn away from where it begins; infinite where that is not limited.
+    rows, row_lower, row_upper : (m, n), (m,) rad, (m,) rad
+        Couplings.
+    weight : (n,) 1/rad
+    metric : str
+    cap : float
+        Largest distance that is allowed; infinite: any.
+    """
+
+    q: Array
+    slope: Array
+    radius: Array
+    lower: Array
+    upper: Array
+    rotation: Array
+    rows: Array
+    row_lower: Array
+    row_upper: Array
+    weight: Array
+    metric: Metric
+    cap: float
+
+
+def solve(model: Model, rates: Rates, aim: Aim) -> Array | None:
+    """Return the best change of gamma (K,) rad by the linear model; None where there is none."""
+    K = len(model.q)
+    rows = Rows(K)
+    dq, D = np.diff(model.q, axis=0), _increments(model)
+    beyond = None
+    if aim in ("excess", "lost"):
+        beyond = rows.new(1 if aim == "excess" else len(rates.tau) + len(rates.span))
+    _limits(rows, dq, D, rates, beyond)
+    _ranges(rows, model)
+    for sign in (1.0, -1.0):
+        rows.hold(sign * sparse.eye_array(K, format="csr"), np.ones(K))
+    cost = np.zeros(K) if aim == "excess" else _cost(rows, dq, D, model, minimax=aim == "max")
+    if beyond is not None:
+        price = (1.0 if aim == "excess" else PRICE) * beyond.sum(axis=0)
+        cost = np.pad(cost, (0, rows.variables - len(cost)))
+        cost[: len(price)] += price
+    equal = None
+    if rates.periodic:
+        ends = [0, K - 1]
+        equal = _matrix(model.radius[ends] * (1, -1), np.zeros(2, np.int64), np.array(ends), (1, K))
+    x = rows.solve(cost, equal)
+    return None if x is None else np.clip(x[:K], -1, 1) * model.radius
+
+
+def _matrix(values: Array, row: Ints, column: Ints, shape: tuple[int, int]) -> Sparse:
+    return sparse.csr_array((values, (row, column)), shape=shape)
+
+
+def _scaled(factors: Array, matrix: Sparse) -> Sparse:
+    """Multiply the rows of a matrix by factors."""
+    return (sparse.diags_array(factors) @ matrix).tocsr()
+
+
+def _less(rows: Sparse, one: Sparse) -> Sparse:
+    """Subtract a single row from each of the rows; it has no fewer unknowns than they."""
+    return wide(rows, one.shape[1]) - sparse.csr_array(np.ones((rows.shape[0], 1))) @ one
+
+
+def _increments(model: Model) -> Sparse:
+    """Slopes ((K-1) n, K) of the increments, edge after edge."""
+    K, n = model.q.shape
+    slope, row = model.slope * model.radius[:, None], np.arange((K - 1) * n)
+    values = np.concatenate([slope[1:].ravel(), -slope[:-1].ravel()])
+    column = np.concatenate([row // n + 1, row // n])
+    return _matrix(values, np.tile(row, 2), column, (len(row), K))
+
+
+def _limits(rows: Rows, dq: Array, D: Sparse, rates: Rates, beyond: Sparse | None) -> None:
+    """Hold (5) and (6), up to a share beyond them where that is unknown.
+
+    One unknown for all, or one for each interval and then each node, none of these negative.
+    """
+    edges, n = dq.shape
+    owner = np.zeros(edges + len(rates.span), np.int64)
+    if beyond is not None and beyond.shape[0] > 1:
+        owner = np.arange(len(owner))
+        rows.hold(-beyond, np.zeros(len(owner)))
+    V = _scaled(np.repeat(1 / rates.tau, n), D)
+    joints = np.arange(n)
+    before, after = ((joints + n * at[:, None]).ravel() for at in (rates.before, rates.after))
+    A = _scaled(np.repeat(1 / rates.span, n), V[after] - V[before])
+    for value, slope, limit, of in (
+        (rates.velocities(dq), V, rates.velocity, owner[:edges]),
+        (rates.accelerations(dq), A, rates.acceleration, owner[edges:]),
+    ):
+        share = (value / limit).ravel()
+        per_share = _scaled(1 / np.tile(limit, len(value)), slope)
+        for sign in (1.0, -1.0):
+            if beyond is None:
+                rows.at_most(sign * share, sign * per_share, 1 - MARGIN)
+            else:
+                spread = beyond[np.repeat(of, n)]
+                rows.hold(wide(sign * per_share, rows.variables) - spread, 1 - sign * share)
+
+
+def _ranges(rows: Rows, model: Model) -> None:
+    """Hold the ranges of joints and of couplings."""
+    K, n = model.q.shape
+    slope = model.slope * model.radius[:, None]
+    node = np.repeat(np.arange(K), n)
+    one = _matrix(slope.ravel(), np.arange(K * n), node, (K * n, K))
+    rows.at_most(model.q.ravel(), one, np.tile(model.upper, K))
+    rows.at_most(-model.q.ravel(), -one, np.tile(-model.lower, K))
+    if np.isfinite(model.rotation).any():
+        away = one - sparse.vstack([one[:n]] * K, format="csr")
+        for sign in (1.0, -1.0):
+            turned = sign * (model.q - model.q[0]).ravel()
+            rows.at_most(turned, sign * away, np.tile(model.rotation, K))
+    for row, lower, upper in zip(model.rows, model.row_lower, model.row_upper, strict=True):
+        both = sparse.diags_array(slope @ row).tocsr()
+        rows.at_most(model.q @ row, both, upper)
+        rows.at_most(-(model.q @ row), -both, -lower)
+
+
+def _cost(rows: Rows, dq: Array, D: Sparse, model: Model, minimax: bool) -> Array:
+    """Return the coefficients of what is minimised: the sum of the distances, or the largest."""
+    lengths, constant = _lengths(rows, dq, D, model)
+    if model.cap < np.inf:
+        rows.hold(lengths, model.cap - constant)
+    if not minimax:
+        return np.asarray(lengths.sum(axis=0))
+    largest = rows.new(1)
+    rows.hold(_less(lengths, largest), -constant)
+    return np.asarray(largest.sum(axis=0))
+
+
+def _lengths(rows: Rows, dq: Array, D: Sparse, model: Model) -> tuple[Sparse, Array]:
+    """Return the distances rho from above, as lengths (K-1, any) @ x + constant (K-1,)."""
+    edges, n = dq.shape
+    value = (model.weight * dq).ravel()
+    slope, edge = _scaled(np.tile(model.weight, edges), D), np.repeat(np.arange(edges), n)
+    reach = abs(slope).sum(axis=1)
+    if model.metric == "manhattan":
+        # Where no step turns a joint round, its absolute value is linear.
+        turns = np.flatnonzero(np.abs(value) <= reach)
+        sign = np.sign(value)
+        sign[turns] = 0.0
+        total = _matrix(sign, edge, np.arange(edges * n), (edges, edges * n))
+        part = rows.new(len(turns))
+        _absolute(rows, value[turns], slope[turns], part)
+        parts = _matrix(
+            np.ones(len(turns)), edge[turns], np.arange(len(turns)), (edges, len(turns))
+        )
+        return wide(total @ slope, rows.variables) + parts @ part, total @ value
+    length = rows.new(edges)
+    if model.metric == "chebychev":
+        # A joint that stays below another's least cannot be the largest.
+        least = np.maximum(np.abs(value) - reach, 0).reshape(edges, n).max(axis=1)
+        can = np.flatnonzero(np.abs(value) + reach >= least[edge])
+        _absolute(rows, value[can], slope[can], length[edge[can]])
+    else:
+        blocks = sparse.vstack([length, wide(slope, rows.variables)], format="csr")
+        parts_of = edges + np.arange(edges * n).reshape(edges, n)
+        order = np.column_stack([np.arange(edges), parts_of]).ravel()
+        rows.cone(blocks[order], np.append(np.zeros(edges), value)[order], n + 1)
+    return length, np.zeros(edges)
+
+
+def _absolute(rows: Rows, value: Array, slope: Sparse, above: Sparse) -> None:
+    """Hold |value + slope x| <= above x."""
+    rows.hold(wide(slope, rows.variables) - above, -value)
+    rows.hold(-wide(slope, rows.variables) - above, value)

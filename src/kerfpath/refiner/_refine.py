@@ -1,0 +1,277 @@
+"""refine(): a plan off the grid, gamma continuous, postures and turns as they are."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import Literal, NamedTuple
+
+import numpy as np
+from scipy.interpolate import CubicSpline
+
+from kerfpath._arrays import Array, scalar
+from kerfpath.contour import Contour
+from kerfpath.errors import InputError
+from kerfpath.plans import Plan, Proof
+from kerfpath.refiner._curves import JointCurves
+from kerfpath.refiner._descent import Descent, Stand
+from kerfpath.refiner._rates import Rates
+
+__all__ = ["Binding", "Refinement", "ease", "quicken", "refine"]
+
+MOST_INTERVALS = 10
+"""Times that the interval is shortened; each gets nearer to the least by its square."""
+SAME_INTERVAL = 1e-4
+"""Relative change of the interval below which it is the least."""
+
+FIRST_STEPS = 2
+"""Grid steps that gamma may move by in the first iteration; what is gained sets it from then on."""
+SAME_NODE = 1e-6
+"""m: a node of a finer contour counts as one of the plan's up to this distance."""
+
+
+class Binding(NamedTuple):
+    """What is used up: which limit of which joint (0-based) at which node."""
+
+    joint: int
+    node: int
+    limit: Literal["velocity", "acceleration"]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Refinement:
+    """What came of a refinement.
+
+    Parameters
+    ----------
+    plan : Plan
+        The refined plan; the one it began from where `done` is False.
+    done : bool
+        The refined plan keeps every limit by the true kinematics.
+    cost_before, cost_after : float
+        Objective of the motion it began from and of the plan.
+    programs : int
+        Convex programs solved.
+    statement : str
+        What was done, or what could not be done and why.
+    """
+
+    plan: Plan
+    done: bool
+    cost_before: float
+    cost_after: float
+    programs: int
+    statement: str
+
+
+def refine(
+    plan: Plan,
+    *,
+    nodes: Contour | None = None,
+    eta_v: float | None = None,
+    eta_a: float | None = None,
+) -> Refinement:
+    """Return the plan with gamma moved off its grid: better, or within limits the grid cannot meet.
+
+    Sequential convex programming on the true kinematics: (5), (6), the ranges of joints and of
+    couplings and a periodic closure are hard constraints of every iteration, and a motion is taken
+    only when, evaluated with the kinematics and not with the linear model, it keeps all of them.
+
+    Parameters
+    ----------
+    plan : Plan
+        It may break (5) or (6), as after a change of eta: the limits are met first, if they can be.
+    nodes : Contour, optional
+        The same contour divided more finely, every interval into the same number: the plan then
+        holds (5) and (6) at the shorter time step.
+    eta_v, eta_a : float, optional
+        Share of the velocity and acceleration limits; default: the plan's.
+
+    Raises
+    ------
+    InputError
+        Nodes that do not divide the plan's intervals evenly, values out of range.
+    """
+    settings = replace(
+        plan.settings,
+        eta_v=plan.settings.eta_v if eta_v is None else scalar(eta_v, "eta_v", above=0.0),
+        eta_a=plan.settings.eta_a if eta_a is None else scalar(eta_a, "eta_a", above=0.0),
+    )
+    asked = replace(plan, settings=settings)
+    if nodes is not None:
+        divided = _divided(asked, nodes)
+        if isinstance(divided, str):
+            return _unrefined(plan, divided)
+        asked = divided
+    descent, start = _descent(asked)
+    begun = start if start.admitted else descent.admitted(start)
+    if not begun.admitted:
+        return _unrefined(plan, _closest(descent, begun))
+    found, programs = descent.best(begun)
+    refined = _moved(asked, found)
+    grid_cost = plan.cost if plan.proof.grid_cost is None else plan.proof.grid_cost
+    proof = Proof(
+        optimal=plan.proof.optimal and start.admitted and found.cost <= grid_cost,
+        statement=f"{plan.proof.statement}; {_done(plan, asked, start, found)}",
+        grid_cost=grid_cost,
+    )
+    return Refinement(
+        plan=replace(refined, proof=proof),
+        done=True,
+        cost_before=start.cost,
+        cost_after=refined.cost,
+        programs=programs,
+        statement=proof.statement,
+    )
+
+
+def ease(plan: Plan) -> Plan:
+    """Return the plan with gamma moved so that little is asked for beyond the limits.
+
+    What every interval and every node asks for beyond them has a price; the rest is the cost.
+    """
+    descent, start = _descent(plan)
+    return _moved(plan, descent.eased(start))
+
+
+def quicken(plan: Plan) -> tuple[Plan, Binding]:
+    """Return the plan with gamma moved so that the interval between its nodes is the least.
+
+    All intervals change alike; also says where a limit is then used up. The cost is what it comes
+    to.
+    """
+    binding = Binding(0, 0, "velocity")
+    for _ in range(MOST_INTERVALS):
+        descent, start = _descent(plan)
+        found = descent.gentlest(start)
+        fast, sharp = descent.rates.shares(np.diff(found.q, axis=0))
+        shorter, binding = _binding(descent, fast, sharp)
+        plan = replace(_moved(plan, found), time=plan.time * shorter)
+        if shorter > 1 - SAME_INTERVAL:
+            break
+    return plan, binding
+
+
+def _binding(descent: Descent, fast: Array, sharp: Array) -> tuple[float, Binding]:
+    """Return the share of the interval that would do, and what asks for it."""
+    velocity, acceleration = float(fast.max()), float(np.sqrt(sharp.max(initial=0.0)))
+    if velocity >= acceleration:
+        edge, joint = np.unravel_index(np.argmax(fast), fast.shape)
+        return velocity, Binding(int(joint), int(edge) + 1, "velocity")
+    change, joint = np.unravel_index(np.argmax(sharp), sharp.shape)
+    return acceleration, Binding(int(joint), int(descent.rates.after[change]), "acceleration")
+
+
+def _done(plan: Plan, asked: Plan, start: Stand, found: Stand) -> str:
+    """Say what was done, and what it did to the cost."""
+    parts = (len(asked.q) - 1) // (len(plan.q) - 1)
+    what = "refined off the grid" if parts == 1 else f"held at {parts} parts of every interval"
+    if not start.admitted:
+        what = f"brought inside limits that it did not keep and {what}"
+    return f"{what}: cost {plan.cost:.6g} to {found.cost:.6g}"
+
+
+def _unrefined(plan: Plan, why: str) -> Refinement:
+    return Refinement(
+        plan=plan,
+        done=False,
+        cost_before=plan.cost,
+        cost_after=plan.cost,
+        programs=0,
+        statement=f"not refined: {why}",
+    )
+
+
+def _descent(plan: Plan) -> tuple[Descent, Stand]:
+    """Return the task of refining a plan, and where it stands."""
+    velocity, acceleration = plan.robot.speed_limits()
+    settings = plan.settings
+    H = np.ascontiguousarray(plan.T_base_part @ plan.contour.frames(settings.frames))
+    descent = Descent(
+        curves=JointCurves(plan.robot, H, plan.T_flange_tip, plan.posture),
+        rates=Rates(
+            tau=np.diff(plan.time),
+            velocity=settings.eta_v * velocity,
+            acceleration=settings.eta_a * acceleration,
+            periodic=settings.closure == "periodic",
+        ),
+        limits=plan.robot.joint_limits(),
+        rotation=np.full(6, np.inf) if settings.rotation is None else settings.rotation,
+        weight=settings.weights,
+        metric=settings.metric,
+        objective=settings.objective,
+        radius=FIRST_STEPS * settings.gamma_step,
+    )
+    return descent, descent.stand(plan.gamma, _unwrapped(plan))
+
+
+def _unwrapped(plan: Plan) -> Array:
+    """Return the joints (K, 6) with endless joints turned on, not wrapped."""
+    return np.vstack([plan.q[:1], plan.q[:1] + np.cumsum(plan.increments, axis=0)])
+
+
+def _moved(plan: Plan, found: Stand) -> Plan:
+    """Return the plan with the motion found."""
+    turn = np.ceil((found.q - np.pi) / (2 * np.pi))
+    gamma = found.gamma - 2 * np.pi * np.ceil((found.gamma - np.pi) / (2 * np.pi))
+    turn[:, plan.robot.endless] = 0
+    wrapped = found.q - 2 * np.pi * np.ceil((found.q - np.pi) / (2 * np.pi))
+    return replace(
+        plan,
+        q=np.where(plan.robot.endless, wrapped, found.q),
+        gamma=gamma,
+        turn=turn.astype(np.int64),
+        cost=found.cost,
+    )
+
+
+def _divided(plan: Plan, nodes: Contour) -> Plan | str:
+    """Return the plan on finer nodes, gamma a spline through its own; or why that cannot be."""
+    K, parts = len(plan.contour), (len(nodes) - 1) // (len(plan.contour) - 1)
+    if len(nodes) != (K - 1) * parts + 1:
+        raise InputError(
+            f"nodes: expected a whole number of intervals for each of the plan's {K - 1}, got "
+            f"{len(nodes) - 1}; resample the contour with count={(K - 1) * (parts + 1) + 1}"
+        )
+    own = slice(None, None, parts)
+    off = float(np.linalg.norm(nodes.points[own] - plan.contour.points, axis=1).max())
+    if off > SAME_NODE:
+        raise InputError(
+            f"nodes: the plan's nodes are not among them (off by {off * 1e3:.3g} mm); resample the "
+            "contour that the plan's was sampled from"
+        )
+    kind, index = plan.settings.frames, np.arange(len(nodes)) / parts
+    x = nodes.frames(kind)[own, :3, :2]
+    before = plan.contour.frames(kind)[:, :3, 0]
+    twist = np.arctan2((x[:, :, 1] * before).sum(1), (x[:, :, 0] * before).sum(1))
+    coarse = np.arange(K)
+    changes = np.flatnonzero(np.diff(plan.posture))
+    if changes.size:
+        return f"the posture changes after node {changes[0]}, an interval that cannot be divided"
+    if parts == 1:
+        return plan
+    gamma = CubicSpline(coarse, np.unwrap(plan.gamma + twist))(index)
+    near = np.stack([np.interp(index, coarse, q) for q in _unwrapped(plan).T], axis=1)
+    return replace(
+        plan,
+        contour=nodes,
+        q=near,
+        gamma=gamma,
+        posture=np.repeat(plan.posture[:1], len(nodes)),
+        turn=np.zeros((len(nodes), 6), np.int64),
+        time=np.interp(index, coarse, plan.time),
+    )
+
+
+def _closest(descent: Descent, at: Stand) -> str:
+    """Say which limit the motion that breaks them least still breaks, and where."""
+    if at.outside == np.inf:
+        return "the motion leaves the reach of its posture between the nodes"
+    rates = descent.rates
+    fast, sharp = rates.shares(np.diff(at.q, axis=0))
+    if at.outside > 0:
+        return f"a joint stays out of its range by {np.degrees(at.outside):.3g} deg"
+    _, worst = _binding(descent, fast, sharp)
+    return (
+        f"the {worst.limit} of joint {worst.joint + 1} at node {worst.node} could not be brought "
+        f"below {1 + at.excess:.4f} of its limit"
+    )

@@ -1,0 +1,71 @@
+"""Rows and cones of a convex program, collected block by block and handed to Clarabel."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import clarabel
+import numpy as np
+from scipy import sparse
+
+from kerfpath._arrays import Array
+
+__all__ = ["Rows", "Sparse", "wide"]
+
+Sparse = Any  # scipy's stubs tell csr from csc and array from matrix, which nothing here needs
+SOLVED = (clarabel.SolverStatus.Solved, clarabel.SolverStatus.AlmostSolved)
+
+
+class Rows:
+    """The constraints of a program whose first `boxed` unknowns lie in [-1, 1]."""
+
+    def __init__(self, boxed: int) -> None:
+        self.variables = boxed
+        self._flat: list[tuple[Sparse, Array]] = []
+        self._cones: list[tuple[Sparse, Array, int]] = []
+
+    def new(self, count: int) -> Sparse:
+        """Add `count` unknowns, free ones; return them as rows of the identity."""
+        first, self.variables = self.variables, self.variables + count
+        place = np.arange(count), np.arange(first, self.variables)
+        return sparse.csr_array((np.ones(count), place), shape=(count, self.variables))
+
+    def hold(self, slope: Sparse, bound: Array) -> None:
+        """Add slope x <= bound."""
+        self._flat.append((slope, bound))
+
+    def at_most(self, value: Array, slope: Sparse, bound: Array | float) -> None:
+        """Add value + slope x <= bound over boxed unknowns, without the rows that always hold."""
+        kept = np.flatnonzero(value + abs(slope).sum(axis=1) > bound)
+        self.hold(slope[kept], (bound - value)[kept])
+
+    def cone(self, slope: Sparse, value: Array, size: int) -> None:
+        """Hold, of every `size` rows of slope x + value, the first above the length of the rest."""
+        self._cones.append((slope, value, size))
+
+    def solve(self, cost: Array, equal: Sparse | None) -> Array | None:
+        """Minimise cost x with equal x = 0; None where the solver finds no optimum."""
+        zero = [] if equal is None else [(equal, np.zeros(equal.shape[0]))]
+        cones = [(-slope, value) for slope, value, _ in self._cones]
+        blocks = [(wide(a, self.variables), b) for a, b in zero + self._flat + cones]
+        kinds: list[Any] = [clarabel.ZeroConeT(len(b)) for _, b in zero]
+        kinds.append(clarabel.NonnegativeConeT(sum(len(b) for _, b in self._flat)))
+        for _, value, size in self._cones:
+            kinds += [clarabel.SecondOrderConeT(size)] * (len(value) // size)
+        settings = clarabel.DefaultSettings()
+        settings.verbose = False
+        solver = clarabel.DefaultSolver(
+            sparse.csc_matrix((self.variables, self.variables)),
+            np.pad(cost, (0, self.variables - len(cost))),
+            sparse.csc_matrix(sparse.vstack([a for a, _ in blocks])),
+            np.concatenate([b for _, b in blocks]),
+            kinds,
+            settings,
+        )
+        found = solver.solve()
+        return np.array(found.x) if found.status in SOLVED else None
+
+
+def wide(rows: Sparse, variables: int) -> Sparse:
+    """Return the rows over more unknowns, the further ones with coefficient zero."""
+    return sparse.csr_array((rows.data, rows.indices, rows.indptr), (rows.shape[0], variables))

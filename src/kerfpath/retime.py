@@ -1,0 +1,259 @@
+"""The dip: keep the commanded speed wherever the limits allow, and slow down elsewhere.
+
+The path is fixed, and each interval of it may take longer than commanded. In the interval times tau
+the limits as the audit measures them are velocity bounds, |dq_k| / tau_k <= v, and, where two
+intervals meet,
+
+    dq_{k+1} / tau_{k+1} - dq_k / tau_k <= a (tau_k + tau_{k+1}) / 2
+
+for either sign. A positive term is convex in 1 / tau; a negative one is not, and its tangent takes
+its place: an inner approximation, so that every solution keeps the limits and the next one is never
+slower (the convex-concave procedure).
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import clarabel
+import numpy as np
+from numpy.typing import ArrayLike
+from scipy import sparse
+
+from kerfpath._arrays import Array, Ints, floats, freeze, positive
+from kerfpath.errors import InputError
+from kerfpath.plans import Feed
+
+__all__ = ["feed", "retime"]
+
+SLACK = 1e-9
+"""Relative slack on the limits that the result keeps: rounding."""
+MARGIN = 1e-7
+"""Share of the acceleration that the solver does not get, so that its tolerance breaks no limit."""
+SNAP = 1e-6
+"""Relative excess over the least time that counts as none, where the limits agree."""
+GAIN = 1e-5
+"""Relative gain in total time below which the procedure has arrived."""
+ITERATIONS = 50
+"""At most: each about halves how much too slow the start is, and the last ones are few."""
+
+
+class _Rows(NamedTuple):
+    """Limits b / tau[after] - a / tau[before] <= (tau[before] + tau[after]) / 2."""
+
+    before: Ints
+    after: Ints
+    a: Array
+    b: Array
+
+    def excess(self, tau: Array) -> Array:
+        """Return, row by row, the left side over the right one."""
+        left = self.b / tau[self.after] - self.a / tau[self.before]
+        return 2 * left / (tau[self.before] + tau[self.after])
+
+
+def retime(
+    dq: ArrayLike,
+    dt: ArrayLike,
+    velocity: ArrayLike,
+    acceleration: ArrayLike,
+    *,
+    periodic: bool = False,
+) -> Array:
+    """Return the interval times of least sum, none below `dt`, that keep the limits.
+
+    The result keeps them to 1e-9 relative; it is a local optimum, to about 1e-4 of the total time.
+    Where the limits leave an interval free, its time is `dt` exactly.
+
+    Parameters
+    ----------
+    dq : (K-1, n) rad
+        Joint increments along the path, endless joints the short way.
+    dt : float or (K-1,) s
+        Commanded time of each interval.
+    velocity, acceleration : (n,) rad/s, rad/s^2
+        Limits that may be used: eta is in them.
+    periodic : bool
+        The last interval is followed by the first; else the ends are reached and left at speed.
+
+    Returns
+    -------
+    tau : (K-1,) s
+
+    Raises
+    ------
+    InputError
+        Arrays that do not fit each other, NaN, limits or times that are not positive.
+    """
+    dq, dt, velocity, acceleration = _inputs(dq, dt, velocity, acceleration)
+    least = np.maximum(dt, (np.abs(dq) / velocity).max(axis=1, initial=0.0))
+    rows = _rows(dq / acceleration, least, periodic)
+    tau = _stretched(rows, least)
+    if np.array_equal(tau, least):
+        return freeze(tau)
+    inner = rows._replace(a=rows.a / (1 - MARGIN), b=rows.b / (1 - MARGIN))
+    tau = _stretched(inner, least)
+    for _ in range(ITERATIONS):
+        solved = _stretched(inner, np.maximum(_improved(inner, least, tau), least))
+        gain = 1 - solved.sum() / tau.sum()
+        tau = solved if gain > 0 else tau
+        if gain < GAIN:
+            break
+    return freeze(_snapped(rows, least, tau))
+
+
+def feed(
+    tau: ArrayLike,
+    dt: ArrayLike,
+    dq: ArrayLike,
+    velocity: ArrayLike,
+    acceleration: ArrayLike,
+    length: ArrayLike,
+    *,
+    periodic: bool = False,
+) -> Feed:
+    """Return where the times `tau` keep the commanded speed and what slows them where not.
+
+    Parameters
+    ----------
+    tau : (K-1,) s
+        As `retime` returns it.
+    dt, dq, velocity, acceleration, periodic
+        As given to `retime`.
+    length : (K-1,) m
+        Length of the path in each interval.
+
+    Raises
+    ------
+    InputError
+        As `retime`.
+    """
+    dq, dt, velocity, acceleration = _inputs(dq, dt, velocity, acceleration)
+    tau = positive(tau, "tau", dt.shape)
+    length = floats(length, "length", dt.shape)
+    at_speed = tau <= dt * (1 + SLACK)
+    full = float(length[at_speed].sum() / length.sum()) if length.any() else float(at_speed.mean())
+    if at_speed.all():
+        return Feed(full=full, slowest=1.0, node=-1, joint=-1, limit=None)
+    k = int(np.argmin(dt / tau))
+    speed = np.abs(dq[k] / tau[k]) / velocity
+    change = np.zeros_like(speed)
+    for before, after in zip(*_meetings(len(dq), periodic), strict=True):
+        if k in (before, after):
+            rate = (dq[after] / tau[after] - dq[before] / tau[before]) / acceleration
+            change = np.maximum(change, np.abs(rate) * 2 / (tau[before] + tau[after]))
+    fast = speed.max() >= change.max()
+    return Feed(
+        full=full,
+        slowest=float(dt[k] / tau[k]),
+        node=k,
+        joint=int(np.argmax(speed if fast else change)),
+        limit="velocity" if fast else "acceleration",
+    )
+
+
+def _inputs(
+    dq: ArrayLike, dt: ArrayLike, velocity: ArrayLike, acceleration: ArrayLike
+) -> tuple[Array, Array, Array, Array]:
+    dq = floats(dq, "dq", (None, None))
+    intervals, n = dq.shape
+    if intervals == 0 or n == 0:
+        raise InputError(f"dq: expected at least one interval and one joint, got shape {dq.shape}")
+    if np.ndim(dt) == 0:
+        dt = np.full(intervals, dt)
+    return (
+        dq,
+        positive(dt, "dt", (intervals,)),
+        positive(velocity, "velocity", (n,)),
+        positive(acceleration, "acceleration", (n,)),
+    )
+
+
+def _meetings(intervals: int, periodic: bool) -> tuple[Ints, Ints]:
+    """Return the intervals before and after each node where two meet."""
+    before = np.arange(intervals if periodic and intervals > 1 else intervals - 1)
+    return before, (before + 1) % intervals
+
+
+def _rows(step: Array, least: Array, periodic: bool) -> _Rows:
+    """Return the acceleration limits that can bind; step (K-1, n) s^2 is dq over acceleration.
+
+    Of the rows of one node, the one with the larger b and the smaller a implies the other.
+    """
+    before, after = _meetings(len(step), periodic)
+    a = np.hstack([step[before], -step[before]])
+    b = np.hstack([step[after], -step[after]])
+    early, late = least[before, None], least[after, None]
+    kept = np.maximum(b, 0) / late + np.maximum(-a, 0) / early > (early + late) / 2
+    number = np.arange(a.shape[1])
+    for i in number:
+        implied = (b >= b[:, [i]]) & (a <= a[:, [i]]) & kept
+        same = (b == b[:, [i]]) & (a == a[:, [i]])
+        kept[:, i] &= ~(implied & ~(same & (number >= i))).any(axis=1)
+    node, row = np.nonzero(kept)
+    return _Rows(before[node], after[node], a[node, row], b[node, row])
+
+
+def _stretched(rows: _Rows, tau: Array) -> Array:
+    """Return times that keep the rows: `tau`, as much slower throughout as the worst row asks."""
+    worst = rows.excess(tau).max(initial=0.0)
+    return tau if worst <= 1 + SLACK / 2 else tau * np.sqrt(worst)
+
+
+def _snapped(rows: _Rows, least: Array, tau: Array) -> Array:
+    """Set times that are the least but for rounding to the least, wherever the rows agree."""
+    near = tau <= least * (1 + SNAP)
+    while True:
+        snapped = np.where(near, least, tau)
+        broken = rows.excess(snapped) > 1 + SLACK / 2
+        blamed = np.zeros_like(near)
+        blamed[rows.before[broken]] = blamed[rows.after[broken]] = True
+        if not (blamed & near).any():
+            return snapped
+        near &= ~blamed
+
+
+def _improved(rows: _Rows, least: Array, tau: Array) -> Array:
+    """Return the quickest times under the rows made convex at `tau` (K-1,).
+
+    Variables: y = tau / unit, and x >= 1 / y where a row has it with a positive sign.
+    """
+    unit = float(np.mean(least))
+    y, a, b = tau / unit, rows.a / unit**2, rows.b / unit**2
+    to_y, to_x, most = _tangents(rows.before, y, np.maximum(-a, 0), np.maximum(a, 0))
+    to_y2, to_x2, most2 = _tangents(rows.after, y, np.maximum(b, 0), np.maximum(-b, 0))
+    used = np.flatnonzero((to_x + to_x2).sum(axis=0))
+    m, each = len(used), sparse.eye_array(len(y), format="csc")
+    # (x + y, x - y, 2) in the cone of order two: x y >= 1.
+    of_y = [to_y + to_y2, -each, sparse.kron(each[:, used].T, np.array([[-1.0], [1.0], [0.0]]))]
+    of_x = [
+        (to_x + to_x2)[:, used],
+        sparse.csc_array((len(y), m)),
+        sparse.kron(sparse.eye_array(m), np.array([[-1.0], [-1.0], [0.0]])),
+    ]
+    settings = clarabel.DefaultSettings()
+    settings.verbose = False
+    settings.max_threads = 1
+    solution = clarabel.DefaultSolver(
+        sparse.csc_matrix((len(y) + m, len(y) + m)),
+        np.repeat([1.0, 0.0], [len(y), m]),
+        sparse.csc_matrix(sparse.hstack([sparse.vstack(of_y), sparse.vstack(of_x)])),
+        np.concatenate([most + most2, -least / unit, np.tile([0.0, 0.0, 2.0], m)]),
+        [clarabel.NonnegativeConeT(len(a) + len(y)), *[clarabel.SecondOrderConeT(3)] * m],
+        settings,
+    ).solve()
+    found = np.array(solution.x)[: len(y)] * unit
+    return found if np.isfinite(found).all() else tau
+
+
+def _tangents(
+    interval: Ints, y: Array, plus: Array, minus: Array
+) -> tuple[sparse.csc_array, sparse.csc_array, Array]:
+    """Return plus / y - minus / y - y / 2 of one interval a row, as (to_y) y + (to_x) x - most.
+
+    The tangent of -1 / y at y0 is y / y0^2 - 2 / y0.
+    """
+    row, at, shape = np.arange(len(interval)), y[interval], (len(interval), len(y))
+    to_y = sparse.csc_array((minus / at**2 - 0.5, (row, interval)), shape=shape)
+    to_x = sparse.csc_array((plus, (row, interval)), shape=shape)
+    return to_y, to_x, 2 * minus / at

@@ -1,0 +1,210 @@
+"""Where no path keeps the limits all along: the fewest interruptions, and the cheapest such plan.
+
+A piece of an admissible path is itself admissible. So a plan that reaches as far as any path can
+before each interruption (the greedy reach) never falls behind another one with as many, and its
+number is the least. From the front the reach says which node interruption i lies before at the
+latest, from the back which at the earliest, and these spans of nodes do not overlap.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from kerfpath._arrays import Array, Bools, Ints, freeze
+from kerfpath.kernels.search import Layers, Objective
+from kerfpath.search._exact import Best, best_path, dead_end, layers_reached
+from kerfpath.search._layers import (
+    backwards,
+    broken_edge,
+    empty_layer,
+    narrowest_key,
+    sorted_layers,
+)
+from kerfpath.search._problem import Metric, ObjectiveKind, checked
+
+__all__ = ["InterruptedPath", "Piece", "interrupted_path"]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Piece:
+    """What is cut without interruption: one vertex for each of several successive layers.
+
+    Parameters
+    ----------
+    first : int
+        Node it begins at.
+    index : (m,) int
+        Vertex of layers first to first + m - 1, 0-based inside its layer; m >= 2 unless K = 1.
+    """
+
+    first: int
+    index: Ints
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class InterruptedPath:
+    """A path in pieces: each begins at the node where the one before ends, at any vertex of it.
+
+    Parameters
+    ----------
+    pieces : tuple of Piece
+    cost : float
+        Objective (14) or (15) over all pieces, vertex costs included; a node that is in two pieces
+        is visited in both.
+    optimal : bool
+        True: proved to have the fewest interruptions, and of all such plans the least cost.
+    """
+
+    pieces: tuple[Piece, ...]
+    cost: float
+    optimal: bool
+
+    @property
+    def interruptions(self) -> int:
+        """Number of times that the cut is interrupted."""
+        return len(self.pieces) - 1
+
+
+def interrupted_path(
+    q: ArrayLike,
+    start: ArrayLike,
+    *,
+    dt: float,
+    velocity: ArrayLike,
+    acceleration: ArrayLike,
+    endless: ArrayLike | None = None,
+    vertex_cost: ArrayLike | None = None,
+    weights: ArrayLike | None = None,
+    metric: Metric = "manhattan",
+    objective: ObjectiveKind = "sum",
+    eta_v: float = 1.0,
+    eta_a: float = 1.0,
+) -> InterruptedPath:
+    """Return the cheapest of the plans with the fewest interruptions, exactly.
+
+    At an interruption the laser goes off at a node, the robot moves to any vertex of the same node
+    (or stops where it is), and the cut goes on from there as a path begins: (6) is not tested
+    across. Every edge between neighbouring nodes is cut. The moves between cost nothing; the node
+    is visited before and after, and its vertex costs count for both. Of several plans with the same
+    maximum, the one with the least sum.
+
+    Parameters
+    ----------
+    q, start, dt, velocity, acceleration, endless, vertex_cost, weights, metric, objective, eta_v, \
+eta_a
+        As in `shortest_path`.
+
+    Raises
+    ------
+    NoFeasiblePath
+        No number of interruptions helps: a layer is empty, or no edge between two neighbouring
+        layers keeps (5). `node` is the last one before.
+    InputError
+        As `shortest_path`.
+    """
+    q, start, endless, aim = checked(
+        q,
+        start,
+        dt=dt,
+        velocity=velocity,
+        acceleration=acceleration,
+        endless=endless,
+        vertex_cost=vertex_cost,
+        weights=weights,
+        metric=metric,
+        objective=objective,
+        eta_v=eta_v,
+        eta_a=eta_a,
+    )
+    key, window, circular = narrowest_key(q, start, aim.velocity, endless)
+    layers, order = sorted_layers(q, start, key, window, circular, endless)
+    aim = aim._replace(vertex_cost=freeze(aim.vertex_cost[order]))
+    last = _reach(layers, aim)
+    first = np.zeros(1, np.int64) if len(last) == 1 else _first(q, start, endless, aim)
+    layers, aim, nodes = _in_stages(layers, aim, first, last)
+    found = best_path(layers, aim)
+    assert isinstance(found, Best), "a plan with this number of interruptions has been found"
+    return InterruptedPath(pieces=_pieces(layers, nodes, found.path), cost=found.cost, optimal=True)
+
+
+def _reach(layers: Layers, aim: Objective) -> Ints:
+    """Return the farthest node that can be cut with 0, 1, 2... interruptions, up to the last one.
+
+    Raises
+    ------
+    NoFeasiblePath
+        From some node on nothing can be cut.
+    """
+    K, k = len(layers.start) - 1, 0
+    if layers.start[1] == 0:
+        raise empty_layer(0)
+    reached: list[int] = []
+    while not reached or k < K - 1:
+        rest = layers._replace(start=layers.start[k:])
+        edges = layers_reached(rest, aim) - 1
+        if edges == 0 and K > 1:
+            if layers.start[k + 1] == layers.start[k + 2]:
+                raise empty_layer(k + 1)
+            raise broken_edge(k + 1, dead_end(rest, aim).counts, proved=True)
+        k += edges
+        reached.append(k)
+    return np.array(reached)
+
+
+def _first(q: Array, start: Ints, endless: Bools, aim: Objective) -> Ints:
+    """Return the first node from which the end is cut with as few interruptions as are left.
+
+    (5) and (6) hold for a path and its reverse alike: it is the reach from the last layer back.
+    """
+    q, start = backwards(q, start)
+    key, window, circular = narrowest_key(q, start, aim.velocity, endless)
+    layers, _ = sorted_layers(q, start, key, window, circular, endless)
+    free = aim._replace(vertex_cost=freeze(np.zeros(len(q))))
+    return (len(start) - 2 - _reach(layers, free))[::-1]
+
+
+def _in_stages(
+    layers: Layers, aim: Objective, first: Ints, last: Ints
+) -> tuple[Layers, Objective, Ints]:
+    """Lay out, one after the other, the layers first[i]..last[i] that piece i can go through.
+
+    Where the layers of two pieces are the same nodes, a path may break off in the one and begin
+    anew in the other. Returns the graph, what is asked of it, and the node of each of its layers.
+    """
+    nodes = np.concatenate([np.arange(a, b + 1) for a, b in zip(first, last, strict=True)])
+    begin = np.concatenate([[0], np.cumsum(last + 1 - first)])
+    sizes = np.diff(layers.start)[nodes]
+    start = np.concatenate([[0], np.cumsum(sizes)])
+    shift = layers.start[nodes] - start[:-1]
+    onwards = np.repeat(np.append(shift[1:], 0), sizes)
+    order = np.arange(start[-1]) + np.repeat(shift, sizes)
+    low, high = layers.low[order] - onwards, layers.high[order] - onwards
+    after = np.full(len(nodes), -1)
+    for i in range(1, len(first)):
+        a, b = first[i], last[i - 1]
+        after[begin[i] : begin[i] + b + 1 - a] = np.arange(begin[i] - 1 - (b - a), begin[i])
+        # No edge leads from the last layer of a piece to the first of the next.
+        seam = slice(start[begin[i] - 1], start[begin[i]])
+        low[seam] = high[seam] = 0
+    staged = layers._replace(
+        q=np.ascontiguousarray(layers.q[:, order]),
+        start=freeze(start),
+        rank=layers.rank[order],
+        low=low,
+        high=high,
+        after=after,
+    )
+    return staged, aim._replace(vertex_cost=freeze(aim.vertex_cost[order])), nodes
+
+
+def _pieces(layers: Layers, nodes: Ints, path: Ints) -> tuple[Piece, ...]:
+    """Part a path through the stages, -1 where it skips a layer, into its pieces."""
+    visited = np.flatnonzero(path >= 0)
+    again = nodes[visited[1:]] == nodes[visited[:-1]]
+    return tuple(
+        Piece(first=int(nodes[part[0]]), index=freeze(layers.rank[path[part]]))
+        for part in np.split(visited, np.flatnonzero(again) + 1)
+    )

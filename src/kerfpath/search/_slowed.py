@@ -1,0 +1,196 @@
+"""The path to be slowed down where none keeps the commanded node interval everywhere."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from kerfpath._arrays import Array, Bools, Ints, freeze, scalar
+from kerfpath.kernels import exact, to_go
+from kerfpath.kernels import search as kernel
+from kerfpath.kernels.metric import increments
+from kerfpath.kernels.states import EVERY
+from kerfpath.search._exact import FIRST_GAP, NO_SEAM, ROOM, ROUNDING, UNLIMITED
+from kerfpath.search._layers import empty_layer, narrowest_key, sorted_layers
+from kerfpath.search._problem import Metric, checked
+
+__all__ = ["SlowedPath", "slowed_path"]
+
+FIRST_STRETCH = 2.0
+"""Steps that take longer than this many node intervals are left out at first; it doubles."""
+CORNER = 0.1
+"""Node intervals of lost time whose price gets through where there is no corner."""
+AROUND = 32
+"""Layers before and behind a corner in which a path prepares for it and recovers."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class SlowedPath:
+    """One vertex per layer, what the path costs, and where it cannot keep the node interval.
+
+    Parameters
+    ----------
+    index : (K,) int
+        Vertex of each layer, 0-based inside its layer.
+    cost : float
+        Distances, vertex costs and the price of the time lost; proved to be the least.
+    lost : (K-1,) node intervals
+        Time that each step asks for on its own, beyond the one it has.
+    """
+
+    index: Ints
+    cost: float
+    lost: Array
+
+
+def slowed_path(
+    q: ArrayLike,
+    start: ArrayLike,
+    *,
+    dt: float,
+    velocity: ArrayLike,
+    acceleration: ArrayLike,
+    endless: ArrayLike | None = None,
+    vertex_cost: ArrayLike | None = None,
+    weights: ArrayLike | None = None,
+    metric: Metric = "manhattan",
+    eta_v: float = 1.0,
+    eta_a: float = 1.0,
+    penalty: float = 100.0,
+) -> SlowedPath:
+    """Return the path with the least sum of distances and of time lost, at `penalty` an interval.
+
+    A step asks for the time t in which (5) would hold on it, and (6) with the step before it: the
+    larger of |dq_i| / (eta_v q'max_i) and sqrt(|ddq_i| / (eta_a q''max_i)). It loses t / dt - 1
+    node intervals, if that is positive. The answer is exact: the second-order recursion with both
+    tests turned into prices. Where a path keeps dt throughout and the penalty outweighs the
+    distances, it is that of `shortest_path`.
+
+    Parameters
+    ----------
+    q, start, dt, velocity, acceleration, endless, vertex_cost, weights, metric, eta_v, eta_a
+        As in `shortest_path` with objective "sum".
+    penalty : float
+        Cost of one node interval of lost time.
+
+    Raises
+    ------
+    NoFeasiblePath
+        An empty layer; says which.
+    InputError
+        As `shortest_path`; a penalty that is not positive.
+    """
+    q, start, endless, aim = checked(
+        q,
+        start,
+        dt=dt,
+        velocity=velocity,
+        acceleration=acceleration,
+        endless=endless,
+        vertex_cost=vertex_cost,
+        weights=weights,
+        metric=metric,
+        objective="sum",
+        eta_v=eta_v,
+        eta_a=eta_a,
+    )
+    penalty = scalar(penalty, "penalty", above=0.0)
+    empty = np.flatnonzero(np.diff(start) == 0)
+    if empty.size:
+        raise empty_layer(int(empty[0]))
+    aim = aim._replace(timed=True, penalty=penalty)
+    index, least = _least(q, start, endless, aim)
+    path = np.ascontiguousarray(q[start[:-1] + index])
+    return SlowedPath(index=freeze(index), cost=least, lost=freeze(_lost(path, endless, aim)))
+
+
+def _least(q: Array, start: Ints, endless: Bools, aim: kernel.Objective) -> tuple[Ints, float]:
+    """Return the best path, as vertices of each layer, and its cost.
+
+    Steps beyond `stretch` times the velocity are left out, but a step at the least price that any
+    of them has may lead from anywhere to anywhere. A best path without such a leap is the best of
+    all; else more steps are let in.
+    """
+    reach = np.where(endless, np.pi, np.ptp(q, axis=0))
+    every = float((reach / aim.velocity).max())
+    stretch = FIRST_STRETCH
+    while True:
+        bound = stretch * aim.velocity
+        leap = float((aim.weight * bound).min()) + aim.penalty * (stretch - 1)
+        key, width, circular = narrowest_key(q, start, bound, endless)
+        layers, order = sorted_layers(q, start, key, width, circular, endless)
+        stretched = aim._replace(
+            vertex_cost=freeze(aim.vertex_cost[order]),
+            velocity=freeze(bound),
+            stretch=stretch,
+            leap=leap if stretch < every else np.inf,
+        )
+        path, cost = _best(layers, stretched)
+        if path[0] >= 0:
+            return layers.rank[path], cost
+        stretch *= 2
+
+
+def _best(layers: kernel.Layers, aim: kernel.Objective) -> tuple[Ints, float]:
+    """Let the bound grow until the recursion comes through; return the path and its cost."""
+    K, h = len(layers.start) - 1, np.empty(len(layers.low))
+    to_go.cost_to_go(layers, aim, np.ones(len(h), np.bool_), h)
+    _add_corners(layers, aim, h)
+    least = float((aim.vertex_cost + h)[: layers.start[1]].min())
+    bound = least * (1 + ROUNDING)
+    while (reached := exact.recursion(layers, aim, h, bound, NO_SEAM, ROOM, EVERY)).best[-1] < 0:
+        gap = max(2 * (bound - least), FIRST_GAP * least)
+        bound = max(least + gap, reached.lowest * (1 + ROUNDING))
+    if not reached.recorded:
+        bound = reached.cost * (1 + ROUNDING)
+        reached = exact.recursion(layers, aim, h, bound, NO_SEAM, UNLIMITED, EVERY)
+    path = np.empty(K, np.int64)
+    exact.trace(layers, reached, path)
+    return path, float(reached.cost)
+
+
+def _add_corners(layers: kernel.Layers, aim: kernel.Objective, h: Array) -> None:
+    """Add to the first-order bound h (N,) what is lost at corners at least.
+
+    Measured by h, no step costs less than nothing. So what it takes at least to come through some
+    layers with (6), from any vertex to any other, is still to come wherever they all are, and the
+    prices of stretches of the path that share no step add up. A stretch is laid around each layer
+    that the recursion does not reach at a small price.
+    """
+    last, at = len(layers.start) - 2, 0
+    prices = []
+    while at < last:
+        stuck = at + _through(layers, aim, h, at, last, CORNER * aim.penalty).layers
+        if stuck > last:
+            break
+        first, at = max(stuck - AROUND, at), min(stuck + AROUND, last)
+        gap = CORNER * aim.penalty
+        while (reached := _through(layers, aim, h, first, at, gap)).best[-1] < 0:
+            gap = max(2 * gap, reached.lowest * (1 + ROUNDING))
+        prices.append((layers.start[first + 1], reached.cost))
+    for end, price in prices:
+        h[:end] += price
+
+
+def _through(
+    layers: kernel.Layers, aim: kernel.Objective, h: Array, first: int, last: int, gap: float
+) -> exact.Reached:
+    """Go through the layers first..last with all costs measured by h, for `gap` at most."""
+    enter, leave = (slice(layers.start[k], layers.start[k + 1]) for k in (first, last))
+    cost, rest = aim.vertex_cost.copy(), h.copy()
+    cost[enter] = np.where(h[enter] < np.inf, -h[enter], 0.0)
+    cost[leave] += h[leave]
+    rest[leave] = np.where(h[leave] < np.inf, 0.0, np.inf)
+    part = layers._replace(start=layers.start[first : last + 2])
+    return exact.recursion(part, aim._replace(vertex_cost=cost), rest, gap, NO_SEAM, 0, EVERY)
+
+
+def _lost(path: Array, endless: Bools, aim: kernel.Objective) -> Array:
+    """Return the time (K-1,) that each step asks for beyond its node interval, in intervals."""
+    dq = increments(path, endless)
+    time = (np.abs(dq) / aim.velocity).max(axis=1)
+    sharp = np.sqrt((np.abs(np.diff(dq, axis=0)) / aim.acceleration).max(axis=1))
+    time[1:] = np.maximum(time[1:], sharp)
+    return np.asarray(np.maximum(time - 1.0, 0.0))
