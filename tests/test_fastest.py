@@ -22,6 +22,12 @@ def instance(rng):
     return q, start, {k: o[k] for k in ("velocity", "acceleration", "endless", "eta_v", "eta_a")}
 
 
+def slack(dt, o):
+    """Return what the 1e-9 rad that shortest_path grants on both limits is in time."""
+    fast = 1e-9 / (o["eta_v"] * o["velocity"]).min()
+    return fast + 1e-9 / (2 * dt * (o["eta_a"] * o["acceleration"]).min())
+
+
 def test_the_interval_agrees_with_bisection_over_shortest_path():
     rng = np.random.default_rng(31)
     for _ in range(150):
@@ -40,10 +46,7 @@ def test_the_interval_agrees_with_bisection_over_shortest_path():
         for _ in range(40):
             middle = (low + high) / 2
             low, high = (low, middle) if feasible(middle) else (middle, high)
-        # shortest_path grants 1e-9 rad on both limits; what that is in time depends on the limits.
-        slack = 1e-9 / (o["eta_v"] * o["velocity"]).min()
-        slack += 1e-9 / (2 * found.dt * (o["eta_a"] * o["acceleration"]).min())
-        assert high == pytest.approx(found.dt, rel=1e-9, abs=2 * slack)
+        assert high == pytest.approx(found.dt, rel=1e-9, abs=2 * slack(found.dt, o))
 
 
 def test_the_path_keeps_the_interval_and_no_other_does_better():
@@ -57,6 +60,20 @@ def test_the_path_keeps_the_interval_and_no_other_does_better():
         for _ in range(20):
             other = q[[rng.integers(a_, b_) for a_, b_ in itertools.pairwise(start)]]
             assert found.dt <= interval_of(other, v, a, o["endless"]) * (1 + 1e-12)
+
+
+@pytest.mark.parametrize("share", [1.0, 3.0])
+def test_a_step_over_the_first_guess_is_not_lost(share):
+    # A search goes up to a guess of the interval and leaves out the steps that alone take longer.
+    rng = np.random.default_rng(34)
+    for _ in range(600):
+        q, start, o = instance(rng)
+        o["acceleration"] = share * o["acceleration"]
+        least = least_interval(q, start, **o).dt
+        less = least * (1 - 1e-6) - 2 * slack(least, o)
+        if less > 0:
+            with pytest.raises(NoFeasiblePath):
+                shortest_path(q, start, dt=less, **o)
 
 
 def test_what_binds_is_named():

@@ -10,19 +10,35 @@ import hashlib
 import os
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any, ParamSpec, TypeVar
+from typing import Any, ParamSpec, TypeVar, cast
 
 import numba
+import numpy as np
 import platformdirs
+from llvmlite import ir
+from numba.cpython.unsafe import numbers
+from numba.extending import intrinsic
 
-__all__ = ["CACHE", "VECTOR_FLAGS", "is_compiled", "jit", "jit_vector"]
+__all__ = [
+    "CACHE",
+    "VECTOR_FLAGS",
+    "either",
+    "is_compiled",
+    "jit",
+    "jit_inline",
+    "jit_vector",
+    "larger",
+    "smaller",
+    "trailing_zeros",
+]
 
 _P = ParamSpec("_P")
 _R = TypeVar("_R")
 
-VECTOR_FLAGS = {"nnan", "nsz", "reassoc", "contract"}
-"""Floating-point freedoms that let a reduction vectorise and keep infinity (no blanket fastmath).
-A kernel that takes them never meets NaN: the border refuses it."""
+VECTOR_FLAGS = {"nnan", "nsz"}
+"""Floating-point freedoms that let the least of many vectorise: no NaN, which the border refuses,
+and no care for the sign of zero. Infinity stays, and sums keep their order: the same to the bit,
+however many numbers an instruction takes."""
 
 
 def _cache_folder() -> Path:
@@ -48,12 +64,12 @@ def is_compiled() -> bool:
     return any(CACHE.rglob("*.nbi"))
 
 
-def _compiled(function: Callable[_P, _R], flags: set[str] | bool) -> Callable[_P, _R]:
+def _compiled(function: Callable[_P, _R], **options: Any) -> Callable[_P, _R]:
     config: Any = numba.config
     kept = config.CACHE_DIR
     config.CACHE_DIR = str(CACHE)
     try:
-        compiled: Callable[_P, _R] = numba.njit(cache=True, nogil=True, fastmath=flags)(function)
+        compiled: Callable[_P, _R] = numba.njit(cache=True, nogil=True, **options)(function)
     finally:
         config.CACHE_DIR = kept
     return compiled
@@ -61,9 +77,60 @@ def _compiled(function: Callable[_P, _R], flags: set[str] | bool) -> Callable[_P
 
 def jit(function: Callable[_P, _R]) -> Callable[_P, _R]:
     """Compile `function` with strict IEEE arithmetic; it releases the interpreter lock."""
-    return _compiled(function, False)
+    return _compiled(function)
+
+
+def jit_inline(function: Callable[_P, _R]) -> Callable[_P, _R]:
+    """Compile `function` as `jit` does, to become part of what calls it; it may make no array.
+
+    For what inner loops call. Handing over a tuple of arrays takes a hundred moves, and taking an
+    array out of one counts a reference, at twenty times the cost of a multiplication; without the
+    runtime that could make an array, nothing is counted.
+    """
+    return _compiled(function, forceinline=True, _nrt=False)
 
 
 def jit_vector(function: Callable[_P, _R]) -> Callable[_P, _R]:
-    """Compile `function` with `VECTOR_FLAGS`; for the innermost loops over bare arrays."""
-    return _compiled(function, VECTOR_FLAGS)
+    """Compile `function` as `jit_inline` does, with `VECTOR_FLAGS`; for the innermost loops.
+
+    They vectorise where no index is signed (it would count from the end if negative), where the
+    number of joints is a constant of the caller's, and where nothing jumps.
+    """
+    return _compiled(function, fastmath=VECTOR_FLAGS, forceinline=True, _nrt=False)
+
+
+def _of_two(name: str) -> Callable[[float, float], float]:
+    """Return the LLVM intrinsic `name` of two floats.
+
+    Python's min and max become comparisons, which LLVM does not take for a reduction and leaves
+    as they are, one number at a time; these vectorise. Of NaN they know nothing.
+    """
+
+    @intrinsic
+    def of_two(_context: Any, _a: Any, _b: Any) -> Any:
+        def code(_context: Any, builder: Any, _signature: Any, args: Any) -> Any:
+            double = ir.DoubleType()
+            kind = ir.FunctionType(double, [double, double])
+            return builder.call(builder.module.declare_intrinsic(name, [double], kind), args)
+
+        real = numba.types.float64
+        return real(real, real), code
+
+    made: Any = of_two
+    return cast("Callable[[float, float], float]", made)
+
+
+smaller = _of_two("llvm.minnum")
+"""The smaller of two floats, in loops that are to vectorise."""
+
+trailing_zeros = cast("Callable[[np.uint64], np.int64]", numbers.trailing_zeros)
+"""How many bits of an unsigned integer are 0 below the lowest 1."""
+
+larger = _of_two("llvm.maxnum")
+"""The larger of two floats, in loops that are to vectorise."""
+
+
+@jit_vector
+def either(condition: bool, a: float, b: float) -> float:
+    """Return a if the condition holds, else b; both are worked out, so that nothing jumps."""
+    return a if condition else b

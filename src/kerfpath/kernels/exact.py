@@ -13,19 +13,20 @@ bound on the cost, only states with d + h inside it are ever kept.
 from __future__ import annotations
 
 from math import sqrt
-from typing import Any, NamedTuple, TypeVar
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from kerfpath._arrays import Array, Ints
-from kerfpath.kernels._jit import jit
+from kerfpath.kernels._jit import jit, jit_inline
 from kerfpath.kernels.limits import (
     acceleration_excess,
     acceleration_time,
     velocity_excess,
     velocity_time,
 )
+from kerfpath.kernels.reach import fill_candidates
 from kerfpath.kernels.search import (
     Layers,
     Objective,
@@ -33,30 +34,13 @@ from kerfpath.kernels.search import (
     fill_increment,
     joined,
     late,
-    runs,
 )
+from kerfpath.kernels.states import Scratch, States, grown, in_order
 
 __all__ = ["Reached", "count_closing", "recursion", "trace"]
 
-_T = TypeVar("_T", bound="np.generic[Any]")
-
 LEAPT = -2
 """Parent of a state that a step beyond `aim.velocity` has led to, from anywhere."""
-
-
-class States(NamedTuple):
-    """The edges into one layer that are kept, by the vertex they lead to, cheapest first."""
-
-    vertex: Ints
-    """(S,): the vertex j that the edge leads to."""
-    d: Array
-    """(S,): cost of the best path that ends with this edge, vertex j included."""
-    dq: Array
-    """(S, n): increment along the edge."""
-    parent: Ints
-    """(S,): place, among the states of the layer before, of the edge that comes before."""
-    first: Ints
-    """(m+1,): states of vertex start[k] + i are first[i]:first[i+1]."""
 
 
 class Reached(NamedTuple):
@@ -83,13 +67,6 @@ class Reached(NamedTuple):
 
 
 @jit
-def _grown(old: NDArray[_T]) -> NDArray[_T]:
-    new = np.empty((2 * len(old), *old.shape[1:]), old.dtype)
-    new[: len(old)] = old
-    return new
-
-
-@jit
 def _begin(
     layers: Layers, aim: Objective, h: Array, bound: float, k: int, cost: float
 ) -> tuple[States, float]:
@@ -113,7 +90,7 @@ def _begin(
     return States(vertex[:count], d[:count], none, np.full(count, -1), first), lowest
 
 
-@jit
+@jit_inline
 def _cheapest(
     states: States,
     a: int,
@@ -137,7 +114,7 @@ def _cheapest(
     return -1, np.inf
 
 
-@jit
+@jit_inline
 def _quickest(
     states: States, a: int, b: int, aim: Objective, step: float, paid: float, dq: Array,
     rest: float, bound: float,
@@ -170,7 +147,7 @@ def _quickest(
     return best, best_d, over
 
 
-@jit
+@jit_inline
 def _braking_time(dq: Array, aim: Objective) -> float:
     """Least time that the change between dq and any step beyond `aim.velocity` asks for."""
     least = np.inf
@@ -181,8 +158,9 @@ def _braking_time(dq: Array, aim: Objective) -> float:
 
 @jit
 def _with_leaps(
-    aim: Objective, h: Array, bound: float, before: States, states: States, a: int, b: int
-) -> tuple[States, float]:
+    aim: Objective, h: Array, bound: float, before: States, states: States, a: int, b: int,
+    width: int,
+) -> tuple[States, float]:  # fmt: skip
     """Add to the states of vertices a..b-1 those that steps beyond `aim.velocity` may lead to.
 
     They cost no more than any such step from the states before, wherever from and to.
@@ -203,90 +181,105 @@ def _with_leaps(
         np.concatenate((states.parent, np.full(m, LEAPT))),
         states.first,
     )
-    return _sorted(together, a, b), lowest
+    return in_order(together, a, b, width), lowest
+
+
+@jit_inline
+def _fill_from(
+    layers: Layers, aim: Objective, h: Array, bound: float, seam: Array, k: int, states: States,
+    i: int, count: int, scratch: Scratch, out: States,
+) -> tuple[int, float]:  # fmt: skip
+    """Append the states that leave vertex i of layer k; their number so far, least cost dropped."""
+    a, b, p, lowest = states.first[i], states.first[i + 1], layers.start[k] + i, np.inf
+    if a == b:
+        return count, lowest
+    closes = len(seam) > 0 and k == len(layers.start) - 3
+    some, dq = fill_candidates(layers, aim, states, a, b, k, p, scratch), scratch.dq
+    for v in range(some):
+        j = scratch.vertex[v]
+        if h[j] == np.inf:
+            continue
+        step = joined(aim.minimax, distance(layers, aim, p, j), aim.vertex_cost[j])
+        if step == np.inf:
+            continue
+        f = joined(aim.minimax, joined(aim.minimax, states.d[a], step), h[j])
+        if f > bound:
+            lowest = min(lowest, f)
+            continue
+        fill_increment(layers, p, j, dq)
+        if closes and acceleration_excess(seam, dq, aim.acceleration) >= 0:
+            continue
+        if aim.timed:
+            paid = 0.0
+            if aim.penalty > 0:
+                paid = late(aim, aim.stretch * velocity_time(dq, aim.velocity))
+            s, cost, dropped = _quickest(states, a, b, aim, step + paid, paid, dq, h[j], bound)
+        else:
+            s, dropped = _cheapest(states, a, b, aim, step, dq, h[j], bound)
+            cost = joined(aim.minimax, states.d[s], step) if s >= 0 else np.inf
+        lowest = min(lowest, dropped)
+        if s >= 0:
+            out.vertex[count], out.parent[count], out.d[count] = j, s, cost
+            for x in range(len(dq)):
+                out.dq[count, x] = dq[x]
+            count += 1
+    return count, lowest
+
+
+@jit_inline
+def _fill_states(
+    layers: Layers, aim: Objective, h: Array, bound: float, seam: Array, k: int, states: States,
+    i: int, count: int, scratch: Scratch, out: States,
+) -> tuple[int, int, float]:  # fmt: skip
+    """Append what leaves vertex i of layer k and those after it, while there is room for one more.
+
+    Returns the vertex to go on with, the number of states so far and the least cost dropped.
+    """
+    lowest = np.inf
+    while i < len(states.first) - 1 and count + len(scratch.vertex) <= len(out.vertex):
+        count, dropped = _fill_from(layers, aim, h, bound, seam, k, states, i, count, scratch, out)
+        lowest, i = min(lowest, dropped), i + 1
+    return i, count, lowest
 
 
 @jit
 def _extend(
-    layers: Layers, aim: Objective, h: Array, bound: float, seam: Array, k: int, states: States
-) -> tuple[States, float]:
+    layers: Layers, aim: Objective, h: Array, bound: float, seam: Array, k: int, states: States,
+    width: int,
+) -> tuple[States, float]:  # fmt: skip
     """States of layer k + 1 from those of layer k, sorted; and the least cost dropped."""
-    n, count, lowest = len(layers.endless), 0, np.inf
-    vertex, parent = np.empty(256, np.int64), np.empty(256, np.int64)
-    d, dq = np.empty(256), np.empty((256, n))
-    step_dq = np.empty(n)
-    closes = len(seam) > 0 and k == len(layers.start) - 3
-    for i in range(len(states.first) - 1):
-        a, b, p = states.first[i], states.first[i + 1], layers.start[k] + i
-        if a == b:
-            continue
-        (low, high), (low2, high2) = runs(layers.start, layers.low, layers.high, k, p)
-        for v in range(low, high + high2 - low2):
-            j = v if v < high else v - high + low2
-            if h[j] == np.inf:
-                continue
-            step = joined(aim.minimax, distance(layers, aim, p, j), aim.vertex_cost[j])
-            if step == np.inf:
-                continue
-            f = joined(aim.minimax, joined(aim.minimax, states.d[a], step), h[j])
-            if f > bound:
-                lowest = min(lowest, f)
-                continue
-            fill_increment(layers, p, j, step_dq)
-            if closes and acceleration_excess(seam, step_dq, aim.acceleration) >= 0:
-                continue
-            if aim.timed:
-                paid = 0.0
-                if aim.penalty > 0:
-                    paid = late(aim, aim.stretch * velocity_time(step_dq, aim.velocity))
-                s, cost, dropped = _quickest(
-                    states, a, b, aim, step + paid, paid, step_dq, h[j], bound
-                )
-            else:
-                s, dropped = _cheapest(states, a, b, aim, step, step_dq, h[j], bound)
-                cost = joined(aim.minimax, states.d[s], step) if s >= 0 else np.inf
-            lowest = min(lowest, dropped)
-            if s < 0:
-                continue
-            if count == len(vertex):
-                vertex, parent, d, dq = _grown(vertex), _grown(parent), _grown(d), _grown(dq)
-            vertex[count], parent[count] = j, s
-            d[count], dq[count] = cost, step_dq
-            count += 1
-    unsorted = States(vertex[:count], d[:count], dq[:count], parent[:count], states.first)
-    return _sorted(unsorted, layers.start[k + 1], layers.start[k + 2]), lowest
-
-
-@jit
-def _sorted(states: States, a: int, b: int) -> States:
-    """Group states by their vertex a..b-1, cheapest first; ties keep the order of their making."""
-    first = np.zeros(b - a + 1, np.int64)
-    for j in states.vertex:
-        first[j - a + 1] += 1
-    first = np.cumsum(first)
-    place, order = first.copy(), np.empty(len(states.vertex), np.int64)
-    for s in np.argsort(states.d, kind="mergesort"):
-        i = states.vertex[s] - a
-        order[place[i]] = s
-        place[i] += 1
-    return States(
-        states.vertex[order], states.d[order], states.dq[order], states.parent[order], first
-    )
+    n, lowest = len(layers.endless), np.inf
+    begin, end, first = layers.start[k + 1], layers.start[k + 2], states.first
+    scratch = Scratch(np.empty(end - begin, np.int64), np.empty(n), np.empty(n), np.empty(n))
+    room = 2 * (end - begin)
+    vertex, parent = np.empty(room, np.int64), np.empty(room, np.int64)
+    out = States(vertex, np.empty(room), np.empty((room, n)), parent, first)
+    i = count = int(first[0])  # 0; a plain 0 would be a type of its own
+    while i < len(first) - 1:
+        if count + end - begin > room:
+            room *= 2
+            out = States(grown(out.vertex), grown(out.d), grown(out.dq), grown(out.parent), first)
+        i, count, dropped = _fill_states(
+            layers, aim, h, bound, seam, k, states, i, count, scratch, out
+        )
+        lowest = min(lowest, dropped)
+    unsorted = States(out.vertex[:count], out.d[:count], out.dq[:count], out.parent[:count], first)
+    return in_order(unsorted, begin, end, width), lowest
 
 
 @jit
 def _next(
     layers: Layers, aim: Objective, h: Array, bound: float, seam: Array, k: int, states: States,
-    least: Array,
+    least: Array, width: int,
 ) -> tuple[States, float]:  # fmt: skip
     """States of layer k + 1, also leapt to or beginning anew; and the least cost dropped.
 
     least (K,) is the least cost of a state of each layer so far.
     """
     a, b = layers.start[k + 1], layers.start[k + 2]
-    on, lowest = _extend(layers, aim, h, bound, seam, k, states)
+    on, lowest = _extend(layers, aim, h, bound, seam, k, states, width)
     if aim.leap < np.inf:
-        on, dropped = _with_leaps(aim, h, bound, states, on, a, b)
+        on, dropped = _with_leaps(aim, h, bound, states, on, a, b, width)
         lowest = min(lowest, dropped)
     if layers.after[k + 1] < 0:
         return on, lowest
@@ -298,17 +291,19 @@ def _next(
         np.concatenate((on.parent, anew.parent)),
         on.first,
     )
-    return _sorted(both, a, b), min(lowest, dropped)
+    return in_order(both, a, b, width), min(lowest, dropped)
 
 
 @jit
 def recursion(
-    layers: Layers, aim: Objective, h: Array, bound: float, seam: Array, room: int
+    layers: Layers, aim: Objective, h: Array, bound: float, seam: Array, room: int, width: int
 ) -> Reached:
     """Best path whose cost keeps `bound`, exactly, under (5) and (6).
 
     h (N,) is `cost_to_go`; seam (n,) is the increment that the last one must go on to by (6), or
     (0,). The states of all layers are recorded for `trace` as long as they are no more than `room`.
+    Of the states of each vertex the `width` cheapest are kept; with fewer than `EVERY` the path
+    found need not be the best.
     """
     K = len(layers.start) - 1
     offset, best, least = np.zeros(K + 1, np.int64), np.full(K, -1), np.full(K, np.inf)
@@ -323,7 +318,7 @@ def recursion(
         recorded = recorded and offset[k + 1] <= room
         if recorded:
             while offset[k + 1] > len(vertex):
-                vertex, parent = _grown(vertex), _grown(parent)
+                vertex, parent = grown(vertex), grown(parent)
             vertex[offset[k] : offset[k + 1]] = states.vertex
             parent[offset[k] : offset[k + 1]] = states.parent
         if size > 0:
@@ -331,7 +326,7 @@ def recursion(
             least[k] = states.d[best[k]]
         if k < K - 1:
             before = states
-            states, dropped = _next(layers, aim, h, bound, seam, k, states, least)
+            states, dropped = _next(layers, aim, h, bound, seam, k, states, least, width)
             lowest = min(lowest, dropped)
     return Reached(K, least[K - 1], lowest, best, offset, vertex, parent, states, recorded)
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from math import sqrt
 
 from kerfpath._arrays import Array
-from kerfpath.kernels._jit import jit
+from kerfpath.kernels._jit import jit_inline
 
 __all__ = [
     "LIMIT_TOLERANCE",
@@ -19,7 +19,7 @@ LIMIT_TOLERANCE = 1e-9
 """Slack on (5) and (6), rad: a thousandth of what any encoder resolves, far above rounding."""
 
 
-@jit
+@jit_inline
 def velocity_excess(dq: Array, bound: Array) -> int:
     """First joint with |q_k - q_{k-1}| > eta_v dq^(v), or -1: the test f_v (Eq. 5).
 
@@ -31,7 +31,7 @@ def velocity_excess(dq: Array, bound: Array) -> int:
     return -1
 
 
-@jit
+@jit_inline
 def acceleration_excess(dq: Array, dq_before: Array, bound: Array) -> int:
     """First joint with |q_k - 2 q_{k-1} + q_{k-2}| > eta_a dq^(a), or -1: the test f_a (Eq. 6).
 
@@ -43,7 +43,7 @@ def acceleration_excess(dq: Array, dq_before: Array, bound: Array) -> int:
     return -1
 
 
-@jit
+@jit_inline
 def velocity_time(dq: Array, velocity: Array) -> float:
     """Least node interval, s, in which (5) holds: largest |dq_i| / q'max_i; dq (n,) rad."""
     least = 0.0
@@ -52,7 +52,7 @@ def velocity_time(dq: Array, velocity: Array) -> float:
     return least
 
 
-@jit
+@jit_inline
 def acceleration_time(dq: Array, dq_before: Array, acceleration: Array) -> float:
     """Least node interval, s, in which (6) holds: largest sqrt(|ddq_i| / q''max_i).
 

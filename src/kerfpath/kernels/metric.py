@@ -7,7 +7,7 @@ from math import pi, sqrt
 import numpy as np
 
 from kerfpath._arrays import Array, Bools
-from kerfpath.kernels._jit import jit
+from kerfpath.kernels._jit import jit, jit_inline
 
 __all__ = [
     "CHEBYCHEV",
@@ -26,7 +26,7 @@ __all__ = [
 EUCLID, MANHATTAN, CHEBYCHEV = 0, 1, 2
 
 
-@jit
+@jit_inline
 def increment(dq: float, endless: bool) -> float:
     """Smallest representative of a joint difference, min over p of dq + 2 pi p (Eq. 13)."""
     return dq - 2.0 * pi * np.round(dq / (2.0 * pi)) if endless else dq

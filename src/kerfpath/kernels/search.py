@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 
 from kerfpath._arrays import Array, Bools, Ints
-from kerfpath.kernels._jit import jit
+from kerfpath.kernels._jit import jit, jit_inline
 from kerfpath.kernels.limits import LIMIT_TOLERANCE, acceleration_excess, velocity_excess
 from kerfpath.kernels.metric import EUCLID, MANHATTAN, increment
 
@@ -21,8 +21,10 @@ __all__ = [
     "Objective",
     "arrange",
     "closing_counts",
+    "count_within",
     "distance",
     "fill_increment",
+    "fill_key",
     "joined",
     "late",
     "path_planning",
@@ -75,10 +77,26 @@ class Objective(NamedTuple):
     """and a step beyond it costs this or more; infinite if there are none."""
 
 
-@jit
+@jit_inline
 def reduced(angle: float) -> float:
     """Bring an angle into (-pi, pi]."""
     return angle - 2.0 * pi * ceil((angle - pi) / (2.0 * pi))
+
+
+@jit
+def count_within(here: Array, there: Array, bound: Array, endless: Bools, out_count: Ints) -> None:
+    """Add to out_count (n,), joint by joint, the pairs of vertices within its bound; q (m, n)."""
+    for p in range(len(here)):
+        for j in range(len(there)):
+            for i in range(len(bound)):
+                out_count[i] += abs(increment(there[j, i] - here[p, i], endless[i])) <= bound[i]
+
+
+@jit
+def fill_key(q: Array, joint: int, endless: bool, out_key: Array) -> None:
+    """Fill the angle (N,) of one joint of q (N, n), an endless one brought into (-pi, pi]."""
+    for v in range(len(out_key)):
+        out_key[v] = reduced(q[v, joint]) if endless else q[v, joint]
 
 
 @jit
@@ -124,7 +142,7 @@ def windows(
             out_low[p], out_high[p] = (a, b) if every else (low, high)
 
 
-@jit
+@jit_inline
 def runs(
     start: Ints, low: Ints, high: Ints, k: int, p: int
 ) -> tuple[tuple[int, int], tuple[int, int]]:
@@ -134,7 +152,7 @@ def runs(
     return (start[k + 1], high[p]), (low[p], start[k + 2])
 
 
-@jit
+@jit_inline
 def distance(layers: Layers, aim: Objective, p: int, j: int) -> float:
     """Distance rho from vertex p to vertex j; infinite where (5) or the cap forbids it."""
     total = 0.0
@@ -154,41 +172,34 @@ def distance(layers: Layers, aim: Objective, p: int, j: int) -> float:
     return total if total <= aim.cap else np.inf
 
 
-@jit
+@jit_inline
 def joined(minimax: bool, a: float, b: float) -> float:
     """Costs put together: added by (14), or the larger by (15)."""
     return max(a, b) if minimax else a + b
 
 
-@jit
+@jit_inline
 def late(aim: Objective, time: float) -> float:
     """Price of a step that asks for `time` node intervals."""
     return aim.penalty * max(0.0, time - 1.0)
 
 
-@jit
+@jit_inline
 def fill_increment(layers: Layers, p: int, j: int, out_dq: Array) -> None:
     """Fill the joint increment (n,) from vertex p to vertex j."""
     for i in range(len(layers.endless)):
         out_dq[i] = increment(layers.q[i, j] - layers.q[i, p], layers.endless[i])
 
 
-@jit
+@jit_inline
 def _offer(
-    layers: Layers,
-    aim: Objective,
-    k: int,
-    p: int,
-    out_dist: Array,
-    out_before: Ints,
-    out_free: Array,
-) -> None:
+    layers: Layers, aim: Objective, k: int, p: int, dq: Array, dq_before: Array,
+    out_dist: Array, out_before: Ints, out_free: Array,
+) -> None:  # fmt: skip
     """Offer vertex p of layer k as predecessor to the vertices its edges lead to, step (2b).
 
-    out_free keeps the best offer whatever its acceleration.
+    out_free keeps the best offer whatever its acceleration; dq, dq_before (n,) are room to work in.
     """
-    n = len(layers.endless)
-    dq, dq_before = np.empty(n), np.empty(n)
     if k > 0:
         fill_increment(layers, out_before[p], p, dq_before)
     (a, b), (c, d) = runs(layers.start, layers.low, layers.high, k, p)
@@ -207,6 +218,23 @@ def _offer(
         out_dist[j], out_before[j] = cost, p
 
 
+@jit_inline
+def _step(
+    layers: Layers, aim: Objective, k: int, dq: Array, dq_before: Array,
+    out_dist: Array, out_before: Ints, out_free: Array,
+) -> tuple[bool, bool]:  # fmt: skip
+    """Step (2) from layer k to the next: whether any vertex was reached, and any turned away."""
+    for p in range(layers.start[k], layers.start[k + 1]):
+        if out_dist[p] < np.inf:
+            _offer(layers, aim, k, p, dq, dq_before, out_dist, out_before, out_free)
+    reached = turned_away = False
+    for j in range(layers.start[k + 1], layers.start[k + 2]):
+        turned_away |= out_free[j] < out_dist[j]
+        reached |= out_before[j] >= 0
+        out_dist[j] = joined(aim.minimax, out_dist[j], aim.vertex_cost[j])
+    return reached, turned_away
+
+
 @jit
 def path_planning(
     layers: Layers, aim: Objective, out_dist: Array, out_before: Ints
@@ -218,21 +246,16 @@ def path_planning(
     reached, and whether the greedy test ever turned away a better edge (if not, the recursion was
     exact).
     """
-    free, turned_away = np.full(len(layers.low), np.inf), False
-    for j in range(layers.start[1]):
-        out_dist[j] = aim.vertex_cost[j]
-    for k in range(1, len(layers.start) - 1):
-        for p in range(layers.start[k - 1], layers.start[k]):
-            if out_dist[p] < np.inf:
-                _offer(layers, aim, k - 1, p, out_dist, out_before, free)
-        reached = False
-        for j in range(layers.start[k], layers.start[k + 1]):
-            turned_away |= free[j] < out_dist[j]
-            reached |= out_before[j] >= 0
-            out_dist[j] = joined(aim.minimax, out_dist[j], aim.vertex_cost[j])
+    n, K, turned_away = len(layers.endless), len(layers.start) - 1, False
+    dq, dq_before, free = np.empty(n), np.empty(n), np.full(len(layers.low), np.inf)
+    first = layers.start[1]
+    out_dist[:first] = aim.vertex_cost[:first]
+    for k in range(K - 1):
+        reached, away = _step(layers, aim, k, dq, dq_before, out_dist, out_before, free)
+        turned_away |= away
         if not reached:
-            return k, turned_away
-    return len(layers.start) - 1, turned_away
+            return k + 1, turned_away
+    return K, turned_away
 
 
 @jit

@@ -10,13 +10,18 @@ from math import sqrt
 
 import numpy as np
 
-from kerfpath._arrays import Array, Bools, Ints
-from kerfpath.kernels._jit import jit, jit_vector
+from kerfpath._arrays import Array, Bools
+from kerfpath.kernels._jit import either, jit, jit_inline, jit_vector, larger, smaller
 from kerfpath.kernels.limits import LIMIT_TOLERANCE
 from kerfpath.kernels.metric import EUCLID, MANHATTAN
-from kerfpath.kernels.search import Layers, Objective, joined, runs
+from kerfpath.kernels.search import Layers, Objective
 
-__all__ = ["cost_to_go"]
+__all__ = ["LANES", "SIX", "cost_to_go"]
+
+LANES = 8
+"""Numbers that one instruction works on; runs are made whole multiples of it where they can be."""
+SIX = 6
+"""Joints of a robot arm; with a constant number of them the loop over them is written out."""
 
 
 @jit
@@ -26,78 +31,103 @@ def cost_to_go(layers: Layers, aim: Objective, allowed: Bools, out_h: Array) -> 
     Vertices that are not allowed, or from which no edges within (5) lead to the end, get infinity.
     """
     last, bound = len(layers.start) - 2, aim.velocity + LIMIT_TOLERANCE
+    slowness, tail = aim.stretch / aim.velocity, np.empty(len(layers.low))
     anew = np.full(last + 1, np.inf)  # least cost to go of a path that breaks off at the layer
-    c, tail = np.empty(np.max(np.diff(layers.start))), np.empty(len(layers.low))
-    time = np.empty(len(c))
-    for j in range(layers.start[last], layers.start[last + 1]):
-        out_h[j] = 0.0 if allowed[j] else np.inf
+    out_h[layers.start[last] :] = 0.0
     for k in range(last, -1, -1):
+        a, b = layers.start[k], layers.start[k + 1]
         if k < last:
-            _layer_to_go(
-                layers.q, layers.turn, bound, aim.weight, aim.metric, aim.cap, aim.minimax,
-                aim.penalty, aim.stretch / aim.velocity,
-                layers.start, layers.low, layers.high, k, tail, c, time, out_h,
-            )  # fmt: skip
+            _layer_to_go(layers, aim, bound, slowness, k, tail, out_h)
             if aim.leap < np.inf:
-                a, b, end = layers.start[k], layers.start[k + 1], layers.start[k + 2]
-                out_h[a:b] = np.minimum(out_h[a:b], aim.leap + tail[b:end].min())
-        least = np.inf
-        for p in range(layers.start[k], layers.start[k + 1]):
-            out_h[p] = min(out_h[p], anew[k]) if allowed[p] else np.inf
-            tail[p] = joined(aim.minimax, aim.vertex_cost[p], out_h[p])
-            least = min(least, tail[p])
+                out_h[a:b] = np.minimum(out_h[a:b], aim.leap + tail[b : layers.start[k + 2]].min())
+        least = _join(
+            aim.minimax, aim.vertex_cost[a:b], allowed[a:b], anew[k], out_h[a:b], tail[a:b]
+        )
         if layers.after[k] >= 0:
             anew[layers.after[k]] = least
 
 
 @jit_vector
+def _join(
+    minimax: bool, cost: Array, allowed: Bools, anew: float, out_h: Array, out_tail: Array
+) -> float:
+    """Close the vertices that are not allowed, and join what is to come with their own cost.
+
+    Returns the least of what has been joined.
+    """
+    least = np.inf
+    for v in range(len(cost)):
+        out_h[v] = smaller(out_h[v], anew) if allowed[v] else np.inf
+    for v in range(len(cost)):
+        out_tail[v] = either(minimax, larger(cost[v], out_h[v]), cost[v] + out_h[v])
+        least = smaller(least, out_tail[v])
+    return least
+
+
+@jit_inline
 def _layer_to_go(
-    q: Array, turn: Array, bound: Array, weight: Array, metric: int, cap: float, minimax: bool,
-    penalty: float, slowness: Array,
-    start: Ints, low: Ints, high: Ints, k: int, tail: Array, c: Array, time: Array, out_h: Array,
+    layers: Layers, aim: Objective, bound: Array, slowness: Array, k: int, tail: Array,
+    out_h: Array,
 ) -> None:  # fmt: skip
     """For each vertex p of layer k the least of its distance to a next vertex joined with its tail.
 
-    The innermost loops of the first-order problem, so over bare arrays and in one piece: handing
-    them to a function costs as much as a run of twenty vertices. Joint by joint, every loop
-    vectorises.
+    A run is lengthened to whole `LANES`: what it takes in breaks (5), or it would be in the run.
     """
-    for p in range(start[k], start[k + 1]):
-        best = np.inf
-        for a, b in runs(start, low, high, k, p):
-            m = b - a
-            c[:m] = 0.0
-            for i in range(len(q) if m else 0):
-                x, t, limit, w = q[i, p], turn[i], bound[i], weight[i]
-                if metric == MANHATTAN:
-                    for v in range(m):
-                        y = min(abs(x - q[i, a + v]), t - abs(x - q[i, a + v]))
-                        c[v] += np.inf if y > limit else w * y
-                elif metric == EUCLID:
-                    for v in range(m):
-                        y = min(abs(x - q[i, a + v]), t - abs(x - q[i, a + v]))
-                        c[v] += np.inf if y > limit else w * y * w * y
-                else:
-                    for v in range(m):
-                        y = min(abs(x - q[i, a + v]), t - abs(x - q[i, a + v]))
-                        c[v] = max(c[v], np.inf if y > limit else w * y)
-            if metric == EUCLID or cap < np.inf:
-                for v in range(m):
-                    r = sqrt(c[v]) if metric == EUCLID else c[v]
-                    c[v] = r if r <= cap else np.inf
-            if penalty > 0:
-                time[:m] = 1.0
-                for i in range(len(q)):
-                    x, t, s = q[i, p], turn[i], slowness[i]
-                    for v in range(m):
-                        y = min(abs(x - q[i, a + v]), t - abs(x - q[i, a + v]))
-                        time[v] = max(time[v], s * y)
-                for v in range(m):
-                    c[v] += penalty * (time[v] - 1.0)
-            if minimax:
-                for v in range(m):
-                    best = min(best, max(c[v], tail[a + v]))
-            else:
-                for v in range(m):
-                    best = min(best, c[v] + tail[a + v])
-        out_h[p] = best
+    first, last = layers.start[k + 1], layers.start[k + 2]
+    for p in range(layers.start[k], layers.start[k + 1]):
+        a, b = layers.low[p], layers.high[p]
+        if a <= b:
+            m = min((b - a + LANES - 1) // LANES * LANES, last - first)
+            out_h[p] = _least(layers, aim, bound, slowness, p, min(a, last - m), m, tail)
+        else:
+            ahead = _least(layers, aim, bound, slowness, p, a, last - a, tail)
+            out_h[p] = min(ahead, _least(layers, aim, bound, slowness, p, first, b - first, tail))
+
+
+@jit_inline
+def _least(
+    layers: Layers,
+    aim: Objective,
+    bound: Array,
+    slowness: Array,
+    p: int,
+    a: int,
+    m: int,
+    tail: Array,
+) -> float:
+    """Least of the distances from vertex p to the vertices a..a+m-1, joined with their tails."""
+    none = aim.cap + np.inf  # infinity: a constant would be folded into jumps
+    if len(bound) == SIX:
+        return _least_of(
+            layers.q, layers.turn, bound, aim.weight, aim.metric, aim.cap, aim.minimax,
+            aim.penalty, slowness, p, a, m, tail, SIX, none,
+        )  # fmt: skip
+    return _least_of(
+        layers.q, layers.turn, bound, aim.weight, aim.metric, aim.cap, aim.minimax,
+        aim.penalty, slowness, p, a, m, tail, len(bound), none,
+    )  # fmt: skip
+
+
+@jit_vector
+def _least_of(
+    q: Array, turn: Array, bound: Array, weight: Array, metric: int, cap: float, minimax: bool,
+    penalty: float, slowness: Array, p: int, a: int, m: int, tail: Array, n: int, none: float,
+) -> float:  # fmt: skip
+    """As `_least`, of n joints: the innermost loop of the first-order problem.
+
+    The distance is that of `distance`, to the bit, in one straight line of code that vectorises.
+    """
+    best, begin = np.inf, np.uintp(a)
+    for v in range(np.uintp(m)):
+        j, r, time = begin + v, 0.0, 1.0
+        for i in range(n):
+            y = abs(q[i, p] - q[i, j])
+            y = smaller(y, turn[i] - y)
+            time = larger(time, slowness[i] * y)
+            y = either(y > bound[i], none, weight[i] * y)
+            longest = larger(r, y)
+            r = either(metric == MANHATTAN, r + y, either(metric == EUCLID, r + y * y, longest))
+        r = either(metric == EUCLID, sqrt(r), r)
+        r = either(r <= cap, r, none) + penalty * (time - 1.0)
+        best = smaller(best, either(minimax, larger(r, tail[j]), r + tail[j]))
+    return best

@@ -8,7 +8,8 @@ import numpy as np
 
 from kerfpath._arrays import Array, Bools, Ints
 from kerfpath.kernels import exact, to_go
-from kerfpath.kernels.search import Layers, Objective, path_planning
+from kerfpath.kernels.search import Layers, Objective
+from kerfpath.kernels.states import EVERY
 
 __all__ = [
     "NO_SEAM",
@@ -25,8 +26,10 @@ ROUNDING = 1e-12
 """Relative slack on a bound, so that rounding never drops the path that the bound came from."""
 FIRST_GAP = 1e-3
 """First growth of the bound over the first-order optimum, relative; it doubles from there."""
-WORTH_A_CEILING = 0.25
-"""States per vertex from which on the greedy path, as a ceiling, costs less than it saves."""
+NARROW = 2
+"""States of a vertex that the search for a good path keeps, whose cost is then a ceiling."""
+WORTH_A_CEILING = 0.1
+"""States per vertex from which on that search takes less time than it saves."""
 ROOM = 10_000_000
 """States that a search under a loose bound may remember: 80 MB."""
 UNLIMITED = 2**62
@@ -129,34 +132,25 @@ def _grow(
     least = float((np.maximum(enter, entry) if aim.minimax else enter + entry).min(initial=np.inf))
     if least == np.inf:
         return None
-    bound, greedy = max(least, floor) * (1 + ROUNDING), None
+    bound, good, sought = max(least, floor) * (1 + ROUNDING), np.inf, False
     while True:
-        reached = exact.recursion(layers, aim, h, bound, seam, ROOM)
+        reached = exact.recursion(layers, aim, h, bound, seam, ROOM, EVERY)
         if reached.best[-1] >= 0:
             break
         if reached.lowest == np.inf or reached.lowest > ceiling:
             return None
-        if greedy is None and reached.offset.max() > WORTH_A_CEILING * len(layers.low):
-            greedy = _greedy_cost(layers, aim, allowed, seam) * (1 + ROUNDING)
-        grown = least + max(2 * (bound - least), FIRST_GAP * least)
-        grown = grown if greedy is None else min(grown, greedy)
-        bound = max(grown, reached.lowest * (1 + ROUNDING))
+        if not sought and reached.offset.max() > WORTH_A_CEILING * len(layers.low):
+            good = exact.recursion(layers, aim, h, np.inf, seam, 0, NARROW).cost * (1 + ROUNDING)
+            sought = True
+        grown = good if good < np.inf else least + max(2 * (bound - least), FIRST_GAP * least)
+        bound = max(min(grown, ceiling), reached.lowest * (1 + ROUNDING))
     if not reached.recorded:
         # Once more at the tightest bound: few states are left to remember.
         bound = reached.cost * (1 + ROUNDING)
-        reached = exact.recursion(layers, aim, h, bound, seam, UNLIMITED)
+        reached = exact.recursion(layers, aim, h, bound, seam, UNLIMITED, EVERY)
     path = np.empty(len(layers.start) - 1, np.int64)
     exact.trace(layers, reached, path)
     return path, float(reached.cost)
-
-
-def _greedy_cost(layers: Layers, aim: Objective, allowed: Bools, seam: Array) -> float:
-    """Return a cost that some admissible path keeps, infinity if the greedy test finds none."""
-    if aim.timed or len(seam) or not allowed.all():
-        return np.inf
-    dist, before = np.full(len(layers.low), np.inf), np.full(len(layers.low), -1)
-    path_planning(layers, aim, dist, before)
-    return float(dist[layers.start[-2] :].min())
 
 
 def dead_end(layers: Layers, aim: Objective) -> Dead:
@@ -178,4 +172,4 @@ def layers_reached(layers: Layers, aim: Objective) -> int:
 def _as_far_as_any(layers: Layers, aim: Objective) -> exact.Reached:
     """Go as far as any admissible path goes, whatever it costs."""
     free = np.zeros(len(layers.low))
-    return exact.recursion(layers, aim, free, np.inf, NO_SEAM, 0)
+    return exact.recursion(layers, aim, free, np.inf, NO_SEAM, 0, EVERY)

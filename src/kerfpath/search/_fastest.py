@@ -110,12 +110,12 @@ def quickest(
     key, width, circular = narrowest_key(q, start, bound, endless)
     layers, _ = sorted_layers(q, start, key, width, circular, endless)
     aim = kernel.Objective(
-        weight=weight,
+        weight=freeze(weight),
         metric=CHEBYCHEV,
         minimax=True,
-        vertex_cost=np.zeros(len(q)),
-        velocity=bound,
-        acceleration=acceleration,
+        vertex_cost=freeze(np.zeros(len(q))),
+        velocity=freeze(bound),
+        acceleration=freeze(acceleration),
         cap=ceiling,
         timed=True,
     )

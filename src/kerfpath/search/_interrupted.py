@@ -121,7 +121,7 @@ eta_a
     )
     key, window, circular = narrowest_key(q, start, aim.velocity, endless)
     layers, order = sorted_layers(q, start, key, window, circular, endless)
-    aim = aim._replace(vertex_cost=aim.vertex_cost[order])
+    aim = aim._replace(vertex_cost=freeze(aim.vertex_cost[order]))
     last = _reach(layers, aim)
     first = np.zeros(1, np.int64) if len(last) == 1 else _first(q, start, endless, aim)
     layers, aim, nodes = _in_stages(layers, aim, first, last)
@@ -162,7 +162,7 @@ def _first(q: Array, start: Ints, endless: Bools, aim: Objective) -> Ints:
     q, start = backwards(q, start)
     key, window, circular = narrowest_key(q, start, aim.velocity, endless)
     layers, _ = sorted_layers(q, start, key, window, circular, endless)
-    free = aim._replace(vertex_cost=np.zeros(len(q)))
+    free = aim._replace(vertex_cost=freeze(np.zeros(len(q))))
     return (len(start) - 2 - _reach(layers, free))[::-1]
 
 
@@ -197,7 +197,7 @@ def _in_stages(
         high=high,
         after=after,
     )
-    return staged, aim._replace(vertex_cost=aim.vertex_cost[order]), nodes
+    return staged, aim._replace(vertex_cost=freeze(aim.vertex_cost[order])), nodes
 
 
 def _pieces(layers: Layers, nodes: Ints, path: Ints) -> tuple[Piece, ...]:

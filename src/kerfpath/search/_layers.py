@@ -22,6 +22,8 @@ __all__ = [
 
 _LAYERS_SAMPLED = 32
 """Layers looked at to choose the joint that sorts them: enough to rank the joints."""
+_VERTICES_SAMPLED = 16
+"""Vertices of each of them whose windows are counted."""
 
 
 def offsets(start: ArrayLike, vertices: int) -> Ints:
@@ -94,20 +96,16 @@ def backwards(q: Array, start: Ints) -> tuple[Array, Ints]:
 
 def narrowest_key(q: Array, start: Ints, bound: Array, endless: Bools) -> tuple[Array, float, bool]:
     """Choose the joint whose velocity window leaves the fewest vertices, to sort the layers by."""
-    pairs = np.zeros(q.shape[1])
     layers = np.unique(np.linspace(0, max(len(start) - 3, 0), _LAYERS_SAMPLED).astype(int))
+    pairs = np.zeros(q.shape[1], np.int64)
     for k in layers[layers + 2 < len(start)]:
-        here, there = (reduced(q[start[i] : start[i + 1]], endless) for i in (k, k + 1))
-        for i in range(q.shape[1]):
-            sorted_ = np.sort(there[:, i])
-            around = endless[i] and bound[i] < np.pi
-            reach = np.inf if endless[i] and not around else bound[i]
-            for shift in (-2 * np.pi, 0.0, 2 * np.pi) if around else (0.0,):
-                low = np.searchsorted(sorted_, here[:, i] + shift - reach, side="left")
-                high = np.searchsorted(sorted_, here[:, i] + shift + reach, side="right")
-                pairs[i] += (high - low).sum()
+        here, there = q[start[k] : start[k + 1]], q[start[k + 1] : start[k + 2]]
+        kernel.count_within(
+            here[:: len(here) // _VERTICES_SAMPLED + 1], there, bound, endless, pairs
+        )
     best = int(np.argmin(pairs))
-    key = reduced(q[:, [best]], endless[[best]])[:, 0]
+    key = np.empty(len(q))
+    kernel.fill_key(q, best, bool(endless[best]), key)
     # Twice the slack of (5): the key must never exclude what the test itself would pass.
     return key, float(bound[best] + 2 * LIMIT_TOLERANCE), bool(endless[best])
 

@@ -7,7 +7,7 @@ from typing import Literal, NamedTuple, get_args
 import numpy as np
 from numpy.typing import ArrayLike
 
-from kerfpath._arrays import Array, Bools, Ints, bools, floats, positive, scalar
+from kerfpath._arrays import Array, Bools, Ints, bools, floats, freeze, positive, scalar
 from kerfpath.errors import InputError
 from kerfpath.kernels import metric as metrics
 from kerfpath.kernels.search import Objective
@@ -83,12 +83,12 @@ def checked(
         raise InputError(f"weights: must not be negative, got {weight.tolist()}")
     cost = np.zeros(len(q)) if vertex_cost is None else vertex_cost
     aim = Objective(
-        weight=np.ascontiguousarray(weight),
+        weight=freeze(np.ascontiguousarray(weight)),
         metric=METRIC_CODES[metric],
         minimax=objective == "max",
         vertex_cost=floats(cost, "vertex_cost", (len(q),)),
-        velocity=scalar(eta_v, "eta_v", above=0.0) * velocity * dt,
-        acceleration=scalar(eta_a, "eta_a", above=0.0) * acceleration * dt**2,
+        velocity=freeze(scalar(eta_v, "eta_v", above=0.0) * velocity * dt),
+        acceleration=freeze(scalar(eta_a, "eta_a", above=0.0) * acceleration * dt**2),
         cap=np.inf,
         timed=False,
     )

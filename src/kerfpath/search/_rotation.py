@@ -108,7 +108,7 @@ def _best(problem: Problem, rotation: Array, *, closed: bool) -> tuple[Ints, flo
     key, window, circular = narrowest_key(q, start, aim.velocity, endless)
     layers, order = sorted_layers(q, start, key, window, circular, endless)
     layers = layers._replace(rank=place[order])
-    aim = aim._replace(vertex_cost=aim.vertex_cost[order])
+    aim = aim._replace(vertex_cost=freeze(aim.vertex_cost[order]))
     found = best_from_its_start(layers, aim, rotation, closed=closed)
     return None if found is None else (layers.rank[found.path], found.cost)
 

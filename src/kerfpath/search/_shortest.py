@@ -157,7 +157,7 @@ def shortest_path(
     else:
         key, window, circular = narrowest_key(q, start, aim.velocity, endless)
     layers, order = sorted_layers(q, start, key, window, circular, endless)
-    aim = aim._replace(vertex_cost=aim.vertex_cost[order])
+    aim = aim._replace(vertex_cost=freeze(aim.vertex_cost[order]))
     filled = int(np.argmin(np.diff(start))) if (np.diff(start) == 0).any() else len(start) - 1
     if filled == 0:
         raise empty_layer(0)
@@ -225,7 +225,7 @@ def _from_the_back(
         return len(sizes), None
     key, window, circular = narrowest_key(q, start, aim.velocity, endless)
     layers, _ = sorted_layers(q, start, key, window, circular, endless)
-    free = aim._replace(vertex_cost=np.zeros(len(q)))
+    free = aim._replace(vertex_cost=freeze(np.zeros(len(q))))
     found = dead_end(layers._replace(start=start[: filled + 1]), free)
     return len(sizes) - found.layers, freeze(layers.rank[found.reached])
 

@@ -11,6 +11,7 @@ from kerfpath._arrays import Array, Bools, Ints, freeze, scalar
 from kerfpath.kernels import exact, to_go
 from kerfpath.kernels import search as kernel
 from kerfpath.kernels.metric import increments
+from kerfpath.kernels.states import EVERY
 from kerfpath.search._exact import FIRST_GAP, NO_SEAM, ROOM, ROUNDING, UNLIMITED
 from kerfpath.search._layers import empty_layer, narrowest_key, sorted_layers
 from kerfpath.search._problem import Metric, checked
@@ -121,8 +122,8 @@ def _least(q: Array, start: Ints, endless: Bools, aim: kernel.Objective) -> tupl
         key, width, circular = narrowest_key(q, start, bound, endless)
         layers, order = sorted_layers(q, start, key, width, circular, endless)
         stretched = aim._replace(
-            vertex_cost=aim.vertex_cost[order],
-            velocity=bound,
+            vertex_cost=freeze(aim.vertex_cost[order]),
+            velocity=freeze(bound),
             stretch=stretch,
             leap=leap if stretch < every else np.inf,
         )
@@ -139,12 +140,12 @@ def _best(layers: kernel.Layers, aim: kernel.Objective) -> tuple[Ints, float]:
     _add_corners(layers, aim, h)
     least = float((aim.vertex_cost + h)[: layers.start[1]].min())
     bound = least * (1 + ROUNDING)
-    while (reached := exact.recursion(layers, aim, h, bound, NO_SEAM, ROOM)).best[-1] < 0:
+    while (reached := exact.recursion(layers, aim, h, bound, NO_SEAM, ROOM, EVERY)).best[-1] < 0:
         gap = max(2 * (bound - least), FIRST_GAP * least)
         bound = max(least + gap, reached.lowest * (1 + ROUNDING))
     if not reached.recorded:
         bound = reached.cost * (1 + ROUNDING)
-        reached = exact.recursion(layers, aim, h, bound, NO_SEAM, UNLIMITED)
+        reached = exact.recursion(layers, aim, h, bound, NO_SEAM, UNLIMITED, EVERY)
     path = np.empty(K, np.int64)
     exact.trace(layers, reached, path)
     return path, float(reached.cost)
@@ -183,7 +184,7 @@ def _through(
     cost[leave] += h[leave]
     rest[leave] = np.where(h[leave] < np.inf, 0.0, np.inf)
     part = layers._replace(start=layers.start[first : last + 2])
-    return exact.recursion(part, aim._replace(vertex_cost=cost), rest, gap, NO_SEAM, 0)
+    return exact.recursion(part, aim._replace(vertex_cost=cost), rest, gap, NO_SEAM, 0, EVERY)
 
 
 def _lost(path: Array, endless: Bools, aim: kernel.Objective) -> Array:

@@ -1,0 +1,95 @@
+"""The states of the exact recursion in one layer, and how they are kept and put in order."""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple, TypeVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from kerfpath._arrays import Array, Ints
+from kerfpath.kernels._jit import jit
+
+__all__ = ["EVERY", "Scratch", "States", "grown", "in_order"]
+
+_T = TypeVar("_T", bound="np.generic[Any]")
+
+EVERY = 2**62
+"""States of a vertex that are kept: all."""
+LONG = 32
+"""Edges into one vertex from which on sorting them one by one takes longer than by halves."""
+
+
+class States(NamedTuple):
+    """The edges into one layer that are kept, by the vertex they lead to, cheapest first."""
+
+    vertex: Ints
+    """(S,): the vertex j that the edge leads to."""
+    d: Array
+    """(S,): cost of the best path that ends with this edge, vertex j included."""
+    dq: Array
+    """(S, n): increment along the edge."""
+    parent: Ints
+    """(S,): place, among the states of the layer before, of the edge that comes before."""
+    first: Ints
+    """(m+1,): states of vertex start[k] + i are first[i]:first[i+1]."""
+
+
+class Scratch(NamedTuple):
+    """Room to work in, made once a layer."""
+
+    vertex: Ints
+    """(m,): vertices of the next layer."""
+    dq: Array
+    """(n,): an increment."""
+    to: Array
+    """(n,): middle of the box,"""
+    by: Array
+    """(n,): and its half width."""
+
+
+@jit
+def grown(old: NDArray[_T]) -> NDArray[_T]:
+    """Return a copy with room for as many again."""
+    new = np.empty((2 * len(old), *old.shape[1:]), old.dtype)
+    new[: len(old)] = old
+    return new
+
+
+@jit
+def in_order(states: States, a: int, b: int, width: int) -> States:
+    """Group states by their vertex a..b-1, cheapest first; ties keep the order of their making.
+
+    Of each vertex only the `width` cheapest are kept.
+    """
+    vertex, d = states.vertex, states.d
+    first = np.zeros(b - a + 1, np.int64)
+    for j in vertex:
+        first[j - a + 1] += 1
+    first = np.cumsum(first)
+    place, order = first.copy(), np.empty(len(vertex), np.int64)
+    for s, j in enumerate(vertex):
+        order[place[j - a]] = s
+        place[j - a] += 1
+    for i in range(b - a):
+        begin, end = first[i], first[i + 1]
+        if end - begin > LONG:
+            group = order[begin:end]
+            group[:] = group[np.argsort(d[group], kind="mergesort")]
+            continue
+        for v in range(begin + 1, end):
+            s = order[v]
+            while v > begin and d[order[v - 1]] > d[s]:
+                order[v] = order[v - 1]
+                v -= 1
+            order[v] = s
+    count = 0
+    for i in range(b - a):
+        begin, end = first[i], first[i + 1]
+        first[i] = count
+        for v in range(begin, min(end, begin + width)):
+            order[count] = order[v]
+            count += 1
+    first[b - a] = count
+    order = order[:count]
+    return States(vertex[order], d[order], states.dq[order], states.parent[order], first)

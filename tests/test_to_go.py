@@ -1,0 +1,77 @@
+"""The first-order bound: to the bit what the scalar recursion gives, and vectorised."""
+
+import re
+
+import numba
+import numpy as np
+import pytest
+
+import naive
+from kerfpath.kernels import to_go
+from kerfpath.kernels.search import Objective, distance
+from kerfpath.search._layers import narrowest_key, sorted_layers
+
+
+def graph(rng, **sizes):
+    q, start, o = naive.random_instance(rng, **sizes)
+    bound = o["eta_v"] * o["velocity"] * o["dt"]
+    key, width, circular = narrowest_key(q, start, bound, o["endless"])
+    layers, order = sorted_layers(q, start, key, width, circular, o["endless"])
+    aim = Objective(
+        weight=o["weights"],
+        metric=0,
+        minimax=False,
+        vertex_cost=o["vertex_cost"][order],
+        velocity=bound,
+        acceleration=bound,
+        cap=np.inf,
+        timed=False,
+    )
+    return layers, aim
+
+
+def scalar(layers, aim, allowed):
+    """Fill the bound by all pairs of neighbouring layers."""
+    h = np.where(allowed, 0.0, np.inf)
+    start = layers.start
+    for k in range(len(start) - 3, -1, -1):
+        for p in range(start[k], start[k + 1]):
+            best = np.inf
+            for j in range(start[k + 1], start[k + 2]):
+                rho, tail = distance(layers, aim, p, j), aim.vertex_cost[j]
+                if aim.minimax:
+                    best = min(best, max(rho, max(tail, h[j])))
+                else:
+                    best = min(best, rho + (tail + h[j]))
+            h[p] = best if allowed[p] else np.inf
+    return h
+
+
+@pytest.mark.parametrize("minimax", [False, True])
+@pytest.mark.parametrize("metric", range(3))
+def test_the_bound_is_that_of_the_scalar_recursion_to_the_bit(metric, minimax):
+    rng = np.random.default_rng(31)
+    finite = 0
+    for capped in (False, True) * 15:
+        layers, aim = graph(rng, layers=(1, 7), size=(1, 40))
+        aim = aim._replace(metric=metric, minimax=minimax)
+        if capped:
+            aim = aim._replace(cap=0.7 * float(aim.weight.sum()))
+        allowed = rng.random(len(layers.low)) < 0.9
+        h = np.empty(len(layers.low))
+        to_go.cost_to_go(layers, aim, allowed, h)
+        np.testing.assert_array_equal(h, scalar(layers, aim, allowed))
+        finite += int(np.isfinite(h[: layers.start[-2]]).sum())
+    assert finite > 300
+
+
+@pytest.mark.skipif(bool(numba.config.BOUNDSCHECK), reason="a loop that checks indices jumps")
+def test_its_innermost_loop_takes_several_numbers_at_once():
+    # Python's own min, a sum that may be reordered or a constant infinity would undo it unnoticed.
+    rng = np.random.default_rng(0)
+    while len((made := graph(rng, layers=(3, 4), size=(5, 9)))[0].q) != to_go.SIX:
+        pass
+    layers, aim = made
+    fresh = numba.njit(nogil=True)(to_go.cost_to_go.py_func)
+    fresh(layers, aim, np.ones(len(layers.low), bool), np.empty(len(layers.low)))
+    assert re.search(r"llvm\.minnum\.v\d+f64", next(iter(fresh.inspect_llvm().values())))
