@@ -73,6 +73,9 @@ def floats(
 
 def integers(value: ArrayLike, name: str, shape: tuple[int | None, ...]) -> Ints:
     """Return `value` as a read-only int64 array of `shape`; floats are refused unless whole."""
+    if isinstance(value, np.ndarray) and value.dtype.kind == "i":
+        _require_shape(value, name, shape)
+        return freeze(np.array(value, dtype=np.int64, order="C"))
     array = _converted(value, name, np.float64)
     _require_shape(array, name, shape)
     if not (np.isfinite(array).all() and (array == np.round(array)).all()):

@@ -6,6 +6,7 @@ import os
 from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -49,9 +50,9 @@ class LayeredGraph:
     q: Array
     start: Ints
     gamma: Array
-    sample: Ints
-    posture: Ints
-    turn: Ints
+    sample: NDArray[np.int32]
+    posture: NDArray[np.int8]
+    turn: NDArray[np.int8]
     reason: NDArray[np.uint8]
     reasons: tuple[str, ...]
 
@@ -142,9 +143,9 @@ def build(
         piece = _Piece(
             count=count,
             q=np.empty((n, robot.joints)),
-            sample=np.empty(n, np.int64),
-            posture=np.empty(n, np.int64),
-            turn=np.empty((n, robot.joints), np.int64),
+            sample=np.empty(n, np.int32),
+            posture=np.empty(n, np.int8),
+            turn=np.empty((n, robot.joints), np.int8),
         )
         turns.fill_admissible(
             q, reason[first:last], limits, piece.q, piece.sample, piece.posture, piece.turn
@@ -158,16 +159,30 @@ def build(
     with ThreadPoolExecutor(os.cpu_count()) as pool:
         pieces = list(pool.map(lambda f: layers_of(f, min(f + nodes, len(frames))), firsts))
     count = np.concatenate([p.count for p in pieces])
+    q, sample = [p.q for p in pieces], [p.sample for p in pieces]
+    posture, turn = [p.posture for p in pieces], [p.turn for p in pieces]
+    pieces.clear()
     return LayeredGraph(
-        q=freeze(np.concatenate([p.q for p in pieces])),
+        q=freeze(_end_to_end(q)),
         start=freeze(np.concatenate([[0], np.cumsum(count)])),
         gamma=gamma,
-        sample=freeze(np.concatenate([p.sample for p in pieces])),
-        posture=freeze(np.concatenate([p.posture for p in pieces])),
-        turn=freeze(np.concatenate([p.turn for p in pieces])),
+        sample=freeze(_end_to_end(sample)),
+        posture=freeze(_end_to_end(posture)),
+        turn=freeze(_end_to_end(turn)),
         reason=freeze(reason),
         reasons=robot.reasons(),
     )
+
+
+def _end_to_end(parts: list[NDArray[Any]]) -> NDArray[Any]:
+    """Return the arrays in one, letting go of each: there are never two copies of them all."""
+    whole = np.empty((sum(map(len, parts)), *parts[0].shape[1:]), parts[0].dtype)
+    end = len(whole)
+    while parts:
+        part = parts.pop()
+        whole[end - len(part) : end] = part
+        end -= len(part)
+    return whole
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -176,9 +191,9 @@ class _Piece:
 
     count: Ints
     q: Array
-    sample: Ints
-    posture: Ints
-    turn: Ints
+    sample: NDArray[np.int32]
+    posture: NDArray[np.int8]
+    turn: NDArray[np.int8]
 
 
 def _wanted(postures: Sequence[int] | None, number: int) -> Bools:

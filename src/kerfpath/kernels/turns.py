@@ -11,7 +11,7 @@ the posture is not wanted.
 from __future__ import annotations
 
 from math import ceil, floor, pi
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -137,9 +137,9 @@ def fill_admissible(
     reason: NDArray[np.uint8],
     limits: JointLimits,
     out_q: Array,
-    out_sample: Ints,
-    out_posture: Ints,
-    out_turn: Ints,
+    out_sample: NDArray[np.signedinteger[Any]],
+    out_posture: NDArray[np.signedinteger[Any]],
+    out_turn: NDArray[np.signedinteger[Any]],
 ) -> None:
     """Write the admitted vertices of q (K, m, P, n) one after the other, with their origin."""
     K, m, P, n = q.shape

@@ -45,6 +45,7 @@ def sorted_layers(
     kernel.arrange(q, key, start, endless, columns, keys, rank)
     low, high = np.zeros(N, np.int64), np.zeros(N, np.int64)
     kernel.windows(keys, start, window, circular, low, high)
+    del keys
     layers = kernel.Layers(
         q=columns,
         start=start,
@@ -55,7 +56,9 @@ def sorted_layers(
         turn=np.where(endless, 2 * np.pi, np.inf),
         after=np.full(len(start) - 1, -1),
     )
-    return layers, rank + np.repeat(start[:-1], np.diff(start))
+    order = np.repeat(start[:-1], np.diff(start))
+    order += rank
+    return layers, order
 
 
 def empty_layer(k: int) -> NoFeasiblePath:

@@ -81,12 +81,12 @@ def checked(
     weight = 1.0 / (velocity * dt) if weights is None else floats(weights, "weights", (n,))
     if (weight < 0).any():
         raise InputError(f"weights: must not be negative, got {weight.tolist()}")
-    cost = np.zeros(len(q)) if vertex_cost is None else vertex_cost
+    free = freeze(np.zeros(len(q)))
     aim = Objective(
         weight=freeze(np.ascontiguousarray(weight)),
         metric=METRIC_CODES[metric],
         minimax=objective == "max",
-        vertex_cost=floats(cost, "vertex_cost", (len(q),)),
+        vertex_cost=free if vertex_cost is None else floats(vertex_cost, "vertex_cost", (len(q),)),
         velocity=freeze(scalar(eta_v, "eta_v", above=0.0) * velocity * dt),
         acceleration=freeze(scalar(eta_a, "eta_a", above=0.0) * acceleration * dt**2),
         cap=np.inf,

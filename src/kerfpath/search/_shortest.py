@@ -157,7 +157,9 @@ def shortest_path(
     else:
         key, window, circular = narrowest_key(q, start, aim.velocity, endless)
     layers, order = sorted_layers(q, start, key, window, circular, endless)
-    aim = aim._replace(vertex_cost=freeze(aim.vertex_cost[order]))
+    if aim.vertex_cost.any():
+        aim = aim._replace(vertex_cost=freeze(aim.vertex_cost[order]))
+    del key, order, posture  # as large as the graph
     filled = int(np.argmin(np.diff(start))) if (np.diff(start) == 0).any() else len(start) - 1
     if filled == 0:
         raise empty_layer(0)
