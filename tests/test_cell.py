@@ -155,7 +155,7 @@ def test_a_cavity_is_outside_and_a_second_piece_inside_is_found():
     assert distance(shell, pieces) < 0
 
 
-def test_containment_by_winding_agrees_with_the_formula():
+def test_points_inside_are_those_of_the_formula():
     rng = np.random.default_rng(3)
     solid = Hull(rng.normal(size=(60, 3)))
     points = rng.normal(size=(300, 3))
@@ -164,6 +164,12 @@ def test_containment_by_winding_agrees_with_the_formula():
     inside = ((points[:, None] - a) * normal).sum(-1).max(axis=1) < 0
     assert 50 < inside.sum() < 250
     np.testing.assert_array_equal(mesh_of(solid).contains(points), inside)
+    # On lines through corners and edges of a box, where crossings cannot be counted.
+    block = mesh_of(box([2, 2, 2]))
+    grid = np.array(np.meshgrid([-1.5, -0.5, 0, 0.5, 1.5], [-1, 0, 0.5], [-2, -0.3, 0, 2])).T
+    there = grid.reshape(-1, 3)
+    there = there[np.abs(np.abs(there).max(axis=1) - 1) > 0.1]
+    np.testing.assert_array_equal(block.contains(there), np.abs(there).max(axis=1) < 1)
 
 
 def test_a_deviation_lessens_distances():

@@ -47,6 +47,15 @@ class Cell:
     endless : (n,) bool
         Joints that go the short way round between nodes.
 
+    Attributes
+    ----------
+    pairs : (P, 2) int
+        The judged pairs, as places in `bodies`.
+    required : (P,) m
+        The near-miss distance of each.
+    own : (P,) bool
+        Those that have one of their own.
+
     Raises
     ------
     InputError
@@ -61,6 +70,7 @@ class Cell:
     endless: Bools
     pairs: Ints = field(init=False)
     required: Array = field(init=False)
+    own: Bools = field(init=False)
     _scene: Scene = field(init=False, repr=False)
     _sweep: Sweep = field(init=False, repr=False)
 
@@ -87,6 +97,7 @@ class Cell:
         own = {self._pair(k, "near_miss_of"): v for k, v in self.near_miss_of.items()}
         needed = [_distance(own.get(pair, self.near_miss), names, pair) for pair in judged]
         _set(self, "required", freeze(np.array(needed, dtype=np.float64)))
+        _set(self, "own", freeze(np.array([pair in own for pair in judged], dtype=np.bool_)))
         _set(self, "_scene", Scene(bodies, self.pairs))
         _set(self, "_sweep", Sweep(self.chain, bodies, self.pairs))
         self._require_room_for_the_base()
@@ -164,7 +175,7 @@ class Cell:
         if len(first) != len(last):
             raise InputError(f"q0, q1: expected as many of each, got {len(first)}, {len(last)}")
         return self._sweep.clear(
-            first, first + self.increments(first, last), self.required, self._sought
+            first, first + self.increments(first, last), self.required, self._scene.distances
         )
 
     def increments(self, q0: Array, q1: Array) -> Array:
@@ -181,8 +192,10 @@ class Cell:
         """Bounds on how far bodies move against each other."""
         return self._sweep
 
-    def _sought(self, frames: Array, enough: Array, wanted: Bools) -> Array:
-        return self._scene.distances(frames, enough, wanted)
+    @property
+    def scene(self) -> Scene:
+        """The bodies ready for distance queries."""
+        return self._scene
 
     def _pair(self, pair: Pair, where: str) -> tuple[int, int]:
         for name in pair:

@@ -6,7 +6,7 @@ that does not touch the surface is inside or outside as a whole, so one of its p
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -15,6 +15,7 @@ from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
 from kerfpath._arrays import Array, Bools, Ints, as_pose, floats, freeze, integers, scalar
+from kerfpath.cell._columns import Columns
 from kerfpath.errors import InputError
 
 __all__ = ["Mesh", "welded"]
@@ -51,6 +52,7 @@ class Mesh:
     triangles: Ints
     deviation: float = 0.0
     name: str = "mesh"
+    _columns: Columns = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
         _set, name = object.__setattr__, self.name
@@ -66,13 +68,15 @@ class Mesh:
             )
         if self.triangles.min() < 0 or self.triangles.max() >= len(self.vertices):
             raise InputError(f"{name}: a triangle names a vertex that is not there")
-        size = float(np.ptp(self.vertices[self.triangles].reshape(-1, 3), axis=0).max())
+        columns = Columns(self.vertices[self.triangles])
+        size = float((columns.high - columns.low).max())
         if not SMALLEST <= size <= LARGEST:
             raise InputError(
                 f"{name}: {size:g} m across, expected {SMALLEST:g} to {LARGEST:g} m; "
                 "is its unit right?"
             )
         _require_closed(self.triangles, name)
+        _set(self, "_columns", columns)
 
     @property
     def radius(self) -> float:
@@ -82,8 +86,7 @@ class Mesh:
     @property
     def bounds(self) -> Array:
         """Least and greatest coordinates, (2, 3) m."""
-        used = self.vertices[self.triangles].reshape(-1, 3)
-        return np.array([used.min(axis=0), used.max(axis=0)])
+        return np.array([self._columns.low, self._columns.high])
 
     @property
     def corners(self) -> Array:
@@ -112,21 +115,8 @@ class Mesh:
         )
 
     def contains(self, points: Array) -> Bools:
-        """Say which of the points (m, 3) m, none of them on the surface, lie inside.
-
-        By the winding number: the solid angle under which a point sees the surface is a full one
-        from inside and zero from outside (van Oosterom and Strackee 1983).
-        """
-        low, high = self.bounds
-        inside = ((points > low) & (points < high)).all(axis=1)
-        for i in np.flatnonzero(inside):
-            a, b, c = (self.vertices[self.triangles[:, j]] - points[i] for j in range(3))
-            la, lb, lc = (np.linalg.norm(x, axis=1) for x in (a, b, c))
-            volume = (a * np.cross(b, c)).sum(1)
-            base = la * lb * lc + (a * b).sum(1) * lc + (b * c).sum(1) * la + (c * a).sum(1) * lb
-            turns = np.arctan2(volume, base).sum() / (2 * np.pi)
-            inside[i] = not abs(turns) < 0.5
-        return freeze(inside)
+        """Say which of the points (m, 3) m, none of them on the surface, lie inside."""
+        return freeze(np.array([self._columns.contains(p) for p in points], dtype=np.bool_))
 
 
 def welded(vertices: ArrayLike, triangles: ArrayLike, tolerance: float) -> tuple[Array, Ints]:

@@ -48,35 +48,39 @@ class Sweep:
     def __init__(self, chain: Chain, bodies: Sequence[Body], pairs: Ints) -> None:
         self._chain = chain
         joints = np.arange(len(chain.axes))
-        self._pairs = [
-            (bodies[a].frame, bodies[b].frame, bodies[b].shape.corners) for a, b in pairs
-        ]
-        self._between = np.array([(joints >= a) & (joints < b) for a, b, _ in self._pairs]).reshape(
-            -1, len(joints)
-        )
-        self._reach = np.array([chain.reach(b, corners) for _, b, corners in self._pairs]).reshape(
-            -1, len(joints)
-        )
+        ways = [(bodies[a].frame, int(b)) for a, b in pairs]
+        self._ways = sorted(set(ways))
+        self._way = np.array([self._ways.index(way) for way in ways], dtype=np.int64)
+        self._moves = [(a, bodies[b].frame, bodies[b].shape.corners) for a, b in self._ways]
+        between = [(joints >= a) & (joints < frame) for a, frame, _ in self._moves]
+        reach = [chain.reach(frame, corners) for _, frame, corners in self._moves]
+        self._between = np.array(between).reshape(-1, len(joints))
+        self._reach = np.array(reach).reshape(-1, len(joints))
+
+    @property
+    def arms(self) -> Array:
+        """The longest reach (n,) m of any body from each joint's axis."""
+        return np.asarray(self._reach.max(axis=0, initial=0.0))
 
     def shift(self, frames0: Array, frames1: Array) -> Array:
         """Return how far (B, P) m any corner comes from poses (B, n+1, 4, 4) to others.
 
         Seen from the first body of the pair; the distance of the pair changes by no more.
         """
-        out = np.empty((len(frames0), len(self._pairs)))
+        out = np.empty((len(frames0), len(self._ways)))
         seen: dict[tuple[int, int], Array] = {}
-        for p, (a, b, corners) in enumerate(self._pairs):
+        for i, (a, b, corners) in enumerate(self._moves):
             if (a, b) not in seen:
                 seen[a, b] = (_relative(frames1, a, b) - _relative(frames0, a, b))[:, :3]
             moved = seen[a, b][:, :, :3] @ corners.T + seen[a, b][:, :, 3:]
-            out[:, p] = np.sqrt((moved**2).sum(axis=1).max(axis=1))
-        return out
+            out[:, i] = np.sqrt((moved**2).sum(axis=1).max(axis=1))
+        return out[:, self._way]
 
     def bend(self, dq: Array) -> Array:
         """Return bounds M (B, P) m on the second derivatives of corners along dq (B, n) rad."""
         total = np.cumsum(np.abs(dq)[:, None] * self._between, axis=2)
         before = np.concatenate([np.zeros_like(total[..., :1]), total[..., :-1]], axis=2)
-        return np.asarray(((total**2 - before**2) * self._reach).sum(axis=2))
+        return np.asarray(((total**2 - before**2) * self._reach).sum(axis=2)[:, self._way])
 
     def least(
         self, d0: Array, d1: Array, frames0: Array, frames1: Array, dq: Array
@@ -85,12 +89,23 @@ class Sweep:
         delta, bow = self.shift(frames0, frames1), self.bend(dq) / 8
         return (d0 + d1 - delta) / 2 - bow - ACCURACY, delta / 2 + bow
 
-    def clear(self, q0: Array, q1: Array, required: Array, distances: Distances) -> Bools:
-        """Say which of the motions q0 to q1 (B, n) rad are proved to keep more than `required`."""
+    def clear(
+        self,
+        q0: Array,
+        q1: Array,
+        required: Array,
+        distances: Distances,
+        wanted: Bools | None = None,
+    ) -> Bools:
+        """Say which of the motions q0 to q1 (B, n) rad are proved to keep more than `required`.
+
+        Of pairs that are not `wanted` (B, P) it is known already.
+        """
         clear = np.ones(len(q0), bool)
-        if not len(self._pairs):
+        if not len(self._way):
             return clear
-        motion, wanted = np.arange(len(q0)), np.ones((len(q0), len(self._pairs)), bool)
+        motion = np.arange(len(q0))
+        wanted = np.ones((len(q0), len(self._way)), bool) if wanted is None else wanted
         T0, T1 = self._chain.frames(q0), self._chain.frames(q1)
         enough = required + self._spent(T0, T1, q1 - q0)
         d0, d1 = distances(T0, enough, wanted), distances(T1, enough, wanted)

@@ -59,6 +59,8 @@ class Scene:
         self._solids = [_solid(body) for body in bodies]
         self._pairs = [(int(a), int(b)) for a, b in pairs]
         self._slack = [sum(_deviation(bodies[i].shape) for i in pair) for pair in self._pairs]
+        with_mesh = [any(self._solids[i].mesh for i in pair) for pair in self._pairs]
+        self._order = np.argsort(with_mesh, kind="stable")
         self._request, self._result = coal.DistanceRequest(), coal.DistanceResult()
         self.queries = 0
 
@@ -73,17 +75,38 @@ class Scene:
         wanted : (B, P) bool, optional
             Which to find; the others are NaN.
         """
-        gap = self._bounds(frames)
-        wanted = np.ones(gap.shape, bool) if wanted is None else wanted
-        enough = np.broadcast_to(np.asarray(enough, dtype=np.float64), gap.shape)
-        near = wanted & (gap < enough)
+        wanted = np.ones((len(frames), len(self._pairs)), bool) if wanted is None else wanted
+        low, _ = self.bounds(frames, enough, wanted)
+        return np.where(wanted, low, np.nan)
+
+    def bounds(
+        self, frames: Array, enough: float | Array, wanted: Bools, stop: Array | None = None
+    ) -> tuple[Array, Array]:
+        """Return distances (B, P) m, and how far apart (B, P) m the pairs are at most.
+
+        The upper bound is one that neighbours keep, too: moved by no more than delta, a pair is no
+        farther apart than it and delta together. It is infinite where only a lower bound was found.
+
+        Parameters
+        ----------
+        frames, enough, wanted
+            As in `distances`; pairs that are not wanted have cheap lower bounds.
+        stop : (P,) m, optional
+            Where a pair is this near or nearer, the others need not be found.
+        """
+        low = self._cheap(frames)
+        high = np.full(low.shape, np.inf)
+        enough = np.broadcast_to(np.asarray(enough, dtype=np.float64), low.shape)
+        near = wanted & (low < enough)
         for row in np.flatnonzero(near.any(axis=1)):
             poses: dict[int, Any] = {}
-            for p in np.flatnonzero(near[row]):
-                gap[row, p] = self._pair(int(p), frames[row], poses, float(enough[row, p]))
-        return np.where(wanted, gap, np.nan)
+            for p in self._order[near[row, self._order]]:
+                low[row, p], high[row, p] = self._pair(p, frames[row], poses, enough[row, p])
+                if stop is not None and low[row, p] <= stop[p]:
+                    break
+        return low, high
 
-    def _bounds(self, frames: Array) -> Array:
+    def _cheap(self, frames: Array) -> Array:
         """Return lower bounds (B, P) by balls, and by boxes around what stands still."""
         centres = [(frames[:, s.frame] @ np.append(s.centre, 1.0))[:, :3] for s in self._solids]
         gap = np.empty((len(frames), len(self._pairs)))
@@ -97,23 +120,27 @@ class Scene:
             gap[:, p] = np.linalg.norm(apart, axis=1) - held - self._slack[p]
         return gap
 
-    def _pair(self, p: int, frames: Array, poses: dict[int, Any], enough: float) -> float:
+    def _pair(
+        self, p: int, frames: Array, poses: dict[int, Any], enough: float
+    ) -> tuple[float, float]:
         a, b = self._pairs[p]
         one, two = self._solids[a], self._solids[b]
         for i, solid in ((a, one), (b, two)):
             if i not in poses:
                 T = frames[solid.frame] @ solid.place
                 poses[i] = coal.Transform3s(T[:3, :3], T[:3, 3])
-        if one.mesh is not None or two.mesh is not None:
-            around = self._query(one.hull, poses[a], two.hull, poses[b], p)
-            if around >= enough:
-                return around
+        if one.mesh is None and two.mesh is None:
+            # Of convex solids the depth of an overlap, too, changes by no more than they move.
+            apart = self._query(one.geometry, poses[a], two.geometry, poses[b], p)
+            return apart, apart
+        around = self._query(one.hull, poses[a], two.hull, poses[b], p)
+        if around >= enough:
+            return around, np.inf
+        slack = self._slack[p]
         apart = self._query(one.geometry, poses[a], two.geometry, poses[b], p)
-        if apart > 0 and (
-            _inside(one, two, frames, self._slack[p]) or _inside(two, one, frames, self._slack[p])
-        ):
-            return -apart - 2 * self._slack[p]
-        return apart
+        if apart > -slack and (_inside(one, two, frames) or _inside(two, one, frames)):
+            apart = -apart - 2 * slack
+        return apart, max(apart, -slack)
 
     def _query(self, one: Any, T_one: Any, two: Any, T_two: Any, p: int) -> float:
         self._result.clear()
@@ -128,7 +155,7 @@ class Scene:
         return float(apart) - self._slack[p]
 
 
-def _inside(inner: _Solid, outer: _Solid, frames: Array, slack: float) -> bool:
+def _inside(inner: _Solid, outer: _Solid, frames: Array) -> bool:
     """Say whether a body that does not touch the surface of a mesh lies inside it."""
     if outer.mesh is None:
         return False
