@@ -46,6 +46,8 @@ class Cell:
         are joined.
     endless : (n,) bool
         Joints that go the short way round between nodes.
+    T_flange_tip, T_base_part : (4, 4) m, optional
+        Where the bodies of head and part were put, for a plan to be held against.
 
     Attributes
     ----------
@@ -68,6 +70,8 @@ class Cell:
     near_miss_of: Mapping[Pair, float] = field(default_factory=dict)
     may_touch: Sequence[Pair] = ()
     endless: Bools
+    T_flange_tip: Array | None = None
+    T_base_part: Array | None = None
     pairs: Ints = field(init=False)
     required: Array = field(init=False)
     own: Bools = field(init=False)
@@ -284,6 +288,8 @@ def cell_of(
         near_miss_of=own,
         may_touch=may_touch,
         endless=robot.endless,
+        T_flange_tip=as_pose(tool, "tool"),
+        T_base_part=None if placement is None else as_pose(placement, "placement"),
     )
 
 

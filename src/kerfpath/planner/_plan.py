@@ -8,10 +8,12 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from kerfpath import refiner
+from kerfpath.cell import Cell
 from kerfpath.contour import Contour, FrameKind
 from kerfpath.errors import NoFeasiblePath
 from kerfpath.graph import LayeredGraph
 from kerfpath.kernels.metric import increments
+from kerfpath.planner._clear import clear_search, only_if_clear, require_same_cell
 from kerfpath.planner._task import Task, refined, task_of
 from kerfpath.plans import Plan, Proof, path_cost
 from kerfpath.refiner import Refinement
@@ -42,6 +44,7 @@ def plan(
     eta_a: float = 1.0,
     closure: Closure = "free",
     refine: bool = False,
+    cell: Cell | None = None,
     graph: LayeredGraph | None = None,
     progress: Callable[[int], None] | None = None,
 ) -> Plan:
@@ -70,6 +73,9 @@ def plan(
     refine : bool
         Move gamma off its grid afterwards, see `kerfpath.refine`. Where the grid has no path (it
         quantises acceleration), one is looked for off it.
+    cell : Cell, optional
+        The plan is clear in it, at the nodes and on straight joint motions between them: the best
+        of all clear ones, though only what the search wants to use is checked. Exact method only.
     graph : LayeredGraph, optional
         The layered graph of this very task, kept from `layered_graph`.
     progress : callable, optional
@@ -101,12 +107,21 @@ def plan(
         graph=graph,
         progress=progress,
     )
+    clear = ""
     try:
-        path = shortest_path(
-            **task.limits, **task.aim, posture=task.graph.posture, method=method, closure=closure
-        )
+        if cell is None:
+            path = shortest_path(
+                **task.limits,
+                **task.aim,
+                posture=task.graph.posture,
+                method=method,
+                closure=closure,
+            )
+        else:
+            require_same_cell(task, cell)
+            path, clear = clear_search(task, cell)
     except NoFeasiblePath as broken:
-        off_grid = _off_grid(task) if refine and closure == "free" else None
+        off_grid = _off_grid(task) if refine and closure == "free" and cell is None else None
         if off_grid is not None and off_grid.done:
             return off_grid.plan
         tried = "" if off_grid is None else f"; off the grid {off_grid.statement}"
@@ -117,8 +132,10 @@ def plan(
             back=broken.back,
             counts=broken.counts,
         ) from None
-    made = task.plan(path.index, path.cost, _proof(method, path.optimal))
-    return refined(made) if refine else made
+    made = task.plan(path.index, path.cost, _proof(method, path.optimal, clear))
+    if not refine:
+        return made
+    return refined(made) if cell is None else only_if_clear(refined(made), made, cell)
 
 
 def _off_grid(task: Task) -> Refinement | None:
@@ -143,9 +160,10 @@ def _bracket(broken: NoFeasiblePath) -> str:
     return f"; from the back, paths reach the end from node {broken.back} on"
 
 
-def _proof(method: Method, optimal: bool) -> Proof:
+def _proof(method: Method, optimal: bool, clear: str) -> Proof:
     if optimal:
         claim = "the best path on this graph under the velocity and acceleration limits"
+        claim += f", {clear}" if clear else ""
     elif method == "known":
         claim = "no claim: the known technique tests neither velocity nor acceleration"
     else:
