@@ -20,8 +20,9 @@ __all__ = ["Checker"]
 
 FAR = 0.1
 """m beyond what is required: distances are not refined above it, as they clear enough already."""
-STRIDE = 32
-"""Of a run of vertices first one in so many is measured, to clear those between."""
+STRIDE = 64
+"""Of a run of vertices first one in so many is looked at, to clear those between; then one in a
+quarter as many."""
 NEAREST = 4
 """Joint vectors measured before that a new one is compared with."""
 
@@ -71,7 +72,7 @@ class Checker:
         while new.size:
             first = np.arange(len(new)) % stride == 0
             self._look(new[first])
-            new, stride = new[~first], max(stride // 2, 1)
+            new, stride = new[~first], max(stride // 4, 1)
         return np.array([self._price[v] for v in vertices.tolist()])
 
     def passable(self, p: Ints, j: Ints) -> Bools:

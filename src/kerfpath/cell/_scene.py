@@ -58,7 +58,17 @@ class Scene:
         self._names = [body.name for body in bodies]
         self._solids = [_solid(body) for body in bodies]
         self._pairs = [(int(a), int(b)) for a, b in pairs]
-        self._slack = [sum(_deviation(bodies[i].shape) for i in pair) for pair in self._pairs]
+        self._slack = np.array(
+            [sum(_deviation(bodies[i].shape) for i in pair) for pair in self._pairs]
+        )
+        self._ends = np.array(self._pairs, np.int64).reshape(-1, 2).T
+        self._frame = np.array([s.frame for s in self._solids])
+        self._centre = np.array([s.centre for s in self._solids])
+        self._low = np.array([s.low for s in self._solids])
+        self._high = np.array([s.high for s in self._solids])
+        ball = np.array([s.ball for s in self._solids])
+        self._still = (self._frame[self._ends[0]] == 0)[:, None]
+        self._held = ball[self._ends[1]] + np.where(self._still[:, 0], 0.0, ball[self._ends[0]])
         with_mesh = [any(self._solids[i].mesh for i in pair) for pair in self._pairs]
         self._order = np.argsort(with_mesh, kind="stable")
         self._request, self._result = coal.DistanceRequest(), coal.DistanceResult()
@@ -108,17 +118,14 @@ class Scene:
 
     def _cheap(self, frames: Array) -> Array:
         """Return lower bounds (B, P) by balls, and by boxes around what stands still."""
-        centres = [(frames[:, s.frame] @ np.append(s.centre, 1.0))[:, :3] for s in self._solids]
-        gap = np.empty((len(frames), len(self._pairs)))
-        for p, (a, b) in enumerate(self._pairs):
-            one, two = self._solids[a], self._solids[b]
-            if one.frame == 0:
-                apart = centres[b] - np.clip(centres[b], one.low, one.high)
-                held = two.ball
-            else:
-                apart, held = centres[a] - centres[b], one.ball + two.ball
-            gap[:, p] = np.linalg.norm(apart, axis=1) - held - self._slack[p]
-        return gap
+        a, b = self._ends
+        T = frames[:, self._frame]
+        centres = (T[..., :3, :3] @ self._centre[:, :, None])[..., 0] + T[..., :3, 3]
+        there = np.where(
+            self._still, np.clip(centres[:, b], self._low[a], self._high[a]), centres[:, a]
+        )
+        apart = centres[:, b] - there
+        return np.asarray(np.sqrt((apart**2).sum(axis=2)) - self._held - self._slack)
 
     def _pair(
         self, p: int, frames: Array, poses: dict[int, Any], enough: float
@@ -136,7 +143,7 @@ class Scene:
         around = self._query(one.hull, poses[a], two.hull, poses[b], p)
         if around >= enough:
             return around, np.inf
-        slack = self._slack[p]
+        slack = float(self._slack[p])
         apart = self._query(one.geometry, poses[a], two.geometry, poses[b], p)
         if apart > -slack and (_inside(one, two, frames) or _inside(two, one, frames)):
             apart = -apart - 2 * slack
@@ -152,7 +159,7 @@ class Scene:
                 f"cell: the distance between {a!r} and {b!r} came out as {apart}; nothing is "
                 "called free on that, so look at their shapes"
             )
-        return float(apart) - self._slack[p]
+        return float(apart) - float(self._slack[p])
 
 
 def _inside(inner: _Solid, outer: _Solid, frames: Array) -> bool:
