@@ -8,7 +8,9 @@ checks.
 A closed vertex leaves its layer. A closed edge cannot, as edges are implied by the joints; but one
 more joint can keep its ends apart: at -1 on one end, at +1 on the other, at 0 on all else, with a
 velocity limit that lets 1 pass and 2 not. One such gate closes all edges from a vertex; gates are
-shared by layers far enough apart.
+shared by layers far enough apart. Every gate is a joint for the search to compare, and edges are
+closed one path at a time: where most motions between two layers hit, as with nodes too far apart
+for straight joint motions, that takes long; sample the contour more finely there.
 """
 
 from __future__ import annotations
