@@ -11,7 +11,15 @@ from rich.console import Console
 from benchmarks._figures import Report, machine, markdown, show
 
 RESULTS = Path(__file__).parent / "RESULTS.md"
-NAMES = ("kinematics", "demo", "search", "retiming", "contours", "refinement")
+NAMES = (
+    "kinematics",
+    "demo",
+    "search",
+    "retiming",
+    "contours",
+    "refinement",
+    "collision",
+)
 
 
 def main() -> None:
@@ -66,6 +74,10 @@ def _run(name: str, *, quick: bool) -> list[Report]:
         from benchmarks import refinement
 
         return refinement.run(quick=quick)
+    if name == "collision":
+        from benchmarks import collision
+
+        return collision.run(quick=quick)
     from benchmarks import search
 
     return search.run(quick=quick)

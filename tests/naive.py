@@ -64,13 +64,16 @@ def path_planning(
     return np.array(path[::-1]), cost
 
 
-def second_order(q, start, closure, **o):
-    """Optimal (cost, tie-breaking sum) under (5) and (6), or None: every pair of edges is tried."""
+def second_order(q, start, closure, passable=None, **o):
+    """Optimal (cost, tie-breaking sum) under (5) and (6), or None: every pair of edges is tried.
+
+    passable, one matrix for each pair of layers, leaves out edges that are closed.
+    """
     layers = [q[a:b] for a, b in itertools.pairwise(start)]
     vertex = [o["vertex_cost"][a:b] for a, b in itertools.pairwise(start)]
     if len(layers) == 1:
         return (vertex[0].min(), vertex[0].min()) if len(vertex[0]) else None
-    D, bound_a, steps = _edges(layers, vertex, o)
+    D, bound_a, steps = _edges(layers, vertex, o, passable)
 
     def best(objective, cap):
         join = np.add if objective == "sum" else np.maximum
@@ -156,10 +159,12 @@ def rotated(q, start, closure, rotation, **o):
     return largest.min(), total[largest <= largest.min() * (1 + 1e-12)].min()
 
 
-def _edges(layers, vertex, o):
+def _edges(layers, vertex, o, passable=None):
     """Increments of all edges, the bound of (6), and what it costs to enter and to step."""
     D = [difference(a[:, None], b[None], o["endless"]) for a, b in itertools.pairwise(layers)]
     slow = [(np.abs(d) <= o["eta_v"] * o["velocity"] * o["dt"] + TOLERANCE).all(-1) for d in D]
+    if passable is not None:
+        slow = [s & ok for s, ok in zip(slow, passable, strict=True)]
     bound_a = o["eta_a"] * o["acceleration"] * o["dt"] ** 2 + TOLERANCE
     R = [_distances(d, o["weights"], o["metric"]) for d in D]
 

@@ -6,8 +6,10 @@ import numpy as np
 
 from kerfpath._arrays import Array, Ints, scalar
 from kerfpath.auditor._chain import chain_of
+from kerfpath.auditor._collision import collisions
 from kerfpath.auditor._motion import Interpolation, Motion, joint_increments, motion_of
 from kerfpath.auditor._table import Check, Issue, Unit
+from kerfpath.cell import Cell
 from kerfpath.contour import Contour
 from kerfpath.errors import InputError
 from kerfpath.plans import Plan
@@ -34,6 +36,7 @@ def audit(
     path_tolerance: float = 1e-4,
     axis_tolerance: float = np.pi / 180,
     parts: int = 8,
+    cell: Cell | None = None,
 ) -> list[Issue]:
     """Return what is wrong with a plan; an empty list means that it passes. Arguments: `checks`."""
     table = checks(
@@ -43,6 +46,7 @@ def audit(
         path_tolerance=path_tolerance,
         axis_tolerance=axis_tolerance,
         parts=parts,
+        cell=cell,
     )
     return [check.issue() for check in table if not check.ok]
 
@@ -55,6 +59,7 @@ def checks(
     path_tolerance: float = 1e-4,
     axis_tolerance: float = np.pi / 180,
     parts: int = 8,
+    cell: Cell | None = None,
 ) -> list[Check]:
     """Return the whole table of checks.
 
@@ -72,6 +77,8 @@ def checks(
         Largest angle of the tool axis from the path's between nodes.
     parts : int
         Into how many parts the way between two nodes is divided.
+    cell : Cell, optional
+        Whose near-miss distances the motion is to keep.
 
     Raises
     ------
@@ -97,6 +104,7 @@ def checks(
         *_between_nodes(plan, motion, path, path_tolerance, axis_tolerance),
         *_positions(plan, motion),
         *_rates(plan, motion),
+        *([] if cell is None or not len(cell.pairs) else [collisions(cell, motion, chain)]),
     ]
 
 

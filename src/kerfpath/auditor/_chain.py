@@ -38,6 +38,10 @@ class JointChain:
         """Return the tip poses (B, 4, 4) of joint vectors q (B, n) rad."""
         return self._frames(q)[-1]
 
+    def joints(self, q: Array) -> list[Array]:
+        """Return the poses (B, 4, 4) of every joint frame, turned, of joint vectors q (B, n)."""
+        return self._frames(q)[:-1]
+
     def jacobian(self, q: Array) -> tuple[Array, Array]:
         """Return tip poses (B, 4, 4) and geometric Jacobians (B, 6, n): linear over angular."""
         *joints, tip = self._frames(q)

@@ -8,9 +8,11 @@ from typing import Literal, get_args
 import numpy as np
 from numpy.typing import ArrayLike
 
+from kerfpath.cell import Cell
 from kerfpath.contour import Contour, FrameKind
 from kerfpath.errors import InputError, NoFeasiblePath
 from kerfpath.graph import LayeredGraph
+from kerfpath.planner._clear import clear_search, only_if_clear, require_same_cell
 from kerfpath.planner._dip import slowed
 from kerfpath.planner._refined import off_grid, refined
 from kerfpath.planner._task import Task, task_of
@@ -43,6 +45,7 @@ def plan(
     rotation: ArrayLike | None = None,
     feed: FeedKind = "constant",
     refine: bool = False,
+    cell: Cell | None = None,
     graph: LayeredGraph | None = None,
     progress: Callable[[int], None] | None = None,
 ) -> Plan:
@@ -75,6 +78,9 @@ def plan(
     refine : bool
         Move gamma off its grid afterwards, see `kerfpath.refine`. Where the grid has no path (it
         quantises acceleration), one is looked for off it.
+    cell : Cell, optional
+        The plan is clear in it, at the nodes and on straight joint motions between them: the best
+        of all clear ones, though only what the search wants to use is checked. Exact method only.
     graph : LayeredGraph, optional
         The layered graph of this very task, kept from `layered_graph`.
     progress : callable, optional
@@ -94,6 +100,8 @@ def plan(
             'feed: "dip" needs objective "sum", closure "free" and no rotation limit, got '
             f'objective "{objective}", closure "{closure}" and rotation {rotation!r}'
         )
+    if cell is not None and (feed == "dip" or rotation is not None):
+        raise InputError('cell: works with feed "constant" and without a rotation limit so far')
     task = task_of(
         contour,
         robot,
@@ -114,21 +122,28 @@ def plan(
         graph=graph,
         progress=progress,
     )
+    clear = ""
     try:
-        path = shortest_path(
-            **task.limits,
-            **task.aim,
-            posture=task.graph.posture,
-            method=method,
-            closure=closure,
-            rotation=task.settings.rotation,
-        )
+        if cell is None:
+            path = shortest_path(
+                **task.limits,
+                **task.aim,
+                posture=task.graph.posture,
+                method=method,
+                closure=closure,
+                rotation=task.settings.rotation,
+            )
+        else:
+            require_same_cell(task, cell)
+            path, clear = clear_search(task, cell)
     except NoFeasiblePath as broken:
         if feed == "dip":
             return slowed(task, refine=refine)
-        found = off_grid(task) if refine and closure == "free" else None
+        found = off_grid(task) if refine and closure == "free" and cell is None else None
         if found is not None and found.done:
             return found.plan
+        if cell is not None:  # these count the vertices that are clear
+            broken.reached = broken.leaving = None
         tried = "" if found is None else f"; off the grid {found.statement}"
         raise NoFeasiblePath(
             f"contour {contour.name!r}: {broken}{_bracket(broken, task)}{tried}",
@@ -139,8 +154,11 @@ def plan(
             leaving=broken.leaving,
             counts=broken.counts,
         ) from None
-    made = task.plan(path.index, path.cost, _proof(method, path.optimal))
-    return refined(task, made) if refine else made
+    made = task.plan(path.index, path.cost, _proof(method, path.optimal, clear))
+    if not refine:
+        return made
+    better = refined(task, made)
+    return better if cell is None else only_if_clear(better, made, cell)
 
 
 def _bracket(broken: NoFeasiblePath, task: Task) -> str:
@@ -161,9 +179,10 @@ def _bracket(broken: NoFeasiblePath, task: Task) -> str:
     return f"{said}; the posture would have to change from {' to '.join(names)}"
 
 
-def _proof(method: Method, optimal: bool) -> Proof:
+def _proof(method: Method, optimal: bool, clear: str) -> Proof:
     if optimal:
         claim = "the best path on this graph under the velocity and acceleration limits"
+        claim += f", {clear}" if clear else ""
     elif method == "known":
         claim = "no claim: the known technique tests neither velocity nor acceleration"
     else:

@@ -1,0 +1,134 @@
+"""Vertices and motions asked of a cell at as few distances as proofs allow.
+
+A pair that was found d apart is between d - delta and d + delta apart wherever no corner of its
+second body has come farther than delta, seen from the first. So what was measured at one joint
+vector clears or closes its neighbours, along gamma as along the contour, pair by pair; only what it
+leaves open is measured.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy.spatial import cKDTree
+
+from kerfpath._arrays import Array, Bools, Ints, floats, scalar
+from kerfpath.cell._cell import Cell
+from kerfpath.cell._motion import TOLERANCE
+from kerfpath.cell._scene import ACCURACY
+
+__all__ = ["Checker"]
+
+FAR = 0.1
+"""m beyond what is required: distances are not refined above it, as they clear enough already."""
+STRIDE = 64
+"""Of a run of vertices first one in so many is looked at, to clear those between; then one in a
+quarter as many."""
+NEAREST = 4
+"""Joint vectors measured before that a new one is compared with."""
+
+
+class Checker:
+    """The checks that `kerfpath.search.clear_path` asks for.
+
+    Parameters
+    ----------
+    cell : Cell
+    q : (N, n) rad
+        Joint vectors of the vertices.
+    comfort : float m
+        Where pairs come nearer than this to their near-miss distance, the vertex costs something;
+        pairs that have a near-miss distance of their own do not count.
+    comfort_cost : float
+        What it costs where the near-miss distance is all but reached; less in proportion before.
+
+    Attributes
+    ----------
+    asked, measured : int
+        Vertices asked about, and those of them at which any distance had to be found.
+    motions_asked, motions_measured : int
+        The same of motions.
+    """
+
+    def __init__(
+        self, cell: Cell, q: Array, *, comfort: float = 0.0, comfort_cost: float = 0.0
+    ) -> None:
+        self._cell = cell
+        self._q = floats(q, "q", (None, len(cell.chain.axes)), copy=False)
+        self._comfort = scalar(comfort, "comfort", unit="m", above=-1e-300)
+        self._comfort_cost = scalar(comfort_cost, "comfort_cost", above=-1e-300)
+        self._needed = cell.required + np.where(cell.own, 0.0, comfort if comfort_cost else 0.0)
+        self._apart: dict[int, tuple[Array, Array]] = {}
+        self._price: dict[int, float] = {}
+        self._at: list[int] = []
+        self._arms = cell.sweep.arms
+        self._tree: tuple[int, cKDTree] | None = None
+        self.asked = self.measured = self.motions_asked = self.motions_measured = 0
+
+    def price(self, vertices: Ints) -> Array:
+        """Return the price (B,) of vertices: infinite where they are not clear."""
+        new = np.unique([v for v in vertices.tolist() if v not in self._price]).astype(np.int64)
+        self.asked += len(new)
+        stride = STRIDE
+        while new.size:
+            first = np.arange(len(new)) % stride == 0
+            self._look(new[first])
+            new, stride = new[~first], max(stride // 4, 1)
+        return np.array([self._price[v] for v in vertices.tolist()])
+
+    def passable(self, p: Ints, j: Ints) -> Bools:
+        """Say which of the motions from vertices p to vertices j, (B,) each, are clear."""
+        cell = self._cell
+        self.motions_asked += len(p)
+        passable = np.isfinite(self.price(p)) & np.isfinite(self.price(j))
+        q0 = self._q[p]
+        q1 = q0 + cell.increments(q0, self._q[j])
+        d0, d1 = (np.array([self._apart[v][0] for v in ends.tolist()]) for ends in (p, j))
+        least, _ = cell.sweep.least(d0, d1, cell.frames(q0), cell.frames(q1), q1 - q0)
+        # A motion that bisection alone would refuse for its tolerance is not cleared here either.
+        open_ = ~(least > cell.required + TOLERANCE)
+        left = passable & open_.any(axis=1)
+        self.motions_measured += int(left.sum())
+        passable[left] = cell.sweep.clear(
+            q0[left], q1[left], cell.required, cell.scene.distances, open_[left]
+        )
+        return passable
+
+    def _look(self, vertices: Ints) -> None:
+        """Find the prices of vertices, from what was measured nearby or by measuring."""
+        cell, q = self._cell, self._q[vertices]
+        frames = cell.frames(q)
+        low, high = self._known(q, frames)
+        open_ = ~(low > self._needed) & ~(high <= cell.required).any(axis=1, keepdims=True)
+        rows = open_.any(axis=1)
+        if rows.any():
+            enough = cell.required + FAR + self._comfort
+            found = cell.scene.bounds(frames[rows], enough, open_[rows], cell.required)
+            low[rows] = np.where(open_[rows], found[0], low[rows])
+            high[rows] = np.where(open_[rows], found[1], high[rows])
+            self.measured += int(rows.sum())
+            self._at += vertices[rows].tolist()
+        hit = (np.minimum(low, high) <= cell.required) & (high < np.inf)
+        price = np.where(hit.any(axis=1), np.inf, self._cost(low))
+        for i, v in enumerate(vertices.tolist()):
+            self._price[v], self._apart[v] = float(price[i]), (low[i], high[i])
+
+    def _cost(self, apart: Array) -> Array:
+        if self._comfort == 0 or self._comfort_cost == 0 or self._cell.own.all():
+            return np.zeros(len(apart))
+        over = (apart - self._cell.required)[:, ~self._cell.own].min(axis=1)
+        return np.asarray(self._comfort_cost * np.clip(1 - over / self._comfort, 0.0, 1.0))
+
+    def _known(self, q: Array, frames: Array) -> tuple[Array, Array]:
+        """Return bounds (B, P) on the distances at q by what was measured nearby."""
+        B, P = len(q), len(self._cell.pairs)
+        if not self._at:
+            return np.full((B, P), -np.inf), np.full((B, P), np.inf)
+        if self._tree is None or self._tree[0] < len(self._at):
+            self._tree = len(self._at), cKDTree(self._q[self._at] * self._arms)
+        count = min(NEAREST, len(self._at))
+        _, near = self._tree[1].query(q * self._arms, count)
+        there = np.array(self._at)[np.asarray(near).ravel()]
+        known = np.array([self._apart[v] for v in there.tolist()]).reshape(B, count, 2, P)
+        at, here = self._cell.frames(self._q[there]), np.repeat(frames, count, axis=0)
+        moved = self._cell.sweep.shift(at, here).reshape(B, count, P) + ACCURACY
+        return (known[:, :, 0] - moved).max(axis=1), (known[:, :, 1] + moved).min(axis=1)

@@ -1,0 +1,148 @@
+"""Closed triangle meshes as solids: what they must be, welding, and which points lie inside.
+
+Collision libraries see the triangles only: to them a body deep inside a closed mesh is free. A body
+that does not touch the surface is inside or outside as a whole, so one of its points decides.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import ArrayLike
+from scipy.sparse import coo_array
+from scipy.sparse.csgraph import connected_components
+from scipy.spatial import cKDTree
+
+from kerfpath._arrays import Array, Bools, Ints, as_pose, floats, freeze, integers, scalar
+from kerfpath.cell._columns import Columns
+from kerfpath.errors import InputError
+
+__all__ = ["Mesh", "welded"]
+
+LARGEST = 100.0
+"""m: nothing in a cell is larger; a mesh that is has the wrong unit."""
+SMALLEST = 1e-4
+"""m: a whole body smaller than this has the wrong unit, too."""
+MOST = 2_000_000
+"""Triangles: more take minutes and gigabytes, and no cell needs them."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Mesh:
+    """The solid inside a closed surface of triangles.
+
+    Parameters
+    ----------
+    vertices : (V, 3) m
+    triangles : (F, 3) int
+        Vertices of each triangle; neighbours run through a common edge in opposite directions.
+    deviation : float m
+        How far the true surface may be from the triangles; distances are lessened by it.
+    name : str
+        What messages call it.
+
+    Raises
+    ------
+    InputError
+        No triangles or too many, a size that no body of a cell has, a surface that is not closed.
+    """
+
+    vertices: Array
+    triangles: Ints
+    deviation: float = 0.0
+    name: str = "mesh"
+    _columns: Columns = field(init=False, repr=False)
+
+    def __post_init__(self) -> None:
+        _set, name = object.__setattr__, self.name
+        _set(self, "vertices", floats(self.vertices, f"{name} vertices", (None, 3)))
+        _set(self, "triangles", integers(self.triangles, f"{name} triangles", (None, 3)))
+        _set(self, "deviation", scalar(self.deviation, f"{name} deviation", unit="m"))
+        if self.deviation < 0:
+            raise InputError(f"{name}: deviation must not be negative, got {self.deviation:g} m")
+        if not 0 < len(self.triangles) <= MOST:
+            raise InputError(
+                f"{name}: expected 1 to {MOST} triangles, got {len(self.triangles)}; "
+                + ("simplify the mesh" if len(self.triangles) else "the mesh is empty")
+            )
+        if self.triangles.min() < 0 or self.triangles.max() >= len(self.vertices):
+            raise InputError(f"{name}: a triangle names a vertex that is not there")
+        columns = Columns(self.vertices[self.triangles])
+        size = float((columns.high - columns.low).max())
+        if not SMALLEST <= size <= LARGEST:
+            raise InputError(
+                f"{name}: {size:g} m across, expected {SMALLEST:g} to {LARGEST:g} m; "
+                "is its unit right?"
+            )
+        _require_closed(self.triangles, name)
+        _set(self, "_columns", columns)
+
+    @property
+    def radius(self) -> float:
+        """Zero: nothing is swept around the vertices."""
+        return 0.0
+
+    @property
+    def bounds(self) -> Array:
+        """Least and greatest coordinates, (2, 3) m."""
+        return np.array([self._columns.low, self._columns.high])
+
+    @property
+    def corners(self) -> Array:
+        """The corners (8, 3) m of the box around the mesh."""
+        return freeze(np.array(np.meshgrid(*self.bounds.T)).reshape(3, -1).T)
+
+    @property
+    def seeds(self) -> Array:
+        """A point (s, 3) m of each piece that hangs together."""
+        edges = self.triangles[:, [0, 1]], self.triangles[:, [1, 2]]
+        pairs = np.vstack(edges)
+        V = len(self.vertices)
+        links = coo_array((np.ones(len(pairs)), (pairs[:, 0], pairs[:, 1])), shape=(V, V))
+        _, piece = connected_components(links, directed=False)
+        _, first = np.unique(piece[self.triangles[:, 0]], return_index=True)
+        return freeze(self.vertices[self.triangles[first, 0]])
+
+    def moved(self, T: ArrayLike) -> Mesh:
+        """Return the mesh in coordinates b of a pose T (4, 4) that maps its own into b."""
+        pose = as_pose(T, "pose")
+        return Mesh(
+            vertices=self.vertices @ pose[:3, :3].T + pose[:3, 3],
+            triangles=self.triangles,
+            deviation=self.deviation,
+            name=self.name,
+        )
+
+    def contains(self, points: Array) -> Bools:
+        """Say which of the points (m, 3) m, none of them on the surface, lie inside."""
+        return freeze(np.array([self._columns.contains(p) for p in points], dtype=np.bool_))
+
+
+def welded(vertices: ArrayLike, triangles: ArrayLike, tolerance: float) -> tuple[Array, Ints]:
+    """Return the mesh with vertices closer than `tolerance` (m) made one, slivers left out."""
+    points = floats(vertices, "vertices", (None, 3))
+    corners = integers(triangles, "triangles", (None, 3))
+    if not len(points):
+        return points, corners
+    pairs = cKDTree(points).query_pairs(tolerance, output_type="ndarray")
+    links = coo_array((np.ones(len(pairs)), (pairs[:, 0], pairs[:, 1])), shape=(len(points),) * 2)
+    _, one = connected_components(links, directed=False)
+    _, first = np.unique(one, return_index=True)
+    corners = one[corners].astype(np.int64)
+    slivers = (corners == np.roll(corners, 1, axis=1)).any(axis=1)
+    return freeze(points[first]), freeze(corners[~slivers])
+
+
+def _require_closed(triangles: Ints, name: str) -> None:
+    """Raise InputError unless every edge is run through as often one way as the other."""
+    edges = np.vstack([triangles[:, [0, 1]], triangles[:, [1, 2]], triangles[:, [2, 0]]])
+    forward = edges[:, 0] < edges[:, 1]
+    keys, place = np.unique(np.sort(edges, axis=1), axis=0, return_inverse=True)
+    balance = np.bincount(place.ravel(), np.where(forward, 1, -1), len(keys))
+    open_ = np.flatnonzero(balance)
+    if open_.size:
+        raise InputError(
+            f"{name}: the surface is not closed, {open_.size} of its {len(keys)} edges have a "
+            "triangle on one side only; what is inside cannot be told, so mend the mesh"
+        )

@@ -1,0 +1,148 @@
+"""Swept motions: a bound on how far bodies stray between two poses, and bisection under it.
+
+While the joints run evenly from q0 to q1, a point x of a body leaves the straight line from x(0) to
+x(1) by no more than M s (1 - s) / 2, M bounding its second derivative. A body is held by the hull
+of its corners, so with delta the farthest that a corner comes, the distance of a pair is all the
+way at least
+
+    (d(0) + d(1) - delta) / 2 - M / 8.
+
+Where that does not clear a pair, its distance half way is found, and each half is judged alike:
+delta halves and M goes down to a quarter. The second derivatives of a chain of revolute joints are
+z_i x (z_j x (x - o_j)) for i <= j, hence M = sum over i, j of |dq_i| |dq_j| r_max(i,j), r_j
+bounding the distance of the point from axis j.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+
+import numpy as np
+
+from kerfpath._arrays import Array, Bools, Ints
+from kerfpath.cell._bodies import Body
+from kerfpath.cell._chain import Chain
+from kerfpath.cell._scene import ACCURACY
+
+__all__ = ["TOLERANCE", "Sweep"]
+
+TOLERANCE = 1e-4
+"""m: a motion too close to tell by this much is refused."""
+HALVINGS = 24
+"""Never reached by motions of a robot; a motion not proved clear by then is refused."""
+
+Distances = Callable[[Array, Array, Bools], Array]
+
+
+class Sweep:
+    """Bounds on the motion of judged pairs against each other.
+
+    Parameters
+    ----------
+    chain : Chain
+    bodies : sequence of Body
+    pairs : (P, 2) int
+        The second of a pair is in the later frame.
+    """
+
+    def __init__(self, chain: Chain, bodies: Sequence[Body], pairs: Ints) -> None:
+        self._chain = chain
+        joints = np.arange(len(chain.axes))
+        ways = [(bodies[a].frame, int(b)) for a, b in pairs]
+        self._ways = sorted(set(ways))
+        self._way = np.array([self._ways.index(way) for way in ways], dtype=np.int64)
+        self._moves = [(a, bodies[b].frame, bodies[b].shape.corners) for a, b in self._ways]
+        between = [(joints >= a) & (joints < frame) for a, frame, _ in self._moves]
+        reach = [chain.reach(frame, corners) for _, frame, corners in self._moves]
+        self._between = np.array(between).reshape(-1, len(joints))
+        self._reach = np.array(reach).reshape(-1, len(joints))
+
+    @property
+    def arms(self) -> Array:
+        """The longest reach (n,) m of any body from each joint's axis."""
+        return np.asarray(self._reach.max(axis=0, initial=0.0))
+
+    def shift(self, frames0: Array, frames1: Array) -> Array:
+        """Return how far (B, P) m any corner comes from poses (B, n+1, 4, 4) to others.
+
+        Seen from the first body of the pair; the distance of the pair changes by no more.
+        """
+        out = np.empty((len(frames0), len(self._ways)))
+        seen: dict[tuple[int, int], Array] = {}
+        for i, (a, b, corners) in enumerate(self._moves):
+            if (a, b) not in seen:
+                seen[a, b] = (_relative(frames1, a, b) - _relative(frames0, a, b))[:, :3]
+            moved = seen[a, b][:, :, :3] @ corners.T + seen[a, b][:, :, 3:]
+            out[:, i] = np.sqrt((moved**2).sum(axis=1).max(axis=1))
+        return out[:, self._way]
+
+    def bend(self, dq: Array) -> Array:
+        """Return bounds M (B, P) m on the second derivatives of corners along dq (B, n) rad."""
+        total = np.cumsum(np.abs(dq)[:, None] * self._between, axis=2)
+        before = np.concatenate([np.zeros_like(total[..., :1]), total[..., :-1]], axis=2)
+        return np.asarray(((total**2 - before**2) * self._reach).sum(axis=2)[:, self._way])
+
+    def least(
+        self, d0: Array, d1: Array, frames0: Array, frames1: Array, dq: Array
+    ) -> tuple[Array, Array]:
+        """Return lower bounds (B, P) m on the distances along motions, and what they leave off."""
+        delta, bow = self.shift(frames0, frames1), self.bend(dq) / 8
+        return (d0 + d1 - delta) / 2 - bow - ACCURACY, delta / 2 + bow
+
+    def clear(
+        self,
+        q0: Array,
+        q1: Array,
+        required: Array,
+        distances: Distances,
+        wanted: Bools | None = None,
+    ) -> Bools:
+        """Say which of the motions q0 to q1 (B, n) rad are proved to keep more than `required`.
+
+        Of pairs that are not `wanted` (B, P) it is known already.
+        """
+        clear = np.ones(len(q0), bool)
+        if not len(self._way):
+            return clear
+        motion = np.arange(len(q0))
+        wanted = np.ones((len(q0), len(self._way)), bool) if wanted is None else wanted
+        T0, T1 = self._chain.frames(q0), self._chain.frames(q1)
+        enough = required + self._spent(T0, T1, q1 - q0)
+        d0, d1 = distances(T0, enough, wanted), distances(T1, enough, wanted)
+        for _ in range(HALVINGS):
+            least, doubt = self.least(d0, d1, T0, T1, q1 - q0)
+            hit = wanted & ~((d0 > required) & (d1 > required))
+            open_ = wanted & ~(least > required)
+            lost = hit.any(axis=1) | (open_ & (doubt < TOLERANCE)).any(axis=1)
+            clear[motion[lost]] = False
+            go = open_.any(axis=1) & clear[motion]
+            if not go.any():
+                return clear
+            motion, wanted, d0, d1 = motion[go], open_[go], d0[go], d1[go]
+            q0, q1, T0, T1 = q0[go], q1[go], T0[go], T1[go]
+            half = (q0 + q1) / 2
+            T_half = self._chain.frames(half)
+            d_half = distances(T_half, required + self._spent(T0, T1, q1 - q0), wanted)
+            motion, wanted = np.tile(motion, 2), np.tile(wanted, (2, 1))
+            d0, d1 = np.vstack([d0, d_half]), np.vstack([d_half, d1])
+            q0, q1 = np.vstack([q0, half]), np.vstack([half, q1])
+            T0, T1 = np.concatenate([T0, T_half]), np.concatenate([T_half, T1])
+        clear[motion] = False
+        return clear
+
+    def _spent(self, frames0: Array, frames1: Array, dq: Array) -> Array:
+        """Return distances (B, P) m of which one at either end is as good as any larger one."""
+        return self.shift(frames0, frames1) + self.bend(dq) / 4 + 4 * ACCURACY
+
+
+def _relative(frames: Array, a: int, b: int) -> Array:
+    """Return the poses (B, 4, 4) of frame b in frame a."""
+    if a == 0:
+        return frames[:, b]
+    R, at = frames[:, a, :3, :3], frames[:, a, :3, 3:]
+    T = np.zeros((len(frames), 4, 4))
+    turned = np.swapaxes(R, 1, 2)
+    T[:, :3, :3] = turned @ frames[:, b, :3, :3]
+    T[:, :3, 3:] = turned @ (frames[:, b, :3, 3:] - at)
+    T[:, 3, 3] = 1.0
+    return T

@@ -1,0 +1,237 @@
+"""Distances between the bodies of a cell, by coal, where cheap bounds do not already tell enough.
+
+A distance here is a lower bound on the true one: exact to coal's tolerance where it is below
+`enough`, lessened by what meshes may deviate from what they stand for, negative where solids
+overlap.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import coal
+import numpy as np
+
+from kerfpath._arrays import Array, Bools, Ints
+from kerfpath.cell._bodies import Body
+from kerfpath.cell._mesh import Mesh
+from kerfpath.cell._shapes import Capsule, Hull, Shape, box_between
+from kerfpath.errors import InputError
+
+__all__ = ["ACCURACY", "Scene"]
+
+ACCURACY = 1e-6
+"""m: coal stops refining a distance here; every bound made from distances leaves it off."""
+THIN = 1e-5
+"""m: what the box around a flat mesh is thickened by, so that it is a solid at all."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Solid:
+    """A body as coal takes it: a geometry, its pose in the body's frame, and bounds around it."""
+
+    geometry: Any
+    place: Array
+    frame: int
+    centre: Array
+    ball: float
+    low: Array
+    high: Array
+    mesh: Mesh | None
+    hull: Any
+    seeds: Array
+
+
+class Scene:
+    """The bodies ready for distance queries.
+
+    Parameters
+    ----------
+    bodies : sequence of Body
+    pairs : (P, 2) int
+        Which of them are judged against each other; frames do not decrease along a pair.
+    """
+
+    def __init__(self, bodies: Sequence[Body], pairs: Ints) -> None:
+        self._names = [body.name for body in bodies]
+        self._solids = [_solid(body) for body in bodies]
+        self._pairs = [(int(a), int(b)) for a, b in pairs]
+        self._slack = np.array(
+            [sum(_deviation(bodies[i].shape) for i in pair) for pair in self._pairs]
+        )
+        self._ends = np.array(self._pairs, np.int64).reshape(-1, 2).T
+        self._frame = np.array([s.frame for s in self._solids])
+        self._centre = np.array([s.centre for s in self._solids])
+        self._low = np.array([s.low for s in self._solids])
+        self._high = np.array([s.high for s in self._solids])
+        ball = np.array([s.ball for s in self._solids])
+        self._still = (self._frame[self._ends[0]] == 0)[:, None]
+        self._held = ball[self._ends[1]] + np.where(self._still[:, 0], 0.0, ball[self._ends[0]])
+        with_mesh = [any(self._solids[i].mesh for i in pair) for pair in self._pairs]
+        self._order = np.argsort(with_mesh, kind="stable")
+        self._request, self._result = coal.DistanceRequest(), coal.DistanceResult()
+        self.queries = 0
+
+    def distances(self, frames: Array, enough: float | Array, wanted: Bools | None = None) -> Array:
+        """Return distances (B, P) m at link poses (B, n+1, 4, 4).
+
+        Parameters
+        ----------
+        frames : (B, n+1, 4, 4)
+        enough : float or (B, P) m
+            Above it any lower bound will do.
+        wanted : (B, P) bool, optional
+            Which to find; the others are NaN.
+        """
+        wanted = np.ones((len(frames), len(self._pairs)), bool) if wanted is None else wanted
+        low, _ = self.bounds(frames, enough, wanted)
+        return np.where(wanted, low, np.nan)
+
+    def bounds(
+        self, frames: Array, enough: float | Array, wanted: Bools, stop: Array | None = None
+    ) -> tuple[Array, Array]:
+        """Return distances (B, P) m, and how far apart (B, P) m the pairs are at most.
+
+        The upper bound is one that neighbours keep, too: moved by no more than delta, a pair is no
+        farther apart than it and delta together. It is infinite where only a lower bound was found.
+
+        Parameters
+        ----------
+        frames, enough, wanted
+            As in `distances`; pairs that are not wanted have cheap lower bounds.
+        stop : (P,) m, optional
+            Where a pair is this near or nearer, the others need not be found.
+        """
+        low = self._cheap(frames)
+        high = np.full(low.shape, np.inf)
+        enough = np.broadcast_to(np.asarray(enough, dtype=np.float64), low.shape)
+        near = wanted & (low < enough)
+        for row in np.flatnonzero(near.any(axis=1)):
+            poses: dict[int, Any] = {}
+            for p in self._order[near[row, self._order]]:
+                low[row, p], high[row, p] = self._pair(p, frames[row], poses, enough[row, p])
+                if stop is not None and low[row, p] <= stop[p]:
+                    break
+        return low, high
+
+    def _cheap(self, frames: Array) -> Array:
+        """Return lower bounds (B, P) by balls, and by boxes around what stands still."""
+        a, b = self._ends
+        T = frames[:, self._frame]
+        centres = (T[..., :3, :3] @ self._centre[:, :, None])[..., 0] + T[..., :3, 3]
+        there = np.where(
+            self._still, np.clip(centres[:, b], self._low[a], self._high[a]), centres[:, a]
+        )
+        apart = centres[:, b] - there
+        return np.asarray(np.sqrt((apart**2).sum(axis=2)) - self._held - self._slack)
+
+    def _pair(
+        self, p: int, frames: Array, poses: dict[int, Any], enough: float
+    ) -> tuple[float, float]:
+        a, b = self._pairs[p]
+        one, two = self._solids[a], self._solids[b]
+        for i, solid in ((a, one), (b, two)):
+            if i not in poses:
+                T = frames[solid.frame] @ solid.place
+                poses[i] = coal.Transform3s(T[:3, :3], T[:3, 3])
+        if one.mesh is None and two.mesh is None:
+            # Of convex solids the depth of an overlap, too, changes by no more than they move.
+            apart = self._query(one.geometry, poses[a], two.geometry, poses[b], p)
+            return apart, apart
+        around = self._query(one.hull, poses[a], two.hull, poses[b], p)
+        if around >= enough:
+            return around, np.inf
+        slack = float(self._slack[p])
+        apart = self._query(one.geometry, poses[a], two.geometry, poses[b], p)
+        if apart > -slack and (_inside(one, two, frames) or _inside(two, one, frames)):
+            apart = -apart - 2 * slack
+        return apart, max(apart, -slack)
+
+    def _query(self, one: Any, T_one: Any, two: Any, T_two: Any, p: int) -> float:
+        self._result.clear()
+        self.queries += 1
+        apart = coal.distance(one, T_one, two, T_two, self._request, self._result)
+        if not np.isfinite(apart):
+            a, b = (self._names[i] for i in self._pairs[p])
+            raise InputError(
+                f"cell: the distance between {a!r} and {b!r} came out as {apart}; nothing is "
+                "called free on that, so look at their shapes"
+            )
+        return float(apart) - float(self._slack[p])
+
+
+def _inside(inner: _Solid, outer: _Solid, frames: Array) -> bool:
+    """Say whether a body that does not touch the surface of a mesh lies inside it."""
+    if outer.mesh is None:
+        return False
+    T = np.linalg.inv(frames[outer.frame]) @ frames[inner.frame]
+    return bool(outer.mesh.contains(inner.seeds @ T[:3, :3].T + T[:3, 3]).any())
+
+
+def _solid(body: Body) -> _Solid:
+    shape = body.shape
+    low, high = (f(shape.corners, axis=0) for f in (np.min, np.max))
+    centre = (low + high) / 2
+    geometry, place = _geometry(shape, body.name)
+    mesh = shape if isinstance(shape, Mesh) else None
+    around = geometry
+    if mesh is not None:
+        around = _convex(box_between(low - THIN, high + THIN))
+    return _Solid(
+        geometry=geometry,
+        place=place,
+        frame=body.frame,
+        centre=centre,
+        ball=float(np.linalg.norm(shape.corners - centre, axis=1).max()) + shape.radius,
+        low=low - shape.radius,
+        high=high + shape.radius,
+        mesh=mesh,
+        hull=around,
+        seeds=shape.seeds,
+    )
+
+
+def _deviation(shape: Shape) -> float:
+    return shape.deviation if isinstance(shape, Mesh) else 0.0
+
+
+def _geometry(shape: Shape, name: str) -> tuple[Any, Array]:
+    """Return a shape's coal geometry and the pose of its own coordinates in the body's frame."""
+    if isinstance(shape, Hull):
+        return _convex(shape), np.eye(4)
+    if isinstance(shape, Capsule):
+        return _capsule(shape)
+    tree = coal.BVHModelOBBRSS()
+    tree.beginModel(len(shape.triangles), len(shape.vertices))
+    tree.addVertices(shape.vertices)
+    tree.addTriangles(shape.triangles)
+    tree.endModel()
+    if tree.num_tris != len(shape.triangles):
+        raise InputError(f"{name}: the collision library took only {tree.num_tris} triangles")
+    return tree, np.eye(4)
+
+
+def _convex(hull: Hull) -> Any:
+    points, triangles = coal.StdVec_Vec3s(), coal.StdVec_Triangle()
+    for point in hull.points:
+        points.append(point)
+    for corners in hull.triangles.tolist():
+        triangles.append(coal.Triangle(*corners))
+    return coal.Convex(points, triangles)
+
+
+def _capsule(shape: Capsule) -> tuple[Any, Array]:
+    """Return coal's capsule, which lies along z about the origin."""
+    along = shape.end - shape.start
+    length = float(np.linalg.norm(along))
+    T = np.eye(4)
+    T[:3, 3] = (shape.start + shape.end) / 2
+    if length == 0:
+        return coal.Sphere(shape.radius), T
+    z = along / length
+    x = np.cross(np.eye(3)[np.argmin(np.abs(z))], z)
+    x /= np.linalg.norm(x)
+    T[:3, :3] = np.array([x, np.cross(z, x), z]).T
+    return coal.Capsule(shape.radius, length), T

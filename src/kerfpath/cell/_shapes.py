@@ -1,0 +1,141 @@
+"""Solids: capsules, convex hulls, and closed triangle meshes, each in the frame of its body."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike
+from scipy.spatial import ConvexHull, QhullError
+
+from kerfpath._arrays import Array, as_pose, floats, freeze, positive, scalar
+from kerfpath.cell._mesh import Mesh
+from kerfpath.errors import InputError
+
+__all__ = ["Capsule", "Hull", "Shape", "box", "box_between", "frustum"]
+
+RING = 24
+"""Corners of the polygon drawn around a circle; it juts out by less than 1 % of the radius."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Capsule:
+    """A ball swept along a straight line, or resting where both ends are the same.
+
+    Parameters
+    ----------
+    start, end : (3,) m
+        Ends of the line.
+    radius : float m
+    """
+
+    start: Array
+    end: Array
+    radius: float
+
+    def __post_init__(self) -> None:
+        for name in ("start", "end"):
+            object.__setattr__(self, name, floats(getattr(self, name), f"capsule {name}", (3,)))
+        object.__setattr__(self, "radius", scalar(self.radius, "radius", unit="m", above=0.0))
+
+    @property
+    def corners(self) -> Array:
+        """Points (c, 3) m whose hull, swept by the radius, holds the shape."""
+        return freeze(np.array([self.start, self.end]))
+
+    @property
+    def seeds(self) -> Array:
+        """A point (1, 3) m inside."""
+        return freeze((self.start + self.end)[None] / 2)
+
+    def moved(self, T: ArrayLike) -> Capsule:
+        """Return the shape in coordinates b of a pose T (4, 4) that maps its own into b."""
+        start, end = _moved(self.corners, T)
+        return Capsule(start=start, end=end, radius=self.radius)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Hull:
+    """The convex hull of points (P, 3) m that do not lie in one plane."""
+
+    points: Array
+    triangles: Array
+
+    def __init__(self, points: ArrayLike) -> None:
+        given = floats(points, "hull points", (None, 3))
+        try:
+            hull = ConvexHull(given)
+        except (QhullError, ValueError):
+            raise InputError(
+                f"hull: expected 4 points or more that do not lie in one plane, got {len(given)}"
+            ) from None
+        kept = hull.vertices
+        place = np.full(len(given), -1)
+        place[kept] = np.arange(len(kept))
+        a, b, c = (given[hull.simplices[:, i]] for i in range(3))
+        inward = (np.cross(b - a, c - a) * hull.equations[:, :3]).sum(1) < 0
+        corners = np.where(inward[:, None], hull.simplices[:, ::-1], hull.simplices)
+        object.__setattr__(self, "points", freeze(given[kept]))
+        object.__setattr__(self, "triangles", freeze(place[corners]))
+
+    @property
+    def radius(self) -> float:
+        """Zero: nothing is swept around the points."""
+        return 0.0
+
+    @property
+    def corners(self) -> Array:
+        """Points (c, 3) m whose hull is the shape."""
+        return self.points
+
+    @property
+    def seeds(self) -> Array:
+        """A point (1, 3) m inside."""
+        return freeze(self.points.mean(axis=0, keepdims=True))
+
+    def moved(self, T: ArrayLike) -> Hull:
+        """Return the shape in coordinates b of a pose T (4, 4) that maps its own into b."""
+        return Hull(_moved(self.points, T))
+
+
+Shape = Capsule | Hull | Mesh
+
+
+def box(size: ArrayLike, T: ArrayLike | None = None) -> Hull:
+    """Return a box of edges size (3,) m, its centre at the origin of pose T (4, 4)."""
+    half = positive(size, "box size", (3,)) / 2
+    whole = box_between(-half, half)
+    return whole if T is None else whole.moved(T)
+
+
+def box_between(low: ArrayLike, high: ArrayLike) -> Hull:
+    """Return the box with edges along the axes from one corner (3,) m to the opposite one."""
+    a, b = floats(low, "box corner", (3,)), floats(high, "box corner", (3,))
+    if not (a < b).all():
+        raise InputError(f"box: {a.tolist()} must lie below {b.tolist()} on every axis")
+    return Hull(np.array(np.meshgrid(*np.array([a, b]).T)).reshape(3, -1).T)
+
+
+def frustum(start: ArrayLike, end: ArrayLike, radii: tuple[float, float]) -> Hull:
+    """Return a cone cut off at both ends: from a point (3,) m to another, a radius (m) at each.
+
+    A polygon of 24 corners is drawn around each circle, so that the solid holds the round one.
+    """
+    a, b = floats(start, "frustum start", (3,)), floats(end, "frustum end", (3,))
+    radii = tuple(positive(radii, "frustum radii", (2,)))
+    length = float(np.linalg.norm(b - a))
+    if length == 0:
+        raise InputError("frustum: both ends are the same point")
+    axis = (b - a) / length
+    u = np.cross(axis, np.eye(3)[np.argmin(np.abs(axis))])
+    u /= np.linalg.norm(u)
+    turn = np.arange(RING) * 2 * np.pi / RING
+    ring = (np.cos(turn)[:, None] * u + np.sin(turn)[:, None] * np.cross(axis, u)) / np.cos(
+        np.pi / RING
+    )
+    return Hull(np.vstack([a + radii[0] * ring, b + radii[1] * ring]))
+
+
+def _moved(points: Array, T: ArrayLike) -> Array:
+    pose = as_pose(T, "pose")
+    return np.asarray(points @ pose[:3, :3].T + pose[:3, 3])

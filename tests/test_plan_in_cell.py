@@ -1,0 +1,112 @@
+"""Plans in a cell: clear, the best of all clear ones, audited again, and refused where they hit."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from kerfpath import InputError, NoFeasiblePath, audit, plan
+from kerfpath.auditor import checks
+from kerfpath.cell import Mesh, box_between, cell_of
+from kerfpath.planner import layered_graph
+
+STEP = np.radians(5)
+
+
+def cell(arm, tool, placement, fixtures, **options):
+    slab = box_between([-0.3, -0.3, -0.06], [0.3, 0.3, -0.03])
+    return cell_of(
+        arm,
+        tool=tool,
+        part=Mesh(vertices=slab.points, triangles=slab.triangles),
+        placement=placement,
+        fixtures=fixtures,
+        near_miss=2e-3,
+        **options,
+    )
+
+
+@pytest.fixture(scope="module")
+def task(circle, arm, tool, placement):
+    options = {"tool": tool, "placement": placement, "gamma_step": STEP}
+    graph = layered_graph(circle, arm, **options)
+    return (circle, arm), options | {"speed": 0.1, "graph": graph}
+
+
+@pytest.fixture(scope="module")
+def blind(task):
+    return plan(*task[0], **task[1])
+
+
+@pytest.fixture(scope="module")
+def posts():
+    """Posts around the circle, one of them where the head would like to be."""
+    turn = np.arange(6) * np.pi / 3 + 0.2
+    places = np.c_[1.2 + 0.27 * np.cos(turn), 0.27 * np.sin(turn)]
+    return {
+        f"post {i}": box_between([x, y, 0.45], [x + 0.01, y + 0.01, 0.9])
+        for i, (x, y) in enumerate(places)
+    }
+
+
+def test_where_nothing_is_in_the_way_the_plan_is_the_same(task, blind, arm, tool, placement):
+    made = plan(*task[0], **task[1], cell=cell(arm, tool, placement, {}))
+    np.testing.assert_array_equal(made.q, blind.q)
+    assert made.proof.optimal
+    assert "clear in the cell: 121 of " in made.proof.statement
+    assert "in 1 searches" in made.proof.statement
+
+
+def test_where_something_is_the_plan_goes_around_it(task, blind, arm, tool, placement, posts):
+    there = cell(arm, tool, placement, posts)
+    assert not there.clear(blind.q).all()
+    made = plan(*task[0], **task[1], cell=there)
+    assert made.cost > blind.cost
+    assert made.proof.optimal
+    assert there.clear(made.q).all()
+    assert there.clear_motion(made.q[:-1], made.q[1:]).all()
+    assert audit(made, cell=there) == []
+    hits = [issue for issue in audit(blind, cell=there) if issue.code == "collision"]
+    assert len(hits) == 1
+    assert "shortfall of the near-miss distance (nearest: post " in hits[0].message
+    free = there.clear(task[1]["graph"].q)
+    assert free.mean() < 0.9
+
+
+def test_the_audit_s_least_distance_is_the_cell_s(task, blind, arm, tool, placement, posts):
+    there = cell(arm, tool, placement, posts)
+    check = next(c for c in checks(blind, cell=there, parts=1) if c.code == "collision")
+    # Convex overlaps are exact to 1e-6 m.
+    assert check.value == pytest.approx(-there.clearance(blind.q)[0].min(), abs=2e-6)
+    assert not check.ok
+
+
+def test_a_refined_plan_is_clear_or_stays_on_the_grid(task, arm, tool, placement, posts):
+    there = cell(arm, tool, placement, posts)
+    made = plan(*task[0], **task[1], cell=there, refine=True)
+    assert there.clear(made.q).all()
+    assert there.clear_motion(made.q[:-1], made.q[1:]).all()
+
+
+def test_a_cage_is_no_way_and_says_so(task, arm, tool, placement):
+    lid = {"lid": box_between([0.9, -0.3, 0.5], [1.5, 0.3, 0.52])}
+    with pytest.raises(NoFeasiblePath, match="contour 'circle': no admissible way to node") as no:
+        plan(*task[0], **task[1], cell=cell(arm, tool, placement, lid))
+    assert no.value.proved
+    assert no.value.counts["collision at the node"] > 0
+
+
+def test_a_cell_of_another_task_is_refused(task, arm, tool, placement):
+    moved = placement.copy()
+    moved[0, 3] += 0.1
+    with pytest.raises(InputError, match="cell: it was built with another placement"):
+        plan(*task[0], **task[1], cell=cell(arm, tool, moved, {}))
+    other = tool.copy()
+    other[2, 3] += 0.1
+    with pytest.raises(InputError, match="cell: it was built with another tool"):
+        plan(*task[0], **task[1], cell=cell(arm, other, placement, {}))
+    plain = replace(arm, endless=np.zeros(6, bool))
+    with pytest.raises(InputError, match="cell: it was built with other endless joints"):
+        plan(*task[0], **task[1], cell=cell(plain, tool, placement, {}))
+    with pytest.raises(InputError, match='method: only "exact"'):
+        plan(*task[0], **task[1], method="paper", cell=cell(arm, tool, placement, {}))
