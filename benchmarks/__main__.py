@@ -11,7 +11,7 @@ from rich.console import Console
 from benchmarks._figures import Report, machine, markdown, show
 
 RESULTS = Path(__file__).parent / "RESULTS.md"
-NAMES = ("kinematics", "demo", "search", "retiming", "contours", "refinement")
+NAMES = ("kinematics", "demo", "search", "scale", "retiming", "contours", "refinement")
 
 
 def main() -> None:
@@ -54,6 +54,10 @@ def _run(name: str, *, quick: bool) -> list[Report]:
         from benchmarks import demo
 
         return [demo.run(quick=quick)]
+    if name == "scale":
+        from benchmarks import scale
+
+        return scale.run(quick=quick)
     if name == "retiming":
         from benchmarks import retiming
 
