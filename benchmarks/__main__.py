@@ -15,6 +15,7 @@ NAMES = (
     "kinematics",
     "demo",
     "search",
+    "scale",
     "retiming",
     "contours",
     "refinement",
@@ -62,6 +63,10 @@ def _run(name: str, *, quick: bool) -> list[Report]:
         from benchmarks import demo
 
         return [demo.run(quick=quick)]
+    if name == "scale":
+        from benchmarks import scale
+
+        return scale.run(quick=quick)
     if name == "retiming":
         from benchmarks import retiming
 

@@ -1,9 +1,10 @@
 """The yardstick of the search: the first-order recursion over every edge, plainly written.
 
 No windows, no sorting, no acceleration: for each vertex, the cost of all edges into it from the
-whole layer before, and the least of them. Layers lie by joint and the six joints are written out,
-so that the loop over the predecessors is vectorised and stores nothing; which joints are endless,
-and the metric, are constants of the compiled code.
+whole layer before, and the least of them. Layers lie by joint, the six joints are written out, and
+nothing is stored per edge; which joints are endless, and the metric, are constants of the compiled
+code. What numba makes of it is one predecessor at a time: LLVM does not take its `min` for a
+reduction that could be vectorised.
 """
 
 from __future__ import annotations
@@ -18,7 +19,7 @@ import numpy as np
 
 from kerfpath._arrays import Array, Bools, Ints
 
-__all__ = ["Metric", "dense_cost"]
+__all__ = ["Metric", "dense_cost", "second_order_cost"]
 
 _P = ParamSpec("_P")
 _R = TypeVar("_R")
@@ -105,3 +106,73 @@ def dense_cost(
     columns = np.ascontiguousarray(np.where(endless, turned, q).T)
     forward = _recursion(tuple(bool(e) for e in endless), metric)
     return float(forward(columns, start, weights, velocity * dt + SLACK))
+
+
+@cache
+def _second_order(endless: tuple[bool, ...]) -> Callable[[Array, Ints, Array, Array, Array], float]:
+    n = len(endless)
+
+    @_jit
+    def increment(dq: float, i: int) -> float:
+        return dq - 2 * pi * np.round(dq / (2 * pi)) if endless[i] else dq
+
+    @_jit
+    def forward(q: Array, start: Ints, weights: Array, most: Array, change: Array) -> float:
+        """Keep every admissible edge (p, j) as a state, those into one vertex together."""
+        first, d = np.zeros(start[1] + 1, np.int64), np.zeros(0)
+        dq, step = np.empty((0, n)), np.empty(n)
+        for k in range(1, len(start) - 1):
+            a, b, c = start[k - 1], start[k], start[k + 1]
+            room, count = 1024, 0
+            new_d, new_dq = np.empty(room), np.empty((room, n))
+            new_first = np.zeros(c - b + 1, np.int64)
+            for j in range(b, c):
+                for p in range(a, b):
+                    rho, far = 0.0, False
+                    for i in range(n):
+                        step[i] = increment(q[j, i] - q[p, i], i)
+                        rho += weights[i] * abs(step[i])
+                        far |= abs(step[i]) > most[i]
+                    if far:
+                        continue
+                    best = 0.0 if k == 1 else np.inf
+                    for s in range(first[p - a], first[p - a + 1]):
+                        sharp = False
+                        for i in range(n):
+                            sharp |= abs(step[i] - dq[s, i]) > change[i]
+                        best = best if sharp else min(best, d[s])
+                    if best == np.inf:
+                        continue
+                    if count == room:
+                        room *= 2
+                        wider_d, wider_dq = np.empty(room), np.empty((room, n))
+                        wider_d[:count], wider_dq[:count] = new_d, new_dq
+                        new_d, new_dq = wider_d, wider_dq
+                    new_d[count] = best + rho
+                    new_dq[count] = step
+                    count += 1
+                new_first[j - b + 1] = count
+            first, d, dq = new_first, new_d[:count], new_dq[:count]
+        return float(d.min()) if len(d) else np.inf
+
+    return forward
+
+
+def second_order_cost(
+    q: Array,
+    start: Ints,
+    *,
+    dt: float,
+    velocity: Array,
+    acceleration: Array,
+    endless: Bools,
+    weights: Array,
+) -> float:
+    """Return the least Manhattan cost of a path under both limits, inf if there is none; K >= 2.
+
+    The plain second-order recursion: over every pair of vertices of neighbouring layers, and for
+    each admissible one over every admissible edge before it. Arguments as `dense_cost`.
+    """
+    forward = _second_order(tuple(bool(e) for e in endless))
+    bounds = velocity * dt + SLACK, acceleration * dt**2 + SLACK
+    return float(forward(np.ascontiguousarray(q), start, weights, *bounds))

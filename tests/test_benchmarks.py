@@ -55,6 +55,28 @@ def test_the_dense_recursion_says_when_there_is_no_path():
     assert dense(q, start, dt=1.0, velocity=ones, **task) == pytest.approx(6.0)
 
 
+@pytest.mark.parametrize("seed", range(6))
+def test_the_brute_recursion_finds_the_cost_of_the_exact_path(seed):
+    rng = np.random.default_rng(seed)
+    sizes = rng.integers(8, 20, 9)
+    start = np.concatenate([[0], np.cumsum(sizes)])
+    task = {
+        "dt": 0.2,
+        "velocity": np.full(6, 4.0),
+        "acceleration": np.full(6, rng.uniform(8, 20)),
+        "endless": np.array([0, 1, 0, 1, 0, 1], bool),
+        "weights": rng.uniform(0.5, 2, 6),
+    }
+    q = rng.uniform(-0.5, 0.5, (start[-1], 6))
+    q[:, task["endless"]] += np.pi
+    brute = benchmark_module("_dense").second_order_cost(q, start, **task)
+    try:
+        cost = kerfpath.shortest_path(q, start, **task).cost
+    except kerfpath.NoFeasiblePath:
+        cost = np.inf
+    assert brute == pytest.approx(cost, rel=1e-12)
+
+
 def test_the_serial_chain_given_to_the_peers_is_the_robot():
     arm = benchmark_module("_arm")
     robot = arm.arm()

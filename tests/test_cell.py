@@ -1,6 +1,7 @@
 """The cell: shapes, STL files, link frames, distances against formulas, swept motions."""
 
 import struct
+from dataclasses import replace
 
 import numpy as np
 import pinocchio as pin
@@ -65,7 +66,19 @@ def distance(still, moving, angle=0.0):
     return two(still, moving).distances([[angle]])[0, 0]
 
 
-@pytest.mark.parametrize("name", [*robot_ids()[::9], "staubli_tx2_90"])
+OPW = [name for name in robot_ids() if robot(name).kinematics == "opw"]
+
+
+def test_links_that_are_not_known_are_refused():
+    with pytest.raises(InputError, match="links of ortho-parallel arms"):
+        cell_of(robot("ur_ur16e"), tool=np.eye(4))
+    moved = np.eye(4)
+    moved[2, 3] = 0.5
+    with pytest.raises(InputError, match="from a description"):
+        cell_of(replace(robot(OPW[0]), T_base_foot=moved), tool=np.eye(4))
+
+
+@pytest.mark.parametrize("name", [*OPW[::9], "staubli_tx2_90"])
 def test_link_frames_are_those_of_pinocchio(name):
     arm = robot(name)
     g = arm.geometry

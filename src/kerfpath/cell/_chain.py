@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from kerfpath._arrays import Array
+from kerfpath.errors import InputError
 from kerfpath.robots import Robot
 
 __all__ = ["Chain", "chain_of"]
@@ -54,7 +55,21 @@ class Chain:
 
 
 def chain_of(robot: Robot) -> Chain:
-    """Return the chain of an OPW robot (Brandstoetter, Angerer and Hofbaur 2014, figure 1)."""
+    """Return the chain of an OPW robot (Brandstoetter, Angerer and Hofbaur 2014, figure 1).
+
+    Raises
+    ------
+    InputError
+        Another family of arm, or one that stands or ends elsewhere than the model: where its links
+        are is not known here.
+    """
+    placed = (robot.T_base_foot, robot.T_end_flange)
+    if robot.kinematics != "opw" or not all(np.array_equal(T, np.eye(4)) for T in placed):
+        raise InputError(
+            f"robot {robot.id!r}: a cell knows the links of ortho-parallel arms of the library so "
+            f"far, got {robot.family.words}"
+            + ("" if robot.kinematics != "opw" else " from a description")
+        )
     g = robot.geometry
     y, z = (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)
     shoulder, elbow = (g["a1"], g["b"], g["c1"]), (0.0, 0.0, g["c2"])
