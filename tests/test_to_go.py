@@ -1,12 +1,15 @@
-"""The first-order bound: to the bit what the scalar recursion gives, and vectorised."""
+"""The kernels of the search: to the bit the scalar recursion, vectorised, from any thread."""
 
 import re
+from concurrent.futures import ProcessPoolExecutor, ThreadPoolExecutor
+from multiprocessing import get_context
 
 import numba
 import numpy as np
 import pytest
 
 import naive
+from kerfpath import NoFeasiblePath, shortest_path
 from kerfpath.kernels import to_go
 from kerfpath.kernels.search import Objective, distance
 from kerfpath.search._layers import narrowest_key, sorted_layers
@@ -75,3 +78,22 @@ def test_its_innermost_loop_takes_several_numbers_at_once():
     fresh = numba.njit(nogil=True)(to_go.cost_to_go.py_func)
     fresh(layers, aim, np.ones(len(layers.low), bool), np.empty(len(layers.low)))
     assert re.search(r"llvm\.minnum\.v\d+f64", next(iter(fresh.inspect_llvm().values())))
+
+
+def answer(seed):
+    """Search one random graph; return the path and its cost to the last bit."""
+    q, start, o = naive.random_instance(np.random.default_rng(seed), layers=(5, 9), size=(5, 20))
+    try:
+        path = shortest_path(q, start, **(o | {"method": "exact"}))
+    except NoFeasiblePath as broken:
+        return broken.node, broken.back, tuple(broken.counts.values())
+    return tuple(path.index), path.cost.hex()
+
+
+def test_the_answer_is_the_same_from_any_thread_or_process():
+    seeds = range(60)
+    want = [answer(seed) for seed in seeds]
+    with ThreadPoolExecutor(4) as pool:
+        assert list(pool.map(answer, seeds)) == want
+    with ProcessPoolExecutor(2, mp_context=get_context("spawn")) as pool:
+        assert list(pool.map(answer, seeds, chunksize=30)) == want

@@ -123,6 +123,14 @@ def shortest_path(
         Arrays that do not fit each other, NaN, limits or dt that are not positive, unknown names,
         a periodic closure whose end layers differ, a finite rotation of a joint that is not
         endless.
+
+    Notes
+    -----
+    Nothing is stored per edge. Beside `q`, the search takes about 100 bytes a vertex with six
+    joints, 80 MB at most for the states (p, j) remembered under a bound that is still loose, and
+    at last 8 bytes for each state within the cost of the answer. Time grows with the number of
+    layers. It runs on the thread that calls it, without the interpreter lock: searches may run at
+    once, and each answer is the same to the bit.
     """
     one_of("method", method, get_args(Method))
     one_of("closure", closure, get_args(Closure))
