@@ -35,7 +35,8 @@ CLOCKS = {
     "compile (cold only)": ("kerfpath.job", "warm_up"),
     "read STEP": ("kerfpath.job._run", "read_step"),
     "graph": ("kerfpath.job._run", "layered_graph"),
-    "search": ("kerfpath.planner", "shortest_path"),
+    "search": ("kerfpath.planner._plan", "shortest_path"),
+    "refinement": ("kerfpath.planner._plan", "refined"),
     "audit": ("kerfpath.job._run", "checks"),
     "report": ("kerfpath.job._files", "report_text"),
 }
@@ -46,7 +47,7 @@ PARTS = ("import", *CLOCKS, "other")
 
 def run(*, quick: bool) -> Report:
     """Run the demo cold and warm, by itself and in parts."""
-    warm_runs, cold_runs = (2, 1) if quick else (5, 5)
+    warm_runs, cold_runs = (2, 1) if quick else (5, 3)
     command = str(Path(sys.executable).parent / "kerfpath")
     _whole([command, "demo", "--out"], cold=False)
     warm = [_whole([command, "demo", "--out"], cold=False) for _ in range(warm_runs)]

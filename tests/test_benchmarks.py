@@ -201,3 +201,8 @@ def test_a_sheet_is_written_with_its_own_columns():
     text = figures.markdown([report], {}, "")
     assert "| what | number |\n| --- | ---: |\n| this | 1 |" in text
     assert "median" not in text
+
+
+def test_the_demo_benchmark_clocks_functions_that_are_there():
+    for module, function in benchmark_module("demo").CLOCKS.values():
+        assert callable(getattr(importlib.import_module(module), function))

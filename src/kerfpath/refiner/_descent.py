@@ -203,9 +203,8 @@ class Descent:
 
     def _model(self, at: Stand, radius: float) -> Model:
         slope = self.curves.slope(at.gamma, at.q)
-        movable = np.asarray(
-            np.isfinite(slope).all(axis=1)
-        )  # at the edge of reach a node stays where it is
+        # At the edge of reach a node stays where it is.
+        movable = np.asarray(np.isfinite(slope).all(axis=1))
         endless = self.limits.endless
         return Model(
             q=at.q,
