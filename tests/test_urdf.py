@@ -192,7 +192,8 @@ def test_a_described_robot_is_planned_and_audited(tmp_path, circle, tool, placem
     )
     assert audit(made) == []
     # The plan file keeps what the audit needs: where the model stands, and the chain.
-    text = plan_text(r, made.T_flange_tip, made.T_base_part, [plan_entry(made, checks(made))], {})
+    entry = plan_entry(made, made.name, checks(made))
+    text = plan_text(r, made.T_flange_tip, made.T_base_part, [entry], {})
     (tmp_path / "plan.json").write_text(text)
     (read,) = read_plan_file(tmp_path / "plan.json").plans
     np.testing.assert_array_equal(read.robot.chain.origins, r.chain.origins)
