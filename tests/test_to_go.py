@@ -11,8 +11,10 @@ import pytest
 
 import naive
 from kerfpath import NoFeasiblePath, shortest_path
-from kerfpath.kernels import to_go
-from kerfpath.kernels.search import Objective, distance
+from kerfpath.kernels import exact, to_go
+from kerfpath.kernels.limits import velocity_time
+from kerfpath.kernels.search import Objective, distance, fill_increment, late
+from kerfpath.search._exact import NO_SEAM, best_allowed
 from kerfpath.search._layers import narrowest_key, sorted_layers
 
 
@@ -43,10 +45,14 @@ def scalar(layers, aim, allowed):
             best = np.inf
             for j in range(start[k + 1], start[k + 2]):
                 rho, tail = distance(layers, aim, p, j), aim.vertex_cost[j]
+                if aim.penalty > 0 and rho < np.inf:
+                    dq = np.empty(len(aim.velocity))
+                    fill_increment(layers, p, j, dq)
+                    rho += late(aim, aim.stretch * velocity_time(dq, aim.velocity))
                 if aim.minimax:
                     best = min(best, max(rho, max(tail, h[j])))
                 else:
-                    best = min(best, rho + (tail + h[j]))
+                    best = min(best, rho + (tail + h[j]), aim.leap + (tail + h[j]))
             h[p] = best if allowed[p] else np.inf
     return h
 
@@ -69,6 +75,22 @@ def test_the_bound_is_that_of_the_scalar_recursion_to_the_bit(metric, minimax):
     assert finite > 300
 
 
+@pytest.mark.parametrize("leap", [3.0, np.inf])
+@pytest.mark.parametrize("metric", range(3))
+def test_lost_time_and_leaps_count_with_the_distance(metric, leap):
+    rng = np.random.default_rng(32)
+    finite = 0
+    for _ in range(20):
+        layers, aim = graph(rng, layers=(1, 7), size=(1, 40))
+        aim = aim._replace(metric=metric, timed=True, penalty=2.0, stretch=2.5, leap=leap)
+        allowed = rng.random(len(layers.low)) < 0.9
+        h = np.empty(len(layers.low))
+        to_go.cost_to_go(layers, aim, allowed, h)
+        np.testing.assert_allclose(h, scalar(layers, aim, allowed), rtol=1e-13)
+        finite += int(np.isfinite(h[: layers.start[-2]]).sum())
+    assert finite > 300
+
+
 @pytest.mark.skipif(bool(numba.config.BOUNDSCHECK), reason="a loop that checks indices jumps")
 def test_its_innermost_loop_takes_several_numbers_at_once():
     # Python's own min, a sum that may be reordered or a constant infinity would undo it unnoticed.
@@ -79,6 +101,22 @@ def test_its_innermost_loop_takes_several_numbers_at_once():
     fresh = numba.njit(nogil=True)(to_go.cost_to_go.py_func)
     fresh(layers, aim, np.ones(len(layers.low), bool), np.empty(len(layers.low)))
     assert re.search(r"llvm\.minnum\.v\d+f64", next(iter(fresh.inspect_llvm().values())))
+
+
+def test_without_a_bound_too_no_path_begins_where_it_is_not_allowed():
+    rng, tried = np.random.default_rng(33), 0
+    for _ in range(60):
+        layers, aim = graph(rng, layers=(2, 7), size=(4, 12))
+        for v in range(layers.start[1]):
+            allowed = np.ones(len(layers.low), np.bool_)
+            allowed[: layers.start[1]] = np.arange(layers.start[1]) == v
+            h = np.empty(len(allowed))
+            to_go.cost_to_go(layers, aim, allowed, h)
+            found = best_allowed(layers, aim, allowed, NO_SEAM, 0.0)
+            few = exact.recursion(layers, aim, h, np.inf, NO_SEAM, 0, 2).cost
+            assert few >= (np.inf if found is None else found.cost * (1 - 1e-12))
+            tried += few < np.inf
+    assert tried > 100
 
 
 def feasible_instances(count):

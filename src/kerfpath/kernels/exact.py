@@ -80,7 +80,7 @@ def _begin(
     for i in range(m):
         enter = joined(aim.minimax, cost, aim.vertex_cost[a + i])
         f = joined(aim.minimax, enter, h[a + i])
-        if f <= bound:
+        if f <= bound and f < np.inf:
             vertex[count], d[count] = a + i, enter
             count += 1
         else:

@@ -86,32 +86,41 @@ def _layer_to_go(
 
 @jit_inline
 def _least(
-    layers: Layers,
-    aim: Objective,
-    bound: Array,
-    slowness: Array,
-    p: int,
-    a: int,
-    m: int,
+    layers: Layers, aim: Objective, bound: Array, slowness: Array, p: int, a: int, m: int,
     tail: Array,
-) -> float:
-    """Least of the distances from vertex p to the vertices a..a+m-1, joined with their tails."""
+) -> float:  # fmt: skip
+    """Least of the distances from vertex p to the vertices a..a+m-1, joined with their tails.
+
+    With a penalty, the price of the time that the step asks for counts with the distance.
+    """
+    if aim.penalty > 0:
+        return _least_of_joints(layers, aim, bound, slowness, p, a, m, tail, True)
+    return _least_of_joints(layers, aim, bound, slowness, p, a, m, tail, False)
+
+
+@jit_inline
+def _least_of_joints(
+    layers: Layers, aim: Objective, bound: Array, slowness: Array, p: int, a: int, m: int,
+    tail: Array, priced: bool,
+) -> float:  # fmt: skip
+    """As `_least`; what is handed on as a constant is not in the loop."""
     none = aim.cap + np.inf  # infinity: a constant would be folded into jumps
     if len(bound) == SIX:
         return _least_of(
             layers.q, layers.turn, bound, aim.weight, aim.metric, aim.cap, aim.minimax,
-            aim.penalty, slowness, p, a, m, tail, SIX, none,
+            aim.penalty, slowness, p, a, m, tail, priced, SIX, none,
         )  # fmt: skip
     return _least_of(
         layers.q, layers.turn, bound, aim.weight, aim.metric, aim.cap, aim.minimax,
-        aim.penalty, slowness, p, a, m, tail, len(bound), none,
+        aim.penalty, slowness, p, a, m, tail, priced, len(bound), none,
     )  # fmt: skip
 
 
 @jit_vector
 def _least_of(
     q: Array, turn: Array, bound: Array, weight: Array, metric: int, cap: float, minimax: bool,
-    penalty: float, slowness: Array, p: int, a: int, m: int, tail: Array, n: int, none: float,
+    penalty: float, slowness: Array, p: int, a: int, m: int, tail: Array, priced: bool, n: int,
+    none: float,
 ) -> float:  # fmt: skip
     """As `_least`, of n joints: the innermost loop of the first-order problem.
 
@@ -123,11 +132,12 @@ def _least_of(
         for i in range(n):
             y = abs(q[i, p] - q[i, j])
             y = smaller(y, turn[i] - y)
-            time = larger(time, slowness[i] * y)
+            time = larger(time, slowness[i] * y) if priced else time
             y = either(y > bound[i], none, weight[i] * y)
             longest = larger(r, y)
             r = either(metric == MANHATTAN, r + y, either(metric == EUCLID, r + y * y, longest))
         r = either(metric == EUCLID, sqrt(r), r)
-        r = either(r <= cap, r, none) + penalty * (time - 1.0)
+        r = either(r <= cap, r, none)
+        r = r + penalty * (time - 1.0) if priced else r
         best = smaller(best, either(minimax, larger(r, tail[j]), r + tail[j]))
     return best
