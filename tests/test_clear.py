@@ -148,7 +148,10 @@ def test_most_of_a_graph_is_never_looked_at():
 def test_where_all_is_closed_the_answer_names_collision():
     q, start = np.zeros((6, 1)), [0, 2, 4, 6]
     o = {"dt": 1.0, "velocity": [1.0], "acceleration": [1.0]}
-    free = lambda v: np.zeros(len(v))  # noqa: E731
+
+    def free(v):
+        return np.zeros(len(v))
+
     with pytest.raises(NoFeasiblePath, match="clear; forbidden by collision at the node: 2") as no:
         clear_path(
             q, start, price=lambda v: np.where((v == 2) | (v == 3), np.inf, 0.0),

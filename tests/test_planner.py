@@ -254,6 +254,9 @@ def test_the_pieces_of_an_interrupted_cut(corner, arm, tool, placement):
     assert [p.name for p in whole] == ["corner"]
     with pytest.raises(InputError, match='needs method "exact"'):
         plan_in_pieces(corner, arm, method="paper", **options)
+    for wrong in ({"closure": "periodic"}, {"rotation": np.full(6, np.inf)}):
+        with pytest.raises(InputError, match=r"plan_in_pieces|is open"):
+            plan_in_pieces(corner, arm, **options, **wrong)
     with pytest.raises(NoFeasiblePath, match="no number of interruptions helps"):
         plan_in_pieces(corner, arm, **options | {"speed": 20})
 

@@ -7,10 +7,9 @@ from dataclasses import replace
 import numpy as np
 
 from kerfpath import refiner
-from kerfpath._arrays import Array
 from kerfpath.planner._refined import first_order
 from kerfpath.planner._task import Task
-from kerfpath.plans import Feed, Plan, Proof
+from kerfpath.plans import Plan, Proof
 from kerfpath.retime import feed, retime
 from kerfpath.search import slowed_path
 
@@ -25,9 +24,10 @@ def slowed(task: Task, *, refine: bool) -> Plan:
     the limits, from the best path without acceleration limits, where there is one. The times along
     the path are then the least under all limits; the refinement keeps them, and they are set anew.
     """
-    start = first_order(task) if refine else None
+    free = refine and task.robot.family.free_rotation
+    start = first_order(task) if free else None
     start = _least_lost(task) if start is None else start
-    if not refine:
+    if not free:
         return _timed(task, start)
     eased = refiner.ease(start)
     claim = f"{start.proof.statement}; gamma moved off the grid to lose little time"
@@ -49,16 +49,8 @@ def _least_lost(task: Task) -> Plan:
 
 def _timed(task: Task, made: Plan) -> Plan:
     """Return the plan with the least times, and where they dip."""
-    tau = retime(made.increments, task.dt, *_limits(task))
-    time = np.concatenate([[0.0], np.cumsum(tau)])
-    return replace(made, time=time, feed=_feed(task, made, tau))
-
-
-def _feed(task: Task, made: Plan, tau: Array) -> Feed:
-    length = np.diff(made.contour.s)
-    return feed(tau, task.dt, made.increments, *_limits(task), length)
-
-
-def _limits(task: Task) -> tuple[Array, Array]:
     velocity, acceleration = task.robot.speed_limits()
-    return task.settings.eta_v * velocity, task.settings.eta_a * acceleration
+    limits = task.settings.eta_v * velocity, task.settings.eta_a * acceleration
+    tau = retime(made.increments, task.dt, *limits)
+    dips = feed(tau, task.dt, made.increments, *limits, np.diff(made.contour.s))
+    return replace(made, time=np.concatenate([[0.0], np.cumsum(tau)]), feed=dips)

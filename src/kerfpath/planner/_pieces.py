@@ -28,7 +28,8 @@ def plan_in_pieces(
     Parameters
     ----------
     contour, robot, refine, options
-        As in `plan`, with method "exact"; a closed contour need not return to its first pose.
+        As in `plan`, with method "exact", closure "free" (a closed contour need not return to its
+        first pose) and no rotation limit.
 
     Returns
     -------
@@ -42,11 +43,16 @@ def plan_in_pieces(
         No number of interruptions helps: a node without a pose, or an interval between two nodes
         that no poses can pass.
     InputError
-        As `plan`; another method.
+        As `plan`; another method or closure, a rotation limit.
     """
-    if options.get("method", "exact") != "exact":
-        raise InputError(f'plan_in_pieces: needs method "exact", got {options["method"]!r}')
     task = task_of(contour, robot, **options)
+    settings = task.settings
+    plain = settings.method == "exact" and settings.closure == "free"
+    if not plain or settings.rotation is not None:
+        raise InputError(
+            'plan_in_pieces: needs method "exact", closure "free" and no rotation limit, got '
+            f"{settings.method!r}, {settings.closure!r} and {settings.rotation}"
+        )
     try:
         found = interrupted_path(**task.limits, **task.aim)
     except NoFeasiblePath as broken:

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+import numpy as np
+
 from kerfpath import refiner
 from kerfpath.errors import NoFeasiblePath
 from kerfpath.planner._task import Task
@@ -27,7 +29,10 @@ def refined(task: Task, made: Plan) -> Plan:
     are begun from.
     """
     first = first_order(task)
-    found = [refiner.refine(start) for start in (made, first) if start is not None]
+    starts = [made]
+    if first is not None and not np.array_equal(first.q, made.q):
+        starts.append(first)
+    found = [refiner.refine(start) for start in starts]
     done = [f for f in found if f.done and f.cost_after <= made.cost]
     if not done:
         statement = f"{made.proof.statement}; {found[0].statement}"

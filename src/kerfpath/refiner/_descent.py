@@ -130,12 +130,12 @@ class Descent:
         """Return the objective (14) or (15) of joints (K, 6), not wrapped."""
         return path_cost(np.diff(q, axis=0), self.weight, self.metric, self.objective)
 
-    def admitted(self, at: Stand) -> Stand:
-        """Return the first motion found that keeps every limit, or the one that breaks them least.
+    def admitted(self, at: Stand) -> tuple[Stand, int]:
+        """Return the first motion found that keeps every limit, and how many programs it took.
 
-        The cap, where there is one, is not a limit here.
+        Where none is found, the one that breaks them least.
         """
-        return self._run(at, "excess", enough=0.0)[0]
+        return (at, 0) if at.admitted else self._run(at, "excess", enough=0.0)
 
     def gentlest(self, at: Stand) -> Stand:
         """Return the motion whose largest share of a limit is least."""

@@ -105,7 +105,7 @@ def refine(
             return _unrefined(plan, divided)
         asked = divided
     descent, start = _descent(asked)
-    begun = start if start.admitted else descent.admitted(start)
+    begun, before = descent.admitted(start)
     if not begun.admitted:
         return _unrefined(plan, _closest(descent, begun))
     found, programs = descent.best(begun)
@@ -121,7 +121,7 @@ def refine(
         done=True,
         cost_before=start.cost,
         cost_after=refined.cost,
-        programs=programs,
+        programs=before + programs,
         statement=proof.statement,
     )
 
@@ -141,7 +141,6 @@ def quicken(plan: Plan) -> tuple[Plan, Binding]:
     All intervals change alike; also says where a limit is then used up. The cost is what it comes
     to.
     """
-    binding = Binding(0, 0, "velocity")
     for _ in range(MOST_INTERVALS):
         descent, start = _descent(plan)
         found = descent.gentlest(start)
