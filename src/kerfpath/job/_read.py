@@ -18,7 +18,7 @@ from kerfpath.contour import Contour
 from kerfpath.errors import InputError
 from kerfpath.job._keys import FAULT, LARGEST, MOST_NODES, SMALLEST, nearest
 from kerfpath.job._lines import Places
-from kerfpath.job._model import TABLES, AuditTable, ContourTable, JobFile, PlanTable, ProgramTable
+from kerfpath.job._tables import TABLES, AuditTable, ContourTable, JobFile, PlanTable, ProgramTable
 from kerfpath.robots import Robot, postures_named
 
 __all__ = ["ContourTask", "Job", "ProgramOptions", "audit_options", "program_options", "read_job"]
