@@ -9,6 +9,7 @@ from typing import Any, Literal
 import numpy as np
 
 from kerfpath._arrays import Array, Ints, as_pose, floats, freeze, integers, scalar
+from kerfpath.comfort import Comfort, measures
 from kerfpath.contour import Contour, FrameKind
 from kerfpath.errors import InputError
 from kerfpath.kernels import metric
@@ -37,6 +38,8 @@ class Settings:
     closure : {"free", "periodic"}
     rotation : (6,) rad, optional
         How far each joint may turn away from where it begins, infinite where that is not limited.
+    comfort : Comfort, optional
+        What the nodes are to keep away from, and what coming near costs.
     """
 
     gamma_step: float
@@ -49,6 +52,7 @@ class Settings:
     eta_a: float
     closure: Closure = "free"
     rotation: Array | None = None
+    comfort: Comfort | None = None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -106,7 +110,7 @@ class Feed:
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Criteria:
-    """Smoothness of a plan, each (n,), joint by joint.
+    """Smoothness of a plan, joint by joint, each (n,), and what it comes near to.
 
     Parameters
     ----------
@@ -118,6 +122,8 @@ class Criteria:
         Coordinate range (9).
     peak_velocity, peak_acceleration : share of the limit
         Largest finite difference over the joint's limit, before eta.
+    nearest : mapping of str to (float, int)
+        The least of each measure of `kerfpath.comfort`, in its unit, and the node it stands at.
     """
 
     displacement: Array
@@ -125,12 +131,22 @@ class Criteria:
     range: Array
     peak_velocity: Array
     peak_acceleration: Array
+    nearest: Mapping[str, tuple[float, int]]
 
 
-def path_cost(dq: Array, weights: Array, metric_name: Metric, objective: ObjectiveKind) -> float:
-    """Return the objective (14) or (15) of joint increments (K-1, n) rad."""
+def path_cost(
+    dq: Array,
+    weights: Array,
+    metric_name: Metric,
+    objective: ObjectiveKind,
+    nodes: Array | None = None,
+) -> float:
+    """Return the objective (14) or (15) of increments (K-1, n) rad and costs of nodes (K,)."""
     total = metric.total_distance if objective == "sum" else metric.maximum_distance
-    return float(total(np.ascontiguousarray(dq), weights, METRIC_CODES[metric_name]))
+    path = float(total(np.ascontiguousarray(dq), weights, METRIC_CODES[metric_name]))
+    if nodes is None:
+        return path
+    return path + float(nodes.sum()) if objective == "sum" else max(path, float(nodes.max()))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -157,7 +173,7 @@ class Plan:
         Time of each node, from 0.
     settings : Settings
     cost : float
-        Objective (14) or (15).
+        Objective (14) or (15), what nodes cost included.
     proof : Proof
     feed : Feed or None
         Where the speed dips; None at constant speed.
@@ -237,12 +253,14 @@ class Plan:
 
     @property
     def criteria(self) -> Criteria:
-        """The criteria (7) to (9) and the peak shares of the limits."""
+        """The criteria (7) to (9), the peak shares of the limits, and the nearest comfort."""
         dq = self.increments
+        measured = measures(self.robot, self.q, tool=self.T_flange_tip)
         return Criteria(
             displacement=metric.total_displacement(dq),
             largest_increment=metric.largest_increment(dq),
             range=metric.coordinate_range(dq),
             peak_velocity=np.abs(self.velocity_share).max(axis=0),
             peak_acceleration=np.abs(self.acceleration_share).max(axis=0, initial=0.0),
+            nearest={name: (float(of.min()), int(of.argmin())) for name, of in measured.items()},
         )

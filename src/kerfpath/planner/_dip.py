@@ -34,12 +34,22 @@ def slowed(task: Task, *, refine: bool) -> Plan:
     made = _timed(task, replace(eased, proof=Proof(optimal=False, statement=claim)))
     better = refiner.refine(made)
     again = _timed(task, better.plan)
-    return again if again.time[-1] <= made.time[-1] else made
+    best = again if again.time[-1] <= made.time[-1] else made
+    comfort = task.settings.comfort
+    if comfort is None or not comfort.broken(task.robot, best.q, task.T_flange_tip):
+        return best
+    return slowed(task, refine=False)
 
 
 def _least_lost(task: Task) -> Plan:
     s = task.settings
-    found = slowed_path(**task.limits, dt=task.dt, weights=s.weights, metric=s.metric)
+    found = slowed_path(
+        **task.limits,
+        dt=task.dt,
+        weights=s.weights,
+        metric=s.metric,
+        vertex_cost=task.vertex_cost,
+    )
     claim = (
         "at constant speed the graph has no path; of all its paths this one loses the least time "
         "step by step"

@@ -10,11 +10,17 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from kerfpath._arrays import Array, Ints, as_pose, floats, freeze, scalar
+from kerfpath.comfort import Comfort
 from kerfpath.contour import Contour, FrameKind
 from kerfpath.errors import InputError
 from kerfpath.graph import LayeredGraph
 from kerfpath.kernels.metric import increments
-from kerfpath.planner._graph import layered_graph, node_interval, require_no_empty_layer
+from kerfpath.planner._graph import (
+    layered_graph,
+    node_interval,
+    require_no_empty_layer,
+    within_margins,
+)
 from kerfpath.plans import Plan, Proof, Settings, path_cost
 from kerfpath.robots import Robot
 from kerfpath.search import Closure, Method, Metric, ObjectiveKind, rotation_limits
@@ -37,6 +43,7 @@ class Options(TypedDict, total=False):
     weights: ArrayLike | None
     eta_v: float
     eta_a: float
+    comfort: Comfort | None
     graph: LayeredGraph | None
     progress: Callable[[int], None] | None
 
@@ -55,6 +62,8 @@ class Task:
     settings : Settings
     graph : LayeredGraph
         No layer of it is empty.
+    vertex_cost : (N,), optional
+        What its vertices cost.
     """
 
     contour: Contour
@@ -64,6 +73,7 @@ class Task:
     dt: float
     settings: Settings
     graph: LayeredGraph
+    vertex_cost: Array | None = None
 
     @property
     def limits(self) -> dict[str, Any]:
@@ -83,12 +93,15 @@ class Task:
     def aim(self) -> dict[str, Any]:
         """What the searches are to minimise."""
         s = self.settings
-        return {"dt": self.dt, "weights": s.weights, "metric": s.metric, "objective": s.objective}
+        aim = {"dt": self.dt, "weights": s.weights, "metric": s.metric, "objective": s.objective}
+        return aim if self.vertex_cost is None else aim | {"vertex_cost": self.vertex_cost}
 
     def cost(self, index: Ints) -> float:
-        """Return the objective (14) or (15) of a path through the graph."""
-        s, q = self.settings, self.graph.q[self.graph.start[:-1] + index]
-        return path_cost(increments(q, self.robot.endless), s.weights, s.metric, s.objective)
+        """Return the objective (14) or (15) of a path through the graph, vertex costs included."""
+        s, vertex = self.settings, self.graph.start[:-1] + index
+        dq = increments(self.graph.q[vertex], self.robot.endless)
+        nodes = None if self.vertex_cost is None else self.vertex_cost[vertex]
+        return path_cost(dq, s.weights, s.metric, s.objective, nodes)
 
     def plan(self, index: Ints, cost: float, proof: Proof) -> Plan:
         """Return the plan of a path through the graph, at the speed asked for."""
@@ -113,10 +126,15 @@ class Task:
     def part(self, first: int, last: int, name: str) -> Task:
         """Return the task of nodes first to last alone."""
         part = self.contour.part(first, last, self.settings.frames)
+        vertices, cost = (
+            slice(self.graph.start[first], self.graph.start[last + 1]),
+            self.vertex_cost,
+        )
         return replace(
             self,
             contour=replace(part, name=name),
             graph=self.graph.part(first, last),
+            vertex_cost=None if cost is None else cost[vertices],
             settings=replace(self.settings, closure="free"),
         )
 
@@ -139,6 +157,7 @@ def task_of(
     eta_a: float = 1.0,
     closure: Closure = "free",
     rotation: ArrayLike | None = None,
+    comfort: Comfort | None = None,
     graph: LayeredGraph | None = None,
     progress: Callable[[int], None] | None = None,
 ) -> Task:
@@ -162,6 +181,7 @@ def task_of(
         eta_a=scalar(eta_a, "eta_a", above=0.0),
         closure=closure,
         rotation=None if rotation is None else rotation_limits(rotation, robot.endless),
+        comfort=comfort,
     )
     graph = graph or layered_graph(
         contour,
@@ -177,6 +197,11 @@ def task_of(
         raise InputError(
             f"graph: has {len(graph.start) - 1} layers, but the contour has {len(contour)} nodes"
         )
+    vertex_cost = None
+    if comfort is not None:
+        graph = within_margins(graph, robot, comfort, T_flange_tip, periodic=closure == "periodic")
+        if any(band.cost for band in comfort.bands.values()):
+            vertex_cost = freeze(comfort.price(robot, graph.q, T_flange_tip))
     require_no_empty_layer(contour, graph)
     return Task(
         contour=contour,
@@ -186,4 +211,5 @@ def task_of(
         dt=dt,
         settings=settings,
         graph=graph,
+        vertex_cost=vertex_cost,
     )
