@@ -1,7 +1,9 @@
 """Comfort: its measures by other means, plans against brute force, margins held and audited."""
 
 import json
+import re
 from dataclasses import replace
+from pathlib import Path
 from types import SimpleNamespace
 
 import numpy as np
@@ -389,3 +391,12 @@ def test_a_plan_file_tells_the_comfort_asked_for(small, tmp_path):
     told = json.loads(text)["contours"][0]
     assert told["comfort"]["wrist"] == {"margin": 0.05, "width": 0.5, "cost": 3.0}
     assert told["criteria"]["nearest"]["shoulder"]["unit"] == "m"
+
+
+def test_the_page_s_example_runs_and_keeps_its_margins(capsys):
+    page = (Path(__file__).parent.parent / "docs" / "comfort.md").read_text()
+    (code,) = re.findall(r"```python\n(.*?)```", page, re.DOTALL)
+    exec(compile(code, "comfort.md", "exec"), {})
+    wrist, _, limits = map(float, capsys.readouterr().out.split())
+    assert wrist >= 5
+    assert limits >= 3
