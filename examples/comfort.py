@@ -59,20 +59,17 @@ def picture(made: dict[str, kerfpath.Plan]) -> str:
         "font-family='sans-serif' font-size='13'><rect width='100%' height='100%' fill='white'/>"
     ]
     for angle in range(0, 51, 10):
-        y = base - angle / most * 220
-        out.append(f"<path d='M{left} {y:.1f}H{width - 20}' stroke='#ddd'/>")
-        out.append(f"<text x='{left - 8}' y='{y + 4:.1f}' text-anchor='end'>{angle}</text>")
+        level = base - angle / most * 220
+        out.append(f"<path d='M{left} {level:.1f}H{width - 20}' stroke='#ddd'/>")
+        out.append(f"<text x='{left - 8}' y='{level + 4:.1f}' text-anchor='end'>{angle}</text>")
     for i, (words, plan) in enumerate(made.items()):
         x = left + plan.contour.s / length * (width - 20 - left)
-        angle = np.degrees(measure("wrist", plan.robot, plan.q))
-        line = " ".join(
-            f"{a:.1f},{base - v / most * 220:.1f}" for a, v in zip(x, angle, strict=True)
-        )
+        y = base - np.degrees(measure("wrist", plan.robot, plan.q)) / most * 220
+        line = " ".join(f"{a:.1f},{b:.1f}" for a, b in np.c_[x, y])
         colour = COLOURS[i]
         out.append(f"<polyline points='{line}' fill='none' stroke='{colour}' stroke-width='2'/>")
-        out.append(
-            f"<text x='{width - 24}' y='{44 + 17 * i}' text-anchor='end' fill='{colour}'>{words}</text>"
-        )
+        place = f"x='{width - 24}' y='{44 + 17 * i}' text-anchor='end'"
+        out.append(f"<text {place} fill='{colour}'>{words}</text>")
     out.append(
         f"<text x='{width / 2}' y='{height - 14}' text-anchor='middle'>along the cut, 0 to "
         f"{length * 1e3:.0f} mm; wrist from its singularity in deg</text></svg>"
