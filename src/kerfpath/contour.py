@@ -212,6 +212,11 @@ class Contour:
         H[:, 3, 3] = 1.0
         return freeze(H)
 
+    @property
+    def along(self) -> Array:
+        """Directions of travel, (K, 3): unit, normal to the tool axes; errors as in `frames`."""
+        return replace(self, x=None).frames("tangent")[:, :3, 0]
+
     def part(self, first: int, last: int, frames: FrameKind) -> Contour:
         """Return the nodes first to last as an open contour, gamma counting from the same frames.
 
