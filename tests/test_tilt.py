@@ -102,7 +102,7 @@ def test_the_plan_is_the_best_of_every_tilt_gamma_posture_and_turn(
     bent = Contour(circle.points[:20:5], circle.axes[:20:5])
     wide = arm.with_limits(endless=[0] * 6, upper=np.where(np.arange(6) == 5, 7.0, arm.upper))
     tilt, step, dt = Tilt(cone=0.1, steps=1, cost=0.02), np.radians(120), 2.0
-    speed = bent.length / 3 / dt
+    speed = np.diff(bent.s).max() / dt
     space = {"tool": tool, "placement": placement, "gamma_step": step, "frames": frames}
     space["postures"] = range(2)
     # By hand: the tangent of each node, and every solution of every tilted and turned frame.

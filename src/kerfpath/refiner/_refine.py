@@ -261,7 +261,7 @@ def _divided(plan: Plan, nodes: Contour) -> Plan | str:
         contour=nodes,
         q=near,
         gamma=gamma,
-        tilt=None,
+        tilt=np.zeros((len(nodes), 2)),
         posture=np.repeat(plan.posture[:1], len(nodes)),
         turn=np.zeros((len(nodes), plan.robot.joints), np.int64),
         time=np.interp(index, coarse, plan.time),
