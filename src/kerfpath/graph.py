@@ -61,6 +61,11 @@ class LayeredGraph:
     reasons: tuple[str, ...]
 
     @property
+    def candidate(self) -> NDArray[np.int32]:
+        """Variant and gamma of each vertex, (N,): its place along the second axis of `reason`."""
+        return self.variant * np.int32(len(self.gamma)) + self.sample
+
+    @property
     def reason_by_gamma(self) -> NDArray[np.uint8]:
         """What became of gamma and posture, (K, m, P): admitted if any variant of them is."""
         K, _, P = self.reason.shape
