@@ -31,6 +31,7 @@ from kerfpath.comfort import MEASURES, jacobian, measure, measures
 from kerfpath.job._planfile import plan_entry, plan_text, read_plan_file
 from kerfpath.planner import layered_graph
 from kerfpath.robots import Robot
+from kerfpath.tilt import Tilt
 
 STEP = np.radians(30)
 FIVE = Robot(
@@ -193,10 +194,10 @@ def by_hand(arm, q, comfort):
     return total
 
 
-def brute(small, comfort, objective, closure):
+def brute(small, comfort, objective, closure, more=0.0):
     nodes, arm, options = small
     graph, dt = options["graph"], nodes.length / 12 / options["speed"]
-    price = by_hand(arm, graph.q, comfort)
+    price = by_hand(arm, graph.q, comfort) + more
     open_ = np.isfinite(price)
     layer = np.repeat(np.arange(13), np.diff(graph.start))[open_]
     start = np.concatenate([[0], np.cumsum(np.bincount(layer, minlength=13))])
@@ -222,6 +223,21 @@ def test_a_plan_with_comfort_is_the_brute_optimum(small, objective, closure):
     both = path.sum() + nodes_cost.sum() if objective == "sum" else max(*path, *nodes_cost)
     assert made.cost == pytest.approx(both, rel=1e-12)
     assert nodes_cost.max() > 0  # it did have something to weigh
+
+
+def test_what_tilt_costs_and_comfort_add_up(small):
+    nodes, arm, options = small
+    where = {key: options[key] for key in ("tool", "placement", "gamma_step")}
+    tilt = Tilt(cone=0.3, steps=1, cost=0.7)
+    graph = layered_graph(nodes, arm, tilt=tilt, postures=(0,), **where)
+    tilted = options | {"graph": graph}
+    made = plan(nodes, arm, tilt=tilt, comfort=EVERY, **tilted)
+    lean = tilt.cost * np.hypot(*graph.tilt[graph.variant].T)
+    assert made.cost == pytest.approx(brute((nodes, arm, tilted), EVERY, "sum", "free", lean))
+    better = plan(nodes, arm, tilt=tilt, comfort=EVERY, refine=True, **tilted)
+    path = np.abs(better.increments * better.settings.weights).sum()
+    price = by_hand(arm, better.q, EVERY).sum() + tilt.cost * np.hypot(*better.tilt.T).sum()
+    assert better.cost == pytest.approx(path + price, rel=1e-9)
 
 
 def test_no_margin_and_no_cost_change_nothing(small):

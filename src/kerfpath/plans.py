@@ -15,6 +15,7 @@ from kerfpath.errors import InputError
 from kerfpath.kernels import metric
 from kerfpath.robots import Robot
 from kerfpath.search import METRIC_CODES, Closure, Method, Metric, ObjectiveKind
+from kerfpath.tilt import Tilt, tilted
 
 __all__ = ["Criteria", "Feed", "Plan", "Proof", "Settings", "path_cost"]
 
@@ -40,6 +41,8 @@ class Settings:
         How far each joint may turn away from where it begins, infinite where that is not limited.
     comfort : Comfort, optional
         What the nodes are to keep away from, and what coming near costs.
+    tilt : Tilt, optional
+        Tolerance of the tool axis; None: the nominal axis.
     """
 
     gamma_step: float
@@ -53,6 +56,7 @@ class Settings:
     closure: Closure = "free"
     rotation: Array | None = None
     comfort: Comfort | None = None
+    tilt: Tilt | None = None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -139,14 +143,14 @@ def path_cost(
     weights: Array,
     metric_name: Metric,
     objective: ObjectiveKind,
-    nodes: Array | None = None,
+    node_cost: Array | None = None,
 ) -> float:
-    """Return the objective (14) or (15) of increments (K-1, n) rad and costs of nodes (K,)."""
+    """Return the objective (14) or (15) of joint increments (K-1, n) rad, with the nodes' costs."""
     total = metric.total_distance if objective == "sum" else metric.maximum_distance
-    path = float(total(np.ascontiguousarray(dq), weights, METRIC_CODES[metric_name]))
-    if nodes is None:
-        return path
-    return path + float(nodes.sum()) if objective == "sum" else max(path, float(nodes.max()))
+    cost = float(total(np.ascontiguousarray(dq), weights, METRIC_CODES[metric_name]))
+    if node_cost is None:
+        return cost
+    return cost + float(node_cost.sum()) if objective == "sum" else max(cost, *node_cost.tolist())
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -165,6 +169,8 @@ class Plan:
         Joints at the nodes.
     gamma : (K,) rad
         Free rotation about the tool axis at the nodes.
+    tilt : (K, 2) rad, optional
+        Lead and lean of the tool axis at the nodes, see `kerfpath.Tilt`; default none.
     posture : (K,) int
         Posture mu; see `kerfpath.robots.posture_name`.
     turn : (K, n) int
@@ -173,12 +179,12 @@ class Plan:
         Time of each node, from 0.
     settings : Settings
     cost : float
-        Objective (14) or (15), what nodes cost included.
+        Objective (14) or (15), with what tilt and comfort cost.
     proof : Proof
     feed : Feed or None
         Where the speed dips; None at constant speed.
     counts : mapping of str to int
-        Candidates (node, gamma, posture) of the layered graph by what became of them.
+        Candidates (node, tilt, gamma, posture) of the layered graph by what became of them.
     """
 
     contour: Contour
@@ -195,6 +201,7 @@ class Plan:
     proof: Proof
     counts: Mapping[str, int]
     feed: Feed | None = None
+    tilt: Array = None  # type: ignore[assignment]  # filled in by __post_init__
 
     def __post_init__(self) -> None:
         K, n = len(self.contour), self.robot.joints
@@ -206,6 +213,7 @@ class Plan:
             "posture": integers(self.posture, "posture", (K,)),
             "turn": integers(self.turn, "turn", (K, n)),
             "time": floats(self.time, "time", (K,)),
+            "tilt": floats(np.zeros((K, 2)) if self.tilt is None else self.tilt, "tilt", (K, 2)),
             "cost": scalar(self.cost, "cost"),
         }
         if (np.diff(cast["time"]) <= 0).any():
@@ -231,8 +239,31 @@ class Plan:
 
     @property
     def axes(self) -> Array:
-        """Tool axes asked for at the nodes, robot base frame, (K, 3)."""
-        return freeze(self.contour.axes @ self.T_base_part[:3, :3].T)
+        """Tool axes asked for at the nodes, tilt included, robot base frame, (K, 3)."""
+        if not self.tilt.any():
+            return freeze(self.contour.axes @ self.T_base_part[:3, :3].T)
+        return freeze(self.frames[:, :3, 2])
+
+    @property
+    def frames(self) -> Array:
+        """Task frames that gamma counts from, tilt included, robot base frame, (K, 4, 4) m."""
+        H = self.contour.frames(self.settings.frames)
+        if self.tilt.any():
+            H = tilted(H, self.contour.along, self.tilt)
+        return freeze(self.T_base_part @ H)
+
+    @property
+    def node_cost(self) -> Array | None:
+        """What tilt and comfort cost at each node, (K,); None where they cost nothing.
+
+        Without what clearance costs, which only a cell tells.
+        """
+        tilt, comfort, costs = self.settings.tilt, self.settings.comfort, []
+        if tilt is not None and tilt.cost:
+            costs.append(tilt.price(self.tilt))
+        if comfort is not None and any(band.cost for band in comfort.bands.values()):
+            costs.append(comfort.price(self.robot, self.q, self.T_flange_tip))
+        return freeze(np.sum(costs, axis=0)) if costs else None
 
     @property
     def increments(self) -> Array:

@@ -29,7 +29,7 @@ def plan_in_pieces(
     ----------
     contour, robot, refine, options
         As in `plan`, with method "exact", closure "free" (a closed contour need not return to its
-        first pose) and no rotation limit. Comfort: a node in two pieces costs in both.
+        first pose), no rotation limit and no tilt. Comfort: a node in two pieces costs in both.
 
     Returns
     -------
@@ -43,7 +43,7 @@ def plan_in_pieces(
         No number of interruptions helps: a node without a pose, or an interval between two nodes
         that no poses can pass.
     InputError
-        As `plan`; another method or closure, a rotation limit.
+        As `plan`; another method or closure, a rotation limit, a tilt.
     """
     comfort = options.get("comfort")
     if comfort is not None and comfort.clearance is not None:
@@ -56,6 +56,8 @@ def plan_in_pieces(
             'plan_in_pieces: needs method "exact", closure "free" and no rotation limit, got '
             f"{settings.method!r}, {settings.closure!r} and {settings.rotation}"
         )
+    if settings.tilt is not None:
+        raise InputError("plan_in_pieces: the tool axis cannot be tilted in pieces; leave out tilt")
     try:
         found = interrupted_path(**task.limits, **task.aim)
     except NoFeasiblePath as broken:

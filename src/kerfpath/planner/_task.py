@@ -24,6 +24,7 @@ from kerfpath.planner._graph import (
 from kerfpath.plans import Plan, Proof, Settings, path_cost
 from kerfpath.robots import Robot
 from kerfpath.search import Closure, Method, Metric, ObjectiveKind, rotation_limits
+from kerfpath.tilt import Tilt
 
 __all__ = ["Options", "Task", "task_of"]
 
@@ -36,6 +37,7 @@ class Options(TypedDict, total=False):
     speed: float | None
     gamma_step: float
     frames: FrameKind
+    tilt: Tilt | None
     postures: Sequence[int] | None
     method: Method
     objective: ObjectiveKind
@@ -63,7 +65,7 @@ class Task:
     graph : LayeredGraph
         No layer of it is empty.
     vertex_cost : (N,), optional
-        What its vertices cost.
+        What each vertex costs on top of the distances.
     """
 
     contour: Contour
@@ -99,9 +101,13 @@ class Task:
     def cost(self, index: Ints) -> float:
         """Return the objective (14) or (15) of a path through the graph, vertex costs included."""
         s, vertex = self.settings, self.graph.start[:-1] + index
-        dq = increments(self.graph.q[vertex], self.robot.endless)
-        nodes = None if self.vertex_cost is None else self.vertex_cost[vertex]
-        return path_cost(dq, s.weights, s.metric, s.objective, nodes)
+        return path_cost(
+            increments(self.graph.q[vertex], self.robot.endless),
+            s.weights,
+            s.metric,
+            s.objective,
+            None if self.vertex_cost is None else self.vertex_cost[vertex],
+        )
 
     def plan(self, index: Ints, cost: float, proof: Proof) -> Plan:
         """Return the plan of a path through the graph, at the speed asked for."""
@@ -114,6 +120,7 @@ class Task:
             T_base_part=self.T_base_part,
             q=graph.q[vertex],
             gamma=graph.gamma[graph.sample[vertex]],
+            tilt=graph.tilt[graph.variant[vertex]],
             posture=graph.posture[vertex],
             turn=graph.turn[vertex],
             time=self.dt * np.arange(len(self.contour), dtype=float),
@@ -126,15 +133,12 @@ class Task:
     def part(self, first: int, last: int, name: str) -> Task:
         """Return the task of nodes first to last alone."""
         part = self.contour.part(first, last, self.settings.frames)
-        vertices, cost = (
-            slice(self.graph.start[first], self.graph.start[last + 1]),
-            self.vertex_cost,
-        )
+        vertices = slice(self.graph.start[first], self.graph.start[last + 1])
         return replace(
             self,
             contour=replace(part, name=name),
             graph=self.graph.part(first, last),
-            vertex_cost=None if cost is None else cost[vertices],
+            vertex_cost=None if self.vertex_cost is None else self.vertex_cost[vertices],
             settings=replace(self.settings, closure="free"),
         )
 
@@ -148,6 +152,7 @@ def task_of(
     speed: float | None = None,
     gamma_step: float = np.pi / 180,
     frames: FrameKind = "rotation-minimising",
+    tilt: Tilt | None = None,
     postures: Sequence[int] | None = None,
     method: Method = "exact",
     objective: ObjectiveKind = "sum",
@@ -181,6 +186,7 @@ def task_of(
         eta_a=scalar(eta_a, "eta_a", above=0.0),
         closure=closure,
         rotation=None if rotation is None else rotation_limits(rotation, robot.endless),
+        tilt=tilt,
         comfort=comfort,
     )
     graph = graph or layered_graph(
@@ -190,6 +196,7 @@ def task_of(
         placement=T_base_part,
         gamma_step=gamma_step,
         frames=frames,
+        tilt=tilt,
         postures=postures,
         progress=progress,
     )
@@ -197,11 +204,10 @@ def task_of(
         raise InputError(
             f"graph: has {len(graph.start) - 1} layers, but the contour has {len(contour)} nodes"
         )
-    vertex_cost = None
+    if not np.array_equal(graph.tilt, np.zeros((1, 2)) if tilt is None else tilt.samples()):
+        raise InputError("graph: it was built with another tilt than is planned with")
     if comfort is not None:
         graph = within_margins(graph, robot, comfort, T_flange_tip, periodic=closure == "periodic")
-        if any(band.cost for band in comfort.bands.values()):
-            vertex_cost = freeze(comfort.price(robot, graph.q, T_flange_tip))
     require_no_empty_layer(contour, graph)
     return Task(
         contour=contour,
@@ -211,5 +217,17 @@ def task_of(
         dt=dt,
         settings=settings,
         graph=graph,
-        vertex_cost=vertex_cost,
+        vertex_cost=_vertex_cost(graph, tilt, comfort, robot, T_flange_tip),
     )
+
+
+def _vertex_cost(
+    graph: LayeredGraph, tilt: Tilt | None, comfort: Comfort | None, robot: Robot, tool: Array
+) -> Array | None:
+    """Return what the vertices cost (N,); None where they cost nothing."""
+    costs = []
+    if tilt is not None and tilt.cost:
+        costs.append(tilt.price(graph.tilt)[graph.variant])
+    if comfort is not None and any(band.cost for band in comfort.bands.values()):
+        costs.append(comfort.price(robot, graph.q, tool))
+    return freeze(np.sum(costs, axis=0)) if costs else None

@@ -1,4 +1,4 @@
-"""refine(): a plan off the grid, gamma continuous, postures and turns as they are."""
+"""refine(): a plan off the grid, gamma continuous; tilts, postures and turns as they are."""
 
 from __future__ import annotations
 
@@ -125,7 +125,7 @@ def refine(
     return Refinement(
         plan=replace(refined, proof=proof),
         done=True,
-        cost_before=_moved(asked, start).cost,
+        cost_before=start.cost,
         cost_after=refined.cost,
         programs=before + programs,
         statement=proof.statement,
@@ -192,9 +192,8 @@ def _descent(plan: Plan) -> tuple[Descent, Stand]:
     """Return the task of refining a plan, and where it stands."""
     velocity, acceleration = plan.robot.speed_limits()
     settings, comfort = plan.settings, plan.settings.comfort
-    H = np.ascontiguousarray(plan.T_base_part @ plan.contour.frames(settings.frames))
     descent = Descent(
-        curves=JointCurves(plan.robot, H, plan.T_flange_tip, plan.posture),
+        curves=JointCurves(plan.robot, plan.frames, plan.T_flange_tip, plan.posture),
         rates=Rates(
             tau=np.diff(plan.time),
             velocity=settings.eta_v * velocity,
@@ -208,6 +207,7 @@ def _descent(plan: Plan) -> tuple[Descent, Stand]:
         weight=settings.weights,
         metric=settings.metric,
         objective=settings.objective,
+        node_cost=plan.node_cost,
         radius=FIRST_STEPS * settings.gamma_step,
     )
     return descent, descent.stand(plan.gamma, _unwrapped(plan))
@@ -219,21 +219,19 @@ def _unwrapped(plan: Plan) -> Array:
 
 
 def _moved(plan: Plan, found: Stand) -> Plan:
-    """Return the plan with the motion found, and what that costs at its nodes too."""
-    s, comfort = plan.settings, plan.settings.comfort
-    nodes = None if comfort is None else comfort.price(plan.robot, found.q, plan.T_flange_tip)
-    cost = path_cost(np.diff(found.q, axis=0), s.weights, s.metric, s.objective, nodes)
+    """Return the plan with the motion found, and what that costs at its own nodes."""
     turn = np.ceil((found.q - np.pi) / (2 * np.pi))
     gamma = found.gamma - 2 * np.pi * np.ceil((found.gamma - np.pi) / (2 * np.pi))
     turn[:, plan.robot.endless] = 0
     wrapped = found.q - 2 * np.pi * np.ceil((found.q - np.pi) / (2 * np.pi))
-    return replace(
+    moved = replace(
         plan,
         q=np.where(plan.robot.endless, wrapped, found.q),
         gamma=gamma,
         turn=turn.astype(np.int64),
-        cost=cost,
     )
+    s, dq = plan.settings, np.diff(found.q, axis=0)
+    return replace(moved, cost=path_cost(dq, s.weights, s.metric, s.objective, moved.node_cost))
 
 
 def _divided(plan: Plan, nodes: Contour) -> Plan | str:
@@ -261,6 +259,8 @@ def _divided(plan: Plan, nodes: Contour) -> Plan | str:
         return f"the posture changes after node {changes[0]}, an interval that cannot be divided"
     if parts == 1:
         return plan
+    if plan.tilt.any():
+        return "the tilts hold at the plan's own nodes, not between them"
     if plan.feed is not None:
         return "the times of a feed that dips hold at its own nodes, not between them"
     gamma = CubicSpline(coarse, np.unwrap(plan.gamma + twist))(index)
@@ -270,6 +270,7 @@ def _divided(plan: Plan, nodes: Contour) -> Plan | str:
         contour=nodes,
         q=near,
         gamma=gamma,
+        tilt=np.zeros((len(nodes), 2)),
         posture=np.repeat(plan.posture[:1], len(nodes)),
         turn=np.zeros((len(nodes), plan.robot.joints), np.int64),
         time=np.interp(index, coarse, plan.time),
