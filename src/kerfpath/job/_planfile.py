@@ -15,7 +15,7 @@ from kerfpath import __version__
 from kerfpath._arrays import Array
 from kerfpath.auditor import Check
 from kerfpath.comfort import MEASURES, Band, Comfort
-from kerfpath.contour import Contour
+from kerfpath.contour import KINDS, Contour
 from kerfpath.errors import InputError, NoFeasiblePath
 from kerfpath.planner import FastestSpeed
 from kerfpath.plans import Feed, Plan, Proof, Settings
@@ -146,6 +146,8 @@ def plan_entry(plan: Plan, contour: str, checks: Sequence[Check]) -> dict[str, A
             "time_s": plan.time.tolist(),
             "points_m": plan.contour.points.tolist(),
             "axes": plan.contour.axes.tolist(),
+            "kind": list(plan.contour.kinds),
+            "speed_share": plan.contour.speed_share.tolist(),
             "x": None if plan.contour.x is None else plan.contour.x.tolist(),
             "q_rad": plan.q.tolist(),
             "gamma_rad": plan.gamma.tolist(),
@@ -303,6 +305,8 @@ def _read_plan(entry: dict[str, Any], robot: Robot, tool: Any, placement: Any) -
             nodes["axes"],
             closed=entry["closed"],
             s=nodes["s_m"],
+            kind=np.array([KINDS.index(word) for word in nodes["kind"]]),
+            speed_share=nodes["speed_share"],
             x=nodes["x"],
             name=str(entry["name"]),
         ),
