@@ -205,7 +205,7 @@ def test_a_general_arm_is_read_planned_and_audited(tmp_path):
     file = tmp_path / "plan.json"
     entry = plan_entry(done, done.name, checks(done))
     file.write_text(plan_text(read, done.T_flange_tip, done.T_base_part, [entry], {}))
-    assert audit(read_plan_file(file)[0]) == []
+    assert audit(read_plan_file(file).plans[0]) == []
 
 
 def test_the_graph_counts_what_no_posture_reaches(offset_wrist):
