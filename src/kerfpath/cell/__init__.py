@@ -8,6 +8,8 @@ from kerfpath.cell._head import CuttingHead as CuttingHead
 from kerfpath.cell._head import MeshHead as MeshHead
 from kerfpath.cell._links import link_bodies as link_bodies
 from kerfpath.cell._links import link_capsules as link_capsules
+from kerfpath.cell._map import Clearances as Clearances
+from kerfpath.cell._map import clearances as clearances
 from kerfpath.cell._mesh import Mesh as Mesh
 from kerfpath.cell._mesh import welded as welded
 from kerfpath.cell._shapes import Capsule as Capsule

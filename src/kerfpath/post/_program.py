@@ -277,14 +277,15 @@ def _tip_poses(plan: Plan, q: Array) -> Array:
     """Return tip poses (K, 4, 4) in the part frame: point of the contour, orientation of FK(q)."""
     T = _inverse(plan.T_base_part) @ plan.robot.forward(q) @ plan.T_flange_tip
     off = np.linalg.norm(T[:, :3, 3] - plan.contour.points, axis=1)
-    tilt = np.linalg.norm(np.cross(T[:, :3, 2], plan.contour.axes), axis=1)
-    tilt[(T[:, :3, 2] * plan.contour.axes).sum(axis=1) < 0] = 1.0
-    k = int(np.argmax(np.maximum(off, tilt)))
-    if max(off[k], tilt[k]) > PLAN_AND_CONTOUR:
+    axes = plan.axes @ plan.T_base_part[:3, :3]
+    turned = np.linalg.norm(np.cross(T[:, :3, 2], axes), axis=1)
+    turned[(T[:, :3, 2] * axes).sum(axis=1) < 0] = 1.0
+    k = int(np.argmax(np.maximum(off, turned)))
+    if max(off[k], turned[k]) > PLAN_AND_CONTOUR:
         raise InputError(
             f"contour {plan.name!r}, node {k}: the planned joints put the tool tip "
-            f"{off[k] * 1e3:.4f} mm and {np.degrees(np.arcsin(tilt[k])):.4f} deg off the contour; "
-            "the plan belongs to another contour, tool or placement"
+            f"{off[k] * 1e3:.4f} mm and {np.degrees(np.arcsin(turned[k])):.4f} deg off the "
+            "contour; the plan belongs to another contour, tool or placement"
         )
     # A placement of few printed decimals is not quite a rotation; a quaternion can say only one.
     T[:, :3, :3] = Rotation.from_matrix(T[:, :3, :3]).as_matrix()
