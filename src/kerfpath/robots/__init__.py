@@ -11,4 +11,4 @@ from kerfpath.robots._library import acceleration_ratios as acceleration_ratios
 from kerfpath.robots._library import robot as robot
 from kerfpath.robots._library import robot_ids as robot_ids
 from kerfpath.robots._robot import Robot as Robot
-from kerfpath.robots._robot import Solutions as Solutions
+from kerfpath.robots._solutions import Solutions as Solutions
