@@ -27,6 +27,7 @@ from kerfpath.robots import _chain, chain_of, robot_ids
 from kerfpath.urdf import Body as Described
 from test_cell import at, mesh_of, stl_bytes
 from test_five_axes import ARM as FIVE
+from test_general import random_arm
 from test_urdf import described
 
 ROOT = Path(__file__).parent.parent
@@ -396,3 +397,12 @@ def test_the_page_about_cells_runs_as_written(capsys):
     (code,) = re.findall(r"```python\n(.*?)```", text, re.DOTALL)
     exec(compile(code, "cells.md", "exec"), {})
     assert capsys.readouterr().out.strip().endswith("[]")
+
+
+def test_a_general_arm_has_a_cell_along_its_own_chain():
+    arm = random_arm("a spherical wrist", 3)
+    q = np.random.default_rng(55).uniform(-2, 2, (20, 6))
+    np.testing.assert_allclose(chain_of(arm).forward(q), arm.forward(q), atol=1e-12)
+    cell = cell_of(arm, tool=at([0, 0, 0.2]))
+    assert {"base", "link 1", "link 2"} <= set(cell.approximate)
+    assert np.isfinite(cell.distances(q)).all()
