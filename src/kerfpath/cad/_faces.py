@@ -8,16 +8,15 @@ from functools import partial
 from pathlib import Path
 from typing import get_args
 
-import numpy as np
 from OCP.BRepAdaptor import BRepAdaptor_Surface
 from OCP.GeomAbs import GeomAbs_SurfaceType
 from OCP.TopoDS import TopoDS_Face, TopoDS_Shape
 
-from kerfpath._arrays import Array, freeze
+from kerfpath._arrays import freeze
 from kerfpath.cad._loops import FaceLoop, bounds_of, loops_of
 from kerfpath.cad._mesh import triangulate
 from kerfpath.cad._part import Kind, Loop, Part, Side, loop_of, numbered
-from kerfpath.cad._sample import Chain, Trace
+from kerfpath.cad._sample import Trace
 from kerfpath.cad._skins import Skin, skins_of
 from kerfpath.cad._units import MM
 
@@ -96,7 +95,7 @@ def _named(name: str, surface: str, side: Side, found: list[FaceLoop], gap: floa
     """Return the loops of one face or skin, outer before inner, numbered by their places."""
     loops = []
     for kind in get_args(Kind):
-        traces: list[Trace] = [Chain(edges=edges) for k, edges in found if k == kind]
+        traces: list[Trace] = [chain for k, chain in found if k == kind]
         alone, stem = ("outer", "outer") if kind == "outer" else (None, "hole")
         for last, trace in numbered(traces, stem, alone=alone).items():
             made = loop_of(

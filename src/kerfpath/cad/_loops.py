@@ -20,6 +20,7 @@ from OCP.TopExp import TopExp_Explorer
 from OCP.TopoDS import TopoDS, TopoDS_Edge, TopoDS_Face, TopoDS_Iterator, TopoDS_Shape, TopoDS_Wire
 
 from kerfpath._arrays import Array
+from kerfpath.cad._sample import Chain
 from kerfpath.errors import InputError
 
 __all__ = ["FaceLoop", "OrientedEdge", "bounds_of", "chained", "loops_of"]
@@ -116,7 +117,7 @@ class OrientedEdge:
         return at, np.array([normal.X(), normal.Y(), normal.Z()]) * (self._outward / size)
 
 
-FaceLoop = tuple[Literal["outer", "inner"], list[OrientedEdge]]
+FaceLoop = tuple[Literal["outer", "inner"], Chain[OrientedEdge]]
 """Whether a loop runs around its face or around a hole in it, and its edges."""
 
 
@@ -142,7 +143,7 @@ def loops_of(face: TopoDS_Face) -> list[FaceLoop]:
         runs, has_seam = _runs(wire, forward, face)
         for edges in chained(runs):
             outer = _winds(edges) or (wire.IsSame(outer_wire) and not has_seam)
-            loops.append(("outer" if outer else "inner", edges))
+            loops.append(("outer" if outer else "inner", Chain(edges=edges)))
         wires.Next()
     return loops
 

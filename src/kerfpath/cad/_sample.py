@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import pairwise
-from typing import Protocol
+from typing import Generic, Protocol, TypeVar
 
 import numpy as np
 
@@ -30,10 +30,17 @@ AROUND = 24
 class Edge(Protocol):
     """A curve with normals, in the direction of travel; lengths in mm."""
 
-    start: float
-    end: float
-    ends: Array
-    """First and last point (2, 3) mm."""
+    @property
+    def start(self) -> float:
+        """Parameter where it starts."""
+
+    @property
+    def end(self) -> float:
+        """Parameter where it ends."""
+
+    @property
+    def ends(self) -> Array:
+        """First and last point (2, 3) mm."""
 
     @property
     def length(self) -> float:
@@ -47,6 +54,9 @@ class Edge(Protocol):
 
     def evaluate(self, t: Array) -> tuple[Array, Array]:
         """Return points (K, 3) mm and outward unit normals (K, 3) at parameters `t` (K,)."""
+
+
+E = TypeVar("E", bound=Edge)
 
 
 class Trace(Protocol):
@@ -83,7 +93,7 @@ class Trace(Protocol):
 
 
 @dataclass(frozen=True, kw_only=True)
-class Chain:
+class Chain(Generic[E]):
     """Edges in the order of travel; of a closed chain the last ends where the first starts.
 
     Parameters
@@ -94,7 +104,7 @@ class Chain:
         Of an open chain: how far it is to what could follow, and where, for messages.
     """
 
-    edges: Sequence[Edge]
+    edges: Sequence[E]
     is_closed: bool = True
     next_end: str = ""
 
@@ -170,10 +180,12 @@ class Points:
         """No gaps, by nature."""
         return np.zeros(1)
 
-    @property
+    @cached_property
     def around(self) -> Array:
-        """The points."""
-        return self.points
+        """The points, and the middles between them: any three points are on a circle."""
+        following = np.roll(self.points, -1, axis=0)
+        both = np.stack([self.points, (self.points + following) / 2], axis=1).reshape(-1, 3)
+        return both if self.is_closed else both[:-1]
 
     def bounds(self) -> Array:
         """Return the least and greatest coordinates (2, 3) mm."""

@@ -10,10 +10,10 @@ from OCP.BRepGProp import BRepGProp
 from OCP.collections import IndexedMap_TopoDS_Shape_TopTools_ShapeMapHasher as ShapeMap
 from OCP.GProp import GProp_GProps
 from OCP.TopoDS import TopoDS_Face
-from scipy.sparse import coo_array
-from scipy.sparse.csgraph import connected_components
+from scipy.spatial import cKDTree
 
 from kerfpath._arrays import Array, Ints
+from kerfpath.cad._connected import connected
 from kerfpath.cad._loops import FaceLoop, OrientedEdge, chained
 from kerfpath.cad._part import Side
 from kerfpath.cad._sample import Chain
@@ -23,7 +23,7 @@ __all__ = ["SMOOTH", "Skin", "skins_of"]
 SMOOTH = float(np.radians(2.0))
 """Faces whose normals differ by less (rad) all along their shared edge belong to one skin."""
 ACCURACY = 1e-2
-"""Relative accuracy of areas and volumes: they tell sheets from blocks, and are not shown."""
+"""Relative accuracy of areas: they tell sheets from blocks, and are not shown."""
 OPPOSITE = 0.2
 """How far the vector areas of a sheet's two sides may be from cancelling, as a part of an area;
 by how much the areas may differ."""
@@ -61,15 +61,16 @@ class Skin:
         runs = [
             run
             for f in self.faces
-            for k, (_, edges) in enumerate(found[f])
-            for run in _outside(edges, [(f, k, e) in self.inside for e in range(len(edges))])
+            for k, (_, loop) in enumerate(found[f])
+            for run in _outside(loop.edges, [(f, k, e) in self.inside for e in _numbers(loop)])
         ]
-        loops = [(is_hole(chain), chain) for chain in chained(runs)]
+        chains = [Chain(edges=edges) for edges in chained(runs)]
+        loops = [(_is_hole(chain), chain) for chain in chains]
         if loops and all(hole for hole, _ in loops):
             # A trim line may face away from its sheet, as that of a C-shaped channel does.
-            longest = max(loops, key=lambda loop: sum(edge.length for edge in loop[1]))
-            loops = [(hole and edges is not longest[1], edges) for hole, edges in loops]
-        return [("inner" if hole else "outer", edges) for hole, edges in loops]
+            longest = max(loops, key=lambda loop: float(loop[1].lengths.sum()))
+            loops = [(hole and loop is not longest[1], loop) for hole, loop in loops]
+        return [("inner" if hole else "outer", loop) for hole, loop in loops]
 
 
 def skins_of(faces: Sequence[TopoDS_Face], found: Sequence[list[FaceLoop]]) -> list[Skin]:
@@ -83,9 +84,11 @@ def skins_of(faces: Sequence[TopoDS_Face], found: Sequence[list[FaceLoop]]) -> l
     """
     uses = _uses(found)
     pairs = [(a, b) for at in uses if len(at) == 2 for a, b in [at] if a[0] != b[0]]
-    smooth = [pair for pair in pairs if _is_smooth(*(found[f][k][1][e] for f, k, e in pair))]
-    group = _connected(smooth, len(faces))
-    whole = _connected(pairs, len(faces))
+    smooth = [pair for pair in pairs if _is_smooth(*(found[f][k][1].edges[e] for f, k, e in pair))]
+    group, whole = (
+        connected(np.array([[a[0], b[0]] for a, b in of], dtype=np.int64), len(faces))
+        for of in (smooth, pairs)
+    )
     inside: dict[int, set[tuple[int, int, int]]] = {}
     for pair in smooth:
         inside.setdefault(int(group[pair[0][0]]), set()).update(pair)
@@ -102,13 +105,17 @@ def _uses(found: Sequence[list[FaceLoop]]) -> list[list[tuple[int, int, int]]]:
     """Return, for each edge of the shape, the (face, loop, edge) numbers that run along it."""
     known, uses = ShapeMap(), list[list[tuple[int, int, int]]]()
     for f, loops in enumerate(found):
-        for k, (_, edges) in enumerate(loops):
-            for e, edge in enumerate(edges):
+        for k, (_, loop) in enumerate(loops):
+            for e, edge in enumerate(loop.edges):
                 number = known.Add(edge.edge)
                 if number > len(uses):
                     uses.append([])
                 uses[number - 1].append((f, k, e))
     return uses
+
+
+def _numbers(loop: Chain[OrientedEdge]) -> range:
+    return range(len(loop.edges))
 
 
 def _is_smooth(a: OrientedEdge, b: OrientedEdge) -> bool:
@@ -117,18 +124,10 @@ def _is_smooth(a: OrientedEdge, b: OrientedEdge) -> bool:
     return bool(turned.max() <= 2 * np.sin(SMOOTH / 2))
 
 
-def _connected(pairs: Sequence[Sequence[tuple[int, int, int]]], count: int) -> Ints:
-    """Return a number (F,) for each face, the same for faces that pairs connect."""
-    ends = np.array([[a[0], b[0]] for a, b in pairs], dtype=np.int64).reshape(-1, 2)
-    links = coo_array((np.ones(len(ends)), (ends[:, 0], ends[:, 1])), shape=(count, count))
-    labels: Ints = connected_components(links, directed=False)[1]
-    return labels
-
-
-def _outside(edges: list[OrientedEdge], inside: list[bool]) -> list[list[OrientedEdge]]:
+def _outside(edges: Sequence[OrientedEdge], inside: list[bool]) -> list[list[OrientedEdge]]:
     """Return the stretches of a closed loop that are no inside edges."""
     if not any(inside):
-        return [edges]
+        return [list(edges)]
     runs: list[list[OrientedEdge]] = []
     first = inside.index(True)
     is_new = True
@@ -144,18 +143,17 @@ def _outside(edges: list[OrientedEdge], inside: list[bool]) -> list[list[Oriente
     return runs
 
 
-def is_hole(edges: list[OrientedEdge]) -> bool:
+def _is_hole(loop: Chain[OrientedEdge]) -> bool:
     """Return whether a closed chain runs about a hole of its skin, by its normals."""
-    area = vector_area(edges)
-    normals = [edge.evaluate(np.array([(edge.start + edge.end) / 2]))[1][0] for edge in edges]
-    normals = [n * edge.length for n, edge in zip(normals, edges, strict=True)]
-    facing = np.sum(normals, axis=0) / sum(edge.length for edge in edges)
+    area = _vector_area(loop.around)
+    middles = [(edge.start + edge.end) / 2 for edge in loop.edges]
+    normals = [e.evaluate(np.array([t]))[1][0] for e, t in zip(loop.edges, middles, strict=True)]
+    facing = loop.lengths @ np.array(normals) / loop.lengths.sum()
     return bool(area @ facing < HOLE * np.linalg.norm(area))
 
 
-def vector_area(edges: list[OrientedEdge]) -> Array:
-    """Return the vector area (3,) mm^2 that a closed chain encloses, by chords."""
-    points = Chain(edges=edges).around
+def _vector_area(points: Array) -> Array:
+    """Return the vector area (3,) that a closed polygon (K, 3) encloses."""
     return np.asarray(np.cross(points, np.roll(points, -1, axis=0)).sum(axis=0) / 2)
 
 
@@ -167,46 +165,50 @@ def _sides(
     whole: Ints,
 ) -> list[Side]:
     """Return which side of a sheet each skin is: opposite ones, large and close, are a sheet's."""
-    areas, volume = np.zeros(len(members)), np.zeros(int(whole.max(initial=-1)) + 1)
-    rims, centre = np.zeros(len(members)), np.zeros((len(members), 3))
+    areas, rims = np.zeros(len(members)), np.zeros(len(members))
     vector = np.zeros((len(members), 3))
+    points: list[Array] = []
     for g, numbers in enumerate(members):
+        around = [np.empty((0, 3))]
         for f in numbers:
-            of_area, of_volume = GProp_GProps(), GProp_GProps()
-            BRepGProp.SurfaceProperties_s(faces[f], of_area, ACCURACY)
-            BRepGProp.VolumeProperties_s(faces[f], of_volume, ACCURACY)
-            areas[g] += of_area.Mass()
-            centre[g] += of_area.Mass() * np.array(of_area.CentreOfMass().Coord())
-            volume[whole[f]] += of_volume.Mass()
-            for k, (_, edges) in enumerate(found[f]):
-                vector[g] += vector_area(edges)
-                rims[g] += sum(
-                    edge.length for e, edge in enumerate(edges) if (f, k, e) not in inside[g]
-                )
-        centre[g] /= max(areas[g], np.finfo(float).tiny)
+            props = GProp_GProps()
+            BRepGProp.SurfaceProperties_s(faces[f], props, ACCURACY)
+            areas[g] += props.Mass()
+            for k, (_, loop) in enumerate(found[f]):
+                vector[g] += _vector_area(loop.around)
+                around.append(loop.around)
+                outside = [(f, k, e) not in inside[g] for e in _numbers(loop)]
+                rims[g] += loop.lengths[outside].sum()
+        points.append(np.vstack(around))
     sides: list[Side] = [""] * len(members)
-    body = [int(whole[numbers[0]]) for numbers in members]
+    body = whole[[numbers[0] for numbers in members]]
     for g in np.argsort(-areas, kind="stable").tolist():
-        alike = [h for h in range(len(members)) if body[h] == body[g]]
+        alike = np.flatnonzero(body == body[g]).tolist()
         if len(alike) == 1:
             sides[g] = "outer"
-        if sides[g] or abs(volume[body[g]]) > THIN * areas[g] ** 1.5:
-            continue
-        partners = [
-            h
+        away = {
+            h: _away(points[g], points[h])
             for h in alike
             if h != g
+            and not sides[g]
             and not sides[h]
             and areas[h] > (1 - OPPOSITE) * areas[g]
             and np.linalg.norm(vector[g] + vector[h]) <= OPPOSITE * areas[g]
-        ]
-        if partners:
-            h = min(partners, key=lambda h: float(np.linalg.norm(centre[h] - centre[g])))
+        }
+        h = min(away, key=away.__getitem__, default=g)
+        if h != g and away[h] < THIN * np.sqrt(areas[g]):
             even = abs(rims[g] - rims[h]) <= EVEN * rims[g]
             is_outer = _faces_up(vector[g]) if even else rims[g] > rims[h]
             sides[g], sides[h] = ("outer", "inner") if is_outer else ("inner", "outer")
     sheets = {body[g] for g, side in enumerate(sides) if side}
     return [side or ("edge" if body[g] in sheets else "") for g, side in enumerate(sides)]
+
+
+def _away(a: Array, b: Array) -> float:
+    """Return how far points (K, 3) usually are from the nearest of others."""
+    if not len(a) or not len(b):
+        return float("inf")
+    return float(np.median(cKDTree(b).query(a)[0]))
 
 
 def _faces_up(vector: Array) -> bool:

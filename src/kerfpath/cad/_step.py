@@ -116,9 +116,7 @@ def _faces(reader: STEPControl_Reader, shape: TopoDS_Shape) -> Iterator[NamedFac
     for name, (_, faces) in zip(names, components, strict=True):
         component = name if len(components) > 1 else ""
         for face in faces:
-            yield NamedFace(
-                face=TopoDS.Face(face), name=_name(reader, face), component=component
-            )
+            yield NamedFace(face=TopoDS.Face(face), name=_name(reader, face), component=component)
 
 
 def _product(used: StepRepr_NextAssemblyUsageOccurrence) -> str:
