@@ -87,6 +87,18 @@ class Loop:
     colour: str = ""
     _trace: Trace = field(repr=False)
 
+    def line(self, chord_tolerance: float = 1e-4) -> Array:
+        """Return points (K, 3) m along the loop for pictures, whether or not it can be cut.
+
+        Parameters
+        ----------
+        chord_tolerance : float m
+            Largest distance between the chords and the curve.
+        """
+        chord = scalar(chord_tolerance, "chord_tolerance", unit="m", above=0.0)
+        points = self._trace.sample(chord / MM, np.pi)[0] * MM
+        return freeze(points if self.kind == "open" else np.vstack([points, points[:1]]))
+
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Part:
@@ -116,6 +128,16 @@ class Part:
     notes: tuple[str, ...] = ()
     _gap: float = field(repr=False)
     _triangulate: Callable[[float], tuple[Array, Ints]] | None = field(default=None, repr=False)
+
+    @property
+    def largest_gap(self) -> float:
+        """Largest gap (m) of any loop, bridged or not."""
+        return max((loop.largest_gap for loop in self.loops), default=0.0)
+
+    @property
+    def shortest_edge(self) -> float:
+        """Shortest edge (m) of any loop."""
+        return min((loop.shortest_edge for loop in self.loops), default=0.0)
 
     def loop(self, name: str) -> Loop:
         """Return the loop called `name`.
