@@ -18,9 +18,6 @@ from kerfpath.robots import Robot
 
 __all__ = ["LayeredGraph", "build", "gamma_grid"]
 
-_POSES_AT_ONCE = 100_000
-"""Poses solved per piece of work: large against the overhead, small against the memory."""
-
 _WHOLE_STEPS = 1e-9
 """How far 2 pi / step may be from a whole number, relative, and still count as one."""
 
@@ -211,7 +208,7 @@ def build(
             progress(last - first)
         return piece
 
-    nodes = max(1, _POSES_AT_ONCE // samples)
+    nodes = max(1, robot.family.poses_at_once // samples)
     firsts = range(0, len(frames), nodes)
     with ThreadPoolExecutor(os.cpu_count()) as pool:
         pieces = list(pool.map(lambda f: layers_of(f, min(f + nodes, len(frames))), firsts))
