@@ -9,6 +9,7 @@ from kerfpath import Contour, InputError, NoFeasiblePath
 from kerfpath.air import air_move, backed_off, least_time
 from kerfpath.cell import box_between, cell_of
 from kerfpath.operations import start_at
+from kerfpath.post import JointMove, build_program, post, preflight, read_rapid
 from kerfpath.sequence import best_order, inner_first, plan_part
 
 STEP = np.radians(10)
@@ -166,3 +167,41 @@ def test_home_heat_and_precedence_are_kept(part, arm, tool, placement):
         plan_part([rest(c) for c in part], arm, heat_spacing=0.15, **asked)
     three = plan_part([rest(c) for c in (part[0], part[3])], arm, heat_spacing=0.15, **asked)
     assert len(three.plans) == 2
+
+
+@pytest.fixture(scope="module")
+def walled(part, arm, tool, placement):
+    """The four holes with a wall between them, and the cell; planned from and to a home."""
+    at = np.array([p.points.mean(axis=0) for p in part]) @ placement[:3, :3].T + placement[:3, 3]
+    middle, top = at.mean(axis=0), at[:, 2].max()
+    wall = box_between(middle - [0.3, 0.005, 0.1], [middle[0] + 0.3, middle[1] + 0.005, top + 0.02])
+    cell = cell_of(arm, tool=tool, placement=placement, fixtures={"wall": wall})
+    asked = {"tool": tool, "placement": placement, "speed": 0.1, "gamma_step": STEP}
+    home = np.radians([0, -20, 10, 0, 60, 0])
+    rested = [rest(c) for c in part]
+    return cell, plan_part(rested, arm, home=home, cell=cell, retract=0.01, **asked)
+
+
+def test_moves_between_contours_go_around_what_stands_there(walled):
+    cell, cut = walled
+    assert len(cut.moves) == len(cut.plans) + 1
+    for move in cut.moves:
+        assert move.clear
+        assert cell.sweep.clear(move.q[:-1], move.q[1:], cell.required, cell.scene.distances).all()
+    assert max(len(move.q) for move in cut.moves) > 2
+
+
+def test_one_program_for_the_part_says_that_its_air_moves_are_clear(walled):
+    _, cut = walled
+    program = build_program(cut.plans, moves=cut.moves, retract=0.01, name="part")
+    assert [issue for issue in preflight(program) if issue.level == "error"] == []
+    assert "air-moves" not in {issue.code for issue in preflight(program)}
+    text = post(program)
+    assert "proved clear in the planned cell" in text
+    corners = [step.q for step in program.steps if isinstance(step, JointMove)]
+    # All corners of all moves but the starts, where the robot is already; and home to begin with.
+    expected = [cut.moves[0].q[0], *(q for move in cut.moves for q in move.q[1:])]
+    np.testing.assert_array_equal(corners, expected)
+    assert len(read_rapid(text).sections) == 4
+    with pytest.raises(InputError, match="4 plans need 3 moves between them, or 5"):
+        build_program(cut.plans, moves=cut.moves[:2])

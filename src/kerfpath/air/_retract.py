@@ -11,10 +11,12 @@ from kerfpath.errors import InputError
 from kerfpath.plans import Plan
 from kerfpath.robots import posture_name
 
-__all__ = ["backed_off"]
+__all__ = ["End", "backed_off"]
+
+End = Literal["start", "end"]
 
 
-def backed_off(plan: Plan, end: Literal["start", "end"], retract: float) -> Array:
+def backed_off(plan: Plan, end: End, retract: float) -> Array:
     """Return the joints (n,) rad after backing off an end of a plan along the tool axis.
 
     The posture is kept, and an endless joint stays on its turn.
@@ -31,7 +33,8 @@ def backed_off(plan: Plan, end: Literal["start", "end"], retract: float) -> Arra
         No such pose within the joint limits.
     """
     node = 0 if end == "start" else len(plan.q) - 1
-    q = plan.q[node]
+    # Where endless joints are after all their turns along the contour.
+    q = plan.q[0] + plan.increments[:node].sum(axis=0)
     T = plan.robot.forward(q) @ plan.T_flange_tip
     T[:3, 3] -= retract * T[:3, 2]
     found = plan.robot.inverse(T @ np.linalg.inv(plan.T_flange_tip))

@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike
 from scipy.spatial import cKDTree
 
 from kerfpath._arrays import Array, Bools, Ints, floats, freeze, scalar
-from kerfpath.air import AirMove, air_move, backed_off, least_time
+from kerfpath.air import AirMove, End, air_move, backed_off, least_time
 from kerfpath.cell import Cell
 from kerfpath.contour import Contour
 from kerfpath.errors import InputError, NoFeasiblePath
@@ -22,6 +22,9 @@ from kerfpath.robots import Robot
 from kerfpath.sequence._order import Order, best_order
 
 __all__ = ["PartPlan", "plan_part"]
+
+BACK_BY = (0.0, 0.1, 0.4, 0.7, 1.0)
+"""Shares of the retract between which the joints are taken to run straight."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -138,7 +141,7 @@ def plan_part(
             f"for each; got {len(groups)} contours and {len(speeds)} speeds"
         )
     options |= {"tool": tool, "placement": placement, "cell": cell}
-    plans, group = _planned(groups, speeds, robot, options, progress)
+    plans, group = _planned(groups, speeds, robot, options, retract, progress)
     if given_order:
         before = [(i, i + 1) for i in range(len(groups) - 1)]
     air = _Air(robot, plans, group, cell, retract, seconds, options)
@@ -167,6 +170,7 @@ def _planned(
     speeds: Sequence[float | None],
     robot: Robot,
     options: dict[str, Any],
+    retract: float,
     progress: Callable[[int], None] | None,
 ) -> tuple[list[Plan], Ints]:
     """Return a plan for every candidate that has one, and the contour of each."""
@@ -176,7 +180,9 @@ def _planned(
         for contour in candidates:
             laid_on = None if contour.time is not None else speed
             try:
-                plans.append(plan(contour, robot, speed=laid_on, **options))
+                made = plan(contour, robot, speed=laid_on, **options)
+                _require_clear_ends(made, options["cell"], retract)
+                plans.append(made)
                 group.append(i)
             except NoFeasiblePath as error:
                 broken = broken or error
@@ -186,6 +192,22 @@ def _planned(
             assert broken is not None
             raise broken
     return plans, np.array(group)
+
+
+def _require_clear_ends(made: Plan, cell: Cell | None, retract: float) -> None:
+    """Raise NoFeasiblePath where the tool cannot go down to a cut or back from it."""
+    if cell is None:
+        return
+    ends: tuple[tuple[End, int], ...] = (("start", 0), ("end", len(made.q) - 1))
+    for end, node in ends:
+        way = np.array([backed_off(made, end, part * retract) for part in BACK_BY])
+        if not cell.sweep.clear(way[:-1], way[1:], cell.required, cell.scene.distances).all():
+            raise NoFeasiblePath(
+                f"contour {made.name!r}: the tool is not clear while it backs off node {node} by "
+                f"{retract * 1e3:g} mm",
+                proved=True,
+                node=node,
+            )
 
 
 def _too_warm(groups: Sequence[Sequence[Contour]], spacing: float) -> Bools:
