@@ -114,7 +114,7 @@ def plan_part(
     heat_spacing : float m
         Contours nearer to each other than this are not cut one right after the other.
     given_order : bool
-        Keep the order of `contours`.
+        Keep the order of `contours`; `before` must agree with it.
     retract, approach_speed : float m, m/s
         How far and how fast the tool backs off along its axis.
     pierce_time : float s
@@ -132,6 +132,7 @@ def plan_part(
     """
     retract = scalar(retract, "retract", unit="m", above=0.0)
     approach_speed = scalar(approach_speed, "approach_speed", unit="m/s", above=0.0)
+    heat_spacing = scalar(heat_spacing, "heat_spacing", unit="m", above=-1e-300)
     pierce_time = scalar(pierce_time, "pierce_time", unit="s", above=-1e-300)
     groups = [[c] if isinstance(c, Contour) else list(c) for c in contours]
     speeds = list(speed) if isinstance(speed, Sequence) else [speed] * len(groups)
@@ -143,7 +144,7 @@ def plan_part(
     options |= {"tool": tool, "placement": placement, "cell": cell}
     plans, group = _planned(groups, speeds, robot, options, retract, progress)
     if given_order:
-        before = [(i, i + 1) for i in range(len(groups) - 1)]
+        before = [*before, *((i, i + 1) for i in range(len(groups) - 1))]
     air = _Air(robot, plans, group, cell, retract, seconds, options)
     air.forbid(_too_warm(groups, heat_spacing)[np.ix_(group, group)])
     if home is not None:
@@ -196,11 +197,14 @@ def _planned(
 
 def _require_clear_ends(made: Plan, cell: Cell | None, retract: float) -> None:
     """Raise NoFeasiblePath where the tool cannot go down to a cut or back from it."""
-    if cell is None:
-        return
     ends: tuple[tuple[End, int], ...] = (("start", 0), ("end", len(made.q) - 1))
     for end, node in ends:
-        way = np.array([backed_off(made, end, part * retract) for part in BACK_BY])
+        try:
+            way = np.array([backed_off(made, end, part * retract) for part in BACK_BY])
+        except InputError as broken:
+            raise NoFeasiblePath(str(broken), proved=True, node=node) from broken
+        if cell is None:
+            continue
         if not cell.sweep.clear(way[:-1], way[1:], cell.required, cell.scene.distances).all():
             raise NoFeasiblePath(
                 f"contour {made.name!r}: the tool is not clear while it backs off node {node} by "
