@@ -428,3 +428,8 @@ def test_the_smoothest_start_is_that_of_the_obvious_sum():
     total = (turn * near).sum(axis=1)
     k = int(np.argmin(np.abs(wavy.s[:-1] - smoothest_start(wavy, window=0.02))))
     assert total[k] == pytest.approx(total.min(), abs=1e-6)
+
+
+def test_an_arc_joins_a_coarse_curve_tangentially():
+    # Chords of 2 degrees: the arc leaves the first by 4 micrometres.
+    assert lead_in(hole(0.012, 180), 0.01, shape="arc", angle=np.pi / 2).kinds[0] == "pierce"

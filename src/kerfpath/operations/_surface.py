@@ -13,8 +13,9 @@ from kerfpath.errors import InputError
 
 __all__ = ["Ribbon", "Side", "Surface", "lateral", "nearest", "require_in_scrap"]
 
-TOUCH = 1e-6
-"""m: rounding; what runs in the scrap may not be on the part's side by more."""
+TOUCH = 1e-5
+"""m: what runs in the scrap may be on the part's side by no more; a lead that is tangent to a curve
+leaves its first chord by some micrometres."""
 SAME_PLACE = 1e-9
 """m: two places nearer than this are one."""
 
