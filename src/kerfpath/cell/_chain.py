@@ -63,6 +63,10 @@ def chain_of(robot: Robot) -> Chain:
         Another family of arm, or one that stands or ends elsewhere than the model: where its links
         are is not known here.
     """
+    if robot.external is not None:
+        raise InputError(
+            f"robot {robot.id!r}: a cell does not know how a {robot.external.kind} moves in it"
+        )
     placed = (robot.T_base_foot, robot.T_end_flange)
     if robot.kinematics != "opw" or not all(np.array_equal(T, np.eye(4)) for T in placed):
         raise InputError(

@@ -18,7 +18,7 @@ from kerfpath.contour import Contour
 from kerfpath.errors import InputError, NoFeasiblePath
 from kerfpath.planner import FastestSpeed
 from kerfpath.plans import Feed, Plan, Proof, Settings
-from kerfpath.robots import Coupling, Robot
+from kerfpath.robots import Coupling, Robot, Travel
 from kerfpath.tilt import Tilt
 from kerfpath.urdf import Chain
 
@@ -81,6 +81,7 @@ def plan_text(
         "kerfpath": __version__,
         "job": job,
         "robot": _robot_entry(robot),
+        "external_axis": _external_entry(robot),
         "T_flange_tip": T_flange_tip.tolist(),
         "T_base_part": T_base_part.tolist(),
         "limits": _limits_entry(robot),
@@ -102,7 +103,7 @@ def plan_entry(plan: Plan, contour: str, checks: Sequence[Check]) -> dict[str, A
         "method": settings.method,
         "objective": settings.objective,
         "metric": settings.metric,
-        "weights_per_rad": settings.weights.tolist(),
+        **_by_unit("weights_per", settings.weights, plan.robot),
         "eta_v": settings.eta_v,
         "eta_a": settings.eta_a,
         "closure": settings.closure,
@@ -122,9 +123,9 @@ def plan_entry(plan: Plan, contour: str, checks: Sequence[Check]) -> dict[str, A
         "proof": plan.proof.statement,
         "grid_cost": plan.proof.grid_cost,
         "criteria": {
-            "displacement_rad": criteria.displacement.tolist(),
-            "largest_increment_rad": criteria.largest_increment.tolist(),
-            "range_rad": criteria.range.tolist(),
+            **_by_unit("displacement", criteria.displacement, plan.robot),
+            **_by_unit("largest_increment", criteria.largest_increment, plan.robot),
+            **_by_unit("range", criteria.range, plan.robot),
             "peak_velocity_share": criteria.peak_velocity.tolist(),
             "peak_acceleration_share": criteria.peak_acceleration.tolist(),
         },
@@ -140,7 +141,7 @@ def plan_entry(plan: Plan, contour: str, checks: Sequence[Check]) -> dict[str, A
             "points_m": plan.contour.points.tolist(),
             "axes": plan.contour.axes.tolist(),
             "x": None if plan.contour.x is None else plan.contour.x.tolist(),
-            "q_rad": plan.q.tolist(),
+            **_by_unit("q", plan.q, plan.robot),
             "gamma_rad": plan.gamma.tolist(),
             "lead_lean_rad": plan.tilt.tolist() if plan.tilt.any() else None,
             "posture": plan.posture.tolist(),
@@ -183,7 +184,8 @@ def read_plan_file(path: str | Path) -> PlanFile:
             f"{path}: expected a plan.json with schema {SCHEMA}, got {got!r}; plan the job again"
         )
     try:
-        robot = _read_robot(data["robot"], data["limits"])
+        arm = _read_robot(data["robot"], data["limits"])
+        robot = _read_external(data["external_axis"], arm)
         tool, placement = data["T_flange_tip"], data["T_base_part"]
         entries = data["contours"]
         return PlanFile(
@@ -216,6 +218,57 @@ def _infinite(rotation: list[float | None] | None) -> Array | None:
     return None if rotation is None else np.array([np.inf if v is None else v for v in rotation])
 
 
+def _by_unit(name: str, values: Array, robot: Robot) -> dict[str, Any]:
+    """Return values (..., n) of the joints, those of an external axis apart and in its own unit."""
+    if robot.external is None:
+        return {f"{name}_rad": values.tolist()}
+    own, last = values[..., :-1].tolist(), values[..., -1].tolist()
+    return {f"{name}_rad": own, f"external_{name}_{robot.external.unit}": last}
+
+
+def _joints(entry: dict[str, Any], name: str, robot: Robot) -> Array:
+    """Return values (..., n) of the joints as `_by_unit` told them."""
+    own = np.array(entry[f"{name}_rad"], dtype=float)
+    if robot.external is None:
+        return own
+    last = np.array(entry[f"external_{name}_{robot.external.unit}"], dtype=float)
+    return np.concatenate([own, last[..., None]], axis=-1)
+
+
+def _external_entry(robot: Robot) -> dict[str, Any] | None:
+    axis = robot.external
+    if axis is None:
+        return None
+    limits, (velocity, acceleration) = robot.joint_limits(), robot.speed_limits()
+    return {
+        "kind": axis.kind,
+        "axis": axis.axis.tolist(),
+        "point_m": axis.point.tolist(),
+        f"step_{axis.unit}": axis.step,
+        f"lower_{axis.unit}": float(limits.lower[-1]),
+        f"upper_{axis.unit}": float(limits.upper[-1]),
+        f"velocity_{axis.unit}_s": float(velocity[-1]),
+        f"acceleration_{axis.unit}_s2": float(acceleration[-1]),
+    }
+
+
+def _read_external(entry: dict[str, Any] | None, robot: Robot) -> Robot:
+    if entry is None:
+        return robot
+    rail = entry["kind"] == "rail"
+    unit = "m" if rail else "rad"
+    travel: Travel = {
+        "lower": entry[f"lower_{unit}"],
+        "upper": entry[f"upper_{unit}"],
+        "velocity": entry[f"velocity_{unit}_s"],
+        "acceleration": entry[f"acceleration_{unit}_s2"],
+        "step": entry[f"step_{unit}"],
+    }
+    if rail:
+        return robot.on_rail(entry["axis"], **travel)
+    return robot.with_positioner(entry["axis"], entry["point_m"], **travel)
+
+
 def _robot_entry(robot: Robot) -> dict[str, Any]:
     return {
         "id": robot.id,
@@ -234,6 +287,7 @@ def _robot_entry(robot: Robot) -> dict[str, Any]:
 
 
 def _limits_entry(robot: Robot) -> dict[str, Any]:
+    robot = robot.alone()
     limits = robot.joint_limits()
     velocity, acceleration = robot.speed_limits()
     return {
@@ -295,7 +349,7 @@ def _read_plan(entry: dict[str, Any], robot: Robot, tool: Any, placement: Any) -
         robot=robot,
         T_flange_tip=tool,
         T_base_part=placement,
-        q=nodes["q_rad"],
+        q=_joints(nodes, "q", robot),
         gamma=nodes["gamma_rad"],
         tilt=nodes["lead_lean_rad"],
         posture=nodes["posture"],
@@ -307,7 +361,7 @@ def _read_plan(entry: dict[str, Any], robot: Robot, tool: Any, placement: Any) -
             method=entry["method"],
             objective=entry["objective"],
             metric=entry["metric"],
-            weights=np.array(entry["weights_per_rad"], dtype=float),
+            weights=_joints(entry, "weights_per", robot),
             eta_v=float(entry["eta_v"]),
             eta_a=float(entry["eta_a"]),
             closure=entry["closure"],

@@ -1,6 +1,8 @@
 """Robots: their kinematics in closed form, their limits, and the library of known models."""
 
 from kerfpath.robots._coupling import Coupling as Coupling
+from kerfpath.robots._external import ExternalAxis as ExternalAxis
+from kerfpath.robots._external import Travel as Travel
 from kerfpath.robots._families import FAMILIES as FAMILIES
 from kerfpath.robots._families import Family as Family
 from kerfpath.robots._families import posture_name as posture_name
@@ -9,4 +11,4 @@ from kerfpath.robots._library import acceleration_ratios as acceleration_ratios
 from kerfpath.robots._library import robot as robot
 from kerfpath.robots._library import robot_ids as robot_ids
 from kerfpath.robots._robot import Robot as Robot
-from kerfpath.robots._robot import Solutions as Solutions
+from kerfpath.robots._solutions import Solutions as Solutions
