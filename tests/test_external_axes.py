@@ -11,6 +11,7 @@ from conftest import pose
 from kerfpath import Contour, InputError, NoFeasiblePath, Tilt, audit, plan
 from kerfpath.auditor import chain_of, checks
 from kerfpath.cell import cell_of
+from kerfpath.comfort import Band, Comfort, measure, measures
 from kerfpath.graph import gamma_grid
 from kerfpath.job import read_plan_file
 from kerfpath.job._planfile import plan_entry, plan_text
@@ -18,6 +19,7 @@ from kerfpath.planner import layered_graph
 from kerfpath.post import build_program
 from kerfpath.report import ContourSection
 from kerfpath.robots import Robot
+from kerfpath.urdf import Chain
 from test_five_axes import ARM, TOOLS
 
 RAIL = {"velocity": 2.0, "acceleration": 4.0, "step": 0.1}
@@ -296,3 +298,40 @@ def test_an_arm_without_limits_takes_no_rail():
     unknown = Robot(id="bare", geometry=dict.fromkeys(("a1", "a2", "b", "c1", "c2", "c3", "c4"), 1))
     with pytest.raises(InputError, match="joint limits are not known"):
         unknown.on_rail([1, 0, 0], lower=0, upper=1, **RAIL)
+
+
+def test_comfort_is_that_of_the_arm(arm, railed, short, options):
+    comfort = Comfort(
+        wrist=Band(margin=0.2, width=0.3, cost=0.1), limits=Band(margin=0.3, width=0.2, cost=0.1)
+    )
+    made = plan(short, railed, comfort=comfort, refine=True, **options)
+    assert audit(made, path_tolerance=1e-3) == []
+    own = made.q[:, :6]
+    for name, value in measures(railed, made.q).items():
+        np.testing.assert_array_equal(value, measure(name, arm, own))
+    # At its end the rail is far from no limit of the arm, and no margin in rad is one in m.
+    q = np.append(own[0], 1.0)
+    assert measure("limits", railed, q[None])[0] == measure("limits", arm, own[:1])[0]
+    narrowed = comfort.narrowed(railed, made.q)
+    assert (narrowed.lower[6], narrowed.upper[6]) == (-1.0, 1.0)
+
+
+def test_a_general_arm_is_held_where_its_rail_stands(arm):
+    frames = chain_of(arm)
+    described = Robot(
+        id="described",
+        kinematics="general",
+        geometry={},
+        chain=Chain(origins=frames.origins, axes=frames.axes, end=frames.tip),
+        **{n: getattr(arm, n) for n in ("lower", "upper", "velocity", "acceleration", "endless")},
+    )
+    rides = described.on_rail([1, 1, 0], lower=-1.0, upper=1.0, **RAIL)
+    q = np.array([0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7])
+    want = arm.on_rail([1, 1, 0], lower=-1.0, upper=1.0, **RAIL).forward(q)
+    np.testing.assert_allclose(rides.forward(q), want, atol=1e-9)
+    np.testing.assert_allclose(rides.held(0.7).forward(q[:6]), want, atol=1e-9)
+    np.testing.assert_allclose(chain_of(rides).forward(q[None])[0], want, atol=1e-9)
+    found = rides.held(0.7).inverse(want).q
+    assert np.abs(found - q[:6]).max(axis=1).min() < 1e-6
+    with pytest.raises(InputError, match=r"ask robot.held\(x\)"):
+        rides.follow(want[None], q[None, :6], np.zeros(1, int))

@@ -14,11 +14,13 @@ import numpy as np
 from kerfpath import __version__
 from kerfpath._arrays import Array
 from kerfpath.auditor import Check
-from kerfpath.contour import Contour
+from kerfpath.comfort import MEASURES, Band, Comfort
+from kerfpath.contour import KINDS, Contour
 from kerfpath.errors import InputError, NoFeasiblePath
+from kerfpath.job._external import by_unit, external_entry, joints, with_external
 from kerfpath.planner import FastestSpeed
 from kerfpath.plans import Feed, Plan, Proof, Settings
-from kerfpath.robots import Coupling, Robot, Travel
+from kerfpath.robots import Coupling, Robot
 from kerfpath.tilt import Tilt
 from kerfpath.urdf import Chain
 
@@ -81,7 +83,7 @@ def plan_text(
         "kerfpath": __version__,
         "job": job,
         "robot": _robot_entry(robot),
-        "external_axis": _external_entry(robot),
+        "external_axis": external_entry(robot),
         "T_flange_tip": T_flange_tip.tolist(),
         "T_base_part": T_base_part.tolist(),
         "limits": _limits_entry(robot),
@@ -103,11 +105,12 @@ def plan_entry(plan: Plan, contour: str, checks: Sequence[Check]) -> dict[str, A
         "method": settings.method,
         "objective": settings.objective,
         "metric": settings.metric,
-        **_by_unit("weights_per", settings.weights, plan.robot),
+        **by_unit("weights_per", settings.weights, plan.robot),
         "eta_v": settings.eta_v,
         "eta_a": settings.eta_a,
         "closure": settings.closure,
         "rotation_rad": _finite(settings.rotation),
+        "comfort": _bands(settings.comfort),
         "gamma_step_rad": settings.gamma_step,
         "tilt": None
         if settings.tilt is None
@@ -123,11 +126,16 @@ def plan_entry(plan: Plan, contour: str, checks: Sequence[Check]) -> dict[str, A
         "proof": plan.proof.statement,
         "grid_cost": plan.proof.grid_cost,
         "criteria": {
-            **_by_unit("displacement", criteria.displacement, plan.robot),
-            **_by_unit("largest_increment", criteria.largest_increment, plan.robot),
-            **_by_unit("range", criteria.range, plan.robot),
+            **by_unit("displacement", criteria.displacement, plan.robot),
+            **by_unit("largest_increment", criteria.largest_increment, plan.robot),
+            **by_unit("range", criteria.range, plan.robot),
             "peak_velocity_share": criteria.peak_velocity.tolist(),
             "peak_acceleration_share": criteria.peak_acceleration.tolist(),
+            "nearest": {
+                name: {"least": least if np.isfinite(least) else None, "unit": MEASURES[name].unit}
+                | {"node": node}
+                for name, (least, node) in criteria.nearest.items()
+            },
         },
         "feed": None if plan.feed is None else asdict(plan.feed),
         "counts": dict(plan.counts),
@@ -140,8 +148,10 @@ def plan_entry(plan: Plan, contour: str, checks: Sequence[Check]) -> dict[str, A
             "time_s": plan.time.tolist(),
             "points_m": plan.contour.points.tolist(),
             "axes": plan.contour.axes.tolist(),
+            "kind": list(plan.contour.kinds),
+            "speed_share": plan.contour.speed_share.tolist(),
             "x": None if plan.contour.x is None else plan.contour.x.tolist(),
-            **_by_unit("q", plan.q, plan.robot),
+            **by_unit("q", plan.q, plan.robot),
             "gamma_rad": plan.gamma.tolist(),
             "lead_lean_rad": plan.tilt.tolist() if plan.tilt.any() else None,
             "posture": plan.posture.tolist(),
@@ -185,7 +195,7 @@ def read_plan_file(path: str | Path) -> PlanFile:
         )
     try:
         arm = _read_robot(data["robot"], data["limits"])
-        robot = _read_external(data["external_axis"], arm)
+        robot = with_external(data["external_axis"], arm)
         tool, placement = data["T_flange_tip"], data["T_base_part"]
         entries = data["contours"]
         return PlanFile(
@@ -218,55 +228,11 @@ def _infinite(rotation: list[float | None] | None) -> Array | None:
     return None if rotation is None else np.array([np.inf if v is None else v for v in rotation])
 
 
-def _by_unit(name: str, values: Array, robot: Robot) -> dict[str, Any]:
-    """Return values (..., n) of the joints, those of an external axis apart and in its own unit."""
-    if robot.external is None:
-        return {f"{name}_rad": values.tolist()}
-    own, last = values[..., :-1].tolist(), values[..., -1].tolist()
-    return {f"{name}_rad": own, f"external_{name}_{robot.external.unit}": last}
-
-
-def _joints(entry: dict[str, Any], name: str, robot: Robot) -> Array:
-    """Return values (..., n) of the joints as `_by_unit` told them."""
-    own = np.array(entry[f"{name}_rad"], dtype=float)
-    if robot.external is None:
-        return own
-    last = np.array(entry[f"external_{name}_{robot.external.unit}"], dtype=float)
-    return np.concatenate([own, last[..., None]], axis=-1)
-
-
-def _external_entry(robot: Robot) -> dict[str, Any] | None:
-    axis = robot.external
-    if axis is None:
+def _bands(comfort: Comfort | None) -> dict[str, Any] | None:
+    """Return the bands that are asked for, margins and widths in rad, m and m^3."""
+    if comfort is None:
         return None
-    limits, (velocity, acceleration) = robot.joint_limits(), robot.speed_limits()
-    return {
-        "kind": axis.kind,
-        "axis": axis.axis.tolist(),
-        "point_m": axis.point.tolist(),
-        f"step_{axis.unit}": axis.step,
-        f"lower_{axis.unit}": float(limits.lower[-1]),
-        f"upper_{axis.unit}": float(limits.upper[-1]),
-        f"velocity_{axis.unit}_s": float(velocity[-1]),
-        f"acceleration_{axis.unit}_s2": float(acceleration[-1]),
-    }
-
-
-def _read_external(entry: dict[str, Any] | None, robot: Robot) -> Robot:
-    if entry is None:
-        return robot
-    rail = entry["kind"] == "rail"
-    unit = "m" if rail else "rad"
-    travel: Travel = {
-        "lower": entry[f"lower_{unit}"],
-        "upper": entry[f"upper_{unit}"],
-        "velocity": entry[f"velocity_{unit}_s"],
-        "acceleration": entry[f"acceleration_{unit}_s2"],
-        "step": entry[f"step_{unit}"],
-    }
-    if rail:
-        return robot.on_rail(entry["axis"], **travel)
-    return robot.with_positioner(entry["axis"], entry["point_m"], **travel)
+    return {name: band for name, band in asdict(comfort).items() if band is not None}
 
 
 def _robot_entry(robot: Robot) -> dict[str, Any]:
@@ -343,13 +309,15 @@ def _read_plan(entry: dict[str, Any], robot: Robot, tool: Any, placement: Any) -
             nodes["axes"],
             closed=entry["closed"],
             s=nodes["s_m"],
+            kind=np.array([KINDS.index(word) for word in nodes["kind"]]),
+            speed_share=nodes["speed_share"],
             x=nodes["x"],
             name=str(entry["name"]),
         ),
         robot=robot,
         T_flange_tip=tool,
         T_base_part=placement,
-        q=_joints(nodes, "q", robot),
+        q=joints(nodes, "q", robot),
         gamma=nodes["gamma_rad"],
         tilt=nodes["lead_lean_rad"],
         posture=nodes["posture"],
@@ -361,11 +329,12 @@ def _read_plan(entry: dict[str, Any], robot: Robot, tool: Any, placement: Any) -
             method=entry["method"],
             objective=entry["objective"],
             metric=entry["metric"],
-            weights=_joints(entry, "weights_per", robot),
+            weights=joints(entry, "weights_per", robot),
             eta_v=float(entry["eta_v"]),
             eta_a=float(entry["eta_a"]),
             closure=entry["closure"],
             rotation=_infinite(entry["rotation_rad"]),
+            comfort=_read_comfort(entry.get("comfort")),
             tilt=_read_tilt(entry["tilt"]),
         ),
         cost=entry["cost"],
@@ -377,3 +346,7 @@ def _read_plan(entry: dict[str, Any], robot: Robot, tool: Any, placement: Any) -
         counts=dict(entry["counts"]),
         feed=None if entry["feed"] is None else Feed(**entry["feed"]),
     )
+
+
+def _read_comfort(bands: dict[str, Any] | None) -> Comfort | None:
+    return None if bands is None else Comfort(**{k: Band(**band) for k, band in bands.items()})

@@ -9,7 +9,9 @@ from typing import Literal
 import numpy as np
 from numpy.typing import ArrayLike
 
+from kerfpath.comfort import Comfort
 from kerfpath.contour import Contour, FrameKind
+from kerfpath.errors import InputError
 from kerfpath.graph import LayeredGraph
 from kerfpath.planner._graph import node_interval, require_even
 from kerfpath.planner._task import task_of
@@ -65,6 +67,7 @@ def fastest_speed(
     eta_v: float = 1.0,
     eta_a: float = 1.0,
     refine: bool = False,
+    comfort: Comfort | None = None,
     graph: LayeredGraph | None = None,
     progress: Callable[[int], None] | None = None,
 ) -> FastestSpeed:
@@ -72,16 +75,19 @@ def fastest_speed(
 
     A second-order minimax problem on the layered graph; arguments as in `plan`. The grid quantises
     the acceleration: `refine` moves gamma off it, from the fastest path, to what is then faster
-    still (the nearest optimum, which is not proved to be the best one).
+    still (the nearest optimum, which is not proved to be the best one), unless that would break a
+    margin of `comfort`, which may have no costs here.
 
     Raises
     ------
     NoFeasiblePath
         Some node has no admissible pose at all.
     InputError
-        Limits that are not known, nodes unevenly spaced, values out of range.
+        Limits that are not known, nodes unevenly spaced, values out of range, costs of comfort.
     """
     require_even(contour, np.diff(contour.s), "m")
+    if comfort is not None and comfort.costs:
+        raise InputError("comfort: what is fastest knows no costs; give margins alone")
     task = task_of(
         replace(contour, time=None),
         robot,
@@ -94,6 +100,7 @@ def fastest_speed(
         postures=postures,
         eta_v=eta_v,
         eta_a=eta_a,
+        comfort=comfort,
         graph=graph,
         progress=progress,
     )
@@ -103,6 +110,8 @@ def fastest_speed(
         return found
     claim = Proof(optimal=False, statement="the fastest path on this graph")
     quick, at = quicken(replace(task, dt=least.dt).plan(least.index, 0.0, claim))
+    if comfort is not None and comfort.broken(robot, quick.q, task.T_flange_tip):
+        return found
     return FastestSpeed(
         speed=contour.length / float(quick.time[-1]),
         joint=at.joint,

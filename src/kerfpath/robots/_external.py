@@ -150,4 +150,6 @@ def held(robot: Robot, x: float) -> Robot:
     T, chain = robot.external.poses(np.asarray(x)), robot.chain
     if chain is not None:
         chain = replace(chain, origins=np.concatenate([T @ chain.origins[:1], chain.origins[1:]]))
-    return replace(alone(robot), T_base_foot=T @ robot.T_base_foot, chain=chain)
+    # A family without lengths has the chain for its model: that has been moved already.
+    foot = T @ robot.T_base_foot if robot.family.lengths else robot.T_base_foot
+    return replace(alone(robot), T_base_foot=foot, chain=chain)

@@ -7,6 +7,7 @@ from typing import Annotated
 from pydantic import BaseModel, Field, model_validator
 
 from kerfpath.job._keys import fault
+from kerfpath.job._tables._comfort import ComfortTable
 from kerfpath.job._tables._contour import ContourTable
 from kerfpath.job._tables._part import PartTable
 from kerfpath.job._tables._plan import PlanTable
@@ -26,6 +27,7 @@ class JobFile(Table):
     part: PartTable
     contour: Annotated[tuple[ContourTable, ...], Field(strict=False, min_length=1)]
     plan: PlanTable = PlanTable()
+    comfort: ComfortTable = ComfortTable()
     audit: AuditTable = AuditTable()
     program: ProgramTable = ProgramTable()
 
@@ -44,6 +46,15 @@ class JobFile(Table):
             seen.add(name)
         return self
 
+    @model_validator(mode="after")
+    def _costs_are_known(self) -> JobFile:
+        """Refuse costs where the planner would not know them."""
+        asked = self.comfort.resolve()
+        if asked and asked.costs and self.plan.feed == "dip" and self.plan.refine is not False:
+            expected = 'refine = false with feed = "dip" and costs in [comfort]'
+            raise fault(expected, "none", "add it, or remove the costs", ("plan", "feed"))
+        return self
+
 
 TABLES: dict[str, type[BaseModel]] = {
     "robot": RobotTable,
@@ -51,6 +62,7 @@ TABLES: dict[str, type[BaseModel]] = {
     "part": PartTable,
     "contour": ContourTable,
     "plan": PlanTable,
+    "comfort": ComfortTable,
     "audit": AuditTable,
     "program": ProgramTable,
 }
