@@ -52,9 +52,9 @@ def model(*, chain: Chain | None, sign: Array, offset: Array) -> general.Arm:
         raise InputError(
             "a robot of family 'general' turns its joints as its chain does: no sign, no offset"
         )
-    T = chain.frames(np.zeros(6))
-    along = np.einsum("nij,nj->ni", T[:6, :3, :3], chain.axes)
-    place = T[:6, :3, 3].copy()
+    T = chain.frames(np.zeros((1, 6)))[0, 1:]
+    along = np.einsum("nij,nj->ni", T[:, :3, :3], chain.axes)
+    place = T[:, :3, 3].copy()
     for i in range(1, 6):
         # The foot on axis i of the line square to it and to the axis before.
         normal = np.cross(along[i - 1], along[i])
@@ -62,7 +62,7 @@ def model(*, chain: Chain | None, sign: Array, offset: Array) -> general.Arm:
         if np.linalg.norm(normal) > PARALLEL:
             gap = np.cross(along[i - 1], gap) @ normal / (normal @ normal) * along[i]
         place[i] += (gap @ along[i]) * along[i]
-    return general.Arm(place=place, along=along, tip=T[6])
+    return general.Arm(place=place, along=along, tip=T[-1] @ chain.end)
 
 
 def inverse_all(arm: general.Arm, T: Array, out_q: Array, out_reach: Bools) -> None:

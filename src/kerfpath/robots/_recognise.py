@@ -112,9 +112,9 @@ def model_of(chain: Chain) -> dict[str, Any]:
 
 
 def _lines(chain: Chain) -> _Lines:
-    T = chain.frames(np.zeros(6))
-    along = np.einsum("nij,nj->ni", T[:6, :3, :3], chain.axes)
-    place = T[:6, :3, 3]
+    T = chain.frames(np.zeros((1, 6)))[0, 1:]
+    along = np.einsum("nij,nj->ni", T[:, :3, :3], chain.axes)
+    place = T[:, :3, 3]
     sign = -1.0 if along[0, 2] < -NEARLY else 1.0
     z = sign * along[0]
     x = np.eye(3)[0] if abs(z[0]) < 0.9 else -np.eye(3)[2]
@@ -125,7 +125,9 @@ def _lines(chain: Chain) -> _Lines:
     foot[:3, 3] = place[0] - (place[0] @ z) * z
     foot = _tidy(foot)
     R = foot[:3, :3]
-    return _Lines(foot, (place - foot[:3, 3]) @ R, along @ R, np.linalg.inv(foot) @ T[6], sign)
+    return _Lines(
+        foot, (place - foot[:3, 3]) @ R, along @ R, np.linalg.inv(foot) @ T[-1] @ chain.end, sign
+    )
 
 
 def _opw(at: _Lines) -> tuple[dict[str, float], list[float], list[float]] | str:
@@ -240,8 +242,7 @@ def _laid(
 def _miss(chain: Chain, model: dict[str, Any]) -> float:
     """Return the largest entry by which the model's poses differ from the chain's."""
     q = np.random.default_rng(2008).uniform(-np.pi, np.pi, (POSES, 6))
-    want = np.array([chain.frames(row)[-1] for row in q])
-    return float(np.abs(Robot(id="", **model).forward(q) - want).max())
+    return float(np.abs(Robot(id="", **model).forward(q) - chain.forward(q)).max())
 
 
 def _round(value: float) -> float:
