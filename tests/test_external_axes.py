@@ -9,7 +9,8 @@ from scipy.spatial.transform import Rotation
 import naive
 from conftest import pose
 from kerfpath import Contour, InputError, NoFeasiblePath, Tilt, audit, plan
-from kerfpath.auditor import chain_of, checks
+from kerfpath.air import air_move
+from kerfpath.auditor import air_checks, chain_of, checks
 from kerfpath.cell import cell_of
 from kerfpath.comfort import Band, Comfort, measure, measures
 from kerfpath.graph import gamma_grid
@@ -270,6 +271,10 @@ def test_what_does_not_go_with_an_extra_joint_is_refused_in_one_line(
         audit(made, cell=cell)
     with pytest.raises(InputError, match="no language writes the rail"):
         build_program([made])
+    with pytest.raises(InputError, match="how a rail moves"):
+        air_move(railed, made.q[0], made.q[-1])
+    with pytest.raises(InputError, match="how a rail moves"):
+        air_checks(railed, made.q[[0, -1]], [0.0, 9.0])
     space = {name: options[name] for name in ("tool", "placement", "gamma_step")}
     graph = layered_graph(short, railed, **space)
     with pytest.raises(InputError, match="does not show a rail"):
