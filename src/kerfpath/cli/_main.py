@@ -33,6 +33,7 @@ Json = Annotated[bool, typer.Option("--json", help="Print one JSON object instea
 Out = Annotated[
     Path | None, typer.Option("--out", help="Folder for the files; made if it is not there.")
 ]
+JobArgument = Annotated[Path, typer.Argument(metavar="JOB.toml", help="The job file.")]
 PlanFileArgument = Annotated[Path, typer.Argument(metavar="PLAN.json", help="A plan, as written.")]
 
 
@@ -81,7 +82,7 @@ def demo(to: Out = None, as_json: Json = False) -> None:
 
 @app.command()
 def plan(
-    job: Annotated[Path, typer.Argument(metavar="JOB.toml", help="The job file.")],
+    job: JobArgument,
     to: Out = None,
     as_json: Json = False,
 ) -> None:
@@ -98,8 +99,28 @@ def plan(
 
 
 @app.command()
+def check(job: JobArgument, as_json: Json = False) -> None:
+    """Read a job without planning it: the bodies and pairs of its cell, and how contours begin.
+
+    Clear: of the robot's poses at the first node, those that keep every near-miss distance.
+    Clearance: of the best of them, its least distance among the pairs that keep near_miss_mm.
+
+    Example: kerfpath check door.toml
+    """
+    from kerfpath.cli._check import show_check
+    from kerfpath.job import check_job, read_job, warm_up
+
+    read = read_job(job)
+    with busy("compiling the kernels, first run only"):
+        warm_up()
+    with busy("looking at the cell"):
+        checked = check_job(read)
+    show_check(checked, as_json=as_json)
+
+
+@app.command()
 def speed(
-    job: Annotated[Path, typer.Argument(metavar="JOB.toml", help="The job file.")],
+    job: JobArgument,
     as_json: Json = False,
 ) -> None:
     """Find the fastest constant cutting speed of each contour, and what binds where.

@@ -11,7 +11,15 @@ import typer
 from rich.markup import escape
 
 from kerfpath.cli._show import busy, errors, out, print_json, progress_bars, table
-from kerfpath.job import Cut, read_job, require_folder, run_job, warm_up, write_outcome
+from kerfpath.job import (
+    Cut,
+    read_job,
+    require_folder,
+    require_language,
+    run_job,
+    warm_up,
+    write_outcome,
+)
 
 __all__ = ["plan_job"]
 
@@ -26,6 +34,7 @@ def plan_job(job_file: Path, folder: Path, *, as_json: bool) -> None:
     """
     require_folder(folder)
     job = read_job(job_file)
+    require_language(job)
     with busy("compiling the kernels, first run only"):
         warm_up()
     with progress_bars() as progress:

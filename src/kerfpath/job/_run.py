@@ -11,9 +11,11 @@ import numpy as np
 from kerfpath._arrays import Array, Ints
 from kerfpath.auditor import Check, checks
 from kerfpath.cad import read_step
+from kerfpath.cell import Cell
 from kerfpath.contour import FRAME_KINDS, Contour
 from kerfpath.errors import NoFeasiblePath
 from kerfpath.graph import LayeredGraph
+from kerfpath.job._cell import cell_of_job
 from kerfpath.job._read import ContourTask, Job
 from kerfpath.kernels import is_compiled
 from kerfpath.planner import (
@@ -105,11 +107,12 @@ class Cut:
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Outcome:
-    """What came of a job: every cut, in order, and the part's mesh for pictures."""
+    """What came of a job: every cut, in order, its cell, and the part's mesh for pictures."""
 
     job: Job
     cuts: tuple[Cut, ...]
     mesh: tuple[Array, Ints]
+    cell: Cell | None = None
 
     @property
     def passed(self) -> bool:
@@ -135,13 +138,18 @@ def run_job(job: Job, *, progress: Progress = lambda what, done, total: None) ->
     part = read_step(job.part_file, unit=job.part_unit)
     for task in job.contours:  # a misspelt name shall not wait for the contours before it
         part.loop(task.pick)
+    cell = cell_of_job(job, part)
     cuts = [
-        cut for task in job.contours for cut in _cut(job, task, part.contour(task.pick), progress)
+        cut
+        for task in job.contours
+        for cut in _cut(job, task, part.contour(task.pick), cell, progress)
     ]
-    return Outcome(job=job, cuts=tuple(cuts), mesh=part.mesh())
+    return Outcome(job=job, cuts=tuple(cuts), mesh=part.mesh(), cell=cell)
 
 
-def _cut(job: Job, task: ContourTask, drawn: Contour, progress: Progress) -> tuple[Cut, ...]:
+def _cut(
+    job: Job, task: ContourTask, drawn: Contour, cell: Cell | None, progress: Progress
+) -> tuple[Cut, ...]:
     """Return what came of a contour: one cut, or several where it is interrupted."""
     nodes = task.sample(drawn)
     options, done = job.plan_options, 0
@@ -164,7 +172,7 @@ def _cut(job: Job, task: ContourTask, drawn: Contour, progress: Progress) -> tup
     )
     whole = Cut(contour=task.name, task=task, drawn=drawn, nodes=nodes, graph=graph)
     try:
-        plans = _plans(job, task, nodes, graph)
+        plans = _plans(job, task, nodes, graph, cell)
     except NoFeasiblePath as broken:
         # With poses everywhere slower would do; for a loop that cannot close it need not.
         if not np.diff(graph.start).all() or options["closure"] != "free":
@@ -175,24 +183,26 @@ def _cut(job: Job, task: ContourTask, drawn: Contour, progress: Progress) -> tup
         )
         fastest = FastestSpeed.of(nodes, least.slower)
         return (replace(whole, broken=broken, fastest=fastest, relaxations=least),)
-    return tuple(_audited(job, whole, made) for made in plans)
+    return tuple(_audited(job, whole, made, cell) for made in plans)
 
 
-def _plans(job: Job, task: ContourTask, nodes: Contour, graph: LayeredGraph) -> tuple[Plan, ...]:
+def _plans(
+    job: Job, task: ContourTask, nodes: Contour, graph: LayeredGraph, cell: Cell | None
+) -> tuple[Plan, ...]:
     """Return the plan of a contour, or those of its pieces where the job lets it be interrupted."""
     options = job.plan_options
-    cell: dict[str, Any] = {"tool": job.tool, "placement": job.placement, "speed": task.speed}
-    cell["graph"] = graph
+    setting: dict[str, Any] = {"tool": job.tool, "placement": job.placement, "speed": task.speed}
+    setting["graph"] = graph
     try:
-        return (plan(nodes, job.robot, **cell, **options),)
+        return (plan(nodes, job.robot, cell=cell, **setting, **options),)
     except NoFeasiblePath:
         if job.interruptions == "none" or not np.diff(graph.start).all():
             raise
     plain = {key: value for key, value in options.items() if key not in ("feed", "rotation")}
-    return plan_in_pieces(nodes, job.robot, **cell, **plain)
+    return plan_in_pieces(nodes, job.robot, **setting, **plain)
 
 
-def _audited(job: Job, whole: Cut, made: Plan) -> Cut:
+def _audited(job: Job, whole: Cut, made: Plan, cell: Cell | None) -> Cut:
     """Return the cut of one plan, at finer intervals if the job asks for them, and its audit."""
     drawn, graph, nodes, s = whole.drawn, whole.graph, whole.nodes, made.contour.s
     if len(s) < len(nodes):
@@ -208,7 +218,7 @@ def _audited(job: Job, whole: Cut, made: Plan) -> Cut:
         nodes=nodes,
         graph=graph,
         plan=made,
-        checks=tuple(checks(made, reference=drawn, **job.audit_options)),
+        checks=tuple(checks(made, reference=drawn, cell=cell, **job.audit_options)),
     )
 
 
