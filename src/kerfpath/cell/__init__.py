@@ -8,6 +8,8 @@ from kerfpath.cell._cell import cell_of as cell_of
 from kerfpath.cell._chain import Chain as Chain
 from kerfpath.cell._chain import chain_of as chain_of
 from kerfpath.cell._checker import Checker as Checker
+from kerfpath.cell._map import Clearances as Clearances
+from kerfpath.cell._map import clearances as clearances
 from kerfpath.cell._mesh import Mesh as Mesh
 from kerfpath.cell._mesh import welded as welded
 from kerfpath.cell._shapes import Capsule as Capsule

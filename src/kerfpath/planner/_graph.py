@@ -15,8 +15,9 @@ from kerfpath.robots import Robot
 
 __all__ = ["layered_graph", "node_interval", "require_even", "require_no_empty_layer"]
 
-UNEVEN = 0.01
-"""Largest relative difference of node distances that still counts as evenly spaced."""
+UNEVEN = 0.11
+"""Largest relative difference of node distances that still counts as evenly spaced: a tenth, which
+sampling may leave so that corners and feature ends are nodes, and rounding."""
 
 
 def layered_graph(
@@ -45,6 +46,8 @@ def layered_graph(
 def node_interval(contour: Contour, speed: float | None) -> float:
     """Return the time between neighbouring nodes, s, from the speed (m/s) or the contour's times.
 
+    Where nodes are not quite evenly spaced, the speed is that of the longest step.
+
     Raises
     ------
     InputError
@@ -61,8 +64,14 @@ def node_interval(contour: Contour, speed: float | None) -> float:
     if speed is None:
         raise InputError(f"speed: contour {contour.name!r} carries no times, give a speed in m/s")
     speed = scalar(speed, "speed", unit="m/s", above=0.0)
-    require_even(contour, np.diff(contour.s), "m")
-    return contour.length / (len(contour) - 1) / speed
+    if (contour.speed_share < 1).any():
+        raise InputError(
+            f"speed: contour {contour.name!r} asks for a share of the speed at some nodes; lay it "
+            f"on with contour.resample(dt=..., speed={speed:g}) and give no speed"
+        )
+    steps = np.diff(contour.s)
+    require_even(contour, steps, "m")
+    return float(steps.max()) / speed
 
 
 def require_even(contour: Contour, steps: Array, unit: str) -> None:
