@@ -212,6 +212,7 @@ def report_text(outcome: Outcome, notes: Sequence[str]) -> str:
             checks=cut.checks,
             failure=cut.failure,
             broken_at=None if cut.broken is None else cut.broken.node + 1,
+            clearance=cut.clearance,
         )
         for cut in outcome.cuts
     ]
@@ -238,6 +239,7 @@ def report_text(outcome: Outcome, notes: Sequence[str]) -> str:
         f"{job.part_file.stem.replace('_', ' ')}",
         sections,
         mesh=outcome.mesh,
+        cell=outcome.cell,
         facts=facts,
         notes=notes,
         job_text=job.path.read_text(encoding="utf-8-sig"),

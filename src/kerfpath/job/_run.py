@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -19,7 +20,9 @@ from kerfpath.job._cell import cell_of_job
 from kerfpath.job._read import ContourTask, Job
 from kerfpath.kernels import is_compiled
 from kerfpath.planner import (
+    ClearanceMap,
     FastestSpeed,
+    clearance_map,
     fastest_speed,
     layered_graph,
     plan,
@@ -61,6 +64,8 @@ class Cut:
         With it: the least change of each limit that would do at the speed asked.
     checks : tuple of Check
         The audit's table; empty without a plan.
+    clearance : ClearanceMap or None
+        How clear every pose is in the cell, where the job asks for the map.
     """
 
     contour: str
@@ -73,6 +78,7 @@ class Cut:
     fastest: FastestSpeed | None = None
     relaxations: Relaxations | None = None
     checks: tuple[Check, ...] = ()
+    clearance: ClearanceMap | None = None
 
     @property
     def passed(self) -> bool:
@@ -86,13 +92,14 @@ class Cut:
         """Why there is no plan, and what would help; empty where there is one."""
         if self.broken is None:
             return ""
-        if self.fastest is None or self.relaxations is None:
+        if self.fastest is None:
             return str(self.broken)
+        least = self.relaxations
         ways = [
             f"{name} {share:.4g}"
             for name, share in (
-                ("eta_velocity", self.relaxations.eta_v),
-                ("eta_acceleration", self.relaxations.eta_a),
+                ("eta_velocity", None if least is None else least.eta_v),
+                ("eta_acceleration", None if least is None else least.eta_a),
             )
             if share is not None
         ]
@@ -170,7 +177,12 @@ def _cut(
         postures=options["postures"],
         progress=solved,
     )
-    whole = Cut(contour=task.name, task=task, drawn=drawn, nodes=nodes, graph=graph)
+    clearance = None
+    if cell is not None and job.cell is not None and job.cell.map:
+        clearance = clearance_map(graph, cell)
+    whole = Cut(
+        contour=task.name, task=task, drawn=drawn, nodes=nodes, graph=graph, clearance=clearance
+    )
     try:
         plans = _plans(job, task, nodes, graph, cell)
     except NoFeasiblePath as broken:
@@ -178,12 +190,40 @@ def _cut(
         if not np.diff(graph.start).all() or options["closure"] != "free":
             return (replace(whole, broken=broken),)
         progress(f"{task.name}: fastest speed", 0, 1)
+        if cell is not None:
+            # Shares of the limits at which a clear path exists are not looked for.
+            with suppress(NoFeasiblePath):
+                slower = _fastest(job, nodes, cell, refine=False, graph=graph)
+                return (replace(whole, broken=broken, fastest=slower),)
+            return (replace(whole, broken=broken),)
         least = relaxations(
             nodes, job.robot, graph, task.speed, eta_v=options["eta_v"], eta_a=options["eta_a"]
         )
         fastest = FastestSpeed.of(nodes, least.slower)
         return (replace(whole, broken=broken, fastest=fastest, relaxations=least),)
     return tuple(_audited(job, whole, made, cell) for made in plans)
+
+
+def _fastest(
+    job: Job,
+    nodes: Contour,
+    cell: Cell | None,
+    *,
+    refine: bool,
+    graph: LayeredGraph | None = None,
+) -> FastestSpeed:
+    """Return the fastest constant speed of a contour, clear in the cell where there is one."""
+    keys = ("gamma_step", "frames", "postures", "eta_v", "eta_a")
+    return fastest_speed(
+        nodes,
+        job.robot,
+        tool=job.tool,
+        placement=job.placement,
+        cell=cell,
+        graph=graph,
+        refine=refine,
+        **{key: job.plan_options[key] for key in keys},
+    )
 
 
 def _plans(
@@ -245,20 +285,14 @@ def fastest_speeds(
         As `run_job`.
     """
     part = read_step(job.part_file, unit=job.part_unit)
-    options = job.plan_options
-    keys = ("gamma_step", "frames", "postures", "eta_v", "eta_a", "refine")
+    cell = cell_of_job(job, part)
+    refine = job.plan_options["refine"]
     answers: list[tuple[ContourTask, Contour, FastestSpeed | NoFeasiblePath]] = []
     for i, task in enumerate(job.contours):
         progress("contours", i, len(job.contours))
         nodes = task.sample(part.contour(task.pick))
         try:
-            found: FastestSpeed | NoFeasiblePath = fastest_speed(
-                nodes,
-                job.robot,
-                tool=job.tool,
-                placement=job.placement,
-                **{key: options[key] for key in keys},
-            )
+            found: FastestSpeed | NoFeasiblePath = _fastest(job, nodes, cell, refine=refine)
         except NoFeasiblePath as broken:
             found = broken
         answers.append((task, nodes, found))

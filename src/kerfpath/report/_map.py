@@ -117,7 +117,8 @@ def feasibility_map(
 def shown_postures(graph: LayeredGraph) -> list[int]:
     """Return the postures with an admitted candidate; if there is none, those worth a look."""
     every = range(graph.reason.shape[2])
-    admitted = [mu for mu in every if (graph.reason[:, :, mu] == ADMITTED).any()]
+    codes = [c for c, word in enumerate(graph.reasons) if c == ADMITTED or word.endswith("spare")]
+    admitted = [mu for mu in every if np.isin(graph.reason[:, :, mu], codes).any()]
     # Where one reason holds everywhere, a word says as much as a panel.
     mixed = [mu for mu in every if np.ptp(graph.reason[:, :, mu])]
     return admitted or mixed or list(every)
