@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from kerfpath import Contour, Tilt
 from kerfpath.cell import (
     Body,
     Capsule,
@@ -65,6 +66,22 @@ def check(cell, q, lower, upper, pair, band, resolution):
     assert (named <= np.maximum(upper, 0) + EXACT)[pair >= 0].all()
     assert (pair >= 0)[near | ~clear].all()
     return clear, near
+
+
+def test_tilts_of_one_gamma_are_poses_of_their_own(dome, circle, arm, tool, placement):
+    graph = layered_graph(
+        Contour(circle.points[:5], circle.axes[:5]), arm, tool=tool, placement=placement,
+        gamma_step=np.radians(30), tilt=Tilt(cone=0.3),
+    )  # fmt: skip
+    found = clearance_map(graph, dome)
+    clear = dome.clear(graph.q)
+    np.testing.assert_array_equal(found.clear, clear)
+    assert found.poses == graph.counts()["admitted"]
+    # The tilt decides: the same gamma and posture of a node are clear and not.
+    layer = np.repeat(np.arange(5), np.diff(graph.start))
+    _, one = np.unique([layer, graph.sample, graph.posture], axis=1, return_inverse=True)
+    every = np.bincount(one.ravel(), clear) / np.bincount(one.ravel())
+    assert ((every > 0) & (every < 1)).any()
 
 
 def test_the_map_is_that_of_measuring_each_vertex(dome, circle, arm, tool, placement):

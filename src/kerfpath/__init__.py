@@ -27,6 +27,7 @@ if TYPE_CHECKING:
     from kerfpath.robots import robot as robot
     from kerfpath.search import LayeredPath as LayeredPath
     from kerfpath.search import shortest_path as shortest_path
+    from kerfpath.tilt import Tilt as Tilt
 
 _HOME = {
     "AuditFailed": "errors",
@@ -38,6 +39,7 @@ _HOME = {
     "Plan": "plans",
     "Refinement": "refiner",
     "Robot": "robots",
+    "Tilt": "tilt",
     "audit": "auditor",
     "fastest_speed": "planner",
     "join": "contour",

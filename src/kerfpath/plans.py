@@ -14,6 +14,7 @@ from kerfpath.errors import InputError
 from kerfpath.kernels import metric
 from kerfpath.robots import Robot
 from kerfpath.search import METRIC_CODES, Closure, Method, Metric, ObjectiveKind
+from kerfpath.tilt import Tilt, tilted
 
 __all__ = ["Criteria", "Feed", "Plan", "Proof", "Settings", "path_cost"]
 
@@ -37,6 +38,8 @@ class Settings:
     closure : {"free", "periodic"}
     rotation : (6,) rad, optional
         How far each joint may turn away from where it begins, infinite where that is not limited.
+    tilt : Tilt, optional
+        Tolerance of the tool axis; None: the nominal axis.
     """
 
     gamma_step: float
@@ -49,6 +52,7 @@ class Settings:
     eta_a: float
     closure: Closure = "free"
     rotation: Array | None = None
+    tilt: Tilt | None = None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -127,10 +131,19 @@ class Criteria:
     peak_acceleration: Array
 
 
-def path_cost(dq: Array, weights: Array, metric_name: Metric, objective: ObjectiveKind) -> float:
-    """Return the objective (14) or (15) of joint increments (K-1, n) rad."""
+def path_cost(
+    dq: Array,
+    weights: Array,
+    metric_name: Metric,
+    objective: ObjectiveKind,
+    node_cost: Array | None = None,
+) -> float:
+    """Return the objective (14) or (15) of joint increments (K-1, n) rad, with the nodes' costs."""
     total = metric.total_distance if objective == "sum" else metric.maximum_distance
-    return float(total(np.ascontiguousarray(dq), weights, METRIC_CODES[metric_name]))
+    cost = float(total(np.ascontiguousarray(dq), weights, METRIC_CODES[metric_name]))
+    if node_cost is None:
+        return cost
+    return cost + float(node_cost.sum()) if objective == "sum" else max(cost, *node_cost.tolist())
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -149,6 +162,8 @@ class Plan:
         Joints at the nodes.
     gamma : (K,) rad
         Free rotation about the tool axis at the nodes.
+    tilt : (K, 2) rad, optional
+        Lead and lean of the tool axis at the nodes, see `kerfpath.Tilt`; default none.
     posture : (K,) int
         Posture mu; see `kerfpath.robots.posture_name`.
     turn : (K, n) int
@@ -157,12 +172,12 @@ class Plan:
         Time of each node, from 0.
     settings : Settings
     cost : float
-        Objective (14) or (15).
+        Objective (14) or (15), with what the tilt costs.
     proof : Proof
     feed : Feed or None
         Where the speed dips; None at constant speed.
     counts : mapping of str to int
-        Candidates (node, gamma, posture) of the layered graph by what became of them.
+        Candidates (node, tilt, gamma, posture) of the layered graph by what became of them.
     """
 
     contour: Contour
@@ -179,6 +194,7 @@ class Plan:
     proof: Proof
     counts: Mapping[str, int]
     feed: Feed | None = None
+    tilt: Array = None  # type: ignore[assignment]  # filled in by __post_init__
 
     def __post_init__(self) -> None:
         K, n = len(self.contour), self.robot.joints
@@ -190,6 +206,7 @@ class Plan:
             "posture": integers(self.posture, "posture", (K,)),
             "turn": integers(self.turn, "turn", (K, n)),
             "time": floats(self.time, "time", (K,)),
+            "tilt": floats(np.zeros((K, 2)) if self.tilt is None else self.tilt, "tilt", (K, 2)),
             "cost": scalar(self.cost, "cost"),
         }
         if (np.diff(cast["time"]) <= 0).any():
@@ -215,8 +232,24 @@ class Plan:
 
     @property
     def axes(self) -> Array:
-        """Tool axes asked for at the nodes, robot base frame, (K, 3)."""
-        return freeze(self.contour.axes @ self.T_base_part[:3, :3].T)
+        """Tool axes asked for at the nodes, tilt included, robot base frame, (K, 3)."""
+        if not self.tilt.any():
+            return freeze(self.contour.axes @ self.T_base_part[:3, :3].T)
+        return freeze(self.frames[:, :3, 2])
+
+    @property
+    def frames(self) -> Array:
+        """Task frames that gamma counts from, tilt included, robot base frame, (K, 4, 4) m."""
+        H = self.contour.frames(self.settings.frames)
+        if self.tilt.any():
+            H = tilted(H, self.contour.along, self.tilt)
+        return freeze(self.T_base_part @ H)
+
+    @property
+    def node_cost(self) -> Array | None:
+        """What the tilt costs at each node, (K,); None where it costs nothing."""
+        tilt = self.settings.tilt
+        return None if tilt is None or tilt.cost == 0 else freeze(tilt.price(self.tilt))
 
     @property
     def increments(self) -> Array:

@@ -205,19 +205,17 @@ class Contour:
         if count is not None:
             if not (isinstance(count, int | np.integer) and count >= 2):
                 raise InputError(f"count: expected a whole number of nodes >= 2, got {count!r}")
-            return self._at_nodes(np.linspace(self.s[0], self.s[-1], int(count)))
+            return self.at_nodes(np.linspace(self.s[0], self.s[-1], int(count)))
         if spacing is not None:
             step = scalar(spacing, "spacing", unit="m", above=0.0)
-            return self._at_nodes(
-                _sampling.evenly(self.s, self.feature_ends, step, "mm", self.name)
-            )
+            return self.at_nodes(_sampling.evenly(self.s, self.feature_ends, step, "mm", self.name))
         if dt is not None or speed is not None:
             return self._in_time(dt, speed)
         position = np.inf if tolerance is None else scalar(tolerance, "tolerance", above=0.0)
         angle = (
             np.inf if axis_tolerance is None else scalar(axis_tolerance, "axis_tolerance", above=0)
         )
-        return self._at_nodes(_sampling.fewest(self, position, angle))
+        return self.at_nodes(_sampling.fewest(self, position, angle))
 
     def frames(self, kind: FrameKind = "tangent") -> Array:
         """Return the task frames H_k, (K, 4, 4): x along the path, z along the tool axis.
@@ -255,6 +253,11 @@ class Contour:
         H[:, 3, 3] = 1.0
         return freeze(H)
 
+    @property
+    def along(self) -> Array:
+        """Directions of travel, (K, 3): unit, normal to the tool axes; errors as in `frames`."""
+        return replace(self, x=None).frames("tangent")[:, :3, 0]
+
     def part(self, first: int, last: int, frames: FrameKind) -> Contour:
         """Return the nodes first to last as an open contour, gamma counting from the same frames.
 
@@ -281,7 +284,7 @@ class Contour:
         """Return the open contour between two arc lengths (m), its own nodes kept on the way."""
         inside = self.s[(self.s > s0 + REPEATED_POINT) & (self.s < s1 - REPEATED_POINT)]
         s = np.concatenate([[s0], inside, [s1]])
-        return replace(self, closed=False, x=None)._at_nodes(s)
+        return replace(self, closed=False, x=None).at_nodes(s)
 
     def _stretch_kind(self) -> Ints:
         """Return the kind of each stretch, (K-1,); that of the first is not its pierce."""
@@ -290,7 +293,8 @@ class Contour:
             kind[0] = self.kind[1]
         return kind
 
-    def _at_nodes(self, s: Array, time: Array | None = None) -> Contour:
+    def at_nodes(self, s: Array, time: Array | None = None) -> Contour:
+        """Return the contour with nodes at arc lengths s (M,) m, increasing, end to end."""
         points, axes = self.at(s)
         # A node that rounding left just before a feature's end still begins what follows it.
         k = np.searchsorted(self.s, s + REPEATED_POINT, side="right") - 1
@@ -314,7 +318,7 @@ class Contour:
         step = scalar(dt, "dt", unit="s", above=0.0)
         v = positive(np.broadcast_to(np.asarray(speed), len(self)), "speed", (len(self),))
         s, time = _sampling.in_time(self, v * self.speed_share, step)
-        return self._at_nodes(s, freeze(time))
+        return self.at_nodes(s, freeze(time))
 
 
 def _increasing(value: ArrayLike, name: str, count: int) -> Array:

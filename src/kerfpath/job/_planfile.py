@@ -15,16 +15,17 @@ from kerfpath import __version__
 from kerfpath._arrays import Array
 from kerfpath.auditor import Check
 from kerfpath.cell import Cell
-from kerfpath.contour import Contour
+from kerfpath.contour import KINDS, Contour
 from kerfpath.errors import InputError, NoFeasiblePath
 from kerfpath.planner import FastestSpeed
 from kerfpath.plans import Feed, Plan, Proof, Settings
 from kerfpath.robots import Coupling, Robot
+from kerfpath.tilt import Tilt
 from kerfpath.urdf import Chain
 
 __all__ = ["SCHEMA", "PlanFile", "broken_entry", "plan_entry", "plan_text", "read_plan_file"]
 
-SCHEMA = 2
+SCHEMA = 3
 """Version of the layout of plan.json; it grows when a reader of the old one would go wrong."""
 
 _NUMBERS = re.compile(r"\[\s+([-+.\deE,\s]+?)\s+\]")
@@ -115,6 +116,13 @@ def plan_entry(plan: Plan, contour: str, checks: Sequence[Check]) -> dict[str, A
         "closure": settings.closure,
         "rotation_rad": _finite(settings.rotation),
         "gamma_step_rad": settings.gamma_step,
+        "tilt": None
+        if settings.tilt is None
+        else {
+            "cone_rad": settings.tilt.cone,
+            "steps": settings.tilt.steps,
+            "cost_per_rad": settings.tilt.cost,
+        },
         "frames": settings.frames,
         "dt": plan.dt,
         "cost": plan.cost,
@@ -139,9 +147,12 @@ def plan_entry(plan: Plan, contour: str, checks: Sequence[Check]) -> dict[str, A
             "time_s": plan.time.tolist(),
             "points_m": plan.contour.points.tolist(),
             "axes": plan.contour.axes.tolist(),
+            "kind": list(plan.contour.kinds),
+            "speed_share": plan.contour.speed_share.tolist(),
             "x": None if plan.contour.x is None else plan.contour.x.tolist(),
             "q_rad": plan.q.tolist(),
             "gamma_rad": plan.gamma.tolist(),
+            "lead_lean_rad": plan.tilt.tolist() if plan.tilt.any() else None,
             "posture": plan.posture.tolist(),
             "turn": plan.turn.tolist(),
         },
@@ -289,6 +300,12 @@ def _read_robot(robot: dict[str, Any], limits: dict[str, Any]) -> Robot:
     )
 
 
+def _read_tilt(entry: dict[str, Any] | None) -> Tilt | None:
+    if entry is None:
+        return None
+    return Tilt(cone=entry["cone_rad"], steps=entry["steps"], cost=entry["cost_per_rad"])
+
+
 def _read_plan(entry: dict[str, Any], robot: Robot, tool: Any, placement: Any) -> Plan:
     nodes = entry["nodes"]
     return Plan(
@@ -297,6 +314,8 @@ def _read_plan(entry: dict[str, Any], robot: Robot, tool: Any, placement: Any) -
             nodes["axes"],
             closed=entry["closed"],
             s=nodes["s_m"],
+            kind=np.array([KINDS.index(word) for word in nodes["kind"]]),
+            speed_share=nodes["speed_share"],
             x=nodes["x"],
             name=str(entry["name"]),
         ),
@@ -305,6 +324,7 @@ def _read_plan(entry: dict[str, Any], robot: Robot, tool: Any, placement: Any) -
         T_base_part=placement,
         q=nodes["q_rad"],
         gamma=nodes["gamma_rad"],
+        tilt=nodes["lead_lean_rad"],
         posture=nodes["posture"],
         turn=nodes["turn"],
         time=nodes["time_s"],
@@ -319,6 +339,7 @@ def _read_plan(entry: dict[str, Any], robot: Robot, tool: Any, placement: Any) -
             eta_a=float(entry["eta_a"]),
             closure=entry["closure"],
             rotation=_infinite(entry["rotation_rad"]),
+            tilt=_read_tilt(entry["tilt"]),
         ),
         cost=entry["cost"],
         proof=Proof(

@@ -82,11 +82,12 @@ def _same(a: Array, b: Array) -> bool:
 def _beside(graph: LayeredGraph) -> Ints:
     """Return the vertices (N, 2) one step of gamma before and after each, -1 where there is none.
 
-    Of the same node, posture and turns; where one collides, its neighbours are likely to.
+    Of the same node, variant, posture and turns; where one collides, its neighbours are likely to.
     """
     m, layer = len(graph.gamma), np.repeat(np.arange(len(graph.start) - 1), np.diff(graph.start))
     _, turn = np.unique(graph.turn, axis=0, return_inverse=True)
-    strand = (layer * (graph.posture.max(initial=0) + 1) + graph.posture) * (turn.max() + 1)
+    strand = layer * len(graph.tilt) + graph.variant
+    strand = (strand * (graph.posture.max(initial=0) + 1) + graph.posture) * (turn.max() + 1)
     strand += turn.ravel()
     key = strand * m + graph.sample
     order = np.argsort(key)

@@ -39,7 +39,13 @@ def slowed(task: Task, *, refine: bool) -> Plan:
 
 def _least_lost(task: Task) -> Plan:
     s = task.settings
-    found = slowed_path(**task.limits, dt=task.dt, weights=s.weights, metric=s.metric)
+    found = slowed_path(
+        **task.limits,
+        dt=task.dt,
+        weights=s.weights,
+        metric=s.metric,
+        vertex_cost=task.vertex_cost,
+    )
     claim = (
         "at constant speed the graph has no path; of all its paths this one loses the least time "
         "step by step"

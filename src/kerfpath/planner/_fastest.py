@@ -19,6 +19,7 @@ from kerfpath.plans import Proof
 from kerfpath.refiner import quicken
 from kerfpath.robots import Robot
 from kerfpath.search import LeastInterval, Relaxations, least_interval, least_relaxations
+from kerfpath.tilt import Tilt
 
 __all__ = ["FastestSpeed", "fastest_speed", "relaxations"]
 
@@ -61,6 +62,7 @@ def fastest_speed(
     placement: ArrayLike,
     gamma_step: float = np.pi / 180,
     frames: FrameKind = "rotation-minimising",
+    tilt: Tilt | None = None,
     postures: Sequence[int] | None = None,
     eta_v: float = 1.0,
     eta_a: float = 1.0,
@@ -93,6 +95,7 @@ def fastest_speed(
         speed=1.0,
         gamma_step=gamma_step,
         frames=frames,
+        tilt=tilt,
         postures=postures,
         eta_v=eta_v,
         eta_a=eta_a,

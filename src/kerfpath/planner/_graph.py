@@ -12,6 +12,7 @@ from kerfpath.contour import Contour, FrameKind
 from kerfpath.errors import InputError, NoFeasiblePath
 from kerfpath.graph import LayeredGraph, build, gamma_grid
 from kerfpath.robots import Robot
+from kerfpath.tilt import Tilt, tilted
 
 __all__ = ["layered_graph", "node_interval", "require_even", "require_no_empty_layer"]
 
@@ -28,16 +29,22 @@ def layered_graph(
     placement: ArrayLike,
     gamma_step: float = np.pi / 180,
     frames: FrameKind = "rotation-minimising",
+    tilt: Tilt | None = None,
     postures: Sequence[int] | None = None,
     progress: Callable[[int], None] | None = None,
 ) -> LayeredGraph:
     """Return the layered graph that `plan` searches; arguments as there."""
-    H = np.ascontiguousarray(as_pose(placement, "placement") @ contour.frames(frames))
+    H = contour.frames(frames)
+    samples = None if tilt is None else tilt.samples()
+    if samples is not None and samples.any():
+        H = tilted(H[:, None], contour.along[:, None], samples)
+    H = np.ascontiguousarray(as_pose(placement, "placement") @ H)
     return build(
         H,
         robot,
         T_flange_tip=as_pose(tool, "tool"),
         gamma=gamma_grid(gamma_step),
+        tilt=samples,
         postures=postures,
         progress=progress,
     )

@@ -111,6 +111,6 @@ def _poses(graph: LayeredGraph) -> tuple[Ints, Ints]:
     """Return a vertex of each pose, node after node, and which pose each vertex has."""
     layer = np.repeat(np.arange(len(graph.start) - 1), np.diff(graph.start))
     _, samples, postures = graph.reason.shape
-    key = (layer * samples + graph.sample) * postures + graph.posture
+    key = (layer * samples + graph.candidate) * postures + graph.posture
     _, first, pose = np.unique(key, return_index=True, return_inverse=True)
     return first, pose

@@ -29,7 +29,7 @@ def plan_in_pieces(
     ----------
     contour, robot, refine, options
         As in `plan`, with method "exact", closure "free" (a closed contour need not return to its
-        first pose) and no rotation limit.
+        first pose), no rotation limit and no tilt.
 
     Returns
     -------
@@ -43,7 +43,7 @@ def plan_in_pieces(
         No number of interruptions helps: a node without a pose, or an interval between two nodes
         that no poses can pass.
     InputError
-        As `plan`; another method or closure, a rotation limit.
+        As `plan`; another method or closure, a rotation limit, a tilt.
     """
     task = task_of(contour, robot, **options)
     settings = task.settings
@@ -53,6 +53,8 @@ def plan_in_pieces(
             'plan_in_pieces: needs method "exact", closure "free" and no rotation limit, got '
             f"{settings.method!r}, {settings.closure!r} and {settings.rotation}"
         )
+    if settings.tilt is not None:
+        raise InputError("plan_in_pieces: the tool axis cannot be tilted in pieces; leave out tilt")
     try:
         found = interrupted_path(**task.limits, **task.aim)
     except NoFeasiblePath as broken:

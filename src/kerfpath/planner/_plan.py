@@ -19,6 +19,7 @@ from kerfpath.planner._task import Task, task_of
 from kerfpath.plans import Plan, Proof
 from kerfpath.robots import Robot, posture_name
 from kerfpath.search import Closure, Method, Metric, ObjectiveKind, shortest_path
+from kerfpath.tilt import Tilt
 
 __all__ = ["FeedKind", "plan"]
 
@@ -34,6 +35,7 @@ def plan(
     speed: float | None = None,
     gamma_step: float = np.pi / 180,
     frames: FrameKind = "rotation-minimising",
+    tilt: Tilt | None = None,
     postures: Sequence[int] | None = None,
     method: Method = "exact",
     objective: ObjectiveKind = "sum",
@@ -67,6 +69,8 @@ def plan(
         Step of the free rotation about the beam.
     frames : {"rotation-minimising", "tangent"}
         Task frames that gamma is measured in.
+    tilt : Tilt, optional
+        Tolerance of the tool axis, searched too; default: the nominal axis alone.
     postures : sequence of int, optional
         The postures that may be used; default all. See `kerfpath.robots.postures_named`.
     method, objective, metric, weights, eta_v, eta_a, closure, rotation
@@ -110,6 +114,7 @@ def plan(
         speed=speed,
         gamma_step=gamma_step,
         frames=frames,
+        tilt=tilt,
         postures=postures,
         method=method,
         objective=objective,

@@ -1,4 +1,4 @@
-"""refine(): a plan off the grid, gamma continuous, postures and turns as they are."""
+"""refine(): a plan off the grid, gamma continuous; tilts, postures and turns as they are."""
 
 from __future__ import annotations
 
@@ -186,9 +186,8 @@ def _descent(plan: Plan) -> tuple[Descent, Stand]:
     """Return the task of refining a plan, and where it stands."""
     velocity, acceleration = plan.robot.speed_limits()
     settings = plan.settings
-    H = np.ascontiguousarray(plan.T_base_part @ plan.contour.frames(settings.frames))
     descent = Descent(
-        curves=JointCurves(plan.robot, H, plan.T_flange_tip, plan.posture),
+        curves=JointCurves(plan.robot, plan.frames, plan.T_flange_tip, plan.posture),
         rates=Rates(
             tau=np.diff(plan.time),
             velocity=settings.eta_v * velocity,
@@ -200,6 +199,7 @@ def _descent(plan: Plan) -> tuple[Descent, Stand]:
         weight=settings.weights,
         metric=settings.metric,
         objective=settings.objective,
+        node_cost=plan.node_cost,
         radius=FIRST_STEPS * settings.gamma_step,
     )
     return descent, descent.stand(plan.gamma, _unwrapped(plan))
@@ -250,6 +250,8 @@ def _divided(plan: Plan, nodes: Contour) -> Plan | str:
         return f"the posture changes after node {changes[0]}, an interval that cannot be divided"
     if parts == 1:
         return plan
+    if plan.tilt.any():
+        return "the tilts hold at the plan's own nodes, not between them"
     if plan.feed is not None:
         return "the times of a feed that dips hold at its own nodes, not between them"
     gamma = CubicSpline(coarse, np.unwrap(plan.gamma + twist))(index)
@@ -259,6 +261,7 @@ def _divided(plan: Plan, nodes: Contour) -> Plan | str:
         contour=nodes,
         q=near,
         gamma=gamma,
+        tilt=np.zeros((len(nodes), 2)),
         posture=np.repeat(plan.posture[:1], len(nodes)),
         turn=np.zeros((len(nodes), plan.robot.joints), np.int64),
         time=np.interp(index, coarse, plan.time),

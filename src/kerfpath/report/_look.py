@@ -33,7 +33,7 @@ _REASONS = {"admitted": "#eef7ee", "unreachable": "#b4bac4", "posture not wanted
 _REASONS |= {f"joint {i + 1} low": colour for i, colour in enumerate(_LOW)}
 _REASONS |= {f"joint {i + 1} high": colour for i, colour in enumerate(_HIGH)}
 _REASONS["collision"] = "#d7263d"
-_SPARE = ("#f08a4b", "#f7c46c", "#d3e7a4")
+_SPARE = ("#d3e7a4", "#f7c46c", "#f08a4b")
 _OTHER_REASONS = ("#7a7f88", "#33373e")
 
 FONT = 'system-ui, -apple-system, "Segoe UI", Roboto, "Helvetica Neue", Arial, sans-serif'
@@ -42,7 +42,7 @@ FONT = 'system-ui, -apple-system, "Segoe UI", Roboto, "Helvetica Neue", Arial, s
 def reason_colours(reasons: Sequence[str]) -> tuple[str, ...]:
     """Return one colour per reason: a joint's light shade below its limits, dark above them.
 
-    Clearances run from orange to green. Reasons without a colour of their own (couplings, low and
+    Clearances run from green to orange. Reasons without a colour of their own (couplings, low and
     high) take two greys in turn.
     """
     greys, spare = cycle(_OTHER_REASONS), cycle(_SPARE)

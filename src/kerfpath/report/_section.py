@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from itertools import pairwise
 
 import numpy as np
 
@@ -28,15 +29,16 @@ def with_clearance(graph: LayeredGraph, found: ClearanceMap) -> LayeredGraph:
     of the map, by how much it has to spare. The turns of a candidate have the same pose, so that
     any of them tells.
     """
-    steps = [1e3 * share * found.band for share in SPARE]
-    words = [f"{a:g} to {b:g} mm to spare" for a, b in zip([0.0, *steps], steps, strict=False)]
-    codes = np.searchsorted(np.array(SPARE) * found.band, found.lower, side="right")
-    first = len(graph.reasons)
-    code = np.where(found.clear, np.where(codes < len(SPARE), first + 1 + codes, 0), first)
+    steps = [1e3 * share * found.band for share in (0.0, *SPARE)]
+    spare = [f"{a:g} to {b:g} mm to spare" for a, b in pairwise(steps)][::-1]
+    reasons = (graph.reasons[0], *spare, COLLISION, *graph.reasons[1:])
+    added = len(spare) + 1
+    above = np.searchsorted(np.array(SPARE) * found.band, found.lower, side="right")
     layer = np.repeat(np.arange(len(graph.reason)), np.diff(graph.start))
-    reason = graph.reason.copy()
-    reason[layer, graph.sample, graph.posture] = code
-    return replace(graph, reason=reason, reasons=(*graph.reasons, COLLISION, *words))
+    # In this order the least code is the best of a gamma's variants.
+    reason = np.where(graph.reason == 0, 0, graph.reason + added).astype(np.uint8)
+    reason[layer, graph.candidate, graph.posture] = np.where(found.clear, len(SPARE) - above, added)
+    return replace(graph, reason=reason, reasons=reasons)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)

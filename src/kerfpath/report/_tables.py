@@ -159,7 +159,7 @@ def reason_legend(graph: LayeredGraph, postures: Sequence[int], *, has_plan: boo
     colours = reason_colours(graph.reasons)
     items = [
         f"<li>{_chip(colours[code])}{escape(graph.reasons[code])}</li>"
-        for code in np.unique(graph.reason[:, :, list(postures)])
+        for code in np.unique(graph.reason_by_gamma[:, :, list(postures)])
     ]
     if has_plan:
         items.append('<li><i class="line"></i>chosen gamma</li>')
