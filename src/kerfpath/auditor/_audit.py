@@ -105,7 +105,7 @@ def checks(
         *_between_nodes(plan, motion, path, path_tolerance, axis_tolerance),
         *_positions(plan, motion),
         *_rates(plan, motion),
-        *([] if cell is None or not len(cell.pairs) else [collisions(cell, motion, chain)]),
+        *([] if cell is None else collisions(cell, motion, chain)),
     ]
 
 

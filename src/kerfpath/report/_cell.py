@@ -12,12 +12,17 @@ import plotly.graph_objects as go
 from kerfpath._arrays import Array
 from kerfpath.cell import Capsule, Cell, Hull, Mesh, Shape
 from kerfpath.plans import Plan
+from kerfpath.report._look import INK
 
 __all__ = ["add_cell", "poses_shown"]
 
 COLOURS = {"robot": "#c9a227", "head": "#5b6675", "fixture": "#8fa8c4"}
 HEIGHT = 760
 """px: a cell is larger than a part."""
+HEIGHT = 760
+"""px: a cell is larger than a part."""
+FILL = 1.5
+"""How much larger than plotly draws it."""
 MOST = 12
 """Poses to choose from."""
 BALL = 48
@@ -68,11 +73,29 @@ def add_cell(
             "args": ["visible", [True] * before + [False] * (len(figure.data) - before)],
         }
     )
+    # The step in use is named above the slider; the names of all would run into each other.
+    look: dict[str, Any] = {
+        "currentvalue": {"prefix": "Shown: ", "font": {"size": 13, "color": INK}},
+        "font": {"size": 1, "color": "white"},
+        "ticklen": 0,
+        "len": 0.5,
+        "x": 0.25,
+        "y": 0.0,
+        "yanchor": "bottom",
+    }
     figure.update_layout(
-        sliders=[
-            {"steps": steps, "currentvalue": {"prefix": "Robot at "}, "pad": {"l": 20, "r": 20}}
-        ]
+        height=HEIGHT, sliders=[{"steps": steps, **look}], scene={"aspectratio": _size(figure)}
     )
+
+
+def _size(figure: go.Figure) -> dict[str, float]:
+    """Return the sides of the box around all that is shown, to one scale, to fill the figure."""
+    sides = {}
+    for axis in "xyz":
+        ends = [np.nan_to_num(t[axis]) for t in figure.data if t.visible is not False]
+        sides[axis] = float(max(e.max() for e in ends) - min(e.min() for e in ends))
+    mean = float(np.prod(list(sides.values()))) ** (1 / 3)
+    return {axis: FILL * side / mean for axis, side in sides.items()}
 
 
 def _add_body(

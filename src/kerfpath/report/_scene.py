@@ -47,7 +47,7 @@ def scene(
     figure.update_layout(
         margin={"l": 0, "r": 0, "t": 0, "b": 0},
         scene={
-            "aspectmode": "data",
+            "aspectmode": "data" if cell is None else "manual",
             "dragmode": "turntable",
             "camera": _camera(sections),
             "annotations": _labels(sections) if len(sections) <= LABELS else [],
