@@ -16,12 +16,12 @@ from kerfpath.cell import (
     box,
     box_between,
     cell_of,
-    chain_of,
     clearances,
     frustum,
 )
 from kerfpath.errors import InputError
 from kerfpath.planner import clearance_map, layered_graph
+from kerfpath.robots import chain_of
 
 EXACT = 2e-6
 """m: coal refines distances to 1e-6, here as in the map."""
@@ -146,7 +146,7 @@ def test_bounds_hold_for_bodies_and_joint_vectors_of_all_kinds(arm, seed):
 
 def test_a_round_body_that_turns_about_itself_is_measured_once(arm):
     chain = chain_of(arm)
-    axis = np.array([chain.flange[:3, 3], chain.flange[:3, 3] + [0, 0, 0.2]])
+    axis = np.array([chain.end[:3, 3], chain.end[:3, 3] + [0, 0, 0.2]])
     cone = Body(name="cone", shape=frustum(*axis, (0.002, 0.02)), frame=6, kind="head")
     q = np.tile([0.1, 0.2, 0.1, 0.3, 0.5, 0.0], (360, 1))
     q[:, 5] = np.radians(np.arange(360))

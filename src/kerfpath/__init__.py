@@ -11,6 +11,8 @@ __version__ = "0.1.0"
 
 if TYPE_CHECKING:
     from kerfpath.auditor import audit as audit
+    from kerfpath.comfort import Band as Band
+    from kerfpath.comfort import Comfort as Comfort
     from kerfpath.contour import Contour as Contour
     from kerfpath.contour import join as join
     from kerfpath.errors import AuditFailed as AuditFailed
@@ -31,6 +33,8 @@ if TYPE_CHECKING:
 
 _HOME = {
     "AuditFailed": "errors",
+    "Band": "comfort",
+    "Comfort": "comfort",
     "Contour": "contour",
     "InputError": "errors",
     "KerfpathError": "errors",

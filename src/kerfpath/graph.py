@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 from typing import Any
@@ -17,9 +17,6 @@ from kerfpath.kernels import turns
 from kerfpath.robots import Robot
 
 __all__ = ["LayeredGraph", "build", "gamma_grid"]
-
-_POSES_AT_ONCE = 100_000
-"""Poses solved per piece of work: large against the overhead, small against the memory."""
 
 _WHOLE_STEPS = 1e-9
 """How far 2 pi / step may be from a whole number, relative, and still count as one."""
@@ -82,6 +79,38 @@ class LayeredGraph:
         K, codes = len(self.reason), len(self.reasons)
         flat = self.reason.reshape(K, -1) + (np.arange(K) * codes)[:, None]
         return np.bincount(flat.ravel(), minlength=K * codes).reshape(K, codes)
+
+    def without(self, unwanted: Mapping[str, Bools]) -> LayeredGraph:
+        """Return the graph without the vertices unwanted, (N,) bool by the word for the reason.
+
+        A candidate counts as dropped where none of its turns is left, by the first word for any.
+        """
+        gone = np.any([*unwanted.values()], axis=0)
+        if not gone.any():
+            return self
+        keep, sizes = ~gone, np.diff(self.start)
+        layer = np.repeat(np.arange(len(sizes)), sizes)
+        at = layer, self.candidate, self.posture
+        candidate = np.ravel_multi_index(at, self.reason.shape)
+        left = np.zeros(self.reason.size, np.bool_)
+        left[candidate[keep]] = True
+        reason, reasons = self.reason.copy(), self.reasons
+        for word, here in reversed(list(unwanted.items())):
+            reasons = reasons if word in reasons else (*reasons, word)
+            reason.flat[candidate[here & ~left[candidate]]] = reasons.index(word)
+        return replace(
+            self,
+            q=freeze(self.q[keep]),
+            start=freeze(
+                np.concatenate([[0], np.cumsum(np.bincount(layer[keep], minlength=len(sizes)))])
+            ),
+            sample=freeze(self.sample[keep]),
+            variant=freeze(self.variant[keep]),
+            posture=freeze(self.posture[keep]),
+            turn=freeze(self.turn[keep]),
+            reason=freeze(reason),
+            reasons=reasons,
+        )
 
     def part(self, first: int, last: int) -> LayeredGraph:
         """Return the layers of nodes first to last."""
@@ -179,7 +208,7 @@ def build(
             progress(last - first)
         return piece
 
-    nodes = max(1, _POSES_AT_ONCE // samples)
+    nodes = max(1, robot.family.poses_at_once // samples)
     firsts = range(0, len(frames), nodes)
     with ThreadPoolExecutor(os.cpu_count()) as pool:
         pieces = list(pool.map(lambda f: layers_of(f, min(f + nodes, len(frames))), firsts))

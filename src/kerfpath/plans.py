@@ -9,6 +9,7 @@ from typing import Any, Literal
 import numpy as np
 
 from kerfpath._arrays import Array, Ints, as_pose, floats, freeze, integers, scalar
+from kerfpath.comfort import Comfort, measures
 from kerfpath.contour import Contour, FrameKind
 from kerfpath.errors import InputError
 from kerfpath.kernels import metric
@@ -38,6 +39,8 @@ class Settings:
     closure : {"free", "periodic"}
     rotation : (6,) rad, optional
         How far each joint may turn away from where it begins, infinite where that is not limited.
+    comfort : Comfort, optional
+        What the nodes are to keep away from, and what coming near costs.
     tilt : Tilt, optional
         Tolerance of the tool axis; None: the nominal axis.
     """
@@ -52,6 +55,7 @@ class Settings:
     eta_a: float
     closure: Closure = "free"
     rotation: Array | None = None
+    comfort: Comfort | None = None
     tilt: Tilt | None = None
 
 
@@ -110,7 +114,7 @@ class Feed:
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Criteria:
-    """Smoothness of a plan, each (n,), joint by joint.
+    """Smoothness of a plan, joint by joint, each (n,), and what it comes near to.
 
     Parameters
     ----------
@@ -122,6 +126,8 @@ class Criteria:
         Coordinate range (9).
     peak_velocity, peak_acceleration : share of the limit
         Largest finite difference over the joint's limit, before eta.
+    nearest : mapping of str to (float, int)
+        The least of each measure of `kerfpath.comfort`, in its unit, and the node it stands at.
     """
 
     displacement: Array
@@ -129,6 +135,7 @@ class Criteria:
     range: Array
     peak_velocity: Array
     peak_acceleration: Array
+    nearest: Mapping[str, tuple[float, int]]
 
 
 def path_cost(
@@ -172,7 +179,7 @@ class Plan:
         Time of each node, from 0.
     settings : Settings
     cost : float
-        Objective (14) or (15), with what the tilt costs.
+        Objective (14) or (15), with what tilt and comfort cost.
     proof : Proof
     feed : Feed or None
         Where the speed dips; None at constant speed.
@@ -247,9 +254,16 @@ class Plan:
 
     @property
     def node_cost(self) -> Array | None:
-        """What the tilt costs at each node, (K,); None where it costs nothing."""
-        tilt = self.settings.tilt
-        return None if tilt is None or tilt.cost == 0 else freeze(tilt.price(self.tilt))
+        """What tilt and comfort cost at each node, (K,); None where they cost nothing.
+
+        Without what clearance costs, which only a cell tells.
+        """
+        tilt, comfort, costs = self.settings.tilt, self.settings.comfort, []
+        if tilt is not None and tilt.cost:
+            costs.append(tilt.price(self.tilt))
+        if comfort is not None and any(band.cost for band in comfort.bands.values()):
+            costs.append(comfort.price(self.robot, self.q, self.T_flange_tip))
+        return freeze(np.sum(costs, axis=0)) if costs else None
 
     @property
     def increments(self) -> Array:
@@ -270,12 +284,14 @@ class Plan:
 
     @property
     def criteria(self) -> Criteria:
-        """The criteria (7) to (9) and the peak shares of the limits."""
+        """The criteria (7) to (9), the peak shares of the limits, and the nearest comfort."""
         dq = self.increments
+        measured = measures(self.robot, self.q, tool=self.T_flange_tip)
         return Criteria(
             displacement=metric.total_displacement(dq),
             largest_increment=metric.largest_increment(dq),
             range=metric.coordinate_range(dq),
             peak_velocity=np.abs(self.velocity_share).max(axis=0),
             peak_acceleration=np.abs(self.acceleration_share).max(axis=0, initial=0.0),
+            nearest={name: (float(of.min()), int(of.argmin())) for name, of in measured.items()},
         )

@@ -7,6 +7,7 @@ import numpy as np
 from kerfpath._arrays import Array, Ints, scalar
 from kerfpath.auditor._chain import chain_of
 from kerfpath.auditor._collision import collisions
+from kerfpath.auditor._margins import margins
 from kerfpath.auditor._motion import Interpolation, Motion, joint_increments, motion_of
 from kerfpath.auditor._nominal import axes_asked_for, tilt_turns
 from kerfpath.auditor._table import Check, Issue, Unit
@@ -105,6 +106,7 @@ def checks(
         *_between_nodes(plan, motion, path, path_tolerance, axis_tolerance),
         *_positions(plan, motion),
         *_rates(plan, motion),
+        *margins(plan, chain),
         *([] if cell is None else collisions(cell, motion, chain)),
     ]
 

@@ -21,8 +21,8 @@ import numpy as np
 
 from kerfpath._arrays import Array, Bools, Ints
 from kerfpath.cell._bodies import Body
-from kerfpath.cell._chain import Chain
 from kerfpath.cell._scene import ACCURACY
+from kerfpath.urdf import Chain
 
 __all__ = ["TOLERANCE", "Sweep", "relative"]
 

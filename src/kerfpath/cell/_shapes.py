@@ -20,6 +20,10 @@ RING = 24
 SAME = 1e-7
 """m: corners that differ by this are the same, but for rounding."""
 
+CORNERS = 64
+"""A hull of more corners is followed along motions by those of the box around it: far fewer, and
+hardly farther out."""
+
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Capsule:
@@ -94,8 +98,10 @@ class Hull:
 
     @property
     def corners(self) -> Array:
-        """Points (c, 3) m whose hull is the shape."""
-        return self.points
+        """Points (c, 3) m whose hull holds the shape: its own, or of the box around many."""
+        if len(self.points) <= CORNERS:
+            return self.points
+        return box_between(self.points.min(axis=0), self.points.max(axis=0)).points
 
     @property
     def seeds(self) -> Array:

@@ -14,6 +14,7 @@ from kerfpath.cell import (
     Cell,
     CuttingHead,
     Mesh,
+    MeshHead,
     Shape,
     box,
     cell_of,
@@ -27,10 +28,14 @@ from kerfpath.errors import InputError
 from kerfpath.job._heads import pose
 from kerfpath.job._read import Job
 from kerfpath.job._refusals import refused_at
-from kerfpath.job._tables import CellTable, FixtureTable, HeadTable, given
+from kerfpath.job._tables import CellTable, FixtureTable, given
 
 __all__ = ["cell_of_job"]
 
+SIZES = (
+    "nozzle_length_mm", "nozzle_radii_mm", "body_length_mm", "body_radius_mm", "arm_radius_mm",
+)  # fmt: skip
+"""Keys of [cell.head] that are arguments of the head, but for their unit."""
 SAME = 1e-6
 """m: corners of neighbouring faces that are one; CAD systems keep to less."""
 
@@ -52,11 +57,13 @@ def cell_of_job(job: Job, part: Part) -> Cell | None:
         with _at(job, "cell", "fixture", i):
             fixtures[fixture.name] = _shape(fixture, job.path.parent, table.deviation_mm / 1000)
     solid = _solid(job, table, part) if table.part else None
+    with _at(job, "cell", "head"):
+        head = _head(table, job.path.parent)
     with _at(job, "cell"):
         bare = cell_of(
             job.robot,
             tool=job.tool,
-            head=_head(table),
+            head=head,
             part=solid,
             placement=job.placement,
             fixtures=fixtures,
@@ -100,14 +107,19 @@ def _require_known(
         raise refused_at(job.path, where, f'expected two bodies, got "{names[0]}" twice')
 
 
-def _head(table: CellTable) -> CuttingHead:
-    """Return the head of its sizes, those not given being the generic ones."""
-    sizes: dict[str, Any] = {}
-    for name in given(table.head, *HeadTable.model_fields):
-        mm = getattr(table.head, name)
+def _head(table: CellTable, folder: Path) -> CuttingHead | MeshHead:
+    """Return the head of its file, or the generic one with the sizes that are given."""
+    head = table.head
+    sizes: dict[str, Any] = {"stand_off": table.stand_off_mm / 1000, "share": table.share}
+    for name in given(head, *SIZES):
+        mm = getattr(head, name)
         many = isinstance(mm, tuple)
         sizes[name.removesuffix("_mm")] = tuple(v / 1000 for v in mm) if many else mm / 1000
-    return CuttingHead(stand_off=table.stand_off_mm / 1000, share=table.share, **sizes)
+    if head.file is None:
+        return CuttingHead(**sizes)
+    solid = _read_solid(folder / head.file, head.unit, table.deviation_mm / 1000)
+    place = pose(head.xyz_mm or (0.0, 0.0, 0.0), head.rpy_deg or (0.0, 0.0, 0.0))
+    return MeshHead(mesh=solid.moved(place), **sizes)
 
 
 def _solid(job: Job, table: CellTable, part: Part) -> Mesh:

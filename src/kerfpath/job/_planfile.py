@@ -15,6 +15,7 @@ from kerfpath import __version__
 from kerfpath._arrays import Array
 from kerfpath.auditor import Check
 from kerfpath.cell import Cell
+from kerfpath.comfort import MEASURES, Band, Comfort
 from kerfpath.contour import KINDS, Contour
 from kerfpath.errors import InputError, NoFeasiblePath
 from kerfpath.planner import FastestSpeed
@@ -115,6 +116,7 @@ def plan_entry(plan: Plan, contour: str, checks: Sequence[Check]) -> dict[str, A
         "eta_a": settings.eta_a,
         "closure": settings.closure,
         "rotation_rad": _finite(settings.rotation),
+        "comfort": _bands(settings.comfort),
         "gamma_step_rad": settings.gamma_step,
         "tilt": None
         if settings.tilt is None
@@ -135,6 +137,11 @@ def plan_entry(plan: Plan, contour: str, checks: Sequence[Check]) -> dict[str, A
             "range_rad": criteria.range.tolist(),
             "peak_velocity_share": criteria.peak_velocity.tolist(),
             "peak_acceleration_share": criteria.peak_acceleration.tolist(),
+            "nearest": {
+                name: {"least": least if np.isfinite(least) else None, "unit": MEASURES[name].unit}
+                | {"node": node}
+                for name, (least, node) in criteria.nearest.items()
+            },
         },
         "feed": None if plan.feed is None else asdict(plan.feed),
         "counts": dict(plan.counts),
@@ -225,6 +232,13 @@ def _finite(rotation: Array | None) -> list[float | None] | None:
 
 def _infinite(rotation: list[float | None] | None) -> Array | None:
     return None if rotation is None else np.array([np.inf if v is None else v for v in rotation])
+
+
+def _bands(comfort: Comfort | None) -> dict[str, Any] | None:
+    """Return the bands that are asked for, margins and widths in rad, m and m^3."""
+    if comfort is None:
+        return None
+    return {name: band for name, band in asdict(comfort).items() if band is not None}
 
 
 def _robot_entry(robot: Robot) -> dict[str, Any]:
@@ -339,6 +353,7 @@ def _read_plan(entry: dict[str, Any], robot: Robot, tool: Any, placement: Any) -
             eta_a=float(entry["eta_a"]),
             closure=entry["closure"],
             rotation=_infinite(entry["rotation_rad"]),
+            comfort=_read_comfort(entry.get("comfort")),
             tilt=_read_tilt(entry["tilt"]),
         ),
         cost=entry["cost"],
@@ -350,3 +365,7 @@ def _read_plan(entry: dict[str, Any], robot: Robot, tool: Any, placement: Any) -
         counts=dict(entry["counts"]),
         feed=None if entry["feed"] is None else Feed(**entry["feed"]),
     )
+
+
+def _read_comfort(bands: dict[str, Any] | None) -> Comfort | None:
+    return None if bands is None else Comfort(**{k: Band(**band) for k, band in bands.items()})

@@ -193,7 +193,7 @@ def read_job(path: str | Path) -> Job:
         part_file=path.parent / file.part.file,
         part_unit=file.part.unit,
         contours=tuple(_task(table) for table in file.contour),
-        plan_options=_plan_options(file.plan, robot.endless),
+        plan_options=_plan_options(file.plan, robot.endless) | {"comfort": file.comfort.resolve()},
         refine_parts=file.plan.refine_parts,
         interruptions=file.plan.interruptions,
         cell=file.cell,

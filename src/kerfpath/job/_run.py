@@ -175,6 +175,7 @@ def _cut(
         gamma_step=options["gamma_step"],
         frames=options["frames"],
         postures=options["postures"],
+        comfort=options["comfort"],
         progress=solved,
     )
     clearance = None
@@ -213,7 +214,10 @@ def _fastest(
     graph: LayeredGraph | None = None,
 ) -> FastestSpeed:
     """Return the fastest constant speed of a contour, clear in the cell where there is one."""
-    keys = ("gamma_step", "frames", "postures", "eta_v", "eta_a")
+    keys, comfort = (
+        ("gamma_step", "frames", "postures", "eta_v", "eta_a"),
+        job.plan_options["comfort"],
+    )
     return fastest_speed(
         nodes,
         job.robot,
@@ -222,6 +226,7 @@ def _fastest(
         cell=cell,
         graph=graph,
         refine=refine,
+        comfort=comfort and comfort.hard,
         **{key: job.plan_options[key] for key in keys},
     )
 
@@ -277,7 +282,7 @@ def fastest_speeds(
 ) -> list[tuple[ContourTask, Contour, FastestSpeed | NoFeasiblePath]]:
     """Return, for each contour of a job, its task, its nodes and the fastest constant speed.
 
-    The speeds that the job asks for play no part.
+    The speeds that the job asks for play no part, nor does what comfort costs.
 
     Raises
     ------

@@ -8,6 +8,7 @@ import numpy as np
 
 from kerfpath._arrays import Array, Ints
 from kerfpath.cell import Cell, Checker
+from kerfpath.comfort import Band
 from kerfpath.errors import InputError
 from kerfpath.graph import LayeredGraph
 from kerfpath.planner._task import Task
@@ -22,7 +23,9 @@ SAME_PLACE = 1e-9
 
 def clear_search(task: Task, cell: Cell) -> tuple[LayeredPath, str]:
     """Return the best path that is clear, and in words how many checks it took."""
-    checker = Checker(cell, task.graph.q)
+    asked = task.settings.comfort
+    band = Band() if asked is None or asked.clearance is None else asked.clearance
+    checker = Checker(cell, task.graph.q, comfort=band.width, comfort_cost=band.cost)
     found = clear_path(
         **task.limits,
         **task.aim,

@@ -34,7 +34,11 @@ def slowed(task: Task, *, refine: bool) -> Plan:
     made = _timed(task, replace(eased, proof=Proof(optimal=False, statement=claim)))
     better = refiner.refine(made)
     again = _timed(task, better.plan)
-    return again if again.time[-1] <= made.time[-1] else made
+    best = again if again.time[-1] <= made.time[-1] else made
+    comfort = task.settings.comfort
+    if comfort is None or not comfort.broken(task.robot, best.q, task.T_flange_tip):
+        return best
+    return slowed(task, refine=False)
 
 
 def _least_lost(task: Task) -> Plan:

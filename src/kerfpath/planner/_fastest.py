@@ -10,7 +10,9 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from kerfpath.cell import Cell
+from kerfpath.comfort import Comfort
 from kerfpath.contour import Contour, FrameKind
+from kerfpath.errors import InputError
 from kerfpath.graph import LayeredGraph
 from kerfpath.planner._clear import clear_least, is_clear, require_same_cell
 from kerfpath.planner._graph import node_interval, require_even
@@ -68,6 +70,7 @@ def fastest_speed(
     eta_a: float = 1.0,
     refine: bool = False,
     cell: Cell | None = None,
+    comfort: Comfort | None = None,
     graph: LayeredGraph | None = None,
     progress: Callable[[int], None] | None = None,
 ) -> FastestSpeed:
@@ -75,7 +78,8 @@ def fastest_speed(
 
     A second-order minimax problem on the layered graph; arguments as in `plan`. The grid quantises
     the acceleration: `refine` moves gamma off it, from the fastest path, to what is then faster
-    still (the nearest optimum, which is not proved to be the best one).
+    still (the nearest optimum, which is not proved to be the best one), unless that would break a
+    margin of `comfort`, which may have no costs here.
 
     In a `cell` the path is the fastest of all clear ones; off the grid it counts only if clear.
 
@@ -84,9 +88,11 @@ def fastest_speed(
     NoFeasiblePath
         Some node has no admissible pose at all, or none that is clear.
     InputError
-        Limits that are not known, nodes unevenly spaced, values out of range.
+        Limits that are not known, nodes unevenly spaced, values out of range, costs of comfort.
     """
     require_even(contour, np.diff(contour.s), "m")
+    if comfort is not None and comfort.costs:
+        raise InputError("comfort: what is fastest knows no costs; give margins alone")
     task = task_of(
         replace(contour, time=None),
         robot,
@@ -99,6 +105,7 @@ def fastest_speed(
         postures=postures,
         eta_v=eta_v,
         eta_a=eta_a,
+        comfort=comfort,
         graph=graph,
         progress=progress,
     )
@@ -113,6 +120,8 @@ def fastest_speed(
     claim = Proof(optimal=False, statement="the fastest path on this graph")
     quick, at = quicken(replace(task, dt=least.dt).plan(least.index, 0.0, claim))
     if cell is not None and not is_clear(quick.q, cell):
+        return found
+    if comfort is not None and comfort.broken(robot, quick.q, task.T_flange_tip):
         return found
     return FastestSpeed(
         speed=contour.length / float(quick.time[-1]),

@@ -29,7 +29,7 @@ def plan_in_pieces(
     ----------
     contour, robot, refine, options
         As in `plan`, with method "exact", closure "free" (a closed contour need not return to its
-        first pose), no rotation limit and no tilt.
+        first pose), no rotation limit and no tilt. Comfort: a node in two pieces costs in both.
 
     Returns
     -------
@@ -45,6 +45,9 @@ def plan_in_pieces(
     InputError
         As `plan`; another method or closure, a rotation limit, a tilt.
     """
+    comfort = options.get("comfort")
+    if comfort is not None and comfort.clearance is not None:
+        raise InputError("comfort clearance: is measured in a cell, which pieces do not have")
     task = task_of(contour, robot, **options)
     settings = task.settings
     plain = settings.method == "exact" and settings.closure == "free"

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from kerfpath.cell import Cell
+from kerfpath.comfort import Comfort
 from kerfpath.contour import Contour, FrameKind
 from kerfpath.errors import InputError, NoFeasiblePath
 from kerfpath.graph import LayeredGraph
@@ -48,6 +49,7 @@ def plan(
     feed: FeedKind = "constant",
     refine: bool = False,
     cell: Cell | None = None,
+    comfort: Comfort | None = None,
     graph: LayeredGraph | None = None,
     progress: Callable[[int], None] | None = None,
 ) -> Plan:
@@ -85,6 +87,10 @@ def plan(
     cell : Cell, optional
         The plan is clear in it, at the nodes and on straight joint motions between them: the best
         of all clear ones, though only what the search wants to use is checked. Exact method only.
+    comfort : Comfort, optional
+        Margins that the nodes keep from singularities and limits, and what coming near costs; see
+        `kerfpath.comfort`. Costs are added at every node visited (objective "max": maximised);
+        with closure "periodic" the first node is visited twice.
     graph : LayeredGraph, optional
         The layered graph of this very task, kept from `layered_graph`.
     progress : callable, optional
@@ -106,6 +112,10 @@ def plan(
         )
     if cell is not None and (feed == "dip" or rotation is not None):
         raise InputError('cell: works with feed "constant" and without a rotation limit so far')
+    if comfort is not None and comfort.clearance is not None and cell is None:
+        raise InputError("comfort clearance: is measured in a cell; give cell=")
+    if comfort is not None and comfort.costs and feed == "dip" and refine:
+        raise InputError('comfort: with feed "dip" costs are known on the grid only; refine=False')
     task = task_of(
         contour,
         robot,
@@ -124,6 +134,7 @@ def plan(
         eta_a=eta_a,
         closure=closure,
         rotation=rotation,
+        comfort=comfort,
         graph=graph,
         progress=progress,
     )

@@ -35,7 +35,8 @@ def refined(task: Task, made: Plan) -> Plan:
     found = [refiner.refine(start) for start in starts]
     done = [f for f in found if f.done and f.cost_after <= made.cost]
     if not done:
-        statement = f"{made.proof.statement}; {found[0].statement}"
+        why = "not refined: off the grid it would cost more"
+        statement = f"{made.proof.statement}; {why if found[0].done else found[0].statement}"
         return replace(made, proof=replace(made.proof, statement=statement))
     best = min(done, key=lambda f: f.cost_after)
     how = "" if best is found[0] else " by way of the best path without acceleration limits"

@@ -10,11 +10,17 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from kerfpath._arrays import Array, Ints, as_pose, floats, freeze, scalar
+from kerfpath.comfort import Comfort
 from kerfpath.contour import Contour, FrameKind
 from kerfpath.errors import InputError
 from kerfpath.graph import LayeredGraph
 from kerfpath.kernels.metric import increments
-from kerfpath.planner._graph import layered_graph, node_interval, require_no_empty_layer
+from kerfpath.planner._graph import (
+    layered_graph,
+    node_interval,
+    require_no_empty_layer,
+    within_margins,
+)
 from kerfpath.plans import Plan, Proof, Settings, path_cost
 from kerfpath.robots import Robot
 from kerfpath.search import Closure, Method, Metric, ObjectiveKind, rotation_limits
@@ -39,6 +45,7 @@ class Options(TypedDict, total=False):
     weights: ArrayLike | None
     eta_v: float
     eta_a: float
+    comfort: Comfort | None
     graph: LayeredGraph | None
     progress: Callable[[int], None] | None
 
@@ -92,7 +99,7 @@ class Task:
         return aim if self.vertex_cost is None else aim | {"vertex_cost": self.vertex_cost}
 
     def cost(self, index: Ints) -> float:
-        """Return the objective (14) or (15) of a path through the graph."""
+        """Return the objective (14) or (15) of a path through the graph, vertex costs included."""
         s, vertex = self.settings, self.graph.start[:-1] + index
         return path_cost(
             increments(self.graph.q[vertex], self.robot.endless),
@@ -155,6 +162,7 @@ def task_of(
     eta_a: float = 1.0,
     closure: Closure = "free",
     rotation: ArrayLike | None = None,
+    comfort: Comfort | None = None,
     graph: LayeredGraph | None = None,
     progress: Callable[[int], None] | None = None,
 ) -> Task:
@@ -179,6 +187,7 @@ def task_of(
         closure=closure,
         rotation=None if rotation is None else rotation_limits(rotation, robot.endless),
         tilt=tilt,
+        comfort=comfort,
     )
     graph = graph or layered_graph(
         contour,
@@ -197,6 +206,8 @@ def task_of(
         )
     if not np.array_equal(graph.tilt, np.zeros((1, 2)) if tilt is None else tilt.samples()):
         raise InputError("graph: it was built with another tilt than is planned with")
+    if comfort is not None:
+        graph = within_margins(graph, robot, comfort, T_flange_tip, periodic=closure == "periodic")
     require_no_empty_layer(contour, graph)
     return Task(
         contour=contour,
@@ -206,12 +217,17 @@ def task_of(
         dt=dt,
         settings=settings,
         graph=graph,
-        vertex_cost=_vertex_cost(graph, tilt),
+        vertex_cost=_vertex_cost(graph, tilt, comfort, robot, T_flange_tip),
     )
 
 
-def _vertex_cost(graph: LayeredGraph, tilt: Tilt | None) -> Array | None:
+def _vertex_cost(
+    graph: LayeredGraph, tilt: Tilt | None, comfort: Comfort | None, robot: Robot, tool: Array
+) -> Array | None:
     """Return what the vertices cost (N,); None where they cost nothing."""
-    if tilt is None or tilt.cost == 0:
-        return None
-    return freeze(tilt.price(graph.tilt)[graph.variant])
+    costs = []
+    if tilt is not None and tilt.cost:
+        costs.append(tilt.price(graph.tilt)[graph.variant])
+    if comfort is not None and any(band.cost for band in comfort.bands.values()):
+        costs.append(comfort.price(robot, graph.q, tool))
+    return freeze(np.sum(costs, axis=0)) if costs else None

@@ -288,9 +288,11 @@ def _require_same_cell(first: Plan, plan: Plan) -> None:
 
 
 def _kinematics(robot: Robot) -> tuple[object, ...]:
-    *lengths, sign, offset = robot.arm()
-    placed = np.concatenate([sign, offset, robot.T_base_foot.ravel(), robot.T_end_flange.ravel()])
-    return robot.id, robot.kinematics, *lengths, *placed.tolist()
+    chain = robot.chain
+    parts = [robot.sign, robot.offset, robot.T_base_foot, robot.T_end_flange]
+    parts += [] if chain is None else [chain.origins, chain.axes, chain.end]
+    numbers = np.concatenate([part.ravel() for part in parts])
+    return robot.id, robot.kinematics, *robot.geometry.values(), *numbers.tolist()
 
 
 def _tip_poses(plan: Plan, q: Array) -> Array:

@@ -95,7 +95,7 @@ class Descent:
     radius : float rad
         Largest change of gamma in the first iteration.
     node_cost : (K,), optional
-        What each node costs, whatever gamma.
+        What each node costs, taken as fixed: what it comes to once gamma has moved is told after.
     cap : float
         Largest distance that is allowed.
     """

@@ -19,9 +19,7 @@ __all__ = ["add_cell", "poses_shown"]
 COLOURS = {"robot": "#c9a227", "head": "#5b6675", "fixture": "#8fa8c4"}
 HEIGHT = 760
 """px: a cell is larger than a part."""
-HEIGHT = 760
-"""px: a cell is larger than a part."""
-FILL = 1.5
+FILL = 1.35
 """How much larger than plotly draws it."""
 MOST = 12
 """Poses to choose from."""

@@ -7,7 +7,6 @@ a message about it says was expected and how to write it.
 
 from kerfpath.job._tables._cell import CellTable as CellTable
 from kerfpath.job._tables._cell import FixtureTable as FixtureTable
-from kerfpath.job._tables._cell import HeadTable as HeadTable
 from kerfpath.job._tables._contour import ContourTable as ContourTable
 from kerfpath.job._tables._job import REPEATED as REPEATED
 from kerfpath.job._tables._job import TABLES as TABLES

@@ -25,7 +25,7 @@ ThreePositive = Annotated[tuple[Positive, ...], Field(strict=False, min_length=3
 Pair = Annotated[tuple[Text, ...], Field(strict=False, min_length=2, max_length=2)]
 
 
-def unit_of(table: FixtureTable) -> None:
+def unit_of(table: HeadTable | FixtureTable) -> None:
     """Require the unit of a mesh file that does not say it, and none without a file.
 
     Raises
@@ -59,8 +59,16 @@ MeshFile = Annotated[
 
 
 class HeadTable(Table):
-    """[cell.head]: sizes of the generic head, where they differ from those it has by itself."""
+    """[cell.head]: a solid from a file, or the generic head's sizes where they differ."""
 
+    file: MeshFile | None = None
+    unit: Annotated[Unit | None, key("the unit of the file's numbers", '"mm"')] = None
+    xyz_mm: Annotated[
+        Three | None, key("3 numbers, where the file's origin is in the flange in mm", "[0, 0, 0]")
+    ] = None
+    rpy_deg: Annotated[
+        Three | None, key("3 numbers, roll, pitch and yaw in the flange in deg", "[0, 0, 0]")
+    ] = None
     nozzle_length_mm: Annotated[Positive | None, key("a number above 0, in mm", "60")] = None
     nozzle_radii_mm: Annotated[
         tuple[Positive, ...] | None,
@@ -75,6 +83,19 @@ class HeadTable(Table):
     body_length_mm: Annotated[Positive | None, key("a number above 0, in mm", "140")] = None
     body_radius_mm: Annotated[Positive | None, key("a number above 0, in mm", "40")] = None
     arm_radius_mm: Annotated[Positive | None, key("a number above 0, in mm", "50")] = None
+
+    @model_validator(mode="after")
+    def _one_head(self) -> HeadTable:
+        """Require sizes of the generic head, or a file and where it is."""
+        if self.file is None:
+            wrong, why = given(self, "xyz_mm", "rpy_deg"), "only with file"
+        else:
+            generic = ("nozzle_radii_mm", "body_length_mm", "body_radius_mm", "arm_radius_mm")
+            wrong, why = given(self, *generic), "only without file"
+        if wrong:
+            raise fault(f"{wrong[0]} {why}", "another head", "remove it", (wrong[0],))
+        unit_of(self)
+        return self
 
 
 class FixtureTable(Table):

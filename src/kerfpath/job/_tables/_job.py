@@ -8,6 +8,7 @@ from pydantic import BaseModel, Field, ValidationInfo, model_validator
 
 from kerfpath.job._keys import fault, folder_of
 from kerfpath.job._tables._cell import CellTable, FixtureTable, HeadTable, PairTable
+from kerfpath.job._tables._comfort import ComfortTable
 from kerfpath.job._tables._contour import ContourTable
 from kerfpath.job._tables._part import PartTable
 from kerfpath.job._tables._plan import PlanTable
@@ -28,6 +29,7 @@ class JobFile(Table):
     contour: Annotated[tuple[ContourTable, ...], Field(strict=False, min_length=1)]
     plan: PlanTable = PlanTable()
     cell: CellTable | None = None
+    comfort: ComfortTable = ComfortTable()
     audit: AuditTable = AuditTable()
     program: ProgramTable = ProgramTable()
 
@@ -76,6 +78,15 @@ class JobFile(Table):
             )
         return self
 
+    @model_validator(mode="after")
+    def _costs_are_known(self) -> JobFile:
+        """Refuse costs where the planner would not know them."""
+        asked = self.comfort.resolve()
+        if asked and asked.costs and self.plan.feed == "dip" and self.plan.refine is not False:
+            expected = 'refine = false with feed = "dip" and costs in [comfort]'
+            raise fault(expected, "none", "add it, or remove the costs", ("plan", "feed"))
+        return self
+
 
 IN_A_CELL = {"method": "exact", "feed": "constant", "rotation_deg": None, "interruptions": "none"}
 """What planning in a cell needs of the keys of [plan]."""
@@ -90,6 +101,7 @@ TABLES: dict[str, type[BaseModel]] = {
     "cell.head": HeadTable,
     "cell.fixture": FixtureTable,
     "cell.pair": PairTable,
+    "comfort": ComfortTable,
     "audit": AuditTable,
     "program": ProgramTable,
 }
