@@ -56,9 +56,9 @@ def main() -> None:
 def _run(name: str, *, quick: bool) -> list[Report]:
     """Import a benchmark and run it; each brings libraries that the others do without."""
     if name == "kinematics":
-        from benchmarks import kinematics
+        from benchmarks import _families, kinematics
 
-        return [kinematics.run(quick=quick)]
+        return [kinematics.run(quick=quick), _families.run(quick=quick)]
     if name == "demo":
         from benchmarks import demo
 

@@ -15,7 +15,7 @@ from benchmarks import _arm
 from benchmarks._figures import Figure, Report, Sheet, in_turn
 from kerfpath import Contour, Robot, plan, robot
 from kerfpath._arrays import Array, Ints
-from kerfpath.cad import read_step
+from kerfpath.cad import read as read_drawing
 from kerfpath.cell import Cell, CuttingHead, Mesh, Shape, box_between, cell_of, welded
 from kerfpath.graph import LayeredGraph
 from kerfpath.job import read_job
@@ -171,7 +171,7 @@ def _demo(quick: bool) -> _Case:
     arm = robot("abb_irb4600_60_205").with_limits(
         acceleration=np.radians([320, 270, 420, 1300, 1400, 2000]), endless=[0, 0, 0, 1, 0, 1]
     )
-    drawn = read_step(Path(str(files("kerfpath.demo") / "b_pillar.step")))
+    drawn = read_drawing(Path(str(files("kerfpath.demo") / "b_pillar.step")))
     vertices, triangles = welded(*drawn.mesh(2e-4), 1e-6)
     part = Mesh(vertices=vertices, triangles=triangles, deviation=2e-4, name="b_pillar.step")
     contour = drawn.contour("skin/outer").resample(spacing=4e-3)

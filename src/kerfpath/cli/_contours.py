@@ -6,7 +6,7 @@ from pathlib import Path
 
 from rich.markup import escape
 
-from kerfpath.cad import read_step
+from kerfpath.cad import read as read_drawing
 from kerfpath.cli._show import out, print_json, table
 
 __all__ = ["list_contours"]
@@ -14,7 +14,7 @@ __all__ = ["list_contours"]
 
 def list_contours(file: Path, unit: str | None, *, as_json: bool) -> None:
     """Print the size of a part, and every loop's name, surface, length, edges and place."""
-    part = read_step(file, unit=unit)
+    part = read_drawing(file, unit=unit)
     size = part.bounding_box[1] - part.bounding_box[0]
     if as_json:
         print_json(

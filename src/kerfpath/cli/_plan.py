@@ -18,13 +18,14 @@ from kerfpath.job import (
     require_language,
     run_job,
     warm_up,
+    with_map,
     write_outcome,
 )
 
 __all__ = ["plan_job"]
 
 
-def plan_job(job_file: Path, folder: Path, *, as_json: bool) -> None:
+def plan_job(job_file: Path, folder: Path, *, as_json: bool, draw_map: bool = False) -> None:
     """Plan a job, write its files into a folder and say what came of it.
 
     Raises
@@ -35,6 +36,8 @@ def plan_job(job_file: Path, folder: Path, *, as_json: bool) -> None:
     require_folder(folder)
     job = read_job(job_file)
     require_language(job)
+    if draw_map:
+        job = with_map(job)
     with busy("compiling the kernels, first run only"):
         warm_up()
     with progress_bars() as progress:

@@ -4,6 +4,7 @@ from kerfpath.job._again import Audited as Audited
 from kerfpath.job._again import audit_file as audit_file
 from kerfpath.job._again import program_from_file as program_from_file
 from kerfpath.job._cell import cell_of_job as cell_of_job
+from kerfpath.job._cell import with_map as with_map
 from kerfpath.job._check import Checked as Checked
 from kerfpath.job._check import check_job as check_job
 from kerfpath.job._files import Written as Written

@@ -11,7 +11,8 @@ import numpy as np
 from pydantic import BaseModel, ValidationError
 
 from kerfpath.auditor import Check, checks
-from kerfpath.cad import Part, read_step
+from kerfpath.cad import Part
+from kerfpath.cad import read as read_drawing
 from kerfpath.cell import Cell
 from kerfpath.contour import Contour
 from kerfpath.errors import AuditFailed, InputError
@@ -82,7 +83,7 @@ def audit_file(plan_file: Path, job_file: Path | None = None) -> Audited:
     cell = None
     if job_file is not None:
         job = read_job(job_file)
-        part = read_step(job.part_file, unit=job.part_unit)
+        part = read_drawing(job.part_file, unit=job.part_unit)
         drawn, cell = _drawn(file, job, part), cell_of_job(job, part)
     asked = _table(file, "audit", AuditTable, audit_options)
     tables = {}

@@ -9,7 +9,8 @@ from pathlib import Path
 from typing import Any
 
 from kerfpath._arrays import Array, Ints
-from kerfpath.cad import Part, read_step
+from kerfpath.cad import Part
+from kerfpath.cad import read as read_drawing
 from kerfpath.cell import (
     Cell,
     CuttingHead,
@@ -30,7 +31,7 @@ from kerfpath.job._read import Job
 from kerfpath.job._refusals import refused_at
 from kerfpath.job._tables import CellTable, FixtureTable, given
 
-__all__ = ["cell_of_job"]
+__all__ = ["cell_of_job", "with_map"]
 
 SIZES = (
     "nozzle_length_mm", "nozzle_radii_mm", "body_length_mm", "body_radius_mm", "arm_radius_mm",
@@ -80,6 +81,21 @@ def cell_of_job(job: Job, part: Part) -> Cell | None:
         return replace(bare, near_miss_of={**bare.near_miss_of, **own}, may_touch=touching)
 
 
+def with_map(job: Job) -> Job:
+    """Return the job with the collision map asked for.
+
+    Raises
+    ------
+    InputError
+        It has no [cell].
+    """
+    if job.cell is None:
+        raise refused_at(
+            job.path, ("cell",), "expected a [cell] for the collision map, got none; add one"
+        )
+    return replace(job, cell=job.cell.model_copy(update={"map": True}))
+
+
 @contextmanager
 def _at(job: Job, *where: str | int) -> Iterator[None]:
     """Give the errors of a piece of the cell their place in the job."""
@@ -124,6 +140,13 @@ def _head(table: CellTable, folder: Path) -> CuttingHead | MeshHead:
 
 def _solid(job: Job, table: CellTable, part: Part) -> Mesh:
     """Return the part as a solid, a part drawn as a surface by its thickness."""
+    if not part.faces:
+        raise refused_at(
+            job.path,
+            ("cell", "part"),
+            f"{job.part_file.name} holds curves and no solid to keep away from; write part = false "
+            "to leave it out of the cell, or give it as a solid",
+        )
     vertices, triangles = _triangles(part, table.deviation_mm / 1000)
     is_open = bool(edges_of(triangles)[1].any())
     if is_open and table.sheet_mm is None:
@@ -163,7 +186,7 @@ def _read_solid(path: Path, unit: str | None, deviation: float) -> Mesh:
     if path.suffix.lower() == ".stl":
         assert unit is not None
         return read_stl(path, unit)
-    vertices, triangles = _triangles(read_step(path, unit=unit), deviation)
+    vertices, triangles = _triangles(read_drawing(path, unit=unit), deviation)
     return Mesh(vertices=vertices, triangles=triangles, deviation=deviation, name=path.name)
 
 

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from kerfpath.cad import read_step
+from kerfpath.cad import read as read_drawing
 from kerfpath.cell import Cell
 from kerfpath.job._cell import cell_of_job
 from kerfpath.job._read import Job
@@ -62,7 +62,7 @@ def check_job(job: Job) -> Checked:
     InputError
         As `run_job`.
     """
-    part = read_step(job.part_file, unit=job.part_unit)
+    part = read_drawing(job.part_file, unit=job.part_unit)
     cell = cell_of_job(job, part)
     starts = []
     for task in job.contours:

@@ -11,7 +11,7 @@ import numpy as np
 
 from kerfpath._arrays import Array, Ints
 from kerfpath.auditor import Check, checks
-from kerfpath.cad import read_step
+from kerfpath.cad import read as read_drawing
 from kerfpath.cell import Cell
 from kerfpath.contour import FRAME_KINDS, Contour
 from kerfpath.errors import NoFeasiblePath
@@ -142,7 +142,7 @@ def run_job(job: Job, *, progress: Progress = lambda what, done, total: None) ->
     InputError
         The part cannot be read, a loop does not exist, a contour cannot be sampled.
     """
-    part = read_step(job.part_file, unit=job.part_unit)
+    part = read_drawing(job.part_file, unit=job.part_unit)
     for task in job.contours:  # a misspelt name shall not wait for the contours before it
         part.loop(task.pick)
     cell = cell_of_job(job, part)
@@ -289,7 +289,7 @@ def fastest_speeds(
     InputError
         As `run_job`.
     """
-    part = read_step(job.part_file, unit=job.part_unit)
+    part = read_drawing(job.part_file, unit=job.part_unit)
     cell = cell_of_job(job, part)
     refine = job.plan_options["refine"]
     answers: list[tuple[ContourTask, Contour, FastestSpeed | NoFeasiblePath]] = []

@@ -53,35 +53,64 @@ class Arm(NamedTuple):
 
 
 @jit
+def _turn(v: Array, along: Array, s: float, c: float) -> None:
+    """Turn the vector v (3,) about a direction by the angle of this sine and cosine."""
+    x, y, z = v
+    a, b, e = along
+    d = (1.0 - c) * (a * x + b * y + e * z)
+    v[0] = c * x + s * (b * z - e * y) + d * a
+    v[1] = c * y + s * (e * x - a * z) + d * b
+    v[2] = c * z + s * (a * y - b * x) + d * e
+
+
+@jit
+def _turn_about(v: Array, place: Array, along: Array, s: float, c: float) -> None:
+    """Turn the point v (3,) about a line."""
+    for r in range(3):
+        v[r] -= place[r]
+    _turn(v, along, s, c)
+    for r in range(3):
+        v[r] += place[r]
+
+
+@jit
 def _chain(arm: Arm, q: Array, out_place: Array, out_along: Array, out_T: Array) -> None:
-    """Axes (6, 3) and tip pose (4, 4) of the arm at q (6,)."""
-    R, t = np.eye(3), np.zeros(3)
-    for i in range(6):
-        x, y, z = arm.along[i]
-        s, c = sin(q[i]), cos(q[i])
-        d = 1.0 - c
-        turn = np.array(
-            [
-                [c + d * x * x, d * x * y - s * z, d * x * z + s * y],
-                [d * x * y + s * z, c + d * y * y, d * y * z - s * x],
-                [d * x * z - s * y, d * y * z + s * x, c + d * z * z],
-            ]
-        )
-        out_along[i] = R @ arm.along[i]
-        out_place[i] = R @ arm.place[i] + t
-        R = R @ turn
-        t = out_place[i] - R @ arm.place[i]
-    out_T[:3, :3] = R @ np.ascontiguousarray(arm.tip[:3, :3])
-    out_T[:3, 3] = R @ np.ascontiguousarray(arm.tip[:3, 3]) + t
-    out_T[3] = arm.tip[3]
+    """Axes (6, 3) and tip pose (4, 4) of the arm at q (6,): the last joint turns first."""
+    out_place[:], out_along[:], out_T[:] = arm.place, arm.along, arm.tip
+    for i in range(5, -1, -1):
+        place, along, s, c = arm.place[i], arm.along[i], sin(q[i]), cos(q[i])
+        for j in range(i + 1, 6):
+            _turn(out_along[j], along, s, c)
+            _turn_about(out_place[j], place, along, s, c)
+        for k in range(3):
+            _turn(out_T[:3, k], along, s, c)
+        _turn_about(out_T[:3, 3], place, along, s, c)
 
 
 @jit
 def _jacobian(place: Array, along: Array, T: Array, out_J: Array) -> None:
     """Speeds (6, 6) of the tip, linear over angular, that each joint gives it."""
     for i in range(6):
-        out_J[:3, i] = np.cross(along[i], T[:3, 3] - place[i])
-        out_J[3:, i] = along[i]
+        for r in range(3):
+            y, z = (r + 1) % 3, (r + 2) % 3
+            out_J[r, i] = along[i, y] * (T[z, 3] - place[i, z])
+            out_J[r, i] -= along[i, z] * (T[y, 3] - place[i, y])
+            out_J[r + 3, i] = along[i, r]
+
+
+@jit
+def _off(T: Array, now: Array, out_e: Array) -> float:
+    """Largest entry by which a pose is off T, and the way there (6,), linear over angular."""
+    off = 0.0
+    out_e[3:] = 0.0
+    for r in range(3):
+        y, z = (r + 1) % 3, (r + 2) % 3
+        out_e[r] = T[r, 3] - now[r, 3]
+        for c in range(4):
+            off = max(off, abs(T[r, c] - now[r, c]))
+        for c in range(3):
+            out_e[r + 3] += 0.5 * (now[y, c] * T[z, c] - now[z, c] * T[y, c])
+    return off
 
 
 @jit
@@ -91,14 +120,12 @@ def _onto(arm: Arm, T: Array, q: Array, place: Array, along: Array, J: Array) ->
     for step in range(STEPS):
         _chain(arm, q, place, along, now)
         _jacobian(place, along, now, J)
-        off = np.abs(T - now).max()
+        off = _off(T, now, e)
         if off < CLOSED or step == STEPS - 1:
             break
-        e[:3] = T[:3, 3] - now[:3, 3]
-        e[3:] = 0.0
-        for c in range(3):
-            e[3:] += 0.5 * np.cross(now[:3, c], T[:3, c])
-        squares = J.T @ J + DAMPING * np.eye(6)
+        squares = J.T @ J
+        for i in range(6):
+            squares[i, i] += DAMPING
         q += np.linalg.solve(squares, J.T @ e)
     return bool(off <= EXACT)
 

@@ -38,7 +38,9 @@ def slowed(task: Task, *, refine: bool) -> Plan:
     comfort = task.settings.comfort
     if comfort is None or not comfort.broken(task.robot, best.q, task.T_flange_tip):
         return best
-    return slowed(task, refine=False)
+    kept = slowed(task, refine=False)
+    claim = f"{kept.proof.statement}; not refined: off the grid it would break a margin of comfort"
+    return replace(kept, proof=replace(kept.proof, statement=claim))
 
 
 def _least_lost(task: Task) -> Plan:
