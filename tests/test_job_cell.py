@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from kerfpath.cad import read_step
+from kerfpath.cad import read as read_drawing
 from kerfpath.cell import Mesh, box, edges_of, thickened
 from kerfpath.errors import InputError
 from kerfpath.graph import LayeredGraph
@@ -161,7 +161,7 @@ def test_pairs_and_files_of_the_job_make_its_cell(folder):
     text += '[[cell.fixture]]\nname = "twin"\nfile = "b_pillar.step"\nxyz_mm = [0, 3000, 0]\n'
     text += "[cell.head]\nbody_radius_mm = 55\n"
     read = read_job(job(folder, text))
-    cell = cell_of_job(read, read_step(read.part_file))
+    cell = cell_of_job(read, read_drawing(read.part_file))
     bodies = {body.name: body.shape for body in cell.bodies}
     assert ("post", "arm") not in cell.pair_names
     assert cell.required[cell.pair_names.index(("part", "nozzle"))] == 0.25e-3
@@ -218,7 +218,7 @@ def test_a_fault_in_the_cell_is_told_in_one_line(folder, old, new, message):
 
 def test_a_part_drawn_as_a_surface_needs_its_thickness(folder, monkeypatch):
     whole = read_job(job(folder, SMALL))
-    part = read_step(whole.part_file)
+    part = read_drawing(whole.part_file)
     n = 5
     x, y = (v.ravel() / n for v in np.meshgrid(range(n), range(n)))
     corner = np.arange(n * (n - 1)).reshape(n - 1, n)[:, :-1].ravel()

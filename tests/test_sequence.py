@@ -7,6 +7,7 @@ import pytest
 
 from kerfpath import Contour, InputError, NoFeasiblePath
 from kerfpath.air import air_move, backed_off, least_time
+from kerfpath.auditor import air_checks
 from kerfpath.cell import box_between, cell_of
 from kerfpath.operations import start_at
 from kerfpath.post import JointMove, build_program, post, preflight, read_rapid
@@ -205,3 +206,19 @@ def test_one_program_for_the_part_says_that_its_air_moves_are_clear(walled):
     assert len(read_rapid(text).sections) == 4
     with pytest.raises(InputError, match="4 plans need 3 moves between them, or 5"):
         build_program(cut.plans, moves=cut.moves[:2])
+
+
+def test_the_audit_holds_moves_through_the_air_to_limits_time_and_cell(walled, arm):
+    cell, cut = walled
+    for move in cut.moves:
+        table = air_checks(arm, move.q, move.time, cell=cell)
+        assert {check.code for check in table} == {"air-time", "air-limits", "collision"}
+        assert all(check.ok for check in table)
+    around = max(cut.moves, key=lambda move: len(move.q))
+    fast = air_checks(arm, around.q, 0.9 * around.time, cell=cell)
+    assert [check.code for check in fast if not check.ok] == ["air-time"]
+    straight = air_checks(arm, around.q[[0, -1]], [0.0, 9.0], cell=cell)
+    assert [check.code for check in straight if not check.ok] == ["collision"]
+    beyond = around.q.copy()
+    beyond[1, 1] = np.radians(170)
+    assert "air-limits" in [c.code for c in air_checks(arm, beyond, 9 * around.time) if not c.ok]

@@ -8,13 +8,13 @@ from __future__ import annotations
 
 import numpy as np
 
-from kerfpath._arrays import Array, Bools
+from kerfpath._arrays import Array, Bools, Ints
 from kerfpath.auditor._chain import JointChain
 from kerfpath.auditor._motion import Motion
 from kerfpath.auditor._table import Check
 from kerfpath.cell import Cell
 
-__all__ = ["collisions"]
+__all__ = ["collision_at", "collisions"]
 
 TOUCHING = -1e-9
 """m: to touch is not to be clear."""
@@ -32,19 +32,23 @@ def collisions(cell: Cell, motion: Motion, chain: JointChain) -> list[Check]:
     nozzle and part. The value is what the nearest pair falls short by, negative where all are
     farther apart.
     """
-    q = motion.q.reshape(-1, motion.q.shape[-1])
+    nodes, samples, n = motion.q.shape
+    return collision_at(cell, motion.q.reshape(-1, n), np.repeat(np.arange(nodes), samples), chain)
+
+
+def collision_at(cell: Cell, q: Array, node: Ints, chain: JointChain) -> list[Check]:
+    """Return the same checks of joint vectors q (S, n) rad, each of a node (S,)."""
     frames = np.stack([np.broadcast_to(np.eye(4), (len(q), 4, 4)), *chain.joints(q)], axis=1)
     frames = np.ascontiguousarray(frames)
-    parts = motion.q.shape[1]
     rows = [("collision", "", ~cell.own), ("collision-own", " of their own", cell.own)]
     return [
-        _nearest(cell, frames, wanted, code, whose, parts)
+        _nearest(cell, frames, wanted, code, whose, node)
         for code, whose, wanted in rows
         if wanted.any()
     ]
 
 
-def _nearest(cell: Cell, frames: Array, wanted: Bools, code: str, whose: str, parts: int) -> Check:
+def _nearest(cell: Cell, frames: Array, wanted: Bools, code: str, whose: str, node: Ints) -> Check:
     beyond = FIRST
     while True:
         short = np.where(
@@ -69,7 +73,7 @@ def _nearest(cell: Cell, frames: Array, wanted: Bools, code: str, whose: str, pa
         value=value,
         limit=TOUCHING,
         unit="m",
-        node=int(row // parts),
+        node=int(node[row]),
         advice="move the part or the fixture, or plan with the cell",
     )
 
