@@ -13,9 +13,9 @@ from kerfpath.errors import InputError
 from kerfpath.graph import LayeredGraph
 from kerfpath.planner._task import Task
 from kerfpath.plans import Plan
-from kerfpath.search import LayeredPath, clear_path
+from kerfpath.search import LayeredPath, LeastInterval, clear_interval, clear_path
 
-__all__ = ["clear_search", "only_if_clear", "require_same_cell"]
+__all__ = ["clear_least", "clear_search", "is_clear", "only_if_clear", "require_same_cell"]
 
 SAME_PLACE = 1e-9
 """m: two poses of the same tool or part differ by rounding at most."""
@@ -42,13 +42,28 @@ def clear_search(task: Task, cell: Cell) -> tuple[LayeredPath, str]:
     )
 
 
+def clear_least(task: Task, cell: Cell) -> LeastInterval:
+    """Return the least node interval in which a path keeps the limits and is clear."""
+    checker = Checker(cell, task.graph.q)
+    return clear_interval(
+        **task.limits,
+        price=checker.price,
+        passable=checker.passable,
+        around=_beside(task.graph),
+    )
+
+
 def only_if_clear(refined: Plan, made: Plan, cell: Cell) -> Plan:
     """Return the refined plan if it is clear at and between its nodes, else the one on the grid."""
-    q = refined.q
-    if cell.clear(q).all() and cell.clear_motion(q[:-1], q[1:]).all():
+    if is_clear(refined.q, cell):
         return refined
     statement = f"{made.proof.statement}; not refined: off the grid it would not be clear"
     return replace(made, proof=replace(made.proof, statement=statement))
+
+
+def is_clear(q: Array, cell: Cell) -> bool:
+    """Say whether joint vectors (K, n) rad and the straight motions between them are clear."""
+    return bool(cell.clear(q).all() and cell.clear_motion(q[:-1], q[1:]).all())
 
 
 def require_same_cell(task: Task, cell: Cell) -> None:

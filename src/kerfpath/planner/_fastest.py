@@ -9,10 +9,12 @@ from typing import Literal
 import numpy as np
 from numpy.typing import ArrayLike
 
+from kerfpath.cell import Cell
 from kerfpath.comfort import Comfort
 from kerfpath.contour import Contour, FrameKind
 from kerfpath.errors import InputError
 from kerfpath.graph import LayeredGraph
+from kerfpath.planner._clear import clear_least, is_clear, require_same_cell
 from kerfpath.planner._graph import node_interval, require_even
 from kerfpath.planner._task import task_of
 from kerfpath.plans import Proof
@@ -67,6 +69,7 @@ def fastest_speed(
     eta_v: float = 1.0,
     eta_a: float = 1.0,
     refine: bool = False,
+    cell: Cell | None = None,
     comfort: Comfort | None = None,
     graph: LayeredGraph | None = None,
     progress: Callable[[int], None] | None = None,
@@ -78,10 +81,12 @@ def fastest_speed(
     still (the nearest optimum, which is not proved to be the best one), unless that would break a
     margin of `comfort`, which may have no costs here.
 
+    In a `cell` the path is the fastest of all clear ones; off the grid it counts only if clear.
+
     Raises
     ------
     NoFeasiblePath
-        Some node has no admissible pose at all.
+        Some node has no admissible pose at all, or none that is clear.
     InputError
         Limits that are not known, nodes unevenly spaced, values out of range, costs of comfort.
     """
@@ -104,12 +109,18 @@ def fastest_speed(
         graph=graph,
         progress=progress,
     )
-    least = least_interval(**task.limits)
+    if cell is None:
+        least = least_interval(**task.limits)
+    else:
+        require_same_cell(task, cell)
+        least = clear_least(task, cell)
     found = FastestSpeed.of(contour, least)
     if not (refine and robot.family.free_rotation):
         return found
     claim = Proof(optimal=False, statement="the fastest path on this graph")
     quick, at = quicken(replace(task, dt=least.dt).plan(least.index, 0.0, claim))
+    if cell is not None and not is_clear(quick.q, cell):
+        return found
     if comfort is not None and comfort.broken(robot, quick.q, task.T_flange_tip):
         return found
     return FastestSpeed(

@@ -16,7 +16,7 @@ for straight joint motions, that takes long; sample the contour more finely ther
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -24,16 +24,17 @@ from numpy.typing import ArrayLike
 
 from kerfpath._arrays import Array, Bools, Ints, floats, freeze, integers, positive, scalar
 from kerfpath.errors import InputError, NoFeasiblePath
+from kerfpath.search._fastest import GATE_LIMIT, LeastInterval, least_interval
 from kerfpath.search._layers import offsets
 from kerfpath.search._shortest import LayeredPath, shortest_path
 
-__all__ = ["ClearPath", "clear_path"]
+__all__ = ["ClearPath", "clear_interval", "clear_path"]
 
 Price = Callable[[Ints], Array]
 Passable = Callable[[Ints, Ints], Bools]
 
-GATE_LIMIT = 1.5
-"""What a gate lets pass: between 1, from open to an end, and 2, from end to end."""
+STANDSTILL = 1e6
+"""s from node to node: so slow that no limit of a joint forbids a step."""
 FEWEST_CLOSED = 4
 """Layers from which on the gates of a closed path's first and last edges do not meet."""
 
@@ -93,6 +94,35 @@ def clear_path(
         As `shortest_path`; another method; a price that is negative or not a number.
     """
     return _Lazy(q, start, price, passable, around, options).run()
+
+
+def clear_interval(
+    q: ArrayLike,
+    start: ArrayLike,
+    *,
+    price: Price,
+    passable: Passable,
+    around: ArrayLike | None = None,
+    **limits: Any,
+) -> LeastInterval:
+    """Return the least node interval in which a clear path keeps the limits, exactly.
+
+    Parameters
+    ----------
+    q, start, **limits
+        As in `least_interval`.
+    price, passable, around
+        As in `clear_path`; only prices that are infinite matter.
+
+    Raises
+    ------
+    NoFeasiblePath
+        No speed is low enough, proved; the counts say what is closed.
+    """
+    lazy = _LazyInterval(q, start, price, passable, around, limits | {"dt": STANDSTILL})
+    lazy.run()
+    assert lazy.least is not None
+    return lazy.least
 
 
 class _Lazy:
@@ -255,10 +285,16 @@ class _Lazy:
         }
         message = f"no admissible way to node {there} that is clear"
         if not any(ways.values()):
-            ways = {"collision elsewhere": int(closed.sum()) + len(self.closed)}
-            message = str(broken)
-        if not any(ways.values()):
-            return broken
+            elsewhere = int(closed.sum()) + len(self.closed)
+            if not elsewhere:
+                return broken
+            return NoFeasiblePath(
+                f"{broken}, collision elsewhere: {elsewhere}",
+                proved=broken.proved,
+                node=broken.node,
+                back=broken.back,
+                counts=counts | {"collision elsewhere": elsewhere},
+            )
         counts |= {name: number for name, number in ways.items() if number}
         told = ", ".join(f"{name}: {number}" for name, number in counts.items())
         return NoFeasiblePath(
@@ -268,6 +304,26 @@ class _Lazy:
             back=broken.back,
             counts=counts,
         )
+
+
+class _LazyInterval(_Lazy):
+    """The same for the least node interval."""
+
+    least: LeastInterval | None = None
+
+    def _search(self) -> LayeredPath:
+        open_ = np.flatnonzero(np.isfinite(self.cost))
+        start = np.searchsorted(open_, self.start)
+        names = ("velocity", "acceleration", "endless", "eta_v", "eta_a")
+        limits = {name: self.options[name] for name in names if name in self.options}
+        try:
+            found = least_interval(self.q[open_], start, gates=self._gates()[open_], **limits)
+        except NoFeasiblePath:
+            super()._search()  # says where the way is closed
+            raise
+        index = open_[start[:-1] + found.index] - self.start[:-1]
+        self.least = replace(found, index=freeze(index))
+        return LayeredPath(index=freeze(index), cost=found.dt, optimal=True)
 
 
 def _stars(edges: list[tuple[int, int]]) -> list[tuple[list[int], list[int]]]:

@@ -9,14 +9,16 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from kerfpath._arrays import Array, Bools, Ints, bools, floats, freeze, positive, scalar
-from kerfpath.errors import InputError
+from kerfpath.errors import InputError, NoFeasiblePath
 from kerfpath.kernels import search as kernel
 from kerfpath.kernels.metric import CHEBYCHEV, increments
 from kerfpath.search._exact import quickest_path
 from kerfpath.search._layers import empty_layer, narrowest_key, offsets, sorted_layers
 
-__all__ = ["LeastInterval", "least_interval", "quickest"]
+__all__ = ["GATE_LIMIT", "LeastInterval", "least_interval", "quickest"]
 
+GATE_LIMIT = 1.5
+"""What a gate lets pass: between 1, from open to an end, and 2, from end to end."""
 _LAYERS_SAMPLED = 8
 """Layers whose nearest pairs give the first guess of the interval; any guess ends right."""
 
@@ -54,6 +56,7 @@ def least_interval(
     endless: ArrayLike | None = None,
     eta_v: float = 1.0,
     eta_a: float = 1.0,
+    gates: ArrayLike | None = None,
 ) -> LeastInterval:
     """Return the least node interval in which a path through the layers keeps (5) and (6), exactly.
 
@@ -64,11 +67,13 @@ def least_interval(
     ----------
     q, start, velocity, acceleration, endless, eta_v, eta_a
         As in `shortest_path`; K >= 2.
+    gates : (N, m), optional
+        Numbers of the vertices that no step may change by more than 1.5, at any speed.
 
     Raises
     ------
     NoFeasiblePath
-        An empty layer; says which.
+        An empty layer; says which. Or the gates let no path through.
     InputError
         Arrays that do not fit each other, NaN, limits that are not positive.
     """
@@ -82,13 +87,26 @@ def least_interval(
     empty = np.flatnonzero(np.diff(start) == 0)
     if empty.size:
         raise empty_layer(int(empty[0]))
-    ceiling = _guess(q, start, v, endless)
+    gate = floats(np.empty((len(q), 0)) if gates is None else gates, "gates", (len(q), None))
+    m, ceiling = gate.shape[1], _guess(q, start, v, endless)
+    widest = np.where(endless, 2 * np.pi, np.ptp(q, axis=0))
+    slowest = float(max((widest / v).max(), np.sqrt(2 * widest / a).max()))
     while True:
         # Edges that take longer than the ceiling are not looked at: right if a path keeps it.
-        found = quickest(q, start, endless, 1 / v, ceiling * v, a, ceiling)
+        found = quickest(
+            np.hstack([q, gate]) if m else q,
+            start,
+            np.append(endless, np.zeros(m, bool)),
+            np.append(1 / v, np.zeros(m)),
+            np.append(ceiling * v, np.full(m, GATE_LIMIT)),
+            np.append(a, np.full(m, np.inf)),
+            ceiling,
+        )
         if found is not None:
             index, _ = found
             return _binding(q[start[:-1] + index], index, v, a, endless)
+        if m and ceiling > slowest:
+            raise NoFeasiblePath("no path passes the gates at any speed", proved=True, node=-1)
         ceiling *= 2
 
 
