@@ -9,8 +9,10 @@ from typing import Literal
 import numpy as np
 from numpy.typing import ArrayLike
 
+from kerfpath.cell import Cell
 from kerfpath.contour import Contour, FrameKind
 from kerfpath.graph import LayeredGraph
+from kerfpath.planner._clear import Finder
 from kerfpath.planner._graph import node_interval, require_even
 from kerfpath.planner._task import task_of
 from kerfpath.plans import Proof
@@ -63,6 +65,7 @@ def fastest_speed(
     eta_v: float = 1.0,
     eta_a: float = 1.0,
     refine: bool = False,
+    cell: Cell | None = None,
     graph: LayeredGraph | None = None,
     progress: Callable[[int], None] | None = None,
 ) -> FastestSpeed:
@@ -70,12 +73,12 @@ def fastest_speed(
 
     A second-order minimax problem on the layered graph; arguments as in `plan`. The grid quantises
     the acceleration: `refine` moves gamma off it, from the fastest path, to what is then faster
-    still (the nearest optimum, which is not proved to be the best one).
+    still (the nearest optimum, which is not proved to be the best one), if it is clear there.
 
     Raises
     ------
     NoFeasiblePath
-        Some node has no admissible pose at all.
+        Some node has no admissible pose at all, or no path is clear in the cell.
     InputError
         Limits that are not known, nodes unevenly spaced, values out of range.
     """
@@ -94,12 +97,15 @@ def fastest_speed(
         graph=graph,
         progress=progress,
     )
-    least = least_interval(**task.limits)
+    finder = Finder(task, cell)
+    least = finder.best(least_interval)
     found = FastestSpeed.of(contour, least)
     if not (refine and robot.family.free_rotation):
         return found
     claim = Proof(optimal=False, statement="the fastest path on this graph")
     quick, at = quicken(replace(task, dt=least.dt).plan(least.index, 0.0, claim))
+    if not finder.is_clear(quick):
+        return found
     return FastestSpeed(
         speed=contour.length / float(quick.time[-1]),
         joint=at.joint,
