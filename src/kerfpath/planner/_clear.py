@@ -44,6 +44,7 @@ class Finder:
             task.graph.start,
             price=self._checker.price,
             passable=self._checker.passable,
+            blocked=self._checker.blocked,
             around=_beside(task.graph),
         )
 

@@ -30,7 +30,10 @@ Passable = Callable[[Ints, Ints], Bools]
 Path = LayeredPath | SlowedPath | InterruptedPath | LeastInterval
 _P = TypeVar("_P", LayeredPath, SlowedPath, InterruptedPath, LeastInterval)
 
-WIDEST = 32
+LIKELY, OPEN, CLOSED = 1, 2, 3
+"""What is known of an edge: not seen to be closed, passable, or closed."""
+
+WIDEST = 16
 """Rings around a closed edge that are looked at, at most."""
 
 
@@ -47,17 +50,17 @@ class Known:
         negative; infinite where it is closed. It must always answer the same.
     passable : callable
         Given vertices (B,) and vertices (B,) of the next layer: which edges may be used, (B,) bool.
+    blocked : callable, optional
+        Given the same: of which edges it is seen at little cost that they may not.
     around : (N, 2) int, optional
         Neighbours of each vertex that are likely to be closed with it, -1 for none: they are looked
-        at, too, outwards until one is open, as are the edges between the neighbours of the ends of
-        a closed edge. It saves searches and changes nothing else.
+        at, too, outwards until one is open. Around a closed edge, those between neighbours of its
+        ends are asked whether they are `blocked`. It saves searches and changes nothing else.
 
     Attributes
     ----------
     searches : int
         How often a search ran.
-    vertices_checked, edges_checked : int
-        How many of each were asked about, each once.
     """
 
     def __init__(
@@ -67,21 +70,23 @@ class Known:
         *,
         price: Price,
         passable: Passable,
+        blocked: Passable | None = None,
         around: ArrayLike | None = None,
     ) -> None:
         self.q = np.asarray(q, dtype=np.float64)
         N = len(self.q)
         self.start = offsets(start, N)
         self._layer = np.searchsorted(self.start, np.arange(N), side="right") - 1
-        self._price, self._passable = price, passable
+        self._price, self._passable, self._blocked = price, passable, blocked
         self._around = None if around is None else integers(around, "around", (N, 2))
         self.cost, self._asked = np.zeros(N), np.zeros(N, bool)
-        self._edges, self._open = np.empty(0, np.int64), np.empty(0, bool)
+        self._edges, self._state = np.empty(0, np.int64), np.empty(0, np.int64)
         self._hits = np.zeros(len(self.start), np.int64)
         self.searches = 0
 
     @property
     def vertices_checked(self) -> int:
+        """How many vertices were asked about, each once."""
         return int(self._asked.sum())
 
     @property
@@ -91,17 +96,18 @@ class Known:
 
     @property
     def edges_checked(self) -> int:
-        return len(self._edges)
+        """How many edges are known to be passable or closed."""
+        return int((self._state >= OPEN).sum())
 
     @property
     def edges_closed(self) -> int:
         """How many edges were found closed."""
-        return len(self._edges) - int(self._open.sum())
+        return int((self._state == CLOSED).sum())
 
     @property
     def shut(self) -> Ints:
         """The edges (E, 2) found closed."""
-        return np.stack(np.divmod(self._edges[~self._open], len(self.q)), axis=1)
+        return np.stack(np.divmod(self._edges[self._state == CLOSED], len(self.q)), axis=1)
 
     def learn(self, runs: list[Ints], near: Callable[[Ints, Ints], Bools]) -> bool:
         """Ask for what is not known of a path; False where all of it is clear and free.
@@ -154,27 +160,22 @@ class Known:
 
         Around closed ones it looks the wider, the more often edges of that layer were closed.
         """
-        closed = edges[self._closed(edges)]
-        layer = np.unique(self._layer[closed[:, 0]])
-        self._hits[layer] += 1
-        if self._around is None:
-            return bool(closed.size)
-        core = closed
-        for ring in range(1, WIDEST + 1):
-            core = core[ring <= 2 ** (self._hits[self._layer[core[:, 0]]] - 1)]
-            if not core.size:
-                break
+        closed = edges[self._closed(edges, self._passable, OPEN)]
+        self._hits[np.unique(self._layer[closed[:, 0]])] += 1
+        core, ring = closed, 1
+        while core.size and self._around is not None and self._blocked is not None:
             sides = [self._beside(core[:, end], ring) for end in range(2)]
             step = np.abs(np.arange(-ring, ring + 1))
             here, there = np.nonzero(np.maximum(step[:, None], step) == ring)
             pairs = np.stack([sides[0][:, here], sides[1][:, there]], axis=2)
-            usable: Bools = np.asarray((pairs >= 0).all(axis=2))
-            usable[usable] = near(*pairs[usable].T)
-            self._ask(np.unique(pairs[usable]))
-            usable[usable] = np.isfinite(self.cost[pairs[usable]]).all(axis=1)
-            hit = np.zeros(usable.shape, bool)
-            hit[usable] = self._closed(pairs[usable])
-            core = core[hit.any(axis=1)]
+            open_ = (pairs >= 0) & (self.cost[pairs] < np.inf)
+            wanted: Bools = np.asarray(open_.all(axis=2))
+            wanted[wanted] = near(*pairs[wanted].T)
+            hit = np.zeros(wanted.shape, bool)
+            hit[wanted] = self._closed(pairs[wanted], self._not_blocked, LIKELY)
+            ring += 1
+            wide = np.minimum(2.0 ** (self._hits[self._layer[core[:, 0]]] - 1), WIDEST)
+            core = core[hit.any(axis=1) & (ring <= wide)]
         return bool(closed.size)
 
     def _beside(self, vertices: Ints, steps: int) -> Ints:
@@ -188,16 +189,22 @@ class Known:
                 out[:, steps + way * (i + 1)] = np.where(v >= 0, self._around[v, side], -1)
         return out
 
-    def _closed(self, edges: Ints) -> Bools:
-        """Return which edges (B, 2) are closed, learning what is not known."""
+    def _not_blocked(self, p: Ints, j: Ints) -> Bools:
+        assert self._blocked is not None
+        return np.asarray(~np.asarray(self._blocked(p, j), dtype=np.bool_))
+
+    def _closed(self, edges: Ints, ask: Passable, verdict: int) -> Bools:
+        """Return which edges (B, 2) are closed, `ask` giving the others at least the verdict."""
         key = edges[:, 0] * len(self.q) + edges[:, 1]
-        new = np.setdiff1d(key, self._edges)
+        new = np.setdiff1d(key, self._edges[self._state >= verdict])
         if new.size:
-            passable = np.asarray(self._passable(*np.divmod(new, len(self.q))), dtype=np.bool_)
-            at = np.searchsorted(self._edges, new)
-            self._edges = np.insert(self._edges, at, new)
-            self._open = np.insert(self._open, at, passable)
-        return np.asarray(~self._open[np.searchsorted(self._edges, key)])
+            passed = np.asarray(ask(*np.divmod(new, len(self.q))), dtype=np.bool_)
+            old = ~np.isin(self._edges, new)
+            edges, state = self._edges[old], self._state[old]
+            at = np.searchsorted(edges, new)
+            self._edges = np.insert(edges, at, new)
+            self._state = np.insert(state, at, np.where(passed, verdict, CLOSED))
+        return np.asarray(self._state[np.searchsorted(self._edges, key)] == CLOSED)
 
     def told(self, broken: NoFeasiblePath) -> NoFeasiblePath:
         """Say of a break what collision has to do with it."""
