@@ -1,7 +1,7 @@
 """The cell: shapes, STL files, link frames, distances against formulas, swept motions."""
 
 import struct
-from dataclasses import replace
+from itertools import combinations
 
 import numpy as np
 import pinocchio as pin
@@ -11,20 +11,19 @@ from kerfpath.cell import (
     Body,
     Capsule,
     Cell,
-    Chain,
     CuttingHead,
     Hull,
     Mesh,
     box,
     box_between,
     cell_of,
-    chain_of,
     frustum,
     read_stl,
     welded,
 )
 from kerfpath.errors import InputError
-from kerfpath.robots import robot, robot_ids
+from kerfpath.robots import chain_of, robot, robot_ids
+from kerfpath.urdf import Chain
 
 EXACT = 2e-6
 """m: coal refines distances to 1e-6."""
@@ -49,7 +48,7 @@ def swivel(joints=1):
     return Chain(
         origins=np.tile(np.eye(4), (joints, 1, 1)),
         axes=np.tile([0.0, 0, 1], (joints, 1)),
-        flange=np.eye(4),
+        end=np.eye(4),
     )
 
 
@@ -67,15 +66,6 @@ def distance(still, moving, angle=0.0):
 
 
 OPW = [name for name in robot_ids() if robot(name).kinematics == "opw"]
-
-
-def test_links_that_are_not_known_are_refused():
-    with pytest.raises(InputError, match="links of ortho-parallel arms"):
-        cell_of(robot("ur_ur16e"), tool=np.eye(4))
-    moved = np.eye(4)
-    moved[2, 3] = 0.5
-    with pytest.raises(InputError, match="from a description"):
-        cell_of(replace(robot(OPW[0]), T_base_foot=moved), tool=np.eye(4))
 
 
 @pytest.mark.parametrize("name", [*OPW[::9], "staubli_tx2_90"])
@@ -101,7 +91,7 @@ def test_link_frames_are_those_of_pinocchio(name):
         for i in range(1, 7):
             # Rounding of six products of matrices with entries near one.
             np.testing.assert_allclose(row[i], data.oMi[i].homogeneous, atol=1e-13)
-    np.testing.assert_allclose(frames[:, 6] @ chain.flange, arm.forward(q), atol=1e-13)
+    np.testing.assert_allclose(frames[:, 6] @ chain.end, arm.forward(q), atol=1e-13)
 
 
 def test_distances_of_balls_capsules_and_boxes_are_those_of_the_formulas():
@@ -280,6 +270,34 @@ def test_what_may_touch_is_not_judged_and_what_stands_still_is_not_either():
     assert near.approximate[0] == "base"
 
 
+def test_every_pair_is_judged_or_left_out_for_a_reason():
+    cell = a_cell(may_touch=[("head", "table")])
+    left_out = cell.unjudged
+    both = [*cell.pair_names, *left_out]
+    assert {frozenset(pair) for pair in both} == {
+        frozenset(pair) for pair in combinations(cell.names, 2)
+    }
+    assert len(both) == len(set(both))
+    assert left_out["table", "head"] == "may touch"
+    assert left_out["nozzle", "head"] == "do not move against each other"
+    assert left_out["link 1", "link 2"] == "joined by joint 2"
+    assert "at every pose" in left_out["link 3", "link 5"]
+    # Looked at pose by pose: what overlaps always is left out, what overlaps at times is judged.
+    arm = robot("abb_irb4600_60_205")
+    q = np.random.default_rng(9).uniform(-np.pi, np.pi, (300, 6))
+    told = [pair for pair, why in left_out.items() if "at every pose" in why]
+    sole = Cell(
+        chain=cell.chain, bodies=[b for b in cell.bodies if b.kind in ("robot", "head")],
+        endless=arm.endless, near_miss_of=dict.fromkeys(told, 0.0),
+    )  # fmt: skip
+    near = sole.distances(q) <= 0
+    for pair, always, ever in zip(sole.pair_names, near.all(axis=0), near.any(axis=0), strict=True):
+        assert always == (pair in told)
+        assert ever or pair not in told
+    # A pair that stays nearer than it must keep says nothing either.
+    assert "at every pose" in a_cell(near_miss=3.0).unjudged["link 1", "link 3"]
+
+
 def dense(cell, q0, q1, parts):
     """Least distance over the near-miss one, up to 0.1 m, at evenly spread points of a motion."""
     along = np.linspace(0, 1, parts)[:, None]
@@ -445,11 +463,22 @@ def test_the_part_on_the_robot_base_is_said_at_once():
         cell_of(arm, tool=np.eye(4), part=part)
 
 
+def test_a_fixture_on_the_robot_base_is_said_at_once_and_may_be_meant():
+    arm, plinth = robot("abb_irb4600_60_205"), box_between([-0.5, -0.5, -1], [0.5, 0.5, 0])
+    with pytest.raises(InputError, match=r"'plinth' overlaps the robot's 'base' .*may_touch"):
+        cell_of(arm, tool=np.eye(4), fixtures={"plinth": plinth})
+    touch = [("plinth", "base")]
+    meant = cell_of(arm, tool=np.eye(4), fixtures={"plinth": plinth}, may_touch=touch)
+    assert meant.unjudged["base", "plinth"] == "may touch"
+    assert {"plinth", "link 3"} in [set(pair) for pair in meant.pair_names]
+
+
 @pytest.mark.parametrize(
     ("change", "message"),
     [
         ({"may_touch": [("head", "lamp")]}, "may_touch: no body is called 'lamp'; there are base"),
         ({"near_miss_of": {("head", "lamp"): 1}}, "near_miss_of: no body is called 'lamp'"),
+        ({"near_miss_of": {("head", "nozzle"): 1}}, "not judged, they do not move against each"),
         ({"near_miss": -1}, "near-miss distance of .* must not be negative"),
         ({"near_miss": np.nan}, "near-miss distance of .* expected a finite number"),
         ({"head": CuttingHead(), "links": [Body(name="part", shape=ball([0, 0, 0], 0.1), frame=2,

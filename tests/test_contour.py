@@ -7,6 +7,7 @@ from hypothesis import strategies as st
 from hypothesis.extra import numpy as hnp
 
 from kerfpath import Contour, InputError, join
+from kerfpath.contour import KINDS
 
 DOWN = (0.0, 0.0, -1.0)
 
@@ -123,7 +124,7 @@ def test_sharp_corners_get_the_nodes_that_the_tolerance_asks_for(monkeypatch):
     assert 5 < len(sheet.resample(tolerance=1e-3)) <= sheet.length / (np.sqrt(8) * 1e-3) + 2
     turning = Contour([[0, 0, 0], [1, 0, 0], [2, 0, 0]], [DOWN, DOWN, (0, np.sin(1), -np.cos(1))])
     assert 2 < len(turning.resample(axis_tolerance=1e-3)) < 2001
-    monkeypatch.setattr("kerfpath.contour.MOST_NODES", 20)
+    monkeypatch.setattr("kerfpath.contour._sampling.MOST_NODES", 20)
     with pytest.raises(InputError, match="more than 20 nodes"):
         sheet.resample(tolerance=1e-3)
 
@@ -254,3 +255,60 @@ def test_a_gap_over_the_tolerance_is_refused_and_a_small_one_bridged():
         join([])
     with pytest.raises(InputError, match="'loop' is closed"):
         join([first, polyline([[1, 0, 0], [2, 0, 0], [2, 1, 0]], closed=True, name="loop")])
+
+
+SQUARE = np.array([[0.0, 0, 0], [0.1, 0, 0], [0.1, 0.07, 0], [0, 0.07, 0], [0, 0, 0]])
+
+
+def test_corners_are_nodes_of_a_sampling_by_spacing_or_time():
+    square = Contour(SQUARE, np.tile(DOWN, (5, 1)), closed=True)
+    for sampled in (square.resample(spacing=0.0041), square.resample(dt=0.02, speed=0.205)):
+        for corner in SQUARE:
+            assert np.linalg.norm(sampled.points - corner, axis=1).min() < 1e-12
+        steps = np.diff(sampled.s)
+        assert steps.max() <= 0.0041 * (1 + 1e-9)
+        assert steps.min() >= 0.9 * steps.max()
+    assert sampled.time is not None
+    # Evenly in time to rounding, so that accelerations are plain second differences.
+    np.testing.assert_allclose(np.diff(sampled.time), np.diff(sampled.time)[0], rtol=1e-9)
+
+
+def test_a_stretch_too_short_for_the_spacing_is_named():
+    points = np.array([[0, 0, 0], [0.1, 0, 0], [0.1, 0.0002, 0], [0.2, 0.0002, 0]])
+    stepped = Contour(points, np.tile(DOWN, (4, 1)))
+    with pytest.raises(InputError, match=r"stretch of 0.2 mm from 100 mm on is too short .* 5 mm"):
+        stepped.resample(spacing=0.005)
+
+
+def test_kinds_and_speed_shares_follow_a_sampling():
+    kind = [KINDS.index(word) for word in ("pierce", "lead-in", "cut", "cut", "lead-out")]
+    points = np.c_[np.arange(5) * 0.05, np.zeros((5, 2))]
+    share = [0.5, 0.5, 1, 1, 1]
+    line = Contour(points, np.tile(DOWN, (5, 1)), kind=kind, speed_share=share)
+    # The last node has the kind of the stretch before it.
+    sampled = line.resample(spacing=0.01)
+    assert sampled.kinds == ("pierce", *["lead-in"] * 9, *["cut"] * 11)
+    np.testing.assert_allclose(np.interp(sampled.s, line.s, share), sampled.speed_share)
+    timed = line.resample(dt=0.01, speed=1.0)
+    assert timed.time is not None
+    v = np.diff(timed.s) / np.diff(timed.time)
+    # Half speed up to the end of the lead-in, then rising evenly along the path.
+    assert v[0] == pytest.approx(0.5, rel=0.1)
+    assert v[-1] == pytest.approx(1.0, rel=0.1)
+    assert v.max() <= 1.0 + 1e-9
+
+
+def test_only_the_first_node_can_be_a_pierce():
+    with pytest.raises(InputError, match="only the first node"):
+        Contour(np.eye(3), np.ones((3, 3)), kind=[0, KINDS.index("pierce"), 0])
+    with pytest.raises(InputError, match="places in KINDS"):
+        Contour(np.eye(3), np.ones((3, 3)), kind=[0, 0, len(KINDS)])
+    with pytest.raises(InputError, match=r"at most 1, got 1\.5"):
+        Contour(np.eye(3), np.ones((3, 3)), speed_share=[1, 1, 1.5])
+
+
+def test_kinds_survive_joining_and_closing():
+    a = Contour([[0, 0, 0], [1, 0, 0]], np.tile(DOWN, (2, 1)), kind=[1, 2])
+    b = Contour([[1, 0, 0], [1, 1, 0], [0, 1, 0]], np.tile(DOWN, (3, 1)))
+    assert join([a, b]).kinds == ("pierce", "cut", "cut", "cut")
+    assert join([a, b], closed=True).kinds == ("pierce", "cut", "cut", "cut", "cut")

@@ -1,10 +1,13 @@
 """The layered graph: every admissible pose, every loss counted."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from kerfpath import InputError, robot
 from kerfpath.graph import build, gamma_grid
+from kerfpath.robots import FAMILIES
 
 
 @pytest.fixture(scope="module")
@@ -66,7 +69,7 @@ def test_pieces_and_threads_leave_no_trace(frames, arm, tool, monkeypatch):
     done = []
     whole = build(frames, arm, T_flange_tip=tool, gamma=gamma, progress=done.append)
     assert sum(done) == len(frames)
-    monkeypatch.setattr("kerfpath.graph._POSES_AT_ONCE", 300)
+    monkeypatch.setitem(FAMILIES, "opw", replace(FAMILIES["opw"], poses_at_once=300))
     pieces = build(frames, arm, T_flange_tip=tool, gamma=gamma)
     for name in ("q", "start", "sample", "posture", "turn", "reason"):
         np.testing.assert_array_equal(getattr(whole, name), getattr(pieces, name))

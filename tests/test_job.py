@@ -8,6 +8,7 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
+from kerfpath.comfort import Band, Comfort
 from kerfpath.contour import Contour
 from kerfpath.errors import InputError
 from kerfpath.job import read_job
@@ -96,6 +97,7 @@ def test_the_example_is_read_into_si(read, folder):
         "rotation": None,
         "feed": "constant",
         "refine": True,
+        "comfort": None,
     }
     assert json.loads(json.dumps(job.source)) == job.source
     assert job.source["contour"][0] == {"pick": "trim", "speed_m_min": 9, "spacing_mm": 2}
@@ -274,6 +276,17 @@ FAULTS = [
     ('"sum"', '"mean"', 17, "plan.objective: expected 'sum' or 'max', got \"mean\""),
     ("0.95", "1.5", 19, "plan.eta_velocity: .*at most 1"),
     ("[program]", "weights = [1, 1, 1, 1, 1, -1]\n[program]", 21, "got -1 as number 6"),
+    # comfort
+    ("[program]", "[comfort]\nwrist_margin_deg = 90\n[program]", 22, "below 90, in deg, got 90"),
+    ("[program]", "[comfort]\nelbow_cost = 1\n[program]", 22, "elbow_band_deg with elbow_cost"),
+    ("[program]", "[comfort]\nlimits_band_deg = 9\n[program]", 22, "limits_cost with limits_band"),
+    ("[program]", "[comfort]\nshoulder_deg = 9\n[program]", 22, "nearest: shoulder_"),
+    (
+        "[program]",
+        'feed = "dip"\n[comfort]\nwrist_band_deg = 9\nwrist_cost = 1\n[program]',
+        21,
+        "plan.feed: expected refine = false with feed = .dip. and costs in .comfort.",
+    ),
     ('"rapid"', '"cobol"', 22, "program.language: expected 'rapid'"),
     ("language", 'work_object = "w part"\nlanguage', 22, "program.work_object: .*letters, digits"),
     ("language", "retract_mm = 0\nlanguage", 22, "program.retract_mm: expected a number above 0"),
@@ -522,3 +535,23 @@ def test_a_rotation_limit_is_one_for_every_endless_axis(read):
     job = read(changed("[plan]", "[plan]\nrotation_deg = 180"))
     inf = np.inf
     assert job.plan_options["rotation"].tolist() == [inf, inf, inf, np.pi, inf, np.pi]
+
+
+def test_the_comfort_table_is_read_into_si(read):
+    text = """[comfort]
+wrist_margin_deg = 9
+wrist_band_deg = 18
+wrist_cost = 2
+shoulder_margin_mm = 50
+limits_band_deg = 3
+limits_cost = 0.5
+manipulability_margin_m3 = 0.02
+[program]"""
+    comfort = read(changed("[program]", text)).plan_options["comfort"]
+    assert comfort == Comfort(
+        wrist=Band(margin=9 * np.radians(1), width=18 * np.radians(1), cost=2),
+        shoulder=Band(margin=50 * 1e-3),
+        limits=Band(width=3 * np.radians(1), cost=0.5),
+        manipulability=Band(margin=0.02),
+    )
+    assert read(changed("[program]", "[comfort]\n[program]")).plan_options["comfort"] is None

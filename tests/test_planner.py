@@ -174,6 +174,7 @@ def test_a_change_of_posture_that_no_path_can_make_is_named(circle, arm, tool, p
         q=graph.q[keep],
         start=np.concatenate([[0], np.cumsum(np.bincount(node[keep]))]),
         sample=graph.sample[keep],
+        variant=graph.variant[keep],
         posture=graph.posture[keep],
         turn=graph.turn[keep],
     )

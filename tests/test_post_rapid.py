@@ -11,6 +11,7 @@ from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
 from kerfpath import Contour, InputError, plan, robot
+from kerfpath.contour import KINDS
 from kerfpath.plans import Plan, Proof, Settings
 from kerfpath.post import (
     LANGUAGES,
@@ -20,6 +21,7 @@ from kerfpath.post import (
     LaserOn,
     LinearMove,
     Section,
+    Wait,
     axes_from_joints,
     build_program,
     confdata,
@@ -30,7 +32,7 @@ from kerfpath.post import (
     read_rapid,
     write_program,
 )
-from kerfpath.post._rapid_reader import ReadJointMove, ReadLaser, ReadLinearMove
+from kerfpath.post._rapid_reader import ReadJointMove, ReadLaser, ReadLinearMove, ReadWait
 
 GOLDEN = Path(__file__).parent / "data" / "golden_rapid.mod"
 STEEP = np.radians(20.0)
@@ -521,3 +523,50 @@ def test_the_reader_refuses_a_module_without_a_tool():
     lines = [line for line in GOLDEN.read_text().splitlines() if "tooldata" not in line]
     with pytest.raises(InputError, match="tool tLaser and work object wPart are not the module's"):
         read_rapid("\n".join(lines))
+
+
+def kinds_of(text):
+    """The kind of each stretch, from single letters."""
+    words = {"p": "pierce", "i": "lead-in", "c": "cut", "m": "micro joint", "o": "lead-out"}
+    return np.array([KINDS.index(words[letter]) for letter in text])
+
+
+def test_the_laser_is_off_along_micro_joints_and_waits_at_the_pierce(cell):
+    contour = replace(arc(), kind=kinds_of("picmmcoo"))
+    made = hand_plan(contour, *cell, speed=0.12)
+    program = build_program([made], pierce_time=0.4, lead_time=0.005)
+    assert codes(program, "error") == []
+    steps = read_rapid(post(program)).sections[0].steps
+    moves, on, waits, switched = 0, False, [], []
+    for step in steps:
+        if isinstance(step, ReadLaser):
+            on = step.on
+        elif isinstance(step, ReadWait):
+            waits.append((moves, on, step.time))
+        else:
+            moves += 1
+            switched.append(on)
+    # Approach twice, then seven stretches of which two are micro joints, then the retract.
+    assert (
+        switched
+        == [False, False, True, True, True, False, False, True, True, False][: len(switched)]
+    )
+    assert waits == [(2, True, 0.4)]
+
+
+def test_preflight_refuses_waits_on_the_fly_or_without_an_end(program):
+    steps = list(program.sections[0].steps)
+    assert "wait" in codes(with_steps(program, [*steps[:6], Wait(time=1.0), *steps[6:]]), "error")
+    for time in (0.0, np.inf, 400.0):
+        odd = with_steps(program, [*steps[:4], Wait(time=time), *steps[4:]])
+        assert "wait" in codes(odd, "error")
+
+
+def test_a_contour_with_times_of_its_own_is_cut_in_them(cell):
+    contour = replace(arc(count=40), speed_share=np.linspace(1, 0.5, 40))
+    timed = contour.resample(dt=0.02, speed=0.12)
+    made = hand_plan(timed, *cell, speed=0.12)
+    made = replace(made, time=timed.time)
+    moves = moves_of(build_program([made]).sections[0], LinearMove)[1:-1]
+    np.testing.assert_allclose([m.speed for m in moves], np.diff(timed.s) / np.diff(timed.time))
+    assert moves[-1].speed < 0.6 * moves[0].speed

@@ -328,14 +328,3 @@ def test_a_link_without_length_is_refused(tmp_path):
     joints.append(joint("end", "link_6", "tool0", flange, kind="fixed", inside=""))
     with pytest.raises(InputError, match="'j2' and 'j3' turn about the same line: link 'link_2'"):
         Robot.from_urdf(urdf(tmp_path, joints))
-
-
-def test_an_arm_of_no_family_is_refused(tmp_path):
-    rng = np.random.default_rng(34)
-    names = ["base", *(f"link_{i}" for i in range(1, 7)), "tool0"]
-    T = np.tile(np.eye(4), (6, 1, 1))
-    T[:, :3, :3], T[:, :3, 3] = Rotation.random(6, rng=rng).as_matrix(), rng.uniform(-1, 1, (6, 3))
-    joints = [joint(f"j{i + 1}", names[i], names[i + 1], T[i]) for i in range(6)]
-    joints.append(joint("end", "link_6", "tool0", np.eye(4), kind="fixed", inside=""))
-    with pytest.raises(InputError, match="not an ortho-parallel arm with"):
-        Robot.from_urdf(urdf(tmp_path, joints))

@@ -11,6 +11,8 @@ __version__ = "0.1.0"
 
 if TYPE_CHECKING:
     from kerfpath.auditor import audit as audit
+    from kerfpath.comfort import Band as Band
+    from kerfpath.comfort import Comfort as Comfort
     from kerfpath.contour import Contour as Contour
     from kerfpath.contour import join as join
     from kerfpath.errors import AuditFailed as AuditFailed
@@ -27,9 +29,12 @@ if TYPE_CHECKING:
     from kerfpath.robots import robot as robot
     from kerfpath.search import LayeredPath as LayeredPath
     from kerfpath.search import shortest_path as shortest_path
+    from kerfpath.tilt import Tilt as Tilt
 
 _HOME = {
     "AuditFailed": "errors",
+    "Band": "comfort",
+    "Comfort": "comfort",
     "Contour": "contour",
     "InputError": "errors",
     "KerfpathError": "errors",
@@ -38,6 +43,7 @@ _HOME = {
     "Plan": "plans",
     "Refinement": "refiner",
     "Robot": "robots",
+    "Tilt": "tilt",
     "audit": "auditor",
     "fastest_speed": "planner",
     "join": "contour",

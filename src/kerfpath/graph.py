@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 from typing import Any
@@ -18,9 +18,6 @@ from kerfpath.robots import Robot
 
 __all__ = ["LayeredGraph", "build", "gamma_grid"]
 
-_POSES_AT_ONCE = 100_000
-"""Poses solved per piece of work: large against the overhead, small against the memory."""
-
 _WHOLE_STEPS = 1e-9
 """How far 2 pi / step may be from a whole number, relative, and still count as one."""
 
@@ -32,17 +29,19 @@ class LayeredGraph:
     Parameters
     ----------
     q : (N, n) rad
-        Joint vectors, layer after layer; within a layer by gamma, posture, turn.
+        Joint vectors, layer after layer; within a layer by variant, gamma, posture, turn.
     start : (K+1,) int
         Layer k is ``q[start[k]:start[k+1]]``.
     gamma : (m,) rad
         The samples of gamma.
-    sample, posture : (N,) int
-        Index into `gamma`, and posture mu, of each vertex.
+    tilt : (V, 2) rad
+        Lead and lean of each variant of a layer; without a tolerance one, the nominal axis.
+    sample, posture, variant : (N,) int
+        Index into `gamma`, posture mu, and variant of each vertex.
     turn : (N, n) int
         Turns of 2 pi of each joint of each vertex.
-    reason : (K, m, P) uint8
-        What became of each candidate: an index into `reasons`.
+    reason : (K, V m, P) uint8
+        What became of each candidate: an index into `reasons`; all gamma of a variant in a row.
     reasons : tuple of str
         Words for the reason codes; code 0 is "admitted".
     """
@@ -50,14 +49,27 @@ class LayeredGraph:
     q: Array
     start: Ints
     gamma: Array
+    tilt: Array
     sample: NDArray[np.int32]
+    variant: NDArray[np.int32]
     posture: NDArray[np.int8]
     turn: NDArray[np.int8]
     reason: NDArray[np.uint8]
     reasons: tuple[str, ...]
 
+    @property
+    def candidate(self) -> NDArray[np.int32]:
+        """Variant and gamma of each vertex, (N,): its place along the second axis of `reason`."""
+        return self.variant * np.int32(len(self.gamma)) + self.sample
+
+    @property
+    def reason_by_gamma(self) -> NDArray[np.uint8]:
+        """What became of gamma and posture, (K, m, P): admitted if any variant of them is."""
+        K, _, P = self.reason.shape
+        return np.asarray(self.reason.reshape(K, -1, len(self.gamma), P).min(axis=1))
+
     def counts(self, node: int | None = None) -> dict[str, int]:
-        """Count the candidates (node, gamma, posture) by reason, over all nodes or at one."""
+        """Count the candidates by reason, over all nodes or at one."""
         codes = self.reason if node is None else self.reason[node]
         number = np.bincount(codes.ravel(), minlength=len(self.reasons))
         return {word: int(c) for word, c in zip(self.reasons, number, strict=True) if c}
@@ -68,6 +80,38 @@ class LayeredGraph:
         flat = self.reason.reshape(K, -1) + (np.arange(K) * codes)[:, None]
         return np.bincount(flat.ravel(), minlength=K * codes).reshape(K, codes)
 
+    def without(self, unwanted: Mapping[str, Bools]) -> LayeredGraph:
+        """Return the graph without the vertices unwanted, (N,) bool by the word for the reason.
+
+        A candidate counts as dropped where none of its turns is left, by the first word for any.
+        """
+        gone = np.any([*unwanted.values()], axis=0)
+        if not gone.any():
+            return self
+        keep, sizes = ~gone, np.diff(self.start)
+        layer = np.repeat(np.arange(len(sizes)), sizes)
+        at = layer, self.candidate, self.posture
+        candidate = np.ravel_multi_index(at, self.reason.shape)
+        left = np.zeros(self.reason.size, np.bool_)
+        left[candidate[keep]] = True
+        reason, reasons = self.reason.copy(), self.reasons
+        for word, here in reversed(list(unwanted.items())):
+            reasons = reasons if word in reasons else (*reasons, word)
+            reason.flat[candidate[here & ~left[candidate]]] = reasons.index(word)
+        return replace(
+            self,
+            q=freeze(self.q[keep]),
+            start=freeze(
+                np.concatenate([[0], np.cumsum(np.bincount(layer[keep], minlength=len(sizes)))])
+            ),
+            sample=freeze(self.sample[keep]),
+            variant=freeze(self.variant[keep]),
+            posture=freeze(self.posture[keep]),
+            turn=freeze(self.turn[keep]),
+            reason=freeze(reason),
+            reasons=reasons,
+        )
+
     def part(self, first: int, last: int) -> LayeredGraph:
         """Return the layers of nodes first to last."""
         vertices = slice(self.start[first], self.start[last + 1])
@@ -76,6 +120,7 @@ class LayeredGraph:
             q=self.q[vertices],
             start=freeze(self.start[first : last + 2] - self.start[first]),
             sample=self.sample[vertices],
+            variant=self.variant[vertices],
             posture=self.posture[vertices],
             turn=self.turn[vertices],
             reason=self.reason[first : last + 1],
@@ -103,21 +148,24 @@ def build(
     *,
     T_flange_tip: Array,
     gamma: Array,
+    tilt: Array | None = None,
     postures: Sequence[int] | None = None,
     progress: Callable[[int], None] | None = None,
 ) -> LayeredGraph:
-    """Return the vertices of every node: all samples of gamma, postures and turns (Eq. 10).
+    """Return the vertices of every node: all variants, gamma, postures and turns (Eq. 10).
 
     Parameters
     ----------
-    frames : (K, 4, 4)
-        Task frames H_k in the robot base, m.
+    frames : (K, 4, 4) or (K, V, 4, 4)
+        Task frames H_k in the robot base, m; or those of each variant.
     robot : Robot
         Kinematics and joint limits.
     T_flange_tip : (4, 4)
         Tool: tip frame in the flange.
     gamma : (m,) rad
         Samples of gamma, see `gamma_grid`; of a robot that leaves no rotation free, one, at zero.
+    tilt : (V, 2) rad, optional
+        Lead and lean of the variants, see `kerfpath.tilt`; default: one variant, not tilted.
     postures : sequence of int, optional
         The postures that may be used; default all. See `kerfpath.robots.postures_named`.
     progress : callable, optional
@@ -132,11 +180,17 @@ def build(
     limits = robot.joint_limits()
     if not robot.family.free_rotation:
         gamma = freeze(np.zeros(1))
-    reason = np.empty((len(frames), len(gamma), robot.postures), np.uint8)
+    tilt = freeze(np.zeros((1, 2))) if tilt is None else tilt
+    frames = np.ascontiguousarray(frames.reshape(len(frames), len(tilt), 4, 4))
+    samples = len(tilt) * len(gamma)
+    reason = np.empty((len(frames), samples, robot.postures), np.uint8)
 
     def layers_of(first: int, last: int) -> _Piece:
         """Solve nodes first..last-1 and keep what the limits admit."""
-        q, reach = robot.inverse_nodes(frames[first:last], gamma, T_flange_tip)
+        H = frames[first:last].reshape(-1, 4, 4)
+        q, reach = robot.inverse_nodes(H, gamma, T_flange_tip)
+        q = q.reshape(last - first, samples, *q.shape[2:])
+        reach = reach.reshape(q.shape[:3])
         count = np.empty(last - first, np.int64)
         turns.count_admissible(q, reach, wanted, limits, count, reason[first:last])
         n = int(count.sum())
@@ -154,7 +208,7 @@ def build(
             progress(last - first)
         return piece
 
-    nodes = max(1, _POSES_AT_ONCE // len(gamma))
+    nodes = max(1, robot.family.poses_at_once // samples)
     firsts = range(0, len(frames), nodes)
     with ThreadPoolExecutor(os.cpu_count()) as pool:
         pieces = list(pool.map(lambda f: layers_of(f, min(f + nodes, len(frames))), firsts))
@@ -162,11 +216,14 @@ def build(
     q, sample = [p.q for p in pieces], [p.sample for p in pieces]
     posture, turn = [p.posture for p in pieces], [p.turn for p in pieces]
     pieces.clear()
+    origin = _end_to_end(sample)
     return LayeredGraph(
         q=freeze(_end_to_end(q)),
         start=freeze(np.concatenate([[0], np.cumsum(count)])),
         gamma=gamma,
-        sample=freeze(_end_to_end(sample)),
+        tilt=tilt,
+        sample=freeze(origin % len(gamma)),
+        variant=freeze(origin // len(gamma)),
         posture=freeze(_end_to_end(posture)),
         turn=freeze(_end_to_end(turn)),
         reason=freeze(reason),

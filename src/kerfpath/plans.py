@@ -9,11 +9,13 @@ from typing import Any, Literal
 import numpy as np
 
 from kerfpath._arrays import Array, Ints, as_pose, floats, freeze, integers, scalar
+from kerfpath.comfort import Comfort, measures
 from kerfpath.contour import Contour, FrameKind
 from kerfpath.errors import InputError
 from kerfpath.kernels import metric
 from kerfpath.robots import Robot
 from kerfpath.search import METRIC_CODES, Closure, Method, Metric, ObjectiveKind
+from kerfpath.tilt import Tilt, tilted
 
 __all__ = ["Criteria", "Feed", "Plan", "Proof", "Settings", "path_cost"]
 
@@ -37,6 +39,10 @@ class Settings:
     closure : {"free", "periodic"}
     rotation : (6,) rad, optional
         How far each joint may turn away from where it begins, infinite where that is not limited.
+    comfort : Comfort, optional
+        What the nodes are to keep away from, and what coming near costs.
+    tilt : Tilt, optional
+        Tolerance of the tool axis; None: the nominal axis.
     """
 
     gamma_step: float
@@ -49,6 +55,8 @@ class Settings:
     eta_a: float
     closure: Closure = "free"
     rotation: Array | None = None
+    comfort: Comfort | None = None
+    tilt: Tilt | None = None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -106,7 +114,7 @@ class Feed:
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Criteria:
-    """Smoothness of a plan, each (n,), joint by joint.
+    """Smoothness of a plan, joint by joint, each (n,), and what it comes near to.
 
     Parameters
     ----------
@@ -118,6 +126,8 @@ class Criteria:
         Coordinate range (9).
     peak_velocity, peak_acceleration : share of the limit
         Largest finite difference over the joint's limit, before eta.
+    nearest : mapping of str to (float, int)
+        The least of each measure of `kerfpath.comfort`, in its unit, and the node it stands at.
     """
 
     displacement: Array
@@ -125,12 +135,22 @@ class Criteria:
     range: Array
     peak_velocity: Array
     peak_acceleration: Array
+    nearest: Mapping[str, tuple[float, int]]
 
 
-def path_cost(dq: Array, weights: Array, metric_name: Metric, objective: ObjectiveKind) -> float:
-    """Return the objective (14) or (15) of joint increments (K-1, n) rad."""
+def path_cost(
+    dq: Array,
+    weights: Array,
+    metric_name: Metric,
+    objective: ObjectiveKind,
+    node_cost: Array | None = None,
+) -> float:
+    """Return the objective (14) or (15) of joint increments (K-1, n) rad, with the nodes' costs."""
     total = metric.total_distance if objective == "sum" else metric.maximum_distance
-    return float(total(np.ascontiguousarray(dq), weights, METRIC_CODES[metric_name]))
+    cost = float(total(np.ascontiguousarray(dq), weights, METRIC_CODES[metric_name]))
+    if node_cost is None:
+        return cost
+    return cost + float(node_cost.sum()) if objective == "sum" else max(cost, *node_cost.tolist())
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -149,6 +169,8 @@ class Plan:
         Joints at the nodes.
     gamma : (K,) rad
         Free rotation about the tool axis at the nodes.
+    tilt : (K, 2) rad, optional
+        Lead and lean of the tool axis at the nodes, see `kerfpath.Tilt`; default none.
     posture : (K,) int
         Posture mu; see `kerfpath.robots.posture_name`.
     turn : (K, n) int
@@ -157,12 +179,12 @@ class Plan:
         Time of each node, from 0.
     settings : Settings
     cost : float
-        Objective (14) or (15).
+        Objective (14) or (15), with what tilt and comfort cost.
     proof : Proof
     feed : Feed or None
         Where the speed dips; None at constant speed.
     counts : mapping of str to int
-        Candidates (node, gamma, posture) of the layered graph by what became of them.
+        Candidates (node, tilt, gamma, posture) of the layered graph by what became of them.
     """
 
     contour: Contour
@@ -179,6 +201,7 @@ class Plan:
     proof: Proof
     counts: Mapping[str, int]
     feed: Feed | None = None
+    tilt: Array = None  # type: ignore[assignment]  # filled in by __post_init__
 
     def __post_init__(self) -> None:
         K, n = len(self.contour), self.robot.joints
@@ -190,6 +213,7 @@ class Plan:
             "posture": integers(self.posture, "posture", (K,)),
             "turn": integers(self.turn, "turn", (K, n)),
             "time": floats(self.time, "time", (K,)),
+            "tilt": floats(np.zeros((K, 2)) if self.tilt is None else self.tilt, "tilt", (K, 2)),
             "cost": scalar(self.cost, "cost"),
         }
         if (np.diff(cast["time"]) <= 0).any():
@@ -215,8 +239,31 @@ class Plan:
 
     @property
     def axes(self) -> Array:
-        """Tool axes asked for at the nodes, robot base frame, (K, 3)."""
-        return freeze(self.contour.axes @ self.T_base_part[:3, :3].T)
+        """Tool axes asked for at the nodes, tilt included, robot base frame, (K, 3)."""
+        if not self.tilt.any():
+            return freeze(self.contour.axes @ self.T_base_part[:3, :3].T)
+        return freeze(self.frames[:, :3, 2])
+
+    @property
+    def frames(self) -> Array:
+        """Task frames that gamma counts from, tilt included, robot base frame, (K, 4, 4) m."""
+        H = self.contour.frames(self.settings.frames)
+        if self.tilt.any():
+            H = tilted(H, self.contour.along, self.tilt)
+        return freeze(self.T_base_part @ H)
+
+    @property
+    def node_cost(self) -> Array | None:
+        """What tilt and comfort cost at each node, (K,); None where they cost nothing.
+
+        Without what clearance costs, which only a cell tells.
+        """
+        tilt, comfort, costs = self.settings.tilt, self.settings.comfort, []
+        if tilt is not None and tilt.cost:
+            costs.append(tilt.price(self.tilt))
+        if comfort is not None and any(band.cost for band in comfort.bands.values()):
+            costs.append(comfort.price(self.robot, self.q, self.T_flange_tip))
+        return freeze(np.sum(costs, axis=0)) if costs else None
 
     @property
     def increments(self) -> Array:
@@ -237,12 +284,14 @@ class Plan:
 
     @property
     def criteria(self) -> Criteria:
-        """The criteria (7) to (9) and the peak shares of the limits."""
+        """The criteria (7) to (9), the peak shares of the limits, and the nearest comfort."""
         dq = self.increments
+        measured = measures(self.robot, self.q, tool=self.T_flange_tip)
         return Criteria(
             displacement=metric.total_displacement(dq),
             largest_increment=metric.largest_increment(dq),
             range=metric.coordinate_range(dq),
             peak_velocity=np.abs(self.velocity_share).max(axis=0),
             peak_acceleration=np.abs(self.acceleration_share).max(axis=0, initial=0.0),
+            nearest={name: (float(of.min()), int(of.argmin())) for name, of in measured.items()},
         )

@@ -7,7 +7,9 @@ import numpy as np
 from kerfpath._arrays import Array, Ints, scalar
 from kerfpath.auditor._chain import chain_of
 from kerfpath.auditor._collision import collisions
+from kerfpath.auditor._margins import margins
 from kerfpath.auditor._motion import Interpolation, Motion, joint_increments, motion_of
+from kerfpath.auditor._nominal import axes_asked_for, tilt_turns
 from kerfpath.auditor._table import Check, Issue, Unit
 from kerfpath.cell import Cell
 from kerfpath.contour import Contour
@@ -104,17 +106,25 @@ def checks(
         *_between_nodes(plan, motion, path, path_tolerance, axis_tolerance),
         *_positions(plan, motion),
         *_rates(plan, motion),
+        *margins(plan, chain),
         *([] if cell is None or not len(cell.pairs) else [collisions(cell, motion, chain)]),
     ]
 
 
 def _at_nodes(plan: Plan, tool: Array) -> list[Check]:
     tip = np.linalg.norm(tool[:, :3, 3] - plan.points, axis=1)
-    axis = _angle(tool[:, :3, 2], plan.axes)
-    return [
+    nominal, s = plan.contour.axes @ plan.T_base_part[:3, :3].T, plan.contour.s
+    axis = _angle(tool[:, :3, 2], axes_asked_for(nominal, s, tilt_turns(plan), s))
+    rows = [
         _worst("tip-at-nodes", "tool tip at the nodes", tip, TIP_AT_NODES, "m"),
         _worst("axis-at-nodes", "tool axis at the nodes", axis, AXIS_AT_NODES, "rad"),
     ]
+    allowed = plan.settings.tilt
+    if allowed is not None or plan.tilt.any():
+        cone = (0.0 if allowed is None else allowed.cone) + AXIS_AT_NODES
+        angle = _angle(tool[:, :3, 2], nominal)
+        rows.append(_worst("tilt", "tilt of the tool axis at the nodes", angle, cone, "rad"))
+    return rows
 
 
 def _between_nodes(
@@ -129,6 +139,7 @@ def _between_nodes(
     points, axes = path.at(at)
     rotation, origin = plan.T_base_part[:3, :3], plan.T_base_part[:3, 3]
     points, axes = points @ rotation.T + origin, axes @ rotation.T
+    axes = axes_asked_for(axes, s, tilt_turns(plan), at)
     tip, axis = motion.tip[cell], motion.axis[cell]
     chord = np.diff(tip, axis=1)
     along = ((points[:, None] - tip[:, :-1]) * chord).sum(-1) / np.maximum(

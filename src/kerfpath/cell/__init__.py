@@ -1,13 +1,15 @@
 """The cell as solids: which bodies may come how near, at a joint vector and along a motion."""
 
 from kerfpath.cell._bodies import Body as Body
-from kerfpath.cell._bodies import CuttingHead as CuttingHead
-from kerfpath.cell._bodies import link_capsules as link_capsules
 from kerfpath.cell._cell import Cell as Cell
 from kerfpath.cell._cell import cell_of as cell_of
-from kerfpath.cell._chain import Chain as Chain
-from kerfpath.cell._chain import chain_of as chain_of
 from kerfpath.cell._checker import Checker as Checker
+from kerfpath.cell._head import CuttingHead as CuttingHead
+from kerfpath.cell._head import MeshHead as MeshHead
+from kerfpath.cell._links import link_bodies as link_bodies
+from kerfpath.cell._links import link_capsules as link_capsules
+from kerfpath.cell._map import Clearances as Clearances
+from kerfpath.cell._map import clearances as clearances
 from kerfpath.cell._mesh import Mesh as Mesh
 from kerfpath.cell._mesh import welded as welded
 from kerfpath.cell._shapes import Capsule as Capsule

@@ -4,26 +4,27 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from itertools import combinations
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from kerfpath._arrays import Array, Bools, Ints, as_pose, bools, floats, freeze, scalar
-from kerfpath.cell._bodies import Body, CuttingHead, link_capsules
-from kerfpath.cell._chain import Chain, chain_of
+from kerfpath.cell._bodies import Body
+from kerfpath.cell._head import CuttingHead, MeshHead
+from kerfpath.cell._links import link_bodies
 from kerfpath.cell._mesh import Mesh
 from kerfpath.cell._motion import Sweep
+from kerfpath.cell._pairs import Places, always_near, fixed_together
 from kerfpath.cell._scene import Scene
 from kerfpath.cell._shapes import Shape
 from kerfpath.errors import InputError
-from kerfpath.robots import Robot
+from kerfpath.robots import Robot, chain_of
+from kerfpath.urdf import Chain
 
 __all__ = ["Cell", "cell_of"]
 
 Pair = tuple[str, str]
-
-WRIST = 3
-"""From this frame on, the links of a compact wrist overlap by design."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -42,8 +43,8 @@ class Cell:
     near_miss_of : mapping of (name, name) to float m
         The same for single pairs.
     may_touch : sequence of (name, name)
-        Pairs that are not judged, beside those that do not move against each other and links that
-        are joined.
+        Pairs that are not judged, beside those that do not move against each other, links joined
+        by a joint, and those of the arm that overlap at every pose.
     endless : (n,) bool
         Joints that go the short way round between nodes.
     T_flange_tip, T_base_part : (4, 4) m, optional
@@ -57,11 +58,14 @@ class Cell:
         The near-miss distance of each.
     own : (P,) bool
         Those that have one of their own.
+    unjudged : mapping of (name, name) to str
+        Every other pair, and why it is not judged.
 
     Raises
     ------
     InputError
-        Two bodies of one name, a pair that names none, a part that overlaps the robot's base.
+        Two bodies of one name, a pair that names none, a distance for a pair that is not judged, a
+        part or fixture that overlaps the robot's base.
     """
 
     chain: Chain
@@ -75,6 +79,7 @@ class Cell:
     pairs: Ints = field(init=False)
     required: Array = field(init=False)
     own: Bools = field(init=False)
+    unjudged: Mapping[Pair, str] = field(init=False)
     _scene: Scene = field(init=False, repr=False)
     _sweep: Sweep = field(init=False, repr=False)
 
@@ -90,18 +95,12 @@ class Cell:
             raise InputError(f"cell: two bodies are called {sorted(twice)[0]!r}; rename one")
         if any(not 0 <= body.frame <= n for body in bodies):
             raise InputError(f"cell: expected frames 0 to {n} for every body")
-        free = {self._pair(pair, "may_touch") for pair in self.may_touch}
-        judged = [
-            (a, b)
-            for b, body in enumerate(bodies)
-            for a in range(b)
-            if (a, b) not in free and not _joined(bodies[a], body)
-        ]
-        _set(self, "pairs", freeze(np.array(judged, np.int64).reshape(-1, 2)))
         own = {self._pair(k, "near_miss_of"): v for k, v in self.near_miss_of.items()}
-        needed = [_distance(own.get(pair, self.near_miss), names, pair) for pair in judged]
-        _set(self, "required", freeze(np.array(needed, dtype=np.float64)))
-        _set(self, "own", freeze(np.array([pair in own for pair in judged], dtype=np.bool_)))
+        why, needed = self._sorted_out(own)
+        _set(self, "unjudged", {(names[a], names[b]): words for (a, b), words in why.items()})
+        _set(self, "pairs", freeze(np.array([*needed], np.int64).reshape(-1, 2)))
+        _set(self, "required", freeze(np.array([*needed.values()], dtype=np.float64)))
+        _set(self, "own", freeze(np.array([pair in own for pair in needed], dtype=np.bool_)))
         _set(self, "_scene", Scene(bodies, self.pairs))
         _set(self, "_sweep", Sweep(self.chain, bodies, self.pairs))
         self._require_room_for_the_base()
@@ -201,6 +200,30 @@ class Cell:
         """The bodies ready for distance queries."""
         return self._scene
 
+    def _sorted_out(
+        self, own: Mapping[Places, float]
+    ) -> tuple[dict[Places, str], dict[Places, float]]:
+        """Return why each pair that is not judged is not, and what (m) each other must keep."""
+        bodies, names = self.bodies, self.names
+        why = {self._pair(pair, "may_touch"): "may touch" for pair in self.may_touch}
+        needed: dict[Places, float] = {}
+        for a, b in combinations(range(len(bodies)), 2):
+            if words := why.get((a, b)) or fixed_together(bodies[a], bodies[b]):
+                why[a, b] = words
+            else:
+                needed[a, b] = _distance(own.get((a, b), self.near_miss), names, (a, b))
+        open_ = {pair: distance for pair, distance in needed.items() if pair not in own}
+        for pair in always_near(self.chain, bodies, open_):
+            del needed[pair]
+            why[pair] = "overlap, or are too near each other, at every pose tried"
+        for a, b in own:
+            if (a, b) in why:
+                raise InputError(
+                    f"cell near_miss_of: {names[a]!r} and {names[b]!r} are not judged, they "
+                    f"{why[a, b]}; leave the pair out"
+                )
+        return why, needed
+
     def _pair(self, pair: Pair, where: str) -> tuple[int, int]:
         for name in pair:
             if name not in self.names:
@@ -211,19 +234,25 @@ class Cell:
         return a, b
 
     def _require_room_for_the_base(self) -> None:
-        base = [b for b in self.bodies if b.frame == 0 and b.kind == "robot"]
-        part = [b for b in self.bodies if b.frame == 0 and b.kind == "part"]
-        pairs = np.array([(i, len(base) + j) for i in range(len(base)) for j in range(len(part))])
-        if not pairs.size:
+        """Raise InputError where a part or fixture overlaps what stands still of the robot."""
+        free = {self._pair(pair, "may_touch") for pair in self.may_touch}
+        still = [body for body in self.bodies if body.frame == 0]
+        pairs = [
+            (a, b)
+            for a, b in combinations(range(len(still)), 2)
+            if (a, b) not in free and (still[a].kind == "robot") != (still[b].kind == "robot")
+        ]
+        if not pairs:
             return
-        gap = Scene([*base, *part], pairs).distances(np.eye(4)[None, None], 1.0)[0]
-        p = int(np.argmin(gap))
-        if gap[p] <= 0:
-            one, two = base[pairs[p, 0]], part[pairs[p, 1] - len(base)]
-            about = " (an approximate capsule)" if one.approximate else ""
+        gap = Scene(still, np.array(pairs)).distances(np.eye(4)[None, None], 1.0)[0]
+        if gap.min() <= 0:
+            a, b = pairs[int(np.argmin(gap))]
+            one, two = sorted((still[a], still[b]), key=lambda body: body.kind != "robot")
+            about = " (an approximate shape)" if one.approximate else ""
             raise InputError(
-                f"cell: {two.name!r} overlaps the robot's {one.name!r}{about}; move the part away "
-                "from the robot"
+                f"cell: {two.name!r} overlaps the robot's {one.name!r}{about}; move it away from "
+                f"the robot, or list ({one.name!r}, {two.name!r}) in may_touch where the robot "
+                "stands on it"
             )
 
 
@@ -231,7 +260,7 @@ def cell_of(
     robot: Robot,
     *,
     tool: ArrayLike,
-    head: CuttingHead | Sequence[Body] | None = None,
+    head: CuttingHead | MeshHead | Sequence[Body] | None = None,
     part: Mesh | None = None,
     placement: ArrayLike | None = None,
     fixtures: Mapping[str, Shape] | None = None,
@@ -250,7 +279,7 @@ def cell_of(
     robot : Robot
     tool : (4, 4)
         T_flange_tip, m.
-    head : CuttingHead or sequence of Body, optional
+    head : CuttingHead, MeshHead or sequence of Body, optional
         Default: the generic head.
     part : Mesh, optional
         In the part frame.
@@ -259,23 +288,22 @@ def cell_of(
     fixtures : mapping of name to Shape, optional
         In the robot base.
     links : sequence of Body, optional
-        Default: capsules along the robot's lengths, marked approximate.
+        Default: `link_bodies(robot)`, the robot's description or else capsules.
     near_miss, near_miss_of, may_touch
         As in `Cell`.
     """
     chain = chain_of(robot)
     head = CuttingHead() if head is None else head
     own = dict(near_miss_of or {})
-    tool_bodies = tuple(head.bodies(chain, tool) if isinstance(head, CuttingHead) else head)
+    tool_bodies = tuple(head if isinstance(head, Sequence) else head.bodies(chain, tool))
     parts: tuple[Body, ...] = ()
     if part is not None:
         if placement is None:
             raise InputError("cell: a part needs its placement, T_base_part (4, 4)")
         placed = part.moved(as_pose(placement, "placement"))
         parts = (Body(name="part", shape=placed, frame=0, kind="part"),)
-        if isinstance(head, CuttingHead) and not {("nozzle", "part"), ("part", "nozzle")} & set(
-            own
-        ):
+        said = {frozenset(pair) for pair in (*own, *may_touch)}
+        if not isinstance(head, Sequence) and {"nozzle", "part"} not in said:
             own["nozzle", "part"] = head.keeps
     things = tuple(
         Body(name=name, shape=shape, frame=0, kind="fixture")
@@ -283,7 +311,7 @@ def cell_of(
     )
     return Cell(
         chain=chain,
-        bodies=(*(link_capsules(robot) if links is None else links), *tool_bodies, *parts, *things),
+        bodies=(*(link_bodies(robot) if links is None else links), *tool_bodies, *parts, *things),
         near_miss=near_miss,
         near_miss_of=own,
         may_touch=may_touch,
@@ -291,20 +319,6 @@ def cell_of(
         T_flange_tip=as_pose(tool, "tool"),
         T_base_part=None if placement is None else as_pose(placement, "placement"),
     )
-
-
-def _joined(one: Body, two: Body) -> bool:
-    """Say whether two bodies never move against each other, or are links joined by design."""
-    apart = abs(one.frame - two.frame)
-    if apart == 0:
-        return True
-    if {one.kind, two.kind} <= {"robot"}:
-        # Capsules drawn rather too thick overlap over two joints.
-        return apart <= (2 if one.approximate or two.approximate else 1) or one.frame >= WRIST
-    if {one.kind, two.kind} == {"robot", "head"}:
-        robot, head = (one, two) if one.kind == "robot" else (two, one)
-        return apart <= 1 or (head.name == "arm" and robot.frame >= WRIST)
-    return False
 
 
 def _distance(value: float, names: Sequence[str], pair: tuple[int, int]) -> float:

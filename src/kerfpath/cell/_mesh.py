@@ -18,12 +18,14 @@ from kerfpath._arrays import Array, Bools, Ints, as_pose, floats, freeze, intege
 from kerfpath.cell._columns import Columns
 from kerfpath.errors import InputError
 
-__all__ = ["Mesh", "welded"]
+__all__ = ["SAME", "Mesh", "size_of", "welded"]
 
 LARGEST = 100.0
 """m: nothing in a cell is larger; a mesh that is has the wrong unit."""
 SMALLEST = 1e-4
 """m: a whole body smaller than this has the wrong unit, too."""
+SAME = 1e-6
+"""Vertices closer than this share of the body's size are one: single precision tells no more."""
 MOST = 2_000_000
 """Triangles: more take minutes and gigabytes, and no cell needs them."""
 
@@ -61,22 +63,9 @@ class Mesh:
         _set(self, "deviation", scalar(self.deviation, f"{name} deviation", unit="m"))
         if self.deviation < 0:
             raise InputError(f"{name}: deviation must not be negative, got {self.deviation:g} m")
-        if not 0 < len(self.triangles) <= MOST:
-            raise InputError(
-                f"{name}: expected 1 to {MOST} triangles, got {len(self.triangles)}; "
-                + ("simplify the mesh" if len(self.triangles) else "the mesh is empty")
-            )
-        if self.triangles.min() < 0 or self.triangles.max() >= len(self.vertices):
-            raise InputError(f"{name}: a triangle names a vertex that is not there")
-        columns = Columns(self.vertices[self.triangles])
-        size = float((columns.high - columns.low).max())
-        if not SMALLEST <= size <= LARGEST:
-            raise InputError(
-                f"{name}: {size:g} m across, expected {SMALLEST:g} to {LARGEST:g} m; "
-                "is its unit right?"
-            )
+        size_of(self.vertices, self.triangles, name)
         _require_closed(self.triangles, name)
-        _set(self, "_columns", columns)
+        _set(self, "_columns", Columns(self.vertices[self.triangles]))
 
     @property
     def radius(self) -> float:
@@ -117,6 +106,85 @@ class Mesh:
     def contains(self, points: Array) -> Bools:
         """Say which of the points (m, 3) m, none of them on the surface, lie inside."""
         return freeze(np.array([self._columns.contains(p) for p in points], dtype=np.bool_))
+
+    def cut(self, point: Array, normal: Array) -> tuple[Mesh | None, Mesh | None]:
+        """Return the parts of the solid before and behind a plane, None where there is none.
+
+        Parameters
+        ----------
+        point : (3,) m
+            In the plane.
+        normal : (3,)
+            Unit vector to what is before it.
+        """
+        height = (self.vertices - point) @ normal
+        return self._above(height), self._above(-height)
+
+    def _above(self, height: Array) -> Mesh | None:
+        """Return the part where the height (V,) m of the vertices over a plane is positive.
+
+        The section is closed by triangles from its rim to one point of the plane: whatever its
+        outline, what they cover twice they cover in opposite directions.
+        """
+        inside = height > 0
+        if inside.all() or not inside.any():
+            return self if inside.any() else None
+        count = inside[self.triangles].sum(axis=1)
+        cut = self.triangles[(count == 1) | (count == 2)]
+        alone = inside[cut] == (inside[cut].sum(axis=1) == 1)[:, None]
+        # Turned such that the first corner is the one on a side of its own.
+        turn = (np.argmax(alone, axis=1)[:, None] + np.arange(3)) % 3
+        cut = np.take_along_axis(cut, turn, axis=1)
+        edges = np.sort(cut[:, [[0, 1], [0, 2]]].reshape(-1, 2), axis=1)
+        edges, place = np.unique(edges, axis=0, return_inverse=True)
+        one, two = edges.T
+        share = (height[one] / (height[one] - height[two]))[:, None]
+        rim = self.vertices[one] + share * (self.vertices[two] - self.vertices[one])
+        V, (first, b, c) = len(self.vertices), cut.T
+        ab, ac = (V + place.reshape(-1, 2)).T
+        centre = np.full(len(cut), V + len(rim))
+        top, tail = inside[first], ~inside[first]
+        triangles = [
+            self.triangles[count == 3],
+            np.array([first, ab, ac]).T[top],
+            np.array([ac, ab, centre]).T[top],
+            np.array([ab, b, c]).T[tail],
+            np.array([ab, c, ac]).T[tail],
+            np.array([ab, ac, centre]).T[tail],
+        ]
+        points = np.vstack([self.vertices, rim, rim.mean(axis=0)])
+        size = float(np.ptp(self.bounds, axis=0).max())
+        vertices, corners = welded(points, np.vstack(triangles), SAME * size)
+        used, corners = np.unique(corners, return_inverse=True)
+        return Mesh(
+            vertices=vertices[used],
+            triangles=corners.reshape(-1, 3),
+            deviation=self.deviation,
+            name=self.name,
+        )
+
+
+def size_of(vertices: Array, triangles: Ints, name: str) -> float:
+    """Return the longest side (m) of the box around the triangles.
+
+    Raises
+    ------
+    InputError
+        No triangles or too many, one without vertices, a size that no body of a cell has.
+    """
+    if not 0 < len(triangles) <= MOST:
+        raise InputError(
+            f"{name}: expected 1 to {MOST} triangles, got {len(triangles)}; "
+            + ("simplify the mesh" if len(triangles) else "the mesh is empty")
+        )
+    if triangles.min() < 0 or triangles.max() >= len(vertices):
+        raise InputError(f"{name}: a triangle names a vertex that is not there")
+    size = float(np.ptp(vertices[triangles.ravel()], axis=0).max())
+    if not SMALLEST <= size <= LARGEST:
+        raise InputError(
+            f"{name}: {size:g} m across, expected {SMALLEST:g} to {LARGEST:g} m; is its unit right?"
+        )
+    return size
 
 
 def welded(vertices: ArrayLike, triangles: ArrayLike, tolerance: float) -> tuple[Array, Ints]:

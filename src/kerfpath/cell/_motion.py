@@ -21,10 +21,10 @@ import numpy as np
 
 from kerfpath._arrays import Array, Bools, Ints
 from kerfpath.cell._bodies import Body
-from kerfpath.cell._chain import Chain
 from kerfpath.cell._scene import ACCURACY
+from kerfpath.urdf import Chain
 
-__all__ = ["TOLERANCE", "Sweep"]
+__all__ = ["TOLERANCE", "Sweep", "relative"]
 
 TOLERANCE = 1e-4
 """m: a motion too close to tell by this much is refused."""
@@ -71,7 +71,7 @@ class Sweep:
         seen: dict[tuple[int, int], Array] = {}
         for i, (a, b, corners) in enumerate(self._moves):
             if (a, b) not in seen:
-                seen[a, b] = (_relative(frames1, a, b) - _relative(frames0, a, b))[:, :3]
+                seen[a, b] = (relative(frames1, a, b) - relative(frames0, a, b))[:, :3]
             moved = seen[a, b][:, :, :3] @ corners.T + seen[a, b][:, :, 3:]
             out[:, i] = np.sqrt((moved**2).sum(axis=1).max(axis=1))
         return out[:, self._way]
@@ -135,7 +135,7 @@ class Sweep:
         return self.shift(frames0, frames1) + self.bend(dq) / 4 + 4 * ACCURACY
 
 
-def _relative(frames: Array, a: int, b: int) -> Array:
+def relative(frames: Array, a: int, b: int) -> Array:
     """Return the poses (B, 4, 4) of frame b in frame a."""
     if a == 0:
         return frames[:, b]

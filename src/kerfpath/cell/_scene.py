@@ -27,6 +27,9 @@ ACCURACY = 1e-6
 THIN = 1e-5
 """m: what the box around a flat mesh is thickened by, so that it is a solid at all."""
 
+AT_ONCE = 500
+"""Poses that cheap bounds are found for together: as many as caches hold."""
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Solid:
@@ -74,6 +77,11 @@ class Scene:
         self._request, self._result = coal.DistanceRequest(), coal.DistanceResult()
         self.queries = 0
 
+    @property
+    def order(self) -> Ints:
+        """The pairs (P,), those with meshes last: they take longest."""
+        return np.asarray(self._order)
+
     def distances(self, frames: Array, enough: float | Array, wanted: Bools | None = None) -> Array:
         """Return distances (B, P) m at link poses (B, n+1, 4, 4).
 
@@ -104,7 +112,7 @@ class Scene:
         stop : (P,) m, optional
             Where a pair is this near or nearer, the others need not be found.
         """
-        low = self._cheap(frames)
+        low = self.cheap(frames)
         high = np.full(low.shape, np.inf)
         enough = np.broadcast_to(np.asarray(enough, dtype=np.float64), low.shape)
         near = wanted & (low < enough)
@@ -116,8 +124,18 @@ class Scene:
                     break
         return low, high
 
+    def pair_bounds(self, p: int, frames: Array, enough: Array) -> tuple[Array, Array]:
+        """Return what `bounds` does of one pair, (B,) m each, with `enough` (B,) m."""
+        found = [self._pair(p, T, {}, e) for T, e in zip(frames, enough.tolist(), strict=True)]
+        low, high = np.array(found).reshape(-1, 2).T
+        return low, high
+
+    def cheap(self, frames: Array) -> Array:
+        """Return lower bounds (B, P) m by balls, and by boxes around what stands still."""
+        parts = range(0, max(len(frames), 1), AT_ONCE)
+        return np.vstack([self._cheap(frames[i : i + AT_ONCE]) for i in parts])
+
     def _cheap(self, frames: Array) -> Array:
-        """Return lower bounds (B, P) by balls, and by boxes around what stands still."""
         a, b = self._ends
         T = frames[:, self._frame]
         centres = (T[..., :3, :3] @ self._centre[:, :, None])[..., 0] + T[..., :3, 3]

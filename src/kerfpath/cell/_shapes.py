@@ -6,7 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike
-from scipy.spatial import ConvexHull, QhullError
+from scipy.spatial import ConvexHull, QhullError, cKDTree
+from scipy.spatial.transform import Rotation
 
 from kerfpath._arrays import Array, as_pose, floats, freeze, positive, scalar
 from kerfpath.cell._mesh import Mesh
@@ -16,6 +17,12 @@ __all__ = ["Capsule", "Hull", "Shape", "box", "box_between", "frustum"]
 
 RING = 24
 """Corners of the polygon drawn around a circle; it juts out by less than 1 % of the radius."""
+SAME = 1e-7
+"""m: corners that differ by this are the same, but for rounding."""
+
+CORNERS = 64
+"""A hull of more corners is followed along motions by those of the box around it: far fewer, and
+hardly farther out."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -56,12 +63,17 @@ class Capsule:
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Hull:
-    """The convex hull of points (P, 3) m that do not lie in one plane."""
+    """The convex hull of points (P, 3) m that do not lie in one plane.
+
+    If the points are rings of `RING` even corners about a line, `axis` (2, 3) m may be two points
+    of it: the solid is known to be all but round then.
+    """
 
     points: Array
     triangles: Array
+    axis: Array | None
 
-    def __init__(self, points: ArrayLike) -> None:
+    def __init__(self, points: ArrayLike, *, axis: ArrayLike | None = None) -> None:
         given = floats(points, "hull points", (None, 3))
         try:
             hull = ConvexHull(given)
@@ -77,6 +89,7 @@ class Hull:
         corners = np.where(inward[:, None], hull.simplices[:, ::-1], hull.simplices)
         object.__setattr__(self, "points", freeze(given[kept]))
         object.__setattr__(self, "triangles", freeze(place[corners]))
+        object.__setattr__(self, "axis", None if axis is None else _axis(axis, given))
 
     @property
     def radius(self) -> float:
@@ -85,8 +98,10 @@ class Hull:
 
     @property
     def corners(self) -> Array:
-        """Points (c, 3) m whose hull is the shape."""
-        return self.points
+        """Points (c, 3) m whose hull holds the shape: its own, or of the box around many."""
+        if len(self.points) <= CORNERS:
+            return self.points
+        return box_between(self.points.min(axis=0), self.points.max(axis=0)).points
 
     @property
     def seeds(self) -> Array:
@@ -95,7 +110,8 @@ class Hull:
 
     def moved(self, T: ArrayLike) -> Hull:
         """Return the shape in coordinates b of a pose T (4, 4) that maps its own into b."""
-        return Hull(_moved(self.points, T))
+        axis = None if self.axis is None else _moved(self.axis, T)
+        return Hull(_moved(self.points, T), axis=axis)
 
 
 Shape = Capsule | Hull | Mesh
@@ -133,7 +149,18 @@ def frustum(start: ArrayLike, end: ArrayLike, radii: tuple[float, float]) -> Hul
     ring = (np.cos(turn)[:, None] * u + np.sin(turn)[:, None] * np.cross(axis, u)) / np.cos(
         np.pi / RING
     )
-    return Hull(np.vstack([a + radii[0] * ring, b + radii[1] * ring]))
+    return Hull(np.vstack([a + radii[0] * ring, b + radii[1] * ring]), axis=[a, b])
+
+
+def _axis(value: ArrayLike, points: Array) -> Array:
+    """Return the axis (2, 3) m of a hull, turned about which by one corner it is the same."""
+    axis = floats(value, "hull axis", (2, 3))
+    along = axis[1] - axis[0]
+    turn = Rotation.from_rotvec(2 * np.pi / RING * along / np.linalg.norm(along))
+    off, _ = cKDTree(points).query(turn.apply(points - axis[0]) + axis[0])
+    if not np.max(off) < SAME:
+        raise InputError(f"hull axis: the points are not rings of {RING} even corners about it")
+    return axis
 
 
 def _moved(points: Array, T: ArrayLike) -> Array:

@@ -1,24 +1,24 @@
-"""STL files, binary and text, as solids; the file does not say its unit, so the caller must."""
+"""Mesh files as solids. An STL file does not say its unit, so the caller must."""
 
 from __future__ import annotations
 
 import re
 from pathlib import Path
 
+import coal
 import numpy as np
 
-from kerfpath._arrays import Array
-from kerfpath.cell._mesh import Mesh, welded
+from kerfpath._arrays import Array, Ints
+from kerfpath.cell._mesh import SAME, Mesh, size_of, welded
 from kerfpath.errors import InputError
 
-__all__ = ["UNITS", "read_stl"]
+__all__ = ["UNITS", "closed", "read_stl", "read_surface"]
 
 UNITS = {"mm": 1e-3, "cm": 1e-2, "m": 1.0, "in": 0.0254}
 """Metres in each unit."""
-SAME = 1e-6
-"""Vertices closer than this share of the body's size are one: single precision tells no more."""
 
 _RECORD = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attribute", "<u2")])
+_UNIT = re.compile(rb"<unit\b[^>]*?\bmeter\s*=\s*[\"']\s*([0-9.eE+-]+)")
 _VERTEX = re.compile(rb"vertex\s+(\S+)\s+(\S+)\s+(\S+)", re.IGNORECASE)
 
 
@@ -36,20 +36,67 @@ def read_stl(path: str | Path, unit: str) -> Mesh:
             f"{path.name}: an STL file does not say its unit; expected one of "
             f"{', '.join(UNITS)}, got {unit!r}"
         )
+    return closed(*_stl(_bytes(path), path.name), UNITS[unit], path.name)
+
+
+def closed(vertices: Array, triangles: Ints, scale: Array | float, name: str) -> Mesh:
+    """Return the solid inside a surface: scaled, and what the file tears apart welded."""
+    points = vertices * scale
+    size = size_of(points, triangles, name)
+    points, triangles = welded(points, triangles, SAME * size)
+    return Mesh(vertices=points, triangles=triangles, name=name)
+
+
+def read_surface(path: Path, name: str) -> tuple[Array, Ints]:
+    """Return vertices (V, 3), in the file's own unit, and triangles (F, 3) of an STL file.
+
+    Of a COLLADA (.dae) file the vertices are in m, its own unit; like the tools that read robot
+    descriptions, this one does not turn it by the axis that it calls up. Wavefront (.obj) too.
+
+    Raises
+    ------
+    InputError
+        Another format, a file that cannot be read or is cut short, a number that is not finite.
+    """
+    if path.suffix.lower() == ".stl":
+        return _stl(_bytes(path), name)
+    if path.suffix.lower() in (".dae", ".obj"):
+        return _loaded(path, name)
+    raise InputError(f"{name}: expected a mesh as .stl, .dae or .obj, got {path.suffix!r}")
+
+
+def _bytes(path: Path) -> bytes:
     try:
-        data = path.read_bytes()
+        return path.read_bytes()
     except OSError as error:
         raise InputError(f"{path}: cannot be read ({error.strerror})") from None
-    corners = _corners(data, path.name) * UNITS[unit]
+
+
+def _stl(data: bytes, name: str) -> tuple[Array, Ints]:
+    corners = _corners(data, name)
     if not len(corners):
-        raise InputError(f"{path.name}: the mesh is empty, it holds no triangle")
+        raise InputError(f"{name}: the mesh is empty, it holds no triangle")
     if not np.isfinite(corners).all():
-        raise InputError(f"{path.name}: a vertex is not a finite number; export the mesh again")
-    size = float(np.ptp(corners.reshape(-1, 3), axis=0).max())
-    vertices, triangles = welded(
-        corners.reshape(-1, 3), np.arange(3 * len(corners)).reshape(-1, 3), SAME * size
-    )
-    return Mesh(vertices=vertices, triangles=triangles, name=path.name)
+        raise InputError(f"{name}: a vertex is not a finite number; export the mesh again")
+    return corners.reshape(-1, 3), np.arange(3 * len(corners)).reshape(-1, 3)
+
+
+def _loaded(path: Path, name: str) -> tuple[Array, Ints]:
+    """Return what the collision library's own reader finds; it ignores the unit of COLLADA."""
+    unit = _UNIT.search(_bytes(path)) if path.suffix.lower() == ".dae" else None
+    try:
+        mesh = coal.MeshLoader().load(
+            str(path), np.full(3, 1.0 if unit is None else unit[1], float)
+        )
+    except ValueError:
+        raise InputError(
+            f"{name}: no mesh that can be read as {path.suffix}; export it again"
+        ) from None
+    found = [[mesh.tri_indices(i)[k] for k in range(3)] for i in range(mesh.num_tris)]
+    vertices, triangles = np.array(mesh.vertices()), np.array(found, np.int64).reshape(-1, 3)
+    if not np.isfinite(vertices).all():
+        raise InputError(f"{name}: a vertex is not a finite number; export the mesh again")
+    return vertices, triangles
 
 
 def _corners(data: bytes, name: str) -> Array:

@@ -4,16 +4,15 @@ from __future__ import annotations
 
 import os
 import sys
-from dataclasses import asdict
 from importlib.resources import as_file, files
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated
 
 import typer
 from rich.markup import escape
 
 from kerfpath import __version__
-from kerfpath.cli._show import busy, errors, out, print_json, progress_bars, table
+from kerfpath.cli._show import busy, errors, out, print_json, progress_bars
 from kerfpath.errors import AuditFailed, KerfpathError, NoFeasiblePath
 
 __all__ = ["app", "main"]
@@ -74,8 +73,10 @@ def demo(to: Out = None, as_json: Json = False) -> None:
 
     Example: kerfpath demo --out my-demo
     """
+    from kerfpath.cli._plan import plan_job
+
     with as_file(files("kerfpath").joinpath("demo")) as folder:
-        _plan(folder / "b_pillar.toml", to or Path("kerfpath-demo"), as_json)
+        plan_job(folder / "b_pillar.toml", to or Path("kerfpath-demo"), as_json=as_json)
 
 
 @app.command()
@@ -91,106 +92,9 @@ def plan(
 
     Example: kerfpath plan door.toml --out door
     """
-    _plan(job, to or Path(f"{job.stem}-plan"), as_json)
+    from kerfpath.cli._plan import plan_job
 
-
-def _plan(job_file: Path, folder: Path, as_json: bool) -> None:
-    from kerfpath.job import read_job, require_folder, run_job, warm_up, write_outcome
-
-    require_folder(folder)
-    job = read_job(job_file)
-    with busy("compiling the kernels, first run only"):
-        warm_up()
-    with progress_bars() as progress:
-        outcome = run_job(job, progress=progress)
-    with busy("writing"):
-        written = write_outcome(outcome, folder)
-    if as_json:
-        print_json(
-            {
-                "passed": outcome.passed,
-                "contours": [_cut_entry(cut) for cut in outcome.cuts],
-                "files": [str(f) for f in written.files],
-                "notes": list(written.notes),
-            }
-        )
-    else:
-        _show_cuts(outcome.cuts)
-        for cut in outcome.cuts:
-            if cut.broken is not None:
-                out.print(f"[bold]{escape(cut.task.name)}[/]: {escape(cut.failure)}")
-            if cut.plan is not None and cut.plan.feed is not None:
-                out.print(f"[bold]{escape(cut.task.name)}[/]: {cut.plan.feed}")
-            for check in cut.checks:
-                if not check.ok:
-                    out.print(f"[bold]{escape(cut.task.name)}[/]: {escape(str(check.issue()))}")
-        for note in written.notes:
-            out.print(f"note: {escape(note)}")
-        for path in written.files:
-            out.print(f"wrote {escape(str(path))}")
-    if written.stale is not None:
-        errors.print(
-            f"kerfpath: {escape(str(written.stale))} is from an earlier run and does not belong "
-            "to this plan; no program was written"
-        )
-    if not outcome.passed:
-        raise typer.Exit(1)
-
-
-def _cut_entry(cut: Any) -> dict[str, Any]:
-    entry: dict[str, Any] = {"name": cut.task.name, "passed": cut.passed}
-    entry |= {"length_m": cut.drawn.length, "nodes": len(cut.nodes), "speed_m_s": cut.task.speed}
-    if cut.plan is None:
-        fastest = None if cut.fastest is None else cut.fastest.speed
-        return entry | {
-            "reason": cut.failure,
-            "last_node_reached": cut.broken.node,
-            "proved": cut.broken.proved,
-            "fastest_speed_m_s": fastest,
-        }
-    criteria = cut.plan.criteria
-    return entry | {
-        "time_s": float(cut.plan.time[-1]),
-        "cost": cut.plan.cost,
-        "grid_cost": cut.plan.proof.grid_cost,
-        "optimal": cut.plan.proof.optimal,
-        "feed": None if cut.plan.feed is None else asdict(cut.plan.feed),
-        "peak_velocity_share": float(criteria.peak_velocity.max()),
-        "peak_acceleration_share": float(criteria.peak_acceleration.max()),
-        "issues": [str(c.issue()) for c in cut.checks if not c.ok],
-    }
-
-
-def _show_cuts(cuts: Any) -> None:
-    rows = []
-    for cut in cuts:
-        row = [
-            escape(cut.task.name),
-            f"{cut.drawn.length * 1000:.1f}",
-            str(len(cut.nodes)),
-            f"{cut.task.speed * 60:g}",
-        ]
-        if cut.plan is None:
-            rows.append([*row, *"-----", "no feasible path"])
-            continue
-        criteria = cut.plan.criteria
-        rows.append(
-            [
-                *row,
-                f"{cut.plan.time[-1]:.2f}",
-                "" if cut.plan.proof.grid_cost is None else f"{cut.plan.proof.grid_cost:.2f}",
-                f"{cut.plan.cost:.2f}",
-                f"{criteria.peak_velocity.max():.0%}",
-                f"{criteria.peak_acceleration.max():.0%}",
-                "passed" if cut.passed else "FAILED",
-            ]
-        )
-    columns = ["contour", "mm", "nodes", "m/min", "s", "grid", "cost", "vel", "acc", "audit"]
-    table(columns, rows, numbers=columns[1:-1])
-    out.print(
-        "cost: what is minimised; grid: the best on the gamma grid, before the refinement; "
-        "vel, acc: highest share of a joint's velocity and acceleration limit"
-    )
+    plan_job(job, to or Path(f"{job.stem}-plan"), as_json=as_json)
 
 
 @app.command()
@@ -273,46 +177,9 @@ def audit(
 
     Example: kerfpath audit door/plan.json --job door.toml
     """
-    from kerfpath.auditor import in_words
-    from kerfpath.job import audit_file
+    from kerfpath.cli._audit import show_audit
 
-    tables, missing = audit_file(plan_file, job)
-    passed = not missing and all(
-        check.ok or check.level == "warning" for checks in tables.values() for check in checks
-    )
-    if as_json:
-        print_json(
-            {
-                "passed": passed,
-                "missing": list(missing),
-                "contours": {
-                    name: [asdict(c) | {"ok": c.ok} for c in checks]
-                    for name, checks in tables.items()
-                },
-            }
-        )
-    else:
-        for name, checks in tables.items():
-            rows = [
-                [
-                    escape(c.title),
-                    in_words(c.value, c.unit),
-                    in_words(c.limit, c.unit),
-                    str(c.node),
-                    "ok" if c.ok else c.level.upper(),
-                ]
-                for c in checks
-            ]
-            table(
-                ["check", "worst", "allowed", "node", ""],
-                rows,
-                title=escape(name),
-                numbers=["worst", "allowed", "node"],
-            )
-        for name in missing:
-            out.print(f"{escape(name)}: no plan")
-        out.print("audit passed" if passed else "audit FAILED")
-    if not passed:
+    if not show_audit(plan_file, job, as_json=as_json):
         raise typer.Exit(1)
 
 
@@ -330,57 +197,9 @@ def contours(
 
     Example: kerfpath contours door.step
     """
-    from kerfpath.cad import read_step
+    from kerfpath.cli._contours import list_contours
 
-    part = read_step(file, unit=unit)
-    size = part.bounding_box[1] - part.bounding_box[0]
-    if as_json:
-        print_json(
-            {
-                "file": str(file),
-                "unit": part.unit,
-                "bounding_box_m": part.bounding_box.tolist(),
-                "faces": part.faces,
-                "loops": [
-                    {
-                        "name": loop.name,
-                        "face": loop.face,
-                        "kind": loop.kind,
-                        "surface": loop.surface,
-                        "length_m": loop.length,
-                        "diameter_m": loop.diameter,
-                        "edges": loop.edges,
-                        "closed": loop.closed,
-                        "largest_gap_m": loop.largest_gap,
-                        "shortest_edge_m": loop.shortest_edge,
-                        "bounding_box_m": loop.bounding_box.tolist(),
-                    }
-                    for loop in part.loops
-                ],
-            }
-        )
-        return
-    out.print(
-        f"{escape(str(file))}: {part.faces} faces, {len(part.loops)} loops, "
-        f"{' x '.join(f'{v * 1000:.1f}' for v in size)} mm (file in {part.unit})"
-    )
-    rows = []
-    for loop in part.loops:
-        middle = loop.bounding_box.mean(axis=0) * 1000
-        rows.append(
-            [
-                escape(loop.name),
-                loop.surface,
-                f"{loop.length * 1000:.2f}",
-                "" if loop.diameter is None else f"{loop.diameter * 1000:.2f}",
-                str(loop.edges),
-                f"{loop.largest_gap * 1000:.4f}",
-                " ".join(f"{v:.1f}" for v in middle),
-                "" if loop.closed else "open",
-            ]
-        )
-    columns = ["loop", "surface", "length mm", "diameter mm", "edges", "gap mm", "middle mm", ""]
-    table(columns, rows, numbers=columns[2:6])
+    list_contours(file, unit, as_json=as_json)
 
 
 @app.command()

@@ -13,9 +13,9 @@ from kerfpath.cad import read_step
 from kerfpath.contour import Contour
 from kerfpath.errors import AuditFailed, InputError
 from kerfpath.job._files import program_of
-from kerfpath.job._model import AuditTable, ProgramTable
 from kerfpath.job._planfile import PlanFile, read_plan_file
 from kerfpath.job._read import ProgramOptions, audit_options, program_options, read_job
+from kerfpath.job._tables import AuditTable, ProgramTable
 from kerfpath.post import language as find_language
 
 __all__ = ["audit_file", "program_from_file"]

@@ -145,8 +145,9 @@ def trajectory_text(plans: Sequence[Plan]) -> str:
                 np.degrees(plan.gamma),
             ]
         )
-        for k, (row, posture) in enumerate(zip(numbers.tolist(), plan.posture, strict=True)):
-            writer.writerow([plan.name, k, "cut", *row, int(posture)])
+        rows = zip(numbers.tolist(), plan.contour.kinds, plan.posture, strict=True)
+        for k, (row, kind, posture) in enumerate(rows):
+            writer.writerow([plan.name, k, kind, *row, int(posture)])
     return out.getvalue()
 
 

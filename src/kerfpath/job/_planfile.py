@@ -14,16 +14,18 @@ import numpy as np
 from kerfpath import __version__
 from kerfpath._arrays import Array
 from kerfpath.auditor import Check
-from kerfpath.contour import Contour
+from kerfpath.comfort import MEASURES, Band, Comfort
+from kerfpath.contour import KINDS, Contour
 from kerfpath.errors import InputError, NoFeasiblePath
 from kerfpath.planner import FastestSpeed
 from kerfpath.plans import Feed, Plan, Proof, Settings
 from kerfpath.robots import Coupling, Robot
+from kerfpath.tilt import Tilt
 from kerfpath.urdf import Chain
 
 __all__ = ["SCHEMA", "PlanFile", "broken_entry", "plan_entry", "plan_text", "read_plan_file"]
 
-SCHEMA = 2
+SCHEMA = 3
 """Version of the layout of plan.json; it grows when a reader of the old one would go wrong."""
 
 _NUMBERS = re.compile(r"\[\s+([-+.\deE,\s]+?)\s+\]")
@@ -106,7 +108,15 @@ def plan_entry(plan: Plan, contour: str, checks: Sequence[Check]) -> dict[str, A
         "eta_a": settings.eta_a,
         "closure": settings.closure,
         "rotation_rad": _finite(settings.rotation),
+        "comfort": _bands(settings.comfort),
         "gamma_step_rad": settings.gamma_step,
+        "tilt": None
+        if settings.tilt is None
+        else {
+            "cone_rad": settings.tilt.cone,
+            "steps": settings.tilt.steps,
+            "cost_per_rad": settings.tilt.cost,
+        },
         "frames": settings.frames,
         "dt": plan.dt,
         "cost": plan.cost,
@@ -119,6 +129,11 @@ def plan_entry(plan: Plan, contour: str, checks: Sequence[Check]) -> dict[str, A
             "range_rad": criteria.range.tolist(),
             "peak_velocity_share": criteria.peak_velocity.tolist(),
             "peak_acceleration_share": criteria.peak_acceleration.tolist(),
+            "nearest": {
+                name: {"least": least if np.isfinite(least) else None, "unit": MEASURES[name].unit}
+                | {"node": node}
+                for name, (least, node) in criteria.nearest.items()
+            },
         },
         "feed": None if plan.feed is None else asdict(plan.feed),
         "counts": dict(plan.counts),
@@ -131,9 +146,12 @@ def plan_entry(plan: Plan, contour: str, checks: Sequence[Check]) -> dict[str, A
             "time_s": plan.time.tolist(),
             "points_m": plan.contour.points.tolist(),
             "axes": plan.contour.axes.tolist(),
+            "kind": list(plan.contour.kinds),
+            "speed_share": plan.contour.speed_share.tolist(),
             "x": None if plan.contour.x is None else plan.contour.x.tolist(),
             "q_rad": plan.q.tolist(),
             "gamma_rad": plan.gamma.tolist(),
+            "lead_lean_rad": plan.tilt.tolist() if plan.tilt.any() else None,
             "posture": plan.posture.tolist(),
             "turn": plan.turn.tolist(),
         },
@@ -207,6 +225,13 @@ def _infinite(rotation: list[float | None] | None) -> Array | None:
     return None if rotation is None else np.array([np.inf if v is None else v for v in rotation])
 
 
+def _bands(comfort: Comfort | None) -> dict[str, Any] | None:
+    """Return the bands that are asked for, margins and widths in rad, m and m^3."""
+    if comfort is None:
+        return None
+    return {name: band for name, band in asdict(comfort).items() if band is not None}
+
+
 def _robot_entry(robot: Robot) -> dict[str, Any]:
     return {
         "id": robot.id,
@@ -266,6 +291,12 @@ def _read_robot(robot: dict[str, Any], limits: dict[str, Any]) -> Robot:
     )
 
 
+def _read_tilt(entry: dict[str, Any] | None) -> Tilt | None:
+    if entry is None:
+        return None
+    return Tilt(cone=entry["cone_rad"], steps=entry["steps"], cost=entry["cost_per_rad"])
+
+
 def _read_plan(entry: dict[str, Any], robot: Robot, tool: Any, placement: Any) -> Plan:
     nodes = entry["nodes"]
     return Plan(
@@ -274,6 +305,8 @@ def _read_plan(entry: dict[str, Any], robot: Robot, tool: Any, placement: Any) -
             nodes["axes"],
             closed=entry["closed"],
             s=nodes["s_m"],
+            kind=np.array([KINDS.index(word) for word in nodes["kind"]]),
+            speed_share=nodes["speed_share"],
             x=nodes["x"],
             name=str(entry["name"]),
         ),
@@ -282,6 +315,7 @@ def _read_plan(entry: dict[str, Any], robot: Robot, tool: Any, placement: Any) -
         T_base_part=placement,
         q=nodes["q_rad"],
         gamma=nodes["gamma_rad"],
+        tilt=nodes["lead_lean_rad"],
         posture=nodes["posture"],
         turn=nodes["turn"],
         time=nodes["time_s"],
@@ -296,6 +330,8 @@ def _read_plan(entry: dict[str, Any], robot: Robot, tool: Any, placement: Any) -
             eta_a=float(entry["eta_a"]),
             closure=entry["closure"],
             rotation=_infinite(entry["rotation_rad"]),
+            comfort=_read_comfort(entry.get("comfort")),
+            tilt=_read_tilt(entry["tilt"]),
         ),
         cost=entry["cost"],
         proof=Proof(
@@ -306,3 +342,7 @@ def _read_plan(entry: dict[str, Any], robot: Robot, tool: Any, placement: Any) -
         counts=dict(entry["counts"]),
         feed=None if entry["feed"] is None else Feed(**entry["feed"]),
     )
+
+
+def _read_comfort(bands: dict[str, Any] | None) -> Comfort | None:
+    return None if bands is None else Comfort(**{k: Band(**band) for k, band in bands.items()})

@@ -18,7 +18,7 @@ from kerfpath.contour import Contour
 from kerfpath.errors import InputError
 from kerfpath.job._keys import FAULT, LARGEST, MOST_NODES, SMALLEST, nearest
 from kerfpath.job._lines import Places
-from kerfpath.job._model import TABLES, AuditTable, ContourTable, JobFile, PlanTable, ProgramTable
+from kerfpath.job._tables import TABLES, AuditTable, ContourTable, JobFile, PlanTable, ProgramTable
 from kerfpath.robots import Robot, postures_named
 
 __all__ = ["ContourTask", "Job", "ProgramOptions", "audit_options", "program_options", "read_job"]
@@ -186,7 +186,7 @@ def read_job(path: str | Path) -> Job:
         part_file=path.parent / file.part.file,
         part_unit=file.part.unit,
         contours=tuple(_task(table) for table in file.contour),
-        plan_options=_plan_options(file.plan, robot.endless),
+        plan_options=_plan_options(file.plan, robot.endless) | {"comfort": file.comfort.resolve()},
         refine_parts=file.plan.refine_parts,
         interruptions=file.plan.interruptions,
         audit_options=audit_options(file.audit),

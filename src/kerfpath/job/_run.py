@@ -160,6 +160,7 @@ def _cut(job: Job, task: ContourTask, drawn: Contour, progress: Progress) -> tup
         gamma_step=options["gamma_step"],
         frames=options["frames"],
         postures=options["postures"],
+        comfort=options["comfort"],
         progress=solved,
     )
     whole = Cut(contour=task.name, task=task, drawn=drawn, nodes=nodes, graph=graph)
@@ -227,7 +228,7 @@ def fastest_speeds(
 ) -> list[tuple[ContourTask, Contour, FastestSpeed | NoFeasiblePath]]:
     """Return, for each contour of a job, its task, its nodes and the fastest constant speed.
 
-    The speeds that the job asks for play no part.
+    The speeds that the job asks for play no part, nor does what comfort costs.
 
     Raises
     ------
@@ -237,6 +238,7 @@ def fastest_speeds(
     part = read_step(job.part_file, unit=job.part_unit)
     options = job.plan_options
     keys = ("gamma_step", "frames", "postures", "eta_v", "eta_a", "refine")
+    comfort = options["comfort"] and options["comfort"].hard
     answers: list[tuple[ContourTask, Contour, FastestSpeed | NoFeasiblePath]] = []
     for i, task in enumerate(job.contours):
         progress("contours", i, len(job.contours))
@@ -247,6 +249,7 @@ def fastest_speeds(
                 job.robot,
                 tool=job.tool,
                 placement=job.placement,
+                comfort=comfort,
                 **{key: options[key] for key in keys},
             )
         except NoFeasiblePath as broken:

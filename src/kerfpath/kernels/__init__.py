@@ -20,7 +20,7 @@ from kerfpath.kernels._jit import is_compiled
 __all__ = ["EQUATIONS", "is_compiled"]
 
 EQUATIONS = {
-    1: "kerfpath.contour:Contour.resample",
+    1: "kerfpath.contour._contour:Contour.resample",
     2: "kerfpath.kernels.frames:location",
     3: "kerfpath.kernels.kinematics:forward",
     4: "kerfpath.kernels.kinematics:inverse",

@@ -5,6 +5,8 @@ from kerfpath.planner._fastest import fastest_speed as fastest_speed
 from kerfpath.planner._fastest import relaxations as relaxations
 from kerfpath.planner._graph import layered_graph as layered_graph
 from kerfpath.planner._graph import node_interval as node_interval
+from kerfpath.planner._map import ClearanceMap as ClearanceMap
+from kerfpath.planner._map import clearance_map as clearance_map
 from kerfpath.planner._pieces import plan_in_pieces as plan_in_pieces
 from kerfpath.planner._plan import FeedKind as FeedKind
 from kerfpath.planner._plan import plan as plan

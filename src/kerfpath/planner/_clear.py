@@ -9,6 +9,7 @@ import numpy as np
 
 from kerfpath._arrays import Array, Ints
 from kerfpath.cell import Cell, Checker
+from kerfpath.comfort import Band
 from kerfpath.errors import InputError
 from kerfpath.graph import LayeredGraph
 from kerfpath.planner._task import Task
@@ -38,7 +39,9 @@ class Finder:
         if cell is None:
             return
         _require_same_cell(task, cell)
-        self._checker = Checker(cell, task.graph.q)
+        asked = task.settings.comfort
+        band = Band() if asked is None or asked.clearance is None else asked.clearance
+        self._checker = Checker(cell, task.graph.q, comfort=band.width, comfort_cost=band.cost)
         self._known = Known(
             task.graph.q,
             task.graph.start,
@@ -94,11 +97,12 @@ def _same(a: Array, b: Array) -> bool:
 def _beside(graph: LayeredGraph) -> Ints:
     """Return the vertices (N, 2) one step of gamma before and after each, -1 where there is none.
 
-    Of the same node, posture and turns; where one collides, its neighbours are likely to.
+    Of the same node, variant, posture and turns; where one collides, its neighbours are likely to.
     """
     m, layer = len(graph.gamma), np.repeat(np.arange(len(graph.start) - 1), np.diff(graph.start))
     _, turn = np.unique(graph.turn, axis=0, return_inverse=True)
-    strand = (layer * (graph.posture.max(initial=0) + 1) + graph.posture) * (turn.max() + 1)
+    strand = layer * len(graph.tilt) + graph.variant
+    strand = (strand * (graph.posture.max(initial=0) + 1) + graph.posture) * (turn.max() + 1)
     strand += turn.ravel()
     key = strand * m + graph.sample
     order = np.argsort(key)

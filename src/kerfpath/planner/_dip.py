@@ -37,6 +37,9 @@ def slowed(task: Task, finder: Finder, *, refine: bool) -> Plan:
     better = refiner.refine(made)
     again = _timed(task, better.plan)
     best = again if again.time[-1] <= made.time[-1] else made
+    comfort = task.settings.comfort
+    if comfort is not None and comfort.broken(task.robot, best.q, task.T_flange_tip):
+        return slowed(task, finder, refine=False)
     if finder.is_clear(best):
         return best
     on_grid = slowed(task, finder, refine=False)
@@ -46,7 +49,13 @@ def slowed(task: Task, finder: Finder, *, refine: bool) -> Plan:
 
 def _least_lost(task: Task, finder: Finder) -> Plan:
     s = task.settings
-    found = finder.best(slowed_path, dt=task.dt, weights=s.weights, metric=s.metric)
+    found = finder.best(
+        slowed_path,
+        dt=task.dt,
+        weights=s.weights,
+        metric=s.metric,
+        vertex_cost=task.vertex_cost,
+    )
     claim = finder.claimed(
         "at constant speed the graph has no path; of all its paths this one loses the least time "
         "step by step"

@@ -10,7 +10,9 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from kerfpath.cell import Cell
+from kerfpath.comfort import Comfort
 from kerfpath.contour import Contour, FrameKind
+from kerfpath.errors import InputError
 from kerfpath.graph import LayeredGraph
 from kerfpath.planner._clear import Finder
 from kerfpath.planner._graph import node_interval, require_even
@@ -19,6 +21,7 @@ from kerfpath.plans import Proof
 from kerfpath.refiner import quicken
 from kerfpath.robots import Robot
 from kerfpath.search import LeastInterval, Relaxations, least_interval, least_relaxations
+from kerfpath.tilt import Tilt
 
 __all__ = ["FastestSpeed", "fastest_speed", "relaxations"]
 
@@ -61,11 +64,13 @@ def fastest_speed(
     placement: ArrayLike,
     gamma_step: float = np.pi / 180,
     frames: FrameKind = "rotation-minimising",
+    tilt: Tilt | None = None,
     postures: Sequence[int] | None = None,
     eta_v: float = 1.0,
     eta_a: float = 1.0,
     refine: bool = False,
     cell: Cell | None = None,
+    comfort: Comfort | None = None,
     graph: LayeredGraph | None = None,
     progress: Callable[[int], None] | None = None,
 ) -> FastestSpeed:
@@ -73,16 +78,19 @@ def fastest_speed(
 
     A second-order minimax problem on the layered graph; arguments as in `plan`. The grid quantises
     the acceleration: `refine` moves gamma off it, from the fastest path, to what is then faster
-    still (the nearest optimum, which is not proved to be the best one), if it is clear there.
+    still (the nearest optimum, which is not proved to be the best one), unless it would not be
+    clear or would break a margin of `comfort`, which may have no costs here.
 
     Raises
     ------
     NoFeasiblePath
         Some node has no admissible pose at all, or no path is clear in the cell.
     InputError
-        Limits that are not known, nodes unevenly spaced, values out of range.
+        Limits that are not known, nodes unevenly spaced, values out of range, costs of comfort.
     """
     require_even(contour, np.diff(contour.s), "m")
+    if comfort is not None and comfort.costs:
+        raise InputError("comfort: what is fastest knows no costs; give margins alone")
     task = task_of(
         replace(contour, time=None),
         robot,
@@ -91,9 +99,11 @@ def fastest_speed(
         speed=1.0,
         gamma_step=gamma_step,
         frames=frames,
+        tilt=tilt,
         postures=postures,
         eta_v=eta_v,
         eta_a=eta_a,
+        comfort=comfort,
         graph=graph,
         progress=progress,
     )
@@ -104,7 +114,8 @@ def fastest_speed(
         return found
     claim = Proof(optimal=False, statement="the fastest path on this graph")
     quick, at = quicken(replace(task, dt=least.dt).plan(least.index, 0.0, claim))
-    if not finder.is_clear(quick):
+    broken = comfort is not None and comfort.broken(robot, quick.q, task.T_flange_tip)
+    if broken or not finder.is_clear(quick):
         return found
     return FastestSpeed(
         speed=contour.length / float(quick.time[-1]),

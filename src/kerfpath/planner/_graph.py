@@ -8,15 +8,24 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from kerfpath._arrays import Array, as_pose, scalar
+from kerfpath.comfort import Comfort
 from kerfpath.contour import Contour, FrameKind
 from kerfpath.errors import InputError, NoFeasiblePath
 from kerfpath.graph import LayeredGraph, build, gamma_grid
 from kerfpath.robots import Robot
+from kerfpath.tilt import Tilt, tilted
 
-__all__ = ["layered_graph", "node_interval", "require_even", "require_no_empty_layer"]
+__all__ = [
+    "layered_graph",
+    "node_interval",
+    "require_even",
+    "require_no_empty_layer",
+    "within_margins",
+]
 
-UNEVEN = 0.01
-"""Largest relative difference of node distances that still counts as evenly spaced."""
+UNEVEN = 0.11
+"""Largest relative difference of node distances that still counts as evenly spaced: a tenth, which
+sampling may leave so that corners and feature ends are nodes, and rounding."""
 
 
 def layered_graph(
@@ -27,23 +36,51 @@ def layered_graph(
     placement: ArrayLike,
     gamma_step: float = np.pi / 180,
     frames: FrameKind = "rotation-minimising",
+    tilt: Tilt | None = None,
     postures: Sequence[int] | None = None,
+    comfort: Comfort | None = None,
     progress: Callable[[int], None] | None = None,
 ) -> LayeredGraph:
     """Return the layered graph that `plan` searches; arguments as there."""
-    H = np.ascontiguousarray(as_pose(placement, "placement") @ contour.frames(frames))
-    return build(
+    H = contour.frames(frames)
+    samples = None if tilt is None else tilt.samples()
+    if samples is not None and samples.any():
+        H = tilted(H[:, None], contour.along[:, None], samples)
+    T_flange_tip = as_pose(tool, "tool")
+    H = np.ascontiguousarray(as_pose(placement, "placement") @ H)
+    graph = build(
         H,
         robot,
-        T_flange_tip=as_pose(tool, "tool"),
+        T_flange_tip=T_flange_tip,
         gamma=gamma_grid(gamma_step),
+        tilt=samples,
         postures=postures,
         progress=progress,
     )
+    return graph if comfort is None else within_margins(graph, robot, comfort, T_flange_tip)
+
+
+def within_margins(
+    graph: LayeredGraph, robot: Robot, comfort: Comfort, tool: Array, *, periodic: bool = False
+) -> LayeredGraph:
+    """Return the graph without the vertices nearer than the hard margins, counted by margin.
+
+    With a `periodic` closure the first layer and the last are the same but for rounding, and are
+    thinned alike.
+    """
+    near = comfort.too_near(robot, graph.q, tool)
+    first, last = slice(0, graph.start[1]), slice(graph.start[-2], graph.start[-1])
+    for here in near.values():
+        if periodic and len(here[first]) == len(here[last]):
+            here[first] |= here[last]
+            here[last] = here[first]
+    return graph.without(near) if near else graph
 
 
 def node_interval(contour: Contour, speed: float | None) -> float:
     """Return the time between neighbouring nodes, s, from the speed (m/s) or the contour's times.
+
+    Where nodes are not quite evenly spaced, the speed is that of the longest step.
 
     Raises
     ------
@@ -61,8 +98,14 @@ def node_interval(contour: Contour, speed: float | None) -> float:
     if speed is None:
         raise InputError(f"speed: contour {contour.name!r} carries no times, give a speed in m/s")
     speed = scalar(speed, "speed", unit="m/s", above=0.0)
-    require_even(contour, np.diff(contour.s), "m")
-    return contour.length / (len(contour) - 1) / speed
+    if (contour.speed_share < 1).any():
+        raise InputError(
+            f"speed: contour {contour.name!r} asks for a share of the speed at some nodes; lay it "
+            f"on with contour.resample(dt=..., speed={speed:g}) and give no speed"
+        )
+    steps = np.diff(contour.s)
+    require_even(contour, steps, "m")
+    return float(steps.max()) / speed
 
 
 def require_even(contour: Contour, steps: Array, unit: str) -> None:

@@ -36,7 +36,7 @@ def plan_in_pieces(
     ----------
     contour, robot, refine, cell, options
         As in `plan`, with method "exact", closure "free" (a closed contour need not return to its
-        first pose) and no rotation limit.
+        first pose), no rotation limit and no tilt. Comfort: a node in two pieces costs in both.
 
     Returns
     -------
@@ -50,8 +50,11 @@ def plan_in_pieces(
         No number of interruptions helps: a node without a pose, or an interval between two nodes
         that no poses can pass.
     InputError
-        As `plan`; another method or closure, a rotation limit.
+        As `plan`; another method or closure, a rotation limit, a tilt.
     """
+    comfort = options.get("comfort")
+    if comfort is not None and comfort.clearance is not None:
+        raise InputError("comfort clearance: has no price in pieces; leave it out")
     task = task_of(contour, robot, **options)
     settings = task.settings
     plain = settings.method == "exact" and settings.closure == "free"
@@ -60,6 +63,8 @@ def plan_in_pieces(
             'plan_in_pieces: needs method "exact", closure "free" and no rotation limit, got '
             f"{settings.method!r}, {settings.closure!r} and {settings.rotation}"
         )
+    if settings.tilt is not None:
+        raise InputError("plan_in_pieces: the tool axis cannot be tilted in pieces; leave out tilt")
     finder = Finder(task, cell)
     try:
         found = finder.best(interrupted_path, **task.aim)

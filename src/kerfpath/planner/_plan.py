@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from kerfpath.cell import Cell
+from kerfpath.comfort import Comfort
 from kerfpath.contour import Contour, FrameKind
 from kerfpath.errors import InputError, NoFeasiblePath
 from kerfpath.graph import LayeredGraph
@@ -19,6 +20,7 @@ from kerfpath.planner._task import Task, task_of
 from kerfpath.plans import Plan, Proof
 from kerfpath.robots import Robot, posture_name
 from kerfpath.search import Closure, Method, Metric, ObjectiveKind, shortest_path
+from kerfpath.tilt import Tilt
 
 __all__ = ["FeedKind", "plan"]
 
@@ -34,6 +36,7 @@ def plan(
     speed: float | None = None,
     gamma_step: float = np.pi / 180,
     frames: FrameKind = "rotation-minimising",
+    tilt: Tilt | None = None,
     postures: Sequence[int] | None = None,
     method: Method = "exact",
     objective: ObjectiveKind = "sum",
@@ -46,6 +49,7 @@ def plan(
     feed: FeedKind = "constant",
     refine: bool = False,
     cell: Cell | None = None,
+    comfort: Comfort | None = None,
     graph: LayeredGraph | None = None,
     progress: Callable[[int], None] | None = None,
 ) -> Plan:
@@ -67,6 +71,8 @@ def plan(
         Step of the free rotation about the beam.
     frames : {"rotation-minimising", "tangent"}
         Task frames that gamma is measured in.
+    tilt : Tilt, optional
+        Tolerance of the tool axis, searched too; default: the nominal axis alone.
     postures : sequence of int, optional
         The postures that may be used; default all. See `kerfpath.robots.postures_named`.
     method, objective, metric, weights, eta_v, eta_a, closure, rotation
@@ -81,6 +87,10 @@ def plan(
     cell : Cell, optional
         The plan is clear in it, at the nodes and on straight joint motions between them: the best
         of all clear ones, though only what the search wants to use is checked. Exact method only.
+    comfort : Comfort, optional
+        Margins that the nodes keep from singularities and limits, and what coming near costs; see
+        `kerfpath.comfort`. Costs are added at every node visited (objective "max": maximised);
+        with closure "periodic" the first node is visited twice.
     graph : LayeredGraph, optional
         The layered graph of this very task, kept from `layered_graph`.
     progress : callable, optional
@@ -100,6 +110,13 @@ def plan(
             'feed: "dip" needs objective "sum", closure "free" and no rotation limit, got '
             f'objective "{objective}", closure "{closure}" and rotation {rotation!r}'
         )
+    clearance = comfort is not None and comfort.clearance is not None
+    if clearance and (cell is None or feed == "dip"):
+        raise InputError(
+            'comfort clearance: needs cell= to be measured in, and feed "constant"'
+        )
+    if comfort is not None and comfort.costs and feed == "dip" and refine:
+        raise InputError('comfort: with feed "dip" costs are known on the grid only; refine=False')
     task = task_of(
         contour,
         robot,
@@ -108,6 +125,7 @@ def plan(
         speed=speed,
         gamma_step=gamma_step,
         frames=frames,
+        tilt=tilt,
         postures=postures,
         method=method,
         objective=objective,
@@ -117,6 +135,7 @@ def plan(
         eta_a=eta_a,
         closure=closure,
         rotation=rotation,
+        comfort=comfort,
         graph=graph,
         progress=progress,
     )

@@ -37,8 +37,8 @@ def refined(task: Task, finder: Finder, made: Plan) -> Plan:
     done = [f for f in found if f.done and f.cost_after <= made.cost]
     clear = [f for f in done if finder.is_clear(f.plan)]
     if not clear:
-        why = "not refined: off the grid it would not be clear" if done else found[0].statement
-        statement = f"{made.proof.statement}; {why}"
+        why = f"not refined: off the grid it would {'not be clear' if done else 'cost more'}"
+        statement = f"{made.proof.statement}; {why if found[0].done else found[0].statement}"
         return replace(made, proof=replace(made.proof, statement=statement))
     best = min(clear, key=lambda f: f.cost_after)
     how = "" if best is found[0] else " by way of the best path without acceleration limits"

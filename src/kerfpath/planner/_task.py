@@ -10,14 +10,21 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from kerfpath._arrays import Array, Ints, as_pose, floats, freeze, scalar
+from kerfpath.comfort import Comfort
 from kerfpath.contour import Contour, FrameKind
 from kerfpath.errors import InputError
 from kerfpath.graph import LayeredGraph
 from kerfpath.kernels.metric import increments
-from kerfpath.planner._graph import layered_graph, node_interval, require_no_empty_layer
+from kerfpath.planner._graph import (
+    layered_graph,
+    node_interval,
+    require_no_empty_layer,
+    within_margins,
+)
 from kerfpath.plans import Plan, Proof, Settings, path_cost
 from kerfpath.robots import Robot
 from kerfpath.search import Closure, Method, Metric, ObjectiveKind, rotation_limits
+from kerfpath.tilt import Tilt
 
 __all__ = ["Options", "Task", "task_of"]
 
@@ -30,6 +37,7 @@ class Options(TypedDict, total=False):
     speed: float | None
     gamma_step: float
     frames: FrameKind
+    tilt: Tilt | None
     postures: Sequence[int] | None
     method: Method
     objective: ObjectiveKind
@@ -37,6 +45,7 @@ class Options(TypedDict, total=False):
     weights: ArrayLike | None
     eta_v: float
     eta_a: float
+    comfort: Comfort | None
     graph: LayeredGraph | None
     progress: Callable[[int], None] | None
 
@@ -55,6 +64,8 @@ class Task:
     settings : Settings
     graph : LayeredGraph
         No layer of it is empty.
+    vertex_cost : (N,), optional
+        What each vertex costs on top of the distances.
     """
 
     contour: Contour
@@ -64,6 +75,7 @@ class Task:
     dt: float
     settings: Settings
     graph: LayeredGraph
+    vertex_cost: Array | None = None
 
     @property
     def limits(self) -> dict[str, Any]:
@@ -83,12 +95,19 @@ class Task:
     def aim(self) -> dict[str, Any]:
         """What the searches are to minimise."""
         s = self.settings
-        return {"dt": self.dt, "weights": s.weights, "metric": s.metric, "objective": s.objective}
+        aim = {"dt": self.dt, "weights": s.weights, "metric": s.metric, "objective": s.objective}
+        return aim if self.vertex_cost is None else aim | {"vertex_cost": self.vertex_cost}
 
     def cost(self, index: Ints) -> float:
-        """Return the objective (14) or (15) of a path through the graph."""
-        s, q = self.settings, self.graph.q[self.graph.start[:-1] + index]
-        return path_cost(increments(q, self.robot.endless), s.weights, s.metric, s.objective)
+        """Return the objective (14) or (15) of a path through the graph, vertex costs included."""
+        s, vertex = self.settings, self.graph.start[:-1] + index
+        return path_cost(
+            increments(self.graph.q[vertex], self.robot.endless),
+            s.weights,
+            s.metric,
+            s.objective,
+            None if self.vertex_cost is None else self.vertex_cost[vertex],
+        )
 
     def plan(self, index: Ints, cost: float, proof: Proof) -> Plan:
         """Return the plan of a path through the graph, at the speed asked for."""
@@ -101,6 +120,7 @@ class Task:
             T_base_part=self.T_base_part,
             q=graph.q[vertex],
             gamma=graph.gamma[graph.sample[vertex]],
+            tilt=graph.tilt[graph.variant[vertex]],
             posture=graph.posture[vertex],
             turn=graph.turn[vertex],
             time=self.dt * np.arange(len(self.contour), dtype=float),
@@ -113,10 +133,12 @@ class Task:
     def part(self, first: int, last: int, name: str) -> Task:
         """Return the task of nodes first to last alone."""
         part = self.contour.part(first, last, self.settings.frames)
+        vertices = slice(self.graph.start[first], self.graph.start[last + 1])
         return replace(
             self,
             contour=replace(part, name=name),
             graph=self.graph.part(first, last),
+            vertex_cost=None if self.vertex_cost is None else self.vertex_cost[vertices],
             settings=replace(self.settings, closure="free"),
         )
 
@@ -130,6 +152,7 @@ def task_of(
     speed: float | None = None,
     gamma_step: float = np.pi / 180,
     frames: FrameKind = "rotation-minimising",
+    tilt: Tilt | None = None,
     postures: Sequence[int] | None = None,
     method: Method = "exact",
     objective: ObjectiveKind = "sum",
@@ -139,6 +162,7 @@ def task_of(
     eta_a: float = 1.0,
     closure: Closure = "free",
     rotation: ArrayLike | None = None,
+    comfort: Comfort | None = None,
     graph: LayeredGraph | None = None,
     progress: Callable[[int], None] | None = None,
 ) -> Task:
@@ -162,6 +186,8 @@ def task_of(
         eta_a=scalar(eta_a, "eta_a", above=0.0),
         closure=closure,
         rotation=None if rotation is None else rotation_limits(rotation, robot.endless),
+        tilt=tilt,
+        comfort=comfort,
     )
     graph = graph or layered_graph(
         contour,
@@ -170,6 +196,7 @@ def task_of(
         placement=T_base_part,
         gamma_step=gamma_step,
         frames=frames,
+        tilt=tilt,
         postures=postures,
         progress=progress,
     )
@@ -177,6 +204,10 @@ def task_of(
         raise InputError(
             f"graph: has {len(graph.start) - 1} layers, but the contour has {len(contour)} nodes"
         )
+    if not np.array_equal(graph.tilt, np.zeros((1, 2)) if tilt is None else tilt.samples()):
+        raise InputError("graph: it was built with another tilt than is planned with")
+    if comfort is not None:
+        graph = within_margins(graph, robot, comfort, T_flange_tip, periodic=closure == "periodic")
     require_no_empty_layer(contour, graph)
     return Task(
         contour=contour,
@@ -186,4 +217,17 @@ def task_of(
         dt=dt,
         settings=settings,
         graph=graph,
+        vertex_cost=_vertex_cost(graph, tilt, comfort, robot, T_flange_tip),
     )
+
+
+def _vertex_cost(
+    graph: LayeredGraph, tilt: Tilt | None, comfort: Comfort | None, robot: Robot, tool: Array
+) -> Array | None:
+    """Return what the vertices cost (N,); None where they cost nothing."""
+    costs = []
+    if tilt is not None and tilt.cost:
+        costs.append(tilt.price(graph.tilt)[graph.variant])
+    if comfort is not None and any(band.cost for band in comfort.bands.values()):
+        costs.append(comfort.price(robot, graph.q, tool))
+    return freeze(np.sum(costs, axis=0)) if costs else None

@@ -16,6 +16,7 @@ from kerfpath.post._program import LinearMove as LinearMove
 from kerfpath.post._program import Program as Program
 from kerfpath.post._program import Section as Section
 from kerfpath.post._program import Step as Step
+from kerfpath.post._program import Wait as Wait
 from kerfpath.post._program import build_program as build_program
 from kerfpath.post._rapid import rapid as rapid
 from kerfpath.post._rapid_reader import ReadProgram as ReadProgram

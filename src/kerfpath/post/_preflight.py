@@ -21,6 +21,7 @@ from kerfpath.post._program import (
     LinearMove,
     Program,
     Section,
+    Wait,
 )
 
 __all__ = ["ProgramIssue", "preflight"]
@@ -31,6 +32,8 @@ LARGEST_ORIENTATION_STEP = np.pi / 2
 """Turn of the tool (rad) between linear targets that every controller interpolates alike."""
 LOWEST_SHARE = 0.01
 """Smallest share of the full speed of a joint move: controllers count it in percent."""
+LONGEST_WAIT = 60.0
+"""s; a longer one is a mistake in its unit."""
 LIMIT_NOISE = 1e-9
 """Excess over a joint limit (rad) that is rounding."""
 
@@ -76,6 +79,7 @@ def preflight(program: Program, language: str = "rapid") -> list[ProgramIssue]:
     issues += _robot(program, rules)
     for section in program.sections:
         issues += _laser(section, rules)
+        issues += _waits(section)
         issues += _motion(program, section, rules)
         issues += _limits(program, section)
     if any(isinstance(step, JointMove) for step in program.steps):
@@ -168,11 +172,32 @@ def _numbers(section: Section, rules: Language) -> Iterator[ProgramIssue]:
             )
 
 
+def _waits(section: Section) -> Iterator[ProgramIssue]:
+    """Check that waits are of a sensible length, and where the robot stands."""
+    stopped = False
+    for number, step in enumerate(section.steps):
+        if isinstance(step, JointMove | LinearMove):
+            stopped = step.zone == 0
+        if not isinstance(step, Wait):
+            continue
+        place = f"{section.name}, step {number}"
+        if not 0 < step.time <= LONGEST_WAIT:
+            yield ProgramIssue(
+                "error",
+                "wait",
+                f"a wait must last more than 0 s and at most {LONGEST_WAIT:g} s, got "
+                f"{step.time:g} s",
+                place,
+            )
+        if not stopped:
+            yield ProgramIssue("error", "wait", "a wait must follow a move that stops", place)
+
+
 def _laser(section: Section, rules: Language) -> Iterator[ProgramIssue]:
     """Check that the laser is only on between its switches, along linear moves, and off after."""
     on, last = False, None
     for number, step in enumerate(section.steps):
-        if isinstance(step, Comment):
+        if isinstance(step, Comment | Wait):
             continue
         place = f"{section.name}, step {number}"
         if isinstance(step, LaserOn | LaserOff):

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 import unicodedata
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -25,6 +25,7 @@ __all__ = [
     "Program",
     "Section",
     "Step",
+    "Wait",
     "build_program",
 ]
 
@@ -108,6 +109,18 @@ class LaserOff:
     lead_time: float
 
 
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Wait:
+    """Stay where the last move stopped, as while the beam pierces.
+
+    Parameters
+    ----------
+    time : float s
+    """
+
+    time: float
+
+
 @dataclass(frozen=True, slots=True)
 class Comment:
     """A remark for the person who reads the program."""
@@ -115,7 +128,7 @@ class Comment:
     text: str
 
 
-Step = JointMove | LinearMove | LaserOn | LaserOff | Comment
+Step = JointMove | LinearMove | LaserOn | LaserOff | Wait | Comment
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -172,6 +185,7 @@ def build_program(
     lead_time: float = 0.02,
     work_object: str = "wPart",
     tool_name: str = "tLaser",
+    pierce_time: float = 0.0,
     approach_speed: float = 0.1,
     air_speed: float = 0.25,
 ) -> Program:
@@ -179,7 +193,8 @@ def build_program(
 
     For each contour: a joint move to a pose backed off the start along the tool axis, a straight
     move to the start with a stop, laser on, straight moves through all nodes with a stop at the
-    last, laser off, and a straight move back along the tool axis.
+    last, laser off, and a straight move back along the tool axis. Along micro joints the laser is
+    off.
 
     Parameters
     ----------
@@ -195,6 +210,8 @@ def build_program(
         What the controller calls them.
     lead_time : float s
         How long before the tip arrives the laser is switched.
+    pierce_time : float s
+        How long to wait at the start, laser on, until the beam is through.
     approach_speed : float m/s
         Speed along the tool axis before and after a contour.
     air_speed : float
@@ -212,6 +229,7 @@ def build_program(
     for plan in plans[1:]:
         _require_same_cell(first, plan)
     retract = scalar(retract, "retract", unit="m", above=0.0)
+    pierce_time = scalar(pierce_time, "pierce_time", unit="s", above=-1e-300)
     title = _identifier(f"cut {first.name}" if name is None else name)
     names = _identifiers(
         (plan.name for plan in plans), taken=(title, tool_name, work_object, laser_output)
@@ -226,9 +244,10 @@ def build_program(
         cut = [
             LinearMove(T_part_tip=T, q=q_k, speed=float(speed_k), zone=float(zone_k))
             for T, q_k, speed_k, zone_k in zip(
-                T_part_tip[1:], q[1:], _cutting_speed(plan), zones, strict=True
+                T_part_tip[1:], q[1:], np.diff(plan.contour.s) / np.diff(plan.time), zones,
+                strict=True,
             )
-        ]
+        ]  # fmt: skip
         steps: tuple[Step, ...] = (
             Comment(
                 f"{plan.name}: {len(q)} nodes, {plan.contour.length * 1e3:.1f} mm, "
@@ -237,7 +256,8 @@ def build_program(
             JointMove(q=q_in, speed=air_speed),
             LinearMove(T_part_tip=T_part_tip[0], q=q[0], speed=approach_speed),
             LaserOn(lead_time=lead_time),
-            *cut,
+            *([Wait(time=pierce_time)] if pierce_time > 0 else []),
+            *_switched(cut, plan.contour.kinds, lead_time),
             LaserOff(lead_time=lead_time),
             LinearMove(T_part_tip=T_out, q=q_out, speed=approach_speed),
         )
@@ -268,23 +288,26 @@ def _require_same_cell(first: Plan, plan: Plan) -> None:
 
 
 def _kinematics(robot: Robot) -> tuple[object, ...]:
-    *lengths, sign, offset = robot.arm()
-    placed = np.concatenate([sign, offset, robot.T_base_foot.ravel(), robot.T_end_flange.ravel()])
-    return robot.id, robot.kinematics, *lengths, *placed.tolist()
+    chain = robot.chain
+    parts = [robot.sign, robot.offset, robot.T_base_foot, robot.T_end_flange]
+    parts += [] if chain is None else [chain.origins, chain.axes, chain.end]
+    numbers = np.concatenate([part.ravel() for part in parts])
+    return robot.id, robot.kinematics, *robot.geometry.values(), *numbers.tolist()
 
 
 def _tip_poses(plan: Plan, q: Array) -> Array:
     """Return tip poses (K, 4, 4) in the part frame: point of the contour, orientation of FK(q)."""
     T = _inverse(plan.T_base_part) @ plan.robot.forward(q) @ plan.T_flange_tip
     off = np.linalg.norm(T[:, :3, 3] - plan.contour.points, axis=1)
-    tilt = np.linalg.norm(np.cross(T[:, :3, 2], plan.contour.axes), axis=1)
-    tilt[(T[:, :3, 2] * plan.contour.axes).sum(axis=1) < 0] = 1.0
-    k = int(np.argmax(np.maximum(off, tilt)))
-    if max(off[k], tilt[k]) > PLAN_AND_CONTOUR:
+    axes = plan.axes @ plan.T_base_part[:3, :3]
+    turned = np.linalg.norm(np.cross(T[:, :3, 2], axes), axis=1)
+    turned[(T[:, :3, 2] * axes).sum(axis=1) < 0] = 1.0
+    k = int(np.argmax(np.maximum(off, turned)))
+    if max(off[k], turned[k]) > PLAN_AND_CONTOUR:
         raise InputError(
             f"contour {plan.name!r}, node {k}: the planned joints put the tool tip "
-            f"{off[k] * 1e3:.4f} mm and {np.degrees(np.arcsin(tilt[k])):.4f} deg off the contour; "
-            "the plan belongs to another contour, tool or placement"
+            f"{off[k] * 1e3:.4f} mm and {np.degrees(np.arcsin(turned[k])):.4f} deg off the "
+            "contour; the plan belongs to another contour, tool or placement"
         )
     # A placement of few printed decimals is not quite a rotation; a quaternion can say only one.
     T[:, :3, :3] = Rotation.from_matrix(T[:, :3, :3]).as_matrix()
@@ -313,15 +336,15 @@ def _backed_off(
     return freeze(T), freeze(q_found[nearest])
 
 
-def _cutting_speed(plan: Plan) -> Array:
-    """Return the speed (K-1,) m/s from node to node."""
-    contour = plan.contour
-    if plan.feed is not None:
-        return np.asarray(np.diff(contour.s) / np.diff(plan.time))
-    if contour.time is None:
-        duration = float(plan.time[-1] - plan.time[0])
-        return np.full(len(contour) - 1, contour.length / duration)
-    return np.asarray(np.diff(contour.s) / np.diff(contour.time))
+def _switched(
+    cut: Sequence[LinearMove], kinds: Sequence[str], lead_time: float
+) -> Iterator[LinearMove | LaserOn | LaserOff]:
+    """Yield the moves of a cut (K-1,), the laser switched where micro joints (K kinds) are."""
+    for k, move in enumerate(cut, 1):
+        yield move
+        ends, begins = (kinds[i] == "micro joint" for i in (k - 1, min(k, len(cut) - 1)))
+        if ends != begins:
+            yield LaserOff(lead_time=lead_time) if begins else LaserOn(lead_time=lead_time)
 
 
 def _inverse(T: Array) -> Array:

@@ -26,6 +26,7 @@ from kerfpath.post._program import (
     Program,
     Section,
     Step,
+    Wait,
 )
 
 __all__ = ["LONGEST_LEAD", "SLOWEST", "TURNING_SPEED", "declared", "is_reserved", "rapid"]
@@ -175,6 +176,8 @@ def _section(
     for (step, laser_on), after in zip(_with_laser(section), following, strict=True):
         if isinstance(step, Comment):
             yield f"! {_plain(step.text)}"
+        elif isinstance(step, Wait):
+            yield f"WaitTime {_number(step.time, 3)};"
         elif isinstance(step, JointMove):
             speed = names.air_speed[_air_speed(step)]
             yield f"MoveAbsJ {next(targets)},{speed},{names.end(step)},{frames}"

@@ -19,6 +19,7 @@ __all__ = [
     "ReadLinearMove",
     "ReadProgram",
     "ReadSection",
+    "ReadWait",
     "read_rapid",
 ]
 
@@ -56,7 +57,15 @@ class ReadLaser:
     line: int
 
 
-ReadStep = ReadJointMove | ReadLinearMove | ReadLaser
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ReadWait:
+    """A wait of `time` (s) where the robot stands, line of the text."""
+
+    time: float
+    line: int
+
+
+ReadStep = ReadJointMove | ReadLinearMove | ReadLaser | ReadWait
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -127,6 +136,7 @@ _LINES = {
         "no_supervision": r"ConfL\\Off;",
         "laser_off": rf"SetDO {_NAME},0;",
         "set_trigger": rf"TriggIO {_NAME},([\d.]+)\\Time\\DOp:={_NAME},([01]);",
+        "wait": r"WaitTime ([\d.]+);",
         "call": rf"{_NAME};",
         "joint_move": rf"MoveAbsJ (\[.*\]),{_NAME},{_NAME},{_FRAMES};",
         "linear_move": rf"MoveL (\[.*\]),{_NAME},{_NAME},{_FRAMES};",
@@ -135,7 +145,7 @@ _LINES = {
 }
 _OUTSIDE = {"tool", "work_object", "speed", "zone", "trigger", "routine", "end_module"}
 _IN_MAIN = {"no_supervision", "laser_off", "set_trigger", "call", "end_routine"}
-_IN_ROUTINE = {"joint_move", "linear_move", "switching_move", "end_routine"}
+_IN_ROUTINE = {"joint_move", "linear_move", "switching_move", "wait", "end_routine"}
 
 
 class _Reader:
@@ -300,6 +310,9 @@ class _Reader:
         if switch is None:
             raise self.fault(f"{trigger} has not been set")
         self.append(ReadLaser(on=switch[0], lead_time=switch[1], line=self.line))
+
+    def wait(self, time: str) -> None:
+        self.append(ReadWait(time=float(self.numbers([float(time)], 1)[0]), line=self.line))
 
     def append(self, step: ReadStep) -> None:
         assert self.routine_name is not None

@@ -43,10 +43,7 @@ class JointCurves:
         spin[:, 0, 0] = spin[:, 1, 1] = np.cos(gamma)
         spin[:, 1, 0] = np.sin(gamma)
         spin[:, 0, 1] = -spin[:, 1, 0]
-        q, reach = self._robot.inverse_all(self._H @ spin @ self._T_tip_flange)
-        node = np.arange(K)
-        found = np.where(reach[node, self._posture, None], q[node, self._posture], np.nan)
-        return np.asarray(found + 2 * np.pi * np.round((near - found) / (2 * np.pi)))
+        return self._robot.follow(self._H @ spin @ self._T_tip_flange, near, self._posture)
 
     def slope(self, gamma: Array, q: Array) -> Array:
         """Return dq/dgamma (K, 6) where the joints are `q`; NaN at the edge of reach."""

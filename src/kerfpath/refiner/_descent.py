@@ -94,6 +94,8 @@ class Descent:
     objective : {"sum", "max"}
     radius : float rad
         Largest change of gamma in the first iteration.
+    node_cost : (K,), optional
+        What each node costs, taken as fixed: what it comes to once gamma has moved is told after.
     cap : float
         Largest distance that is allowed.
     """
@@ -106,6 +108,7 @@ class Descent:
     metric: Metric
     objective: ObjectiveKind
     radius: float
+    node_cost: Array | None = None
     cap: float = np.inf
 
     def stand(self, gamma: Array, near: Array) -> Stand:
@@ -128,7 +131,8 @@ class Descent:
 
     def cost(self, q: Array) -> float:
         """Return the objective (14) or (15) of joints (K, 6), not wrapped."""
-        return path_cost(np.diff(q, axis=0), self.weight, self.metric, self.objective)
+        dq = np.diff(q, axis=0)
+        return path_cost(dq, self.weight, self.metric, self.objective, self.node_cost)
 
     def admitted(self, at: Stand) -> tuple[Stand, int]:
         """Return the first motion found that keeps every limit, and how many programs it took.

@@ -1,4 +1,4 @@
-"""refine(): a plan off the grid, gamma continuous, postures and turns as they are."""
+"""refine(): a plan off the grid, gamma continuous; tilts, postures and turns as they are."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from scipy.interpolate import CubicSpline
 from kerfpath._arrays import Array, scalar
 from kerfpath.contour import Contour
 from kerfpath.errors import InputError
-from kerfpath.plans import Plan, Proof
+from kerfpath.plans import Plan, Proof, path_cost
 from kerfpath.refiner._curves import JointCurves
 from kerfpath.refiner._descent import Descent, Stand
 from kerfpath.refiner._rates import Rates
@@ -104,16 +104,22 @@ def refine(
         if isinstance(divided, str):
             return _unrefined(plan, divided)
         asked = divided
+    comfort = plan.settings.comfort
+    if comfort is not None and comfort.clearance is not None and comfort.clearance.cost:
+        return _unrefined(plan, "what clearance costs is known on the grid only")
     descent, start = _descent(asked)
     begun, before = descent.admitted(start)
     if not begun.admitted:
         return _unrefined(plan, _closest(descent, begun))
     found, programs = descent.best(begun)
     refined = _moved(asked, found)
+    broken = comfort and comfort.broken(plan.robot, refined.q, plan.T_flange_tip)
+    if broken:
+        return _unrefined(plan, f"off the grid it would break the {' and the '.join(broken)}")
     grid_cost = plan.cost if plan.proof.grid_cost is None else plan.proof.grid_cost
     proof = Proof(
-        optimal=plan.proof.optimal and start.admitted and found.cost <= grid_cost,
-        statement=f"{plan.proof.statement}; {_done(plan, asked, start, found)}",
+        optimal=plan.proof.optimal and start.admitted and refined.cost <= grid_cost,
+        statement=f"{plan.proof.statement}; {_done(plan, asked, start, refined.cost)}",
         grid_cost=grid_cost,
     )
     return Refinement(
@@ -162,13 +168,13 @@ def _binding(descent: Descent, fast: Array, sharp: Array) -> tuple[float, Bindin
     return acceleration, Binding(int(joint), int(descent.rates.after[change]), "acceleration")
 
 
-def _done(plan: Plan, asked: Plan, start: Stand, found: Stand) -> str:
+def _done(plan: Plan, asked: Plan, start: Stand, cost: float) -> str:
     """Say what was done, and what it did to the cost."""
     parts = (len(asked.q) - 1) // (len(plan.q) - 1)
     what = "refined off the grid" if parts == 1 else f"held at {parts} parts of every interval"
     if not start.admitted:
         what = f"brought inside limits that it did not keep and {what}"
-    return f"{what}: cost {plan.cost:.6g} to {found.cost:.6g}"
+    return f"{what}: cost {plan.cost:.6g} to {cost:.6g}"
 
 
 def _unrefined(plan: Plan, why: str) -> Refinement:
@@ -185,21 +191,23 @@ def _unrefined(plan: Plan, why: str) -> Refinement:
 def _descent(plan: Plan) -> tuple[Descent, Stand]:
     """Return the task of refining a plan, and where it stands."""
     velocity, acceleration = plan.robot.speed_limits()
-    settings = plan.settings
-    H = np.ascontiguousarray(plan.T_base_part @ plan.contour.frames(settings.frames))
+    settings, comfort = plan.settings, plan.settings.comfort
     descent = Descent(
-        curves=JointCurves(plan.robot, H, plan.T_flange_tip, plan.posture),
+        curves=JointCurves(plan.robot, plan.frames, plan.T_flange_tip, plan.posture),
         rates=Rates(
             tau=np.diff(plan.time),
             velocity=settings.eta_v * velocity,
             acceleration=settings.eta_a * acceleration,
             periodic=settings.closure == "periodic",
         ),
-        limits=plan.robot.joint_limits(),
+        limits=plan.robot.joint_limits()
+        if comfort is None
+        else comfort.narrowed(plan.robot, plan.q),
         rotation=np.full(6, np.inf) if settings.rotation is None else settings.rotation,
         weight=settings.weights,
         metric=settings.metric,
         objective=settings.objective,
+        node_cost=plan.node_cost,
         radius=FIRST_STEPS * settings.gamma_step,
     )
     return descent, descent.stand(plan.gamma, _unwrapped(plan))
@@ -211,18 +219,19 @@ def _unwrapped(plan: Plan) -> Array:
 
 
 def _moved(plan: Plan, found: Stand) -> Plan:
-    """Return the plan with the motion found."""
+    """Return the plan with the motion found, and what that costs at its own nodes."""
     turn = np.ceil((found.q - np.pi) / (2 * np.pi))
     gamma = found.gamma - 2 * np.pi * np.ceil((found.gamma - np.pi) / (2 * np.pi))
     turn[:, plan.robot.endless] = 0
     wrapped = found.q - 2 * np.pi * np.ceil((found.q - np.pi) / (2 * np.pi))
-    return replace(
+    moved = replace(
         plan,
         q=np.where(plan.robot.endless, wrapped, found.q),
         gamma=gamma,
         turn=turn.astype(np.int64),
-        cost=found.cost,
     )
+    s, dq = plan.settings, np.diff(found.q, axis=0)
+    return replace(moved, cost=path_cost(dq, s.weights, s.metric, s.objective, moved.node_cost))
 
 
 def _divided(plan: Plan, nodes: Contour) -> Plan | str:
@@ -250,6 +259,8 @@ def _divided(plan: Plan, nodes: Contour) -> Plan | str:
         return f"the posture changes after node {changes[0]}, an interval that cannot be divided"
     if parts == 1:
         return plan
+    if plan.tilt.any():
+        return "the tilts hold at the plan's own nodes, not between them"
     if plan.feed is not None:
         return "the times of a feed that dips hold at its own nodes, not between them"
     gamma = CubicSpline(coarse, np.unwrap(plan.gamma + twist))(index)
@@ -259,6 +270,7 @@ def _divided(plan: Plan, nodes: Contour) -> Plan | str:
         contour=nodes,
         q=near,
         gamma=gamma,
+        tilt=np.zeros((len(nodes), 2)),
         posture=np.repeat(plan.posture[:1], len(nodes)),
         turn=np.zeros((len(nodes), plan.robot.joints), np.int64),
         time=np.interp(index, coarse, plan.time),

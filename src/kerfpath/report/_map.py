@@ -46,7 +46,7 @@ def feasibility_map(
     Parameters
     ----------
     graph : LayeredGraph
-        Its `reason` is drawn.
+        Its `reason_by_gamma` is drawn.
     plan : Plan, optional
         Its gamma is drawn as a line on the posture in use, broken where the posture changes and
         where gamma passes from 180 to -180 deg.
@@ -82,7 +82,7 @@ def feasibility_map(
             showarrow=False,
         )
         figure.add_heatmap(
-            z=np.ascontiguousarray(graph.reason[:, :, mu].T),
+            z=np.ascontiguousarray(graph.reason_by_gamma[:, :, mu].T),
             x0=0,
             dx=1,
             y0=float(gamma[0]),
@@ -116,20 +116,20 @@ def feasibility_map(
 
 def shown_postures(graph: LayeredGraph) -> list[int]:
     """Return the postures with an admitted candidate; if there is none, those worth a look."""
-    every = range(graph.reason.shape[2])
-    admitted = [mu for mu in every if (graph.reason[:, :, mu] == ADMITTED).any()]
+    every = range(graph.reason.shape[-1])
+    admitted = [mu for mu in every if (graph.reason_by_gamma[:, :, mu] == ADMITTED).any()]
     # Where one reason holds everywhere, a word says as much as a panel.
-    mixed = [mu for mu in every if np.ptp(graph.reason[:, :, mu])]
+    mixed = [mu for mu in every if np.ptp(graph.reason_by_gamma[:, :, mu])]
     return admitted or mixed or list(every)
 
 
 def hidden_postures(graph: LayeredGraph) -> list[str]:
     """Say of each posture without a panel why its candidates were dropped."""
     shown, told = shown_postures(graph), []
-    for mu in range(graph.reason.shape[2]):
+    for mu in range(graph.reason.shape[-1]):
         if mu in shown:
             continue
-        codes = graph.reason[:, :, mu]
+        codes = graph.reason_by_gamma[:, :, mu]
         number = np.bincount(codes.ravel(), minlength=len(graph.reasons))
         order = [int(c) for c in np.argsort(-number, kind="stable") if number[c]]
         if len(order) == 1:
@@ -246,7 +246,7 @@ def _add_legend(
     figure: go.Figure, graph: LayeredGraph, postures: list[int], *, has_plan: bool
 ) -> None:
     colours = reason_colours(graph.reasons)
-    for code in np.unique(graph.reason[:, :, postures]):
+    for code in np.unique(graph.reason_by_gamma[:, :, postures]):
         figure.add_scatter(
             x=[None],
             y=[None],

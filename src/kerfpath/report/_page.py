@@ -160,6 +160,7 @@ def _contour(number: int, section: ContourSection, figures: _Figures) -> str:
             figures.place(_motion.limit_shares(plan), "shares"),
             "<h4>Criteria by joint</h4>",
             _tables.criteria_table(plan),
+            _tables.nearest_table(plan),
             "<h4>Audit</h4>",
             '<p class="caption">An independent re-check of the plan, with its own kinematics.</p>',
             _tables.audit_table(section.checks),

@@ -9,6 +9,7 @@ from html import escape
 import numpy as np
 
 from kerfpath.auditor import Check
+from kerfpath.comfort import MEASURES
 from kerfpath.graph import LayeredGraph
 from kerfpath.plans import Plan
 from kerfpath.report._look import JOINT_COLOURS, reason_colours
@@ -22,6 +23,7 @@ __all__ = [
     "counts_table",
     "criteria_table",
     "facts_list",
+    "nearest_table",
     "number",
     "reason_legend",
     "sign",
@@ -33,6 +35,7 @@ _SIGNS = {PASS: "✓", FAIL: "✗", WARN: "!"}
 _UNITS = {
     "m": (1e3, " mm"),
     "rad": (180.0 / math.pi, "°"),
+    "m^3": (1.0, " m³"),
     "share": (100.0, " %"),
     "count": (1.0, ""),
 }
@@ -116,6 +119,24 @@ def criteria_table(plan: Plan) -> str:
     return _table(heads, rows)
 
 
+def nearest_table(plan: Plan) -> str:
+    """Return how near the nodes come to singularities and limits, and the margins asked for."""
+    heads = (("Nearest to", ""), ("Least", ""), ("At node", ""), ("Margin", ""))
+    bands = {} if plan.settings.comfort is None else plan.settings.comfort.bands
+    rows = []
+    for name, (least, node) in plan.criteria.nearest.items():
+        unit = MEASURES[name].unit
+        margin = bands[name].margin if name in bands else 0.0
+        rows.append(
+            f'<tr><th scope="row">{escape(MEASURES[name].words)}</th>'
+            + _td(_measured(least, unit))
+            + _td(str(node))
+            + _td(_measured(margin, unit) if margin else "&ndash;")
+            + "</tr>"
+        )
+    return _table(heads, rows)
+
+
 def audit_table(checks: Sequence[Check]) -> str:
     """Return the audit: what was checked, the worst value, what is allowed, where, the verdict."""
     if not checks:
@@ -159,7 +180,7 @@ def reason_legend(graph: LayeredGraph, postures: Sequence[int], *, has_plan: boo
     colours = reason_colours(graph.reasons)
     items = [
         f"<li>{_chip(colours[code])}{escape(graph.reasons[code])}</li>"
-        for code in np.unique(graph.reason[:, :, list(postures)])
+        for code in np.unique(graph.reason_by_gamma[:, :, list(postures)])
     ]
     if has_plan:
         items.append('<li><i class="line"></i>chosen gamma</li>')

@@ -1,5 +1,7 @@
 """Robots: their kinematics in closed form, their limits, and the library of known models."""
 
+from kerfpath.robots._chain import chain_of as chain_of
+from kerfpath.robots._chain import model_chain as model_chain
 from kerfpath.robots._coupling import Coupling as Coupling
 from kerfpath.robots._families import FAMILIES as FAMILIES
 from kerfpath.robots._families import Family as Family
@@ -9,4 +11,4 @@ from kerfpath.robots._library import acceleration_ratios as acceleration_ratios
 from kerfpath.robots._library import robot as robot
 from kerfpath.robots._library import robot_ids as robot_ids
 from kerfpath.robots._robot import Robot as Robot
-from kerfpath.robots._robot import Solutions as Solutions
+from kerfpath.robots._solutions import Solutions as Solutions

@@ -40,8 +40,10 @@ def robot_of(
         raise InputError(f"{where}: {error}") from None
     continuous = np.array([joint.kind == "continuous" for joint in description.joints])
     left_out = ", ".join(description.left_out)
+    outside = [f"Links on joints outside the chain are left out: {left_out}."] if left_out else []
     return Robot(
         id=description.name,
+        notes=(*model.pop("notes", ()), *outside),
         **model,
         **_ranges(description, lower, upper, endless),
         velocity=_velocity(description) if velocity is None else np.asarray(velocity),
@@ -50,7 +52,6 @@ def robot_of(
         endless=continuous if endless is None else np.asarray(endless),
         chain=description.chain,
         bodies=description.bodies,
-        notes=(f"Links on joints outside the chain are left out: {left_out}.",) if left_out else (),
         frames={"base": description.base, "tip": description.tip},
         sources={"geometry_limits_velocity": f"URDF {Path(description.path).name}"},
     )

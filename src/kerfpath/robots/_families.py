@@ -12,6 +12,7 @@ import numpy as np
 from kerfpath._arrays import Array
 from kerfpath.errors import InputError
 from kerfpath.kernels import five, kinematics, ur
+from kerfpath.robots import _general
 
 __all__ = ["FAMILIES", "Family", "posture_name", "postures_named"]
 
@@ -22,7 +23,7 @@ EIGHT = tuple(
 MORE = tuple(
     "/".join(words) for words in product(("front", "rear"), ("up", "down"), ("third", "fourth"))
 )
-"""What an offset tool may add to them on a five-axis arm, mu = 8 and on."""
+"""What an offset tool may add to them on a five-axis arm, an offset wrist on any, mu = 8 and on."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -41,12 +42,18 @@ class Family:
     postures : tuple of str
         Name of every posture mu.
     model : callable
-        Makes what the kernels take from the lengths, `sign` and `offset`.
+        Makes what the kernels take from the lengths, `sign` and `offset`; without lengths, from
+        `chain`, the robot's joint frames, in their place.
     forward_all, inverse_all : callable
         (model, q (B, n), out_T (B, 4, 4)) and (model, T (B, 4, 4), out_q (B, P, n), out_reach
         (B, P)), between joints and the model's own base and end frames.
     inverse_nodes : callable, optional
         As `kernels.kinematics.inverse_nodes`, where a family has it in one piece.
+    follow_all : callable, optional
+        (model, T (B, 4, 4), q (B, n)): brings each q onto its pose along its own branch, or makes
+        it NaN. Of a family whose branches are not told apart by their posture alone.
+    poses_at_once : int
+        Poses solved per piece of work: large against the overhead, small against the memory.
     free_rotation : bool
         Whether a tool tip and a tool axis leave the rotation about that axis free. If not, a
         layer has one sample of gamma, and poses ask for the tip and the axis alone.
@@ -61,6 +68,8 @@ class Family:
     forward_all: Callable[..., None]
     inverse_all: Callable[..., None]
     inverse_nodes: Callable[..., None] | None = None
+    follow_all: Callable[..., None] | None = None
+    poses_at_once: int = 100_000
     free_rotation: bool = True
 
 
@@ -104,6 +113,18 @@ FAMILIES = {
             inverse_all=five.inverse_all,
             inverse_nodes=five.inverse_nodes,
             free_rotation=False,
+        ),
+        Family(
+            name="general",
+            words="six-axis arm of any geometry, solved by ssik",
+            joints=6,
+            lengths=(),
+            postures=(*EIGHT, *MORE),
+            model=_general.model,
+            forward_all=_general.forward_all,
+            inverse_all=_general.inverse_all,
+            follow_all=_general.follow_all,
+            poses_at_once=10_000,
         ),
     )
 }

@@ -2,7 +2,8 @@
 
 The joint axes at angle zero say everything: the model is laid into them, its lengths are measured
 between them, and its angles at that pose become the joint offsets. Whether it then is the robot is
-not argued but measured, against the chain of the description at joint angles of all kinds.
+not argued but measured, against the chain of the description at joint angles of all kinds. An arm
+that is of no family with a closed form is "general", and its chain is its model.
 """
 
 from __future__ import annotations
@@ -16,6 +17,7 @@ import numpy as np
 from kerfpath._arrays import Array
 from kerfpath.errors import InputError
 from kerfpath.robots._families import FAMILIES
+from kerfpath.robots._general import require_solver
 from kerfpath.robots._robot import Robot
 from kerfpath.urdf import Chain
 
@@ -27,6 +29,8 @@ NEARLY = 1e-3
 """m, and sine: how far lines may miss each other for a family to be tried at all."""
 NONE = 1e-12
 """Below this a transform is the identity: rounding has left it."""
+ROUNDED = 1e-4
+"""A model no further off than this is meant, and the description's angles have few digits."""
 POSES = 64
 
 
@@ -75,11 +79,13 @@ def model_of(chain: Chain) -> dict[str, Any]:
     Raises
     ------
     InputError
-        The chain is of no family; says of each why, or of the nearest by how much.
+        Not six joints; a closed form that angles of few digits miss; no solver for the others.
     """
     n = len(chain.axes)
     if n != 6:
-        raise InputError(f"expected 6 joints between base and tip, got {n}")
+        redundant = "the arm is redundant, and planning with a free elbow is not offered"
+        why = redundant if n > 6 else "such arms are not recognised from descriptions"
+        raise InputError(f"expected 6 joints between base and tip, got {n}: {why}")
     lines, told = _lines(chain), []
     for name, derive in (("opw", _opw), ("ur", _ur)):
         derived = derive(lines)
@@ -91,17 +97,24 @@ def model_of(chain: Chain) -> dict[str, Any]:
         miss = _miss(chain, model)
         if miss <= EXACT:
             return model
+        told.append(f"not an {words}, which it misses by {miss:.1e} (m and rad)")
+        if miss > ROUNDED:
+            continue
         raise InputError(
             f"nearly an {words}, but {miss:.1e} off (m and rad, allowed {EXACT:g}); if the "
             "description prints right angles with few digits, snap=1e-4 takes them as meant"
         )
-    raise InputError(f"no family that can be solved: {'; '.join(told)}")
+    try:
+        require_solver()
+    except InputError as error:
+        raise InputError(f"{'; '.join(told)}: {error}") from None
+    return {"kinematics": "general", "geometry": {}, "notes": (f"{'; '.join(told)}.".capitalize(),)}
 
 
 def _lines(chain: Chain) -> _Lines:
-    T = chain.frames(np.zeros(6))
-    along = np.einsum("nij,nj->ni", T[:6, :3, :3], chain.axes)
-    place = T[:6, :3, 3]
+    T = chain.frames(np.zeros((1, 6)))[0, 1:]
+    along = np.einsum("nij,nj->ni", T[:, :3, :3], chain.axes)
+    place = T[:, :3, 3]
     sign = -1.0 if along[0, 2] < -NEARLY else 1.0
     z = sign * along[0]
     x = np.eye(3)[0] if abs(z[0]) < 0.9 else -np.eye(3)[2]
@@ -112,7 +125,9 @@ def _lines(chain: Chain) -> _Lines:
     foot[:3, 3] = place[0] - (place[0] @ z) * z
     foot = _tidy(foot)
     R = foot[:3, :3]
-    return _Lines(foot, (place - foot[:3, 3]) @ R, along @ R, np.linalg.inv(foot) @ T[6], sign)
+    return _Lines(
+        foot, (place - foot[:3, 3]) @ R, along @ R, np.linalg.inv(foot) @ T[-1] @ chain.end, sign
+    )
 
 
 def _opw(at: _Lines) -> tuple[dict[str, float], list[float], list[float]] | str:
@@ -227,8 +242,7 @@ def _laid(
 def _miss(chain: Chain, model: dict[str, Any]) -> float:
     """Return the largest entry by which the model's poses differ from the chain's."""
     q = np.random.default_rng(2008).uniform(-np.pi, np.pi, (POSES, 6))
-    want = np.array([chain.frames(row)[-1] for row in q])
-    return float(np.abs(Robot(id="", **model).forward(q) - want).max())
+    return float(np.abs(Robot(id="", **model).forward(q) - chain.forward(q)).max())
 
 
 def _round(value: float) -> float:

@@ -15,34 +15,10 @@ from kerfpath.errors import InputError
 from kerfpath.kernels import turns
 from kerfpath.robots._coupling import Coupling
 from kerfpath.robots._families import FAMILIES, Family
+from kerfpath.robots._solutions import Solutions, admitted, every
 from kerfpath.urdf import Body, Chain, read_urdf
 
-__all__ = ["Robot", "Solutions"]
-
-
-@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class Solutions:
-    """Inverse kinematics of B poses: one row per solution.
-
-    Parameters
-    ----------
-    q : (N, n) rad
-        Joint vectors.
-    pose : (N,) int
-        Which of the B poses each row solves, increasing.
-    posture : (N,) int
-        Posture mu of each row; see `Family.postures`.
-    turn : (N, n) int
-        How many turns of 2 pi each joint is away from (-pi, pi].
-    """
-
-    q: Array
-    pose: Ints
-    posture: Ints
-    turn: Ints
-
-    def __len__(self) -> int:
-        return len(self.q)
+__all__ = ["Robot"]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -55,12 +31,13 @@ class Robot:
     Parameters
     ----------
     id, manufacturer, model : str
-    kinematics : {"opw", "ur", "five"}
+    kinematics : {"opw", "ur", "five", "general"}
         The family, see `kerfpath.robots.FAMILIES`.
     geometry : mapping
         Its lengths, m: a1, a2, b, c1, c2, c3, c4 (Brandstoetter, Angerer and Hofbaur 2014; of a
         five-axis arm c4 is that of the head's flange at q5 = 0, along the forearm), or
-        d1, a2, a3, d4, d5, d6 (Denavit and Hartenberg's, as Universal Robots publishes them).
+        d1, a2, a3, d4, d5, d6 (Denavit and Hartenberg's, as Universal Robots publishes them);
+        of a general arm none, its `chain` says all.
     sign : (n,)
         +1 or -1, and
     offset : (n,) rad
@@ -256,28 +233,7 @@ class Robot:
         poses = np.asarray(T, dtype=float)
         poses = floats(poses[None] if poses.ndim == 2 else poses, "T", (None, 4, 4))
         q, reach = self.inverse_all(poses)
-        q, reach = q[:, None], reach[:, None]  # one node a pose, one sample of gamma
-        if not within_limits:
-            pose, _, posture = np.nonzero(reach)
-            found = q[reach]
-            turn = np.zeros(found.shape, dtype=np.int64)
-            return Solutions(
-                q=freeze(found), pose=freeze(pose), posture=freeze(posture), turn=freeze(turn)
-            )
-        limits = self.joint_limits()
-        count, reason = np.empty(len(poses), np.int64), np.empty(reach.shape, np.uint8)
-        every = np.ones(self.postures, np.bool_)
-        turns.count_admissible(q, reach, every, limits, count, reason)
-        total = int(count.sum())
-        found, turn = np.empty((total, self.joints)), np.empty((total, self.joints), np.int64)
-        sample, posture = np.empty(total, np.int64), np.empty(total, np.int64)
-        turns.fill_admissible(q, reason, limits, found, sample, posture, turn)
-        return Solutions(
-            q=freeze(found),
-            pose=freeze(np.repeat(np.arange(len(poses)), count)),
-            posture=freeze(posture),
-            turn=freeze(turn),
-        )
+        return admitted(q, reach, self.joint_limits()) if within_limits else every(q, reach)
 
     def inverse_all(self, T: Array) -> tuple[Array, Bools]:
         """Return every posture of flange poses T (B, 4, 4), limits ignored, as bare arrays.
@@ -288,12 +244,25 @@ class Robot:
         if not self.family.free_rotation:
             q, reach = self.inverse_nodes(T, np.zeros(1), np.eye(4))
             return q[:, 0], reach[:, 0]
-        if self._placed:
-            T = np.linalg.inv(self.T_base_foot) @ T @ np.linalg.inv(self.T_end_flange)
         q = np.empty((len(T), self.postures, self.joints))
         reach = np.empty(q.shape[:2], dtype=np.bool_)
-        self.family.inverse_all(self.arm(), np.ascontiguousarray(T), q, reach)
+        self.family.inverse_all(self.arm(), self._model_poses(T), q, reach)
         return q, reach
+
+    def follow(self, T: Array, q: Array, posture: Ints) -> Array:
+        """Return the joints (B, n) that bring the flange to T (B, 4, 4) on the branch of each q.
+
+        Each on the turn nearest to its q (B, n), whose postures (B,) are given; NaN where the
+        branch does not reach.
+        """
+        if self.family.follow_all is None:
+            solved, reach = self.inverse_all(T)
+            b = np.arange(len(q))
+            found = np.where(reach[b, posture, None], solved[b, posture], np.nan)
+            return np.asarray(found + 2 * np.pi * np.round((q - found) / (2 * np.pi)))
+        found = np.array(q)
+        self.family.follow_all(self.arm(), self._model_poses(T), found)
+        return found
 
     def inverse_nodes(self, H: Array, gamma: Array, T_flange_tip: Array) -> tuple[Array, Bools]:
         """Return every posture of task frames H (K, 4, 4) turned by each gamma (m,), with tool.
@@ -319,8 +288,16 @@ class Robot:
 
     def arm(self) -> Any:
         """Return the geometry as the family's kernels take it."""
-        lengths = {k: float(self.geometry[k]) for k in self.family.lengths}
-        return self.family.model(**lengths, sign=self.sign, offset=self.offset)
+        given: dict[str, Any] = {k: float(self.geometry[k]) for k in self.family.lengths}
+        if not given:
+            given["chain"] = self.chain
+        return self.family.model(**given, sign=self.sign, offset=self.offset)
+
+    def _model_poses(self, T: Array) -> Array:
+        """Return flange poses (B, 4, 4) as poses of the model's end in its own base."""
+        if self._placed:
+            T = np.linalg.inv(self.T_base_foot) @ T @ np.linalg.inv(self.T_end_flange)
+        return np.ascontiguousarray(T)
 
     @property
     def _placed(self) -> bool:

@@ -7,51 +7,17 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-from scipy.spatial.transform import Rotation
 
-from kerfpath._arrays import Array, floats, freeze
+from kerfpath._arrays import Array, freeze
 from kerfpath.errors import InputError
 from kerfpath.urdf._bodies import Body, bodies_of
+from kerfpath.urdf._chain import Chain
 from kerfpath.urdf._xml import Joint, Tree, read_tree
 
-__all__ = ["Chain", "Description", "read_urdf"]
+__all__ = ["Description", "read_urdf"]
 
 SAME_LINE = 1e-9
 """m, and sine: two neighbouring axes nearer than this turn about the same line."""
-
-
-@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class Chain:
-    """Revolute joints one after the other, as a description states them.
-
-    Parameters
-    ----------
-    origins : (n, 4, 4)
-        Pose of each joint frame at angle zero, in the frame of the joint before it, m.
-    axes : (n, 3)
-        Unit axis of each joint in its own frame.
-    end : (4, 4)
-        Tip in the frame of the last joint, m.
-    """
-
-    origins: Array
-    axes: Array
-    end: Array
-
-    def __post_init__(self) -> None:
-        n = len(self.origins)
-        object.__setattr__(self, "origins", floats(self.origins, "chain origins", (n, 4, 4)))
-        object.__setattr__(self, "axes", floats(self.axes, "chain axes", (n, 3)))
-        object.__setattr__(self, "end", floats(self.end, "chain end", (4, 4)))
-
-    def frames(self, q: Array) -> Array:
-        """Return the joint frames, turned, and the tip in the base, (n+1, 4, 4), at q (n,) rad."""
-        T, found = np.eye(4), []
-        for origin, axis, angle in zip(self.origins, self.axes, q, strict=True):
-            T = T @ origin
-            T[:3, :3] = T[:3, :3] @ Rotation.from_rotvec(angle * axis).as_matrix()
-            found.append(T)
-        return np.array([*found, T @ self.end])
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)

@@ -1,30 +1,29 @@
-"""The contour: the paper's augmented line of points and tool axes, its sampling and its frames."""
+"""The augmented line of section 2.1: points, tool axes, and what each stretch of it is."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from itertools import pairwise
 from typing import Literal
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from kerfpath._arrays import Array, Ints, floats, freeze, positive, scalar
+from kerfpath._arrays import Array, Ints, floats, freeze, integers, positive, scalar
+from kerfpath.contour import _sampling
+from kerfpath.contour._vectors import turned, unit
 from kerfpath.errors import InputError
 from kerfpath.kernels.frames import closing_twist, rotation_minimising_x, tangent_x
 
-__all__ = ["FRAME_KINDS", "Contour", "FrameKind", "join"]
+__all__ = ["FRAME_KINDS", "KINDS", "Contour", "FrameKind"]
 
 FrameKind = Literal["tangent", "rotation-minimising"]
 FRAME_KINDS: tuple[FrameKind, ...] = ("tangent", "rotation-minimising")
 
 REPEATED_POINT = 1e-9
 """Consecutive nodes closer than this (m) are one point: they leave no direction of travel."""
-MOST_NODES = 200_000
-"""Nodes that a tolerance may ask for; a sharp corner asks for its length over the tolerance."""
-ZERO_AXIS = 1e-9
-"""A tool axis shorter than this (any unit) has no direction."""
+
+KINDS = ("cut", "pierce", "lead-in", "micro joint", "overlap", "lead-out", "loop")
+"""What a stretch of a contour is; `Contour.kind` holds places in this tuple."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -46,6 +45,12 @@ class Contour:
         Arc length of each node along the path that was sampled; default: along the polyline.
     time : (K,) s, optional
         Time of each node, where a speed has been laid on the contour.
+    kind : (K,) int, optional
+        What the stretch that begins at each node is, a place in `KINDS`; the last node has that of
+        the stretch before it. "pierce" is a point: the first node, where the beam goes through.
+        Default: "cut" throughout.
+    speed_share : (K,), optional
+        Speed asked for at each node as a share of the contour's, above 0 and at most 1; default 1.
     x : (K, 3), optional
         Direction at each node that gamma counts from, where that is not to follow from the path
         alone (see `frames`), as for a part of a contour.
@@ -63,18 +68,23 @@ class Contour:
     closed: bool = False
     s: Array = None  # type: ignore[assignment]  # filled in by __post_init__
     time: Array | None = None
+    kind: Ints = None  # type: ignore[assignment]  # filled in by __post_init__
+    speed_share: Array = None  # type: ignore[assignment]  # filled in by __post_init__
     x: Array | None = None
     name: str = "contour"
 
     def __post_init__(self) -> None:
         points = floats(self.points, "points", (None, 3))
-        axes = _unit(floats(self.axes, "axes", (len(points), 3)))
-        if self.closed and len(points) and _distance(points[0], points[-1]) > REPEATED_POINT:
+        axes = unit(floats(self.axes, "axes", (len(points), 3)))
+        kind, share = self._labels(len(points))
+        returns = self.closed and len(points) > 0
+        if returns and np.linalg.norm(points[0] - points[-1]) > REPEATED_POINT:
             if self.s is not None or self.time is not None:
                 raise InputError(
                     "points: a closed contour with s or time must repeat its first node at the end"
                 )
             points, axes = np.vstack([points, points[:1]]), np.vstack([axes, axes[:1]])
+            kind, share = np.append(kind, kind[-1]), np.append(share, share[0])
         if len(points) < 2:
             raise InputError(f"points: a contour needs at least 2 nodes, got {len(points)}")
         steps = np.linalg.norm(np.diff(points, axis=0), axis=1)
@@ -91,12 +101,30 @@ class Contour:
         _set = object.__setattr__
         _set(self, "points", freeze(points))
         _set(self, "axes", freeze(axes))
+        _set(self, "kind", freeze(kind))
+        _set(self, "speed_share", freeze(share))
         _set(self, "closed", bool(self.closed))
         _set(self, "s", _increasing(s, "s", len(points)))
         if self.time is not None:
             _set(self, "time", _increasing(self.time, "time", len(points)))
         if self.x is not None:
             _set(self, "x", floats(self.x, "x", (len(points), 3)))
+
+    def _labels(self, count: int) -> tuple[Ints, Array]:
+        """Return kinds and speed shares (K,), defaults filled in."""
+        kind = np.zeros(count, np.int64)
+        if self.kind is not None:
+            kind = integers(self.kind, "kind", (count,))
+            if not ((kind >= 0) & (kind < len(KINDS))).all():
+                raise InputError(f"kind: expected places in KINDS, 0 to {len(KINDS) - 1}")
+            if (kind[1:] == KINDS.index("pierce")).any():
+                raise InputError("kind: only the first node of a contour can be its pierce")
+        share = np.ones(count)
+        if self.speed_share is not None:
+            share = positive(self.speed_share, "speed_share", (count,))
+            if (share > 1).any():
+                raise InputError(f"speed_share: expected at most 1, got {share.max():g}")
+        return kind, share
 
     def __len__(self) -> int:
         return len(self.points)
@@ -112,7 +140,17 @@ class Contour:
         k = np.clip(np.searchsorted(self.s, where, side="right") - 1, 0, len(self) - 2)
         part = ((where - self.s[k]) / (self.s[k + 1] - self.s[k]))[..., None]
         points = self.points[k] + part * (self.points[k + 1] - self.points[k])
-        return points, _turned(self.axes[k], self.axes[k + 1], part)
+        return points, turned(self.axes[k], self.axes[k + 1], part)
+
+    @property
+    def kinds(self) -> tuple[str, ...]:
+        """What the stretch that begins at each node is, in words."""
+        return tuple(KINDS[code] for code in self.kind)
+
+    @property
+    def feature_ends(self) -> Ints:
+        """Nodes that sampling by `spacing` or `dt` keeps: ends, corners, and where a kind ends."""
+        return _sampling.feature_ends(self.points, self._stretch_kind(), self.closed)
 
     def resample(
         self,
@@ -127,12 +165,13 @@ class Contour:
         """Sample the contour anew, uniformly in arc length or in time (Eq. 1).
 
         Give exactly one of `spacing`, `count`, `tolerance` (with or without `axis_tolerance`), or
-        `dt` together with `speed`. The ends are always nodes.
+        `dt` together with `speed`. The ends are always nodes; with `spacing` or `dt` corners and
+        feature ends are, too, and steps may be shorter than the largest by up to a tenth.
 
         Parameters
         ----------
         spacing : float m
-            Largest distance between nodes along the path; the path is divided evenly.
+            Largest distance between nodes along the path; each stretch is divided evenly.
         count : int
             Number of nodes, both ends included.
         tolerance : float m
@@ -140,14 +179,16 @@ class Contour:
         axis_tolerance : float rad
             With it (or alone): the axis, turned evenly along each chord, also stays this close.
         dt : float s
-            Largest time between nodes; the duration is divided evenly.
+            Largest time between nodes; each stretch is divided evenly, and where that leaves its
+            steps shorter than the others, it is run through more slowly.
         speed : float or (K,) m/s
-            Speed along the path, constant or at each node of this contour.
+            Speed along the path, constant or at each node of this contour; times `speed_share`.
 
         Raises
         ------
         InputError
-            No or several ways of sampling given, or a value that is not positive.
+            No or several ways of sampling given, a value that is not positive, or a stretch too
+            short for the step.
         """
         given = {
             "spacing": spacing,
@@ -164,17 +205,17 @@ class Contour:
         if count is not None:
             if not (isinstance(count, int | np.integer) and count >= 2):
                 raise InputError(f"count: expected a whole number of nodes >= 2, got {count!r}")
-            return self._at_nodes(np.linspace(self.s[0], self.s[-1], int(count)))
+            return self.at_nodes(np.linspace(self.s[0], self.s[-1], int(count)))
         if spacing is not None:
-            cells = _cells(self.length, scalar(spacing, "spacing", unit="m", above=0.0))
-            return self._at_nodes(np.linspace(self.s[0], self.s[-1], cells + 1))
+            step = scalar(spacing, "spacing", unit="m", above=0.0)
+            return self.at_nodes(_sampling.evenly(self.s, self.feature_ends, step, "mm", self.name))
         if dt is not None or speed is not None:
             return self._in_time(dt, speed)
         position = np.inf if tolerance is None else scalar(tolerance, "tolerance", above=0.0)
         angle = (
             np.inf if axis_tolerance is None else scalar(axis_tolerance, "axis_tolerance", above=0)
         )
-        return self._at_nodes(self._fewest(position, angle))
+        return self.at_nodes(_sampling.fewest(self, position, angle))
 
     def frames(self, kind: FrameKind = "tangent") -> Array:
         """Return the task frames H_k, (K, 4, 4): x along the path, z along the tool axis.
@@ -193,7 +234,7 @@ class Contour:
         n, x = self.axes, np.empty_like(self.points)
         if self.x is not None:
             x = self.x - (self.x * n).sum(axis=1, keepdims=True) * n
-            x, bad = _unit(x, "x"), -1
+            x, bad = unit(x, "x"), -1
         elif kind == "tangent":
             bad = tangent_x(self.points, n, self.closed, x)
         else:
@@ -212,6 +253,11 @@ class Contour:
         H[:, 3, 3] = 1.0
         return freeze(H)
 
+    @property
+    def along(self) -> Array:
+        """Directions of travel, (K, 3): unit, normal to the tool axes; errors as in `frames`."""
+        return replace(self, x=None).frames("tangent")[:, :3, 0]
+
     def part(self, first: int, last: int, frames: FrameKind) -> Contour:
         """Return the nodes first to last as an open contour, gamma counting from the same frames.
 
@@ -228,6 +274,8 @@ class Contour:
             self.axes[nodes],
             s=self.s[nodes],
             time=None if self.time is None else self.time[nodes],
+            kind=self.kind[nodes],
+            speed_share=self.speed_share[nodes],
             x=self.frames(frames)[nodes, :3, 0],
             name=self.name,
         )
@@ -236,143 +284,41 @@ class Contour:
         """Return the open contour between two arc lengths (m), its own nodes kept on the way."""
         inside = self.s[(self.s > s0 + REPEATED_POINT) & (self.s < s1 - REPEATED_POINT)]
         s = np.concatenate([[s0], inside, [s1]])
-        return replace(self, closed=False, x=None)._at_nodes(s)
+        return replace(self, closed=False, x=None).at_nodes(s)
 
-    def _at_nodes(self, s: Array, time: Array | None = None) -> Contour:
+    def _stretch_kind(self) -> Ints:
+        """Return the kind of each stretch, (K-1,); that of the first is not its pierce."""
+        kind = self.kind[:-1].copy()
+        if self.kind[0] == KINDS.index("pierce"):
+            kind[0] = self.kind[1]
+        return kind
+
+    def at_nodes(self, s: Array, time: Array | None = None) -> Contour:
+        """Return the contour with nodes at arc lengths s (M,) m, increasing, end to end."""
         points, axes = self.at(s)
-        return Contour(points, axes, closed=self.closed, s=s, time=time, name=self.name)
+        # A node that rounding left just before a feature's end still begins what follows it.
+        k = np.searchsorted(self.s, s + REPEATED_POINT, side="right") - 1
+        kind = self._stretch_kind()[np.clip(k, 0, len(self) - 2)]
+        if self.kind[0] == KINDS.index("pierce") and s[0] == self.s[0]:
+            kind[0] = self.kind[0]
+        return Contour(
+            points,
+            axes,
+            closed=self.closed,
+            s=s,
+            time=time,
+            kind=kind,
+            speed_share=np.interp(s, self.s, self.speed_share),
+            name=self.name,
+        )
 
     def _in_time(self, dt: float | None, speed: ArrayLike | None) -> Contour:
         if dt is None or speed is None:
             raise InputError("resample: sampling in time needs both dt= (s) and speed= (m/s)")
         step = scalar(dt, "dt", unit="s", above=0.0)
         v = positive(np.broadcast_to(np.asarray(speed), len(self)), "speed", (len(self),))
-        # With the speed linear in s over a segment, its mean slowness is ln(v1/v0)/(v1-v0).
-        log_ratio = np.log(v[1:] / v[:-1])
-        change = np.diff(v)
-        even = np.abs(log_ratio) < 1e-6
-        slowness = np.where(even, 2.0 / (v[1:] + v[:-1]), log_ratio / np.where(even, 1.0, change))
-        t = np.concatenate([[0.0], np.cumsum(np.diff(self.s) * slowness)])
-        time = np.linspace(0.0, t[-1], _cells(float(t[-1]), step) + 1)
-        k = np.clip(np.searchsorted(t, time, side="right") - 1, 0, len(self) - 2)
-        # Within a segment s(t) solves ds/dt = v: exponential where the speed changes.
-        rate = np.append(change, 0.0)[k] / np.diff(self.s)[k]
-        tau = time - t[k]
-        grown = np.where(
-            np.abs(rate * tau) < 1e-12, tau, np.expm1(rate * tau) / np.where(rate, rate, 1)
-        )
-        s = self.s[k] + v[k] * grown
-        s[0], s[-1] = self.s[0], self.s[-1]
-        return self._at_nodes(s, freeze(time))
-
-    def _fewest(self, tolerance: float, axis_tolerance: float) -> Array:
-        """Return the arc lengths of the fewest evenly spaced nodes that keep both tolerances."""
-        # Cells this short keep both: in one, path and axis move less than is allowed.
-        n0, n1 = self.axes[:-1], self.axes[1:]
-        turn = np.arctan2(np.linalg.norm(np.cross(n0, n1), axis=1), (n0 * n1).sum(1))
-        rate = float((turn / np.diff(self.s)).max())
-        enough = self.length * max(1 / tolerance, rate / axis_tolerance) + 1
-        witness = len(self) // 2
-        for cells in range(1, int(min(enough, MOST_NODES)) + 1):
-            s = np.linspace(self.s[0], self.s[-1], cells + 1)
-            # A node that spoilt the coarser sampling most likely spoils this one: try it first.
-            if self._keeps(s, np.array([witness]), tolerance, axis_tolerance) < 0:
-                bad = self._keeps(s, np.arange(len(self)), tolerance, axis_tolerance)
-                if bad < 0:
-                    return s
-                witness = bad
-        raise InputError(
-            f"tolerance: {tolerance:g} m would need more than {MOST_NODES} nodes; relax it, or "
-            "round the sharp corners of the contour"
-        )
-
-    def _keeps(self, s: Array, nodes: Ints, tolerance: float, axis_tolerance: float) -> int:
-        """Return -1 if chords over `s` stay close at these nodes, or the worst of them."""
-        cell = np.clip(np.searchsorted(s, self.s[nodes], side="right") - 1, 0, len(s) - 2)
-        p0, n0 = self.at(s[cell])
-        p1, n1 = self.at(s[cell + 1])
-        part = ((self.s[nodes] - s[cell]) / (s[cell + 1] - s[cell]))[:, None]
-        chord, there = p1 - p0, self.points[nodes]
-        along = ((there - p0) * chord).sum(1) / np.maximum(
-            (chord * chord).sum(1), REPEATED_POINT**2
-        )
-        off = np.linalg.norm(p0 + np.clip(along, 0, 1)[:, None] * chord - there, axis=1)
-        axis = _turned(n0, n1, part)
-        sine = np.linalg.norm(np.cross(axis, self.axes[nodes]), axis=1)
-        angle = np.arctan2(sine, (axis * self.axes[nodes]).sum(1))
-        excess = np.maximum(off / tolerance, angle / axis_tolerance)
-        worst = int(np.argmax(excess))
-        return -1 if excess[worst] <= 1.0 else int(nodes[worst])
-
-
-def join(
-    contours: Sequence[Contour],
-    *,
-    gap_tolerance: float = 1e-5,
-    spacing: float | None = None,
-    closed: bool = False,
-    name: str | None = None,
-) -> Contour:
-    """Return one contour that runs through `contours` in order, sampled alike if asked.
-
-    Parameters
-    ----------
-    contours : sequence of open Contour
-        Each begins where the one before it ends.
-    gap_tolerance : float m
-        Largest distance bridged between an end and the next start; such ends become one node.
-    spacing : float m, optional
-        Sample the whole evenly at this spacing (the segments' own nodes are not kept).
-    closed : bool
-        The last segment returns to the first.
-
-    Raises
-    ------
-    InputError
-        Nothing to join, a closed contour among several, or a gap over the tolerance (says where).
-    """
-    if not contours:
-        raise InputError("join: expected at least one contour, got none")
-    for c in contours:
-        if c.closed and len(contours) > 1:
-            raise InputError(f"join: contour {c.name!r} is closed, nothing can be joined to it")
-    points, axes = [contours[0].points], [contours[0].axes]
-    for before, after in pairwise(contours):
-        gap = _distance(before.points[-1], after.points[0])
-        if gap > gap_tolerance:
-            raise InputError(
-                f"join: {before.name!r} ends {gap * 1e3:.4f} mm from the start of {after.name!r} "
-                f"(allowed {gap_tolerance * 1e3:g} mm); check order and direction"
-            )
-        points.append(after.points[1:])
-        axes.append(after.axes[1:])
-    whole = np.vstack(points)
-    if closed and _distance(whole[0], whole[-1]) <= gap_tolerance:
-        whole[-1] = whole[0]
-    joined = Contour(whole, np.vstack(axes), closed=closed or contours[0].closed)
-    joined = replace(joined, name=name or "+".join(c.name for c in contours))
-    return joined if spacing is None else joined.resample(spacing=spacing)
-
-
-def _unit(axes: Array, name: str = "axes") -> Array:
-    size = np.abs(axes).max(axis=1, initial=0.0)
-    if (zero := np.flatnonzero(size <= ZERO_AXIS)).size:
-        what = "the tool axis" if name == "axes" else "the direction normal to the tool axis"
-        raise InputError(f"{name}: {what} of node {zero[0]} is zero; it needs a direction")
-    scaled = axes / size[:, None]  # no square overflows
-    return np.asarray(scaled / np.linalg.norm(scaled, axis=1)[:, None])
-
-
-def _turned(n0: Array, n1: Array, part: Array) -> Array:
-    """Turn unit vectors n0 (..., 3) by `part` (..., 1) of the angle towards n1, evenly."""
-    cosine = np.clip((n0 * n1).sum(-1, keepdims=True), -1.0, 1.0)
-    angle = np.arctan2(np.linalg.norm(np.cross(n0, n1), axis=-1, keepdims=True), cosine)
-    small = angle < 1e-7
-    sine = np.where(small, 1.0, np.sin(angle))
-    w0 = np.where(small, 1 - part, np.sin((1 - part) * angle) / sine)
-    w1 = np.where(small, part, np.sin(part * angle) / sine)
-    turned = w0 * n0 + w1 * n1
-    return np.asarray(turned / np.linalg.norm(turned, axis=-1, keepdims=True))
+        s, time = _sampling.in_time(self, v * self.speed_share, step)
+        return self.at_nodes(s, freeze(time))
 
 
 def _increasing(value: ArrayLike, name: str, count: int) -> Array:
@@ -380,12 +326,3 @@ def _increasing(value: ArrayLike, name: str, count: int) -> Array:
     if (bad := np.flatnonzero(np.diff(array) <= 0)).size:
         raise InputError(f"{name}: must increase from node to node, but not after node {bad[0]}")
     return array
-
-
-def _distance(a: Array, b: Array) -> float:
-    return float(np.linalg.norm(a - b))
-
-
-def _cells(length: float, step: float) -> int:
-    """Return into how many equal parts `length` falls so that none is longer than `step`."""
-    return max(1, int(np.ceil(length / step * (1 - 1e-12))))

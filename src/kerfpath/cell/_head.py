@@ -1,0 +1,147 @@
+"""The cutting head: a generic one by its measures, or a mesh."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from kerfpath._arrays import as_pose, scalar
+from kerfpath.cell._bodies import Body
+from kerfpath.cell._mesh import Mesh
+from kerfpath.cell._shapes import Capsule, Shape, frustum
+from kerfpath.errors import InputError
+from kerfpath.urdf import Chain
+
+__all__ = ["CuttingHead", "MeshHead"]
+
+PAST = 1e-5
+"""m: a mesh may reach this far beyond the stand-off point; files round their numbers."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class CuttingHead:
+    """A generic cutting head: a conical nozzle, a round body above it, an arm to the flange.
+
+    Everything lies along the beam, the tip's z axis. The tip is where the beam meets the part; the
+    nozzle ends at the stand-off above it, and must keep `share` of the stand-off to the part.
+
+    Parameters
+    ----------
+    stand_off : float m
+        From the nozzle's end to the part.
+    share : float
+        Of the stand-off, what the nozzle may come down to.
+    nozzle_length : float m
+    nozzle_radii : (2,) m
+        At its end and where it meets the body.
+    body_length, body_radius : float m
+    arm_radius : float m
+    """
+
+    stand_off: float = 1e-3
+    share: float = 0.5
+    nozzle_length: float = 0.06
+    nozzle_radii: tuple[float, float] = (2.5e-3, 16e-3)
+    body_length: float = 0.14
+    body_radius: float = 0.04
+    arm_radius: float = 0.05
+
+    def __post_init__(self) -> None:
+        for name in ("stand_off", "nozzle_length", "body_length", "body_radius", "arm_radius"):
+            scalar(getattr(self, name), f"head {name}", unit="m", above=0.0)
+        _require_share(self.share)
+
+    @property
+    def keeps(self) -> float:
+        """Distance (m) that the nozzle must keep to the part."""
+        return self.share * self.stand_off
+
+    def bodies(self, chain: Chain, T_flange_tip: ArrayLike) -> tuple[Body, ...]:
+        """Return nozzle, head and, from the flange to the head, the arm."""
+        tip = as_pose(T_flange_tip, "T_flange_tip")
+        beam, at = tip[:3, 2], tip[:3, 3]
+        end = at - self.stand_off * beam
+        neck = end - self.nozzle_length * beam
+        top = neck - self.body_length * beam
+        shapes: dict[str, Shape] = {
+            "nozzle": frustum(end, neck, self.nozzle_radii),
+            "head": frustum(neck, top, (self.body_radius, self.body_radius)),
+            "arm": Capsule(start=np.zeros(3), end=top, radius=self.arm_radius),
+        }
+        return tuple(
+            Body(name=name, shape=shape.moved(chain.end), frame=len(chain.axes), kind="head")
+            for name, shape in shapes.items()
+        )
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class MeshHead:
+    """A cutting head as a closed mesh, cut in two across the beam: the nozzle, and all above it.
+
+    The nozzle is what lies within `nozzle_length` of the stand-off point along the beam. It must
+    keep `share` of the stand-off to the part, the rest the near-miss distance.
+
+    Parameters
+    ----------
+    mesh : Mesh
+        In the flange frame.
+    stand_off : float m
+        From the nozzle's end to the part.
+    share : float
+        Of the stand-off, what the nozzle may come down to.
+    nozzle_length : float m
+    """
+
+    mesh: Mesh
+    stand_off: float = 1e-3
+    share: float = 0.5
+    nozzle_length: float = 0.06
+
+    def __post_init__(self) -> None:
+        for name in ("stand_off", "nozzle_length"):
+            scalar(getattr(self, name), f"head {name}", unit="m", above=0.0)
+        _require_share(self.share)
+
+    @property
+    def keeps(self) -> float:
+        """Distance (m) that the nozzle must keep to the part."""
+        return self.share * self.stand_off
+
+    def bodies(self, chain: Chain, T_flange_tip: ArrayLike) -> tuple[Body, ...]:
+        """Return the nozzle and the head above it.
+
+        Raises
+        ------
+        InputError
+            The mesh reaches past the stand-off point, or does not come near it.
+        """
+        tip, mesh = as_pose(T_flange_tip, "T_flange_tip"), self.mesh
+        beam = tip[:3, 2]
+        end = tip[:3, 3] - self.stand_off * beam
+        past = float(((mesh.vertices - end) @ beam).max()) + mesh.deviation
+        if past > PAST:
+            raise InputError(
+                f"head {mesh.name}: reaches {past * 1e3:.3g} mm past the stand-off point, "
+                f"{self.stand_off * 1e3:g} mm before the tip; the mesh must be in the flange "
+                "frame, and the tip where the beam meets the part"
+            )
+        if past < -self.nozzle_length:
+            raise InputError(
+                f"head {mesh.name}: ends {-past * 1e3:.3g} mm before the stand-off point, so that "
+                f"no nozzle lies in the {self.nozzle_length * 1e3:g} mm above it; the mesh must be "
+                "in the flange frame, m"
+            )
+        nozzle, above = mesh.cut(end - self.nozzle_length * beam, beam)
+        shapes = {"nozzle": nozzle, "head": above}
+        return tuple(
+            Body(name=name, shape=shape.moved(chain.end), frame=len(chain.axes), kind="head")
+            for name, shape in shapes.items()
+            if shape is not None
+        )
+
+
+def _require_share(share: float) -> None:
+    if not 0 <= share < 1:
+        raise InputError(f"head share: expected 0 to below 1, got {share:g}")

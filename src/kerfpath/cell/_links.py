@@ -1,0 +1,167 @@
+"""The links of a robot as bodies: those of its description, or capsules along its joint chain."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Callable, Mapping
+
+import numpy as np
+
+from kerfpath._arrays import Array
+from kerfpath.cell._bodies import Body
+from kerfpath.cell._mesh import size_of
+from kerfpath.cell._shapes import Capsule, Hull, Shape, box, frustum
+from kerfpath.cell._stl import closed, read_surface
+from kerfpath.errors import InputError
+from kerfpath.robots import Robot, chain_of, model_chain
+from kerfpath.urdf import Body as Described
+
+__all__ = ["link_bodies", "link_capsules"]
+
+Line = tuple[str, int, tuple[float, ...], tuple[float, ...], float]
+"""Name, frame of the model, start and end in it (m), radius (m)."""
+
+FRACTIONS = (0.10, 0.09, 0.07, 0.055, 0.055, 0.04, 0.04)
+"""Radius of each link's capsule over the length of the arm's two long links: typical of heavy arms,
+drawn rather too thick than too thin."""
+POINT = 1e-9
+"""m: joints nearer than this have no link between them to draw."""
+
+
+def link_bodies(robot: Robot, *, hulls: bool = True) -> tuple[Body, ...]:
+    """Return the links: bodies of the description, and capsules for those that have none there.
+
+    Parameters
+    ----------
+    robot : Robot
+    hulls : bool
+        Take the convex hull of each link's mesh, which holds the link, and mark it approximate.
+        False: the meshes as they are, which must be closed.
+
+    Raises
+    ------
+    InputError
+        A mesh that cannot be read, is empty or too large or small, or is not closed where it must
+        be; an arm without length.
+    """
+    found: list[Body] = []
+    count: Counter[str] = Counter()
+    for described in robot.bodies:
+        count[described.link] += 1
+        number = count[described.link]
+        found.append(
+            Body(
+                name=described.link if number == 1 else f"{described.link} {number}",
+                shape=_shape(described, hulls),
+                frame=described.joint,
+                kind="robot",
+                approximate=described.kind == "mesh" and hulls,
+            )
+        )
+    held = {body.frame for body in found}
+    return (*found, *(body for body in link_capsules(robot) if body.frame not in held))
+
+
+def link_capsules(robot: Robot) -> tuple[Body, ...]:
+    """Return the links as capsules along the joint chain, marked approximate.
+
+    Radii are typical ones over the arm's lengths; for judging a cell in earnest, take the meshes
+    of the robot's description.
+    """
+    chain, zero = chain_of(robot), np.zeros((1, robot.joints))
+    places = np.tile(np.eye(4), (robot.joints + 1, 1, 1))
+    if robot.kinematics in _LINES:
+        lines = _LINES[robot.kinematics](robot.geometry)
+        # Model and description name the same links by frames that are turned, and set, otherwise.
+        model = model_chain(robot).frames(zero)[0]
+        places = np.linalg.inv(chain.frames(zero)[0]) @ model
+        places[0] = robot.T_base_foot
+    else:
+        lines = _along(chain.origins[:, :3, 3], chain.end[:3, 3])
+    if not all(radius > 0 for *_, radius in lines):
+        raise InputError(
+            f"robot {robot.id!r}: its links have no length, so none can be drawn; give links="
+        )
+    return tuple(
+        Body(
+            name=name,
+            shape=Capsule(start=np.array(a), end=np.array(b), radius=radius).moved(places[frame]),
+            frame=frame,
+            kind="robot",
+            approximate=True,
+        )
+        for name, frame, a, b, radius in lines
+    )
+
+
+def _along(steps: Array, end: Array) -> list[Line]:
+    """Return a line from each joint to the next; their places (n, 3) and the flange's (3,), m."""
+    lengths = np.linalg.norm([*steps, end], axis=1)
+    arm = float(np.sort(lengths[1:-1])[-2:].sum())
+    return [
+        (f"link {i}" if i else "base", i, (0.0, 0.0, 0.0), tuple(to), FRACTIONS[min(i, 6)] * arm)
+        for i, (to, length) in enumerate(zip([*steps, end / 2], lengths, strict=True))
+        if i == 0 or length > POINT
+    ]
+
+
+def _opw(g: Mapping[str, float]) -> list[Line]:
+    arm = g["c2"] + g["c3"]
+    base, shoulder, upper, fore, _, wrist, _ = (fraction * arm for fraction in FRACTIONS)
+    here, elbow = (0.0, 0.0, 0.0), (g["a2"], 0.0, 0.0)
+    return [
+        ("base", 0, here, (0.0, 0.0, g["c1"] / 2), base),
+        ("link 1", 1, (0.0, 0.0, g["c1"]), (g["a1"], g["b"], g["c1"]), shoulder),
+        ("link 2", 2, here, (0.0, 0.0, g["c2"]), upper),
+        ("link 3 elbow", 3, here, elbow, fore),
+        ("link 3", 3, elbow, (g["a2"], 0.0, g["c3"]), fore),
+        ("link 5", 5, here, (0.0, 0.0, g["c4"] / 2), wrist),
+    ]
+
+
+def _ur(g: Mapping[str, float]) -> list[Line]:
+    """Return lines beside the Denavit-Hartenberg ones: the links lie next to each other along d4.
+
+    Measured on the maker's meshes of UR3, UR5 and UR10; d4 is about twice a joint's radius.
+    """
+    d, upper, fore = g["d4"], 1.15 * g["d4"], 0.08 * g["d4"]
+    return [
+        ("base", 0, (0.0, 0.0, 0.0), (0.0, 0.0, g["d1"] / 4), 0.55 * d),
+        ("link 1", 1, (0.0, 0.0, g["d1"] - d / 4), (0.0, 0.0, g["d1"] + d / 4), 0.55 * d),
+        ("link 2", 2, (0.0, 0.0, upper), (g["a2"], 0.0, upper), 0.7 * d),
+        ("link 3", 3, (0.0, 0.0, fore), (g["a3"], 0.0, fore), 0.47 * d),
+        ("link 4", 4, (0.0, 0.0, 0.75 * d), (0.0, 0.0, 1.15 * d), 0.35 * d),
+        ("link 5", 5, (0.0, 0.0, g["d5"] - d / 4), (0.0, 0.0, g["d5"] + d / 6), 0.36 * d),
+        ("link 6", 6, (0.0, 0.0, g["d6"] / 2), (0.0, 0.0, g["d6"] - d / 5), 0.27 * d),
+    ]
+
+
+_LINES: dict[str, Callable[[Mapping[str, float]], list[Line]]] = {
+    "opw": _opw,
+    "five": _opw,
+    "ur": _ur,
+}
+
+
+def _shape(body: Described, hulls: bool) -> Shape:
+    """Return a collision body of a description as a solid in the frame of its joint."""
+    if body.kind == "box":
+        return box(body.size, body.pose)
+    if body.kind == "sphere":
+        return Capsule(start=body.pose[:3, 3], end=body.pose[:3, 3], radius=float(body.size[0]))
+    if body.kind == "cylinder":
+        radius, length = body.size.tolist()
+        half = length / 2 * body.pose[:3, 2]
+        return frustum(body.pose[:3, 3] - half, body.pose[:3, 3] + half, (radius, radius))
+    if body.path is None:
+        raise InputError(f"link {body.link!r}: a mesh without its file")
+    name = f"link {body.link!r}, {body.path.name}"
+    vertices, triangles = read_surface(body.path, name)
+    if not hulls:
+        return closed(vertices, triangles, body.size, name).moved(body.pose)
+    vertices = vertices * body.size
+    size_of(vertices, triangles, name)
+    try:
+        return Hull(vertices[np.unique(triangles)]).moved(body.pose)
+    except InputError as error:
+        raise InputError(f"{name}: {error}") from None

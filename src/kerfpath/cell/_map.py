@@ -1,0 +1,226 @@
+"""How clear very many joint vectors are, at as few distances as proofs allow.
+
+One pair of bodies at a time: seen from its first body, the second takes a cloud of poses, one for
+each joint vector. A block of that cloud is measured at its middle, d. No point of the second body
+comes farther than delta from there to another pose of the block, so there the distance is between
+d - delta and d + delta. What this leaves open is halved, twice, along its widest direction, and
+each part is measured alike. Poses that only look the same from the first body, as those of a head
+whose arm stands in another posture, or of a round nozzle that turns about the beam, fall on one
+place of the cloud by themselves. A joint vector at which one pair collides is asked no more.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+
+from kerfpath._arrays import Array, Ints
+from kerfpath.cell._cell import Cell
+from kerfpath.cell._motion import relative
+from kerfpath.cell._scene import ACCURACY
+from kerfpath.cell._shapes import RING, Hull, Shape
+
+__all__ = ["Clearances", "clearances"]
+
+AT_ONCE = 40_000
+"""Joint vectors worked through together: many against the overhead, few against the memory."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Clearances:
+    """Bounds on what joint vectors leave beyond the near-miss distances.
+
+    Parameters
+    ----------
+    lower, upper : (B,) m
+        Of the least distance of any pair beyond what it must keep, leaving pairs out that have a
+        near-miss distance of their own. Where any pair comes too near, `upper` is 0 or less and
+        `lower` minus infinity.
+    pair : (B,) int
+        The pair that `upper` is of, a row of `Cell.pairs`; -1 where it is infinite.
+    """
+
+    lower: Array
+    upper: Array
+    pair: Ints
+
+
+def clearances(
+    cell: Cell,
+    q: Array,
+    *,
+    band: float,
+    resolution: float,
+    progress: Callable[[int], None] | None = None,
+) -> Clearances:
+    """Return how clear each of q (B, n) rad is.
+
+    Neighbours should follow each other in q: it is worked through piece by piece.
+
+    Parameters
+    ----------
+    cell : Cell
+    q : (B, n) rad
+    band : float m
+        Beyond this much clearance, no upper bound is sought.
+    resolution : float m
+        Below it, the bounds of what is clear are to be this close to each other.
+    progress : callable, optional
+        Called with the number of joint vectors done since the last call.
+    """
+    lower, upper = np.full(len(q), np.inf), np.full(len(q), np.inf)
+    pair = np.full(len(q), -1)
+    for first in range(0, len(q), AT_ONCE):
+        piece = slice(first, first + AT_ONCE)
+        _judge(cell, q[piece], band, resolution, (lower[piece], upper[piece], pair[piece]))
+        if progress is not None:
+            progress(len(q[piece]))
+    return Clearances(lower=lower, upper=upper, pair=pair)
+
+
+def _judge(
+    cell: Cell, q: Array, band: float, resolution: float, out: tuple[Array, Array, Ints]
+) -> None:
+    """Find lower, upper and pair (B,) of joint vectors, one pair of bodies after the other."""
+    lower, upper, pair = out
+    frames = cell.frames(q)
+    cheap = cell.scene.cheap(frames) - cell.required
+    for p in cell.scene.order.tolist():
+        own = bool(cell.own[p])
+        aim = np.zeros(len(q)) if own else np.minimum(band, upper)
+        over, above = cheap[:, p], np.full(len(q), np.inf)
+        rows = np.flatnonzero((upper > 0) & ~(over > aim))
+        if rows.size:
+            cloud = _Cloud(cell, p, frames[rows])
+            over[rows], above[rows] = cloud.bounds(aim[rows], resolution)
+        if own:
+            above[above > 0] = np.inf
+        else:
+            np.minimum(lower, over, out=lower)
+        pair[above < upper] = p
+        np.minimum(upper, above, out=upper)
+    lower[upper <= 0] = -np.inf
+
+
+class _Cloud:
+    """The poses of a pair's second body, seen from its first."""
+
+    def __init__(self, cell: Cell, p: int, frames: Array) -> None:
+        one, two = (cell.bodies[i] for i in cell.pairs[p])
+        self._scene, self._p, self._frames = cell.scene, p, frames
+        self._required = float(cell.required[p])
+        T = relative(frames, one.frame, two.frame)
+        self._body = body = _outline(two.shape)
+        self._rows = np.ascontiguousarray(T[:, :3].transpose(1, 2, 0))
+        middle, turned = T[:, :3] @ body.tips.mean(axis=0), T[:, :3, :3] @ body.spread
+        self._place = np.hstack([middle, turned.reshape(len(T), -1)])
+
+    def bounds(self, aim: Array, resolution: float) -> tuple[Array, Array]:
+        """Return bounds (B,) m on the distances beyond the required one.
+
+        They tell on which side of zero it is; and where it is between zero and `aim`, the bounds
+        are `resolution` or less apart.
+        """
+        over, above = np.full(len(aim), -np.inf), np.full(len(aim), np.inf)
+        left, block = np.arange(len(aim)), np.zeros(len(aim), np.int64)
+        while left.size:
+            start = np.flatnonzero(np.diff(block, prepend=-1))
+            count = np.diff(start, append=len(left))
+            middle = left[self._middles(left, block, start)]
+            delta = self._shift(np.repeat(middle, count), left) + ACCURACY
+            # A distance this large clears the whole block up to its aim: a bound on it will do.
+            enough = np.maximum.reduceat(delta, start) + np.maximum.reduceat(aim[left], start)
+            low, high = self._scene.pair_bounds(
+                self._p, self._frames[middle], self._required + enough + ACCURACY
+            )
+            low, high = low - self._required, high - self._required
+            over[left] = np.maximum(over[left], np.repeat(low, count) - delta)
+            above[left] = np.minimum(above[left], np.repeat(high, count) + delta)
+            over[middle], above[middle] = low, np.where(np.isinf(high), high, low)
+            o, a = over[left], above[left]
+            told = (a <= 0) | ((o > 0) & ((o >= aim[left]) | (a - o <= resolution)))
+            told[np.isin(left, middle)] = True
+            left, block = self._halved(*self._halved(left[~told], block[~told]))
+        return over, above
+
+    def _middles(self, left: Ints, block: Ints, start: Ints) -> Ints:
+        """Return which of `left` is next to the middle of each block."""
+        x = self._place[left]
+        count = np.diff(start, append=len(left))
+        mean = np.add.reduceat(x, start) / count[:, None]
+        off = ((x - np.repeat(mean, count, axis=0)) ** 2).sum(axis=1)
+        return np.asarray(np.lexsort((off, block))[start])
+
+    def _halved(self, left: Ints, block: Ints) -> tuple[Ints, Ints]:
+        """Return the same with every block cut in two: across its widest direction, if any."""
+        if not left.size:
+            return left, block
+        x, i = self._place[left], np.arange(len(left))
+        start = np.flatnonzero(np.diff(block, prepend=-1))
+        count = np.diff(start, append=len(left))
+        each = np.repeat(np.arange(len(start)), count)
+        low, high = np.minimum.reduceat(x, start), np.maximum.reduceat(x, start)
+        widest = np.argmax(high - low, axis=1)
+        wide = (high - low).max(axis=1) > ACCURACY
+        cut = ((low + high) / 2)[each, widest[each]]
+        beyond = np.where(wide[each], x[i, widest[each]] > cut, i >= (start + count / 2)[each])
+        block = 2 * each + beyond
+        order = np.argsort(block, kind="stable")
+        return left[order], block[order]
+
+    def _shift(self, one: Ints, two: Ints) -> Array:
+        """Return how far (b,) m any point of the body comes from poses `one` to poses `two`."""
+        D = self._rows[:, :, two] - self._rows[:, :, one]
+        body = self._body
+        far = _length([body.tips @ row for row in D]).max(axis=0)
+        tilt = _length([body.axis @ row[:3] for row in D]) if body.radius else 0.0
+        return np.asarray(far + body.radius * tilt + body.uneven)
+
+
+class _Outline(NamedTuple):
+    """What tells how far a body moves: points that hold it, or a cylinder if it is a round one.
+
+    Parameters
+    ----------
+    tips : (c, 4) m
+        Homogeneous: the body is in their hull, or in that of the two discs about them.
+    axis : (3,)
+        Of a round body: it may turn about it unnoticed, but for what it is uneven.
+    radius, uneven : float m
+        Of the discs, and how much nearer than that to the axis it comes between corners.
+    spread : (3, s) m
+        Vectors that turn with the body, as long as it is wide.
+    """
+
+    tips: Array
+    axis: Array
+    radius: float
+    uneven: float
+    spread: Array
+
+
+def _length(xyz: Sequence[Array]) -> Array:
+    x, y, z = xyz
+    return np.asarray(np.sqrt(x * x + y * y + z * z))
+
+
+def _outline(shape: Shape) -> _Outline:
+    corners = shape.corners
+    if not isinstance(shape, Hull) or shape.axis is None:
+        spread = np.diag(corners.std(axis=0))
+        return _Outline(_homogeneous(corners), np.zeros(3), 0.0, 0.0, spread)
+    foot, top = shape.axis
+    axis = (top - foot) / np.linalg.norm(top - foot)
+    along = (corners - foot) @ axis
+    radius = float(np.linalg.norm(corners - foot - along[:, None] * axis, axis=1).max())
+    tips = foot + np.array([[along.min()], [along.max()]]) * axis
+    uneven = radius * (1 - np.cos(np.pi / RING))
+    spread = axis[:, None] * np.hypot(np.ptp(along) / 2, radius)
+    return _Outline(_homogeneous(tips), axis, radius, uneven + ACCURACY, spread)
+
+
+def _homogeneous(points: Array) -> Array:
+    return np.hstack([points, np.ones((len(points), 1))])

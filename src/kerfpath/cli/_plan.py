@@ -1,0 +1,121 @@
+"""`kerfpath plan`: the run of a job, what came of each contour, and the files it left."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import asdict
+from pathlib import Path
+from typing import Any
+
+import typer
+from rich.markup import escape
+
+from kerfpath.cli._show import busy, errors, out, print_json, progress_bars, table
+from kerfpath.job import Cut, read_job, require_folder, run_job, warm_up, write_outcome
+
+__all__ = ["plan_job"]
+
+
+def plan_job(job_file: Path, folder: Path, *, as_json: bool) -> None:
+    """Plan a job, write its files into a folder and say what came of it.
+
+    Raises
+    ------
+    typer.Exit
+        Code 1: some contour has no plan that passes its audit.
+    """
+    require_folder(folder)
+    job = read_job(job_file)
+    with busy("compiling the kernels, first run only"):
+        warm_up()
+    with progress_bars() as progress:
+        outcome = run_job(job, progress=progress)
+    with busy("writing"):
+        written = write_outcome(outcome, folder)
+    if as_json:
+        print_json(
+            {
+                "passed": outcome.passed,
+                "contours": [_cut_entry(cut) for cut in outcome.cuts],
+                "files": [str(f) for f in written.files],
+                "notes": list(written.notes),
+            }
+        )
+    else:
+        _show_cuts(outcome.cuts)
+        for cut in outcome.cuts:
+            if cut.broken is not None:
+                out.print(f"[bold]{escape(cut.task.name)}[/]: {escape(cut.failure)}")
+            if cut.plan is not None and cut.plan.feed is not None:
+                out.print(f"[bold]{escape(cut.task.name)}[/]: {cut.plan.feed}")
+            for check in cut.checks:
+                if not check.ok:
+                    out.print(f"[bold]{escape(cut.task.name)}[/]: {escape(str(check.issue()))}")
+        for note in written.notes:
+            out.print(f"note: {escape(note)}")
+        for path in written.files:
+            out.print(f"wrote {escape(str(path))}")
+    if written.stale is not None:
+        errors.print(
+            f"kerfpath: {escape(str(written.stale))} is from an earlier run and does not belong "
+            "to this plan; no program was written"
+        )
+    if not outcome.passed:
+        raise typer.Exit(1)
+
+
+def _cut_entry(cut: Cut) -> dict[str, Any]:
+    entry: dict[str, Any] = {"name": cut.task.name, "passed": cut.passed}
+    entry |= {"length_m": cut.drawn.length, "nodes": len(cut.nodes), "speed_m_s": cut.task.speed}
+    if cut.plan is None:
+        assert cut.broken is not None
+        fastest = None if cut.fastest is None else cut.fastest.speed
+        return entry | {
+            "reason": cut.failure,
+            "last_node_reached": cut.broken.node,
+            "proved": cut.broken.proved,
+            "fastest_speed_m_s": fastest,
+        }
+    criteria = cut.plan.criteria
+    return entry | {
+        "time_s": float(cut.plan.time[-1]),
+        "cost": cut.plan.cost,
+        "grid_cost": cut.plan.proof.grid_cost,
+        "optimal": cut.plan.proof.optimal,
+        "feed": None if cut.plan.feed is None else asdict(cut.plan.feed),
+        "peak_velocity_share": float(criteria.peak_velocity.max()),
+        "peak_acceleration_share": float(criteria.peak_acceleration.max()),
+        "issues": [str(c.issue()) for c in cut.checks if not c.ok],
+    }
+
+
+def _show_cuts(cuts: Sequence[Cut]) -> None:
+    rows = []
+    for cut in cuts:
+        row = [
+            escape(cut.task.name),
+            f"{cut.drawn.length * 1000:.1f}",
+            str(len(cut.nodes)),
+            f"{cut.task.speed * 60:g}",
+        ]
+        if cut.plan is None:
+            rows.append([*row, *"-----", "no feasible path"])
+            continue
+        criteria = cut.plan.criteria
+        rows.append(
+            [
+                *row,
+                f"{cut.plan.time[-1]:.2f}",
+                "" if cut.plan.proof.grid_cost is None else f"{cut.plan.proof.grid_cost:.2f}",
+                f"{cut.plan.cost:.2f}",
+                f"{criteria.peak_velocity.max():.0%}",
+                f"{criteria.peak_acceleration.max():.0%}",
+                "passed" if cut.passed else "FAILED",
+            ]
+        )
+    columns = ["contour", "mm", "nodes", "m/min", "s", "grid", "cost", "vel", "acc", "audit"]
+    table(columns, rows, numbers=columns[1:-1])
+    out.print(
+        "cost: what is minimised; grid: the best on the gamma grid, before the refinement; "
+        "vel, acc: highest share of a joint's velocity and acceleration limit"
+    )

@@ -1,0 +1,359 @@
+"""How far a joint vector is from where arms do badly, and what coming near is to cost.
+
+The measures, of an arm whose model angles are sign * q - offset:
+
+==============  ====  ======================================================================
+wrist           rad   angle between axes 4 and 6, away from being in line: 0 where sin q5 is
+elbow           rad   angle between the upper arm (axis 2 to 3) and what lies behind it (axis 3
+                      to the wrist centre or, of a UR arm, to axis 4), away from stretched or
+                      folded: the offset a2 of the forearm is part of it
+shoulder        m     distance of the wrist centre (of a UR arm: of where axes 5 and 6 meet) from
+                      the plane through axis 1 that is parallel to axis 2: sqrt(r^2 - b^2) at the
+                      distance r from axis 1, which a1 and the offset b of the arm are part of
+limits          rad   to the nearest limit of a joint that is not endless, or of a coupling
+manipulability  m^3   Yoshikawa's, sqrt(det J J^T), see `jacobian`
+==============  ====  ======================================================================
+
+The determinant of an ortho-parallel arm with a spherical wrist is, up to its sign, c2 sqrt(a2^2 +
+c3^2) sin(elbow) shoulder sin(wrist), that of a UR arm a2 a3 sin(elbow) shoulder sin(wrist): at
+these three zeros, and only there, such arms lose a direction of motion. Sources: B. Siciliano et
+al., "Robotics: Modelling, Planning and Control" (2009), section 3.3; T. Yoshikawa, "Manipulability
+of robotic mechanisms", IJRR 4(2), 1985. Which singularities a five-axis wrist has depends on the
+tool; its manipulability knows the tool.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, fields
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from kerfpath._arrays import Array, Bools, as_pose, floats, freeze, scalar
+from kerfpath.errors import InputError
+from kerfpath.kernels.turns import JointLimits
+from kerfpath.robots import Robot
+
+__all__ = ["MEASURES", "Band", "Comfort", "Measure", "jacobian", "measure", "measures"]
+
+AT_ONCE = 100_000
+"""Jacobians worked out at a time: large against the overhead, small against the memory."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Measure:
+    """One of the measures: what it says in words, its unit, and the most that it can be."""
+
+    words: str
+    unit: str
+    most: float = np.inf
+
+
+MEASURES: Mapping[str, Measure] = {
+    "wrist": Measure(words="wrist singularity", unit="rad", most=np.pi / 2),
+    "elbow": Measure(words="elbow singularity", unit="rad", most=np.pi / 2),
+    "shoulder": Measure(words="shoulder singularity", unit="m"),
+    "limits": Measure(words="joint limit", unit="rad"),
+    "manipulability": Measure(words="manipulability", unit="m^3"),
+}
+"""What can be measured of a joint vector, by name."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Band:
+    """A hard margin of a measure, and the soft band beyond it.
+
+    Parameters
+    ----------
+    margin : float, unit of the measure
+        What is nearer is not used.
+    width : float, unit of the measure
+        The band reaches from the margin so far.
+    cost : float
+        Of a node at the margin, falling linearly to 0 at the end of the band; in the unit of the
+        objective: with the default weights, a joint at full speed from node to node costs 1.
+
+    Raises
+    ------
+    InputError
+        A negative number, or a cost without a width.
+    """
+
+    margin: float = 0.0
+    width: float = 0.0
+    cost: float = 0.0
+
+    def __post_init__(self) -> None:
+        for name in ("margin", "width", "cost"):
+            value = scalar(getattr(self, name), f"comfort {name}")
+            if value < 0:
+                raise InputError(f"comfort {name}: must not be negative, got {value:g}")
+            object.__setattr__(self, name, value)
+        if self.cost and not self.width:
+            raise InputError("comfort cost: needs a width over which it falls to zero, got none")
+
+    def price(self, value: Array) -> Array:
+        """Return what values (B,) of the measure cost, (B,)."""
+        if not self.cost:
+            return np.zeros(len(value))
+        return np.asarray(self.cost * np.clip(1 - (value - self.margin) / self.width, 0.0, 1.0))
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Comfort:
+    """What a plan is to keep away from, by measure; None: it does not matter.
+
+    Parameters
+    ----------
+    wrist, elbow, limits : Band rad, optional
+    shoulder : Band m, optional
+    manipulability : Band m^3, optional
+    clearance : Band m, optional
+        Of the near-miss distances of a cell, which are the hard margin: it has none of its own.
+
+    Raises
+    ------
+    InputError
+        A margin that no joint vector keeps, a margin of clearance, something else than a Band.
+    """
+
+    wrist: Band | None = None
+    elbow: Band | None = None
+    shoulder: Band | None = None
+    limits: Band | None = None
+    manipulability: Band | None = None
+    clearance: Band | None = None
+
+    def __post_init__(self) -> None:
+        for field in fields(self):
+            band = getattr(self, field.name)
+            if not (band is None or isinstance(band, Band)):
+                raise InputError(f"comfort {field.name}: expected a Band, got {band!r}")
+        for name, band in self.bands.items():
+            if band.margin >= MEASURES[name].most:
+                raise InputError(
+                    f"comfort {name}: the margin must be below {MEASURES[name].most:.4g} "
+                    f"{MEASURES[name].unit}, the most there is, got {band.margin:g}"
+                )
+        if self.clearance is not None and self.clearance.margin:
+            raise InputError(
+                "comfort clearance: its margin is the near-miss distance of the cell; give that "
+                "there, and width and cost here"
+            )
+
+    @property
+    def bands(self) -> dict[str, Band]:
+        """The bands of measures of joint vectors, by name."""
+        return {name: band for name in MEASURES if (band := getattr(self, name)) is not None}
+
+    @property
+    def costs(self) -> bool:
+        """Whether anything of it costs."""
+        return any(b.cost for b in (*self.bands.values(), *filter(None, [self.clearance])))
+
+    @property
+    def hard(self) -> Comfort:
+        """The margins alone, without costs."""
+        return Comfort(**{name: Band(margin=band.margin) for name, band in self.bands.items()})
+
+    def too_near(self, robot: Robot, q: Array, tool: Array) -> dict[str, Bools]:
+        """Say which of joint vectors q (B, n) rad break which hard margin, (B,) by its words.
+
+        Raises
+        ------
+        InputError
+            A measure that the arm does not have.
+        """
+        return {
+            f"{MEASURES[name].words} margin": measure(name, robot, q, tool=tool) < band.margin
+            for name, band in self.bands.items()
+            if band.margin
+        }
+
+    def broken(self, robot: Robot, q: Array, tool: Array) -> tuple[str, ...]:
+        """Return the words of the hard margins that any of joint vectors q (B, n) rad break."""
+        return tuple(w for w, near in self.too_near(robot, q, tool).items() if near.any())
+
+    def narrowed(self, robot: Robot, q: Array) -> JointLimits:
+        """Return the joint limits inside which the margins of limits, wrist and elbow are kept.
+
+        On the sides of the singularities that joint vectors q (B, n) rad are on; where they are on
+        both, and where a joint is endless, nothing is narrowed.
+        """
+        limits = robot.joint_limits()
+        lower, upper, room = limits.lower.copy(), limits.upper.copy(), 0.0
+        if self.limits is not None:
+            room = self.limits.margin
+            lower, upper = lower + room, upper - room
+        for name, (joint, _) in _BENDS.get(robot.kinematics, {}).items():
+            band = self.bands.get(name, Band())
+            bend = _bend(name, robot, q)
+            side = np.floor(bend / np.pi)
+            if band.margin and (side == side[0]).all():
+                ends = np.pi * (side[0] + np.arange(2)) + band.margin * np.array([1.0, -1.0])
+                ends = q[0, joint] + robot.sign[joint] * (ends - bend[0])
+                lower[joint] = max(lower[joint], ends.min())
+                upper[joint] = min(upper[joint], ends.max())
+        return limits._replace(
+            lower=lower,
+            upper=upper,
+            row_lower=limits.row_lower + room,
+            row_upper=limits.row_upper - room,
+        )
+
+    def price(self, robot: Robot, q: Array, tool: Array) -> Array:
+        """Return what joint vectors q (B, n) rad cost, (B,), clearance left out.
+
+        Raises
+        ------
+        InputError
+            A measure that the arm does not have.
+        """
+        total = np.zeros(len(q))
+        for name, band in self.bands.items():
+            if band.cost:
+                total += band.price(measure(name, robot, q, tool=tool))
+        return total
+
+
+def measures(robot: Robot, q: ArrayLike, *, tool: ArrayLike | None = None) -> dict[str, Array]:
+    """Return every measure that the arm has, (B,) by its name, of joint vectors q (B, n) rad.
+
+    Units are those of `MEASURES`; arguments and errors as in `measure`.
+    """
+    return {name: measure(name, robot, q, tool=tool) for name in _measures_of(robot)}
+
+
+def measure(name: str, robot: Robot, q: ArrayLike, *, tool: ArrayLike | None = None) -> Array:
+    """Return one measure (B,) of joint vectors q (B, n) rad.
+
+    Parameters
+    ----------
+    name : str
+        One of `MEASURES`.
+    robot : Robot
+        With joint limits, for "limits".
+    q : (B, n) rad
+    tool : (4, 4), optional
+        T_flange_tip, m; only the manipulability of an arm without free rotation depends on it.
+
+    Raises
+    ------
+    InputError
+        An unknown measure, or one that such an arm does not have; limits that are not known.
+    """
+    q = floats(q, "q", (None, robot.joints), copy=False)
+    if name not in MEASURES:
+        raise InputError(f"comfort: expected one of {', '.join(MEASURES)}, got {name!r}")
+    if name == "limits":
+        return _to_limits(robot, q)
+    if name == "manipulability":
+        return _manipulability(robot, q, tool)
+    if name not in _measures_of(robot):
+        raise InputError(
+            f"comfort {name}: no {MEASURES[name].words} is defined for this kind of arm "
+            f"({robot.family.words}); use {' or '.join(_measures_of(robot))}"
+        )
+    return freeze(_shoulder(robot, q) if name == "shoulder" else _from_line(_bend(name, robot, q)))
+
+
+def jacobian(robot: Robot, q: ArrayLike, *, tool: ArrayLike | None = None) -> Array:
+    """Return the geometric Jacobians (B, 6, n) of the tool tip at joint vectors q (B, n) rad.
+
+    Linear (m/rad) over angular velocity, in the robot base. Every entry of a pose is a sinusoid of
+    each joint's angle, so that half the difference between a quarter turn ahead and one behind is
+    its derivative, exactly and for every family.
+    """
+    q = floats(q, "q", (None, robot.joints), copy=False)
+    T_flange_tip = np.eye(4) if tool is None else as_pose(tool, "tool")
+    turned = robot.forward(q)[:, :3, :3] @ T_flange_tip[:3, :3]
+    J = np.empty((len(q), 6, robot.joints))
+    for i in range(robot.joints):
+        quarter = np.zeros(robot.joints)
+        quarter[i] = np.pi / 2
+        slope = (robot.forward(q + quarter) - robot.forward(q - quarter)) @ T_flange_tip / 2
+        spin = slope[:, :3, :3] @ turned.transpose(0, 2, 1)
+        J[:, :3, i] = slope[:, :3, 3]
+        J[:, 3, i], J[:, 4, i], J[:, 5, i] = spin[:, 2, 1], spin[:, 0, 2], spin[:, 1, 0]
+    return freeze(J)
+
+
+def _measures_of(robot: Robot) -> list[str]:
+    """Return the names of the measures that the arm has."""
+    bends = _BENDS.get(robot.kinematics, {})
+    return [*bends, *(["shoulder"] if bends else []), "limits", "manipulability"]
+
+
+def _manipulability(robot: Robot, q: Array, tool: ArrayLike | None) -> Array:
+    """Return Yoshikawa's measure (B,) m^3.
+
+    Of an arm without free rotation, that of the tool tip and the direction of the tool axis.
+    """
+    found = np.empty(len(q))
+    T_flange_tip = np.eye(4) if tool is None else as_pose(tool, "tool")
+    for first in range(0, len(q), AT_ONCE):
+        part = slice(first, first + AT_ONCE)
+        J = jacobian(robot, q[part], tool=T_flange_tip)
+        if not robot.family.free_rotation:
+            tip = robot.forward(q[part])[:, :3, :3] @ T_flange_tip[:3, :3]
+            J = np.concatenate([J[:, :3], tip.transpose(0, 2, 1)[:, :2] @ J[:, 3:]], axis=1)
+        if J.shape[1] == J.shape[2]:
+            found[part] = np.abs(np.linalg.det(J))
+        else:
+            found[part] = np.sqrt(np.maximum(np.linalg.det(J @ J.transpose(0, 2, 1)), 0.0))
+    return freeze(found)
+
+
+def _to_limits(robot: Robot, q: Array) -> Array:
+    """Return how far the nearest limit is, (B,) rad, negative beyond it; infinite without any."""
+    limits = robot.joint_limits()
+    bound = ~limits.endless
+    combined = q @ limits.rows.T
+    room = [
+        (q - limits.lower)[:, bound],
+        (limits.upper - q)[:, bound],
+        combined - limits.row_lower,
+        limits.row_upper - combined,
+    ]
+    return freeze(np.concatenate(room, axis=1).min(axis=1, initial=np.inf))
+
+
+def _from_line(angle: Array) -> Array:
+    """Return how far angles are from the nearest multiple of pi, from 0 to pi / 2."""
+    return np.asarray(np.abs(angle - np.pi * np.round(angle / np.pi)))
+
+
+def _bend(name: str, robot: Robot, q: Array) -> Array:
+    """Return the angle (B,) whose multiples of pi are the wrist's or the elbow's singularities."""
+    joint, offset = _BENDS[robot.kinematics][name]
+    angle = robot.sign[joint] * q[:, joint] - robot.offset[joint]
+    return np.asarray(angle + offset(robot.geometry))
+
+
+def _shoulder(robot: Robot, q: Array) -> Array:
+    """Return the distance (B,) m of the wrist from the plane of axis 1 along axis 2."""
+    g, angle = robot.geometry, robot.sign * q - robot.offset
+    q2, q23 = angle[:, 1], angle[:, 1] + angle[:, 2]
+    if robot.kinematics == "ur":
+        along = g["a2"] * np.cos(q2) + g["a3"] * np.cos(q23) + g["d5"] * np.sin(q23 + angle[:, 3])
+    else:
+        along = g["a1"] + g["c2"] * np.sin(q2) + g["c3"] * np.sin(q23) + g["a2"] * np.cos(q23)
+    return np.asarray(np.abs(along))
+
+
+def _straight(g: Mapping[str, float]) -> float:
+    return 0.0
+
+
+def _forearm(g: Mapping[str, float]) -> float:
+    """Return the angle (rad) at which the wrist centre lies off the forearm's axis."""
+    return float(np.arctan2(g["a2"], g["c3"]))
+
+
+_BENDS: Mapping[str, Mapping[str, tuple[int, Callable[[Mapping[str, float]], float]]]] = {
+    "opw": {"wrist": (4, _straight), "elbow": (2, _forearm)},
+    "ur": {"wrist": (4, _straight), "elbow": (2, _straight)},
+    "five": {"elbow": (2, _forearm)},
+}
+"""By family and measure: the joint that bends, and what its angle is off by, from the lengths."""

@@ -1,0 +1,152 @@
+"""Where the nodes of a sampling lie: evenly between features, evenly in time, or fewest."""
+
+from __future__ import annotations
+
+from itertools import pairwise
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from kerfpath._arrays import Array, Ints
+from kerfpath.contour._vectors import angle_between, turned, unit
+from kerfpath.errors import InputError
+
+if TYPE_CHECKING:
+    from kerfpath.contour._contour import Contour
+
+__all__ = ["evenly", "feature_ends", "fewest", "in_time"]
+
+CORNER = np.radians(20)
+"""Turn of the path at one node from which on it is a corner, which sampling keeps."""
+EVEN = 0.9
+"""Least share of the largest step that the steps between two features have."""
+MOST_OFTEN = 8.0
+"""How much shorter than asked for steps may become for the sake of a short stretch."""
+MOST_NODES = 200_000
+"""Nodes that a tolerance may ask for; a sharp corner asks for its length over the tolerance."""
+REPEATED_POINT = 1e-9
+"""m; keeps a chord of no length from dividing by zero."""
+
+
+def feature_ends(points: Array, kind: Ints, closed: bool) -> Ints:
+    """Return the nodes that end a feature: both ends, corners, and where the kind changes.
+
+    Parameters
+    ----------
+    points : (K, 3) m
+    kind : (K-1,) int
+        What each stretch is.
+    closed : bool
+        The ends are one node then; it is kept as every end is.
+    """
+    along = unit(np.diff(points, axis=0), "points")
+    inner = (angle_between(along[:-1], along[1:]) > CORNER) | (kind[1:] != kind[:-1])
+    return np.concatenate([[0], np.flatnonzero(inner) + 1, [len(points) - 1]])
+
+
+def evenly(at: Array, ends: Ints, step: float, unit_name: str, name: str) -> Array:
+    """Return values that divide the stretches between at[ends] evenly, none longer than `step`.
+
+    Parameters
+    ----------
+    at : (K,) m or s
+        Arc length or time of the nodes.
+    ends : (e,) int
+        Nodes that are kept.
+    step : float m or s
+        A smaller one is taken where that makes the steps of all stretches alike within `EVEN`.
+    unit_name, name : str
+        For messages: mm or ms, and the contour's name.
+
+    Raises
+    ------
+    InputError
+        A stretch so short that far more nodes than asked for would be needed.
+    """
+    lengths = np.diff(at[ends])
+    if len(lengths) == 1:
+        return np.linspace(at[0], at[-1], int(_cells(lengths, step)[0]) + 1)
+    steps = step * np.geomspace(1.0, 1.0 / MOST_OFTEN, 400)
+    cells = _cells(lengths, steps[:, None])
+    share = (lengths / cells / steps[:, None]).min(axis=1)
+    if share.max() < EVEN:
+        k = int(np.argmin(lengths))
+        raise InputError(
+            f"contour {name!r}: the stretch of {lengths[k] * 1e3:.4g} {unit_name} from "
+            f"{at[ends[k]] * 1e3:.6g} {unit_name} on is too short for steps of {step * 1e3:.4g} "
+            f"{unit_name}; take about {lengths[k] * 1e3:.4g} {unit_name}, or leave the feature out"
+        )
+    best = int(np.argmax(share >= EVEN))
+    pieces = [
+        np.linspace(at[a], at[b], int(n) + 1)[:-1]
+        for (a, b), n in zip(pairwise(ends), cells[best], strict=True)
+    ]
+    return np.concatenate([*pieces, at[-1:]])
+
+
+def in_time(line: Contour, speed: Array, dt: float) -> tuple[Array, Array]:
+    """Return arc lengths (M,) m and times (M,) s of nodes evenly spaced in time, at most `dt`.
+
+    Parameters
+    ----------
+    line : Contour
+    speed : (K,) m/s
+        At each node, linear in arc length between them.
+    dt : float s
+    """
+    # With the speed linear in s over a segment, its mean slowness is ln(v1/v0)/(v1-v0).
+    log_ratio, change = np.log(speed[1:] / speed[:-1]), np.diff(speed)
+    even = np.abs(log_ratio) < 1e-6
+    slowness = np.where(even, 2.0 / (speed[1:] + speed[:-1]), log_ratio / np.where(even, 1, change))
+    t = np.concatenate([[0.0], np.cumsum(np.diff(line.s) * slowness)])
+    at = evenly(t, line.feature_ends, dt, "ms", line.name)
+    k = np.clip(np.searchsorted(t, at, side="right") - 1, 0, len(t) - 2)
+    # Within a segment s(t) solves ds/dt = v: exponential where the speed changes.
+    rate = np.append(change, 0.0)[k] / np.diff(line.s)[k]
+    tau = at - t[k]
+    still = np.abs(rate * tau) < 1e-12
+    grown = np.where(still, tau, np.expm1(rate * tau) / np.where(still, 1.0, rate))
+    s = line.s[k] + speed[k] * grown
+    s[0], s[-1] = line.s[0], line.s[-1]
+    # A stretch whose steps are shorter than the longest is run through in as much time each.
+    return s, np.diff(at).max(initial=0.0) * np.arange(len(at))
+
+
+def fewest(line: Contour, tolerance: float, axis_tolerance: float) -> Array:
+    """Return the arc lengths of the fewest evenly spaced nodes that keep both tolerances."""
+    # Cells this short keep both: in one, path and axis move less than is allowed.
+    rate = float((angle_between(line.axes[:-1], line.axes[1:]) / np.diff(line.s)).max())
+    enough = line.length * max(1 / tolerance, rate / axis_tolerance) + 1
+    witness = len(line.s) // 2
+    for cells in range(1, int(min(enough, MOST_NODES)) + 1):
+        s = np.linspace(line.s[0], line.s[-1], cells + 1)
+        # A node that spoilt the coarser sampling most likely spoils this one: try it first.
+        if _spoilt(line, s, np.array([witness]), tolerance, axis_tolerance) < 0:
+            bad = _spoilt(line, s, np.arange(len(line.s)), tolerance, axis_tolerance)
+            if bad < 0:
+                return s
+            witness = bad
+    raise InputError(
+        f"tolerance: {tolerance:g} m would need more than {MOST_NODES} nodes; relax it, or "
+        "round the sharp corners of the contour"
+    )
+
+
+def _spoilt(line: Contour, s: Array, nodes: Ints, tolerance: float, axis_tolerance: float) -> int:
+    """Return -1 if chords over `s` stay close at these nodes, or the worst of them."""
+    cell = np.clip(np.searchsorted(s, line.s[nodes], side="right") - 1, 0, len(s) - 2)
+    p0, n0 = line.at(s[cell])
+    p1, n1 = line.at(s[cell + 1])
+    part = ((line.s[nodes] - s[cell]) / (s[cell + 1] - s[cell]))[:, None]
+    chord, there = p1 - p0, line.points[nodes]
+    along = ((there - p0) * chord).sum(1) / np.maximum((chord * chord).sum(1), REPEATED_POINT**2)
+    off = np.linalg.norm(p0 + np.clip(along, 0, 1)[:, None] * chord - there, axis=1)
+    angle = angle_between(turned(n0, n1, part), line.axes[nodes])
+    excess = np.maximum(off / tolerance, angle / axis_tolerance)
+    worst = int(np.argmax(excess))
+    return -1 if excess[worst] <= 1.0 else int(nodes[worst])
+
+
+def _cells(length: Array, step: Array | float) -> Ints:
+    """Return into how many equal parts each length falls so that none is longer than `step`."""
+    return np.maximum(1, np.ceil(length / step * (1 - 1e-12))).astype(np.int64)

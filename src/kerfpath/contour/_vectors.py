@@ -1,0 +1,46 @@
+"""Unit vectors in bulk: made from vectors of any length, and turned from one to another."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from kerfpath._arrays import Array
+from kerfpath.errors import InputError
+
+__all__ = ["angle_between", "turned", "unit"]
+
+ZERO = 1e-9
+"""A vector shorter than this (any unit) has no direction."""
+
+
+def unit(vectors: Array, name: str = "axes") -> Array:
+    """Return vectors (K, 3) at length one.
+
+    Raises
+    ------
+    InputError
+        A vector without direction (with its index).
+    """
+    size = np.abs(vectors).max(axis=1, initial=0.0)
+    if (zero := np.flatnonzero(size <= ZERO)).size:
+        what = "the tool axis" if name == "axes" else "the direction normal to the tool axis"
+        raise InputError(f"{name}: {what} of node {zero[0]} is zero; it needs a direction")
+    scaled = vectors / size[:, None]  # no square overflows
+    return np.asarray(scaled / np.linalg.norm(scaled, axis=1)[:, None])
+
+
+def angle_between(n0: Array, n1: Array) -> Array:
+    """Return the angle (...,) rad between unit vectors (..., 3), exact also where it is tiny."""
+    sine = np.linalg.norm(np.cross(n0, n1), axis=-1)
+    return np.asarray(np.arctan2(sine, (n0 * n1).sum(-1)))
+
+
+def turned(n0: Array, n1: Array, part: Array) -> Array:
+    """Turn unit vectors n0 (..., 3) by `part` (..., 1) of the angle towards n1, evenly."""
+    angle = angle_between(n0, n1)[..., None]
+    small = angle < 1e-7
+    sine = np.where(small, 1.0, np.sin(angle))
+    w0 = np.where(small, 1 - part, np.sin((1 - part) * angle) / sine)
+    w1 = np.where(small, part, np.sin(part * angle) / sine)
+    mixed = w0 * n0 + w1 * n1
+    return np.asarray(mixed / np.linalg.norm(mixed, axis=-1, keepdims=True))

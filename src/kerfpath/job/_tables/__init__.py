@@ -1,0 +1,13 @@
+"""The tables and keys of a job file: units, bounds, and the rules between them.
+
+Units are in the names of the keys. Angles `rpy_deg` are roll, pitch and yaw about the fixed axes
+x, y and z, R = Rz(yaw) Ry(pitch) Rx(roll), as in URDF. A field's description and example are what
+a message about it says was expected and how to write it.
+"""
+
+from kerfpath.job._tables._contour import ContourTable as ContourTable
+from kerfpath.job._tables._job import TABLES as TABLES
+from kerfpath.job._tables._job import JobFile as JobFile
+from kerfpath.job._tables._plan import PlanTable as PlanTable
+from kerfpath.job._tables._program import AuditTable as AuditTable
+from kerfpath.job._tables._program import ProgramTable as ProgramTable

@@ -1,0 +1,202 @@
+"""Kinematics of any six-axis arm from the lines that its joints turn about.
+
+Forward is the product of the rotations about those lines as they lie at angle zero. There is no
+closed form for the inverse: a solver elsewhere brings candidates, and here each is brought onto its
+pose by Newton's method, refused where it does not get there, and numbered.
+
+Posture mu = 4 * shoulder + 2 * elbow + wrist, + 8: with W the point of axis 5 that lies nearest to
+axis 4, shoulder is the sign of the volume of axes 1, 2 and the way from axis 1 to W, shoulder times
+elbow that of the speeds which joints 1 to 3 give W, wrist that of the directions of axes 4 to 6. Of
+an arm whose wrist is almost spherical these are its shoulder, elbow and wrist. Where the
+determinant of all six joints is not of the sign of the last two, as a spherical wrist has it, a
+solution is one of 8 to 15; two of a kind take whichever row is free.
+"""
+
+from __future__ import annotations
+
+from math import cos, sin
+from typing import NamedTuple
+
+import numpy as np
+
+from kerfpath._arrays import Array, Bools, Ints
+from kerfpath.kernels._jit import jit
+from kerfpath.kernels.kinematics import wrap
+
+__all__ = ["EXACT", "POSTURES", "Arm", "follow_all", "forward_all", "sort_in"]
+
+POSTURES = 16
+"""Most solutions of a pose (Primrose 1986)."""
+EXACT = 1e-9
+"""m, and entries of a rotation: how far a solution may be from its pose."""
+CLOSED = 1e-12
+"""Where Newton's method has nothing more to gain."""
+STEPS = 12
+"""Most steps; one or two are usual, near a singularity each halves what is left."""
+DAMPING = 1e-14
+"""Added to the squares of the Jacobian, so that a singular one can be solved."""
+SAME = 1e-5
+"""rad: solutions nearer than this are one, found twice at a singularity."""
+NOTHING = 1e-9
+"""A volume this small has no sign."""
+
+
+class Arm(NamedTuple):
+    """The joint axes at angle zero, in the base, and the tip."""
+
+    place: Array
+    """(6, 3) m: a point of each axis; of the fifth, the one nearest to the fourth."""
+    along: Array
+    """(6, 3): directions."""
+    tip: Array
+    """(4, 4) m."""
+
+
+@jit
+def _turn(v: Array, along: Array, s: float, c: float) -> None:
+    """Turn the vector v (3,) about a direction by the angle of this sine and cosine."""
+    x, y, z = v
+    a, b, e = along
+    d = (1.0 - c) * (a * x + b * y + e * z)
+    v[0] = c * x + s * (b * z - e * y) + d * a
+    v[1] = c * y + s * (e * x - a * z) + d * b
+    v[2] = c * z + s * (a * y - b * x) + d * e
+
+
+@jit
+def _turn_about(v: Array, place: Array, along: Array, s: float, c: float) -> None:
+    """Turn the point v (3,) about a line."""
+    for r in range(3):
+        v[r] -= place[r]
+    _turn(v, along, s, c)
+    for r in range(3):
+        v[r] += place[r]
+
+
+@jit
+def _chain(arm: Arm, q: Array, out_place: Array, out_along: Array, out_T: Array) -> None:
+    """Axes (6, 3) and tip pose (4, 4) of the arm at q (6,): the last joint turns first."""
+    out_place[:], out_along[:], out_T[:] = arm.place, arm.along, arm.tip
+    for i in range(5, -1, -1):
+        place, along, s, c = arm.place[i], arm.along[i], sin(q[i]), cos(q[i])
+        for j in range(i + 1, 6):
+            _turn(out_along[j], along, s, c)
+            _turn_about(out_place[j], place, along, s, c)
+        for k in range(3):
+            _turn(out_T[:3, k], along, s, c)
+        _turn_about(out_T[:3, 3], place, along, s, c)
+
+
+@jit
+def _jacobian(place: Array, along: Array, T: Array, out_J: Array) -> None:
+    """Speeds (6, 6) of the tip, linear over angular, that each joint gives it."""
+    for i in range(6):
+        for r in range(3):
+            y, z = (r + 1) % 3, (r + 2) % 3
+            out_J[r, i] = along[i, y] * (T[z, 3] - place[i, z])
+            out_J[r, i] -= along[i, z] * (T[y, 3] - place[i, y])
+            out_J[r + 3, i] = along[i, r]
+
+
+@jit
+def _off(T: Array, now: Array, out_e: Array) -> float:
+    """Largest entry by which a pose is off T, and the way there (6,), linear over angular."""
+    off = 0.0
+    out_e[3:] = 0.0
+    for r in range(3):
+        y, z = (r + 1) % 3, (r + 2) % 3
+        out_e[r] = T[r, 3] - now[r, 3]
+        for c in range(4):
+            off = max(off, abs(T[r, c] - now[r, c]))
+        for c in range(3):
+            out_e[r + 3] += 0.5 * (now[y, c] * T[z, c] - now[z, c] * T[y, c])
+    return off
+
+
+@jit
+def _onto(arm: Arm, T: Array, q: Array, place: Array, along: Array, J: Array) -> bool:
+    """Bring q (6,) onto the pose T (4, 4); whether it got there. Axes and Jacobian are left."""
+    now, e = np.empty((4, 4)), np.empty(6)
+    for step in range(STEPS):
+        _chain(arm, q, place, along, now)
+        _jacobian(place, along, now, J)
+        off = _off(T, now, e)
+        if off < CLOSED or step == STEPS - 1:
+            break
+        squares = J.T @ J
+        for i in range(6):
+            squares[i, i] += DAMPING
+        q += np.linalg.solve(squares, J.T @ e)
+    return bool(off <= EXACT)
+
+
+@jit
+def _posture(place: Array, along: Array, J: Array) -> int:
+    """Posture 0 to 15 of an arm whose axes (6, 3) lie so."""
+    speeds = np.empty((3, 3))
+    for i in range(3):
+        speeds[i] = np.cross(along[i], place[4] - place[i])
+    shoulder = np.cross(place[4] - place[0], along[0]) @ along[1] < -NOTHING
+    volume = np.linalg.det(speeds)
+    wrist = np.linalg.det(along[3:]) < -NOTHING
+    other = (np.linalg.det(J) < 0.0) != ((volume < 0.0) != wrist)
+    elbow = (volume < -NOTHING) != shoulder
+    return int(8 * other + 4 * shoulder + 2 * elbow + wrist)
+
+
+@jit
+def _known(q: Array, rows: Array, reach: Bools) -> bool:
+    """Whether q (6,) is among the rows (P, 6) that are solutions."""
+    for mu in range(len(rows)):
+        apart = 0.0
+        for i in range(6):
+            apart = max(apart, abs(wrap(q[i] - rows[mu, i])))
+        if reach[mu] and apart < SAME:
+            return True
+    return False
+
+
+@jit
+def sort_in(arm: Arm, T: Array, q: Array, pose: Ints, out_q: Array, out_reach: Bools) -> None:
+    """Write candidates q (N, 6) of poses T[pose] that are solutions in the rows of their posture.
+
+    Fills out_q (B, 16, 6), in (-pi, pi], and out_reach (B, 16); no solution is there twice.
+    """
+    place, along, J = np.empty((6, 3)), np.empty((6, 3)), np.empty((6, 6))
+    out_q[:] = 0.0
+    out_reach[:] = False
+    for v in range(len(q)):
+        b, row = pose[v], q[v].copy()
+        if not _onto(arm, T[b], row, place, along, J):
+            continue
+        for i in range(6):
+            row[i] = wrap(row[i])
+        if _known(row, out_q[b], out_reach[b]):
+            continue
+        mu = _posture(place, along, J)
+        for other in range(POSTURES):  # its own row, the one 8 away, then the others
+            slot = (mu + 8 * other + other // 2) % POSTURES
+            if not out_reach[b, slot]:
+                out_q[b, slot] = row
+                out_reach[b, slot] = True
+                break
+
+
+@jit
+def follow_all(arm: Arm, T: Array, q: Array) -> None:
+    """Bring each q (B, 6) onto its pose T (B, 4, 4) along its own branch; NaN where there is none.
+
+    Joints stay on their turns.
+    """
+    place, along, J = np.empty((6, 3)), np.empty((6, 3)), np.empty((6, 6))
+    for i in range(len(q)):
+        if not _onto(arm, T[i], q[i], place, along, J):
+            q[i] = np.nan
+
+
+@jit
+def forward_all(arm: Arm, q: Array, out_T: Array) -> None:
+    """Tip poses (B, 4, 4) of joint vectors (B, 6)."""
+    place, along = np.empty((6, 3)), np.empty((6, 3))
+    for i in range(len(q)):
+        _chain(arm, q[i], place, along, out_T[i])

@@ -1,0 +1,23 @@
+"""From a loop of the drawing to a cut: start, kerf, leads, joints, corners, tool axes.
+
+Each operation takes a contour and returns a new one. Sides are as seen from the nozzle, looking
+along the travel: loops of CAD files run with the material on their left and the scrap on their
+right, see `Side`.
+"""
+
+from kerfpath.operations._axes import bevel as bevel
+from kerfpath.operations._axes import smooth_axes as smooth_axes
+from kerfpath.operations._corners import loop_corners as loop_corners
+from kerfpath.operations._corners import round_corners as round_corners
+from kerfpath.operations._corners import slow_corners as slow_corners
+from kerfpath.operations._kerf import offset as offset
+from kerfpath.operations._leads import LeadShape as LeadShape
+from kerfpath.operations._leads import lead_in as lead_in
+from kerfpath.operations._leads import lead_out as lead_out
+from kerfpath.operations._start import micro_joints as micro_joints
+from kerfpath.operations._start import overlap as overlap
+from kerfpath.operations._start import reverse as reverse
+from kerfpath.operations._start import smoothest_start as smoothest_start
+from kerfpath.operations._start import start_at as start_at
+from kerfpath.operations._surface import Side as Side
+from kerfpath.operations._surface import Surface as Surface

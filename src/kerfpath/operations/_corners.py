@@ -1,0 +1,165 @@
+"""Corners: rounded within a tolerance, run around in a loop in the scrap, or slowed down at."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+
+from kerfpath._arrays import Array, Ints, scalar
+from kerfpath.contour import CORNER, KINDS, Contour, angle_between, join, turned, unit
+from kerfpath.errors import InputError
+from kerfpath.operations._start import smoothest_start, start_at, with_nodes
+from kerfpath.operations._surface import Side, lateral
+
+__all__ = ["loop_corners", "round_corners", "slow_corners"]
+
+ARC_STEP = np.radians(5)
+"""Turn between the nodes of an arc."""
+
+Corner = Callable[[int, Array, Array, float], tuple[float, Array] | None]
+"""Node, directions before and behind it, room on both sides (m): what to put there, and how far
+before and behind it (m) the contour is left; None to leave the corner as it is."""
+
+
+def round_corners(contour: Contour, tolerance: float) -> Contour:
+    """Return the contour with an arc in place of each corner that leaves it by `tolerance` (m).
+
+    The arc is smaller where corners are too near to each other for that. A closed contour that
+    begins in a corner begins at its smoothest place afterwards.
+    """
+    tolerance = scalar(tolerance, "corner tolerance", unit="m", above=0.0)
+
+    def arc(k: int, t0: Array, t1: Array, room: float) -> tuple[float, Array]:
+        turn = float(angle_between(t0, t1))
+        radius = tolerance / (1 / np.cos(turn / 2) - 1)
+        reach = min(radius * np.tan(turn / 2), room)
+        return reach, _arc(contour.points[k], t0, t1, reach)
+
+    return _replaced(contour, arc, KINDS.index("cut"))
+
+
+def loop_corners(contour: Contour, radius: float, *, side: Side = "right") -> Contour:
+    """Return the contour with each outer corner run past and come back to in a loop.
+
+    Parameters
+    ----------
+    contour : Contour
+    radius : float m
+        Of the loop.
+    side : {"left", "right"}
+        Where the scrap is; corners that turn towards it have no room for a loop and stay. A closed
+        contour that begins in a corner begins at its smoothest place afterwards.
+    """
+    radius = scalar(radius, "loop radius", unit="m", above=0.0)
+    axes = contour.axes
+
+    def loop(k: int, t0: Array, t1: Array, room: float) -> tuple[float, Array] | None:
+        away = lateral(axes[k : k + 1], t0[None], side)[0]
+        if t1 @ away >= 0:
+            return None
+        turn = float(angle_between(t0, t1))
+        reach = radius / np.tan((np.pi - turn) / 2)
+        centre = contour.points[k] + reach * t0 + radius * away
+        swept = np.linspace(0, 2 * np.pi - turn, int(np.ceil((2 * np.pi - turn) / ARC_STEP)) + 1)
+        ring = np.sin(swept)[:, None] * t0 - np.cos(swept)[:, None] * away
+        corner = contour.points[k][None]
+        return 0.0, np.vstack([corner, centre + radius * ring, corner])
+
+    return _replaced(contour, loop, KINDS.index("loop"))
+
+
+def slow_corners(
+    contour: Contour, share: float, *, distance: float = 1e-3, ramp: float = 2e-3
+) -> Contour:
+    """Return the contour with only a share of the speed asked for around each corner.
+
+    Parameters
+    ----------
+    contour : Contour
+    share : float
+        Of the speed, above 0 and below 1.
+    distance : float m
+        Before and behind the corner at that share.
+    ramp : float m
+        Length over which the speed changes, before and behind that.
+    """
+    share = scalar(share, "corner speed share", above=0.0)
+    if share >= 1:
+        raise InputError(f"corner speed share: expected less than 1, got {share:g}")
+    distance = scalar(distance, "distance", unit="m", above=-1e-300)
+    ramp = scalar(ramp, "ramp", unit="m", above=0.0)
+    at = contour.s[_corners(contour)]
+    if not at.size:
+        return contour
+    ends = np.concatenate(
+        [at + d for d in (-distance - ramp, -distance, distance, distance + ramp)]
+    )
+    if contour.closed:
+        ends = contour.s[0] + np.mod(ends - contour.s[0], contour.length)
+    inside = (ends > contour.s[0]) & (ends < contour.s[-1])
+    marked = with_nodes(contour, np.unique(ends[inside]))
+    apart = np.abs(marked.s[:, None] - at)
+    if contour.closed:
+        apart = np.minimum(apart, contour.length - apart)
+    slowed = share + (1 - share) * np.clip((apart.min(axis=1) - distance) / ramp, 0.0, 1.0)
+    return replace(marked, speed_share=np.minimum(marked.speed_share, slowed))
+
+
+def _corners(contour: Contour) -> Ints:
+    """Return the inner nodes that are corners, and the first of a closed contour if it is one."""
+    plain = replace(contour, kind=None, x=None, time=None)  # type: ignore[arg-type]
+    found = plain.feature_ends[1:-1]
+    if not contour.closed:
+        return found
+    along = unit(np.diff(contour.points, axis=0)[[-1, 0]])
+    return np.append(0, found) if angle_between(along[0], along[1]) > CORNER else found
+
+
+def _replaced(contour: Contour, corner: Corner, kind: int) -> Contour:
+    """Return the contour with what `corner` makes of each corner, all of one kind, in its place."""
+    nodes = _corners(contour)
+    if not nodes.size:
+        return contour
+    if nodes[0] == 0:
+        contour = start_at(contour, smoothest_start(contour))
+        nodes = _corners(contour)
+    s = contour.s
+    bounds = np.concatenate([s[:1], s[nodes], s[-1:]])
+    room = np.diff(bounds)
+    room[1:-1] /= 2  # shared with the next corner
+    pieces, here = [], s[0]
+    for i, k in enumerate(nodes.tolist()):
+        t0, t1 = unit(np.diff(contour.points[k - 1 : k + 2], axis=0))
+        made = corner(k, t0, t1, 0.99 * min(room[i], room[i + 1]))
+        if made is None:
+            continue
+        reach, points = made
+        ends, normals = contour.at(s[k] + reach * np.array([-1.0, 1.0]))
+        part = np.linspace(0, 1, len(points))[:, None]
+        # On a curved way an arc that is tangent at the corner begins and ends a little beside it.
+        points = points + (1 - part) * (ends[0] - points[0]) + part * (ends[1] - points[-1])
+        axes = turned(
+            np.tile(normals[0], (len(part), 1)), np.tile(normals[1], (len(part), 1)), part
+        )
+        share = np.full(len(points), np.interp(s[k], s, contour.speed_share))
+        before = contour.between(here, s[k] - reach)
+        kinds = np.full(len(points), kind)
+        pieces += [before, Contour(points, axes, kind=kinds, speed_share=share, name="corner")]
+        here = s[k] + reach
+    if not pieces:
+        return contour
+    pieces.append(contour.between(here, s[-1]))
+    return join(pieces, closed=contour.closed, name=contour.name)
+
+
+def _arc(corner: Array, t0: Array, t1: Array, reach: float) -> Array:
+    """Return the arc (m, 3) tangent to both ways at `reach` (m) from the corner."""
+    turn = float(angle_between(t0, t1))
+    radius = reach / np.tan(turn / 2)
+    inwards = t1 - (t1 @ t0) * t0
+    inwards /= np.linalg.norm(inwards)
+    swept = np.linspace(0, turn, int(np.ceil(turn / ARC_STEP)) + 1)[:, None]
+    start = corner - reach * t0
+    return np.asarray(start + radius * (np.sin(swept) * t0 + (1 - np.cos(swept)) * inwards))

@@ -1,0 +1,166 @@
+"""Lead-in and lead-out on the scrap side, laid on the healed surface."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Literal, get_args
+
+import numpy as np
+
+from kerfpath._arrays import Array, scalar
+from kerfpath.contour import KINDS, Contour, join, turned, unit
+from kerfpath.errors import InputError
+from kerfpath.operations._start import reverse
+from kerfpath.operations._surface import Ribbon, Side, Surface, lateral, nearest
+
+__all__ = ["LeadShape", "lead_in", "lead_out"]
+
+LeadShape = Literal["line", "arc"]
+
+STEP = 2e-4
+"""m between the nodes of a lead."""
+SURFACE_ENDS = 1e-3
+"""m: a lead farther than this from the surface has left it."""
+TOUCH = 1e-6
+"""m: rounding; a lead may not be on the part's side by more."""
+
+
+def lead_in(
+    contour: Contour,
+    length: float,
+    *,
+    shape: LeadShape = "line",
+    angle: float = np.pi / 4,
+    side: Side = "right",
+    surface: Surface | None = None,
+    fan: float | None = None,
+    clearance: float = 2e-4,
+) -> Contour:
+    """Return the contour with a lead from its pierce in the scrap to its first node.
+
+    The tool stands normal to the surface at the pierce and fans to the axis of the cut. A closed
+    contour becomes an open one that ends where its cut began.
+
+    Parameters
+    ----------
+    contour : Contour
+    length : float m
+        Of the lead.
+    shape : {"line", "arc"}
+        A line at `angle` to the first step, or an arc that turns by `angle` and joins it
+        tangentially.
+    angle : float rad
+        At most pi / 2 for a line, pi for an arc; 0 is a tangent lead, for outer corners.
+    side : {"left", "right"}
+        Where the scrap is, seen from the nozzle along the travel.
+    surface : Surface, optional
+        What the lead is laid on; default: the planes across the contour's own axes.
+    fan : float m, optional
+        Length over which the axis fans; default: the whole lead.
+    clearance : float m
+        How far the pierce must be from the contour.
+
+    Raises
+    ------
+    InputError
+        A lead that touches the part, leaves the surface or pierces too near; values out of range.
+    """
+    if contour.kind[0] == KINDS.index("pierce"):
+        raise InputError(f"lead_in: contour {contour.name!r} has a pierce already")
+    points, axes = _laid(
+        contour, length, shape, angle, side, surface or Ribbon(contour), fan, clearance, "lead-in"
+    )
+    kind = np.full(len(points), KINDS.index("lead-in"))
+    kind[0] = KINDS.index("pierce")
+    lead = Contour(points, axes, kind=kind, name=contour.name)
+    return join([lead, replace(contour, closed=False, x=None, time=None)], name=contour.name)
+
+
+def lead_out(
+    contour: Contour,
+    length: float,
+    *,
+    shape: LeadShape = "line",
+    angle: float = np.pi / 4,
+    side: Side = "right",
+    surface: Surface | None = None,
+    fan: float | None = None,
+    clearance: float = 0.0,
+) -> Contour:
+    """Return the contour with a lead from its last node into the scrap; as `lead_in`."""
+    plain = replace(contour, closed=False, kind=None, x=None, time=None)  # type: ignore[arg-type]
+    backwards: Side = "left" if side == "right" else "right"
+    points, axes = _laid(
+        reverse(plain), length, shape, angle, backwards, surface or Ribbon(contour), fan,
+        clearance, "lead-out",
+    )  # fmt: skip
+    kind = np.full(len(points), KINDS.index("lead-out"))
+    lead = Contour(points[::-1], axes[::-1], kind=kind, name=contour.name)
+    return join([replace(contour, closed=False, x=None, time=None), lead], name=contour.name)
+
+
+def _laid(
+    contour: Contour, length: float, shape: LeadShape, angle: float, side: Side, surface: Surface,
+    fan: float | None, clearance: float, what: str,
+) -> tuple[Array, Array]:  # fmt: skip
+    """Return points (m, 3) m and axes (m, 3) of a lead that ends in the contour's first node."""
+    length = scalar(length, f"{what} length", unit="m", above=0.0)
+    fan = length if fan is None else min(scalar(fan, "fan", unit="m", above=0.0), length)
+    if shape not in get_args(LeadShape):
+        raise InputError(f"{what} shape: expected line or arc, got {shape!r}")
+    most = np.pi / 2 if shape == "line" else np.pi
+    if not 0 <= angle <= most:
+        raise InputError(
+            f"{what} angle: expected 0 to {np.degrees(most):g} deg for a {shape}, got "
+            f"{np.degrees(angle):g} deg"
+        )
+    back = np.linspace(length, 0.0, max(2, int(np.ceil(length / STEP))) + 1)
+    start = contour.points[0]
+    _, normal = surface.project(start[None])
+    travel = (contour.points[1] - start)[None]
+    along = unit(travel - (travel * normal).sum() * normal, "travel")
+    aside = lateral(-normal, along, side)
+    if shape == "line" or angle == 0:
+        flat = start - back[:, None] * (np.cos(angle) * along - np.sin(angle) * aside)
+    else:
+        radius, turn = length / angle, back[:, None] / length * angle
+        flat = start - radius * (np.sin(turn) * along - (1 - np.cos(turn)) * aside)
+    points, normals = surface.project(flat)
+    _require_on_surface(points - flat, contour, what)
+    # The cut may lie beside the surface by rounding or kerf: close that gap along the lead.
+    points = points + (1 - back / length)[:, None] * (start - points[-1])
+    axes = turned(
+        -normals, np.tile(contour.axes[0], (len(back), 1)), 1 - np.minimum(back / fan, 1)[:, None]
+    )
+    _require_in_scrap(contour, points, side, clearance, what)
+    return points, axes
+
+
+def _require_on_surface(off: Array, contour: Contour, what: str) -> None:
+    far = float(np.linalg.norm(off, axis=1).max())
+    if far > SURFACE_ENDS:
+        raise InputError(
+            f"{what} of {contour.name!r} leaves the surface by {far * 1e3:.3g} mm; make it shorter"
+        )
+
+
+def _require_in_scrap(
+    contour: Contour, points: Array, side: Side, clearance: float, what: str
+) -> None:
+    """Raise InputError where a lead lies on the part's side of the contour."""
+    where, k = nearest(contour, points[:-1])
+    off = points[:-1] - where
+    step = contour.points[k + 1] - contour.points[k]
+    depth = (off * lateral(contour.axes[k], step, side)).sum(1)
+    if (depth < -TOUCH).any():
+        i = int(np.argmin(depth))
+        raise InputError(
+            f"{what} of {contour.name!r} hits the part near {(points[i] * 1e3).round(2).tolist()} "
+            f"mm, {-depth[i] * 1e3:.3g} mm deep; make it shorter, start elsewhere, or change side"
+        )
+    apart = float(np.linalg.norm(off[0]))
+    if apart <= max(clearance, TOUCH):
+        raise InputError(
+            f"{what} of {contour.name!r} ends {apart * 1e3:.3g} mm from the part, expected more "
+            f"than {clearance * 1e3:g} mm; make it shorter or change its angle"
+        )

@@ -1,0 +1,190 @@
+"""Where a closed cut begins, which way it runs, how far it overlaps, what it leaves standing."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from kerfpath._arrays import Array, floats, scalar
+from kerfpath.contour import KINDS, Contour, angle_between, unit
+from kerfpath.errors import InputError
+
+__all__ = [
+    "micro_joints",
+    "overlap",
+    "reverse",
+    "smoothest_start",
+    "start_at",
+    "with_nodes",
+]
+
+SAME_PLACE = 1e-9
+"""m: two nodes nearer than this are one."""
+ALIKE = 1e-6
+"""rad: turns of two windows that differ by less are alike."""
+MICRO_JOINT, OVERLAP = (KINDS.index(word) for word in ("micro joint", "overlap"))
+
+
+def reverse(contour: Contour) -> Contour:
+    """Return the contour run the other way; scrap then lies on its other side.
+
+    Raises
+    ------
+    InputError
+        A contour that has a pierce: give it its lead-in afterwards.
+    """
+    if contour.kind[0] == KINDS.index("pierce"):
+        raise InputError(f"reverse: contour {contour.name!r} has a pierce; reverse it before")
+    return replace(
+        contour,
+        points=contour.points[::-1],
+        axes=contour.axes[::-1],
+        s=contour.s[-1] - contour.s[::-1],
+        time=None if contour.time is None else contour.time[-1] - contour.time[::-1],
+        kind=np.append(contour.kind[-2::-1], contour.kind[0]),
+        speed_share=contour.speed_share[::-1],
+        x=None if contour.x is None else contour.x[::-1],
+    )
+
+
+def start_at(contour: Contour, s: float) -> Contour:
+    """Return a closed contour that begins at arc length s (m) of this one.
+
+    Raises
+    ------
+    InputError
+        An open contour, or a place that it does not have.
+    """
+    _require_closed(contour, "start_at")
+    s = scalar(s, "s", unit="m")
+    if not contour.s[0] <= s <= contour.s[-1]:
+        raise InputError(
+            f"start_at: expected 0 to {contour.length * 1e3:g} mm along {contour.name!r}, got "
+            f"{s * 1e3:g} mm"
+        )
+    opened = with_nodes(contour, np.array([s]))
+    k = int(np.argmin(np.abs(opened.s - s))) % (len(opened) - 1)
+    order = np.append(np.roll(np.arange(len(opened) - 1), -k), k)
+    kind = opened.kind[order]
+    kind[-1] = kind[-2]
+    return replace(
+        opened,
+        points=opened.points[order],
+        axes=opened.axes[order],
+        s=None,  # type: ignore[arg-type]  # filled in along the polyline
+        time=None,
+        kind=kind,
+        speed_share=opened.speed_share[order],
+        x=None,
+    )
+
+
+def smoothest_start(contour: Contour, *, window: float = 5e-3) -> float:
+    """Return the arc length (m) around which path and tool axis turn least, for `start_at`.
+
+    Parameters
+    ----------
+    contour : closed Contour
+    window : float m
+        Length looked at around each place.
+    """
+    _require_closed(contour, "smoothest_start")
+    half = scalar(window, "window", unit="m", above=0.0) / 2
+    axes, along = contour.axes[:-1], unit(np.diff(contour.points, axis=0))
+    turn = angle_between(np.roll(along, 1, axis=0), along)
+    turn += angle_between(axes, np.roll(axes, 1, axis=0)) / 2
+    turn += angle_between(axes, np.roll(axes, -1, axis=0)) / 2
+    s, length = contour.s[:-1] - contour.s[0], contour.length
+    apart = np.abs(s[:, None] - s)
+    near = np.minimum(apart, length - apart) <= half
+    total = np.where(near, turn, 0.0).sum(axis=1)
+    smooth = total <= total.min() + ALIKE
+    if smooth.all():
+        return float(contour.s[0])
+    # Amid the longest stretch of places that are alike.
+    rough = np.flatnonzero(~smooth)
+    gap = np.diff(np.append(s[rough], s[rough[0]] + length))
+    k = int(np.argmax(gap))
+    middle = s[rough[k]] + gap[k] / 2
+    return float(contour.s[0] + s[int(np.argmin(np.abs(s - middle % length)))])
+
+
+def overlap(contour: Contour, length: float) -> Contour:
+    """Return a closed contour run on past its start by `length` (m): an open one.
+
+    Raises
+    ------
+    InputError
+        An open contour, or an overlap longer than it.
+    """
+    _require_closed(contour, "overlap")
+    length = scalar(length, "overlap", unit="m", above=0.0)
+    if length >= contour.length:
+        raise InputError(
+            f"overlap: expected less than the contour's {contour.length * 1e3:g} mm, got "
+            f"{length * 1e3:g} mm"
+        )
+    again = contour.between(contour.s[0], contour.s[0] + length)
+    kind = np.concatenate([contour.kind[:-1], np.full(len(again), OVERLAP)])
+    return Contour(
+        np.vstack([contour.points, again.points[1:]]),
+        np.vstack([contour.axes, again.axes[1:]]),
+        kind=kind,
+        speed_share=np.append(contour.speed_share, again.speed_share[1:]),
+        name=contour.name,
+    )
+
+
+def micro_joints(
+    contour: Contour, width: float, *, count: int | None = None, at: Sequence[float] | None = None
+) -> Contour:
+    """Return the contour with stretches that are not cut through, so that the part stays in place.
+
+    Parameters
+    ----------
+    contour : Contour
+    width : float m
+        Of each joint.
+    count : int
+        How many, spread evenly from half a distance behind the start on; or
+    at : sequence of float m
+        Arc lengths of their middles.
+
+    Raises
+    ------
+    InputError
+        Both or none of `count` and `at`; joints that overlap or pass the ends.
+    """
+    if (count is None) == (at is None):
+        raise InputError("micro_joints: give one of count= and at=")
+    width = scalar(width, "micro joint width", unit="m", above=0.0)
+    if count is not None:
+        if count < 1:
+            raise InputError(f"micro_joints: expected a count of at least 1, got {count}")
+        middles = contour.s[0] + (np.arange(count) + 0.5) * contour.length / count
+    else:
+        middles = np.sort(floats(at, "at", (None,)))  # type: ignore[arg-type]  # not None here
+    ends = np.c_[middles - width / 2, middles + width / 2].ravel()
+    if (np.diff(ends) <= 0).any() or ends[0] <= contour.s[0] or ends[-1] >= contour.s[-1]:
+        raise InputError(
+            f"micro_joints: {len(middles)} joints of {width * 1e3:g} mm do not fit into "
+            f"{contour.length * 1e3:g} mm of {contour.name!r} one behind the other"
+        )
+    marked = with_nodes(contour, ends)
+    place = np.searchsorted(ends, marked.s + SAME_PLACE, side="right")
+    kind = np.where(place % 2 == 1, MICRO_JOINT, marked.kind)
+    return replace(marked, kind=kind)
+
+
+def with_nodes(contour: Contour, s: Array) -> Contour:
+    """Return the contour with nodes at arc lengths s (m) too, where it has none."""
+    known = np.abs(contour.s - s[:, None]).min(axis=1) <= SAME_PLACE
+    every = np.sort(np.concatenate([contour.s, s[~known]]))
+    return replace(contour, x=None, time=None).at_nodes(every)
+
+
+def _require_closed(contour: Contour, what: str) -> None:
+    if not contour.closed:
+        raise InputError(f"{what}: contour {contour.name!r} is open; only closed ones will do")

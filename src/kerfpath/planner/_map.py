@@ -1,0 +1,116 @@
+"""The collision map: which vertices of a layered graph are clear in a cell, and by how much."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from kerfpath._arrays import Array, Bools, Ints, freeze, scalar
+from kerfpath.cell import Cell, clearances
+from kerfpath.errors import InputError
+from kerfpath.graph import LayeredGraph
+
+__all__ = ["ClearanceMap", "clearance_map"]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class ClearanceMap:
+    """How clear each vertex of a layered graph is in a cell.
+
+    Clearance is the least distance of any judged pair of bodies beyond what the pair must keep.
+    Pairs with a near-miss distance of their own, as nozzle and part, work near each other by
+    design: they close vertices but do not count as clearance.
+
+    Parameters
+    ----------
+    clear : (N,) bool
+        The vertex keeps all near-miss distances.
+    lower, upper : (N,) m
+        Bounds on the clearance, at most `resolution` apart where `lower` is below `band`. Above,
+        `upper` may be infinite; where a vertex is not clear, `lower` is minus infinity and `upper`
+        0 or less.
+    pair : (N,) int
+        The pair, of `pairs`, that comes too near, or else the nearest known; -1 for none.
+    pairs : tuple of (name, name)
+        The judged pairs.
+    band, resolution : float m
+        As asked for.
+    poses : int
+        Different poses among the vertices: those of one posture, on whichever turns, are the same.
+    queries : int
+        Distances between two bodies that were computed.
+    """
+
+    clear: Bools
+    lower: Array
+    upper: Array
+    pair: Ints
+    pairs: tuple[tuple[str, str], ...]
+    band: float
+    resolution: float
+    poses: int
+    queries: int
+
+
+def clearance_map(
+    graph: LayeredGraph,
+    cell: Cell,
+    *,
+    band: float = 20e-3,
+    resolution: float = 2e-3,
+    progress: Callable[[int], None] | None = None,
+) -> ClearanceMap:
+    """Return the collision map of all vertices, at far fewer distances than there are vertices.
+
+    `ClearanceMap.clear` is what `Cell.clear` says of each, unless a pair keeps its near-miss
+    distance to the micrometre that distances are computed to.
+
+    Parameters
+    ----------
+    graph : LayeredGraph
+        Of a task with the tool and placement that the cell was built with.
+    cell : Cell
+    band : float m
+        Where there is more clearance than this, it need not be known how much.
+    resolution : float m
+        How closely clearance within the band is to be known.
+    progress : callable, optional
+        Called with the number of poses done since the last call.
+
+    Raises
+    ------
+    InputError
+        A cell of another robot, a negative band, a resolution that is not positive.
+    """
+    band = scalar(band, "band", unit="m", above=-1e-300)
+    resolution = scalar(resolution, "resolution", unit="m", above=0.0)
+    if graph.q.shape[1] != len(cell.chain.axes):
+        raise InputError(
+            f"graph: its vertices have {graph.q.shape[1]} joints, but the cell's robot has "
+            f"{len(cell.chain.axes)}"
+        )
+    first, pose = _poses(graph)
+    before = cell.queries
+    found = clearances(cell, graph.q[first], band=band, resolution=resolution, progress=progress)
+    return ClearanceMap(
+        clear=freeze(found.upper[pose] > 0),
+        lower=freeze(found.lower[pose]),
+        upper=freeze(found.upper[pose]),
+        pair=freeze(found.pair[pose]),
+        pairs=cell.pair_names,
+        band=band,
+        resolution=resolution,
+        poses=len(first),
+        queries=cell.queries - before,
+    )
+
+
+def _poses(graph: LayeredGraph) -> tuple[Ints, Ints]:
+    """Return a vertex of each pose, node after node, and which pose each vertex has."""
+    layer = np.repeat(np.arange(len(graph.start) - 1), np.diff(graph.start))
+    _, samples, postures = graph.reason.shape
+    key = (layer * samples + graph.candidate) * postures + graph.posture
+    _, first, pose = np.unique(key, return_index=True, return_inverse=True)
+    return first, pose

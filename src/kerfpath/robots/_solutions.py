@@ -1,0 +1,63 @@
+"""Solutions of the inverse kinematics: the postures and turns of each pose in one table."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from kerfpath._arrays import Array, Bools, Ints, freeze
+from kerfpath.kernels import turns
+
+__all__ = ["Solutions", "admitted", "every"]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Solutions:
+    """Inverse kinematics of B poses: one row per solution.
+
+    Parameters
+    ----------
+    q : (N, n) rad
+        Joint vectors.
+    pose : (N,) int
+        Which of the B poses each row solves, increasing.
+    posture : (N,) int
+        Posture mu of each row; see `Family.postures`.
+    turn : (N, n) int
+        How many turns of 2 pi each joint is away from (-pi, pi].
+    """
+
+    q: Array
+    pose: Ints
+    posture: Ints
+    turn: Ints
+
+    def __len__(self) -> int:
+        return len(self.q)
+
+
+def every(q: Array, reach: Bools) -> Solutions:
+    """Return the rows of q (B, P, n) that `reach` (B, P) has for solutions, limits ignored."""
+    pose, posture = np.nonzero(reach)
+    found = q[reach]
+    turn = np.zeros(found.shape, dtype=np.int64)
+    return Solutions(q=freeze(found), pose=freeze(pose), posture=freeze(posture), turn=freeze(turn))
+
+
+def admitted(q: Array, reach: Bools, limits: turns.JointLimits) -> Solutions:
+    """Return every turn within the limits of the rows of q (B, P, n) that `reach` (B, P) has."""
+    B, P, n = q.shape
+    q, reach = q[:, None], reach[:, None]  # one node a pose, one sample of gamma
+    count, reason = np.empty(B, np.int64), np.empty(reach.shape, np.uint8)
+    turns.count_admissible(q, reach, np.ones(P, np.bool_), limits, count, reason)
+    total = int(count.sum())
+    found, turn = np.empty((total, n)), np.empty((total, n), np.int64)
+    sample, posture = np.empty(total, np.int64), np.empty(total, np.int64)
+    turns.fill_admissible(q, reason, limits, found, sample, posture, turn)
+    return Solutions(
+        q=freeze(found),
+        pose=freeze(np.repeat(np.arange(B), count)),
+        posture=freeze(posture),
+        turn=freeze(turn),
+    )

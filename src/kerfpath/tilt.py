@@ -1,0 +1,82 @@
+"""The tolerance of the tool axis: a cone about it, sampled as lead and lean."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from kerfpath._arrays import Array, freeze, scalar
+from kerfpath.errors import InputError
+
+__all__ = ["Tilt", "tilted"]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Tilt:
+    """How far the tool may be tilted away from the nominal axis, in which steps, at what cost.
+
+    Lead and lean are told in the frame of travel: x along the path, z along the nominal tool axis
+    into the part, y = z x x across the path. They are the parts of one turn about an axis between
+    the two: by hypot(lead, lean), about lean x + lead y. Lead alone turns about y, and where it is
+    positive the beam points ahead; lean alone turns about x, and where it is positive the beam
+    points away from y.
+
+    Parameters
+    ----------
+    cone : float rad
+        Largest angle between tool axis and nominal axis, from 0 to less than a quarter turn.
+    steps : int
+        Steps of lead and of lean from the nominal axis to the rim of the cone; 0: no tilt.
+    cost : float 1/rad
+        What each node costs per angle of tilt, on top of the distances of (14) or (15).
+
+    Raises
+    ------
+    InputError
+        A value out of these ranges.
+    """
+
+    cone: float
+    steps: int = 1
+    cost: float = 0.0
+
+    def __post_init__(self) -> None:
+        for name, unit in (("cone", "rad"), ("cost", "1/rad")):
+            value = scalar(getattr(self, name), f"tilt {name}", unit=unit)
+            if value < 0:
+                raise InputError(f"tilt {name}: must not be negative, got {value:g} {unit}")
+            object.__setattr__(self, name, value)
+        if self.cone >= np.pi / 2:
+            raise InputError(f"tilt cone: expected less than pi/2 rad, got {self.cone:g} rad")
+        if not (isinstance(self.steps, int | np.integer) and self.steps >= 0):
+            raise InputError(f"tilt steps: expected a whole number >= 0, got {self.steps!r}")
+        object.__setattr__(self, "steps", int(self.steps))
+
+    def samples(self) -> Array:
+        """Return lead and lean of every sample (T, 2) rad, the nominal axis first."""
+        if self.cone == 0 or self.steps == 0:
+            return freeze(np.zeros((1, 2)))
+        steps = np.arange(-self.steps, self.steps + 1)
+        grid = np.stack(np.meshgrid(steps, steps, indexing="ij"), axis=-1).reshape(-1, 2)
+        square = (grid**2).sum(axis=1)
+        inside = np.argsort(square, kind="stable")[: (square <= self.steps**2).sum()]
+        return freeze(np.asarray(grid[inside] * (self.cone / self.steps), dtype=float))
+
+    def price(self, samples: Array) -> Array:
+        """Return what nodes cost (T,) with lead and lean (T, 2) rad."""
+        return self.cost * np.hypot(samples[:, 0], samples[:, 1])
+
+
+def tilted(frames: Array, along: Array, tilt: Array) -> Array:
+    """Return task frames (..., 4, 4) turned by lead and lean (..., 2) rad; z is the tool axis.
+
+    along (..., 3) are the directions of travel, see `Contour.along`.
+    """
+    across = np.cross(frames[..., :3, 2], along)
+    turn = tilt[..., 1:] * along + tilt[..., :1] * across
+    rotation = Rotation.from_rotvec(turn.reshape(-1, 3)).as_matrix().reshape(*turn.shape[:-1], 3, 3)
+    T = np.broadcast_to(frames, (*turn.shape[:-1], 4, 4)).copy()
+    T[..., :3, :3] = rotation @ T[..., :3, :3]
+    return T

@@ -1,0 +1,73 @@
+"""A chain of revolute joints: the frames of its links in bulk, and how far points can get."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from kerfpath._arrays import Array, floats
+
+__all__ = ["Chain", "turns"]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Chain:
+    """Revolute joints one after the other; frame 0 is the base, frame i turns with joint i.
+
+    Parameters
+    ----------
+    origins : (n, 4, 4)
+        Pose of each joint frame at angle zero, in the frame of the joint before it, m.
+    axes : (n, 3)
+        Unit axis of each joint in its own frame.
+    end : (4, 4)
+        Flange or tip in the frame of the last joint, m.
+    """
+
+    origins: Array
+    axes: Array
+    end: Array
+
+    def __post_init__(self) -> None:
+        n = len(self.origins)
+        object.__setattr__(self, "origins", floats(self.origins, "chain origins", (n, 4, 4)))
+        object.__setattr__(self, "axes", floats(self.axes, "chain axes", (n, 3)))
+        object.__setattr__(self, "end", floats(self.end, "chain end", (4, 4)))
+
+    def frames(self, q: Array) -> Array:
+        """Return the poses (B, n+1, 4, 4) in the base of all frames at q (B, n) rad."""
+        B, n = q.shape
+        T = np.zeros((B, n + 1, 4, 4))
+        T[:, 0] = np.eye(4)
+        for i in range(n):
+            T[:, i + 1] = T[:, i] @ (self.origins[i] @ turns(self.axes[i], q[:, i]))
+        return T
+
+    def forward(self, q: Array) -> Array:
+        """Return the poses (B, 4, 4) of the end in the base at q (B, n) rad."""
+        return np.asarray(self.frames(q)[:, -1] @ self.end)
+
+    def reach(self, frame: int, points: Array) -> Array:
+        """Return bounds (n,) m on the distance of any of points (c, 3) from each joint's axis.
+
+        They hold at every q: the links between stretched out, or zero for joints that do not move
+        the frame.
+        """
+        arms = np.zeros(len(self.axes))
+        length = float(np.linalg.norm(points, axis=1).max())
+        for i in range(frame - 1, -1, -1):
+            arms[i] = length
+            length += float(np.linalg.norm(self.origins[i][:3, 3]))
+        return arms
+
+
+def turns(axis: Array, angle: Array) -> Array:
+    """Return the rotations (B, 4, 4) about a unit axis (3,) by angles (B,) rad (Rodrigues)."""
+    x, y, z = axis
+    cross = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
+    s, c = np.sin(angle)[:, None, None], np.cos(angle)[:, None, None]
+    T = np.zeros((len(angle), 4, 4))
+    T[:, :3, :3] = np.eye(3) + s * cross + (1 - c) * (cross @ cross)
+    T[:, 3, 3] = 1.0
+    return T
