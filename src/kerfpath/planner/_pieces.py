@@ -54,7 +54,7 @@ def plan_in_pieces(
     """
     comfort = options.get("comfort")
     if comfort is not None and comfort.clearance is not None:
-        raise InputError("comfort clearance: has no price in pieces; leave it out")
+        raise InputError("comfort clearance: is measured in a cell, and has no price in pieces")
     task = task_of(contour, robot, **options)
     settings = task.settings
     plain = settings.method == "exact" and settings.closure == "free"

@@ -113,7 +113,8 @@ def plan(
     clearance = comfort is not None and comfort.clearance is not None
     if clearance and (cell is None or feed == "dip"):
         raise InputError(
-            'comfort clearance: needs cell= to be measured in, and feed "constant"'
+            "comfort clearance: is measured in a cell, at constant speed; give cell= and feed "
+            '"constant"'
         )
     if comfort is not None and comfort.costs and feed == "dip" and refine:
         raise InputError('comfort: with feed "dip" costs are known on the grid only; refine=False')
