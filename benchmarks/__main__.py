@@ -20,6 +20,7 @@ NAMES = (
     "contours",
     "refinement",
     "collision",
+    "cad",
 )
 
 
@@ -56,9 +57,9 @@ def main() -> None:
 def _run(name: str, *, quick: bool) -> list[Report]:
     """Import a benchmark and run it; each brings libraries that the others do without."""
     if name == "kinematics":
-        from benchmarks import kinematics
+        from benchmarks import _families, kinematics
 
-        return [kinematics.run(quick=quick)]
+        return [kinematics.run(quick=quick), _families.run(quick=quick)]
     if name == "demo":
         from benchmarks import demo
 
@@ -83,6 +84,10 @@ def _run(name: str, *, quick: bool) -> list[Report]:
         from benchmarks import collision
 
         return collision.run(quick=quick)
+    if name == "cad":
+        from benchmarks import cad
+
+        return [cad.run(quick=quick)]
     from benchmarks import search
 
     return search.run(quick=quick)

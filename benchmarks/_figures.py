@@ -37,6 +37,8 @@ PACKAGES = (
     "scipy",
     "eaik",
     "py-opw-kinematics",
+    "ssik",
+    "ur-analytic-ik",
     "tesseract-robotics",
     "pymoo",
     "ompl",

@@ -33,7 +33,7 @@ start, frames and sampling, plan and program files, kernels that `warm_up` leave
 
 CLOCKS = {
     "compile (cold only)": ("kerfpath.job", "warm_up"),
-    "read STEP": ("kerfpath.job._run", "read_step"),
+    "read STEP": ("kerfpath.job._run", "read_drawing"),
     "graph": ("kerfpath.job._run", "layered_graph"),
     "search": ("kerfpath.planner._plan", "shortest_path"),
     "refinement": ("kerfpath.planner._plan", "refined"),

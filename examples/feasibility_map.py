@@ -13,7 +13,7 @@ import tempfile
 from importlib.resources import as_file, files
 from pathlib import Path
 
-from kerfpath.cad import read_step
+from kerfpath.cad import read as read_drawing
 from kerfpath.job import read_job
 from kerfpath.planner import layered_graph, plan
 from kerfpath.report import feasibility_map
@@ -37,7 +37,7 @@ def main() -> None:
     """Plan the trim line with every posture allowed, and draw its map."""
     with as_file(files("kerfpath").joinpath("demo")) as folder:
         job = read_job(folder / "b_pillar.toml")
-        part = read_step(job.part_file)
+        part = read_drawing(job.part_file)
     task = next(t for t in job.contours if t.name == "trim")
     nodes = task.sample(part.contour(task.pick))
     options = job.plan_options

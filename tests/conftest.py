@@ -1,5 +1,8 @@
 """Fixtures shared by the tests: a robot with all limits, a tool, a placement, a contour."""
 
+import importlib.util
+from pathlib import Path
+
 import numpy as np
 import pytest
 
@@ -42,3 +45,13 @@ def circle():
     points = np.c_[0.15 * np.cos(t), 0.15 * np.sin(t), 0.02 * np.cos(2 * t)]
     axes = np.c_[-0.2 * np.cos(t), -0.2 * np.sin(t), -np.ones_like(t)]
     return Contour(points, axes, closed=True, name="circle").resample(count=121)
+
+
+@pytest.fixture(scope="session")
+def examples():
+    """The script that models the example drawings."""
+    path = Path(__file__).parents[1] / "examples" / "model_drawings.py"
+    spec = importlib.util.spec_from_file_location("model_drawings", path)
+    script = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(script)
+    return script

@@ -186,7 +186,7 @@ def test_a_general_arm_is_read_planned_and_audited(tmp_path):
     path = described(tmp_path, arm)
     read = Robot.from_urdf(path, acceleration=[200] * 6, velocity=[20] * 6)
     assert read.kinematics == "general"
-    assert "not an ortho-parallel arm" in read.notes[0].lower()
+    assert "not an ortho-parallel arm" in read.notes[0]
     middle = read.forward(np.full(6, 0.5))
     x = np.linspace(0, 0.03, 16)
     points = middle[:3, 3] + x[:, None] * middle[:3, 0]

@@ -1,5 +1,6 @@
 """The audit: a re-check of a plan by kinematics that share no code with the planner."""
 
+from kerfpath.auditor._air import air_checks as air_checks
 from kerfpath.auditor._audit import audit as audit
 from kerfpath.auditor._audit import checks as checks
 from kerfpath.auditor._chain import JointChain as JointChain

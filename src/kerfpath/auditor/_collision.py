@@ -8,13 +8,13 @@ from __future__ import annotations
 
 import numpy as np
 
-from kerfpath._arrays import Array
+from kerfpath._arrays import Array, Ints
 from kerfpath.auditor._chain import JointChain
 from kerfpath.auditor._motion import Motion
 from kerfpath.auditor._table import Check
 from kerfpath.cell import Cell
 
-__all__ = ["collisions"]
+__all__ = ["collision_at", "collisions"]
 
 TOUCHING = -1e-9
 """m: to touch is not to be clear."""
@@ -27,7 +27,12 @@ def collisions(cell: Cell, motion: Motion, chain: JointChain) -> Check:
 
     The value is what the nearest pair falls short by, negative where all are farther apart.
     """
-    q = motion.q.reshape(-1, motion.q.shape[-1])
+    nodes, samples, n = motion.q.shape
+    return collision_at(cell, motion.q.reshape(-1, n), np.repeat(np.arange(nodes), samples), chain)
+
+
+def collision_at(cell: Cell, q: Array, node: Ints, chain: JointChain) -> Check:
+    """Return the same check of joint vectors q (S, n) rad, each of a node (S,)."""
     frames = np.stack([np.broadcast_to(np.eye(4), (len(q), 4, 4)), *chain.joints(q)], axis=1)
     enough = cell.required + REFINED
     short = cell.required - cell.scene.distances(np.ascontiguousarray(frames), enough)
@@ -40,7 +45,7 @@ def collisions(cell: Cell, motion: Motion, chain: JointChain) -> Check:
         value=float(short[row, pair]),
         limit=TOUCHING,
         unit="m",
-        node=int(row // motion.q.shape[1]),
+        node=int(node[row]),
         advice="move the part or the fixture, or plan with the cell",
     )
 

@@ -6,20 +6,24 @@ from collections.abc import Iterator
 from typing import Literal
 
 import numpy as np
+from OCP.Bnd import Bnd_Box
 from OCP.BRep import BRep_Tool
-from OCP.BRepAdaptor import BRepAdaptor_Surface
+from OCP.BRepAdaptor import BRepAdaptor_Curve, BRepAdaptor_Surface
+from OCP.BRepBndLib import BRepBndLib
 from OCP.BRepTools import BRepTools, BRepTools_WireExplorer
+from OCP.collections import Array1_double
+from OCP.GCPnts import GCPnts_AbscissaPoint
+from OCP.GeomAbs import GeomAbs_Shape
 from OCP.gp import gp_Pnt, gp_Vec
 from OCP.TopAbs import TopAbs_Orientation, TopAbs_ShapeEnum
 from OCP.TopExp import TopExp_Explorer
-from OCP.TopoDS import TopoDS, TopoDS_Edge, TopoDS_Face, TopoDS_Iterator, TopoDS_Wire
+from OCP.TopoDS import TopoDS, TopoDS_Edge, TopoDS_Face, TopoDS_Iterator, TopoDS_Shape, TopoDS_Wire
 
 from kerfpath._arrays import Array
+from kerfpath.cad._sample import Chain
 from kerfpath.errors import InputError
 
-__all__ = ["Kind", "OrientedEdge", "loops_of"]
-
-Kind = Literal["outer", "inner"]
+__all__ = ["FaceLoop", "OrientedEdge", "bounds_of", "chained", "loops_of"]
 
 FORWARD, REVERSED = TopAbs_Orientation.TopAbs_FORWARD, TopAbs_Orientation.TopAbs_REVERSED
 
@@ -43,11 +47,12 @@ class OrientedEdge:
         As it lies in the face taken FORWARD.
     face : TopoDS_Face
         The face in its own orientation.
+    surface : BRepAdaptor_Surface
+        Of the face; one for all its edges, since making it looks at every edge.
     """
 
-    def __init__(self, edge: TopoDS_Edge, face: TopoDS_Face) -> None:
-        self.edge, self.face = edge, face
-        self.surface = BRepAdaptor_Surface(face)
+    def __init__(self, edge: TopoDS_Edge, face: TopoDS_Face, surface: BRepAdaptor_Surface) -> None:
+        self.edge, self.face, self.surface = edge, face, surface
         self._outward = -1.0 if face.Orientation() == REVERSED else 1.0
         first, last = BRep_Tool.Range_s(edge, face)
         # A REVERSED face shows its other side, about which its wires run the other way round.
@@ -76,6 +81,26 @@ class OrientedEdge:
             )
         return points, normals
 
+    @property
+    def length(self) -> float:
+        """Arc length, mm."""
+        return GCPnts_AbscissaPoint.Length_s(BRepAdaptor_Curve(self.edge))
+
+    def bounds(self) -> Array:
+        """Return the least and greatest coordinates (2, 3) mm."""
+        return bounds_of(self.edge)
+
+    def breaks(self) -> Array:
+        """Return the parameters, in the direction of travel, between which the edge is smooth."""
+        curve = BRepAdaptor_Curve(self.edge, self.face)
+        count = curve.NbIntervals(GeomAbs_Shape.GeomAbs_C2)
+        ends = Array1_double(1, count + 1)
+        curve.Intervals(ends, GeomAbs_Shape.GeomAbs_C2)
+        low, high = sorted((self.start, self.end))
+        inside = [t for t in ends if low < t < high]
+        t = np.unique([low, *inside, high])
+        return t if self.start < self.end else t[::-1]
+
     def in_parameters(self) -> Array:
         """Return how far (2,) the edge goes in the parameters (u, v) of its surface."""
         start, end = self._curve.Value(self.start), self._curve.Value(self.end)
@@ -93,7 +118,18 @@ class OrientedEdge:
         return at, np.array([normal.X(), normal.Y(), normal.Z()]) * (self._outward / size)
 
 
-def loops_of(face: TopoDS_Face) -> list[tuple[Kind, list[OrientedEdge]]]:
+FaceLoop = tuple[Literal["outer", "inner"], Chain[OrientedEdge]]
+"""Whether a loop runs around its face or around a hole in it, and its edges."""
+
+
+def bounds_of(shape: TopoDS_Shape) -> Array:
+    """Return the least and greatest coordinates (2, 3) mm of a shape."""
+    box = Bnd_Box()
+    BRepBndLib.AddOptimal_s(shape, box, False, False)
+    return np.array([[c.X(), c.Y(), c.Z()] for c in (box.CornerMin(), box.CornerMax())])
+
+
+def loops_of(face: TopoDS_Face) -> list[FaceLoop]:
     """Return the loops of `face`, each edge in the direction of travel.
 
     Outer ones run counter-clockwise about its outward normal, inner ones clockwise. Seams are no
@@ -101,24 +137,25 @@ def loops_of(face: TopoDS_Face) -> list[tuple[Kind, list[OrientedEdge]]]:
     """
     forward = TopoDS.Face(face.Oriented(FORWARD))
     outer_wire = BRepTools.OuterWire_s(forward)
-    loops: list[tuple[Kind, list[OrientedEdge]]] = []
+    surface = BRepAdaptor_Surface(face)
+    loops: list[FaceLoop] = []
     wires = TopExp_Explorer(forward, TopAbs_ShapeEnum.TopAbs_WIRE)
     while wires.More():
         wire = TopoDS.Wire(wires.Current())
-        runs, has_seam = _runs(wire, forward, face)
-        for edges in _chained(runs):
+        runs, has_seam = _runs(wire, forward, face, surface)
+        for edges in chained(runs):
             outer = _winds(edges) or (wire.IsSame(outer_wire) and not has_seam)
-            loops.append(("outer" if outer else "inner", edges))
+            loops.append(("outer" if outer else "inner", Chain(edges=edges)))
         wires.Next()
     return loops
 
 
 def _runs(
-    wire: TopoDS_Wire, forward: TopoDS_Face, face: TopoDS_Face
+    wire: TopoDS_Wire, forward: TopoDS_Face, face: TopoDS_Face, surface: BRepAdaptor_Surface
 ) -> tuple[list[list[OrientedEdge]], bool]:
     """Return the edges of `wire` as travelled, broken at each seam, and whether it has a seam."""
-    ordered = list(_in_order(wire, forward))
     everything = list(_edges(wire))
+    ordered = everything if len(everything) == 1 else list(_in_order(wire, forward))
     connected = len(ordered) == len(everything)
     runs: list[list[OrientedEdge]] = [[]]
     has_seam = False
@@ -127,7 +164,7 @@ def _runs(
             has_seam = True
             runs.append([])
         elif not BRep_Tool.Degenerated_s(edge):
-            runs[-1].append(OrientedEdge(edge, face))
+            runs[-1].append(OrientedEdge(edge, face, surface))
         if not connected:
             runs.append([])
     if face.Orientation() == REVERSED:
@@ -150,18 +187,22 @@ def _edges(wire: TopoDS_Wire) -> Iterator[TopoDS_Edge]:
         iterator.Next()
 
 
-def _chained(runs: list[list[OrientedEdge]]) -> Iterator[list[OrientedEdge]]:
+def chained(runs: list[list[OrientedEdge]]) -> Iterator[list[OrientedEdge]]:
     """Join runs into closed chains: each end goes on at the nearest start, its own included."""
-    runs = list(runs)
-    while runs:
-        chain = runs.pop(0)
-        while runs:
-            end = chain[-1].ends[1]
-            gaps = [float(np.linalg.norm(run[0].ends[0] - end)) for run in [chain, *runs]]
-            nearest = int(np.argmin(gaps))
-            if nearest == 0:
-                break
-            chain = chain + runs.pop(nearest - 1)
+    starts = np.array([run[0].ends[0] for run in runs]).reshape(-1, 3)
+    left = np.ones(len(runs), dtype=bool)
+    while left.any():
+        first = int(np.argmax(left))
+        chain: list[OrientedEdge] = []
+        following = first
+        while following != first or not chain:
+            chain = chain + runs[following]
+            left[following] = following == first
+            far = np.linalg.norm(starts - chain[-1].ends[1], axis=1)
+            far[~left] = np.inf
+            # Where several start, the chain closes rather than go on.
+            following = first if far[first] <= far.min() else int(np.argmin(far))
+        left[first] = False
         yield chain
 
 

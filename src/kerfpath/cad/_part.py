@@ -1,68 +1,55 @@
-"""The part: faces and loops by name, contours along loops, and triangles for pictures."""
+"""The part: what a drawing holds, its loops by name and by what they are, contours along them."""
 
 from __future__ import annotations
 
 import difflib
-from collections.abc import Sequence
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Literal
 
 import numpy as np
-from OCP.Bnd import Bnd_Box
-from OCP.BRepAdaptor import BRepAdaptor_Curve
-from OCP.BRepBndLib import BRepBndLib
-from OCP.GCPnts import GCPnts_AbscissaPoint
-from OCP.GeomAbs import GeomAbs_SurfaceType
-from OCP.TopoDS import TopoDS_Face, TopoDS_Shape
+from numpy.typing import ArrayLike
 
-from kerfpath._arrays import Array, Ints, freeze, scalar
-from kerfpath.cad._loops import Kind, OrientedEdge, loops_of
-from kerfpath.cad._mesh import triangulate
-from kerfpath.cad._sample import chain
+from kerfpath._arrays import Array, Ints, floats, freeze, scalar
+from kerfpath.cad._crossing import crossing
+from kerfpath.cad._sample import Trace
+from kerfpath.cad._units import MM
 from kerfpath.contour import Contour
 from kerfpath.errors import InputError
 
-__all__ = ["Loop", "Part", "part_of"]
+__all__ = ["Kind", "Loop", "Part", "Side", "loop_of", "numbered"]
 
-MM = 1e-3
-"""OCCT works in mm; every length that leaves this package is in m."""
-GAP = 5e-5
-"""Largest distance (m) between the ends of two edges that a contour bridges: half a kerf."""
+Kind = Literal["outer", "inner", "open"]
+Side = Literal["outer", "inner", "edge", ""]
+
 ROUND = 5e-5
 """How far (m) a loop may stray from a circle and still be a round hole."""
 FLAT = 0.1
 """How far a round hole may stray from its mean plane, as a part of its diameter: one drilled into a
 curved sheet does."""
 
-SURFACES = {
-    GeomAbs_SurfaceType.GeomAbs_Plane: "plane",
-    GeomAbs_SurfaceType.GeomAbs_Cylinder: "cylinder",
-    GeomAbs_SurfaceType.GeomAbs_Cone: "cone",
-    GeomAbs_SurfaceType.GeomAbs_Sphere: "sphere",
-    GeomAbs_SurfaceType.GeomAbs_Torus: "torus",
-    GeomAbs_SurfaceType.GeomAbs_BezierSurface: "bezier",
-    GeomAbs_SurfaceType.GeomAbs_BSplineSurface: "bspline",
-    GeomAbs_SurfaceType.GeomAbs_SurfaceOfRevolution: "revolution",
-    GeomAbs_SurfaceType.GeomAbs_SurfaceOfExtrusion: "extrusion",
-    GeomAbs_SurfaceType.GeomAbs_OffsetSurface: "offset",
-    GeomAbs_SurfaceType.GeomAbs_OtherSurface: "other",
-}
+
+TOUCH = 1e-5
+"""Stretches of one loop that come nearer to each other than this (m) cross or touch."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Loop:
-    """A closed chain of edges around a face, or around one of its holes.
+    """A line to cut: around a face or a skin, around one of its holes, or an open one.
 
     Parameters
     ----------
     name : str
-        Unique in the part: the face's name, then /outer or /hole1, /hole2, ...
+        Unique in the part: the face's name, then /outer or /hole1, /hole2, ... or /line1, ...
     face : str
-        Name of the face whose normal the tool axis opposes.
-    kind : "outer" or "inner"
-        Around the face (counter-clockwise about its outward normal) or a hole (clockwise).
+        Name of the face or skin whose normal the tool axis opposes; in a DXF the layer.
+    kind : "outer", "inner" or "open"
+        Around the face (counter-clockwise about its outward normal), a hole (clockwise), or a line
+        that was drawn open.
     surface : str
-        plane, cylinder, cone, sphere, torus, bspline, ...
+        plane, cylinder, cone, sphere, torus, bspline, ...; skin where it is made of several;
+        points.
     length : float m
     bounding_box : (2, 3) m
         Least and greatest coordinates.
@@ -72,9 +59,15 @@ class Loop:
     largest_gap : float m
         Largest distance between the end of an edge and the start of the next.
     closed : bool
-        Whether the largest gap is small enough to cut the loop.
+        Whether it is a closed line, its largest gap small enough to be cut.
     diameter : float m or None
         Where the loop is a circle, seen along its mean normal.
+    side : {"outer", "inner", "edge", ""}
+        Of a sheet: its outer (larger) side, its inner side, or its thickness; "" if no sheet.
+    skin : str
+        Of the loop of a face that is a piece of a skin: the skin's name.
+    layer, colour : str
+        In a DXF: where and how it is drawn (red, ..., white, aci30 or #ff8000).
     """
 
     name: str
@@ -88,24 +81,43 @@ class Loop:
     largest_gap: float
     closed: bool
     diameter: float | None
+    side: Side = ""
+    skin: str = ""
+    layer: str = ""
+    colour: str = ""
+    _trace: Trace = field(repr=False)
+
+    def line(self, chord_tolerance: float = 1e-4) -> Array:
+        """Return points (K, 3) m along the loop for pictures, whether or not it can be cut.
+
+        Parameters
+        ----------
+        chord_tolerance : float m
+            Largest distance between the chords and the curve.
+        """
+        chord = scalar(chord_tolerance, "chord_tolerance", unit="m", above=0.0)
+        points = self._trace.sample(chord / MM, np.pi)[0] * MM
+        return freeze(points if self.kind == "open" else np.vstack([points, points[:1]]))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Part:
-    """What a CAD file holds: its faces, and their loops by name, in the part's own frame.
+    """What a drawing holds: its loops by name, in the part's own frame.
 
     Parameters
     ----------
     path : Path
         The file it came from.
     unit : str
-        Length unit as the file's header says.
+        Length unit that the file's numbers were taken for.
     bounding_box : (2, 3) m
         Least and greatest coordinates.
     faces : int
-        Number of faces.
+        Number of faces; 0 in a drawing of lines.
     loops : tuple of Loop
-        In the order of the faces; outer before inner.
+        Those of the skins, then those of the faces in their order; outer before inner.
+    notes : tuple of str
+        What was assumed, repaired or left out in reading.
     """
 
     path: Path
@@ -113,8 +125,19 @@ class Part:
     bounding_box: Array
     faces: int
     loops: tuple[Loop, ...]
-    _shape: TopoDS_Shape = field(repr=False)
-    _edges: dict[str, list[OrientedEdge]] = field(repr=False)
+    notes: tuple[str, ...] = ()
+    _gap: float = field(repr=False)
+    _triangulate: Callable[[float], tuple[Array, Ints]] | None = field(default=None, repr=False)
+
+    @property
+    def largest_gap(self) -> float:
+        """Largest gap (m) of any loop, bridged or not."""
+        return max((loop.largest_gap for loop in self.loops), default=0.0)
+
+    @property
+    def shortest_edge(self) -> float:
+        """Shortest edge (m) of any loop."""
+        return min((loop.shortest_edge for loop in self.loops), default=0.0)
 
     def loop(self, name: str) -> Loop:
         """Return the loop called `name`.
@@ -134,10 +157,77 @@ class Part:
             + (f"did you mean {', '.join(offer)}?" if names else "no face has an edge")
         )
 
+    def pick(
+        self,
+        *,
+        face: str | None = None,
+        kind: Kind | None = None,
+        side: Side | None = None,
+        diameter: tuple[float, float] | None = None,
+        length: tuple[float, float] | None = None,
+        layer: str | None = None,
+        colour: str | None = None,
+        near: ArrayLike | None = None,
+    ) -> tuple[Loop, ...]:
+        """Return the loops that are all that is asked for, in the order of `loops`.
+
+        Loops of faces that are pieces of a skin, and those around the thickness of a sheet, are
+        left out unless `face` or `side` asks for them.
+
+        Parameters
+        ----------
+        face : str
+            Name of a face or a skin.
+        kind : {"outer", "inner", "open"}
+            Trim lines, holes, or open lines.
+        side : {"outer", "inner", "edge"}
+            Of a sheet.
+        diameter : (float, float) m
+            Round ones from the one to the other, both included.
+        length : (float, float) m
+            Their length, likewise.
+        layer, colour : str
+            As drawn in a DXF.
+        near : (3,) m
+            Of all the others that fit, the one that passes this point most closely.
+
+        Raises
+        ------
+        InputError
+            Nothing fits, or a range that is none.
+        """
+        asked: dict[str, object] = {
+            "face": face, "kind": kind, "side": side, "layer": layer, "colour": colour,
+        }  # fmt: skip
+        ranges = {"diameter": _range(diameter, "diameter"), "length": _range(length, "length")}
+        found = [
+            loop
+            for loop in self.loops
+            if (face is not None or (not loop.skin and (side is not None or loop.side != "edge")))
+            and all(want is None or getattr(loop, key) == want for key, want in asked.items())
+            and all(_within(getattr(loop, key), want) for key, want in ranges.items())
+        ]
+        if not found:
+            wanted = {**asked, "diameter": diameter, "length": length}
+            told = ", ".join(f"{key}={want!r}" for key, want in wanted.items() if want is not None)
+            raise InputError(
+                f"{self.path}: no loop among {len(self.loops)} fits {told or 'a pick'}; "
+                "list them with: kerfpath contours"
+            )
+        if near is not None:
+            point = floats(near, "near", (3,)) / MM
+            found = [min(found, key=lambda loop: _distance(loop._trace, point))]
+        return tuple(found)
+
     def contour(
-        self, name: str, *, chord_tolerance: float = 2e-6, axis_tolerance: float = 0.002
+        self,
+        name: str,
+        *,
+        closed: bool = True,
+        chord_tolerance: float = 2e-6,
+        axis_tolerance: float = 0.002,
     ) -> Contour:
-        """Return the loop called `name` as a closed contour: dense points and tool axes.
+        """Return the loop called `name` as a contour: dense points and tool axes.
 
         The tool axis is the face's outward normal turned round: from the nozzle into the part.
 
@@ -145,36 +235,45 @@ class Part:
         ----------
         name : str
             Of one of the part's loops.
+        closed : bool
+            Whether it must be closed; False lets a line pass that was drawn open.
         chord_tolerance : float m
             Largest distance between the contour's chords and the curve.
         axis_tolerance : float rad
-            Largest angle between the axes of neighbouring nodes.
+            Largest angle between the axes of neighbouring nodes on an edge. Where the faces of a
+            skin meet, it may turn by up to 2 deg at once.
 
         Raises
         ------
         InputError
-            No such loop, a tolerance that is not positive, or a gap in the loop (says where).
+            No such loop, a tolerance that is not positive, a loop that is not closed, or one that
+            crosses itself (says where).
         """
-        loop, edges = self.loop(name), self._edges[self.loop(name).name]
-        chord = scalar(chord_tolerance, "chord_tolerance", unit="m", above=0.0) / MM
+        loop = self.loop(name)
+        chord = scalar(chord_tolerance, "chord_tolerance", unit="m", above=0.0)
         angle = scalar(axis_tolerance, "axis_tolerance", unit="rad", above=0.0)
-        if not loop.closed:
-            k = int(np.argmax(_gaps(edges)))
+        if not loop.closed and (closed or loop.kind != "open"):
             raise InputError(
-                f"{self.path}: loop {name!r} has a gap of {loop.largest_gap / MM:.3f} mm after its "
-                f"edge {k + 1}, at {edges[k].ends[1].round(3).tolist()} mm (allowed "
-                f"{GAP / MM:g} mm); close it in CAD"
+                f"{self.path}: loop {name!r} {loop._trace.break_at()} (allowed "
+                f"{self._gap / MM:g} mm); close it in CAD"
+                + (", or ask for an open one" if loop.kind == "open" else "")
             )
         try:
-            points, normals = chain(edges, chord, angle)
+            points, normals = loop._trace.sample(chord / MM, angle)
         except InputError as error:
             raise InputError(f"{self.path}: loop {name!r}: {error}") from None
-        return Contour(points * MM, -normals, closed=True, name=name)
+        contour = Contour(points * MM, -normals, closed=loop.closed, name=name)
+        if (place := crossing(contour.points, min(2 * chord, TOUCH))) is not None:
+            raise InputError(
+                f"{self.path}: loop {name!r} crosses or touches itself at "
+                f"{(place / MM).round(3).tolist()} mm; repair it in CAD"
+            )
+        return contour
 
     def mesh(self, deflection: float = 5e-4) -> tuple[Array, Ints]:
         """Return vertices (V, 3) m and triangles (F, 3) of the part's faces, for pictures.
 
-        Triangles run counter-clockwise about the outward normal.
+        Triangles run counter-clockwise about the outward normal; a drawing of lines has none.
 
         Parameters
         ----------
@@ -182,88 +281,76 @@ class Part:
             Largest distance between triangles and faces.
         """
         size = scalar(deflection, "deflection", unit="m", above=0.0)
-        vertices, triangles = triangulate(self._shape, size / MM)
+        if self._triangulate is None:
+            return freeze(np.empty((0, 3))), freeze(np.empty((0, 3), dtype=np.int64))
+        vertices, triangles = self._triangulate(size / MM)
         return freeze(vertices * MM), freeze(triangles)
 
 
-def part_of(
-    path: Path, unit: str, shape: TopoDS_Shape, faces: Sequence[tuple[str, TopoDS_Face]]
-) -> Part:
-    """Return the part made of `faces` (name or "", face), every face and loop given its name."""
-    names = _unique([name or f"face{k}" for k, (name, _) in enumerate(faces, start=1)])
-    loops: list[Loop] = []
-    chains: dict[str, list[OrientedEdge]] = {}
-    for face_name, (_, face) in zip(names, faces, strict=True):
-        found = loops_of(face)
-        for kind, stem in (("outer", "outer"), ("inner", "hole")):
-            alike = sorted((edges for k, edges in found if k == kind), key=_place)
-            for number, edges in enumerate(alike, start=1):
-                alone = kind == "outer" and len(alike) == 1
-                name = f"{face_name}/{stem}" + ("" if alone else str(number))
-                chains[name] = edges
-                loops.append(_loop(name, face_name, "outer" if kind == "outer" else "inner", edges))
-    return Part(
-        path=path,
-        unit=unit,
-        bounding_box=_bounding_box([shape]),
-        faces=len(faces),
-        loops=tuple(loops),
-        _shape=shape,
-        _edges=chains,
-    )
-
-
-def _unique(names: list[str]) -> list[str]:
-    """Return `names` with a number behind each repeated one."""
-    taken, unique = set(names), []
-    for k, name in enumerate(names):
-        number, chosen = 1, name
-        if name in names[:k]:
-            while chosen in taken:
-                number += 1
-                chosen = f"{name}-{number}"
-        taken.add(chosen)
-        unique.append(chosen)
-    return unique
-
-
-def _loop(name: str, face: str, kind: Kind, edges: list[OrientedEdge]) -> Loop:
-    lengths = [GCPnts_AbscissaPoint.Length_s(BRepAdaptor_Curve(edge.edge)) * MM for edge in edges]
-    largest_gap = float(_gaps(edges).max()) * MM
+def loop_of(
+    *,
+    name: str,
+    face: str,
+    kind: Kind,
+    trace: Trace,
+    surface: str,
+    gap: float,
+    layer: str = "",
+    colour: str = "",
+) -> Loop:
+    """Return the loop along `trace`, measured; it is closed where no gap (m) is larger."""
+    largest_gap = float(trace.gaps.max(initial=0.0)) * MM
     return Loop(
         name=name,
         face=face,
         kind=kind,
-        surface=SURFACES[edges[0].surface.GetType()],
-        length=sum(lengths),
-        bounding_box=_bounding_box([edge.edge for edge in edges]),
-        edges=len(edges),
-        shortest_edge=min(lengths),
+        surface=surface,
+        length=float(trace.lengths.sum()) * MM,
+        bounding_box=freeze(trace.bounds() * MM),
+        edges=len(trace.lengths),
+        shortest_edge=float(trace.lengths.min()) * MM,
         largest_gap=largest_gap,
-        closed=largest_gap <= GAP,
-        diameter=_diameter(_around(edges) * MM),
+        closed=kind != "open" and largest_gap <= gap,
+        diameter=None if kind == "open" else _diameter(trace.around * MM),
+        layer=layer,
+        colour=colour,
+        _trace=trace,
     )
 
 
-def _gaps(edges: list[OrientedEdge]) -> Array:
-    """Return the distance (mm) from the end of each edge to the start of the next."""
-    ends = np.array([edge.ends for edge in edges])
-    return np.asarray(np.linalg.norm(np.roll(ends[:, 0], -1, axis=0) - ends[:, 1], axis=1))
+def numbered(traces: list[Trace], stem: str, *, alone: str | None = None) -> dict[str, Trace]:
+    """Return `traces` in the order of their middles by name: stem1, stem2, ...; a single `alone`.
+
+    Middles are rounded, so that last bits do not decide an order.
+    """
+    middles = [tuple((t.around.mean(axis=0).round(3) + 0.0).tolist()) for t in traces]
+    order = sorted(range(len(traces)), key=middles.__getitem__)
+    if alone is not None and len(traces) == 1:
+        return {alone: traces[0]}
+    return {f"{stem}{n}": traces[k] for n, k in enumerate(order, start=1)}
 
 
-def _around(edges: list[OrientedEdge], count: int = 24) -> Array:
-    """Return points (K, 3) mm all around the loop, `count` to an edge."""
-    return np.vstack(
-        [
-            edge.evaluate(np.linspace(edge.start, edge.end, count, endpoint=False))[0]
-            for edge in edges
-        ]
-    )
+def _range(value: tuple[float, float] | None, name: str) -> tuple[float, float] | None:
+    if value is None:
+        return None
+    low, high = floats(value, name, (2,), infinite=True).tolist()
+    if low > high:
+        raise InputError(f"{name}: expected (least, greatest) in m, got ({low:g}, {high:g})")
+    return low, high
 
 
-def _place(edges: list[OrientedEdge]) -> tuple[float, ...]:
-    """Return the loop's centroid (mm), rounded so that the last bits do not decide an order."""
-    return tuple((_around(edges).mean(axis=0).round(3) + 0.0).tolist())
+def _within(value: float | None, bounds: tuple[float, float] | None) -> bool:
+    # A nanometre of leave: a hole of 10 mm measures 9.9999999996 mm.
+    return bounds is None or (value is not None and bounds[0] - 1e-9 <= value <= bounds[1] + 1e-9)
+
+
+def _distance(trace: Trace, point: Array) -> float:
+    """Return the distance (mm) of `point` from the chords through the points around a trace."""
+    p = trace.around
+    d = np.roll(p, -1, axis=0) - p
+    along = ((point - p) * d).sum(1) / np.maximum((d * d).sum(1), np.finfo(float).tiny)
+    off = np.linalg.norm(p + np.clip(along, 0, 1)[:, None] * d - point, axis=1)
+    return float((off if trace.gaps.size == len(trace.lengths) else off[:-1]).min())
 
 
 def _diameter(points: Array) -> float | None:
@@ -279,11 +366,3 @@ def _diameter(points: Array) -> float | None:
     off = np.abs(np.hypot(x - a, y - b) - radius).max()
     is_round = off <= min(ROUND, radius / 20) and np.ptp(height) <= FLAT * 2 * radius
     return 2 * radius if is_round else None
-
-
-def _bounding_box(shapes: Sequence[TopoDS_Shape]) -> Array:
-    box = Bnd_Box()
-    for shape in shapes:
-        BRepBndLib.AddOptimal_s(shape, box, False, False)
-    corners = box.CornerMin(), box.CornerMax()
-    return freeze(np.array([[c.X(), c.Y(), c.Z()] for c in corners]) * MM)

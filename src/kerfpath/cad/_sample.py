@@ -1,20 +1,19 @@
-"""Dense points and normals along a chain of edges, no further apart than the tolerances allow."""
+"""What a loop runs along: a chain of curves, or points as they came; facts and dense samples."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
 from itertools import pairwise
+from typing import Generic, Protocol, TypeVar
 
 import numpy as np
-from OCP.BRepAdaptor import BRepAdaptor_Curve
-from OCP.collections import Array1_double
-from OCP.GeomAbs import GeomAbs_Shape
 
 from kerfpath._arrays import Array
-from kerfpath.cad._loops import OrientedEdge
 from kerfpath.errors import InputError
 
-__all__ = ["breaks", "chain"]
+__all__ = ["Chain", "Edge", "Points", "Trace"]
 
 FIRST_CELLS = 4
 """Cells per smooth stretch to begin with: one could hide an S whose middle lies on its chord."""
@@ -22,52 +21,192 @@ MARGIN = 0.8
 """Share of the tolerance allowed at the middle of a cell; a curve may stray more beside it."""
 SHORTEST = 1e-3
 """Cells below this (mm) are not divided: a crease of the surface turns its normal in no length."""
-
 MOST = 500_000
 """Nodes on one edge; a broken edge would ask for them without end."""
+AROUND = 24
+"""Points on each edge for what need not be exact: middles, and whether a loop is round."""
 
 
-def chain(
-    edges: Sequence[OrientedEdge], chord_tolerance: float, axis_tolerance: float
-) -> tuple[Array, Array]:
-    """Return points (K, 3) mm and outward normals (K, 3) around a closed chain of `edges`.
+class Edge(Protocol):
+    """A curve with normals, in the direction of travel; lengths in mm."""
 
-    The end of an edge and the start of the next become one node, halfway; the first node is not
-    repeated at the end.
+    @property
+    def start(self) -> float:
+        """Parameter where it starts."""
+
+    @property
+    def end(self) -> float:
+        """Parameter where it ends."""
+
+    @property
+    def ends(self) -> Array:
+        """First and last point (2, 3) mm."""
+
+    @property
+    def length(self) -> float:
+        """Arc length, mm."""
+
+    def bounds(self) -> Array:
+        """Return the least and greatest coordinates (2, 3) mm."""
+
+    def breaks(self) -> Array:
+        """Return the parameters, in the direction of travel, between which it is smooth."""
+
+    def evaluate(self, t: Array) -> tuple[Array, Array]:
+        """Return points (K, 3) mm and outward unit normals (K, 3) at parameters `t` (K,)."""
+
+
+E = TypeVar("E", bound=Edge)
+
+
+class Trace(Protocol):
+    """What a loop runs along."""
+
+    @property
+    def lengths(self) -> Array:
+        """Length (E,) of each of its edges, mm."""
+
+    @property
+    def gaps(self) -> Array:
+        """Distance (mm) from the end of each edge to the start of the next."""
+
+    @property
+    def around(self) -> Array:
+        """Some points (K, 3) mm all along."""
+
+    def bounds(self) -> Array:
+        """Return the least and greatest coordinates (2, 3) mm."""
+
+    def break_at(self) -> str:
+        """Say where its largest gap is."""
+
+    def sample(self, chord_tolerance: float, axis_tolerance: float) -> tuple[Array, Array]:
+        """Return points (K, 3) mm and outward normals (K, 3); a closed trace's first ends it not.
+
+        Parameters
+        ----------
+        chord_tolerance : float mm
+            Largest distance between the chord of two nodes and the edge.
+        axis_tolerance : float rad
+            Largest angle between the normals of two nodes that follow each other on an edge.
+        """
+
+
+@dataclass(frozen=True, kw_only=True)
+class Chain(Generic[E]):
+    """Edges in the order of travel; of a closed chain the last ends where the first starts.
 
     Parameters
     ----------
-    edges : sequence of OrientedEdge
-        In the order of travel, the last ending where the first starts.
-    chord_tolerance : float mm
-        Largest distance between the chord of two nodes and the edge.
-    axis_tolerance : float rad
-        Largest angle between the normals of two nodes that follow each other.
+    edges : sequence of Edge
+    is_closed : bool
+    next_end : str
+        Of an open chain: how far it is to what could follow, and where, for messages.
     """
-    sampled = [_edge(edge, chord_tolerance, axis_tolerance) for edge in edges]
-    points, normals = [], []
-    for (before_p, before_n), (p, n) in zip(sampled[-1:] + sampled[:-1], sampled, strict=True):
-        joint = before_n[-1] + n[0]
-        points += [(before_p[-1:] + p[:1]) / 2, p[1:-1]]
-        normals += [(joint / np.linalg.norm(joint))[None], n[1:-1]]
-    return np.vstack(points), np.vstack(normals)
+
+    edges: Sequence[E]
+    is_closed: bool = True
+    next_end: str = ""
+
+    @cached_property
+    def lengths(self) -> Array:
+        """Length (E,) of each edge, mm."""
+        return np.array([edge.length for edge in self.edges])
+
+    @cached_property
+    def gaps(self) -> Array:
+        """Distance (mm) from the end of each edge to the start of the next."""
+        ends = np.array([edge.ends for edge in self.edges])
+        gaps = np.linalg.norm(np.roll(ends[:, 0], -1, axis=0) - ends[:, 1], axis=1)
+        return np.asarray(gaps if self.is_closed else gaps[:-1])
+
+    @cached_property
+    def around(self) -> Array:
+        """Points (K, 3) mm all along, as many on each edge."""
+        return np.vstack(
+            [
+                edge.evaluate(np.linspace(edge.start, edge.end, AROUND, endpoint=False))[0]
+                for edge in self.edges
+            ]
+        )
+
+    def bounds(self) -> Array:
+        """Return the least and greatest coordinates (2, 3) mm."""
+        boxes = np.array([edge.bounds() for edge in self.edges])
+        return np.stack([boxes[:, 0].min(axis=0), boxes[:, 1].max(axis=0)])
+
+    def break_at(self) -> str:
+        """Say where the largest gap is."""
+        if not self.is_closed:
+            return self.next_end
+        k = int(np.argmax(self.gaps))
+        place = self.edges[k].ends[1].round(3).tolist()
+        return f"has a gap of {self.gaps[k]:.3f} mm after its edge {k + 1}, at {place} mm"
+
+    def sample(self, chord_tolerance: float, axis_tolerance: float) -> tuple[Array, Array]:
+        """Return points (K, 3) mm and outward normals (K, 3).
+
+        The end of an edge and the start of the next become one node, halfway.
+        """
+        sampled = [_edge(edge, chord_tolerance, axis_tolerance) for edge in self.edges]
+        points, normals = [], []
+        for (before_p, before_n), (p, n) in zip(sampled[-1:] + sampled[:-1], sampled, strict=True):
+            joint = before_n[-1] + n[0]
+            points += [(before_p[-1:] + p[:1]) / 2, p[1:-1]]
+            normals += [(joint / np.linalg.norm(joint))[None], n[1:-1]]
+        if not self.is_closed:
+            points[0], normals[0] = sampled[0][0][:1], sampled[0][1][:1]
+            points.append(sampled[-1][0][-1:])
+            normals.append(sampled[-1][1][-1:])
+        return np.vstack(points), np.vstack(normals)
 
 
-def breaks(edge: OrientedEdge) -> Array:
-    """Return the parameters, in the direction of travel, between which the edge is smooth."""
-    curve = BRepAdaptor_Curve(edge.edge, edge.face)
-    count = curve.NbIntervals(GeomAbs_Shape.GeomAbs_C2)
-    ends = Array1_double(1, count + 1)
-    curve.Intervals(ends, GeomAbs_Shape.GeomAbs_C2)
-    low, high = sorted((edge.start, edge.end))
-    inside = [t for t in ends if low < t < high]
-    t = np.unique([low, *inside, high])
-    return t if edge.start < edge.end else t[::-1]
+@dataclass(frozen=True, kw_only=True)
+class Points:
+    """Points (K, 3) mm and outward normals (K, 3) that are given as they are."""
+
+    points: Array
+    normals: Array
+    is_closed: bool
+
+    @cached_property
+    def lengths(self) -> Array:
+        """Length of each segment, mm."""
+        points = np.vstack([self.points, self.points[:1]]) if self.is_closed else self.points
+        return np.asarray(np.linalg.norm(np.diff(points, axis=0), axis=1))
+
+    @property
+    def gaps(self) -> Array:
+        """No gaps, by nature."""
+        return np.zeros(1)
+
+    @cached_property
+    def around(self) -> Array:
+        """The points, and the middles between them: any three points are on a circle."""
+        following = np.roll(self.points, -1, axis=0)
+        both = np.stack([self.points, (self.points + following) / 2], axis=1).reshape(-1, 3)
+        return both if self.is_closed else both[:-1]
+
+    def bounds(self) -> Array:
+        """Return the least and greatest coordinates (2, 3) mm."""
+        return np.stack([self.points.min(axis=0), self.points.max(axis=0)])
+
+    def break_at(self) -> str:
+        """Say how far its ends lie apart."""
+        first, last = self.points[[0, -1]]
+        return (
+            f"ends {np.linalg.norm(last - first):.3f} mm from its start, "
+            f"at {last.round(3).tolist()} mm"
+        )
+
+    def sample(self, chord_tolerance: float, axis_tolerance: float) -> tuple[Array, Array]:
+        """Return the points and normals; they know nothing between them."""
+        return self.points, self.normals
 
 
-def _edge(edge: OrientedEdge, chord_tolerance: float, axis_tolerance: float) -> tuple[Array, Array]:
+def _edge(edge: Edge, chord_tolerance: float, axis_tolerance: float) -> tuple[Array, Array]:
     """Return points and normals along one edge, both ends included, by halving cells."""
-    stretch = breaks(edge)
+    stretch = edge.breaks()
     t = np.concatenate(
         [
             *(np.linspace(a, b, FIRST_CELLS, endpoint=False) for a, b in pairwise(stretch)),

@@ -3,36 +3,22 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from contextlib import contextmanager
 from pathlib import Path
 
 from OCP.collections import Sequence_TCollection_AsciiString
 from OCP.IFSelect import IFSelect_ReturnStatus
-from OCP.Message import Message
-from OCP.Standard import Standard_Failure
 from OCP.STEPControl import STEPControl_Reader
-from OCP.StepRepr import StepRepr_RepresentationItem
+from OCP.StepRepr import StepRepr_NextAssemblyUsageOccurrence, StepRepr_RepresentationItem
 from OCP.TopAbs import TopAbs_ShapeEnum
-from OCP.TopExp import TopExp_Explorer
-from OCP.TopoDS import TopoDS, TopoDS_Face, TopoDS_Shape
+from OCP.TopoDS import TopoDS, TopoDS_Iterator, TopoDS_Shape
 
-from kerfpath.cad._part import Part, part_of
+from kerfpath.cad._faces import NamedFace, unique
+from kerfpath.cad._part import Part
+from kerfpath.cad._shape import occt, part_of_shape
+from kerfpath.cad._units import UNITS_MM
 from kerfpath.errors import InputError
 
 __all__ = ["read_step"]
-
-UNITS_MM = {
-    "um": 1e-3,
-    "mm": 1.0,
-    "cm": 10.0,
-    "dm": 100.0,
-    "m": 1000.0,
-    "km": 1e6,
-    "mil": 0.0254,
-    "in": 25.4,
-    "ft": 304.8,
-}
-"""Length units by the name that users give, in mm."""
 
 HEADER_UNITS = {
     "micrometre": "um",
@@ -51,50 +37,21 @@ UNNAMED = ("", "none")
 """What CAD systems write for a face without a name, in lower case."""
 
 
-def read_step(path: str | Path, unit: str | None = None) -> Part:
-    """Return the part that a STEP file holds, its placements applied.
-
-    Parameters
-    ----------
-    path : str or Path
-        The STEP file (AP203, AP214 or AP242).
-    unit : str, optional
-        What the numbers in the file mean, instead of what its header says: um, mm, cm, dm, m, km,
-        mil, in or ft.
+def read_step(path: Path, content: bytes, unit: str | None, gap: float) -> Part:
+    """Return the part that a STEP file (AP203, AP214, AP242) holds, its placements applied.
 
     Raises
     ------
     InputError
-        No such file, not a STEP file, a truncated one, one without faces, or one whose header
-        declares no single unit while `unit` is not given.
+        Not a STEP file, a truncated or damaged one, one without faces, or one whose header declares
+        no single unit while `unit` is not given.
     """
-    path = Path(path)
-    if unit is not None and unit not in UNITS_MM:
-        raise InputError(f"unit: expected one of {', '.join(UNITS_MM)}, got {unit!r}")
-    _require_whole(path)
-    try:
-        with _quiet():
-            return _read(path, unit)
-    except (Standard_Failure, RuntimeError, UnicodeDecodeError) as error:
-        reason = " ".join(str(error).split()) or type(error).__name__
-        raise InputError(
-            f"{path}: the geometry cannot be read ({reason}); export the part again"
-        ) from None
+    _require_whole(path, content)
+    with occt(path):
+        return _read(path, unit, gap)
 
 
-def _require_whole(path: Path) -> None:
-    try:
-        text = path.read_bytes()
-    except FileNotFoundError:
-        raise InputError(f"{path}: no such file; expected a STEP file (.step, .stp)") from None
-    except IsADirectoryError:
-        raise InputError(f"{path}: is a directory; expected a STEP file (.step, .stp)") from None
-    except OSError as error:
-        raise InputError(
-            f"{path}: cannot be read ({error.strerror}); expected a STEP file"
-        ) from None
-    if not text.strip():
-        raise InputError(f"{path}: the file is empty; expected a STEP file")
+def _require_whole(path: Path, text: bytes) -> None:
     if b"ISO-10303-21;" not in text[:1024]:
         raise InputError(
             f"{path}: not a STEP file: expected ISO-10303-21; in its first line, "
@@ -107,7 +64,7 @@ def _require_whole(path: Path) -> None:
         )
 
 
-def _read(path: Path, unit: str | None) -> Part:
+def _read(path: Path, unit: str | None, gap: float) -> Part:
     reader = STEPControl_Reader()
     if reader.ReadFile(str(path)) != IFSelect_ReturnStatus.IFSelect_RetDone:
         raise InputError(f"{path}: the file cannot be parsed; export the part as STEP again")
@@ -118,23 +75,57 @@ def _read(path: Path, unit: str | None) -> Part:
             f"{path}: the header declares {header or 'no length unit'}, expected one of "
             f"{', '.join(UNITS_MM)}; say what the numbers mean with unit="
         )
-    if unit is not None:
+    notes = []
+    if unit is not None and unit != header:
         # OCCT scales by the header's unit over this one: what it takes for mm is then `unit`.
         reader.SetSystemLengthUnit(UNITS_MM.get(header, 1.0) / UNITS_MM[unit])
+        notes.append(f"unit {unit} as asked; the header says {header or 'nothing'}")
     reader.TransferRoots()
     shape = reader.OneShape()
-    faces: list[tuple[str, TopoDS_Face]] = []
-    if shape is not None and not shape.IsNull():
-        explorer = TopExp_Explorer(shape, TopAbs_ShapeEnum.TopAbs_FACE)
-        while explorer.More():
-            faces.append((_name(reader, explorer.Current()), TopoDS.Face(explorer.Current())))
-            explorer.Next()
-    if not faces:
+    if shape is None or shape.IsNull():
         raise InputError(f"{path}: the file holds no face; export the part as a solid or a surface")
-    try:
-        return part_of(path, header, shape, faces)
-    except InputError as error:
-        raise InputError(f"{path}: {error}") from None
+    return part_of_shape(
+        path, unit or header, shape, list(_faces(reader, shape)), gap=gap, notes=notes
+    )
+
+
+def _faces(reader: STEPControl_Reader, shape: TopoDS_Shape) -> Iterator[NamedFace]:
+    """Yield every face with its name; in an assembly with that of its component, numbered."""
+    components: list[tuple[str, list[TopoDS_Shape]]] = []
+
+    def walk(shape: TopoDS_Shape, component: str, into: list[TopoDS_Shape]) -> None:
+        children = TopoDS_Iterator(shape)
+        while children.More():
+            child = children.Value()
+            entity = reader.WS().TransferReader().EntityFromShapeResult(child, -1)
+            if child.ShapeType() == TopAbs_ShapeEnum.TopAbs_FACE:
+                into.append(child)
+            elif isinstance(entity, StepRepr_NextAssemblyUsageOccurrence):
+                components.append((_product(entity), []))
+                walk(child, *components[-1])
+            else:
+                walk(child, component, into)
+            children.Next()
+
+    components.append(("", []))
+    if shape.ShapeType() == TopAbs_ShapeEnum.TopAbs_FACE:
+        components[0][1].append(shape)
+    walk(shape, *components[0])
+    components = [(name, faces) for name, faces in components if faces]
+    names = unique([name for name, _ in components])
+    for name, (_, faces) in zip(names, components, strict=True):
+        component = name if len(components) > 1 else ""
+        for face in faces:
+            yield NamedFace(face=TopoDS.Face(face), name=_name(reader, face), component=component)
+
+
+def _product(used: StepRepr_NextAssemblyUsageOccurrence) -> str:
+    """Return the name of the product that an assembly uses there."""
+    definition = used.RelatedProductDefinition()
+    formation = None if definition is None else definition.Formation()
+    product = None if formation is None else formation.OfProduct()
+    name = None if product is None else product.Name()
+    return (name.ToCString().strip() if name is not None else "") or "component"
 
 
 def _require_sound(path: Path, reader: STEPControl_Reader) -> None:
@@ -171,16 +162,3 @@ def _name(reader: STEPControl_Reader, face: TopoDS_Shape) -> str:
         return ""
     name = entity.Name().ToCString().strip()
     return "" if name.lower() in UNNAMED else name
-
-
-@contextmanager
-def _quiet() -> Iterator[None]:
-    """Keep OCCT's own messages off the terminal."""
-    messenger = Message.DefaultMessenger_s()
-    printers = list(messenger.Printers())
-    messenger.ChangePrinters().Clear()
-    try:
-        yield
-    finally:
-        for printer in printers:
-            messenger.AddPrinter(printer)

@@ -122,7 +122,8 @@ def _opw(g: Mapping[str, float]) -> list[Line]:
 def _ur(g: Mapping[str, float]) -> list[Line]:
     """Return lines beside the Denavit-Hartenberg ones: the links lie next to each other along d4.
 
-    Measured on the maker's meshes of UR3, UR5 and UR10; d4 is about twice a joint's radius.
+    After the extents of the maker's meshes of UR3, UR5 and UR10; corners of the joint housings jut
+    out, as capsules that held them would overlap at many a pose that is clear.
     """
     d, upper, fore = g["d4"], 1.15 * g["d4"], 0.08 * g["d4"]
     return [

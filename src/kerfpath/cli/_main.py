@@ -185,21 +185,31 @@ def audit(
 
 @app.command()
 def contours(
-    file: Annotated[Path, typer.Argument(metavar="FILE", help="A STEP file.")],
+    file: Annotated[
+        Path, typer.Argument(metavar="FILE", help="STEP, IGES, DXF, or a table of points (CSV).")
+    ],
     unit: Annotated[
-        str | None, typer.Option(help="Length unit, if the file's header is wrong: mm, cm, m, in.")
+        str | None,
+        typer.Option(help="Length unit, if the file says none or a wrong one: mm, cm, m, in."),
     ] = None,
+    html: Annotated[
+        Path | None,
+        typer.Option(help="Page to write: the part with its loops by name."),
+    ] = None,
+    everything: Annotated[
+        bool, typer.Option("--all", help="Single faces of skins and cut edges of sheets too.")
+    ] = False,
     as_json: Json = False,
 ) -> None:
-    """List the loops of a CAD file, by the names that jobs pick them by.
+    """List the loops of a drawing, by the names that jobs pick them by.
 
     Check the bounding box first: a wrong unit in the file's header shows there.
 
-    Example: kerfpath contours door.step
+    Example: kerfpath contours door.step --html door.html
     """
     from kerfpath.cli._contours import list_contours
 
-    list_contours(file, unit, as_json=as_json)
+    list_contours(file, unit, html, everything=everything, as_json=as_json)
 
 
 @app.command()

@@ -9,7 +9,7 @@ from typing import Any, TypeVar
 from pydantic import BaseModel, ValidationError
 
 from kerfpath.auditor import Check, checks
-from kerfpath.cad import read_step
+from kerfpath.cad import read as read_drawing
 from kerfpath.contour import Contour
 from kerfpath.errors import AuditFailed, InputError
 from kerfpath.job._files import program_of
@@ -100,7 +100,7 @@ def _table(
 
 def _drawn(file: PlanFile, job_file: Path) -> dict[str, Contour]:
     job = read_job(job_file)
-    part = read_step(job.part_file, unit=job.part_unit)
+    part = read_drawing(job.part_file, unit=job.part_unit)
     picks = {task.name: task.pick for task in job.contours}
     unknown = [name for name in file.contours.values() if name not in picks]
     if unknown:

@@ -17,6 +17,7 @@ from kerfpath.auditor import Check
 from kerfpath.comfort import MEASURES, Band, Comfort
 from kerfpath.contour import KINDS, Contour
 from kerfpath.errors import InputError, NoFeasiblePath
+from kerfpath.job._external import by_unit, external_entry, joints, with_external
 from kerfpath.planner import FastestSpeed
 from kerfpath.plans import Feed, Plan, Proof, Settings
 from kerfpath.robots import Coupling, Robot
@@ -82,6 +83,7 @@ def plan_text(
         "kerfpath": __version__,
         "job": job,
         "robot": _robot_entry(robot),
+        "external_axis": external_entry(robot),
         "T_flange_tip": T_flange_tip.tolist(),
         "T_base_part": T_base_part.tolist(),
         "limits": _limits_entry(robot),
@@ -103,7 +105,7 @@ def plan_entry(plan: Plan, contour: str, checks: Sequence[Check]) -> dict[str, A
         "method": settings.method,
         "objective": settings.objective,
         "metric": settings.metric,
-        "weights_per_rad": settings.weights.tolist(),
+        **by_unit("weights_per", settings.weights, plan.robot),
         "eta_v": settings.eta_v,
         "eta_a": settings.eta_a,
         "closure": settings.closure,
@@ -124,9 +126,9 @@ def plan_entry(plan: Plan, contour: str, checks: Sequence[Check]) -> dict[str, A
         "proof": plan.proof.statement,
         "grid_cost": plan.proof.grid_cost,
         "criteria": {
-            "displacement_rad": criteria.displacement.tolist(),
-            "largest_increment_rad": criteria.largest_increment.tolist(),
-            "range_rad": criteria.range.tolist(),
+            **by_unit("displacement", criteria.displacement, plan.robot),
+            **by_unit("largest_increment", criteria.largest_increment, plan.robot),
+            **by_unit("range", criteria.range, plan.robot),
             "peak_velocity_share": criteria.peak_velocity.tolist(),
             "peak_acceleration_share": criteria.peak_acceleration.tolist(),
             "nearest": {
@@ -149,7 +151,7 @@ def plan_entry(plan: Plan, contour: str, checks: Sequence[Check]) -> dict[str, A
             "kind": list(plan.contour.kinds),
             "speed_share": plan.contour.speed_share.tolist(),
             "x": None if plan.contour.x is None else plan.contour.x.tolist(),
-            "q_rad": plan.q.tolist(),
+            **by_unit("q", plan.q, plan.robot),
             "gamma_rad": plan.gamma.tolist(),
             "lead_lean_rad": plan.tilt.tolist() if plan.tilt.any() else None,
             "posture": plan.posture.tolist(),
@@ -192,7 +194,8 @@ def read_plan_file(path: str | Path) -> PlanFile:
             f"{path}: expected a plan.json with schema {SCHEMA}, got {got!r}; plan the job again"
         )
     try:
-        robot = _read_robot(data["robot"], data["limits"])
+        arm = _read_robot(data["robot"], data["limits"])
+        robot = with_external(data["external_axis"], arm)
         tool, placement = data["T_flange_tip"], data["T_base_part"]
         entries = data["contours"]
         return PlanFile(
@@ -250,6 +253,7 @@ def _robot_entry(robot: Robot) -> dict[str, Any]:
 
 
 def _limits_entry(robot: Robot) -> dict[str, Any]:
+    robot = robot.alone()
     limits = robot.joint_limits()
     velocity, acceleration = robot.speed_limits()
     return {
@@ -313,7 +317,7 @@ def _read_plan(entry: dict[str, Any], robot: Robot, tool: Any, placement: Any) -
         robot=robot,
         T_flange_tip=tool,
         T_base_part=placement,
-        q=nodes["q_rad"],
+        q=joints(nodes, "q", robot),
         gamma=nodes["gamma_rad"],
         tilt=nodes["lead_lean_rad"],
         posture=nodes["posture"],
@@ -325,7 +329,7 @@ def _read_plan(entry: dict[str, Any], robot: Robot, tool: Any, placement: Any) -
             method=entry["method"],
             objective=entry["objective"],
             metric=entry["metric"],
-            weights=np.array(entry["weights_per_rad"], dtype=float),
+            weights=joints(entry, "weights_per", robot),
             eta_v=float(entry["eta_v"]),
             eta_a=float(entry["eta_a"]),
             closure=entry["closure"],

@@ -10,7 +10,7 @@ import numpy as np
 
 from kerfpath._arrays import Array, Ints
 from kerfpath.auditor import Check, checks
-from kerfpath.cad import read_step
+from kerfpath.cad import read as read_drawing
 from kerfpath.contour import FRAME_KINDS, Contour
 from kerfpath.errors import NoFeasiblePath
 from kerfpath.graph import LayeredGraph
@@ -132,7 +132,7 @@ def run_job(job: Job, *, progress: Progress = lambda what, done, total: None) ->
     InputError
         The part cannot be read, a loop does not exist, a contour cannot be sampled.
     """
-    part = read_step(job.part_file, unit=job.part_unit)
+    part = read_drawing(job.part_file, unit=job.part_unit)
     for task in job.contours:  # a misspelt name shall not wait for the contours before it
         part.loop(task.pick)
     cuts = [
@@ -235,7 +235,7 @@ def fastest_speeds(
     InputError
         As `run_job`.
     """
-    part = read_step(job.part_file, unit=job.part_unit)
+    part = read_drawing(job.part_file, unit=job.part_unit)
     options = job.plan_options
     keys = ("gamma_step", "frames", "postures", "eta_v", "eta_a", "refine")
     comfort = options["comfort"] and options["comfort"].hard

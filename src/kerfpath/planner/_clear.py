@@ -80,6 +80,8 @@ class Finder:
 
 def _require_same_cell(task: Task, cell: Cell) -> None:
     """Raise InputError where the cell was built for another tool or another place of the part."""
+    if task.robot.external is not None:
+        raise InputError(f"cell: it does not know how a {task.robot.external.kind} moves in it")
     for name, here, there in (
         ("tool", task.T_flange_tip, cell.T_flange_tip),
         ("placement", task.T_base_part, cell.T_base_part),

@@ -37,14 +37,16 @@ def slowed(task: Task, finder: Finder, *, refine: bool) -> Plan:
     better = refiner.refine(made)
     again = _timed(task, better.plan)
     best = again if again.time[-1] <= made.time[-1] else made
-    comfort = task.settings.comfort
+    comfort, broken = task.settings.comfort, ""
     if comfort is not None and comfort.broken(task.robot, best.q, task.T_flange_tip):
-        return slowed(task, finder, refine=False)
-    if finder.is_clear(best):
+        broken = "break a margin of comfort"
+    elif not finder.is_clear(best):
+        broken = "not be clear"
+    if not broken:
         return best
-    on_grid = slowed(task, finder, refine=False)
-    statement = f"{on_grid.proof.statement}; not refined: off the grid it would not be clear"
-    return replace(on_grid, proof=replace(on_grid.proof, statement=statement))
+    kept = slowed(task, finder, refine=False)
+    claim = f"{kept.proof.statement}; not refined: off the grid it would {broken}"
+    return replace(kept, proof=replace(kept.proof, statement=claim))
 
 
 def _least_lost(task: Task, finder: Finder) -> Plan:

@@ -82,7 +82,7 @@ def preflight(program: Program, language: str = "rapid") -> list[ProgramIssue]:
         issues += _waits(section)
         issues += _motion(program, section, rules)
         issues += _limits(program, section)
-    if any(isinstance(step, JointMove) for step in program.steps):
+    if not program.air_checked and any(isinstance(step, JointMove) for step in program.steps):
         issues.append(
             ProgramIssue(
                 "warning",

@@ -5,12 +5,13 @@ from __future__ import annotations
 import re
 import unicodedata
 from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.spatial.transform import Rotation
 
 from kerfpath._arrays import Array, as_pose, floats, freeze, scalar
+from kerfpath.air import AirMove, backed_off
 from kerfpath.errors import InputError
 from kerfpath.plans import Plan
 from kerfpath.robots import Robot, posture_name
@@ -154,6 +155,8 @@ class Program:
         What the controller calls the tool, the work object and the output of the laser.
     sections : tuple of Section
         One for each contour, in order.
+    air_checked : bool
+        Whether the moves to and between the contours have been proved clear.
     """
 
     name: str
@@ -164,6 +167,7 @@ class Program:
     work_object: str
     laser_output: str
     sections: tuple[Section, ...]
+    air_checked: bool = False
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "T_flange_tip", as_pose(self.T_flange_tip, "T_flange_tip"))
@@ -178,6 +182,7 @@ class Program:
 def build_program(
     plans: Sequence[Plan],
     *,
+    moves: Sequence[AirMove] = (),
     name: str | None = None,
     retract: float = 0.05,
     zone: float = 0.0003,
@@ -200,6 +205,9 @@ def build_program(
     ----------
     plans : sequence of Plan
         In the order of cutting; same robot, tool and placement.
+    moves : sequence of AirMove
+        Between the contours, as `kerfpath.sequence.plan_part` returns them, one less than plans or,
+        from and to a home position, one more; default: joint moves straight to each start.
     name : str, optional
         Name of the program, made an identifier; default: "cut" and the first contour.
     retract : float m
@@ -226,6 +234,9 @@ def build_program(
     if not plans:
         raise InputError("build_program: expected at least one plan, got none")
     first = plans[0]
+    for axis in (plan.robot.external for plan in plans):
+        if axis is not None:
+            raise InputError(f"program: no language writes the {axis.kind} of a plan yet")
     for plan in plans[1:]:
         _require_same_cell(first, plan)
     retract = scalar(retract, "retract", unit="m", above=0.0)
@@ -234,12 +245,13 @@ def build_program(
     names = _identifiers(
         (plan.name for plan in plans), taken=(title, tool_name, work_object, laser_output)
     )
+    *ways, home = _corners(plans, moves, retract)
     sections = []
-    for plan, section_name in zip(plans, names, strict=True):
+    for plan, section_name, way in zip(plans, names, ways, strict=True):
         q = plan.q[0] + np.vstack([np.zeros(6), np.cumsum(plan.increments, axis=0)])
         T_part_tip = _tip_poses(plan, q)
-        _, q_in = _backed_off(plan, T_part_tip[0], q[0], 0, retract)
-        T_out, q_out = _backed_off(plan, T_part_tip[-1], q[-1], len(q) - 1, retract)
+        T_out = T_part_tip[-1].copy()
+        T_out[:3, 3] -= retract * T_out[:3, 2]
         zones = np.append(np.full(len(q) - 2, zone), 0.0)
         cut = [
             LinearMove(T_part_tip=T, q=q_k, speed=float(speed_k), zone=float(zone_k))
@@ -253,15 +265,18 @@ def build_program(
                 f"{plan.name}: {len(q)} nodes, {plan.contour.length * 1e3:.1f} mm, "
                 f"posture {posture_name(int(plan.posture[0]))}"
             ),
-            JointMove(q=q_in, speed=air_speed),
+            *(JointMove(q=corner, speed=air_speed) for corner in way),
             LinearMove(T_part_tip=T_part_tip[0], q=q[0], speed=approach_speed),
             LaserOn(lead_time=lead_time),
             *([Wait(time=pierce_time)] if pierce_time > 0 else []),
             *_switched(cut, plan.contour.kinds, lead_time),
             LaserOff(lead_time=lead_time),
-            LinearMove(T_part_tip=T_out, q=q_out, speed=approach_speed),
+            LinearMove(T_part_tip=T_out, q=backed_off(plan, "end", retract), speed=approach_speed),
         )
         sections.append(Section(name=section_name, steps=steps))
+    if home:
+        back = tuple(JointMove(q=corner, speed=air_speed) for corner in home)
+        sections[-1] = replace(sections[-1], steps=sections[-1].steps + back)
     return Program(
         name=title,
         robot=first.robot,
@@ -271,6 +286,22 @@ def build_program(
         work_object=work_object,
         laser_output=laser_output,
         sections=tuple(sections),
+        air_checked=len(moves) > 0 and all(move.clear for move in moves),
+    )
+
+
+def _corners(plans: Sequence[Plan], moves: Sequence[AirMove], retract: float) -> list[list[Array]]:
+    """Return the joint vectors on the way to each of P plans, and P + 1st those after the last."""
+    if not moves:
+        return [*([backed_off(plan, "start", retract)] for plan in plans), []]
+    ways = [list(move.q[1:]) for move in moves]
+    if len(moves) == len(plans) - 1:
+        return [[backed_off(plans[0], "start", retract)], *ways, []]
+    if len(moves) == len(plans) + 1:
+        return [list(moves[0].q), *ways[1:]]
+    raise InputError(
+        f"build_program: {len(plans)} plans need {len(plans) - 1} moves between them, or "
+        f"{len(plans) + 1} from and to a home position, got {len(moves)}"
     )
 
 
@@ -313,27 +344,6 @@ def _tip_poses(plan: Plan, q: Array) -> Array:
     T[:, :3, :3] = Rotation.from_matrix(T[:, :3, :3]).as_matrix()
     T[:, :3, 3], T[:, 3] = plan.contour.points, (0.0, 0.0, 0.0, 1.0)
     return freeze(T)
-
-
-def _backed_off(
-    plan: Plan, T_part_tip: Array, q: Array, node: int, retract: float
-) -> tuple[Array, Array]:
-    """Return pose and joints after backing off a node along the tool axis, posture kept."""
-    T = T_part_tip.copy()
-    T[:3, 3] -= retract * T[:3, 2]
-    found = plan.robot.inverse(plan.T_base_part @ T @ _inverse(plan.T_flange_tip))
-    q_found = found.q[found.posture == plan.posture[node]]
-    if not len(q_found):
-        raise InputError(
-            f"contour {plan.name!r}, node {node}: the tool cannot back off by {retract * 1e3:g} mm "
-            f"in posture {posture_name(int(plan.posture[node]))} within the joint limits; lower "
-            "the retract"
-        )
-    # An endless joint is solved within one turn: bring it onto the turn that the contour is on.
-    turns = np.round((q - q_found) / (2 * np.pi)) * plan.robot.endless
-    q_found = q_found + 2 * np.pi * turns
-    nearest = int(np.argmin(np.abs(q_found - q).max(axis=1)))
-    return freeze(T), freeze(q_found[nearest])
 
 
 def _switched(

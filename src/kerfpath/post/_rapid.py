@@ -42,6 +42,7 @@ SLOWEST = 1e-5
 LONGEST_LEAD = 0.5
 r"""Longest lead (s) that ``TriggIO \Time`` takes."""
 
+NOT_CHECKED = "not been checked for collisions"
 NO_EXTERNAL_AXES = "[9E9,9E9,9E9,9E9,9E9,9E9]"
 EXTERNAL_SPEEDS = "5000,1000"
 """mm/s and deg/s of external axes; there are none, but speed data must say something."""
@@ -76,7 +77,8 @@ def rapid(program: Program) -> str:
         f"  ! Written by kerfpath for {_plain(program.robot.model)} ({_plain(program.robot.id)}).",
         "  ! Complete the load of the tool: mass -1 stands for not known.",
         "  ! The work object is the part in the robot's base, with the world frame at that base.",
-        "  ! Moves through the air have not been checked for collisions.",
+        "  ! Moves through the air have "
+        f"{'been proved clear in the planned cell' if program.air_checked else NOT_CHECKED}.",
         "  ! A stop does not switch the laser off: the safety circuit of the cell has to.",
         f"  PERS tooldata {program.tool_name}:=[TRUE,{tool},[-1,[0,0,0],[1,0,0,0],0,0,0]];",
         f'  PERS wobjdata {program.work_object}:=[FALSE,TRUE,"",{part},[[0,0,0],[1,0,0,0]]];',

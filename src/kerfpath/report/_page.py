@@ -2,19 +2,15 @@
 
 from __future__ import annotations
 
-import base64
-import zlib
 from collections.abc import Sequence
 from html import escape
 from importlib.metadata import version
-from importlib.resources import files
 
-import plotly.graph_objects as go
 from numpy.typing import ArrayLike
-from plotly.offline import get_plotlyjs
 
 from kerfpath.plans import Plan
 from kerfpath.report import _map, _motion, _tables
+from kerfpath.report._html import Figures, page
 from kerfpath.report._scene import scene
 from kerfpath.report._section import ContourSection
 from kerfpath.report._tables import FAIL, PASS, WARN, sign
@@ -49,7 +45,7 @@ def render(
     job_text : str
         The job file as read.
     """
-    figures = _Figures()
+    figures = Figures()
     state, verdict = _verdict(sections)
     body = [
         "<header>",
@@ -74,60 +70,10 @@ def render(
         _job(job_text),
         f"<footer>{_origin(sections)}</footer>",
     ]
-    return _SKELETON.format(
-        title=escape(title),
-        style=_resource("page.css"),
-        body="\n".join(part for part in body if part),
-        data="\n".join(figures.data),
-        plotly=get_plotlyjs(),
-        script=_resource("page.js"),
-    )
+    return page(title, body, figures)
 
 
-_SKELETON = """<!DOCTYPE html>
-<html lang="en">
-<head>
-<meta charset="utf-8">
-<meta name="viewport" content="width=device-width, initial-scale=1">
-<meta name="generator" content="kerfpath">
-<title>{title}</title>
-<style>
-{style}</style>
-</head>
-<body>
-<main>
-{body}
-</main>
-{data}
-<script>{plotly}</script>
-<script>
-{script}</script>
-</body>
-</html>
-"""
-
-
-class _Figures:
-    """The figures of a page: each is packed once, and drawn when it first comes into view."""
-
-    def __init__(self) -> None:
-        self.data: list[str] = []
-
-    def place(self, figure: go.Figure, kind: str) -> str:
-        """Pack `figure` and return the element that it is drawn into."""
-        number = len(self.data) + 1
-        # A map of 1500 x 360 x 8 codes has long runs: deflated, a report with many stays small.
-        packed = base64.b64encode(zlib.compress(figure.to_json().encode(), 9)).decode()
-        self.data.append(
-            f'<script type="application/octet-stream" id="figure-{number}">{packed}</script>'
-        )
-        return (
-            f'<div class="figure {kind}" data-figure="figure-{number}" '
-            f'style="min-height:{figure.layout.height}px"></div>'
-        )
-
-
-def _contour(number: int, section: ContourSection, figures: _Figures) -> str:
+def _contour(number: int, section: ContourSection, figures: Figures) -> str:
     plan = section.plan
     result = _tables.audit_sign(section) if plan else sign(FAIL, "no feasible path")
     size = f"{_tables.number(section.path.length * 1e3, 1)} mm, {len(section.path)} nodes"
@@ -174,7 +120,7 @@ def _contour(number: int, section: ContourSection, figures: _Figures) -> str:
     return "\n".join(parts)
 
 
-def _map_part(section: ContourSection, figures: _Figures) -> list[str]:
+def _map_part(section: ContourSection, figures: Figures) -> list[str]:
     graph, plan = section.graph, section.plan
     figure = _map.feasibility_map(graph, plan, s=section.path.s, broken_at=section.broken_at)
     # The page has a legend of its own, which wraps, and a hover text that knows the reason.
@@ -262,7 +208,3 @@ def _origin(sections: Sequence[ContourSection]) -> str:
             limits = plan.robot.sources["geometry_limits_velocity"]
             told.append(f"geometry, joint and velocity limits: {limits}")
     return escape(" · ".join(told))
-
-
-def _resource(name: str) -> str:
-    return (files("kerfpath.report") / name).read_text(encoding="utf-8")

@@ -108,7 +108,7 @@ def model_of(chain: Chain) -> dict[str, Any]:
         require_solver()
     except InputError as error:
         raise InputError(f"{'; '.join(told)}: {error}") from None
-    return {"kinematics": "general", "geometry": {}, "notes": (f"{'; '.join(told)}.".capitalize(),)}
+    return {"kinematics": "general", "geometry": {}, "notes": (f"General arm: {'; '.join(told)}.",)}
 
 
 def _lines(chain: Chain) -> _Lines:

@@ -1,0 +1,155 @@
+"""A move from one joint vector to another: its corners, and the time it takes."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from kerfpath._arrays import Array, floats, freeze
+from kerfpath.air._around import way_around
+from kerfpath.cell import Cell
+from kerfpath.errors import InputError, NoFeasiblePath
+from kerfpath.robots import Robot
+
+__all__ = ["AirMove", "air_move", "least_time"]
+
+SECONDS = 10.0
+"""How long a way around is looked for."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class AirMove:
+    """Straight joint motions from corner to corner, with a stop at each.
+
+    Parameters
+    ----------
+    q : (m, n) rad
+        Corners, both ends included.
+    time : (m,) s
+        When each is reached, from 0.
+    clear : bool
+        Whether it has been proved clear in a cell; False where there was none to check it in.
+    """
+
+    q: Array
+    time: Array
+    clear: bool
+
+    @property
+    def duration(self) -> float:
+        """Time it takes, s."""
+        return float(self.time[-1])
+
+
+def least_time(dq: ArrayLike, velocity: ArrayLike, acceleration: ArrayLike) -> Array:
+    """Return the times (B,) s of straight joint motions dq (B, n) rad from stop to stop.
+
+    All joints start and arrive together; with s from 0 to 1 along the motion, the joint that is
+    nearest to a limit bounds the speed v of s and its acceleration a, and it takes 1 / v + v / a,
+    or 2 / sqrt(a) where v is not reached.
+    """
+    step = np.abs(floats(dq, "dq", (None, None)))
+    n = step.shape[1]
+    # Time to cross at full speed, and square of the time to gain it all, of the slowest joint.
+    cross = (step / floats(velocity, "velocity", (n,))).max(axis=1)
+    gain = (step / floats(acceleration, "acceleration", (n,))).max(axis=1)
+    full = cross**2 >= gain
+    over = np.where(cross > 0, cross, 1.0)
+    return np.asarray(np.where(full, cross + gain / over, 2 * np.sqrt(gain)))
+
+
+def air_move(
+    robot: Robot,
+    q0: ArrayLike,
+    q1: ArrayLike,
+    *,
+    cell: Cell | None = None,
+    eta_v: float = 1.0,
+    eta_a: float = 1.0,
+    seconds: float = SECONDS,
+) -> AirMove:
+    """Return a move from q0 to q1 (n,) rad, clear in the cell and within the limits.
+
+    The straight joint motion if it is clear; else a way around it by RRT-Connect, shortened. The
+    same arguments give the same move.
+
+    Parameters
+    ----------
+    robot : Robot
+        With all limits known.
+    q0, q1 : (n,) rad
+        Endless joints turn as the two say: they do not go the short way by themselves.
+    cell : Cell, optional
+        Without one the straight motion is returned, not `clear`.
+    eta_v, eta_a : float
+        Share of the limits that may be used.
+    seconds : float s
+        How long a way around is looked for.
+
+    Raises
+    ------
+    NoFeasiblePath
+        An end that is not clear (proved), or no way found in time (not proved).
+    InputError
+        Limits that are not known, joints beyond them, an external axis.
+    """
+    if robot.external is not None:
+        raise InputError(f"air move: it is not known yet how a {robot.external.kind} moves in it")
+    n = robot.joints
+    ends = np.array([floats(q0, "q0", (n,)), floats(q1, "q1", (n,))])
+    velocity, acceleration = robot.speed_limits()
+    lower, upper = _bounds(robot, ends)
+    corners = ends
+    if cell is not None:
+        _require_clear(cell, ends)
+        if not _clear(cell, ends):
+            found = way_around(
+                ends, lower, upper, 1 / velocity,
+                clear=lambda q: bool(cell.clear(q).all()), passable=lambda q: _clear(cell, q),
+                seconds=seconds,
+            )  # fmt: skip
+            if found is None:
+                raise NoFeasiblePath(
+                    f"no way through the air found in {seconds:g} s; its ends are clear",
+                    proved=False,
+                    node=-1,
+                )
+            corners = found
+    took = least_time(np.diff(corners, axis=0), eta_v * velocity, eta_a * acceleration)
+    return AirMove(
+        q=freeze(corners),
+        time=freeze(np.concatenate([[0.0], np.cumsum(np.maximum(took, 1e-9))])),
+        clear=cell is not None,
+    )
+
+
+def _bounds(robot: Robot, ends: Array) -> tuple[Array, Array]:
+    """Return joint bounds (n,) rad; endless joints have a turn of room beyond either end."""
+    limits = robot.joint_limits()
+    low = np.where(robot.endless, ends.min(axis=0) - 2 * np.pi, limits.lower)
+    high = np.where(robot.endless, ends.max(axis=0) + 2 * np.pi, limits.upper)
+    beyond = (ends < low - 1e-9) | (ends > high + 1e-9)
+    if beyond.any():
+        joint = int(np.flatnonzero(beyond.any(axis=0))[0])
+        raise InputError(f"air move: joint {joint + 1} of an end is beyond its limits")
+    return np.minimum(low, ends.min(axis=0)), np.maximum(high, ends.max(axis=0))
+
+
+def _clear(cell: Cell, q: Array) -> bool:
+    """Say whether the straight motions through q (m, n) are all proved clear, as they turn."""
+    return bool(cell.sweep.clear(q[:-1], q[1:], cell.required, cell.scene.distances).all())
+
+
+def _require_clear(cell: Cell, ends: Array) -> None:
+    over, pair = cell.clearance(ends)
+    for what, gap, p in zip(("start", "end"), over, pair, strict=True):
+        if gap <= 0:
+            one, two = cell.pair_names[int(p)]
+            raise NoFeasiblePath(
+                f"the {what} of a move through the air is not clear: {one!r} and {two!r} come "
+                f"{-gap * 1e3:.3g} mm nearer than allowed",
+                proved=True,
+                node=-1,
+            )

@@ -1,0 +1,51 @@
+"""Where the tool goes before and after a cut: straight back along its axis."""
+
+from __future__ import annotations
+
+from typing import Literal
+
+import numpy as np
+
+from kerfpath._arrays import Array, freeze
+from kerfpath.errors import InputError
+from kerfpath.plans import Plan
+from kerfpath.robots import posture_name
+
+__all__ = ["End", "backed_off"]
+
+End = Literal["start", "end"]
+
+
+def backed_off(plan: Plan, end: End, retract: float) -> Array:
+    """Return the joints (n,) rad after backing off an end of a plan along the tool axis.
+
+    The posture is kept, and an endless joint stays on its turn.
+
+    Parameters
+    ----------
+    plan : Plan
+    end : {"start", "end"}
+    retract : float m
+
+    Raises
+    ------
+    InputError
+        No such pose within the joint limits.
+    """
+    node = 0 if end == "start" else len(plan.q) - 1
+    # Where endless joints are after all their turns along the contour.
+    q = plan.q[0] + plan.increments[:node].sum(axis=0)
+    T = plan.robot.forward(q) @ plan.T_flange_tip
+    T[:3, 3] -= retract * T[:3, 2]
+    found = plan.robot.inverse(T @ np.linalg.inv(plan.T_flange_tip))
+    q_found = found.q[found.posture == plan.posture[node]]
+    if not len(q_found):
+        raise InputError(
+            f"contour {plan.name!r}, node {node}: the tool cannot back off by {retract * 1e3:g} mm "
+            f"in posture {posture_name(int(plan.posture[node]))} within the joint limits; lower "
+            "the retract"
+        )
+    # An endless joint is solved within one turn: bring it onto the turn that the contour is on.
+    turns = np.round((q - q_found) / (2 * np.pi)) * plan.robot.endless
+    q_found = q_found + 2 * np.pi * turns
+    return freeze(q_found[int(np.argmin(np.abs(q_found - q).max(axis=1)))])

@@ -1,0 +1,97 @@
+"""The re-check of a move through the air: joint limits, the time it has, and collisions."""
+
+from __future__ import annotations
+
+from itertools import pairwise
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from kerfpath._arrays import Array, Ints, floats
+from kerfpath.auditor._chain import chain_of
+from kerfpath.auditor._collision import collision_at
+from kerfpath.auditor._table import Check, Unit
+from kerfpath.cell import Cell
+from kerfpath.errors import InputError
+from kerfpath.robots import Robot
+
+__all__ = ["air_checks"]
+
+STEP = np.radians(0.5)
+"""Largest joint step between two samples of a move."""
+SLACK = 1e-6
+"""Relative slack on the time, and rad on joint limits, for rounding."""
+
+
+def air_checks(
+    robot: Robot,
+    q: ArrayLike,
+    time: ArrayLike,
+    *,
+    cell: Cell | None = None,
+    eta_v: float = 1.0,
+    eta_a: float = 1.0,
+) -> list[Check]:
+    """Return the checks of straight joint motions from corner to corner, with a stop at each.
+
+    Parameters
+    ----------
+    robot : Robot
+    q : (m, n) rad
+        Corners; endless joints turn as they say.
+    time : (m,) s
+        When each is reached.
+    cell : Cell, optional
+        Without one, collisions are not checked.
+    eta_v, eta_a : float
+        Share of the limits that may be used.
+
+    Returns
+    -------
+    list of Check
+        Their node is the corner that a motion starts from.
+    """
+    if robot.external is not None:
+        raise InputError(f"air move: it is not known yet how a {robot.external.kind} moves in it")
+    corners = floats(q, "q", (None, robot.joints))
+    duration = np.diff(floats(time, "time", (len(corners),)))
+    late = _needed(robot, np.abs(np.diff(corners, axis=0)), eta_v, eta_a) / duration
+    limits = robot.joint_limits()
+    beyond = np.maximum(limits.lower - corners, corners - limits.upper)
+    beyond[:, robot.endless] = -np.inf
+    rows = [
+        _check("air-time", "time that a move through the air needs", late, 1 + SLACK, "share"),
+        _check("air-limits", "excess over the joint limits", beyond.max(axis=1), SLACK, "rad"),
+    ]
+    if cell is not None and len(cell.pairs):
+        samples, leg = _sampled(corners)
+        rows.append(collision_at(cell, samples, leg, chain_of(robot)))
+    return rows
+
+
+def _needed(robot: Robot, step: Array, eta_v: float, eta_a: float) -> Array:
+    """Return the least time (m-1,) s of straight motions by |dq| (m-1, n) rad, stop to stop."""
+    velocity, acceleration = robot.speed_limits()
+    still = 1e-300
+    v = (eta_v * velocity / np.maximum(step, still)).min(axis=1)
+    a = (eta_a * acceleration / np.maximum(step, still)).min(axis=1)
+    # Of the motion's own share of the way: it peaks at v, or half way where it never gets there.
+    peak = np.minimum(v, np.sqrt(a))
+    return np.asarray(1 / peak + peak / a)
+
+
+def _sampled(corners: Array) -> tuple[Array, Ints]:
+    """Return joint vectors (S, n) along the motions, no joint step above `STEP`, and their legs."""
+    samples, legs = [], []
+    for k, (one, two) in enumerate(pairwise(corners)):
+        count = int(np.ceil(np.abs(two - one).max() / STEP)) + 1
+        samples.append(one + np.linspace(0, 1, count + 1)[:, None] * (two - one))
+        legs.append(np.full(count + 1, k))
+    return np.vstack(samples), np.concatenate(legs)
+
+
+def _check(code: str, title: str, values: Array, limit: float, unit: Unit) -> Check:
+    worst = int(np.argmax(np.where(np.isnan(values), np.inf, values)))
+    return Check(
+        code=code, title=title, value=float(values[worst]), limit=limit, unit=unit, node=worst
+    )

@@ -1,0 +1,160 @@
+"""Lines, arcs and splines of flat drawings; the drawing plane faces up, along +z."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+from scipy.interpolate import BSpline
+
+from kerfpath._arrays import Array
+
+__all__ = ["Arc", "Curve", "Line", "Spline", "backwards"]
+
+UP = np.array([0.0, 0.0, 1.0])
+GAUSS = np.polynomial.legendre.leggauss(12)
+"""Nodes and weights on (-1, 1); 12 per smooth stretch give the length of drawn curves to 1e-9."""
+LOOK = 64
+"""Points per stretch of a spline from which its bounding box is taken."""
+
+
+class _Flat:
+    """What all flat curves have in common; each gives `start`, `end`, `at` and `speed`."""
+
+    start: float
+    end: float
+
+    @cached_property
+    def ends(self) -> Array:
+        """First and last point (2, 3) mm."""
+        return self.at(np.array([self.start, self.end]))
+
+    @cached_property
+    def length(self) -> float:
+        """Arc length, mm."""
+        breaks = self.breaks()
+        half, middle = np.diff(breaks)[:, None] / 2, (breaks[1:] + breaks[:-1])[:, None] / 2
+        speed = self.speed((middle + half * GAUSS[0]).ravel()).reshape(len(half), -1)
+        return float(np.abs(half[:, 0]) @ (speed @ GAUSS[1]))
+
+    def bounds(self) -> Array:
+        """Return the least and greatest coordinates (2, 3) mm."""
+        points = self.at(self.extremes())
+        return np.stack([points.min(axis=0), points.max(axis=0)])
+
+    def breaks(self) -> Array:
+        """Return the parameters, in the direction of travel, between which it is smooth."""
+        return np.array([self.start, self.end])
+
+    def extremes(self) -> Array:
+        """Return parameters (K,) at which coordinates are least and greatest."""
+        return self.breaks()
+
+    def evaluate(self, t: Array) -> tuple[Array, Array]:
+        """Return points (K, 3) mm and normals (K, 3), all up."""
+        return self.at(t), np.tile(UP, (len(t), 1))
+
+    def at(self, t: Array) -> Array:
+        """Return points (K, 3) mm."""
+        raise NotImplementedError
+
+    def speed(self, t: Array) -> Array:
+        """Return the length (K,) mm of the derivative."""
+        raise NotImplementedError
+
+
+@dataclass(frozen=True)
+class Line(_Flat):
+    """The segment from `p` to `q`, (3,) mm."""
+
+    p: Array
+    q: Array
+    start: float = 0.0
+    end: float = 1.0
+
+    def at(self, t: Array) -> Array:
+        """Return points (K, 3) mm."""
+        return np.asarray(self.p + t[:, None] * (self.q - self.p))
+
+    def speed(self, t: Array) -> Array:
+        """Return the length (K,) mm of the derivative."""
+        return np.full(len(t), np.linalg.norm(self.q - self.p))
+
+
+@dataclass(frozen=True)
+class Arc(_Flat):
+    """Part of a circle or an ellipse: centre + cos(t) major + sin(t) minor, all (3,) mm."""
+
+    centre: Array
+    major: Array
+    minor: Array
+    start: float
+    end: float
+
+    def at(self, t: Array) -> Array:
+        """Return points (K, 3) mm."""
+        return np.asarray(
+            self.centre + np.cos(t)[:, None] * self.major + np.sin(t)[:, None] * self.minor
+        )
+
+    def speed(self, t: Array) -> Array:
+        """Return the length (K,) mm of the derivative."""
+        d = np.cos(t)[:, None] * self.minor - np.sin(t)[:, None] * self.major
+        return np.asarray(np.linalg.norm(d, axis=1))
+
+    def breaks(self) -> Array:
+        """Return quarters: an ellipse is nearly a straight line at its flat sides."""
+        quarters = int(np.ceil(abs(self.end - self.start) / (np.pi / 2) - 1e-9))
+        return np.linspace(self.start, self.end, max(1, quarters) + 1)
+
+    def extremes(self) -> Array:
+        """Return the ends, and where x, y or z turns round between them."""
+        low, high = sorted((self.start, self.end))
+        turns = np.arctan2(self.minor, self.major)
+        k = np.arange(np.floor(low / np.pi) - 1, np.ceil(high / np.pi) + 1)
+        t = (turns[:, None] + k * np.pi).ravel()
+        return np.concatenate([[low, high], t[(t > low) & (t < high)]])
+
+
+@dataclass(frozen=True)
+class Spline(_Flat):
+    """A rational B-spline: `homogeneous` gives (x w, y w, z w, w)."""
+
+    homogeneous: BSpline
+    start: float
+    end: float
+
+    def at(self, t: Array) -> Array:
+        """Return points (K, 3) mm."""
+        p = self.homogeneous(t)
+        return np.asarray(p[:, :3] / p[:, 3:])
+
+    def speed(self, t: Array) -> Array:
+        """Return the length (K,) mm of the derivative."""
+        p, d = self.homogeneous(t), self.homogeneous(t, 1)
+        return np.asarray(
+            np.linalg.norm((d[:, :3] - d[:, 3:] * p[:, :3] / p[:, 3:]) / p[:, 3:], axis=1)
+        )
+
+    def breaks(self) -> Array:
+        """Return the knots between the ends."""
+        low, high = sorted((self.start, self.end))
+        knots = np.unique(self.homogeneous.t)
+        t = np.concatenate([[low], knots[(knots > low) & (knots < high)], [high]])
+        return t if self.start < self.end else t[::-1]
+
+    def extremes(self) -> Array:
+        """Return many parameters: within a thousandth of a stretch of the true extremes."""
+        breaks = self.breaks()
+        part = np.linspace(0.0, 1.0, LOOK, endpoint=False)
+        inside = (breaks[:-1, None] + np.diff(breaks)[:, None] * part).ravel()
+        return np.append(inside, breaks[-1])
+
+
+Curve = Line | Arc | Spline
+
+
+def backwards(curve: Curve) -> Curve:
+    """Return the curve travelled the other way."""
+    return replace(curve, start=curve.end, end=curve.start)

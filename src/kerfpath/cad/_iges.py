@@ -1,0 +1,117 @@
+"""Read IGES files: loose faces, their unit and names, and a clear word for every bad file."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+from OCP.BRepBuilderAPI import BRepBuilderAPI_Transform
+from OCP.gp import gp_Pnt, gp_Trsf
+from OCP.IFSelect import IFSelect_ReturnStatus
+from OCP.IGESControl import IGESControl_Controller, IGESControl_Reader
+from OCP.IGESData import IGESData_IGESEntity
+from OCP.TopAbs import TopAbs_ShapeEnum
+from OCP.TopoDS import TopoDS, TopoDS_Shape
+
+from kerfpath.cad._faces import NamedFace
+from kerfpath.cad._part import Part
+from kerfpath.cad._shape import explored, occt, part_of_shape
+from kerfpath.cad._units import UNITS_MM
+from kerfpath.errors import InputError
+
+__all__ = ["read_iges"]
+
+FLAGS = {1: "in", 2: "mm", 4: "ft", 6: "m", 7: "km", 8: "mil", 9: "um", 10: "cm"}
+"""Units by the flag of the global section (IGES 5.3, table 2)."""
+WIDTH = 80
+"""Columns of a line; the 73rd names its section."""
+
+
+def read_iges(path: Path, content: bytes, unit: str | None, gap: float) -> Part:
+    """Return the part that an IGES file holds, its loose faces sewn together.
+
+    Raises
+    ------
+    InputError
+        Not an IGES file, a truncated or damaged one, one without faces, or one whose header
+        declares no known unit while `unit` is not given.
+    """
+    _require_whole(path, content)
+    with occt(path):
+        return _read(path, unit, gap)
+
+
+def _require_whole(path: Path, content: bytes) -> None:
+    lines = content.splitlines()
+    sections = [line[72:73].decode("ascii", "replace") for line in lines if line.strip()]
+    if sections[0] != "S":
+        raise InputError(
+            f"{path}: not an IGES file: expected S in column 73 of its first line, "
+            f"got {sections[0]!r}; export the part as IGES"
+        )
+    last = next(line for line in reversed(lines) if line.strip()).decode("ascii", "replace")
+    told = re.match(r"S\s*(\d+)G\s*(\d+)D\s*(\d+)P\s*(\d+)", last)
+    if sections[-1] != "T" or told is None:
+        raise InputError(
+            f"{path}: the file is truncated: expected a line T at its end, got {last[:32]!r}; "
+            "copy or export it again"
+        )
+    for section, count in zip("SGDP", told.groups(), strict=True):
+        if sections.count(section) != int(count):
+            raise InputError(
+                f"{path}: the file is damaged: expected {int(count)} lines in section {section}, "
+                f"got {sections.count(section)}; copy or export it again"
+            )
+
+
+def _read(path: Path, unit: str | None, gap: float) -> Part:
+    IGESControl_Controller.Init_s()
+    reader = IGESControl_Reader()
+    if reader.ReadFile(str(path)) != IFSelect_ReturnStatus.IFSelect_RetDone:
+        raise InputError(f"{path}: the file cannot be parsed; export the part as IGES again")
+    _require_sound(path, reader)
+    flag = reader.IGESModel().GlobalSection().UnitFlag()
+    header = FLAGS.get(flag, "")
+    if unit is None and not header:
+        raise InputError(
+            f"{path}: the header's unit flag is {flag}, expected one of "
+            f"{', '.join(map(str, FLAGS))}; say what the numbers mean with unit="
+        )
+    reader.TransferRoots()
+    shape = reader.OneShape()
+    loose = [] if shape is None else explored(shape, TopAbs_ShapeEnum.TopAbs_FACE)
+    faces = [NamedFace(face=TopoDS.Face(face), name=_name(reader, face)) for face in loose]
+    notes = []
+    if unit is not None and unit != header:
+        # OCCT has converted the header's unit to mm.
+        move = gp_Trsf()
+        move.SetScale(gp_Pnt(), UNITS_MM[unit] / UNITS_MM.get(header, 1.0))
+        moved = BRepBuilderAPI_Transform(shape, move, True)
+        shape = moved.Shape()
+        faces = [
+            NamedFace(face=TopoDS.Face(moved.ModifiedShape(named.face)), name=named.name)
+            for named in faces
+        ]
+        notes.append(f"unit {unit} as asked; the header says {header or 'nothing'}")
+    return part_of_shape(path, unit or header, shape, faces, gap=gap, notes=notes)
+
+
+def _require_sound(path: Path, reader: IGESControl_Reader) -> None:
+    """Refuse broken entities, on which OCCT's transfer may crash the process."""
+    checks = reader.WS().ModelCheckList()
+    checks.Start()
+    while checks.More():
+        check = checks.Value()
+        checks.Next()
+        if check.HasFailed():
+            reason = " ".join(check.CFail(1).split())
+            raise InputError(f"{path}: the file is damaged ({reason}); copy or export it again")
+
+
+def _name(reader: IGESControl_Reader, face: TopoDS_Shape) -> str:
+    """Return the name of the entity that `face` was read from, "" if it has none."""
+    entity = reader.WS().TransferReader().EntityFromShapeResult(face, -1)
+    if not isinstance(entity, IGESData_IGESEntity) or not entity.HasName():
+        return ""
+    name = entity.NameValue()
+    return "" if name is None else str(name.ToCString()).strip()

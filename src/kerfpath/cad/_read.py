@@ -1,0 +1,95 @@
+"""Read any drawing: by its suffix, after a look at the file itself."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+
+from kerfpath._arrays import scalar
+from kerfpath.cad._part import Part
+from kerfpath.cad._units import GAP, require_unit
+from kerfpath.errors import InputError
+
+__all__ = ["read"]
+
+
+def read(path: str | Path, unit: str | None = None, *, gap: float = GAP) -> Part:
+    """Return the part that a drawing holds: STEP, IGES, DXF, or a table of points.
+
+    Parameters
+    ----------
+    path : str or Path
+        .step, .stp, .iges, .igs, .dxf, .csv, .tsv or .txt.
+    unit : str, optional
+        What the numbers in the file mean, instead of what its header says: um, mm, cm, dm, m, km,
+        mil, in or ft.
+    gap : float m
+        Distance between the ends of two curves that a loop bridges; loose faces (IGES) are sewn
+        together over it.
+
+    Raises
+    ------
+    InputError
+        No such file, another format than its suffix says, a damaged one, nothing to cut in it, or
+        no length unit known.
+    """
+    path = Path(path)
+    require_unit(unit)
+    scalar(gap, "gap", unit="m", above=0.0)
+    content = _content(path)
+    reader = _READERS.get(path.suffix.lower())
+    if reader is None:
+        raise InputError(f"{path}: expected {_EXPECTED} by its suffix, got {path.suffix!r}")
+    if not content.strip():
+        raise InputError(f"{path}: the file is empty; expected {_EXPECTED}")
+    return reader(path, content, unit, gap)
+
+
+def _content(path: Path) -> bytes:
+    try:
+        return path.read_bytes()
+    except FileNotFoundError:
+        raise InputError(f"{path}: no such file; expected {_EXPECTED}") from None
+    except IsADirectoryError:
+        raise InputError(f"{path}: is a directory; expected {_EXPECTED}") from None
+    except (OSError, ValueError) as error:
+        why = getattr(error, "strerror", None) or str(error)
+        raise InputError(f"{path}: cannot be read ({why}); expected {_EXPECTED}") from None
+
+
+# Each reader is loaded when a file asks for it: OCCT alone takes over a second.
+def _step(path: Path, content: bytes, unit: str | None, gap: float) -> Part:
+    from kerfpath.cad._step import read_step
+
+    return read_step(path, content, unit, gap)
+
+
+def _iges(path: Path, content: bytes, unit: str | None, gap: float) -> Part:
+    from kerfpath.cad._iges import read_iges
+
+    return read_iges(path, content, unit, gap)
+
+
+def _dxf(path: Path, content: bytes, unit: str | None, gap: float) -> Part:
+    from kerfpath.cad._dxf import read_dxf
+
+    return read_dxf(path, content, unit, gap)
+
+
+def _table(path: Path, content: bytes, unit: str | None, gap: float) -> Part:
+    from kerfpath.cad._table import read_table
+
+    return read_table(path, content, unit, gap)
+
+
+_READERS: dict[str, Callable[[Path, bytes, str | None, float], Part]] = {
+    ".step": _step,
+    ".stp": _step,
+    ".iges": _iges,
+    ".igs": _iges,
+    ".dxf": _dxf,
+    ".csv": _table,
+    ".tsv": _table,
+    ".txt": _table,
+}
+_EXPECTED = f"a drawing ({', '.join(_READERS)})"

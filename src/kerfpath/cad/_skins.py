@@ -1,0 +1,220 @@
+"""Skins: faces that go on smoothly into each other, their loops, and the two sides of a sheet."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from OCP.BRepGProp import BRepGProp
+from OCP.collections import IndexedMap_TopoDS_Shape_TopTools_ShapeMapHasher as ShapeMap
+from OCP.GProp import GProp_GProps
+from OCP.TopoDS import TopoDS_Face
+from scipy.spatial import cKDTree
+
+from kerfpath._arrays import Array, Ints
+from kerfpath.cad._connected import connected
+from kerfpath.cad._loops import FaceLoop, OrientedEdge, chained
+from kerfpath.cad._part import Side
+from kerfpath.cad._sample import Chain
+
+__all__ = ["SMOOTH", "Skin", "skins_of"]
+
+SMOOTH = float(np.radians(2.0))
+"""Faces whose normals differ by less (rad) all along their shared edge belong to one skin."""
+ACCURACY = 1e-2
+"""Relative accuracy of areas: they tell sheets from blocks, and are not shown."""
+OPPOSITE = 0.2
+"""How far the vector areas of a sheet's two sides may be from cancelling, as a part of an area;
+by how much the areas may differ."""
+THIN = 0.2
+"""A sheet is thinner than this part of the square root of its area."""
+EVEN = 1e-4
+"""Sides whose rims differ by less in length, as a part, are told apart by where they face."""
+NOWHERE = 1e9
+"""Place (mm) of what has no loops, far from all that has."""
+HOLE = -0.25
+"""Cosine between a loop's vector area and its mean normal below which it runs about a hole: for
+holes it is near -1, for a trim line near 1, for the rim of a tube near 0."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Skin:
+    """Faces that go on smoothly into each other.
+
+    Parameters
+    ----------
+    faces : tuple of int
+        Numbers of the faces.
+    side : {"outer", "inner", "edge", ""}
+        Of a sheet; "" if it is none.
+    inside : set of (int, int, int)
+        Face, loop and edge numbers of what lies inside the skin, and is no cut.
+    """
+
+    faces: tuple[int, ...]
+    side: Side
+    inside: frozenset[tuple[int, int, int]]
+
+    def loops(self, found: Sequence[list[FaceLoop]]) -> list[FaceLoop]:
+        """Return the loops around the skin and its holes, over all its faces."""
+        if len(self.faces) == 1:
+            return found[self.faces[0]]
+        runs = [
+            run
+            for f in self.faces
+            for k, (_, loop) in enumerate(found[f])
+            for run in _outside(loop.edges, [(f, k, e) in self.inside for e in _numbers(loop)])
+        ]
+        chains = [Chain(edges=edges) for edges in chained(runs)]
+        loops = [(_is_hole(chain), chain) for chain in chains]
+        if loops and all(hole for hole, _ in loops):
+            # A trim line may face away from its sheet, as that of a C-shaped channel does.
+            longest = max(loops, key=lambda loop: float(loop[1].lengths.sum()))
+            loops = [(hole and loop is not longest[1], loop) for hole, loop in loops]
+        return [("inner" if hole else "outer", loop) for hole, loop in loops]
+
+
+def skins_of(faces: Sequence[TopoDS_Face], found: Sequence[list[FaceLoop]]) -> list[Skin]:
+    """Return the skins of a part, in the order of their first faces.
+
+    Parameters
+    ----------
+    faces : sequence of TopoDS_Face
+    found : sequence of list of FaceLoop
+        The loops of each.
+    """
+    uses = _uses(found)
+    pairs = [(a, b) for at in uses if len(at) == 2 for a, b in [at] if a[0] != b[0]]
+    smooth = [pair for pair in pairs if _is_smooth(*(found[f][k][1].edges[e] for f, k, e in pair))]
+    group, whole = (
+        connected(np.array([[a[0], b[0]] for a, b in of], dtype=np.int64), len(faces))
+        for of in (smooth, pairs)
+    )
+    inside: dict[int, set[tuple[int, int, int]]] = {}
+    for pair in smooth:
+        inside.setdefault(int(group[pair[0][0]]), set()).update(pair)
+    members = [tuple(np.flatnonzero(group == g).tolist()) for g in range(group.max(initial=-1) + 1)]
+    insides = [frozenset(inside.get(g, ())) for g in range(len(members))]
+    sides = _sides(faces, found, members, insides, whole)
+    return [
+        Skin(faces=m, side=side, inside=edges)
+        for m, side, edges in zip(members, sides, insides, strict=True)
+    ]
+
+
+def _uses(found: Sequence[list[FaceLoop]]) -> list[list[tuple[int, int, int]]]:
+    """Return, for each edge of the shape, the (face, loop, edge) numbers that run along it."""
+    known, uses = ShapeMap(), list[list[tuple[int, int, int]]]()
+    for f, loops in enumerate(found):
+        for k, (_, loop) in enumerate(loops):
+            for e, edge in enumerate(loop.edges):
+                number = known.Add(edge.edge)
+                if number > len(uses):
+                    uses.append([])
+                uses[number - 1].append((f, k, e))
+    return uses
+
+
+def _numbers(loop: Chain[OrientedEdge]) -> range:
+    return range(len(loop.edges))
+
+
+def _is_smooth(a: OrientedEdge, b: OrientedEdge) -> bool:
+    t = np.linspace(a.start, a.end, 5)
+    turned = np.linalg.norm(a.evaluate(t)[1] - b.evaluate(t)[1], axis=1)
+    return bool(turned.max() <= 2 * np.sin(SMOOTH / 2))
+
+
+def _outside(edges: Sequence[OrientedEdge], inside: list[bool]) -> list[list[OrientedEdge]]:
+    """Return the stretches of a closed loop that are no inside edges."""
+    if not any(inside):
+        return [list(edges)]
+    runs: list[list[OrientedEdge]] = []
+    first = inside.index(True)
+    is_new = True
+    for k in range(len(edges)):
+        at = (first + k) % len(edges)
+        if inside[at]:
+            is_new = True
+            continue
+        if is_new:
+            runs.append([])
+        runs[-1].append(edges[at])
+        is_new = False
+    return runs
+
+
+def _is_hole(loop: Chain[OrientedEdge]) -> bool:
+    """Return whether a closed chain runs about a hole of its skin, by its normals."""
+    area = _vector_area(loop.around)
+    middles = [(edge.start + edge.end) / 2 for edge in loop.edges]
+    normals = [e.evaluate(np.array([t]))[1][0] for e, t in zip(loop.edges, middles, strict=True)]
+    facing = loop.lengths @ np.array(normals) / loop.lengths.sum()
+    return bool(area @ facing < HOLE * np.linalg.norm(area))
+
+
+def _vector_area(points: Array) -> Array:
+    """Return the vector area (3,) that a closed polygon (K, 3) encloses."""
+    return np.asarray(np.cross(points, np.roll(points, -1, axis=0)).sum(axis=0) / 2)
+
+
+def _sides(
+    faces: Sequence[TopoDS_Face],
+    found: Sequence[list[FaceLoop]],
+    members: Sequence[tuple[int, ...]],
+    inside: Sequence[frozenset[tuple[int, int, int]]],
+    whole: Ints,
+) -> list[Side]:
+    """Return which side of a sheet each skin is: opposite ones, large and close, are a sheet's."""
+    areas, rims = np.zeros(len(members)), np.zeros(len(members))
+    vector = np.zeros((len(members), 3))
+    low, high = np.full((len(members), 3), NOWHERE), np.full((len(members), 3), -NOWHERE)
+    points: list[Array] = []
+    for g, numbers in enumerate(members):
+        around = [np.empty((0, 3))]
+        for f in numbers:
+            props = GProp_GProps()
+            BRepGProp.SurfaceProperties_s(faces[f], props, ACCURACY)
+            areas[g] += props.Mass()
+            for k, (_, loop) in enumerate(found[f]):
+                vector[g] += _vector_area(loop.around)
+                around.append(loop.around)
+                outside = [(f, k, e) not in inside[g] for e in _numbers(loop)]
+                rims[g] += loop.lengths[outside].sum()
+        points.append(np.vstack(around))
+        if len(points[g]):
+            low[g], high[g] = points[g].min(axis=0), points[g].max(axis=0)
+    sides: list[Side] = [""] * len(members)
+    body = whole[[numbers[0] for numbers in members]]
+    for g in np.argsort(-areas, kind="stable").tolist():
+        alike = np.flatnonzero(body == body[g])
+        if len(alike) == 1:
+            sides[g] = "outer"
+        if sides[g]:
+            continue
+        apart = np.maximum(low[alike] - high[g], low[g] - high[alike]).max(axis=1)
+        opposite = np.linalg.norm(vector[alike] + vector[g], axis=1) <= OPPOSITE * areas[g]
+        large = areas[alike] > (1 - OPPOSITE) * areas[g]
+        near = alike[(apart < THIN * np.sqrt(areas[g])) & opposite & large].tolist()
+        away = {h: _away(points[g], points[h]) for h in near if h != g and not sides[h]}
+        h = min(away, key=away.__getitem__, default=g)
+        if h != g and away[h] < THIN * np.sqrt(areas[g]):
+            even = abs(rims[g] - rims[h]) <= EVEN * rims[g]
+            is_outer = _faces_up(vector[g]) if even else rims[g] > rims[h]
+            sides[g], sides[h] = ("outer", "inner") if is_outer else ("inner", "outer")
+    sheets = {body[g] for g, side in enumerate(sides) if side}
+    return [side or ("edge" if body[g] in sheets else "") for g, side in enumerate(sides)]
+
+
+def _away(a: Array, b: Array) -> float:
+    """Return how far points (K, 3) usually are from the nearest of others."""
+    if not len(a) or not len(b):
+        return float("inf")
+    return float(np.median(cKDTree(b).query(a)[0]))
+
+
+def _faces_up(vector: Array) -> bool:
+    """Return whether a vector area points up, along +z; if it is level, along +y, then +x."""
+    level = EVEN * np.linalg.norm(vector)
+    return bool(next((v > 0 for v in vector[::-1] if abs(v) > level), True))

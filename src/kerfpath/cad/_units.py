@@ -1,0 +1,31 @@
+"""Length units, and the tolerance within which ends of curves meet."""
+
+from __future__ import annotations
+
+from kerfpath.errors import InputError
+
+__all__ = ["GAP", "MM", "UNITS_MM", "require_unit"]
+
+MM = 1e-3
+"""OCCT works in mm, and so does this package; every length that leaves it is in m."""
+GAP = 5e-5
+"""Distance (m) between the ends of two curves that a loop bridges unless told: half a kerf."""
+
+UNITS_MM = {
+    "um": 1e-3,
+    "mm": 1.0,
+    "cm": 10.0,
+    "dm": 100.0,
+    "m": 1000.0,
+    "km": 1e6,
+    "mil": 0.0254,
+    "in": 25.4,
+    "ft": 304.8,
+}
+"""Length units by the name that users give, in mm."""
+
+
+def require_unit(unit: str | None) -> None:
+    """Refuse a unit that is not known; None passes."""
+    if unit is not None and unit not in UNITS_MM:
+        raise InputError(f"unit: expected one of {', '.join(UNITS_MM)}, got {unit!r}")

@@ -1,0 +1,43 @@
+"""Which contours lie inside which: what is cut out must not fall before its holes are cut."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from kerfpath._arrays import Array, Bools
+from kerfpath.contour import Contour
+
+__all__ = ["inner_first"]
+
+
+def inner_first(contours: Sequence[Contour]) -> list[tuple[int, int]]:
+    """Return the pairs (i, j) of contours of which i lies inside the closed contour j.
+
+    Seen along the mean tool axis of j; both must lie on one side of the part, their mean axes less
+    than 90 deg apart.
+    """
+    pairs = []
+    for j, outer in enumerate(contours):
+        if not outer.closed:
+            continue
+        n = outer.axes.mean(axis=0)
+        x = np.cross(n, np.eye(3)[np.argmin(np.abs(n))])
+        plane = np.array([x / np.linalg.norm(x), np.cross(n, x) / np.linalg.norm(np.cross(n, x))]).T
+        ring = outer.points @ plane
+        for i, inner in enumerate(contours):
+            faces = i != j and float(inner.axes.mean(axis=0) @ n) > 0
+            if faces and _inside(ring, inner.points @ plane).all():
+                pairs.append((i, j))
+    return pairs
+
+
+def _inside(ring: Array, points: Array) -> Bools:
+    """Say which points (B, 2) lie inside a ring (K, 2): a ray to the right crosses it oddly."""
+    a, b = ring[:-1], ring[1:]
+    above = a[:, 1] > points[:, None, 1], b[:, 1] > points[:, None, 1]
+    rise = np.where(b[:, 1] == a[:, 1], 1.0, b[:, 1] - a[:, 1])
+    at = a[:, 0] + (points[:, None, 1] - a[:, 1]) / rise * (b[:, 0] - a[:, 0])
+    crossed = (above[0] != above[1]) & (points[:, None, 0] < at)
+    return np.asarray(crossed.sum(axis=1) % 2 == 1)

@@ -1,0 +1,151 @@
+"""The order of cutting: a travelling-salesman problem over groups of candidates.
+
+Each group (a contour) has candidates (a start, a direction, a posture), of which one is taken. What
+is minimised is the time of the candidates taken and of the moves between them; the solver (CP-SAT
+of OR-tools) proves its order best, or says how far from it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from kerfpath._arrays import Array, Ints, floats, integers
+from kerfpath.errors import InputError, NoFeasiblePath
+
+__all__ = ["Order", "best_order"]
+
+TICK = 1e-4
+"""s: the solver counts in whole ticks."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Order:
+    """An order of cutting.
+
+    Parameters
+    ----------
+    candidates : (G,) int
+        The candidate taken of each group, in the order of cutting.
+    duration : float s
+        Of those candidates and the moves between them.
+    at_least : float s
+        No order takes less; the same as `duration` where it is proved best.
+    """
+
+    candidates: Ints
+    duration: float
+    at_least: float
+
+    @property
+    def optimal(self) -> bool:
+        """Whether no order is shorter by more than the solver's tick for each move."""
+        return self.duration - self.at_least <= 2 * TICK * (len(self.candidates) + 1)
+
+
+def best_order(
+    group: ArrayLike,
+    own: ArrayLike,
+    between: ArrayLike,
+    *,
+    first: ArrayLike | None = None,
+    last: ArrayLike | None = None,
+    before: Sequence[tuple[int, int]] = (),
+    seconds: float = 10.0,
+) -> Order:
+    """Return the order of least time in which one candidate of every group is done.
+
+    Parameters
+    ----------
+    group : (C,) int
+        Group of each candidate, 0 to G - 1, each with one candidate at least.
+    own : (C,) s
+        Time that each candidate takes itself.
+    between : (C, C) s
+        Time from the end of one to the start of another; infinite where that may not follow.
+    first, last : (C,) s, optional
+        Time to reach each as the first, and to come home from each as the last; default 0.
+    before : sequence of (g, h)
+        Group g is done before group h.
+    seconds : float
+        How long the solver may take.
+
+    Raises
+    ------
+    NoFeasiblePath
+        No order keeps all of that (proved), or none was found in time.
+    InputError
+        Shapes that do not fit, a group without candidates.
+    """
+    g = integers(group, "group", (None,))
+    C, G = len(g), int(g.max(initial=-1)) + 1
+    if set(g.tolist()) != set(range(G)) or G == 0:
+        raise InputError(f"group: expected every number from 0 to {max(G - 1, 0)}, got {set(g)}")
+    move = np.asarray(between, dtype=np.float64)
+    if move.shape != (C, C) or np.isnan(move).any() or (move < 0).any():
+        raise InputError(f"between: expected times >= 0 of shape ({C}, {C}), got {move.shape}")
+    cost = floats(own, "own", (C,))
+    enter = np.zeros(C) if first is None else floats(first, "first", (C,))
+    leave = np.zeros(C) if last is None else floats(last, "last", (C,))
+    return _solved(g, cost, move, enter, leave, before, seconds)
+
+
+def _solved(
+    group: Ints, own: Array, move: Array, enter: Array, leave: Array,
+    before: Sequence[tuple[int, int]], seconds: float,
+) -> Order:  # fmt: skip
+    from ortools.sat.python import cp_model  # loaded where it is needed: half a second
+
+    C, G = len(group), int(group.max()) + 1
+    model = cp_model.CpModel()
+    place = [model.new_int_var(0, G - 1, f"place {h}") for h in range(G)]
+    arcs, terms, after = [], [], {}
+    for i in range(C):
+        arcs.append((i + 1, i + 1, model.new_bool_var(f"without {i}")))
+        for ends, time in (((0, i + 1), enter[i] + own[i]), ((i + 1, 0), leave[i])):
+            taken = model.new_bool_var(f"{ends}")
+            arcs.append((*ends, taken))
+            terms.append((taken, time))
+            model.add(place[group[i]] == (0 if ends[0] == 0 else G - 1)).only_enforce_if(taken)
+        for j in np.flatnonzero((group != group[i]) & np.isfinite(move[i])).tolist():
+            taken = after[i, j] = model.new_bool_var(f"{i} to {j}")
+            arcs.append((i + 1, j + 1, taken))
+            terms.append((taken, move[i, j] + own[j]))
+            model.add(place[group[j]] == place[group[i]] + 1).only_enforce_if(taken)
+    model.add_circuit(arcs)
+    without = [arc[2] for arc in arcs if arc[0] == arc[1]]
+    for h in range(G):
+        members = np.flatnonzero(group == h).tolist()
+        model.add(sum(without[i] for i in members) == len(members) - 1)
+    model.add_all_different(place)
+    for earlier, later in before:
+        model.add(place[earlier] < place[later])
+    model.minimize(sum(round(time / TICK) * taken for taken, time in terms))
+    solver = cp_model.CpSolver()
+    solver.parameters.max_time_in_seconds = seconds
+    solver.parameters.num_workers = 1  # the same answer each time
+    solver.parameters.random_seed = 1
+    status = solver.solve(model)
+    if status not in (cp_model.OPTIMAL, cp_model.FEASIBLE):
+        proved = status == cp_model.INFEASIBLE
+        why = "contradict each other" if proved else f"were not met within {seconds:g} s"
+        raise NoFeasiblePath(
+            f"no order of cutting: what may follow what, and what comes first, {why}",
+            proved=proved,
+            node=-1,
+        )
+    following = {a: b for a, b, taken in arcs if a != b and solver.boolean_value(taken)}
+    chosen, here = [], following[0]
+    while here:
+        chosen.append(here - 1)
+        here = following[here]
+    order = np.array(chosen)
+    duration = enter[order[0]] + own[order].sum() + move[order[:-1], order[1:]].sum()
+    return Order(
+        candidates=order,
+        duration=float(duration + leave[order[-1]]),
+        at_least=float(min(solver.best_objective_bound * TICK, duration + leave[order[-1]])),
+    )

@@ -1,0 +1,224 @@
+"""Order of cutting and moves through the air."""
+
+from itertools import permutations, product
+
+import numpy as np
+import pytest
+
+from kerfpath import Contour, InputError, NoFeasiblePath
+from kerfpath.air import air_move, backed_off, least_time
+from kerfpath.auditor import air_checks
+from kerfpath.cell import box_between, cell_of
+from kerfpath.operations import start_at
+from kerfpath.post import JointMove, build_program, post, preflight, read_rapid
+from kerfpath.sequence import best_order, inner_first, plan_part
+
+STEP = np.radians(10)
+
+
+def every_order(group, own, between, first, last, before):
+    """The least time over all orders and candidates, one by one."""
+    G = group.max() + 1
+    best = np.inf
+    for groups in permutations(range(G)):
+        place = {g: k for k, g in enumerate(groups)}
+        if any(place[g] >= place[h] for g, h in before):
+            continue
+        for chosen in product(*(np.flatnonzero(group == g) for g in groups)):
+            c = np.array(chosen)
+            time = first[c[0]] + own[c].sum() + between[c[:-1], c[1:]].sum() + last[c[-1]]
+            best = min(best, time)
+    return best
+
+
+@pytest.mark.parametrize("seed", range(12))
+def test_the_order_is_the_best_of_all(seed):
+    rng = np.random.default_rng(seed)
+    G = int(rng.integers(1, 6))
+    group = np.concatenate([np.arange(G), rng.integers(0, G, rng.integers(0, 4))])
+    C = len(group)
+    own, first, last = rng.random((3, C))
+    between = rng.random((C, C))
+    between[rng.random((C, C)) < 0.15] = np.inf
+    before = [(g, g + 1) for g in range(G - 1) if rng.random() < 0.4]
+    best = every_order(group, own, between, first, last, before)
+    if np.isinf(best):
+        with pytest.raises(NoFeasiblePath) as none:
+            best_order(group, own, between, first=first, last=last, before=before)
+        assert none.value.proved
+        return
+    found = best_order(group, own, between, first=first, last=last, before=before)
+    # The solver counts in ticks of 0.1 ms, one rounding for each candidate and move.
+    assert found.duration == pytest.approx(best, abs=1e-4 * (2 * G + 2))
+    assert found.optimal
+    assert sorted(group[found.candidates]) == list(range(G))
+
+
+def test_orders_that_contradict_are_refused_and_shapes_too():
+    with pytest.raises(NoFeasiblePath, match="contradict"):
+        best_order([0, 1], [0, 0], np.zeros((2, 2)), before=[(0, 1), (1, 0)])
+    with pytest.raises(InputError, match="every number from 0 to 2"):
+        best_order([0, 2], [0, 0], np.zeros((2, 2)))
+    with pytest.raises(InputError, match="times >= 0"):
+        best_order([0, 1], [0, 0], np.full((2, 2), -1.0))
+
+
+def test_least_time_is_that_of_a_trapezoid():
+    v, a = np.array([1.0, 2.0]), np.array([4.0, 1.0])
+    # 3 rad at 1 rad/s, a quarter of a second to gain it; 0.5 rad never gains 2 rad/s.
+    assert least_time([[3.0, 0.0]], v, a)[0] == pytest.approx(3.25)
+    assert least_time([[0.0, 0.5]], v, a)[0] == pytest.approx(2 * np.sqrt(0.5))
+    assert least_time([[0.0, 0.0]], v, a)[0] == 0
+    # Along a straight motion no joint can do better than alone.
+    rng = np.random.default_rng(0)
+    dq = rng.normal(size=(50, 2))
+    alone = np.max([least_time(dq * keep, v, a) for keep in np.eye(2)], axis=0)
+    assert (least_time(dq, v, a) >= alone - 1e-12).all()
+
+
+@pytest.fixture(scope="module")
+def ring():
+    t = -np.linspace(0, 2 * np.pi, 60)[:-1]
+    points = np.c_[0.03 * np.cos(t), 0.03 * np.sin(t), 0 * t]
+    return Contour(points, np.tile([0, 0, -1.0], (59, 1)), closed=True, name="ring")
+
+
+def moved(contour, x, y, name):
+    return Contour(contour.points + np.array([x, y, 0]), contour.axes, closed=True, name=name)
+
+
+def test_a_move_goes_straight_where_it_is_clear_and_around_where_not(arm, tool):
+    q0, q1 = np.radians([[-30, 10, 10, 0, 60, 0], [30, 10, 10, 0, 60, 0]])
+    free = air_move(arm, q0, q1, cell=cell_of(arm, tool=tool))
+    assert len(free.q) == 2
+    assert free.clear
+    assert not air_move(arm, q0, q1).clear
+    tip = (arm.forward((q0 + q1) / 2) @ tool)[:3, 3]
+    post = box_between([tip[0] - 0.02, -0.02, -0.5], [tip[0] + 0.02, 0.02, tip[2] + 0.1])
+    cell = cell_of(arm, tool=tool, fixtures={"post": post})
+    assert cell.clear([q0, q1]).all()
+    assert not cell.clear_motion([q0], [q1])[0]
+    around = air_move(arm, q0, q1, cell=cell)
+    assert len(around.q) > 2
+    assert cell.clear_motion(around.q[:-1], around.q[1:]).all()
+    assert around.duration > free.duration
+    np.testing.assert_array_equal(around.q[[0, -1]], [q0, q1])
+    again = air_move(arm, q0, q1, cell=cell)
+    np.testing.assert_array_equal(again.q, around.q)
+
+
+def test_a_move_from_within_a_fixture_says_which(arm, tool):
+    q0, q1 = np.radians([[0, 10, 10, 0, 60, 0], [30, 10, 10, 0, 60, 0]])
+    tip = (arm.forward(q0) @ tool)[:3, 3]
+    block = box_between(tip - 0.05, tip + 0.05)
+    cell = cell_of(arm, tool=tool, fixtures={"block": block})
+    with pytest.raises(NoFeasiblePath, match=r"start .* not clear: .*'block'") as none:
+        air_move(arm, q0, q1, cell=cell)
+    assert none.value.proved
+
+
+def test_inner_contours_come_first(ring):
+    big = Contour(3 * ring.points, ring.axes, closed=True, name="trim")
+    beside = moved(ring, 0.3, 0, "beside")
+    assert inner_first([big, ring, beside]) == [(1, 0)]
+    below = Contour(ring.points, -ring.axes, closed=True)
+    assert inner_first([big, below]) == []
+
+
+@pytest.fixture(scope="module")
+def part(ring):
+    places = [(0.0, 0.0), (0.2, 0.0), (0.0, 0.2), (0.2, 0.2)]
+    return [moved(ring, x, y, f"hole {i}") for i, (x, y) in enumerate(places)]
+
+
+def rest(contour):
+    return contour.resample(count=20)
+
+
+def test_a_part_is_cut_in_less_time_than_in_the_order_given(part, arm, tool, placement):
+    asked = {"tool": tool, "placement": placement, "speed": 0.1, "gamma_step": STEP}
+    starts = [
+        [rest(start_at(c, s)) for s in np.linspace(0, c.length, 3, endpoint=False)] for c in part
+    ]
+    given = plan_part([s[0] for s in starts[::2] + starts[1::2]], arm, given_order=True, **asked)
+    free = plan_part(starts, arm, pierce_time=0.3, **asked)
+    assert free.order.optimal
+    assert free.air_time < given.air_time
+    assert free.piercing_time == pytest.approx(1.2)
+    assert free.cycle_time == pytest.approx(free.cutting_time + free.air_time + free.piercing_time)
+    assert {p.name for p in free.plans} == {c.name for c in part}
+    # Each move begins and ends where its contours back off to.
+    for k, move in enumerate(free.moves):
+        before, after = free.plans[k : k + 2]
+        np.testing.assert_allclose(move.q[0], backed_off(before, "end", 0.05), atol=1e-9)
+        np.testing.assert_allclose(move.q[-1], backed_off(after, "start", 0.05), atol=1e-9)
+
+
+def test_home_heat_and_precedence_are_kept(part, arm, tool, placement):
+    asked = {"tool": tool, "placement": placement, "speed": 0.1, "gamma_step": STEP}
+    home = np.radians([0, -20, 10, 0, 60, 0])
+    cut = plan_part([rest(c) for c in part], arm, home=home, before=[(3, 0)], **asked)
+    names = [p.name for p in cut.plans]
+    assert names.index("hole 3") < names.index("hole 0")
+    assert len(cut.moves) == 5
+    np.testing.assert_array_equal(cut.moves[0].q[0], home)
+    # Neighbours are 140 mm apart from rim to rim, diagonals 223 mm: with 150 mm asked for, no
+    # order of four corners of a square is left.
+    with pytest.raises(NoFeasiblePath, match="no order"):
+        plan_part([rest(c) for c in part], arm, heat_spacing=0.15, **asked)
+    three = plan_part([rest(c) for c in (part[0], part[3])], arm, heat_spacing=0.15, **asked)
+    assert len(three.plans) == 2
+
+
+@pytest.fixture(scope="module")
+def walled(part, arm, tool, placement):
+    """The four holes with a wall between them, and the cell; planned from and to a home."""
+    at = np.array([p.points.mean(axis=0) for p in part]) @ placement[:3, :3].T + placement[:3, 3]
+    middle, top = at.mean(axis=0), at[:, 2].max()
+    wall = box_between(middle - [0.3, 0.005, 0.1], [middle[0] + 0.3, middle[1] + 0.005, top + 0.02])
+    cell = cell_of(arm, tool=tool, placement=placement, fixtures={"wall": wall})
+    asked = {"tool": tool, "placement": placement, "speed": 0.1, "gamma_step": STEP}
+    home = np.radians([0, -20, 10, 0, 60, 0])
+    rested = [rest(c) for c in part]
+    return cell, plan_part(rested, arm, home=home, cell=cell, retract=0.01, **asked)
+
+
+def test_moves_between_contours_go_around_what_stands_there(walled):
+    cell, cut = walled
+    assert len(cut.moves) == len(cut.plans) + 1
+    for move in cut.moves:
+        assert move.clear
+        assert cell.sweep.clear(move.q[:-1], move.q[1:], cell.required, cell.scene.distances).all()
+    assert max(len(move.q) for move in cut.moves) > 2
+
+
+def test_one_program_for_the_part_says_that_its_air_moves_are_clear(walled):
+    _, cut = walled
+    program = build_program(cut.plans, moves=cut.moves, retract=0.01, name="part")
+    assert [issue for issue in preflight(program) if issue.level == "error"] == []
+    assert "air-moves" not in {issue.code for issue in preflight(program)}
+    text = post(program)
+    assert "proved clear in the planned cell" in text
+    corners = [step.q for step in program.steps if isinstance(step, JointMove)]
+    # All corners of all moves but the starts, where the robot is already; and home to begin with.
+    expected = [cut.moves[0].q[0], *(q for move in cut.moves for q in move.q[1:])]
+    np.testing.assert_array_equal(corners, expected)
+    assert len(read_rapid(text).sections) == 4
+    with pytest.raises(InputError, match="4 plans need 3 moves between them, or 5"):
+        build_program(cut.plans, moves=cut.moves[:2])
+
+
+def test_the_audit_holds_moves_through_the_air_to_limits_time_and_cell(walled, arm):
+    cell, cut = walled
+    for move in cut.moves:
+        table = air_checks(arm, move.q, move.time, cell=cell)
+        assert {check.code for check in table} == {"air-time", "air-limits", "collision"}
+        assert all(check.ok for check in table)
+    around = max(cut.moves, key=lambda move: len(move.q))
+    fast = air_checks(arm, around.q, 0.9 * around.time, cell=cell)
+    assert [check.code for check in fast if not check.ok] == ["air-time"]
+    straight = air_checks(arm, around.q[[0, -1]], [0.0, 9.0], cell=cell)
+    assert [check.code for check in straight if not check.ok] == ["collision"]
+    beyond = around.q.copy()
+    beyond[1, 1] = np.radians(170)
+    assert "air-limits" in [c.code for c in air_checks(arm, beyond, 9 * around.time) if not c.ok]
