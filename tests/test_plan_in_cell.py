@@ -68,7 +68,7 @@ def test_where_something_is_the_plan_goes_around_it(task, blind, arm, tool, plac
     assert audit(made, cell=there) == []
     hits = [issue for issue in audit(blind, cell=there) if issue.code == "collision"]
     assert len(hits) == 1
-    assert "shortfall of the near-miss distance (nearest: post " in hits[0].message
+    assert "shortfall of near-miss distances (nearest: post " in hits[0].message
     free = there.clear(task[1]["graph"].q)
     assert free.mean() < 0.9
 

@@ -65,7 +65,7 @@ def air_checks(
     ]
     if cell is not None and len(cell.pairs):
         samples, leg = _sampled(corners)
-        rows.append(collision_at(cell, samples, leg, chain_of(robot)))
+        rows += collision_at(cell, samples, leg, chain_of(robot))
     return rows
 
 

@@ -109,7 +109,7 @@ def checks(
         *_positions(plan, motion),
         *_rates(plan, motion),
         *margins(plan, chain),
-        *([] if cell is None or not len(cell.pairs) else [collisions(cell, motion, chain)]),
+        *([] if cell is None else collisions(cell, motion, chain)),
     ]
 
 

@@ -10,17 +10,28 @@ from pathlib import Path
 
 import numpy as np
 
+from kerfpath.cell import Cell
 from kerfpath.errors import AuditFailed, InputError
 from kerfpath.job._planfile import broken_entry, plan_entry, plan_text
-from kerfpath.job._read import ProgramOptions
+from kerfpath.job._read import Job, ProgramOptions
+from kerfpath.job._refusals import refused_at
 from kerfpath.job._run import Outcome
 from kerfpath.plans import Plan
 from kerfpath.post import build_program, language, post, preflight, write_program
 from kerfpath.report import ContourSection, render
 
-__all__ = ["Written", "program_of", "require_folder", "trajectory_text", "write_outcome"]
+__all__ = [
+    "Written",
+    "collision_note",
+    "program_of",
+    "require_folder",
+    "require_language",
+    "trajectory_text",
+    "write_outcome",
+]
 
 NOT_CHECKED = "Collisions are not checked: simulate the program in the cell before running it."
+"""What is said of a job without a [cell]."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -52,10 +63,9 @@ def write_outcome(outcome: Outcome, folder: Path) -> Written:
         are written.
     """
     job = outcome.job
-    chosen = language(job.program.language)
-    target = folder / f"{job.program.name}{chosen.suffix}"
-    texts, notes, refused = {}, [NOT_CHECKED], None
-    if outcome.passed:
+    target = _program_file(job, folder)
+    texts, notes, refused = {}, [collision_note(outcome.cell)], None
+    if outcome.passed and target is not None:
         try:
             texts[target], warnings = program_of(outcome.plans, job.program)
             notes += warnings
@@ -68,7 +78,9 @@ def write_outcome(outcome: Outcome, folder: Path) -> Written:
             entries.append(plan_entry(cut.plan, cut.contour, cut.checks))
         elif cut.broken is not None:
             entries.append(broken_entry(cut.task.name, cut.broken, cut.fastest))
-    texts[folder / "plan.json"] = plan_text(job.robot, job.tool, job.placement, entries, job.source)
+    texts[folder / "plan.json"] = plan_text(
+        job.robot, job.tool, job.placement, entries, job.source, outcome.cell
+    )
     texts[folder / "trajectory.csv"] = trajectory_text(outcome.plans)
     texts[folder / "report.html"] = report_text(outcome, notes)
     try:
@@ -79,8 +91,26 @@ def write_outcome(outcome: Outcome, folder: Path) -> Written:
         write_program(path, text)
     if refused is not None:
         raise InputError(f"{refused} ({folder / 'plan.json'} and the report are written)")
-    stale = target if not outcome.passed and target.exists() else None
+    stale = target if target and target not in texts and target.exists() else None
     return Written(files=tuple(texts), stale=stale, notes=tuple(notes))
+
+
+def _program_file(job: Job, folder: Path) -> Path | None:
+    """Return where the program goes; None where the job wants none."""
+    if job.program.language == "none":
+        return None
+    return folder / f"{job.program.name}{language(job.program.language).suffix}"
+
+
+def collision_note(cell: Cell | None) -> str:
+    """Say what was checked for collisions, and what was not."""
+    if cell is None:
+        return NOT_CHECKED
+    about = f" (approximate: {', '.join(cell.approximate)})" if cell.approximate else ""
+    return (
+        f"Collisions are checked along the contours, among {len(cell.bodies)} bodies of the "
+        f"cell{about}; the moves to and between contours are not checked."
+    )
 
 
 def require_folder(folder: Path) -> None:
@@ -98,6 +128,24 @@ def require_folder(folder: Path) -> None:
             raise InputError(f"{folder}: expected a folder, but {place} is a file; name another")
 
 
+def require_language(job: Job) -> None:
+    """Refuse a program that the job's robot cannot run, before any work is done for it.
+
+    Raises
+    ------
+    InputError
+        At the language in the job.
+    """
+    if job.program.language == "none":
+        return
+    if refusal := language(job.program.language).refusal(job.robot):
+        raise refused_at(
+            job.path,
+            ("program", "language"),
+            f'{refusal}; write language = "none" in [program] to plan without a program',
+        )
+
+
 def program_of(plans: Sequence[Plan], options: ProgramOptions) -> tuple[str, list[str]]:
     """Return the text of the program that cuts `plans`, and the warnings of its preflight.
 
@@ -112,6 +160,8 @@ def program_of(plans: Sequence[Plan], options: ProgramOptions) -> tuple[str, lis
     """
     if not plans:
         raise AuditFailed("no program: there is no plan to write one from")
+    if refusal := language(options.language).refusal(plans[0].robot):
+        raise InputError(f"no program: {refusal}")
     program = build_program(
         plans,
         name=options.name,
@@ -129,7 +179,7 @@ def program_of(plans: Sequence[Plan], options: ProgramOptions) -> tuple[str, lis
 
 def trajectory_text(plans: Sequence[Plan]) -> str:
     """Return the text of trajectory.csv: one row per node, in mm and degrees, base frame."""
-    joints = range(1, 7)
+    joints = range(1, (plans[0].robot.joints if plans else 6) + 1)
     header = ["contour", "node", "kind", "t_s", *(f"q{i}_deg" for i in joints)]
     header += ["x_mm", "y_mm", "z_mm", "axis_x", "axis_y", "axis_z", "gamma_deg", "posture"]
     out = io.StringIO()
@@ -163,6 +213,7 @@ def report_text(outcome: Outcome, notes: Sequence[str]) -> str:
             checks=cut.checks,
             failure=cut.failure,
             broken_at=None if cut.broken is None else cut.broken.node + 1,
+            clearance=cut.clearance,
         )
         for cut in outcome.cuts
     ]
@@ -172,7 +223,7 @@ def report_text(outcome: Outcome, notes: Sequence[str]) -> str:
     facts = [
         ("Job", job.path.name),
         ("Part", job.part_file.name),
-        ("Robot", f"{robot.manufacturer} {robot.model}"),
+        ("Robot", f"{robot.manufacturer} {robot.model}".strip() or robot.id),
         ("Cutting speed", f"{' / '.join(f'{v:g}' for v in speeds)} m/min"),
         ("Gamma step", f"{np.degrees(options['gamma_step']):g} deg"),
         ("Objective", f"{options['objective']}, {options['metric']} metric"),
@@ -189,6 +240,7 @@ def report_text(outcome: Outcome, notes: Sequence[str]) -> str:
         f"{job.part_file.stem.replace('_', ' ')}",
         sections,
         mesh=outcome.mesh,
+        cell=outcome.cell,
         facts=facts,
         notes=notes,
         job_text=job.path.read_text(encoding="utf-8-sig"),

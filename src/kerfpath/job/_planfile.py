@@ -14,6 +14,7 @@ import numpy as np
 from kerfpath import __version__
 from kerfpath._arrays import Array
 from kerfpath.auditor import Check
+from kerfpath.cell import Cell
 from kerfpath.comfort import MEASURES, Band, Comfort
 from kerfpath.contour import KINDS, Contour
 from kerfpath.errors import InputError, NoFeasiblePath
@@ -49,6 +50,8 @@ class PlanFile:
         Names of the contours whose plan failed its audit when it was made.
     contours : dict of str to str
         What the job calls the contour of each plan: a plan may be that of a piece.
+    in_cell : bool
+        Whether the motions were planned and audited clear of collisions.
     """
 
     path: Path
@@ -57,6 +60,7 @@ class PlanFile:
     missing: tuple[str, ...]
     failed: tuple[str, ...]
     contours: dict[str, str]
+    in_cell: bool
 
 
 def plan_text(
@@ -65,6 +69,7 @@ def plan_text(
     T_base_part: np.ndarray[Any, Any],
     contours: Sequence[dict[str, Any]],
     job: dict[str, Any],
+    cell: Cell | None = None,
 ) -> str:
     """Return the text of a plan.json; the same input gives the same bytes.
 
@@ -77,6 +82,8 @@ def plan_text(
         From `plan_entry` and `broken_entry`.
     job : dict
         The job file as read.
+    cell : Cell, optional
+        What the motions were planned and audited clear of.
     """
     data = {
         "schema": SCHEMA,
@@ -87,6 +94,7 @@ def plan_text(
         "T_flange_tip": T_flange_tip.tolist(),
         "T_base_part": T_base_part.tolist(),
         "limits": _limits_entry(robot),
+        "cell": None if cell is None else _cell_entry(cell),
         "contours": list(contours),
     }
     text = json.dumps(data, indent=1, allow_nan=False)
@@ -209,6 +217,7 @@ def read_plan_file(path: str | Path) -> PlanFile:
                 for e in entries
                 if e["feasible"] and e["audit"]["passed"] is not True
             ),
+            in_cell=data.get("cell") is not None,
         )
     except InputError as error:
         raise InputError(f"{path}: {error}") from None
@@ -266,6 +275,20 @@ def _limits_entry(robot: Robot) -> dict[str, Any]:
         "couplings": [
             {"row": c.row.tolist(), "lower_rad": c.lower, "upper_rad": c.upper, "note": c.note}
             for c in robot.couplings
+        ],
+    }
+
+
+def _cell_entry(cell: Cell) -> dict[str, Any]:
+    """Return what kept apart and how far: a record, as the cell itself is that of the job."""
+    return {
+        "bodies": [
+            {"name": b.name, "kind": b.kind, "frame": b.frame, "approximate": b.approximate}
+            for b in cell.bodies
+        ],
+        "near_miss_m": [
+            {"between": list(pair), "at_least": float(required)}
+            for pair, required in zip(cell.pair_names, cell.required, strict=True)
         ],
     }
 

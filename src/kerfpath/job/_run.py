@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -11,13 +12,17 @@ import numpy as np
 from kerfpath._arrays import Array, Ints
 from kerfpath.auditor import Check, checks
 from kerfpath.cad import read as read_drawing
+from kerfpath.cell import Cell
 from kerfpath.contour import FRAME_KINDS, Contour
 from kerfpath.errors import NoFeasiblePath
 from kerfpath.graph import LayeredGraph
+from kerfpath.job._cell import cell_of_job
 from kerfpath.job._read import ContourTask, Job
 from kerfpath.kernels import is_compiled
 from kerfpath.planner import (
+    ClearanceMap,
     FastestSpeed,
+    clearance_map,
     fastest_speed,
     layered_graph,
     plan,
@@ -59,6 +64,8 @@ class Cut:
         With it: the least change of each limit that would do at the speed asked.
     checks : tuple of Check
         The audit's table; empty without a plan.
+    clearance : ClearanceMap or None
+        How clear every pose is in the cell, where the job asks for the map.
     """
 
     contour: str
@@ -71,6 +78,7 @@ class Cut:
     fastest: FastestSpeed | None = None
     relaxations: Relaxations | None = None
     checks: tuple[Check, ...] = ()
+    clearance: ClearanceMap | None = None
 
     @property
     def passed(self) -> bool:
@@ -84,13 +92,14 @@ class Cut:
         """Why there is no plan, and what would help; empty where there is one."""
         if self.broken is None:
             return ""
-        if self.fastest is None or self.relaxations is None:
+        if self.fastest is None:
             return str(self.broken)
+        least = self.relaxations
         ways = [
             f"{name} {share:.4g}"
             for name, share in (
-                ("eta_velocity", self.relaxations.eta_v),
-                ("eta_acceleration", self.relaxations.eta_a),
+                ("eta_velocity", None if least is None else least.eta_v),
+                ("eta_acceleration", None if least is None else least.eta_a),
             )
             if share is not None
         ]
@@ -105,11 +114,12 @@ class Cut:
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Outcome:
-    """What came of a job: every cut, in order, and the part's mesh for pictures."""
+    """What came of a job: every cut, in order, its cell, and the part's mesh for pictures."""
 
     job: Job
     cuts: tuple[Cut, ...]
     mesh: tuple[Array, Ints]
+    cell: Cell | None = None
 
     @property
     def passed(self) -> bool:
@@ -135,13 +145,18 @@ def run_job(job: Job, *, progress: Progress = lambda what, done, total: None) ->
     part = read_drawing(job.part_file, unit=job.part_unit)
     for task in job.contours:  # a misspelt name shall not wait for the contours before it
         part.loop(task.pick)
+    cell = cell_of_job(job, part)
     cuts = [
-        cut for task in job.contours for cut in _cut(job, task, part.contour(task.pick), progress)
+        cut
+        for task in job.contours
+        for cut in _cut(job, task, part.contour(task.pick), cell, progress)
     ]
-    return Outcome(job=job, cuts=tuple(cuts), mesh=part.mesh())
+    return Outcome(job=job, cuts=tuple(cuts), mesh=part.mesh(), cell=cell)
 
 
-def _cut(job: Job, task: ContourTask, drawn: Contour, progress: Progress) -> tuple[Cut, ...]:
+def _cut(
+    job: Job, task: ContourTask, drawn: Contour, cell: Cell | None, progress: Progress
+) -> tuple[Cut, ...]:
     """Return what came of a contour: one cut, or several where it is interrupted."""
     nodes = task.sample(drawn)
     options, done = job.plan_options, 0
@@ -163,37 +178,76 @@ def _cut(job: Job, task: ContourTask, drawn: Contour, progress: Progress) -> tup
         comfort=options["comfort"],
         progress=solved,
     )
-    whole = Cut(contour=task.name, task=task, drawn=drawn, nodes=nodes, graph=graph)
+    clearance = None
+    if cell is not None and job.cell is not None and job.cell.map:
+        clearance = clearance_map(graph, cell)
+    whole = Cut(
+        contour=task.name, task=task, drawn=drawn, nodes=nodes, graph=graph, clearance=clearance
+    )
     try:
-        plans = _plans(job, task, nodes, graph)
+        plans = _plans(job, task, nodes, graph, cell)
     except NoFeasiblePath as broken:
         # With poses everywhere slower would do; for a loop that cannot close it need not.
         if not np.diff(graph.start).all() or options["closure"] != "free":
             return (replace(whole, broken=broken),)
         progress(f"{task.name}: fastest speed", 0, 1)
+        if cell is not None:
+            # Shares of the limits at which a clear path exists are not looked for.
+            with suppress(NoFeasiblePath):
+                slower = _fastest(job, nodes, cell, refine=False, graph=graph)
+                return (replace(whole, broken=broken, fastest=slower),)
+            return (replace(whole, broken=broken),)
         least = relaxations(
             nodes, job.robot, graph, task.speed, eta_v=options["eta_v"], eta_a=options["eta_a"]
         )
         fastest = FastestSpeed.of(nodes, least.slower)
         return (replace(whole, broken=broken, fastest=fastest, relaxations=least),)
-    return tuple(_audited(job, whole, made) for made in plans)
+    return tuple(_audited(job, whole, made, cell) for made in plans)
 
 
-def _plans(job: Job, task: ContourTask, nodes: Contour, graph: LayeredGraph) -> tuple[Plan, ...]:
+def _fastest(
+    job: Job,
+    nodes: Contour,
+    cell: Cell | None,
+    *,
+    refine: bool,
+    graph: LayeredGraph | None = None,
+) -> FastestSpeed:
+    """Return the fastest constant speed of a contour, clear in the cell where there is one."""
+    keys, comfort = (
+        ("gamma_step", "frames", "postures", "eta_v", "eta_a"),
+        job.plan_options["comfort"],
+    )
+    return fastest_speed(
+        nodes,
+        job.robot,
+        tool=job.tool,
+        placement=job.placement,
+        cell=cell,
+        graph=graph,
+        refine=refine,
+        comfort=comfort and comfort.hard,
+        **{key: job.plan_options[key] for key in keys},
+    )
+
+
+def _plans(
+    job: Job, task: ContourTask, nodes: Contour, graph: LayeredGraph, cell: Cell | None
+) -> tuple[Plan, ...]:
     """Return the plan of a contour, or those of its pieces where the job lets it be interrupted."""
     options = job.plan_options
-    cell: dict[str, Any] = {"tool": job.tool, "placement": job.placement, "speed": task.speed}
-    cell["graph"] = graph
+    setting: dict[str, Any] = {"tool": job.tool, "placement": job.placement, "speed": task.speed}
+    setting["graph"] = graph
     try:
-        return (plan(nodes, job.robot, **cell, **options),)
+        return (plan(nodes, job.robot, cell=cell, **setting, **options),)
     except NoFeasiblePath:
         if job.interruptions == "none" or not np.diff(graph.start).all():
             raise
     plain = {key: value for key, value in options.items() if key not in ("feed", "rotation")}
-    return plan_in_pieces(nodes, job.robot, **cell, **plain)
+    return plan_in_pieces(nodes, job.robot, **setting, **plain)
 
 
-def _audited(job: Job, whole: Cut, made: Plan) -> Cut:
+def _audited(job: Job, whole: Cut, made: Plan, cell: Cell | None) -> Cut:
     """Return the cut of one plan, at finer intervals if the job asks for them, and its audit."""
     drawn, graph, nodes, s = whole.drawn, whole.graph, whole.nodes, made.contour.s
     if len(s) < len(nodes):
@@ -209,7 +263,7 @@ def _audited(job: Job, whole: Cut, made: Plan) -> Cut:
         nodes=nodes,
         graph=graph,
         plan=made,
-        checks=tuple(checks(made, reference=drawn, **job.audit_options)),
+        checks=tuple(checks(made, reference=drawn, cell=cell, **job.audit_options)),
     )
 
 
@@ -236,22 +290,14 @@ def fastest_speeds(
         As `run_job`.
     """
     part = read_drawing(job.part_file, unit=job.part_unit)
-    options = job.plan_options
-    keys = ("gamma_step", "frames", "postures", "eta_v", "eta_a", "refine")
-    comfort = options["comfort"] and options["comfort"].hard
+    cell = cell_of_job(job, part)
+    refine = job.plan_options["refine"]
     answers: list[tuple[ContourTask, Contour, FastestSpeed | NoFeasiblePath]] = []
     for i, task in enumerate(job.contours):
         progress("contours", i, len(job.contours))
         nodes = task.sample(part.contour(task.pick))
         try:
-            found: FastestSpeed | NoFeasiblePath = fastest_speed(
-                nodes,
-                job.robot,
-                tool=job.tool,
-                placement=job.placement,
-                comfort=comfort,
-                **{key: options[key] for key in keys},
-            )
+            found: FastestSpeed | NoFeasiblePath = _fastest(job, nodes, cell, refine=refine)
         except NoFeasiblePath as broken:
             found = broken
         answers.append((task, nodes, found))

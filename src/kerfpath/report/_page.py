@@ -8,6 +8,7 @@ from importlib.metadata import version
 
 from numpy.typing import ArrayLike
 
+from kerfpath.cell import Cell
 from kerfpath.plans import Plan
 from kerfpath.report import _map, _motion, _tables
 from kerfpath.report._html import Figures, page
@@ -24,6 +25,7 @@ def render(
     sections: Sequence[ContourSection],
     *,
     mesh: tuple[ArrayLike, ArrayLike] | None = None,
+    cell: Cell | None = None,
     facts: Sequence[tuple[str, str]] = (),
     notes: Sequence[str] = (),
     job_text: str = "",
@@ -38,6 +40,8 @@ def render(
         The contours, in cutting order.
     mesh : (vertices (V, 3) m, triangles (F, 3)), optional
         The part, in the part frame.
+    cell : Cell, optional
+        What stands around it, and robot and head, drawn at a few poses.
     facts : sequence of (what, value)
         Rows such as ("Robot", "ABB IRB 4600-60/2.05").
     notes : sequence of str
@@ -58,8 +62,8 @@ def render(
         "<section><h2>Part and contours</h2>",
         '<p class="caption">Part frame, all axes to the same scale. Dot and cone mark start and '
         "direction; short lines are tool axes, on the side of the nozzle. Drag to turn, scroll to "
-        "zoom.</p>",
-        figures.place(scene(sections, mesh), "scene"),
+        f"zoom.{'' if cell is None else _CELL}</p>",
+        figures.place(scene(sections, mesh, cell), "scene"),
         "</section>",
         "<section><h2>Contours</h2>",
         _tables.summary_table(sections),
@@ -71,6 +75,13 @@ def render(
         f"<footer>{_origin(sections)}</footer>",
     ]
     return page(title, body, figures)
+
+
+_SPARE = (
+    " Where nothing forbids it, the colour says how much more than the near-miss distances is kept;"
+    " pairs with a distance of their own, as nozzle and part, count as collisions alone."
+)
+_CELL = " The slider puts robot and head to a few poses; capsules stand in for links."
 
 
 def _contour(number: int, section: ContourSection, figures: Figures) -> str:
@@ -114,14 +125,14 @@ def _contour(number: int, section: ContourSection, figures: Figures) -> str:
     parts += [
         "<h4>What became of the candidates</h4>",
         '<p class="caption">A candidate is one gamma in one posture at one node.</p>',
-        _tables.counts_table(section.graph),
+        _tables.counts_table(section.mapped),
         "</details>",
     ]
     return "\n".join(parts)
 
 
 def _map_part(section: ContourSection, figures: Figures) -> list[str]:
-    graph, plan = section.graph, section.plan
+    graph, plan = section.mapped, section.plan
     figure = _map.feasibility_map(graph, plan, s=section.path.s, broken_at=section.broken_at)
     # The page has a legend of its own, which wraps, and a hover text that knows the reason.
     figure.update_layout(showlegend=False)
@@ -129,10 +140,10 @@ def _map_part(section: ContourSection, figures: Figures) -> list[str]:
     hidden = _map.hidden_postures(graph)
     others = "".join(f"<li>{escape(text)}</li>" for text in hidden)
     return [
-        "<h4>Feasibility map</h4>",
+        f"<h4>{'Feasibility' if section.clearance is None else 'Collision'} map</h4>",
         '<p class="caption">Which rotations gamma about the beam the robot can take at each node, '
         "one panel per posture (shoulder / elbow / wrist); elsewhere the colour says which limit "
-        "forbids it.</p>",
+        f"forbids it.{'' if section.clearance is None else _SPARE}</p>",
         _tables.reason_legend(graph, _map.shown_postures(graph), has_plan=plan is not None),
         figures.place(figure, "map"),
         f'<ul class="others">{others}</ul>' if others else "",

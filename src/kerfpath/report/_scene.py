@@ -11,7 +11,9 @@ import plotly.graph_objects as go
 from numpy.typing import ArrayLike
 
 from kerfpath._arrays import Array, floats, integers
+from kerfpath.cell import Cell
 from kerfpath.errors import InputError
+from kerfpath.report._cell import add_cell, poses_shown
 from kerfpath.report._look import ACCENT, ALERT, FAINT, GRID, INK, QUIET, base_layout
 from kerfpath.report._section import ContourSection
 
@@ -25,9 +27,11 @@ LABELS = 12
 
 
 def scene(
-    sections: Sequence[ContourSection], mesh: tuple[ArrayLike, ArrayLike] | None
+    sections: Sequence[ContourSection],
+    mesh: tuple[ArrayLike, ArrayLike] | None,
+    cell: Cell | None = None,
 ) -> go.Figure:
-    """Return the part (if given as a mesh, m) and its contours, in mm, all axes alike."""
+    """Return the part (if given as a mesh, m), its contours and its cell, in mm, axes alike."""
     figure = go.Figure(layout=base_layout(HEIGHT, showlegend=False))
     corners = [section.path.points * 1e3 for section in sections]
     if mesh is not None:
@@ -37,10 +41,13 @@ def scene(
     size = float(np.linalg.norm(np.ptp(np.vstack(corners), axis=0))) if corners else 1.0
     for section in sections:
         _add_contour(figure, section, size)
+    if cell is not None and cell.T_base_part is not None:
+        plans = [section.plan for section in sections if section.plan is not None]
+        add_cell(figure, cell, cell.T_base_part, poses_shown(plans))
     figure.update_layout(
         margin={"l": 0, "r": 0, "t": 0, "b": 0},
         scene={
-            "aspectmode": "data",
+            "aspectmode": "data" if cell is None else "manual",
             "dragmode": "turntable",
             "camera": _camera(sections),
             "annotations": _labels(sections) if len(sections) <= LABELS else [],

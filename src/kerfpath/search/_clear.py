@@ -215,16 +215,17 @@ class Known:
             "collision at the node": int(closed[self._layer == there].sum()),
             "collision on the way": counts.pop("shut edges", 0),
         }
-        message = f"no admissible way to node {there} that is clear"
         if not broken.counts or not any(ways.values()):
             ways = {"collision elsewhere": self.vertices_closed + self.edges_closed}
-            message = str(broken)
         if not any(ways.values()):
             return broken
         counts |= {name: number for name, number in ways.items() if number}
         told = ", ".join(f"{name}: {number}" for name, number in counts.items())
+        message = f"no admissible way to node {there} that is clear; forbidden by {told}"
+        if "collision elsewhere" in ways:
+            message = f"{broken}, collision elsewhere: {ways['collision elsewhere']}"
         return NoFeasiblePath(
-            f"{message}; forbidden by {told}",
+            message,
             proved=broken.proved,
             node=broken.node,
             back=broken.back,

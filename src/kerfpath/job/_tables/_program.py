@@ -13,7 +13,9 @@ __all__ = ["AuditTable", "ProgramTable"]
 class ProgramTable(Table):
     """[program]: the robot program, its language, names and process values."""
 
-    language: Literal["rapid"] = "rapid"
+    language: Annotated[
+        Literal["rapid", "none"], key("a robot language, or none for no program", '"rapid"')
+    ] = "rapid"
     name: Identifier | None = None
     retract_mm: Annotated[Positive, key("a number above 0, in mm", "50")] = 50.0
     zone_mm: Annotated[NotNegative, key("a number not below 0, in mm", "0.3")] = 0.3
