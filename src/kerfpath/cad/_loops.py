@@ -53,7 +53,7 @@ class OrientedEdge:
 
     def __init__(self, edge: TopoDS_Edge, face: TopoDS_Face, surface: BRepAdaptor_Surface) -> None:
         self.edge, self.face, self.surface = edge, face, surface
-        self._outward = -1.0 if face.Orientation() == REVERSED else 1.0
+        self.outward = -1.0 if face.Orientation() == REVERSED else 1.0
         first, last = BRep_Tool.Range_s(edge, face)
         # A REVERSED face shows its other side, about which its wires run the other way round.
         backward = (edge.Orientation() == REVERSED) != (face.Orientation() == REVERSED)
@@ -115,7 +115,7 @@ class OrientedEdge:
         at = (point.X(), point.Y(), point.Z())
         if not size > SINGULAR * du.Magnitude() * dv.Magnitude():
             return at, None
-        return at, np.array([normal.X(), normal.Y(), normal.Z()]) * (self._outward / size)
+        return at, np.array([normal.X(), normal.Y(), normal.Z()]) * (self.outward / size)
 
 
 FaceLoop = tuple[Literal["outer", "inner"], Chain[OrientedEdge]]
