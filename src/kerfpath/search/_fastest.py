@@ -9,16 +9,15 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from kerfpath._arrays import Array, Bools, Ints, bools, floats, freeze, positive, scalar
-from kerfpath.errors import InputError, NoFeasiblePath
+from kerfpath.errors import InputError
 from kerfpath.kernels import search as kernel
 from kerfpath.kernels.metric import CHEBYCHEV, increments
 from kerfpath.search._exact import quickest_path
-from kerfpath.search._layers import empty_layer, narrowest_key, offsets, sorted_layers
+from kerfpath.search._layers import require_joined, sorted_layers
+from kerfpath.search._problem import Problem, closed_vertices, offsets, shut_edges
 
-__all__ = ["GATE_LIMIT", "LeastInterval", "least_interval", "quickest"]
+__all__ = ["LeastInterval", "least_interval", "quickest"]
 
-GATE_LIMIT = 1.5
-"""What a gate lets pass: between 1, from open to an end, and 2, from end to end."""
 _LAYERS_SAMPLED = 8
 """Layers whose nearest pairs give the first guess of the interval; any guess ends right."""
 
@@ -54,9 +53,10 @@ def least_interval(
     velocity: ArrayLike,
     acceleration: ArrayLike,
     endless: ArrayLike | None = None,
+    vertex_cost: ArrayLike | None = None,
+    shut: ArrayLike | None = None,
     eta_v: float = 1.0,
     eta_a: float = 1.0,
-    gates: ArrayLike | None = None,
 ) -> LeastInterval:
     """Return the least node interval in which a path through the layers keeps (5) and (6), exactly.
 
@@ -65,17 +65,17 @@ def least_interval(
 
     Parameters
     ----------
-    q, start, velocity, acceleration, endless, eta_v, eta_a
+    q, start, velocity, acceleration, endless, shut, eta_v, eta_a
         As in `shortest_path`; K >= 2.
-    gates : (N, m), optional
-        Numbers of the vertices that no step may change by more than 1.5, at any speed.
+    vertex_cost : (N,), optional
+        0, or infinity where a vertex is closed.
 
     Raises
     ------
     NoFeasiblePath
-        An empty layer; says which. Or the gates let no path through.
+        An empty layer, or closed vertices and shut edges that leave no path; says where.
     InputError
-        Arrays that do not fit each other, NaN, limits that are not positive.
+        Arrays that do not fit each other, NaN, limits that are not positive, other vertex costs.
     """
     q = floats(q, "q", (None, None), copy=False)
     start, n = offsets(start, len(q)), q.shape[1]
@@ -84,59 +84,57 @@ def least_interval(
     endless = bools(np.zeros(n, bool) if endless is None else endless, "endless", (n,))
     if len(start) < 3:
         raise InputError("start: a node interval needs at least two layers, got 1")
-    empty = np.flatnonzero(np.diff(start) == 0)
-    if empty.size:
-        raise empty_layer(int(empty[0]))
-    gate = floats(np.empty((len(q), 0)) if gates is None else gates, "gates", (len(q), None))
-    m, ceiling = gate.shape[1], _guess(q, start, v, endless)
-    widest = np.where(endless, 2 * np.pi, np.ptp(q, axis=0))
-    slowest = float(max((widest / v).max(), np.sqrt(2 * widest / a).max()))
+    problem = timed(
+        q, start, endless, weight=1 / v, acceleration=a, vertex_cost=vertex_cost, shut=shut
+    )
+    if not np.isin(problem.aim.vertex_cost, (0.0, np.inf)).all():
+        raise InputError("vertex_cost: here a vertex is open (0) or closed (infinity)")
+    require_joined(problem)
+    ceiling = _guess(q, start, v, endless)
     while True:
         # Edges that take longer than the ceiling are not looked at: right if a path keeps it.
-        found = quickest(
-            np.hstack([q, gate]) if m else q,
-            start,
-            np.append(endless, np.zeros(m, bool)),
-            np.append(1 / v, np.zeros(m)),
-            np.append(ceiling * v, np.full(m, GATE_LIMIT)),
-            np.append(a, np.full(m, np.inf)),
-            ceiling,
-        )
+        found = quickest(problem, ceiling * v, ceiling)
         if found is not None:
             index, _ = found
             return _binding(q[start[:-1] + index], index, v, a, endless)
-        if m and ceiling > slowest:
-            raise NoFeasiblePath("no path passes the gates at any speed", proved=True, node=-1)
         ceiling *= 2
 
 
-def quickest(
+def timed(
     q: Array,
     start: Ints,
     endless: Bools,
+    *,
     weight: Array,
-    bound: Array,
     acceleration: Array,
-    ceiling: float,
-) -> tuple[Ints, float] | None:
-    """Return the path whose steps and changes ask for the least time at most, and that time.
+    vertex_cost: ArrayLike | None = None,
+    shut: ArrayLike | None = None,
+) -> Problem:
+    """Return the problem of the path whose steps and changes ask for the least time at most.
 
-    A step asks for its Chebychev distance under `weight` (n,) s/rad and may not exceed `bound` (n,)
-    rad; a change asks for the time in which `acceleration` (n,) rad/s^2 allows it. None where more
-    than `ceiling` s is asked for, or no path keeps the bound.
+    A step asks for its Chebychev distance under `weight` (n,) s/rad, a change for the time in which
+    `acceleration` (n,) rad/s^2 allows it.
     """
-    key, width, circular = narrowest_key(q, start, bound, endless)
-    layers, _ = sorted_layers(q, start, key, width, circular, endless)
     aim = kernel.Objective(
         weight=freeze(weight),
         metric=CHEBYCHEV,
         minimax=True,
-        vertex_cost=freeze(np.zeros(len(q))),
-        velocity=freeze(bound),
+        vertex_cost=closed_vertices(vertex_cost, len(q)),
+        velocity=np.full(len(endless), np.inf),
         acceleration=freeze(acceleration),
-        cap=ceiling,
+        cap=np.inf,
         timed=True,
     )
+    return Problem(q=q, start=start, endless=endless, aim=aim, shut=shut_edges(shut, start))
+
+
+def quickest(problem: Problem, bound: Array, ceiling: float) -> tuple[Ints, float] | None:
+    """Return the best path of a timed problem whose steps keep `bound` (n,) rad, and its time.
+
+    None where more than `ceiling` s is asked for, or no path keeps the bound.
+    """
+    aim = problem.aim._replace(velocity=freeze(bound), cap=ceiling)
+    layers, aim, _ = sorted_layers(problem._replace(aim=aim))
     best = quickest_path(layers, aim, ceiling)
     return None if best is None else (layers.rank[best.path], best.cost)
 
