@@ -20,6 +20,7 @@ NAMES = (
     "contours",
     "refinement",
     "collision",
+    "cad",
 )
 
 
@@ -83,6 +84,10 @@ def _run(name: str, *, quick: bool) -> list[Report]:
         from benchmarks import collision
 
         return collision.run(quick=quick)
+    if name == "cad":
+        from benchmarks import cad
+
+        return [cad.run(quick=quick)]
     from benchmarks import search
 
     return search.run(quick=quick)

@@ -9,7 +9,7 @@ reduction that could be vectorised.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from functools import cache
 from math import pi, sqrt
 from typing import Literal, ParamSpec, TypeVar
@@ -109,7 +109,7 @@ def dense_cost(
 
 
 @cache
-def _second_order(endless: tuple[bool, ...]) -> Callable[[Array, Ints, Array, Array, Array], float]:
+def _second_order(endless: tuple[bool, ...]) -> Callable[..., float]:
     n = len(endless)
 
     @_jit
@@ -117,8 +117,11 @@ def _second_order(endless: tuple[bool, ...]) -> Callable[[Array, Ints, Array, Ar
         return dq - 2 * pi * np.round(dq / (2 * pi)) if endless[i] else dq
 
     @_jit
-    def forward(q: Array, start: Ints, weights: Array, most: Array, change: Array) -> float:
+    def forward(
+        q: Array, start: Ints, weights: Array, most: Array, change: Array, closed: Bools
+    ) -> float:
         """Keep every admissible edge (p, j) as a state, those into one vertex together."""
+        edge = 0
         first, d = np.zeros(start[1] + 1, np.int64), np.zeros(0)
         dq, step = np.empty((0, n)), np.empty(n)
         for k in range(1, len(start) - 1):
@@ -129,6 +132,8 @@ def _second_order(endless: tuple[bool, ...]) -> Callable[[Array, Ints, Array, Ar
             for j in range(b, c):
                 for p in range(a, b):
                     rho, far = 0.0, False
+                    if len(closed):
+                        far = closed[edge + (p - a) * (c - b) + j - b]
                     for i in range(n):
                         step[i] = increment(q[j, i] - q[p, i], i)
                         rho += weights[i] * abs(step[i])
@@ -153,6 +158,7 @@ def _second_order(endless: tuple[bool, ...]) -> Callable[[Array, Ints, Array, Ar
                     count += 1
                 new_first[j - b + 1] = count
             first, d, dq = new_first, new_d[:count], new_dq[:count]
+            edge += (b - a) * (c - b)
         return float(d.min()) if len(d) else np.inf
 
     return forward
@@ -167,12 +173,15 @@ def second_order_cost(
     acceleration: Array,
     endless: Bools,
     weights: Array,
+    passable: Sequence[Bools] = (),
 ) -> float:
     """Return the least Manhattan cost of a path under both limits, inf if there is none; K >= 2.
 
     The plain second-order recursion: over every pair of vertices of neighbouring layers, and for
-    each admissible one over every admissible edge before it. Arguments as `dense_cost`.
+    each admissible one over every admissible edge before it. Arguments as `dense_cost`; which edges
+    are `passable` may be given for each two layers, (from, to).
     """
     forward = _second_order(tuple(bool(e) for e in endless))
     bounds = velocity * dt + SLACK, acceleration * dt**2 + SLACK
-    return float(forward(np.ascontiguousarray(q), start, weights, *bounds))
+    closed = ~np.concatenate([np.zeros(0, bool), *(edges.ravel() for edges in passable)])
+    return float(forward(np.ascontiguousarray(q), start, weights, *bounds, closed))

@@ -1,7 +1,8 @@
 """Tesseract's Descartes planner on the benchmark's poses, in a process of its own.
 
-The wheel brings neither robots nor a plugin list, so both are written here: a URDF and SRDF of the
-arm without geometry, and a list that points at the wheel's own libraries, whose names carry a hash.
+The wheel brings neither robots nor plugin lists, so both are written here: a URDF and SRDF of the
+arm, without geometry unless solids are given, and lists that point at the wheel's own libraries,
+whose names carry a hash.
 """
 
 from __future__ import annotations
@@ -11,7 +12,7 @@ from collections.abc import Sequence
 from concurrent.futures import ProcessPoolExecutor
 from concurrent.futures.process import BrokenProcessPool
 from dataclasses import dataclass
-from itertools import pairwise
+from itertools import combinations, pairwise
 from multiprocessing import get_context
 from pathlib import Path
 from time import perf_counter, process_time
@@ -22,17 +23,25 @@ import numpy as np
 from benchmarks._arm import chain
 from benchmarks._figures import available_gigabytes, peak_megabytes
 from kerfpath import Robot
-from kerfpath._arrays import Array
+from kerfpath._arrays import Array, Ints
 
-__all__ = ["NotRun", "Solved", "Task", "solve"]
+__all__ = ["NotRun", "Solid", "Solved", "Task", "solve"]
 
 NAMESPACE, PROFILE = "DescartesMotionPlannerTask", "benchmark"
-LONGEST = 600.0
-"""Seconds after which the peer's process counts as hung."""
 
 
 class NotRun(Exception):
     """The peer did not run; says why."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Solid:
+    """A closed mesh, vertices (V, 3) m in the base at joint angles zero, that joint i carries."""
+
+    name: str
+    frame: int
+    vertices: Array
+    triangles: Ints
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -53,6 +62,12 @@ class Task:
         Vertices of each layer, as kerfpath counts them; tells the memory it will need.
     runs : int
         How often it is solved, after one run that is not measured.
+    solids : sequence of Solid
+        With any, poses and the straight joint motions between them are checked for collisions.
+    apart : sequence of (name, name)
+        Which solids may not touch each other.
+    longest : float s
+        After which its process counts as hung.
     """
 
     robot: Robot
@@ -61,6 +76,9 @@ class Task:
     samples: int
     sizes: Sequence[int]
     runs: int
+    solids: Sequence[Solid] = ()
+    apart: Sequence[tuple[str, str]] = ()
+    longest: float = 600.0
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -87,7 +105,7 @@ def solve(task: Task) -> Solved:
     with ProcessPoolExecutor(1, mp_context=get_context("spawn")) as pool:
         work = pool.submit(_solve_here, task)
         try:
-            return work.result(timeout=LONGEST)
+            return work.result(timeout=task.longest)
         except ImportError as error:
             raise NotRun(f"tesseract-robotics does not import here ({error})") from None
         except BrokenProcessPool:
@@ -95,7 +113,7 @@ def solve(task: Task) -> Solved:
         except TimeoutError:
             for process in pool._processes.values():
                 process.kill()
-            raise NotRun(f"no answer within {LONGEST:.0f} s") from None
+            raise NotRun(f"no answer within {task.longest:.0f} s") from None
 
 
 def _edges_gigabytes(task: Task) -> float:
@@ -113,8 +131,11 @@ def _solve_here(task: Task) -> Solved:
     with tempfile.TemporaryDirectory() as folder:
         plugins = Path(folder) / "plugins.yaml"
         plugins.write_text(_plugins(task.robot))
+        contacts = Path(folder) / "contacts.yaml"
+        contacts.write_text(_contacts())
+        urdf, srdf = _urdf(task, Path(folder)), _srdf(task, plugins, contacts)
         environment = environments.Environment()
-        if not environment.init(_urdf(task.robot), _srdf(plugins), common.GeneralResourceLocator()):
+        if not environment.init(urdf, srdf, common.GeneralResourceLocator()):
             raise NotRun("its environment refused the URDF, SRDF or plugin list")
     info = common.ManipulatorInfo()
     info.manipulator, info.manipulator_ik_solver = "manipulator", "OPWInvKin"
@@ -127,8 +148,9 @@ def _solve_here(task: Task) -> Solved:
     profile.target_pose_sample_min, profile.target_pose_sample_max = -np.pi, np.pi
     # Both ends are sampled: one sample more than ours, the last the same as the first.
     profile.target_pose_sample_resolution = 2 * np.pi / task.samples * (1 + 1e-9)
-    profile.enable_collision = profile.enable_edge_collision = False
-    profile.allow_collision = True  # else poses that nobody checked count as colliding
+    profile.enable_collision = profile.enable_edge_collision = bool(task.solids)
+    # Else poses that nobody checked count as colliding.
+    profile.allow_collision = not task.solids
     profiles = language.ProfileDictionary()
     profiles.addProfile(NAMESPACE, PROFILE, descartes.cast_DescartesPlanProfileD(profile))
 
@@ -178,45 +200,89 @@ def _solve_here(task: Task) -> Solved:
     )
 
 
-def _urdf(robot: Robot) -> str:
+def _urdf(task: Task, folder: Path) -> str:
+    robot = task.robot
     axes, origins = chain(robot)
     assert robot.lower is not None
     assert robot.upper is not None
     text = '<robot name="arm"><link name="base_link"/>'
-    parent = "base_link"
+    parents = ["base_link", *(f"link_{i + 1}" for i in range(6))]
     for i in range(6):
         text += (
-            f'<link name="link_{i + 1}"/><joint name="joint_{i + 1}" type="revolute">'
-            f'<parent link="{parent}"/><child link="link_{i + 1}"/>'
+            f'<link name="{parents[i + 1]}"/><joint name="joint_{i + 1}" type="revolute">'
+            f'<parent link="{parents[i]}"/><child link="{parents[i + 1]}"/>'
             f'<origin xyz="{_row(origins[i])}" rpy="0 0 0"/><axis xyz="{_row(axes[i])}"/>'
             f'<limit effort="0" velocity="1" lower="{float(robot.lower[i])!r}" '
             f'upper="{float(robot.upper[i])!r}"/></joint>'
         )
-        parent = f"link_{i + 1}"
+    places = np.vstack([np.zeros(3), np.cumsum(origins[:6], axis=0)])
+    for i, solid in enumerate(task.solids):
+        file = folder / f"{i}.stl"
+        file.write_bytes(_stl(solid.vertices - places[solid.frame], solid.triangles))
+        text += (
+            f'<link name="{solid.name}"><collision><geometry><mesh filename="file://{file}"/>'
+            f'</geometry></collision></link><joint name="fixed_{i}" type="fixed">'
+            f'<parent link="{parents[solid.frame]}"/><child link="{solid.name}"/></joint>'
+        )
     # z of the flange along x of the last link: Ry(90 deg).
     return (
-        f'{text}<link name="tool0"/><joint name="flange" type="fixed"><parent link="{parent}"/>'
+        f'{text}<link name="tool0"/><joint name="flange" type="fixed"><parent link="link_6"/>'
         f'<child link="tool0"/><origin xyz="{_row(origins[6])}" rpy="0 {np.pi / 2!r} 0"/></joint>'
         "</robot>"
     )
 
 
-def _srdf(plugins: Path) -> str:
+def _stl(vertices: Array, triangles: Ints) -> bytes:
+    """Return a binary STL file; normals are left to the reader."""
+    facets = np.zeros(len(triangles), np.dtype([("xyz", "<f4", (4, 3)), ("end", "<u2")]))
+    facets["xyz"][:, 1:] = vertices[triangles]
+    return bytes(80) + np.uint32(len(triangles)).tobytes() + facets.tobytes()
+
+
+def _srdf(task: Task, plugins: Path, contacts: Path) -> str:
+    judged = {frozenset(pair) for pair in task.apart}
+    names = [solid.name for solid in task.solids]
+    may_touch = "".join(
+        f'<disable_collisions link1="{a}" link2="{b}" reason="Never"/>'
+        for a, b in combinations(names, 2)
+        if frozenset((a, b)) not in judged
+    )
     return (
         '<robot name="arm" version="1.0.0"><group name="manipulator">'
         '<chain base_link="base_link" tip_link="tool0"/></group>'
-        f'<kinematics_plugin_config filename="file://{plugins}"/></robot>'
+        f'<kinematics_plugin_config filename="file://{plugins}"/>'
+        f'<contact_managers_plugin_config filename="file://{contacts}"/>{may_touch}</robot>'
     )
 
 
-def _plugins(robot: Robot) -> str:
+def _libraries(pattern: str) -> tuple[Path, list[str]]:
+    """Return where the wheel keeps its libraries, and those that match, as its lists name them."""
     import tesseract_robotics
 
     libraries = Path(tesseract_robotics.__file__).parent.parent / "tesseract_robotics.libs"
-    found = sorted(libraries.glob("libtesseract_kinematics_*_factor*.so"))
+    found = sorted(libraries.glob(f"libtesseract_{pattern}.so"))
     if not found:
-        raise NotRun(f"its wheel has no kinematics plugins in {libraries}")
-    names = "".join(f"    - {f.name.removeprefix('lib').removesuffix('.so')}\n" for f in found)
+        raise NotRun(f"its wheel has no {pattern} in {libraries}")
+    return libraries, [f.name.removeprefix("lib").removesuffix(".so") for f in found]
+
+
+def _contacts() -> str:
+    libraries, found = _libraries("collision_bullet_factor*")
+    text = f"contact_manager_plugins:\n  search_paths:\n    - {libraries}\n  search_libraries:\n"
+    text += "".join(f"    - {name}\n" for name in found)
+    for kind in ("Discrete", "Cast"):
+        group = "discrete" if kind == "Discrete" else "continuous"
+        manager = f"Bullet{kind}BVHManager"
+        text += (
+            f"  {group}_plugins:\n    default: {manager}\n    plugins:\n"
+            f"      {manager}:\n        class: {manager}Factory\n"
+        )
+    return text
+
+
+def _plugins(robot: Robot) -> str:
+    libraries, found = _libraries("kinematics_*_factor*")
+    names = "".join(f"    - {name}\n" for name in found)
     lengths = "".join(f"              {k}: {float(v)!r}\n" for k, v in robot.geometry.items())
 
     def group(kind: str, plugin: str, factory: str, params: str = "") -> str:

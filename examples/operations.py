@@ -196,7 +196,7 @@ def start() -> Picture:
 
 
 def leads() -> Picture:
-    """A lead that is a line, and one that is an arc."""
+    """Lead in by a line, and by an arc."""
     right = hole(0.034)
     return in_holes(
         (hole(), lead_in(hole(), 0.006)),
@@ -214,7 +214,7 @@ def slow() -> Picture:
 
 
 def bend() -> Picture:
-    """A cut over a bend of the sheet, seen from the side: axes as drawn, and smoothed."""
+    """Smooth the axes of a cut over a bend of the sheet, seen from the side."""
     up = np.radians(40)
     s = np.linspace(-0.03, 0.03, 61)
     points = np.c_[np.where(s < 0, s, s * np.cos(up)), 0 * s, np.where(s < 0, 0, s * np.sin(up))]
@@ -232,7 +232,7 @@ def bend() -> Picture:
 
 
 def tilted() -> Picture:
-    """A hole cut for a weld: the head leans 30 degrees over the scrap."""
+    """Cut a hole for a weld: the head leans 30 degrees over the scrap."""
     made = bevel(hole(), np.radians(30))
     picture = Picture(view=OBLIQUE)
     picture.material(around(hole()), hole().points)

@@ -22,7 +22,7 @@ def distance(d, weights, metric):
 
 def path_planning(
     q, start, *, dt, velocity, acceleration, endless, posture, vertex_cost, weights, metric,
-    objective, method, eta_v, eta_a,
+    objective, method, eta_v, eta_a, passable=None,
 ):  # fmt: skip
     """The procedure of section 3.2, line by line; returns (index, cost) or None."""
     layers = [list(range(start[k], start[k + 1])) for k in range(len(start) - 1)]
@@ -40,6 +40,8 @@ def path_planning(
                     continue
                 dq = difference(q[p], q[j], endless)
                 d_cur = join(M_dist[p], distance(dq, weights, metric))
+                if passable is not None and not passable[k - 1][p - start[k - 1], j - start[k]]:
+                    d_cur = np.inf
                 if known:
                     if posture[p] != posture[j]:
                         d_cur = np.inf
@@ -103,13 +105,13 @@ def second_order(q, start, closure, passable=None, **o):
     return cost, best("sum", np.inf if o["objective"] == "sum" else cost * (1 + 1e-12))
 
 
-def interrupted(q, start, **o):
+def interrupted(q, start, passable=None, **o):
     """Fewest interruptions, and of plans with that many the optimal (cost, tie-breaking sum)."""
     layers = [q[a:b] for a, b in itertools.pairwise(start)]
     vertex = [o["vertex_cost"][a:b] for a, b in itertools.pairwise(start)]
     if len(layers) == 1:
         return (0, vertex[0].min(), vertex[0].min()) if len(vertex[0]) else None
-    D, bound_a, steps = _edges(layers, vertex, o)
+    D, bound_a, steps = _edges(layers, vertex, o, passable)
 
     def best(objective, cap):
         """By the number of interruptions: the least cost."""
@@ -137,7 +139,7 @@ def interrupted(q, start, **o):
     return fewest, cost[fewest], best("sum", cap)[fewest]
 
 
-def rotated(q, start, closure, rotation, **o):
+def rotated(q, start, closure, rotation, passable=None, **o):
     """Optimal (cost, tie-breaking sum) that keeps `rotation` too, or None: every path is tried."""
     ranges = [np.arange(a, b) for a, b in itertools.pairwise(start)]
     paths = np.array(list(itertools.product(*ranges)), dtype=int).reshape(-1, len(ranges))
@@ -150,6 +152,9 @@ def rotated(q, start, closure, rotation, **o):
     ok = (np.abs(d) <= o["eta_v"] * o["velocity"] * o["dt"] + TOLERANCE).all((1, 2))
     ok &= (np.abs(changes) <= o["eta_a"] * o["acceleration"] * o["dt"] ** 2 + TOLERANCE).all((1, 2))
     ok &= (np.abs(np.cumsum(d, axis=1)) <= rotation + TOLERANCE).all((1, 2))
+    ok &= np.isfinite(o["vertex_cost"][paths]).all(axis=1)
+    for k, there in enumerate(passable or []):
+        ok &= there[paths[:, k] - start[k], paths[:, k + 1] - start[k + 1]]
     if not ok.any():
         return None
     parts = np.hstack([_distances(d, o["weights"], o["metric"]), o["vertex_cost"][paths]])[ok]
@@ -218,8 +223,8 @@ def random_instance(rng, *, layers=(1, 9), size=(1, 9)):
 
 
 def slowed(q, start, *, dt, velocity, acceleration, endless, vertex_cost, weights, metric, penalty,
-           eta_v, eta_a):  # fmt: skip
-    """Least cost when time lost has a price: every pair of edges is tried."""
+           eta_v, eta_a, passable=None):  # fmt: skip
+    """Least cost when time lost has a price: every pair of edges is tried; infinity: no path."""
     layers = [q[a:b] for a, b in itertools.pairwise(start)]
     vertex = [vertex_cost[a:b] for a, b in itertools.pairwise(start)]
     if len(layers) == 1:
@@ -227,6 +232,8 @@ def slowed(q, start, *, dt, velocity, acceleration, endless, vertex_cost, weight
     D = [difference(a[:, None], b[None], endless) for a, b in itertools.pairwise(layers)]
     alone = [(np.abs(d) / (eta_v * velocity * dt)).max(-1) for d in D]
     R = [_distances(d, weights, metric) + v for d, v in zip(D, vertex[1:], strict=True)]
+    if passable is not None:
+        R = [np.where(ok, r, np.inf) for ok, r in zip(passable, R, strict=True)]
     d = vertex[0][:, None] + R[0] + penalty * np.maximum(0, alone[0] - 1)
     for k in range(1, len(D)):
         change = np.abs(D[k][None] - D[k - 1][:, :, None])
@@ -234,3 +241,32 @@ def slowed(q, start, *, dt, velocity, acceleration, endless, vertex_cost, weight
         lost = np.maximum(0, np.maximum(asked, alone[k][None]) - 1)
         d = (d[:, :, None] + R[k][None] + penalty * lost).min(axis=0)
     return d.min()
+
+
+def quickest(q, start, *, velocity, acceleration, endless, eta_v, eta_a, vertex_cost, passable):
+    """Least node interval by every pair of edges, infinity if there is no path."""
+    layers = [q[a:b] for a, b in itertools.pairwise(start)]
+    vertex = [vertex_cost[a:b] for a, b in itertools.pairwise(start)]
+    D = [difference(a[:, None], b[None], endless) for a, b in itertools.pairwise(layers)]
+    step = [
+        (np.abs(d) / (eta_v * velocity)).max(-1) + v for d, v in zip(D, vertex[1:], strict=True)
+    ]
+    step = [np.where(ok, s, np.inf) for ok, s in zip(passable, step, strict=True)]
+    d = vertex[0][:, None] + step[0]
+    for k in range(1, len(D)):
+        change = np.abs(D[k][None] - D[k - 1][:, :, None])
+        sharp = np.sqrt((change / (eta_a * acceleration)).max(-1))
+        d = np.maximum(np.maximum(d[:, :, None], sharp).min(axis=0, initial=np.inf), step[k])
+    return d.min(initial=np.inf)
+
+
+def random_closures(rng, start, share, closure="free"):
+    """Vertex costs (N,) of 0 or infinity, shut edges (E, 2), and these as passable matrices."""
+    closed = np.where(rng.random(start[-1]) < share * rng.random(), np.inf, 0.0)
+    if closure == "periodic":
+        closed[start[-2] :] = closed[: start[1]]
+    sizes = np.diff(start)
+    there = share * rng.random()
+    passable = [rng.random(shape) >= there for shape in itertools.pairwise(sizes)]
+    edges = [np.argwhere(~ok) + start[k : k + 2] for k, ok in enumerate(passable)]
+    return closed, np.concatenate([np.empty((0, 2), int), *edges]), passable

@@ -29,7 +29,8 @@ from OCP.BRepPrimAPI import (
     BRepPrimAPI_MakeSphere,
     BRepPrimAPI_MakeTorus,
 )
-from OCP.GeomAPI import GeomAPI_ProjectPointOnSurf
+from OCP.collections import Array2_gp_Pnt
+from OCP.GeomAPI import GeomAPI_PointsToBSplineSurface, GeomAPI_ProjectPointOnSurf
 from OCP.GeomLProp import GeomLProp_SLProps
 from OCP.gp import gp_Ax1, gp_Ax2, gp_Dir, gp_Pnt, gp_Trsf, gp_Vec
 from OCP.Interface import Interface_Static
@@ -618,3 +619,49 @@ def test_b_pillar_file_is_what_its_script_writes(tmp_path: Path) -> None:
     for name in ("first.step", "second.step"):
         script.write(tmp_path / name)
         assert (tmp_path / name).read_bytes() == B_PILLAR.read_bytes()
+
+
+def test_the_healed_surface_goes_on_over_a_hole(tmp_path: Path) -> None:
+    bored = tube(cylinder(5, 60, (0, 0, 50), "y"))
+    part = read(write_step(tmp_path / "tube.step", bored))
+    holes = [loop.name for loop in part.loops if loop.kind == "inner" and loop.diameter]
+    contours = [part.contour(name) for name in holes]
+    outside = int(np.argmax([np.hypot(*c.points[0, :2]) for c in contours]))
+    contour, surface = contours[outside], part.surface(holes[outside])
+    # The loop lies on it.
+    on, normals = surface.project(contour.points)
+    np.testing.assert_allclose(on, contour.points, atol=1e-9)
+    np.testing.assert_allclose(normals, -contour.axes, atol=1e-6)
+    # Amid the hole, where there is no material, it is still the tube's outside.
+    amid = contour.points[:-1].mean(axis=0)
+    assert np.hypot(*amid[:2]) < 0.03 - 1e-4
+    on, normals = surface.project(amid[None])
+    assert np.hypot(*on[0, :2]) == pytest.approx(0.03, abs=1e-9)
+    np.testing.assert_allclose(normals[0, :2], on[0, :2] / 0.03, atol=1e-9)
+
+
+def test_where_a_surface_ends_the_healed_one_goes_on_straight(tmp_path: Path) -> None:
+    # A spline patch z = x^2 / 200 over 100 x 60 mm knows nothing beyond its own edges.
+    grid = Array2_gp_Pnt(1, 12, 1, 8)
+    for i, x in enumerate(np.linspace(0, 100, 12), 1):
+        for j, y in enumerate(np.linspace(0, 60, 8), 1):
+            grid.SetValue(i, j, gp_Pnt(x, y, x * x / 200))
+    face = BRepBuilderAPI_MakeFace(GeomAPI_PointsToBSplineSurface(grid).Surface(), 1e-6).Face()
+    part = read(write_step(tmp_path / "patch.step", face))
+    surface = part.surface(part.loops[0].name)
+    asked = np.array([[0.105, 0.03, 0.055], [0.05, 0.03, 0.0125]])
+    on, normals = surface.project(asked)
+    # At x = 100 mm the patch rises one to one: beyond it goes on at that slope.
+    assert on[0, 2] - 0.05 == pytest.approx(on[0, 0] - 0.1, abs=1e-6)
+    assert abs(normals[0] @ [-1, 0, 1]) == pytest.approx(np.sqrt(2), abs=1e-6)
+    np.testing.assert_allclose(on[1], asked[1], atol=1e-6)  # what splines leave of a parabola
+
+
+def test_a_drawing_of_points_is_healed_by_planes(tmp_path: Path) -> None:
+    file = tmp_path / "ring.csv"
+    t = np.linspace(0, 2 * np.pi, 60, endpoint=False)
+    rows = [f"{30 * np.cos(a)},{30 * np.sin(a)},5,0,0,-1" for a in t]
+    file.write_text("\n".join(["x,y,z,nx,ny,nz", *rows, rows[0]]) + "\n")
+    part = read(file, unit="mm")
+    on, _ = part.surface(part.loops[0].name).project(np.array([[0.01, 0.0, 0.02]]))
+    np.testing.assert_allclose(on, [[0.01, 0.0, 0.005]], atol=1e-12)

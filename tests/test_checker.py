@@ -7,7 +7,7 @@ import naive
 from kerfpath.cell import Checker, Mesh, box, box_between, cell_of
 from kerfpath.errors import InputError
 from kerfpath.planner import layered_graph
-from kerfpath.search import clear_path, shortest_path
+from kerfpath.search import Known, clear_path, shortest_path
 
 
 @pytest.fixture(scope="module")
@@ -63,6 +63,10 @@ def test_certified_motions_are_those_of_checking_each(dome, graph):
     np.testing.assert_array_equal(passable, dome.clear_motion(graph.q[p], graph.q[j]))
     assert 0.02 < passable.mean() < 0.98
     assert checker.motions_measured < checker.motions_asked
+    seen = checker.blocked(p, j)
+    assert not (seen & passable).any()
+    ends = dome.clear(graph.q[p]) & dome.clear(graph.q[j])
+    assert (seen & ends).any()
 
 
 @pytest.mark.parametrize(("radius", "count"), [(0.27, 6), (0.255, 12)])
@@ -100,13 +104,14 @@ def test_the_lazy_optimum_in_a_cell_is_that_of_checking_every_vertex_and_edge(
     cost = np.where(clear, 0.0, np.inf)
     want = naive.second_order(graph.q, graph.start, "free", passable, vertex_cost=cost, **o)
     checker = Checker(cell, graph.q)
-    found = clear_path(graph.q, graph.start, price=checker.price, passable=checker.passable, **o)
-    assert found.path.cost == pytest.approx(want[0], rel=1e-12)
+    known = Known(graph.q, graph.start, price=checker.price, passable=checker.passable)
+    found = clear_path(shortest_path, known, **o)
+    assert found.cost == pytest.approx(want[0], rel=1e-12)
     blind = shortest_path(graph.q, graph.start, **o)
-    assert blind.cost < found.path.cost
-    assert found.vertices_closed
-    assert found.edges_closed == (count == 6)
-    assert found.edges_checked < sum(m.size for m in passable) / 50
+    assert blind.cost < found.cost
+    assert known.vertices_closed
+    assert known.edges_closed == (count == 6)
+    assert known.edges_checked < sum(m.size for m in passable) / 50
 
 
 def test_near_misses_can_cost_instead_of_being_forbidden(dome, graph):

@@ -7,7 +7,7 @@ import pytest
 
 import naive
 from kerfpath import InputError, NoFeasiblePath, shortest_path
-from kerfpath.search import clear_path
+from kerfpath.search import Known, clear_path, interrupted_path, least_interval, slowed_path
 
 
 class Checks:
@@ -25,6 +25,30 @@ class Checks:
         ]
         self.vertices_asked = np.zeros(N, int)
         self.edges_asked = {}
+
+    def known(self, q, around=None):
+        checks = {"price": self.vertices, "passable": self.passable, "blocked": self.blocked}
+        return Known(q, self.start, around=around, **checks)
+
+    def blocked(self, p, j):
+        """Two in three of what is closed."""
+        k = np.searchsorted(self.start, p, side="right") - 1
+        closed = [
+            not self.open[i][a - self.start[i], b - self.start[i + 1]]
+            for i, a, b in zip(k, p, j, strict=True)
+        ]
+        return np.array(closed, bool) & ((p + j) % 3 > 0)
+
+    @property
+    def shut(self):
+        edges = [np.argwhere(~m) + self.start[k : k + 2] for k, m in enumerate(self.open)]
+        return np.concatenate([np.empty((0, 2), int), *edges])
+
+    def require_open(self, index, first=0):
+        start, rest = self.start[first:], self.open[first:]
+        assert np.isfinite(self.price[start[: len(index)] + index]).all()
+        edges = itertools.pairwise(index)
+        assert all(m[a, b] for m, (a, b) in zip(rest, edges, strict=False))
 
     def vertices(self, v):
         self.vertices_asked[v] += 1
@@ -55,39 +79,40 @@ def instance(rng, closure, **sizes):
     return q, start, o
 
 
+def beside(rng, q, start):
+    """Neighbours in the order of the rows, in half of the cases none."""
+    if rng.random() < 0.5:
+        return None
+    around = np.c_[np.arange(len(q)) - 1, np.append(np.arange(1, len(q)), -1)]
+    inner = np.isin(np.arange(len(q)), start)
+    around[inner, 0] = -1
+    around[np.append(inner[1:], True), 1] = -1
+    return around
+
+
 def agree(rng, closure, share, cost=0.0, **sizes):
-    """Compare one random instance with checking everything; returns what was found, or None."""
+    """Compare one random instance with checking everything; returns what is known, or None."""
     q, start, o = instance(rng, closure, **sizes)
     checks = Checks(rng, q, start, closure, share * rng.random(), share * rng.random(), cost)
     all_of_it = o | {"vertex_cost": o["vertex_cost"] + checks.price}
     want = naive.second_order(q, start, closure, checks.open, **all_of_it)
-    around = None
-    if rng.random() < 0.5:
-        around = np.c_[np.arange(len(q)) - 1, np.append(np.arange(1, len(q)), -1)]
-        inner = np.isin(np.arange(len(q)), start)
-        around[inner, 0] = -1
-        around[np.append(inner[1:], True), 1] = -1
-    lazy = {"price": checks.vertices, "passable": checks.passable, "around": around}
+    known = checks.known(q, beside(rng, q, start))
+    o["closure"] = closure
     if want is None or want[0] == np.inf:
         with pytest.raises(NoFeasiblePath) as caught:
-            clear_path(q, start, closure=closure, **lazy, **o)
+            clear_path(shortest_path, known, **o)
         assert caught.value.proved
-        found = None
     else:
-        found = clear_path(q, start, closure=closure, **lazy, **o)
-        index = found.path.index
-        assert found.path.optimal
-        assert found.path.cost == pytest.approx(want[0], rel=1e-10, abs=1e-12)
-        assert np.isfinite(checks.price[start[:-1] + index]).all()
-        assert all(
-            m[a, b] for m, (a, b) in zip(checks.open, itertools.pairwise(index), strict=True)
-        )
-        assert closure == "free" or index[0] == index[-1]
-        assert found.vertices_checked == checks.vertices_asked.sum()
-        assert found.edges_checked == len(checks.edges_asked)
+        found = clear_path(shortest_path, known, **o)
+        assert found.optimal
+        assert found.cost == pytest.approx(want[0], rel=1e-10, abs=1e-12)
+        checks.require_open(found.index)
+        assert closure == "free" or found.index[0] == found.index[-1]
+    assert known.vertices_checked == checks.vertices_asked.sum()
+    assert len(checks.edges_asked) <= known.edges_checked
     assert checks.vertices_asked.max() <= 1
     assert max(checks.edges_asked.values(), default=0) <= 1
-    return found
+    return None if want is None else known
 
 
 @pytest.mark.parametrize("share", [0.2, 0.5, 0.9])
@@ -103,7 +128,7 @@ def test_the_lazy_optimum_is_that_of_checking_everything(share):
 @pytest.mark.parametrize("share", [0.2, 0.5])
 def test_the_same_holds_for_closed_paths(share):
     rng = np.random.default_rng(32)
-    found = [agree(rng, "periodic", share, layers=(3, 7), size=(1, 6)) for _ in range(300)]
+    found = [agree(rng, "periodic", share, layers=(2, 7), size=(1, 6)) for _ in range(300)]
     made = [f for f in found if f is not None]
     assert len(made) > 60
     assert sum(f.edges_closed > 1 for f in made) > 10
@@ -115,14 +140,122 @@ def test_a_price_per_vertex_is_added_and_paid_only_where_it_is_worth_it():
     assert sum(f is not None for f in found) > 150
 
 
+def all_of(checks, o):
+    """The closures as the searches take them, and what is open in the answer."""
+    return {"shut": checks.shut, "vertex_cost": o.get("vertex_cost", 0.0) + checks.price}
+
+
+SLOWED = ("dt", "velocity", "acceleration", "endless", "vertex_cost", "weights", "metric")
+LEAST = ("velocity", "acceleration", "endless", "eta_v", "eta_a")
+
+
+@pytest.mark.parametrize("search", [interrupted_path, slowed_path, least_interval])
+def test_every_search_finds_its_lazy_optimum(search):
+    """The searches themselves are held against oracles with closures in `test_shut`."""
+    rng, found, tried = np.random.default_rng(35), 0, 0
+    for _ in range(250):
+        q, start, o = instance(rng, "free", layers=(2, 9), size=(1, 8))
+        checks = Checks(rng, q, start, "free", 0.6 * rng.random(), 0.6 * rng.random())
+        if search is interrupted_path:
+            o["acceleration"] = o["acceleration"] * 0.1
+            o = {k: v for k, v in o.items() if k not in ("posture", "method")}
+        else:
+            o = {k: o[k] for k in (SLOWED if search is slowed_path else LEAST)}
+        known = checks.known(q, beside(rng, q, start))
+        try:
+            want = search(q, start, **o | all_of(checks, o))
+        except NoFeasiblePath:
+            with pytest.raises(NoFeasiblePath, match=r"collision|velocity") as caught:
+                clear_path(search, known, **o)
+            assert caught.value.proved
+            continue
+        got = clear_path(search, known, **o)
+        if search is interrupted_path:
+            assert got.interruptions == want.interruptions
+            for piece in got.pieces:
+                checks.require_open(piece.index, piece.first)
+        else:
+            checks.require_open(got.index)
+        cost = "dt" if search is least_interval else "cost"
+        assert getattr(got, cost) == pytest.approx(getattr(want, cost), rel=1e-10, abs=1e-12)
+        found += 1
+        tried += known.searches > 2
+    assert found > 100
+    assert tried > 50
+
+
+def test_within_rotation_limits_too():
+    rng, found, other = np.random.default_rng(36), 0, 0
+    for i in range(120):
+        closure = ("free", "periodic")[i % 2]
+        q, start, o = instance(rng, closure, layers=(3, 6), size=(2, 6))
+        limit = np.where(o["endless"], rng.uniform(0.1, 1.5, q.shape[1]), np.inf)
+        checks = Checks(rng, q, start, closure, 0.4 * rng.random(), 0.4 * rng.random())
+        known = checks.known(q, beside(rng, q, start))
+        o |= {"closure": closure, "rotation": limit}
+        try:
+            want = shortest_path(q, start, **o | all_of(checks, o))
+        except NoFeasiblePath:
+            with pytest.raises(NoFeasiblePath):
+                clear_path(shortest_path, known, **o)
+            continue
+        got = clear_path(shortest_path, known, **o)
+        assert got.cost == pytest.approx(want.cost, rel=1e-10, abs=1e-12)
+        checks.require_open(got.index)
+        found += 1
+        other += known.edges_closed > 0
+    assert found > 25
+    assert other > 10
+
+
+def test_what_one_search_learnt_serves_the_next():
+    rng = np.random.default_rng(37)
+    q, start, o = instance(rng, "free", layers=(8, 9), size=(8, 9))
+    checks = Checks(rng, q, start, "free", 0.2, 0.2)
+    known = checks.known(q)
+    clear_path(shortest_path, known, **o)
+    searches = known.searches
+    assert searches > 1
+    clear_path(shortest_path, known, **o)
+    assert known.searches == searches + 1
+    assert checks.vertices_asked.max() == 1
+    assert max(checks.edges_asked.values()) == 1
+
+
+def test_rings_around_closed_edges_save_searches():
+    """A band of 40 x 30 vertices; between two layers only one corner of the edges is open."""
+    x = np.linspace(-1, 1, 30)
+    q, start = np.tile(x[:, None], (40, 1)), np.arange(0, 1201, 30)
+    around = np.c_[np.arange(-1, 1199), np.append(np.arange(1, 1200), -1)]
+    around[::30, 0] = around[29::30, 1] = -1
+    o = {"dt": 1.0, "velocity": [0.3], "acceleration": [1.0], "metric": "chebychev"}
+
+    def passable(p, j):
+        return (p // 30 != 20) | ((p % 30 > 26) & (j % 30 > 26))
+
+    taken, costs = [], []
+    for neighbours in (None, around):
+        known = Known(
+            q, start, price=lambda v: np.zeros(len(v)), passable=passable,
+            blocked=lambda p, j: ~passable(p, j), around=neighbours,
+        )  # fmt: skip
+        costs.append(clear_path(shortest_path, known, **o).cost)
+        taken.append(known.searches)
+    assert costs[0] == costs[1]
+    assert taken[0] > 25
+    assert taken[1] < 10
+
+
 def test_nothing_closed_costs_one_search_and_one_check_of_each_vertex_and_edge_of_the_path():
     rng = np.random.default_rng(34)
     q, start = rng.uniform(-1, 1, (300, 3)), np.arange(0, 301, 10)
     o = {"dt": 1.0, "velocity": np.full(3, 3.0), "acceleration": np.full(3, 9.0)}
-    free = {"price": lambda v: np.zeros(len(v)), "passable": lambda p, j: np.ones(len(p), bool)}
-    found = clear_path(q, start, **free, **o)
-    assert (found.searches, found.vertices_checked, found.edges_checked) == (1, 30, 29)
-    np.testing.assert_array_equal(found.path.index, shortest_path(q, start, **o).index)
+    known = Known(
+        q, start, price=lambda v: np.zeros(len(v)), passable=lambda p, j: np.ones(len(p), bool)
+    )
+    found = clear_path(shortest_path, known, **o)
+    assert (known.searches, known.vertices_checked, known.edges_checked) == (1, 30, 29)
+    np.testing.assert_array_equal(found.index, shortest_path(q, start, **o).index)
 
 
 def test_most_of_a_graph_is_never_looked_at():
@@ -135,14 +268,15 @@ def test_most_of_a_graph_is_never_looked_at():
     closed = np.isin(layer, range(40, 60)) & (q[:, 0] < 0.5)
     around = np.c_[np.arange(-1, 4999), np.append(np.arange(1, 5000), -1)]
     around[::50, 0] = around[49::50, 1] = -1
-    found = clear_path(
+    known = Known(
         q, start, price=lambda v: np.where(closed[v], np.inf, 0.0),
-        passable=lambda p, j: np.ones(len(p), bool), around=around, **o,
+        passable=lambda p, j: np.ones(len(p), bool), around=around,
     )  # fmt: skip
-    every = shortest_path(q[~closed], np.searchsorted(np.flatnonzero(~closed), start), **o)
-    assert found.path.cost == pytest.approx(every.cost)
-    assert found.vertices_checked < 5000 / 3
-    assert found.searches < 20
+    found = clear_path(shortest_path, known, **o)
+    every = shortest_path(q, start, vertex_cost=np.where(closed, np.inf, 0.0), **o)
+    assert found.cost == pytest.approx(every.cost)
+    assert known.vertices_checked < 5000 / 3
+    assert known.searches < 20
 
 
 def test_where_all_is_closed_the_answer_names_collision():
@@ -152,20 +286,23 @@ def test_where_all_is_closed_the_answer_names_collision():
     def free(v):
         return np.zeros(len(v))
 
+    wall = Known(
+        q, start, price=lambda v: np.where((v == 2) | (v == 3), np.inf, 0.0),
+        passable=lambda p, j: np.ones(len(p), bool),
+    )  # fmt: skip
     with pytest.raises(NoFeasiblePath, match="clear; forbidden by collision at the node: 2") as no:
-        clear_path(
-            q, start, price=lambda v: np.where((v == 2) | (v == 3), np.inf, 0.0),
-            passable=lambda p, j: np.ones(len(p), bool), **o,
-        )  # fmt: skip
+        clear_path(shortest_path, wall, **o)
     assert no.value.proved
     assert no.value.node == 0
     assert no.value.counts == {"collision at the node": 2}
+    gate = Known(q, start, price=free, passable=lambda p, j: p > 2)
     with pytest.raises(NoFeasiblePath, match="clear; forbidden by collision on the way: 4") as no:
-        clear_path(q, start, price=free, passable=lambda p, j: p > 2, **o)
+        clear_path(shortest_path, gate, **o)
     assert no.value.node == 0
     q[4:] = 5
+    far = Known(q, start, price=free, passable=lambda p, j: p > 0)
     with pytest.raises(NoFeasiblePath, match=r"by velocity, joint 1: 4$"):
-        clear_path(q, start, price=free, passable=lambda p, j: p > 0, **o)
+        clear_path(shortest_path, far, **o)
 
 
 @pytest.mark.parametrize(
@@ -183,16 +320,12 @@ def test_where_all_is_closed_the_answer_names_collision():
 def test_bad_input_is_refused(change, message):
     options = {
         "price": lambda v: np.zeros(len(v)), "passable": lambda p, j: np.ones(len(p), bool),
-        "dt": 1.0, "velocity": [1.0], "acceleration": [1.0],
-    }  # fmt: skip
+        "dt": 1.0, "velocity": [1.0], "acceleration": [1.0], "around": None,
+    } | change  # fmt: skip
+    checks = {name: options.pop(name) for name in ("price", "passable", "around")}
+
+    def run():
+        clear_path(shortest_path, Known(np.zeros((4, 1)), [0, 2, 4], **checks), **options)
+
     with pytest.raises(InputError, match=message):
-        clear_path(np.zeros((4, 1)), [0, 2, 4], **options | change)
-
-
-def test_a_closed_path_of_three_nodes_is_refused_where_an_edge_is_closed():
-    q = np.array([[0.0], [0.1], [0.0]])
-    o = {"dt": 1.0, "velocity": [1.0], "acceleration": [1.0], "closure": "periodic"}
-    with pytest.raises(InputError, match="needs 4 layers"):
-        clear_path(
-            q, [0, 1, 2, 3], price=lambda v: np.zeros(len(v)), passable=lambda p, j: p > 0, **o
-        )
+        run()

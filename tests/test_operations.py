@@ -400,6 +400,13 @@ def test_a_lead_out_may_meet_the_lead_in_but_not_the_part():
     cut = lead_in(square(), 0.004, shape="arc", angle=np.pi)
     both = lead_out(cut, 0.004, shape="arc", angle=np.pi)
     np.testing.assert_allclose(both.points[0], both.points[-1], atol=1e-9)
+    other = lead_out(square(), 0.004, shape="arc", angle=np.pi)
+    other = lead_in(other, 0.004, shape="arc", angle=np.pi)
+    np.testing.assert_allclose(other.points, both.points, atol=1e-12)
+    assert other.kinds == both.kinds
+    # Nor are loops: a lead may lie inside one.
+    begun = start_at(loop_corners(square(), 0.004), 0.0499)
+    assert lead_in(begun, 0.003).kinds[0] == "pierce"
 
 
 def test_a_loop_that_would_cut_the_part_is_refused():

@@ -5,10 +5,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from kerfpath import InputError, NoFeasiblePath, audit, plan
+from kerfpath import InputError, NoFeasiblePath, audit, fastest_speed, plan
 from kerfpath.auditor import checks
 from kerfpath.cell import Mesh, box_between, cell_of
-from kerfpath.planner import layered_graph
+from kerfpath.planner import layered_graph, plan_in_pieces
 
 STEP = np.radians(5)
 
@@ -68,7 +68,7 @@ def test_where_something_is_the_plan_goes_around_it(task, blind, arm, tool, plac
     assert audit(made, cell=there) == []
     hits = [issue for issue in audit(blind, cell=there) if issue.code == "collision"]
     assert len(hits) == 1
-    assert "shortfall of the near-miss distance (nearest: post " in hits[0].message
+    assert "shortfall of near-miss distances (nearest: post " in hits[0].message
     free = there.clear(task[1]["graph"].q)
     assert free.mean() < 0.9
 
@@ -86,6 +86,59 @@ def test_a_refined_plan_is_clear_or_stays_on_the_grid(task, arm, tool, placement
     made = plan(*task[0], **task[1], cell=there, refine=True)
     assert there.clear(made.q).all()
     assert there.clear_motion(made.q[:-1], made.q[1:]).all()
+
+
+def is_clear(there, q):
+    return there.clear(q).all() and there.clear_motion(q[:-1], q[1:]).all()
+
+
+def test_closed_and_turning_little_the_plan_is_clear_too(task, blind, arm, tool, placement, posts):
+    there = cell(arm, tool, placement, posts)
+    closed = plan(*task[0], **task[1], cell=there, closure="periodic")
+    assert is_clear(there, closed.q)
+    assert closed.proof.optimal
+    assert closed.cost >= plan(*task[0], **task[1], closure="periodic").cost
+    rotation = [np.inf, np.inf, np.inf, 1.0, np.inf, 6.5]
+    little = plan(*task[0], **task[1], cell=there, rotation=rotation)
+    assert is_clear(there, little.q)
+    assert little.cost >= plan(*task[0], **task[1], cell=there).cost
+
+
+def test_where_the_speed_must_dip_the_plan_is_clear_too(task, arm, tool, placement, posts):
+    there = cell(arm, tool, placement, posts)
+    fast = task[1] | {"speed": 1.0}
+    with pytest.raises(NoFeasiblePath):
+        plan(*task[0], **fast)
+    for refine in (False, True):
+        made = plan(*task[0], **fast, cell=there, feed="dip", refine=refine)
+        assert is_clear(there, made.q)
+        assert audit(made, cell=there) == []
+
+
+def test_pieces_and_the_fastest_speed_are_clear_too(task, arm, tool, placement, posts):
+    there = cell(arm, tool, placement, posts)
+    pieces = plan_in_pieces(*task[0], **task[1] | {"speed": 0.3}, cell=there, refine=True)
+    assert all(is_clear(there, piece.q) for piece in pieces)
+    options = {name: task[1][name] for name in ("tool", "placement", "gamma_step", "graph")}
+    free, around = (fastest_speed(*task[0], **options, cell=c) for c in (None, there))
+    assert around.speed < free.speed
+    made = plan(*task[0], **task[1] | {"speed": around.speed * (1 - 1e-9)}, cell=there)
+    assert is_clear(there, made.q)
+    with pytest.raises(NoFeasiblePath):
+        plan(*task[0], **task[1] | {"speed": around.speed * (1 + 1e-6)}, cell=there)
+
+
+def test_behind_a_cage_no_speed_and_no_interruption_helps(task, arm, tool, placement):
+    lid = {"lid": box_between([0.9, -0.3, 0.5], [1.5, 0.3, 0.52])}
+    caged = cell(arm, tool, placement, lid)
+    options = {name: task[1][name] for name in ("tool", "placement", "gamma_step", "graph")}
+    with pytest.raises(NoFeasiblePath, match="contour 'circle': no admissible way to node") as no:
+        plan(*task[0], **task[1], cell=caged, feed="dip")
+    assert no.value.counts["collision at the node"] > 0
+    with pytest.raises(NoFeasiblePath, match="no number of interruptions helps: no admissible way"):
+        plan_in_pieces(*task[0], **task[1], cell=caged)
+    with pytest.raises(NoFeasiblePath, match="collision at the node"):
+        fastest_speed(*task[0], **options, cell=caged)
 
 
 def test_a_cage_is_no_way_and_says_so(task, arm, tool, placement):

@@ -257,7 +257,7 @@ def test_a_greedy_refusal_is_not_called_a_proof():
         ({"endless": [2]}, "endless: expected true or false"),
         ({"posture": [0.5, 1]}, "posture: expected whole numbers"),
         ({"posture": [0]}, "posture: expected shape"),
-        ({"vertex_cost": [np.inf, 0]}, "vertex_cost: every number must be finite"),
+        ({"vertex_cost": [np.nan, 0]}, "vertex_cost: every number must be a number"),
         ({"weights": [-1.0]}, "weights: must not be negative"),
         ({"metric": "taxi"}, "metric: expected one of euclid, manhattan, chebychev, got 'taxi'"),
         ({"objective": "mean"}, "objective: expected one of sum, max"),

@@ -143,6 +143,7 @@ def test_a_part_is_cut_in_less_time_than_in_the_order_given(part, arm, tool, pla
     given = plan_part([s[0] for s in starts[::2] + starts[1::2]], arm, given_order=True, **asked)
     free = plan_part(starts, arm, pierce_time=0.3, **asked)
     assert free.order.optimal
+    assert [free.plans[k].name for k in range(4)] == [part[i].name for i, _ in free.chosen]
     assert free.air_time < given.air_time
     assert free.piercing_time == pytest.approx(1.2)
     assert free.cycle_time == pytest.approx(free.cutting_time + free.air_time + free.piercing_time)

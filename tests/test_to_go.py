@@ -13,27 +13,36 @@ import naive
 from kerfpath import NoFeasiblePath, shortest_path
 from kerfpath.kernels import exact, to_go
 from kerfpath.kernels.limits import velocity_time
-from kerfpath.kernels.search import Objective, distance, fill_increment, late
+from kerfpath.kernels.search import (
+    Objective,
+    distance,
+    fill_increment,
+    is_shut,
+    late,
+    shut_edges,
+)
 from kerfpath.search._exact import NO_SEAM, best_allowed
-from kerfpath.search._layers import narrowest_key, sorted_layers
+from kerfpath.search._layers import sorted_layers
+from kerfpath.search._problem import Problem
 
 
 def graph(rng, **sizes):
+    """A sorted graph, in every other one with some edges shut."""
     q, start, o = naive.random_instance(rng, **sizes)
     bound = o["eta_v"] * o["velocity"] * o["dt"]
-    key, width, circular = narrowest_key(q, start, bound, o["endless"])
-    layers, order = sorted_layers(q, start, key, width, circular, o["endless"])
+    _, shut, _ = naive.random_closures(rng, start, rng.choice([0.0, 0.6]))
     aim = Objective(
         weight=o["weights"],
         metric=0,
         minimax=False,
-        vertex_cost=o["vertex_cost"][order],
+        vertex_cost=o["vertex_cost"],
         velocity=bound,
         acceleration=bound,
         cap=np.inf,
         timed=False,
     )
-    return layers, aim
+    problem = Problem(q=q, start=start, endless=o["endless"], aim=aim, shut=shut)
+    return sorted_layers(problem)[:2]
 
 
 def scalar(layers, aim, allowed):
@@ -45,6 +54,7 @@ def scalar(layers, aim, allowed):
             best = np.inf
             for j in range(start[k + 1], start[k + 2]):
                 rho, tail = distance(layers, aim, p, j), aim.vertex_cost[j]
+                rho = np.inf if is_shut(layers.shut, *shut_edges(layers, p), j) else rho
                 if aim.penalty > 0 and rho < np.inf:
                     dq = np.empty(len(aim.velocity))
                     fill_increment(layers, p, j, dq)

@@ -184,8 +184,9 @@ class Comfort:
         limits = robot.joint_limits()
         lower, upper, room = limits.lower.copy(), limits.upper.copy(), 0.0
         if self.limits is not None:
-            room = self.limits.margin
-            lower, upper = lower + room, upper - room
+            room, own = self.limits.margin, slice(robot.family.joints)
+            lower[own] += room
+            upper[own] -= room
         for name, (joint, _) in _BENDS.get(robot.kinematics, {}).items():
             band = self.bands.get(name, Band())
             bend = _bend(name, robot, q)
@@ -226,7 +227,7 @@ def measures(robot: Robot, q: ArrayLike, *, tool: ArrayLike | None = None) -> di
 
 
 def measure(name: str, robot: Robot, q: ArrayLike, *, tool: ArrayLike | None = None) -> Array:
-    """Return one measure (B,) of joint vectors q (B, n) rad.
+    """Return one measure (B,) of joint vectors q (B, n) rad, of the arm without an external axis.
 
     Parameters
     ----------
@@ -243,7 +244,8 @@ def measure(name: str, robot: Robot, q: ArrayLike, *, tool: ArrayLike | None = N
     InputError
         An unknown measure, or one that such an arm does not have; limits that are not known.
     """
-    q = floats(q, "q", (None, robot.joints), copy=False)
+    q = floats(q, "q", (None, robot.joints), copy=False)[:, : robot.family.joints]
+    robot = robot.alone()
     if name not in MEASURES:
         raise InputError(f"comfort: expected one of {', '.join(MEASURES)}, got {name!r}")
     if name == "limits":
@@ -261,11 +263,14 @@ def measure(name: str, robot: Robot, q: ArrayLike, *, tool: ArrayLike | None = N
 def jacobian(robot: Robot, q: ArrayLike, *, tool: ArrayLike | None = None) -> Array:
     """Return the geometric Jacobians (B, 6, n) of the tool tip at joint vectors q (B, n) rad.
 
-    Linear (m/rad) over angular velocity, in the robot base. Every entry of a pose is a sinusoid of
+    Linear (m/rad) over angular velocity, in the robot base, of a robot without an external axis.
+    Every entry of a pose is a sinusoid of
     each joint's angle, so that half the difference between a quarter turn ahead and one behind is
     its derivative, exactly and for every family.
     """
     q = floats(q, "q", (None, robot.joints), copy=False)
+    if robot.external is not None:
+        raise InputError(f"jacobian: with a {robot.external.kind} ask for that of robot.held(x)")
     T_flange_tip = np.eye(4) if tool is None else as_pose(tool, "tool")
     turned = robot.forward(q)[:, :3, :3] @ T_flange_tip[:3, :3]
     J = np.empty((len(q), 6, robot.joints))

@@ -35,7 +35,9 @@ class LayeredGraph:
     gamma : (m,) rad
         The samples of gamma.
     tilt : (V, 2) rad
-        Lead and lean of each variant of a layer; without a tolerance one, the nominal axis.
+        Lead and lean of each variant of a layer; without a tolerance all nominal.
+    external : (V,) m or rad
+        Value of the robot's external axis in each variant; empty where it has none.
     sample, posture, variant : (N,) int
         Index into `gamma`, posture mu, and variant of each vertex.
     turn : (N, n) int
@@ -50,6 +52,7 @@ class LayeredGraph:
     start: Ints
     gamma: Array
     tilt: Array
+    external: Array
     sample: NDArray[np.int32]
     variant: NDArray[np.int32]
     posture: NDArray[np.int8]
@@ -156,16 +159,16 @@ def build(
 
     Parameters
     ----------
-    frames : (K, 4, 4) or (K, V, 4, 4)
-        Task frames H_k in the robot base, m; or those of each variant.
+    frames : (K, 4, 4) or (K, T, 4, 4)
+        Task frames H_k in the robot base, m; or those of each tilt.
     robot : Robot
-        Kinematics and joint limits.
+        Kinematics and joint limits. Every sample of its external axis is a variant of each tilt.
     T_flange_tip : (4, 4)
         Tool: tip frame in the flange.
     gamma : (m,) rad
         Samples of gamma, see `gamma_grid`; of a robot that leaves no rotation free, one, at zero.
-    tilt : (V, 2) rad, optional
-        Lead and lean of the variants, see `kerfpath.tilt`; default: one variant, not tilted.
+    tilt : (T, 2) rad, optional
+        Lead and lean of the tilts, see `kerfpath.tilt`; default: one, the nominal axis.
     postures : sequence of int, optional
         The postures that may be used; default all. See `kerfpath.robots.postures_named`.
     progress : callable, optional
@@ -177,18 +180,22 @@ def build(
         The robot's joint limits are not known, or a posture that does not exist.
     """
     wanted = _wanted(postures, robot.postures)
-    limits = robot.joint_limits()
+    arm = robot.alone()
+    limits = arm.joint_limits()
     if not robot.family.free_rotation:
         gamma = freeze(np.zeros(1))
     tilt = freeze(np.zeros((1, 2))) if tilt is None else tilt
-    frames = np.ascontiguousarray(frames.reshape(len(frames), len(tilt), 4, 4))
+    frames = frames.reshape(len(frames), len(tilt), 4, 4)
+    external, part_in_base = _stands(robot)
+    tilt = freeze(np.repeat(tilt, len(part_in_base), axis=0))
     samples = len(tilt) * len(gamma)
     reason = np.empty((len(frames), samples, robot.postures), np.uint8)
 
     def layers_of(first: int, last: int) -> _Piece:
         """Solve nodes first..last-1 and keep what the limits admit."""
-        H = frames[first:last].reshape(-1, 4, 4)
-        q, reach = robot.inverse_nodes(H, gamma, T_flange_tip)
+        H = frames[first:last, :, None]
+        H = np.ascontiguousarray(part_in_base @ H if robot.external else H).reshape(-1, 4, 4)
+        q, reach = arm.inverse_nodes(H, gamma, T_flange_tip)
         q = q.reshape(last - first, samples, *q.shape[2:])
         reach = reach.reshape(q.shape[:3])
         count = np.empty(last - first, np.int64)
@@ -196,14 +203,21 @@ def build(
         n = int(count.sum())
         piece = _Piece(
             count=count,
-            q=np.empty((n, robot.joints)),
+            q=np.empty((n, arm.joints)),
             sample=np.empty(n, np.int32),
             posture=np.empty(n, np.int8),
-            turn=np.empty((n, robot.joints), np.int8),
+            turn=np.empty((n, arm.joints), np.int8),
         )
         turns.fill_admissible(
             q, reason[first:last], limits, piece.q, piece.sample, piece.posture, piece.turn
         )
+        if robot.external:
+            at = np.tile(external, len(tilt) // len(external))[piece.sample // len(gamma)]
+            piece = replace(
+                piece,
+                q=np.column_stack([piece.q, at]),
+                turn=np.column_stack([piece.turn, np.zeros(n, np.int8)]),
+            )
         if progress is not None:
             progress(last - first)
         return piece
@@ -222,13 +236,26 @@ def build(
         start=freeze(np.concatenate([[0], np.cumsum(count)])),
         gamma=gamma,
         tilt=tilt,
+        external=freeze(np.tile(external, len(tilt) // max(1, len(external)))),
         sample=freeze(origin % len(gamma)),
         variant=freeze(origin // len(gamma)),
         posture=freeze(_end_to_end(posture)),
         turn=freeze(_end_to_end(turn)),
         reason=freeze(reason),
-        reasons=robot.reasons(),
+        reasons=arm.reasons(),
     )
+
+
+def _stands(robot: Robot) -> tuple[Array, Array]:
+    """Return the samples (E,) of the external axis, and the part against the base at each.
+
+    The poses are (E, 4, 4) m; a robot without such an axis has no sample and stands at one place.
+    """
+    if robot.external is None:
+        return np.zeros(0), np.eye(4)[None]
+    limits = robot.joint_limits()
+    samples = robot.external.samples(float(limits.lower[-1]), float(limits.upper[-1]))
+    return samples, np.asarray(np.linalg.inv(robot.external.poses(samples)), dtype=float)
 
 
 def _end_to_end(parts: list[NDArray[Any]]) -> NDArray[Any]:

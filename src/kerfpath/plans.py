@@ -33,7 +33,7 @@ class Settings:
     method, objective, metric : str
         As in `kerfpath.shortest_path`.
     weights : (n,) 1/rad
-        Weights of the joint-space distance.
+        Weights of the joint-space distance; of a rail 1/m.
     eta_v, eta_a : float
         Share of the velocity and acceleration limits that may be used.
     closure : {"free", "periodic"}
@@ -116,6 +116,8 @@ class Feed:
 class Criteria:
     """Smoothness of a plan, joint by joint, each (n,), and what it comes near to.
 
+    Of a rail m stands where others have rad.
+
     Parameters
     ----------
     displacement : rad
@@ -166,7 +168,7 @@ class Plan:
     T_flange_tip, T_base_part : (4, 4)
         Tool and placement of the part, m.
     q : (K, n) rad
-        Joints at the nodes.
+        Joints at the nodes; the last column is the external axis where there is one (a rail: m).
     gamma : (K,) rad
         Free rotation about the tool axis at the nodes.
     tilt : (K, 2) rad, optional

@@ -93,8 +93,10 @@ def air_move(
     NoFeasiblePath
         An end that is not clear (proved), or no way found in time (not proved).
     InputError
-        Limits that are not known, joints beyond them.
+        Limits that are not known, joints beyond them, an external axis.
     """
+    if robot.external is not None:
+        raise InputError(f"air move: it is not known yet how a {robot.external.kind} moves in it")
     n = robot.joints
     ends = np.array([floats(q0, "q0", (n,)), floats(q1, "q1", (n,))])
     velocity, acceleration = robot.speed_limits()

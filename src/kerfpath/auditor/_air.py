@@ -12,6 +12,7 @@ from kerfpath.auditor._chain import chain_of
 from kerfpath.auditor._collision import collision_at
 from kerfpath.auditor._table import Check, Unit
 from kerfpath.cell import Cell
+from kerfpath.errors import InputError
 from kerfpath.robots import Robot
 
 __all__ = ["air_checks"]
@@ -50,6 +51,8 @@ def air_checks(
     list of Check
         Their node is the corner that a motion starts from.
     """
+    if robot.external is not None:
+        raise InputError(f"air move: it is not known yet how a {robot.external.kind} moves in it")
     corners = floats(q, "q", (None, robot.joints))
     duration = np.diff(floats(time, "time", (len(corners),)))
     late = _needed(robot, np.abs(np.diff(corners, axis=0)), eta_v, eta_a) / duration
@@ -62,7 +65,7 @@ def air_checks(
     ]
     if cell is not None and len(cell.pairs):
         samples, leg = _sampled(corners)
-        rows.append(collision_at(cell, samples, leg, chain_of(robot)))
+        rows += collision_at(cell, samples, leg, chain_of(robot))
     return rows
 
 

@@ -25,7 +25,7 @@ AXIS_AT_NODES = 1e-5
 SHARE_SLACK = 1e-6
 """Relative slack on limits that the planner may use up to the last digit."""
 LIMIT_SLACK = 1e-8
-"""rad: slack on joint positions, for the same reason."""
+"""rad, or m on a rail: slack on joint positions, for the same reason."""
 LENGTH_AGREES = 1e-6
 """Relative difference of path lengths between a plan's contour and the reference it came from."""
 
@@ -93,6 +93,8 @@ def checks(
         raise InputError(f"parts: expected a whole number >= 1, got {parts!r}")
     path_tolerance = scalar(path_tolerance, "path_tolerance", unit="m", above=0.0)
     axis_tolerance = scalar(axis_tolerance, "axis_tolerance", unit="rad", above=0.0)
+    if cell is not None and plan.robot.external is not None:
+        raise InputError(f"cell: it does not know how a {plan.robot.external.kind} moves in it")
     chain = chain_of(plan.robot)
     motion = motion_of(plan, chain, interpolation, parts)
     path = plan.contour if reference is None else reference
@@ -107,7 +109,7 @@ def checks(
         *_positions(plan, motion),
         *_rates(plan, motion),
         *margins(plan, chain),
-        *([] if cell is None or not len(cell.pairs) else [collisions(cell, motion, chain)]),
+        *([] if cell is None else collisions(cell, motion, chain)),
     ]
 
 
@@ -186,8 +188,13 @@ def _between_nodes(
 
 def _positions(plan: Plan, motion: Motion) -> list[Check]:
     limits = plan.robot.joint_limits()
-    bound = ~plan.robot.endless
-    rows = []
+    bound, axis = ~plan.robot.endless, plan.robot.external
+    rows, own = [], slice(plan.robot.family.joints)
+    if axis is not None:
+        x, bound[-1] = motion.q[..., -1], False
+        over = np.maximum(limits.lower[-1] - x, x - limits.upper[-1]).max(axis=1)
+        title = f"excess over the limits of the {axis.kind}"
+        rows.append(_worst("external-limits", title, over, LIMIT_SLACK, axis.unit))
     if bound.any():
         excess = np.maximum(limits.lower - motion.q, motion.q - limits.upper)[..., bound]
         joint = np.flatnonzero(bound)[np.unravel_index(np.argmax(excess), excess.shape)[-1]] + 1
@@ -210,7 +217,7 @@ def _positions(plan: Plan, motion: Motion) -> list[Check]:
         over = (np.abs(turned) - plan.settings.rotation).max(axis=1)
         title = "excess over the limits of accumulated rotation"
         rows.append(_worst("rotation", title, over, LIMIT_SLACK, "rad"))
-    step = np.abs(joint_increments(plan)).max(axis=1)
+    step = np.abs(joint_increments(plan)[:, own]).max(axis=1)
     rows.append(_worst("joint-step", "joint step between nodes", step, np.pi * (1 - 1e-9), "rad"))
     return rows
 

@@ -11,7 +11,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from kerfpath._arrays import Array
-from kerfpath.robots import Robot
+from kerfpath.robots import ExternalAxis, Robot
 
 __all__ = ["JointChain", "chain_of"]
 
@@ -28,11 +28,14 @@ class JointChain:
         Unit axis of each joint in its own frame.
     tip : (4, 4)
         Tip in the frame of the last joint, m.
+    external : ExternalAxis, optional
+        What carries the first joint, or the part against it; its values are the last of q.
     """
 
     origins: Array
     axes: Array
     tip: Array
+    external: ExternalAxis | None = None
 
     def forward(self, q: Array) -> Array:
         """Return the tip poses (B, 4, 4) of joint vectors q (B, n) rad."""
@@ -43,7 +46,10 @@ class JointChain:
         return self._frames(q)[:-1]
 
     def jacobian(self, q: Array) -> tuple[Array, Array]:
-        """Return tip poses (B, 4, 4) and geometric Jacobians (B, 6, n): linear over angular."""
+        """Return tip poses (B, 4, 4) and geometric Jacobians (B, 6, n): linear over angular.
+
+        Of the arm's own joints, without an external axis.
+        """
         *joints, tip = self._frames(q)
         position = tip[:, :3, 3]
         J = np.empty((len(q), 6, len(self.axes)))
@@ -55,7 +61,14 @@ class JointChain:
 
     def _frames(self, q: Array) -> list[Array]:
         """Return the poses of every joint frame, turned, and of the tip; (B, 4, 4) each."""
-        T = np.broadcast_to(np.eye(4), (len(q), 4, 4))
+        T = np.tile(np.eye(4), (len(q), 1, 1))
+        if self.external is not None and self.external.kind == "rail":
+            T[:, :3, 3] = np.outer(q[:, -1], self.external.axis)
+        elif self.external is not None:
+            # The part turns one way, so that seen from it the base turns the other way.
+            back = Rotation.from_rotvec(np.outer(q[:, -1], -self.external.axis)).as_matrix()
+            T[:, :3, :3] = back
+            T[:, :3, 3] = self.external.point - back @ self.external.point
         frames = []
         for i, (origin, axis) in enumerate(zip(self.origins, self.axes, strict=True)):
             turn = np.zeros((len(q), 4, 4))
@@ -73,7 +86,9 @@ def chain_of(robot: Robot) -> JointChain:
     """
     if robot.chain is not None:
         given = robot.chain
-        return JointChain(origins=given.origins, axes=given.axes, tip=given.end)
+        return JointChain(
+            origins=given.origins, axes=given.axes, tip=given.end, external=robot.external
+        )
     origins, axes, end = _MODELS[robot.kinematics](robot.geometry)
     for i, axis in enumerate(axes):
         # q_model = sign q - offset: the frame at angle zero is turned back by the offset.
@@ -81,7 +96,10 @@ def chain_of(robot: Robot) -> JointChain:
         origins[i, :3, :3] = origins[i, :3, :3] @ back
     origins[0] = robot.T_base_foot @ origins[0]
     return JointChain(
-        origins=origins, axes=robot.sign[:, None] * axes, tip=end @ robot.T_end_flange
+        origins=origins,
+        axes=robot.sign[:, None] * axes,
+        tip=end @ robot.T_end_flange,
+        external=robot.external,
     )
 
 

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from kerfpath._arrays import Array, Ints
+from kerfpath._arrays import Array, Bools, Ints
 from kerfpath.auditor._chain import JointChain
 from kerfpath.auditor._motion import Motion
 from kerfpath.auditor._table import Check
@@ -18,31 +18,59 @@ __all__ = ["collision_at", "collisions"]
 
 TOUCHING = -1e-9
 """m: to touch is not to be clear."""
-REFINED = 1e-3
-"""m beyond the near-miss distance: distances above that are not worth finding exactly."""
+FIRST, FARTHER = 1e-3, 8.0
+"""m beyond the near-miss distance up to which distances are found exactly, and how many times
+farther is looked next where all are farther apart."""
+FARTHEST = 1.0
+"""m: from there on it need not be told."""
 
 
-def collisions(cell: Cell, motion: Motion, chain: JointChain) -> Check:
-    """Return the check of every sample of a motion: by how much any near-miss distance is missed.
+def collisions(cell: Cell, motion: Motion, chain: JointChain) -> list[Check]:
+    """Return the checks of every sample of a motion: by how much near-miss distances are missed.
 
-    The value is what the nearest pair falls short by, negative where all are farther apart.
+    One of the pairs that keep that of the cell, one of those with a distance of their own, as
+    nozzle and part. The value is what the nearest pair falls short by, negative where all are
+    farther apart.
     """
     nodes, samples, n = motion.q.shape
     return collision_at(cell, motion.q.reshape(-1, n), np.repeat(np.arange(nodes), samples), chain)
 
 
-def collision_at(cell: Cell, q: Array, node: Ints, chain: JointChain) -> Check:
-    """Return the same check of joint vectors q (S, n) rad, each of a node (S,)."""
+def collision_at(cell: Cell, q: Array, node: Ints, chain: JointChain) -> list[Check]:
+    """Return the same checks of joint vectors q (S, n) rad, each of a node (S,)."""
     frames = np.stack([np.broadcast_to(np.eye(4), (len(q), 4, 4)), *chain.joints(q)], axis=1)
-    enough = cell.required + REFINED
-    short = cell.required - cell.scene.distances(np.ascontiguousarray(frames), enough)
-    worst = _worst(short)
-    row, pair = worst // short.shape[1], worst % short.shape[1]
-    one, two = cell.pair_names[pair]
+    frames = np.ascontiguousarray(frames)
+    rows = [("collision", "", ~cell.own), ("collision-own", " of their own", cell.own)]
+    return [
+        _nearest(cell, frames, wanted, code, whose, node)
+        for code, whose, wanted in rows
+        if wanted.any()
+    ]
+
+
+def _nearest(cell: Cell, frames: Array, wanted: Bools, code: str, whose: str, node: Ints) -> Check:
+    beyond = FIRST
+    while True:
+        short = np.where(
+            wanted,
+            cell.required
+            - cell.scene.distances(
+                frames, cell.required + beyond, np.broadcast_to(wanted, (len(frames), len(wanted)))
+            ),
+            -np.inf,
+        )
+        worst = _worst(short)
+        row, pair = worst // short.shape[1], worst % short.shape[1]
+        if not short[row, pair] <= -beyond or beyond > FARTHEST:
+            break
+        beyond *= FARTHER
+    (one, two), value = cell.pair_names[pair], float(short[row, pair])
+    needed = float(cell.required[pair])
     return Check(
-        code="collision",
-        title=f"shortfall of the near-miss distance (nearest: {one} and {two})",
-        value=float(short[row, pair]),
+        code=code,
+        title=f"shortfall of near-miss distances{whose} (nearest: {one} and {two}, "
+        f"{(needed - value) * 1e3:.2f} mm apart, {needed * 1e3:g} mm asked)",
+        value=value,
         limit=TOUCHING,
         unit="m",
         node=int(node[row]),

@@ -79,7 +79,8 @@ def _shoulder(plan: Plan, chain: JointChain) -> Array:
 def _limits(plan: Plan, chain: JointChain) -> Array:
     robot, q = plan.robot, plan.q
     limits = robot.joint_limits()
-    room = np.minimum(q - limits.lower, limits.upper - q)[:, ~robot.endless]
+    bound = ~robot.endless & (np.arange(robot.joints) < robot.family.joints)
+    room = np.minimum(q - limits.lower, limits.upper - q)[:, bound]
     least = room.min(axis=1, initial=np.inf)
     for coupling in robot.couplings:
         value = q @ coupling.row

@@ -30,6 +30,7 @@ class Motion:
     Parameters
     ----------
     q : (K-1, m+1, n) rad
+        An external axis last; a rail in m.
     tip : (K-1, m+1, 3) m
         Tool tip in the robot base.
     axis : (K-1, m+1, 3)
@@ -55,7 +56,8 @@ def motion_of(plan: Plan, chain: JointChain, interpolation: Interpolation, parts
     """Return the motion between the nodes, `parts` equal parts in time each.
 
     "linear": the tip runs straight and the tool turns evenly about one axis from pose to pose, as
-    linear moves do; the joints follow by inverse kinematics. "joint": the joints run evenly.
+    linear moves do; the joints follow by inverse kinematics. "joint": the joints run evenly. An
+    external axis runs evenly in both, the straight line being one of the part.
     """
     K, dq = len(plan.q), joint_increments(plan)
     f = np.linspace(0.0, 1.0, parts + 1)
@@ -91,9 +93,10 @@ def _straight(poses: Array, f: Array) -> Array:
 def _follow(chain: JointChain, wanted: Array, q: Array) -> tuple[Array, Array]:
     """Solve the tool poses `wanted` (B, 4, 4) by Newton's method from the joints q (B, n).
 
-    Five joints are asked for tip and tool axis alone. Returns the joints and what they miss (B,).
+    Five joints are asked for tip and tool axis alone; an external axis stays as it is. Returns the
+    joints and what they miss (B,).
     """
-    q = q.copy()
+    q, n = q.copy(), len(chain.axes)
     residual = np.full(len(q), np.inf)
     open_ = np.arange(len(q))
     for _ in range(NEWTON_STEPS):
@@ -102,7 +105,7 @@ def _follow(chain: JointChain, wanted: Array, q: Array) -> tuple[Array, Array]:
         error[:, :3] = wanted[open_, :3, 3] - T[:, :3, 3]
         turn = wanted[open_, :3, :3] @ T[:, :3, :3].transpose(0, 2, 1)
         error[:, 3:] = Rotation.from_matrix(turn).as_rotvec()
-        if q.shape[1] < 6:
+        if n < 6:
             z = T[:, :3, 2]
             error[:, 3:] = np.cross(z, wanted[open_, :3, 2])
             J[:, 3:] -= z[:, :, None] * np.einsum("bi,bij->bj", z, J[:, 3:])[:, None]
@@ -113,6 +116,6 @@ def _follow(chain: JointChain, wanted: Array, q: Array) -> tuple[Array, Array]:
         open_, J, error = open_[late], J[late], error[late]
         # Damped least squares: at a singularity the step stays bounded and the residual tells.
         Jt = J.transpose(0, 2, 1)
-        step = np.linalg.solve(Jt @ J + 1e-12 * np.eye(q.shape[1]), Jt @ error[..., None])[..., 0]
-        q[open_] += np.clip(step, -0.5, 0.5)
+        step = np.linalg.solve(Jt @ J + 1e-12 * np.eye(n), Jt @ error[..., None])[..., 0]
+        q[open_, :n] += np.clip(step, -0.5, 0.5)
     return q, residual

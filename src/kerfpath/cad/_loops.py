@@ -47,12 +47,13 @@ class OrientedEdge:
         As it lies in the face taken FORWARD.
     face : TopoDS_Face
         The face in its own orientation.
+    surface : BRepAdaptor_Surface
+        Of the face; one for all its edges, since making it looks at every edge.
     """
 
-    def __init__(self, edge: TopoDS_Edge, face: TopoDS_Face) -> None:
-        self.edge, self.face = edge, face
-        self.surface = BRepAdaptor_Surface(face)
-        self._outward = -1.0 if face.Orientation() == REVERSED else 1.0
+    def __init__(self, edge: TopoDS_Edge, face: TopoDS_Face, surface: BRepAdaptor_Surface) -> None:
+        self.edge, self.face, self.surface = edge, face, surface
+        self.outward = -1.0 if face.Orientation() == REVERSED else 1.0
         first, last = BRep_Tool.Range_s(edge, face)
         # A REVERSED face shows its other side, about which its wires run the other way round.
         backward = (edge.Orientation() == REVERSED) != (face.Orientation() == REVERSED)
@@ -114,7 +115,7 @@ class OrientedEdge:
         at = (point.X(), point.Y(), point.Z())
         if not size > SINGULAR * du.Magnitude() * dv.Magnitude():
             return at, None
-        return at, np.array([normal.X(), normal.Y(), normal.Z()]) * (self._outward / size)
+        return at, np.array([normal.X(), normal.Y(), normal.Z()]) * (self.outward / size)
 
 
 FaceLoop = tuple[Literal["outer", "inner"], Chain[OrientedEdge]]
@@ -136,11 +137,12 @@ def loops_of(face: TopoDS_Face) -> list[FaceLoop]:
     """
     forward = TopoDS.Face(face.Oriented(FORWARD))
     outer_wire = BRepTools.OuterWire_s(forward)
+    surface = BRepAdaptor_Surface(face)
     loops: list[FaceLoop] = []
     wires = TopExp_Explorer(forward, TopAbs_ShapeEnum.TopAbs_WIRE)
     while wires.More():
         wire = TopoDS.Wire(wires.Current())
-        runs, has_seam = _runs(wire, forward, face)
+        runs, has_seam = _runs(wire, forward, face, surface)
         for edges in chained(runs):
             outer = _winds(edges) or (wire.IsSame(outer_wire) and not has_seam)
             loops.append(("outer" if outer else "inner", Chain(edges=edges)))
@@ -149,11 +151,11 @@ def loops_of(face: TopoDS_Face) -> list[FaceLoop]:
 
 
 def _runs(
-    wire: TopoDS_Wire, forward: TopoDS_Face, face: TopoDS_Face
+    wire: TopoDS_Wire, forward: TopoDS_Face, face: TopoDS_Face, surface: BRepAdaptor_Surface
 ) -> tuple[list[list[OrientedEdge]], bool]:
     """Return the edges of `wire` as travelled, broken at each seam, and whether it has a seam."""
-    ordered = list(_in_order(wire, forward))
     everything = list(_edges(wire))
+    ordered = everything if len(everything) == 1 else list(_in_order(wire, forward))
     connected = len(ordered) == len(everything)
     runs: list[list[OrientedEdge]] = [[]]
     has_seam = False
@@ -162,7 +164,7 @@ def _runs(
             has_seam = True
             runs.append([])
         elif not BRep_Tool.Degenerated_s(edge):
-            runs[-1].append(OrientedEdge(edge, face))
+            runs[-1].append(OrientedEdge(edge, face, surface))
         if not connected:
             runs.append([])
     if face.Orientation() == REVERSED:

@@ -13,10 +13,13 @@ from numpy.typing import ArrayLike
 
 from kerfpath._arrays import Array, Ints, floats, freeze, scalar
 from kerfpath.cad._crossing import crossing
-from kerfpath.cad._sample import Trace
+from kerfpath.cad._healed import HealedSurface
+from kerfpath.cad._loops import OrientedEdge
+from kerfpath.cad._sample import Chain, Trace
 from kerfpath.cad._units import MM
 from kerfpath.contour import Contour
 from kerfpath.errors import InputError
+from kerfpath.operations import Ribbon, Surface
 
 __all__ = ["Kind", "Loop", "Part", "Side", "loop_of", "numbered"]
 
@@ -269,6 +272,22 @@ class Part:
                 f"{(place / MM).round(3).tolist()} mm; repair it in CAD"
             )
         return contour
+
+    def surface(self, name: str) -> Surface:
+        """Return the surface around a loop, healed, for leads (see `kerfpath.operations`).
+
+        The surfaces of its faces go on where the loop cuts a hole; where they end, and in drawings
+        of lines and points, the plane tangent at the nearest place of the loop does.
+
+        Raises
+        ------
+        InputError
+            No such loop.
+        """
+        trace = self.loop(name)._trace
+        if isinstance(trace, Chain) and all(isinstance(e, OrientedEdge) for e in trace.edges):
+            return HealedSurface(trace.edges)
+        return Ribbon(self.contour(name, closed=False))
 
     def mesh(self, deflection: float = 5e-4) -> tuple[Array, Ints]:
         """Return vertices (V, 3) m and triangles (F, 3) of the part's faces, for pictures.

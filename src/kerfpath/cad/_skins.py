@@ -31,6 +31,8 @@ THIN = 0.2
 """A sheet is thinner than this part of the square root of its area."""
 EVEN = 1e-4
 """Sides whose rims differ by less in length, as a part, are told apart by where they face."""
+NOWHERE = 1e9
+"""Place (mm) of what has no loops, far from all that has."""
 HOLE = -0.25
 """Cosine between a loop's vector area and its mean normal below which it runs about a hole: for
 holes it is near -1, for a trim line near 1, for the rim of a tube near 0."""
@@ -167,6 +169,7 @@ def _sides(
     """Return which side of a sheet each skin is: opposite ones, large and close, are a sheet's."""
     areas, rims = np.zeros(len(members)), np.zeros(len(members))
     vector = np.zeros((len(members), 3))
+    low, high = np.full((len(members), 3), NOWHERE), np.full((len(members), 3), -NOWHERE)
     points: list[Array] = []
     for g, numbers in enumerate(members):
         around = [np.empty((0, 3))]
@@ -180,21 +183,21 @@ def _sides(
                 outside = [(f, k, e) not in inside[g] for e in _numbers(loop)]
                 rims[g] += loop.lengths[outside].sum()
         points.append(np.vstack(around))
+        if len(points[g]):
+            low[g], high[g] = points[g].min(axis=0), points[g].max(axis=0)
     sides: list[Side] = [""] * len(members)
     body = whole[[numbers[0] for numbers in members]]
     for g in np.argsort(-areas, kind="stable").tolist():
-        alike = np.flatnonzero(body == body[g]).tolist()
+        alike = np.flatnonzero(body == body[g])
         if len(alike) == 1:
             sides[g] = "outer"
-        away = {
-            h: _away(points[g], points[h])
-            for h in alike
-            if h != g
-            and not sides[g]
-            and not sides[h]
-            and areas[h] > (1 - OPPOSITE) * areas[g]
-            and np.linalg.norm(vector[g] + vector[h]) <= OPPOSITE * areas[g]
-        }
+        if sides[g]:
+            continue
+        apart = np.maximum(low[alike] - high[g], low[g] - high[alike]).max(axis=1)
+        opposite = np.linalg.norm(vector[alike] + vector[g], axis=1) <= OPPOSITE * areas[g]
+        large = areas[alike] > (1 - OPPOSITE) * areas[g]
+        near = alike[(apart < THIN * np.sqrt(areas[g])) & opposite & large].tolist()
+        away = {h: _away(points[g], points[h]) for h in near if h != g and not sides[h]}
         h = min(away, key=away.__getitem__, default=g)
         if h != g and away[h] < THIN * np.sqrt(areas[g]):
             even = abs(rims[g] - rims[h]) <= EVEN * rims[g]

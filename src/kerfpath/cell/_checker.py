@@ -61,6 +61,7 @@ class Checker:
         self._price: dict[int, float] = {}
         self._at: list[int] = []
         self._arms = cell.sweep.arms
+        self._closing = np.zeros(len(cell.required), bool)
         self._tree: tuple[int, cKDTree] | None = None
         self.asked = self.measured = self.motions_asked = self.motions_measured = 0
 
@@ -76,7 +77,10 @@ class Checker:
         return np.array([self._price[v] for v in vertices.tolist()])
 
     def passable(self, p: Ints, j: Ints) -> Bools:
-        """Say which of the motions from vertices p to vertices j, (B,) each, are clear."""
+        """Say which of the motions from vertices p to vertices j, (B,) each, are clear.
+
+        Pairs that closed a motion before are looked at half way first: there most motions hit.
+        """
         cell = self._cell
         self.motions_asked += len(p)
         passable = np.isfinite(self.price(p)) & np.isfinite(self.price(j))
@@ -88,10 +92,34 @@ class Checker:
         open_ = ~(least > cell.required + TOLERANCE)
         left = passable & open_.any(axis=1)
         self.motions_measured += int(left.sum())
-        passable[left] = cell.sweep.clear(
-            q0[left], q1[left], cell.required, cell.scene.distances, open_[left]
+        q0, q1, open_ = q0[left], q1[left], open_[left]
+        half = cell.frames((q0 + q1) / 2)
+        clear: Bools = ~np.asarray(self._hit(half, open_ & self._closing).any(axis=1))
+        rest = np.flatnonzero(clear)
+        clear[rest] = cell.sweep.clear(
+            q0[rest], q1[rest], cell.required, cell.scene.distances, open_[rest]
         )
+        lost = rest[~clear[rest]]
+        self._closing |= self._hit(half[lost], open_[lost]).any(axis=0)
+        passable[left] = clear
         return passable
+
+    def blocked(self, p: Ints, j: Ints) -> Bools:
+        """Say of which motions, (B,) each, it is seen at little cost that they are not clear.
+
+        Half way, pairs that closed a motion before are too near.
+        """
+        self.motions_asked += len(p)
+        self.motions_measured += len(p) if self._closing.any() else 0
+        q0 = self._q[p]
+        half = self._cell.frames(q0 + self._cell.increments(q0, self._q[j]) / 2)
+        return np.asarray(self._hit(half, np.tile(self._closing, (len(p), 1))).any(axis=1))
+
+    def _hit(self, frames: Array, wanted: Bools) -> Bools:
+        """Return which pairs (B, P) of those wanted are too near; of each row one at least."""
+        required = self._cell.required
+        low, _ = self._cell.scene.bounds(frames, required, wanted, required)
+        return np.asarray(wanted & (low <= required))
 
     def _look(self, vertices: Ints) -> None:
         """Find the prices of vertices, from what was measured nearby or by measuring."""

@@ -16,6 +16,7 @@ from scipy.spatial import cKDTree
 
 from kerfpath._arrays import Array, Bools, Ints, as_pose, floats, freeze, integers, scalar
 from kerfpath.cell._columns import Columns
+from kerfpath.cell._sheet import edges_of
 from kerfpath.errors import InputError
 
 __all__ = ["SAME", "Mesh", "size_of", "welded"]
@@ -204,13 +205,9 @@ def welded(vertices: ArrayLike, triangles: ArrayLike, tolerance: float) -> tuple
 
 def _require_closed(triangles: Ints, name: str) -> None:
     """Raise InputError unless every edge is run through as often one way as the other."""
-    edges = np.vstack([triangles[:, [0, 1]], triangles[:, [1, 2]], triangles[:, [2, 0]]])
-    forward = edges[:, 0] < edges[:, 1]
-    keys, place = np.unique(np.sort(edges, axis=1), axis=0, return_inverse=True)
-    balance = np.bincount(place.ravel(), np.where(forward, 1, -1), len(keys))
-    open_ = np.flatnonzero(balance)
-    if open_.size:
+    edges, open_ = edges_of(triangles)
+    if count := np.count_nonzero(open_):
         raise InputError(
-            f"{name}: the surface is not closed, {open_.size} of its {len(keys)} edges have a "
-            "triangle on one side only; what is inside cannot be told, so mend the mesh"
+            f"{name}: the surface is not closed, {count} of its {len(edges)} edges have a triangle "
+            "on one side only; what is inside cannot be told, so mend the mesh"
         )

@@ -163,7 +163,9 @@ class Scene:
             return around, np.inf
         slack = float(self._slack[p])
         apart = self._query(one.geometry, poses[a], two.geometry, poses[b], p)
-        if apart > -slack and (_inside(one, two, frames) or _inside(two, one, frames)):
+        # What lies inside a mesh lies inside the box around it.
+        nested = around <= -slack and apart > -slack
+        if nested and (_inside(one, two, frames) or _inside(two, one, frames)):
             apart = -apart - 2 * slack
         return apart, max(apart, -slack)
 
@@ -184,8 +186,9 @@ def _inside(inner: _Solid, outer: _Solid, frames: Array) -> bool:
     """Say whether a body that does not touch the surface of a mesh lies inside it."""
     if outer.mesh is None:
         return False
-    T = np.linalg.inv(frames[outer.frame]) @ frames[inner.frame]
-    return bool(outer.mesh.contains(inner.seeds @ T[:3, :3].T + T[:3, 3]).any())
+    T, into = frames[inner.frame], frames[outer.frame]
+    seeds = inner.seeds @ T[:3, :3].T + T[:3, 3]
+    return bool(outer.mesh.contains((seeds - into[:3, 3]) @ into[:3, :3]).any())
 
 
 def _solid(body: Body) -> _Solid:

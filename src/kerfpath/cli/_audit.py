@@ -16,23 +16,21 @@ __all__ = ["show_audit"]
 
 def show_audit(plan_file: Path, job: Path | None, *, as_json: bool) -> bool:
     """Print the audit's table of each contour of a plan; return whether all of them pass."""
-    tables, missing = audit_file(plan_file, job)
-    passed = not missing and all(
-        check.ok or check.level == "warning" for checks in tables.values() for check in checks
-    )
+    found = audit_file(plan_file, job)
     if as_json:
         print_json(
             {
-                "passed": passed,
-                "missing": list(missing),
+                "passed": found.passed,
+                "notes": [found.note],
+                "missing": list(found.missing),
                 "contours": {
                     name: [asdict(c) | {"ok": c.ok} for c in checks]
-                    for name, checks in tables.items()
+                    for name, checks in found.tables.items()
                 },
             }
         )
     else:
-        for name, checks in tables.items():
+        for name, checks in found.tables.items():
             rows = [
                 [
                     escape(c.title),
@@ -49,7 +47,8 @@ def show_audit(plan_file: Path, job: Path | None, *, as_json: bool) -> bool:
                 title=escape(name),
                 numbers=["worst", "allowed", "node"],
             )
-        for name in missing:
+        for name in found.missing:
             out.print(f"{escape(name)}: no plan")
-        out.print("audit passed" if passed else "audit FAILED")
-    return passed
+        out.print(f"note: {escape(found.note)}")
+        out.print("audit passed" if found.passed else "audit FAILED")
+    return found.passed

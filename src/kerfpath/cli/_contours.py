@@ -1,4 +1,4 @@
-"""`kerfpath contours`: the loops of a CAD file, by the names that jobs pick them by."""
+"""`kerfpath contours`: the loops of a drawing, by the names that jobs pick them by."""
 
 from __future__ import annotations
 
@@ -6,49 +6,39 @@ from pathlib import Path
 
 from rich.markup import escape
 
+from kerfpath.cad import Loop, Part
 from kerfpath.cad import read as read_drawing
-from kerfpath.cli._show import out, print_json, table
+from kerfpath.cli._show import busy, out, print_json, table
+from kerfpath.report import DrawnLoop, render_drawing
 
 __all__ = ["list_contours"]
 
 
-def list_contours(file: Path, unit: str | None, *, as_json: bool) -> None:
+def list_contours(
+    file: Path, unit: str | None, html: Path | None, *, everything: bool, as_json: bool
+) -> None:
     """Print the size of a part, and every loop's name, surface, length, edges and place."""
-    part = read_drawing(file, unit=unit)
-    size = part.bounding_box[1] - part.bounding_box[0]
+    with busy(f"reading {file.name}"):
+        part = read_drawing(file, unit=unit)
+    main = [loop for loop in part.loops if not loop.skin and loop.side != "edge"]
+    if html is not None:
+        with busy(f"drawing {html.name}"):
+            html.write_text(_page(part, main), encoding="utf-8")
     if as_json:
-        print_json(
-            {
-                "file": str(file),
-                "unit": part.unit,
-                "bounding_box_m": part.bounding_box.tolist(),
-                "faces": part.faces,
-                "loops": [
-                    {
-                        "name": loop.name,
-                        "face": loop.face,
-                        "kind": loop.kind,
-                        "surface": loop.surface,
-                        "length_m": loop.length,
-                        "diameter_m": loop.diameter,
-                        "edges": loop.edges,
-                        "closed": loop.closed,
-                        "largest_gap_m": loop.largest_gap,
-                        "shortest_edge_m": loop.shortest_edge,
-                        "bounding_box_m": loop.bounding_box.tolist(),
-                    }
-                    for loop in part.loops
-                ],
-            }
-        )
+        print_json(_as_json(part, html))
         return
-    out.print(
-        f"{escape(str(file))}: {part.faces} faces, {len(part.loops)} loops, "
-        f"{' x '.join(f'{v * 1000:.1f}' for v in size)} mm (file in {part.unit})"
-    )
+    out.print(escape(f"{file}: {_summary(part)}"))
+    for note in part.notes:
+        out.print(escape(f"note: {note}"))
+    shown = part.loops if everything else main
+    optional = [
+        (head, key)
+        for head, key in (("side", "side"), ("layer", "layer"), ("colour", "colour"))
+        if any(getattr(loop, key) for loop in shown)
+    ]
     rows = []
-    for loop in part.loops:
-        middle = loop.bounding_box.mean(axis=0) * 1000
+    for loop in shown:
+        middle = (loop.bounding_box.mean(axis=0) * 1000).round(1) + 0.0
         rows.append(
             [
                 escape(loop.name),
@@ -58,8 +48,80 @@ def list_contours(file: Path, unit: str | None, *, as_json: bool) -> None:
                 str(loop.edges),
                 f"{loop.largest_gap * 1000:.4f}",
                 " ".join(f"{v:.1f}" for v in middle),
+                *(escape(getattr(loop, key)) for _, key in optional),
                 "" if loop.closed else "open",
             ]
         )
-    columns = ["loop", "surface", "length mm", "diameter mm", "edges", "gap mm", "middle mm", ""]
-    table(columns, rows, numbers=columns[2:6])
+    columns = ["loop", "surface", "length mm", "diameter mm", "edges", "gap mm", "middle mm"]
+    table([*columns, *(head for head, _ in optional), ""], rows, numbers=columns[2:6])
+    if len(shown) < len(part.loops):
+        out.print(
+            f"and {len(part.loops) - len(shown)} loops of single faces in skins and around the "
+            "thickness of the sheet: list them with --all"
+        )
+    if html is not None:
+        out.print(f"wrote {escape(str(html))}")
+
+
+def _summary(part: Part) -> str:
+    size = (part.bounding_box[1] - part.bounding_box[0]) * 1000
+    return (
+        f"{part.faces} faces, {len(part.loops)} loops, "
+        f"{' x '.join(f'{v:.1f}' for v in size)} mm (file in {part.unit}); "
+        f"largest gap {part.largest_gap * 1000:.4f} mm, "
+        f"shortest edge {part.shortest_edge * 1000:.4f} mm"
+    )
+
+
+def _page(part: Part, main: list[Loop]) -> str:
+    loops = [
+        DrawnLoop(
+            name=loop.name,
+            kind=loop.kind,
+            points=loop.line(2e-5),
+            facts=f"{loop.length * 1000:.2f} mm, {loop.edges} edges"
+            + ("" if loop.diameter is None else f", diameter {loop.diameter * 1000:.2f} mm")
+            + ("" if loop.closed else ", open"),
+            fault=not loop.closed and loop.kind != "open",
+            aside=loop not in main,
+        )
+        for loop in part.loops
+    ]
+    corners = " to ".join(
+        " ".join(f"{v:.1f}" for v in (corner * 1000).round(1) + 0.0) for corner in part.bounding_box
+    )
+    facts = [("File", str(part.path)), ("Holds", _summary(part)), ("Box", f"{corners} mm")]
+    return render_drawing(part.path.name, loops, mesh=part.mesh(), facts=facts, notes=part.notes)
+
+
+def _as_json(part: Part, html: Path | None) -> dict[str, object]:
+    return {
+        "file": str(part.path),
+        "html": None if html is None else str(html),
+        "unit": part.unit,
+        "bounding_box_m": part.bounding_box.tolist(),
+        "faces": part.faces,
+        "largest_gap_m": part.largest_gap,
+        "shortest_edge_m": part.shortest_edge,
+        "notes": list(part.notes),
+        "loops": [
+            {
+                "name": loop.name,
+                "face": loop.face,
+                "kind": loop.kind,
+                "surface": loop.surface,
+                "length_m": loop.length,
+                "diameter_m": loop.diameter,
+                "edges": loop.edges,
+                "closed": loop.closed,
+                "largest_gap_m": loop.largest_gap,
+                "shortest_edge_m": loop.shortest_edge,
+                "bounding_box_m": loop.bounding_box.tolist(),
+                "side": loop.side,
+                "skin": loop.skin,
+                "layer": loop.layer,
+                "colour": loop.colour,
+            }
+            for loop in part.loops
+        ],
+    }

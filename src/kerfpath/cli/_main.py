@@ -33,6 +33,7 @@ Json = Annotated[bool, typer.Option("--json", help="Print one JSON object instea
 Out = Annotated[
     Path | None, typer.Option("--out", help="Folder for the files; made if it is not there.")
 ]
+JobArgument = Annotated[Path, typer.Argument(metavar="JOB.toml", help="The job file.")]
 PlanFileArgument = Annotated[Path, typer.Argument(metavar="PLAN.json", help="A plan, as written.")]
 
 
@@ -81,32 +82,56 @@ def demo(to: Out = None, as_json: Json = False) -> None:
 
 @app.command()
 def plan(
-    job: Annotated[Path, typer.Argument(metavar="JOB.toml", help="The job file.")],
+    job: JobArgument,
     to: Out = None,
+    draw_map: Annotated[
+        bool, typer.Option("--map", help="Draw every pose by its clearance; needs a cell.")
+    ] = False,
     as_json: Json = False,
 ) -> None:
     """Plan and audit every contour of a job; write plan, trajectory, report and program.
 
     The files go to the folder JOB-plan beside you unless --out names another. No program is
-    written unless every contour has a plan that passes its audit.
+    written unless every contour has a plan that passes its audit, nor with language = "none".
+    With a cell in the job the motions keep clear of collisions along the contours.
 
     Example: kerfpath plan door.toml --out door
     """
     from kerfpath.cli._plan import plan_job
 
-    plan_job(job, to or Path(f"{job.stem}-plan"), as_json=as_json)
+    plan_job(job, to or Path(f"{job.stem}-plan"), as_json=as_json, draw_map=draw_map)
+
+
+@app.command()
+def check(job: JobArgument, as_json: Json = False) -> None:
+    """Read a job without planning it: the bodies and pairs of its cell, and how contours begin.
+
+    Clear: of the robot's poses at the first node, those that keep every near-miss distance.
+    Clearance: of the best of them, its least distance among the pairs that keep near_miss_mm.
+
+    Example: kerfpath check door.toml
+    """
+    from kerfpath.cli._check import show_check
+    from kerfpath.job import check_job, read_job, warm_up
+
+    read = read_job(job)
+    with busy("compiling the kernels, first run only"):
+        warm_up()
+    with busy("looking at the cell"):
+        checked = check_job(read)
+    show_check(checked, as_json=as_json)
 
 
 @app.command()
 def speed(
-    job: Annotated[Path, typer.Argument(metavar="JOB.toml", help="The job file.")],
+    job: JobArgument,
     as_json: Json = False,
 ) -> None:
     """Find the fastest constant cutting speed of each contour, and what binds where.
 
     On the grid: exact on the graph that the job describes (its spacing, gamma step, limits and
-    eta). Fastest: with gamma moved off the grid from there, if the job refines; what binds is said
-    of that. The speeds that the job asks for play no part.
+    eta), and clear in its cell, if it has one. Fastest: with gamma moved off the grid from there,
+    if the job refines; what binds is said of that. The speeds that the job asks for play no part.
 
     Example: kerfpath speed door.toml
     """
@@ -173,7 +198,7 @@ def audit(
     """Check a plan again, by kinematics that share nothing with the planner.
 
     Without --job the way between nodes is compared with the straight lines between them; with it,
-    with the curve as drawn.
+    with the curve as drawn, and the motion with the cell of the job, if it has one.
 
     Example: kerfpath audit door/plan.json --job door.toml
     """
@@ -185,21 +210,31 @@ def audit(
 
 @app.command()
 def contours(
-    file: Annotated[Path, typer.Argument(metavar="FILE", help="A STEP file.")],
+    file: Annotated[
+        Path, typer.Argument(metavar="FILE", help="STEP, IGES, DXF, or a table of points (CSV).")
+    ],
     unit: Annotated[
-        str | None, typer.Option(help="Length unit, if the file's header is wrong: mm, cm, m, in.")
+        str | None,
+        typer.Option(help="Length unit, if the file says none or a wrong one: mm, cm, m, in."),
     ] = None,
+    html: Annotated[
+        Path | None,
+        typer.Option(help="Page to write: the part with its loops by name."),
+    ] = None,
+    everything: Annotated[
+        bool, typer.Option("--all", help="Single faces of skins and cut edges of sheets too.")
+    ] = False,
     as_json: Json = False,
 ) -> None:
-    """List the loops of a CAD file, by the names that jobs pick them by.
+    """List the loops of a drawing, by the names that jobs pick them by.
 
     Check the bounding box first: a wrong unit in the file's header shows there.
 
-    Example: kerfpath contours door.step
+    Example: kerfpath contours door.step --html door.html
     """
     from kerfpath.cli._contours import list_contours
 
-    list_contours(file, unit, as_json=as_json)
+    list_contours(file, unit, html, everything=everything, as_json=as_json)
 
 
 @app.command()

@@ -11,12 +11,22 @@ import typer
 from rich.markup import escape
 
 from kerfpath.cli._show import busy, errors, out, print_json, progress_bars, table
-from kerfpath.job import Cut, read_job, require_folder, run_job, warm_up, write_outcome
+from kerfpath.job import (
+    Cut,
+    read_job,
+    require_folder,
+    require_language,
+    run_job,
+    sequence_entry,
+    warm_up,
+    with_map,
+    write_outcome,
+)
 
 __all__ = ["plan_job"]
 
 
-def plan_job(job_file: Path, folder: Path, *, as_json: bool) -> None:
+def plan_job(job_file: Path, folder: Path, *, as_json: bool, draw_map: bool = False) -> None:
     """Plan a job, write its files into a folder and say what came of it.
 
     Raises
@@ -26,6 +36,9 @@ def plan_job(job_file: Path, folder: Path, *, as_json: bool) -> None:
     """
     require_folder(folder)
     job = read_job(job_file)
+    require_language(job)
+    if draw_map:
+        job = with_map(job)
     with busy("compiling the kernels, first run only"):
         warm_up()
     with progress_bars() as progress:
@@ -37,6 +50,7 @@ def plan_job(job_file: Path, folder: Path, *, as_json: bool) -> None:
             {
                 "passed": outcome.passed,
                 "contours": [_cut_entry(cut) for cut in outcome.cuts],
+                "sequence": None if outcome.part is None else sequence_entry(outcome.part),
                 "files": [str(f) for f in written.files],
                 "notes": list(written.notes),
             }

@@ -3,31 +3,69 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, TypeVar
 
+import numpy as np
 from pydantic import BaseModel, ValidationError
 
 from kerfpath.auditor import Check, checks
+from kerfpath.cad import Part
 from kerfpath.cad import read as read_drawing
+from kerfpath.cell import Cell
 from kerfpath.contour import Contour
 from kerfpath.errors import AuditFailed, InputError
-from kerfpath.job._files import program_of
+from kerfpath.job._cell import cell_of_job
+from kerfpath.job._files import collision_note, program_of
 from kerfpath.job._planfile import PlanFile, read_plan_file
-from kerfpath.job._read import ProgramOptions, audit_options, program_options, read_job
+from kerfpath.job._read import Job, ProgramOptions, audit_options, program_options, read_job
 from kerfpath.job._tables import AuditTable, ProgramTable
+from kerfpath.plans import Plan
 from kerfpath.post import language as find_language
 
-__all__ = ["audit_file", "program_from_file"]
+__all__ = ["Audited", "audit_file", "program_from_file"]
 
 _M = TypeVar("_M", bound=BaseModel)
 _R = TypeVar("_R")
 
 
-def audit_file(
-    plan_file: Path, job_file: Path | None = None
-) -> tuple[dict[str, list[Check]], tuple[str, ...]]:
-    """Return the audit's table of each contour of a plan.json, and the contours without a plan.
+SAME_PLACE = 1e-6
+"""m: what a plan.json and its job say of the same place differs by rounding at most."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Audited:
+    """What the audit of a plan.json says.
+
+    Parameters
+    ----------
+    tables : dict of str to list of Check
+        The table of each contour that has a plan.
+    missing : tuple of str
+        Names of the contours without one.
+    note : str
+        What was checked for collisions, and what was not.
+    """
+
+    tables: dict[str, list[Check]]
+    missing: tuple[str, ...]
+    note: str
+
+    @property
+    def passed(self) -> bool:
+        """True when every contour has a plan and no check found an error."""
+        return not self.missing and all(
+            check.ok or check.level == "warning"
+            for checks in self.tables.values()
+            for check in checks
+        )
+
+
+def audit_file(plan_file: Path, job_file: Path | None = None) -> Audited:
+    """Return what the audit says of every contour of a plan.json.
+
+    Collisions are checked in the cell of the job, where one is given and has one.
 
     Parameters
     ----------
@@ -38,13 +76,22 @@ def audit_file(
     Raises
     ------
     InputError
-        A file cannot be read, or the job does not have a contour of the plan.
+        A file cannot be read, or the job is not that of the plan.
     """
     file = read_plan_file(plan_file)
-    drawn = {} if job_file is None else _drawn(file, job_file)
+    drawn: dict[str, Contour] = {}
+    cell = None
+    if job_file is not None:
+        job = read_job(job_file)
+        part = read_drawing(job.part_file, unit=job.part_unit)
+        drawn, cell = _drawn(file, job, part), cell_of_job(job, part)
     asked = _table(file, "audit", AuditTable, audit_options)
-    table = {p.name: checks(p, reference=drawn.get(p.name), **asked) for p in file.plans}
-    return table, file.missing
+    tables = {}
+    for p in file.plans:
+        if cell is not None:
+            _require_same(p, job, file.path)
+        tables[p.name] = checks(p, reference=drawn.get(p.name), cell=cell, **asked)
+    return Audited(tables=tables, missing=file.missing, note=_note(file, cell, job_file))
 
 
 def program_from_file(plan_file: Path, language: str) -> tuple[str, list[str]]:
@@ -72,7 +119,7 @@ def program_from_file(plan_file: Path, language: str) -> tuple[str, list[str]]:
                 raise AuditFailed(
                     f"no program: contour {p.name!r} fails its audit: {check.issue()}"
                 )
-    return program_of(file.plans, _options(file, language))
+    return program_of(file.plans, _options(file, language), file.moves)
 
 
 def _options(file: PlanFile, language: str) -> ProgramOptions:
@@ -98,14 +145,12 @@ def _table(
         raise InputError(f"{file.path}: its [{name}] table is not valid ({said})") from None
 
 
-def _drawn(file: PlanFile, job_file: Path) -> dict[str, Contour]:
-    job = read_job(job_file)
-    part = read_drawing(job.part_file, unit=job.part_unit)
+def _drawn(file: PlanFile, job: Job, part: Part) -> dict[str, Contour]:
     picks = {task.name: task.pick for task in job.contours}
     unknown = [name for name in file.contours.values() if name not in picks]
     if unknown:
         raise InputError(
-            f"{job_file}: has no contour {unknown[0]!r} of {file.path}; give the job of that plan"
+            f"{job.path}: has no contour {unknown[0]!r} of {file.path}; give the job of that plan"
         )
     drawn: dict[str, Contour] = {}
     for p in file.plans:
@@ -114,3 +159,26 @@ def _drawn(file: PlanFile, job_file: Path) -> dict[str, Contour]:
         s = p.contour.s
         drawn[p.name] = whole.between(float(s[0]), float(s[-1])) if piece else whole
     return drawn
+
+
+def _require_same(plan: Plan, job: Job, path: Path) -> None:
+    """Raise InputError where a plan's tool, part or arm is not where the job's cell has it."""
+    pairs = {
+        "tool": (plan.T_flange_tip, job.tool),
+        "part": (plan.T_base_part, job.placement),
+        "robot": (plan.robot.forward(plan.q[:1]), job.robot.forward(plan.q[:1])),
+    }
+    for name, (here, there) in pairs.items():
+        if np.abs(here - there).max() > SAME_PLACE:
+            raise InputError(
+                f"{job.path}: its {name} is not where that of {path} is, so that its cell cannot "
+                "be checked; give the job of that plan, or plan it again"
+            )
+
+
+def _note(file: PlanFile, cell: Cell | None, job_file: Path | None) -> str:
+    """Say what was checked for collisions."""
+    if cell is None and file.in_cell:
+        why = "give its job with --job" if job_file is None else f"{job_file} has no [cell]"
+        return f"Planned clear of collisions in a cell, which was not checked again: {why}."
+    return collision_note(cell)

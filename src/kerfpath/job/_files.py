@@ -7,20 +7,34 @@ import io
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
+from kerfpath.air import AirMove
+from kerfpath.cell import Cell
 from kerfpath.errors import AuditFailed, InputError
 from kerfpath.job._planfile import broken_entry, plan_entry, plan_text
-from kerfpath.job._read import ProgramOptions
+from kerfpath.job._read import Job, ProgramOptions
+from kerfpath.job._refusals import refused_at
 from kerfpath.job._run import Outcome
 from kerfpath.plans import Plan
 from kerfpath.post import build_program, language, post, preflight, write_program
 from kerfpath.report import ContourSection, render
+from kerfpath.sequence import PartPlan
 
-__all__ = ["Written", "program_of", "require_folder", "trajectory_text", "write_outcome"]
+__all__ = [
+    "Written",
+    "collision_note",
+    "program_of",
+    "require_folder",
+    "require_language",
+    "trajectory_text",
+    "write_outcome",
+]
 
 NOT_CHECKED = "Collisions are not checked: simulate the program in the cell before running it."
+"""What is said of a job without a [cell]."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -52,12 +66,16 @@ def write_outcome(outcome: Outcome, folder: Path) -> Written:
         are written.
     """
     job = outcome.job
-    chosen = language(job.program.language)
-    target = folder / f"{job.program.name}{chosen.suffix}"
-    texts, notes, refused = {}, [NOT_CHECKED], None
-    if outcome.passed:
+    target = _program_file(job, folder)
+    part, moves = outcome.part, () if outcome.part is None else outcome.part.moves
+    texts, refused = {}, None
+    notes = [collision_note(outcome.cell, moves_too=bool(moves))]
+    notes += [] if part is None else [order_note(part)]
+    notes += [] if outcome.stuck is None else [f"The moves between contours: {outcome.stuck}"]
+    notes += [f"The moves between contours: {c.issue()}" for c in outcome.air if not c.ok]
+    if outcome.passed and target is not None:
         try:
-            texts[target], warnings = program_of(outcome.plans, job.program)
+            texts[target], warnings = program_of(outcome.plans, job.program, moves)
             notes += warnings
         except InputError as error:
             refused = error
@@ -68,8 +86,10 @@ def write_outcome(outcome: Outcome, folder: Path) -> Written:
             entries.append(plan_entry(cut.plan, cut.contour, cut.checks))
         elif cut.broken is not None:
             entries.append(broken_entry(cut.task.name, cut.broken, cut.fastest))
-    texts[folder / "plan.json"] = plan_text(job.robot, job.tool, job.placement, entries, job.source)
-    texts[folder / "trajectory.csv"] = trajectory_text(outcome.plans)
+    texts[folder / "plan.json"] = plan_text(
+        job.robot, job.tool, job.placement, entries, job.source, outcome.cell, part
+    )
+    texts[folder / "trajectory.csv"] = trajectory_text(outcome.plans, moves)
     texts[folder / "report.html"] = report_text(outcome, notes)
     try:
         folder.mkdir(parents=True, exist_ok=True)
@@ -79,8 +99,42 @@ def write_outcome(outcome: Outcome, folder: Path) -> Written:
         write_program(path, text)
     if refused is not None:
         raise InputError(f"{refused} ({folder / 'plan.json'} and the report are written)")
-    stale = target if not outcome.passed and target.exists() else None
+    stale = target if target and target not in texts and target.exists() else None
     return Written(files=tuple(texts), stale=stale, notes=tuple(notes))
+
+
+def _program_file(job: Job, folder: Path) -> Path | None:
+    """Return where the program goes; None where the job wants none."""
+    if job.program.language == "none":
+        return None
+    return folder / f"{job.program.name}{language(job.program.language).suffix}"
+
+
+def order_note(part: PartPlan) -> str:
+    """Say how long the part takes, of what, and what is proved about the order."""
+    order = part.order
+    proved = (
+        "no order takes less"
+        if order.optimal
+        else f"an order of {order.at_least:.1f} s is not ruled out"
+    )
+    return (
+        f"Cycle time {part.cycle_time:.1f} s: cutting {part.cutting_time:.1f} s, air "
+        f"{part.air_time:.1f} s, piercing {part.piercing_time:.1f} s; by these candidates and "
+        f"moves {proved}."
+    )
+
+
+def collision_note(cell: Cell | None, *, moves_too: bool = False) -> str:
+    """Say what was checked for collisions, and what was not."""
+    if cell is None:
+        return NOT_CHECKED
+    about = f" (approximate: {', '.join(cell.approximate)})" if cell.approximate else ""
+    return (
+        f"Collisions are checked along the contours, among {len(cell.bodies)} bodies of the "
+        f"cell{about}; the moves to and between contours are "
+        f"{'checked, too' if moves_too else 'not checked'}."
+    )
 
 
 def require_folder(folder: Path) -> None:
@@ -98,8 +152,30 @@ def require_folder(folder: Path) -> None:
             raise InputError(f"{folder}: expected a folder, but {place} is a file; name another")
 
 
-def program_of(plans: Sequence[Plan], options: ProgramOptions) -> tuple[str, list[str]]:
+def require_language(job: Job) -> None:
+    """Refuse a program that the job's robot cannot run, before any work is done for it.
+
+    Raises
+    ------
+    InputError
+        At the language in the job.
+    """
+    if job.program.language == "none":
+        return
+    if refusal := language(job.program.language).refusal(job.robot):
+        raise refused_at(
+            job.path,
+            ("program", "language"),
+            f'{refusal}; write language = "none" in [program] to plan without a program',
+        )
+
+
+def program_of(
+    plans: Sequence[Plan], options: ProgramOptions, moves: Sequence[AirMove] = ()
+) -> tuple[str, list[str]]:
     """Return the text of the program that cuts `plans`, and the warnings of its preflight.
+
+    Between them the robot moves as `moves` say; without any, straight to each.
 
     The caller answers for the audit.
 
@@ -112,13 +188,19 @@ def program_of(plans: Sequence[Plan], options: ProgramOptions) -> tuple[str, lis
     """
     if not plans:
         raise AuditFailed("no program: there is no plan to write one from")
+    if refusal := language(options.language).refusal(plans[0].robot):
+        raise InputError(f"no program: {refusal}")
     program = build_program(
         plans,
+        moves=moves,
         name=options.name,
         retract=options.retract,
         zone=options.zone,
         laser_output=options.laser_output,
         lead_time=options.lead_time,
+        pierce_time=options.pierce_time,
+        approach_speed=options.approach_speed,
+        air_speed=options.air_speed,
         work_object=options.work_object,
         tool_name=options.tool_name,
     )
@@ -127,15 +209,21 @@ def program_of(plans: Sequence[Plan], options: ProgramOptions) -> tuple[str, lis
     return text, [str(issue) for issue in issues if issue.level == "warning"]
 
 
-def trajectory_text(plans: Sequence[Plan]) -> str:
-    """Return the text of trajectory.csv: one row per node, in mm and degrees, base frame."""
-    joints = range(1, 7)
+def trajectory_text(plans: Sequence[Plan], moves: Sequence[AirMove] = ()) -> str:
+    """Return the text of trajectory.csv: one row per node, in mm and degrees, base frame.
+
+    Moves through the air stand where they are made, a row per corner; each has a time of its own.
+    """
+    joints = range(1, (plans[0].robot.joints if plans else 6) + 1)
     header = ["contour", "node", "kind", "t_s", *(f"q{i}_deg" for i in joints)]
     header += ["x_mm", "y_mm", "z_mm", "axis_x", "axis_y", "axis_z", "gamma_deg", "posture"]
     out = io.StringIO()
     writer = csv.writer(out, lineterminator="\n")
     writer.writerow(header)
-    for plan in plans:
+    homeless = len(moves) < len(plans)
+    for i, plan in enumerate(plans):
+        if moves and not (homeless and i == 0):
+            _write_air(writer, moves[i - 1 if homeless else i], plan)
         numbers = np.column_stack(
             [
                 plan.time,
@@ -148,7 +236,17 @@ def trajectory_text(plans: Sequence[Plan]) -> str:
         rows = zip(numbers.tolist(), plan.contour.kinds, plan.posture, strict=True)
         for k, (row, kind, posture) in enumerate(rows):
             writer.writerow([plan.name, k, kind, *row, int(posture)])
+    if len(moves) > len(plans):
+        _write_air(writer, moves[-1], plans[-1])
     return out.getvalue()
+
+
+def _write_air(writer: Any, move: AirMove, plan: Plan) -> None:
+    """Write the corners of a move; gamma and posture are those of contours alone."""
+    T = plan.robot.forward(move.q) @ plan.T_flange_tip
+    for k, (time, q, tip) in enumerate(zip(move.time, move.q, T, strict=True)):
+        row = [time, *np.degrees(q), *tip[:3, 3] * 1000, *tip[:3, 2]]
+        writer.writerow(["air", k, "air", *(float(v) for v in row), "", ""])
 
 
 def report_text(outcome: Outcome, notes: Sequence[str]) -> str:
@@ -163,6 +261,7 @@ def report_text(outcome: Outcome, notes: Sequence[str]) -> str:
             checks=cut.checks,
             failure=cut.failure,
             broken_at=None if cut.broken is None else cut.broken.node + 1,
+            clearance=cut.clearance,
         )
         for cut in outcome.cuts
     ]
@@ -172,7 +271,7 @@ def report_text(outcome: Outcome, notes: Sequence[str]) -> str:
     facts = [
         ("Job", job.path.name),
         ("Part", job.part_file.name),
-        ("Robot", f"{robot.manufacturer} {robot.model}"),
+        ("Robot", f"{robot.manufacturer} {robot.model}".strip() or robot.id),
         ("Cutting speed", f"{' / '.join(f'{v:g}' for v in speeds)} m/min"),
         ("Gamma step", f"{np.degrees(options['gamma_step']):g} deg"),
         ("Objective", f"{options['objective']}, {options['metric']} metric"),
@@ -189,6 +288,7 @@ def report_text(outcome: Outcome, notes: Sequence[str]) -> str:
         f"{job.part_file.stem.replace('_', ' ')}",
         sections,
         mesh=outcome.mesh,
+        cell=outcome.cell,
         facts=facts,
         notes=notes,
         job_text=job.path.read_text(encoding="utf-8-sig"),

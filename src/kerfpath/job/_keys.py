@@ -4,9 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Callable, Collection
 from difflib import get_close_matches
-from typing import Annotated, Any
+from pathlib import Path
+from typing import Annotated, Any, Literal
 
-from pydantic import AfterValidator, Field
+from pydantic import AfterValidator, Field, ValidationInfo
 from pydantic_core import PydanticCustomError
 
 from kerfpath.errors import InputError
@@ -14,9 +15,10 @@ from kerfpath.job._heads import heads
 from kerfpath.robots import acceleration_ratios, postures_named
 
 __all__ = [
-    "FAULT", "LARGEST", "MOST_NODES", "SMALLEST", "Axis", "Head", "Identifier", "NotNegative",
-    "Number", "Positive", "Posture", "Ratio", "Six", "SixNotNegative", "SixPositive", "Text",
-    "Three", "fault", "key", "nearest", "one_of",
+    "FAULT", "LARGEST", "MOST_NODES", "SMALLEST", "Axis", "Head", "Identifier", "Joints",
+    "JointsNotNegative", "JointsPositive", "Lengths", "NotNegative", "Number", "Positive",
+    "Posture", "Ratio", "Signs", "Text", "Three", "existing", "fault", "folder_of", "key",
+    "nearest", "one_of", "told",
 ]  # fmt: skip
 
 LARGEST = 1e6
@@ -52,6 +54,33 @@ def fault(
     return PydanticCustomError(FAULT, "expected {expected}, got {got}; {remedy}", said)
 
 
+def told(said: str, where: tuple[str | int, ...] = ()) -> PydanticCustomError:
+    """Return an error that says `said`, a whole line but for its place, at `where` from here."""
+    return PydanticCustomError(FAULT, "{said}", {"said": said, "where": where})
+
+
+def folder_of(info: ValidationInfo) -> Path:
+    """Return the folder of the job file."""
+    return info.context["folder"] if info.context else Path()
+
+
+def existing(what: str) -> Callable[[str, ValidationInfo], str]:
+    """Return a validator that requires a file, its path relative to the job's folder."""
+
+    def check(value: str, info: ValidationInfo) -> str:
+        folder = folder_of(info)
+        try:
+            is_file, is_there = (folder / value).is_file(), (folder / value).exists()
+        except (OSError, ValueError):  # a name that the file system cannot hold
+            is_file = is_there = False
+        if not is_file:
+            why = "it is not a file" if is_there else f"it is not in {folder}"
+            raise fault(what, None, f"{why}; give its path relative to the job file")
+        return value
+
+    return check
+
+
 def one_of(what: str, names: Callable[[], Collection[str]], hint: str = "") -> AfterValidator:
     """Return a validator that admits only one of `names`."""
 
@@ -69,9 +98,12 @@ NotNegative = Annotated[float, Field(allow_inf_nan=False, ge=0, le=LARGEST)]
 Axis = Annotated[int, Field(ge=1, le=6)]
 # TOML arrays arrive as lists: not strict about that, while their elements stay strict.
 Three = Annotated[tuple[Number, ...], Field(strict=False, min_length=3, max_length=3)]
-Six = Annotated[tuple[Number, ...], Field(strict=False, min_length=6, max_length=6)]
-SixPositive = Annotated[tuple[Positive, ...], Field(strict=False, min_length=6, max_length=6)]
-SixNotNegative = Annotated[tuple[NotNegative, ...], Field(strict=False, min_length=6, max_length=6)]
+# One number for every joint: how many that are is known once the robot is.
+Joints = Annotated[tuple[Number, ...], Field(strict=False, min_length=1)]
+JointsPositive = Annotated[tuple[Positive, ...], Field(strict=False, min_length=1)]
+JointsNotNegative = Annotated[tuple[NotNegative, ...], Field(strict=False, min_length=1)]
+Signs = Annotated[tuple[Literal[-1, 1], ...], Field(strict=False, min_length=1)]
+Lengths = dict[str, Number]
 # One printable line that is not blank.
 Text = Annotated[str, Field(pattern=r"^[^\p{C}\p{Zl}\p{Zp}]*\S[^\p{C}\p{Zl}\p{Zp}]*$")]
 Identifier = Annotated[

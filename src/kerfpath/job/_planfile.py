@@ -13,13 +13,18 @@ import numpy as np
 
 from kerfpath import __version__
 from kerfpath._arrays import Array
+from kerfpath.air import AirMove
 from kerfpath.auditor import Check
+from kerfpath.cell import Cell
 from kerfpath.comfort import MEASURES, Band, Comfort
 from kerfpath.contour import KINDS, Contour
 from kerfpath.errors import InputError, NoFeasiblePath
+from kerfpath.job._external import by_unit, external_entry, joints, with_external
+from kerfpath.job._sequencefile import read_moves, sequence_entry
 from kerfpath.planner import FastestSpeed
 from kerfpath.plans import Feed, Plan, Proof, Settings
 from kerfpath.robots import Coupling, Robot
+from kerfpath.sequence import PartPlan
 from kerfpath.tilt import Tilt
 from kerfpath.urdf import Chain
 
@@ -46,8 +51,12 @@ class PlanFile:
         Names of the contours that have no plan.
     failed : tuple of str
         Names of the contours whose plan failed its audit when it was made.
+    moves : tuple of AirMove
+        Through the air between them; empty when none were planned.
     contours : dict of str to str
         What the job calls the contour of each plan: a plan may be that of a piece.
+    in_cell : bool
+        Whether the motions were planned and audited clear of collisions.
     """
 
     path: Path
@@ -56,6 +65,8 @@ class PlanFile:
     missing: tuple[str, ...]
     failed: tuple[str, ...]
     contours: dict[str, str]
+    moves: tuple[AirMove, ...]
+    in_cell: bool
 
 
 def plan_text(
@@ -64,6 +75,8 @@ def plan_text(
     T_base_part: np.ndarray[Any, Any],
     contours: Sequence[dict[str, Any]],
     job: dict[str, Any],
+    cell: Cell | None = None,
+    part: PartPlan | None = None,
 ) -> str:
     """Return the text of a plan.json; the same input gives the same bytes.
 
@@ -76,16 +89,23 @@ def plan_text(
         From `plan_entry` and `broken_entry`.
     job : dict
         The job file as read.
+    cell : Cell, optional
+        What the motions were planned and audited clear of.
+    part : PartPlan, optional
+        The moves between the contours, and what is proved about their order.
     """
     data = {
         "schema": SCHEMA,
         "kerfpath": __version__,
         "job": job,
         "robot": _robot_entry(robot),
+        "external_axis": external_entry(robot),
         "T_flange_tip": T_flange_tip.tolist(),
         "T_base_part": T_base_part.tolist(),
         "limits": _limits_entry(robot),
+        "cell": None if cell is None else _cell_entry(cell),
         "contours": list(contours),
+        "sequence": None if part is None else sequence_entry(part),
     }
     text = json.dumps(data, indent=1, allow_nan=False)
     # One row of numbers to a line: a person can still read it, and a diff shows a node.
@@ -103,7 +123,7 @@ def plan_entry(plan: Plan, contour: str, checks: Sequence[Check]) -> dict[str, A
         "method": settings.method,
         "objective": settings.objective,
         "metric": settings.metric,
-        "weights_per_rad": settings.weights.tolist(),
+        **by_unit("weights_per", settings.weights, plan.robot),
         "eta_v": settings.eta_v,
         "eta_a": settings.eta_a,
         "closure": settings.closure,
@@ -124,9 +144,9 @@ def plan_entry(plan: Plan, contour: str, checks: Sequence[Check]) -> dict[str, A
         "proof": plan.proof.statement,
         "grid_cost": plan.proof.grid_cost,
         "criteria": {
-            "displacement_rad": criteria.displacement.tolist(),
-            "largest_increment_rad": criteria.largest_increment.tolist(),
-            "range_rad": criteria.range.tolist(),
+            **by_unit("displacement", criteria.displacement, plan.robot),
+            **by_unit("largest_increment", criteria.largest_increment, plan.robot),
+            **by_unit("range", criteria.range, plan.robot),
             "peak_velocity_share": criteria.peak_velocity.tolist(),
             "peak_acceleration_share": criteria.peak_acceleration.tolist(),
             "nearest": {
@@ -149,7 +169,7 @@ def plan_entry(plan: Plan, contour: str, checks: Sequence[Check]) -> dict[str, A
             "kind": list(plan.contour.kinds),
             "speed_share": plan.contour.speed_share.tolist(),
             "x": None if plan.contour.x is None else plan.contour.x.tolist(),
-            "q_rad": plan.q.tolist(),
+            **by_unit("q", plan.q, plan.robot),
             "gamma_rad": plan.gamma.tolist(),
             "lead_lean_rad": plan.tilt.tolist() if plan.tilt.any() else None,
             "posture": plan.posture.tolist(),
@@ -192,7 +212,8 @@ def read_plan_file(path: str | Path) -> PlanFile:
             f"{path}: expected a plan.json with schema {SCHEMA}, got {got!r}; plan the job again"
         )
     try:
-        robot = _read_robot(data["robot"], data["limits"])
+        arm = _read_robot(data["robot"], data["limits"])
+        robot = with_external(data["external_axis"], arm)
         tool, placement = data["T_flange_tip"], data["T_base_part"]
         entries = data["contours"]
         return PlanFile(
@@ -206,6 +227,8 @@ def read_plan_file(path: str | Path) -> PlanFile:
                 for e in entries
                 if e["feasible"] and e["audit"]["passed"] is not True
             ),
+            moves=read_moves(data["sequence"]),
+            in_cell=data.get("cell") is not None,
         )
     except InputError as error:
         raise InputError(f"{path}: {error}") from None
@@ -250,6 +273,7 @@ def _robot_entry(robot: Robot) -> dict[str, Any]:
 
 
 def _limits_entry(robot: Robot) -> dict[str, Any]:
+    robot = robot.alone()
     limits = robot.joint_limits()
     velocity, acceleration = robot.speed_limits()
     return {
@@ -262,6 +286,20 @@ def _limits_entry(robot: Robot) -> dict[str, Any]:
         "couplings": [
             {"row": c.row.tolist(), "lower_rad": c.lower, "upper_rad": c.upper, "note": c.note}
             for c in robot.couplings
+        ],
+    }
+
+
+def _cell_entry(cell: Cell) -> dict[str, Any]:
+    """Return what kept apart and how far: a record, as the cell itself is that of the job."""
+    return {
+        "bodies": [
+            {"name": b.name, "kind": b.kind, "frame": b.frame, "approximate": b.approximate}
+            for b in cell.bodies
+        ],
+        "near_miss_m": [
+            {"between": list(pair), "at_least": float(required)}
+            for pair, required in zip(cell.pair_names, cell.required, strict=True)
         ],
     }
 
@@ -313,7 +351,7 @@ def _read_plan(entry: dict[str, Any], robot: Robot, tool: Any, placement: Any) -
         robot=robot,
         T_flange_tip=tool,
         T_base_part=placement,
-        q=nodes["q_rad"],
+        q=joints(nodes, "q", robot),
         gamma=nodes["gamma_rad"],
         tilt=nodes["lead_lean_rad"],
         posture=nodes["posture"],
@@ -325,7 +363,7 @@ def _read_plan(entry: dict[str, Any], robot: Robot, tool: Any, placement: Any) -
             method=entry["method"],
             objective=entry["objective"],
             metric=entry["metric"],
-            weights=np.array(entry["weights_per_rad"], dtype=float),
+            weights=joints(entry, "weights_per", robot),
             eta_v=float(entry["eta_v"]),
             eta_a=float(entry["eta_a"]),
             closure=entry["closure"],

@@ -5,26 +5,32 @@ from __future__ import annotations
 import re
 import tomllib
 from dataclasses import dataclass, replace
-from datetime import date, datetime, time
 from pathlib import Path
 from typing import Any, Literal
 
 import numpy as np
 from pydantic import ValidationError
-from pydantic_core import ErrorDetails
 
 from kerfpath._arrays import Array, Bools
 from kerfpath.contour import Contour
 from kerfpath.errors import InputError
-from kerfpath.job._keys import FAULT, LARGEST, MOST_NODES, SMALLEST, nearest
-from kerfpath.job._lines import Places
-from kerfpath.job._tables import TABLES, AuditTable, ContourTable, JobFile, PlanTable, ProgramTable
+from kerfpath.job._keys import MOST_NODES
+from kerfpath.job._refusals import error_at, refusal
+from kerfpath.job._shape import shaped
+from kerfpath.job._tables import (
+    AuditTable,
+    CellTable,
+    ContourTable,
+    JobFile,
+    PlanTable,
+    ProgramTable,
+    SequenceTable,
+)
+from kerfpath.operations import Surface
 from kerfpath.robots import Robot, postures_named
 
 __all__ = ["ContourTask", "Job", "ProgramOptions", "audit_options", "program_options", "read_job"]
 
-_LONGEST = 60
-"""Characters of a wrong value that a message shows."""
 _NAME_LENGTH = 32
 """Characters that a robot controller takes in a name."""
 
@@ -49,6 +55,8 @@ class ContourTask:
         largest distance of the chords from the contour; exactly one of the three is given.
     axis_tolerance : float rad, optional
         Largest angle between the axis along a chord and the contour's, with `tolerance`.
+    table : ContourTable
+        What is made of the loop before it is sampled, as the file says it.
     """
 
     pick: str
@@ -58,6 +66,11 @@ class ContourTask:
     count: int | None = None
     tolerance: float | None = None
     axis_tolerance: float | None = None
+    table: ContourTable
+
+    def candidates(self, drawn: Contour, surface: Surface) -> list[Contour]:
+        """Return the contours that may be cut for a loop as drawn, see `shaped`."""
+        return shaped(self.table, drawn, surface)
 
     def sample(self, contour: Contour) -> Contour:
         """Return the contour sampled as this task says, under the task's name.
@@ -72,7 +85,10 @@ class ContourTask:
                 f"contour {self.name!r}: {self.spacing * 1e3:g} mm between nodes would make more "
                 f"than {MOST_NODES} of them over {contour.length * 1e3:g} mm; raise spacing_mm"
             )
-        return replace(contour, name=self.name).resample(
+        named = replace(contour, name=self.name)
+        if self.spacing is not None and (contour.speed_share < 1).any():
+            return named.resample(dt=self.spacing / self.speed, speed=self.speed)
+        return named.resample(
             spacing=self.spacing,
             count=self.count,
             tolerance=self.tolerance,
@@ -86,8 +102,8 @@ class ProgramOptions:
 
     Parameters
     ----------
-    language : {"rapid"}
-        Robot language.
+    language : {"rapid", "none"}
+        Robot language, or that no program is wanted.
     name : str
         Name of the module: letters, digits and _, a letter first.
     retract : float m
@@ -98,16 +114,25 @@ class ProgramOptions:
         Digital output that switches the laser.
     lead_time : float s
         How long before the robot reaches a point the laser is switched for it.
+    pierce_time : float s
+        How long the laser stays on at the start before the cut goes on.
+    approach_speed : float m/s
+        Along the tool axis before and after a contour.
+    air_speed : float
+        Share of the full speed of joint moves.
     work_object, tool_name : str
         Names of the part frame and the tool in the program.
     """
 
-    language: Literal["rapid"]
+    language: Literal["rapid", "none"]
     name: str
     retract: float
     zone: float
     laser_output: str
     lead_time: float
+    pierce_time: float
+    approach_speed: float
+    air_speed: float
     work_object: str
     tool_name: str
 
@@ -138,6 +163,10 @@ class Job:
         Parts into which the refinement divides every interval between nodes.
     interruptions : {"none", "fewest"}
         Whether a contour that cannot be cut in one go is cut in pieces.
+    cell : CellTable or None
+        What stands around, as the file says it; without one, collisions are not checked.
+    sequence : SequenceTable or None
+        How the order and the moves between contours are chosen; without one, neither is.
     audit_options : dict
         Keyword arguments of `kerfpath.auditor.checks`, in SI.
     program : ProgramOptions
@@ -156,6 +185,8 @@ class Job:
     plan_options: dict[str, Any]
     refine_parts: int
     interruptions: Literal["none", "fewest"]
+    cell: CellTable | None
+    sequence: SequenceTable | None
     audit_options: dict[str, Any]
     program: ProgramOptions
     source: dict[str, Any]
@@ -176,8 +207,9 @@ def read_job(path: str | Path) -> Job:
     try:
         file = JobFile.model_validate(source, context={"folder": path.parent})
     except ValidationError as error:
-        raise _refusal(path, text, error) from None
-    robot = file.robot.resolve()
+        raise refusal(path, text, error) from None
+    described = file.cell is not None and file.cell.links != "capsules"
+    robot = file.robot.resolve(path.parent, bodies=described)
     return Job(
         path=path,
         robot=robot,
@@ -189,6 +221,8 @@ def read_job(path: str | Path) -> Job:
         plan_options=_plan_options(file.plan, robot.endless) | {"comfort": file.comfort.resolve()},
         refine_parts=file.plan.refine_parts,
         interruptions=file.plan.interruptions,
+        cell=file.cell,
+        sequence=file.sequence,
         audit_options=audit_options(file.audit),
         program=program_options(file.program, path.stem),
         source=source,
@@ -199,17 +233,17 @@ def _text(path: Path) -> str:
     try:
         raw = path.read_bytes()
     except IsADirectoryError:
-        raise _error(path, None, "expected a job file, got a folder; name a file in it") from None
+        raise error_at(path, None, "expected a job file, got a folder; name a file in it") from None
     except FileNotFoundError:
-        raise _error(path, None, "no such file; give the path of a job file") from None
+        raise error_at(path, None, "no such file; give the path of a job file") from None
     except (OSError, ValueError) as error:
         why = getattr(error, "strerror", None) or str(error)
-        raise _error(path, None, f"cannot be read ({why}); give the path of a job file") from None
+        raise error_at(path, None, f"cannot be read ({why}); give the path of a job file") from None
     try:
         return raw.decode("utf-8-sig")  # some editors begin a UTF-8 file with a byte order mark
     except UnicodeDecodeError as error:
         line = raw.count(b"\n", 0, error.start) + 1
-        raise _error(
+        raise error_at(
             path,
             line,
             f"expected UTF-8 text, got the byte 0x{raw[error.start]:02x}; save the file as UTF-8",
@@ -220,16 +254,16 @@ def _tables(path: Path, text: str) -> dict[str, Any]:
     try:
         tables = tomllib.loads(text)
     except RecursionError:
-        raise _error(path, None, "arrays or tables are nested too deeply; flatten them") from None
+        raise error_at(path, None, "arrays or tables are nested too deeply; flatten them") from None
     except tomllib.TOMLDecodeError as error:
         told = str(error)
         at = re.search(r" \(at line (\d+), column \d+\)$", told)
         line = int(at[1]) if at else text.rstrip("\n").count("\n") + 1
-        raise _error(path, line, f"not valid TOML: {told}; correct it there") from None
+        raise error_at(path, line, f"not valid TOML: {told}; correct it there") from None
     except ValueError:  # what Python's int() refuses
-        raise _error(path, None, "not valid TOML: an integer is too long; shorten it") from None
+        raise error_at(path, None, "not valid TOML: an integer is too long; shorten it") from None
     if not tables:
-        raise _error(
+        raise error_at(
             path, 1, "expected [robot], [tool], [part] and [[contour]], got an empty file; add them"
         )
     return tables
@@ -245,6 +279,7 @@ def _task(table: ContourTable) -> ContourTask:
         count=table.count,
         tolerance=_metres(table.tolerance_mm),
         axis_tolerance=None if angle is None else float(np.radians(angle)),
+        table=table,
     )
 
 
@@ -293,84 +328,9 @@ def program_options(table: ProgramTable, stem: str) -> ProgramOptions:
         zone=table.zone_mm / 1000,
         laser_output=table.laser_output,
         lead_time=table.lead_time_s,
+        pierce_time=table.pierce_time_s,
+        approach_speed=table.approach_mm_s / 1000,
+        air_speed=table.air_speed,
         work_object=table.work_object,
         tool_name=table.tool_name,
     )
-
-
-def _refusal(path: Path, text: str, error: ValidationError) -> InputError:
-    """Return the first problem in the file, said in one line."""
-    details = error.errors(include_url=False)
-    locs, places = [d["loc"] for d in details], Places(text)
-    problems = []
-    for detail in details:
-        loc = detail["loc"]
-        # An array with a wrong element is also called too short: the element says it all.
-        if detail["type"] == "too_short" and any(p[: len(loc)] == loc != p for p in locs):
-            continue
-        where = (*loc, *detail["ctx"]["where"]) if detail["type"] == FAULT else loc
-        # What is missing comes last: a misspelt key is the better news of the two.
-        order = detail["type"] == "missing", *places.locate(where)
-        key = ".".join(part for part in where if isinstance(part, str))
-        problems.append((order, f"{key}: {_problem(detail)}"))
-    (_, *position), said = min(problems)
-    more = f" (and {len(problems) - 1} more)" if len(problems) > 1 else ""
-    return _error(path, position[0], said + more)
-
-
-def _problem(detail: ErrorDetails) -> str:
-    """Say what was expected, what came and what to do."""
-    kind, value, context = detail["type"], detail["input"], detail.get("ctx", {})
-    if kind == FAULT:
-        got = context["got"] or _shown(value)
-        return f"expected {context['expected']}, got {got}; {context['remedy']}"
-    table, *keys = (part for part in detail["loc"] if isinstance(part, str))
-    header = f"[[{table}]]" if table == "contour" else f"[{table}]"
-    if kind == "extra_forbidden":
-        known = TABLES[table].model_fields if keys else TABLES
-        holder = f"a key of {header}" if keys else "a known table"
-        unknown = keys[0] if keys else table
-        return f"expected {holder}, got an unknown name; {nearest(unknown, known)}"
-    if not keys:
-        if kind == "tuple_type" and isinstance(value, dict):
-            return f"expected tables {header}, got a single one; write it as {header}"
-        got = "none" if kind == "missing" else _shown(value)
-        return f"expected a table {header}, got {got}; write its header and its keys"
-    field = TABLES[table].model_fields[keys[0]]
-    expected, example = field.description, f"{keys[0]} = {(field.examples or [''])[0]}"
-    if kind == "missing":
-        return f"expected {expected}, got nothing; add, for example, {example}"
-    if kind == "literal_error":
-        return f"expected {context['expected']}, got {_shown(value)}; write one of them"
-    bound = context.get("le", context.get("ge"))
-    if bound in (-LARGEST, LARGEST) or (bound == SMALLEST and value > 0):
-        expected = f"{expected}, at {'most' if 'le' in context else 'least'} {bound:g}"
-    last = detail["loc"][-1]
-    number = f" as number {last + 1}" if isinstance(last, int) else ""
-    return f"expected {expected}, got {_shown(value)}{number}; write, for example, {example}"
-
-
-def _shown(value: object) -> str:
-    """Return a value as TOML has it, cut short."""
-    if isinstance(value, dict):
-        return "a table"
-    if isinstance(value, list):
-        inside = ("..." if isinstance(v, dict | list) else _shown(v) for v in value[:_LONGEST])
-        text = f"[{', '.join(inside)}]"
-    elif isinstance(value, bool):
-        text = str(value).lower()
-    elif isinstance(value, str):
-        text = f'"{value}"'
-    elif isinstance(value, date | datetime | time):
-        text = value.isoformat()
-    elif isinstance(value, int) and abs(value) >= 1e20:
-        return "a number of more than 20 digits"
-    else:
-        text = str(value)
-    return text if len(text) <= _LONGEST else f"{text[:_LONGEST]}..."
-
-
-def _error(path: Path, line: int | None, said: str) -> InputError:
-    """Return the error with its place in front, all on one line whatever came from the file."""
-    text = f"{path}: {said}" if line is None else f"{path}:{line}: {said}"
-    return InputError("".join(c if c.isprintable() else repr(c)[1:-1] for c in text))

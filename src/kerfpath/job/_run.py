@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -11,13 +12,18 @@ import numpy as np
 from kerfpath._arrays import Array, Ints
 from kerfpath.auditor import Check, checks
 from kerfpath.cad import read as read_drawing
+from kerfpath.cell import Cell
 from kerfpath.contour import FRAME_KINDS, Contour
 from kerfpath.errors import NoFeasiblePath
 from kerfpath.graph import LayeredGraph
+from kerfpath.job._cell import cell_of_job
+from kerfpath.job._cut import Cut
+from kerfpath.job._order import ordered
 from kerfpath.job._read import ContourTask, Job
 from kerfpath.kernels import is_compiled
 from kerfpath.planner import (
     FastestSpeed,
+    clearance_map,
     fastest_speed,
     layered_graph,
     plan,
@@ -27,7 +33,7 @@ from kerfpath.planner import (
 from kerfpath.plans import Plan
 from kerfpath.refiner import refine
 from kerfpath.robots import robot
-from kerfpath.search import Relaxations
+from kerfpath.sequence import PartPlan
 
 __all__ = ["Cut", "Outcome", "Progress", "fastest_speeds", "run_job", "warm_up"]
 
@@ -36,85 +42,25 @@ Progress = Callable[[str, int, int], None]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class Cut:
-    """What came of one contour of a job, or of one piece of it.
-
-    Parameters
-    ----------
-    contour : str
-        What the job calls the contour.
-    task : ContourTask
-    drawn : Contour
-        The loop as drawn, densely sampled, part frame.
-    nodes : Contour
-        Its nodes, part frame.
-    graph : LayeredGraph
-    plan : Plan or None
-        None when no feasible path was found.
-    broken : NoFeasiblePath or None
-        Why there is no plan.
-    fastest : FastestSpeed or None
-        Where there is no plan but a slower one exists: up to which speed.
-    relaxations : Relaxations or None
-        With it: the least change of each limit that would do at the speed asked.
-    checks : tuple of Check
-        The audit's table; empty without a plan.
-    """
-
-    contour: str
-    task: ContourTask
-    drawn: Contour
-    nodes: Contour
-    graph: LayeredGraph
-    plan: Plan | None = None
-    broken: NoFeasiblePath | None = None
-    fastest: FastestSpeed | None = None
-    relaxations: Relaxations | None = None
-    checks: tuple[Check, ...] = ()
-
-    @property
-    def passed(self) -> bool:
-        """True when there is a plan and its audit finds no error."""
-        return self.plan is not None and not any(
-            c.level == "error" and not c.ok for c in self.checks
-        )
-
-    @property
-    def failure(self) -> str:
-        """Why there is no plan, and what would help; empty where there is one."""
-        if self.broken is None:
-            return ""
-        if self.fastest is None or self.relaxations is None:
-            return str(self.broken)
-        ways = [
-            f"{name} {share:.4g}"
-            for name, share in (
-                ("eta_velocity", self.relaxations.eta_v),
-                ("eta_acceleration", self.relaxations.eta_a),
-            )
-            if share is not None
-        ]
-        node = self.nodes.points[self.fastest.node] * 1000
-        return (
-            f"{self.broken}; a path exists up to {self.fastest.speed * 60:.4g} m/min, where the "
-            f"{self.fastest.limit} of joint {self.fastest.joint + 1} binds at node "
-            f"{self.fastest.node}, {' '.join(f'{v:.1f}' for v in node)} mm"
-            f"{'; or from ' + ' or from '.join(ways) + ' on' if ways else ''}"
-        )
-
-
-@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Outcome:
-    """What came of a job: every cut, in order, and the part's mesh for pictures."""
+    """What came of a job: every cut, in order, its cell, and the part's mesh for pictures.
+
+    With [sequence]: the moves between the cuts and their audit, or why there is no way.
+    """
 
     job: Job
     cuts: tuple[Cut, ...]
     mesh: tuple[Array, Ints]
+    cell: Cell | None = None
+    part: PartPlan | None = None
+    stuck: NoFeasiblePath | None = None
+    air: tuple[Check, ...] = ()
 
     @property
     def passed(self) -> bool:
-        """True when every contour has a plan that passes its audit."""
-        return all(cut.passed for cut in self.cuts)
+        """True when every contour has a plan that passes its audit, and every move too."""
+        moves = self.stuck is None and all(check.ok for check in self.air)
+        return moves and all(cut.passed for cut in self.cuts)
 
     @property
     def plans(self) -> tuple[Plan, ...]:
@@ -135,13 +81,32 @@ def run_job(job: Job, *, progress: Progress = lambda what, done, total: None) ->
     part = read_drawing(job.part_file, unit=job.part_unit)
     for task in job.contours:  # a misspelt name shall not wait for the contours before it
         part.loop(task.pick)
-    cuts = [
-        cut for task in job.contours for cut in _cut(job, task, part.contour(task.pick), progress)
+    cell = cell_of_job(job, part)
+    loops = [part.contour(task.pick) for task in job.contours]
+    tries = [
+        [
+            _cut(job, task, shaped, cell, progress)
+            for shaped in task.candidates(loop, part.surface(task.pick))
+        ]
+        for task, loop in zip(job.contours, loops, strict=True)
     ]
-    return Outcome(job=job, cuts=tuple(cuts), mesh=part.mesh())
+    if job.sequence is not None:
+        progress("order and moves", 0, 1)
+    found = ordered(job, loops, tries, cell)
+    return Outcome(
+        job=job,
+        cuts=found.cuts,
+        mesh=part.mesh(),
+        cell=cell,
+        part=found.part,
+        stuck=found.stuck,
+        air=found.air,
+    )
 
 
-def _cut(job: Job, task: ContourTask, drawn: Contour, progress: Progress) -> tuple[Cut, ...]:
+def _cut(
+    job: Job, task: ContourTask, drawn: Contour, cell: Cell | None, progress: Progress
+) -> tuple[Cut, ...]:
     """Return what came of a contour: one cut, or several where it is interrupted."""
     nodes = task.sample(drawn)
     options, done = job.plan_options, 0
@@ -163,37 +128,77 @@ def _cut(job: Job, task: ContourTask, drawn: Contour, progress: Progress) -> tup
         comfort=options["comfort"],
         progress=solved,
     )
-    whole = Cut(contour=task.name, task=task, drawn=drawn, nodes=nodes, graph=graph)
+    clearance = None
+    if cell is not None and job.cell is not None and job.cell.map:
+        clearance = clearance_map(graph, cell)
+    whole = Cut(
+        contour=task.name, task=task, drawn=drawn, nodes=nodes, graph=graph, clearance=clearance
+    )
     try:
-        plans = _plans(job, task, nodes, graph)
+        plans = _plans(job, task, nodes, graph, cell)
     except NoFeasiblePath as broken:
         # With poses everywhere slower would do; for a loop that cannot close it need not.
-        if not np.diff(graph.start).all() or options["closure"] != "free":
+        constant = options["closure"] == "free" and nodes.time is None
+        if not np.diff(graph.start).all() or not constant:
             return (replace(whole, broken=broken),)
         progress(f"{task.name}: fastest speed", 0, 1)
+        if cell is not None:
+            # Shares of the limits at which a clear path exists are not looked for.
+            with suppress(NoFeasiblePath):
+                slower = _fastest(job, nodes, cell, refine=False, graph=graph)
+                return (replace(whole, broken=broken, fastest=slower),)
+            return (replace(whole, broken=broken),)
         least = relaxations(
             nodes, job.robot, graph, task.speed, eta_v=options["eta_v"], eta_a=options["eta_a"]
         )
         fastest = FastestSpeed.of(nodes, least.slower)
         return (replace(whole, broken=broken, fastest=fastest, relaxations=least),)
-    return tuple(_audited(job, whole, made) for made in plans)
+    return tuple(_audited(job, whole, made, cell) for made in plans)
 
 
-def _plans(job: Job, task: ContourTask, nodes: Contour, graph: LayeredGraph) -> tuple[Plan, ...]:
+def _fastest(
+    job: Job,
+    nodes: Contour,
+    cell: Cell | None,
+    *,
+    refine: bool,
+    graph: LayeredGraph | None = None,
+) -> FastestSpeed:
+    """Return the fastest constant speed of a contour, clear in the cell where there is one."""
+    keys, comfort = (
+        ("gamma_step", "frames", "postures", "eta_v", "eta_a"),
+        job.plan_options["comfort"],
+    )
+    return fastest_speed(
+        nodes,
+        job.robot,
+        tool=job.tool,
+        placement=job.placement,
+        cell=cell,
+        graph=graph,
+        refine=refine,
+        comfort=comfort and comfort.hard,
+        **{key: job.plan_options[key] for key in keys},
+    )
+
+
+def _plans(
+    job: Job, task: ContourTask, nodes: Contour, graph: LayeredGraph, cell: Cell | None
+) -> tuple[Plan, ...]:
     """Return the plan of a contour, or those of its pieces where the job lets it be interrupted."""
     options = job.plan_options
-    cell: dict[str, Any] = {"tool": job.tool, "placement": job.placement, "speed": task.speed}
-    cell["graph"] = graph
+    setting: dict[str, Any] = {"tool": job.tool, "placement": job.placement, "graph": graph}
+    setting["speed"] = task.speed if nodes.time is None else None
     try:
-        return (plan(nodes, job.robot, **cell, **options),)
+        return (plan(nodes, job.robot, cell=cell, **setting, **options),)
     except NoFeasiblePath:
         if job.interruptions == "none" or not np.diff(graph.start).all():
             raise
     plain = {key: value for key, value in options.items() if key not in ("feed", "rotation")}
-    return plan_in_pieces(nodes, job.robot, **cell, **plain)
+    return plan_in_pieces(nodes, job.robot, **setting, **plain)
 
 
-def _audited(job: Job, whole: Cut, made: Plan) -> Cut:
+def _audited(job: Job, whole: Cut, made: Plan, cell: Cell | None) -> Cut:
     """Return the cut of one plan, at finer intervals if the job asks for them, and its audit."""
     drawn, graph, nodes, s = whole.drawn, whole.graph, whole.nodes, made.contour.s
     if len(s) < len(nodes):
@@ -209,13 +214,16 @@ def _audited(job: Job, whole: Cut, made: Plan) -> Cut:
         nodes=nodes,
         graph=graph,
         plan=made,
-        checks=tuple(checks(made, reference=drawn, **job.audit_options)),
+        checks=tuple(checks(made, reference=drawn, cell=cell, **job.audit_options)),
     )
 
 
 def _divided(made: Plan, drawn: Contour, parts: int) -> Plan:
     """Return the plan on nodes that divide its intervals, where one keeps the limits there."""
-    finer = drawn.resample(count=(len(made.contour) - 1) * parts + 1)
+    nodes = np.arange(len(made.contour))
+    finer = drawn.at_nodes(
+        np.interp(np.arange(nodes[-1] * parts + 1) / parts, nodes, made.contour.s)
+    )
     found = refine(made, nodes=replace(finer, name=made.name))
     if found.done:
         return found.plan
@@ -236,22 +244,15 @@ def fastest_speeds(
         As `run_job`.
     """
     part = read_drawing(job.part_file, unit=job.part_unit)
-    options = job.plan_options
-    keys = ("gamma_step", "frames", "postures", "eta_v", "eta_a", "refine")
-    comfort = options["comfort"] and options["comfort"].hard
+    cell = cell_of_job(job, part)
+    refine = job.plan_options["refine"]
     answers: list[tuple[ContourTask, Contour, FastestSpeed | NoFeasiblePath]] = []
     for i, task in enumerate(job.contours):
         progress("contours", i, len(job.contours))
-        nodes = task.sample(part.contour(task.pick))
+        drawn = task.candidates(part.contour(task.pick), part.surface(task.pick))[0]
+        nodes = task.sample(drawn)
         try:
-            found: FastestSpeed | NoFeasiblePath = fastest_speed(
-                nodes,
-                job.robot,
-                tool=job.tool,
-                placement=job.placement,
-                comfort=comfort,
-                **{key: options[key] for key in keys},
-            )
+            found: FastestSpeed | NoFeasiblePath = _fastest(job, nodes, cell, refine=refine)
         except NoFeasiblePath as broken:
             found = broken
         answers.append((task, nodes, found))

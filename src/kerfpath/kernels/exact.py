@@ -32,8 +32,10 @@ from kerfpath.kernels.search import (
     Objective,
     distance,
     fill_increment,
+    is_shut,
     joined,
     late,
+    shut_edges,
 )
 from kerfpath.kernels.states import Scratch, States, grown, in_order
 
@@ -354,27 +356,32 @@ def trace(layers: Layers, found: Reached, out_path: Ints) -> None:
 
 
 @jit
-def count_closing(layers: Layers, aim: Objective, states: States, k: int) -> Ints:
+def count_closing(layers: Layers, aim: Objective, states: States, k: int) -> tuple[Ints, int]:
     """Count, for ways from the states of layer k-1 into layer k, what forbids them.
 
-    Row 0: edges whose first velocity excess (5) is at joint i; row 1: of the others, the pairs of
-    state and edge whose first acceleration excess (6) is at joint i.
+    Row 0: edges whose first velocity excess (5) is at joint i; row 1: of the others that are not
+    shut, the pairs of state and edge whose first acceleration excess (6) is at joint i. Also
+    returns how many edges are shut.
     """
-    n = len(layers.endless)
+    n, shut = len(layers.endless), 0
     counts, dq = np.zeros((2, n), np.int64), np.empty(n)
     for i in range(len(states.first) - 1):
         a, b, p = states.first[i], states.first[i + 1], layers.start[k - 1] + i
         if a == b:
             continue
+        first, last = shut_edges(layers, p)
         for j in range(layers.start[k], layers.start[k + 1]):
             fill_increment(layers, p, j, dq)
             excess = velocity_excess(dq, aim.velocity)
             if excess >= 0:
                 counts[0, excess] += 1
                 continue
+            if is_shut(layers.shut, first, last, j):
+                shut += 1
+                continue
             for s in range(a, b):
                 if states.parent[s] >= 0:
                     excess = acceleration_excess(dq, states.dq[s], aim.acceleration)
                     if excess >= 0:
                         counts[1, excess] += 1
-    return counts
+    return counts, shut

@@ -25,11 +25,13 @@ __all__ = [
     "distance",
     "fill_increment",
     "fill_key",
+    "is_shut",
     "joined",
     "late",
     "path_planning",
     "reduced",
     "runs",
+    "shut_edges",
     "windows",
 ]
 
@@ -53,6 +55,10 @@ class Layers(NamedTuple):
     after: Ints
     """(K,): a path may break off at layer after[k], an earlier one, and begin anew at layer k, for
     the cost up to there; -1: it may not."""
+    shut_from: Ints
+    """(N+1,): edges that are shut lead from vertex p to shut[shut_from[p]:shut_from[p+1]];"""
+    shut: Ints
+    """(S,): vertices, those of one p in growing order. Both are empty where no edge is shut."""
 
 
 class Objective(NamedTuple):
@@ -153,6 +159,27 @@ def runs(
 
 
 @jit_inline
+def shut_edges(layers: Layers, p: int) -> tuple[int, int]:
+    """Return where in `shut` the edges from vertex p stand, a..b; a == b where none is shut."""
+    if len(layers.shut) == 0:
+        return 0, 0
+    return layers.shut_from[p], layers.shut_from[p + 1]
+
+
+@jit_inline
+def is_shut(shut: Ints, a: int, b: int, j: int) -> bool:
+    """Return whether vertex j is among a..b of `shut`, by halving."""
+    end = b
+    while a < b:
+        middle = (a + b) // 2
+        if shut[middle] < j:
+            a = middle + 1
+        else:
+            b = middle
+    return a < end and shut[a] == j
+
+
+@jit_inline
 def distance(layers: Layers, aim: Objective, p: int, j: int) -> float:
     """Distance rho from vertex p to vertex j; infinite where (5) or the cap forbids it."""
     total = 0.0
@@ -203,8 +230,11 @@ def _offer(
     if k > 0:
         fill_increment(layers, out_before[p], p, dq_before)
     (a, b), (c, d) = runs(layers.start, layers.low, layers.high, k, p)
+    first, last = shut_edges(layers, p)
     for v in range(a, b + d - c):
         j = v if v < b else v - b + c
+        if is_shut(layers.shut, first, last, j):
+            continue
         cost = joined(aim.minimax, out_dist[p], distance(layers, aim, p, j))
         best, best_p = out_dist[j], out_before[j]
         tie = cost == best and best_p >= 0 and layers.rank[p] < layers.rank[best_p]
@@ -259,13 +289,15 @@ def path_planning(
 
 
 @jit
-def closing_counts(layers: Layers, aim: Objective, dist: Array, before: Ints, k: int) -> Ints:
+def closing_counts(
+    layers: Layers, aim: Objective, dist: Array, before: Ints, k: int
+) -> tuple[Ints, int]:
     """Count, for edges from reached vertices of layer k-1 into layer k, what forbids them.
 
-    Row 0: edges whose first velocity excess (5) is at joint i; row 1: of the others, those whose
-    first acceleration excess (6) is at joint i.
+    Row 0: edges whose first velocity excess (5) is at joint i; row 1: of the others that are not
+    shut, those whose first acceleration excess (6) is at joint i. Also returns how many are shut.
     """
-    n = len(layers.endless)
+    n, shut = len(layers.endless), 0
     counts = np.zeros((2, n), np.int64)
     dq, dq_before = np.empty(n), np.empty(n)
     for p in range(layers.start[k - 1], layers.start[k]):
@@ -273,13 +305,16 @@ def closing_counts(layers: Layers, aim: Objective, dist: Array, before: Ints, k:
             continue
         if k > 1:
             fill_increment(layers, before[p], p, dq_before)
+        first, last = shut_edges(layers, p)
         for j in range(layers.start[k], layers.start[k + 1]):
             fill_increment(layers, p, j, dq)
             i = velocity_excess(dq, aim.velocity)
             if i >= 0:
                 counts[0, i] += 1
+            elif is_shut(layers.shut, first, last, j):
+                shut += 1
             elif k > 1:
                 i = acceleration_excess(dq, dq_before, aim.acceleration)
                 if i >= 0:
                     counts[1, i] += 1
-    return counts
+    return counts, shut

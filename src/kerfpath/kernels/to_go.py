@@ -14,7 +14,7 @@ from kerfpath._arrays import Array, Bools
 from kerfpath.kernels._jit import either, jit, jit_inline, jit_vector, larger, smaller
 from kerfpath.kernels.limits import LIMIT_TOLERANCE
 from kerfpath.kernels.metric import EUCLID, MANHATTAN
-from kerfpath.kernels.search import Layers, Objective
+from kerfpath.kernels.search import Layers, Objective, joined, shut_edges
 
 __all__ = ["LANES", "SIX", "cost_to_go"]
 
@@ -72,9 +72,13 @@ def _layer_to_go(
     """For each vertex p of layer k the least of its distance to a next vertex joined with its tail.
 
     A run is lengthened to whole `LANES`: what it takes in breaks (5), or it would be in the run.
+    While p is looked at, the tails that its shut edges lead to are infinite.
     """
     first, last = layers.start[k + 1], layers.start[k + 2]
     for p in range(layers.start[k], layers.start[k + 1]):
+        s, t = shut_edges(layers, p)
+        for i in range(s, t):
+            tail[layers.shut[i]] = np.inf
         a, b = layers.low[p], layers.high[p]
         if a <= b:
             m = min((b - a + LANES - 1) // LANES * LANES, last - first)
@@ -82,6 +86,9 @@ def _layer_to_go(
         else:
             ahead = _least(layers, aim, bound, slowness, p, a, last - a, tail)
             out_h[p] = min(ahead, _least(layers, aim, bound, slowness, p, first, b - first, tail))
+        for i in range(s, t):
+            j = layers.shut[i]
+            tail[j] = joined(aim.minimax, aim.vertex_cost[j], out_h[j])
 
 
 @jit_inline

@@ -16,6 +16,7 @@ from kerfpath.operations._surface import (
     Ribbon,
     Side,
     Surface,
+    edge,
     lateral,
     nearest,
     require_in_scrap,
@@ -27,7 +28,6 @@ LeadShape = Literal["line", "arc"]
 
 STEP = 2e-4
 """m between the nodes of a lead."""
-LEADING = [KINDS.index(word) for word in ("pierce", "lead-in")]
 SURFACE_ENDS = 1e-3
 """m: a lead farther than this from the surface has left it."""
 
@@ -95,10 +95,9 @@ def lead_out(
     clearance: float = 0.0,
 ) -> Contour:
     """Return the contour with a lead from its last node into the scrap; as `lead_in`."""
-    # A lead-in is not an edge of the part.
-    cut = int(np.argmin(np.isin(contour.kind, LEADING)))
-    plain = contour.between(contour.s[cut], contour.s[-1])
-    plain = replace(plain, kind=None)  # type: ignore[arg-type]  # all cut
+    pierced = contour.kind == KINDS.index("pierce")
+    kinds = np.where(pierced, KINDS.index("lead-in"), contour.kind)  # for `reverse`
+    plain = replace(contour, closed=False, kind=kinds, x=None, time=None)
     backwards: Side = "left" if side == "right" else "right"
     points, axes = _laid(
         reverse(plain), length, shape, angle, backwards, surface or Ribbon(contour), fan,
@@ -158,8 +157,9 @@ def _require_clearance(
     contour: Contour, points: Array, side: Side, clearance: float, what: str
 ) -> None:
     """Raise InputError where a lead lies on the part's side, or its pierce too near to the part."""
-    require_in_scrap(contour, points[:-1], side, what)
-    apart = float(np.linalg.norm(points[0] - nearest(contour, points[:1])[0]))
+    part = edge(contour)
+    require_in_scrap(part, points[:-1], side, what)
+    apart = float(np.linalg.norm(points[0] - nearest(part, points[:1])[0]))
     if apart <= max(clearance, TOUCH):
         raise InputError(
             f"{what} of {contour.name!r} ends {apart * 1e3:.3g} mm from the part, expected more "

@@ -8,16 +8,18 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from kerfpath._arrays import Array
-from kerfpath.contour import Contour, unit
+from kerfpath.contour import KINDS, Contour, unit
 from kerfpath.errors import InputError
 
-__all__ = ["Ribbon", "Side", "Surface", "lateral", "nearest", "require_in_scrap"]
+__all__ = ["Ribbon", "Side", "Surface", "edge", "lateral", "nearest", "require_in_scrap"]
 
 TOUCH = 1e-5
 """m: what runs in the scrap may be on the part's side by no more; a lead that is tangent to a curve
 leaves its first chord by some micrometres."""
 SAME_PLACE = 1e-9
 """m: two places nearer than this are one."""
+
+IN_SCRAP = [KINDS.index(word) for word in ("pierce", "lead-in", "lead-out", "loop")]
 
 Side = Literal["left", "right"]
 """Seen from the nozzle along the travel."""
@@ -71,6 +73,15 @@ def nearest(contour: Contour, points: Array) -> tuple[Array, Array]:
     order = np.lexsort((k, np.linalg.norm(points[row] - foot, axis=1), row))
     best = order[np.cumsum(many) - many]
     return foot[best], k[best]
+
+
+def edge(contour: Contour) -> Contour:
+    """Return what of a contour is the part's edge: without the leads and loops in the scrap."""
+    on = ~np.isin(contour.kind[:-1], IN_SCRAP)
+    keep = np.append(on, False) | np.append(False, on)
+    points, axes = contour.points[keep], contour.axes[keep]
+    new = np.append(np.linalg.norm(np.diff(points, axis=0), axis=1) > SAME_PLACE, True)
+    return Contour(points[new], axes[new], closed=contour.closed, name=contour.name)
 
 
 def require_in_scrap(contour: Contour, points: Array, side: Side, what: str) -> None:

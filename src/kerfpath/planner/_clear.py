@@ -1,8 +1,9 @@
-"""The best path of a task that is clear in a cell, and whether a plan is."""
+"""The searches of a task, in a cell for what is clear in it."""
 
 from __future__ import annotations
 
-from dataclasses import replace
+from collections.abc import Callable
+from typing import Any, TypeVar
 
 import numpy as np
 
@@ -13,46 +14,74 @@ from kerfpath.errors import InputError
 from kerfpath.graph import LayeredGraph
 from kerfpath.planner._task import Task
 from kerfpath.plans import Plan
-from kerfpath.search import LayeredPath, clear_path
+from kerfpath.search import (
+    InterruptedPath,
+    Known,
+    LayeredPath,
+    LeastInterval,
+    SlowedPath,
+    clear_path,
+)
 
-__all__ = ["clear_search", "only_if_clear", "require_same_cell"]
+__all__ = ["Finder"]
+
+_P = TypeVar("_P", LayeredPath, SlowedPath, InterruptedPath, LeastInterval)
 
 SAME_PLACE = 1e-9
 """m: two poses of the same tool or part differ by rounding at most."""
 
 
-def clear_search(task: Task, cell: Cell) -> tuple[LayeredPath, str]:
-    """Return the best path that is clear, and in words how many checks it took."""
-    asked = task.settings.comfort
-    band = Band() if asked is None or asked.clearance is None else asked.clearance
-    checker = Checker(cell, task.graph.q, comfort=band.width, comfort_cost=band.cost)
-    found = clear_path(
-        **task.limits,
-        **task.aim,
-        price=checker.price,
-        passable=checker.passable,
-        around=_beside(task.graph),
-        method=task.settings.method,
-        closure=task.settings.closure,
-    )
-    return found.path, (
-        f"clear in the cell: {checker.asked} of {len(task.graph.q)} poses and "
-        f"{checker.motions_asked} motions looked at in {found.searches} searches, distances "
-        f"found at {checker.measured} poses and on {checker.motions_measured} motions"
-    )
+class Finder:
+    """How the searches of a task run: as they are or, in a cell, for what is clear in it."""
+
+    def __init__(self, task: Task, cell: Cell | None) -> None:
+        self._limits, self._cell = task.limits, cell
+        if cell is None:
+            return
+        _require_same_cell(task, cell)
+        asked = task.settings.comfort
+        band = Band() if asked is None or asked.clearance is None else asked.clearance
+        self._checker = Checker(cell, task.graph.q, comfort=band.width, comfort_cost=band.cost)
+        self._known = Known(
+            task.graph.q,
+            task.graph.start,
+            price=self._checker.price,
+            passable=self._checker.passable,
+            blocked=self._checker.blocked,
+            around=_beside(task.graph),
+        )
+
+    def best(self, search: Callable[..., _P], **options: Any) -> _P:
+        """Return what a search finds within the limits of the task, `options` before them."""
+        options = self._limits | options
+        if self._cell is None:
+            return search(**options)
+        del options["q"], options["start"]
+        return clear_path(search, self._known, **options)
+
+    def claimed(self, claim: str) -> str:
+        """Return a claim and, in a cell, that it holds for what is clear, after how many checks."""
+        if self._cell is None:
+            return claim
+        seen = self._checker
+        return (
+            f"{claim}, clear in the cell: {seen.asked} of {len(self._known.cost)} poses and "
+            f"{seen.motions_asked} motions looked at in {self._known.searches} searches, "
+            f"distances found at {seen.measured} poses and on {seen.motions_measured} motions"
+        )
+
+    def is_clear(self, made: Plan) -> bool:
+        """Return whether a plan is clear in the cell, if there is one, at and between its nodes."""
+        if self._cell is None:
+            return True
+        q = made.q
+        return bool(self._cell.clear(q).all() and self._cell.clear_motion(q[:-1], q[1:]).all())
 
 
-def only_if_clear(refined: Plan, made: Plan, cell: Cell) -> Plan:
-    """Return the refined plan if it is clear at and between its nodes, else the one on the grid."""
-    q = refined.q
-    if cell.clear(q).all() and cell.clear_motion(q[:-1], q[1:]).all():
-        return refined
-    statement = f"{made.proof.statement}; not refined: off the grid it would not be clear"
-    return replace(made, proof=replace(made.proof, statement=statement))
-
-
-def require_same_cell(task: Task, cell: Cell) -> None:
+def _require_same_cell(task: Task, cell: Cell) -> None:
     """Raise InputError where the cell was built for another tool or another place of the part."""
+    if task.robot.external is not None:
+        raise InputError(f"cell: it does not know how a {task.robot.external.kind} moves in it")
     for name, here, there in (
         ("tool", task.T_flange_tip, cell.T_flange_tip),
         ("placement", task.T_base_part, cell.T_base_part),

@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from kerfpath import refiner
+from kerfpath.planner._clear import Finder
 from kerfpath.planner._refined import first_order
 from kerfpath.planner._task import Task
 from kerfpath.plans import Plan, Proof
@@ -16,17 +17,18 @@ from kerfpath.search import slowed_path
 __all__ = ["slowed"]
 
 
-def slowed(task: Task, *, refine: bool) -> Plan:
+def slowed(task: Task, finder: Finder, *, refine: bool) -> Plan:
     """Return a plan that keeps the speed asked for wherever its path lets it, and dips elsewhere.
 
     On the grid the path is the one that loses the least time, priced above all distances, if each
     step had to be slow on its own. With `refine` gamma moves off the grid to ask for little beyond
     the limits, from the best path without acceleration limits, where there is one. The times along
     the path are then the least under all limits; the refinement keeps them, and they are set anew.
+    What would not be clear off the grid stays on it.
     """
     free = refine and task.robot.family.free_rotation
-    start = first_order(task) if free else None
-    start = _least_lost(task) if start is None else start
+    start = first_order(task, finder) if free else None
+    start = _least_lost(task, finder) if start is None else start
     if not free:
         return _timed(task, start)
     eased = refiner.ease(start)
@@ -35,24 +37,28 @@ def slowed(task: Task, *, refine: bool) -> Plan:
     better = refiner.refine(made)
     again = _timed(task, better.plan)
     best = again if again.time[-1] <= made.time[-1] else made
-    comfort = task.settings.comfort
-    if comfort is None or not comfort.broken(task.robot, best.q, task.T_flange_tip):
+    comfort, broken = task.settings.comfort, ""
+    if comfort is not None and comfort.broken(task.robot, best.q, task.T_flange_tip):
+        broken = "break a margin of comfort"
+    elif not finder.is_clear(best):
+        broken = "not be clear"
+    if not broken:
         return best
-    kept = slowed(task, refine=False)
-    claim = f"{kept.proof.statement}; not refined: off the grid it would break a margin of comfort"
+    kept = slowed(task, finder, refine=False)
+    claim = f"{kept.proof.statement}; not refined: off the grid it would {broken}"
     return replace(kept, proof=replace(kept.proof, statement=claim))
 
 
-def _least_lost(task: Task) -> Plan:
+def _least_lost(task: Task, finder: Finder) -> Plan:
     s = task.settings
-    found = slowed_path(
-        **task.limits,
+    found = finder.best(
+        slowed_path,
         dt=task.dt,
         weights=s.weights,
         metric=s.metric,
         vertex_cost=task.vertex_cost,
     )
-    claim = (
+    claim = finder.claimed(
         "at constant speed the graph has no path; of all its paths this one loses the least time "
         "step by step"
     )

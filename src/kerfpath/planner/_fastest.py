@@ -9,10 +9,12 @@ from typing import Literal
 import numpy as np
 from numpy.typing import ArrayLike
 
+from kerfpath.cell import Cell
 from kerfpath.comfort import Comfort
 from kerfpath.contour import Contour, FrameKind
 from kerfpath.errors import InputError
 from kerfpath.graph import LayeredGraph
+from kerfpath.planner._clear import Finder
 from kerfpath.planner._graph import node_interval, require_even
 from kerfpath.planner._task import task_of
 from kerfpath.plans import Proof
@@ -67,6 +69,7 @@ def fastest_speed(
     eta_v: float = 1.0,
     eta_a: float = 1.0,
     refine: bool = False,
+    cell: Cell | None = None,
     comfort: Comfort | None = None,
     graph: LayeredGraph | None = None,
     progress: Callable[[int], None] | None = None,
@@ -75,13 +78,13 @@ def fastest_speed(
 
     A second-order minimax problem on the layered graph; arguments as in `plan`. The grid quantises
     the acceleration: `refine` moves gamma off it, from the fastest path, to what is then faster
-    still (the nearest optimum, which is not proved to be the best one), unless that would break a
-    margin of `comfort`, which may have no costs here.
+    still (the nearest optimum, which is not proved to be the best one), unless it would not be
+    clear or would break a margin of `comfort`, which may have no costs here.
 
     Raises
     ------
     NoFeasiblePath
-        Some node has no admissible pose at all.
+        Some node has no admissible pose at all, or no path is clear in the cell.
     InputError
         Limits that are not known, nodes unevenly spaced, values out of range, costs of comfort.
     """
@@ -104,13 +107,15 @@ def fastest_speed(
         graph=graph,
         progress=progress,
     )
-    least = least_interval(**task.limits)
+    finder = Finder(task, cell)
+    least = finder.best(least_interval)
     found = FastestSpeed.of(contour, least)
     if not (refine and robot.family.free_rotation):
         return found
     claim = Proof(optimal=False, statement="the fastest path on this graph")
     quick, at = quicken(replace(task, dt=least.dt).plan(least.index, 0.0, claim))
-    if comfort is not None and comfort.broken(robot, quick.q, task.T_flange_tip):
+    broken = comfort is not None and comfort.broken(robot, quick.q, task.T_flange_tip)
+    if broken or not finder.is_clear(quick):
         return found
     return FastestSpeed(
         speed=contour.length / float(quick.time[-1]),

@@ -4,8 +4,10 @@ from __future__ import annotations
 
 from typing import Unpack
 
+from kerfpath.cell import Cell
 from kerfpath.contour import Contour
 from kerfpath.errors import InputError, NoFeasiblePath
+from kerfpath.planner._clear import Finder
 from kerfpath.planner._refined import refined
 from kerfpath.planner._task import Options, Task, task_of
 from kerfpath.plans import Plan, Proof
@@ -16,7 +18,12 @@ __all__ = ["plan_in_pieces"]
 
 
 def plan_in_pieces(
-    contour: Contour, robot: Robot, *, refine: bool = False, **options: Unpack[Options]
+    contour: Contour,
+    robot: Robot,
+    *,
+    refine: bool = False,
+    cell: Cell | None = None,
+    **options: Unpack[Options],
 ) -> tuple[Plan, ...]:
     """Return the plans of the pieces that the contour is cut in, with the fewest interruptions.
 
@@ -27,7 +34,7 @@ def plan_in_pieces(
 
     Parameters
     ----------
-    contour, robot, refine, options
+    contour, robot, refine, cell, options
         As in `plan`, with method "exact", closure "free" (a closed contour need not return to its
         first pose), no rotation limit and no tilt. Comfort: a node in two pieces costs in both.
 
@@ -47,7 +54,7 @@ def plan_in_pieces(
     """
     comfort = options.get("comfort")
     if comfort is not None and comfort.clearance is not None:
-        raise InputError("comfort clearance: is measured in a cell, which pieces do not have")
+        raise InputError("comfort clearance: is measured in a cell, and has no price in pieces")
     task = task_of(contour, robot, **options)
     settings = task.settings
     plain = settings.method == "exact" and settings.closure == "free"
@@ -58,8 +65,9 @@ def plan_in_pieces(
         )
     if settings.tilt is not None:
         raise InputError("plan_in_pieces: the tool axis cannot be tilted in pieces; leave out tilt")
+    finder = Finder(task, cell)
     try:
-        found = interrupted_path(**task.limits, **task.aim)
+        found = finder.best(interrupted_path, **task.aim)
     except NoFeasiblePath as broken:
         raise NoFeasiblePath(
             f"contour {contour.name!r}: no number of interruptions helps: {broken}",
@@ -70,17 +78,19 @@ def plan_in_pieces(
         ) from None
     plans = []
     for number, piece in enumerate(found.pieces, 1):
-        part, made = _planned(task, piece, number, len(found.pieces))
-        plans.append(refined(part, made) if refine else made)
+        part, made = _planned(task, finder, piece, number, len(found.pieces))
+        plans.append(refined(part, Finder(part, cell), made) if refine else made)
     return tuple(plans)
 
 
-def _planned(task: Task, piece: Piece, number: int, count: int) -> tuple[Task, Plan]:
+def _planned(
+    task: Task, finder: Finder, piece: Piece, number: int, count: int
+) -> tuple[Task, Plan]:
     """Return the task of one piece, and its plan on the grid."""
     claim = "the best path on this graph under the velocity and acceleration limits"
     if count > 1:
         last = piece.first + len(piece.index) - 1
         task = task.part(piece.first, last, f"{task.contour.name}, piece {number} of {count}")
         claim = f"piece {number} of the cheapest cut with the fewest interruptions, {count - 1}"
-    proof = Proof(optimal=True, statement=claim)
+    proof = Proof(optimal=True, statement=finder.claimed(claim))
     return task, task.plan(piece.index, task.cost(piece.index), proof)

@@ -13,7 +13,7 @@ from kerfpath.comfort import Comfort
 from kerfpath.contour import Contour, FrameKind
 from kerfpath.errors import InputError, NoFeasiblePath
 from kerfpath.graph import LayeredGraph
-from kerfpath.planner._clear import clear_search, only_if_clear, require_same_cell
+from kerfpath.planner._clear import Finder
 from kerfpath.planner._dip import slowed
 from kerfpath.planner._refined import off_grid, refined
 from kerfpath.planner._task import Task, task_of
@@ -110,10 +110,12 @@ def plan(
             'feed: "dip" needs objective "sum", closure "free" and no rotation limit, got '
             f'objective "{objective}", closure "{closure}" and rotation {rotation!r}'
         )
-    if cell is not None and (feed == "dip" or rotation is not None):
-        raise InputError('cell: works with feed "constant" and without a rotation limit so far')
-    if comfort is not None and comfort.clearance is not None and cell is None:
-        raise InputError("comfort clearance: is measured in a cell; give cell=")
+    clearance = comfort is not None and comfort.clearance is not None
+    if clearance and (cell is None or feed == "dip"):
+        raise InputError(
+            "comfort clearance: is measured in a cell, at constant speed; give cell= and feed "
+            '"constant"'
+        )
     if comfort is not None and comfort.costs and feed == "dip" and refine:
         raise InputError('comfort: with feed "dip" costs are known on the grid only; refine=False')
     task = task_of(
@@ -138,28 +140,28 @@ def plan(
         graph=graph,
         progress=progress,
     )
-    clear = ""
+    finder = Finder(task, cell)
     try:
-        if cell is None:
-            path = shortest_path(
-                **task.limits,
-                **task.aim,
-                posture=task.graph.posture,
-                method=method,
-                closure=closure,
-                rotation=task.settings.rotation,
-            )
-        else:
-            require_same_cell(task, cell)
-            path, clear = clear_search(task, cell)
-    except NoFeasiblePath as broken:
+        path = finder.best(
+            shortest_path,
+            **task.aim,
+            posture=task.graph.posture,
+            method=method,
+            closure=closure,
+            rotation=task.settings.rotation,
+        )
+    except NoFeasiblePath as at_speed:
+        broken = at_speed
         if feed == "dip":
-            return slowed(task, refine=refine)
-        found = off_grid(task) if refine and closure == "free" and cell is None else None
+            try:
+                return slowed(task, finder, refine=refine)
+            except NoFeasiblePath as at_any:
+                broken = at_any
+        found = None
+        if refine and closure == "free" and feed == "constant":
+            found = off_grid(task, finder)
         if found is not None and found.done:
             return found.plan
-        if cell is not None:  # these count the vertices that are clear
-            broken.reached = broken.leaving = None
         tried = "" if found is None else f"; off the grid {found.statement}"
         raise NoFeasiblePath(
             f"contour {contour.name!r}: {broken}{_bracket(broken, task)}{tried}",
@@ -170,11 +172,8 @@ def plan(
             leaving=broken.leaving,
             counts=broken.counts,
         ) from None
-    made = task.plan(path.index, path.cost, _proof(method, path.optimal, clear))
-    if not refine:
-        return made
-    better = refined(task, made)
-    return better if cell is None else only_if_clear(better, made, cell)
+    made = task.plan(path.index, path.cost, _proof(method, path.optimal, finder))
+    return refined(task, finder, made) if refine else made
 
 
 def _bracket(broken: NoFeasiblePath, task: Task) -> str:
@@ -195,10 +194,11 @@ def _bracket(broken: NoFeasiblePath, task: Task) -> str:
     return f"{said}; the posture would have to change from {' to '.join(names)}"
 
 
-def _proof(method: Method, optimal: bool, clear: str) -> Proof:
+def _proof(method: Method, optimal: bool, finder: Finder) -> Proof:
     if optimal:
-        claim = "the best path on this graph under the velocity and acceleration limits"
-        claim += f", {clear}" if clear else ""
+        claim = finder.claimed(
+            "the best path on this graph under the velocity and acceleration limits"
+        )
     elif method == "known":
         claim = "no claim: the known technique tests neither velocity nor acceleration"
     else:

@@ -8,6 +8,7 @@ import numpy as np
 
 from kerfpath import refiner
 from kerfpath.errors import NoFeasiblePath
+from kerfpath.planner._clear import Finder
 from kerfpath.planner._task import Task
 from kerfpath.plans import Plan, Proof
 from kerfpath.refiner import Refinement
@@ -21,24 +22,25 @@ TOO_SLOW = 2.0
 """Multiple of the node interval up to which the fastest path is worth an attempt off the grid."""
 
 
-def refined(task: Task, made: Plan) -> Plan:
-    """Return the plan off its grid, at least as good; where that cannot be, as it is.
+def refined(task: Task, finder: Finder, made: Plan) -> Plan:
+    """Return the plan off its grid, at least as good and clear; where that cannot be, as it is.
 
     A refinement ends in the nearest optimum. The grid quantises the acceleration, so that its best
     path under (6) may lie far from the best motion, and its best path without (6) close by: both
     are begun from.
     """
-    first = first_order(task)
+    first = first_order(task, finder)
     starts = [made]
     if first is not None and not np.array_equal(first.q, made.q):
         starts.append(first)
     found = [refiner.refine(start) for start in starts]
     done = [f for f in found if f.done and f.cost_after <= made.cost]
-    if not done:
-        why = "not refined: off the grid it would cost more"
+    clear = [f for f in done if finder.is_clear(f.plan)]
+    if not clear:
+        why = f"not refined: off the grid it would {'not be clear' if done else 'cost more'}"
         statement = f"{made.proof.statement}; {why if found[0].done else found[0].statement}"
         return replace(made, proof=replace(made.proof, statement=statement))
-    best = min(done, key=lambda f: f.cost_after)
+    best = min(clear, key=lambda f: f.cost_after)
     how = "" if best is found[0] else " by way of the best path without acceleration limits"
     statement = (
         f"{made.proof.statement}; refined off the grid{how}: cost {made.cost:.6g} to "
@@ -48,30 +50,45 @@ def refined(task: Task, made: Plan) -> Plan:
     return replace(best.plan, proof=proof)
 
 
-def off_grid(task: Task) -> Refinement | None:
+def off_grid(task: Task, finder: Finder) -> Refinement | None:
     """Look for a motion where the graph has no path; None where that is hopeless.
 
     Of a path that breaks (6) because gamma can only step, the motion close by may not. Begun from
-    the best path without (6), and from the one that asks for the least time.
+    the best path without (6), and from the one that asks for the least time. What is found is clear
+    in the cell.
     """
-    first = first_order(task)
-    found = None if first is None else refiner.refine(first)
+    first = first_order(task, finder)
+    found = None if first is None else _cleared(refiner.refine(first), finder)
     if found is not None and found.done:
         return found
-    least = least_interval(**task.limits)
+    try:
+        least = finder.best(least_interval)
+    except NoFeasiblePath:
+        return found
     if least.dt > TOO_SLOW * task.dt:
         return found
     claim = Proof(optimal=False, statement="the fastest path on this graph")
-    return refiner.refine(task.plan(least.index, task.cost(least.index), claim))
+    quick = task.plan(least.index, task.cost(least.index), claim)
+    return _cleared(refiner.refine(quick), finder)
 
 
-def first_order(task: Task) -> Plan | None:
+def _cleared(found: Refinement, finder: Finder) -> Refinement:
+    """Return the refinement, not done where its plan is not clear."""
+    if not found.done or finder.is_clear(found.plan):
+        return found
+    return replace(found, done=False, statement="what keeps the limits would not be clear")
+
+
+def first_order(task: Task, finder: Finder) -> Plan | None:
     """Return the best path without (6); None where (5) alone closes the way."""
-    limits = task.limits | {"acceleration": FREE * task.limits["acceleration"]}
+    settings = task.settings
     try:
-        settings = task.settings
-        path = shortest_path(
-            **limits, **task.aim, closure=settings.closure, rotation=settings.rotation
+        path = finder.best(
+            shortest_path,
+            **task.aim,
+            acceleration=FREE * task.limits["acceleration"],
+            closure=settings.closure,
+            rotation=settings.rotation,
         )
     except NoFeasiblePath:
         return None

@@ -204,8 +204,13 @@ def task_of(
         raise InputError(
             f"graph: has {len(graph.start) - 1} layers, but the contour has {len(contour)} nodes"
         )
-    if not np.array_equal(graph.tilt, np.zeros((1, 2)) if tilt is None else tilt.samples()):
+    tilts = np.zeros((1, 2)) if tilt is None else tilt.samples()
+    if not np.array_equal(graph.tilt, np.repeat(tilts, len(graph.tilt) // len(tilts), axis=0)):
         raise InputError("graph: it was built with another tilt than is planned with")
+    if graph.q.shape[1] != robot.joints:
+        raise InputError(
+            f"graph: its vertices have {graph.q.shape[1]} joints, but the robot has {robot.joints}"
+        )
     if comfort is not None:
         graph = within_margins(graph, robot, comfort, T_flange_tip, periodic=closure == "periodic")
     require_no_empty_layer(contour, graph)

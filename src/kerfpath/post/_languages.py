@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from kerfpath.errors import InputError
 from kerfpath.post import _rapid
 from kerfpath.post._program import LONGEST_NAME, Program
+from kerfpath.robots import Robot
 
 __all__ = ["LANGUAGES", "Language", "language"]
 
@@ -21,6 +22,8 @@ class Language:
     name : str
     manufacturer : str
         Whose robots it moves.
+    families : tuple of str
+        Those of them that the formatter can express, by `Robot.kinematics`.
     suffix : str
         File suffix, with its dot.
     write : callable
@@ -41,6 +44,7 @@ class Language:
 
     name: str
     manufacturer: str
+    families: tuple[str, ...]
     suffix: str
     write: Callable[[Program], str]
     declared: Callable[[Program], list[tuple[str, str]]]
@@ -50,11 +54,23 @@ class Language:
     turning_speed: float
     longest_lead: float
 
+    def refusal(self, robot: Robot) -> str:
+        """Say why no program in this language can move a robot; empty where one can."""
+        if robot.manufacturer != self.manufacturer:
+            return (
+                f"language {self.name!r} is for robots by {self.manufacturer}, but {robot.id!r} is "
+                f"by {robot.manufacturer or 'an unknown maker'}"
+            )
+        if robot.kinematics not in self.families:
+            return f"language {self.name!r} cannot yet say the axes of an arm like {robot.id!r}"
+        return ""
+
 
 LANGUAGES = {
     "rapid": Language(
         name="rapid",
         manufacturer="ABB",
+        families=("opw",),
         suffix=".mod",
         write=_rapid.rapid,
         declared=_rapid.declared,

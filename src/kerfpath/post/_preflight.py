@@ -96,14 +96,8 @@ def preflight(program: Program, language: str = "rapid") -> list[ProgramIssue]:
 
 
 def _robot(program: Program, rules: Language) -> Iterator[ProgramIssue]:
-    if program.robot.manufacturer != rules.manufacturer:
-        yield ProgramIssue(
-            "error",
-            "wrong-robot",
-            f"language {rules.name!r} is for robots by {rules.manufacturer}, but "
-            f"{program.robot.id!r} is by {program.robot.manufacturer or 'an unknown maker'}",
-            "program",
-        )
+    if refusal := rules.refusal(program.robot):
+        yield ProgramIssue("error", "wrong-robot", refusal, "program")
     if not program.sections:
         yield ProgramIssue("error", "empty", "there is no contour to cut", "program")
 

@@ -28,24 +28,32 @@ class JointCurves:
     """
 
     def __init__(self, robot: Robot, H: Array, T_flange_tip: Array, posture: Ints) -> None:
-        self._robot = robot
+        self._robot = robot.alone()
+        self._external = robot.external
         self._H = H
         self._T_tip_flange = np.linalg.inv(T_flange_tip)
         self._posture = posture
 
     def at(self, gamma: Array, near: Array) -> Array:
-        """Return the joints (K, 6) rad at `gamma` (K,), each on the turn nearest to `near` (K, 6).
+        """Return the joints (K, n) rad at `gamma` (K,), each on the turn nearest to `near` (K, n).
 
-        NaN at the nodes that are out of reach.
+        NaN at the nodes that are out of reach. An external axis stays where it is in `near`.
         """
+        H = self._H
+        if self._external is not None:
+            H = np.linalg.inv(self._external.poses(near[:, -1])) @ H
+            return np.column_stack([self._of_arm(H, gamma, near[:, :-1]), near[:, -1]])
+        return self._of_arm(H, gamma, near)
+
+    def _of_arm(self, H: Array, gamma: Array, near: Array) -> Array:
         K = len(gamma)
         spin = np.tile(np.eye(4), (K, 1, 1))
         spin[:, 0, 0] = spin[:, 1, 1] = np.cos(gamma)
         spin[:, 1, 0] = np.sin(gamma)
         spin[:, 0, 1] = -spin[:, 1, 0]
-        return self._robot.follow(self._H @ spin @ self._T_tip_flange, near, self._posture)
+        return self._robot.follow(H @ spin @ self._T_tip_flange, near, self._posture)
 
     def slope(self, gamma: Array, q: Array) -> Array:
-        """Return dq/dgamma (K, 6) where the joints are `q`; NaN at the edge of reach."""
+        """Return dq/dgamma (K, n) where the joints are `q`; NaN at the edge of reach."""
         ahead, behind = (self.at(gamma + h, q) for h in (DERIVATIVE_STEP, -DERIVATIVE_STEP))
         return np.asarray((ahead - behind) / (2 * DERIVATIVE_STEP))

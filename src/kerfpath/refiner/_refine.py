@@ -203,7 +203,7 @@ def _descent(plan: Plan) -> tuple[Descent, Stand]:
         limits=plan.robot.joint_limits()
         if comfort is None
         else comfort.narrowed(plan.robot, plan.q),
-        rotation=np.full(6, np.inf) if settings.rotation is None else settings.rotation,
+        rotation=np.full(len(velocity), np.inf) if settings.rotation is None else settings.rotation,
         weight=settings.weights,
         metric=settings.metric,
         objective=settings.objective,
@@ -223,6 +223,7 @@ def _moved(plan: Plan, found: Stand) -> Plan:
     turn = np.ceil((found.q - np.pi) / (2 * np.pi))
     gamma = found.gamma - 2 * np.pi * np.ceil((found.gamma - np.pi) / (2 * np.pi))
     turn[:, plan.robot.endless] = 0
+    turn[:, plan.robot.family.joints :] = 0
     wrapped = found.q - 2 * np.pi * np.ceil((found.q - np.pi) / (2 * np.pi))
     moved = replace(
         plan,

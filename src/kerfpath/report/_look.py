@@ -32,6 +32,8 @@ _HIGH = ("#003875", "#be8313", "#09603f", "#c34fa9", "#742d0b", "#2f688d")
 _REASONS = {"admitted": "#eef7ee", "unreachable": "#b4bac4", "posture not wanted": "#d9d4e2"}
 _REASONS |= {f"joint {i + 1} low": colour for i, colour in enumerate(_LOW)}
 _REASONS |= {f"joint {i + 1} high": colour for i, colour in enumerate(_HIGH)}
+_REASONS["collision"] = "#d7263d"
+_SPARE = ("#d3e7a4", "#f7c46c", "#f08a4b")
 _OTHER_REASONS = ("#7a7f88", "#33373e")
 
 FONT = 'system-ui, -apple-system, "Segoe UI", Roboto, "Helvetica Neue", Arial, sans-serif'
@@ -40,10 +42,14 @@ FONT = 'system-ui, -apple-system, "Segoe UI", Roboto, "Helvetica Neue", Arial, s
 def reason_colours(reasons: Sequence[str]) -> tuple[str, ...]:
     """Return one colour per reason: a joint's light shade below its limits, dark above them.
 
-    Reasons without a colour of their own (couplings, low and high) take two greys in turn.
+    Clearances run from green to orange. Reasons without a colour of their own (couplings, low and
+    high) take two greys in turn.
     """
-    greys = cycle(_OTHER_REASONS)
-    return tuple(_REASONS[word] if word in _REASONS else next(greys) for word in reasons)
+    greys, spare = cycle(_OTHER_REASONS), cycle(_SPARE)
+    return tuple(
+        _REASONS[word] if word in _REASONS else next(spare if word.endswith("to spare") else greys)
+        for word in reasons
+    )
 
 
 def base_layout(height: int, **more: Any) -> go.Layout:

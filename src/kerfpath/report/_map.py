@@ -117,7 +117,8 @@ def feasibility_map(
 def shown_postures(graph: LayeredGraph) -> list[int]:
     """Return the postures with an admitted candidate; if there is none, those worth a look."""
     every = range(graph.reason.shape[-1])
-    admitted = [mu for mu in every if (graph.reason_by_gamma[:, :, mu] == ADMITTED).any()]
+    codes = [c for c, word in enumerate(graph.reasons) if c == ADMITTED or word.endswith("spare")]
+    admitted = [mu for mu in every if np.isin(graph.reason_by_gamma[:, :, mu], codes).any()]
     # Where one reason holds everywhere, a word says as much as a panel.
     mixed = [mu for mu in every if np.ptp(graph.reason_by_gamma[:, :, mu])]
     return admitted or mixed or list(every)

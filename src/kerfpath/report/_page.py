@@ -2,19 +2,16 @@
 
 from __future__ import annotations
 
-import base64
-import zlib
 from collections.abc import Sequence
 from html import escape
 from importlib.metadata import version
-from importlib.resources import files
 
-import plotly.graph_objects as go
 from numpy.typing import ArrayLike
-from plotly.offline import get_plotlyjs
 
+from kerfpath.cell import Cell
 from kerfpath.plans import Plan
 from kerfpath.report import _map, _motion, _tables
+from kerfpath.report._html import Figures, page
 from kerfpath.report._scene import scene
 from kerfpath.report._section import ContourSection
 from kerfpath.report._tables import FAIL, PASS, WARN, sign
@@ -28,6 +25,7 @@ def render(
     sections: Sequence[ContourSection],
     *,
     mesh: tuple[ArrayLike, ArrayLike] | None = None,
+    cell: Cell | None = None,
     facts: Sequence[tuple[str, str]] = (),
     notes: Sequence[str] = (),
     job_text: str = "",
@@ -42,6 +40,8 @@ def render(
         The contours, in cutting order.
     mesh : (vertices (V, 3) m, triangles (F, 3)), optional
         The part, in the part frame.
+    cell : Cell, optional
+        What stands around it, and robot and head, drawn at a few poses.
     facts : sequence of (what, value)
         Rows such as ("Robot", "ABB IRB 4600-60/2.05").
     notes : sequence of str
@@ -49,7 +49,7 @@ def render(
     job_text : str
         The job file as read.
     """
-    figures = _Figures()
+    figures = Figures()
     state, verdict = _verdict(sections)
     body = [
         "<header>",
@@ -62,8 +62,8 @@ def render(
         "<section><h2>Part and contours</h2>",
         '<p class="caption">Part frame, all axes to the same scale. Dot and cone mark start and '
         "direction; short lines are tool axes, on the side of the nozzle. Drag to turn, scroll to "
-        "zoom.</p>",
-        figures.place(scene(sections, mesh), "scene"),
+        f"zoom.{'' if cell is None else _CELL}</p>",
+        figures.place(scene(sections, mesh, cell), "scene"),
         "</section>",
         "<section><h2>Contours</h2>",
         _tables.summary_table(sections),
@@ -74,60 +74,17 @@ def render(
         _job(job_text),
         f"<footer>{_origin(sections)}</footer>",
     ]
-    return _SKELETON.format(
-        title=escape(title),
-        style=_resource("page.css"),
-        body="\n".join(part for part in body if part),
-        data="\n".join(figures.data),
-        plotly=get_plotlyjs(),
-        script=_resource("page.js"),
-    )
+    return page(title, body, figures)
 
 
-_SKELETON = """<!DOCTYPE html>
-<html lang="en">
-<head>
-<meta charset="utf-8">
-<meta name="viewport" content="width=device-width, initial-scale=1">
-<meta name="generator" content="kerfpath">
-<title>{title}</title>
-<style>
-{style}</style>
-</head>
-<body>
-<main>
-{body}
-</main>
-{data}
-<script>{plotly}</script>
-<script>
-{script}</script>
-</body>
-</html>
-"""
+_SPARE = (
+    " Where nothing forbids it, the colour says how much more than the near-miss distances is kept;"
+    " pairs with a distance of their own, as nozzle and part, count as collisions alone."
+)
+_CELL = " The slider puts robot and head to a few poses; capsules stand in for links."
 
 
-class _Figures:
-    """The figures of a page: each is packed once, and drawn when it first comes into view."""
-
-    def __init__(self) -> None:
-        self.data: list[str] = []
-
-    def place(self, figure: go.Figure, kind: str) -> str:
-        """Pack `figure` and return the element that it is drawn into."""
-        number = len(self.data) + 1
-        # A map of 1500 x 360 x 8 codes has long runs: deflated, a report with many stays small.
-        packed = base64.b64encode(zlib.compress(figure.to_json().encode(), 9)).decode()
-        self.data.append(
-            f'<script type="application/octet-stream" id="figure-{number}">{packed}</script>'
-        )
-        return (
-            f'<div class="figure {kind}" data-figure="figure-{number}" '
-            f'style="min-height:{figure.layout.height}px"></div>'
-        )
-
-
-def _contour(number: int, section: ContourSection, figures: _Figures) -> str:
+def _contour(number: int, section: ContourSection, figures: Figures) -> str:
     plan = section.plan
     result = _tables.audit_sign(section) if plan else sign(FAIL, "no feasible path")
     size = f"{_tables.number(section.path.length * 1e3, 1)} mm, {len(section.path)} nodes"
@@ -168,14 +125,14 @@ def _contour(number: int, section: ContourSection, figures: _Figures) -> str:
     parts += [
         "<h4>What became of the candidates</h4>",
         '<p class="caption">A candidate is one gamma in one posture at one node.</p>',
-        _tables.counts_table(section.graph),
+        _tables.counts_table(section.mapped),
         "</details>",
     ]
     return "\n".join(parts)
 
 
-def _map_part(section: ContourSection, figures: _Figures) -> list[str]:
-    graph, plan = section.graph, section.plan
+def _map_part(section: ContourSection, figures: Figures) -> list[str]:
+    graph, plan = section.mapped, section.plan
     figure = _map.feasibility_map(graph, plan, s=section.path.s, broken_at=section.broken_at)
     # The page has a legend of its own, which wraps, and a hover text that knows the reason.
     figure.update_layout(showlegend=False)
@@ -183,10 +140,10 @@ def _map_part(section: ContourSection, figures: _Figures) -> list[str]:
     hidden = _map.hidden_postures(graph)
     others = "".join(f"<li>{escape(text)}</li>" for text in hidden)
     return [
-        "<h4>Feasibility map</h4>",
+        f"<h4>{'Feasibility' if section.clearance is None else 'Collision'} map</h4>",
         '<p class="caption">Which rotations gamma about the beam the robot can take at each node, '
         "one panel per posture (shoulder / elbow / wrist); elsewhere the colour says which limit "
-        "forbids it.</p>",
+        f"forbids it.{'' if section.clearance is None else _SPARE}</p>",
         _tables.reason_legend(graph, _map.shown_postures(graph), has_plan=plan is not None),
         figures.place(figure, "map"),
         f'<ul class="others">{others}</ul>' if others else "",
@@ -262,7 +219,3 @@ def _origin(sections: Sequence[ContourSection]) -> str:
             limits = plan.robot.sources["geometry_limits_velocity"]
             told.append(f"geometry, joint and velocity limits: {limits}")
     return escape(" · ".join(told))
-
-
-def _resource(name: str) -> str:
-    return (files("kerfpath.report") / name).read_text(encoding="utf-8")

@@ -11,11 +11,13 @@ import plotly.graph_objects as go
 from numpy.typing import ArrayLike
 
 from kerfpath._arrays import Array, floats, integers
+from kerfpath.cell import Cell
 from kerfpath.errors import InputError
+from kerfpath.report._cell import add_cell, poses_shown
 from kerfpath.report._look import ACCENT, ALERT, FAINT, GRID, INK, QUIET, base_layout
 from kerfpath.report._section import ContourSection
 
-__all__ = ["scene"]
+__all__ = ["add_part", "checked", "scene", "space_axis", "xyz"]
 
 HEIGHT = 560
 AXES_DRAWN = 48
@@ -25,32 +27,38 @@ LABELS = 12
 
 
 def scene(
-    sections: Sequence[ContourSection], mesh: tuple[ArrayLike, ArrayLike] | None
+    sections: Sequence[ContourSection],
+    mesh: tuple[ArrayLike, ArrayLike] | None,
+    cell: Cell | None = None,
 ) -> go.Figure:
-    """Return the part (if given as a mesh, m) and its contours, in mm, all axes alike."""
+    """Return the part (if given as a mesh, m), its contours and its cell, in mm, axes alike."""
     figure = go.Figure(layout=base_layout(HEIGHT, showlegend=False))
     corners = [section.path.points * 1e3 for section in sections]
     if mesh is not None:
-        vertices, triangles = _checked(mesh)
+        vertices, triangles = checked(mesh)
         corners.append(vertices * 1e3)
-        _add_part(figure, vertices * 1e3, triangles)
+        add_part(figure, vertices * 1e3, triangles)
     size = float(np.linalg.norm(np.ptp(np.vstack(corners), axis=0))) if corners else 1.0
     for section in sections:
         _add_contour(figure, section, size)
+    if cell is not None and cell.T_base_part is not None:
+        plans = [section.plan for section in sections if section.plan is not None]
+        add_cell(figure, cell, cell.T_base_part, poses_shown(plans))
     figure.update_layout(
         margin={"l": 0, "r": 0, "t": 0, "b": 0},
         scene={
-            "aspectmode": "data",
+            "aspectmode": "data" if cell is None else "manual",
             "dragmode": "turntable",
             "camera": _camera(sections),
             "annotations": _labels(sections) if len(sections) <= LABELS else [],
-            **{f"{a}axis": _axis(a) for a in "xyz"},
+            **{f"{a}axis": space_axis(a) for a in "xyz"},
         },
     )
     return figure
 
 
-def _add_part(figure: go.Figure, vertices: Array, triangles: Any) -> None:
+def add_part(figure: go.Figure, vertices: Array, triangles: Any) -> None:
+    """Add the part (mm) to a figure."""
     figure.add_mesh3d(
         **dict(zip("xyz", vertices.T.astype(np.float32), strict=True)),
         **dict(zip("ijk", triangles.T.astype(np.uint32), strict=True)),
@@ -86,7 +94,7 @@ def _add_contour(figure: go.Figure, section: ContourSection, size: float) -> Non
         name=f"{name}: tool axes",
     )
     figure.add_scatter3d(
-        **_xyz(points),
+        **xyz(points),
         mode="lines",
         line={"color": colour, "width": 6},
         customdata=np.round((path.s - path.s[0]) * 1e3, 1).astype(np.float32),
@@ -99,7 +107,7 @@ def _add_contour(figure: go.Figure, section: ContourSection, size: float) -> Non
     along = points[min(3, len(points) - 1)] - points[0]
     along = along / np.linalg.norm(along)
     figure.add_cone(
-        **_xyz(points[:1]),
+        **xyz(points[:1]),
         **dict(zip("uvw", along[:, None], strict=True)),
         anchor="tail",
         sizemode="raw",
@@ -110,7 +118,7 @@ def _add_contour(figure: go.Figure, section: ContourSection, size: float) -> Non
         name=f"{name}: direction",
     )
     figure.add_scatter3d(
-        **_xyz(points[:1]),
+        **xyz(points[:1]),
         mode="markers",
         marker={"color": INK, "size": 4},
         hovertemplate="start<extra>" + name + "</extra>",
@@ -118,7 +126,7 @@ def _add_contour(figure: go.Figure, section: ContourSection, size: float) -> Non
     )
     if section.broken_at is not None and 0 <= section.broken_at < len(points):
         figure.add_scatter3d(
-            **_xyz(points[section.broken_at][None]),
+            **xyz(points[section.broken_at][None]),
             mode="markers",
             marker={"color": ALERT, "size": 6, "symbol": "x"},
             hovertemplate=f"path breaks at node {section.broken_at}<extra>{name}</extra>",
@@ -160,7 +168,8 @@ def _camera(sections: Sequence[ContourSection]) -> dict[str, Any]:
     }
 
 
-def _axis(name: str) -> dict[str, Any]:
+def space_axis(name: str) -> dict[str, Any]:
+    """Return the look of an axis in space."""
     return {
         "title": {"text": f"{name}, mm", "font": {"size": 12, "color": QUIET}},
         "tickfont": {"size": 10, "color": QUIET},
@@ -172,7 +181,8 @@ def _axis(name: str) -> dict[str, Any]:
     }
 
 
-def _checked(mesh: tuple[ArrayLike, ArrayLike]) -> tuple[Array, Any]:
+def checked(mesh: tuple[ArrayLike, ArrayLike]) -> tuple[Array, Any]:
+    """Return a mesh (vertices, triangles), its indices checked."""
     vertices = floats(mesh[0], "mesh vertices", (None, 3))
     triangles = integers(mesh[1], "mesh triangles", (None, 3))
     if triangles.size and not (triangles.min() >= 0 and triangles.max() < len(vertices)):
@@ -183,11 +193,12 @@ def _checked(mesh: tuple[ArrayLike, ArrayLike]) -> tuple[Array, Any]:
     return vertices, triangles
 
 
-def _xyz(points: Array) -> dict[str, Any]:
+def xyz(points: Array) -> dict[str, Any]:
+    """Return points (K, 3) as plotly takes them."""
     return dict(zip("xyz", points.T.astype(np.float32), strict=True))
 
 
 def _lines(starts: Array, ends: Array) -> dict[str, Any]:
     """Return many separate lines as one trace; NaN is plotly's sign for a break."""
     breaks = np.full_like(starts, np.nan)
-    return _xyz(np.stack([starts, ends, breaks], axis=1).reshape(-1, 3))
+    return xyz(np.stack([starts, ends, breaks], axis=1).reshape(-1, 3))

@@ -3,15 +3,42 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from itertools import pairwise
+
+import numpy as np
 
 from kerfpath.auditor import Check
 from kerfpath.contour import Contour
 from kerfpath.errors import InputError
 from kerfpath.graph import LayeredGraph
+from kerfpath.planner import ClearanceMap
 from kerfpath.plans import Plan
 
-__all__ = ["ContourSection"]
+__all__ = ["COLLISION", "SPARE", "ContourSection", "with_clearance"]
+
+COLLISION = "collision"
+SPARE = (0.25, 0.5, 1.0)
+"""Shares of the band of a clearance map up to which clearances are told apart."""
+
+
+def with_clearance(graph: LayeredGraph, found: ClearanceMap) -> LayeredGraph:
+    """Return the graph with what was found of its vertices among the reasons, by candidate.
+
+    A candidate that is not clear is called a collision; one whose clearance is less than the band
+    of the map, by how much it has to spare. The turns of a candidate have the same pose, so that
+    any of them tells.
+    """
+    steps = [1e3 * share * found.band for share in (0.0, *SPARE)]
+    spare = [f"{a:g} to {b:g} mm to spare" for a, b in pairwise(steps)][::-1]
+    reasons = (graph.reasons[0], *spare, COLLISION, *graph.reasons[1:])
+    added = len(spare) + 1
+    above = np.searchsorted(np.array(SPARE) * found.band, found.lower, side="right")
+    layer = np.repeat(np.arange(len(graph.reason)), np.diff(graph.start))
+    # In this order the least code is the best of a gamma's variants.
+    reason = np.where(graph.reason == 0, 0, graph.reason + added).astype(np.uint8)
+    reason[layer, graph.candidate, graph.posture] = np.where(found.clear, len(SPARE) - above, added)
+    return replace(graph, reason=reason, reasons=reasons)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -32,6 +59,8 @@ class ContourSection:
         The audit's table; empty when the audit was not run.
     failure : str
         Why there is no plan, in words.
+    clearance : ClearanceMap, optional
+        How clear each vertex of the graph is in the cell.
     broken_at : int, optional
         First node that no admissible path reaches (one after `NoFeasiblePath.node`), 0-based.
 
@@ -48,17 +77,28 @@ class ContourSection:
     checks: Sequence[Check] = ()
     failure: str = ""
     broken_at: int | None = None
+    clearance: ClearanceMap | None = None
 
     def __post_init__(self) -> None:
         nodes = {"graph": len(self.graph.reason), "path": len(self.path)}
         if self.plan is not None:
             nodes["plan"] = len(self.plan.q)
+            if self.plan.robot.external is not None:
+                raise InputError(
+                    f"section {self.name!r}: a report does not show a "
+                    f"{self.plan.robot.external.kind} yet"
+                )
         intervals = {count - 1 for count in nodes.values()}
         if any(count % min(intervals) for count in intervals) or len(self.path) != nodes["graph"]:
             told = ", ".join(f"{name} {count}" for name, count in nodes.items())
             raise InputError(
                 f"section {self.name!r}: expected the same nodes throughout, got {told}"
             )
+
+    @property
+    def mapped(self) -> LayeredGraph:
+        """The graph, its vertices told apart by how clear they are where that is known."""
+        return self.graph if self.clearance is None else with_clearance(self.graph, self.clearance)
 
     @property
     def errors(self) -> list[Check]:

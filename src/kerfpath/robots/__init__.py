@@ -3,6 +3,8 @@
 from kerfpath.robots._chain import chain_of as chain_of
 from kerfpath.robots._chain import model_chain as model_chain
 from kerfpath.robots._coupling import Coupling as Coupling
+from kerfpath.robots._external import ExternalAxis as ExternalAxis
+from kerfpath.robots._external import Travel as Travel
 from kerfpath.robots._families import FAMILIES as FAMILIES
 from kerfpath.robots._families import Family as Family
 from kerfpath.robots._families import posture_name as posture_name

@@ -22,8 +22,13 @@ def chain_of(robot: Robot) -> Chain:
     Raises
     ------
     InputError
-        The robot has no description, and its family no model that says where its joints are.
+        The robot has no description, and its family no model that says where its joints are; or it
+        has an external axis.
     """
+    if robot.external is not None:
+        raise InputError(
+            f"robot {robot.id!r}: a cell does not know how a {robot.external.kind} moves in it"
+        )
     return model_chain(robot) if robot.chain is None else robot.chain
 
 

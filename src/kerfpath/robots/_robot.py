@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Any
+from typing import Any, Unpack
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -14,6 +14,7 @@ from kerfpath._arrays import Array, Bools, Ints, as_pose, bools, floats, freeze,
 from kerfpath.errors import InputError
 from kerfpath.kernels import turns
 from kerfpath.robots._coupling import Coupling
+from kerfpath.robots._external import ExternalAxis, Travel, alone, carried, held
 from kerfpath.robots._families import FAMILIES, Family
 from kerfpath.robots._solutions import Solutions, admitted, every
 from kerfpath.urdf import Body, Chain, read_urdf
@@ -58,6 +59,8 @@ class Robot:
         The joint frames of the description that the robot comes from: the audit's kinematics.
     bodies : tuple of Body
         Collision bodies of that description.
+    external : ExternalAxis, optional
+        Rail or positioner: one more joint, the last of q and of the limits. See `on_rail`.
 
     Raises
     ------
@@ -80,6 +83,7 @@ class Robot:
     couplings: tuple[Coupling, ...] = ()
     chain: Chain | None = None
     bodies: tuple[Body, ...] = ()
+    external: ExternalAxis | None = None
     manufacturer: str = ""
     model: str = ""
     payload: float | None = None
@@ -98,12 +102,12 @@ class Robot:
                 f"robot {self.id!r}: kinematics {self.kinematics!r} is none of "
                 f"{', '.join(FAMILIES)}"
             )
-        n, lengths = self.joints, self.family.lengths
+        n, arm, lengths = self.joints, self.family.joints, self.family.lengths
         missing = [k for k in lengths if k not in self.geometry]
         if missing:
             raise InputError(f"robot {self.id!r}: geometry lacks {', '.join(missing)} (m)")
         for name in ("sign", "offset"):
-            _set(self, name, floats(_for_each(getattr(self, name), n), name, (n,)))
+            _set(self, name, floats(_for_each(getattr(self, name), arm), name, (arm,)))
         if not (np.abs(self.sign) == 1).all():
             raise InputError(f"robot {self.id!r}: sign must be +1 or -1, got {self.sign.tolist()}")
         for name in ("T_base_foot", "T_end_flange"):
@@ -122,7 +126,10 @@ class Robot:
     def _require_limits_in_order(self) -> None:
         if self.lower is None or self.upper is None:
             return
-        reversed_ = np.flatnonzero(~(self.lower < self.upper))
+        n = self.family.joints
+        if self.external is not None:
+            self.external.require_range(float(self.lower[n]), float(self.upper[n]))
+        reversed_ = np.flatnonzero(~(self.lower[:n] < self.upper[:n]))
         if reversed_.size:
             i = int(reversed_[0])
             raise InputError(
@@ -138,8 +145,8 @@ class Robot:
 
     @property
     def joints(self) -> int:
-        """Number of joints, n."""
-        return self.family.joints
+        """Number of joints, n, with the external axis."""
+        return self.family.joints + (self.external is not None)
 
     @property
     def postures(self) -> int:
@@ -204,14 +211,36 @@ class Robot:
             changes["acceleration_source"] = "given by the user"
         return replace(self, **changes)  # type: ignore[arg-type]  # cast by __post_init__
 
+    def on_rail(self, direction: ArrayLike, **travel: Unpack[Travel]) -> Robot:
+        """Return this robot with its base on a rail along `direction` (3,).
+
+        Keywords lower, upper, velocity, acceleration, step (m, m/s, m/s^2); see `ExternalAxis`.
+        """
+        return carried(self, "rail", direction, np.zeros(3), travel)
+
+    def with_positioner(self, axis: ArrayLike, point: ArrayLike, **travel: Unpack[Travel]) -> Robot:
+        """Return this robot with a part that turns about `axis` (3,) through `point` (3,) m.
+
+        Keywords as in `on_rail`, in rad, rad/s, rad/s^2; see `ExternalAxis`.
+        """
+        return carried(self, "positioner", axis, point, travel)
+
+    alone, held = alone, held  # as they are: each a function of a robot
+
     def forward(self, q: ArrayLike) -> Array:
-        """Return the flange poses (..., 4, 4) in the robot base of joint vectors q (..., n) rad."""
+        """Return the flange poses (..., 4, 4) in the robot base of joint vectors q (..., n) rad.
+
+        The base is that at zero of an external axis, and the part's place at zero, too.
+        """
         q = np.asarray(q, dtype=float)
         rows = floats(q.reshape(-1, q.shape[-1]) if q.ndim else q, "q", (None, self.joints))
         T = np.empty((len(rows), 4, 4))
-        self.family.forward_all(self.arm(), rows, T)
+        n = self.family.joints
+        self.family.forward_all(self.arm(), np.ascontiguousarray(rows[:, :n]), T)
         if self._placed:
             T = self.T_base_foot @ T @ self.T_end_flange
+        if self.external is not None:
+            T = self.external.poses(rows[:, n]) @ T
         return freeze(T.reshape(*q.shape[:-1], 4, 4))
 
     def inverse(self, T: ArrayLike, *, within_limits: bool = True) -> Solutions:
@@ -269,6 +298,7 @@ class Robot:
 
         q (K, m, P, n) in (-pi, pi] and reach (K, m, P); frames in the robot base, limits ignored.
         """
+        self._require_alone()
         T_tip_flange = np.linalg.inv(T_flange_tip)
         if self.family.inverse_nodes is None:
             spin = np.tile(np.eye(4), (len(gamma), 1, 1))
@@ -295,6 +325,7 @@ class Robot:
 
     def _model_poses(self, T: Array) -> Array:
         """Return flange poses (B, 4, 4) as poses of the model's end in its own base."""
+        self._require_alone()
         if self._placed:
             T = np.linalg.inv(self.T_base_foot) @ T @ np.linalg.inv(self.T_end_flange)
         return np.ascontiguousarray(T)
@@ -344,11 +375,15 @@ class Robot:
     def reasons(self) -> tuple[str, ...]:
         """Say what each reason code of a dropped pose means, by code."""
         words = ["admitted", "unreachable"]
-        for name in [f"joint {i + 1}" for i in range(self.joints)] + [
+        for name in [f"joint {i + 1}" for i in range(self.family.joints)] + [
             c.name for c in self.couplings
         ]:
             words += [f"{name} low", f"{name} high"]
         return (*words, "posture not wanted")
+
+    def _require_alone(self) -> None:
+        if self.external is not None:
+            raise self.external.no_inverse()
 
     def _lacks(self, what: str, keys: str, hint: str = "") -> InputError:
         why = f" ({self.limits_missing})" if self.limits_missing else ""

@@ -1,6 +1,6 @@
 """The best path through a layered graph given as bare arrays."""
 
-from kerfpath.search._clear import ClearPath as ClearPath
+from kerfpath.search._clear import Known as Known
 from kerfpath.search._clear import clear_path as clear_path
 from kerfpath.search._fastest import LeastInterval as LeastInterval
 from kerfpath.search._fastest import least_interval as least_interval

@@ -69,8 +69,8 @@ class _Task:
     rotation : (n,) rad
         Largest distance of a joint from where the path begins.
     twin : (m,) int or None
-        The vertex of the first layer that each vertex of the last one repeats; None: the path need
-        not return.
+        The vertex of the first layer that each vertex of the last one repeats, -1 where that is
+        closed; None: the path need not return.
     """
 
     layers: Layers
@@ -140,8 +140,9 @@ class _Task:
 def _twins(layers: Layers) -> Ints:
     """Return, for each vertex of the last layer, the vertex of the first one that it repeats."""
     first, last = layers.start[1], layers.start[-2]
-    by_rank = np.empty(first, np.int64)
-    by_rank[layers.rank[:first]] = np.arange(first)
+    by_rank = np.full(layers.rank[last:].max(initial=-1) + 1, -1)
+    known = np.flatnonzero(layers.rank[:first] < len(by_rank))
+    by_rank[layers.rank[known]] = known
     return by_rank[layers.rank[last:]]
 
 

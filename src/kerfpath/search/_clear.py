@@ -4,176 +4,136 @@ Whatever has not been looked at counts as clear and free of charge, so the best 
 a lower bound; where all it uses has been looked at, it is the best of all. What is found closed is
 taken out of the graph and the search runs again: the optimum of checking everything, at a few
 checks.
-
-A closed vertex leaves its layer. A closed edge cannot, as edges are implied by the joints; but one
-more joint can keep its ends apart: at -1 on one end, at +1 on the other, at 0 on all else, with a
-velocity limit that lets 1 pass and 2 not. One such gate closes all edges from a vertex; gates are
-shared by layers far enough apart. Every gate is a joint for the search to compare, and edges are
-closed one path at a time: where most motions between two layers hit, as with nodes too far apart
-for straight joint motions, that takes long; sample the contour more finely there.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from kerfpath._arrays import Array, Bools, Ints, floats, freeze, integers, positive, scalar
+from kerfpath._arrays import Array, Bools, Ints, integers
 from kerfpath.errors import InputError, NoFeasiblePath
-from kerfpath.search._layers import offsets
-from kerfpath.search._shortest import LayeredPath, shortest_path
+from kerfpath.search._fastest import LeastInterval
+from kerfpath.search._interrupted import InterruptedPath
+from kerfpath.search._layers import reduced
+from kerfpath.search._problem import offsets
+from kerfpath.search._shortest import LayeredPath
+from kerfpath.search._slowed import SlowedPath
 
-__all__ = ["ClearPath", "clear_path"]
+__all__ = ["Known", "clear_path"]
 
 Price = Callable[[Ints], Array]
 Passable = Callable[[Ints, Ints], Bools]
+Path = LayeredPath | SlowedPath | InterruptedPath | LeastInterval
+_P = TypeVar("_P", LayeredPath, SlowedPath, InterruptedPath, LeastInterval)
 
-GATE_LIMIT = 1.5
-"""What a gate lets pass: between 1, from open to an end, and 2, from end to end."""
-FEWEST_CLOSED = 4
-"""Layers from which on the gates of a closed path's first and last edges do not meet."""
+LIKELY, OPEN, CLOSED = 1, 2, 3
+"""What is known of an edge: not seen to be closed, passable, or closed."""
 
-
-@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class ClearPath:
-    """A best clear path, and what it took to find it.
-
-    Parameters
-    ----------
-    path : LayeredPath
-    searches : int
-        How often the search ran.
-    vertices_checked, edges_checked : int
-        How many of each were asked about, each once.
-    vertices_closed, edges_closed : int
-        How many of them were closed.
-    """
-
-    path: LayeredPath
-    searches: int
-    vertices_checked: int
-    vertices_closed: int
-    edges_checked: int
-    edges_closed: int
+WIDEST = 16
+"""Rings around a closed edge that are looked at, at most."""
 
 
-def clear_path(
-    q: ArrayLike,
-    start: ArrayLike,
-    *,
-    price: Price,
-    passable: Passable,
-    around: ArrayLike | None = None,
-    **options: Any,
-) -> ClearPath:
-    """Return the best path through vertices that are open and edges that are passable, exactly.
+class Known:
+    """What has been found out about a graph, for one search after another.
 
     Parameters
     ----------
-    q, start, **options
-        As in `shortest_path`; its method must be "exact".
+    q : (N, n) rad
+    start : (K+1,) int
+        As in `shortest_path`.
     price : callable
         Given vertices (B,) int, rows of q: what each costs on top of its `vertex_cost`, (B,), not
         negative; infinite where it is closed. It must always answer the same.
     passable : callable
         Given vertices (B,) and vertices (B,) of the next layer: which edges may be used, (B,) bool.
+    blocked : callable, optional
+        Given the same: of which edges it is seen at little cost that they may not.
     around : (N, 2) int, optional
         Neighbours of each vertex that are likely to be closed with it, -1 for none: they are looked
-        at, too, outwards until one is open. It saves searches and changes nothing else.
+        at, too, outwards until one is open. Around a closed edge, those between neighbours of its
+        ends are asked whether they are `blocked`. It saves searches and changes nothing else.
 
-    Raises
-    ------
-    NoFeasiblePath
-        Proved: what is closed was found closed; the counts say how much.
-    InputError
-        As `shortest_path`; another method; a price that is negative or not a number.
+    Attributes
+    ----------
+    searches : int
+        How often a search ran.
     """
-    return _Lazy(q, start, price, passable, around, options).run()
-
-
-class _Lazy:
-    """What is known so far, by vertex and by edge."""
 
     def __init__(
         self,
         q: ArrayLike,
         start: ArrayLike,
+        *,
         price: Price,
         passable: Passable,
-        around: ArrayLike | None,
-        options: dict[str, Any],
+        blocked: Passable | None = None,
+        around: ArrayLike | None = None,
     ) -> None:
-        self.q = floats(q, "q", (None, None), copy=False)
-        N, n = self.q.shape
+        self.q = np.asarray(q, dtype=np.float64)
+        N = len(self.q)
         self.start = offsets(start, N)
-        if options.get("method", "exact") != "exact":
-            raise InputError(
-                f'method: only "exact" finds the best clear path, got {options["method"]!r}'
-            )
-        self.layers, self.periodic = len(self.start) - 1, options.get("closure") == "periodic"
-        self.layer = np.searchsorted(self.start, np.arange(N), side="right") - 1
-        self._price, self._passable, self.options = price, passable, options
-        self.around = None if around is None else integers(around, "around", (N, 2))
-        self.cost, self.known, self.asked = np.zeros(N), np.zeros(N, bool), 0
-        self.passed: set[tuple[int, int]] = set()
-        self.closed: set[tuple[int, int]] = set()
-        self.limits = _limits(n, options)
+        self._layer = np.searchsorted(self.start, np.arange(N), side="right") - 1
+        self._price, self._passable, self._blocked = price, passable, blocked
+        self._around = None if around is None else integers(around, "around", (N, 2))
+        self.cost, self._asked = np.zeros(N), np.zeros(N, bool)
+        self._edges, self._state = np.empty(0, np.int64), np.empty(0, np.int64)
+        self._hits = np.zeros(len(self.start), np.int64)
+        self.searches = 0
 
-    def run(self) -> ClearPath:
-        searches = 0
-        while True:
-            path = self._search()
-            searches += 1
-            vertices = self.start[:-1] + path.index
-            if self._look_at_vertices(vertices, 2**searches) or self._look_at_edges(vertices):
-                continue
-            return ClearPath(
-                path=path,
-                searches=searches,
-                vertices_checked=self.asked,
-                vertices_closed=int(np.isinf(self.cost).sum()),
-                edges_checked=len(self.passed) + len(self.closed),
-                edges_closed=len(self.closed),
-            )
+    @property
+    def vertices_checked(self) -> int:
+        """How many vertices were asked about, each once."""
+        return int(self._asked.sum())
 
-    def _search(self) -> LayeredPath:
-        """Return the best path through what is not known to be closed."""
-        open_ = np.flatnonzero(np.isfinite(self.cost))
-        start = np.searchsorted(open_, self.start)
-        gates = self._gates()
-        dt, velocity, acceleration, weights = self.limits
-        m = gates.shape[1]
-        eta_v, eta_a = (float(self.options.get(eta, 1.0)) for eta in ("eta_v", "eta_a"))
-        endless = self.options.get("endless")
-        options = self.options | {
-            "dt": dt,
-            "velocity": np.append(velocity, np.full(m, GATE_LIMIT / (eta_v * dt))),
-            "acceleration": np.append(acceleration, np.full(m, 1e3 / (eta_a * dt**2))),
-            "weights": np.append(weights, np.zeros(m)),
-            "endless": None if endless is None else np.append(endless, np.zeros(m, bool)),
-            "vertex_cost": (self.cost + self.options.get("vertex_cost", 0.0))[open_],
-            "posture": None,
-        }
-        try:
-            found = shortest_path(np.hstack([self.q, gates])[open_], start, **options)
-        except NoFeasiblePath as broken:
-            raise self._told(broken) from None
-        index = open_[start[:-1] + found.index] - self.start[:-1]
-        return LayeredPath(index=freeze(index), cost=found.cost, optimal=found.optimal)
+    @property
+    def vertices_closed(self) -> int:
+        """How many vertices were found closed."""
+        return int(np.isinf(self.cost).sum())
 
-    def _look_at_vertices(self, vertices: Ints, steps: int) -> bool:
+    @property
+    def edges_checked(self) -> int:
+        """How many edges are known to be passable or closed."""
+        return int((self._state >= OPEN).sum())
+
+    @property
+    def edges_closed(self) -> int:
+        """How many edges were found closed."""
+        return int((self._state == CLOSED).sum())
+
+    @property
+    def shut(self) -> Ints:
+        """The edges (E, 2) found closed."""
+        return np.stack(np.divmod(self._edges[self._state == CLOSED], len(self.q)), axis=1)
+
+    def learn(self, runs: list[Ints], near: Callable[[Ints, Ints], Bools]) -> bool:
+        """Ask for what is not known of a path; False where all of it is clear and free.
+
+        Parameters
+        ----------
+        runs : list of (m,) int
+            Vertices of successive layers.
+        near : callable
+            Given vertices (B,) and (B,) of the next layer, which edges a search might use.
+        """
+        self.searches += 1
+        if self._look_at_vertices(np.concatenate(runs)):
+            return True
+        edges = np.concatenate([np.stack([run[:-1], run[1:]], axis=1) for run in runs])
+        return self._look_at_edges(edges, near)
+
+    def _look_at_vertices(self, vertices: Ints) -> bool:
         """Ask for what is not known of a path's vertices; True where one costs something."""
         dearer = self._ask(vertices)
         closed = dearer[np.isinf(self.cost[dearer])]
-        if self.around is not None:
+        if self._around is not None:
             for side in range(2):
                 front = closed
-                for _ in range(steps):
-                    front = self.around[front, side]
+                for _ in range(2**self.searches):
+                    front = self._around[front, side]
                     front = front[front >= 0]
                     if not front.size:
                         break
@@ -183,7 +143,7 @@ class _Lazy:
 
     def _ask(self, vertices: Ints) -> Ints:
         """Learn the price of vertices; returns those now known to cost something."""
-        new = np.unique(vertices[~self.known[vertices]])
+        new = np.unique(vertices[~self._asked[vertices]])
         if not new.size:
             return new
         price = np.asarray(self._price(new), dtype=np.float64)
@@ -192,101 +152,145 @@ class _Lazy:
                 f"price: expected one number >= 0 for each of {len(new)} vertices, got "
                 f"{'another shape' if price.shape != new.shape else 'a negative one or NaN'}"
             )
-        self.known[new], self.cost[new] = True, price
-        self.asked += len(new)
-        if self.periodic:
-            self.cost[self._twin(new)] = price[self._has_twin(new)]
-            self.known[self._twin(new)] = True
+        self._asked[new], self.cost[new] = True, price
         return new[price > 0]
 
-    def _look_at_edges(self, vertices: Ints) -> bool:
-        """Ask for what is not known of a path's edges; True where one is closed."""
-        edges = list(zip(vertices[:-1].tolist(), vertices[1:].tolist(), strict=True))
-        new = [edge for edge in edges if edge not in self.passed]
-        if not new:
-            return False
-        ends = np.array(new, np.int64)
-        passable = np.asarray(self._passable(ends[:, 0], ends[:, 1]), dtype=np.bool_)
-        self.passed |= {e for e, ok in zip(new, passable, strict=True) if ok}
-        closed = {e for e, ok in zip(new, passable, strict=True) if not ok}
-        if closed and self.periodic and self.layers < FEWEST_CLOSED:
-            raise InputError(
-                f"closure: a periodic clear path needs {FEWEST_CLOSED} layers, got {self.layers}"
-            )
-        self.closed |= closed
-        return bool(closed)
+    def _look_at_edges(self, edges: Ints, near: Callable[[Ints, Ints], Bools]) -> bool:
+        """Ask for what is not known of a path's edges; True where one is closed.
 
-    def _gates(self) -> Array:
-        """Return the gates (N, m): joints that closed edges cannot pass."""
-        columns: dict[tuple[int, int], Array] = {}
-        by_layer: dict[int, list[tuple[int, int]]] = {}
-        for p, j in sorted(self.closed):
-            by_layer.setdefault(int(self.layer[p]), []).append((p, j))
-        for k, edges in by_layer.items():
-            # Signs alternate, so that the ends of one layer's gate and of the one after next agree.
-            kind, sign = k % 2, (-1.0) ** (k // 2)
-            if self.periodic and k in (0, self.layers - 2):
-                kind, sign = (2, 1.0) if k == 0 else (3, 1.0)
-            for i, (froms, tos) in enumerate(_stars(edges)):
-                gate = columns.setdefault((kind, i), np.zeros(len(self.q)))
-                gate[froms], gate[tos] = -sign, sign
-                for ends in (froms, tos) if self.periodic else ():
-                    here = np.array(ends)
-                    gate[self._twin(here)] = gate[here[self._has_twin(here)]]
-        return np.array(list(columns.values())).reshape(-1, len(self.q)).T
+        Around closed ones it looks the wider, the more often edges of that layer were closed.
+        """
+        closed = edges[self._closed(edges, self._passable, OPEN)]
+        self._hits[np.unique(self._layer[closed[:, 0]])] += 1
+        core, ring = closed, 1
+        while core.size and self._around is not None and self._blocked is not None:
+            sides = [self._beside(core[:, end], ring) for end in range(2)]
+            step = np.abs(np.arange(-ring, ring + 1))
+            here, there = np.nonzero(np.maximum(step[:, None], step) == ring)
+            pairs = np.stack([sides[0][:, here], sides[1][:, there]], axis=2)
+            open_ = (pairs >= 0) & (self.cost[pairs] < np.inf)
+            wanted: Bools = np.asarray(open_.all(axis=2))
+            wanted[wanted] = near(*pairs[wanted].T)
+            hit = np.zeros(wanted.shape, bool)
+            hit[wanted] = self._closed(pairs[wanted], self._not_blocked, LIKELY)
+            ring += 1
+            wide = np.minimum(2.0 ** (self._hits[self._layer[core[:, 0]]] - 1), WIDEST)
+            core = core[hit.any(axis=1) & (ring <= wide)]
+        return bool(closed.size)
 
-    def _has_twin(self, vertices: Ints) -> Bools:
-        return np.isin(self.layer[vertices], (0, self.layers - 1))
+    def _beside(self, vertices: Ints, steps: int) -> Ints:
+        """Return the vertices (B, 2 steps + 1) up to so many neighbours away, -1 beyond the end."""
+        assert self._around is not None
+        out = np.full((len(vertices), 2 * steps + 1), -1)
+        out[:, steps] = vertices
+        for side, way in ((0, -1), (1, 1)):
+            for i in range(steps):
+                v = out[:, steps + way * i]
+                out[:, steps + way * (i + 1)] = np.where(v >= 0, self._around[v, side], -1)
+        return out
 
-    def _twin(self, vertices: Ints) -> Ints:
-        """Return the same vertices of the first or last layer in the other one."""
-        ends = vertices[self._has_twin(vertices)]
-        over = self.start[-2] if self.layers > 1 else 0
-        return np.where(ends < self.start[1], ends + over, ends - over)
+    def _not_blocked(self, p: Ints, j: Ints) -> Bools:
+        assert self._blocked is not None
+        return np.asarray(~np.asarray(self._blocked(p, j), dtype=np.bool_))
 
-    def _told(self, broken: NoFeasiblePath) -> NoFeasiblePath:
+    def _closed(self, edges: Ints, ask: Passable, verdict: int) -> Bools:
+        """Return which edges (B, 2) are closed, `ask` giving the others at least the verdict."""
+        key = edges[:, 0] * len(self.q) + edges[:, 1]
+        new = np.setdiff1d(key, self._edges[self._state >= verdict])
+        if new.size:
+            passed = np.asarray(ask(*np.divmod(new, len(self.q))), dtype=np.bool_)
+            old = ~np.isin(self._edges, new)
+            edges, state = self._edges[old], self._state[old]
+            at = np.searchsorted(edges, new)
+            self._edges = np.insert(edges, at, new)
+            self._state = np.insert(state, at, np.where(passed, verdict, CLOSED))
+        return np.asarray(self._state[np.searchsorted(self._edges, key)] == CLOSED)
+
+    def told(self, broken: NoFeasiblePath) -> NoFeasiblePath:
         """Say of a break what collision has to do with it."""
-        joints = {f"velocity, joint {i + 1}" for i in range(self.q.shape[1], 1000)}
-        counts = {name: number for name, number in broken.counts.items() if name not in joints}
+        counts = dict(broken.counts)
+        counts.pop("closed vertices", None)
         there, closed = broken.node + 1, np.isinf(self.cost)
         ways = {
-            "collision at the node": int(closed[self.layer == there].sum()),
-            "collision on the way": sum(c for name, c in broken.counts.items() if name in joints),
+            "collision at the node": int(closed[self._layer == there].sum()),
+            "collision on the way": counts.pop("shut edges", 0),
         }
-        message = f"no admissible way to node {there} that is clear"
-        if not any(ways.values()):
-            ways = {"collision elsewhere": int(closed.sum()) + len(self.closed)}
-            message = str(broken)
+        if not broken.counts or not any(ways.values()):
+            ways = {"collision elsewhere": self.vertices_closed + self.edges_closed}
         if not any(ways.values()):
             return broken
         counts |= {name: number for name, number in ways.items() if number}
         told = ", ".join(f"{name}: {number}" for name, number in counts.items())
+        message = f"no admissible way to node {there} that is clear; forbidden by {told}"
+        if "collision elsewhere" in ways:
+            message = f"{broken}, collision elsewhere: {ways['collision elsewhere']}"
         return NoFeasiblePath(
-            f"{message}; forbidden by {told}",
+            message,
             proved=broken.proved,
             node=broken.node,
             back=broken.back,
+            reached=broken.reached,
+            leaving=broken.leaving,
             counts=counts,
         )
 
 
-def _stars(edges: list[tuple[int, int]]) -> list[tuple[list[int], list[int]]]:
-    """Return the edges as sets of edges that share one end, by the side that makes fewer."""
-    out: dict[int, list[int]] = {}
-    into: dict[int, list[int]] = {}
-    for p, j in edges:
-        out.setdefault(p, []).append(j)
-        into.setdefault(j, []).append(p)
-    if len(out) <= len(into):
-        return [([p], js) for p, js in out.items()]
-    return [(ps, [j]) for j, ps in into.items()]
+def clear_path(search: Callable[..., _P], known: Known, **options: Any) -> _P:
+    """Return the best path of a search through open vertices and passable edges alone, exactly.
+
+    Parameters
+    ----------
+    search : callable
+        `shortest_path`, `slowed_path`, `interrupted_path` or `least_interval`.
+    known : Known
+        The graph, and what is known of it; it learns more.
+    **options
+        Of the search, but q, start and shut; a method must be "exact".
+
+    Raises
+    ------
+    NoFeasiblePath
+        Proved: what is closed was found closed; the counts say how much.
+    InputError
+        As the search; another method; a price that is negative or not a number.
+    """
+    if options.get("method", "exact") != "exact":
+        raise InputError(
+            f'method: only "exact" finds the best clear path, got {options["method"]!r}'
+        )
+    given = options.pop("vertex_cost", None)
+    while True:
+        try:
+            found = search(
+                q=known.q,
+                start=known.start,
+                vertex_cost=known.cost + (0.0 if given is None else np.asarray(given)),
+                shut=known.shut,
+                **options,
+            )
+        except NoFeasiblePath as broken:
+            raise known.told(broken) from None
+        if not known.learn(_runs(found, known.start), _near(known.q, options)):
+            return found
 
 
-def _limits(n: int, options: dict[str, Any]) -> tuple[float, Array, Array, Array]:
-    """Return dt, velocity, acceleration and weights, defaults filled in as in `shortest_path`."""
-    dt = scalar(options["dt"], "dt", unit="s", above=0.0)
-    velocity = positive(options["velocity"], "velocity", (n,))
-    acceleration = positive(options["acceleration"], "acceleration", (n,))
-    given = options.get("weights")
-    weights = 1.0 / (velocity * dt) if given is None else floats(given, "weights", (n,))
-    return dt, velocity, acceleration, weights
+def _runs(found: Path, start: Ints) -> list[Ints]:
+    """Return the vertices of each piece of a path."""
+    if not isinstance(found, InterruptedPath):
+        return [start[:-1] + found.index]
+    return [start[p.first : p.first + len(p.index)] + p.index for p in found.pieces]
+
+
+def _near(q: Array, options: dict[str, Any]) -> Callable[[Ints, Ints], Bools]:
+    """Return what tells which edges keep the velocity limit; without a node interval, all do."""
+    given = options.get("endless")
+    endless = np.zeros(q.shape[1], bool) if given is None else np.asarray(given, dtype=np.bool_)
+    bound = np.inf
+    if "dt" in options:
+        velocity = np.asarray(options["velocity"], dtype=np.float64)
+        bound = options["dt"] * options.get("eta_v", 1.0) * velocity
+
+    def near(p: Ints, j: Ints) -> Bools:
+        return np.asarray((np.abs(reduced(q[j] - q[p], endless)) <= bound).all(axis=1))
+
+    return near

@@ -47,13 +47,16 @@ class Dead:
         Number of layers that some admissible path reaches.
     counts : (2, n) int
         Of the ways into the next layer, how many each joint's velocity (row 0) and acceleration
-        (row 1) forbids.
+        (row 1) forbids,
+    shut : int
+        and how many are shut edges.
     reached : (m,) int
         Vertices of the sorted graph, in the last layer reached, that some path ends in.
     """
 
     layers: int
     counts: Ints
+    shut: int
     reached: Ints
 
 
@@ -159,9 +162,10 @@ def dead_end(layers: Layers, aim: Objective) -> Dead:
     K, n = len(layers.start) - 1, len(layers.endless)
     ends = np.unique(reached.last.vertex)
     if reached.layers in (0, K):
-        return Dead(layers=reached.layers, counts=np.zeros((2, n), np.int64), reached=ends)
-    counts = exact.count_closing(layers, aim, reached.last, reached.layers)
-    return Dead(layers=reached.layers, counts=counts, reached=ends)
+        none = np.zeros((2, n), np.int64)
+        return Dead(layers=reached.layers, counts=none, shut=0, reached=ends)
+    counts, shut = exact.count_closing(layers, aim, reached.last, reached.layers)
+    return Dead(layers=reached.layers, counts=counts, shut=int(shut), reached=ends)
 
 
 def layers_reached(layers: Layers, aim: Objective) -> int:

@@ -13,7 +13,8 @@ from kerfpath.errors import InputError
 from kerfpath.kernels import search as kernel
 from kerfpath.kernels.metric import CHEBYCHEV, increments
 from kerfpath.search._exact import quickest_path
-from kerfpath.search._layers import empty_layer, narrowest_key, offsets, sorted_layers
+from kerfpath.search._layers import require_joined, sorted_layers
+from kerfpath.search._problem import Problem, closed_vertices, offsets, shut_edges
 
 __all__ = ["LeastInterval", "least_interval", "quickest"]
 
@@ -52,6 +53,8 @@ def least_interval(
     velocity: ArrayLike,
     acceleration: ArrayLike,
     endless: ArrayLike | None = None,
+    vertex_cost: ArrayLike | None = None,
+    shut: ArrayLike | None = None,
     eta_v: float = 1.0,
     eta_a: float = 1.0,
 ) -> LeastInterval:
@@ -62,15 +65,17 @@ def least_interval(
 
     Parameters
     ----------
-    q, start, velocity, acceleration, endless, eta_v, eta_a
+    q, start, velocity, acceleration, endless, shut, eta_v, eta_a
         As in `shortest_path`; K >= 2.
+    vertex_cost : (N,), optional
+        0, or infinity where a vertex is closed.
 
     Raises
     ------
     NoFeasiblePath
-        An empty layer; says which.
+        An empty layer, or closed vertices and shut edges that leave no path; says where.
     InputError
-        Arrays that do not fit each other, NaN, limits that are not positive.
+        Arrays that do not fit each other, NaN, limits that are not positive, other vertex costs.
     """
     q = floats(q, "q", (None, None), copy=False)
     start, n = offsets(start, len(q)), q.shape[1]
@@ -79,46 +84,57 @@ def least_interval(
     endless = bools(np.zeros(n, bool) if endless is None else endless, "endless", (n,))
     if len(start) < 3:
         raise InputError("start: a node interval needs at least two layers, got 1")
-    empty = np.flatnonzero(np.diff(start) == 0)
-    if empty.size:
-        raise empty_layer(int(empty[0]))
+    problem = timed(
+        q, start, endless, weight=1 / v, acceleration=a, vertex_cost=vertex_cost, shut=shut
+    )
+    if not np.isin(problem.aim.vertex_cost, (0.0, np.inf)).all():
+        raise InputError("vertex_cost: here a vertex is open (0) or closed (infinity)")
+    require_joined(problem)
     ceiling = _guess(q, start, v, endless)
     while True:
         # Edges that take longer than the ceiling are not looked at: right if a path keeps it.
-        found = quickest(q, start, endless, 1 / v, ceiling * v, a, ceiling)
+        found = quickest(problem, ceiling * v, ceiling)
         if found is not None:
             index, _ = found
             return _binding(q[start[:-1] + index], index, v, a, endless)
         ceiling *= 2
 
 
-def quickest(
+def timed(
     q: Array,
     start: Ints,
     endless: Bools,
+    *,
     weight: Array,
-    bound: Array,
     acceleration: Array,
-    ceiling: float,
-) -> tuple[Ints, float] | None:
-    """Return the path whose steps and changes ask for the least time at most, and that time.
+    vertex_cost: ArrayLike | None = None,
+    shut: ArrayLike | None = None,
+) -> Problem:
+    """Return the problem of the path whose steps and changes ask for the least time at most.
 
-    A step asks for its Chebychev distance under `weight` (n,) s/rad and may not exceed `bound` (n,)
-    rad; a change asks for the time in which `acceleration` (n,) rad/s^2 allows it. None where more
-    than `ceiling` s is asked for, or no path keeps the bound.
+    A step asks for its Chebychev distance under `weight` (n,) s/rad, a change for the time in which
+    `acceleration` (n,) rad/s^2 allows it.
     """
-    key, width, circular = narrowest_key(q, start, bound, endless)
-    layers, _ = sorted_layers(q, start, key, width, circular, endless)
     aim = kernel.Objective(
         weight=freeze(weight),
         metric=CHEBYCHEV,
         minimax=True,
-        vertex_cost=freeze(np.zeros(len(q))),
-        velocity=freeze(bound),
+        vertex_cost=closed_vertices(vertex_cost, len(q)),
+        velocity=np.full(len(endless), np.inf),
         acceleration=freeze(acceleration),
-        cap=ceiling,
+        cap=np.inf,
         timed=True,
     )
+    return Problem(q=q, start=start, endless=endless, aim=aim, shut=shut_edges(shut, start))
+
+
+def quickest(problem: Problem, bound: Array, ceiling: float) -> tuple[Ints, float] | None:
+    """Return the best path of a timed problem whose steps keep `bound` (n,) rad, and its time.
+
+    None where more than `ceiling` s is asked for, or no path keeps the bound.
+    """
+    aim = problem.aim._replace(velocity=freeze(bound), cap=ceiling)
+    layers, aim, _ = sorted_layers(problem._replace(aim=aim))
     best = quickest_path(layers, aim, ceiling)
     return None if best is None else (layers.rank[best.path], best.cost)
 

@@ -13,17 +13,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from kerfpath._arrays import Array, Bools, Ints, freeze
+from kerfpath._arrays import Bools, Ints, freeze
 from kerfpath.kernels.search import Layers, Objective
 from kerfpath.search._exact import Best, best_path, dead_end, layers_reached
-from kerfpath.search._layers import (
-    backwards,
-    broken_edge,
-    empty_layer,
-    narrowest_key,
-    sorted_layers,
-)
-from kerfpath.search._problem import Metric, ObjectiveKind, checked
+from kerfpath.search._layers import backwards, broken_edge, empty_layer, sorted_layers
+from kerfpath.search._problem import Metric, ObjectiveKind, Problem, checked
 
 __all__ = ["InterruptedPath", "Piece", "interrupted_path"]
 
@@ -77,6 +71,7 @@ def interrupted_path(
     acceleration: ArrayLike,
     endless: ArrayLike | None = None,
     vertex_cost: ArrayLike | None = None,
+    shut: ArrayLike | None = None,
     weights: ArrayLike | None = None,
     metric: Metric = "manhattan",
     objective: ObjectiveKind = "sum",
@@ -93,19 +88,19 @@ def interrupted_path(
 
     Parameters
     ----------
-    q, start, dt, velocity, acceleration, endless, vertex_cost, weights, metric, objective, eta_v, \
-eta_a
+    q, start, dt, velocity, acceleration, endless, vertex_cost, shut, weights, metric, objective, \
+eta_v, eta_a
         As in `shortest_path`.
 
     Raises
     ------
     NoFeasiblePath
         No number of interruptions helps: a layer is empty, or no edge between two neighbouring
-        layers keeps (5). `node` is the last one before.
+        layers is open and keeps (5). `node` is the last one before.
     InputError
         As `shortest_path`.
     """
-    q, start, endless, aim = checked(
+    problem = checked(
         q,
         start,
         dt=dt,
@@ -113,24 +108,23 @@ eta_a
         acceleration=acceleration,
         endless=endless,
         vertex_cost=vertex_cost,
+        shut=shut,
         weights=weights,
         metric=metric,
         objective=objective,
         eta_v=eta_v,
         eta_a=eta_a,
     )
-    key, window, circular = narrowest_key(q, start, aim.velocity, endless)
-    layers, order = sorted_layers(q, start, key, window, circular, endless)
-    aim = aim._replace(vertex_cost=freeze(aim.vertex_cost[order]))
-    last = _reach(layers, aim)
-    first = np.zeros(1, np.int64) if len(last) == 1 else _first(q, start, endless, aim)
+    layers, aim, _ = sorted_layers(problem)
+    last = _reach(problem, layers, aim)
+    first = np.zeros(1, np.int64) if len(last) == 1 else _first(problem)
     layers, aim, nodes = _in_stages(layers, aim, first, last)
     found = best_path(layers, aim)
     assert isinstance(found, Best), "a plan with this number of interruptions has been found"
     return InterruptedPath(pieces=_pieces(layers, nodes, found.path), cost=found.cost, optimal=True)
 
 
-def _reach(layers: Layers, aim: Objective) -> Ints:
+def _reach(problem: Problem, layers: Layers, aim: Objective) -> Ints:
     """Return the farthest node that can be cut with 0, 1, 2... interruptions, up to the last one.
 
     Raises
@@ -140,30 +134,29 @@ def _reach(layers: Layers, aim: Objective) -> Ints:
     """
     K, k = len(layers.start) - 1, 0
     if layers.start[1] == 0:
-        raise empty_layer(0)
+        raise empty_layer(problem, 0)
     reached: list[int] = []
     while not reached or k < K - 1:
         rest = layers._replace(start=layers.start[k:])
         edges = layers_reached(rest, aim) - 1
         if edges == 0 and K > 1:
             if layers.start[k + 1] == layers.start[k + 2]:
-                raise empty_layer(k + 1)
-            raise broken_edge(k + 1, dead_end(rest, aim).counts, proved=True)
+                raise empty_layer(problem, k + 1)
+            dead = dead_end(rest, aim)
+            raise broken_edge(k + 1, dead.counts, dead.shut, proved=True)
         k += edges
         reached.append(k)
     return np.array(reached)
 
 
-def _first(q: Array, start: Ints, endless: Bools, aim: Objective) -> Ints:
+def _first(problem: Problem) -> Ints:
     """Return the first node from which the end is cut with as few interruptions as are left.
 
     (5) and (6) hold for a path and its reverse alike: it is the reach from the last layer back.
     """
-    q, start = backwards(q, start)
-    key, window, circular = narrowest_key(q, start, aim.velocity, endless)
-    layers, _ = sorted_layers(q, start, key, window, circular, endless)
-    free = aim._replace(vertex_cost=freeze(np.zeros(len(q))))
-    return (len(start) - 2 - _reach(layers, free))[::-1]
+    problem = backwards(problem)
+    layers, aim, _ = sorted_layers(problem)
+    return (len(layers.start) - 2 - _reach(problem, layers, aim))[::-1]
 
 
 def _in_stages(
@@ -189,6 +182,7 @@ def _in_stages(
         # No edge leads from the last layer of a piece to the first of the next.
         seam = slice(start[begin[i] - 1], start[begin[i]])
         low[seam] = high[seam] = 0
+    shut_from, shut = _shut_in_stages(layers, order, onwards, low != high)
     staged = layers._replace(
         q=np.ascontiguousarray(layers.q[:, order]),
         start=freeze(start),
@@ -196,8 +190,26 @@ def _in_stages(
         low=low,
         high=high,
         after=after,
+        shut_from=shut_from,
+        shut=shut,
     )
     return staged, aim._replace(vertex_cost=freeze(aim.vertex_cost[order])), nodes
+
+
+def _shut_in_stages(
+    layers: Layers, order: Ints, onwards: Ints, leading: Bools
+) -> tuple[Ints, Ints]:
+    """Return the shut edges of the vertices `order` (N,), which lead `onwards` vertices before.
+
+    Only vertices that are `leading` (N,) have any.
+    """
+    if not len(layers.shut):
+        return layers.shut_from, layers.shut
+    begin = layers.shut_from[order]
+    count = np.where(leading, layers.shut_from[order + 1] - begin, 0)
+    shut_from = np.concatenate([[0], np.cumsum(count)])
+    place = np.arange(shut_from[-1]) + np.repeat(begin - shut_from[:-1], count)
+    return shut_from, layers.shut[place] - np.repeat(onwards, count)
 
 
 def _pieces(layers: Layers, nodes: Ints, path: Ints) -> tuple[Piece, ...]:

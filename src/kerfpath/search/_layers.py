@@ -2,21 +2,24 @@
 
 from __future__ import annotations
 
-import numpy as np
-from numpy.typing import ArrayLike
+from typing import NamedTuple
 
-from kerfpath._arrays import Array, Bools, Ints, freeze, integers
-from kerfpath.errors import InputError, NoFeasiblePath
+import numpy as np
+
+from kerfpath._arrays import Array, Bools, Ints, freeze
+from kerfpath.errors import NoFeasiblePath
 from kerfpath.kernels import search as kernel
 from kerfpath.kernels.limits import LIMIT_TOLERANCE
+from kerfpath.kernels.search import Layers, Objective
+from kerfpath.search._problem import Problem
 
 __all__ = [
+    "Sorted",
     "backwards",
     "broken_edge",
     "empty_layer",
-    "narrowest_key",
-    "offsets",
     "reduced",
+    "require_joined",
     "sorted_layers",
 ]
 
@@ -26,27 +29,46 @@ _VERTICES_SAMPLED = 16
 """Vertices of each of them whose windows are counted."""
 
 
-def offsets(start: ArrayLike, vertices: int) -> Ints:
-    start = integers(start, "start", (None,))
-    if len(start) < 2 or start[0] != 0 or start[-1] != vertices or (np.diff(start) < 0).any():
-        raise InputError(
-            "start: expected K+1 offsets that begin with 0, never decrease and end with the number "
-            f"of vertices ({vertices}), got {start.tolist() if len(start) < 12 else '...'}"
-        )
-    return start
+class Sorted(NamedTuple):
+    """A problem as the kernels take it: without closed vertices, each layer sorted by one key."""
+
+    layers: Layers
+    """Its ranks count all vertices of a layer, the closed ones too."""
+    aim: Objective
+    order: Ints
+    """(N,): where each of its vertices stands in q."""
 
 
 def sorted_layers(
-    q: Array, start: Ints, key: Array, window: float, circular: bool, endless: Bools
-) -> tuple[kernel.Layers, Ints]:
-    """Return the graph as the kernels take it, and where each of its vertices stands in q."""
+    problem: Problem, key: Array | None = None, width: float = 0.0, *, circular: bool = False
+) -> Sorted:
+    """Return the problem sorted by a key (N,) that may change by `width` along an edge.
+
+    Without a key, by the joint whose velocity window leaves the fewest vertices.
+    """
+    q, start, endless, aim, _ = problem
+    kept = np.flatnonzero(aim.vertex_cost < np.inf) if _any_closed(aim) else None
+    if kept is not None:
+        q, start = q[kept], np.searchsorted(kept, start)
+        key = None if key is None else key[kept]
+    if key is None:
+        key, width, circular = _narrowest_key(q, start, aim.velocity, endless)
     N, n = q.shape
     columns, keys, rank = np.empty((n, N)), np.empty(N), np.empty(N, np.int64)
     kernel.arrange(q, key, start, endless, columns, keys, rank)
     low, high = np.zeros(N, np.int64), np.zeros(N, np.int64)
-    kernel.windows(keys, start, window, circular, low, high)
-    del keys
-    layers = kernel.Layers(
+    kernel.windows(keys, start, width, circular, low, high)
+    del key, keys
+    sizes = np.diff(start)
+    order = np.repeat(start[:-1], sizes)
+    order += rank
+    if kept is not None:
+        order = kept[order]
+        rank = order - np.repeat(problem.start[:-1], sizes)
+    if aim.vertex_cost.any():
+        aim = aim._replace(vertex_cost=freeze(aim.vertex_cost[order]))
+    shut_from, shut = _by_vertex(problem.shut, order, len(problem.q))
+    layers = Layers(
         q=columns,
         start=start,
         rank=rank,
@@ -55,29 +77,49 @@ def sorted_layers(
         endless=endless,
         turn=np.where(endless, 2 * np.pi, np.inf),
         after=np.full(len(start) - 1, -1),
+        shut_from=shut_from,
+        shut=shut,
     )
-    order = np.repeat(start[:-1], np.diff(start))
-    order += rank
-    return layers, order
+    return Sorted(layers, aim, order)
 
 
-def empty_layer(k: int) -> NoFeasiblePath:
-    """Return the answer for a graph whose layer k has no vertex."""
-    if k == 0:
-        return NoFeasiblePath("layer 0 is empty: no path can start", proved=True, node=-1)
+def _any_closed(aim: Objective) -> bool:
+    return bool(aim.vertex_cost.max(initial=0.0) == np.inf)
+
+
+def _by_vertex(edges: Ints, order: Ints, vertices: int) -> tuple[Ints, Ints]:
+    """Return shut edges as `Layers` holds them, those of closed vertices left out."""
+    if not len(edges):
+        return np.empty(0, np.int64), np.empty(0, np.int64)
+    place = np.full(vertices, -1)
+    place[order] = np.arange(len(order))
+    p, j = place[edges[(place[edges] >= 0).all(axis=1)]].T
+    by = np.lexsort((j, p))
+    return np.searchsorted(p[by], np.arange(len(order) + 1)), np.ascontiguousarray(j[by])
+
+
+def empty_layer(problem: Problem, k: int) -> NoFeasiblePath:
+    """Return the answer for a graph whose layer k has no vertex, or none that is open."""
+    closed = int(problem.start[k + 1] - problem.start[k])
+    why = "no path can start" if k == 0 else "no admissible pose at that node"
     return NoFeasiblePath(
-        f"layer {k} is empty: no admissible pose at that node", proved=True, node=k - 1
+        f"layer {k} is empty: {why}" + (f"; closed vertices: {closed}" if closed else ""),
+        proved=True,
+        node=k - 1,
+        counts={"closed vertices": closed} if closed else {},
     )
 
 
-def broken_edge(k: int, forbidden: Ints, *, proved: bool) -> NoFeasiblePath:
-    """Say that no admissible edge leads into layer k, and which limits forbid how many."""
+def broken_edge(k: int, forbidden: Ints, shut: int, *, proved: bool) -> NoFeasiblePath:
+    """Say that no admissible edge leads into layer k, and what forbids how many."""
     counts = {
         f"{test}, joint {i + 1}": int(number)
         for test, row in zip(("velocity", "acceleration"), forbidden, strict=True)
         for i, number in enumerate(row)
         if number
     }
+    if shut:
+        counts["shut edges"] = shut
     told = ", ".join(f"{name}: {number}" for name, number in counts.items())
     total = int(sum(counts.values()))
     return NoFeasiblePath(
@@ -88,16 +130,45 @@ def broken_edge(k: int, forbidden: Ints, *, proved: bool) -> NoFeasiblePath:
     )
 
 
-def backwards(q: Array, start: Ints) -> tuple[Array, Ints]:
-    """Return the same graph with its layers in reverse order: q (N, n), start (K+1,)."""
+def require_joined(problem: Problem) -> None:
+    """Raise NoFeasiblePath where closed vertices and shut edges alone leave no path."""
+    _, start, _, aim, edges = problem
+    open_ = reached = aim.vertex_cost < np.inf
+    edges = edges[np.argsort(edges[:, 0])]
+    begin = np.searchsorted(edges[:, 0], start)
+    for k in range(len(start) - 1):
+        here = open_[start[k] : start[k + 1]]
+        if k > 0 and begin[k - 1] < begin[k]:
+            p, j = np.unique(edges[begin[k - 1] : begin[k]], axis=0).T
+            ways = np.bincount(j[reached[p - start[k - 1]]] - start[k], minlength=len(here))
+            shut = int(ways[here].sum())
+            here = here & (ways < reached.sum())
+            if shut and not here.any():
+                none = np.zeros((2, problem.q.shape[1]), np.int64)
+                raise broken_edge(k, none, shut, proved=True)
+        if not here.any():
+            raise empty_layer(problem, k)
+        reached = here
+
+
+def backwards(problem: Problem) -> Problem:
+    """Return the same problem with its layers in reverse order."""
+    q, start, _, aim, shut = problem
     sizes = np.diff(start)[::-1]
     begin = np.concatenate([[0], np.cumsum(sizes)])
     # Vertex i of reversed layer k comes from where that layer stood.
     order = np.arange(len(q)) + np.repeat(start[:-1][::-1] - begin[:-1], sizes)
-    return freeze(q[order]), freeze(begin)
+    return problem._replace(
+        q=freeze(q[order]),
+        start=freeze(begin),
+        aim=aim._replace(vertex_cost=freeze(aim.vertex_cost[order])),
+        shut=np.argsort(order)[shut[:, ::-1]] if len(shut) else shut,
+    )
 
 
-def narrowest_key(q: Array, start: Ints, bound: Array, endless: Bools) -> tuple[Array, float, bool]:
+def _narrowest_key(
+    q: Array, start: Ints, bound: Array, endless: Bools
+) -> tuple[Array, float, bool]:
     """Choose the joint whose velocity window leaves the fewest vertices, to sort the layers by."""
     layers = np.unique(np.linspace(0, max(len(start) - 3, 0), _LAYERS_SAMPLED).astype(int))
     pairs = np.zeros(q.shape[1], np.int64)

@@ -7,11 +7,10 @@ from typing import Literal, NamedTuple, get_args
 import numpy as np
 from numpy.typing import ArrayLike
 
-from kerfpath._arrays import Array, Bools, Ints, bools, floats, freeze, positive, scalar
+from kerfpath._arrays import Array, Bools, Ints, bools, floats, freeze, integers, positive, scalar
 from kerfpath.errors import InputError
 from kerfpath.kernels import metric as metrics
 from kerfpath.kernels.search import Objective
-from kerfpath.search._layers import offsets
 
 __all__ = [
     "METRIC_CODES",
@@ -19,8 +18,11 @@ __all__ = [
     "ObjectiveKind",
     "Problem",
     "checked",
+    "closed_vertices",
+    "offsets",
     "one_of",
     "rotation_limits",
+    "shut_edges",
 ]
 
 Metric = Literal["manhattan", "chebychev", "euclid"]
@@ -43,7 +45,19 @@ class Problem(NamedTuple):
     endless: Bools
     """(n,): joints that turn without end."""
     aim: Objective
-    """Its vertex costs are in the order of q."""
+    """Its vertex costs are in the order of q, infinite where a vertex is closed."""
+    shut: Ints
+    """(E, 2): edges that may not be used, from and to, in the order of q."""
+
+
+def offsets(start: ArrayLike, vertices: int) -> Ints:
+    start = integers(start, "start", (None,))
+    if len(start) < 2 or start[0] != 0 or start[-1] != vertices or (np.diff(start) < 0).any():
+        raise InputError(
+            "start: expected K+1 offsets that begin with 0, never decrease and end with the number "
+            f"of vertices ({vertices}), got {start.tolist() if len(start) < 12 else '...'}"
+        )
+    return start
 
 
 def checked(
@@ -55,6 +69,7 @@ def checked(
     acceleration: ArrayLike,
     endless: ArrayLike | None,
     vertex_cost: ArrayLike | None,
+    shut: ArrayLike | None,
     weights: ArrayLike | None,
     metric: Metric,
     objective: ObjectiveKind,
@@ -81,18 +96,43 @@ def checked(
     weight = 1.0 / (velocity * dt) if weights is None else floats(weights, "weights", (n,))
     if (weight < 0).any():
         raise InputError(f"weights: must not be negative, got {weight.tolist()}")
-    free = freeze(np.zeros(len(q)))
     aim = Objective(
         weight=freeze(np.ascontiguousarray(weight)),
         metric=METRIC_CODES[metric],
         minimax=objective == "max",
-        vertex_cost=free if vertex_cost is None else floats(vertex_cost, "vertex_cost", (len(q),)),
+        vertex_cost=closed_vertices(vertex_cost, len(q)),
         velocity=freeze(scalar(eta_v, "eta_v", above=0.0) * velocity * dt),
         acceleration=freeze(scalar(eta_a, "eta_a", above=0.0) * acceleration * dt**2),
         cap=np.inf,
         timed=False,
     )
-    return Problem(q=q, start=start, endless=endless, aim=aim)
+    return Problem(q=q, start=start, endless=endless, aim=aim, shut=shut_edges(shut, start))
+
+
+def closed_vertices(vertex_cost: ArrayLike | None, vertices: int) -> Array:
+    """Return what vertices (N,) cost, infinity where they are closed."""
+    if vertex_cost is None:
+        return freeze(np.zeros(vertices))
+    cost = floats(vertex_cost, "vertex_cost", (vertices,), infinite=True)
+    if (cost == -np.inf).any():
+        raise InputError("vertex_cost: a vertex may cost infinity, which closes it, but not -inf")
+    return cost
+
+
+def shut_edges(shut: ArrayLike | None, start: Ints) -> Ints:
+    """Return the edges (E, 2) that may not be used, each from a layer to the next."""
+    if shut is None:
+        return np.empty((0, 2), np.int64)
+    edges = integers(shut, "shut", (None, 2))
+    layer = np.searchsorted(start, edges, side="right") - 1
+    inside = ((edges >= 0) & (edges < start[-1])).all(axis=1)
+    wrong = np.flatnonzero(~inside | (layer[:, 1] != layer[:, 0] + 1))
+    if wrong.size:
+        raise InputError(
+            "shut: an edge leads from a vertex to one of the next layer, got "
+            f"{edges[wrong[0]].tolist()}"
+        )
+    return edges
 
 
 def rotation_limits(rotation: ArrayLike | None, endless: Bools) -> Array:

@@ -9,8 +9,8 @@ from numpy.typing import ArrayLike
 
 from kerfpath._arrays import bools, floats, positive, scalar
 from kerfpath.errors import NoFeasiblePath
-from kerfpath.search._fastest import LeastInterval, least_interval, quickest
-from kerfpath.search._layers import offsets
+from kerfpath.search._fastest import LeastInterval, least_interval, quickest, timed
+from kerfpath.search._problem import offsets
 from kerfpath.search._shortest import shortest_path
 
 __all__ = ["Relaxations", "least_relaxations"]
@@ -75,7 +75,8 @@ def least_relaxations(
         q, start, velocity=v, acceleration=a, endless=turning, eta_v=eta_v, eta_a=eta_a
     )
     # Velocity as it is, and of all paths the one whose sharpest change asks for the least time.
-    sharpest = quickest(q, start, turning, np.zeros(n), eta_v * v * dt, a, np.inf)
+    changes = timed(q, start, turning, weight=np.zeros(n), acceleration=a)
+    sharpest = quickest(changes, eta_v * v * dt, np.inf)
     return Relaxations(
         eta_v=_least_eta_v(q, start, dt, v, a, turning, eta_v, eta_a),
         eta_a=None if sharpest is None else (sharpest[1] / dt) ** 2,

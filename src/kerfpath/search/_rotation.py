@@ -14,7 +14,7 @@ from kerfpath.errors import NoFeasiblePath
 from kerfpath.kernels.limits import LIMIT_TOLERANCE
 from kerfpath.kernels.metric import MANHATTAN, increments
 from kerfpath.search._branch import best_from_its_start
-from kerfpath.search._layers import narrowest_key, reduced, sorted_layers
+from kerfpath.search._layers import reduced, sorted_layers
 from kerfpath.search._problem import Problem
 
 __all__ = ["best_within", "too_far", "why_closed"]
@@ -54,7 +54,7 @@ def why_closed(
         weight=closing.astype(float),
         metric=MANHATTAN,
         minimax=False,
-        vertex_cost=np.zeros(len(problem.q)),
+        vertex_cost=np.where(problem.aim.vertex_cost < np.inf, 0.0, np.inf),
     )
     problem = problem._replace(aim=turning)
     joints = np.flatnonzero(closing).tolist()
@@ -84,7 +84,7 @@ def _last_node(problem: Problem, rotation: Array, closing: Bools, *, closed: boo
 
     Without `closed` it is known that none reaches the end.
     """
-    q, start, endless, aim = problem
+    q, start, endless, aim, shut = problem
     reached, beyond = 0, len(start) - (1 if closed else 2)
     while beyond - reached > 1:
         node = (reached + beyond) // 2
@@ -94,6 +94,7 @@ def _last_node(problem: Problem, rotation: Array, closing: Bools, *, closed: boo
             start=start[: node + 2],
             endless=endless,
             aim=aim._replace(vertex_cost=aim.vertex_cost[:N]),
+            shut=shut[shut[:, 1] < N],
         )
         if best_within(part, rotation, closing, closed=False)[1] is None:
             beyond = node
@@ -104,11 +105,11 @@ def _last_node(problem: Problem, rotation: Array, closing: Bools, *, closed: boo
 
 def _best(problem: Problem, rotation: Array, *, closed: bool) -> tuple[Ints, float] | None:
     """Return the best path that keeps `rotation`, all joints that have a limit unrolled."""
-    (q, start, endless, aim), place = _unrolled(problem, rotation)
-    key, window, circular = narrowest_key(q, start, aim.velocity, endless)
-    layers, order = sorted_layers(q, start, key, window, circular, endless)
+    unrolled, place = _unrolled(problem, rotation)
+    layers, aim, order = sorted_layers(unrolled)
+    if (np.diff(layers.start) == 0).any():
+        return None
     layers = layers._replace(rank=place[order])
-    aim = aim._replace(vertex_cost=freeze(aim.vertex_cost[order]))
     found = best_from_its_start(layers, aim, rotation, closed=closed)
     return None if found is None else (layers.rank[found.path], found.cost)
 
@@ -118,7 +119,7 @@ def _unrolled(problem: Problem, rotation: Array) -> tuple[Problem, Ints]:
 
     Vertices that are too far from wherever a path begins are left out.
     """
-    q, start, endless, aim = problem
+    q, start, endless, aim, shut = problem
     place = np.arange(len(q)) - np.repeat(start[:-1], np.diff(start))
     limited, origin = np.isfinite(rotation), np.arange(len(q))
     q = reduced(q, limited)
@@ -142,5 +143,18 @@ def _unrolled(problem: Problem, rotation: Array) -> tuple[Problem, Ints]:
             # The other way round would be shorter.
             velocity=np.where(limited, np.minimum(aim.velocity, np.pi), aim.velocity),
         ),
+        shut=_every_copy(shut, origin, len(place)),
     )
     return unrolled, place[origin]
+
+
+def _every_copy(shut: Ints, origin: Ints, vertices: int) -> Ints:
+    """Return the shut edges (E, 2) from each copy of the one end to each of the other."""
+    if not len(shut):
+        return shut
+    copies = np.bincount(origin, minlength=vertices)
+    most = copies.max()
+    by, first = np.argsort(origin, kind="stable"), np.cumsum(copies) - copies
+    each = np.mgrid[:most, :most].reshape(2, -1).T
+    there = (each < copies[shut][:, None]).all(axis=2)
+    return np.asarray(by[(first[shut][:, None] + each)[there]])

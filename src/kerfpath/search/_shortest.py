@@ -13,13 +13,7 @@ from kerfpath.errors import InputError, NoFeasiblePath
 from kerfpath.kernels import search as kernel
 from kerfpath.search._branch import best_closed_path
 from kerfpath.search._exact import Best, best_path, dead_end
-from kerfpath.search._layers import (
-    backwards,
-    broken_edge,
-    empty_layer,
-    narrowest_key,
-    sorted_layers,
-)
+from kerfpath.search._layers import backwards, broken_edge, empty_layer, reduced, sorted_layers
 from kerfpath.search._problem import (
     Metric,
     ObjectiveKind,
@@ -68,6 +62,7 @@ def shortest_path(
     endless: ArrayLike | None = None,
     posture: ArrayLike | None = None,
     vertex_cost: ArrayLike | None = None,
+    shut: ArrayLike | None = None,
     weights: ArrayLike | None = None,
     metric: Metric = "manhattan",
     objective: ObjectiveKind = "sum",
@@ -94,7 +89,9 @@ def shortest_path(
     posture : (N,) int, optional
         Posture of each vertex; the "known" method stays on one.
     vertex_cost : (N,), optional
-        Added for each visited vertex (with objective "max": maximised).
+        Added for each visited vertex (with objective "max": maximised); infinite: it is closed.
+    shut : (E, 2) int, optional
+        Edges that may not be used: rows of q, from a vertex to one of the next layer.
     weights : (n,) 1/rad, optional
         Weights of the distance; default 1 / (velocity dt).
     metric : {"manhattan", "chebychev", "euclid"}
@@ -126,11 +123,11 @@ def shortest_path(
 
     Notes
     -----
-    Nothing is stored per edge. Beside `q`, the search takes about 100 bytes a vertex with six
-    joints, 80 MB at most for the states (p, j) remembered under a bound that is still loose, and
-    at last 8 bytes for each state within the cost of the answer. Time grows with the number of
-    layers. It runs on the thread that calls it, without the interpreter lock: searches may run at
-    once, and each answer is the same to the bit.
+    Nothing is stored per edge that is not shut. Beside `q`, the search takes about 100 bytes a
+    vertex with six joints, 80 MB at most for the states (p, j) remembered under a bound that is
+    still loose, and at last 8 bytes for each state within the cost of the answer. Time grows with
+    the number of layers. It runs on the thread that calls it, without the interpreter lock:
+    searches may run at once, and each answer is the same to the bit.
     """
     one_of("method", method, get_args(Method))
     one_of("closure", closure, get_args(Closure))
@@ -142,13 +139,14 @@ def shortest_path(
         acceleration=acceleration,
         endless=endless,
         vertex_cost=vertex_cost,
+        shut=shut,
         weights=weights,
         metric=metric,
         objective=objective,
         eta_v=eta_v,
         eta_a=eta_a,
     )
-    q, start, endless, aim = problem
+    q, start, endless, aim, _ = problem
     reach = rotation_limits(rotation, endless)
     if posture is not None:
         posture = integers(posture, "posture", (len(q),))
@@ -159,53 +157,59 @@ def shortest_path(
 
     if method == "known":
         free = np.full(q.shape[1], np.inf)
-        aim = aim._replace(velocity=free, acceleration=free)
+        limitless = problem._replace(aim=aim._replace(velocity=free, acceleration=free))
         key = np.zeros(len(q)) if posture is None else posture.astype(float)
-        window, circular = 0.5, False
+        layers, aim = sorted_layers(limitless, key, 0.5)[:2]
+        del key
     else:
-        key, window, circular = narrowest_key(q, start, aim.velocity, endless)
-    layers, order = sorted_layers(q, start, key, window, circular, endless)
-    if aim.vertex_cost.any():
-        aim = aim._replace(vertex_cost=freeze(aim.vertex_cost[order]))
-    del key, order, posture  # as large as the graph
-    filled = int(np.argmin(np.diff(start))) if (np.diff(start) == 0).any() else len(start) - 1
+        layers, aim = sorted_layers(problem)[:2]
+    del posture  # as large as the graph
+    filled = _filled(layers)
     if filled == 0:
-        raise empty_layer(0)
+        raise empty_layer(problem, 0)
     if method == "exact":
+        if closure == "periodic":
+            _require_same_ends(problem)
         try:
-            found = _exactly(layers, aim, filled, closure)
+            found = _exactly(problem, layers, aim, filled, closure)
         except NoFeasiblePath as broken:
-            broken.back, broken.leaving = _from_the_back(q, start, aim, endless)
+            broken.back, broken.leaving = _from_the_back(problem)
             raise
         over = too_far(q[start[:-1] + found.index], endless, reach)
         return _turning_less(problem, reach, over, closure) if over.any() else found
-    return _search(layers, aim, filled, may_prove=method == "paper")
+    return _search(problem, layers, aim, filled, may_prove=method == "paper")
+
+
+def _filled(layers: kernel.Layers) -> int:
+    """Return the first layer that has no vertex; without one, the number of layers."""
+    sizes = np.diff(layers.start)
+    return int(np.argmin(sizes)) if (sizes == 0).any() else len(sizes)
 
 
 def _exactly(
-    layers: kernel.Layers, aim: kernel.Objective, filled: int, closure: Closure
+    problem: Problem, layers: kernel.Layers, aim: kernel.Objective, filled: int, closure: Closure
 ) -> LayeredPath:
     """Return the proved optimum, or prove that there is no path (and say where it breaks)."""
     whole = filled == len(layers.start) - 1
     to_search = layers._replace(start=layers.start[: filled + 1])
     if closure == "periodic" and whole:
-        _require_same_ends(layers)
         found = best_closed_path(layers, aim)
     else:
         found = best_path(to_search, aim)
     if isinstance(found, Best):
         if not whole:
-            raise empty_layer(filled)
+            raise empty_layer(problem, filled)
         index = layers.rank[found.path]
         return LayeredPath(index=freeze(index), cost=found.cost, optimal=True)
-    if closure == "periodic" and found.layers >= filled - 1 and not found.counts.any():
+    breaks = found.counts.any() or found.shut
+    if closure == "periodic" and found.layers >= filled - 1 and not breaks:
         raise NoFeasiblePath(
             "paths reach the last node, but none returns to the vertex that it left"
             " with its acceleration across the seam admissible",
             proved=True,
             node=len(layers.start) - 2,
         )
-    broken = broken_edge(found.layers, found.counts, proved=True)
+    broken = broken_edge(found.layers, found.counts, found.shut, proved=True)
     broken.reached = freeze(layers.rank[found.reached])
     raise broken
 
@@ -220,28 +224,22 @@ def _turning_less(problem: Problem, rotation: Array, over: Bools, closure: Closu
     return LayeredPath(index=freeze(index), cost=cost, optimal=True)
 
 
-def _from_the_back(
-    q: Array, start: Ints, aim: kernel.Objective, endless: Bools
-) -> tuple[int, Ints | None]:
+def _from_the_back(problem: Problem) -> tuple[int, Ints | None]:
     """Return the first node from which admissible paths reach the end, and their vertices there.
 
     (5) and (6) hold for a path and its reverse alike, so that it is as far as any path goes from
     the last layer backwards.
     """
-    q, start = backwards(q, start)
-    sizes = np.diff(start)
-    filled = int(np.argmin(sizes)) if (sizes == 0).any() else len(sizes)
+    layers, aim = sorted_layers(backwards(problem))[:2]
+    K, filled = len(layers.start) - 1, _filled(layers)
     if filled == 0:
-        return len(sizes), None
-    key, window, circular = narrowest_key(q, start, aim.velocity, endless)
-    layers, _ = sorted_layers(q, start, key, window, circular, endless)
-    free = aim._replace(vertex_cost=freeze(np.zeros(len(q))))
-    found = dead_end(layers._replace(start=start[: filled + 1]), free)
-    return len(sizes) - found.layers, freeze(layers.rank[found.reached])
+        return K, None
+    found = dead_end(layers._replace(start=layers.start[: filled + 1]), aim)
+    return K - found.layers, freeze(layers.rank[found.reached])
 
 
 def _search(
-    layers: kernel.Layers, aim: kernel.Objective, filled: int, *, may_prove: bool
+    problem: Problem, layers: kernel.Layers, aim: kernel.Objective, filled: int, *, may_prove: bool
 ) -> LayeredPath:
     """Run steps (1) to (5) of the procedure and read the path back (or say where it breaks)."""
     start = layers.start
@@ -250,10 +248,10 @@ def _search(
     to_search = layers._replace(start=start[: filled + 1])
     reached, turned_away = kernel.path_planning(to_search, aim, dist, before)
     if reached < filled:
-        counts = kernel.closing_counts(layers, aim, dist, before, reached)
-        raise broken_edge(reached, counts, proved=not turned_away)
+        counts, shut = kernel.closing_counts(layers, aim, dist, before, reached)
+        raise broken_edge(reached, counts, int(shut), proved=not turned_away)
     if filled < len(sizes):
-        raise empty_layer(filled)
+        raise empty_layer(problem, filled)
     a, b = start[-2], start[-1]
     best = np.flatnonzero(dist[a:b] == dist[a:b].min()) + a
     j = int(best[np.argmin(layers.rank[best])])
@@ -265,21 +263,18 @@ def _search(
     return LayeredPath(index=freeze(path), cost=cost, optimal=may_prove and not turned_away)
 
 
-def _require_same_ends(layers: kernel.Layers) -> None:
-    first, last = slice(0, layers.start[1]), slice(layers.start[-2], layers.start[-1])
-    sizes = int(layers.start[1]), int(layers.start[-1] - layers.start[-2])
-    if sizes[0] != sizes[1]:
+def _require_same_ends(problem: Problem) -> None:
+    q, start = problem.q, problem.start
+    first, last = q[: start[1]], q[start[-2] :]
+    if len(first) != len(last):
         raise InputError(
             "closure: periodic needs a last layer that repeats the first, but they have "
-            f"{sizes[0]} and {sizes[1]} vertices"
+            f"{len(first)} and {len(last)} vertices"
         )
-    a = layers.q[:, first][:, np.argsort(layers.rank[first])]
-    b = layers.q[:, last][:, np.argsort(layers.rank[last])]
-    gap = np.abs(a - b)
-    gap = np.where(layers.endless[:, None], np.minimum(gap, 2 * np.pi - gap), gap)
+    gap = np.abs(reduced(last - first, problem.endless))
     if gap.max(initial=0.0) > SAME_END:
-        i = int(np.argmax(gap.max(axis=0)))
+        i = int(np.argmax(gap.max(axis=1)))
         raise InputError(
             "closure: periodic needs a last layer that repeats the first, but their vertices "
-            f"{i} differ by {gap[:, i].max():.3g} rad"
+            f"{i} differ by {gap[i].max():.3g} rad"
         )

@@ -13,8 +13,8 @@ from kerfpath.kernels import search as kernel
 from kerfpath.kernels.metric import increments
 from kerfpath.kernels.states import EVERY
 from kerfpath.search._exact import FIRST_GAP, NO_SEAM, ROOM, ROUNDING, UNLIMITED
-from kerfpath.search._layers import empty_layer, narrowest_key, sorted_layers
-from kerfpath.search._problem import Metric, checked
+from kerfpath.search._layers import require_joined, sorted_layers
+from kerfpath.search._problem import Metric, Problem, checked
 
 __all__ = ["SlowedPath", "slowed_path"]
 
@@ -54,6 +54,7 @@ def slowed_path(
     acceleration: ArrayLike,
     endless: ArrayLike | None = None,
     vertex_cost: ArrayLike | None = None,
+    shut: ArrayLike | None = None,
     weights: ArrayLike | None = None,
     metric: Metric = "manhattan",
     eta_v: float = 1.0,
@@ -70,7 +71,7 @@ def slowed_path(
 
     Parameters
     ----------
-    q, start, dt, velocity, acceleration, endless, vertex_cost, weights, metric, eta_v, eta_a
+    q, start, dt, velocity, acceleration, endless, vertex_cost, shut, weights, metric, eta_v, eta_a
         As in `shortest_path` with objective "sum".
     penalty : float
         Cost of one node interval of lost time.
@@ -78,11 +79,11 @@ def slowed_path(
     Raises
     ------
     NoFeasiblePath
-        An empty layer; says which.
+        An empty layer, or closed vertices and shut edges that leave no path; says where.
     InputError
         As `shortest_path`; a penalty that is not positive.
     """
-    q, start, endless, aim = checked(
+    problem = checked(
         q,
         start,
         dt=dt,
@@ -90,6 +91,7 @@ def slowed_path(
         acceleration=acceleration,
         endless=endless,
         vertex_cost=vertex_cost,
+        shut=shut,
         weights=weights,
         metric=metric,
         objective="sum",
@@ -97,36 +99,32 @@ def slowed_path(
         eta_a=eta_a,
     )
     penalty = scalar(penalty, "penalty", above=0.0)
-    empty = np.flatnonzero(np.diff(start) == 0)
-    if empty.size:
-        raise empty_layer(int(empty[0]))
-    aim = aim._replace(timed=True, penalty=penalty)
-    index, least = _least(q, start, endless, aim)
-    path = np.ascontiguousarray(q[start[:-1] + index])
-    return SlowedPath(index=freeze(index), cost=least, lost=freeze(_lost(path, endless, aim)))
+    require_joined(problem)
+    aim = problem.aim._replace(timed=True, penalty=penalty)
+    index, least = _least(problem._replace(aim=aim))
+    path = np.ascontiguousarray(problem.q[problem.start[:-1] + index])
+    lost = _lost(path, problem.endless, aim)
+    return SlowedPath(index=freeze(index), cost=least, lost=freeze(lost))
 
 
-def _least(q: Array, start: Ints, endless: Bools, aim: kernel.Objective) -> tuple[Ints, float]:
+def _least(problem: Problem) -> tuple[Ints, float]:
     """Return the best path, as vertices of each layer, and its cost.
 
     Steps beyond `stretch` times the velocity are left out, but a step at the least price that any
     of them has may lead from anywhere to anywhere. A best path without such a leap is the best of
     all; else more steps are let in.
     """
+    q, _, endless, aim, _ = problem
     reach = np.where(endless, np.pi, np.ptp(q, axis=0))
     every = float((reach / aim.velocity).max())
     stretch = FIRST_STRETCH
     while True:
         bound = stretch * aim.velocity
         leap = float((aim.weight * bound).min()) + aim.penalty * (stretch - 1)
-        key, width, circular = narrowest_key(q, start, bound, endless)
-        layers, order = sorted_layers(q, start, key, width, circular, endless)
         stretched = aim._replace(
-            vertex_cost=freeze(aim.vertex_cost[order]),
-            velocity=freeze(bound),
-            stretch=stretch,
-            leap=leap if stretch < every else np.inf,
+            velocity=freeze(bound), stretch=stretch, leap=leap if stretch < every else np.inf
         )
+        layers, stretched, _ = sorted_layers(problem._replace(aim=stretched))
         path, cost = _best(layers, stretched)
         if path[0] >= 0:
             return layers.rank[path], cost

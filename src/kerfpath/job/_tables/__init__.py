@@ -5,9 +5,14 @@ x, y and z, R = Rz(yaw) Ry(pitch) Rx(roll), as in URDF. A field's description an
 a message about it says was expected and how to write it.
 """
 
+from kerfpath.job._tables._cell import CellTable as CellTable
+from kerfpath.job._tables._cell import FixtureTable as FixtureTable
 from kerfpath.job._tables._contour import ContourTable as ContourTable
+from kerfpath.job._tables._job import REPEATED as REPEATED
 from kerfpath.job._tables._job import TABLES as TABLES
 from kerfpath.job._tables._job import JobFile as JobFile
 from kerfpath.job._tables._plan import PlanTable as PlanTable
 from kerfpath.job._tables._program import AuditTable as AuditTable
 from kerfpath.job._tables._program import ProgramTable as ProgramTable
+from kerfpath.job._tables._sequence import SequenceTable as SequenceTable
+from kerfpath.job._tables._table import given as given

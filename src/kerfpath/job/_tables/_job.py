@@ -4,29 +4,34 @@ from __future__ import annotations
 
 from typing import Annotated
 
-from pydantic import BaseModel, Field, model_validator
+from pydantic import BaseModel, Field, ValidationInfo, model_validator
 
-from kerfpath.job._keys import fault
+from kerfpath.job._keys import fault, folder_of
+from kerfpath.job._tables._cell import CellTable, FixtureTable, HeadTable, PairTable
 from kerfpath.job._tables._comfort import ComfortTable
 from kerfpath.job._tables._contour import ContourTable
+from kerfpath.job._tables._cut import CornersTable, LeadTable, MicroJointsTable, SmoothAxesTable
 from kerfpath.job._tables._part import PartTable
 from kerfpath.job._tables._plan import PlanTable
 from kerfpath.job._tables._program import AuditTable, ProgramTable
 from kerfpath.job._tables._robot import RobotTable
+from kerfpath.job._tables._sequence import SequenceTable
 from kerfpath.job._tables._table import Table
 from kerfpath.job._tables._tool import ToolTable
 
-__all__ = ["TABLES", "JobFile"]
+__all__ = ["REPEATED", "TABLES", "JobFile"]
 
 
 class JobFile(Table):
-    """The whole job file: cell, contours, process and objective."""
+    """The whole job file: robot, part, contours, process, objective, and what stands around."""
 
     robot: RobotTable
     tool: ToolTable
     part: PartTable
     contour: Annotated[tuple[ContourTable, ...], Field(strict=False, min_length=1)]
     plan: PlanTable = PlanTable()
+    cell: CellTable | None = None
+    sequence: SequenceTable | None = None
     comfort: ComfortTable = ComfortTable()
     audit: AuditTable = AuditTable()
     program: ProgramTable = ProgramTable()
@@ -47,6 +52,60 @@ class JobFile(Table):
         return self
 
     @model_validator(mode="after")
+    def _weights_fit(self, info: ValidationInfo) -> JobFile:
+        weights, joints = self.plan.weights, self.robot.joints(folder_of(info))
+        if weights is not None and len(weights) != joints:
+            raise fault(
+                f"{joints} numbers, one for every joint",
+                f"{len(weights)}",
+                "give as many",
+                ("plan", "weights"),
+            )
+        return self
+
+    @model_validator(mode="after")
+    def _sequence_fits(self, info: ValidationInfo) -> JobFile:
+        """Require [sequence] of what it alone can choose, and a home of the robot's joints."""
+        if self.sequence is None:
+            for i, table in enumerate(self.contour):
+                for name in ("start", "direction"):
+                    if getattr(table, name) == "best":
+                        raise fault(
+                            "[sequence], which chooses what is best",
+                            "none",
+                            f"add it, or write another {name}",
+                            ("contour", i, name),
+                        )
+            return self
+        home, joints = self.sequence.home_deg, self.robot.joints(folder_of(info))
+        if home is not None and len(home) != joints:
+            raise fault(
+                f"{joints} numbers, one for every joint",
+                f"{len(home)}",
+                "give as many",
+                ("sequence", "home_deg"),
+            )
+        return self
+
+    @model_validator(mode="after")
+    def _cell_fits(self) -> JobFile:
+        """Refuse what cannot be planned or known in a cell, at its key."""
+        if self.cell is None:
+            return self
+        for name, plain in IN_A_CELL.items():
+            if (value := getattr(self.plan, name)) != plain:
+                expected = f'{name} = "{plain}"' if plain else f"no {name}"
+                raise fault(f"{expected} with [cell]", f"{value}", "change one", ("plan", name))
+        if self.cell.links == "description" and self.robot.urdf is None:
+            raise fault(
+                'links = "description" only with urdf in [robot]',
+                "none there",
+                'write links = "capsules"',
+                ("cell", "links"),
+            )
+        return self
+
+    @model_validator(mode="after")
     def _costs_are_known(self) -> JobFile:
         """Refuse costs where the planner would not know them."""
         asked = self.comfort.resolve()
@@ -56,14 +115,29 @@ class JobFile(Table):
         return self
 
 
+IN_A_CELL = {"method": "exact", "feed": "constant", "rotation_deg": None, "interruptions": "none"}
+"""What planning in a cell needs of the keys of [plan]."""
+
 TABLES: dict[str, type[BaseModel]] = {
     "robot": RobotTable,
     "tool": ToolTable,
     "part": PartTable,
     "contour": ContourTable,
+    "contour.lead_in": LeadTable,
+    "contour.lead_out": LeadTable,
+    "contour.micro_joints": MicroJointsTable,
+    "contour.corners": CornersTable,
+    "contour.smooth_axes": SmoothAxesTable,
     "plan": PlanTable,
+    "cell": CellTable,
+    "cell.head": HeadTable,
+    "cell.fixture": FixtureTable,
+    "cell.pair": PairTable,
+    "sequence": SequenceTable,
     "comfort": ComfortTable,
     "audit": AuditTable,
     "program": ProgramTable,
 }
 """The model of each table of the file."""
+REPEATED = ("contour", "cell.fixture", "cell.pair")
+"""Those that a file may have several of."""

@@ -7,7 +7,7 @@ from typing import Annotated, Literal
 from pydantic import model_validator
 
 from kerfpath.contour import FrameKind
-from kerfpath.job._keys import NotNegative, Positive, Posture, SixNotNegative, fault, key
+from kerfpath.job._keys import JointsNotNegative, NotNegative, Positive, Posture, fault, key
 from kerfpath.job._tables._table import Table
 from kerfpath.planner import FeedKind
 from kerfpath.search import Closure, Method, Metric, ObjectiveKind
@@ -45,14 +45,15 @@ class PlanTable(Table):
     frames: FrameKind = "rotation-minimising"
     posture: Posture | None = None
     feed: FeedKind = "constant"
-    refine: bool | None = None
+    refine: Annotated[bool | None, key("true or false", "true")] = None
     refine_parts: Annotated[
         int, key("a whole number of parts from 1 to 100", "4", ge=1, le=100)
     ] = 1
     eta_velocity: Annotated[Positive, key("a number above 0, at most 1", "0.95", le=1)] = 1.0
     eta_acceleration: Annotated[Positive, key("a number above 0, at most 1", "0.9", le=1)] = 1.0
     weights: Annotated[
-        SixNotNegative | None, key("6 numbers not below 0, in 1/rad", "[1, 1, 1, 1, 1, 1]")
+        JointsNotNegative | None,
+        key("a number not below 0 for every joint, in 1/rad", "[1, 1, 1, 1, 1, 1]"),
     ] = None
 
     @model_validator(mode="after")

@@ -1,0 +1,109 @@
+"""`kerfpath check`: the bodies and pairs of a job's cell, and how its contours begin in it."""
+
+from __future__ import annotations
+
+from itertools import combinations
+from typing import Any
+
+import numpy as np
+from rich.markup import escape
+
+from kerfpath.cell import Body, Capsule, Cell, Mesh
+from kerfpath.cli._show import out, print_json, table
+from kerfpath.job import Checked, collision_note
+
+__all__ = ["show_check"]
+
+
+def show_check(checked: Checked, *, as_json: bool) -> None:
+    """Print a job's robot, the bodies and pairs of its cell, and the start of every contour."""
+    job, cell = checked.job, checked.cell
+    if as_json:
+        print_json(
+            {
+                "robot": job.robot.id,
+                "joints": job.robot.joints,
+                "language": job.program.language,
+                "cell": None if cell is None else _cell_entry(cell),
+                "contours": [
+                    {
+                        "name": s.name,
+                        "nodes": s.nodes,
+                        "poses": s.poses,
+                        "clear": None if cell is None else s.clear,
+                        "clearance_m": None if np.isnan(s.clearance) else s.clearance,
+                        "pair": s.pair,
+                    }
+                    for s in checked.starts
+                ],
+                "notes": [collision_note(cell)],
+            }
+        )
+        return
+    out.print(f"robot {escape(job.robot.id)}, {job.robot.joints} joints; {job.part_file.name}")
+    if cell is not None:
+        _show_cell(cell)
+    rows = []
+    for s in checked.starts:
+        row = [escape(s.name), str(s.nodes), str(s.poses)]
+        if cell is not None:
+            said = "" if np.isnan(s.clearance) else f"{s.clearance * 1e3:.1f}"
+            row += [str(s.clear), said, "" if s.pair is None else escape(" - ".join(s.pair))]
+        rows.append(row)
+    columns = ["contour", "nodes", "poses at its start"]
+    columns += [] if cell is None else ["clear", "clearance mm", "nearest"]
+    table(columns, rows, numbers=columns[1:5])
+    out.print(f"note: {escape(collision_note(cell))}")
+
+
+def _show_cell(cell: Cell) -> None:
+    rows = [
+        [
+            escape(body.name),
+            body.kind,
+            "base" if body.frame == 0 else f"joint {body.frame}",
+            _shape(body) + (", approximate" if body.approximate else ""),
+            f"{len(_partners(cell, i))}",
+        ]
+        for i, body in enumerate(cell.bodies)
+    ]
+    table(["body", "kind", "moves with", "shape", "pairs"], rows, numbers=["pairs"])
+    out.print(f"{len(cell.pairs)} pairs are judged; all keep {cell.near_miss * 1e3:g} mm, but for:")
+    for (a, b), required, own in zip(cell.pair_names, cell.required, cell.own, strict=True):
+        if own:
+            out.print(f"  {escape(a)} - {escape(b)}: {required * 1e3:g} mm")
+    free = ", ".join(f"{a} - {b}" for a, b in _not_judged(cell))
+    out.print(f"not judged, as they are joined, or stand still, or may touch: {escape(free)}")
+
+
+def _partners(cell: Cell, body: int) -> list[int]:
+    return [int(a + b - body) for a, b in cell.pairs.tolist() if body in (a, b)]
+
+
+def _not_judged(cell: Cell) -> list[tuple[str, str]]:
+    judged = set(cell.pair_names)
+    return [pair for pair in combinations(cell.names, 2) if pair not in judged]
+
+
+def _shape(body: Body) -> str:
+    shape = body.shape
+    if isinstance(shape, Capsule):
+        return f"capsule, radius {shape.radius * 1e3:.0f} mm"
+    if isinstance(shape, Mesh):
+        return f"mesh, {len(shape.triangles)} triangles, within {shape.deviation * 1e3:g} mm"
+    return f"convex, {len(shape.points)} corners"
+
+
+def _cell_entry(cell: Cell) -> dict[str, Any]:
+    return {
+        "near_miss_m": cell.near_miss,
+        "bodies": [
+            {"name": b.name, "kind": b.kind, "joint": b.frame, "approximate": b.approximate}
+            for b in cell.bodies
+        ],
+        "judged": [
+            {"between": list(pair), "at_least_m": float(required)}
+            for pair, required in zip(cell.pair_names, cell.required, strict=True)
+        ],
+        "not_judged": [list(pair) for pair in _not_judged(cell)],
+    }

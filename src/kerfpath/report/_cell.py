@@ -1,0 +1,124 @@
+"""The cell in three dimensions: what stands still, and robot and head at poses to choose from."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from html import escape
+from typing import Any
+
+import numpy as np
+import plotly.graph_objects as go
+
+from kerfpath._arrays import Array
+from kerfpath.cell import Capsule, Cell, Hull, Mesh, Shape
+from kerfpath.plans import Plan
+from kerfpath.report._look import INK
+
+__all__ = ["add_cell", "poses_shown"]
+
+COLOURS = {"robot": "#c9a227", "head": "#5b6675", "fixture": "#8fa8c4"}
+HEIGHT = 760
+"""px: a cell is larger than a part."""
+FILL = 1.35
+"""How much larger than plotly draws it."""
+MOST = 12
+"""Poses to choose from."""
+BALL = 48
+"""Points on a ball, of which a capsule is drawn."""
+
+
+def poses_shown(plans: Sequence[Plan]) -> list[tuple[str, Array]]:
+    """Return a few poses, what each is and its joints (n,) rad: starts, and middles if few."""
+    nodes = [(plan, k) for plan in plans for k in (0, len(plan.q) // 2)]
+    if len(nodes) > MOST:
+        nodes = nodes[::2]
+    return [(f"{plan.name}, node {k}", plan.q[k]) for plan, k in nodes[:MOST]]
+
+
+def add_cell(
+    figure: go.Figure, cell: Cell, T_base_part: Array, poses: Sequence[tuple[str, Array]]
+) -> None:
+    """Draw a cell into a figure in the part's frame, mm, and a slider over the poses.
+
+    The part itself is left to the figure; without poses, so are robot and head.
+    """
+    T_part_base = np.asarray(np.linalg.inv(T_base_part), dtype=np.float64)
+    before = len(figure.data)
+    still = [b for b in cell.bodies if b.frame == 0 and b.kind != "part"]
+    moving = [b for b in cell.bodies if b.frame != 0]
+    for body in still:
+        _add_body(figure, body.name, body.kind, _triangles(body.shape), T_part_base, shown=True)
+    drawn = {body.name: _triangles(body.shape) for body in moving}
+    for i, (_, q) in enumerate(poses):
+        frames = cell.frames(q[None])[0]
+        for body in moving:
+            T = T_part_base @ frames[body.frame]
+            _add_body(figure, body.name, body.kind, drawn[body.name], T, shown=i == 0)
+    if not poses:
+        return
+    steps = []
+    for i, (name, _) in enumerate(poses):
+        shown = [True] * (before + len(still))
+        for j in range(len(poses)):
+            shown += [i == j] * len(moving)
+        steps.append(
+            {"label": f"robot at {escape(name)}", "method": "restyle", "args": ["visible", shown]}
+        )
+    steps.append(
+        {
+            "label": "part only",
+            "method": "restyle",
+            "args": ["visible", [True] * before + [False] * (len(figure.data) - before)],
+        }
+    )
+    # The step in use is named above the slider; the names of all would run into each other.
+    look: dict[str, Any] = {
+        "currentvalue": {"prefix": "Shown: ", "font": {"size": 13, "color": INK}},
+        "font": {"size": 1, "color": "white"},
+        "ticklen": 0,
+        "len": 0.5,
+        "x": 0.25,
+        "y": 0.0,
+        "yanchor": "bottom",
+    }
+    figure.update_layout(
+        height=HEIGHT, sliders=[{"steps": steps, **look}], scene={"aspectratio": _size(figure)}
+    )
+
+
+def _size(figure: go.Figure) -> dict[str, float]:
+    """Return the sides of the box around all that is shown, to one scale, to fill the figure."""
+    sides = {}
+    for axis in "xyz":
+        ends = [np.nan_to_num(t[axis]) for t in figure.data if t.visible is not False]
+        sides[axis] = float(max(e.max() for e in ends) - min(e.min() for e in ends))
+    mean = float(np.prod(list(sides.values()))) ** (1 / 3)
+    return {axis: FILL * side / mean for axis, side in sides.items()}
+
+
+def _add_body(
+    figure: go.Figure, name: str, kind: str, mesh: tuple[Array, Any], T: Array, *, shown: bool
+) -> None:
+    vertices = (mesh[0] @ T[:3, :3].T + T[:3, 3]) * 1e3
+    figure.add_mesh3d(
+        **dict(zip("xyz", vertices.T.astype(np.float32), strict=True)),
+        **dict(zip("ijk", mesh[1].T.astype(np.uint32), strict=True)),
+        color=COLOURS[kind],
+        opacity=0.55 if kind == "robot" else 0.9,
+        flatshading=True,
+        name=escape(name),
+        hovertemplate="%{fullData.name}<extra></extra>",
+        visible=shown,
+    )
+
+
+def _triangles(shape: Shape) -> tuple[Array, Any]:
+    if isinstance(shape, Mesh):
+        return shape.vertices, shape.triangles
+    if isinstance(shape, Capsule):
+        k = np.arange(BALL) + 0.5
+        z, turn = 1 - 2 * k / BALL, np.pi * (1 + np.sqrt(5)) * k  # evenly spread, by Fibonacci
+        ring = np.sqrt(1 - z**2)
+        ball = shape.radius * np.c_[ring * np.cos(turn), ring * np.sin(turn), z]
+        shape = Hull(np.vstack([shape.start + ball, shape.end + ball]))
+    return shape.points, shape.triangles

@@ -1,0 +1,177 @@
+"""The page of a drawing: the part with every loop drawn and called by its name."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from html import escape
+from typing import Any
+
+import numpy as np
+import plotly.graph_objects as go
+from numpy.typing import ArrayLike
+
+from kerfpath._arrays import Array, floats
+from kerfpath.report._html import Figures, page
+from kerfpath.report._look import ACCENT, ALERT, FAINT, JOINT_COLOURS, base_layout
+from kerfpath.report._scene import add_part, checked, space_axis, xyz
+from kerfpath.report._tables import facts_list
+
+__all__ = ["DrawnLoop", "render_drawing"]
+
+HEIGHT = 720
+LABELS = 80
+"""Names drawn; the others show where a pointer is."""
+COLOURS = {"outer": ACCENT, "inner": JOINT_COLOURS[0], "open": JOINT_COLOURS[4]}
+CAPTIONS = {"outer": "trim lines", "inner": "holes", "open": "open lines"}
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class DrawnLoop:
+    """A loop for the picture.
+
+    Parameters
+    ----------
+    name : str
+    kind : "outer", "inner" or "open"
+    points : (K, 3) m
+        Along the loop; of a closed one the first repeated at the end.
+    facts : str
+        What a pointer on it is shown.
+    fault : bool
+        Drawn as one that cannot be cut.
+    aside : bool
+        Hidden at first: a piece of a skin, or around the thickness of a sheet.
+    """
+
+    name: str
+    kind: str
+    points: Array
+    facts: str = ""
+    fault: bool = False
+    aside: bool = False
+
+
+def render_drawing(
+    title: str,
+    loops: Sequence[DrawnLoop],
+    *,
+    mesh: tuple[ArrayLike, ArrayLike],
+    facts: Sequence[tuple[str, str]] = (),
+    notes: Sequence[str] = (),
+) -> str:
+    """Return a self-contained HTML page of a part and its loops.
+
+    Parameters
+    ----------
+    title : str
+    loops : sequence of DrawnLoop
+    mesh : (vertices (V, 3) m, triangles (F, 3))
+        The part; without triangles only the loops are drawn.
+    facts : sequence of (what, value)
+    notes : sequence of str
+    """
+    figures = Figures()
+    body = [
+        "<header>",
+        '<p class="kind">Drawing</p>',
+        f"<h1>{escape(title)}</h1>",
+        facts_list(facts),
+        "".join(f'<p class="note"><b>Note</b> {escape(note)}</p>' for note in notes),
+        "</header>",
+        "<section><h2>Loops by name</h2>",
+        '<p class="caption">Part frame, all axes to the same scale. Names stand at the start of '
+        "each loop. Drag to turn, scroll to zoom, point at a loop for its size; click in the "
+        "legend to hide and show.</p>",
+        figures.place(_figure(loops, mesh), "scene"),
+        "</section>",
+    ]
+    return page(title, body, figures)
+
+
+def _figure(loops: Sequence[DrawnLoop], mesh: tuple[ArrayLike, ArrayLike]) -> go.Figure:
+    legend = {"x": 0, "y": 1, "bgcolor": "rgba(255, 255, 255, 0.8)"}
+    figure = go.Figure(layout=base_layout(HEIGHT, showlegend=True, legend=legend))
+    vertices, triangles = checked(mesh)
+    if len(triangles):
+        add_part(figure, vertices * 1e3, triangles)
+    for aside in (False, True):
+        for kind, caption in CAPTIONS.items():
+            for fault in (False, True):
+                alike = [
+                    loop
+                    for loop in loops
+                    if (loop.aside, loop.kind, loop.fault) == (aside, kind, fault)
+                ]
+                if alike:
+                    colour = ALERT if fault else FAINT if aside else COLOURS[kind]
+                    what = caption + (" of single faces and cut edges" if aside else "")
+                    _add(figure, alike, what + (" with faults" if fault else ""), colour, aside)
+    figure.update_layout(
+        margin={"l": 0, "r": 0, "t": 0, "b": 0},
+        scene=_view(
+            np.vstack([vertices, *(floats(loop.points, "points", (None, 3)) for loop in loops)])
+        )
+        | {"annotations": _labels([loop for loop in loops if not loop.aside][:LABELS])},
+    )
+    return figure
+
+
+def _view(points: Array) -> dict[str, Any]:
+    """Return a scene around `points` (m) to scale; a flat drawing is looked at from above."""
+    low, high = points.min(axis=0) * 1e3, points.max(axis=0) * 1e3
+    size = float((high - low).max())
+    # An axis without length would leave plotly no scale.
+    half = np.maximum((high - low) * 0.55, 0.05 * size)
+    middle, is_flat = (low + high) / 2, bool(high[2] - low[2] < 1e-3 * size)
+    look = {"eye": {"x": 0.0, "y": 0.0, "z": 1.3}, "up": {"x": 0.0, "y": 1.0, "z": 0.0}}
+    if not is_flat:
+        look = {"eye": {"x": 0.9, "y": -1.3, "z": 1.0}}
+    return {
+        "aspectmode": "manual",
+        "aspectratio": dict(zip("xyz", (1.5 * half / half.max()).tolist(), strict=True)),
+        "dragmode": "turntable" if not is_flat else "pan",
+        "camera": look | {"projection": {"type": "orthographic"}},
+        **{
+            f"{a}axis": space_axis(a) | {"range": [float(m - h), float(m + h)]}
+            for a, m, h in zip("xyz", middle, half, strict=True)
+        },
+    }
+
+
+def _labels(loops: Sequence[DrawnLoop]) -> list[dict[str, Any]]:
+    """Return the names at the starts of loops, in front of the part; heights alternate."""
+    return [
+        {
+            **dict(zip("xyz", (loop.points[0] * 1e3).tolist(), strict=True)),
+            "text": escape(loop.name),
+            "font": {"size": 12, "color": ALERT if loop.fault else COLOURS[loop.kind]},
+            "bgcolor": "rgba(255, 255, 255, 0.8)",
+            "showarrow": True,
+            "arrowhead": 0,
+            "arrowwidth": 1,
+            "arrowcolor": FAINT,
+            "ax": 24,
+            "ay": (-24, 24, -48, 48)[i % 4],
+            "xanchor": "left",
+        }
+        for i, loop in enumerate(loops)
+    ]
+
+
+def _add(
+    figure: go.Figure, loops: Sequence[DrawnLoop], caption: str, colour: str, aside: bool
+) -> None:
+    """Add loops as one line with breaks."""
+    lines = [floats(loop.points, f"loop {loop.name}", (None, 3)) * 1e3 for loop in loops]
+    broken = [np.vstack([line, np.full((1, 3), np.nan)]) for line in lines]
+    told = [f"<b>{escape(loop.name)}</b><br>{escape(loop.facts)}" for loop in loops]
+    figure.add_scatter3d(
+        **xyz(np.vstack(broken)),
+        mode="lines",
+        line={"color": colour, "width": 6},
+        text=np.repeat(told, [len(line) for line in broken]).tolist(),
+        hovertemplate="%{text}<extra></extra>",
+        name=f"{len(loops)} {caption}",
+        visible="legendonly" if aside else True,
+    )

@@ -1,0 +1,72 @@
+"""The skeleton of an HTML page, and the figures packed into it."""
+
+from __future__ import annotations
+
+import base64
+import zlib
+from collections.abc import Sequence
+from html import escape
+from importlib.resources import files
+
+import plotly.graph_objects as go
+from plotly.offline import get_plotlyjs
+
+__all__ = ["Figures", "page"]
+
+_SKELETON = """<!DOCTYPE html>
+<html lang="en">
+<head>
+<meta charset="utf-8">
+<meta name="viewport" content="width=device-width, initial-scale=1">
+<meta name="generator" content="kerfpath">
+<title>{title}</title>
+<style>
+{style}</style>
+</head>
+<body>
+<main>
+{body}
+</main>
+{data}
+<script>{plotly}</script>
+<script>
+{script}</script>
+</body>
+</html>
+"""
+
+
+class Figures:
+    """The figures of a page: each is packed once, and drawn when it first comes into view."""
+
+    def __init__(self) -> None:
+        self.data: list[str] = []
+
+    def place(self, figure: go.Figure, kind: str) -> str:
+        """Pack `figure` and return the element that it is drawn into."""
+        number = len(self.data) + 1
+        # A map of 1500 x 360 x 8 codes has long runs: deflated, a report with many stays small.
+        packed = base64.b64encode(zlib.compress(figure.to_json().encode(), 9)).decode()
+        self.data.append(
+            f'<script type="application/octet-stream" id="figure-{number}">{packed}</script>'
+        )
+        return (
+            f'<div class="figure {kind}" data-figure="figure-{number}" '
+            f'style="min-height:{figure.layout.height}px"></div>'
+        )
+
+
+def page(title: str, body: Sequence[str], figures: Figures) -> str:
+    """Return a self-contained page: its body in pieces of HTML, and the figures in it."""
+    return _SKELETON.format(
+        title=escape(title),
+        style=_resource("page.css"),
+        body="\n".join(part for part in body if part),
+        data="\n".join(figures.data),
+        plotly=get_plotlyjs(),
+        script=_resource("page.js"),
+    )
+
+
+def _resource(name: str) -> str:
+    return (files("kerfpath.report") / name).read_text(encoding="utf-8")

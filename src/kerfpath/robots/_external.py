@@ -1,0 +1,155 @@
+"""One more joint, of the robot's base or of the part: a rail or a positioner."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Any, Literal, TypedDict
+
+import numpy as np
+from numpy.typing import ArrayLike
+from scipy.spatial.transform import Rotation
+
+from kerfpath._arrays import Array, floats, freeze, scalar
+from kerfpath.errors import InputError
+
+if TYPE_CHECKING:
+    from kerfpath.robots._robot import Robot
+
+__all__ = ["ExternalAxis", "Travel", "alone", "carried", "held"]
+
+
+class Travel(TypedDict):
+    """Range, limits and grid of an external axis; m for a rail, rad for a positioner."""
+
+    lower: float
+    upper: float
+    velocity: float
+    acceleration: float
+    step: float
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class ExternalAxis:
+    """A joint that moves the whole robot against the part; its value is the last column of q.
+
+    Where it stands at x: a rail has taken the robot's base x metres along `axis`; a positioner has
+    turned the part by x about `axis` through `point`. All frames and poses stay those of base and
+    part at x = 0: what matters is how the one moves against the other. Its limits are the last of
+    the robot's `lower`, `upper`, `velocity` and `acceleration`.
+
+    Parameters
+    ----------
+    kind : {"rail", "positioner"}
+    axis : (3,)
+        Direction in the robot base, any length but zero.
+    point : (3,) m
+        Where a positioner's axis passes, in the robot base.
+    step : float m or rad
+        Largest step of its samples.
+
+    Raises
+    ------
+    InputError
+        A direction of length zero, a step that is not positive.
+    """
+
+    kind: Literal["rail", "positioner"]
+    axis: Array
+    point: Array
+    step: float
+
+    def __post_init__(self) -> None:
+        axis = floats(self.axis, f"{self.kind} axis", (3,))
+        if not axis.any():
+            raise InputError(f"{self.kind} axis: expected a direction, got {axis.tolist()}")
+        step = scalar(self.step, f"{self.kind} step", unit=self.unit, above=0.0)
+        _set = object.__setattr__
+        _set(self, "axis", freeze(axis / np.linalg.norm(axis)))
+        _set(self, "point", floats(self.point, f"{self.kind} point", (3,)))
+        _set(self, "step", step)
+
+    @property
+    def unit(self) -> Literal["m", "rad"]:
+        """Unit of its values."""
+        return "m" if self.kind == "rail" else "rad"
+
+    def samples(self, lower: float, upper: float) -> Array:
+        """Return its samples (E,), both ends of the range among them, at most a step apart."""
+        parts = int(np.ceil((upper - lower) / self.step * (1 - 1e-9)))
+        return freeze(np.linspace(lower, upper, parts + 1))
+
+    def require_range(self, lower: float, upper: float) -> None:
+        """Raise InputError where the ends of its range are reversed; they may be the same."""
+        if not lower <= upper:
+            raise InputError(
+                f"{self.kind}: its limits are reversed, lower {lower:g} {self.unit} is above upper "
+                f"{upper:g} {self.unit}"
+            )
+
+    def no_inverse(self) -> InputError:
+        """Say why one pose is not solved, and what to ask instead."""
+        return InputError(
+            f"inverse: with a {self.kind} a pose has solutions without end; ask "
+            f"robot.held(x).inverse(T), x in {self.unit}"
+        )
+
+    def poses(self, x: Array) -> Array:
+        """Return where the robot's base stands against the part, (..., 4, 4) m, at x (...,)."""
+        x = np.asarray(x, dtype=float)
+        T = np.zeros((*x.shape, 4, 4))
+        T[..., range(4), range(4)] = 1.0
+        if self.kind == "rail":
+            T[..., :3, 3] = x[..., None] * self.axis
+            return T
+        turn = Rotation.from_rotvec(-x.reshape(-1, 1) * self.axis).as_matrix()
+        T[..., :3, :3] = turn.reshape(*x.shape, 3, 3)
+        T[..., :3, 3] = self.point - T[..., :3, :3] @ self.point
+        return T
+
+
+def carried(robot: Robot, kind: Literal["rail", "positioner"], axis: ArrayLike, point: ArrayLike,
+            travel: Travel) -> Robot:  # fmt: skip
+    """Return the robot with an external axis."""
+    if robot.external is not None:
+        raise InputError(f"robot {robot.id!r}: it has an external axis already; only one is known")
+    limits, (velocity, acceleration) = robot.joint_limits(), robot.speed_limits()
+    return replace(
+        robot,
+        external=ExternalAxis(
+            kind=kind,
+            axis=axis,  # type: ignore[arg-type]  # cast by __post_init__
+            point=point,  # type: ignore[arg-type]
+            step=travel["step"],
+        ),
+        lower=np.append(limits.lower, travel["lower"]),
+        upper=np.append(limits.upper, travel["upper"]),
+        velocity=np.append(velocity, travel["velocity"]),
+        acceleration=np.append(acceleration, travel["acceleration"]),
+        endless=np.append(robot.endless, False),
+        couplings=tuple(replace(c, row=np.append(c.row, 0.0)) for c in robot.couplings),
+    )
+
+
+def alone(robot: Robot) -> Robot:
+    """Return the arm without its external axis, standing where it does at zero."""
+    if robot.external is None:
+        return robot
+    n = robot.family.joints
+    own: dict[str, Any] = {
+        name: None if getattr(robot, name) is None else getattr(robot, name)[:n]
+        for name in ("lower", "upper", "velocity", "acceleration", "endless")
+    }
+    couplings = tuple(replace(c, row=c.row[:n]) for c in robot.couplings)
+    return replace(robot, external=None, couplings=couplings, **own)
+
+
+def held(robot: Robot, x: float) -> Robot:
+    """Return the arm alone, standing where its external axis takes it at x (m or rad)."""
+    if robot.external is None:
+        raise InputError(f"robot {robot.id!r}: it has no external axis to be held")
+    T, chain = robot.external.poses(np.asarray(x)), robot.chain
+    if chain is not None:
+        chain = replace(chain, origins=np.concatenate([T @ chain.origins[:1], chain.origins[1:]]))
+    # A family without lengths has the chain for its model: that has been moved already.
+    foot = T @ robot.T_base_foot if robot.family.lengths else robot.T_base_foot
+    return replace(alone(robot), T_base_foot=foot, chain=chain)
