@@ -203,6 +203,7 @@ def test_a_sheet_is_written_with_its_own_columns():
 
 
 def test_a_run_keeps_the_sections_that_it_did_not_make():
+    figures = benchmark_module("_figures")
     old, new = (figures.Report(title=title, how="how") for title in ("Old", "New"))
     before = figures.markdown([old, new], {"note": "at a"}, "2026-01-01")
     again = figures.markdown([new], {"note": "at b"}, "2026-02-02", before)
