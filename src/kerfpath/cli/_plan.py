@@ -17,6 +17,7 @@ from kerfpath.job import (
     require_folder,
     require_language,
     run_job,
+    sequence_entry,
     warm_up,
     with_map,
     write_outcome,
@@ -49,6 +50,7 @@ def plan_job(job_file: Path, folder: Path, *, as_json: bool, draw_map: bool = Fa
             {
                 "passed": outcome.passed,
                 "contours": [_cut_entry(cut) for cut in outcome.cuts],
+                "sequence": None if outcome.part is None else sequence_entry(outcome.part),
                 "files": [str(f) for f in written.files],
                 "notes": list(written.notes),
             }

@@ -119,7 +119,7 @@ def program_from_file(plan_file: Path, language: str) -> tuple[str, list[str]]:
                 raise AuditFailed(
                     f"no program: contour {p.name!r} fails its audit: {check.issue()}"
                 )
-    return program_of(file.plans, _options(file, language))
+    return program_of(file.plans, _options(file, language), file.moves)
 
 
 def _options(file: PlanFile, language: str) -> ProgramOptions:

@@ -7,9 +7,11 @@ import io
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
+from kerfpath.air import AirMove
 from kerfpath.cell import Cell
 from kerfpath.errors import AuditFailed, InputError
 from kerfpath.job._planfile import broken_entry, plan_entry, plan_text
@@ -19,6 +21,7 @@ from kerfpath.job._run import Outcome
 from kerfpath.plans import Plan
 from kerfpath.post import build_program, language, post, preflight, write_program
 from kerfpath.report import ContourSection, render
+from kerfpath.sequence import PartPlan
 
 __all__ = [
     "Written",
@@ -64,10 +67,15 @@ def write_outcome(outcome: Outcome, folder: Path) -> Written:
     """
     job = outcome.job
     target = _program_file(job, folder)
-    texts, notes, refused = {}, [collision_note(outcome.cell)], None
+    part, moves = outcome.part, () if outcome.part is None else outcome.part.moves
+    texts, refused = {}, None
+    notes = [collision_note(outcome.cell, moves_too=bool(moves))]
+    notes += [] if part is None else [order_note(part)]
+    notes += [] if outcome.stuck is None else [f"The moves between contours: {outcome.stuck}"]
+    notes += [f"The moves between contours: {c.issue()}" for c in outcome.air if not c.ok]
     if outcome.passed and target is not None:
         try:
-            texts[target], warnings = program_of(outcome.plans, job.program)
+            texts[target], warnings = program_of(outcome.plans, job.program, moves)
             notes += warnings
         except InputError as error:
             refused = error
@@ -79,9 +87,9 @@ def write_outcome(outcome: Outcome, folder: Path) -> Written:
         elif cut.broken is not None:
             entries.append(broken_entry(cut.task.name, cut.broken, cut.fastest))
     texts[folder / "plan.json"] = plan_text(
-        job.robot, job.tool, job.placement, entries, job.source, outcome.cell
+        job.robot, job.tool, job.placement, entries, job.source, outcome.cell, part
     )
-    texts[folder / "trajectory.csv"] = trajectory_text(outcome.plans)
+    texts[folder / "trajectory.csv"] = trajectory_text(outcome.plans, moves)
     texts[folder / "report.html"] = report_text(outcome, notes)
     try:
         folder.mkdir(parents=True, exist_ok=True)
@@ -102,14 +110,30 @@ def _program_file(job: Job, folder: Path) -> Path | None:
     return folder / f"{job.program.name}{language(job.program.language).suffix}"
 
 
-def collision_note(cell: Cell | None) -> str:
+def order_note(part: PartPlan) -> str:
+    """Say how long the part takes, of what, and what is proved about the order."""
+    order = part.order
+    proved = (
+        "no order takes less"
+        if order.optimal
+        else f"an order of {order.at_least:.1f} s is not ruled out"
+    )
+    return (
+        f"Cycle time {part.cycle_time:.1f} s: cutting {part.cutting_time:.1f} s, air "
+        f"{part.air_time:.1f} s, piercing {part.piercing_time:.1f} s; by these candidates and "
+        f"moves {proved}."
+    )
+
+
+def collision_note(cell: Cell | None, *, moves_too: bool = False) -> str:
     """Say what was checked for collisions, and what was not."""
     if cell is None:
         return NOT_CHECKED
     about = f" (approximate: {', '.join(cell.approximate)})" if cell.approximate else ""
     return (
         f"Collisions are checked along the contours, among {len(cell.bodies)} bodies of the "
-        f"cell{about}; the moves to and between contours are not checked."
+        f"cell{about}; the moves to and between contours are "
+        f"{'checked, too' if moves_too else 'not checked'}."
     )
 
 
@@ -146,8 +170,12 @@ def require_language(job: Job) -> None:
         )
 
 
-def program_of(plans: Sequence[Plan], options: ProgramOptions) -> tuple[str, list[str]]:
+def program_of(
+    plans: Sequence[Plan], options: ProgramOptions, moves: Sequence[AirMove] = ()
+) -> tuple[str, list[str]]:
     """Return the text of the program that cuts `plans`, and the warnings of its preflight.
+
+    Between them the robot moves as `moves` say; without any, straight to each.
 
     The caller answers for the audit.
 
@@ -164,11 +192,15 @@ def program_of(plans: Sequence[Plan], options: ProgramOptions) -> tuple[str, lis
         raise InputError(f"no program: {refusal}")
     program = build_program(
         plans,
+        moves=moves,
         name=options.name,
         retract=options.retract,
         zone=options.zone,
         laser_output=options.laser_output,
         lead_time=options.lead_time,
+        pierce_time=options.pierce_time,
+        approach_speed=options.approach_speed,
+        air_speed=options.air_speed,
         work_object=options.work_object,
         tool_name=options.tool_name,
     )
@@ -177,15 +209,21 @@ def program_of(plans: Sequence[Plan], options: ProgramOptions) -> tuple[str, lis
     return text, [str(issue) for issue in issues if issue.level == "warning"]
 
 
-def trajectory_text(plans: Sequence[Plan]) -> str:
-    """Return the text of trajectory.csv: one row per node, in mm and degrees, base frame."""
+def trajectory_text(plans: Sequence[Plan], moves: Sequence[AirMove] = ()) -> str:
+    """Return the text of trajectory.csv: one row per node, in mm and degrees, base frame.
+
+    Moves through the air stand where they are made, a row per corner; each has a time of its own.
+    """
     joints = range(1, (plans[0].robot.joints if plans else 6) + 1)
     header = ["contour", "node", "kind", "t_s", *(f"q{i}_deg" for i in joints)]
     header += ["x_mm", "y_mm", "z_mm", "axis_x", "axis_y", "axis_z", "gamma_deg", "posture"]
     out = io.StringIO()
     writer = csv.writer(out, lineterminator="\n")
     writer.writerow(header)
-    for plan in plans:
+    homeless = len(moves) < len(plans)
+    for i, plan in enumerate(plans):
+        if moves and not (homeless and i == 0):
+            _write_air(writer, moves[i - 1 if homeless else i], plan)
         numbers = np.column_stack(
             [
                 plan.time,
@@ -198,7 +236,17 @@ def trajectory_text(plans: Sequence[Plan]) -> str:
         rows = zip(numbers.tolist(), plan.contour.kinds, plan.posture, strict=True)
         for k, (row, kind, posture) in enumerate(rows):
             writer.writerow([plan.name, k, kind, *row, int(posture)])
+    if len(moves) > len(plans):
+        _write_air(writer, moves[-1], plans[-1])
     return out.getvalue()
+
+
+def _write_air(writer: Any, move: AirMove, plan: Plan) -> None:
+    """Write the corners of a move; gamma and posture are those of contours alone."""
+    T = plan.robot.forward(move.q) @ plan.T_flange_tip
+    for k, (time, q, tip) in enumerate(zip(move.time, move.q, T, strict=True)):
+        row = [time, *np.degrees(q), *tip[:3, 3] * 1000, *tip[:3, 2]]
+        writer.writerow(["air", k, "air", *(float(v) for v in row), "", ""])
 
 
 def report_text(outcome: Outcome, notes: Sequence[str]) -> str:

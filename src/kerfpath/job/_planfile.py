@@ -13,15 +13,18 @@ import numpy as np
 
 from kerfpath import __version__
 from kerfpath._arrays import Array
+from kerfpath.air import AirMove
 from kerfpath.auditor import Check
 from kerfpath.cell import Cell
 from kerfpath.comfort import MEASURES, Band, Comfort
 from kerfpath.contour import KINDS, Contour
 from kerfpath.errors import InputError, NoFeasiblePath
 from kerfpath.job._external import by_unit, external_entry, joints, with_external
+from kerfpath.job._sequencefile import read_moves, sequence_entry
 from kerfpath.planner import FastestSpeed
 from kerfpath.plans import Feed, Plan, Proof, Settings
 from kerfpath.robots import Coupling, Robot
+from kerfpath.sequence import PartPlan
 from kerfpath.tilt import Tilt
 from kerfpath.urdf import Chain
 
@@ -48,6 +51,8 @@ class PlanFile:
         Names of the contours that have no plan.
     failed : tuple of str
         Names of the contours whose plan failed its audit when it was made.
+    moves : tuple of AirMove
+        Through the air between them; empty when none were planned.
     contours : dict of str to str
         What the job calls the contour of each plan: a plan may be that of a piece.
     in_cell : bool
@@ -60,6 +65,7 @@ class PlanFile:
     missing: tuple[str, ...]
     failed: tuple[str, ...]
     contours: dict[str, str]
+    moves: tuple[AirMove, ...]
     in_cell: bool
 
 
@@ -70,6 +76,7 @@ def plan_text(
     contours: Sequence[dict[str, Any]],
     job: dict[str, Any],
     cell: Cell | None = None,
+    part: PartPlan | None = None,
 ) -> str:
     """Return the text of a plan.json; the same input gives the same bytes.
 
@@ -84,6 +91,8 @@ def plan_text(
         The job file as read.
     cell : Cell, optional
         What the motions were planned and audited clear of.
+    part : PartPlan, optional
+        The moves between the contours, and what is proved about their order.
     """
     data = {
         "schema": SCHEMA,
@@ -96,6 +105,7 @@ def plan_text(
         "limits": _limits_entry(robot),
         "cell": None if cell is None else _cell_entry(cell),
         "contours": list(contours),
+        "sequence": None if part is None else sequence_entry(part),
     }
     text = json.dumps(data, indent=1, allow_nan=False)
     # One row of numbers to a line: a person can still read it, and a diff shows a node.
@@ -217,6 +227,7 @@ def read_plan_file(path: str | Path) -> PlanFile:
                 for e in entries
                 if e["feasible"] and e["audit"]["passed"] is not True
             ),
+            moves=read_moves(data["sequence"]),
             in_cell=data.get("cell") is not None,
         )
     except InputError as error:

@@ -16,6 +16,7 @@ from kerfpath.contour import Contour
 from kerfpath.errors import InputError
 from kerfpath.job._keys import MOST_NODES
 from kerfpath.job._refusals import error_at, refusal
+from kerfpath.job._shape import shaped
 from kerfpath.job._tables import (
     AuditTable,
     CellTable,
@@ -23,7 +24,9 @@ from kerfpath.job._tables import (
     JobFile,
     PlanTable,
     ProgramTable,
+    SequenceTable,
 )
+from kerfpath.operations import Surface
 from kerfpath.robots import Robot, postures_named
 
 __all__ = ["ContourTask", "Job", "ProgramOptions", "audit_options", "program_options", "read_job"]
@@ -52,6 +55,8 @@ class ContourTask:
         largest distance of the chords from the contour; exactly one of the three is given.
     axis_tolerance : float rad, optional
         Largest angle between the axis along a chord and the contour's, with `tolerance`.
+    table : ContourTable
+        What is made of the loop before it is sampled, as the file says it.
     """
 
     pick: str
@@ -61,6 +66,11 @@ class ContourTask:
     count: int | None = None
     tolerance: float | None = None
     axis_tolerance: float | None = None
+    table: ContourTable
+
+    def candidates(self, drawn: Contour, surface: Surface) -> list[Contour]:
+        """Return the contours that may be cut for a loop as drawn, see `shaped`."""
+        return shaped(self.table, drawn, surface)
 
     def sample(self, contour: Contour) -> Contour:
         """Return the contour sampled as this task says, under the task's name.
@@ -75,7 +85,10 @@ class ContourTask:
                 f"contour {self.name!r}: {self.spacing * 1e3:g} mm between nodes would make more "
                 f"than {MOST_NODES} of them over {contour.length * 1e3:g} mm; raise spacing_mm"
             )
-        return replace(contour, name=self.name).resample(
+        named = replace(contour, name=self.name)
+        if self.spacing is not None and (contour.speed_share < 1).any():
+            return named.resample(dt=self.spacing / self.speed, speed=self.speed)
+        return named.resample(
             spacing=self.spacing,
             count=self.count,
             tolerance=self.tolerance,
@@ -101,6 +114,12 @@ class ProgramOptions:
         Digital output that switches the laser.
     lead_time : float s
         How long before the robot reaches a point the laser is switched for it.
+    pierce_time : float s
+        How long the laser stays on at the start before the cut goes on.
+    approach_speed : float m/s
+        Along the tool axis before and after a contour.
+    air_speed : float
+        Share of the full speed of joint moves.
     work_object, tool_name : str
         Names of the part frame and the tool in the program.
     """
@@ -111,6 +130,9 @@ class ProgramOptions:
     zone: float
     laser_output: str
     lead_time: float
+    pierce_time: float
+    approach_speed: float
+    air_speed: float
     work_object: str
     tool_name: str
 
@@ -143,6 +165,8 @@ class Job:
         Whether a contour that cannot be cut in one go is cut in pieces.
     cell : CellTable or None
         What stands around, as the file says it; without one, collisions are not checked.
+    sequence : SequenceTable or None
+        How the order and the moves between contours are chosen; without one, neither is.
     audit_options : dict
         Keyword arguments of `kerfpath.auditor.checks`, in SI.
     program : ProgramOptions
@@ -162,6 +186,7 @@ class Job:
     refine_parts: int
     interruptions: Literal["none", "fewest"]
     cell: CellTable | None
+    sequence: SequenceTable | None
     audit_options: dict[str, Any]
     program: ProgramOptions
     source: dict[str, Any]
@@ -197,6 +222,7 @@ def read_job(path: str | Path) -> Job:
         refine_parts=file.plan.refine_parts,
         interruptions=file.plan.interruptions,
         cell=file.cell,
+        sequence=file.sequence,
         audit_options=audit_options(file.audit),
         program=program_options(file.program, path.stem),
         source=source,
@@ -253,6 +279,7 @@ def _task(table: ContourTable) -> ContourTask:
         count=table.count,
         tolerance=_metres(table.tolerance_mm),
         axis_tolerance=None if angle is None else float(np.radians(angle)),
+        table=table,
     )
 
 
@@ -301,6 +328,9 @@ def program_options(table: ProgramTable, stem: str) -> ProgramOptions:
         zone=table.zone_mm / 1000,
         laser_output=table.laser_output,
         lead_time=table.lead_time_s,
+        pierce_time=table.pierce_time_s,
+        approach_speed=table.approach_mm_s / 1000,
+        air_speed=table.air_speed,
         work_object=table.work_object,
         tool_name=table.tool_name,
     )

@@ -17,10 +17,11 @@ from kerfpath.contour import FRAME_KINDS, Contour
 from kerfpath.errors import NoFeasiblePath
 from kerfpath.graph import LayeredGraph
 from kerfpath.job._cell import cell_of_job
+from kerfpath.job._cut import Cut
+from kerfpath.job._order import ordered
 from kerfpath.job._read import ContourTask, Job
 from kerfpath.kernels import is_compiled
 from kerfpath.planner import (
-    ClearanceMap,
     FastestSpeed,
     clearance_map,
     fastest_speed,
@@ -32,7 +33,7 @@ from kerfpath.planner import (
 from kerfpath.plans import Plan
 from kerfpath.refiner import refine
 from kerfpath.robots import robot
-from kerfpath.search import Relaxations
+from kerfpath.sequence import PartPlan
 
 __all__ = ["Cut", "Outcome", "Progress", "fastest_speeds", "run_job", "warm_up"]
 
@@ -41,90 +42,25 @@ Progress = Callable[[str, int, int], None]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class Cut:
-    """What came of one contour of a job, or of one piece of it.
-
-    Parameters
-    ----------
-    contour : str
-        What the job calls the contour.
-    task : ContourTask
-    drawn : Contour
-        The loop as drawn, densely sampled, part frame.
-    nodes : Contour
-        Its nodes, part frame.
-    graph : LayeredGraph
-    plan : Plan or None
-        None when no feasible path was found.
-    broken : NoFeasiblePath or None
-        Why there is no plan.
-    fastest : FastestSpeed or None
-        Where there is no plan but a slower one exists: up to which speed.
-    relaxations : Relaxations or None
-        With it: the least change of each limit that would do at the speed asked.
-    checks : tuple of Check
-        The audit's table; empty without a plan.
-    clearance : ClearanceMap or None
-        How clear every pose is in the cell, where the job asks for the map.
-    """
-
-    contour: str
-    task: ContourTask
-    drawn: Contour
-    nodes: Contour
-    graph: LayeredGraph
-    plan: Plan | None = None
-    broken: NoFeasiblePath | None = None
-    fastest: FastestSpeed | None = None
-    relaxations: Relaxations | None = None
-    checks: tuple[Check, ...] = ()
-    clearance: ClearanceMap | None = None
-
-    @property
-    def passed(self) -> bool:
-        """True when there is a plan and its audit finds no error."""
-        return self.plan is not None and not any(
-            c.level == "error" and not c.ok for c in self.checks
-        )
-
-    @property
-    def failure(self) -> str:
-        """Why there is no plan, and what would help; empty where there is one."""
-        if self.broken is None:
-            return ""
-        if self.fastest is None:
-            return str(self.broken)
-        least = self.relaxations
-        ways = [
-            f"{name} {share:.4g}"
-            for name, share in (
-                ("eta_velocity", None if least is None else least.eta_v),
-                ("eta_acceleration", None if least is None else least.eta_a),
-            )
-            if share is not None
-        ]
-        node = self.nodes.points[self.fastest.node] * 1000
-        return (
-            f"{self.broken}; a path exists up to {self.fastest.speed * 60:.4g} m/min, where the "
-            f"{self.fastest.limit} of joint {self.fastest.joint + 1} binds at node "
-            f"{self.fastest.node}, {' '.join(f'{v:.1f}' for v in node)} mm"
-            f"{'; or from ' + ' or from '.join(ways) + ' on' if ways else ''}"
-        )
-
-
-@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Outcome:
-    """What came of a job: every cut, in order, its cell, and the part's mesh for pictures."""
+    """What came of a job: every cut, in order, its cell, and the part's mesh for pictures.
+
+    With [sequence]: the moves between the cuts and their audit, or why there is no way.
+    """
 
     job: Job
     cuts: tuple[Cut, ...]
     mesh: tuple[Array, Ints]
     cell: Cell | None = None
+    part: PartPlan | None = None
+    stuck: NoFeasiblePath | None = None
+    air: tuple[Check, ...] = ()
 
     @property
     def passed(self) -> bool:
-        """True when every contour has a plan that passes its audit."""
-        return all(cut.passed for cut in self.cuts)
+        """True when every contour has a plan that passes its audit, and every move too."""
+        moves = self.stuck is None and all(check.ok for check in self.air)
+        return moves and all(cut.passed for cut in self.cuts)
 
     @property
     def plans(self) -> tuple[Plan, ...]:
@@ -146,12 +82,26 @@ def run_job(job: Job, *, progress: Progress = lambda what, done, total: None) ->
     for task in job.contours:  # a misspelt name shall not wait for the contours before it
         part.loop(task.pick)
     cell = cell_of_job(job, part)
-    cuts = [
-        cut
-        for task in job.contours
-        for cut in _cut(job, task, part.contour(task.pick), cell, progress)
+    loops = [part.contour(task.pick) for task in job.contours]
+    tries = [
+        [
+            _cut(job, task, shaped, cell, progress)
+            for shaped in task.candidates(loop, part.surface(task.pick))
+        ]
+        for task, loop in zip(job.contours, loops, strict=True)
     ]
-    return Outcome(job=job, cuts=tuple(cuts), mesh=part.mesh(), cell=cell)
+    if job.sequence is not None:
+        progress("order and moves", 0, 1)
+    found = ordered(job, loops, tries, cell)
+    return Outcome(
+        job=job,
+        cuts=found.cuts,
+        mesh=part.mesh(),
+        cell=cell,
+        part=found.part,
+        stuck=found.stuck,
+        air=found.air,
+    )
 
 
 def _cut(
@@ -188,7 +138,8 @@ def _cut(
         plans = _plans(job, task, nodes, graph, cell)
     except NoFeasiblePath as broken:
         # With poses everywhere slower would do; for a loop that cannot close it need not.
-        if not np.diff(graph.start).all() or options["closure"] != "free":
+        constant = options["closure"] == "free" and nodes.time is None
+        if not np.diff(graph.start).all() or not constant:
             return (replace(whole, broken=broken),)
         progress(f"{task.name}: fastest speed", 0, 1)
         if cell is not None:
@@ -236,8 +187,8 @@ def _plans(
 ) -> tuple[Plan, ...]:
     """Return the plan of a contour, or those of its pieces where the job lets it be interrupted."""
     options = job.plan_options
-    setting: dict[str, Any] = {"tool": job.tool, "placement": job.placement, "speed": task.speed}
-    setting["graph"] = graph
+    setting: dict[str, Any] = {"tool": job.tool, "placement": job.placement, "graph": graph}
+    setting["speed"] = task.speed if nodes.time is None else None
     try:
         return (plan(nodes, job.robot, cell=cell, **setting, **options),)
     except NoFeasiblePath:
@@ -269,7 +220,10 @@ def _audited(job: Job, whole: Cut, made: Plan, cell: Cell | None) -> Cut:
 
 def _divided(made: Plan, drawn: Contour, parts: int) -> Plan:
     """Return the plan on nodes that divide its intervals, where one keeps the limits there."""
-    finer = drawn.resample(count=(len(made.contour) - 1) * parts + 1)
+    nodes = np.arange(len(made.contour))
+    finer = drawn.at_nodes(
+        np.interp(np.arange(nodes[-1] * parts + 1) / parts, nodes, made.contour.s)
+    )
     found = refine(made, nodes=replace(finer, name=made.name))
     if found.done:
         return found.plan
@@ -295,7 +249,8 @@ def fastest_speeds(
     answers: list[tuple[ContourTask, Contour, FastestSpeed | NoFeasiblePath]] = []
     for i, task in enumerate(job.contours):
         progress("contours", i, len(job.contours))
-        nodes = task.sample(part.contour(task.pick))
+        drawn = task.candidates(part.contour(task.pick), part.surface(task.pick))[0]
+        nodes = task.sample(drawn)
         try:
             found: FastestSpeed | NoFeasiblePath = _fastest(job, nodes, cell, refine=refine)
         except NoFeasiblePath as broken:

@@ -4,4 +4,5 @@ from kerfpath.sequence._inner import inner_first as inner_first
 from kerfpath.sequence._order import Order as Order
 from kerfpath.sequence._order import best_order as best_order
 from kerfpath.sequence._part import PartPlan as PartPlan
+from kerfpath.sequence._part import order_plans as order_plans
 from kerfpath.sequence._part import plan_part as plan_part

@@ -14,4 +14,5 @@ from kerfpath.job._tables._job import JobFile as JobFile
 from kerfpath.job._tables._plan import PlanTable as PlanTable
 from kerfpath.job._tables._program import AuditTable as AuditTable
 from kerfpath.job._tables._program import ProgramTable as ProgramTable
+from kerfpath.job._tables._sequence import SequenceTable as SequenceTable
 from kerfpath.job._tables._table import given as given

@@ -2,18 +2,24 @@
 
 from __future__ import annotations
 
-from typing import Annotated
+from typing import Annotated, Literal
 
 from pydantic import model_validator
 
-from kerfpath.job._keys import MOST_NODES, Positive, Text, fault, key
+from kerfpath.job._keys import MOST_NODES, NotNegative, Number, Positive, Text, fault, key
+from kerfpath.job._tables._cut import CornersTable, LeadTable, MicroJointsTable, SmoothAxesTable
 from kerfpath.job._tables._table import Table, given
+from kerfpath.operations import Side
 
 __all__ = ["ContourTable"]
 
 
+SHAPES = ("overlap_mm", "lead_in", "lead_out", "micro_joints", "corners")
+"""Keys that give a contour features, whose ends sampling by spacing_mm keeps."""
+
+
 class ContourTable(Table):
-    """[[contour]]: which loop of the part to cut, how fast, and how finely it is sampled."""
+    """[[contour]]: which loop of the part to cut, how fast, how sampled, and what is made of it."""
 
     pick: Annotated[Text, key("the name of a loop in the part", '"trim"')]
     name: Annotated[Text | None, key("a name that no other contour has", '"trim 2"')] = None
@@ -24,6 +30,23 @@ class ContourTable(Table):
     ] = None
     tolerance_mm: Annotated[Positive | None, key("a number above 0, in mm", "0.05")] = None
     axis_tolerance_deg: Annotated[Positive | None, key("a number above 0, in deg", "1")] = None
+    start: Literal["drawn", "smoothest", "best"] = "drawn"
+    start_mm: Annotated[
+        NotNegative | None, key("a number not below 0, in mm along the loop", "120")
+    ] = None
+    direction: Literal["drawn", "reversed", "best"] = "drawn"
+    candidates: Annotated[
+        int, key('a whole number of starts from 2 to 100, for start = "best"', "4", ge=2, le=100)
+    ] = 4
+    scrap: Side = "right"
+    kerf_mm: Annotated[Positive | None, key("a number above 0, in mm", "0.2")] = None
+    bevel_deg: Annotated[Number, key("a number from -60 to 60, in deg", "20", ge=-60, le=60)] = 0.0
+    overlap_mm: Annotated[Positive | None, key("a number above 0, in mm", "2")] = None
+    lead_in: LeadTable | None = None
+    lead_out: LeadTable | None = None
+    micro_joints: MicroJointsTable | None = None
+    corners: CornersTable | None = None
+    smooth_axes: SmoothAxesTable | None = None
 
     @model_validator(mode="after")
     def _one_sampling(self) -> ContourTable:
@@ -50,4 +73,14 @@ class ContourTable(Table):
                 "remove one",
                 ("axis_tolerance_deg",),
             )
+        features = given(self, *SHAPES)
+        if features and self.spacing_mm is None:
+            raise fault(
+                f"spacing_mm with {features[0]}, whose ends it keeps",
+                found[0],
+                "write, for example, spacing_mm = 1",
+                (found[0],),
+            )
+        if self.start != "drawn" and self.start_mm is not None:
+            raise fault("start or start_mm", "both", "remove one", ("start_mm",))
         return self

@@ -10,10 +10,12 @@ from kerfpath.job._keys import fault, folder_of
 from kerfpath.job._tables._cell import CellTable, FixtureTable, HeadTable, PairTable
 from kerfpath.job._tables._comfort import ComfortTable
 from kerfpath.job._tables._contour import ContourTable
+from kerfpath.job._tables._cut import CornersTable, LeadTable, MicroJointsTable, SmoothAxesTable
 from kerfpath.job._tables._part import PartTable
 from kerfpath.job._tables._plan import PlanTable
 from kerfpath.job._tables._program import AuditTable, ProgramTable
 from kerfpath.job._tables._robot import RobotTable
+from kerfpath.job._tables._sequence import SequenceTable
 from kerfpath.job._tables._table import Table
 from kerfpath.job._tables._tool import ToolTable
 
@@ -29,6 +31,7 @@ class JobFile(Table):
     contour: Annotated[tuple[ContourTable, ...], Field(strict=False, min_length=1)]
     plan: PlanTable = PlanTable()
     cell: CellTable | None = None
+    sequence: SequenceTable | None = None
     comfort: ComfortTable = ComfortTable()
     audit: AuditTable = AuditTable()
     program: ProgramTable = ProgramTable()
@@ -57,6 +60,30 @@ class JobFile(Table):
                 f"{len(weights)}",
                 "give as many",
                 ("plan", "weights"),
+            )
+        return self
+
+    @model_validator(mode="after")
+    def _sequence_fits(self, info: ValidationInfo) -> JobFile:
+        """Require [sequence] of what it alone can choose, and a home of the robot's joints."""
+        if self.sequence is None:
+            for i, table in enumerate(self.contour):
+                for name in ("start", "direction"):
+                    if getattr(table, name) == "best":
+                        raise fault(
+                            "[sequence], which chooses what is best",
+                            "none",
+                            f"add it, or write another {name}",
+                            ("contour", i, name),
+                        )
+            return self
+        home, joints = self.sequence.home_deg, self.robot.joints(folder_of(info))
+        if home is not None and len(home) != joints:
+            raise fault(
+                f"{joints} numbers, one for every joint",
+                f"{len(home)}",
+                "give as many",
+                ("sequence", "home_deg"),
             )
         return self
 
@@ -96,11 +123,17 @@ TABLES: dict[str, type[BaseModel]] = {
     "tool": ToolTable,
     "part": PartTable,
     "contour": ContourTable,
+    "contour.lead_in": LeadTable,
+    "contour.lead_out": LeadTable,
+    "contour.micro_joints": MicroJointsTable,
+    "contour.corners": CornersTable,
+    "contour.smooth_axes": SmoothAxesTable,
     "plan": PlanTable,
     "cell": CellTable,
     "cell.head": HeadTable,
     "cell.fixture": FixtureTable,
     "cell.pair": PairTable,
+    "sequence": SequenceTable,
     "comfort": ComfortTable,
     "audit": AuditTable,
     "program": ProgramTable,

@@ -1,0 +1,207 @@
+"""Jobs that say how a contour is cut, in which order, and how the robot gets there."""
+
+import csv
+import json
+import shutil
+from importlib.resources import files
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from kerfpath.errors import InputError
+from kerfpath.job import program_from_file, read_job, read_plan_file
+from kerfpath.post import read_rapid
+from test_cli import refused, run
+
+DEMO = Path(str(files("kerfpath") / "demo"))
+HEAD = """\
+[robot]
+model = "abb_irb4600_60_205"
+endless = [4, 6]
+acceleration_deg_s2 = [320, 270, 420, 1300, 1400, 2000]
+[tool]
+head = "laser-head-45"
+[part]
+file = "b_pillar.step"
+xyz_mm = [1200, -600, 500]
+rpy_deg = [0, 0, 90]
+"""
+CONTOURS = """\
+[[contour]]
+pick = "skin/hole1"
+name = "led in"
+speed_m_min = 3
+spacing_mm = 2
+start = "best"
+candidates = 2
+overlap_mm = 2
+kerf_mm = 0.2
+[contour.lead_in]
+length_mm = 4
+shape = "arc"
+angle_deg = 90
+[contour.lead_out]
+length_mm = 3
+shape = "arc"
+[[contour]]
+pick = "skin/hole11"
+name = "joined"
+speed_m_min = 3
+spacing_mm = 2
+direction = "best"
+[contour.micro_joints]
+width_mm = 2
+count = 2
+[[contour]]
+pick = "skin/hole8"
+name = "cornered"
+speed_m_min = 3
+spacing_mm = 2
+start_mm = 10
+bevel_deg = 5
+[contour.lead_in]
+length_mm = 4
+[contour.corners]
+slow_share = 0.1
+ramp_mm = 6
+"""
+PLAN = """\
+[plan]
+gamma_step_deg = 10
+posture = "front/up"
+"""
+SEQUENCE = """\
+[sequence]
+home_deg = [0, -20, 10, 0, 60, 0]
+[program]
+name = "job"
+pierce_time_s = 0.25
+lead_time_s = 0.005
+"""
+WHOLE = HEAD + CONTOURS + PLAN + SEQUENCE
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("part")
+    shutil.copy(DEMO / "b_pillar.step", folder)
+    (folder / "job.toml").write_text(WHOLE)
+    return folder
+
+
+@pytest.fixture(scope="module")
+def done(folder):
+    result = run("plan", str(folder / "job.toml"), "--out", str(folder / "out"), "--json")
+    assert result.returncode == 0, result.stderr
+    return json.loads(result.stdout), folder / "out"
+
+
+def test_a_part_is_planned_audited_and_written_as_one_program(done):
+    said, out = done
+    assert said["passed"]
+    assert {entry["name"] for entry in said["contours"]} == {"led in", "joined", "cornered"}
+    times = said["sequence"]
+    assert times["cycle_s"] == pytest.approx(
+        times["cutting_s"] + times["air_s"] + times["piercing_s"]
+    )
+    assert times["piercing_s"] == pytest.approx(0.75)
+    assert len(times["moves"]) == 4
+    program = read_rapid((out / "job.mod").read_text())
+    assert len(program.sections) == 3
+
+
+def test_kinds_and_air_moves_are_in_the_trajectory(done):
+    _, out = done
+    rows = list(csv.DictReader((out / "trajectory.csv").read_text().splitlines()))
+    by_contour = {}
+    for row in rows:
+        by_contour.setdefault(row["contour"], []).append(row)
+    assert {row["kind"] for row in by_contour["led in"]} == {
+        "pierce", "lead-in", "cut", "overlap", "lead-out",
+    }  # fmt: skip
+    assert {row["kind"] for row in by_contour["joined"]} == {"cut", "micro joint"}
+    assert {row["kind"] for row in by_contour["air"]} == {"air"}
+    # From home and back to it.
+    home = [0, -20, 10, 0, 60, 0]
+    for row in (rows[0], rows[-1]):
+        q = [float(row[f"q{i}_deg"]) for i in range(1, 7)]
+        turns = np.array([0, 0, 0, 1, 0, 1]) * 360
+        off = np.abs(np.array(q) - home)
+        np.testing.assert_allclose(
+            np.where(turns > 0, np.minimum(off % 360, 360 - off % 360), off), 0, atol=1e-9
+        )
+
+
+def test_a_plan_read_back_gives_the_same_program(done):
+    _, out = done
+    file = read_plan_file(out / "plan.json")
+    assert len(file.moves) == 4
+    kinds = {plan.name: set(plan.contour.kinds) for plan in file.plans}
+    assert "micro joint" in kinds["joined"]
+    text, _ = program_from_file(out / "plan.json", "rapid")
+    assert text == (out / "job.mod").read_text()
+
+
+def test_the_slowed_corner_is_slow_and_the_rest_is_not(done):
+    _, out = done
+    plans = {plan.name: plan for plan in read_plan_file(out / "plan.json").plans}
+    plan = plans["cornered"]
+    speed = np.diff(plan.contour.s) / np.diff(plan.time)
+    assert speed.max() == pytest.approx(0.05, rel=0.11)  # steps may be a tenth shorter
+    assert speed.min() < 0.3 * speed.max()
+
+
+def test_the_given_order_is_kept_on_request(folder):
+    job = folder / "given.toml"
+    job.write_text(WHOLE.replace("[sequence]", '[sequence]\norder = "given"'))
+    result = run("plan", str(job), "--out", str(folder / "given"), "--json")
+    assert result.returncode == 0, result.stderr
+    names = [entry["name"] for entry in json.loads(result.stdout)["contours"]]
+    assert names == ["led in", "joined", "cornered"]
+
+
+BAD = [
+    ("count = 2\n[[contour]]", "count = 0\n[[contour]]", "count: expected a whole number from 1"),
+    ('shape = "arc"\nangle_deg = 90', "angle_deg = 100", 'angle_deg up to 90 with shape = "line"'),
+    ("length_mm = 3\n", "length_mm = -3\n", "lead_out.length_mm: expected a number above 0"),
+    ("start_mm = 10", 'start_mm = 10\nstart = "smoothest"', "start or start_mm, got both"),
+    ("[sequence]", "[sequences]", "nearest: sequence"),
+    ("home_deg = [0, -20, 10, 0, 60, 0]", "home_deg = [0, 0]", "6 numbers, one for every joint"),
+    ("slow_share = 0.1", "round_mm = 0.1\nloop_mm = 1", "round_mm or loop_mm, got both"),
+    ("ramp_mm = 6", "ramps_mm = 6", "expected a key of [contour.corners]"),
+    ("spacing_mm = 2\nstart =", "count = 40\nstart =", "expected spacing_mm with overlap_mm"),
+]
+
+
+@pytest.mark.parametrize(("old", "new", "message"), BAD)
+def test_bad_keys_are_refused_with_their_place(folder, old, new, message):
+    assert old in WHOLE
+    bad = folder / "bad.toml"
+    bad.write_text(WHOLE.replace(old, new, 1))
+    with pytest.raises(InputError) as error:
+        read_job(bad)
+    assert message in str(error.value)
+    assert "bad.toml:" in str(error.value)
+
+
+def test_what_is_best_needs_a_sequence(folder):
+    bad = folder / "bad.toml"
+    bad.write_text(HEAD + CONTOURS + PLAN)
+    with pytest.raises(InputError, match=r"contour.start: expected \[sequence\]"):
+        read_job(bad)
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "message"),
+    [
+        ("length_mm = 4\nshape", "length_mm = 60\nshape", "leaves the surface"),
+        ("kerf_mm = 0.2", "kerf_mm = 40", "the beam does not fit"),
+        ("width_mm = 2", "width_mm = 200", "do not fit into"),
+        ("overlap_mm = 2", "overlap_mm = 2000", "expected less than the contour's"),
+    ],
+)
+def test_operations_that_cannot_be_are_one_line_and_code_2(folder, old, new, message):
+    bad = folder / "bad.toml"
+    bad.write_text(WHOLE.replace(old, new, 1))
+    refused(run("plan", str(bad), "--out", str(folder / "bad")), message)
