@@ -29,7 +29,9 @@ def main() -> None:
     parser = argparse.ArgumentParser(prog="python -m benchmarks", description=__doc__)
     parser.add_argument("names", nargs="*", metavar="NAME", help=f"of {', '.join(NAMES)}; all")
     parser.add_argument("--quick", action="store_true", help="small problems, few runs: a try")
-    parser.add_argument("--write", action="store_true", help=f"write {RESULTS.name} beside this")
+    parser.add_argument(
+        "--write", action="store_true", help=f"write into {RESULTS.name} beside this"
+    )
     parser.add_argument("--date", default="", help="date that the written file bears")
     parser.add_argument("--note", default="", help="what else to say of the run, as its commit")
     given = parser.parse_args()
@@ -50,7 +52,8 @@ def main() -> None:
             show(report, console)
         reports += made
     if given.write:
-        RESULTS.write_text(markdown(reports, facts, given.date), encoding="utf-8")
+        before = RESULTS.read_text(encoding="utf-8") if RESULTS.exists() else ""
+        RESULTS.write_text(markdown(reports, facts, given.date, before), encoding="utf-8")
         console.print(f"wrote {RESULTS}")
 
 

@@ -6,7 +6,7 @@ import ctypes
 import os
 import platform
 import re
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
@@ -194,18 +194,29 @@ def _is_number(sheet: Sheet, column: int) -> bool:
     return column >= sheet.words and sheet.columns[column] not in ("unit", "note")
 
 
-def markdown(reports: Sequence[Report], facts: Mapping[str, str], date: str) -> str:
-    """Return the text of RESULTS.md."""
+def markdown(
+    reports: Sequence[Report], facts: Mapping[str, str], date: str, before: str = ""
+) -> str:
+    """Return the text of RESULTS.md; reports that this run did not make are kept from before."""
     lines = ["# Benchmark results", ""]
-    lines += ["Written by `python -m benchmarks --write`; do not edit.", ""]
-    lines += [f"- date: {date}"] if date else []
+    lines += ["Written by `python -m benchmarks --write`; do not edit. The machine and versions of"]
+    lines += ["the last run, which made the sections that bear its date:", ""]
     lines += [f"- {name}: {value}" for name, value in facts.items()]
+    sections = {text.partition("\n")[0]: text for text in before.split("\n## ")[1:]}
+    when = ", ".join(text for text in (date, facts.get("note", "")) if text)
     for report in reports:
-        lines += ["", f"## {report.title}", "", report.how]
-        for sheet in _sheets(report):
-            columns = range(len(sheet.columns))
-            rules = ["---:" if _is_number(sheet, j) else "---" for j in columns]
-            lines.append("")
-            lines += ["| " + " | ".join(row) + " |" for row in (sheet.columns, rules, *sheet.rows)]
-        lines += ["", *(f"- {finding}" for finding in report.findings)]
-    return "\n".join(lines) + "\n"
+        sections[report.title] = "\n".join(_section(report, when))
+    return "\n".join(lines) + "".join(f"\n\n## {text.strip()}" for text in sections.values()) + "\n"
+
+
+def _section(report: Report, when: str) -> Iterator[str]:
+    yield from (report.title, "")
+    if when:
+        yield from (f"*Measured {when}.*", "")
+    yield report.how
+    for sheet in _sheets(report):
+        columns = range(len(sheet.columns))
+        rules = ["---:" if _is_number(sheet, j) else "---" for j in columns]
+        yield ""
+        yield from ("| " + " | ".join(row) + " |" for row in (sheet.columns, rules, *sheet.rows))
+    yield from ("", *(f"- {finding}" for finding in report.findings))

@@ -202,6 +202,17 @@ def test_a_sheet_is_written_with_its_own_columns():
     assert "median" not in text
 
 
+def test_a_run_keeps_the_sections_that_it_did_not_make():
+    figures = benchmark_module("_figures")
+    old, new = (figures.Report(title=title, how="how") for title in ("Old", "New"))
+    before = figures.markdown([old, new], {"note": "at a"}, "2026-01-01")
+    again = figures.markdown([new], {"note": "at b"}, "2026-02-02", before)
+    assert again.count("## Old\n\n*Measured 2026-01-01, at a.*") == 1
+    assert again.count("## New\n\n*Measured 2026-02-02, at b.*") == 1
+    assert again.index("## Old") < again.index("## New")
+    assert again.count("## ") == 2
+
+
 def test_the_demo_benchmark_clocks_functions_that_are_there():
     for module, function in benchmark_module("demo").CLOCKS.values():
         assert callable(getattr(importlib.import_module(module), function))

@@ -2,6 +2,7 @@
 
 import csv
 import importlib.util
+import re
 import sys
 import xml.etree.ElementTree as ET
 from pathlib import Path
@@ -129,6 +130,28 @@ def test_turning_back_is_counted_only_beyond_the_threshold(example):
     assert example.reversals(x, 2.0) == 2
     assert example.reversals(x, 0.4) == 6
     assert example.reversals(np.zeros(4), 2.0) == 0
+
+
+def test_the_kept_pictures_of_operations_are_those_of_the_script():
+    spec = importlib.util.spec_from_file_location("operations", EXAMPLES / "operations.py")
+    module = importlib.util.module_from_spec(spec)
+    sys.modules["operations"] = module  # dataclasses look themselves up
+    spec.loader.exec_module(module)
+    del sys.modules["operations"]
+    made = module.pictures()
+    kept = {file.stem: file.read_text(encoding="utf-8") for file in module.FOLDER.glob("*.svg")}
+    assert made == kept
+    page = (module.FOLDER.parent / "operations.md").read_text(encoding="utf-8")
+    assert all(f"operations/{name}.svg" in page for name in made)
+
+
+def test_the_example_of_a_whole_part_runs(capsys):
+    page = (EXAMPLES.parent / "docs" / "whole-part.md").read_text(encoding="utf-8")
+    (code,) = re.findall(r"```python\n(.*?)```", page, re.DOTALL)
+    exec(compile(code, "whole-part.md", "exec"), {})
+    said = capsys.readouterr().out
+    assert said.index("'a'") < said.index("'outline'")
+    assert said.strip().endswith("True")
 
 
 def test_no_path_shows_every_way_out(capsys):

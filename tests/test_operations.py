@@ -302,3 +302,141 @@ def test_a_whole_cut_is_sampled_with_all_its_features():
     ends = cut.s[np.flatnonzero(np.diff(cut.kind)) + 1][1:]
     assert np.abs(sampled.s[:, None] - ends).min(axis=0).max() < 1e-12
     assert KINDS[sampled.kind[-1]] == "lead-out"
+
+
+def polygon(corners, step, name="part"):
+    """A closed contour around corners (m), mm apart as given, with nodes every `step` mm."""
+    ring = [*corners, corners[0]]
+    sides = [
+        np.linspace(a, b, max(1, round(np.hypot(*np.subtract(b, a)) / step)), endpoint=False)
+        for a, b in pairwise(ring)
+    ]
+    points = np.vstack(sides) * 1e-3
+    return flat(np.c_[points, np.zeros(len(points))], closed=True, name=name)
+
+
+ELL = [(0, 0), (50, 0), (50, 20), (20, 20), (20, 50), (0, 50)]
+STAIR = [(0, 0), (30, 0), (30, 10), (20, 10), (20, 10.15), (10, 10.15), (10, 30), (0, 30)]
+
+
+def from_edge(contour, points):
+    """Distances of points to a contour, segment by segment: slow and obvious."""
+    a, ab = contour.points[:-1], np.diff(contour.points, axis=0)
+    t = ((points[:, None] - a) * ab).sum(2) / (ab**2).sum(1)
+    feet = a + np.clip(t, 0, 1)[..., None] * ab
+    return np.linalg.norm(points[:, None] - feet, axis=2).min(axis=1)
+
+
+@pytest.mark.parametrize("corners", [ELL, STAIR])
+@pytest.mark.parametrize("step", [100, 0.5])
+@pytest.mark.parametrize("distance", [0.0001, 0.0002, 0.001])
+@pytest.mark.parametrize("side", ["left", "right"])
+def test_no_point_of_an_offset_is_nearer_than_the_distance(corners, step, distance, side):
+    # Also where corners are nearer to each other than the kerf, and nodes than that.
+    part = polygon(corners, step)
+    moved = offset(part, distance, side=side)
+    apart = from_edge(part, moved.at(np.linspace(0, moved.length, 3000))[0])
+    # A chord of an arc of 10 deg keeps 0.996 of the radius.
+    assert apart.min() > 0.995 * distance
+    # It keeps its direction and does not fold back.
+    along = np.diff(moved.points, axis=0)
+    along /= np.linalg.norm(along, axis=1)[:, None]
+    assert angle_between(along[:-1], along[1:]).max() < np.radians(91)
+
+
+def test_an_offset_begins_where_its_contour_did():
+    plate = polygon(ELL, 0.5)
+    for s in (0.01, 0.05, 0.11):  # amid an edge, at an outer corner, amid another edge
+        begun = start_at(plate, s)
+        moved = offset(begun, 0.001)
+        assert np.linalg.norm(moved.points[0] - begun.points[0]) < 1.0011e-3
+        assert moved.length == pytest.approx(offset(plate, 0.001).length, rel=1e-9)
+
+
+def test_a_neck_narrower_than_the_beam_is_refused():
+    neck = [(0, 0), (40, 0), (40, 30), (20.1, 30), (20.1, 20), (25, 20), (25, 10), (15, 10),
+            (15, 20), (19.9, 20), (19.9, 30), (0, 30)]  # fmt: skip
+    with pytest.raises(InputError, match="slot or neck too narrow near"):
+        offset(polygon(neck, 0.5), 0.0002)
+    assert offset(polygon(neck, 0.5), 0.00009).length > 0.1
+    slot = [(0, 0), (30, 0), (30, 20), (15.1, 20), (15.1, 19), (14.9, 19), (14.9, 20), (0, 20)]
+    with pytest.raises(InputError, match="slot or neck too narrow near"):
+        offset(polygon(slot, 0.5), 0.0002)
+
+
+def test_what_would_be_lost_is_refused():
+    cut = lead_in(hole(), 0.004)
+    for operation in (
+        lambda: offset(cut, 0.0002),
+        lambda: offset(slow_corners(square(), 0.5), 0.0002),
+        lambda: round_corners(lead_in(square(), 0.004), 0.0005),
+        lambda: overlap(micro_joints(hole(), 0.0004, at=[0.001]), 0.002),
+        lambda: micro_joints(cut, 0.0004, at=[0.002]),
+        lambda: micro_joints(hole(), 0.0004, at=[]),
+        lambda: round_corners(flat([[0, 0, 0], [0.01, 0, 0], [0.005, 0, 0]]), 0.0005),
+    ):
+        with pytest.raises(
+            InputError, match=r"offset it before|corners before|cut through|lies in a lead|at=|back"
+        ):
+            operation()
+
+
+def test_the_side_is_told_at_sharp_corners_too():
+    # The part is a needle of 12 deg; beyond its tip there is scrap on all sides.
+    needle = polygon([(0, 0), (30, 0), (30, 20), (17, 20), (15, 40), (13, 20), (0, 20)], 0.5)
+    tip = int(np.argmax(needle.points[:, 1]))
+    begun = start_at(needle, needle.s[tip])
+    for angle in (0.0, np.pi / 4, np.pi / 2):
+        assert lead_in(begun, 0.004, angle=angle).kinds[0] == "pierce"
+    # The scrap is such a notch; the part lies around its tip.
+    notch = polygon([(0, 0), (30, 0), (30, 40), (17, 40), (15, 20), (13, 40), (0, 40)], 0.5)
+    tip = int(np.argmin(np.linalg.norm(notch.points - [0.015, 0.02, 0], axis=1)))
+    for angle in (np.pi / 4, np.pi / 2):
+        with pytest.raises(InputError, match="hits the part"):
+            lead_in(start_at(notch, notch.s[tip]), 0.004, angle=angle)
+
+
+def test_a_lead_out_may_meet_the_lead_in_but_not_the_part():
+    cut = lead_in(square(), 0.004, shape="arc", angle=np.pi)
+    both = lead_out(cut, 0.004, shape="arc", angle=np.pi)
+    np.testing.assert_allclose(both.points[0], both.points[-1], atol=1e-9)
+    other = lead_out(square(), 0.004, shape="arc", angle=np.pi)
+    other = lead_in(other, 0.004, shape="arc", angle=np.pi)
+    np.testing.assert_allclose(other.points, both.points, atol=1e-12)
+    assert other.kinds == both.kinds
+    # Nor are loops: a lead may lie inside one.
+    begun = start_at(loop_corners(square(), 0.004), 0.0499)
+    assert lead_in(begun, 0.003).kinds[0] == "pierce"
+
+
+def test_a_loop_that_would_cut_the_part_is_refused():
+    # A wall stands 5 mm beside the outer corner at (30, 20): a loop is two radii wide.
+    walled = [(0, 0), (40, 0), (40, 40), (35, 40), (35, 10), (30, 10), (30, 20), (0, 20)]
+    part = polygon(walled, 0.5)
+    assert loop_corners(part, 0.0024).kinds.count("loop") > 0
+    with pytest.raises(InputError, match="loop of 'part' hits the part near"):
+        loop_corners(part, 0.003)
+
+
+def test_corners_are_found_where_they_are_when_the_contour_begins_in_one():
+    plate = start_at(square(), 0.05)
+    looped, whole = loop_corners(plate, 0.002), loop_corners(square(), 0.002)
+    assert looped.length == pytest.approx(whole.length, abs=1e-9)
+    assert np.abs(looped.points - 0.05).max() == pytest.approx(0.05 + 0.004, abs=1e-4)
+
+
+def test_the_smoothest_start_is_that_of_the_obvious_sum():
+    wavy = slotted(0.003)
+    along = np.diff(wavy.points, axis=0)
+    along /= np.linalg.norm(along, axis=1)[:, None]
+    turn = angle_between(np.roll(along, 1, axis=0), along)
+    apart = np.abs(wavy.s[:-1, None] - wavy.s[:-1])
+    near = np.minimum(apart, wavy.length - apart) <= 0.01
+    total = (turn * near).sum(axis=1)
+    k = int(np.argmin(np.abs(wavy.s[:-1] - smoothest_start(wavy, window=0.02))))
+    assert total[k] == pytest.approx(total.min(), abs=1e-6)
+
+
+def test_an_arc_joins_a_coarse_curve_tangentially():
+    # Chords of 2 degrees: the arc leaves the first by 4 micrometres.
+    assert lead_in(hole(0.012, 180), 0.01, shape="arc", angle=np.pi / 2).kinds[0] == "pierce"

@@ -223,3 +223,29 @@ def test_the_audit_holds_moves_through_the_air_to_limits_time_and_cell(walled, a
     beyond = around.q.copy()
     beyond[1, 1] = np.radians(170)
     assert "air-limits" in [c.code for c in air_checks(arm, beyond, 9 * around.time) if not c.ok]
+
+
+def test_what_contradicts_the_given_order_or_does_not_exist_is_refused(part, arm, tool, placement):
+    asked = {"tool": tool, "placement": placement, "speed": 0.1, "gamma_step": STEP}
+    two = [rest(c) for c in part[:2]]
+    with pytest.raises(NoFeasiblePath, match="contradict"):
+        plan_part(two, arm, given_order=True, before=[(1, 0)], **asked)
+    with pytest.raises(InputError, match="before: expected pairs of numbers from 0 to 1"):
+        plan_part(two, arm, before=[(0, 2)], **asked)
+    with pytest.raises(InputError, match="heat_spacing"):
+        plan_part(two, arm, heat_spacing=-0.1, **asked)
+
+
+def test_a_cut_that_the_tool_cannot_back_off_from_is_infeasible(part, arm, tool, placement):
+    with pytest.raises(NoFeasiblePath, match="cannot back off by 2000 mm") as none:
+        plan_part(
+            [rest(part[0])], arm, tool=tool, placement=placement, speed=0.1, gamma_step=STEP,
+            retract=5.0,
+        )  # fmt: skip
+    assert none.value.proved
+
+
+def test_a_loop_around_a_tube_has_no_inside(ring):
+    around = Contour(ring.points, -ring.points, closed=True, name="cut-off")
+    hole = moved(ring, 0, 0, "hole")
+    assert inner_first([around, hole]) == []

@@ -208,6 +208,9 @@ def _fill_from(
         if f > bound:
             lowest = min(lowest, f)
             continue
+        first, last = shut_edges(layers, p)
+        if is_shut(layers.shut, first, last, j):  # looked at last: few come so far
+            continue
         fill_increment(layers, p, j, dq)
         if closes and acceleration_excess(seam, dq, aim.acceleration) >= 0:
             continue

@@ -9,10 +9,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from kerfpath._arrays import Array, Ints
+from kerfpath._arrays import Array
 from kerfpath.kernels._jit import jit_inline, jit_vector, larger, smaller, trailing_zeros
 from kerfpath.kernels.limits import LIMIT_TOLERANCE
-from kerfpath.kernels.search import Layers, Objective, is_shut, reduced, runs, shut_edges
+from kerfpath.kernels.search import Layers, Objective, reduced, runs
 from kerfpath.kernels.states import Scratch, States
 from kerfpath.kernels.to_go import LANES, SIX
 
@@ -71,7 +71,7 @@ def fill_candidates(
 ) -> int:  # fmt: skip
     """Fill the vertices that lie in the box that the states a..b of p can go on to; their number.
 
-    All that (5) and (6) allow are among them, and few others; none that a shut edge leads to.
+    All that (5) and (6) allow are among them, and few others.
     """
     _fill_reach(layers, aim, states, a, b, p, out.to, out.by)
     count, end = 0, layers.start[k + 2]
@@ -85,15 +85,4 @@ def fill_candidates(
                 out.vertex[count] = v + np.int64(trailing_zeros(mask))
                 mask &= mask - np.uint64(1)
                 count += 1
-    first, last = shut_edges(layers, p)
-    return count if first == last else _keep_open(layers.shut, first, last, count, out.vertex)
-
-
-@jit_inline
-def _keep_open(shut: Ints, a: int, b: int, count: int, out_vertex: Ints) -> int:
-    """Leave out, of the first `count` vertices, those among a..b of `shut`; how many stay."""
-    kept = 0
-    for v in range(count):
-        out_vertex[kept] = out_vertex[v]
-        kept += not is_shut(shut, a, b, out_vertex[v])
-    return kept
+    return count

@@ -11,10 +11,11 @@ from kerfpath._arrays import Array, Ints, scalar
 from kerfpath.contour import CORNER, KINDS, Contour, angle_between, join, turned, unit
 from kerfpath.errors import InputError
 from kerfpath.operations._start import smoothest_start, start_at, with_nodes
-from kerfpath.operations._surface import Side, lateral
+from kerfpath.operations._surface import Side, lateral, require_in_scrap
 
 __all__ = ["loop_corners", "round_corners", "slow_corners"]
 
+STRAIGHT_BACK = np.radians(179)
 ARC_STEP = np.radians(5)
 """Turn between the nodes of an arc."""
 
@@ -28,8 +29,14 @@ def round_corners(contour: Contour, tolerance: float) -> Contour:
 
     The arc is smaller where corners are too near to each other for that. A closed contour that
     begins in a corner begins at its smoothest place afterwards.
+
+    Raises
+    ------
+    InputError
+        A corner that turns straight back; a contour that is more than a cut already.
     """
     tolerance = scalar(tolerance, "corner tolerance", unit="m", above=0.0)
+    contour = _begun_off_corners(contour)
 
     def arc(k: int, t0: Array, t1: Array, room: float) -> tuple[float, Array]:
         turn = float(angle_between(t0, t1))
@@ -51,8 +58,15 @@ def loop_corners(contour: Contour, radius: float, *, side: Side = "right") -> Co
     side : {"left", "right"}
         Where the scrap is; corners that turn towards it have no room for a loop and stay. A closed
         contour that begins in a corner begins at its smoothest place afterwards.
+
+    Raises
+    ------
+    InputError
+        A loop that touches the part; a corner that turns straight back; a contour that is more
+        than a cut already.
     """
     radius = scalar(radius, "loop radius", unit="m", above=0.0)
+    contour = _begun_off_corners(contour)
     axes = contour.axes
 
     def loop(k: int, t0: Array, t1: Array, room: float) -> tuple[float, Array] | None:
@@ -64,8 +78,9 @@ def loop_corners(contour: Contour, radius: float, *, side: Side = "right") -> Co
         centre = contour.points[k] + reach * t0 + radius * away
         swept = np.linspace(0, 2 * np.pi - turn, int(np.ceil((2 * np.pi - turn) / ARC_STEP)) + 1)
         ring = np.sin(swept)[:, None] * t0 - np.cos(swept)[:, None] * away
-        corner = contour.points[k][None]
-        return 0.0, np.vstack([corner, centre + radius * ring, corner])
+        corner, ring = contour.points[k][None], centre + radius * ring
+        require_in_scrap(contour, ring, side, "loop")
+        return 0.0, np.vstack([corner, ring, corner])
 
     return _replaced(contour, loop, KINDS.index("loop"))
 
@@ -117,14 +132,23 @@ def _corners(contour: Contour) -> Ints:
     return np.append(0, found) if angle_between(along[0], along[1]) > CORNER else found
 
 
+def _begun_off_corners(contour: Contour) -> Contour:
+    """Return the contour begun at its smoothest place if it is closed and begins in a corner."""
+    if contour.kind.any():
+        raise InputError(
+            f"corners of {contour.name!r}: expected a cut without leads, joints or loops; see to "
+            "corners before"
+        )
+    if 0 in _corners(contour):
+        return start_at(contour, smoothest_start(contour))
+    return contour
+
+
 def _replaced(contour: Contour, corner: Corner, kind: int) -> Contour:
     """Return the contour with what `corner` makes of each corner, all of one kind, in its place."""
     nodes = _corners(contour)
     if not nodes.size:
         return contour
-    if nodes[0] == 0:
-        contour = start_at(contour, smoothest_start(contour))
-        nodes = _corners(contour)
     s = contour.s
     bounds = np.concatenate([s[:1], s[nodes], s[-1:]])
     room = np.diff(bounds)
@@ -132,6 +156,11 @@ def _replaced(contour: Contour, corner: Corner, kind: int) -> Contour:
     pieces, here = [], s[0]
     for i, k in enumerate(nodes.tolist()):
         t0, t1 = unit(np.diff(contour.points[k - 1 : k + 2], axis=0))
+        if angle_between(t0, t1) > STRAIGHT_BACK:
+            raise InputError(
+                f"corners of {contour.name!r}: the path turns straight back at "
+                f"{(contour.points[k] * 1e3).round(2).tolist()} mm; cut it as two contours"
+            )
         made = corner(k, t0, t1, 0.99 * min(room[i], room[i + 1]))
         if made is None:
             continue

@@ -2,33 +2,39 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 
 from kerfpath._arrays import Array, Ints, scalar
 from kerfpath.contour import CORNER, Contour, angle_between, turned, unit
 from kerfpath.errors import InputError
-from kerfpath.operations._surface import Side, lateral
+from kerfpath.operations._surface import Side, lateral, nearest
 
 __all__ = ["offset"]
 
 ARC_STEP = np.radians(10)
 """Turn between the nodes of an arc around an outer corner; a smaller turn needs no arc."""
-LOOK = 10.0
-"""How many kerfs along the path an inner corner may reach."""
+ENOUGH = 0.98
+"""Least share of the distance that is kept; the chords of an arc keep 0.996 of it."""
+LOOK = 20.0
+"""How many distances of path an inner corner may take."""
+SLOT = np.radians(165)
+"""Turn of an inner corner from which on it is a slot or a notch that the beam does not fit into."""
+PARALLEL = 1e-9
+"""Sine of the angle of two segments that have no one crossing."""
+SAME_PLACE = 1e-9
+"""m: two nodes nearer than this are one."""
 
 
 def offset(contour: Contour, distance: float, *, side: Side = "right") -> Contour:
     """Return the contour moved sideways by `distance` (m) in the planes across its tool axes.
 
     Outer corners become arcs around the corner; at inner corners the sides are cut back to where
-    they meet.
+    they meet. A closed contour begins where it did, or as near to there as is left of it.
 
     Parameters
     ----------
     contour : Contour
-        All of one kind; closed or open.
+        Nothing but a cut at one speed; closed or open.
     distance : float m
         Half the kerf.
     side : {"left", "right"}
@@ -37,43 +43,35 @@ def offset(contour: Contour, distance: float, *, side: Side = "right") -> Contou
     Raises
     ------
     InputError
-        A radius on that side smaller than the distance (with its place), or nothing left.
+        A place where the beam does not fit: a radius on that side smaller than the distance, a slot
+        or neck narrower than twice the distance, or nothing left.
     """
     distance = scalar(distance, "offset distance", unit="m", above=0.0)
-    points, axes, source = _moved(contour, distance, side)
-    keep = np.ones(len(points), bool)
-    along = np.diff(contour.points, axis=0)
-    # Segments that join the images of one node, in an arc, run as the contour does around it.
-    back = (np.diff(points, axis=0) * along[np.minimum(source[:-1], len(along) - 1)]).sum(1) < 0
-    back &= source[1:] != source[:-1]
-    if contour.closed and back.any():
-        points, axes, source, back = _opened_where_forward(points, axes, source, back)
-    for first, last in _runs(back):
-        if not keep[first : last + 2].any():
-            continue
-        a, b, meet = _meeting(points, axes, first, last, distance, contour.name)
-        _require_corner(contour, source[a + 1 : b + 1], distance)
-        keep[a + 1 : b + 1] = False
-        keep[b], points[b] = True, meet
-    points, axes = points[keep], axes[keep]
-    if len(points) < (4 if contour.closed else 2):
+    if contour.kind.any() or (contour.speed_share < 1).any():
         raise InputError(
-            f"offset: contour {contour.name!r} is too small for {distance * 1e3:g} mm; nothing "
-            "would be left of it"
+            f"offset: contour {contour.name!r} has leads, joints, loops or slow corners already; "
+            "offset it before"
+        )
+    points, axes, source = _moved(contour, distance, side)
+    if contour.closed:
+        k = _amid_what_fits(contour, points, distance)
+        around = (np.arange(len(points) + 1) + k) % len(points)
+        points, axes, source = points[around], axes[around], source[around]
+    points, axes = _without_loops(contour, points, axes, source, distance, side)
+    apart = np.append(np.linalg.norm(np.diff(points, axis=0), axis=1) > SAME_PLACE, True)
+    points, axes = points[apart], axes[apart]
+    if len(points) < (4 if contour.closed else 2):
+        raise _too_tight(contour, contour.points[0], distance, "is too small")
+    middles = (points[:-1] + points[1:]) / 2
+    gap = np.linalg.norm(middles - nearest(contour, middles)[0], axis=1)
+    if (gap < ENOUGH * distance).any():
+        raise _too_tight(
+            contour, middles[np.argmin(gap)], distance, "has a slot or neck too narrow"
         )
     if contour.closed:
-        points[-1], axes[-1] = points[0], axes[0]
-    apart = np.append(np.linalg.norm(np.diff(points, axis=0), axis=1) > 1e-9, True)
-    return replace(
-        contour,
-        points=points[apart],
-        axes=axes[apart],
-        s=None,  # type: ignore[arg-type]  # filled in along the polyline
-        time=None,
-        kind=None,  # type: ignore[arg-type]  # all cut
-        speed_share=None,  # type: ignore[arg-type]  # all one
-        x=None,
-    )
+        k = int(np.argmin(np.linalg.norm(points[:-1] - contour.points[0], axis=1)))
+        points, axes = np.roll(points[:-1], -k, axis=0), np.roll(axes[:-1], -k, axis=0)
+    return Contour(points, axes, closed=contour.closed, name=contour.name)
 
 
 def _moved(contour: Contour, distance: float, side: Side) -> tuple[Array, Array, Ints]:
@@ -85,80 +83,97 @@ def _moved(contour: Contour, distance: float, side: Side) -> tuple[Array, Array,
     turn = angle_between(*across)
     outer = (after * across[0]).sum(1) < 0
     points, axes, source = [], [], []
-    for k, (p, n) in enumerate(zip(contour.points, contour.axes, strict=True)):
+    for k in range(len(contour) - contour.closed):
         l0, l1 = across[0][k], across[1][k]
-        if outer[k] and turn[k] > ARC_STEP:
+        if turn[k] <= ARC_STEP:
+            ways = (l0 + l1)[None] / (1.0 + float(l0 @ l1))
+        elif outer[k]:
             part = np.linspace(0, 1, int(np.ceil(turn[k] / ARC_STEP - 1e-9)) + 1)[:, None]
             ways = turned(np.tile(l0, (len(part), 1)), np.tile(l1, (len(part), 1)), part)
         else:
-            ways = (l0 + l1)[None] / max(1.0 + float(l0 @ l1), 1e-6)
-        points.append(p + distance * ways)
-        axes.append(np.tile(n, (len(ways), 1)))
+            ways = np.array([l0, l1])  # the way between them is cut off, where the sides meet
+        points.append(contour.points[k] + distance * ways)
+        axes.append(np.tile(contour.axes[k], (len(ways), 1)))
         source += [k] * len(ways)
     return np.vstack(points), np.vstack(axes), np.array(source)
 
 
-def _runs(back: Array) -> list[tuple[int, int]]:
-    """Return first and last of each run of segments that are turned back."""
-    edges = np.flatnonzero(np.diff(np.concatenate([[0], back.astype(np.int8), [0]])))
-    return [(int(a), int(b) - 1) for a, b in edges.reshape(-1, 2)]
+def _amid_what_fits(contour: Contour, points: Array, distance: float) -> int:
+    """Return the middle of the longest run of images (M, 3) m that keep the distance."""
+    gap = np.linalg.norm(points - nearest(contour, points)[0], axis=1)
+    tight = np.flatnonzero(gap < ENOUGH * distance)
+    if len(tight) == len(points):
+        raise _too_tight(contour, contour.points[0], distance, "is too small")
+    if not len(tight):
+        return 0
+    runs = np.diff(np.append(tight, tight[0] + len(points)))
+    k = int(np.argmax(runs))
+    return int(tight[k] + runs[k] // 2) % len(points)
 
 
-def _opened_where_forward(
-    points: Array, axes: Array, source: Ints, back: Array
-) -> tuple[Array, Array, Ints, Array]:
-    """Return a closed chain begun as far from segments that turn back as it can be."""
-    n = len(back)
-    twice = np.flatnonzero(np.tile(back, 2))
-    gaps = np.diff(twice)
-    k = int((twice[int(np.argmax(gaps))] + gaps.max() // 2) % n) if len(gaps) else (n // 2)
-    order = np.append(np.roll(np.arange(n), -k), k)
-    return points[order], axes[order], source[order], np.roll(back, -k)
+def _without_loops(
+    contour: Contour, points: Array, axes: Array, source: Ints, distance: float, side: Side
+) -> tuple[Array, Array]:
+    """Return the chain without the loops that it runs where it crosses itself."""
+    kept, kept_axes = [], []
+    first, place = 0, 0.0  # the next node to keep, and where on the chain, in nodes, that is
+    far = min(LOOK * distance, contour.length / 2)
+    for i, f, j, g in _crossings(points, axes, far):
+        if i + f < place:
+            continue
+        _require_corner(contour, np.unique(source[i + 1 : j + 1]), distance, side)
+        part = np.array([[f]])
+        kept += [points[first : i + 1], points[[i]] + f * (points[[i + 1]] - points[[i]])]
+        kept_axes += [axes[first : i + 1], turned(axes[[i]], axes[[i + 1]], part)]
+        first, place = j + 1, j + g
+    return np.vstack([*kept, points[first:]]), np.vstack([*kept_axes, axes[first:]])
 
 
-def _meeting(
-    points: Array, axes: Array, first: int, last: int, distance: float, name: str
-) -> tuple[int, int, Array]:
-    """Return segments a before and b behind a run that meet, and where, seen along the axis."""
-    n = axes[first]
-    u = points[first + 1] - points[first]
-    u = (u - (u @ n) * n) / np.linalg.norm(u - (u @ n) * n)
-    flat = points @ np.array([u, np.cross(n, u)]).T
-    step = np.linalg.norm(np.diff(points, axis=0), axis=1)
-    far = LOOK * distance
-    a = first - 1 - np.arange(int(np.searchsorted(np.cumsum(step[:first][::-1]), far)) + 1)
-    b = last + 1 + np.arange(int(np.searchsorted(np.cumsum(step[last + 1 :]), far)) + 1)
-    a, b = a[a >= 0], b[b < len(step)]
-    i, j = (x.ravel() for x in np.meshgrid(a, b, indexing="ij"))
-    p, r, q, s = flat[i], flat[i + 1] - flat[i], flat[j], flat[j + 1] - flat[j]
-    det = r[:, 0] * s[:, 1] - r[:, 1] * s[:, 0]
-    safe = np.where(det == 0, 1.0, det)
-    w = q - p
-    f = (w[:, 0] * s[:, 1] - w[:, 1] * s[:, 0]) / safe
-    g = (w[:, 0] * r[:, 1] - w[:, 1] * r[:, 0]) / safe
-    meets = (det != 0) & (f >= 0) & (f <= 1) & (g >= 0) & (g <= 1)
-    if not meets.any():
-        place = (points[first] * 1e3).round(2).tolist()
-        raise InputError(
-            f"offset: contour {name!r} near {place} mm has a radius smaller than "
-            f"{distance * 1e3:g} mm on that side; the beam does not fit into it"
-        )
-    m = int(np.argmin(np.where(meets, j - i, len(points))))
-    meet = points[i[m]] + f[m] * (points[i[m] + 1] - points[i[m]])
-    return int(i[m]), int(j[m]), meet
+def _crossings(points: Array, axes: Array, far: float) -> list[tuple[int, float, int, float]]:
+    """Return where segments i < j of a chain cross seen along the axis, at shares f and g of them.
+
+    Only those with less than `far` (m) of chain between them; in order along the chain.
+    """
+    step = np.diff(points, axis=0)
+    size = np.linalg.norm(step, axis=1)
+    s = np.concatenate([[0.0], np.cumsum(size)])
+    found = []
+    for apart in range(2, len(step)):
+        near = s[apart:-1] - s[1:-apart] < far
+        if not near.any():
+            break
+        i = np.flatnonzero(near)
+        j = i + apart
+        r, q, w, n = step[i], step[j], points[j] - points[i], axes[i]
+        det = (np.cross(r, q) * n).sum(1)
+        crosses = np.abs(det) > PARALLEL * size[i] * size[j]
+        safe = np.where(crosses, det, 1.0)
+        f, g = (np.cross(w, q) * n).sum(1) / safe, (np.cross(w, r) * n).sum(1) / safe
+        meets = crosses & (f >= 0) & (f <= 1) & (g >= 0) & (g <= 1)
+        found += list(zip(i[meets], f[meets], j[meets], g[meets], strict=True))
+    return sorted((int(i), float(f), int(j), float(g)) for i, f, j, g in found)
 
 
-def _require_corner(contour: Contour, nodes: Ints, distance: float) -> None:
-    """Raise InputError where a curve, not a corner, is tighter than the distance."""
-    along = unit(np.diff(contour.points, axis=0))
-    nodes = np.unique(nodes) % len(along)
-    turn = angle_between(along[nodes - 1], along[nodes])
-    if turn.max() >= CORNER:
-        return
-    length = np.linalg.norm(np.diff(contour.points, axis=0), axis=1)[nodes].mean()
-    radius = length / max(float(turn.max()), 1e-12)
-    place = (contour.points[nodes[len(nodes) // 2]] * 1e3).round(2).tolist()
-    raise InputError(
-        f"offset: contour {contour.name!r} near {place} mm has a radius of about "
-        f"{radius * 1e3:.3g} mm, smaller than {distance * 1e3:g} mm; the beam does not fit into it"
+def _require_corner(contour: Contour, nodes: Ints, distance: float, side: Side) -> None:
+    """Raise InputError where what is left out is no corner but a curve or a slot too tight."""
+    steps = np.diff(contour.points, axis=0)
+    along = unit(steps)
+    before, after = along[nodes - 1], along[nodes % len(along)]
+    turn = angle_between(before, after)
+    if turn.max() < CORNER:
+        radius = np.linalg.norm(steps[nodes % len(along)], axis=1).mean() / max(turn.max(), 1e-12)
+        raise _too_tight(
+            contour, contour.points[nodes[len(nodes) // 2]], distance,
+            f"has a radius of about {radius * 1e3:.3g} mm",
+        )  # fmt: skip
+    inwards = (after * lateral(contour.axes[nodes], before, side)).sum(1) > 0
+    if turn[inwards].sum() > SLOT:
+        worst = contour.points[nodes[np.argmax(turn)]]
+        raise _too_tight(contour, worst, distance, "has a slot or neck too narrow")
+
+
+def _too_tight(contour: Contour, place: Array, distance: float, what: str) -> InputError:
+    return InputError(
+        f"offset: contour {contour.name!r} {what} near {(place * 1e3).round(2).tolist()} mm; the "
+        f"beam does not fit in there, {distance * 1e3:g} mm beside it"
     )

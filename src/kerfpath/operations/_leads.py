@@ -11,7 +11,16 @@ from kerfpath._arrays import Array, scalar
 from kerfpath.contour import KINDS, Contour, join, turned, unit
 from kerfpath.errors import InputError
 from kerfpath.operations._start import reverse
-from kerfpath.operations._surface import Ribbon, Side, Surface, lateral, nearest
+from kerfpath.operations._surface import (
+    TOUCH,
+    Ribbon,
+    Side,
+    Surface,
+    edge,
+    lateral,
+    nearest,
+    require_in_scrap,
+)
 
 __all__ = ["LeadShape", "lead_in", "lead_out"]
 
@@ -21,8 +30,6 @@ STEP = 2e-4
 """m between the nodes of a lead."""
 SURFACE_ENDS = 1e-3
 """m: a lead farther than this from the surface has left it."""
-TOUCH = 1e-6
-"""m: rounding; a lead may not be on the part's side by more."""
 
 
 def lead_in(
@@ -88,7 +95,9 @@ def lead_out(
     clearance: float = 0.0,
 ) -> Contour:
     """Return the contour with a lead from its last node into the scrap; as `lead_in`."""
-    plain = replace(contour, closed=False, kind=None, x=None, time=None)  # type: ignore[arg-type]
+    pierced = contour.kind == KINDS.index("pierce")
+    kinds = np.where(pierced, KINDS.index("lead-in"), contour.kind)  # for `reverse`
+    plain = replace(contour, closed=False, kind=kinds, x=None, time=None)
     backwards: Side = "left" if side == "right" else "right"
     points, axes = _laid(
         reverse(plain), length, shape, angle, backwards, surface or Ribbon(contour), fan,
@@ -132,7 +141,7 @@ def _laid(
     axes = turned(
         -normals, np.tile(contour.axes[0], (len(back), 1)), 1 - np.minimum(back / fan, 1)[:, None]
     )
-    _require_in_scrap(contour, points, side, clearance, what)
+    _require_clearance(contour, points, side, clearance, what)
     return points, axes
 
 
@@ -144,21 +153,13 @@ def _require_on_surface(off: Array, contour: Contour, what: str) -> None:
         )
 
 
-def _require_in_scrap(
+def _require_clearance(
     contour: Contour, points: Array, side: Side, clearance: float, what: str
 ) -> None:
-    """Raise InputError where a lead lies on the part's side of the contour."""
-    where, k = nearest(contour, points[:-1])
-    off = points[:-1] - where
-    step = contour.points[k + 1] - contour.points[k]
-    depth = (off * lateral(contour.axes[k], step, side)).sum(1)
-    if (depth < -TOUCH).any():
-        i = int(np.argmin(depth))
-        raise InputError(
-            f"{what} of {contour.name!r} hits the part near {(points[i] * 1e3).round(2).tolist()} "
-            f"mm, {-depth[i] * 1e3:.3g} mm deep; make it shorter, start elsewhere, or change side"
-        )
-    apart = float(np.linalg.norm(off[0]))
+    """Raise InputError where a lead lies on the part's side, or its pierce too near to the part."""
+    part = edge(contour)
+    require_in_scrap(part, points[:-1], side, what)
+    apart = float(np.linalg.norm(points[0] - nearest(part, points[:1])[0]))
     if apart <= max(clearance, TOUCH):
         raise InputError(
             f"{what} of {contour.name!r} ends {apart * 1e3:.3g} mm from the part, expected more "

@@ -97,9 +97,13 @@ def smoothest_start(contour: Contour, *, window: float = 5e-3) -> float:
     turn += angle_between(axes, np.roll(axes, 1, axis=0)) / 2
     turn += angle_between(axes, np.roll(axes, -1, axis=0)) / 2
     s, length = contour.s[:-1] - contour.s[0], contour.length
-    apart = np.abs(s[:, None] - s)
-    near = np.minimum(apart, length - apart) <= half
-    total = np.where(near, turn, 0.0).sum(axis=1)
+    half = min(half, length / 2)
+    around = np.concatenate([s - length, s, s + length])
+    sums = np.concatenate([[0.0], np.cumsum(np.tile(turn, 3))])
+    total = (
+        sums[np.searchsorted(around, s + half, side="right")]
+        - sums[np.searchsorted(around, s - half, side="left")]
+    )
     smooth = total <= total.min() + ALIKE
     if smooth.all():
         return float(contour.s[0])
@@ -117,7 +121,7 @@ def overlap(contour: Contour, length: float) -> Contour:
     Raises
     ------
     InputError
-        An open contour, or an overlap longer than it.
+        An open contour, an overlap longer than it, or one that would cut a micro joint.
     """
     _require_closed(contour, "overlap")
     length = scalar(length, "overlap", unit="m", above=0.0)
@@ -127,6 +131,11 @@ def overlap(contour: Contour, length: float) -> Contour:
             f"{length * 1e3:g} mm"
         )
     again = contour.between(contour.s[0], contour.s[0] + length)
+    if (again.kind == MICRO_JOINT).any():
+        raise InputError(
+            f"overlap: the first {length * 1e3:g} mm of {contour.name!r} hold a micro joint, which "
+            "would be cut through"
+        )
     kind = np.concatenate([contour.kind[:-1], np.full(len(again), OVERLAP)])
     return Contour(
         np.vstack([contour.points, again.points[1:]]),
@@ -155,7 +164,7 @@ def micro_joints(
     Raises
     ------
     InputError
-        Both or none of `count` and `at`; joints that overlap or pass the ends.
+        Both or none of `count` and `at`; joints that overlap, pass the ends, or lie in a lead.
     """
     if (count is None) == (at is None):
         raise InputError("micro_joints: give one of count= and at=")
@@ -166,6 +175,8 @@ def micro_joints(
         middles = contour.s[0] + (np.arange(count) + 0.5) * contour.length / count
     else:
         middles = np.sort(floats(at, "at", (None,)))  # type: ignore[arg-type]  # not None here
+        if not middles.size:
+            raise InputError("micro_joints: expected at least one place, got at=[]")
     ends = np.c_[middles - width / 2, middles + width / 2].ravel()
     if (np.diff(ends) <= 0).any() or ends[0] <= contour.s[0] or ends[-1] >= contour.s[-1]:
         raise InputError(
@@ -174,7 +185,13 @@ def micro_joints(
         )
     marked = with_nodes(contour, ends)
     place = np.searchsorted(ends, marked.s + SAME_PLACE, side="right")
-    kind = np.where(place % 2 == 1, MICRO_JOINT, marked.kind)
+    joint = place % 2 == 1
+    if marked.kind[joint].any():
+        raise InputError(
+            f"micro_joints: a joint of {contour.name!r} lies in a lead, loop or overlap; make "
+            "joints before those, or elsewhere"
+        )
+    kind = np.where(joint, MICRO_JOINT, marked.kind)
     return replace(marked, kind=kind)
 
 

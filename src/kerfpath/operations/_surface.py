@@ -5,12 +5,21 @@ from __future__ import annotations
 from typing import Literal, Protocol, get_args
 
 import numpy as np
+from scipy.spatial import cKDTree
 
 from kerfpath._arrays import Array
-from kerfpath.contour import Contour, unit
+from kerfpath.contour import KINDS, Contour, unit
 from kerfpath.errors import InputError
 
-__all__ = ["Ribbon", "Side", "Surface", "lateral", "nearest"]
+__all__ = ["Ribbon", "Side", "Surface", "edge", "lateral", "nearest", "require_in_scrap"]
+
+TOUCH = 1e-5
+"""m: what runs in the scrap may be on the part's side by no more; a lead that is tangent to a curve
+leaves its first chord by some micrometres."""
+SAME_PLACE = 1e-9
+"""m: two places nearer than this are one."""
+
+IN_SCRAP = [KINDS.index(word) for word in ("pierce", "lead-in", "lead-out", "loop")]
 
 Side = Literal["left", "right"]
 """Seen from the nozzle along the travel."""
@@ -53,9 +62,44 @@ def lateral(axes: Array, along: Array, side: Side) -> Array:
 def nearest(contour: Contour, points: Array) -> tuple[Array, Array]:
     """Return for points (B, 3) the nearest points (B, 3) of a contour, and the node before each."""
     start, step = contour.points[:-1], np.diff(contour.points, axis=0)
-    off = points[:, None] - start
-    part = np.clip((off * step).sum(2) / (step**2).sum(1), 0.0, 1.0)
-    apart = np.linalg.norm(off - part[..., None] * step, axis=2)
-    k = np.argmin(apart, axis=1)
-    rows = np.arange(len(points))
-    return start[k] + part[rows, k, None] * step[k], k
+    # The segments whose middle is not farther than the nearest node by half the longest of them.
+    bound, _ = cKDTree(contour.points).query(points)
+    size = np.linalg.norm(step, axis=1)
+    near = cKDTree(start + step / 2).query_ball_point(points, bound + 0.5001 * size.max())
+    many = np.array([len(segments) for segments in near])
+    row, k = np.repeat(np.arange(len(points)), many), np.concatenate(near).astype(np.int64)
+    part = np.clip(((points[row] - start[k]) * step[k]).sum(1) / size[k] ** 2, 0.0, 1.0)
+    foot = start[k] + part[:, None] * step[k]
+    order = np.lexsort((k, np.linalg.norm(points[row] - foot, axis=1), row))
+    best = order[np.cumsum(many) - many]
+    return foot[best], k[best]
+
+
+def edge(contour: Contour) -> Contour:
+    """Return what of a contour is the part's edge: without the leads and loops in the scrap."""
+    on = ~np.isin(contour.kind[:-1], IN_SCRAP)
+    keep = np.append(on, False) | np.append(False, on)
+    points, axes = contour.points[keep], contour.axes[keep]
+    new = np.append(np.linalg.norm(np.diff(points, axis=0), axis=1) > SAME_PLACE, True)
+    return Contour(points[new], axes[new], closed=contour.closed, name=contour.name)
+
+
+def require_in_scrap(contour: Contour, points: Array, side: Side, what: str) -> None:
+    """Raise InputError where one of the points (B, 3) m lies on the part's side of the contour."""
+    where, k = nearest(contour, points)
+    across = lateral(contour.axes[:-1], np.diff(contour.points, axis=0), side)
+    last, nodes = len(across) - 1, contour.points
+    ring = np.linalg.norm(nodes[0] - nodes[-1]) <= SAME_PLACE
+    before = np.where(k > 0, k - 1, last if ring else 0)
+    after = np.where(k < last, k + 1, 0 if ring else last)
+    # Beside a corner the segment on either side of it alone may tell the wrong side.
+    at_start, at_end = (np.linalg.norm(where - nodes[i], axis=1) <= SAME_PLACE for i in (k, k + 1))
+    other = np.where(at_start, before, np.where(at_end, after, k))
+    depth = ((points - where) * (across[k] + across[other]) / 2).sum(1)
+    if (depth < -TOUCH).any():
+        i = int(np.argmin(depth))
+        raise InputError(
+            f"{what} of {contour.name!r} hits the part near {(points[i] * 1e3).round(2).tolist()} "
+            f"mm, {-depth[i] * 1e3:.3g} mm deep; make it smaller, place it elsewhere, or change "
+            "side"
+        )

@@ -11,18 +11,24 @@ from kerfpath.contour import Contour
 
 __all__ = ["inner_first"]
 
+COMMON = 0.1
+"""Length of a mean of unit vectors from which on they have a direction in common."""
+
 
 def inner_first(contours: Sequence[Contour]) -> list[tuple[int, int]]:
     """Return the pairs (i, j) of contours of which i lies inside the closed contour j.
 
     Seen along the mean tool axis of j; both must lie on one side of the part, their mean axes less
-    than 90 deg apart.
+    than 90 deg apart. Open contours hold nothing: ask for the loops of the drawing, before their
+    leads. Neither does a loop around a tube, whose axes have no common direction.
     """
     pairs = []
     for j, outer in enumerate(contours):
         if not outer.closed:
             continue
         n = outer.axes.mean(axis=0)
+        if np.linalg.norm(n) < COMMON:
+            continue
         x = np.cross(n, np.eye(3)[np.argmin(np.abs(n))])
         plane = np.array([x / np.linalg.norm(x), np.cross(n, x) / np.linalg.norm(np.cross(n, x))]).T
         ring = outer.points @ plane

@@ -78,7 +78,7 @@ def best_order(
     NoFeasiblePath
         No order keeps all of that (proved), or none was found in time.
     InputError
-        Shapes that do not fit, a group without candidates.
+        Shapes that do not fit, a group without candidates, `before` of a group that is not there.
     """
     g = integers(group, "group", (None,))
     C, G = len(g), int(g.max(initial=-1)) + 1
@@ -87,6 +87,8 @@ def best_order(
     move = np.asarray(between, dtype=np.float64)
     if move.shape != (C, C) or np.isnan(move).any() or (move < 0).any():
         raise InputError(f"between: expected times >= 0 of shape ({C}, {C}), got {move.shape}")
+    if any(not 0 <= h < G for pair in before for h in pair):
+        raise InputError(f"before: expected pairs of numbers from 0 to {G - 1}, got {list(before)}")
     cost = floats(own, "own", (C,))
     enter = np.zeros(C) if first is None else floats(first, "first", (C,))
     leave = np.zeros(C) if last is None else floats(last, "last", (C,))

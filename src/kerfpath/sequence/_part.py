@@ -190,7 +190,7 @@ def order_plans(
     heat_spacing : float m
         Contours nearer to each other than this are not cut one right after the other.
     given_order : bool
-        Keep the order of `candidates`.
+        Keep the order of `candidates`; `before` must agree with it.
     retract, approach_speed : float m, m/s
         How far and how fast the tool backs off along its axis.
     pierce_time : float s
@@ -206,12 +206,13 @@ def order_plans(
     """
     retract = scalar(retract, "retract", unit="m", above=0.0)
     approach_speed = scalar(approach_speed, "approach_speed", unit="m/s", above=0.0)
+    heat_spacing = scalar(heat_spacing, "heat_spacing", unit="m", above=-1e-300)
     pierce_time = scalar(pierce_time, "pierce_time", unit="s", above=-1e-300)
     places = _reachable(candidates, cell, retract)
     plans = [candidates[i][c] for i, c in places]
     group = np.array([i for i, _ in places])
     if given_order:
-        before = [(i, i + 1) for i in range(len(candidates) - 1)]
+        before = [*before, *((i, i + 1) for i in range(len(candidates) - 1))]
     air = Moves(plans, group, cell, retract, seconds)
     air.forbid(_too_warm([c[0].contour for c in candidates], heat_spacing)[np.ix_(group, group)])
     if home is not None:
@@ -254,11 +255,14 @@ def _reachable(
 
 def _require_clear_ends(made: Plan, cell: Cell | None, retract: float) -> None:
     """Raise NoFeasiblePath where the tool cannot go down to a cut or back from it."""
-    if cell is None:
-        return
     ends: tuple[tuple[End, int], ...] = (("start", 0), ("end", len(made.q) - 1))
     for end, node in ends:
-        way = np.array([backed_off(made, end, part * retract) for part in BACK_BY])
+        try:
+            way = np.array([backed_off(made, end, part * retract) for part in BACK_BY])
+        except InputError as broken:
+            raise NoFeasiblePath(str(broken), proved=True, node=node) from broken
+        if cell is None:
+            continue
         if not cell.sweep.clear(way[:-1], way[1:], cell.required, cell.scene.distances).all():
             raise NoFeasiblePath(
                 f"contour {made.name!r}: the tool is not clear while it backs off node {node} by "
