@@ -267,7 +267,7 @@ def test_corners_are_nodes_of_a_sampling_by_spacing_or_time():
             assert np.linalg.norm(sampled.points - corner, axis=1).min() < 1e-12
         steps = np.diff(sampled.s)
         assert steps.max() <= 0.0041 * (1 + 1e-9)
-        assert steps.min() >= 0.9 * steps.max()
+        assert steps.min() >= 0.8 * steps.max()
     assert sampled.time is not None
     # Evenly in time to rounding, so that accelerations are plain second differences.
     np.testing.assert_allclose(np.diff(sampled.time), np.diff(sampled.time)[0], rtol=1e-9)
@@ -293,8 +293,8 @@ def test_kinds_and_speed_shares_follow_a_sampling():
     assert timed.time is not None
     v = np.diff(timed.s) / np.diff(timed.time)
     # Half speed up to the end of the lead-in, then rising evenly along the path.
-    assert v[0] == pytest.approx(0.5, rel=0.1)
-    assert v[-1] == pytest.approx(1.0, rel=0.1)
+    assert v[0] == pytest.approx(0.5, rel=0.2)
+    assert v[-1] == pytest.approx(1.0, rel=0.2)
     assert v.max() <= 1.0 + 1e-9
 
 

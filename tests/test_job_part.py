@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from kerfpath.cad import read
 from kerfpath.errors import InputError
 from kerfpath.job import program_from_file, read_job, read_plan_file
 from kerfpath.post import read_rapid
@@ -148,8 +149,55 @@ def test_the_slowed_corner_is_slow_and_the_rest_is_not(done):
     plans = {plan.name: plan for plan in read_plan_file(out / "plan.json").plans}
     plan = plans["cornered"]
     speed = np.diff(plan.contour.s) / np.diff(plan.time)
-    assert speed.max() == pytest.approx(0.05, rel=0.11)  # steps may be a tenth shorter
+    assert speed.max() == pytest.approx(0.05, rel=0.21)  # steps may be a fifth shorter
     assert speed.min() < 0.3 * speed.max()
+
+
+def test_the_audit_against_the_drawing_knows_what_was_made_of_it(folder, done):
+    _, out = done
+    result = run("audit", str(out / "plan.json"), "--job", str(folder / "job.toml"))
+    assert result.returncode == 0, result.stdout + result.stderr
+    # Another kerf is another path.
+    other = folder / "other.toml"
+    other.write_text(WHOLE.replace("kerf_mm = 0.2", "kerf_mm = 1.2"))
+    refused(run("audit", str(out / "plan.json"), "--job", str(other)), "reference: ")
+
+
+ALL = """\
+[[contour]]
+speed_m_min = 3
+spacing_mm = 4
+[contour.pick_all]
+kind = "inner"
+face = "skin"
+diameter_mm = [14, 26]
+"""
+
+
+def test_loops_are_picked_by_what_they_are(folder):
+    job = read_job(with_text(folder / "all.toml", HEAD + ALL + PLAN))
+    names = [task.name for task in job.tasks(read(job.part_file))]
+    assert names == ["skin/hole3", "skin/hole8", "skin/hole11", "skin/hole12"]
+    twice = read_job(with_text(folder / "all.toml", HEAD + ALL + ALL + PLAN))
+    with pytest.raises(InputError, match="'skin/hole3' is picked twice"):
+        twice.tasks(read(twice.part_file))
+    none = ALL.replace("[14, 26]", "[900, 901]")
+    nothing = read_job(with_text(folder / "all.toml", HEAD + none + PLAN))
+    with pytest.raises(InputError, match="no loop among"):
+        nothing.tasks(read(nothing.part_file))
+    for old, new, message in (
+        ("[contour.pick_all]", 'pick = "x"\n[contour.pick_all]', "expected pick .* got both"),
+        ("speed", 'name = "n"\nspeed', "expected name only with pick"),
+        ("[14, 26]", "[14]", "expected 2 numbers"),
+        ('"inner"', '"iner"', "kind"),
+    ):
+        with pytest.raises(InputError, match=message):
+            read_job(with_text(folder / "all.toml", HEAD + ALL.replace(old, new, 1) + PLAN))
+
+
+def with_text(path, text):
+    path.write_text(text)
+    return path
 
 
 def test_the_given_order_is_kept_on_request(folder):
@@ -205,3 +253,15 @@ def test_operations_that_cannot_be_are_one_line_and_code_2(folder, old, new, mes
     bad = folder / "bad.toml"
     bad.write_text(WHOLE.replace(old, new, 1))
     refused(run("plan", str(bad), "--out", str(folder / "bad")), message)
+
+
+def test_every_cut_of_the_shipped_part_can_be_made():
+    job = read_job(DEMO / "b_pillar_part.toml")
+    part = read(job.part_file)
+    tasks = job.tasks(part)
+    assert len(tasks) == 13
+    for task in tasks:
+        shaped = task.candidates(part.contour(task.pick), part.surface(task.pick))
+        assert len(shaped) == (1 if task.name == "trim" else 2)
+        for cut in shaped:
+            assert {"pierce", "lead-in", "cut"} <= set(task.sample(cut).kinds)

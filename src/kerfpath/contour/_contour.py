@@ -166,7 +166,7 @@ class Contour:
 
         Give exactly one of `spacing`, `count`, `tolerance` (with or without `axis_tolerance`), or
         `dt` together with `speed`. The ends are always nodes; with `spacing` or `dt` corners and
-        feature ends are, too, and steps may be shorter than the largest by up to a tenth.
+        feature ends are, too, and steps may be shorter than the largest by up to a fifth.
 
         Parameters
         ----------

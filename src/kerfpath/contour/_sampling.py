@@ -18,7 +18,7 @@ __all__ = ["evenly", "feature_ends", "fewest", "in_time"]
 
 CORNER = np.radians(20)
 """Turn of the path at one node from which on it is a corner, which sampling keeps."""
-EVEN = 0.9
+EVEN = 0.8
 """Least share of the largest step that the steps between two features have."""
 MOST_OFTEN = 8.0
 """How much shorter than asked for steps may become for the sake of a short stretch."""

@@ -146,19 +146,25 @@ def _table(
 
 
 def _drawn(file: PlanFile, job: Job, part: Part) -> dict[str, Contour]:
-    picks = {task.name: task.pick for task in job.contours}
-    unknown = [name for name in file.contours.values() if name not in picks]
+    tasks = {task.name: task for task in job.tasks(part)}
+    unknown = [name for name in file.contours.values() if name not in tasks]
     if unknown:
         raise InputError(
             f"{job.path}: has no contour {unknown[0]!r} of {file.path}; give the job of that plan"
         )
     drawn: dict[str, Contour] = {}
     for p in file.plans:
-        whole = part.contour(picks[file.contours[p.name]])
-        piece = p.name != file.contours[p.name]
-        s = p.contour.s
+        task, s = tasks[file.contours[p.name]], p.contour.s
+        piece = p.name != task.name
+        shaped = task.candidates(part.contour(task.pick), part.surface(task.pick))
+        whole = min(shaped, key=lambda cut: _apart(p.contour, cut))
         drawn[p.name] = whole.between(float(s[0]), float(s[-1])) if piece else whole
     return drawn
+
+
+def _apart(planned: Contour, cut: Contour) -> float:
+    """Return how far (m) the planned nodes are from a candidate at the same arc lengths."""
+    return float(np.linalg.norm(planned.points - cut.at(planned.s)[0], axis=1).max())
 
 
 def _require_same(plan: Plan, job: Job, path: Path) -> None:

@@ -65,8 +65,9 @@ def check_job(job: Job) -> Checked:
     part = read_drawing(job.part_file, unit=job.part_unit)
     cell = cell_of_job(job, part)
     starts = []
-    for task in job.contours:
-        nodes = task.sample(part.contour(task.pick))
+    for task in job.tasks(part):
+        shaped = task.candidates(part.contour(task.pick), part.surface(task.pick))
+        nodes = task.sample(shaped[0])
         graph = layered_graph(
             nodes.part(0, 1, job.plan_options["frames"]),
             job.robot,

@@ -12,6 +12,7 @@ import numpy as np
 from pydantic import ValidationError
 
 from kerfpath._arrays import Array, Bools
+from kerfpath.cad import Part
 from kerfpath.contour import Contour
 from kerfpath.errors import InputError
 from kerfpath.job._keys import MOST_NODES
@@ -42,7 +43,7 @@ class ContourTask:
     Parameters
     ----------
     pick : str
-        Name of the loop in the part.
+        Name of the loop in the part; "" where the table picks several, see `expanded`.
     name : str
         What the contour is called in messages, reports and programs.
     speed : float m/s
@@ -67,6 +68,19 @@ class ContourTask:
     tolerance: float | None = None
     axis_tolerance: float | None = None
     table: ContourTable
+
+    def expanded(self, part: Part) -> list[ContourTask]:
+        """Return a task for each loop of the part that this one picks.
+
+        Raises
+        ------
+        InputError
+            No such loop.
+        """
+        if self.table.pick_all is None:
+            return [replace(self, pick=part.loop(self.pick).name)]
+        loops = part.pick(**self.table.pick_all.resolve())
+        return [replace(self, pick=loop.name, name=loop.name) for loop in loops]
 
     def candidates(self, drawn: Contour, surface: Surface) -> list[Contour]:
         """Return the contours that may be cut for a loop as drawn, see `shaped`."""
@@ -191,6 +205,24 @@ class Job:
     program: ProgramOptions
     source: dict[str, Any]
 
+    def tasks(self, part: Part) -> tuple[ContourTask, ...]:
+        """Return the contours to cut of the part that was read.
+
+        Raises
+        ------
+        InputError
+            A loop that does not exist, or that is picked twice.
+        """
+        tasks = [task for each in self.contours for task in each.expanded(part)]
+        names = [task.name for task in tasks]
+        for name in names:
+            if names.count(name) > 1:
+                raise InputError(
+                    f"{self.path}: contour {name!r} is picked twice; give one of the two another "
+                    "name, or narrow [contour.pick_all]"
+                )
+        return tuple(tasks)
+
 
 def read_job(path: str | Path) -> Job:
     """Return the job of a TOML file.
@@ -272,8 +304,8 @@ def _tables(path: Path, text: str) -> dict[str, Any]:
 def _task(table: ContourTable) -> ContourTask:
     angle = table.axis_tolerance_deg
     return ContourTask(
-        pick=table.pick,
-        name=table.name or table.pick,
+        pick=table.pick or "",
+        name=table.name or table.pick or "",
         speed=table.speed_m_min / 60,
         spacing=_metres(table.spacing_mm),
         count=table.count,

@@ -79,16 +79,15 @@ def run_job(job: Job, *, progress: Progress = lambda what, done, total: None) ->
         The part cannot be read, a loop does not exist, a contour cannot be sampled.
     """
     part = read_drawing(job.part_file, unit=job.part_unit)
-    for task in job.contours:  # a misspelt name shall not wait for the contours before it
-        part.loop(task.pick)
+    tasks = job.tasks(part)  # a misspelt name shall not wait for the contours before it
     cell = cell_of_job(job, part)
-    loops = [part.contour(task.pick) for task in job.contours]
+    loops = [part.contour(task.pick) for task in tasks]
     tries = [
         [
             _cut(job, task, shaped, cell, progress)
             for shaped in task.candidates(loop, part.surface(task.pick))
         ]
-        for task, loop in zip(job.contours, loops, strict=True)
+        for task, loop in zip(tasks, loops, strict=True)
     ]
     if job.sequence is not None:
         progress("order and moves", 0, 1)
@@ -248,8 +247,9 @@ def fastest_speeds(
     cell = cell_of_job(job, part)
     refine = job.plan_options["refine"]
     answers: list[tuple[ContourTask, Contour, FastestSpeed | NoFeasiblePath]] = []
-    for i, task in enumerate(job.contours):
-        progress("contours", i, len(job.contours))
+    tasks = job.tasks(part)
+    for i, task in enumerate(tasks):
+        progress("contours", i, len(tasks))
         drawn = task.candidates(part.contour(task.pick), part.surface(task.pick))[0]
         nodes = task.sample(drawn)
         try:

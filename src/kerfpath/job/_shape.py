@@ -112,4 +112,5 @@ def _lead(table: LeadTable) -> dict[str, Any]:
         "shape": table.shape,
         "angle": float(np.radians(table.angle_deg)),
         "fan": None if table.fan_mm is None else table.fan_mm * MM,
+        "speed_share": table.speed_share,
     }

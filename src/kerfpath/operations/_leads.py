@@ -6,6 +6,7 @@ from dataclasses import replace
 from typing import Literal, get_args
 
 import numpy as np
+from scipy.spatial.transform import Rotation
 
 from kerfpath._arrays import Array, scalar
 from kerfpath.contour import KINDS, Contour, join, turned, unit
@@ -41,6 +42,7 @@ def lead_in(
     side: Side = "right",
     surface: Surface | None = None,
     fan: float | None = None,
+    speed_share: float = 1.0,
     clearance: float = 2e-4,
 ) -> Contour:
     """Return the contour with a lead from its pierce in the scrap to its first node.
@@ -64,6 +66,8 @@ def lead_in(
         What the lead is laid on; default: the planes across the contour's own axes.
     fan : float m, optional
         Length over which the axis fans; default: the whole lead.
+    speed_share : float
+        Share of the speed at the far end of the lead; it changes evenly along it.
     clearance : float m
         How far the pierce must be from the contour.
 
@@ -79,7 +83,8 @@ def lead_in(
     )
     kind = np.full(len(points), KINDS.index("lead-in"))
     kind[0] = KINDS.index("pierce")
-    lead = Contour(points, axes, kind=kind, name=contour.name)
+    share = _share(points, speed_share, float(contour.speed_share[0]))
+    lead = Contour(points, axes, kind=kind, speed_share=share, name=contour.name)
     return join([lead, replace(contour, closed=False, x=None, time=None)], name=contour.name)
 
 
@@ -92,6 +97,7 @@ def lead_out(
     side: Side = "right",
     surface: Surface | None = None,
     fan: float | None = None,
+    speed_share: float = 1.0,
     clearance: float = 0.0,
 ) -> Contour:
     """Return the contour with a lead from its last node into the scrap; as `lead_in`."""
@@ -104,8 +110,15 @@ def lead_out(
         clearance, "lead-out",
     )  # fmt: skip
     kind = np.full(len(points), KINDS.index("lead-out"))
-    lead = Contour(points[::-1], axes[::-1], kind=kind, name=contour.name)
+    share = _share(points, speed_share, float(contour.speed_share[-1]))[::-1]
+    lead = Contour(points[::-1], axes[::-1], kind=kind, speed_share=share, name=contour.name)
     return join([replace(contour, closed=False, x=None, time=None), lead], name=contour.name)
+
+
+def _share(points: Array, far: float, near: float) -> Array:
+    """Return speed shares (m,) from the far end of a lead to its joint."""
+    s = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(points, axis=0), axis=1))])
+    return np.asarray(far + (near - far) * s / s[-1])
 
 
 def _laid(
@@ -138,9 +151,9 @@ def _laid(
     _require_on_surface(points - flat, contour, what)
     # The cut may lie beside the surface by rounding or kerf: close that gap along the lead.
     points = points + (1 - back / length)[:, None] * (start - points[-1])
-    axes = turned(
-        -normals, np.tile(contour.axes[0], (len(back), 1)), 1 - np.minimum(back / fan, 1)[:, None]
-    )
+    # What tilts the cut's axis from the surface's normal tilts the lead's more and more.
+    tilt, _ = Rotation.align_vectors(contour.axes[:1], -normal)
+    axes = turned(-normals, tilt.apply(-normals), 1 - np.minimum(back / fan, 1)[:, None])
     _require_clearance(contour, points, side, clearance, what)
     return points, axes
 

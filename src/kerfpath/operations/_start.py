@@ -20,7 +20,7 @@ __all__ = [
     "with_nodes",
 ]
 
-SAME_PLACE = 1e-9
+SAME_PLACE = 1e-7
 """m: two nodes nearer than this are one."""
 ALIKE = 1e-6
 """rad: turns of two windows that differ by less are alike."""

@@ -55,6 +55,8 @@ def lateral(axes: Array, along: Array, side: Side) -> Array:
     """
     if side not in get_args(Side):
         raise InputError(f"side: expected left or right, got {side!r}")
+    # Of steps as short as they come: only a travel along the tool axis has no side.
+    along = along / np.linalg.norm(along, axis=-1, keepdims=True)
     across = unit(np.cross(axes, along), "side")
     return across if side == "right" else -across
 

@@ -23,8 +23,8 @@ __all__ = [
     "within_margins",
 ]
 
-UNEVEN = 0.11
-"""Largest relative difference of node distances that still counts as evenly spaced: a tenth, which
+UNEVEN = 0.21
+"""Largest relative difference of node distances that still counts as evenly spaced: a fifth, which
 sampling may leave so that corners and feature ends are nodes, and rounding."""
 
 

@@ -7,7 +7,13 @@ from typing import Annotated, Literal
 from pydantic import model_validator
 
 from kerfpath.job._keys import MOST_NODES, NotNegative, Number, Positive, Text, fault, key
-from kerfpath.job._tables._cut import CornersTable, LeadTable, MicroJointsTable, SmoothAxesTable
+from kerfpath.job._tables._cut import (
+    CornersTable,
+    LeadTable,
+    MicroJointsTable,
+    PickTable,
+    SmoothAxesTable,
+)
 from kerfpath.job._tables._table import Table, given
 from kerfpath.operations import Side
 
@@ -21,7 +27,8 @@ SHAPES = ("overlap_mm", "lead_in", "lead_out", "micro_joints", "corners")
 class ContourTable(Table):
     """[[contour]]: which loop of the part to cut, how fast, how sampled, and what is made of it."""
 
-    pick: Annotated[Text, key("the name of a loop in the part", '"trim"')]
+    pick: Annotated[Text | None, key("the name of a loop in the part", '"trim"')] = None
+    pick_all: PickTable | None = None
     name: Annotated[Text | None, key("a name that no other contour has", '"trim 2"')] = None
     speed_m_min: Annotated[Positive, key("a number above 0, in m/min", "9")]
     spacing_mm: Annotated[Positive | None, key("a number above 0, in mm", "2")] = None
@@ -47,6 +54,20 @@ class ContourTable(Table):
     micro_joints: MicroJointsTable | None = None
     corners: CornersTable | None = None
     smooth_axes: SmoothAxesTable | None = None
+
+    @model_validator(mode="after")
+    def _one_pick(self) -> ContourTable:
+        found = given(self, "pick", "pick_all")
+        if len(found) != 1:
+            raise fault(
+                "pick (a loop's name) or [contour.pick_all]",
+                "both" if found else "none",
+                "remove one" if found else 'add, for example, pick = "trim"',
+                ("pick",),
+            )
+        if self.pick_all is not None and self.name is not None:
+            raise fault("name only with pick", "pick_all", "remove it", ("name",))
+        return self
 
     @model_validator(mode="after")
     def _one_sampling(self) -> ContourTable:

@@ -2,15 +2,56 @@
 
 from __future__ import annotations
 
-from typing import Annotated
+from typing import Annotated, Any, Literal
 
-from pydantic import model_validator
+from pydantic import Field, model_validator
 
-from kerfpath.job._keys import NotNegative, Positive, fault, key
+from kerfpath.job._keys import NotNegative, Positive, Text, Three, fault, key
 from kerfpath.job._tables._table import Table, given
 from kerfpath.operations import LeadShape
 
-__all__ = ["CornersTable", "LeadTable", "MicroJointsTable", "SmoothAxesTable"]
+__all__ = ["CornersTable", "LeadTable", "MicroJointsTable", "PickTable", "SmoothAxesTable"]
+
+Range = Annotated[tuple[Positive, ...], Field(strict=False, min_length=2, max_length=2)]
+
+
+class PickTable(Table):
+    """[contour.pick_all]: every loop that is all of this is a contour of its own."""
+
+    kind: Annotated[
+        Literal["inner", "outer"] | None, key('"inner" for holes, "outer" for trims', '"inner"')
+    ] = None
+    face: Annotated[Text | None, key("the name of a face or skin", '"skin"')] = None
+    side: Annotated[
+        Literal["outer", "inner", "edge"] | None, key("a side of the sheet", '"outer"')
+    ] = None
+    diameter_mm: Annotated[
+        Range | None, key("2 numbers above 0, from and to, in mm", "[8, 12]")
+    ] = None
+    length_mm: Annotated[
+        Range | None, key("2 numbers above 0, from and to, in mm", "[20, 400]")
+    ] = None
+    layer: Annotated[Text | None, key("the name of a layer of a DXF", '"CUT"')] = None
+    colour: Annotated[Text | None, key("a colour of a DXF", '"red"')] = None
+    near_mm: Annotated[
+        Three | None, key("3 numbers, a point of the part in mm", "[120, 40, 70]")
+    ] = None
+
+    @model_validator(mode="after")
+    def _something(self) -> PickTable:
+        if not self.model_fields_set:
+            raise fault("what to pick by", "none", 'add, for example, kind = "inner"', ("kind",))
+        return self
+
+    def resolve(self) -> dict[str, Any]:
+        """Return the keyword arguments of `Part.pick`, in m."""
+        lengths = ("diameter_mm", "length_mm", "near_mm")
+        asked = {name: getattr(self, name) for name in self.model_fields_set}
+        return {
+            name.removesuffix("_mm"): tuple(v / 1000 for v in value) if name in lengths else value
+            for name, value in asked.items()
+            if value is not None
+        }
 
 
 class LeadTable(Table):
@@ -20,6 +61,9 @@ class LeadTable(Table):
     shape: LeadShape = "line"
     angle_deg: Annotated[NotNegative, key("a number from 0 to 180, in deg", "45", le=180)] = 45.0
     fan_mm: Annotated[Positive | None, key("a number above 0, in mm", "3")] = None
+    speed_share: Annotated[
+        Positive, key("a number above 0, at most 1, of the speed", "0.4", le=1)
+    ] = 1.0
 
     @model_validator(mode="after")
     def _line_or_arc(self) -> LeadTable:

@@ -11,7 +11,13 @@ from kerfpath.job._keys import fault, folder_of, told
 from kerfpath.job._tables._cell import CellTable, FixtureTable, HeadTable, PairTable
 from kerfpath.job._tables._comfort import ComfortTable
 from kerfpath.job._tables._contour import ContourTable
-from kerfpath.job._tables._cut import CornersTable, LeadTable, MicroJointsTable, SmoothAxesTable
+from kerfpath.job._tables._cut import (
+    CornersTable,
+    LeadTable,
+    MicroJointsTable,
+    PickTable,
+    SmoothAxesTable,
+)
 from kerfpath.job._tables._part import PartTable
 from kerfpath.job._tables._plan import PlanTable
 from kerfpath.job._tables._program import AuditTable, ProgramTable
@@ -43,6 +49,8 @@ class JobFile(Table):
         seen: set[str] = set()
         for i, table in enumerate(self.contour):
             name = table.name or table.pick
+            if name is None:
+                continue
             if name in seen:
                 raise fault(
                     "a name that no other contour has",
@@ -143,6 +151,7 @@ TABLES: dict[str, type[BaseModel]] = {
     "tool": ToolTable,
     "part": PartTable,
     "contour": ContourTable,
+    "contour.pick_all": PickTable,
     "contour.lead_in": LeadTable,
     "contour.lead_out": LeadTable,
     "contour.micro_joints": MicroJointsTable,
