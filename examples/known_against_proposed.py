@@ -157,7 +157,9 @@ def runs_of(
     tool, placement = pose(0.15, 0.30, 45), pose(1.2, task.height, -task.tilt_deg)
     step, dt = np.radians(task.gamma_step_deg), node_interval(contour, task.speed)
     build = partial(layered_graph, tool=tool, placement=placement, frames=task.frames)
-    graph = build(contour, arm, gamma_step=step, postures=postures_named("front/up"))
+    graph = build(
+        contour, arm, gamma_step=step, postures=postures_named("front/up", arm.kinematics)
+    )
     ask = partial(plan, contour, arm, tool=tool, placement=placement, frames=task.frames)
     ask = partial(ask, speed=task.speed, gamma_step=step, graph=graph)
     for objective, (name, factor), eta in product(OBJECTIVES, factors.items(), (None, *etas)):

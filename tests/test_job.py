@@ -15,6 +15,7 @@ from kerfpath.job import read_job
 from kerfpath.job._heads import heads, pose
 from kerfpath.job._lines import Places
 from kerfpath.robots import acceleration_ratios, robot
+from kerfpath.tilt import Tilt
 
 # Every test of a line number counts from the first line here.
 JOB = """\
@@ -86,6 +87,7 @@ def test_the_example_is_read_into_si(read, folder):
     assert job.plan_options == {
         "gamma_step": np.pi / 180,
         "frames": "rotation-minimising",
+        "tilt": None,
         "postures": None,
         "method": "exact",
         "objective": "sum",
@@ -281,6 +283,13 @@ FAULTS = [
     ("[program]", "[comfort]\nelbow_cost = 1\n[program]", 22, "elbow_band_deg with elbow_cost"),
     ("[program]", "[comfort]\nlimits_band_deg = 9\n[program]", 22, "limits_cost with limits_band"),
     ("[program]", "[comfort]\nshoulder_deg = 9\n[program]", 22, "nearest: shoulder_"),
+    (
+        "[program]",
+        "[comfort]\nclearance_band_mm = 9\nclearance_cost = 1\n[program]",
+        22,
+        "comfort.clearance_band_mm: expected .cell. with .*got none",
+    ),
+    ("[program]", "[comfort]\nclearance_margin_mm = 9\n[program]", 22, "nearest: clearance_"),
     (
         "[program]",
         'feed = "dip"\n[comfort]\nwrist_band_deg = 9\nwrist_cost = 1\n[program]',
@@ -520,6 +529,16 @@ def test_a_posture_that_does_not_exist_is_refused_at_its_line(read, words):
         ('feed = "dip"\nrefine_parts = 3', 'expected refine_parts = 1 with feed = "dip", got 3'),
         ('feed = "dip"\nrotation_deg = 90', 'expected no rotation_deg with feed = "dip", got 90'),
         ('interruptions = "fewest"\nmethod = "paper"', 'plan.method: expected method = "exact"'),
+        ('rotation_deg = 90\nmethod = "known"', 'method = "exact" with rotation_deg, got "known"'),
+        (
+            'tilt_deg = 3\ninterruptions = "fewest"',
+            'plan.tilt_deg: expected no tilt_deg with interruptions = "fewest", got 3',
+        ),
+        ("tilt_deg = 3\nrefine_parts = 2", "expected refine_parts = 1 with tilt_deg, got 2"),
+        ("tilt_steps = 2", "plan.tilt_steps: expected tilt_deg with tilt_steps, got none"),
+        ("tilt_cost_per_deg = 0", "expected tilt_deg with tilt_cost_per_deg, got none"),
+        ("tilt_deg = 90", "plan.tilt_deg: expected a number above 0, below 90, in deg, got 90"),
+        ("tilt_deg = 3\ntilt_steps = 0", "tilt_steps: expected a whole number from 1 to 10, got 0"),
         ('closure = "periodic"\nmethod = "known"', 'method = "exact" with closure = "periodic"'),
         ("refine_parts = 0", "refine_parts: expected a whole number of parts from 1 to 100, got 0"),
         ("rotation_deg = -1", "rotation_deg: expected a number not below 0, in deg, got -1"),
@@ -529,6 +548,17 @@ def test_keys_of_plan_that_do_not_go_together_are_refused_at_their_line(read, ke
     with pytest.raises(InputError, match=r"^[^\n]*$") as refused:
         read(changed("[plan]", f"[plan]\n{keys}"))
     assert said in str(refused.value)
+
+
+def test_a_tolerance_of_the_tool_axis_is_read_into_si(read):
+    assert read(changed("[plan]", "[plan]\ntilt_deg = 18")).plan_options["tilt"] == Tilt(
+        cone=np.pi / 10
+    )
+    keys = "tilt_deg = 9\ntilt_steps = 3\ntilt_cost_per_deg = 0.01"
+    tilt = read(changed("[plan]", f"[plan]\n{keys}")).plan_options["tilt"]
+    assert (tilt.cone, tilt.steps) == (np.pi / 20, 3)
+    # What the rim costs is the angle times the cost, in whichever unit.
+    assert tilt.cone * tilt.cost == pytest.approx(9 * 0.01, rel=1e-12)
 
 
 def test_a_rotation_limit_is_one_for_every_endless_axis(read):

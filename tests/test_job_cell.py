@@ -12,9 +12,11 @@ import pytest
 
 from kerfpath.cad import read as read_drawing
 from kerfpath.cell import Mesh, box, edges_of, thickened
+from kerfpath.comfort import Band, Comfort
 from kerfpath.errors import InputError
 from kerfpath.graph import LayeredGraph
-from kerfpath.job import audit_file, cell_of_job, check_job, fastest_speeds, read_job
+from kerfpath.job import audit_file, cell_of_job, check_job, fastest_speeds, read_job, run_job
+from kerfpath.job._planfile import read_plan_file
 from kerfpath.planner import ClearanceMap
 from kerfpath.report._section import with_clearance
 from test_cli import refused, run
@@ -38,6 +40,7 @@ acceleration_deg_s2 = [400, 300, 500, 1500, 1500]
 endless = [4, 5]
 """
 ROBOT = HEAD[HEAD.index("[robot]") : HEAD.index("[tool]")]
+NEAR = "[comfort]\nclearance_band_mm = 30\nclearance_cost = 0.5\n"
 NO_PROGRAM = REST[REST.index("[program]") :]
 
 
@@ -135,6 +138,37 @@ def test_the_fastest_speed_in_a_cell_is_clear_and_no_higher(folder):
     assert 0 < there.on_grid <= alone.on_grid
 
 
+@pytest.mark.parametrize("key", ['feed = "dip"', 'interruptions = "fewest"'])
+def test_over_the_fastest_speed_a_cut_in_a_cell_dips_or_is_interrupted(folder, key):
+    over = with_keys("[plan]", "refine = false", key).replace("spacing_mm = 1", "spacing_mm = 2")
+    over = over.replace("speed_m_min = 3", "speed_m_min = 4.5")
+    outcome = run_job(read_job(job(folder, over)))
+    assert outcome.passed
+    dips = "dip" in key
+    assert (len(outcome.cuts) > 1) is not dips
+    for cut in outcome.cuts:
+        assert (cut.plan.feed is not None) is dips
+        assert "clear in the cell" in cut.plan.proof.statement
+        assert {"collision", "collision-own"} <= {check.code for check in cut.checks}
+
+
+def test_a_tilted_cut_in_a_cell_stays_out_of_the_band_of_clearance(folder):
+    keys = ("refine = false", "tilt_deg = 4", "tilt_cost_per_deg = 0.001", "rotation_deg = 10")
+    tilted = with_keys("[plan]", *keys).replace("[cell]", f"{NEAR}[cell]", 1)
+    path = job(folder, tilted.replace("spacing_mm = 1", "spacing_mm = 2"), "tilted.toml")
+    result = run("plan", path, cwd=folder)
+    assert result.returncode == 0, result.stderr or result.stdout
+    assert "slot: tool axis tilted by up to 4.00 deg" in result.stdout
+    (made,) = read_plan_file(folder / "tilted-plan" / "plan.json").plans
+    assert made.proof.optimal
+    assert made.settings.comfort == Comfort(clearance=Band(width=0.03, cost=0.5))
+    np.testing.assert_allclose(made.settings.rotation[made.robot.endless], np.radians(10))
+    read = read_job(path)
+    cell = cell_of_job(read, read_drawing(read.part_file))
+    apart = cell.distances(made.q, enough=cell.required + 0.03)[:, ~cell.own]
+    assert apart.min() >= cell.near_miss + 0.03 - 1e-6  # convex distances are exact to 1e-6 m
+
+
 def test_check_shows_bodies_pairs_and_the_start(folder):
     checked = check_job(read_job(job(folder, SMALL, "small.toml")))
     (start,) = checked.starts
@@ -202,8 +236,18 @@ FAULTS = [
         "head.file = 'lump.stl'\nhead.unit = 'mm'",
         "cell: head lump.stl: .*stand-off point",
     ),
-    ("[plan]", '[plan]\nfeed = "dip"', 'plan.feed: expected feed = "constant" with .cell.'),
-    ("[plan]", "[plan]\nrotation_deg = 360", "plan.rotation_deg: expected no rotation_deg with"),
+    ("[plan]", '[plan]\nmethod = "known"', 'plan.method: expected method = "exact" with .cell.'),
+    ('posture = "front/up"', 'posture = "third"', "plan.posture: .*plus.minus, such .*got 'third'"),
+    (
+        "[plan]",
+        f'{NEAR}[plan]\nfeed = "dip"',
+        'comfort.clearance_band_mm: expected feed = "constant" with .*got "dip"',
+    ),
+    (
+        "[plan]",
+        f'{NEAR}[plan]\ninterruptions = "fewest"',
+        'comfort.clearance_band_mm: expected interruptions = "none" .*got "fewest"',
+    ),
 ]
 
 
@@ -310,6 +354,13 @@ def test_an_arm_by_its_lengths_plans_without_a_program(folder):
     assert result.returncode in (0, 1), result.stderr
     written = {Path(f).name for f in said["files"]}
     assert written == {"plan.json", "trajectory.csv", "report.html"}
+
+
+def test_a_posture_in_words_is_one_of_the_robot_s_family(folder):
+    text = free(FIVE).replace("[plan]", '[plan]\nposture = "rear/third"')
+    assert read_job(job(folder, text)).plan_options["postures"] == (12, 14)
+    with pytest.raises(InputError, match=r"plan\.posture: .*minus\|third\|fourth, such"):
+        read_job(job(folder, text.replace("third", "fifth")))
 
 
 @pytest.mark.parametrize("cell", [False, True])

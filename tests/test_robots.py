@@ -7,7 +7,15 @@ import pytest
 from kerfpath import InputError, robot
 from kerfpath.kernels.frames import location
 from kerfpath.kernels.turns import MOST_TURNS, admissible_turns
-from kerfpath.robots import Coupling, Robot, acceleration_ratios, posture_name, robot_ids
+from kerfpath.robots import (
+    FAMILIES,
+    Coupling,
+    Robot,
+    acceleration_ratios,
+    posture_name,
+    postures_named,
+    robot_ids,
+)
 
 IDS = robot_ids()
 
@@ -112,6 +120,23 @@ def test_postures_are_told_apart_by_geometry():
     np.testing.assert_array_equal(found.posture // 4, np.where(ahead >= 0, 0, 1))
     assert posture_name(0) == "front/up/plus"
     assert posture_name(7) == "rear/down/minus"
+
+
+@pytest.mark.parametrize("kinematics", FAMILIES)
+@pytest.mark.parametrize("words", ["", "front/up", "rear", "fourth", "minus/down"])
+def test_postures_named_are_those_of_the_family_whose_names_have_the_words(kinematics, words):
+    names = FAMILIES[kinematics].postures
+    fitting = [mu for mu in range(len(names)) if set(words.split("/")) - {""} <= named(mu)]
+    if fitting:
+        assert postures_named(words, kinematics) == tuple(fitting)
+    else:
+        assert (words, len(names)) == ("fourth", 8)
+        with pytest.raises(InputError, match=r"minus, such as .* got 'fourth'"):
+            postures_named(words, kinematics)
+
+
+def named(mu):
+    return set(posture_name(mu).split("/"))
 
 
 def test_a_pose_out_of_reach_has_no_solution():

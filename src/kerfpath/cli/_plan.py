@@ -7,6 +7,7 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import typer
 from rich.markup import escape
 
@@ -62,6 +63,10 @@ def plan_job(job_file: Path, folder: Path, *, as_json: bool, draw_map: bool = Fa
                 out.print(f"[bold]{escape(cut.task.name)}[/]: {escape(cut.failure)}")
             if cut.plan is not None and cut.plan.feed is not None:
                 out.print(f"[bold]{escape(cut.task.name)}[/]: {cut.plan.feed}")
+            if (tilt := _largest_tilt(cut)) is not None:
+                out.print(
+                    f"[bold]{escape(cut.task.name)}[/]: tool axis tilted by up to {tilt:.2f} deg"
+                )
             for check in cut.checks:
                 if not check.ok:
                     out.print(f"[bold]{escape(cut.task.name)}[/]: {escape(str(check.issue()))}")
@@ -76,6 +81,13 @@ def plan_job(job_file: Path, folder: Path, *, as_json: bool, draw_map: bool = Fa
         )
     if not outcome.passed:
         raise typer.Exit(1)
+
+
+def _largest_tilt(cut: Cut) -> float | None:
+    """Return the largest tilt of the tool axis at the nodes, deg; None where none is allowed."""
+    if cut.plan is None or cut.plan.settings.tilt is None:
+        return None
+    return float(np.degrees(np.hypot(*cut.plan.tilt.T).max()))
 
 
 def _cut_entry(cut: Cut) -> dict[str, Any]:
@@ -97,6 +109,7 @@ def _cut_entry(cut: Cut) -> dict[str, Any]:
         "grid_cost": cut.plan.proof.grid_cost,
         "optimal": cut.plan.proof.optimal,
         "feed": None if cut.plan.feed is None else asdict(cut.plan.feed),
+        "largest_tilt_deg": _largest_tilt(cut),
         "peak_velocity_share": float(criteria.peak_velocity.max()),
         "peak_acceleration_share": float(criteria.peak_acceleration.max()),
         "issues": [str(c.issue()) for c in cut.checks if not c.ok],

@@ -75,6 +75,7 @@ def check_job(job: Job) -> Checked:
             placement=job.placement,
             gamma_step=job.plan_options["gamma_step"],
             frames=job.plan_options["frames"],
+            tilt=job.plan_options["tilt"],
             postures=job.plan_options["postures"],
         )
         q = graph.q[: graph.start[1]]

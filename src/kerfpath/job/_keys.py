@@ -10,14 +10,13 @@ from typing import Annotated, Any, Literal
 from pydantic import AfterValidator, Field, ValidationInfo
 from pydantic_core import PydanticCustomError
 
-from kerfpath.errors import InputError
 from kerfpath.job._heads import heads
-from kerfpath.robots import acceleration_ratios, postures_named
+from kerfpath.robots import acceleration_ratios
 
 __all__ = [
     "FAULT", "LARGEST", "MOST_NODES", "SMALLEST", "Axis", "Head", "Identifier", "Joints",
     "JointsNotNegative", "JointsPositive", "Lengths", "NotNegative", "Number", "Positive",
-    "Posture", "Ratio", "Signs", "Text", "Three", "existing", "fault", "folder_of", "key",
+    "Ratio", "Signs", "Text", "Three", "existing", "fault", "folder_of", "key",
     "nearest", "one_of", "told",
 ]  # fmt: skip
 
@@ -116,18 +115,3 @@ Identifier = Annotated[
 ]
 Head = Annotated[str, one_of("a cutting head", heads)]
 Ratio = Annotated[str, one_of("a known ratio", acceleration_ratios)]
-
-
-def _posture(words: str) -> str:
-    try:
-        postures_named(words)
-    except InputError:
-        raise fault(
-            "a posture in words of front|rear / up|down / plus|minus",
-            None,
-            'write, for example, posture = "front/up"',
-        ) from None
-    return words
-
-
-Posture = Annotated[str, AfterValidator(_posture)]

@@ -250,7 +250,7 @@ def read_job(path: str | Path) -> Job:
         part_file=path.parent / file.part.file,
         part_unit=file.part.unit,
         contours=tuple(_task(table) for table in file.contour),
-        plan_options=_plan_options(file.plan, robot.endless) | {"comfort": file.comfort.resolve()},
+        plan_options=_plan_options(file.plan, robot) | {"comfort": file.comfort.resolve()},
         refine_parts=file.plan.refine_parts,
         interruptions=file.plan.interruptions,
         cell=file.cell,
@@ -323,11 +323,13 @@ def _rotation(degrees: float | None, endless: Bools) -> Array | None:
     return None if degrees is None else np.where(endless, np.radians(degrees), np.inf)
 
 
-def _plan_options(table: PlanTable, endless: Bools) -> dict[str, Any]:
+def _plan_options(table: PlanTable, robot: Robot) -> dict[str, Any]:
+    words = table.posture
     return {
         "gamma_step": float(np.radians(table.gamma_step_deg)),
         "frames": table.frames,
-        "postures": None if table.posture is None else postures_named(table.posture),
+        "tilt": table.tilt(),
+        "postures": None if words is None else postures_named(words, robot.kinematics),
         "method": table.method,
         "objective": table.objective,
         "metric": table.metric,
@@ -335,7 +337,7 @@ def _plan_options(table: PlanTable, endless: Bools) -> dict[str, Any]:
         "eta_v": table.eta_velocity,
         "eta_a": table.eta_acceleration,
         "closure": table.closure,
-        "rotation": _rotation(table.rotation_deg, endless),
+        "rotation": _rotation(table.rotation_deg, robot.endless),
         "feed": table.feed,
         "refine": table.method == "exact" if table.refine is None else table.refine,
     }

@@ -123,6 +123,7 @@ def _cut(
         placement=job.placement,
         gamma_step=options["gamma_step"],
         frames=options["frames"],
+        tilt=options["tilt"],
         postures=options["postures"],
         comfort=options["comfort"],
         progress=solved,
@@ -136,9 +137,11 @@ def _cut(
     try:
         plans = _plans(job, task, nodes, graph, cell)
     except NoFeasiblePath as broken:
-        # With poses everywhere slower would do; for a loop that cannot close it need not.
-        constant = options["closure"] == "free" and nodes.time is None
-        if not np.diff(graph.start).all() or not constant:
+        # With poses everywhere slower would do; for a loop that cannot close, or an axis that may
+        # not turn as far, it need not, and a feed that dips has tried.
+        plain = options["closure"] == "free" and options["rotation"] is None
+        constant = options["feed"] == "constant" and nodes.time is None
+        if not (np.diff(graph.start).all() and plain and constant):
             return (replace(whole, broken=broken),)
         progress(f"{task.name}: fastest speed", 0, 1)
         if cell is not None:
@@ -164,10 +167,8 @@ def _fastest(
     graph: LayeredGraph | None = None,
 ) -> FastestSpeed:
     """Return the fastest constant speed of a contour, clear in the cell where there is one."""
-    keys, comfort = (
-        ("gamma_step", "frames", "postures", "eta_v", "eta_a"),
-        job.plan_options["comfort"],
-    )
+    keys = ("gamma_step", "frames", "tilt", "postures", "eta_v", "eta_a")
+    comfort = job.plan_options["comfort"]
     return fastest_speed(
         nodes,
         job.robot,
@@ -194,7 +195,7 @@ def _plans(
         if job.interruptions == "none" or not np.diff(graph.start).all():
             raise
     plain = {key: value for key, value in options.items() if key not in ("feed", "rotation")}
-    return plan_in_pieces(nodes, job.robot, **setting, **plain)
+    return plan_in_pieces(nodes, job.robot, cell=cell, **setting, **plain)
 
 
 def _audited(job: Job, whole: Cut, made: Plan, cell: Cell | None) -> Cut:

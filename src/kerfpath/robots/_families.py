@@ -135,19 +135,23 @@ def posture_name(posture: int) -> str:
     return (*EIGHT, *MORE)[posture]
 
 
-def postures_named(words: str) -> tuple[int, ...]:
-    """Return the postures that fit some words: "front/up" fits 0 and 1, "rear" fits 4 to 7.
+def postures_named(words: str, kinematics: str) -> tuple[int, ...]:
+    """Return the postures of a family of arms (`Robot.kinematics`) that fit some words.
+
+    "front/up" fits 0 and 1, "rear" fits 4 to 7, and whatever the family has beyond these eight.
 
     Raises
     ------
     InputError
-        A word that names no shoulder, elbow or wrist, or two that exclude each other.
+        Words that fit no posture of the family: an unknown one, two that exclude each other.
     """
-    wanted = [word for word in words.split("/") if word]
-    fitting = [mu for mu, name in enumerate(EIGHT) if all(w in name.split("/") for w in wanted)]
+    wanted = {word for word in words.split("/") if word}
+    named = [set(name.split("/")) for name in FAMILIES[kinematics].postures]
+    fitting = [mu for mu, name in enumerate(named) if wanted <= name]
     if not fitting:
+        more = "|third|fourth" if len(named) > len(EIGHT) else ""
         raise InputError(
-            f"posture {words!r}: expected words of front|rear / up|down / plus|minus, "
-            'such as "front/up"'
+            f"expected a posture in words of front|rear / up|down / plus|minus{more}, such as "
+            f'"front/up", got {words!r:.60}'
         )
     return tuple(fitting)

@@ -28,8 +28,9 @@ UNITS = {
     "shoulder": ("mm", 1e-3),
     "limits": ("deg", DEGREE),
     "manipulability": ("m3", 1.0),
+    "clearance": ("mm", 1e-3),
 }
-"""Of each measure of `kerfpath.comfort`: the unit of its keys, and what that is in SI."""
+"""Of each band of `kerfpath.Comfort`: the unit of its keys, and what that is in SI."""
 
 
 class ComfortTable(Table):
@@ -50,6 +51,8 @@ class ComfortTable(Table):
     manipulability_margin_m3: Volume = None
     manipulability_band_m3: Volume = None
     manipulability_cost: Cost = None
+    clearance_band_mm: Length = None
+    clearance_cost: Cost = None
 
     @model_validator(mode="after")
     def _goes_together(self) -> ComfortTable:
@@ -65,7 +68,9 @@ class ComfortTable(Table):
         """Return what the table asks for, in SI; None where it asks for nothing."""
         bands = {}
         for name, (unit, si) in UNITS.items():
-            margin, width = (getattr(self, f"{name}_{part}_{unit}") for part in ("margin", "band"))
+            # The margin of clearance is the near-miss distance of the cell.
+            margin = getattr(self, f"{name}_margin_{unit}", None)
+            width = getattr(self, f"{name}_band_{unit}")
             if margin is not None or width is not None:
                 bands[name] = Band(
                     margin=(margin or 0.0) * si,

@@ -6,7 +6,8 @@ from typing import Annotated
 
 from pydantic import BaseModel, Field, ValidationInfo, model_validator
 
-from kerfpath.job._keys import fault, folder_of
+from kerfpath.errors import InputError
+from kerfpath.job._keys import fault, folder_of, told
 from kerfpath.job._tables._cell import CellTable, FixtureTable, HeadTable, PairTable
 from kerfpath.job._tables._comfort import ComfortTable
 from kerfpath.job._tables._contour import ContourTable
@@ -24,6 +25,7 @@ from kerfpath.job._tables._robot import RobotTable
 from kerfpath.job._tables._sequence import SequenceTable
 from kerfpath.job._tables._table import Table
 from kerfpath.job._tables._tool import ToolTable
+from kerfpath.robots import postures_named
 
 __all__ = ["REPEATED", "TABLES", "JobFile"]
 
@@ -72,6 +74,15 @@ class JobFile(Table):
         return self
 
     @model_validator(mode="after")
+    def _posture_fits(self, info: ValidationInfo) -> JobFile:
+        if self.plan.posture is not None:
+            try:
+                postures_named(self.plan.posture, self.robot.resolve(folder_of(info)).kinematics)
+            except InputError as error:
+                raise told(f"{error}", ("plan", "posture")) from None
+        return self
+
+    @model_validator(mode="after")
     def _sequence_fits(self, info: ValidationInfo) -> JobFile:
         """Require [sequence] of what it alone can choose, and a home of the robot's joints."""
         if self.sequence is None:
@@ -100,10 +111,9 @@ class JobFile(Table):
         """Refuse what cannot be planned or known in a cell, at its key."""
         if self.cell is None:
             return self
-        for name, plain in IN_A_CELL.items():
-            if (value := getattr(self.plan, name)) != plain:
-                expected = f'{name} = "{plain}"' if plain else f"no {name}"
-                raise fault(f"{expected} with [cell]", f"{value}", "change one", ("plan", name))
+        if (method := self.plan.method) != "exact":
+            expected = 'method = "exact" with [cell]'
+            raise fault(expected, f'"{method}"', "change one", ("plan", "method"))
         if self.cell.links == "description" and self.robot.urdf is None:
             raise fault(
                 'links = "description" only with urdf in [robot]',
@@ -111,6 +121,19 @@ class JobFile(Table):
                 'write links = "capsules"',
                 ("cell", "links"),
             )
+        return self
+
+    @model_validator(mode="after")
+    def _clearance_is_measured(self) -> JobFile:
+        """Refuse a cost of clearance where the planner would not measure it."""
+        here, why = ("comfort", "clearance_band_mm"), "with clearance_band_mm"
+        if self.comfort.clearance_band_mm is None:
+            return self
+        if self.cell is None:
+            raise fault(f"[cell] {why}, as it is measured there", "none", "change one", here)
+        for name, plain in (("feed", "constant"), ("interruptions", "none")):
+            if (got := getattr(self.plan, name)) != plain:
+                raise fault(f'{name} = "{plain}" {why}', f'"{got}"', "change one", here)
         return self
 
     @model_validator(mode="after")
@@ -122,9 +145,6 @@ class JobFile(Table):
             raise fault(expected, "none", "add it, or remove the costs", ("plan", "feed"))
         return self
 
-
-IN_A_CELL = {"method": "exact", "feed": "constant", "rotation_deg": None, "interruptions": "none"}
-"""What planning in a cell needs of the keys of [plan]."""
 
 TABLES: dict[str, type[BaseModel]] = {
     "robot": RobotTable,
