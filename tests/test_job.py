@@ -565,6 +565,11 @@ def test_a_rotation_limit_is_one_for_every_endless_axis(read):
     job = read(changed("[plan]", "[plan]\nrotation_deg = 180"))
     inf = np.inf
     assert job.plan_options["rotation"].tolist() == [inf, inf, inf, np.pi, inf, np.pi]
+    none = changed("[plan]", "[plan]\nrotation_deg = 180").replace(
+        "endless = [4, 6]", "endless = []"
+    )
+    with pytest.raises(InputError, match=r"plan.rotation_deg: expected an endless axis"):
+        read(none)
 
 
 def test_the_comfort_table_is_read_into_si(read):

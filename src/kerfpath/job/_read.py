@@ -16,7 +16,7 @@ from kerfpath.cad import Part
 from kerfpath.contour import Contour
 from kerfpath.errors import InputError
 from kerfpath.job._keys import MOST_NODES
-from kerfpath.job._refusals import error_at, refusal
+from kerfpath.job._refusals import error_at, refusal, refused_at
 from kerfpath.job._shape import shaped
 from kerfpath.job._tables import (
     AuditTable,
@@ -242,6 +242,13 @@ def read_job(path: str | Path) -> Job:
         raise refusal(path, text, error) from None
     described = file.cell is not None and file.cell.links != "capsules"
     robot = file.robot.resolve(path.parent, bodies=described)
+    if file.plan.rotation_deg is not None and not robot.endless.any():
+        raise refused_at(
+            path,
+            ("plan", "rotation_deg"),
+            "expected an endless axis to limit, got none; remove it, or say which with endless "
+            "in [robot]",
+        )
     return Job(
         path=path,
         robot=robot,
