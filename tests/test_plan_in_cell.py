@@ -1,5 +1,6 @@
 """Plans in a cell: clear, the best of all clear ones, audited again, and refused where they hit."""
 
+import re
 from dataclasses import replace
 
 import numpy as np
@@ -145,6 +146,8 @@ def test_a_cage_is_no_way_and_says_so(task, arm, tool, placement):
     lid = {"lid": box_between([0.9, -0.3, 0.5], [1.5, 0.3, 0.52])}
     with pytest.raises(NoFeasiblePath, match="contour 'circle': no admissible way to node") as no:
         plan(*task[0], **task[1], cell=cell(arm, tool, placement, lid))
+    # The lid lies between the part and all that is above it.
+    assert "(most often of lid and head" in str(no.value)
     assert no.value.proved
     assert no.value.counts["collision at the node"] > 0
 

@@ -10,7 +10,7 @@ import numpy as np
 from kerfpath._arrays import Array, Ints
 from kerfpath.cell import Cell, Checker
 from kerfpath.comfort import Band
-from kerfpath.errors import InputError
+from kerfpath.errors import InputError, NoFeasiblePath
 from kerfpath.graph import LayeredGraph
 from kerfpath.planner._task import Task
 from kerfpath.plans import Plan
@@ -27,6 +27,10 @@ __all__ = ["Finder"]
 
 _P = TypeVar("_P", LayeredPath, SlowedPath, InterruptedPath, LeastInterval)
 
+POSES_TOLD, PAIRS_TOLD = 100, 3
+"""Poses of a node that are looked at, and pairs of bodies that are named, where it is closed."""
+ACCURACY = 1e-5
+"""m beyond what is required: nothing above it need be known."""
 SAME_PLACE = 1e-9
 """m: two poses of the same tool or part differ by rounding at most."""
 
@@ -57,7 +61,31 @@ class Finder:
         if self._cell is None:
             return search(**options)
         del options["q"], options["start"]
-        return clear_path(search, self._known, **options)
+        try:
+            return clear_path(search, self._known, **options)
+        except NoFeasiblePath as broken:
+            raise self._named(broken) from None
+
+    def _named(self, broken: NoFeasiblePath) -> NoFeasiblePath:
+        """Say of a break at a node which bodies collide there, in some of its poses, most often."""
+        if not broken.counts.get("collision at the node") or self._cell is None:
+            return broken
+        first, last = self._known.start[broken.node + 1 : broken.node + 3]
+        some = np.unique(np.linspace(first, last - 1, POSES_TOLD).astype(np.int64))
+        needed = self._cell.required
+        hits = self._cell.distances(self._known.q[some], enough=needed + ACCURACY) <= needed
+        order = np.argsort(-hits.sum(axis=0), kind="stable")[:PAIRS_TOLD]
+        pairs = [self._cell.pair_names[p] for p in order if hits[:, p].any()]
+        told = ", ".join(f"{one} and {two}" for one, two in pairs)
+        return NoFeasiblePath(
+            f"{broken} (most often of {told})" if told else str(broken),
+            proved=broken.proved,
+            node=broken.node,
+            back=broken.back,
+            reached=broken.reached,
+            leaving=broken.leaving,
+            counts=broken.counts,
+        )
 
     def claimed(self, claim: str) -> str:
         """Return a claim and, in a cell, that it holds for what is clear, after how many checks."""
