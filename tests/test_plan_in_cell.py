@@ -1,6 +1,5 @@
 """Plans in a cell: clear, the best of all clear ones, audited again, and refused where they hit."""
 
-import re
 from dataclasses import replace
 
 import numpy as np
