@@ -261,7 +261,7 @@ def test_every_cut_of_the_shipped_part_can_be_made():
     tasks = job.tasks(part)
     assert len(tasks) == 13
     for task in tasks:
-        shaped = task.candidates(part.contour(task.pick), part.surface(task.pick))
+        shaped = task.candidates(part)
         assert len(shaped) == (1 if task.name == "trim" else 2)
         for cut in shaped:
             assert {"pierce", "lead-in", "cut"} <= set(task.sample(cut).kinds)

@@ -60,6 +60,18 @@ class NoFeasiblePath(KerfpathError):
         self.leaving = leaving
         self.counts = dict(counts or {})
 
+    def retold(self, message: str, counts: Mapping[str, int] | None = None) -> NoFeasiblePath:
+        """Return the same answer in other words, and with other counts if they are given."""
+        return NoFeasiblePath(
+            message,
+            proved=self.proved,
+            node=self.node,
+            back=self.back,
+            reached=self.reached,
+            leaving=self.leaving,
+            counts=self.counts if counts is None else counts,
+        )
+
 
 class AuditFailed(KerfpathError):
     """A plan or program that its audit refuses; nothing is written from it."""

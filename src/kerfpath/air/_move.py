@@ -104,10 +104,10 @@ def air_move(
     corners = ends
     if cell is not None:
         _require_clear(cell, ends)
-        if not _clear(cell, ends):
+        if not cell.clear_through(ends):
             found = way_around(
                 ends, lower, upper, 1 / velocity,
-                clear=lambda q: bool(cell.clear(q).all()), passable=lambda q: _clear(cell, q),
+                clear=lambda q: bool(cell.clear(q).all()), passable=cell.clear_through,
                 seconds=seconds,
             )  # fmt: skip
             if found is None:
@@ -135,11 +135,6 @@ def _bounds(robot: Robot, ends: Array) -> tuple[Array, Array]:
         joint = int(np.flatnonzero(beyond.any(axis=0))[0])
         raise InputError(f"air move: joint {joint + 1} of an end is beyond its limits")
     return np.minimum(low, ends.min(axis=0)), np.maximum(high, ends.max(axis=0))
-
-
-def _clear(cell: Cell, q: Array) -> bool:
-    """Say whether the straight motions through q (m, n) are all proved clear, as they turn."""
-    return bool(cell.sweep.clear(q[:-1], q[1:], cell.required, cell.scene.distances).all())
 
 
 def _require_clear(cell: Cell, ends: Array) -> None:

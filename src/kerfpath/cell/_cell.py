@@ -181,6 +181,15 @@ class Cell:
             first, first + self.increments(first, last), self.required, self._scene.distances
         )
 
+    def clear_through(self, q: ArrayLike) -> bool:
+        """Say whether the straight joint motions through q (m, n) rad are all proved clear.
+
+        As in `clear_motion`, but endless joints turn as q says.
+        """
+        corners = floats(q, "q", (None, len(self.chain.axes)))
+        motions = self._sweep.clear(corners[:-1], corners[1:], self.required, self._scene.distances)
+        return bool(motions.all())
+
     def increments(self, q0: Array, q1: Array) -> Array:
         """Return joint increments (B, n) rad from q0 to q1, endless joints the short way (13)."""
         dq = q1 - q0

@@ -148,9 +148,15 @@ class Contour:
         return tuple(KINDS[code] for code in self.kind)
 
     @property
+    def corners(self) -> Ints:
+        """Nodes at which the path turns by more than 20 deg; the first of a closed one may be."""
+        return _sampling.corners(self.points, self.closed)
+
+    @property
     def feature_ends(self) -> Ints:
         """Nodes that sampling by `spacing` or `dt` keeps: ends, corners, and where a kind ends."""
-        return _sampling.feature_ends(self.points, self._stretch_kind(), self.closed)
+        ends = np.flatnonzero(np.diff(self._stretch_kind())) + 1
+        return np.unique(np.concatenate([[0], self.corners, ends, [len(self) - 1]]))
 
     def resample(
         self,

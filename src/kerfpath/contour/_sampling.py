@@ -14,7 +14,7 @@ from kerfpath.errors import InputError
 if TYPE_CHECKING:
     from kerfpath.contour._contour import Contour
 
-__all__ = ["evenly", "feature_ends", "fewest", "in_time"]
+__all__ = ["corners", "evenly", "fewest", "in_time"]
 
 CORNER = np.radians(20)
 """Turn of the path at one node from which on it is a corner, which sampling keeps."""
@@ -28,20 +28,15 @@ REPEATED_POINT = 1e-9
 """m; keeps a chord of no length from dividing by zero."""
 
 
-def feature_ends(points: Array, kind: Ints, closed: bool) -> Ints:
-    """Return the nodes that end a feature: both ends, corners, and where the kind changes.
+def corners(points: Array, closed: bool) -> Ints:
+    """Return the nodes of points (K, 3) m at which the path turns sharply, in their order.
 
-    Parameters
-    ----------
-    points : (K, 3) m
-    kind : (K-1,) int
-        What each stretch is.
-    closed : bool
-        The ends are one node then; it is kept as every end is.
+    The first node counts where the path is closed, the ends of an open one do not.
     """
     along = unit(np.diff(points, axis=0), "points")
-    inner = (angle_between(along[:-1], along[1:]) > CORNER) | (kind[1:] != kind[:-1])
-    return np.concatenate([[0], np.flatnonzero(inner) + 1, [len(points) - 1]])
+    turn = angle_between(along, np.roll(along, 1, axis=0))
+    turn[0] = turn[0] if closed else 0.0
+    return np.flatnonzero(turn > CORNER)
 
 
 def evenly(at: Array, ends: Ints, step: float, unit_name: str, name: str) -> Array:

@@ -152,13 +152,12 @@ def _drawn(file: PlanFile, job: Job, part: Part) -> dict[str, Contour]:
         raise InputError(
             f"{job.path}: has no contour {unknown[0]!r} of {file.path}; give the job of that plan"
         )
+    shaped = {name: tasks[name].candidates(part) for name in dict.fromkeys(file.contours.values())}
     drawn: dict[str, Contour] = {}
     for p in file.plans:
-        task, s = tasks[file.contours[p.name]], p.contour.s
-        piece = p.name != task.name
-        shaped = task.candidates(part.contour(task.pick), part.surface(task.pick))
-        whole = min(shaped, key=lambda cut: _apart(p.contour, cut))
-        drawn[p.name] = whole.between(float(s[0]), float(s[-1])) if piece else whole
+        name, s = file.contours[p.name], p.contour.s
+        whole = min(shaped[name], key=lambda cut: _apart(p.contour, cut))
+        drawn[p.name] = whole if p.name == name else whole.between(float(s[0]), float(s[-1]))
     return drawn
 
 

@@ -66,18 +66,9 @@ def check_job(job: Job) -> Checked:
     cell = cell_of_job(job, part)
     starts = []
     for task in job.tasks(part):
-        shaped = task.candidates(part.contour(task.pick), part.surface(task.pick))
-        nodes = task.sample(shaped[0])
-        graph = layered_graph(
-            nodes.part(0, 1, job.plan_options["frames"]),
-            job.robot,
-            tool=job.tool,
-            placement=job.placement,
-            gamma_step=job.plan_options["gamma_step"],
-            frames=job.plan_options["frames"],
-            tilt=job.plan_options["tilt"],
-            postures=job.plan_options["postures"],
-        )
+        nodes = task.sample(task.candidates(part)[0])
+        first = nodes.part(0, 1, job.plan_options["frames"])
+        graph = layered_graph(first, job.robot, **job.graph_options)
         q = graph.q[: graph.start[1]]
         starts.append(_start(task.name, len(nodes), q, cell))
     return Checked(job=job, cell=cell, starts=tuple(starts))

@@ -27,7 +27,6 @@ from kerfpath.job._tables import (
     ProgramTable,
     SequenceTable,
 )
-from kerfpath.operations import Surface
 from kerfpath.robots import Robot, postures_named
 
 __all__ = ["ContourTask", "Job", "ProgramOptions", "audit_options", "program_options", "read_job"]
@@ -82,8 +81,14 @@ class ContourTask:
         loops = part.pick(**self.table.pick_all.resolve())
         return [replace(self, pick=loop.name, name=loop.name) for loop in loops]
 
-    def candidates(self, drawn: Contour, surface: Surface) -> list[Contour]:
-        """Return the contours that may be cut for a loop as drawn, see `shaped`."""
+    def candidates(self, part: Part, drawn: Contour | None = None) -> list[Contour]:
+        """Return the contours that may be cut for its loop, see `shaped`.
+
+        `drawn` is the loop as the part has it, where that is at hand.
+        """
+        leads = self.table.lead_in or self.table.lead_out
+        surface = part.surface(self.pick) if leads else None
+        drawn = part.contour(self.pick) if drawn is None else drawn
         return shaped(self.table, drawn, surface)
 
     def sample(self, contour: Contour) -> Contour:
@@ -204,6 +209,13 @@ class Job:
     audit_options: dict[str, Any]
     program: ProgramOptions
     source: dict[str, Any]
+
+    @property
+    def graph_options(self) -> dict[str, Any]:
+        """What the layered graph of a contour is built by; its comfort is `plan_options`'."""
+        keys = ("gamma_step", "frames", "tilt", "postures")
+        placed = {"tool": self.tool, "placement": self.placement}
+        return placed | {key: self.plan_options[key] for key in keys}
 
     def tasks(self, part: Part) -> tuple[ContourTask, ...]:
         """Return the contours to cut of the part that was read.

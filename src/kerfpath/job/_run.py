@@ -83,10 +83,7 @@ def run_job(job: Job, *, progress: Progress = lambda what, done, total: None) ->
     cell = cell_of_job(job, part)
     loops = [part.contour(task.pick) for task in tasks]
     tries = [
-        [
-            _cut(job, task, shaped, cell, progress)
-            for shaped in task.candidates(loop, part.surface(task.pick))
-        ]
+        [_cut(job, task, shaped, cell, progress) for shaped in task.candidates(part, loop)]
         for task, loop in zip(tasks, loops, strict=True)
     ]
     if job.sequence is not None:
@@ -117,16 +114,7 @@ def _cut(
 
     progress(task.name, 0, len(nodes))
     graph = layered_graph(
-        nodes,
-        job.robot,
-        tool=job.tool,
-        placement=job.placement,
-        gamma_step=options["gamma_step"],
-        frames=options["frames"],
-        tilt=options["tilt"],
-        postures=options["postures"],
-        comfort=options["comfort"],
-        progress=solved,
+        nodes, job.robot, **job.graph_options, comfort=options["comfort"], progress=solved
     )
     clearance = None
     if cell is not None and job.cell is not None and job.cell.map:
@@ -167,18 +155,17 @@ def _fastest(
     graph: LayeredGraph | None = None,
 ) -> FastestSpeed:
     """Return the fastest constant speed of a contour, clear in the cell where there is one."""
-    keys = ("gamma_step", "frames", "tilt", "postures", "eta_v", "eta_a")
-    comfort = job.plan_options["comfort"]
+    comfort, eta_v, eta_a = (job.plan_options[key] for key in ("comfort", "eta_v", "eta_a"))
     return fastest_speed(
         nodes,
         job.robot,
-        tool=job.tool,
-        placement=job.placement,
+        **job.graph_options,
+        eta_v=eta_v,
+        eta_a=eta_a,
         cell=cell,
         graph=graph,
         refine=refine,
         comfort=comfort and comfort.hard,
-        **{key: job.plan_options[key] for key in keys},
     )
 
 
@@ -250,8 +237,7 @@ def fastest_speeds(
     tasks = job.tasks(part)
     for i, task in enumerate(tasks):
         progress("contours", i, len(tasks))
-        drawn = task.candidates(part.contour(task.pick), part.surface(task.pick))[0]
-        nodes = task.sample(drawn)
+        nodes = task.sample(task.candidates(part)[0])
         try:
             found: FastestSpeed | NoFeasiblePath = _fastest(job, nodes, cell, refine=refine)
         except NoFeasiblePath as broken:

@@ -33,7 +33,7 @@ MM = 1e-3
 OTHER: dict[Side, Side] = {"left": "right", "right": "left"}
 
 
-def shaped(table: ContourTable, drawn: Contour, surface: Surface) -> list[Contour]:
+def shaped(table: ContourTable, drawn: Contour, surface: Surface | None) -> list[Contour]:
     """Return the contours that may be cut for a loop: one, or several starts and directions.
 
     Leads are laid on `surface`.
@@ -51,7 +51,7 @@ def shaped(table: ContourTable, drawn: Contour, surface: Surface) -> list[Contou
 
 
 def _run(
-    table: ContourTable, contour: Contour, surface: Surface, *, backwards: bool
+    table: ContourTable, contour: Contour, surface: Surface | None, *, backwards: bool
 ) -> list[Contour]:
     scrap: Side = OTHER[table.scrap] if backwards else table.scrap
     contour = reverse(contour) if backwards else contour
@@ -82,7 +82,9 @@ def _started(table: ContourTable, contour: Contour) -> list[Contour]:
     return [contour]
 
 
-def _featured(table: ContourTable, contour: Contour, surface: Surface, scrap: Side) -> Contour:
+def _featured(
+    table: ContourTable, contour: Contour, surface: Surface | None, scrap: Side
+) -> Contour:
     """Return the contour with its bevel, joints, slow corners, overlap and leads."""
     if table.bevel_deg:
         contour = bevel(contour, float(np.radians(table.bevel_deg)), side=scrap)

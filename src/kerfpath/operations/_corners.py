@@ -7,8 +7,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from kerfpath._arrays import Array, Ints, scalar
-from kerfpath.contour import CORNER, KINDS, Contour, angle_between, join, turned, unit
+from kerfpath._arrays import Array, scalar
+from kerfpath.contour import KINDS, Contour, angle_between, join, turned, unit
 from kerfpath.errors import InputError
 from kerfpath.operations._start import smoothest_start, start_at, with_nodes
 from kerfpath.operations._surface import Side, lateral, require_in_scrap
@@ -105,7 +105,7 @@ def slow_corners(
         raise InputError(f"corner speed share: expected less than 1, got {share:g}")
     distance = scalar(distance, "distance", unit="m", above=-1e-300)
     ramp = scalar(ramp, "ramp", unit="m", above=0.0)
-    at = contour.s[_corners(contour)]
+    at = contour.s[contour.corners]
     if not at.size:
         return contour
     ends = np.concatenate(
@@ -122,16 +122,6 @@ def slow_corners(
     return replace(marked, speed_share=np.minimum(marked.speed_share, slowed))
 
 
-def _corners(contour: Contour) -> Ints:
-    """Return the inner nodes that are corners, and the first of a closed contour if it is one."""
-    plain = replace(contour, kind=None, x=None, time=None)  # type: ignore[arg-type]
-    found = plain.feature_ends[1:-1]
-    if not contour.closed:
-        return found
-    along = unit(np.diff(contour.points, axis=0)[[-1, 0]])
-    return np.append(0, found) if angle_between(along[0], along[1]) > CORNER else found
-
-
 def _begun_off_corners(contour: Contour) -> Contour:
     """Return the contour begun at its smoothest place if it is closed and begins in a corner."""
     if contour.kind.any():
@@ -139,14 +129,14 @@ def _begun_off_corners(contour: Contour) -> Contour:
             f"corners of {contour.name!r}: expected a cut without leads, joints or loops; see to "
             "corners before"
         )
-    if 0 in _corners(contour):
+    if 0 in contour.corners:
         return start_at(contour, smoothest_start(contour))
     return contour
 
 
 def _replaced(contour: Contour, corner: Corner, kind: int) -> Contour:
     """Return the contour with what `corner` makes of each corner, all of one kind, in its place."""
-    nodes = _corners(contour)
+    nodes = contour.corners
     if not nodes.size:
         return contour
     s = contour.s

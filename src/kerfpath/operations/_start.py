@@ -169,14 +169,14 @@ def micro_joints(
     if (count is None) == (at is None):
         raise InputError("micro_joints: give one of count= and at=")
     width = scalar(width, "micro joint width", unit="m", above=0.0)
-    if count is not None:
-        if count < 1:
-            raise InputError(f"micro_joints: expected a count of at least 1, got {count}")
-        middles = contour.s[0] + (np.arange(count) + 0.5) * contour.length / count
-    else:
-        middles = np.sort(floats(at, "at", (None,)))  # type: ignore[arg-type]  # not None here
+    if at is not None:
+        middles = np.sort(floats(at, "at", (None,)))
         if not middles.size:
             raise InputError("micro_joints: expected at least one place, got at=[]")
+    else:
+        if not count or count < 1:
+            raise InputError(f"micro_joints: expected a count of at least 1, got {count}")
+        middles = contour.s[0] + (np.arange(count) + 0.5) * contour.length / count
     ends = np.c_[middles - width / 2, middles + width / 2].ravel()
     if (np.diff(ends) <= 0).any() or ends[0] <= contour.s[0] or ends[-1] >= contour.s[-1]:
         raise InputError(

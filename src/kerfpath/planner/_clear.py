@@ -77,15 +77,7 @@ class Finder:
         order = np.argsort(-hits.sum(axis=0), kind="stable")[:PAIRS_TOLD]
         pairs = [self._cell.pair_names[p] for p in order if hits[:, p].any()]
         told = ", ".join(f"{one} and {two}" for one, two in pairs)
-        return NoFeasiblePath(
-            f"{broken} (most often of {told})" if told else str(broken),
-            proved=broken.proved,
-            node=broken.node,
-            back=broken.back,
-            reached=broken.reached,
-            leaving=broken.leaving,
-            counts=broken.counts,
-        )
+        return broken.retold(f"{broken} (most often of {told})") if told else broken
 
     def claimed(self, claim: str) -> str:
         """Return a claim and, in a cell, that it holds for what is clear, after how many checks."""

@@ -69,12 +69,8 @@ def plan_in_pieces(
     try:
         found = finder.best(interrupted_path, **task.aim)
     except NoFeasiblePath as broken:
-        raise NoFeasiblePath(
-            f"contour {contour.name!r}: no number of interruptions helps: {broken}",
-            proved=broken.proved,
-            node=broken.node,
-            back=broken.back,
-            counts=broken.counts,
+        raise broken.retold(
+            f"contour {contour.name!r}: no number of interruptions helps: {broken}"
         ) from None
     plans = []
     for number, piece in enumerate(found.pieces, 1):

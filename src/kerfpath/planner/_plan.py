@@ -163,14 +163,8 @@ def plan(
         if found is not None and found.done:
             return found.plan
         tried = "" if found is None else f"; off the grid {found.statement}"
-        raise NoFeasiblePath(
-            f"contour {contour.name!r}: {broken}{_bracket(broken, task)}{tried}",
-            proved=broken.proved,
-            node=broken.node,
-            back=broken.back,
-            reached=broken.reached,
-            leaving=broken.leaving,
-            counts=broken.counts,
+        raise broken.retold(
+            f"contour {contour.name!r}: {broken}{_bracket(broken, task)}{tried}"
         ) from None
     made = task.plan(path.index, path.cost, _proof(method, path.optimal, finder))
     return refined(task, finder, made) if refine else made

@@ -118,7 +118,7 @@ def carried(robot: Robot, kind: Literal["rail", "positioner"], axis: ArrayLike, 
         external=ExternalAxis(
             kind=kind,
             axis=axis,  # type: ignore[arg-type]  # cast by __post_init__
-            point=point,  # type: ignore[arg-type]
+            point=point,  # type: ignore[arg-type]  # cast by __post_init__
             step=travel["step"],
         ),
         lower=np.append(limits.lower, travel["lower"]),

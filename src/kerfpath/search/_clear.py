@@ -224,15 +224,7 @@ class Known:
         message = f"no admissible way to node {there} that is clear; forbidden by {told}"
         if "collision elsewhere" in ways:
             message = f"{broken}, collision elsewhere: {ways['collision elsewhere']}"
-        return NoFeasiblePath(
-            message,
-            proved=broken.proved,
-            node=broken.node,
-            back=broken.back,
-            reached=broken.reached,
-            leaving=broken.leaving,
-            counts=counts,
-        )
+        return broken.retold(message, counts)
 
 
 def clear_path(search: Callable[..., _P], known: Known, **options: Any) -> _P:

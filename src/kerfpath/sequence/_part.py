@@ -263,7 +263,7 @@ def _require_clear_ends(made: Plan, cell: Cell | None, retract: float) -> None:
             raise NoFeasiblePath(str(broken), proved=True, node=node) from broken
         if cell is None:
             continue
-        if not cell.sweep.clear(way[:-1], way[1:], cell.required, cell.scene.distances).all():
+        if not cell.clear_through(way):
             raise NoFeasiblePath(
                 f"contour {made.name!r}: the tool is not clear while it backs off node {node} by "
                 f"{retract * 1e3:g} mm",

@@ -62,15 +62,14 @@ class JobFile(Table):
         return self
 
     @model_validator(mode="after")
-    def _weights_fit(self, info: ValidationInfo) -> JobFile:
-        weights, joints = self.plan.weights, self.robot.joints(folder_of(info))
-        if weights is not None and len(weights) != joints:
-            raise fault(
-                f"{joints} numbers, one for every joint",
-                f"{len(weights)}",
-                "give as many",
-                ("plan", "weights"),
-            )
+    def _one_for_every_joint(self, info: ValidationInfo) -> JobFile:
+        home = None if self.sequence is None else self.sequence.home_deg
+        given = {("plan", "weights"): self.plan.weights, ("sequence", "home_deg"): home}
+        joints = self.robot.joints(folder_of(info))
+        for where, numbers in given.items():
+            if numbers is not None and len(numbers) != joints:
+                expected = f"{joints} numbers, one for every joint"
+                raise fault(expected, f"{len(numbers)}", "give as many", where)
         return self
 
     @model_validator(mode="after")
@@ -83,27 +82,19 @@ class JobFile(Table):
         return self
 
     @model_validator(mode="after")
-    def _sequence_fits(self, info: ValidationInfo) -> JobFile:
-        """Require [sequence] of what it alone can choose, and a home of the robot's joints."""
-        if self.sequence is None:
-            for i, table in enumerate(self.contour):
-                for name in ("start", "direction"):
-                    if getattr(table, name) == "best":
-                        raise fault(
-                            "[sequence], which chooses what is best",
-                            "none",
-                            f"add it, or write another {name}",
-                            ("contour", i, name),
-                        )
+    def _best_is_chosen(self) -> JobFile:
+        """Require [sequence] of what it alone can choose."""
+        if self.sequence is not None:
             return self
-        home, joints = self.sequence.home_deg, self.robot.joints(folder_of(info))
-        if home is not None and len(home) != joints:
-            raise fault(
-                f"{joints} numbers, one for every joint",
-                f"{len(home)}",
-                "give as many",
-                ("sequence", "home_deg"),
-            )
+        for i, table in enumerate(self.contour):
+            for name in ("start", "direction"):
+                if getattr(table, name) == "best":
+                    raise fault(
+                        "[sequence], which chooses what is best",
+                        "none",
+                        f"add it, or write another {name}",
+                        ("contour", i, name),
+                    )
         return self
 
     @model_validator(mode="after")
