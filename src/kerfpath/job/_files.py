@@ -68,14 +68,16 @@ def write_outcome(outcome: Outcome, folder: Path) -> Written:
     job = outcome.job
     target = _program_file(job, folder)
     part, moves = outcome.part, () if outcome.part is None else outcome.part.moves
-    texts, refused = {}, None
+    texts: dict[Path, str] = {}
+    refused = None
     notes = [collision_note(outcome.cell, moves_too=bool(moves))]
     notes += [] if part is None else [order_note(part)]
     notes += [] if outcome.stuck is None else [f"The moves between contours: {outcome.stuck}"]
     notes += [f"The moves between contours: {c.issue()}" for c in outcome.air if not c.ok]
     if outcome.passed and target is not None:
         try:
-            texts[target], warnings = program_of(outcome.plans, job.program, moves)
+            program, warnings = program_of(outcome.plans, job.program, moves)
+            texts |= {folder / name: text for name, text in program.items()}
             notes += warnings
         except InputError as error:
             refused = error
@@ -171,9 +173,13 @@ def require_language(job: Job) -> None:
 
 
 def program_of(
-    plans: Sequence[Plan], options: ProgramOptions, moves: Sequence[AirMove] = ()
-) -> tuple[str, list[str]]:
-    """Return the text of the program that cuts `plans`, and the warnings of its preflight.
+    plans: Sequence[Plan],
+    options: ProgramOptions,
+    moves: Sequence[AirMove] = (),
+    *,
+    strict: bool = False,
+) -> tuple[dict[str, str], list[str]]:
+    """Return the files of the program that cuts `plans`, and the warnings of its preflight.
 
     Between them the robot moves as `moves` say; without any, straight to each.
 
@@ -196,17 +202,15 @@ def program_of(
         name=options.name,
         retract=options.retract,
         zone=options.zone,
-        laser_output=options.laser_output,
         lead_time=options.lead_time,
         pierce_time=options.pierce_time,
         approach_speed=options.approach_speed,
         air_speed=options.air_speed,
-        work_object=options.work_object,
-        tool_name=options.tool_name,
+        gas_lead=options.gas_lead,
     )
-    text = post(program, options.language)
-    issues = preflight(program, options.language)
-    return text, [str(issue) for issue in issues if issue.level == "warning"]
+    written = post(program, options.language, options.settings, strict=strict)
+    issues = preflight(program, options.language, options.settings)
+    return written, [str(issue) for issue in issues if issue.level == "warning"]
 
 
 def trajectory_text(plans: Sequence[Plan], moves: Sequence[AirMove] = ()) -> str:
