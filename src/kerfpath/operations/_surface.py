@@ -11,7 +11,16 @@ from kerfpath._arrays import Array
 from kerfpath.contour import KINDS, Contour, unit
 from kerfpath.errors import InputError
 
-__all__ = ["Ribbon", "Side", "Surface", "edge", "lateral", "nearest", "require_in_scrap"]
+__all__ = [
+    "IN_SCRAP",
+    "Ribbon",
+    "Side",
+    "Surface",
+    "edge",
+    "lateral",
+    "nearest",
+    "require_in_scrap",
+]
 
 TOUCH = 1e-5
 """m: what runs in the scrap may be on the part's side by no more; a lead that is tangent to a curve
@@ -20,6 +29,7 @@ SAME_PLACE = 1e-9
 """m: two places nearer than this are one."""
 
 IN_SCRAP = [KINDS.index(word) for word in ("pierce", "lead-in", "lead-out", "loop")]
+"""Kinds of the stretches that run in the scrap."""
 
 Side = Literal["left", "right"]
 """Seen from the nozzle along the travel."""
