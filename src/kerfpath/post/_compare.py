@@ -25,6 +25,8 @@ FRAME = 1e-7
 """The same of frames, m and sine."""
 LEAD = 6e-4
 """The same of lead times and waits (s): controllers count milliseconds."""
+DURATION = 1e-6
+"""The same of durations (s), where a text says times."""
 SHARE = 6e-3
 """The same of shares of the full speed: controllers count per cent."""
 
@@ -89,9 +91,12 @@ def _places(
 ) -> Iterator[ProgramIssue]:
     """Compare the tips of all targets, by joints where the text says them."""
     point, angle = POINT + rules.point_step, ANGLE + rules.angle_step
-    told = [(m, b, m.T_part_tip, b.T_part_tip) for m, b in pairs if isinstance(m, LinearMove)]
-    told += [(m, b, m.T_part_via, b.T_part_via) for m, b in pairs if isinstance(m, CircularMove)]
-    posed = [(b, ours, theirs) for _, b, ours, theirs in told if theirs is not None]
+    posed = [(b, program.tip(m), b.T_part_tip) for m, b in pairs if b.T_part_tip is not None]
+    posed += [
+        (b, m.T_part_via, b.T_part_via)
+        for m, b in pairs
+        if isinstance(m, CircularMove) and b.T_part_via is not None
+    ]
     if posed:
         yield from _apart(
             [b for b, _, _ in posed],
@@ -130,10 +135,17 @@ def _apart(
 def _motion(pairs: list[tuple[Move, ReadMove]], rules: Rules) -> Iterator[ProgramIssue]:
     for move, back in pairs:
         joint = isinstance(move, JointMove)
-        if abs(move.speed - back.speed) > (SHARE if joint else 0.51 * rules.speed_step + 1e-9):
+        off = SHARE if joint else 0.51 * rules.speed_step + 1e-9
+        if back.speed is not None and abs(move.speed - back.speed) > off:
             unit, scale = ("of the full speed", 1.0) if joint else ("mm/s", 1e3)
             said = f"the speed is {back.speed * scale:g} {unit}, expected {move.speed * scale:g}"
             yield _issue(back, said)
+        if (
+            isinstance(move, LinearMove)
+            and (took := back.duration) is not None
+            and abs(move.duration - took) > DURATION
+        ):
+            yield _issue(back, f"takes {took:g} s, expected {move.duration:g} s")
         if back.zone is not None and abs(move.zone - back.zone) > POINT:
             said = f"the zone is {back.zone * 1e3:g} mm, expected {move.zone * 1e3:g} mm"
             yield _issue(back, said)

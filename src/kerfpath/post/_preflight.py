@@ -8,12 +8,11 @@ from collections.abc import Iterator
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from kerfpath._arrays import Array
 from kerfpath.errors import InputError
 from kerfpath.post._issue import ProgramIssue
 from kerfpath.post._languages import Language
 from kerfpath.post._languages import language as find_language
-from kerfpath.post._program import JointMove, LinearMove, Move, Program, Section, Wait
+from kerfpath.post._program import JointMove, LinearMove, Program, Section, Wait
 from kerfpath.post._settings import Rules, Settings
 
 __all__ = ["preflight"]
@@ -216,7 +215,7 @@ def _laser(section: Section) -> Iterator[ProgramIssue]:
 def _motion(program: Program, section: Section, rules: Rules) -> Iterator[ProgramIssue]:
     """Check the straight moves of a section: steps, zones, turning speed, lead times."""
     moves = section.moves
-    poses = [_tip(program, move) for move in moves]
+    poses = [program.tip(move) for move in moves]
     places = [f"{section.name}, move {number}" for number in range(len(moves))]
     lengths, too_fast = [], 0
     for k in range(1, len(moves)):
@@ -296,11 +295,3 @@ def _limits(program: Program, section: Section) -> Iterator[ProgramIssue]:
                     f"{words[i]}: {np.degrees(excess):.3f} deg beyond its limit",
                     f"{section.name}, move {number}",
                 )
-
-
-def _tip(program: Program, move: Move) -> Array:
-    """Return the tip pose of a target in the part frame, (4, 4) m."""
-    if isinstance(move, LinearMove):
-        return move.T_part_tip
-    T_base_tip = program.robot.forward(move.q) @ program.T_flange_tip
-    return np.asarray(np.linalg.solve(program.T_base_part, T_base_tip))

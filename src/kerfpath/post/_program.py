@@ -5,6 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Literal
 
+import numpy as np
+
 from kerfpath._arrays import Array, as_pose, floats
 from kerfpath.errors import InputError
 from kerfpath.robots import Robot
@@ -200,3 +202,10 @@ class Program:
     def moves(self) -> tuple[Move, ...]:
         """All moves in order, over all sections."""
         return tuple(move for section in self.sections for move in section.moves)
+
+    def tip(self, move: Move) -> Array:
+        """Return the tip pose of a target in the part frame, (4, 4) m."""
+        if isinstance(move, LinearMove):
+            return move.T_part_tip
+        T_base_tip = self.robot.forward(move.q) @ self.T_flange_tip
+        return np.asarray(np.linalg.solve(self.T_base_part, T_base_tip))
