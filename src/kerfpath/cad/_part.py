@@ -16,7 +16,7 @@ from kerfpath.cad._crossing import crossing
 from kerfpath.cad._healed import HealedSurface
 from kerfpath.cad._loops import OrientedEdge
 from kerfpath.cad._sample import Chain, Trace
-from kerfpath.cad._units import MM
+from kerfpath.cad._units import LARGEST, MM
 from kerfpath.contour import Contour
 from kerfpath.errors import InputError
 from kerfpath.operations import Ribbon, Surface
@@ -70,7 +70,8 @@ class Loop:
     skin : str
         Of the loop of a face that is a piece of a skin: the skin's name.
     layer, colour : str
-        In a DXF: where and how it is drawn (red, ..., white, aci30 or #ff8000).
+        In a DXF and of a STEP's face: where and how it is drawn (red, ..., white, #ff8000, aci30),
+        "" where that is not said, or not the same all over a skin.
     """
 
     name: str
@@ -190,7 +191,7 @@ class Part:
         length : (float, float) m
             Their length, likewise.
         layer, colour : str
-            As drawn in a DXF.
+            As drawn in a DXF or STEP.
         near : (3,) m
             Of all the others that fit, the one that passes this point most closely.
 
@@ -317,15 +318,27 @@ def loop_of(
     layer: str = "",
     colour: str = "",
 ) -> Loop:
-    """Return the loop along `trace`, measured; it is closed where no gap (m) is larger."""
+    """Return the loop along `trace`, measured; it is closed where no gap (m) is larger.
+
+    Raises
+    ------
+    InputError
+        A trace that is longer or reaches further than any part does.
+    """
     largest_gap = float(trace.gaps.max(initial=0.0)) * MM
+    length, box = float(trace.lengths.sum()), trace.bounds()
+    if not (length <= LARGEST and (np.abs(box) <= LARGEST).all()):
+        raise InputError(
+            f"loop {name!r} reaches further than {LARGEST / 1e6:g} km; the file is damaged, or its "
+            "unit is wrong"
+        )
     return Loop(
         name=name,
         face=face,
         kind=kind,
         surface=surface,
-        length=float(trace.lengths.sum()) * MM,
-        bounding_box=freeze(trace.bounds() * MM),
+        length=length * MM,
+        bounding_box=freeze(box * MM),
         edges=len(trace.lengths),
         shortest_edge=float(trace.lengths.min()) * MM,
         largest_gap=largest_gap,
