@@ -2,8 +2,8 @@
 
     python tests/spoilt.py [SECONDS] [FIRST_SEED]
 
-spoils one per seed and reads it in a child process. What crashes, hangs, ends in a traceback or says
-more than one line is printed, and the file is left in the folder spoilt.
+spoils one per seed and reads it in a child process. What crashes, hangs, ends in a traceback or
+says more than one line is printed, and the file is left in the folder spoilt.
 """
 
 from __future__ import annotations
@@ -40,10 +40,10 @@ LOOPS = 8
 """How many contours are taken from a part."""
 LONGEST = 400
 """Characters of a message."""
-NUMBERS = [
-    b"", b"0", b"-1", b"1", b"2", b"1.", b"-0.", b"1E-300", b"1.E+300", b"-1E20", b"1e400", b"nan", b"inf",
-    b"99999999999999999999", b"2147483648", b"-2147483649", b"1e", b"0x10", b"1,5", b"1.D5", b"3", b"17",
-]  # fmt: skip
+NUMBERS = (
+    b" 0 -1 1 2 3 17 1. -0. 1E-300 1.E+300 -1E20 1e400 nan inf 99999999999999999999 2147483648"
+    b" -2147483649 1e 0x10 1,5 1.D5"
+).split(b" ")
 NUMBER = re.compile(rb"[-+]?\d+\.?\d*(?:[eEdD][-+]?\d+)?")
 
 
@@ -161,7 +161,8 @@ def drawings(folder: Path) -> dict[str, bytes]:
     """Return small drawings of each format by file name."""
     path = Path(__file__).parents[1] / "examples" / "model_drawings.py"
     spec = importlib.util.spec_from_file_location("model_drawings", path)
-    assert spec is not None and spec.loader is not None
+    assert spec is not None
+    assert spec.loader is not None
     examples = importlib.util.module_from_spec(spec)
     spec.loader.exec_module(examples)
     folder.mkdir(parents=True, exist_ok=True)
@@ -264,7 +265,8 @@ def _main(seconds: float, seed: int) -> None:
                     [sys.executable, __file__, "child"],
                     stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=said, text=True,
                 )  # fmt: skip
-                assert child.stdin is not None and child.stdout is not None
+                assert child.stdin is not None
+                assert child.stdout is not None
                 patience = 2 * HANG
             child.stdin.write(f"{seed}\n")
             child.stdin.flush()

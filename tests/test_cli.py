@@ -288,6 +288,16 @@ def test_contours_lists_the_loops_by_name():
     np.testing.assert_allclose(size, 25.4 * np.ptp(data["bounding_box_m"], axis=0), rtol=1e-6)
 
 
+@pytest.mark.parametrize("command", ["plan", "check"])
+def test_a_drawing_is_shown_before_its_job_is_planned(folder, tmp_path, command):
+    arguments = ["--out", tmp_path / "out"] if command == "plan" else []
+    first = run(command, folder / "small.toml", *arguments).stdout.splitlines()[0]
+    listed = run("contours", folder / "b_pillar.step").stdout.splitlines()[0]
+    assert first == listed
+    for words in ("mm (file in mm)", "66 loops of 25.2 to 2906.1 mm", "gap", "shortest edge"):
+        assert words in first
+
+
 def test_robots_lists_the_library_and_shows_sources():
     assert "68 robots" in run("robots").stdout
     shown = run("robots", "abb_irb2400_155").stdout

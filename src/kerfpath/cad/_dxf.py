@@ -50,7 +50,9 @@ MOST = 200_000
 """Curves in a drawing; more is a slip in the rows and columns of a block."""
 FLAT = 1e-6
 """How far (mm) a curve may leave the drawing plane: what writers round to."""
-DAMAGED = (DXFError, ArithmeticError, AttributeError, LookupError, TypeError, ValueError)
+DAMAGED = (
+    DXFError, ArithmeticError, AssertionError, AttributeError, LookupError, TypeError, ValueError,
+)  # fmt: skip
 """What ezdxf and splines raise on values that are none, and on structures that are torn."""
 
 

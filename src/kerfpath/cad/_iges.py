@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from itertools import zip_longest
+from itertools import groupby, zip_longest
 from pathlib import Path
 
 from OCP.BRepBuilderAPI import BRepBuilderAPI_Transform
@@ -66,6 +66,16 @@ def _require_whole(path: Path, content: bytes) -> None:
                 f"{path}: the file is damaged: expected {want} in columns 73 to {WIDTH} of line "
                 f"{line}, got {got or 'nothing'}; copy or export it again"
             )
+
+    # Columns 65 to 72 of the parameters tell the directory entry that each line belongs to.
+    owners = [line[64:72].strip() for line in lines if line[72:73] == b"P"]
+    entries = [int(owner) if owner.isdigit() else 0 for owner, _ in groupby(owners)]
+    known = range(1, int(told[3]) + 1, 2)
+    if len(set(entries)) < len(entries) or not all(entry in known for entry in entries):
+        raise InputError(
+            f"{path}: the file is damaged: parameters of section P belong to no entity, or are "
+            "scattered; copy or export it again"
+        )
 
 
 def _read(path: Path, unit: str | None, gap: float) -> Part:

@@ -10,6 +10,7 @@ import numpy as np
 from OCP.collections import Sequence_TCollection_AsciiString
 from OCP.IFSelect import IFSelect_ReturnStatus
 from OCP.STEPControl import STEPControl_Reader
+from OCP.StepGeom import StepGeom_Curve, StepGeom_Pcurve
 from OCP.StepRepr import StepRepr_NextAssemblyUsageOccurrence, StepRepr_RepresentationItem
 from OCP.TopAbs import TopAbs_ShapeEnum
 from OCP.TopoDS import TopoDS, TopoDS_Iterator, TopoDS_Shape
@@ -157,6 +158,15 @@ def _require_sound(path: Path, reader: STEPControl_Reader) -> bool:
             where = f"{entity}: "
         reason = " ".join(check.CFail(1).split())
         raise InputError(f"{path}: the file is damaged ({where}{reason}); copy or export it again")
+    for number in range(1, model.NbEntities() + 1):
+        drawn = model.Value(number)
+        if isinstance(drawn, StepGeom_Pcurve):
+            items = drawn.ReferenceToCurve()
+            if not (items and items.NbItems() and isinstance(items.ItemsValue(1), StepGeom_Curve)):
+                raise InputError(
+                    f"{path}: the file is damaged (Pcurve: expected a curve); copy or export it "
+                    "again"
+                )
     return has_styles
 
 

@@ -40,7 +40,9 @@ def styles_in(model: Interface_InterfaceModel) -> tuple[dict[object, str], dict[
         if isinstance(entity, StepVisual_PresentationLayerAssignment):
             name = entity.Name()
             for k in range(1, entity.NbAssignedItems() + 1):
-                layers[entity.AssignedItemsValue(k).Value()] = "" if name is None else name.ToCString().strip()
+                layers[entity.AssignedItemsValue(k).Value()] = (
+                    "" if name is None else name.ToCString().strip()
+                )
         elif isinstance(entity, StepVisual_StyledItem):
             for colour in _fills(entity):
                 colours[entity.Item()] = _named(colour)
