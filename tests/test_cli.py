@@ -18,7 +18,7 @@ import pytest
 from kerfpath import robot
 from kerfpath.cli import main
 from kerfpath.job import read_plan_file
-from kerfpath.post import read_rapid
+from programs import read_text
 
 DEMO = Path(str(files("kerfpath") / "demo"))
 SMALL = (DEMO / "b_pillar.toml").read_text()
@@ -149,7 +149,7 @@ def test_post_writes_the_program_that_plan_wrote(planned, folder):
     # Only the module's name differs: plan.json does not keep the file name of its job.
     written = (folder / "small-plan" / "small.mod").read_text()
     assert printed.stdout.replace("MODULE plan", "MODULE small") == written
-    read_rapid(printed.stdout)
+    read_text(printed.stdout, robot("abb_irb4600_60_205"))
     to_file = run("post", "small-plan/plan.json", "-o", "again.mod", cwd=folder)
     assert to_file.returncode == 0
     assert (folder / "again.mod").read_text() == printed.stdout

@@ -94,9 +94,14 @@ def run_job(
     if job.sequence is not None:
         progress("order and moves", 0, 1)
     found = ordered(job, loops, tries, cell)
+    moved = {
+        task.name: part.departure(task.pick, loop)
+        for task, loop in zip(tasks, loops, strict=True)
+        if task.table.moves_the_path
+    }
     return Outcome(
         job=job,
-        cuts=found.cuts,
+        cuts=tuple(cut.measured(part, moved.get(cut.contour)) for cut in found.cuts),
         mesh=part.mesh(),
         cell=cell,
         part=found.part,

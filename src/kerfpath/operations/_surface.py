@@ -13,6 +13,7 @@ from kerfpath.contour import KINDS, Contour, unit
 from kerfpath.errors import InputError
 
 __all__ = [
+    "IN_SCRAP",
     "Ribbon",
     "Side",
     "Surface",
@@ -33,6 +34,7 @@ SAME_PLACE = 1e-9
 """m: two places nearer than this are one."""
 
 IN_SCRAP = [KINDS.index(word) for word in ("pierce", "lead-in", "lead-out", "loop")]
+"""Kinds of the stretches that run in the scrap."""
 
 Side = Literal["left", "right"]
 """Seen from the nozzle along the travel."""
