@@ -382,7 +382,7 @@ def test_assembly_placements_are_applied(tmp_path: Path) -> None:
         shape = compound(placed(box(10, 10, 10), 0.0, 0.0), placed(box(10, 10, 10), 0.0, 950.0))
         path = write_step(tmp_path / "assembly.step", shape)
     finally:
-        Interface_Static.SetIVal_s("write.step.assembly", 0)
+        Interface_Static.SetIVal_s("write.step.assembly", 2)
     assert "NEXT_ASSEMBLY_USAGE_OCCURRENCE" in path.read_text("ascii")
     part = read(path)
     np.testing.assert_allclose(part.bounding_box, [[0, 0, 0], [0.96, 0.01, 0.01]], atol=EXACT)

@@ -176,5 +176,5 @@ def test_a_curve_on_a_face_that_is_none_is_refused(tmp_path: Path) -> None:
         )
     )
     assert path.read_text() != text
-    with pytest.raises(InputError, match="damaged .Pcurve: expected a curve"):
+    with pytest.raises(InputError, match=r"damaged .Pcurve: expected a curve"):
         read(path)

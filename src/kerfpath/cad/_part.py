@@ -17,7 +17,7 @@ from kerfpath.cad._departure import ON_CURVE, Departure, departure
 from kerfpath.cad._healed import HealedSurface
 from kerfpath.cad._loops import OrientedEdge
 from kerfpath.cad._round import diameter
-from kerfpath.cad._sample import Chain, Trace
+from kerfpath.cad._sample import Chain, Trace, distance
 from kerfpath.cad._units import LARGEST, MM
 from kerfpath.contour import Contour
 from kerfpath.errors import InputError
@@ -215,7 +215,7 @@ class Part:
             )
         if near is not None:
             point = floats(near, "near", (3,)) / MM
-            found = [min(found, key=lambda loop: _distance(loop._trace, point))]
+            found = [min(found, key=lambda loop: distance(loop._trace, point))]
         return tuple(found)
 
     def contour(
@@ -397,12 +397,3 @@ def _range(value: tuple[float, float] | None, name: str) -> tuple[float, float] 
 def _within(value: float | None, bounds: tuple[float, float] | None) -> bool:
     # A nanometre of leave: a hole of 10 mm measures 9.9999999996 mm.
     return bounds is None or (value is not None and bounds[0] - 1e-9 <= value <= bounds[1] + 1e-9)
-
-
-def _distance(trace: Trace, point: Array) -> float:
-    """Return the distance (mm) of `point` from the chords through the points around a trace."""
-    p = trace.around
-    d = np.roll(p, -1, axis=0) - p
-    along = ((point - p) * d).sum(1) / np.maximum((d * d).sum(1), np.finfo(float).tiny)
-    off = np.linalg.norm(p + np.clip(along, 0, 1)[:, None] * d - point, axis=1)
-    return float((off if trace.gaps.size == len(trace.lengths) else off[:-1]).min())
