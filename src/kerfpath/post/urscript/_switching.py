@@ -12,7 +12,10 @@ from math import sqrt
 
 from kerfpath.post._program import Signal
 
-__all__ = ["distance_ahead", "names", "time_ahead", "words"]
+__all__ = ["LOCAL", "distance_ahead", "names", "time_ahead", "words"]
+
+LOCAL = ("due", "gap", "near", "on", "target", "value")
+"""Names inside the thread and the functions of `words`; a contour of that name would hide them."""
 
 
 def distance_ahead(lead_time: float, speed: float, acceleration: float, *, stops: bool) -> float:
@@ -51,13 +54,16 @@ def words(signal: Signal, output: int) -> list[str]:
         f"thread {signal}_thread():",
         "  while True:",
         "    enter_critical",
-        f"    if {signal}_waits:",
-        f"      if point_dist(get_actual_tcp_pose(), {signal}_point) <= {signal}_distance:",
-        f"        {put}{signal}_value)",
-        f"        {signal}_waits = False",
-        "      end",
+        f"    gap = point_dist(get_actual_tcp_pose(), {signal}_point)",
+        f"    value = {signal}_value",
+        f"    due = {signal}_waits and (gap <= {signal}_distance)",
+        "    if due:",
+        f"      {signal}_waits = False",
         "    end",
         "    exit_critical",
+        "    if due:",
+        f"      {put}value)",
+        "    end",
         "    sync()",
         "  end",
         "end",
@@ -70,9 +76,7 @@ def words(signal: Signal, output: int) -> list[str]:
         "  exit_critical",
         "end",
         f"def {signal}_set(on):",
-        "  enter_critical",
         f"  {signal}_waits = False",
         f"  {put}on)",
-        "  exit_critical",
         "end",
     ]

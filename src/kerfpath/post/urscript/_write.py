@@ -21,7 +21,7 @@ from kerfpath.post._formatter import Formatter, number, plain
 from kerfpath.post._orientations import rotation_vectors
 from kerfpath.post._program import CircularMove, JointMove, LinearMove, Move, Signal, Wait
 from kerfpath.post._settings import Rules, Settings, setting
-from kerfpath.post.urscript._switching import distance_ahead, names, words
+from kerfpath.post.urscript._switching import LOCAL, distance_ahead, names, words
 from kerfpath.robots import Robot
 
 __all__ = ["URScript", "URScriptSettings", "full_joint_speed", "rules"]
@@ -118,6 +118,7 @@ class URScript(Formatter):
         return [
             (self.program.name, "the program"),
             ("part_frame", "the part's frame"),
+            *((name, "the switching") for name in LOCAL),
             *((name, "the switching") for signal in self.signals for name in names(signal)),
             *((section.name, "a contour") for section in self.program.sections),
         ]
