@@ -17,8 +17,8 @@ from kerfpath.cad._departure import ON_CURVE, Departure, departure
 from kerfpath.cad._healed import HealedSurface
 from kerfpath.cad._loops import OrientedEdge
 from kerfpath.cad._round import diameter
-from kerfpath.cad._sample import Chain, Trace
-from kerfpath.cad._units import MM
+from kerfpath.cad._sample import Chain, Trace, distance
+from kerfpath.cad._units import LARGEST, MM
 from kerfpath.contour import Contour
 from kerfpath.errors import InputError
 from kerfpath.operations import Ribbon, Surface
@@ -65,7 +65,8 @@ class Loop:
     skin : str
         Of the loop of a face that is a piece of a skin: the skin's name.
     layer, colour : str
-        In a DXF: where and how it is drawn (red, ..., white, aci30 or #ff8000).
+        In a DXF and of a STEP's face: where and how it is drawn (red, ..., white, #ff8000, aci30),
+        "" where that is not said, or not the same all over a skin.
     """
 
     name: str
@@ -185,7 +186,7 @@ class Part:
         length : (float, float) m
             Their length, likewise.
         layer, colour : str
-            As drawn in a DXF.
+            As drawn in a DXF or STEP.
         near : (3,) m
             Of all the others that fit, the one that passes this point most closely.
 
@@ -214,7 +215,7 @@ class Part:
             )
         if near is not None:
             point = floats(near, "near", (3,)) / MM
-            found = [min(found, key=lambda loop: _distance(loop._trace, point))]
+            found = [min(found, key=lambda loop: distance(loop._trace, point))]
         return tuple(found)
 
     def contour(
@@ -340,15 +341,27 @@ def loop_of(
     layer: str = "",
     colour: str = "",
 ) -> Loop:
-    """Return the loop along `trace`, measured; it is closed where no gap (m) is larger."""
+    """Return the loop along `trace`, measured; it is closed where no gap (m) is larger.
+
+    Raises
+    ------
+    InputError
+        A trace that is longer or reaches further than any part does.
+    """
     largest_gap = float(trace.gaps.max(initial=0.0)) * MM
+    length, box = float(trace.lengths.sum()), trace.bounds()
+    if not (length <= LARGEST and (np.abs(box) <= LARGEST).all()):
+        raise InputError(
+            f"loop {name!r} reaches further than {LARGEST / 1e6:g} km; the file is damaged, or its "
+            "unit is wrong"
+        )
     return Loop(
         name=name,
         face=face,
         kind=kind,
         surface=surface,
-        length=float(trace.lengths.sum()) * MM,
-        bounding_box=freeze(trace.bounds() * MM),
+        length=length * MM,
+        bounding_box=freeze(box * MM),
         edges=len(trace.lengths),
         shortest_edge=float(trace.lengths.min()) * MM,
         largest_gap=largest_gap,
@@ -384,12 +397,3 @@ def _range(value: tuple[float, float] | None, name: str) -> tuple[float, float] 
 def _within(value: float | None, bounds: tuple[float, float] | None) -> bool:
     # A nanometre of leave: a hole of 10 mm measures 9.9999999996 mm.
     return bounds is None or (value is not None and bounds[0] - 1e-9 <= value <= bounds[1] + 1e-9)
-
-
-def _distance(trace: Trace, point: Array) -> float:
-    """Return the distance (mm) of `point` from the chords through the points around a trace."""
-    p = trace.around
-    d = np.roll(p, -1, axis=0) - p
-    along = ((point - p) * d).sum(1) / np.maximum((d * d).sum(1), np.finfo(float).tiny)
-    off = np.linalg.norm(p + np.clip(along, 0, 1)[:, None] * d - point, axis=1)
-    return float((off if trace.gaps.size == len(trace.lengths) else off[:-1]).min())

@@ -297,3 +297,12 @@ def off_chord(p0: Array, p1: Array, p: Array) -> Array:
 def _angle(n0: Array, n1: Array) -> Array:
     """Return the angles between unit vectors, exact also where they are tiny."""
     return np.asarray(2 * np.arcsin(np.minimum(np.linalg.norm(n1 - n0, axis=1) / 2, 1.0)))
+
+
+def distance(trace: Trace, point: Array) -> float:
+    """Return the distance (mm) of `point` from the chords through the points around a trace."""
+    p = trace.around
+    d = np.roll(p, -1, axis=0) - p
+    along = ((point - p) * d).sum(1) / np.maximum((d * d).sum(1), np.finfo(float).tiny)
+    off = np.linalg.norm(p + np.clip(along, 0, 1)[:, None] * d - point, axis=1)
+    return float((off if trace.gaps.size == len(trace.lengths) else off[:-1]).min())

@@ -11,6 +11,7 @@ import numpy as np
 import typer
 from rich.markup import escape
 
+from kerfpath.cli._drawing import drawing_entry, drawing_of, show_drawing
 from kerfpath.cli._show import busy, errors, out, print_json, progress_bars, table
 from kerfpath.job import (
     Cut,
@@ -40,16 +41,20 @@ def plan_job(job_file: Path, folder: Path, *, as_json: bool, draw_map: bool = Fa
     require_language(job)
     if draw_map:
         job = with_map(job)
+    part = drawing_of(job)
+    if not as_json:
+        show_drawing(part)
     with busy("compiling the kernels, first run only"):
         warm_up()
     with progress_bars() as progress:
-        outcome = run_job(job, progress=progress)
+        outcome = run_job(job, part, progress=progress)
     with busy("writing"):
         written = write_outcome(outcome, folder)
     if as_json:
         print_json(
             {
                 "passed": outcome.passed,
+                "drawing": drawing_entry(part),
                 "contours": [_cut_entry(cut) for cut in outcome.cuts],
                 "sequence": None if outcome.part is None else sequence_entry(outcome.part),
                 "files": [str(f) for f in written.files],
