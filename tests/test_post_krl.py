@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from pydantic import ValidationError
 from scipy.spatial.transform import Rotation
 
 from kerfpath import Contour, InputError, plan, robot
@@ -319,7 +320,15 @@ def test_more_files_than_a_main_program_can_call_are_refused(program):
         Krl(endless, OUTPUTS.model_copy(update={"lines_per_file": 100}))
 
 
-# Preflight.
+# Settings and preflight.
+
+
+def test_every_setting_says_what_it_expects():
+    for name, field in KrlSettings.model_fields.items():
+        assert field.description, name
+        assert field.examples, name
+        with pytest.raises(ValidationError):
+            KrlSettings(**{name: -1})
 
 
 @pytest.mark.parametrize(

@@ -19,7 +19,9 @@ SPEED_STEP = 1e-6
 LONGEST_LEAD = 10.0
 """The longest lead (s) of a trigger that is no mistake in its unit; KUKA's bound is 10000 s."""
 
-Output = Annotated[int, setting("the number of a digital output, 1 to 8192", "5", ge=1, le=8192)]
+Output = Annotated[
+    int | None, setting("the number of a digital output, 1 to 8192", "5", ge=1, le=8192)
+]
 
 
 class KrlSettings(Settings):
@@ -28,8 +30,8 @@ class KrlSettings(Settings):
     lines_per_file: Annotated[
         int, setting("a whole number of lines from 100 to 1000000", "1400", ge=100, le=1_000_000)
     ] = 1400
-    laser_output: Output | None = None
-    gas_output: Output | None = None
+    laser_output: Output = None
+    gas_output: Output = None
     tool_number: Annotated[
         int | None, setting("the number of a TOOL_DATA, 1 to 128", "1", ge=1, le=128)
     ] = None
