@@ -91,7 +91,12 @@ def _places(
 ) -> Iterator[ProgramIssue]:
     """Compare the tips of all targets, by joints where the text says them."""
     point, angle = POINT + rules.point_step, ANGLE + rules.angle_step
-    posed = [(b, program.tip(m), b.T_part_tip) for m, b in pairs if b.T_part_tip is not None]
+    tips = program.tips([m for m, _ in pairs])
+    posed = [
+        (b, T, b.T_part_tip)
+        for (_, b), T in zip(pairs, tips, strict=True)
+        if b.T_part_tip is not None
+    ]
     posed += [
         (b, m.T_part_via, b.T_part_via)
         for m, b in pairs

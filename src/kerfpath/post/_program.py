@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Literal
 
@@ -203,9 +204,11 @@ class Program:
         """All moves in order, over all sections."""
         return tuple(move for section in self.sections for move in section.moves)
 
-    def tip(self, move: Move) -> Array:
-        """Return the tip pose of a target in the part frame, (4, 4) m."""
-        if isinstance(move, LinearMove):
-            return move.T_part_tip
-        T_base_tip = self.robot.forward(move.q) @ self.T_flange_tip
-        return np.asarray(np.linalg.solve(self.T_base_part, T_base_tip))
+    def tips(self, moves: Sequence[Move]) -> Array:
+        """Return the tip poses of targets in the part frame, (K, 4, 4) m."""
+        T = np.array([getattr(move, "T_part_tip", np.eye(4)) for move in moves]).reshape(-1, 4, 4)
+        joint = [k for k, move in enumerate(moves) if isinstance(move, JointMove)]
+        if joint:
+            T_base_tip = self.robot.forward([moves[k].q for k in joint]) @ self.T_flange_tip
+            T[joint] = np.linalg.solve(self.T_base_part, T_base_tip)
+        return T

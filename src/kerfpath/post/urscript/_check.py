@@ -70,7 +70,7 @@ def _blends(program: Program) -> Iterator[ProgramIssue]:
     moves = program.moves
     if not moves:
         return
-    points = np.array([program.tip(move)[:3, 3] for move in moves])
+    points = program.tips(moves)[:, :3, 3]
     zone = np.array([move.zone for move in moves])
     room = np.linalg.norm(np.diff(points, axis=0), axis=1) - zone[:-1] - zone[1:]
     blended = (zone[:-1] > 0) | (zone[1:] > 0)

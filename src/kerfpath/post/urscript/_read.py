@@ -33,12 +33,12 @@ _POSE = rf"p\[{_SIX}\]"
 _MOTION = rf"a={_NUMBER}, v={_NUMBER}, r={_NUMBER}"
 _TARGET = rf"pose_trans\(part_frame, {_POSE}\)"
 _SIGNAL = "(laser|gas)"
-_DEFINITION = re.compile(r"def ([A-Za-z]\w*)\(\):")
-_CALL = re.compile(r"([A-Za-z]\w*)\(\)")
-_TOOL = re.compile(rf"set_tcp\({_POSE}\)")
-_PART = re.compile(rf"global part_frame = {_POSE}")
+_DEFINITION = re.compile(r"def ([A-Za-z]\w*)\(\):", re.ASCII)
+_CALL = re.compile(r"([A-Za-z]\w*)\(\)", re.ASCII)
+_TOOL = re.compile(rf"set_tcp\({_POSE}\)", re.ASCII)
+_PART = re.compile(rf"global part_frame = {_POSE}", re.ASCII)
 _STEPS = {
-    kind: re.compile(pattern)
+    kind: re.compile(pattern, re.ASCII)
     for kind, pattern in {
         "linear": rf"movel\({_TARGET}, {_MOTION}\)",
         "circular": rf"movec\({_TARGET}, {_TARGET}, {_MOTION}, mode=0\)",
