@@ -99,6 +99,25 @@ def done(folder):
     return json.loads(result.stdout), folder / "out"
 
 
+def test_every_cut_says_how_far_its_nodes_leave_the_drawing(done, folder):
+    said, out = done
+    part = read(folder / "b_pillar.step")
+    found = {entry["name"]: entry["departure"] for entry in said["contours"]}
+    plans = {p.name: p.contour for p in read_plan_file(out / "plan.json").plans}
+    assert found["joined"]["against"] == "CAD curve"
+    again = part.departure("skin/hole11", plans["joined"])
+    assert found["joined"]["chord_error"] == pytest.approx(again.chord_error, rel=1e-9)
+    # Kerf makes another path of the loop, and so does a bevel of the axes.
+    for name, pick in (("led in", "skin/hole1"), ("cornered", "skin/hole8")):
+        assert found[name]["against"] == "path as cut"
+        loop = part.departure(pick, part.contour(pick))
+        assert found[name]["path"]["against"] == "CAD curve"
+        assert found[name]["path"]["chord_error"] == loop.chord_error
+    page = (out / "report.html").read_text()
+    assert page.count("Largest chord error") == 3
+    assert f"{again.chord_error * 1e3:.4f} mm, after node" in page
+
+
 def test_a_part_is_planned_audited_and_written_as_one_program(done):
     said, out = done
     assert said["passed"]

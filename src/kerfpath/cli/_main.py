@@ -112,13 +112,17 @@ def check(job: JobArgument, as_json: Json = False) -> None:
     Example: kerfpath check door.toml
     """
     from kerfpath.cli._check import show_check
+    from kerfpath.cli._drawing import drawing_of, show_drawing
     from kerfpath.job import check_job, read_job, warm_up
 
     read = read_job(job)
+    part = drawing_of(read)
+    if not as_json:
+        show_drawing(part)
     with busy("compiling the kernels, first run only"):
         warm_up()
     with busy("looking at the cell"):
-        checked = check_job(read)
+        checked = check_job(read, part)
     show_check(checked, as_json=as_json)
 
 

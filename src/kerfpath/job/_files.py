@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 
 from kerfpath.air import AirMove
+from kerfpath.cad import Departure
 from kerfpath.cell import Cell
 from kerfpath.errors import AuditFailed, InputError
 from kerfpath.job._planfile import broken_entry, plan_entry, plan_text
@@ -266,6 +267,7 @@ def report_text(outcome: Outcome, notes: Sequence[str]) -> str:
             failure=cut.failure,
             broken_at=None if cut.broken is None else cut.broken.node + 1,
             clearance=cut.clearance,
+            sampling=() if cut.departure is None else _sampling(cut.departure),
         )
         for cut in outcome.cuts
     ]
@@ -297,6 +299,31 @@ def report_text(outcome: Outcome, notes: Sequence[str]) -> str:
         notes=notes,
         job_text=job.path.read_text(encoding="utf-8-sig"),
     )
+
+
+def _sampling(found: Departure) -> list[tuple[str, str]]:
+    """Return how far the nodes leave what they sample, in words."""
+    against = {
+        "CAD curve": "the CAD curve",
+        "points of the drawing": "the lines through the points of the drawing, which tell no more",
+        "path as cut": "the path as cut, which is not the drawn one",
+    }
+    rows = [
+        ("Measured against", against[found.against]),
+        ("Largest chord error", f"{found.chord_error * 1e3:.4f} mm, after node {found.chord_node}"),
+        (
+            "Largest axis error between nodes",
+            f"{np.degrees(found.axis_error):.3f} deg, after node {found.axis_node}",
+        ),
+        (
+            "Largest axis step from node to node",
+            f"{np.degrees(found.axis_step):.3f} deg, after node {found.step_node}",
+        ),
+    ]
+    if (loop := found.path) is not None:
+        told = f"{loop.chord_error * 1e3:.4f} mm and {np.degrees(loop.axis_error):.3f} deg"
+        rows.append(("Drawn loop", f"within {told} of {against[loop.against]}"))
+    return rows
 
 
 def _row(values: object) -> str:
