@@ -24,6 +24,7 @@ ENTRY_POINTS = "kerfpath.languages"
 """Group of entry points whose objects are languages."""
 SHIPPED = {
     "fanuc": "kerfpath.post.fanuc:FANUC",
+    "krl": "kerfpath.post.krl:KRL",
     "rapid": "kerfpath.post.rapid:RAPID",
 }
 """Where the languages are that come with the package."""
