@@ -27,6 +27,8 @@ LEAD = 6e-4
 """The same of lead times and waits (s): controllers count milliseconds."""
 DURATION = 1e-6
 """The same of durations (s), where a text says times."""
+REACH = 4.0
+"""Farther (m) than a tip is from any axis: the lever of what digits leave of joints."""
 SHARE = 6e-3
 """The same of shares of the full speed: controllers count per cent."""
 
@@ -116,7 +118,9 @@ def _places(
         forward = program.robot.forward
         backs = [b for _, b in jointed]
         tool = program.T_flange_tip
-        yield from _apart(backs, forward(q) @ tool, forward(q_back) @ tool, point, angle)
+        left = q.shape[1] * rules.angle_step
+        tips, tips_back = forward(q) @ tool, forward(q_back) @ tool
+        yield from _apart(backs, tips, tips_back, point + REACH * left, angle + left)
         off = np.abs(q - q_back).max(axis=1)
         for k in np.flatnonzero(off > angle).tolist():
             joint = int(np.abs(q[k] - q_back[k]).argmax()) + 1
@@ -151,6 +155,8 @@ def _motion(pairs: list[tuple[Move, ReadMove]], rules: Rules) -> Iterator[Progra
             and abs(move.duration - took) > DURATION
         ):
             yield _issue(back, f"takes {took:g} s, expected {move.duration:g} s")
+        if back.zone is None and move.zone == 0:
+            yield _issue(back, "does not stop, but should")
         if back.zone is not None and abs(move.zone - back.zone) > POINT:
             said = f"the zone is {back.zone * 1e3:g} mm, expected {move.zone * 1e3:g} mm"
             yield _issue(back, said)

@@ -23,6 +23,7 @@ __all__ = ["ENTRY_POINTS", "Language", "language", "languages"]
 ENTRY_POINTS = "kerfpath.languages"
 """Group of entry points whose objects are languages."""
 SHIPPED = {
+    "fanuc": "kerfpath.post.fanuc:FANUC",
     "krl": "kerfpath.post.krl:KRL",
     "rapid": "kerfpath.post.rapid:RAPID",
     "urscript": "kerfpath.post.urscript:URSCRIPT",
