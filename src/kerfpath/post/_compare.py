@@ -25,6 +25,8 @@ FRAME = 1e-7
 """The same of frames, m and sine."""
 LEAD = 6e-4
 """The same of lead times and waits (s): controllers count milliseconds."""
+DURATION = 1e-6
+"""The same of durations (s), where a text says times."""
 REACH = 4.0
 """Farther (m) than a tip is from any axis: the lever of what digits leave of joints."""
 SHARE = 6e-3
@@ -91,9 +93,17 @@ def _places(
 ) -> Iterator[ProgramIssue]:
     """Compare the tips of all targets, by joints where the text says them."""
     point, angle = POINT + rules.point_step, ANGLE + rules.angle_step
-    told = [(m, b, m.T_part_tip, b.T_part_tip) for m, b in pairs if isinstance(m, LinearMove)]
-    told += [(m, b, m.T_part_via, b.T_part_via) for m, b in pairs if isinstance(m, CircularMove)]
-    posed = [(b, ours, theirs) for _, b, ours, theirs in told if theirs is not None]
+    tips = program.tips([m for m, _ in pairs])
+    posed = [
+        (b, T, b.T_part_tip)
+        for (_, b), T in zip(pairs, tips, strict=True)
+        if b.T_part_tip is not None
+    ]
+    posed += [
+        (b, m.T_part_via, b.T_part_via)
+        for m, b in pairs
+        if isinstance(m, CircularMove) and b.T_part_via is not None
+    ]
     if posed:
         yield from _apart(
             [b for b, _, _ in posed],
@@ -134,10 +144,17 @@ def _apart(
 def _motion(pairs: list[tuple[Move, ReadMove]], rules: Rules) -> Iterator[ProgramIssue]:
     for move, back in pairs:
         joint = isinstance(move, JointMove)
-        if abs(move.speed - back.speed) > (SHARE if joint else 0.51 * rules.speed_step + 1e-9):
+        off = SHARE if joint else 0.51 * rules.speed_step + 1e-9
+        if back.speed is not None and abs(move.speed - back.speed) > off:
             unit, scale = ("of the full speed", 1.0) if joint else ("mm/s", 1e3)
             said = f"the speed is {back.speed * scale:g} {unit}, expected {move.speed * scale:g}"
             yield _issue(back, said)
+        if (
+            isinstance(move, LinearMove)
+            and (took := back.duration) is not None
+            and abs(move.duration - took) > DURATION
+        ):
+            yield _issue(back, f"takes {took:g} s, expected {move.duration:g} s")
         if back.zone is None and move.zone == 0:
             yield _issue(back, "does not stop, but should")
         if back.zone is not None and abs(move.zone - back.zone) > POINT:

@@ -5,10 +5,11 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 
+from kerfpath.errors import InputError
 from kerfpath.post._names import LONGEST_NAME, identifiers
 from kerfpath.post._program import Program, Section
 
-__all__ = ["divided", "in_files"]
+__all__ = ["divided", "in_files", "in_one_file"]
 
 
 def divided(program: Program, most_steps: int, *, longest_name: int = LONGEST_NAME) -> Program:
@@ -43,3 +44,19 @@ def in_files(
         files[-1].append(section)
         room -= count
     return files
+
+
+def in_one_file(name: str, lines: Sequence[str], most_lines: int) -> dict[str, str]:
+    """Return the text of a program that cannot be divided, by the name of its file.
+
+    Raises
+    ------
+    InputError
+        It has more than `most_lines` lines.
+    """
+    if len(lines) > most_lines:
+        raise InputError(
+            f"{name}: the program has {len(lines)} lines, lines_per_file allows {most_lines}, and "
+            "this language cannot divide it; cut fewer contours in one program, or allow more lines"
+        )
+    return {name: "\n".join([*lines, ""])}

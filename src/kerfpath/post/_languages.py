@@ -26,6 +26,7 @@ SHIPPED = {
     "fanuc": "kerfpath.post.fanuc:FANUC",
     "krl": "kerfpath.post.krl:KRL",
     "rapid": "kerfpath.post.rapid:RAPID",
+    "urscript": "kerfpath.post.urscript:URSCRIPT",
 }
 """Where the languages are that come with the package."""
 BROKEN = (ImportError, AttributeError, NameError, SyntaxError, TypeError, ValueError)

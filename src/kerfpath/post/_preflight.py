@@ -3,17 +3,16 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from kerfpath._arrays import Array
 from kerfpath.errors import InputError
 from kerfpath.post._issue import ProgramIssue
 from kerfpath.post._languages import Language
 from kerfpath.post._languages import language as find_language
-from kerfpath.post._program import JointMove, LinearMove, Move, Program, Section, Wait
+from kerfpath.post._program import JointMove, LinearMove, Program, Section, Wait
 from kerfpath.post._settings import Rules, Settings
 
 __all__ = ["preflight"]
@@ -220,7 +219,7 @@ def _motion(program: Program, section: Section, rules: Rules) -> Iterator[Progra
     moves = section.moves
     if len(moves) < 2:
         return
-    T = _tips(program, moves)
+    T = program.tips(moves)
     q = np.array([move.q for move in moves])
     lengths = np.linalg.norm(np.diff(T[:, :3, 3], axis=0), axis=1)
     between = np.swapaxes(T[:-1, :3, :3], 1, 2) @ T[1:, :3, :3]
@@ -299,13 +298,3 @@ def _limits(program: Program, section: Section) -> Iterator[ProgramIssue]:
             f"{words[i]}: {np.degrees(excess[k, i]):.3f} deg beyond its limit",
             f"{section.name}, move {k}",
         )
-
-
-def _tips(program: Program, moves: Sequence[Move]) -> Array:
-    """Return the tip poses of targets in the part frame, (K, 4, 4) m."""
-    T = np.array([getattr(move, "T_part_tip", np.eye(4)) for move in moves])
-    joint = [k for k, move in enumerate(moves) if isinstance(move, JointMove)]
-    if joint:
-        T_base_tip = program.robot.forward([moves[k].q for k in joint]) @ program.T_flange_tip
-        T[joint] = np.linalg.solve(program.T_base_part, T_base_tip)
-    return T

@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Literal
+
+import numpy as np
 
 from kerfpath._arrays import Array, as_pose, floats
 from kerfpath.errors import InputError
@@ -200,3 +203,12 @@ class Program:
     def moves(self) -> tuple[Move, ...]:
         """All moves in order, over all sections."""
         return tuple(move for section in self.sections for move in section.moves)
+
+    def tips(self, moves: Sequence[Move]) -> Array:
+        """Return the tip poses of targets in the part frame, (K, 4, 4) m."""
+        T = np.array([getattr(move, "T_part_tip", np.eye(4)) for move in moves]).reshape(-1, 4, 4)
+        joint = [k for k, move in enumerate(moves) if isinstance(move, JointMove)]
+        if joint:
+            T_base_tip = self.robot.forward([moves[k].q for k in joint]) @ self.T_flange_tip
+            T[joint] = np.linalg.solve(self.T_base_part, T_base_tip)
+        return T

@@ -25,8 +25,10 @@ class ReadMove:
     kind : {"joint", "linear", "circular"}
     file, line
         Where it stands.
-    speed : float
-        Of the tip, m/s; of a joint move the share of the full speed.
+    speed : float or None
+        Of the tip, m/s; of a joint move the share of the full speed; None where the text has none.
+    duration : float s or None
+        How long it takes, where the text says times.
     zone : float m or None
         None where the language has no length for it.
     q : (n,) rad or None
@@ -43,7 +45,8 @@ class ReadMove:
     kind: Literal["joint", "linear", "circular"]
     file: str
     line: int
-    speed: float
+    speed: float | None
+    duration: float | None = None
     zone: float | None = 0.0
     q: Array | None = None
     T_part_tip: Array | None = None

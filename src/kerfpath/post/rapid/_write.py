@@ -15,12 +15,12 @@ from typing import Annotated, TypeVar
 
 import numpy as np
 from pydantic import StringConstraints
-from scipy.spatial.transform import Rotation
 
 from kerfpath._arrays import Array
 from kerfpath.post._divide import divided, in_files
 from kerfpath.post._formatter import Formatter, number, plain
 from kerfpath.post._names import identifiers
+from kerfpath.post._orientations import quaternions
 from kerfpath.post._program import (
     CircularMove,
     JointMove,
@@ -255,7 +255,7 @@ class Rapid(Formatter):
         axes_deg = (np.degrees(axes_from_joints(robot, q)).round(6) + 0.0).tolist()
         T = np.array([T for _, _, T in points]).reshape(-1, 4, 4)
         point_mm = (T[:, :3, 3] * 1e3).round(4) + 0.0
-        wxyz = _continuous(_wxyz(T)).round(8) + 0.0
+        wxyz = quaternions(T).round(8) + 0.0
         rows = np.hstack([point_mm, wxyz, confdata(robot, q)]).tolist()
         texts: dict[Move, list[str]] = {move: [] for move in self.program.moves}
         for (move, _, _), axes, row in zip(points, axes_deg, rows, strict=True):
@@ -301,19 +301,8 @@ def _with_laser(moves: Iterable[Move]) -> list[tuple[LinearMove, bool]]:
     return found
 
 
-def _wxyz(T: Array) -> Array:
-    rotations = Rotation.from_matrix(T[..., :3, :3])
-    return np.asarray(rotations.as_quat(canonical=True, scalar_first=True))
-
-
-def _continuous(wxyz: Array) -> Array:
-    """Return quaternions (K, 4) of the same rotations, each on the side of the one before."""
-    back = (wxyz[1:] * wxyz[:-1]).sum(axis=1) < 0
-    return wxyz * np.cumprod(np.append(1.0, np.where(back, -1.0, 1.0)))[: len(wxyz), None]
-
-
 def _pose(T: Array) -> str:
-    return f"[{_list(T[:3, 3] * 1e3, 4)},{_list(_wxyz(T), 8)}]"
+    return f"[{_list(T[:3, 3] * 1e3, 4)},{_list(quaternions(T[None])[0], 8)}]"
 
 
 @cache
