@@ -7,21 +7,14 @@ around the library's calls; the benchmark starts it in processes of its own.
 from __future__ import annotations
 
 import json
-import os
-import subprocess
 import sys
 import tempfile
-from collections.abc import Callable
-from importlib import import_module
 from pathlib import Path
-from time import perf_counter
-from typing import Any
 
 from benchmarks._figures import Figure, Report
+from benchmarks._process import clocked, seconds
 
 __all__ = ["run"]
-
-ROOT = Path(__file__).parent.parent
 
 HOW = """\
 `kerfpath demo --out FOLDER` as a user starts it, in a process of its own, interpreter start
@@ -40,8 +33,6 @@ CLOCKS = {
     "audit": ("kerfpath.job._run", "checks"),
     "report": ("kerfpath.job._files", "report_text"),
 }
-"""What is timed: the name by which the caller's module knows each function."""
-
 PARTS = ("import", *CLOCKS, "other")
 
 
@@ -73,20 +64,8 @@ def run(*, quick: bool) -> Report:
 
 def _whole(command: list[str], *, cold: bool) -> float:
     with tempfile.TemporaryDirectory() as folder:
-        environment = dict(os.environ)
-        environment.pop("NUMBA_CACHE_DIR", None)
-        if cold:
-            environment["NUMBA_CACHE_DIR"] = str(Path(folder) / "compiled")
-        start = perf_counter()
-        subprocess.run(
-            [*command, str(Path(folder) / "out")],
-            check=True,
-            cwd=ROOT,
-            env=environment,
-            stdout=subprocess.DEVNULL,
-            stderr=subprocess.DEVNULL,
-        )
-        return perf_counter() - start
+        cache = {"NUMBA_CACHE_DIR": str(Path(folder) / "compiled")} if cold else {}
+        return seconds([*command, str(Path(folder) / "out")], **cache)
 
 
 def _parts(*, cold: bool) -> dict[str, float]:
@@ -98,43 +77,5 @@ def _parts(*, cold: bool) -> dict[str, float]:
     return {**parts, "other": total - sum(parts.values())}
 
 
-class _Clock:
-    """Seconds spent in each named call; a call inside another counts for the outer one."""
-
-    def __init__(self) -> None:
-        self.seconds = dict.fromkeys(CLOCKS, 0.0)
-        self._running = False
-
-    def around(self, name: str, function: Callable[..., Any]) -> Callable[..., Any]:
-        def timed(*args: Any, **options: Any) -> Any:
-            if self._running:
-                return function(*args, **options)
-            self._running, start = True, perf_counter()
-            try:
-                return function(*args, **options)
-            finally:
-                self.seconds[name] += perf_counter() - start
-                self._running = False
-
-        return timed
-
-
-def _one_run(times: Path, folder: Path) -> None:
-    start = perf_counter()
-    command = import_module("kerfpath.cli")
-    modules = {name: import_module(module) for name, (module, _) in CLOCKS.items()}
-    imported = perf_counter() - start
-    clock = _Clock()
-    for name, (_, function) in CLOCKS.items():
-        setattr(modules[name], function, clock.around(name, getattr(modules[name], function)))
-    sys.argv = ["kerfpath", "demo", "--out", str(folder)]
-    try:
-        command.main()
-    except SystemExit as done:
-        if done.code:
-            raise
-    times.write_text(json.dumps({"import": imported, **clock.seconds}))
-
-
 if __name__ == "__main__":
-    _one_run(Path(sys.argv[1]), Path(sys.argv[2]))
+    clocked(CLOCKS, ["demo", "--out", sys.argv[2]], Path(sys.argv[1]))

@@ -165,6 +165,6 @@ def _times(
     time = np.full((len(group) + 1, len(group) + 1), np.inf)
     same = group[:, None] == group
     time[1:, 1:] = np.where(same | earlier[group[None], group[:, None]], np.inf, move + own)
-    time[0, 1:] = np.where(earlier.any(axis=0)[group], np.inf, enter + own)
-    time[1:, 0] = np.where(earlier.any(axis=1)[group], np.inf, leave)
+    time[0, 1:] = np.where(earlier[:, group].any(axis=0), np.inf, enter + own)
+    time[1:, 0] = np.where(earlier[group].any(axis=1), np.inf, leave)
     return time
