@@ -1,4 +1,8 @@
-"""A run of the command in a process of its own, with a clock around the library's calls."""
+"""A run of the command in a process of its own, with a clock around the library's calls.
+
+Run as a module (``python -m benchmarks._process CLOCKS TIMES.json ARGUMENT ...``) this is one run
+of ``kerfpath ARGUMENT ...`` in this process, with the clocks given as JSON.
+"""
 
 from __future__ import annotations
 
@@ -6,13 +10,14 @@ import json
 import os
 import subprocess
 import sys
+import tempfile
 from collections.abc import Callable, Mapping, Sequence
 from importlib import import_module
 from pathlib import Path
 from time import perf_counter
 from typing import Any
 
-__all__ = ["Clock", "Clocks", "clocked", "seconds"]
+__all__ = ["Clock", "Clocks", "parts", "seconds"]
 
 ROOT = Path(__file__).parent.parent
 
@@ -35,22 +40,14 @@ def seconds(command: Sequence[str], **environment: str) -> float:
     return perf_counter() - start
 
 
-def clocked(clocks: Clocks, arguments: Sequence[str], times: Path) -> None:
-    """Run `kerfpath` here; write the seconds in each of the clocks, and of the import, as JSON."""
-    start = perf_counter()
-    command = import_module("kerfpath.cli")
-    modules = {name: import_module(module) for name, (module, _) in clocks.items()}
-    imported = perf_counter() - start
-    clock = Clock(clocks)
-    for name, (_, function) in clocks.items():
-        setattr(modules[name], function, clock.around(name, getattr(modules[name], function)))
-    sys.argv = ["kerfpath", *arguments]
-    try:
-        command.main()
-    except SystemExit as done:
-        if done.code:
-            raise
-    times.write_text(json.dumps({"import": imported, **clock.seconds}))
+def parts(clocks: Clocks, arguments: Sequence[str], **environment: str) -> dict[str, float]:
+    """Return the seconds of a run of `kerfpath` in "import", in each of the clocks, and "other"."""
+    with tempfile.TemporaryDirectory() as folder:
+        times = Path(folder) / "times.json"
+        module = [sys.executable, "-m", "benchmarks._process", json.dumps(clocks), str(times)]
+        total = seconds([*module, *arguments], **environment)
+        found: dict[str, float] = json.loads(times.read_text())
+    return {**found, "other": total - sum(found.values())}
 
 
 class Clock:
@@ -72,3 +69,24 @@ class Clock:
                 self._running = False
 
         return timed
+
+
+def _clocked(clocks: Clocks, times: Path, arguments: Sequence[str]) -> None:
+    start = perf_counter()
+    command = import_module("kerfpath.cli")
+    modules = {name: import_module(module) for name, (module, _) in clocks.items()}
+    imported = perf_counter() - start
+    clock = Clock(clocks)
+    for name, (_, function) in clocks.items():
+        setattr(modules[name], function, clock.around(name, getattr(modules[name], function)))
+    sys.argv = ["kerfpath", *arguments]
+    try:
+        command.main()
+    except SystemExit as done:
+        if done.code:
+            raise
+    times.write_text(json.dumps({"import": imported, **clock.seconds}))
+
+
+if __name__ == "__main__":
+    _clocked(json.loads(sys.argv[1]), Path(sys.argv[2]), sys.argv[3:])

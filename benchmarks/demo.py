@@ -1,18 +1,13 @@
-"""The demo: seconds from the command to the audited program, cold and warm, and where they go.
-
-Run as a module (``python -m benchmarks.demo FOLDER TIMES.json``) this is one demo run with a clock
-around the library's calls; the benchmark starts it in processes of its own.
-"""
+"""The demo: seconds from the command to the audited program, cold and warm, and where they go."""
 
 from __future__ import annotations
 
-import json
 import sys
 import tempfile
 from pathlib import Path
 
 from benchmarks._figures import Figure, Report
-from benchmarks._process import clocked, seconds
+from benchmarks._process import parts, seconds
 
 __all__ = ["run"]
 
@@ -64,18 +59,13 @@ def run(*, quick: bool) -> Report:
 
 def _whole(command: list[str], *, cold: bool) -> float:
     with tempfile.TemporaryDirectory() as folder:
-        cache = {"NUMBA_CACHE_DIR": str(Path(folder) / "compiled")} if cold else {}
-        return seconds([*command, str(Path(folder) / "out")], **cache)
+        return seconds([*command, f"{folder}/out"], **_cache(folder, cold=cold))
 
 
 def _parts(*, cold: bool) -> dict[str, float]:
     with tempfile.TemporaryDirectory() as folder:
-        times = Path(folder) / "times.json"
-        module = [sys.executable, "-m", "benchmarks.demo", str(times)]
-        total = _whole(module, cold=cold)
-        parts: dict[str, float] = json.loads(times.read_text())
-    return {**parts, "other": total - sum(parts.values())}
+        return parts(CLOCKS, ["demo", "--out", f"{folder}/out"], **_cache(folder, cold=cold))
 
 
-if __name__ == "__main__":
-    clocked(CLOCKS, ["demo", "--out", sys.argv[2]], Path(sys.argv[1]))
+def _cache(folder: str, *, cold: bool) -> dict[str, str]:
+    return {"NUMBA_CACHE_DIR": f"{folder}/compiled"} if cold else {}

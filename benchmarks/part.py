@@ -1,14 +1,8 @@
-"""A whole part: seconds from STEP to program, and the time that order and air moves save.
-
-Run as a module (``python -m benchmarks.part TIMES.json JOB.toml FOLDER``) this is one run of the
-job with a clock around the library's calls; the benchmark starts it in processes of its own.
-"""
+"""A whole part: seconds from STEP to program, and the time that order and air moves save."""
 
 from __future__ import annotations
 
-import json
 import shutil
-import sys
 import tempfile
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -20,7 +14,7 @@ from statistics import median
 import numpy as np
 
 from benchmarks._figures import Figure, Report, Sheet
-from benchmarks._process import clocked, seconds
+from benchmarks._process import parts
 from kerfpath import Contour, Plan, plan
 from kerfpath._arrays import Array
 from kerfpath.air import backed_off, least_time
@@ -108,17 +102,17 @@ def run(*, quick: bool) -> list[Report]:
         job, scene = folder / "b_pillar_part.toml", folder / "scene.toml"
         job.write_text(text, encoding="utf-8")
         scene.write_text(text + SCENE, encoding="utf-8")
-        return [_clocked(job, runs=1 if quick else 3), _compared(job, scene)]
+        return [_clocked(job, runs=1 if quick else 3), _compared(job, None if quick else scene)]
 
 
 def _clocked(job: Path, runs: int) -> Report:
     caches = job.parent / "caches"
     cold, *warm = [_one(job, caches) for _ in range(1 + runs)]
-    whole = [sum(parts.values()) for parts in warm]
+    whole = [sum(one.values()) for one in warm]
     figures = [
         Figure(what="STEP to program, warm", values=whole),
         *(
-            Figure(what=f"  of which {part}", values=[parts[part] for parts in warm])
+            Figure(what=f"  of which {part}", values=[one[part] for one in warm])
             for part in PARTS
             if part != "compiling"
         ),
@@ -134,18 +128,16 @@ def _clocked(job: Path, runs: int) -> Report:
 
 
 def _one(job: Path, caches: Path) -> dict[str, float]:
-    times = job.parent / "times.json"
-    total = seconds(
-        [sys.executable, "-m", "benchmarks.part", str(times), str(job), str(job.parent / "out")],
+    return parts(
+        CLOCKS,
+        ["plan", str(job), "--out", str(job.parent / "out")],
         NUMBA_CACHE_DIR=str(caches / "numba"),
         PYTHONPYCACHEPREFIX=str(caches / "python"),
         PYTHONDONTWRITEBYTECODE="",
     )
-    parts: dict[str, float] = json.loads(times.read_text())
-    return {**parts, "other": total - sum(parts.values())}
 
 
-def _compared(job_file: Path, scene: Path) -> Report:
+def _compared(job_file: Path, scene: Path | None) -> Report:
     job, part = read_job(job_file), read_drawing(DEMO / "b_pillar.step")
     tasks = job.tasks(part)
     loops = [part.contour(task.pick) for task in tasks]
@@ -154,12 +146,14 @@ def _compared(job_file: Path, scene: Path) -> Report:
         for task, loop in zip(tasks, loops, strict=True)
     ]
     before = inner_first(loops)
-    cell = cell_of_job(read_job(scene), part)
+    scenes: dict[str, Cell | None] = {"free": None}
+    if scene is not None:
+        scenes["in the cell"] = cell_of_job(read_job(scene), part)
     fixed = 2 * len(loops) * job.program.retract / job.program.approach_speed
     rows, findings = [], []
-    for where, inside in (("free", None), ("in the cell", cell)):
-        near = _nearest(job, [made[0] for made in candidates], before, inside)
-        best = _best(job, candidates, before, inside)
+    for where, cell in scenes.items():
+        near = _nearest(job, [made[0] for made in candidates], before, cell)
+        best = _best(job, candidates, before, cell)
         for order, found in (("nearest", near), ("kerfpath", best)):
             times = (found.air, found.cutting, found.cycle)
             rows.append((where, order, *(f"{t:.1f}" for t in times), found.moves))
@@ -254,7 +248,3 @@ def _home(job: Job) -> Array:
     assert job.sequence is not None
     assert job.sequence.home_deg is not None
     return np.radians(job.sequence.home_deg)
-
-
-if __name__ == "__main__":
-    clocked(CLOCKS, ["plan", sys.argv[2], "--out", sys.argv[3]], Path(sys.argv[1]))
