@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import contextlib
 import functools
 import importlib.util
 import itertools
@@ -12,8 +11,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
 from OCP.BRep import BRep_Builder, BRep_Tool
 from OCP.BRepAlgoAPI import BRepAlgoAPI_Cut
 from OCP.BRepBuilderAPI import (
@@ -385,7 +382,7 @@ def test_assembly_placements_are_applied(tmp_path: Path) -> None:
         shape = compound(placed(box(10, 10, 10), 0.0, 0.0), placed(box(10, 10, 10), 0.0, 950.0))
         path = write_step(tmp_path / "assembly.step", shape)
     finally:
-        Interface_Static.SetIVal_s("write.step.assembly", 0)
+        Interface_Static.SetIVal_s("write.step.assembly", 2)
     assert "NEXT_ASSEMBLY_USAGE_OCCURRENCE" in path.read_text("ascii")
     part = read(path)
     np.testing.assert_allclose(part.bounding_box, [[0, 0, 0], [0.96, 0.01, 0.01]], atol=EXACT)
@@ -447,6 +444,16 @@ BAD: dict[str, tuple[Callable[[str], str], str]] = {
         r"damaged \(.*Line \d+: Incorrect syntax",
     ),
     "no data": (lambda text: text.replace("DATA;", "", 1), "cannot be parsed"),
+    "number out of range": (
+        lambda text: text.replace("#12 =", "#2147483648 ="),
+        "2147483648 is more",
+    ),
+    "a number twice": (lambda text: text.replace("#12 =", "#13 ="), "#13 is there 2 times"),
+    "a number cut": (lambda text: text.replace("(100.,", "(1,5.D,", 1), r"Line \d+: Incorrect"),
+    "an empty list in a list": (
+        lambda text: text.replace("NAL_REPRESENTATION('',(#38)", "NAL_REPRESENTATION('',(())"),
+        "damaged",
+    ),
     "unresolved reference": (
         lambda text: text.replace("EDGE_LOOP('',(#", "EDGE_LOOP('',(#99", 1),
         r"damaged .*Unresolved Reference",
@@ -457,11 +464,11 @@ BAD: dict[str, tuple[Callable[[str], str], str]] = {
     ),
     "astray": (
         lambda text: text.replace("CARTESIAN_POINT('',(100.,", "CARTESIAN_POINT('',(1.E+200,"),
-        "no face|strays|cannot be read",
+        "a point lies at .* further than 10 km",
     ),
     "header only": (
         lambda text: text[: text.index("DATA;")] + "DATA;\nENDSEC;\nEND-ISO-10303-21;\n",
-        "damaged|no face|no length unit",
+        "it has no DATA",
     ),
 }
 
@@ -542,21 +549,6 @@ def test_gap_in_a_loop_is_reported_with_its_place(tmp_path: Path) -> None:
     object.__setattr__(part, "loops", (gappy, *part.loops[1:]))
     with pytest.raises(InputError, match=r"gap of 0\.200 mm after its edge 2, at \["):
         part.contour("face1/outer")
-
-
-@settings(max_examples=40, derandomize=True, deadline=None, database=None)
-@given(data=st.data())
-def test_corrupted_files_give_a_part_or_an_input_error(
-    data: st.DataObject, text: str, tmp_path_factory: pytest.TempPathFactory
-) -> None:
-    at = data.draw(st.integers(0, len(text) - 1))
-    length = data.draw(st.integers(0, 60))
-    junk = data.draw(st.binary(max_size=20))
-    raw = text.encode("ascii")
-    path = tmp_path_factory.mktemp("corrupt") / "corrupt.step"
-    path.write_bytes(raw[:at] + junk + raw[at + length :])
-    with contextlib.suppress(InputError):
-        assert isinstance(read(path), Part)
 
 
 # --- the shipped part ------------------------------------------------------------------------

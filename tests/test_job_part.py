@@ -9,10 +9,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from kerfpath import robot
 from kerfpath.cad import read
 from kerfpath.errors import InputError
 from kerfpath.job import program_from_file, read_job, read_plan_file
-from kerfpath.post import read_rapid
+from programs import read_text
 from test_cli import refused, run
 
 DEMO = Path(str(files("kerfpath") / "demo"))
@@ -98,6 +99,25 @@ def done(folder):
     return json.loads(result.stdout), folder / "out"
 
 
+def test_every_cut_says_how_far_its_nodes_leave_the_drawing(done, folder):
+    said, out = done
+    part = read(folder / "b_pillar.step")
+    found = {entry["name"]: entry["departure"] for entry in said["contours"]}
+    plans = {p.name: p.contour for p in read_plan_file(out / "plan.json").plans}
+    assert found["joined"]["against"] == "CAD curve"
+    again = part.departure("skin/hole11", plans["joined"])
+    assert found["joined"]["chord_error"] == pytest.approx(again.chord_error, rel=1e-9)
+    # Kerf makes another path of the loop, and so does a bevel of the axes.
+    for name, pick in (("led in", "skin/hole1"), ("cornered", "skin/hole8")):
+        assert found[name]["against"] == "path as cut"
+        loop = part.departure(pick, part.contour(pick))
+        assert found[name]["path"]["against"] == "CAD curve"
+        assert found[name]["path"]["chord_error"] == loop.chord_error
+    page = (out / "report.html").read_text()
+    assert page.count("Largest chord error") == 3
+    assert f"{again.chord_error * 1e3:.4f} mm, after node" in page
+
+
 def test_a_part_is_planned_audited_and_written_as_one_program(done):
     said, out = done
     assert said["passed"]
@@ -108,7 +128,7 @@ def test_a_part_is_planned_audited_and_written_as_one_program(done):
     )
     assert times["piercing_s"] == pytest.approx(0.75)
     assert len(times["moves"]) == 4
-    program = read_rapid((out / "job.mod").read_text())
+    program = read_text((out / "job.mod").read_text(), robot("abb_irb4600_60_205"))
     assert len(program.sections) == 3
 
 
@@ -140,8 +160,8 @@ def test_a_plan_read_back_gives_the_same_program(done):
     assert len(file.moves) == 4
     kinds = {plan.name: set(plan.contour.kinds) for plan in file.plans}
     assert "micro joint" in kinds["joined"]
-    text, _ = program_from_file(out / "plan.json", "rapid")
-    assert text == (out / "job.mod").read_text()
+    written, _ = program_from_file(out / "plan.json", "rapid")
+    assert written == {"job.mod": (out / "job.mod").read_text()}
 
 
 def test_the_slowed_corner_is_slow_and_the_rest_is_not(done):

@@ -234,6 +234,39 @@ def test_loops_run_past_outer_corners_on_the_scrap_side():
     assert loop_corners(reverse(square()), 0.002, side="right").kinds.count("loop") == 0
 
 
+class Tube:
+    """A tube's outside, 20 mm from the x axis."""
+
+    def project(self, points):
+        away = points * [0, 1, 1]
+        away = away / np.linalg.norm(away, axis=1)[:, None]
+        return points * [1, 0, 0] + 0.02 * away, away
+
+
+@pytest.mark.parametrize(
+    ("corners", "beside"), [(round_corners, 1e-6), (loop_corners, 1e-4)], ids=["round", "loop"]
+)
+def test_corners_on_a_tube_lie_on_it(corners, beside):
+    flat_ = square(0.02, 400)
+    turn = (flat_.points[:, 1] - 0.01) / 0.02
+    away = np.c_[0 * turn, np.sin(turn), np.cos(turn)]
+    trim = Contour(flat_.points * [1, 0, 0] + 0.02 * away, -away, closed=True, name="trim")
+    made = corners(trim, 0.002, surface=Tube())
+    off = np.abs(np.hypot(*made.points[:, 1:].T) - 0.02)
+    assert off.max() < 1e-7  # chords of the trim's own 0.1 mm steps
+    normal = made.points * [0, 1, 1] / np.hypot(*made.points[:, 1:].T)[:, None]
+    np.testing.assert_allclose(made.axes, -normal, atol=1e-5)
+    plain = corners(trim, 0.002)
+    assert np.abs(np.hypot(*plain.points[:, 1:].T) - 0.02).max() > beside
+    # A bevel stays; around the corner it leans from the one side over to the other.
+    leant = corners(bevel(trim, np.radians(10)), 0.002, surface=Tube())
+    angle = np.degrees(angle_between(leant.axes, made.axes))
+    assert angle.max() == pytest.approx(10, abs=0.1)
+    assert angle.min() > 9.9 * np.cos(np.radians(45))
+    with pytest.raises(InputError, match="corner of 'trim' leaves the surface by"):
+        corners(trim, 0.015, surface=Tube())
+
+
 def test_corners_are_slowed_down_at_and_nothing_else():
     slowed = slow_corners(square(), 0.3, distance=0.001, ramp=0.004)
     apart = np.abs(slowed.points[:, None, :2] - 0.1 * np.array([[0, 0], [1, 0], [1, 1], [0, 1]]))
