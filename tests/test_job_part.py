@@ -105,10 +105,10 @@ def test_every_cut_says_how_far_its_nodes_leave_the_drawing(done, folder):
     found = {entry["name"]: entry["departure"] for entry in said["contours"]}
     plans = {p.name: p.contour for p in read_plan_file(out / "plan.json").plans}
     assert found["joined"]["against"] == "CAD curve"
-    again = part.departure("skin/hole11", plans["joined"])
+    again = part.departure("skin/hole21", plans["joined"])
     assert found["joined"]["chord_error"] == pytest.approx(again.chord_error, rel=1e-9)
     # Kerf makes another path of the loop, and so does a bevel of the axes.
-    for name, pick in (("led in", "skin/hole1"), ("cornered", "skin/hole8")):
+    for name, pick in (("led in", "skin/hole1"), ("cornered", "skin/hole13")):
         assert found[name]["against"] == "path as cut"
         loop = part.departure(pick, part.contour(pick))
         assert found[name]["path"]["against"] == "CAD curve"
