@@ -23,6 +23,7 @@ from kerfpath.post import (
     language,
     post,
     preflight,
+    read_program,
     write_program,
 )
 from kerfpath.post.rapid import RapidSettings, axes_from_joints, confdata, joints_from_axes
@@ -425,7 +426,7 @@ def test_a_retract_out_of_reach_says_to_lower_it(small):
 
 
 def test_an_unknown_language_lists_those_known(small):
-    with pytest.raises(InputError, match="'basic' is not known; expected rapid"):
+    with pytest.raises(InputError, match=r"'basic' is not known; expected .*rapid"):
         post([small], "basic")
 
 
@@ -527,3 +528,74 @@ def test_a_contour_with_times_of_its_own_is_cut_in_them(cell):
     moves = moves_of(build_program([made]).sections[0], LinearMove)[1:-1]
     np.testing.assert_allclose([m.speed for m in moves], np.diff(timed.s) / np.diff(timed.time))
     assert moves[-1].speed < 0.6 * moves[0].speed
+
+
+@pytest.fixture(scope="module")
+def long_program(cell):
+    plans = [hand_plan(arc(f"hole {k}", count=70), *cell) for k in range(3)]
+    return build_program(plans, name="long")
+
+
+def test_a_long_program_is_loaded_module_by_module(long_program):
+    settings = RapidSettings(lines_per_file=100)
+    files = post(long_program, settings=settings)
+    assert list(files)[:3] == ["long.mod", "long_part.mod", "long_part_2.mod"]
+    assert max(text.count("\n") for text in files.values()) <= 100
+    main = files["long.mod"]
+    assert main.count("Load \\Dynamic") == main.count("UnLoad ") == len(files) - 1
+    read = read_program(files, "rapid", long_program.robot, settings)
+    assert deviations(long_program, read, RAPID, settings) == []
+    assert post(long_program).keys() == {"long.mod"}
+
+
+@pytest.mark.parametrize(
+    ("file", "old", "new", "message"),
+    [
+        ("long.mod", "UnLoad", "Reload", "long.mod, line .*not expected here: 'Reload"),
+        ("long.mod", '%"hole_0"%;', "", "do not match: hole_0"),
+        ("long.mod", "HOME:/long_part.mod", "HOME:/other.mod", "the file 'other.mod' is not there"),
+        ("long.mod", 'UnLoad "HOME:/long_part.mod', 'UnLoad "HOME:/x.mod', "x.mod is not loaded"),
+        ("long_part.mod", "PROC hole_0()", "PROC main()", "main is declared twice"),
+        ("long_part.mod", "ENDMODULE", "", "long_part.mod, line .*ENDMODULE is missing"),
+    ],
+)
+def test_modules_that_do_not_fit_each_other_are_refused(long_program, file, old, new, message):
+    settings = RapidSettings(lines_per_file=100)
+    files = dict(post(long_program, settings=settings))
+    assert old in files[file]
+    files[file] = files[file].replace(old, new)
+    with pytest.raises(InputError, match=message):
+        read_program(files, "rapid", long_program.robot, settings)
+
+
+def test_a_folder_of_the_controller_cannot_carry_anything_else():
+    with pytest.raises(ValueError, match="folder"):
+        RapidSettings(folder='HOME:"; StopMove; !')
+
+
+NASTY = st.text(max_size=40) | st.sampled_from(
+    ['a";StopMove;!', "x\nENDPROC\nPROC y()", "\u2028ENDMODULE", "\r\nSetDO doLaser,1;", "%main%"]
+)
+
+
+@settings(max_examples=40, deadline=None, derandomize=True)
+@given(name=NASTY, model=NASTY)
+def test_no_name_gets_a_line_of_its_own_into_the_program(cell, small, name, model):
+    """Names of contours and robots are identifiers and comments, whatever they hold."""
+    contour = replace(small.contour, name=name)
+    plain = post([small])
+    made = replace(small, contour=contour, robot=replace(small.robot, model=model, id=model))
+    refused = [str(i) for i in preflight(build_program([made])) if i.level == "error"]
+    if refused:
+        assert re.search(r"is reserved in ABB RAPID; rename it|is also the name of", refused[0])
+        assert "\n" not in refused[0]
+        return
+    files = post([made])
+    text = text_of(files)
+    assert len(text.splitlines()) == len(text_of(plain).splitlines())
+    words = [line.split()[0] for line in text.splitlines() if line.strip()]
+    expected = [line.split()[0] for line in text_of(plain).splitlines() if line.strip()]
+    differing = [w for w, e in zip(words, expected, strict=True) if w != e]
+    assert all(re.fullmatch(r"[A-Za-z]\w*;", word) for word in differing)  # the call of the routine
+    read = read_program(files, "rapid", made.robot)
+    assert len(read.moves) == 10

@@ -208,6 +208,7 @@ def program_of(
         approach_speed=options.approach_speed,
         air_speed=options.air_speed,
         gas_lead=options.gas_lead,
+        arc_tolerance=options.arc_tolerance,
     )
     written = post(program, options.language, options.settings, strict=strict)
     issues = preflight(program, options.language, options.settings)

@@ -140,6 +140,8 @@ class ProgramOptions:
         Along the tool axis before and after a contour.
     air_speed : float
         Share of the full speed of joint moves.
+    arc_tolerance : float m or None
+        How near to the path circular moves stay; None: there are none.
     gas_lead : float s or None
         How long before the start the gas is switched on; None: not by the program.
     """
@@ -153,6 +155,7 @@ class ProgramOptions:
     pierce_time: float
     approach_speed: float
     air_speed: float
+    arc_tolerance: float | None
     gas_lead: float | None
 
 
@@ -384,5 +387,6 @@ def program_options(table: ProgramTable, stem: str) -> ProgramOptions:
         pierce_time=table.pierce_time_s,
         approach_speed=table.approach_mm_s / 1000,
         air_speed=table.air_speed,
+        arc_tolerance=_metres(table.arcs_mm),
         gas_lead=table.gas_lead_s,
     )

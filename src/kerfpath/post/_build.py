@@ -13,6 +13,7 @@ from kerfpath._arrays import Array, freeze, scalar
 from kerfpath.air import AirMove, backed_off
 from kerfpath.errors import InputError
 from kerfpath.plans import Plan
+from kerfpath.post._arcs import with_arcs
 from kerfpath.post._names import identifier, identifiers
 from kerfpath.post._program import (
     Comment,
@@ -44,6 +45,7 @@ def build_program(
     pierce_time: float = 0.0,
     approach_speed: float = 0.1,
     air_speed: float = 0.25,
+    arc_tolerance: float | None = None,
 ) -> Program:
     """Return the program that cuts the planned contours one after the other.
 
@@ -77,6 +79,8 @@ def build_program(
         Speed along the tool axis before and after a contour.
     air_speed : float
         Share of the full speed for the joint moves between contours.
+    arc_tolerance : float m, optional
+        Arcs that stay so near to the planned path are written as circular moves, see `with_arcs`.
 
     Raises
     ------
@@ -126,7 +130,7 @@ def build_program(
     if home:
         back = tuple(JointMove(q=corner, speed=air_speed) for corner in home)
         sections[-1] = replace(sections[-1], steps=sections[-1].steps + back)
-    return Program(
+    program = Program(
         name=title,
         robot=first.robot,
         T_flange_tip=first.T_flange_tip,
@@ -134,6 +138,7 @@ def build_program(
         sections=tuple(sections),
         air_checked=len(moves) > 0 and all(move.clear for move in moves),
     )
+    return program if arc_tolerance is None else with_arcs(program, arc_tolerance)
 
 
 def _cut(

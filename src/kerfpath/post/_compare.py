@@ -25,6 +25,8 @@ FRAME = 1e-7
 """The same of frames, m and sine."""
 LEAD = 6e-4
 """The same of lead times and waits (s): controllers count milliseconds."""
+REACH = 4.0
+"""Farther (m) than a tip is from any axis: the lever of what digits leave of joints."""
 SHARE = 6e-3
 """The same of shares of the full speed: controllers count per cent."""
 
@@ -106,7 +108,9 @@ def _places(
         forward = program.robot.forward
         backs = [b for _, b in jointed]
         tool = program.T_flange_tip
-        yield from _apart(backs, forward(q) @ tool, forward(q_back) @ tool, point, angle)
+        left = q.shape[1] * rules.angle_step
+        tips, tips_back = forward(q) @ tool, forward(q_back) @ tool
+        yield from _apart(backs, tips, tips_back, point + REACH * left, angle + left)
         off = np.abs(q - q_back).max(axis=1)
         for k in np.flatnonzero(off > angle).tolist():
             joint = int(np.abs(q[k] - q_back[k]).argmax()) + 1
@@ -134,6 +138,8 @@ def _motion(pairs: list[tuple[Move, ReadMove]], rules: Rules) -> Iterator[Progra
             unit, scale = ("of the full speed", 1.0) if joint else ("mm/s", 1e3)
             said = f"the speed is {back.speed * scale:g} {unit}, expected {move.speed * scale:g}"
             yield _issue(back, said)
+        if back.zone is None and move.zone == 0:
+            yield _issue(back, "does not stop, but should")
         if back.zone is not None and abs(move.zone - back.zone) > POINT:
             said = f"the zone is {back.zone * 1e3:g} mm, expected {move.zone * 1e3:g} mm"
             yield _issue(back, said)

@@ -22,7 +22,11 @@ __all__ = ["ENTRY_POINTS", "Language", "language", "languages"]
 
 ENTRY_POINTS = "kerfpath.languages"
 """Group of entry points whose objects are languages."""
-SHIPPED = {"rapid": "kerfpath.post.rapid:RAPID"}
+SHIPPED = {
+    "fanuc": "kerfpath.post.fanuc:FANUC",
+    "krl": "kerfpath.post.krl:KRL",
+    "rapid": "kerfpath.post.rapid:RAPID",
+}
 """Where the languages are that come with the package."""
 BROKEN = (ImportError, AttributeError, NameError, SyntaxError, TypeError, ValueError)
 """What a module that was written for another version raises when it is imported."""

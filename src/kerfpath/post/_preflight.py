@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 from scipy.spatial.transform import Rotation
@@ -26,6 +26,8 @@ LOWEST_SHARE = 0.01
 """Smallest share of the full speed of a joint move: controllers count it in percent."""
 LONGEST_WAIT = 60.0
 """s; a longer one is a mistake in its unit."""
+ROUNDING = 1e-9
+"""Share by which half a distance may be exceeded for rounding."""
 LIMIT_NOISE = 1e-9
 """Excess over a joint limit (rad) that is rounding."""
 
@@ -214,47 +216,46 @@ def _laser(section: Section) -> Iterator[ProgramIssue]:
 
 
 def _motion(program: Program, section: Section, rules: Rules) -> Iterator[ProgramIssue]:
-    """Check the straight moves of a section: steps, zones, turning speed, lead times."""
+    """Check the path of a section: steps, zones, turning speed, lead times."""
     moves = section.moves
-    poses = [_tip(program, move) for move in moves]
-    places = [f"{section.name}, move {number}" for number in range(len(moves))]
-    lengths, too_fast = [], 0
-    for k in range(1, len(moves)):
-        before, move = moves[k - 1], moves[k]
-        lengths.append(float(np.linalg.norm(poses[k][:3, 3] - poses[k - 1][:3, 3])))
-        if not isinstance(move, LinearMove):
-            continue
-        step = np.abs(move.q - before.q)
-        joint = int(np.argmax(step))
-        if step[joint] >= LARGEST_JOINT_STEP:
-            yield ProgramIssue(
-                "error",
-                "joint-step",
-                f"joint {joint + 1} turns {np.degrees(step[joint]):.1f} deg in one linear move, "
-                f"expected less than {np.degrees(LARGEST_JOINT_STEP):g} deg; use finer nodes",
-                places[k],
-            )
-        turn = Rotation.from_matrix(poses[k - 1][:3, :3].T @ poses[k][:3, :3]).magnitude()
-        if turn >= LARGEST_ORIENTATION_STEP:
-            yield ProgramIssue(
-                "error",
-                "orientation-step",
-                f"the tool turns {np.degrees(turn):.1f} deg in one linear move, expected less "
-                f"than {np.degrees(LARGEST_ORIENTATION_STEP):g} deg; use finer nodes",
-                places[k],
-            )
-        too_fast += int(turn * move.speed > rules.turning_speed * lengths[-1])
-    if too_fast:
+    if len(moves) < 2:
+        return
+    T = _tips(program, moves)
+    q = np.array([move.q for move in moves])
+    lengths = np.linalg.norm(np.diff(T[:, :3, 3], axis=0), axis=1)
+    between = np.swapaxes(T[:-1, :3, :3], 1, 2) @ T[1:, :3, :3]
+    turn = np.asarray(Rotation.from_matrix(between).magnitude())
+    on_path = np.array([isinstance(move, LinearMove) for move in moves[1:]])
+    step = np.abs(np.diff(q, axis=0))
+    for k in np.flatnonzero(on_path & (step.max(axis=1) >= LARGEST_JOINT_STEP)).tolist():
+        joint = int(np.argmax(step[k]))
+        yield ProgramIssue(
+            "error",
+            "joint-step",
+            f"joint {joint + 1} turns {np.degrees(step[k, joint]):.1f} deg in one move of the "
+            f"path, expected less than {np.degrees(LARGEST_JOINT_STEP):g} deg; use finer nodes",
+            f"{section.name}, move {k + 1}",
+        )
+    for k in np.flatnonzero(on_path & (turn >= LARGEST_ORIENTATION_STEP)).tolist():
+        yield ProgramIssue(
+            "error",
+            "orientation-step",
+            f"the tool turns {np.degrees(turn[k]):.1f} deg in one move of the path, expected less "
+            f"than {np.degrees(LARGEST_ORIENTATION_STEP):g} deg; use finer nodes",
+            f"{section.name}, move {k + 1}",
+        )
+    speed = np.array([move.speed for move in moves[1:]])
+    if too_fast := int((on_path & (turn * speed > rules.turning_speed * lengths)).sum()):
         yield ProgramIssue(
             "warning",
             "turning-speed",
-            f"in {too_fast} linear moves the tool turns faster than "
+            f"in {too_fast} moves of the path the tool turns faster than "
             f"{np.degrees(rules.turning_speed):g} deg/s; the controller will slow the tip down",
             section.name,
         )
-    near = [min(lengths[max(k - 1, 0) : k + 1], default=np.inf) for k in range(len(moves))]
-    overlaps = sum(move.zone > gap / 2 for move, gap in zip(moves, near, strict=True))
-    if overlaps:
+    near = np.minimum(np.append(lengths, np.inf), np.append(np.inf, lengths))
+    zone = np.array([move.zone for move in moves])
+    if overlaps := int((zone > near / 2 * (1 + ROUNDING)).sum()):
         yield ProgramIssue(
             "warning",
             "zone-overlap",
@@ -262,7 +263,7 @@ def _motion(program: Program, section: Section, rules: Rules) -> Iterator[Progra
             "neighbour; the controller will reduce it",
             section.name,
         )
-    yield from _late_switches(section, lengths)
+    yield from _late_switches(section, lengths.tolist())
 
 
 def _late_switches(section: Section, lengths: list[float]) -> Iterator[ProgramIssue]:
@@ -280,27 +281,31 @@ def _late_switches(section: Section, lengths: list[float]) -> Iterator[ProgramIs
 
 
 def _limits(program: Program, section: Section) -> Iterator[ProgramIssue]:
+    if not section.moves:
+        return
     limits = program.robot.joint_limits()
     words = program.robot.reasons()[2:]
-    for number, step in enumerate(section.moves):
-        sums = limits.rows @ step.q
-        below = np.concatenate([limits.lower - step.q, limits.row_lower - sums])
-        above = np.concatenate([step.q - limits.upper, sums - limits.row_upper])
-        endless = np.flatnonzero(limits.endless)
-        below[endless] = above[endless] = -np.inf
-        for i, excess in enumerate(np.stack([below, above], axis=1).ravel()):
-            if excess > LIMIT_NOISE:
-                yield ProgramIssue(
-                    "error",
-                    "axis-limit",
-                    f"{words[i]}: {np.degrees(excess):.3f} deg beyond its limit",
-                    f"{section.name}, move {number}",
-                )
+    q = np.array([move.q for move in section.moves])
+    sums = q @ limits.rows.T
+    below = np.hstack([limits.lower - q, limits.row_lower - sums])
+    above = np.hstack([q - limits.upper, sums - limits.row_upper])
+    endless = np.flatnonzero(limits.endless)
+    below[:, endless] = above[:, endless] = -np.inf
+    excess = np.stack([below, above], axis=2).reshape(len(q), -1)
+    for k, i in np.argwhere(excess > LIMIT_NOISE).tolist():
+        yield ProgramIssue(
+            "error",
+            "axis-limit",
+            f"{words[i]}: {np.degrees(excess[k, i]):.3f} deg beyond its limit",
+            f"{section.name}, move {k}",
+        )
 
 
-def _tip(program: Program, move: Move) -> Array:
-    """Return the tip pose of a target in the part frame, (4, 4) m."""
-    if isinstance(move, LinearMove):
-        return move.T_part_tip
-    T_base_tip = program.robot.forward(move.q) @ program.T_flange_tip
-    return np.asarray(np.linalg.solve(program.T_base_part, T_base_tip))
+def _tips(program: Program, moves: Sequence[Move]) -> Array:
+    """Return the tip poses of targets in the part frame, (K, 4, 4) m."""
+    T = np.array([getattr(move, "T_part_tip", np.eye(4)) for move in moves])
+    joint = [k for k, move in enumerate(moves) if isinstance(move, JointMove)]
+    if joint:
+        T_base_tip = program.robot.forward([moves[k].q for k in joint]) @ program.T_flange_tip
+        T[joint] = np.linalg.solve(program.T_base_part, T_base_tip)
+    return T

@@ -26,6 +26,7 @@ class ProgramTable(Table):
     retract_mm: Annotated[Positive, key("a number above 0, in mm", "50")] = 50.0
     zone_mm: Annotated[NotNegative, key("a number not below 0, in mm", "0.3")] = 0.3
     lead_time_s: Annotated[NotNegative, key("a number not below 0, in s", "0.02")] = 0.02
+    arcs_mm: Annotated[Positive | None, key("a number above 0, in mm", "0.01")] = None
     gas_lead_s: Annotated[NotNegative | None, key("a number not below 0, in s", "0.3")] = None
     pierce_time_s: Annotated[NotNegative, key("a number from 0 to 60, in s", "0.3", le=60)] = 0.0
     approach_mm_s: Annotated[Positive, key("a number above 0, in mm/s", "100")] = 100.0

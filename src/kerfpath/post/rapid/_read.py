@@ -34,9 +34,11 @@ UNIT = 1e-6
 
 def read(main: str, files: Mapping[str, str], robot: Robot, settings: RapidSettings) -> ReadProgram:
     """Return the program that a RAPID module of ours says; see `kerfpath.post.Reader`."""
-    reader = _Reader(main, robot, settings)
-    for number, line in enumerate(files[main].splitlines(), 1):
-        reader.read(number, line.strip())
+    reader = _Reader(main, files, robot, settings)
+    reader.read_module(main)
+    for file in dict.fromkeys(reader.called_in.values()):
+        if file != main:
+            reader.read_module(file)
     return reader.program()
 
 
@@ -61,6 +63,9 @@ _LINES = {
         "reset": rf"SetDO {_NAME},0;",
         "set_trigger": rf"TriggIO {_NAME},([\d.]+)\\Time\\DOp:={_NAME},([01]);",
         "wait": r"WaitTime ([\d.]+);",
+        "load": r'Load \\Dynamic,"([^"]*)/([^"/]*)";',
+        "late_call": rf'%"{_NAME}"%;',
+        "unload": r'UnLoad "([^"]*)/([^"/]*)";',
         "call": rf"{_NAME};",
         "joint_move": rf"MoveAbsJ (\[.*\]),{_NAME},{_NAME},{_FRAMES};",
         "linear_move": rf"MoveL (\[.*\]),{_NAME},{_NAME},{_FRAMES};",
@@ -70,7 +75,10 @@ _LINES = {
     }.items()
 }
 _OUTSIDE = {"tool", "work_object", "speed", "zone", "trigger", "routine", "end_module"}
-_IN_MAIN = {"no_supervision", "reset", "set_trigger", "call", "end_routine"}
+_IN_PART = {"routine", "end_module"}
+_IN_MAIN = {
+    "no_supervision", "reset", "set_trigger", "load", "late_call", "unload", "call", "end_routine",
+}  # fmt: skip
 _IN_ROUTINE = {
     "joint_move", "linear_move", "circular_move", "switching_move", "switching_arc", "wait",
     "end_routine",
@@ -80,18 +88,31 @@ _IN_ROUTINE = {
 class _Reader:
     """Reads line by line; each kind of line has a method of its name."""
 
-    def __init__(self, file: str, robot: Robot, settings: RapidSettings) -> None:
-        self.file, self.robot, self.settings = file, robot, settings
-        self.line = 0
+    def __init__(
+        self, main: str, files: Mapping[str, str], robot: Robot, settings: RapidSettings
+    ) -> None:
+        self.main, self.files, self.robot, self.settings = main, files, robot, settings
+        self.file, self.line = main, 0
         self.name = ""
+        self.modules: dict[str, str] = {}
+        self.loaded = ""
         self.routine_name: str | None = None
         self.ended = False
         self.frames: dict[str, tuple[str, Array]] = {}
         self.speeds: dict[str, float] = {}
         self.zones: dict[str, float] = {"fine": 0.0}
         self.triggers: dict[str, Switch | None] = {}
-        self.calls: list[str] = []
+        self.called_in: dict[str, str] = {}
         self.routines: dict[str, list[ReadStep]] = {}
+        self.homes: dict[str, str] = {}
+
+    def read_module(self, file: str) -> None:
+        self.file, self.line, self.ended, self.name = file, 0, False, ""
+        for number, line in enumerate(self.files[file].splitlines(), 1):
+            self.read(number, line.strip())
+        self.line += 1
+        if not self.ended:
+            raise self.fault("ENDMODULE is missing")
 
     def read(self, number: int, line: str) -> None:
         self.line = number
@@ -102,7 +123,7 @@ class _Reader:
         if not self.name:
             expected = {"module"}
         elif self.routine_name is None:
-            expected = _OUTSIDE
+            expected = _OUTSIDE if self.file == self.main else _IN_PART
         else:
             expected = _IN_MAIN if self.routine_name == "main" else _IN_ROUTINE
         for kind in expected:
@@ -112,26 +133,24 @@ class _Reader:
         raise self.fault(f"not expected here: {line[:60]!r}")
 
     def program(self) -> ReadProgram:
-        self.line += 1
-        if not self.ended:
-            raise self.fault("ENDMODULE is missing")
         for kind in ("tool", "work_object"):
             if kind not in self.frames:
                 raise self.fault(f"the module declares no {kind.replace('_', ' ')}")
-        unknown = set(self.calls) ^ (set(self.routines) - {"main"})
+        unknown = set(self.called_in.items()) ^ set(self.homes.items())
         if unknown or "main" not in self.routines:
-            raise self.fault(f"main and routines do not match: {', '.join(sorted(unknown))}")
+            names = ", ".join(sorted({name for name, _ in unknown}))
+            raise self.fault(f"main and routines do not match: {names}")
         return ReadProgram(
-            name=self.name,
+            name=self.modules[self.main],
             T_flange_tip=self.frames["tool"][1],
             T_base_part=self.frames["work_object"][1],
             sections=tuple(
-                ReadSection(name=name, steps=tuple(self.routines[name])) for name in self.calls
+                ReadSection(name=name, steps=tuple(self.routines[name])) for name in self.called_in
             ),
         )
 
     def module(self, name: str) -> None:
-        self.name = name
+        self.name = self.modules[self.file] = name
 
     def end_module(self) -> None:
         self.ended = True
@@ -172,6 +191,10 @@ class _Reader:
     def routine(self, name: str) -> None:
         self.unused(name, self.routines)
         self.routine_name, self.routines[name] = name, []
+        if name != "main":
+            self.homes[name] = self.file
+        elif self.file != self.main:
+            raise self.fault("a second main")
 
     def end_routine(self) -> None:
         self.routine_name = None
@@ -194,10 +217,25 @@ class _Reader:
         same_output(output, self.settings.laser_output, f"{self.file}, line {self.line}")
         return "laser"
 
+    def load(self, folder: str, file: str) -> None:
+        if self.loaded or folder != self.settings.folder:
+            raise self.fault(f"expected one module at a time, from {self.settings.folder}")
+        self.loaded = file
+
+    def unload(self, folder: str, file: str) -> None:
+        if (folder, file) != (self.settings.folder, self.loaded):
+            raise self.fault(f"{folder}/{file} is not loaded")
+        self.loaded = ""
+
+    def late_call(self, name: str) -> None:
+        if not self.loaded:
+            raise self.fault(f"{name} is called while no module is loaded")
+        self.call(name)
+
     def call(self, name: str) -> None:
-        if name in self.calls:
+        if name in self.called_in:
             raise self.fault(f"{name} is called twice")
-        self.calls.append(name)
+        self.called_in[name] = self.loaded or self.main
 
     def joint_move(self, text: str, speed: str, zone: str, tool: str, work_object: str) -> None:
         axes_deg, external = self.values(text, 2)

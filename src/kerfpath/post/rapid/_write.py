@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Hashable, Iterable, Iterator
+from functools import cache, cached_property
 from typing import Annotated, TypeVar
 
 import numpy as np
@@ -17,13 +18,16 @@ from pydantic import StringConstraints
 from scipy.spatial.transform import Rotation
 
 from kerfpath._arrays import Array
+from kerfpath.post._divide import divided, in_files
 from kerfpath.post._formatter import Formatter, number, plain
+from kerfpath.post._names import identifiers
 from kerfpath.post._program import (
     CircularMove,
     JointMove,
     LinearMove,
     Move,
     Program,
+    Section,
     Switch,
     Wait,
 )
@@ -47,6 +51,12 @@ r"""Longest lead (s) that ``TriggIO \Time`` takes."""
 
 NOT_CHECKED = "not been checked for collisions"
 NO_EXTERNAL_AXES = "[9E9,9E9,9E9,9E9,9E9,9E9]"
+JOINT_TARGET = "[[" + ",".join(["%.6f"] * 6) + "]," + NO_EXTERNAL_AXES + "]"
+TARGET = "[[%.4f,%.4f,%.4f],[%.8f,%.8f,%.8f,%.8f],[%d,%d,%d,%d]," + NO_EXTERNAL_AXES + "]"
+NO_POSE = np.eye(4)
+"""Stands in for that of a joint move."""
+AROUND = 60
+"""Lines of a module beside those of its routines, where it declares few speeds and zones."""
 EXTERNAL_SPEEDS = "5000,1000"
 """mm/s and deg/s of external axes; there are none, but speed data must say something."""
 
@@ -72,6 +82,7 @@ PREDEFINED = re.compile(r"[vz]\d+|vmax|vrot\d+|vlin\d+", re.IGNORECASE)
 
 
 Name = Annotated[str, StringConstraints(min_length=1, max_length=80)]
+Folder = Annotated[str, StringConstraints(pattern=r"^[A-Za-z0-9_:/.\-]{1,60}$")]
 
 
 class RapidSettings(Settings):
@@ -80,6 +91,7 @@ class RapidSettings(Settings):
     laser_output: Annotated[Name, setting("the name of a digital output", '"doLaser"')] = "doLaser"
     gas_output: Annotated[Name | None, setting("the name of a digital output", '"doGas"')] = None
     tool_name: Annotated[Name, setting("a name for the tool", '"tLaser"')] = "tLaser"
+    folder: Annotated[Folder, setting("a folder of the controller", '"HOME:"')] = "HOME:"
     work_object: Annotated[Name, setting("a name for the part's frame", '"wPart"')] = "wPart"
 
 
@@ -105,28 +117,47 @@ class Rapid(Formatter):
     settings: RapidSettings
 
     def __init__(self, program: Program, settings: RapidSettings) -> None:
-        super().__init__(program, settings)
+        super().__init__(divided(program, settings.lines_per_file - AROUND), settings)
         moves = program.moves
         joint = [move for move in moves if isinstance(move, JointMove)]
-        self.air_speed = _numbered("vAir", (_air_speed(move) for move in joint))
-        linear = [(on, _linear_speed(move)) for move, on in _with_laser(moves)]
+        self.air_speed = _numbered("vAir", (_air_speed(move.speed) for move in joint))
+        self._laser_on = dict(_with_laser(moves))
+        linear = [(on, _linear_speed(move.speed)) for move, on in self._laser_on.items()]
         self.linear_speed = _numbered("vApproach", (key for key in linear if not key[0]))
         self.linear_speed |= _numbered("vCut", (key for key in linear if key[0]))
-        self.zone = _numbered("zCorner", (_zone(move) for move in moves if move.zone > 0))
+        self.zone = _numbered("zCorner", (_zone(move.zone) for move in moves if move.zone > 0))
         switches = [s for m in moves if isinstance(m, LinearMove) for s in m.switches]
         self.trigger: dict[Switch, str] = {}
         for signal, prefix in (("laser", "tr"), ("gas", "trGas")):
             for on, suffix in ((True, "On"), (False, "Off")):
                 keys = (s for s in switches if (s.signal, s.on) == (signal, on))
                 self.trigger |= _numbered(f"{prefix}{suffix}", keys)
-        self.target = self._target_texts()
-        self._laser_on = dict(_with_laser(moves))
 
     def files(self) -> dict[str, str]:
-        """Return the one module."""
-        return {f"{self.program.name}.mod": "\n".join([*self._module(), ""])}
+        """Return one module, or a main one and those with its routines that it loads."""
+        name, sections = self.program.name, self.program.sections
+        lines = [len(section.steps) + 3 for section in sections]
+        if sum(lines) + AROUND <= self.settings.lines_per_file:
+            calls = [f"{section.name};" for section in sections]
+            return {f"{name}.mod": _text(self._module(calls, sections))}
+        files, calls = {}, []
+        for module, part in zip(
+            self._modules(), in_files(sections, lines, self.settings.lines_per_file), strict=False
+        ):
+            place = f'"{self.settings.folder}/{module}.mod"'
+            calls += [rf"Load \Dynamic,{place};"]
+            calls += [f'%"{section.name}"%;' for section in part]
+            calls += [f"UnLoad {place};"]
+            body = (line for section in part for line in self._routine(section))
+            files[f"{module}.mod"] = _text([f"MODULE {module}", *body, "ENDMODULE"])
+        return {f"{name}.mod": _text(self._module(calls, ()))} | files
 
-    def _module(self) -> Iterator[str]:
+    def _modules(self) -> list[str]:
+        """Return names for modules of routines, as many as there might be."""
+        count = len(self.program.sections)
+        return identifiers((f"{self.program.name}_part",) * count, taken=(self.program.name,))
+
+    def _module(self, calls: Iterable[str], sections: Iterable[Section]) -> Iterator[str]:
         program, settings = self.program, self.settings
         tool, part = _pose(program.T_flange_tip), _pose(program.T_base_part)
         checked = "been proved clear in the planned cell" if program.air_checked else NOT_CHECKED
@@ -146,24 +177,27 @@ class Rapid(Formatter):
         yield from (f"  VAR triggdata {name};" for name in self.trigger.values())
         yield ""
         yield "  PROC main()"
-        yield from (f"    {line}" for line in self.main())
+        yield from (f"    {line}" for line in self.begin())
+        yield from (f"    {line}" for line in calls)
         yield "  ENDPROC"
-        for section in program.sections:
-            yield ""
-            yield f"  PROC {section.name}()"
-            yield from (f"    {line}" for line in self.lines(section))
-            yield "  ENDPROC"
+        for section in sections:
+            yield from self._routine(section)
         yield "ENDMODULE"
 
-    def main(self) -> Iterator[str]:
-        """Yield the lines of the main routine."""
+    def _routine(self, section: Section) -> Iterator[str]:
+        yield ""
+        yield f"  PROC {section.name}()"
+        yield from (f"    {line}" for line in self.lines(section))
+        yield "  ENDPROC"
+
+    def begin(self) -> Iterator[str]:
+        """Yield the lines of the main routine before it calls those of the sections."""
         yield r"ConfL\Off;"
         for signal in dict.fromkeys(["laser", *(s.signal for s in self.trigger)]):
             yield f"SetDO {self.output(signal)},0;"
         for s, name in self.trigger.items():
             lead = number(s.lead_time, 4)
             yield rf"TriggIO {name},{lead}\Time\DOp:={self.output(s.signal)},{int(s.on)};"
-        yield from (f"{section.name};" for section in self.program.sections)
 
     def names(self) -> list[tuple[str, str]]:
         """Return every name in the module, with what it names."""
@@ -180,24 +214,25 @@ class Rapid(Formatter):
             *((name, "a speed") for _, name in self._speed_data()),
             *((name, "a zone") for name in self.zone.values()),
             *((name, "a switch") for name in self.trigger.values()),
+            *((name[:-4], "a module") for name in list(self.files())[1:]),
         ]
 
     def joint_move(self, move: JointMove) -> Iterator[str]:
         """Yield a MoveAbsJ."""
-        speed = self.air_speed[_air_speed(move)]
-        yield f"MoveAbsJ {self.target[move][-1]},{speed},{self._end(move)};"
+        speed = self.air_speed[_air_speed(move.speed)]
+        yield f"MoveAbsJ {self.target[move][-1]},{speed},{self.end(move)};"
 
     def linear_move(self, move: LinearMove) -> Iterator[str]:
         """Yield a MoveL, or a TriggL where something is switched."""
         word, triggers = self._switched("L", move)
         target = self.target[move][-1]
-        yield f"{word} {target},{self._speed(move)}{triggers},{self._end(move)};"
+        yield f"{word} {target},{self.speed(move)}{triggers},{self.end(move)};"
 
     def circular_move(self, move: CircularMove) -> Iterator[str]:
         """Yield a MoveC, or a TriggC where something is switched."""
         word, triggers = self._switched("C", move)
-        via, target = self.target[move]
-        yield f"{word} {via},{target},{self._speed(move)}{triggers},{self._end(move)};"
+        via, target = self.target[move][-2:]
+        yield f"{word} {via},{target},{self.speed(move)}{triggers},{self.end(move)};"
 
     def wait(self, wait: Wait) -> Iterator[str]:
         """Yield a WaitTime."""
@@ -207,43 +242,44 @@ class Rapid(Formatter):
         """Yield a comment."""
         yield f"! {text}"
 
-    def _target_texts(self) -> dict[Move, list[str]]:
-        """Return the targets of each move, all at once; quaternions without a jump of sign."""
-        points: list[tuple[Move, Array, Array | None]] = []
+    @cached_property
+    def target(self) -> dict[Move, list[str]]:
+        """The targets of each move, all at once; quaternions without a jump of sign."""
+        points: list[tuple[Move, Array, Array]] = []
         for move in self.program.moves:
             if isinstance(move, CircularMove):
                 points.append((move, move.q_via, move.T_part_via))
-            points.append((move, move.q, getattr(move, "T_part_tip", None)))
+            points.append((move, move.q, getattr(move, "T_part_tip", NO_POSE)))
         robot = self.program.robot
         q = np.array([q for _, q, _ in points]).reshape(-1, robot.joints)
-        axes_deg = np.degrees(axes_from_joints(robot, q))
+        axes_deg = (np.degrees(axes_from_joints(robot, q)).round(6) + 0.0).tolist()
+        T = np.array([T for _, _, T in points]).reshape(-1, 4, 4)
+        point_mm = (T[:, :3, 3] * 1e3).round(4) + 0.0
+        wxyz = _continuous(_wxyz(T)).round(8) + 0.0
+        rows = np.hstack([point_mm, wxyz, confdata(robot, q)]).tolist()
         texts: dict[Move, list[str]] = {move: [] for move in self.program.moves}
-        before = np.array([1.0, 0.0, 0.0, 0.0])
-        for (move, _, T), axes, conf in zip(points, axes_deg, confdata(robot, q), strict=True):
-            if T is None:
-                texts[move].append(f"[{_list(axes, 6)},{NO_EXTERNAL_AXES}]")
-                continue
-            wxyz = _wxyz(T)
-            before = wxyz if wxyz @ before >= 0 else -wxyz
-            quarters = ",".join(str(n) for n in conf)
-            point = _list(T[:3, 3] * 1e3, 4)
-            texts[move].append(f"[{point},{_list(before, 8)},[{quarters}],{NO_EXTERNAL_AXES}]")
+        for (move, _, _), axes, row in zip(points, axes_deg, rows, strict=True):
+            texts[move].append(
+                JOINT_TARGET % tuple(axes) if isinstance(move, JointMove) else TARGET % tuple(row)
+            )
         return texts
 
     def _speed_data(self) -> list[tuple[str, str]]:
         linear = [(value, name) for (_, value), name in self.linear_speed.items()]
         return [*self.air_speed.items(), *linear]
 
-    def _speed(self, move: LinearMove) -> str:
-        return self.linear_speed[self._laser_on[move], _linear_speed(move)]
+    def speed(self, move: LinearMove) -> str:
+        """Return the name of the speed data of a move."""
+        return self.linear_speed[self._laser_on[move], _linear_speed(move.speed)]
 
     def _switched(self, path: str, move: LinearMove) -> tuple[str, str]:
         names = [self.trigger[s] for s in move.switches]
         later = "".join(rf"\T{i}:={name}" for i, name in enumerate(names[1:], 2))
         return (f"Trigg{path}", f",{names[0]}{later}") if names else (f"Move{path}", "")
 
-    def _end(self, move: Move) -> str:
-        zone = self.zone[_zone(move)] if move.zone > 0 else "fine"
+    def end(self, move: Move) -> str:
+        """Return the zone, tool and work object at the end of a move."""
+        zone = self.zone[_zone(move.zone)] if move.zone > 0 else "fine"
         return rf"{zone},{self.settings.tool_name}\WObj:={self.settings.work_object}"
 
 
@@ -266,31 +302,44 @@ def _with_laser(moves: Iterable[Move]) -> list[tuple[LinearMove, bool]]:
 
 
 def _wxyz(T: Array) -> Array:
-    return np.asarray(Rotation.from_matrix(T[:3, :3]).as_quat(canonical=True, scalar_first=True))
+    rotations = Rotation.from_matrix(T[..., :3, :3])
+    return np.asarray(rotations.as_quat(canonical=True, scalar_first=True))
+
+
+def _continuous(wxyz: Array) -> Array:
+    """Return quaternions (K, 4) of the same rotations, each on the side of the one before."""
+    back = (wxyz[1:] * wxyz[:-1]).sum(axis=1) < 0
+    return wxyz * np.cumprod(np.append(1.0, np.where(back, -1.0, 1.0)))[: len(wxyz), None]
 
 
 def _pose(T: Array) -> str:
     return f"[{_list(T[:3, 3] * 1e3, 4)},{_list(_wxyz(T), 8)}]"
 
 
-def _linear_speed(move: LinearMove) -> str:
-    speed_mm_s, turning_deg_s = move.speed * 1e3, np.degrees(TURNING_SPEED)
+@cache
+def _linear_speed(speed: float) -> str:
+    return f"[{number(speed * 1e3, 2)},{number(np.degrees(TURNING_SPEED), 0)},{EXTERNAL_SPEEDS}]"
+
+
+@cache
+def _air_speed(share: float) -> str:
+    speed_mm_s = share * FULL_AIR_SPEED * 1e3
+    turning_deg_s = share * np.degrees(TURNING_SPEED)
     return f"[{number(speed_mm_s, 2)},{number(turning_deg_s, 0)},{EXTERNAL_SPEEDS}]"
 
 
-def _air_speed(move: JointMove) -> str:
-    speed_mm_s = move.speed * FULL_AIR_SPEED * 1e3
-    turning_deg_s = move.speed * np.degrees(TURNING_SPEED)
-    return f"[{number(speed_mm_s, 2)},{number(turning_deg_s, 0)},{EXTERNAL_SPEEDS}]"
-
-
-def _zone(move: Move) -> str:
+@cache
+def _zone(zone: float) -> str:
     # ABB's own zones turn the tool within 1.5 times the path zone at most; here within the same,
     # and 0.1 deg for each mm.
-    zone_mm = number(move.zone * 1e3, 3)
-    zone_deg = number(move.zone * 1e3 * 0.1, 3)
+    zone_mm = number(zone * 1e3, 3)
+    zone_deg = number(zone * 1e3 * 0.1, 3)
     return f"[FALSE,{zone_mm},{zone_mm},{zone_mm},{zone_deg},{zone_mm},{zone_deg}]"
 
 
 def _list(values: Array, decimals: int) -> str:
     return f"[{','.join(number(value, decimals) for value in values)}]"
+
+
+def _text(lines: Iterable[str]) -> str:
+    return "\n".join([*lines, ""])
