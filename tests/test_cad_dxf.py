@@ -2,9 +2,6 @@
 
 from __future__ import annotations
 
-import contextlib
-import functools
-import io
 import itertools
 from collections.abc import Callable
 from pathlib import Path
@@ -15,8 +12,6 @@ from ezdxf import path as ezpath
 from ezdxf.document import Drawing
 from ezdxf.filemanagement import new
 from ezdxf.layouts import Modelspace
-from hypothesis import given, settings
-from hypothesis import strategies as st
 
 from kerfpath.cad import Part, read
 from kerfpath.errors import InputError
@@ -364,41 +359,3 @@ def test_files_that_are_no_dxf_are_refused(tmp_path: Path, content: bytes) -> No
     with pytest.raises(InputError, match=r"bad\.dxf: ") as caught:
         read(tmp_path / "bad.dxf")
     assert "\n" not in str(caught.value)
-
-
-@functools.cache
-def entities() -> tuple[str, str]:
-    """Return a small DXF before and after its entities' text, and that text."""
-    document = new("R12")
-    document.header["$INSUNITS"] = 4
-    space = document.modelspace()
-    bulge = document.blocks.new("B")
-    bulge.add_arc((1, 1), 2, 0, 90)
-    lines((0, 0), (10, 0), (10, 10))(space)
-    space.add_polyline2d([(0, 0, 1), (5, 5, 0), (9, 2, 0.3)], format="xyb", close=True)
-    space.add_blockref("B", (3, 3), dxfattribs={"xscale": 2, "row_count": 2})
-    stream = io.StringIO()
-    document.write(stream)
-    text = stream.getvalue()
-    start = text.index("ENTITIES")
-    return text[:start], text[start:]
-
-
-@settings(max_examples=60, derandomize=True, deadline=None, database=None)
-@given(data=st.data())
-def test_corrupted_drawings_give_a_part_or_an_input_error(
-    data: st.DataObject, tmp_path_factory: pytest.TempPathFactory
-) -> None:
-    before, text = entities()
-    rows = text.split("\n")
-    for _ in range(data.draw(st.integers(1, 4))):
-        row = data.draw(st.integers(0, len(rows) - 1))
-        junk = st.sampled_from(["", "-1", "1e308", "nan", "inf", "70", "B", "INSERT", "1e-300"])
-        new_text = data.draw(junk | st.text(alphabet="0123456789.-eE \tABC", max_size=8))
-        rows[row : row + data.draw(st.integers(0, 3))] = [new_text]
-    path = tmp_path_factory.mktemp("corrupt") / "corrupt.dxf"
-    path.write_text(before + "\n".join(rows))
-    with contextlib.suppress(InputError):
-        part = read(path, unit="mm")
-        for loop in part.loops:
-            part.contour(loop.name, closed=False)

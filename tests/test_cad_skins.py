@@ -119,6 +119,10 @@ def test_holes_of_a_bulged_tube_are_holes_on_the_seam_and_off_it(
     assert len(holes) == 8
     rims = part.pick(side="outer", kind="outer")
     assert [rim.diameter for rim in rims] == pytest.approx([0.044, 0.044], abs=EXACT)
+    # Beyond the end of the tube its surface goes on, however near: z is not brought back to 0.
+    beyond = np.array([[0.022, 0.0, -0.0001], [0.0, 0.022, -0.003]])
+    rim = min(rims, key=lambda loop: loop.bounding_box[0, 2])
+    np.testing.assert_allclose(part.surface(rim.name).project(beyond)[0], beyond, atol=1e-5)
 
 
 def test_a_tube_of_two_halves_is_one_skin(tmp_path: Path) -> None:
@@ -179,12 +183,24 @@ def test_loose_faces_of_a_step_are_sewn_and_gaps_over_the_tolerance_stay(tmp_pat
     assert "widest gap" in note
 
 
+def swapped(raw: bytes, i: int, k: int) -> bytes:
+    """Return a file with two of its lines in each other's place."""
+    lines = raw.splitlines()
+    lines[i], lines[k] = lines[k], lines[i]
+    return b"\n".join(lines)
+
+
 BAD_IGES = {
     "not iges": (lambda raw: b"hello\n", "not an IGES file"),
     "truncated": (lambda raw: raw[: len(raw) // 2], "truncated"),
     "a line missing": (
         lambda raw: b"\n".join(raw.split(b"\n")[:40] + raw.split(b"\n")[41:]), "damaged: expected"
     ),
+    "two lines swapped": (lambda raw: swapped(raw, -3, -4), r"expected P\d{7} in columns 73 to 80"),
+    "a line astray": (
+        lambda raw: raw.replace(b"0000001P0000001", b"0000002P0000001"), "belong to no entity"
+    ),
+    "sections mixed": (lambda raw: swapped(raw, 1, 7), r"expected G0000001 .*of line 2, got D"),
     "unknown unit": (lambda raw: raw.replace(b",2,2HMM,", b",3,2HXX,"), "unit flag is 3"),
     "no face": (lambda raw: raw, "no face"),
 }  # fmt: skip
@@ -218,7 +234,7 @@ def test_components_of_an_assembly_name_their_faces(tmp_path: Path) -> None:
         shape = compound(placed(box(10, 10, 10), 0.0, 0.0), placed(box(5, 5, 5), 0.0, 950.0))
         path = write_step(tmp_path / "assembly.step", shape)
     finally:
-        Interface_Static.SetIVal_s("write.step.assembly", 0)
+        Interface_Static.SetIVal_s("write.step.assembly", 2)
     text = path.read_text("ascii")
     first, second = _products(text)[1:3]
     path.write_text(text.replace(f"'{first}'", "'base'").replace(f"'{second}'", "'lid'"))

@@ -198,17 +198,3 @@ def test_any_text_gives_a_part_or_an_input_error(
         part = table(folder, text.encode("utf-8", "surrogatepass"), unit="mm")
         for loop in part.loops:
             part.contour(loop.name, closed=False)
-
-
-@settings(max_examples=200, derandomize=True, deadline=None, database=None)
-@given(data=st.data())
-def test_spoilt_tables_give_a_part_or_an_input_error(
-    data: st.DataObject, tmp_path_factory: pytest.TempPathFactory
-) -> None:
-    raw = (SQUARE + "0,0,0,0,0,1\n").encode()
-    at = data.draw(st.integers(0, len(raw) - 1))
-    spoilt = raw[:at] + data.draw(st.binary(max_size=8)) + raw[at + data.draw(st.integers(0, 9)) :]
-    with contextlib.suppress(InputError):
-        part = table(tmp_path_factory.mktemp("table"), spoilt)
-        for loop in part.loops:
-            part.contour(loop.name, closed=False)

@@ -18,7 +18,7 @@ import pytest
 from kerfpath import robot
 from kerfpath.cli import main
 from kerfpath.job import read_plan_file
-from kerfpath.post import read_rapid
+from programs import read_text
 
 DEMO = Path(str(files("kerfpath") / "demo"))
 SMALL = (DEMO / "b_pillar.toml").read_text()
@@ -51,9 +51,9 @@ def run(*arguments, cwd="."):
 
 
 def refused(result, *words):
-    """Assert bad input: exit code 2, one line on stderr, nothing on stdout."""
+    """Assert bad input: exit code 2, one line on stderr, on stdout at most the drawing's line."""
     assert result.returncode == 2, result.stderr
-    assert result.stdout == ""
+    assert all("(file in" in line for line in result.stdout.splitlines())
     assert len(result.stderr.strip().splitlines()) == 1, result.stderr
     assert result.stderr.startswith("kerfpath: error: ")
     for word in words:
@@ -149,7 +149,7 @@ def test_post_writes_the_program_that_plan_wrote(planned, folder):
     # Only the module's name differs: plan.json does not keep the file name of its job.
     written = (folder / "small-plan" / "small.mod").read_text()
     assert printed.stdout.replace("MODULE plan", "MODULE small") == written
-    read_rapid(printed.stdout)
+    read_text(printed.stdout, robot("abb_irb4600_60_205"))
     to_file = run("post", "small-plan/plan.json", "-o", "again.mod", cwd=folder)
     assert to_file.returncode == 0
     assert (folder / "again.mod").read_text() == printed.stdout
@@ -288,6 +288,16 @@ def test_contours_lists_the_loops_by_name():
     np.testing.assert_allclose(size, 25.4 * np.ptp(data["bounding_box_m"], axis=0), rtol=1e-6)
 
 
+@pytest.mark.parametrize("command", ["plan", "check"])
+def test_a_drawing_is_shown_before_its_job_is_planned(folder, tmp_path, command):
+    arguments = ["--out", tmp_path / "out"] if command == "plan" else []
+    first = run(command, folder / "small.toml", *arguments).stdout.splitlines()[0]
+    listed = run("contours", folder / "b_pillar.step").stdout.splitlines()[0]
+    assert first == listed
+    for words in ("mm (file in mm)", "66 loops of 25.2 to 2906.1 mm", "gap", "shortest edge"):
+        assert words in first
+
+
 def test_robots_lists_the_library_and_shows_sources():
     assert "68 robots" in run("robots").stdout
     shown = run("robots", "abb_irb2400_155").stdout
@@ -329,7 +339,7 @@ def test_help_teaches():
         (("contours", "small.toml"), ["small.toml"]),
         (("contours", "b_pillar.step", "--unit", "ell"), ["ell"]),
         (("robots", "abb_irb9999"), ["not in the library"]),
-        (("plan", "wrong-loop.toml", "--out", "wrong"), ["no loop 'skin/hole99'", "skin/hole9"]),
+        (("plan", "wrong-loop.toml", "--out", "wrong"), ["no loop 'skin/hole99'", "skin/hole1"]),
         (("plan", "slow.toml", "--out", "wrong"), ["slow.toml:", "speed_m_min"]),
         (("plan", "small.toml", "--out", "small.toml"), ["small.toml", "folder"]),
     ],
@@ -338,7 +348,7 @@ def test_bad_input_is_one_line_and_nothing_is_written(planned, folder, arguments
     (folder / "list.json").write_text("[]")
     (folder / "old.json").write_text('{"schema": 0}')
     (folder / "short.json").write_text('{"schema": 3}')
-    (folder / "wrong-loop.toml").write_text(SMALL.replace("skin/hole9", "skin/hole99"))
+    (folder / "wrong-loop.toml").write_text(SMALL.replace("skin/hole16", "skin/hole99"))
     (folder / "slow.toml").write_text(SMALL.replace("speed_m_min = 3", "speed_m_min = -3", 1))
     before = sorted(folder.iterdir())
     refused(run(*arguments, cwd=folder), *words)

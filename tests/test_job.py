@@ -15,6 +15,7 @@ from kerfpath.job import read_job
 from kerfpath.job._heads import heads, pose
 from kerfpath.job._lines import Places
 from kerfpath.operations import micro_joints, slow_corners
+from kerfpath.post.rapid import RapidSettings
 from kerfpath.robots import acceleration_ratios, robot
 from kerfpath.tilt import Tilt
 
@@ -113,8 +114,7 @@ def test_plan_and_program_may_be_left_out(read):
     program = job.program
     assert (program.language, program.name) == ("rapid", "job_9_side_panel")
     assert (program.retract, program.zone, program.lead_time) == (0.05, 0.0003, 0.02)
-    assert (program.laser_output, program.work_object) == ("doLaser", "wPart")
-    assert program.tool_name == "tLaser"
+    assert program.settings == RapidSettings()
 
 
 def test_the_plan_options_are_what_the_planner_takes(read):
@@ -335,8 +335,11 @@ FAULTS = [
         21,
         "plan.feed: expected refine = false with feed = .dip. and costs in .comfort.",
     ),
-    ('"rapid"', '"cobol"', 22, "program.language: expected 'rapid'"),
-    ("language", 'work_object = "w part"\nlanguage', 22, "program.work_object: .*letters, digits"),
+    ('"rapid"', '"cobol"', 22, "program.language: expected a robot language, or none, got .cobol."),
+    ("language", 'work_object = "w"\nlanguage', 22, "program.work_object: expected a key of"),
+    ('"rapid"', '"rapid"\n[program.rapid]\ntool = 1', 24, "program.rapid.tool: expected a key of"),
+    ('"rapid"', '"rapid"\n[program.rapid]\ntool_name = 1', 24, r"tool_name: expected a name .* 1;"),
+    ('"rapid"', '"rapid"\n[program.cobol]\nx = 1', 23, "program.cobol: expected a key of"),
     ("language", "retract_mm = 0\nlanguage", 22, "program.retract_mm: expected a number above 0"),
     # not TOML
     ("= 9", "= nine", 13, r"not valid TOML: Invalid value \(at line 13, column 15\)"),

@@ -96,6 +96,13 @@ def test_the_other_commands_take_open_lines(folder):
     ((task, nodes, found),) = fastest_speeds(job)
     assert (task.name, nodes.closed) == ("mark", False)
     assert found.speed > 0.05
+    # What is asked for along a lead plays no part.
+    slow = LINE + "[contour.lead_in]\nlength_mm = 4\nangle_deg = 0\nspeed_share = 0.5\n"
+    slowed = fastest_speeds(read_job(job_of(folder, HEAD + slow + PLAN, "slow.toml")))
+    led = fastest_speeds(
+        read_job(job_of(folder, HEAD + slow.replace("speed_share = 0.5\n", "") + PLAN, "led.toml"))
+    )
+    assert slowed[0][2].speed == led[0][2].speed
 
 
 def test_open_lines_are_picked_as_such_alone(folder):

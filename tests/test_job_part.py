@@ -9,10 +9,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from kerfpath import robot
 from kerfpath.cad import read
 from kerfpath.errors import InputError
 from kerfpath.job import program_from_file, read_job, read_plan_file
-from kerfpath.post import read_rapid
+from programs import read_text
 from test_cli import refused, run
 
 DEMO = Path(str(files("kerfpath") / "demo"))
@@ -46,7 +47,7 @@ angle_deg = 90
 length_mm = 3
 shape = "arc"
 [[contour]]
-pick = "skin/hole11"
+pick = "skin/hole21"
 name = "joined"
 speed_m_min = 3
 spacing_mm = 2
@@ -55,7 +56,7 @@ direction = "best"
 width_mm = 2
 count = 2
 [[contour]]
-pick = "skin/hole8"
+pick = "skin/hole13"
 name = "cornered"
 speed_m_min = 3
 spacing_mm = 2
@@ -98,6 +99,25 @@ def done(folder):
     return json.loads(result.stdout), folder / "out"
 
 
+def test_every_cut_says_how_far_its_nodes_leave_the_drawing(done, folder):
+    said, out = done
+    part = read(folder / "b_pillar.step")
+    found = {entry["name"]: entry["departure"] for entry in said["contours"]}
+    plans = {p.name: p.contour for p in read_plan_file(out / "plan.json").plans}
+    assert found["joined"]["against"] == "CAD curve"
+    again = part.departure("skin/hole21", plans["joined"])
+    assert found["joined"]["chord_error"] == pytest.approx(again.chord_error, rel=1e-9)
+    # Kerf makes another path of the loop, and so does a bevel of the axes.
+    for name, pick in (("led in", "skin/hole1"), ("cornered", "skin/hole13")):
+        assert found[name]["against"] == "path as cut"
+        loop = part.departure(pick, part.contour(pick))
+        assert found[name]["path"]["against"] == "CAD curve"
+        assert found[name]["path"]["chord_error"] == loop.chord_error
+    page = (out / "report.html").read_text()
+    assert page.count("Largest chord error") == 3
+    assert f"{again.chord_error * 1e3:.4f} mm, after node" in page
+
+
 def test_a_part_is_planned_audited_and_written_as_one_program(done):
     said, out = done
     assert said["passed"]
@@ -108,7 +128,7 @@ def test_a_part_is_planned_audited_and_written_as_one_program(done):
     )
     assert times["piercing_s"] == pytest.approx(0.75)
     assert len(times["moves"]) == 4
-    program = read_rapid((out / "job.mod").read_text())
+    program = read_text((out / "job.mod").read_text(), robot("abb_irb4600_60_205"))
     assert len(program.sections) == 3
 
 
@@ -140,8 +160,8 @@ def test_a_plan_read_back_gives_the_same_program(done):
     assert len(file.moves) == 4
     kinds = {plan.name: set(plan.contour.kinds) for plan in file.plans}
     assert "micro joint" in kinds["joined"]
-    text, _ = program_from_file(out / "plan.json", "rapid")
-    assert text == (out / "job.mod").read_text()
+    written, _ = program_from_file(out / "plan.json", "rapid")
+    assert written == {"job.mod": (out / "job.mod").read_text()}
 
 
 def test_the_slowed_corner_is_slow_and_the_rest_is_not(done):
@@ -170,25 +190,25 @@ spacing_mm = 4
 [contour.pick_all]
 kind = "inner"
 face = "skin"
-diameter_mm = [14, 26]
+diameter_mm = [15, 26]
 """
 
 
 def test_loops_are_picked_by_what_they_are(folder):
     job = read_job(with_text(folder / "all.toml", HEAD + ALL + PLAN))
     names = [task.name for task in job.tasks(read(job.part_file))]
-    assert names == ["skin/hole3", "skin/hole8", "skin/hole11", "skin/hole12"]
+    assert names == ["skin/hole3", "skin/hole13", "skin/hole21", "skin/hole24"]
     twice = read_job(with_text(folder / "all.toml", HEAD + ALL + ALL + PLAN))
     with pytest.raises(InputError, match="'skin/hole3' is picked twice"):
         twice.tasks(read(twice.part_file))
-    none = ALL.replace("[14, 26]", "[900, 901]")
+    none = ALL.replace("[15, 26]", "[900, 901]")
     nothing = read_job(with_text(folder / "all.toml", HEAD + none + PLAN))
     with pytest.raises(InputError, match="no loop among"):
         nothing.tasks(read(nothing.part_file))
     for old, new, message in (
         ("[contour.pick_all]", 'pick = "x"\n[contour.pick_all]', "expected pick .* got both"),
         ("speed", 'name = "n"\nspeed', "expected name only with pick"),
-        ("[14, 26]", "[14]", "expected 2 numbers"),
+        ("[15, 26]", "[14]", "expected 2 numbers"),
         ('"inner"', '"iner"', "kind"),
     ):
         with pytest.raises(InputError, match=message):
@@ -259,7 +279,7 @@ def test_every_cut_of_the_shipped_part_can_be_made():
     job = read_job(DEMO / "b_pillar_part.toml")
     part = read(job.part_file)
     tasks = job.tasks(part)
-    assert len(tasks) == 13
+    assert len(tasks) == 25
     for task in tasks:
         shaped = task.candidates(part)
         assert len(shaped) == (1 if task.name == "trim" else 2)

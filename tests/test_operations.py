@@ -234,6 +234,39 @@ def test_loops_run_past_outer_corners_on_the_scrap_side():
     assert loop_corners(reverse(square()), 0.002, side="right").kinds.count("loop") == 0
 
 
+class Tube:
+    """A tube's outside, 20 mm from the x axis."""
+
+    def project(self, points):
+        away = points * [0, 1, 1]
+        away = away / np.linalg.norm(away, axis=1)[:, None]
+        return points * [1, 0, 0] + 0.02 * away, away
+
+
+@pytest.mark.parametrize(
+    ("corners", "beside"), [(round_corners, 1e-6), (loop_corners, 1e-4)], ids=["round", "loop"]
+)
+def test_corners_on_a_tube_lie_on_it(corners, beside):
+    flat_ = square(0.02, 400)
+    turn = (flat_.points[:, 1] - 0.01) / 0.02
+    away = np.c_[0 * turn, np.sin(turn), np.cos(turn)]
+    trim = Contour(flat_.points * [1, 0, 0] + 0.02 * away, -away, closed=True, name="trim")
+    made = corners(trim, 0.002, surface=Tube())
+    off = np.abs(np.hypot(*made.points[:, 1:].T) - 0.02)
+    assert off.max() < 1e-7  # chords of the trim's own 0.1 mm steps
+    normal = made.points * [0, 1, 1] / np.hypot(*made.points[:, 1:].T)[:, None]
+    np.testing.assert_allclose(made.axes, -normal, atol=1e-5)
+    plain = corners(trim, 0.002)
+    assert np.abs(np.hypot(*plain.points[:, 1:].T) - 0.02).max() > beside
+    # A bevel stays; around the corner it leans from the one side over to the other.
+    leant = corners(bevel(trim, np.radians(10)), 0.002, surface=Tube())
+    angle = np.degrees(angle_between(leant.axes, made.axes))
+    assert angle.max() == pytest.approx(10, abs=0.1)
+    assert angle.min() > 9.9 * np.cos(np.radians(45))
+    with pytest.raises(InputError, match="corner of 'trim' leaves the surface by"):
+        corners(trim, 0.015, surface=Tube())
+
+
 def test_corners_are_slowed_down_at_and_nothing_else():
     slowed = slow_corners(square(), 0.3, distance=0.001, ramp=0.004)
     apart = np.abs(slowed.points[:, None, :2] - 0.1 * np.array([[0, 0], [1, 0], [1, 1], [0, 1]]))
@@ -280,6 +313,21 @@ def test_a_bevel_leans_the_head_to_its_side():
     assert (np.abs(head[:, :2] - 0.05).max(axis=1) > 0.05).all()
     with pytest.raises(InputError, match="up to 60 deg"):
         bevel(square(), 1.2)
+
+
+def test_sharp_corners_of_an_offset_stay_for_what_is_made_of_them():
+    moved = offset(square(), 0.002, sharp=True)
+    # The mitred square is larger by the distance on every side; arcs leave no corner.
+    assert moved.length == pytest.approx(4 * 0.104, abs=1e-12)
+    assert len(moved.corners) == 4
+    assert not len(offset(square(), 0.002).corners)
+    assert KINDS.index("loop") in loop_corners(moved, 0.002).kind
+    assert slow_corners(moved, 0.5).speed_share.min() == 0.5
+    # A spike would be met too far off: it keeps its arc.
+    spike = Contour(
+        [[0, 0, 0], [0.1, 0.005, 0], [0, 0.01, 0]], np.tile([0, 0, -1], (3, 1)), closed=True
+    )
+    assert np.ptp(offset(spike, 0.001, sharp=True).points[:, 0]) < 0.1 + 0.02
 
 
 def test_operations_on_closed_contours_refuse_open_ones():

@@ -1,6 +1,7 @@
 """The example parts: drawings as modelled, and jobs that plan whole parts with a passing audit."""
 
 import json
+import re
 import shutil
 from pathlib import Path
 
@@ -31,7 +32,7 @@ def test_the_shipped_drawings_are_what_the_script_models(examples, tmp_path, nam
 # The job, its gamma step, a coarser one that does, the contours, and those that come last.
 JOBS = [
     ("bracket", 3, 5, 4, {"trim"}),
-    ("tube", 5, 10, 10, set()),
+    ("tube", 10, 15, 10, set()),
     ("blank", 5, 15, 7, {"trim"}),
 ]
 
@@ -46,7 +47,10 @@ def test_an_example_part_is_planned_audited_and_written(
     job = tmp_path / f"{name}.toml"
     text = job.read_text()
     assert f"gamma_step_deg = {step}\n" in text
-    job.write_text(text.replace(f"gamma_step_deg = {step}\n", f"gamma_step_deg = {coarser}\n"))
+    text = text.replace(f"gamma_step_deg = {step}\n", f"gamma_step_deg = {coarser}\n")
+    if name == "tube":  # half a minute of distances to its walls; the bracket has a cell, too
+        text = re.sub(r"\[cell\].*(?=\[program\])", "", text, flags=re.DOTALL)
+    job.write_text(text)
     result = run("plan", str(job), "--out", str(tmp_path / "out"), "--json")
     assert result.returncode == 0, result.stdout + result.stderr
     said = json.loads(result.stdout)

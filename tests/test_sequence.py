@@ -10,8 +10,9 @@ from kerfpath.air import air_move, backed_off, least_time
 from kerfpath.auditor import air_checks
 from kerfpath.cell import box_between, cell_of
 from kerfpath.operations import start_at
-from kerfpath.post import JointMove, build_program, post, preflight, read_rapid
+from kerfpath.post import JointMove, build_program, post, preflight
 from kerfpath.sequence import best_order, inner_first, plan_part
+from programs import read_text, text_of
 
 STEP = np.radians(10)
 
@@ -198,13 +199,13 @@ def test_one_program_for_the_part_says_that_its_air_moves_are_clear(walled):
     program = build_program(cut.plans, moves=cut.moves, retract=0.01, name="part")
     assert [issue for issue in preflight(program) if issue.level == "error"] == []
     assert "air-moves" not in {issue.code for issue in preflight(program)}
-    text = post(program)
+    text = text_of(post(program))
     assert "proved clear in the planned cell" in text
     corners = [step.q for step in program.steps if isinstance(step, JointMove)]
     # All corners of all moves but the starts, where the robot is already; and home to begin with.
     expected = [cut.moves[0].q[0], *(q for move in cut.moves for q in move.q[1:])]
     np.testing.assert_array_equal(corners, expected)
-    assert len(read_rapid(text).sections) == 4
+    assert len(read_text(text, program.robot).sections) == 4
     with pytest.raises(InputError, match="4 plans need 3 moves between them, or 5"):
         build_program(cut.plans, moves=cut.moves[:2])
 

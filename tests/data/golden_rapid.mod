@@ -1,7 +1,7 @@
 MODULE cut_skin_outer
   ! Written by kerfpath for IRB 4600-60/2.05 (abb_irb4600_60_205).
   ! Complete the load of the tool: mass -1 stands for not known.
-  ! The work object is the part in the robot's base, with the world frame at that base.
+  ! The work object is the part in the robot's base, which is the world's, too.
   ! Moves through the air have not been checked for collisions.
   ! A stop does not switch the laser off: the safety circuit of the cell has to.
   PERS tooldata tLaser:=[TRUE,[[51.3000,0.0000,248.7000],[0.95371695,0.00000000,0.30070580,0.00000000]],[-1,[0,0,0],[1,0,0,0],0,0,0]];

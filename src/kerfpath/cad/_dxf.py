@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import logging
 from collections import Counter
 from collections.abc import Iterable, Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass, field
 from io import BytesIO
 from pathlib import Path
@@ -28,11 +30,12 @@ from kerfpath._arrays import Array
 from kerfpath.cad._chains import Look, loops_in
 from kerfpath.cad._curves import Arc, Curve, Line, Spline
 from kerfpath.cad._part import Part
-from kerfpath.cad._units import UNITS_MM
+from kerfpath.cad._units import LARGEST, UNITS_MM
 from kerfpath.errors import InputError
 
 __all__ = ["read_dxf"]
 
+logger = logging.getLogger("ezdxf")
 INSUNITS = {
     1: "in", 2: "ft", 4: "mm", 5: "cm", 6: "m", 7: "km", 9: "mil", 13: "um", 14: "dm",
 }  # fmt: skip
@@ -47,9 +50,9 @@ MOST = 200_000
 """Curves in a drawing; more is a slip in the rows and columns of a block."""
 FLAT = 1e-6
 """How far (mm) a curve may leave the drawing plane: what writers round to."""
-LARGEST = 1e7
-"""No drawing reaches further than this, mm."""
-DAMAGED = (DXFError, ArithmeticError, AttributeError, LookupError, TypeError, ValueError)
+DAMAGED = (
+    DXFError, ArithmeticError, AssertionError, AttributeError, LookupError, TypeError, ValueError,
+)  # fmt: skip
 """What ezdxf and splines raise on values that are none, and on structures that are torn."""
 
 
@@ -63,7 +66,7 @@ def read_dxf(path: Path, content: bytes, unit: str | None, gap: float) -> Part:
         known.
     """
     try:
-        document, repaired = _document(content)
+        document, repairs = _document(content)
         insunits = int(document.header.get("$INSUNITS", 0))
     except DAMAGED as error:
         reason = " ".join(str(error).split()) or type(error).__name__
@@ -81,11 +84,12 @@ def read_dxf(path: Path, content: bytes, unit: str | None, gap: float) -> Part:
         notes.append(f"unit {declared} taken from $INSUNITS, which is no more than a hint: check")
     elif declared and declared != unit:
         notes.append(f"unit {unit} as asked; $INSUNITS says {declared}")
-    if repaired:
-        notes.append(f"{repaired} faults of the file's structure repaired")
+    if repairs:
+        notes.append(f"{len(repairs)} faults of the file repaired, the first: {repairs[0]}")
     sheet = _Sheet(document, UNITS_MM[unit or declared])
     try:
-        sheet.add(document.modelspace())
+        with np.errstate(all="ignore"):  # ezdxf divides by lengths that may be 0
+            sheet.add(document.modelspace())
     except InputError as error:
         raise InputError(f"{path}: {error}") from None
     except DAMAGED as error:
@@ -94,14 +98,31 @@ def read_dxf(path: Path, content: bytes, unit: str | None, gap: float) -> Part:
     return loops_in(path, unit or declared, sheet.curves, gap=gap, notes=notes + sheet.notes())
 
 
-def _document(content: bytes) -> tuple[Drawing, int]:
-    """Return the drawing and how many faults were repaired in reading it."""
+def _document(content: bytes) -> tuple[Drawing, list[str]]:
+    """Return the drawing and what was repaired in reading it."""
     if b"AutoCAD Binary DXF" in content[:22]:
         raise InputError("a binary DXF; save it as text")
     if b"SECTION" not in content[:4096]:
         raise DXFError(f"expected SECTION at its start, got {content[:32]!r}")
-    document, auditor = recover.read(BytesIO(content))
-    return document, len(auditor.fixes) + len(auditor.errors)
+    with _overheard() as said:
+        document, auditor = recover.read(BytesIO(content))
+    faults = [*said, *(fault.message for fault in (*auditor.fixes, *auditor.errors))]
+    return document, [" ".join(fault.split())[:200] for fault in faults]
+
+
+@contextmanager
+def _overheard() -> Iterator[list[str]]:
+    """Give what ezdxf logs about faults, which would go to the terminal otherwise."""
+    said: list[str] = []
+    handler = logging.Handler(logging.WARNING)
+    handler.emit = lambda record: said.append(record.getMessage())  # type: ignore[method-assign]
+    propagates, logger.propagate = logger.propagate, False
+    logger.addHandler(handler)
+    try:
+        yield said
+    finally:
+        logger.removeHandler(handler)
+        logger.propagate = propagates
 
 
 @dataclass

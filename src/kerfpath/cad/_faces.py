@@ -48,11 +48,15 @@ class NamedFace:
         As the file says, "" if it does not.
     component : str
         The part of an assembly that it belongs to, "" if there is only one.
+    layer, colour : str
+        As the file says, "" if it does not.
     """
 
     face: TopoDS_Face
     name: str = ""
     component: str = ""
+    layer: str = ""
+    colour: str = ""
 
 
 def part_of(
@@ -73,11 +77,12 @@ def part_of(
     loops: list[Loop] = []
     for skin, name in zip(skins, skin_names, strict=True):
         if name:
-            loops += _named(name, "skin", skin.side, skin.loops(found), gap)
+            look = _look([faces[f] for f in skin.faces])
+            loops += _named(name, "skin", skin.side, skin.loops(found), gap, look)
     side_of = {f: skin.side for skin in skins for f in skin.faces}
     for f, (name, named) in enumerate(zip(names, faces, strict=True)):
         surface = SURFACES[BRepAdaptor_Surface(named.face).GetType()]
-        made = _named(name, surface, side_of[f], found[f], gap)
+        made = _named(name, surface, side_of[f], found[f], gap, _look([named]))
         loops += [replace(loop, skin=piece_of[f]) for loop in made]
     return Part(
         path=path,
@@ -91,7 +96,15 @@ def part_of(
     )
 
 
-def _named(name: str, surface: str, side: Side, found: list[FaceLoop], gap: float) -> list[Loop]:
+def _look(faces: Sequence[NamedFace]) -> tuple[str, str]:
+    """Return the layer and the colour that all of the faces have, "" where they differ."""
+    layers, colours = {named.layer for named in faces}, {named.colour for named in faces}
+    return layers.pop() if len(layers) == 1 else "", colours.pop() if len(colours) == 1 else ""
+
+
+def _named(
+    name: str, surface: str, side: Side, found: list[FaceLoop], gap: float, look: tuple[str, str]
+) -> list[Loop]:
     """Return the loops of one face or skin, outer before inner, numbered by their places."""
     loops = []
     for kind in get_args(Kind):
@@ -99,8 +112,9 @@ def _named(name: str, surface: str, side: Side, found: list[FaceLoop], gap: floa
         alone, stem = ("outer", "outer") if kind == "outer" else (None, "hole")
         for last, trace in numbered(traces, stem, alone=alone).items():
             made = loop_of(
-                name=f"{name}/{last}", face=name, kind=kind, trace=trace, surface=surface, gap=gap
-            )
+                name=f"{name}/{last}", face=name, kind=kind, trace=trace, surface=surface, gap=gap,
+                layer=look[0], colour=look[1],
+            )  # fmt: skip
             loops.append(replace(made, side=side))
     return loops
 

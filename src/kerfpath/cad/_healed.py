@@ -60,10 +60,9 @@ class HealedSurface:
             at, flat = self._points[place], self._normals[place]
             foot = point - ((point - at) @ flat) * flat
             way = point - on
-            ended = (
-                np.linalg.norm(way - (way @ normal) * normal) > BESIDE
-                or np.linalg.norm(on - foot) > ENDS * (far + STEP)
-            )
+            ended = np.linalg.norm(way - (way @ normal) * normal) > BESIDE or np.linalg.norm(
+                on - foot
+            ) > ENDS * (far + STEP)
             found[k], normals[k] = (foot, flat) if ended else (on, normal)
         return found * MM, normals
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from itertools import groupby, zip_longest
 from pathlib import Path
 
 from OCP.BRepBuilderAPI import BRepBuilderAPI_Transform
@@ -24,7 +25,7 @@ __all__ = ["read_iges"]
 FLAGS = {1: "in", 2: "mm", 4: "ft", 6: "m", 7: "km", 8: "mil", 9: "um", 10: "cm"}
 """Units by the flag of the global section (IGES 5.3, table 2)."""
 WIDTH = 80
-"""Columns of a line; the 73rd names its section."""
+"""Columns of a line; the 73rd names its section, the rest number it there."""
 
 
 def read_iges(path: Path, content: bytes, unit: str | None, gap: float) -> Part:
@@ -42,26 +43,39 @@ def read_iges(path: Path, content: bytes, unit: str | None, gap: float) -> Part:
 
 
 def _require_whole(path: Path, content: bytes) -> None:
-    lines = content.splitlines()
-    sections = [line[72:73].decode("ascii", "replace") for line in lines if line.strip()]
-    if sections[0] != "S":
+    lines = [line for line in content.splitlines() if line.strip()]
+    marks = [line[72:WIDTH].decode("ascii", "replace").replace(" ", "0") for line in lines]
+    if marks[0][:1] != "S":
         raise InputError(
             f"{path}: not an IGES file: expected S in column 73 of its first line, "
-            f"got {sections[0]!r}; export the part as IGES"
+            f"got {marks[0][:1]!r}; export the part as IGES"
         )
-    last = next(line for line in reversed(lines) if line.strip()).decode("ascii", "replace")
+    last = lines[-1].decode("ascii", "replace")
     told = re.match(r"S\s*(\d+)G\s*(\d+)D\s*(\d+)P\s*(\d+)", last)
-    if sections[-1] != "T" or told is None:
+    if marks[-1][:1] != "T" or told is None:
         raise InputError(
             f"{path}: the file is truncated: expected a line T at its end, got {last[:32]!r}; "
             "copy or export it again"
         )
-    for section, count in zip("SGDP", told.groups(), strict=True):
-        if sections.count(section) != int(count):
+    # OCCT may crash on lines that are missing or in another order.
+    counts = zip("SGDPT", (*map(int, told.groups()), 1), strict=True)
+    due = (f"{section}{k:07}" for section, count in counts for k in range(1, count + 1))
+    for line, (want, got) in enumerate(zip_longest(due, marks), start=1):
+        if got != want:
             raise InputError(
-                f"{path}: the file is damaged: expected {int(count)} lines in section {section}, "
-                f"got {sections.count(section)}; copy or export it again"
+                f"{path}: the file is damaged: expected {want} in columns 73 to {WIDTH} of line "
+                f"{line}, got {got or 'nothing'}; copy or export it again"
             )
+
+    # Columns 65 to 72 of the parameters tell the directory entry that each line belongs to.
+    owners = [line[64:72].strip() for line in lines if line[72:73] == b"P"]
+    entries = [int(owner) if owner.isdigit() else 0 for owner, _ in groupby(owners)]
+    known = range(1, int(told[3]) + 1, 2)
+    if len(set(entries)) < len(entries) or not all(entry in known for entry in entries):
+        raise InputError(
+            f"{path}: the file is damaged: parameters of section P belong to no entity, or are "
+            "scattered; copy or export it again"
+        )
 
 
 def _read(path: Path, unit: str | None, gap: float) -> Part:

@@ -21,6 +21,7 @@ from OCP.TopoDS import TopoDS, TopoDS_Edge, TopoDS_Face, TopoDS_Iterator, TopoDS
 
 from kerfpath._arrays import Array
 from kerfpath.cad._sample import Chain
+from kerfpath.cad._units import LARGEST
 from kerfpath.errors import InputError
 
 __all__ = ["FaceLoop", "OrientedEdge", "bounds_of", "chained", "loops_of"]
@@ -30,8 +31,6 @@ FORWARD, REVERSED = TopAbs_Orientation.TopAbs_FORWARD, TopAbs_Orientation.TopAbs
 SINGULAR = 1e-9
 """Sine of the angle between the surface's two directions below which they leave no normal, as at
 a pole or the tip of a cone."""
-LARGEST = 1e7
-"""No part reaches further than this, mm; a damaged number or a wrong unit soon makes it so."""
 NUDGE = 1e-4
 """How far from such a point the normal is taken, as a part of the edge."""
 

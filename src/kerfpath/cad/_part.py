@@ -13,10 +13,12 @@ from numpy.typing import ArrayLike
 
 from kerfpath._arrays import Array, Ints, floats, freeze, scalar
 from kerfpath.cad._crossing import crossing
+from kerfpath.cad._departure import ON_CURVE, Departure, departure
 from kerfpath.cad._healed import HealedSurface
 from kerfpath.cad._loops import OrientedEdge
-from kerfpath.cad._sample import Chain, Trace
-from kerfpath.cad._units import MM
+from kerfpath.cad._round import diameter
+from kerfpath.cad._sample import Chain, Trace, distance
+from kerfpath.cad._units import LARGEST, MM
 from kerfpath.contour import Contour
 from kerfpath.errors import InputError
 from kerfpath.operations import Ribbon, Surface
@@ -25,13 +27,6 @@ __all__ = ["Kind", "Loop", "Part", "Side", "loop_of", "numbered"]
 
 Kind = Literal["outer", "inner", "open"]
 Side = Literal["outer", "inner", "edge", ""]
-
-ROUND = 5e-5
-"""How far (m) a loop may stray from a circle and still be a round hole."""
-FLAT = 0.1
-"""How far a round hole may stray from its mean plane, as a part of its diameter: one drilled into a
-curved sheet does."""
-
 
 TOUCH = 1e-5
 """Stretches of one loop that come nearer to each other than this (m) cross or touch."""
@@ -70,7 +65,8 @@ class Loop:
     skin : str
         Of the loop of a face that is a piece of a skin: the skin's name.
     layer, colour : str
-        In a DXF: where and how it is drawn (red, ..., white, aci30 or #ff8000).
+        In a DXF and of a STEP's face: where and how it is drawn (red, ..., white, #ff8000, aci30),
+        "" where that is not said, or not the same all over a skin.
     """
 
     name: str
@@ -190,7 +186,7 @@ class Part:
         length : (float, float) m
             Their length, likewise.
         layer, colour : str
-            As drawn in a DXF.
+            As drawn in a DXF or STEP.
         near : (3,) m
             Of all the others that fit, the one that passes this point most closely.
 
@@ -219,7 +215,7 @@ class Part:
             )
         if near is not None:
             point = floats(near, "near", (3,)) / MM
-            found = [min(found, key=lambda loop: _distance(loop._trace, point))]
+            found = [min(found, key=lambda loop: distance(loop._trace, point))]
         return tuple(found)
 
     def contour(
@@ -273,6 +269,34 @@ class Part:
             )
         return contour
 
+    def departure(self, name: str, contour: Contour, *, tolerance: float = ON_CURVE) -> Departure:
+        """Return how far the nodes of a contour leave the loop called `name`, at most.
+
+        Measured against the CAD curve itself, between the nodes, not against samples of it; of a
+        table, which knows nothing between its points, against the lines through them.
+
+        Parameters
+        ----------
+        name : str
+            Of one of the part's loops.
+        contour : Contour
+            Nodes on that loop or a part of it: begun and sampled anyhow, either way round. Its
+            leads and loops in the scrap are not measured.
+        tolerance : float m
+            How far a node may lie off the curve, besides half the loop's largest gap.
+
+        Raises
+        ------
+        InputError
+            No such loop, or a contour that does not lie on it (says where).
+        """
+        loop = self.loop(name)
+        beside = scalar(tolerance, "tolerance", unit="m", above=0.0) + loop.largest_gap / 2
+        try:
+            return departure(loop._trace, contour, beside)
+        except InputError as error:
+            raise InputError(f"{self.path}: loop {name!r}: {error}") from None
+
     def surface(self, name: str) -> Surface:
         """Return the surface around a loop, healed, for leads (see `kerfpath.operations`).
 
@@ -317,20 +341,32 @@ def loop_of(
     layer: str = "",
     colour: str = "",
 ) -> Loop:
-    """Return the loop along `trace`, measured; it is closed where no gap (m) is larger."""
+    """Return the loop along `trace`, measured; it is closed where no gap (m) is larger.
+
+    Raises
+    ------
+    InputError
+        A trace that is longer or reaches further than any part does.
+    """
     largest_gap = float(trace.gaps.max(initial=0.0)) * MM
+    length, box = float(trace.lengths.sum()), trace.bounds()
+    if not (length <= LARGEST and (np.abs(box) <= LARGEST).all()):
+        raise InputError(
+            f"loop {name!r} reaches further than {LARGEST / 1e6:g} km; the file is damaged, or its "
+            "unit is wrong"
+        )
     return Loop(
         name=name,
         face=face,
         kind=kind,
         surface=surface,
-        length=float(trace.lengths.sum()) * MM,
-        bounding_box=freeze(trace.bounds() * MM),
+        length=length * MM,
+        bounding_box=freeze(box * MM),
         edges=len(trace.lengths),
         shortest_edge=float(trace.lengths.min()) * MM,
         largest_gap=largest_gap,
         closed=kind != "open" and largest_gap <= gap,
-        diameter=None if kind == "open" else _diameter(trace.around * MM),
+        diameter=None if kind == "open" else diameter(trace.around * MM),
         layer=layer,
         colour=colour,
         _trace=trace,
@@ -361,27 +397,3 @@ def _range(value: tuple[float, float] | None, name: str) -> tuple[float, float] 
 def _within(value: float | None, bounds: tuple[float, float] | None) -> bool:
     # A nanometre of leave: a hole of 10 mm measures 9.9999999996 mm.
     return bounds is None or (value is not None and bounds[0] - 1e-9 <= value <= bounds[1] + 1e-9)
-
-
-def _distance(trace: Trace, point: Array) -> float:
-    """Return the distance (mm) of `point` from the chords through the points around a trace."""
-    p = trace.around
-    d = np.roll(p, -1, axis=0) - p
-    along = ((point - p) * d).sum(1) / np.maximum((d * d).sum(1), np.finfo(float).tiny)
-    off = np.linalg.norm(p + np.clip(along, 0, 1)[:, None] * d - point, axis=1)
-    return float((off if trace.gaps.size == len(trace.lengths) else off[:-1]).min())
-
-
-def _diameter(points: Array) -> float | None:
-    """Return the diameter (m) of the circle through `points` (K, 3) m, None if they are on none."""
-    centred = points - points.mean(axis=0)
-    axes = np.linalg.svd(centred, full_matrices=False)[2]
-    x, y, height = (centred @ axes.T).T
-    # A circle about (a, b): x^2 + y^2 = 2 a x + 2 b y + c, linear in its three unknowns.
-    a, b, c = np.linalg.lstsq(
-        np.stack([2 * x, 2 * y, np.ones_like(x)], axis=1), x**2 + y**2, rcond=None
-    )[0]
-    radius = float(np.sqrt(max(c + a**2 + b**2, 0.0)))
-    off = np.abs(np.hypot(x - a, y - b) - radius).max()
-    is_round = off <= min(ROUND, radius / 20) and np.ptp(height) <= FLAT * 2 * radius
-    return 2 * radius if is_round else None

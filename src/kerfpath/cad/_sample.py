@@ -11,9 +11,10 @@ from typing import Generic, Protocol, TypeVar
 import numpy as np
 
 from kerfpath._arrays import Array
+from kerfpath.contour import Contour
 from kerfpath.errors import InputError
 
-__all__ = ["Chain", "Edge", "Points", "Trace"]
+__all__ = ["Chain", "Curve", "Edge", "Points", "Polyline", "Trace", "off_chord", "sampled"]
 
 FIRST_CELLS = 4
 """Cells per smooth stretch to begin with: one could hide an S whose middle lies on its chord."""
@@ -27,8 +28,18 @@ AROUND = 24
 """Points on each edge for what need not be exact: middles, and whether a loop is round."""
 
 
-class Edge(Protocol):
+class Curve(Protocol):
     """A curve with normals, in the direction of travel; lengths in mm."""
+
+    def breaks(self) -> Array:
+        """Return the parameters, in the direction of travel, between which it is smooth."""
+
+    def evaluate(self, t: Array) -> tuple[Array, Array]:
+        """Return points (K, 3) mm and outward unit normals (K, 3) at parameters `t` (K,)."""
+
+
+class Edge(Curve, Protocol):
+    """A curve of a drawing, and its extent."""
 
     @property
     def start(self) -> float:
@@ -49,18 +60,20 @@ class Edge(Protocol):
     def bounds(self) -> Array:
         """Return the least and greatest coordinates (2, 3) mm."""
 
-    def breaks(self) -> Array:
-        """Return the parameters, in the direction of travel, between which it is smooth."""
-
-    def evaluate(self, t: Array) -> tuple[Array, Array]:
-        """Return points (K, 3) mm and outward unit normals (K, 3) at parameters `t` (K,)."""
-
 
 E = TypeVar("E", bound=Edge)
 
 
 class Trace(Protocol):
     """What a loop runs along."""
+
+    @property
+    def curves(self) -> Sequence[Curve]:
+        """What it is made of, in the order of travel."""
+
+    @property
+    def is_closed(self) -> bool:
+        """Whether the last of them ends where the first starts."""
 
     @property
     def lengths(self) -> Array:
@@ -108,6 +121,11 @@ class Chain(Generic[E]):
     is_closed: bool = True
     next_end: str = ""
 
+    @property
+    def curves(self) -> Sequence[Curve]:
+        """Its edges."""
+        return self.edges
+
     @cached_property
     def lengths(self) -> Array:
         """Length (E,) of each edge, mm."""
@@ -148,17 +166,39 @@ class Chain(Generic[E]):
 
         The end of an edge and the start of the next become one node, halfway.
         """
-        sampled = [_edge(edge, chord_tolerance, axis_tolerance) for edge in self.edges]
+        each = [sampled(edge, chord_tolerance, axis_tolerance)[1:] for edge in self.edges]
         points, normals = [], []
-        for (before_p, before_n), (p, n) in zip(sampled[-1:] + sampled[:-1], sampled, strict=True):
+        for (before_p, before_n), (p, n) in zip(each[-1:] + each[:-1], each, strict=True):
             joint = before_n[-1] + n[0]
             points += [(before_p[-1:] + p[:1]) / 2, p[1:-1]]
             normals += [(joint / np.linalg.norm(joint))[None], n[1:-1]]
         if not self.is_closed:
-            points[0], normals[0] = sampled[0][0][:1], sampled[0][1][:1]
-            points.append(sampled[-1][0][-1:])
-            normals.append(sampled[-1][1][-1:])
+            points[0], normals[0] = each[0][0][:1], each[0][1][:1]
+            points.append(each[-1][0][-1:])
+            normals.append(each[-1][1][-1:])
         return np.vstack(points), np.vstack(normals)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Polyline:
+    """The lines through the nodes of `line`, the axis turning evenly along each.
+
+    Parameters
+    ----------
+    line : Contour
+        In mm; its `s`, of any unit, is the parameter.
+    """
+
+    line: Contour
+
+    def breaks(self) -> Array:
+        """Return the parameters of the nodes."""
+        return self.line.s
+
+    def evaluate(self, t: Array) -> tuple[Array, Array]:
+        """Return points (K, 3) mm and outward unit normals (K, 3) at parameters `t` (K,)."""
+        points, axes = self.line.at(t)
+        return points, -axes
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -174,6 +214,11 @@ class Points:
         """Length of each segment, mm."""
         points = np.vstack([self.points, self.points[:1]]) if self.is_closed else self.points
         return np.asarray(np.linalg.norm(np.diff(points, axis=0), axis=1))
+
+    @cached_property
+    def curves(self) -> Sequence[Curve]:
+        """The lines through them."""
+        return [Polyline(line=Contour(self.points, -self.normals, closed=self.is_closed))]
 
     @property
     def gaps(self) -> Array:
@@ -204,8 +249,13 @@ class Points:
         return self.points, self.normals
 
 
-def _edge(edge: Edge, chord_tolerance: float, axis_tolerance: float) -> tuple[Array, Array]:
-    """Return points and normals along one edge, both ends included, by halving cells."""
+def sampled(
+    edge: Curve, chord_tolerance: float, axis_tolerance: float
+) -> tuple[Array, Array, Array]:
+    """Return parameters, points and normals along one edge, both ends included, by halving cells.
+
+    Parameters and raises as `Trace.sample`.
+    """
     stretch = edge.breaks()
     t = np.concatenate(
         [
@@ -220,7 +270,7 @@ def _edge(edge: Edge, chord_tolerance: float, axis_tolerance: float) -> tuple[Ar
         mid_points, mid_normals = edge.evaluate(middle)
         p0, p1 = points[open_cells], points[open_cells + 1]
         chord = np.linalg.norm(p1 - p0, axis=1)
-        coarse = _off_chord(p0, p1, mid_points) > MARGIN * chord_tolerance
+        coarse = off_chord(p0, p1, mid_points) > MARGIN * chord_tolerance
         coarse |= _angle(normals[open_cells], normals[open_cells + 1]) > axis_tolerance
         coarse &= chord > SHORTEST
         split = open_cells[coarse]
@@ -234,10 +284,10 @@ def _edge(edge: Edge, chord_tolerance: float, axis_tolerance: float) -> tuple[Ar
             )
         left = split + np.arange(split.size)
         open_cells = np.sort(np.concatenate([left, left + 1]))
-    return points, normals
+    return t, points, normals
 
 
-def _off_chord(p0: Array, p1: Array, p: Array) -> Array:
+def off_chord(p0: Array, p1: Array, p: Array) -> Array:
     """Return the distances of `p` from the segments p0 p1, row by row."""
     d = p1 - p0
     along = ((p - p0) * d).sum(1) / np.maximum((d * d).sum(1), np.finfo(float).tiny)
@@ -247,3 +297,12 @@ def _off_chord(p0: Array, p1: Array, p: Array) -> Array:
 def _angle(n0: Array, n1: Array) -> Array:
     """Return the angles between unit vectors, exact also where they are tiny."""
     return np.asarray(2 * np.arcsin(np.minimum(np.linalg.norm(n1 - n0, axis=1) / 2, 1.0)))
+
+
+def distance(trace: Trace, point: Array) -> float:
+    """Return the distance (mm) of `point` from the chords through the points around a trace."""
+    p = trace.around
+    d = np.roll(p, -1, axis=0) - p
+    along = ((point - p) * d).sum(1) / np.maximum((d * d).sum(1), np.finfo(float).tiny)
+    off = np.linalg.norm(p + np.clip(along, 0, 1)[:, None] * d - point, axis=1)
+    return float((off if trace.gaps.size == len(trace.lengths) else off[:-1]).min())

@@ -176,7 +176,7 @@ def _sides(
         for f in numbers:
             props = GProp_GProps()
             BRepGProp.SurfaceProperties_s(faces[f], props, ACCURACY)
-            areas[g] += props.Mass()
+            areas[g] += abs(props.Mass())  # a damaged face may count as less than nothing
             for k, (_, loop) in enumerate(found[f]):
                 vector[g] += _vector_area(loop.around)
                 around.append(loop.around)

@@ -3,19 +3,25 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
 from OCP.collections import Sequence_TCollection_AsciiString
 from OCP.IFSelect import IFSelect_ReturnStatus
 from OCP.STEPControl import STEPControl_Reader
+from OCP.StepGeom import StepGeom_Curve, StepGeom_Pcurve
 from OCP.StepRepr import StepRepr_NextAssemblyUsageOccurrence, StepRepr_RepresentationItem
 from OCP.TopAbs import TopAbs_ShapeEnum
 from OCP.TopoDS import TopoDS, TopoDS_Iterator, TopoDS_Shape
 
+from kerfpath._arrays import Array
 from kerfpath.cad._faces import NamedFace, unique
 from kerfpath.cad._part import Part
+from kerfpath.cad._part21 import points_in, sound_data
 from kerfpath.cad._shape import occt, part_of_shape
-from kerfpath.cad._units import UNITS_MM
+from kerfpath.cad._styles import styles_in
+from kerfpath.cad._units import LARGEST, UNITS_MM
 from kerfpath.errors import InputError
 
 __all__ = ["read_step"]
@@ -48,7 +54,7 @@ def read_step(path: Path, content: bytes, unit: str | None, gap: float) -> Part:
     """
     _require_whole(path, content)
     with occt(path):
-        return _read(path, unit, gap)
+        return _read(path, sound_data(content), unit, gap)
 
 
 def _require_whole(path: Path, text: bytes) -> None:
@@ -64,18 +70,19 @@ def _require_whole(path: Path, text: bytes) -> None:
         )
 
 
-def _read(path: Path, unit: str | None, gap: float) -> Part:
+def _read(path: Path, data: bytes, unit: str | None, gap: float) -> Part:
     reader = STEPControl_Reader()
     if reader.ReadFile(str(path)) != IFSelect_ReturnStatus.IFSelect_RetDone:
         raise InputError(f"{path}: the file cannot be parsed; export the part as STEP again")
-    _require_sound(path, reader)
+    has_styles = _require_sound(path, reader)
     header = _header_unit(reader)
     if unit is None and header not in UNITS_MM:
         raise InputError(
             f"{path}: the header declares {header or 'no length unit'}, expected one of "
             f"{', '.join(UNITS_MM)}; say what the numbers mean with unit="
         )
-    notes = []
+    _require_near(points_in(data) * UNITS_MM[unit or header])
+    notes = [] if has_styles else ["colours and layers are damaged and not read"]
     if unit is not None and unit != header:
         # OCCT scales by the header's unit over this one: what it takes for mm is then `unit`.
         reader.SetSystemLengthUnit(UNITS_MM.get(header, 1.0) / UNITS_MM[unit])
@@ -84,39 +91,43 @@ def _read(path: Path, unit: str | None, gap: float) -> Part:
     shape = reader.OneShape()
     if shape is None or shape.IsNull():
         raise InputError(f"{path}: the file holds no face; export the part as a solid or a surface")
-    return part_of_shape(
-        path, unit or header, shape, list(_faces(reader, shape)), gap=gap, notes=notes
-    )
+    faces = list(_faces(reader, shape, has_styles=has_styles))
+    return part_of_shape(path, unit or header, shape, faces, gap=gap, notes=notes)
 
 
-def _faces(reader: STEPControl_Reader, shape: TopoDS_Shape) -> Iterator[NamedFace]:
-    """Yield every face with its name; in an assembly with that of its component, numbered."""
-    components: list[tuple[str, list[TopoDS_Shape]]] = []
+def _faces(
+    reader: STEPControl_Reader, shape: TopoDS_Shape, *, has_styles: bool
+) -> Iterator[NamedFace]:
+    """Yield every face with its name; in an assembly with that of its component, numbered.
 
-    def walk(shape: TopoDS_Shape, component: str, into: list[TopoDS_Shape]) -> None:
+    A face has the layer and the colour that it is given, else those of its shell, solid or
+    component.
+    """
+    transferred = reader.WS().TransferReader()
+    layers, colours = styles_in(reader.WS().Model()) if has_styles else ({}, {})
+    components: list[tuple[str, list[NamedFace]]] = [("", [])]
+
+    def walk(shape: TopoDS_Shape, into: list[NamedFace], layer: str, colour: str) -> None:
+        entity = transferred.EntityFromShapeResult(shape, -1)
+        layer, colour = layers.get(entity, layer), colours.get(entity, colour)
+        if shape.ShapeType() == TopAbs_ShapeEnum.TopAbs_FACE:
+            face, name = TopoDS.Face(shape), _name(entity)
+            into.append(NamedFace(face=face, name=name, layer=layer, colour=colour))
+            return
+        if isinstance(entity, StepRepr_NextAssemblyUsageOccurrence):
+            into = []
+            components.append((_product(entity), into))
         children = TopoDS_Iterator(shape)
         while children.More():
-            child = children.Value()
-            entity = reader.WS().TransferReader().EntityFromShapeResult(child, -1)
-            if child.ShapeType() == TopAbs_ShapeEnum.TopAbs_FACE:
-                into.append(child)
-            elif isinstance(entity, StepRepr_NextAssemblyUsageOccurrence):
-                components.append((_product(entity), []))
-                walk(child, *components[-1])
-            else:
-                walk(child, component, into)
+            walk(children.Value(), into, layer, colour)
             children.Next()
 
-    components.append(("", []))
-    if shape.ShapeType() == TopAbs_ShapeEnum.TopAbs_FACE:
-        components[0][1].append(shape)
-    walk(shape, *components[0])
+    walk(shape, components[0][1], "", "")
     components = [(name, faces) for name, faces in components if faces]
     names = unique([name for name, _ in components])
     for name, (_, faces) in zip(names, components, strict=True):
-        component = name if len(components) > 1 else ""
         for face in faces:
-            yield NamedFace(face=TopoDS.Face(face), name=_name(reader, face), component=component)
+            yield replace(face, component=name if len(components) > 1 else "")
 
 
 def _product(used: StepRepr_NextAssemblyUsageOccurrence) -> str:
@@ -128,8 +139,9 @@ def _product(used: StepRepr_NextAssemblyUsageOccurrence) -> str:
     return (name.ToCString().strip() if name is not None else "") or "component"
 
 
-def _require_sound(path: Path, reader: STEPControl_Reader) -> None:
-    """Refuse broken syntax and broken geometry, on which OCCT's transfer may crash the process."""
+def _require_sound(path: Path, reader: STEPControl_Reader) -> bool:
+    """Refuse broken syntax and geometry, on which OCCT may crash; say if styles are sound."""
+    has_styles = True
     model, checks = reader.WS().Model(), reader.WS().ModelCheckList()
     checks.Start()
     while checks.More():
@@ -140,11 +152,32 @@ def _require_sound(path: Path, reader: STEPControl_Reader) -> None:
         where = ""
         if number:
             package, _, entity = type(model.Value(number)).__name__.partition("_")
-            if package not in ("StepGeom", "StepShape"):
+            has_styles &= package != "StepVisual"
+            if package not in ("StepGeom", "StepShape") and entity != "DefinitionalRepresentation":
                 continue
             where = f"{entity}: "
         reason = " ".join(check.CFail(1).split())
         raise InputError(f"{path}: the file is damaged ({where}{reason}); copy or export it again")
+    for number in range(1, model.NbEntities() + 1):
+        drawn = model.Value(number)
+        if isinstance(drawn, StepGeom_Pcurve):
+            items = drawn.ReferenceToCurve()
+            if not (items and items.NbItems() and isinstance(items.ItemsValue(1), StepGeom_Curve)):
+                raise InputError(
+                    f"{path}: the file is damaged (Pcurve: expected a curve); copy or export it "
+                    "again"
+                )
+    return has_styles
+
+
+def _require_near(points: Array) -> None:
+    """Refuse points (K, 3) mm that no part has: OCCT would spend minutes on curves through them."""
+    far = points[~(np.abs(points) <= LARGEST).all(axis=1)]
+    if len(far):
+        raise InputError(
+            f"a point lies at {far[0].tolist()} mm, further than {LARGEST / 1e6:g} km from the "
+            "origin; the file is damaged, or its unit is wrong"
+        )
 
 
 def _header_unit(reader: STEPControl_Reader) -> str:
@@ -155,9 +188,8 @@ def _header_unit(reader: STEPControl_Reader) -> str:
     return " and ".join(HEADER_UNITS.get(name, name) for name in names)
 
 
-def _name(reader: STEPControl_Reader, face: TopoDS_Shape) -> str:
-    """Return the name of the entity that `face` was read from, "" if it has none."""
-    entity = reader.WS().TransferReader().EntityFromShapeResult(face, -1)
+def _name(entity: object) -> str:
+    """Return the name of the entity that a face was read from, "" if it has none."""
     if not isinstance(entity, StepRepr_RepresentationItem) or entity.Name() is None:
         return ""
     name = entity.Name().ToCString().strip()

@@ -15,7 +15,7 @@ import numpy as np
 from kerfpath._arrays import Array, freeze
 from kerfpath.cad._part import Kind, Part, loop_of
 from kerfpath.cad._sample import Points
-from kerfpath.cad._units import MM, UNITS_MM
+from kerfpath.cad._units import LARGEST, MM, UNITS_MM
 from kerfpath.errors import InputError
 
 __all__ = ["read_table"]
@@ -40,8 +40,6 @@ FLIP = float(np.radians(90.0))
 """An axis that turns by more from one point to the next has flipped."""
 UNIT_QUATERNION = 1e-2
 """How far a quaternion's length may be from one: rounded digits pass, other columns fail."""
-LARGEST = 1e7
-"""No part reaches further than this, mm."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -4,12 +4,14 @@ from __future__ import annotations
 
 from kerfpath.errors import InputError
 
-__all__ = ["GAP", "MM", "UNITS_MM", "require_unit"]
+__all__ = ["GAP", "LARGEST", "MM", "UNITS_MM", "require_unit"]
 
 MM = 1e-3
 """OCCT works in mm, and so does this package; every length that leaves it is in m."""
 GAP = 5e-5
 """Distance (m) between the ends of two curves that a loop bridges unless told: half a kerf."""
+LARGEST = 1e7
+"""No drawing reaches further than this, mm; a damaged number or a wrong unit soon makes it so."""
 
 UNITS_MM = {
     "um": 1e-3,

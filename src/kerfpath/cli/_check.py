@@ -9,6 +9,7 @@ import numpy as np
 from rich.markup import escape
 
 from kerfpath.cell import Body, Capsule, Cell, Mesh
+from kerfpath.cli._drawing import drawing_entry
 from kerfpath.cli._show import out, print_json, table
 from kerfpath.job import Checked, collision_note
 
@@ -21,6 +22,7 @@ def show_check(checked: Checked, *, as_json: bool) -> None:
     if as_json:
         print_json(
             {
+                "drawing": drawing_entry(checked.part),
                 "robot": job.robot.id,
                 "joints": job.robot.joints,
                 "language": job.program.language,

@@ -8,6 +8,7 @@ from rich.markup import escape
 
 from kerfpath.cad import Loop, Part
 from kerfpath.cad import read as read_drawing
+from kerfpath.cli._drawing import drawing_entry, show_drawing, summary
 from kerfpath.cli._show import busy, out, print_json, table
 from kerfpath.report import DrawnLoop, render_drawing
 
@@ -27,9 +28,7 @@ def list_contours(
     if as_json:
         print_json(_as_json(part, html))
         return
-    out.print(escape(f"{file}: {_summary(part)}"))
-    for note in part.notes:
-        out.print(escape(f"note: {note}"))
+    show_drawing(part)
     shown = part.loops if everything else main
     optional = [
         (head, key)
@@ -63,16 +62,6 @@ def list_contours(
         out.print(f"wrote {escape(str(html))}")
 
 
-def _summary(part: Part) -> str:
-    size = (part.bounding_box[1] - part.bounding_box[0]) * 1000
-    return (
-        f"{part.faces} faces, {len(part.loops)} loops, "
-        f"{' x '.join(f'{v:.1f}' for v in size)} mm (file in {part.unit}); "
-        f"largest gap {part.largest_gap * 1000:.4f} mm, "
-        f"shortest edge {part.shortest_edge * 1000:.4f} mm"
-    )
-
-
 def _page(part: Part, main: list[Loop]) -> str:
     loops = [
         DrawnLoop(
@@ -90,20 +79,13 @@ def _page(part: Part, main: list[Loop]) -> str:
     corners = " to ".join(
         " ".join(f"{v:.1f}" for v in (corner * 1000).round(1) + 0.0) for corner in part.bounding_box
     )
-    facts = [("File", str(part.path)), ("Holds", _summary(part)), ("Box", f"{corners} mm")]
+    facts = [("File", str(part.path)), ("Holds", summary(part)), ("Box", f"{corners} mm")]
     return render_drawing(part.path.name, loops, mesh=part.mesh(), facts=facts, notes=part.notes)
 
 
 def _as_json(part: Part, html: Path | None) -> dict[str, object]:
-    return {
-        "file": str(part.path),
+    return drawing_entry(part) | {
         "html": None if html is None else str(html),
-        "unit": part.unit,
-        "bounding_box_m": part.bounding_box.tolist(),
-        "faces": part.faces,
-        "largest_gap_m": part.largest_gap,
-        "shortest_edge_m": part.shortest_edge,
-        "notes": list(part.notes),
         "loops": [
             {
                 "name": loop.name,

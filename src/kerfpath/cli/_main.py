@@ -12,7 +12,7 @@ import typer
 from rich.markup import escape
 
 from kerfpath import __version__
-from kerfpath.cli._show import busy, errors, out, print_json, progress_bars
+from kerfpath.cli._show import busy, errors, out, progress_bars
 from kerfpath.errors import AuditFailed, KerfpathError, NoFeasiblePath
 
 __all__ = ["app", "main"]
@@ -112,13 +112,17 @@ def check(job: JobArgument, as_json: Json = False) -> None:
     Example: kerfpath check door.toml
     """
     from kerfpath.cli._check import show_check
+    from kerfpath.cli._drawing import drawing_of, show_drawing
     from kerfpath.job import check_job, read_job, warm_up
 
     read = read_job(job)
+    part = drawing_of(read)
+    if not as_json:
+        show_drawing(part)
     with busy("compiling the kernels, first run only"):
         warm_up()
     with busy("looking at the cell"):
-        checked = check_job(read)
+        checked = check_job(read, part)
     show_check(checked, as_json=as_json)
 
 
@@ -150,10 +154,18 @@ def speed(
 @app.command()
 def post(
     plan_file: PlanFileArgument,
-    language: Annotated[str, typer.Option(help="Robot language; known: rapid.")] = "rapid",
+    language: Annotated[str, typer.Option(help="Robot language.")] = "rapid",
     output: Annotated[
-        Path | None, typer.Option("-o", "--output", help="File to write; default: print it.")
+        Path | None,
+        typer.Option(
+            "-o",
+            "--output",
+            help="File to write, or folder of a program of several files; default: print it.",
+        ),
     ] = None,
+    strict: Annotated[
+        bool, typer.Option("--strict", help="Refuse what is only warned of otherwise.")
+    ] = False,
     as_json: Json = False,
 ) -> None:
     """Write the robot program of a plan, after auditing it again.
@@ -163,27 +175,9 @@ def post(
 
     Example: kerfpath post door/plan.json --language rapid -o door.mod
     """
-    from kerfpath.job import program_from_file
-    from kerfpath.post import write_program
+    from kerfpath.cli._post import write_post
 
-    text, warnings = program_from_file(plan_file, language)
-    if output is not None:
-        write_program(output, text)
-    if as_json:
-        print_json(
-            {
-                "language": language,
-                "file": None if output is None else str(output),
-                "text": text if output is None else None,
-                "notes": warnings,
-            }
-        )
-    elif output is None:
-        print(text, end="")
-    else:
-        for warning in warnings:
-            out.print(f"note: {escape(warning)}")
-        out.print(f"wrote {escape(str(output))}")
+    write_post(plan_file, language, output, strict=strict, as_json=as_json)
 
 
 @app.command()

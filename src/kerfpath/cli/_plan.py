@@ -11,6 +11,7 @@ import numpy as np
 import typer
 from rich.markup import escape
 
+from kerfpath.cli._drawing import drawing_entry, drawing_of, show_drawing
 from kerfpath.cli._show import busy, errors, out, print_json, progress_bars, table
 from kerfpath.job import (
     Cut,
@@ -40,16 +41,20 @@ def plan_job(job_file: Path, folder: Path, *, as_json: bool, draw_map: bool = Fa
     require_language(job)
     if draw_map:
         job = with_map(job)
+    part = drawing_of(job)
+    if not as_json:
+        show_drawing(part)
     with busy("compiling the kernels, first run only"):
         warm_up()
     with progress_bars() as progress:
-        outcome = run_job(job, progress=progress)
+        outcome = run_job(job, part, progress=progress)
     with busy("writing"):
         written = write_outcome(outcome, folder)
     if as_json:
         print_json(
             {
                 "passed": outcome.passed,
+                "drawing": drawing_entry(part),
                 "contours": [_cut_entry(cut) for cut in outcome.cuts],
                 "sequence": None if outcome.part is None else sequence_entry(outcome.part),
                 "files": [str(f) for f in written.files],
@@ -93,6 +98,7 @@ def _largest_tilt(cut: Cut) -> float | None:
 def _cut_entry(cut: Cut) -> dict[str, Any]:
     entry: dict[str, Any] = {"name": cut.task.name, "passed": cut.passed}
     entry |= {"length_m": cut.drawn.length, "nodes": len(cut.nodes), "speed_m_s": cut.task.speed}
+    entry["departure"] = None if cut.departure is None else asdict(cut.departure)
     if cut.plan is None:
         assert cut.broken is not None
         fastest = None if cut.fastest is None else cut.fastest.speed
@@ -125,8 +131,9 @@ def _show_cuts(cuts: Sequence[Cut]) -> None:
             str(len(cut.nodes)),
             f"{cut.task.speed * 60:g}",
         ]
+        sampling = _sampling(cut)
         if cut.plan is None:
-            rows.append([*row, *"-----", "no feasible path"])
+            rows.append([*row, *"-----", *sampling, "no feasible path"])
             continue
         criteria = cut.plan.criteria
         rows.append(
@@ -137,12 +144,34 @@ def _show_cuts(cuts: Sequence[Cut]) -> None:
                 f"{cut.plan.cost:.2f}",
                 f"{criteria.peak_velocity.max():.0%}",
                 f"{criteria.peak_acceleration.max():.0%}",
+                *sampling,
                 "passed" if cut.passed else "FAILED",
             ]
         )
-    columns = ["contour", "mm", "nodes", "m/min", "s", "grid", "cost", "vel", "acc", "audit"]
+    columns = ["contour", "mm", "nodes", "m/min", "s", "grid", "cost", "vel", "acc"]
+    columns += ["chord mm", "step deg", "audit"]
     table(columns, rows, numbers=columns[1:-1])
     out.print(
         "cost: what is minimised; grid: the best on the gamma grid, before the refinement; "
-        "vel, acc: highest share of a joint's velocity and acceleration limit"
+        "vel, acc: highest share of a joint's velocity and acceleration limit; chord: largest "
+        "distance of the CAD curve from the chords between nodes; step: largest turn of the tool "
+        "axis from node to node"
     )
+    found = [cut.departure for cut in cuts if cut.departure is not None]
+    loops = [each.path for each in found if each.path is not None]
+    if loops:
+        out.print(
+            "*: from the path as cut, which is not the drawn one; that was within "
+            f"{max(loop.chord_error for loop in loops) * 1e3:.4f} mm of the CAD curve"
+        )
+    if any(each.against == "points of the drawing" for each in found + loops):
+        out.print("where the drawing has points, the lines through them stand for the CAD curve")
+
+
+def _sampling(cut: Cut) -> list[str]:
+    """Return the chord error and the axis step of a cut's nodes."""
+    found = cut.departure
+    if found is None:
+        return ["-", "-"]
+    mark = "*" if found.path is not None else ""
+    return [f"{found.chord_error * 1e3:.4f}{mark}", f"{np.degrees(found.axis_step):.2f}"]

@@ -94,8 +94,10 @@ def audit_file(plan_file: Path, job_file: Path | None = None) -> Audited:
     return Audited(tables=tables, missing=file.missing, note=_note(file, cell, job_file))
 
 
-def program_from_file(plan_file: Path, language: str) -> tuple[str, list[str]]:
-    """Return the program of a plan.json in a language, and the warnings of its preflight.
+def program_from_file(
+    plan_file: Path, language: str, *, strict: bool = False
+) -> tuple[dict[str, str], list[str]]:
+    """Return the files of a plan.json's program in a language, and its preflight's warnings.
 
     Raises
     ------
@@ -119,7 +121,7 @@ def program_from_file(plan_file: Path, language: str) -> tuple[str, list[str]]:
                 raise AuditFailed(
                     f"no program: contour {p.name!r} fails its audit: {check.issue()}"
                 )
-    return program_of(file.plans, _options(file, language), file.moves)
+    return program_of(file.plans, _options(file, language), file.moves, strict=strict)
 
 
 def _options(file: PlanFile, language: str) -> ProgramOptions:

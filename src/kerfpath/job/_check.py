@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from kerfpath.cad import Part
 from kerfpath.cad import read as read_drawing
 from kerfpath.cell import Cell
 from kerfpath.job._cell import cell_of_job
@@ -47,22 +48,23 @@ class Start:
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Checked:
-    """A job that can be read, its cell if it has one, and in it the start of every contour."""
+    """A job that can be read, its part, its cell if it has one, and how every contour begins."""
 
     job: Job
+    part: Part
     cell: Cell | None
     starts: tuple[Start, ...]
 
 
-def check_job(job: Job) -> Checked:
-    """Return the cell of a job and how its contours begin in it.
+def check_job(job: Job, part: Part | None = None) -> Checked:
+    """Return the cell of a job and how its contours begin in it; `part` if it is read already.
 
     Raises
     ------
     InputError
         As `run_job`.
     """
-    part = read_drawing(job.part_file, unit=job.part_unit)
+    part = part or read_drawing(job.part_file, unit=job.part_unit)
     cell = cell_of_job(job, part)
     starts = []
     for task in job.tasks(part):
@@ -71,7 +73,7 @@ def check_job(job: Job) -> Checked:
         graph = layered_graph(first, job.robot, **job.graph_options)
         q = graph.q[: graph.start[1]]
         starts.append(_start(task.name, len(nodes), q, cell))
-    return Checked(job=job, cell=cell, starts=tuple(starts))
+    return Checked(job=job, part=part, cell=cell, starts=tuple(starts))
 
 
 def _start(name: str, nodes: int, q: np.ndarray, cell: Cell | None) -> Start:

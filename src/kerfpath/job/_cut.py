@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from kerfpath.auditor import Check
+from kerfpath.cad import Departure, Part, departure_from
 from kerfpath.contour import Contour
 from kerfpath.errors import NoFeasiblePath
 from kerfpath.graph import LayeredGraph
@@ -42,6 +43,8 @@ class Cut:
         The audit's table; empty without a plan.
     clearance : ClearanceMap or None
         How clear every pose is in the cell, where the job asks for the map.
+    departure : Departure or None
+        How far the nodes leave the CAD curve; measured once it is settled what is cut.
     """
 
     contour: str
@@ -55,6 +58,7 @@ class Cut:
     relaxations: Relaxations | None = None
     checks: tuple[Check, ...] = ()
     clearance: ClearanceMap | None = None
+    departure: Departure | None = None
 
     @property
     def passed(self) -> bool:
@@ -62,6 +66,24 @@ class Cut:
         return self.plan is not None and not any(
             c.level == "error" and not c.ok for c in self.checks
         )
+
+    def measured(self, part: Part, loop: Departure | None) -> Cut:
+        """Return the cut with the departure of its nodes.
+
+        Parameters
+        ----------
+        part : Part
+        loop : Departure or None
+            That of the loop as drawn, where operations moved it: the nodes are then measured from
+            the path as cut.
+        """
+        nodes = self.nodes if self.plan is None else self.plan.contour
+        found = (
+            part.departure(self.task.pick, nodes)
+            if loop is None
+            else departure_from(self.drawn, nodes, loop)
+        )
+        return replace(self, departure=found)
 
     @property
     def failure(self) -> str:

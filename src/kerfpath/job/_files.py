@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 
 from kerfpath.air import AirMove
+from kerfpath.cad import Departure
 from kerfpath.cell import Cell
 from kerfpath.errors import AuditFailed, InputError
 from kerfpath.job._planfile import broken_entry, plan_entry, plan_text
@@ -68,14 +69,16 @@ def write_outcome(outcome: Outcome, folder: Path) -> Written:
     job = outcome.job
     target = _program_file(job, folder)
     part, moves = outcome.part, () if outcome.part is None else outcome.part.moves
-    texts, refused = {}, None
+    texts: dict[Path, str] = {}
+    refused = None
     notes = [collision_note(outcome.cell, moves_too=bool(moves))]
     notes += [] if part is None else [order_note(part)]
     notes += [] if outcome.stuck is None else [f"The moves between contours: {outcome.stuck}"]
     notes += [f"The moves between contours: {c.issue()}" for c in outcome.air if not c.ok]
     if outcome.passed and target is not None:
         try:
-            texts[target], warnings = program_of(outcome.plans, job.program, moves)
+            program, warnings = program_of(outcome.plans, job.program, moves)
+            texts |= {folder / name: text for name, text in program.items()}
             notes += warnings
         except InputError as error:
             refused = error
@@ -171,9 +174,13 @@ def require_language(job: Job) -> None:
 
 
 def program_of(
-    plans: Sequence[Plan], options: ProgramOptions, moves: Sequence[AirMove] = ()
-) -> tuple[str, list[str]]:
-    """Return the text of the program that cuts `plans`, and the warnings of its preflight.
+    plans: Sequence[Plan],
+    options: ProgramOptions,
+    moves: Sequence[AirMove] = (),
+    *,
+    strict: bool = False,
+) -> tuple[dict[str, str], list[str]]:
+    """Return the files of the program that cuts `plans`, and the warnings of its preflight.
 
     Between them the robot moves as `moves` say; without any, straight to each.
 
@@ -196,17 +203,16 @@ def program_of(
         name=options.name,
         retract=options.retract,
         zone=options.zone,
-        laser_output=options.laser_output,
         lead_time=options.lead_time,
         pierce_time=options.pierce_time,
         approach_speed=options.approach_speed,
         air_speed=options.air_speed,
-        work_object=options.work_object,
-        tool_name=options.tool_name,
+        gas_lead=options.gas_lead,
+        arc_tolerance=options.arc_tolerance,
     )
-    text = post(program, options.language)
-    issues = preflight(program, options.language)
-    return text, [str(issue) for issue in issues if issue.level == "warning"]
+    written = post(program, options.language, options.settings, strict=strict)
+    issues = preflight(program, options.language, options.settings)
+    return written, [str(issue) for issue in issues if issue.level == "warning"]
 
 
 def trajectory_text(plans: Sequence[Plan], moves: Sequence[AirMove] = ()) -> str:
@@ -262,6 +268,7 @@ def report_text(outcome: Outcome, notes: Sequence[str]) -> str:
             failure=cut.failure,
             broken_at=None if cut.broken is None else cut.broken.node + 1,
             clearance=cut.clearance,
+            sampling=() if cut.departure is None else _sampling(cut.departure),
         )
         for cut in outcome.cuts
     ]
@@ -293,6 +300,31 @@ def report_text(outcome: Outcome, notes: Sequence[str]) -> str:
         notes=notes,
         job_text=job.path.read_text(encoding="utf-8-sig"),
     )
+
+
+def _sampling(found: Departure) -> list[tuple[str, str]]:
+    """Return how far the nodes leave what they sample, in words."""
+    against = {
+        "CAD curve": "the CAD curve",
+        "points of the drawing": "the lines through the points of the drawing, which tell no more",
+        "path as cut": "the path as cut, which is not the drawn one",
+    }
+    rows = [
+        ("Measured against", against[found.against]),
+        ("Largest chord error", f"{found.chord_error * 1e3:.4f} mm, after node {found.chord_node}"),
+        (
+            "Largest axis error between nodes",
+            f"{np.degrees(found.axis_error):.3f} deg, after node {found.axis_node}",
+        ),
+        (
+            "Largest axis step from node to node",
+            f"{np.degrees(found.axis_step):.3f} deg, after node {found.step_node}",
+        ),
+    ]
+    if (loop := found.path) is not None:
+        told = f"{loop.chord_error * 1e3:.4f} mm and {np.degrees(loop.axis_error):.3f} deg"
+        rows.append(("Drawn loop", f"within {told} of {against[loop.against]}"))
+    return rows
 
 
 def _row(values: object) -> str:

@@ -25,6 +25,7 @@ from kerfpath.job._tables import (
     SequenceTable,
 )
 from kerfpath.job._task import ContourTask, task_of
+from kerfpath.post import Settings
 from kerfpath.robots import Robot, postures_named
 
 __all__ = ["Job", "ProgramOptions", "audit_options", "program_options", "read_job"]
@@ -39,16 +40,16 @@ class ProgramOptions:
 
     Parameters
     ----------
-    language : {"rapid", "none"}
-        Robot language, or that no program is wanted.
+    language : str
+        Robot language, or "none".
     name : str
         Name of the module: letters, digits and _, a letter first.
     retract : float m
         How far the head backs off along the tool axis between contours.
     zone : float m
         How far from a node the robot may begin to turn towards the next.
-    laser_output : str
-        Digital output that switches the laser.
+    settings : Settings or None
+        Those of the language.
     lead_time : float s
         How long before the robot reaches a point the laser is switched for it.
     pierce_time : float s
@@ -57,21 +58,23 @@ class ProgramOptions:
         Along the tool axis before and after a contour.
     air_speed : float
         Share of the full speed of joint moves.
-    work_object, tool_name : str
-        Names of the part frame and the tool in the program.
+    arc_tolerance : float m or None
+        How near to the path circular moves stay; None: there are none.
+    gas_lead : float s or None
+        How long before the start the gas is switched on; None: not by the program.
     """
 
-    language: Literal["rapid", "none"]
+    language: str
     name: str
     retract: float
     zone: float
-    laser_output: str
+    settings: Settings | None
     lead_time: float
     pierce_time: float
     approach_speed: float
     air_speed: float
-    work_object: str
-    tool_name: str
+    arc_tolerance: float | None
+    gas_lead: float | None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -294,11 +297,11 @@ def program_options(table: ProgramTable, stem: str) -> ProgramOptions:
         name=table.name or stem[:_NAME_LENGTH],
         retract=table.retract_mm / 1000,
         zone=table.zone_mm / 1000,
-        laser_output=table.laser_output,
+        settings=table.settings(),
         lead_time=table.lead_time_s,
         pierce_time=table.pierce_time_s,
         approach_speed=table.approach_mm_s / 1000,
         air_speed=table.air_speed,
-        work_object=table.work_object,
-        tool_name=table.tool_name,
+        arc_tolerance=None if table.arcs_mm is None else table.arcs_mm / 1000,
+        gas_lead=table.gas_lead_s,
     )

@@ -11,6 +11,7 @@ import numpy as np
 
 from kerfpath._arrays import Array, Ints
 from kerfpath.auditor import Check, checks
+from kerfpath.cad import Part
 from kerfpath.cad import read as read_drawing
 from kerfpath.cell import Cell
 from kerfpath.contour import FRAME_KINDS, Contour
@@ -69,8 +70,12 @@ class Outcome:
         return tuple(cut.plan for cut in self.cuts if cut.plan is not None)
 
 
-def run_job(job: Job, *, progress: Progress = lambda what, done, total: None) -> Outcome:
+def run_job(
+    job: Job, part: Part | None = None, *, progress: Progress = lambda what, done, total: None
+) -> Outcome:
     """Return what comes of planning and auditing every contour of a job.
+
+    `part` is what its drawing holds, if that is read already.
 
     A contour without a feasible path does not stop the others; it is reported as such.
 
@@ -79,7 +84,7 @@ def run_job(job: Job, *, progress: Progress = lambda what, done, total: None) ->
     InputError
         The part cannot be read, a loop does not exist, a contour cannot be sampled.
     """
-    part = read_drawing(job.part_file, unit=job.part_unit)
+    part = part or read_drawing(job.part_file, unit=job.part_unit)
     tasks = job.tasks(part)  # a misspelt name shall not wait for the contours before it
     cell = cell_of_job(job, part)
     loops = [task.drawn(part) for task in tasks]
@@ -90,9 +95,14 @@ def run_job(job: Job, *, progress: Progress = lambda what, done, total: None) ->
     if job.sequence is not None:
         progress("order and moves", 0, 1)
     found = ordered(job, loops, tries, cell)
+    moved = {
+        task.name: part.departure(task.pick, loop)
+        for task, loop in zip(tasks, loops, strict=True)
+        if task.table.moves_the_path
+    }
     return Outcome(
         job=job,
-        cuts=found.cuts,
+        cuts=tuple(cut.measured(part, moved.get(cut.contour)) for cut in found.cuts),
         mesh=part.mesh(),
         cell=cell,
         part=found.part,

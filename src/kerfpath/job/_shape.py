@@ -47,7 +47,7 @@ def closed_only(table: ContourTable) -> dict[str, str]:
 def shaped(table: ContourTable, drawn: Contour, surface: Surface | None) -> list[Contour]:
     """Return the contours that may be cut for a loop: one, or several starts and directions.
 
-    Leads are laid on `surface`.
+    Corners and leads are laid on `surface`.
 
     In this order: direction, smoothed axes, kerf, corners, start, bevel, micro joints, overlap,
     leads, slowing down (also where a lead meets the cut at an angle).
@@ -76,9 +76,9 @@ def _run(
         sharp = table.corners is not None
         contour = offset(contour, table.kerf_mm * MM / 2, side=scrap, sharp=sharp)
     if table.corners is not None and table.corners.round_mm is not None:
-        contour = round_corners(contour, table.corners.round_mm * MM)
+        contour = round_corners(contour, table.corners.round_mm * MM, surface=surface)
     if table.corners is not None and table.corners.loop_mm is not None:
-        contour = loop_corners(contour, table.corners.loop_mm * MM, side=scrap)
+        contour = loop_corners(contour, table.corners.loop_mm * MM, side=scrap, surface=surface)
     return [_featured(table, begun, surface, scrap) for begun in _started(table, contour)]
 
 

@@ -82,8 +82,8 @@ class ContourTask:
 
         `drawn` is the loop as the part has it, where that is at hand.
         """
-        leads = self.table.lead_in or self.table.lead_out
-        surface = part.surface(self.pick) if leads else None
+        laid = self.table.lead_in or self.table.lead_out or self.table.corners
+        surface = part.surface(self.pick) if laid else None
         drawn = self.drawn(part) if drawn is None else drawn
         return shaped(self.table, drawn, surface)
 

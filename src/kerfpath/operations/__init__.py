@@ -19,6 +19,7 @@ from kerfpath.operations._start import overlap as overlap
 from kerfpath.operations._start import reverse as reverse
 from kerfpath.operations._start import smoothest_start as smoothest_start
 from kerfpath.operations._start import start_at as start_at
+from kerfpath.operations._surface import IN_SCRAP as IN_SCRAP
 from kerfpath.operations._surface import Ribbon as Ribbon
 from kerfpath.operations._surface import Side as Side
 from kerfpath.operations._surface import Surface as Surface

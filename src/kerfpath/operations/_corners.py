@@ -11,7 +11,7 @@ from kerfpath._arrays import Array, scalar
 from kerfpath.contour import KINDS, Contour, angle_between, join, turned, unit
 from kerfpath.errors import InputError
 from kerfpath.operations._start import smoothest_start, start_at, with_nodes
-from kerfpath.operations._surface import Side, lateral, require_in_scrap
+from kerfpath.operations._surface import Side, Surface, laid, lateral, require_in_scrap, tilted
 
 __all__ = ["loop_corners", "round_corners", "slow_corners"]
 
@@ -24,16 +24,24 @@ Corner = Callable[[int, Array, Array, float], tuple[float, Array] | None]
 before and behind it (m) the contour is left; None to leave the corner as it is."""
 
 
-def round_corners(contour: Contour, tolerance: float) -> Contour:
+def round_corners(contour: Contour, tolerance: float, *, surface: Surface | None = None) -> Contour:
     """Return the contour with an arc in place of each corner that leaves it by `tolerance` (m).
 
     The arc is smaller where corners are too near to each other for that. A closed contour that
     begins in a corner begins at its smoothest place afterwards.
 
+    Parameters
+    ----------
+    contour : Contour
+    tolerance : float m
+    surface : Surface, optional
+        What the arcs are laid on; default: the plane of the two ways at each corner.
+
     Raises
     ------
     InputError
-        A corner that turns straight back; a contour that is more than a cut already.
+        A corner that turns straight back; a contour that is more than a cut already; an arc that
+        leaves the surface.
     """
     tolerance = scalar(tolerance, "corner tolerance", unit="m", above=0.0)
     contour = _begun_off_corners(contour)
@@ -44,10 +52,12 @@ def round_corners(contour: Contour, tolerance: float) -> Contour:
         reach = min(radius * np.tan(turn / 2), room)
         return reach, _arc(contour.points[k], t0, t1, reach)
 
-    return _replaced(contour, arc, KINDS.index("cut"))
+    return _replaced(contour, arc, KINDS.index("cut"), surface)
 
 
-def loop_corners(contour: Contour, radius: float, *, side: Side = "right") -> Contour:
+def loop_corners(
+    contour: Contour, radius: float, *, side: Side = "right", surface: Surface | None = None
+) -> Contour:
     """Return the contour with each outer corner run past and come back to in a loop.
 
     Parameters
@@ -58,12 +68,14 @@ def loop_corners(contour: Contour, radius: float, *, side: Side = "right") -> Co
     side : {"left", "right"}
         Where the scrap is; corners that turn towards it have no room for a loop and stay. A closed
         contour that begins in a corner begins at its smoothest place afterwards.
+    surface : Surface, optional
+        What the loops are laid on; default: the plane across the tool axis at each corner.
 
     Raises
     ------
     InputError
-        A loop that touches the part; a corner that turns straight back; a contour that is more
-        than a cut already.
+        A loop that touches the part or leaves the surface; a corner that turns straight back; a
+        contour that is more than a cut already.
     """
     radius = scalar(radius, "loop radius", unit="m", above=0.0)
     contour = _begun_off_corners(contour)
@@ -82,7 +94,7 @@ def loop_corners(contour: Contour, radius: float, *, side: Side = "right") -> Co
         require_in_scrap(contour, ring, side, "loop")
         return 0.0, np.vstack([corner, ring, corner])
 
-    return _replaced(contour, loop, KINDS.index("loop"))
+    return _replaced(contour, loop, KINDS.index("loop"), surface)
 
 
 def slow_corners(
@@ -134,7 +146,7 @@ def _begun_off_corners(contour: Contour) -> Contour:
     return contour
 
 
-def _replaced(contour: Contour, corner: Corner, kind: int) -> Contour:
+def _replaced(contour: Contour, corner: Corner, kind: int, surface: Surface | None) -> Contour:
     """Return the contour with what `corner` makes of each corner, all of one kind, in its place."""
     nodes = contour.corners
     if not nodes.size:
@@ -155,22 +167,32 @@ def _replaced(contour: Contour, corner: Corner, kind: int) -> Contour:
         if made is None:
             continue
         reach, points = made
-        ends, normals = contour.at(s[k] + reach * np.array([-1.0, 1.0]))
+        ends, axes = contour.at(s[k] + reach * np.array([-1.0, 1.0]))
         part = np.linspace(0, 1, len(points))[:, None]
         # On a curved way an arc that is tangent at the corner begins and ends a little beside it.
-        points = points + (1 - part) * (ends[0] - points[0]) + part * (ends[1] - points[-1])
-        axes = turned(
-            np.tile(normals[0], (len(part), 1)), np.tile(normals[1], (len(part), 1)), part
-        )
+        points = _between(ends, points, part)
+        if surface is None:
+            before, after = (np.tile(axis, (len(part), 1)) for axis in axes)
+        else:
+            points, normals = laid(surface, points, contour, "corner")
+            points = _between(ends, points, part)  # the cut may lie beside the surface
+            before, after = (tilted(normals, normals[e], axes[e]) for e in (0, -1))
+        axes = turned(before, after, part)
         share = np.full(len(points), np.interp(s[k], s, contour.speed_share))
-        before = contour.between(here, s[k] - reach)
         kinds = np.full(len(points), kind)
-        pieces += [before, Contour(points, axes, kind=kinds, speed_share=share, name="corner")]
+        pieces += [contour.between(here, s[k] - reach)]
+        pieces += [Contour(points, axes, kind=kinds, speed_share=share, name="corner")]
         here = s[k] + reach
     if not pieces:
         return contour
     pieces.append(contour.between(here, s[-1]))
     return join(pieces, closed=contour.closed, name=contour.name)
+
+
+def _between(ends: Array, points: Array, part: Array) -> Array:
+    """Return points (m, 3) shifted evenly, at shares (m, 1), so as to begin and end in `ends`."""
+    moved: Array = points + (1 - part) * (ends[0] - points[0]) + part * (ends[1] - points[-1])
+    return moved
 
 
 def _arc(corner: Array, t0: Array, t1: Array, reach: float) -> Array:

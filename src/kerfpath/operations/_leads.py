@@ -6,7 +6,6 @@ from dataclasses import replace
 from typing import Literal, get_args
 
 import numpy as np
-from scipy.spatial.transform import Rotation
 
 from kerfpath._arrays import Array, scalar
 from kerfpath.contour import KINDS, Contour, join, turned, unit
@@ -18,9 +17,11 @@ from kerfpath.operations._surface import (
     Side,
     Surface,
     edge,
+    laid,
     lateral,
     nearest,
     require_in_scrap,
+    tilted,
 )
 
 __all__ = ["LeadShape", "lead_in", "lead_out"]
@@ -29,8 +30,6 @@ LeadShape = Literal["line", "arc"]
 
 STEP = 2e-4
 """m between the nodes of a lead."""
-SURFACE_ENDS = 1e-3
-"""m: a lead farther than this from the surface has left it."""
 
 
 def lead_in(
@@ -147,23 +146,14 @@ def _laid(
     else:
         radius, turn = length / angle, back[:, None] / length * angle
         flat = start - radius * (np.sin(turn) * along - (1 - np.cos(turn)) * aside)
-    points, normals = surface.project(flat)
-    _require_on_surface(points - flat, contour, what)
+    points, normals = laid(surface, flat, contour, what)
     # The cut may lie beside the surface by rounding or kerf: close that gap along the lead.
     points = points + (1 - back / length)[:, None] * (start - points[-1])
     # What tilts the cut's axis from the surface's normal tilts the lead's more and more.
-    tilt, _ = Rotation.align_vectors(contour.axes[:1], -normal)
-    axes = turned(-normals, tilt.apply(-normals), 1 - np.minimum(back / fan, 1)[:, None])
+    leaning = tilted(normals, normal[0], contour.axes[0])
+    axes = turned(-normals, leaning, 1 - np.minimum(back / fan, 1)[:, None])
     _require_clearance(contour, points, side, clearance, what)
     return points, axes
-
-
-def _require_on_surface(off: Array, contour: Contour, what: str) -> None:
-    far = float(np.linalg.norm(off, axis=1).max())
-    if far > SURFACE_ENDS:
-        raise InputError(
-            f"{what} of {contour.name!r} leaves the surface by {far * 1e3:.3g} mm; make it shorter"
-        )
 
 
 def _require_clearance(

@@ -6,20 +6,35 @@ from typing import Literal, Protocol, get_args
 
 import numpy as np
 from scipy.spatial import cKDTree
+from scipy.spatial.transform import Rotation
 
 from kerfpath._arrays import Array
 from kerfpath.contour import KINDS, Contour, unit
 from kerfpath.errors import InputError
 
-__all__ = ["Ribbon", "Side", "Surface", "edge", "lateral", "nearest", "require_in_scrap"]
+__all__ = [
+    "IN_SCRAP",
+    "Ribbon",
+    "Side",
+    "Surface",
+    "edge",
+    "laid",
+    "lateral",
+    "nearest",
+    "require_in_scrap",
+    "tilted",
+]
 
 TOUCH = 1e-5
 """m: what runs in the scrap may be on the part's side by no more; a lead that is tangent to a curve
 leaves its first chord by some micrometres."""
+SURFACE_ENDS = 1e-3
+"""m: what is to be laid on the surface and is farther than this from it has left it."""
 SAME_PLACE = 1e-9
 """m: two places nearer than this are one."""
 
 IN_SCRAP = [KINDS.index(word) for word in ("pierce", "lead-in", "lead-out", "loop")]
+"""Kinds of the stretches that run in the scrap."""
 
 Side = Literal["left", "right"]
 """Seen from the nozzle along the travel."""
@@ -43,6 +58,29 @@ class Ribbon:
         where, k = nearest(self._contour, points)
         axis = self._contour.axes[k]
         return points - ((points - where) * axis).sum(1, keepdims=True) * axis, -axis
+
+
+def laid(surface: Surface, flat: Array, contour: Contour, what: str) -> tuple[Array, Array]:
+    """Return points (B, 3) m laid on a surface, and its outward normals (B, 3).
+
+    Raises
+    ------
+    InputError
+        A point too far from the surface.
+    """
+    points, normals = surface.project(flat)
+    far = float(np.linalg.norm(points - flat, axis=1).max())
+    if far > SURFACE_ENDS:
+        raise InputError(
+            f"{what} of {contour.name!r} leaves the surface by {far * 1e3:.3g} mm; make it smaller"
+        )
+    return points, normals
+
+
+def tilted(normals: Array, normal: Array, axis: Array) -> Array:
+    """Return tool axes (B, 3) that lean from the normals as `axis` (3,) does from `normal` (3,)."""
+    tilt, _ = Rotation.align_vectors(axis[None], -normal[None])
+    return np.asarray(tilt.apply(-normals))
 
 
 def lateral(axes: Array, along: Array, side: Side) -> Array:

@@ -1,86 +1,126 @@
-"""The robot languages that programs can be written in, and the rules of each."""
+"""The robot languages that programs can be written in, and what each brings along."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
+import warnings
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from functools import cache
+from importlib.metadata import EntryPoint, entry_points
+from typing import Any
 
+from kerfpath._arrays import Array
 from kerfpath.errors import InputError
-from kerfpath.post import _rapid
-from kerfpath.post._program import LONGEST_NAME, Program
+from kerfpath.post._formatter import Formatter
+from kerfpath.post._issue import ProgramIssue
+from kerfpath.post._program import Program
+from kerfpath.post._read import Reader
+from kerfpath.post._settings import Rules, Settings
 from kerfpath.robots import Robot
 
-__all__ = ["LANGUAGES", "Language", "language"]
+__all__ = ["ENTRY_POINTS", "Language", "language", "languages"]
+
+ENTRY_POINTS = "kerfpath.languages"
+"""Group of entry points whose objects are languages."""
+SHIPPED = {
+    "fanuc": "kerfpath.post.fanuc:FANUC",
+    "krl": "kerfpath.post.krl:KRL",
+    "rapid": "kerfpath.post.rapid:RAPID",
+    "urscript": "kerfpath.post.urscript:URSCRIPT",
+}
+"""Where the languages are that come with the package."""
+BROKEN = (ImportError, AttributeError, NameError, SyntaxError, TypeError, ValueError)
+"""What a module that was written for another version raises when it is imported."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Language:
-    """One robot language.
+    """One robot language, or a dialect of one.
 
     Parameters
     ----------
     name : str
-    manufacturer : str
-        Whose robots it moves.
+        What jobs and the command line call it.
+    title : str
+        What people call it.
+    manufacturers : tuple of str
+        Whose robots it moves; empty: everyone's.
     families : tuple of str
-        Those of them that the formatter can express, by `Robot.kinematics`.
+        The arms that it can express, by `Robot.kinematics`; empty: all.
     suffix : str
-        File suffix, with its dot.
-    write : callable
-        The formatter, Program to text.
-    declared : callable
-        Every name that the text of a Program would define or use, with what it names.
+        Suffix of the file to start, with its dot.
+    settings : type of Settings
+    rules : callable
+        (settings) to the Rules of programs.
+    formatter : type of Formatter
     is_reserved : callable
         Whether a name means something else in the language.
-    longest_name : int
-        Characters allowed in a name.
-    slowest : float m/s
-        The lowest speed that the formatter's digits can say.
-    turning_speed : float rad/s
-        How fast the tool may turn in linear moves before the controller slows down.
-    longest_lead : float s
-        The longest lead time of a switch on the path.
+    posture : callable, optional
+        (robot, q (K, n) rad, settings) to what the text says of posture and turns at each target,
+        in the words of its reader; None where a target says nothing of them.
+    check : callable, optional
+        (program, settings) to the issues that only this language has.
+    read : Reader, optional
+        Reads back what is written; without one a program cannot be audited.
     """
 
     name: str
-    manufacturer: str
+    title: str
+    manufacturers: tuple[str, ...]
     families: tuple[str, ...]
     suffix: str
-    write: Callable[[Program], str]
-    declared: Callable[[Program], list[tuple[str, str]]]
+    settings: type[Settings]
+    rules: Callable[[Any], Rules]
+    formatter: type[Formatter]
     is_reserved: Callable[[str], bool]
-    longest_name: int
-    slowest: float
-    turning_speed: float
-    longest_lead: float
+    posture: Callable[[Robot, Array, Any], list[tuple[int | str, ...]]] | None = None
+    check: Callable[[Program, Any], Iterator[ProgramIssue]] | None = None
+    read: Reader | None = None
 
     def refusal(self, robot: Robot) -> str:
         """Say why no program in this language can move a robot; empty where one can."""
-        if robot.manufacturer != self.manufacturer:
-            return (
-                f"language {self.name!r} is for robots by {self.manufacturer}, but {robot.id!r} is "
-                f"by {robot.manufacturer or 'an unknown maker'}"
-            )
-        if robot.kinematics not in self.families:
+        if self.families and robot.kinematics not in self.families:
             return f"language {self.name!r} cannot yet say the axes of an arm like {robot.id!r}"
         return ""
 
+    def doubt(self, robot: Robot) -> str:
+        """Say why a robot may not understand this language; empty where it does."""
+        if not self.manufacturers or robot.manufacturer in self.manufacturers:
+            return ""
+        return (
+            f"language {self.name!r} is for robots by {' or '.join(self.manufacturers)}, but "
+            f"{robot.id!r} is by {robot.manufacturer or 'an unknown maker'}"
+        )
 
-LANGUAGES = {
-    "rapid": Language(
-        name="rapid",
-        manufacturer="ABB",
-        families=("opw",),
-        suffix=".mod",
-        write=_rapid.rapid,
-        declared=_rapid.declared,
-        is_reserved=_rapid.is_reserved,
-        longest_name=LONGEST_NAME,
-        slowest=_rapid.SLOWEST,
-        turning_speed=_rapid.TURNING_SPEED,
-        longest_lead=_rapid.LONGEST_LEAD,
-    )
-}
+
+@cache
+def languages() -> dict[str, Language]:
+    """Return all languages by name: those shipped, and those that entry points add.
+
+    An entry point that cannot be loaded, that is no language, or that has the name of one shipped
+    is left out with a warning.
+    """
+    found = {name: _shipped(name) for name in SHIPPED}
+    for point in sorted(entry_points(group=ENTRY_POINTS), key=lambda point: point.name):
+        try:
+            loaded, fault = point.load(), ""
+        except BROKEN as error:
+            loaded, fault = None, f"cannot be loaded: {' '.join(str(error).split())}"
+        if not fault and not isinstance(loaded, Language):
+            fault = f"is a {type(loaded).__name__}, expected a kerfpath.post.Language"
+        if not fault and loaded.name in found:
+            fault = f"has the name {loaded.name!r} of another; give it one of its own"
+        if fault:
+            warnings.warn(f"language {point.name!r} ({point.value}) {fault}", stacklevel=2)
+        else:
+            found[loaded.name] = loaded
+    return found
+
+
+def _shipped(name: str) -> Language:
+    loaded = EntryPoint(name, SHIPPED[name], ENTRY_POINTS).load()
+    assert isinstance(loaded, Language)
+    return loaded
 
 
 def language(name: str) -> Language:
@@ -91,6 +131,7 @@ def language(name: str) -> Language:
     InputError
         An unknown language; the message lists those known.
     """
-    if name not in LANGUAGES:
-        raise InputError(f"language {name!r} is not known; expected {', '.join(sorted(LANGUAGES))}")
-    return LANGUAGES[name]
+    known = languages()
+    if name not in known:
+        raise InputError(f"language {name!r} is not known; expected {', '.join(sorted(known))}")
+    return known[name]

@@ -4,27 +4,18 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator
-from dataclasses import dataclass
-from typing import Literal
 
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from kerfpath._arrays import Array
+from kerfpath.errors import InputError
+from kerfpath.post._issue import ProgramIssue
 from kerfpath.post._languages import Language
 from kerfpath.post._languages import language as find_language
-from kerfpath.post._program import (
-    Comment,
-    JointMove,
-    LaserOff,
-    LaserOn,
-    LinearMove,
-    Program,
-    Section,
-    Wait,
-)
+from kerfpath.post._program import JointMove, LinearMove, Program, Section, Wait
+from kerfpath.post._settings import Rules, Settings
 
-__all__ = ["ProgramIssue", "preflight"]
+__all__ = ["preflight"]
 
 LARGEST_JOINT_STEP = np.pi
 """From half a turn on (rad), "the short way" no longer says which way a joint turns."""
@@ -34,55 +25,53 @@ LOWEST_SHARE = 0.01
 """Smallest share of the full speed of a joint move: controllers count it in percent."""
 LONGEST_WAIT = 60.0
 """s; a longer one is a mistake in its unit."""
+ROUNDING = 1e-9
+"""Share by which half a distance may be exceeded for rounding."""
 LIMIT_NOISE = 1e-9
 """Excess over a joint limit (rad) that is rounding."""
 
 
-@dataclass(frozen=True, slots=True)
-class ProgramIssue:
-    """One thing that is wrong with a program, or that its user has to know.
+def preflight(
+    program: Program, language: str = "rapid", settings: Settings | None = None
+) -> list[ProgramIssue]:
+    """Return everything that speaks against running `program`; empty = nothing known.
 
     Parameters
     ----------
-    level : {"error", "warning"}
-        An error forbids writing the program.
-    code : str
-        What kind of issue it is.
-    message : str
-        What was expected, what came, and what to do.
-    place : str
-        Where in the program.
-    """
-
-    level: Literal["error", "warning"]
-    code: str
-    message: str
-    place: str
-
-    def __str__(self) -> str:
-        return f"{self.place}: {self.message}"
-
-
-def preflight(program: Program, language: str = "rapid") -> list[ProgramIssue]:
-    """Return everything that speaks against running `program`; empty = nothing known.
+    program : Program
+    language : str
+        One of `languages()`.
+    settings : Settings, optional
+        Those of the language; default: its defaults.
 
     Raises
     ------
     InputError
-        An unknown language.
+        An unknown language, or settings of another.
     """
-    rules = find_language(language)
-    issues = [issue for section in program.sections for issue in _numbers(section, rules)]
+    chosen = find_language(language)
+    settings = chosen.settings() if settings is None else settings
+    if not isinstance(settings, chosen.settings):
+        raise InputError(
+            f"settings: expected {chosen.settings.__name__} of language {language!r}, got "
+            f"{type(settings).__name__}"
+        )
+    rules = chosen.rules(settings)
+    issues = list(_robot(program, chosen))
+    numbers = [issue for section in program.sections for issue in _numbers(section, rules)]
+    outputs = list(_outputs(program, settings))
+    issues += numbers + outputs
     # Speeds and zones are named by their formatted values: only finite ones can be.
-    if not issues:
-        issues += _names(program, rules)
-    issues += _robot(program, rules)
+    if not numbers and not outputs and not chosen.refusal(program.robot):
+        issues += _names(program, chosen, rules, settings)
     for section in program.sections:
-        issues += _laser(section, rules)
+        issues += _laser(section)
         issues += _waits(section)
         issues += _motion(program, section, rules)
         issues += _limits(program, section)
-    if not program.air_checked and any(isinstance(step, JointMove) for step in program.steps):
+    if chosen.check is not None and not any(issue.level == "error" for issue in issues):
+        issues += chosen.check(program, settings)
+    if not program.air_checked and any(isinstance(move, JointMove) for move in program.moves):
         issues.append(
             ProgramIssue(
                 "warning",
@@ -95,21 +84,39 @@ def preflight(program: Program, language: str = "rapid") -> list[ProgramIssue]:
     return issues
 
 
-def _robot(program: Program, rules: Language) -> Iterator[ProgramIssue]:
-    if refusal := rules.refusal(program.robot):
-        yield ProgramIssue("error", "wrong-robot", refusal, "program")
+def _outputs(program: Program, settings: Settings) -> Iterator[ProgramIssue]:
+    """Check that there is an output for everything that is switched."""
+    linear = [move for move in program.moves if isinstance(move, LinearMove)]
+    for signal in sorted({switch.signal for move in linear for switch in move.switches}):
+        key = f"{signal}_output"
+        if key in type(settings).model_fields and getattr(settings, key) is None:
+            yield ProgramIssue(
+                "error",
+                "output",
+                f"the {signal} is switched, but no output is named for it; say which with {key}",
+                "program",
+            )
+
+
+def _robot(program: Program, language: Language) -> Iterator[ProgramIssue]:
+    if refusal := language.refusal(program.robot):
+        yield ProgramIssue("error", "wrong-arm", refusal, "program")
+    if doubt := language.doubt(program.robot):
+        yield ProgramIssue("warning", "wrong-robot", doubt, "program")
     if not program.sections:
         yield ProgramIssue("error", "empty", "there is no contour to cut", "program")
 
 
-def _names(program: Program, rules: Language) -> Iterator[ProgramIssue]:
+def _names(
+    program: Program, language: Language, rules: Rules, settings: Settings
+) -> Iterator[ProgramIssue]:
     seen: dict[str, str] = {}
-    for name, what in rules.declared(program):
-        if not re.fullmatch(r"[A-Za-z][A-Za-z0-9_]*", name):
+    for name, what in language.formatter(program, settings).names():
+        if not re.fullmatch(rules.name, name, re.ASCII):
             yield ProgramIssue(
                 "error",
                 "name-identifier",
-                f"{name!r} must be a letter followed by letters, digits and _",
+                f"{name!r} is no name in {language.title}: a letter, then letters, digits and _",
                 what,
             )
         elif len(name) > rules.longest_name:
@@ -119,10 +126,9 @@ def _names(program: Program, rules: Language) -> Iterator[ProgramIssue]:
                 f"{name!r} has {len(name)} characters, at most {rules.longest_name} are allowed",
                 what,
             )
-        elif rules.is_reserved(name):
-            yield ProgramIssue(
-                "error", "name-reserved", f"{name!r} is reserved in {rules.name}; rename it", what
-            )
+        elif language.is_reserved(name):
+            said = f"{name!r} is reserved in {language.title}; rename it"
+            yield ProgramIssue("error", "name-reserved", said, what)
         elif (other := seen.get(name.lower())) is not None:
             yield ProgramIssue(
                 "error", "name-collision", f"{name!r} is also the name of {other}; rename it", what
@@ -130,14 +136,18 @@ def _names(program: Program, rules: Language) -> Iterator[ProgramIssue]:
         seen[name.lower()] = what
 
 
-def _numbers(section: Section, rules: Language) -> Iterator[ProgramIssue]:
+def _numbers(section: Section, rules: Rules) -> Iterator[ProgramIssue]:
     for number, step in enumerate(section.steps):
         place = f"{section.name}, step {number}"
-        if isinstance(step, LinearMove) and not rules.slowest <= step.speed < np.inf:
+        in_reach = np.isfinite(getattr(step, "speed", 0.0))
+        if isinstance(step, LinearMove) and not (
+            in_reach and rules.slowest <= step.speed <= rules.fastest
+        ):
+            most = "" if np.isinf(rules.fastest) else f" and at most {rules.fastest * 1e3:g} mm/s"
             yield ProgramIssue(
                 "error",
                 "speed",
-                f"the speed must be at least {rules.slowest * 1e3:g} mm/s, "
+                f"the speed must be at least {rules.slowest * 1e3:g} mm/s{most}, "
                 f"got {step.speed * 1e3:g} mm/s",
                 place,
             )
@@ -156,14 +166,15 @@ def _numbers(section: Section, rules: Language) -> Iterator[ProgramIssue]:
                 f"the zone must be 0 mm (stop) or more, got {step.zone * 1e3:g} mm",
                 place,
             )
-        if isinstance(step, LaserOn | LaserOff) and not 0 <= step.lead_time <= rules.longest_lead:
-            yield ProgramIssue(
-                "error",
-                "lead-time",
-                f"the lead time must lie between 0 and {rules.longest_lead:g} s, "
-                f"got {step.lead_time:g} s",
-                place,
-            )
+        for switch in step.switches if isinstance(step, LinearMove) else ():
+            if not (0 <= switch.lead_time <= rules.longest_lead and np.isfinite(switch.lead_time)):
+                yield ProgramIssue(
+                    "error",
+                    "lead-time",
+                    f"the lead time must lie between 0 and {rules.longest_lead:g} s, "
+                    f"got {switch.lead_time:g} s",
+                    place,
+                )
 
 
 def _waits(section: Section) -> Iterator[ProgramIssue]:
@@ -187,71 +198,63 @@ def _waits(section: Section) -> Iterator[ProgramIssue]:
             yield ProgramIssue("error", "wait", "a wait must follow a move that stops", place)
 
 
-def _laser(section: Section, rules: Language) -> Iterator[ProgramIssue]:
-    """Check that the laser is only on between its switches, along linear moves, and off after."""
-    on, last = False, None
+def _laser(section: Section) -> Iterator[ProgramIssue]:
+    """Check that the laser is only on between its switches, along the path, and off after."""
+    on = False
     for number, step in enumerate(section.steps):
-        if isinstance(step, Comment | Wait):
-            continue
         place = f"{section.name}, step {number}"
-        if isinstance(step, LaserOn | LaserOff):
-            if not isinstance(last, LinearMove) or on == isinstance(step, LaserOn):
-                yield ProgramIssue(
-                    "error",
-                    "laser-order",
-                    "the laser must be switched on and off in turn, each right after a linear move",
-                    place,
-                )
-            on = isinstance(step, LaserOn)
-        elif on and isinstance(step, JointMove):
+        if isinstance(step, JointMove) and on:
             yield ProgramIssue("error", "laser-order", "a joint move with the laser on", place)
-        last = step
+        for switch in step.switches if isinstance(step, LinearMove) else ():
+            if switch.signal == "laser" and on == switch.on:
+                said = f"the laser is switched {'on' if on else 'off'}, but is so already"
+                yield ProgramIssue("error", "laser-order", said, place)
+            on = switch.on if switch.signal == "laser" else on
     if on:
         yield ProgramIssue("error", "laser-order", "the laser is still on at the end", section.name)
 
 
-def _motion(program: Program, section: Section, rules: Language) -> Iterator[ProgramIssue]:
-    """Check the straight moves of a section: steps, zones, turning speed, lead times."""
-    moves = [step for step in section.steps if isinstance(step, JointMove | LinearMove)]
-    poses = [_tip(program, move) for move in moves]
-    places = [f"{section.name}, move {number}" for number in range(len(moves))]
-    lengths, too_fast = [], 0
-    for k in range(1, len(moves)):
-        before, move = moves[k - 1], moves[k]
-        lengths.append(float(np.linalg.norm(poses[k][:3, 3] - poses[k - 1][:3, 3])))
-        if not isinstance(move, LinearMove):
-            continue
-        step = np.abs(move.q - before.q)
-        joint = int(np.argmax(step))
-        if step[joint] >= LARGEST_JOINT_STEP:
-            yield ProgramIssue(
-                "error",
-                "joint-step",
-                f"joint {joint + 1} turns {np.degrees(step[joint]):.1f} deg in one linear move, "
-                f"expected less than {np.degrees(LARGEST_JOINT_STEP):g} deg; use finer nodes",
-                places[k],
-            )
-        turn = Rotation.from_matrix(poses[k - 1][:3, :3].T @ poses[k][:3, :3]).magnitude()
-        if turn >= LARGEST_ORIENTATION_STEP:
-            yield ProgramIssue(
-                "error",
-                "orientation-step",
-                f"the tool turns {np.degrees(turn):.1f} deg in one linear move, expected less "
-                f"than {np.degrees(LARGEST_ORIENTATION_STEP):g} deg; use finer nodes",
-                places[k],
-            )
-        too_fast += int(turn * move.speed > rules.turning_speed * lengths[-1])
-    if too_fast:
+def _motion(program: Program, section: Section, rules: Rules) -> Iterator[ProgramIssue]:
+    """Check the path of a section: steps, zones, turning speed, lead times."""
+    moves = section.moves
+    if len(moves) < 2:
+        return
+    T = program.tips(moves)
+    q = np.array([move.q for move in moves])
+    lengths = np.linalg.norm(np.diff(T[:, :3, 3], axis=0), axis=1)
+    between = np.swapaxes(T[:-1, :3, :3], 1, 2) @ T[1:, :3, :3]
+    turn = np.asarray(Rotation.from_matrix(between).magnitude())
+    on_path = np.array([isinstance(move, LinearMove) for move in moves[1:]])
+    step = np.abs(np.diff(q, axis=0))
+    for k in np.flatnonzero(on_path & (step.max(axis=1) >= LARGEST_JOINT_STEP)).tolist():
+        joint = int(np.argmax(step[k]))
+        yield ProgramIssue(
+            "error",
+            "joint-step",
+            f"joint {joint + 1} turns {np.degrees(step[k, joint]):.1f} deg in one move of the "
+            f"path, expected less than {np.degrees(LARGEST_JOINT_STEP):g} deg; use finer nodes",
+            f"{section.name}, move {k + 1}",
+        )
+    for k in np.flatnonzero(on_path & (turn >= LARGEST_ORIENTATION_STEP)).tolist():
+        yield ProgramIssue(
+            "error",
+            "orientation-step",
+            f"the tool turns {np.degrees(turn[k]):.1f} deg in one move of the path, expected less "
+            f"than {np.degrees(LARGEST_ORIENTATION_STEP):g} deg; use finer nodes",
+            f"{section.name}, move {k + 1}",
+        )
+    speed = np.array([move.speed for move in moves[1:]])
+    if too_fast := int((on_path & (turn * speed > rules.turning_speed * lengths)).sum()):
         yield ProgramIssue(
             "warning",
             "turning-speed",
-            f"in {too_fast} linear moves the tool turns faster than "
+            f"in {too_fast} moves of the path the tool turns faster than "
             f"{np.degrees(rules.turning_speed):g} deg/s; the controller will slow the tip down",
             section.name,
         )
-    near = [min(lengths[max(k - 1, 0) : k + 1], default=np.inf) for k in range(len(moves))]
-    overlaps = sum(move.zone > gap / 2 for move, gap in zip(moves, near, strict=True))
-    if overlaps:
+    near = np.minimum(np.append(lengths, np.inf), np.append(np.inf, lengths))
+    zone = np.array([move.zone for move in moves])
+    if overlaps := int((zone > near / 2 * (1 + ROUNDING)).sum()):
         yield ProgramIssue(
             "warning",
             "zone-overlap",
@@ -259,51 +262,39 @@ def _motion(program: Program, section: Section, rules: Language) -> Iterator[Pro
             "neighbour; the controller will reduce it",
             section.name,
         )
-    yield from _late_switches(section, lengths)
+    yield from _late_switches(section, lengths.tolist())
 
 
 def _late_switches(section: Section, lengths: list[float]) -> Iterator[ProgramIssue]:
-    number, speed = -1, 0.0
-    for step in section.steps:
-        if isinstance(step, JointMove | LinearMove):
-            number, speed = number + 1, step.speed
-        elif isinstance(step, LaserOn | LaserOff) and number >= 1 and speed > 0:
-            duration = lengths[number - 1] / speed
-            if step.lead_time > duration:
+    for k, (move, length) in enumerate(zip(section.moves[1:], lengths, strict=True), 1):
+        for switch in move.switches if isinstance(move, LinearMove) and move.speed > 0 else ():
+            if switch.lead_time > length / move.speed:
                 yield ProgramIssue(
                     "warning",
                     "short-lead",
-                    f"the laser is to be switched {step.lead_time * 1e3:g} ms ahead, but the move "
-                    f"there lasts only {duration * 1e3:.1f} ms; it is switched as that move begins",
-                    f"{section.name}, move {number}",
+                    f"the {switch.signal} is to be switched {switch.lead_time * 1e3:g} ms ahead, "
+                    f"but the move there lasts only {length / move.speed * 1e3:.1f} ms; it is "
+                    "switched as that move begins",
+                    f"{section.name}, move {k}",
                 )
 
 
 def _limits(program: Program, section: Section) -> Iterator[ProgramIssue]:
+    if not section.moves:
+        return
     limits = program.robot.joint_limits()
     words = program.robot.reasons()[2:]
-    number = -1
-    for step in section.steps:
-        if not isinstance(step, JointMove | LinearMove):
-            continue
-        number += 1
-        sums = limits.rows @ step.q
-        below = np.concatenate([limits.lower - step.q, limits.row_lower - sums])
-        above = np.concatenate([step.q - limits.upper, sums - limits.row_upper])
-        below[:6][limits.endless] = above[:6][limits.endless] = -np.inf
-        for i, excess in enumerate(np.stack([below, above], axis=1).ravel()):
-            if excess > LIMIT_NOISE:
-                yield ProgramIssue(
-                    "error",
-                    "axis-limit",
-                    f"{words[i]}: {np.degrees(excess):.3f} deg beyond its limit",
-                    f"{section.name}, move {number}",
-                )
-
-
-def _tip(program: Program, move: JointMove | LinearMove) -> Array:
-    """Return the tip pose of a target in the part frame, (4, 4) m."""
-    if isinstance(move, LinearMove):
-        return move.T_part_tip
-    T_base_tip = program.robot.forward(move.q) @ program.T_flange_tip
-    return np.asarray(np.linalg.solve(program.T_base_part, T_base_tip))
+    q = np.array([move.q for move in section.moves])
+    sums = q @ limits.rows.T
+    below = np.hstack([limits.lower - q, limits.row_lower - sums])
+    above = np.hstack([q - limits.upper, sums - limits.row_upper])
+    endless = np.flatnonzero(limits.endless)
+    below[:, endless] = above[:, endless] = -np.inf
+    excess = np.stack([below, above], axis=2).reshape(len(q), -1)
+    for k, i in np.argwhere(excess > LIMIT_NOISE).tolist():
+        yield ProgramIssue(
+            "error",
+            "axis-limit",
+            f"{words[i]}: {np.degrees(excess[k, i]):.3f} deg beyond its limit",
+            f"{section.name}, move {k}",
+        )

@@ -97,6 +97,8 @@ def _contour(number: int, section: ContourSection, figures: Figures) -> str:
         parts.append(_failure(section))
     else:
         parts.append(f'<p class="caption">{escape(_in_words(plan))}</p>')
+    if section.sampling:
+        parts += ["<h4>Sampling</h4>", _tables.facts_list(section.sampling)]
     parts += _map_part(section, figures)
     if plan is not None and plan.feed is not None:
         parts += [

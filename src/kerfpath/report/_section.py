@@ -63,6 +63,8 @@ class ContourSection:
         How clear each vertex of the graph is in the cell.
     broken_at : int, optional
         First node that no admissible path reaches (one after `NoFeasiblePath.node`), 0-based.
+    sampling : sequence of (what, value)
+        How far the nodes leave what they sample, in rows such as ("Chord error", "0.01 mm").
 
     Raises
     ------
@@ -78,6 +80,7 @@ class ContourSection:
     failure: str = ""
     broken_at: int | None = None
     clearance: ClearanceMap | None = None
+    sampling: Sequence[tuple[str, str]] = ()
 
     def __post_init__(self) -> None:
         nodes = {"graph": len(self.graph.reason), "path": len(self.path)}

@@ -57,6 +57,12 @@ class ContourTable(Table):
     corners: CornersTable | None = None
     smooth_axes: SmoothAxesTable | None = None
 
+    @property
+    def moves_the_path(self) -> bool:
+        """Whether points or tool axes of the cut are other than those of the loop as drawn."""
+        rounded = self.corners is not None and self.corners.round_mm is not None
+        return bool(self.kerf_mm or self.bevel_deg or self.smooth_axes or rounded)
+
     @model_validator(mode="after")
     def _one_pick(self) -> ContourTable:
         found = given(self, "pick", "pick_all")

@@ -32,8 +32,8 @@ class PickTable(Table):
     length_mm: Annotated[
         Range | None, key("2 numbers above 0, from and to, in mm", "[20, 400]")
     ] = None
-    layer: Annotated[Text | None, key("the name of a layer of a DXF", '"CUT"')] = None
-    colour: Annotated[Text | None, key("a colour of a DXF", '"red"')] = None
+    layer: Annotated[Text | None, key("the name of a layer of a DXF or STEP", '"CUT"')] = None
+    colour: Annotated[Text | None, key("a colour of a DXF or STEP", '"red"')] = None
     near_mm: Annotated[
         Three | None, key("3 numbers, a point of the part in mm", "[120, 40, 70]")
     ] = None

@@ -16,7 +16,7 @@ from numpy.typing import ArrayLike
 from kerfpath._arrays import Array, Ints, floats, freeze
 from kerfpath.robots import Robot
 
-__all__ = ["axes_from_joints", "axis_matrix", "confdata", "joints_from_axes"]
+__all__ = ["axes_from_joints", "axis_matrix", "confdata", "joints_from_axes", "posture"]
 
 ROD = (0.0, 1.0, 1.0, 0.0, 0.0, 0.0)
 """The coupling of a parallel rod: it carries the upper arm, so that its motor turns joint 2 + 3."""
@@ -65,3 +65,8 @@ def confdata(robot: Robot, q: ArrayLike) -> Ints:
     conf[:, :3] = np.floor(axes_deg[:, [0, 3, 5]] / 90.0)
     conf[:, 3] = 4 * (ahead < 0) + 2 * (bend < 0) + (axes_deg[:, 4] < 0)
     return freeze(conf)
+
+
+def posture(robot: Robot, q: Array, settings: object) -> list[tuple[int | str, ...]]:
+    """Return `confdata` of joint vectors q (K, 6) rad, as tuples."""
+    return [tuple(row) for row in confdata(robot, q).tolist()]

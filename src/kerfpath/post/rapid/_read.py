@@ -1,124 +1,50 @@
-r"""Read back the RAPID that `rapid` writes, and nothing else: what it does not know, it refuses."""
+r"""Read back the RAPID that `Rapid` writes, and nothing else: what it does not know, it refuses."""
 
 from __future__ import annotations
 
 import json
 import re
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from kerfpath._arrays import Array, Ints, freeze
+from kerfpath._arrays import Array, freeze
 from kerfpath.errors import InputError
+from kerfpath.post._program import Signal, Switch
+from kerfpath.post._read import (
+    ReadMove,
+    ReadProgram,
+    ReadSection,
+    ReadStep,
+    ReadWait,
+    same_output,
+)
+from kerfpath.post.rapid._axes import joints_from_axes
+from kerfpath.post.rapid._write import FULL_AIR_SPEED, RapidSettings
+from kerfpath.robots import Robot
 
-__all__ = [
-    "ReadJointMove",
-    "ReadLaser",
-    "ReadLinearMove",
-    "ReadProgram",
-    "ReadSection",
-    "ReadWait",
-    "read_rapid",
-]
+__all__ = ["read"]
 
 UNIT = 1e-6
 """How far the length of a quaternion may be from one: eight printed decimals pass."""
 
 
-@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class ReadJointMove:
-    """A joint move: the controller's axes (6,) rad, tip speed m/s, zone m, line of the text."""
-
-    axes: Array
-    speed: float
-    zone: float
-    line: int
-
-
-@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class ReadLinearMove:
-    """A linear move: tip pose in the part (4, 4) m, confdata (4,), speed m/s, zone m, line."""
-
-    T_part_tip: Array
-    conf: Ints
-    speed: float
-    zone: float
-    line: int
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class ReadLaser:
-    """A switch of the laser `lead_time` (s) before the end of the move that stands before it."""
-
-    on: bool
-    lead_time: float
-    line: int
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class ReadWait:
-    """A wait of `time` (s) where the robot stands, line of the text."""
-
-    time: float
-    line: int
-
-
-ReadStep = ReadJointMove | ReadLinearMove | ReadLaser | ReadWait
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class ReadSection:
-    """One routine of the module and its steps."""
-
-    name: str
-    steps: tuple[ReadStep, ...]
-
-
-@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class ReadProgram:
-    """A program as its text says it; units SI.
-
-    Parameters
-    ----------
-    name, tool_name, work_object, laser_output : str
-    T_flange_tip, T_base_part : (4, 4)
-        Tool and work object, m.
-    speeds : dict of str to float
-        Tip speeds by name, m/s.
-    zones : dict of str to float
-        Path zones by name, m.
-    sections : tuple of ReadSection
-        In the order in which main calls them.
-    """
-
-    name: str
-    tool_name: str
-    T_flange_tip: Array
-    work_object: str
-    T_base_part: Array
-    laser_output: str
-    speeds: dict[str, float]
-    zones: dict[str, float]
-    sections: tuple[ReadSection, ...]
-
-
-def read_rapid(text: str) -> ReadProgram:
-    """Return the program that a RAPID module of ours says.
-
-    Raises
-    ------
-    InputError
-        A line that is not of our making, or that does not fit the lines before it, with its number.
-    """
-    reader = _Reader()
-    for number, line in enumerate(text.splitlines(), 1):
-        reader.read(number, line.strip())
+def read(main: str, files: Mapping[str, str], robot: Robot, settings: RapidSettings) -> ReadProgram:
+    """Return the program that a RAPID module of ours says; see `kerfpath.post.Reader`."""
+    reader = _Reader(main, files, robot, settings)
+    reader.read_module(main)
+    for file in dict.fromkeys(reader.called_in.values()):
+        if file != main:
+            reader.read_module(file)
     return reader.program()
 
 
 _NAME = r"([A-Za-z]\w*)"
+_POSE = r"(\[\[.*?9E9\]\])"
+_TRIGGERS = r"([A-Za-z]\w*(?:\\T\d:=[A-Za-z]\w*)*)"
 _FRAMES = rf"{_NAME}\\WObj:={_NAME}"
 _LINES = {
     kind: re.compile(pattern)
@@ -134,35 +60,59 @@ _LINES = {
         "routine": rf"PROC {_NAME}\(\)",
         "end_routine": "ENDPROC",
         "no_supervision": r"ConfL\\Off;",
-        "laser_off": rf"SetDO {_NAME},0;",
+        "reset": rf"SetDO {_NAME},0;",
         "set_trigger": rf"TriggIO {_NAME},([\d.]+)\\Time\\DOp:={_NAME},([01]);",
         "wait": r"WaitTime ([\d.]+);",
+        "load": r'Load \\Dynamic,"([^"]*)/([^"/]*)";',
+        "late_call": rf'%"{_NAME}"%;',
+        "unload": r'UnLoad "([^"]*)/([^"/]*)";',
         "call": rf"{_NAME};",
         "joint_move": rf"MoveAbsJ (\[.*\]),{_NAME},{_NAME},{_FRAMES};",
         "linear_move": rf"MoveL (\[.*\]),{_NAME},{_NAME},{_FRAMES};",
-        "switching_move": rf"TriggL (\[.*\]),{_NAME},{_NAME},{_NAME},{_FRAMES};",
+        "circular_move": rf"MoveC {_POSE},{_POSE},{_NAME},{_NAME},{_FRAMES};",
+        "switching_move": rf"TriggL (\[.*\]),{_NAME},{_TRIGGERS},{_NAME},{_FRAMES};",
+        "switching_arc": rf"TriggC {_POSE},{_POSE},{_NAME},{_TRIGGERS},{_NAME},{_FRAMES};",
     }.items()
 }
 _OUTSIDE = {"tool", "work_object", "speed", "zone", "trigger", "routine", "end_module"}
-_IN_MAIN = {"no_supervision", "laser_off", "set_trigger", "call", "end_routine"}
-_IN_ROUTINE = {"joint_move", "linear_move", "switching_move", "wait", "end_routine"}
+_IN_PART = {"routine", "end_module"}
+_IN_MAIN = {
+    "no_supervision", "reset", "set_trigger", "load", "late_call", "unload", "call", "end_routine",
+}  # fmt: skip
+_IN_ROUTINE = {
+    "joint_move", "linear_move", "circular_move", "switching_move", "switching_arc", "wait",
+    "end_routine",
+}  # fmt: skip
 
 
 class _Reader:
     """Reads line by line; each kind of line has a method of its name."""
 
-    def __init__(self) -> None:
-        self.line = 0
+    def __init__(
+        self, main: str, files: Mapping[str, str], robot: Robot, settings: RapidSettings
+    ) -> None:
+        self.main, self.files, self.robot, self.settings = main, files, robot, settings
+        self.file, self.line = main, 0
         self.name = ""
+        self.modules: dict[str, str] = {}
+        self.loaded = ""
         self.routine_name: str | None = None
         self.ended = False
         self.frames: dict[str, tuple[str, Array]] = {}
         self.speeds: dict[str, float] = {}
         self.zones: dict[str, float] = {"fine": 0.0}
-        self.triggers: dict[str, tuple[bool, float] | None] = {}
-        self.output = ""
-        self.calls: list[str] = []
+        self.triggers: dict[str, Switch | None] = {}
+        self.called_in: dict[str, str] = {}
         self.routines: dict[str, list[ReadStep]] = {}
+        self.homes: dict[str, str] = {}
+
+    def read_module(self, file: str) -> None:
+        self.file, self.line, self.ended, self.name = file, 0, False, ""
+        for number, line in enumerate(self.files[file].splitlines(), 1):
+            self.read(number, line.strip())
+        self.line += 1
+        if not self.ended:
+            raise self.fault("ENDMODULE is missing")
 
     def read(self, number: int, line: str) -> None:
         self.line = number
@@ -173,7 +123,7 @@ class _Reader:
         if not self.name:
             expected = {"module"}
         elif self.routine_name is None:
-            expected = _OUTSIDE
+            expected = _OUTSIDE if self.file == self.main else _IN_PART
         else:
             expected = _IN_MAIN if self.routine_name == "main" else _IN_ROUTINE
         for kind in expected:
@@ -183,31 +133,24 @@ class _Reader:
         raise self.fault(f"not expected here: {line[:60]!r}")
 
     def program(self) -> ReadProgram:
-        self.line += 1
-        if not self.ended:
-            raise self.fault("ENDMODULE is missing")
         for kind in ("tool", "work_object"):
             if kind not in self.frames:
                 raise self.fault(f"the module declares no {kind.replace('_', ' ')}")
-        unknown = set(self.calls) ^ (set(self.routines) - {"main"})
+        unknown = set(self.called_in.items()) ^ set(self.homes.items())
         if unknown or "main" not in self.routines:
-            raise self.fault(f"main and routines do not match: {', '.join(sorted(unknown))}")
+            names = ", ".join(sorted({name for name, _ in unknown}))
+            raise self.fault(f"main and routines do not match: {names}")
         return ReadProgram(
-            name=self.name,
-            tool_name=self.frames["tool"][0],
+            name=self.modules[self.main],
             T_flange_tip=self.frames["tool"][1],
-            work_object=self.frames["work_object"][0],
             T_base_part=self.frames["work_object"][1],
-            laser_output=self.output,
-            speeds=self.speeds,
-            zones={name: zone for name, zone in self.zones.items() if name != "fine"},
             sections=tuple(
-                ReadSection(name=name, steps=tuple(self.routines[name])) for name in self.calls
+                ReadSection(name=name, steps=tuple(self.routines[name])) for name in self.called_in
             ),
         )
 
     def module(self, name: str) -> None:
-        self.name = name
+        self.name = self.modules[self.file] = name
 
     def end_module(self) -> None:
         self.ended = True
@@ -248,6 +191,10 @@ class _Reader:
     def routine(self, name: str) -> None:
         self.unused(name, self.routines)
         self.routine_name, self.routines[name] = name, []
+        if name != "main":
+            self.homes[name] = self.file
+        elif self.file != self.main:
+            raise self.fault("a second main")
 
     def end_routine(self) -> None:
         self.routine_name = None
@@ -255,68 +202,118 @@ class _Reader:
     def no_supervision(self) -> None:
         """Keep nothing: configurations are not supervised along linear moves."""
 
-    def laser_off(self, output: str) -> None:
-        self.require_output(output)
+    def reset(self, output: str) -> None:
+        self.signal(output)
 
     def set_trigger(self, name: str, lead_time: str, output: str, value: str) -> None:
-        if self.triggers.get(name, (False, 0.0)) is not None:
+        if name not in self.triggers or self.triggers[name] is not None:
             raise self.fault(f"{name} must be declared once and set once")
-        self.require_output(output)
-        self.triggers[name] = value == "1", float(self.numbers([float(lead_time)], 1)[0])
+        lead = float(self.numbers([float(lead_time)], 1)[0])
+        self.triggers[name] = Switch(signal=self.signal(output), on=value == "1", lead_time=lead)
 
-    def require_output(self, output: str) -> None:
-        if self.output not in ("", output):
-            raise self.fault(f"a second output {output}, {self.output} before")
-        self.output = output
+    def signal(self, output: str) -> Signal:
+        if output == self.settings.gas_output:
+            return "gas"
+        same_output(output, self.settings.laser_output, f"{self.file}, line {self.line}")
+        return "laser"
+
+    def load(self, folder: str, file: str) -> None:
+        if self.loaded or folder != self.settings.folder:
+            raise self.fault(f"expected one module at a time, from {self.settings.folder}")
+        self.loaded = file
+
+    def unload(self, folder: str, file: str) -> None:
+        if (folder, file) != (self.settings.folder, self.loaded):
+            raise self.fault(f"{folder}/{file} is not loaded")
+        self.loaded = ""
+
+    def late_call(self, name: str) -> None:
+        if not self.loaded:
+            raise self.fault(f"{name} is called while no module is loaded")
+        self.call(name)
 
     def call(self, name: str) -> None:
-        if name in self.calls:
+        if name in self.called_in:
             raise self.fault(f"{name} is called twice")
-        self.calls.append(name)
+        self.called_in[name] = self.loaded or self.main
 
     def joint_move(self, text: str, speed: str, zone: str, tool: str, work_object: str) -> None:
         axes_deg, external = self.values(text, 2)
         self.require_frames(tool, work_object, external)
+        axes = np.radians(self.numbers(axes_deg, 6))
         self.append(
-            ReadJointMove(
-                axes=freeze(np.radians(self.numbers(axes_deg, 6))),
-                speed=self.named(speed, self.speeds),
-                zone=self.named(zone, self.zones),
+            ReadMove(
+                kind="joint",
+                file=self.file,
                 line=self.line,
+                q=joints_from_axes(self.robot, axes[None])[0],
+                speed=self.named(speed, self.speeds) / FULL_AIR_SPEED,
+                zone=self.named(zone, self.zones),
             )
         )
 
     def linear_move(self, text: str, speed: str, zone: str, tool: str, work_object: str) -> None:
+        T_part_tip, quarters = self.target(text, tool, work_object)
+        self.append(
+            ReadMove(
+                kind="linear",
+                file=self.file,
+                line=self.line,
+                T_part_tip=T_part_tip,
+                posture=quarters,
+                speed=self.named(speed, self.speeds),
+                zone=self.named(zone, self.zones),
+            )
+        )
+
+    def circular_move(
+        self, via: str, text: str, speed: str, zone: str, tool: str, work_object: str
+    ) -> None:
+        self.linear_move(text, speed, zone, tool, work_object)
+        T_part_via, _ = self.target(via, tool, work_object)
+        self.amend(kind="circular", T_part_via=T_part_via)
+
+    def switching_move(
+        self, text: str, speed: str, triggers: str, zone: str, tool: str, work_object: str
+    ) -> None:
+        self.linear_move(text, speed, zone, tool, work_object)
+        self.amend(switches=self.switches(triggers))
+
+    def switching_arc(
+        self, via: str, text: str, speed: str, triggers: str, zone: str, tool: str, work: str
+    ) -> None:
+        self.circular_move(via, text, speed, zone, tool, work)
+        self.amend(switches=self.switches(triggers))
+
+    def target(self, text: str, tool: str, work_object: str) -> tuple[Array, tuple[int, ...]]:
         point, wxyz, conf, external = self.values(text, 4)
         self.require_frames(tool, work_object, external)
         quarters = self.numbers(conf, 4)
         if (quarters != np.round(quarters)).any():
             raise self.fault(f"configuration {conf} must be whole numbers")
-        self.append(
-            ReadLinearMove(
-                T_part_tip=self.pose([point, wxyz]),
-                conf=freeze(quarters.astype(np.int64)),
-                speed=self.named(speed, self.speeds),
-                zone=self.named(zone, self.zones),
-                line=self.line,
-            )
-        )
+        return self.pose([point, wxyz]), tuple(quarters.astype(int).tolist())
 
-    def switching_move(
-        self, text: str, speed: str, trigger: str, zone: str, tool: str, work_object: str
-    ) -> None:
-        self.linear_move(text, speed, zone, tool, work_object)
-        switch = self.triggers.get(trigger)
-        if switch is None:
-            raise self.fault(f"{trigger} has not been set")
-        self.append(ReadLaser(on=switch[0], lead_time=switch[1], line=self.line))
+    def switches(self, text: str) -> tuple[Switch, ...]:
+        switches = []
+        for name in re.split(r"\\T\d:=", text):
+            switch = self.triggers.get(name)
+            if switch is None:
+                raise self.fault(f"{name} has not been set")
+            switches.append(switch)
+        return tuple(switches)
 
     def wait(self, time: str) -> None:
-        self.append(ReadWait(time=float(self.numbers([float(time)], 1)[0]), line=self.line))
+        seconds = float(self.numbers([float(time)], 1)[0])
+        self.append(ReadWait(time=seconds, file=self.file, line=self.line))
 
     def append(self, step: ReadStep) -> None:
         assert self.routine_name is not None
         self.routines[self.routine_name].append(step)
+
+    def amend(self, **changes: Any) -> None:
+        assert self.routine_name is not None
+        steps = self.routines[self.routine_name]
+        steps[-1] = replace(steps[-1], **changes)
 
     def require_frames(self, tool: str, work_object: str, external: Any) -> None:
         known = [self.frames[kind][0] for kind in ("tool", "work_object") if kind in self.frames]
@@ -362,4 +359,4 @@ class _Reader:
         return freeze(T)
 
     def fault(self, message: str) -> InputError:
-        return InputError(f"line {self.line}: {message}")
+        return InputError(f"{self.file}, line {self.line}: {message}")

@@ -1,0 +1,312 @@
+"""How far the chords of a contour leave the curve that it samples."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Literal
+
+import numpy as np
+from scipy.spatial import cKDTree
+
+from kerfpath._arrays import Array, Ints
+from kerfpath.cad._sample import Curve, Points, Polyline, Trace, off_chord, sampled
+from kerfpath.cad._units import MM
+from kerfpath.contour import Contour, angle_between, turned
+from kerfpath.errors import InputError
+from kerfpath.operations import IN_SCRAP
+
+__all__ = ["ON_CURVE", "Departure", "departure", "departure_from"]
+
+Reference = Literal["CAD curve", "points of the drawing", "path as cut"]
+
+TINY = np.finfo(float).tiny
+
+ON_CURVE = 1e-5
+"""How far (m) a node that lies on a curve may be off it; samples of samples are some micrometres
+off."""
+CHORD, ANGLE = 0.02, 0.05
+"""Within a cell the curve bends by no more than this (mm, rad), so that few points tell it all."""
+CELLS = 200
+"""Least number of cells along a loop; a node looks for its place in those around it."""
+POLISH = 6
+"""Steps to a node's own place in its cell; each leaves a small share of the error, the curve being
+nearly straight and even there."""
+LOOKS = 8
+"""Intervals at whose ends each piece is looked at: what bends evenly has its worst at a middle."""
+CLOSER, PEAKS = 128, 16
+"""Intervals on the pieces with the largest errors, looked at again; how many these are."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Departure:
+    """How far the nodes of a contour, joined by chords, leave what they sample.
+
+    Tool axes turn evenly along each chord. Nodes are counted from 0; an error between two nodes is
+    told by the first of them.
+
+    Parameters
+    ----------
+    against : "CAD curve", "points of the drawing" or "path as cut"
+        What was measured against: the curve; the lines through the points of a table, which knows
+        nothing between them; or the path that operations made of a loop.
+    chord_error : float m
+        Largest distance of the curve from its chord.
+    chord_node : int
+    axis_error : float rad
+        Largest angle between the axis along a chord and that of the curve beside it.
+    axis_node : int
+    axis_step : float rad
+        Largest angle between the axes of two nodes that follow each other.
+    step_node : int
+    path : Departure or None
+        That of the loop from which the path as cut was made, before it was changed.
+    """
+
+    against: Reference
+    chord_error: float
+    chord_node: int
+    axis_error: float
+    axis_node: int
+    axis_step: float
+    step_node: int
+    path: Departure | None = None
+
+
+def departure(trace: Trace, contour: Contour, tolerance: float) -> Departure:
+    """Return how far the nodes of a contour leave the trace of a loop, see `Part.departure`.
+
+    Parameters
+    ----------
+    trace : Trace
+    contour : Contour
+    tolerance : float m
+        How far its nodes may lie off the trace.
+    """
+    against: Reference = "points of the drawing" if isinstance(trace, Points) else "CAD curve"
+    nodes, beside = _cut_nodes(contour), tolerance / MM
+    cells = _cells(trace.curves)
+    at = _places(cells, contour.points / MM, nodes, beside, contour.name)
+    around = cells.s[-1] if trace.is_closed else np.inf
+    length = (contour.s[nodes[-1]] - contour.s[nodes[0]]) / MM
+    at = _unrolled(at, around, length, beside, contour.name)
+    return _measured(cells, at, nodes, contour, against)
+
+
+def departure_from(path: Contour, contour: Contour, drawn: Departure) -> Departure:
+    """Return how far the nodes of a contour leave a dense path that operations made of a loop.
+
+    Parameters
+    ----------
+    path : Contour
+        As it was sampled.
+    contour : Contour
+        Its nodes, or some of them in a row; `s` says where each lies on the path.
+    drawn : Departure
+        That of the loop that the path was made of, from the drawing.
+
+    Raises
+    ------
+    InputError
+        The contour does not lie on the path (says where).
+    """
+    off = np.linalg.norm(path.at(contour.s)[0] - contour.points, axis=1)
+    if off.max() > ON_CURVE:
+        k = int(np.argmax(off))
+        raise InputError(
+            f"node {k} of contour {contour.name!r} lies {off[k] / MM:.3g} mm off the path "
+            f"{path.name!r} at its s (allowed {ON_CURVE / MM:g} mm); give what samples this path"
+        )
+    nodes = _cut_nodes(contour)
+    cells = _cells([Polyline(line=replace(path, points=path.points / MM, time=None, x=None))])
+    at = np.interp(contour.s[nodes], np.append(cells.t[:, 0], cells.t[-1, 1]), cells.s)
+    return replace(_measured(cells, at, nodes, contour, "path as cut"), path=drawn)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class _Cells:
+    """Curves end to end in short cells.
+
+    Parameters
+    ----------
+    curves : sequence of Curve
+    of : (C,) int
+        Curve of each cell.
+    t : (C, 2)
+        Parameters where it starts and ends.
+    ends : (C, 2, 3) mm
+        Points there.
+    s : (C + 1,) mm
+        Length along all cells; gaps between curves have none.
+    """
+
+    curves: Sequence[Curve]
+    of: Ints
+    t: Array
+    ends: Array
+    s: Array
+
+    def at(self, cell: Ints, share: Array) -> tuple[Array, Array]:
+        """Return points (..., 3) mm and tool axes (..., 3) at a share (...,) of each cell's t."""
+        t = self.t[cell, 0] + share * (self.t[cell, 1] - self.t[cell, 0])
+        points, normals = np.empty((*t.shape, 3)), np.empty((*t.shape, 3))
+        for k in np.unique(self.of[cell]).tolist():
+            here = self.of[cell] == k
+            points[here], normals[here] = self.curves[k].evaluate(t[here])
+        return points, -normals
+
+
+def _chords(contour: Contour) -> Ints:
+    """Return the first nodes of the chords that do not run in the scrap."""
+    return np.flatnonzero(~np.isin(contour.kind[:-1], IN_SCRAP))
+
+
+def _cut_nodes(contour: Contour) -> Ints:
+    """Return the nodes at the ends of those chords."""
+    chords = _chords(contour)
+    if not chords.size:
+        raise InputError(f"contour {contour.name!r} runs in the scrap throughout; nothing is cut")
+    return np.union1d(chords, chords + 1)
+
+
+def _measured(
+    cells: _Cells, at: Array, nodes: Ints, contour: Contour, against: Reference
+) -> Departure:
+    """Return how far the chords leave the cells; `nodes` lie at places `at` (mm) along them."""
+    points, axes, chords = contour.points / MM, contour.axes, _chords(contour)
+    a, b, cell, chord = _pieces(cells.s, at)
+    chord = nodes[chord]
+    keep = np.isin(chord, chords)
+    a, b, cell, chord = a[keep], b[keep], cell[keep], chord[keep]
+
+    def errors(of: Ints, looks: int) -> Array:
+        """Return chord errors (mm) and axis errors (rad) all along some pieces, (2, P, looks)."""
+        part = np.linspace(0.0, 1.0, looks + 1)
+        share = a[of, None] + (b - a)[of, None] * part
+        k = np.broadcast_to(chord[of, None], share.shape)
+        p, n = cells.at(np.broadcast_to(cell[of, None], share.shape), share)
+        d = points[k + 1] - points[k]
+        along = np.clip(((p - points[k]) * d).sum(-1) / (d * d).sum(-1), 0.0, 1.0)[..., None]
+        off = np.linalg.norm(points[k] + along * d - p, axis=-1)
+        return np.stack([off, angle_between(turned(axes[k], axes[k + 1], along), n)])
+
+    rough = errors(np.arange(len(chord)), LOOKS).max(axis=-1)
+    worst = []
+    for i, each in enumerate(rough):
+        peaks = np.argsort(-each, kind="stable")[:PEAKS]
+        close = errors(peaks, CLOSER)[i].max(axis=-1)
+        worst.append((float(close.max()), int(chord[peaks[int(np.argmax(close))]])))
+    steps = angle_between(axes[chords], axes[chords + 1])
+    return Departure(
+        against=against,
+        chord_error=worst[0][0] * MM,
+        chord_node=worst[0][1],
+        axis_error=worst[1][0],
+        axis_node=worst[1][1],
+        axis_step=float(steps.max()),
+        step_node=int(chords[int(np.argmax(steps))]),
+    )
+
+
+def _cells(curves: Sequence[Curve]) -> _Cells:
+    """Return the curves in cells that bend little, none longer than its share of the whole."""
+    fine = [sampled(curve, CHORD, ANGLE)[:2] for curve in curves]
+    lengths = [np.linalg.norm(np.diff(points, axis=0), axis=1) for _, points in fine]
+    longest = sum(float(each.sum()) for each in lengths) / CELLS
+    of, t, ends = [], [], []
+    for k, (curve, (coarse, _), each) in enumerate(zip(curves, fine, lengths, strict=True)):
+        parts = np.maximum(1, np.ceil(each / longest)).astype(np.int64)
+        at = np.cumsum(np.concatenate([[0.0], np.repeat(1 / parts, parts)]))
+        cut = np.interp(at, np.arange(len(coarse)), coarse)
+        points = curve.evaluate(cut)[0]
+        of.append(np.full(len(cut) - 1, k))
+        t.append(np.stack([cut[:-1], cut[1:]], axis=1))
+        ends.append(np.stack([points[:-1], points[1:]], axis=1))
+    whole = np.concatenate(ends)
+    s = np.concatenate([[0.0], np.cumsum(np.linalg.norm(whole[:, 1] - whole[:, 0], axis=1))])
+    return _Cells(curves=curves, of=np.concatenate(of), t=np.concatenate(t), ends=whole, s=s)
+
+
+def _places(cells: _Cells, points: Array, nodes: Ints, tolerance: float, name: str) -> Array:
+    """Return where along the cells (mm) each node is nearest to them."""
+    p, ends = points[nodes], cells.ends
+    # The middle of the nearest cell is no farther than this from a node that lies on it.
+    reach = float(np.diff(cells.s).max()) / 2 + CHORD + tolerance
+    tree = cKDTree(ends.mean(axis=1))
+    pairs = cKDTree(p).sparse_distance_matrix(tree, reach, output_type="ndarray")
+    i, c = pairs["i"], pairs["j"]
+    order = np.lexsort((c, off_chord(ends[c, 0], ends[c, 1], p[i]), i))
+    found, first = np.unique(i[order], return_index=True)
+    if len(found) < len(p):
+        off = np.asarray(tree.query(p)[0])
+        k = int(np.argmax(off))
+        off[k] = off_chord(ends[:, 0], ends[:, 1], p[k]).min()
+    else:
+        cell = c[order[first]]
+        d = ends[cell, 1] - ends[cell, 0]
+        share = np.zeros(len(p))
+        for _ in range(POLISH):
+            ahead = ((p - cells.at(cell, share)[0]) * d).sum(1) / np.maximum((d * d).sum(1), TINY)
+            share = np.clip(share + ahead, 0.0, 1.0)
+        off = np.asarray(np.linalg.norm(cells.at(cell, share)[0] - p, axis=1))
+        k = int(np.argmax(off))
+    if off[k] > tolerance:
+        raise InputError(
+            f"node {nodes[k]} of contour {name!r} lies {off[k]:.3g} mm off it, at "
+            f"{p[k].round(3).tolist()} mm (allowed {tolerance:.3g} mm); give a contour that "
+            "samples this loop"
+        )
+    return np.asarray(cells.s[cell] + share * np.diff(cells.s)[cell])
+
+
+def _unrolled(at: Array, around: float, length: float, tolerance: float, name: str) -> Array:
+    """Return places along a loop that rise or fall all along: at its end another turn begins.
+
+    Parameters
+    ----------
+    at : (M,) mm
+    around : float mm
+        Length of the loop, infinite for an open one.
+    length : float mm
+        Of the contour, which tells in what direction it runs.
+    tolerance : float mm
+        Steps back that are only inaccurate are none.
+    name : str
+    """
+    slack = 2 * tolerance
+    ways = {}
+    for sign in (1.0, -1.0):
+        steps = np.mod(sign * np.diff(at) + slack, around) - slack
+        ways[sign] = at[0] + sign * np.concatenate([[0.0], np.cumsum(np.maximum(steps, 0.0))])
+    runs = {sign: abs(abs(each[-1] - each[0]) - length) for sign, each in ways.items()}
+    sign = min(runs, key=runs.__getitem__)
+    if not runs[sign] <= min(around, length) / 2 + slack:
+        raise InputError(
+            f"contour {name!r} lies on it, but its nodes run back and forth; give a contour that "
+            "samples this loop"
+        )
+    return np.asarray(ways[sign])
+
+
+def _pieces(s: Array, at: Array) -> tuple[Array, Array, Ints, Ints]:
+    """Return the pieces between cell ends and nodes: from, to (shares), cell and chord of each.
+
+    Parameters
+    ----------
+    s : (C + 1,) mm
+        Of the ends of the cells, along the loop.
+    at : (M,) mm
+        Of the nodes, rising or falling.
+    """
+    falls = at[-1] < at[0]
+    nodes = at[::-1] if falls else at
+    turns = np.arange(np.floor(nodes[0] / s[-1]), np.floor(nodes[-1] / s[-1]) + 1)
+    borders = (s + s[-1] * turns[:, None]).ravel()
+    cuts = np.union1d(nodes, borders[(borders > nodes[0]) & (borders < nodes[-1])])
+    middle = (cuts[:-1] + cuts[1:]) / 2
+    turn = s[-1] * np.floor(middle / s[-1])
+    cell = np.clip(np.searchsorted(s, middle - turn, side="right") - 1, 0, len(s) - 2)
+    chord = np.clip(np.searchsorted(nodes, middle, side="right") - 1, 0, len(nodes) - 2)
+    start, size = s[cell] + turn, np.diff(s)[cell]
+    share = [np.clip((each - start) / size, 0.0, 1.0) for each in (cuts[:-1], cuts[1:])]
+    return share[0], share[1], cell, len(nodes) - 2 - chord if falls else chord

@@ -1,0 +1,78 @@
+"""The grammar of STEP files (ISO 10303-21), checked first: OCCT may crash on what breaks it."""
+
+from __future__ import annotations
+
+import re
+from collections import Counter
+
+import numpy as np
+
+from kerfpath._arrays import Array
+from kerfpath.errors import InputError
+
+__all__ = ["points_in", "sound_data"]
+
+BLANKS = re.compile(rb"'[^']*'|/\*.*?\*/|\s+", re.DOTALL)
+SECTION = re.compile(rb";DATA(?:\([^;]*\))?;(.*?)ENDSEC;", re.DOTALL | re.IGNORECASE)
+NUMBER = rb"[+-]?(?:\d++(?:\.\d*+)?|\.\d++)(?:[eE][+-]?\d++)?"
+ITEM = rb"(?:\$++|\*|#\d++|%s|\.\w++\.|\"[0-9A-Fa-f]*+\")" % NUMBER
+LIST = re.compile(rb"!?(?:[A-Za-z_]\w*+)?\((?:%s(?:,%s)*+)?\)" % (ITEM, ITEM))
+"""A list without lists in it; with its type in front, an entity."""
+ENTITY = re.compile(rb"#\d+=\$+")
+POINT = re.compile(rb"=CARTESIAN_POINT\(\$+,\(([^,()]+,[^,()]+,[^,()]+)\)\)", re.IGNORECASE)
+DEEPEST = 32
+"""Lists inside lists; files have about six."""
+LARGEST = 2**31 - 1
+"""OCCT keeps the numbers of entities in 32 bits."""
+
+
+def sound_data(content: bytes) -> bytes:
+    """Return the data of a STEP file without blanks and comments, each text replaced by $.
+
+    Raises
+    ------
+    InputError
+        No data, something that is no entity, a number out of range or used twice, a reference to
+        nothing.
+    """
+    plain = BLANKS.sub(lambda found: b"$" if found[0][:1] == b"'" else b"", content)
+    data = b"".join(SECTION.findall(plain))
+    if not data:
+        raise InputError("the file cannot be parsed: it has no DATA; export the part as STEP again")
+    # From the innermost lists on, each becomes one value, until every entity reads #1=$.
+    reduced, count, depth = data, 1, 0
+    while count and depth < DEEPEST:
+        reduced, count = LIST.subn(b"$", reduced)
+        depth += 1
+    for statement in reduced.split(b";")[:-1]:
+        if not ENTITY.fullmatch(statement):
+            raise _damaged(f"{_line(content, statement)}: Incorrect syntax")
+    made = Counter(map(int, re.findall(rb"#(\d+)=", data)))
+    number, times = made.most_common(1)[0]
+    if times > 1:
+        raise _damaged(f"#{number} is there {times} times")
+    if (largest := max(made)) > LARGEST:
+        raise _damaged(f"#{largest} is more than {LARGEST}")
+    if missing := set(map(int, re.findall(rb"#(\d+)(?![\d=])", data))) - made.keys():
+        raise _damaged(f"Unresolved Reference to #{min(missing)}")
+    return data
+
+
+def points_in(data: bytes) -> Array:
+    """Return the coordinates (K, 3) of all points in space, in the file's unit."""
+    numbers = b",".join(POINT.findall(data)).replace(b"$", b"nan")
+    return np.array(numbers.split(b",") if numbers else [], dtype=np.float64).reshape(-1, 3)
+
+
+def _line(content: bytes, statement: bytes) -> str:
+    """Say where the entity stands that a statement begins with, as far as that can be told."""
+    number = re.match(rb"#\d+", statement)
+    place = number and re.search(number[0] + rb"\s*=", content)
+    if not place:
+        return f"at {statement[:32].decode('ascii', 'replace')!r}"
+    line = content.count(b"\n", 0, place.start()) + 1
+    return f"Line {line}"
+
+
+def _damaged(reason: str) -> InputError:
+    return InputError(f"the file is damaged ({reason}); copy or export it again")

@@ -1,0 +1,30 @@
+"""Whether a loop is a round hole."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from kerfpath._arrays import Array
+
+__all__ = ["diameter"]
+
+ROUND = 5e-5
+"""How far (m) a loop may stray from a circle and still be a round hole."""
+FLAT = 0.1
+"""How far a round hole may stray from its mean plane, as a part of its diameter: one drilled into a
+curved sheet does."""
+
+
+def diameter(points: Array) -> float | None:
+    """Return the diameter (m) of the circle through `points` (K, 3) m, None if they are on none."""
+    centred = points - points.mean(axis=0)
+    axes = np.linalg.svd(centred, full_matrices=False)[2]
+    x, y, height = (centred @ axes.T).T
+    # A circle about (a, b): x^2 + y^2 = 2 a x + 2 b y + c, linear in its three unknowns.
+    a, b, c = np.linalg.lstsq(
+        np.stack([2 * x, 2 * y, np.ones_like(x)], axis=1), x**2 + y**2, rcond=None
+    )[0]
+    radius = float(np.sqrt(max(c + a**2 + b**2, 0.0)))
+    off = np.abs(np.hypot(x - a, y - b) - radius).max()
+    is_round = off <= min(ROUND, radius / 20) and np.ptp(height) <= FLAT * 2 * radius
+    return 2 * radius if is_round else None

@@ -1,0 +1,61 @@
+"""What a drawing holds in one line: shown wherever one is read, before anything is planned."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from rich.markup import escape
+
+from kerfpath.cad import Part
+from kerfpath.cad import read as read_drawing
+from kerfpath.cli._show import busy, out
+from kerfpath.job import Job
+
+__all__ = ["drawing_entry", "drawing_of", "show_drawing", "summary"]
+
+
+def drawing_of(job: Job) -> Part:
+    """Return the part that a job cuts.
+
+    Raises
+    ------
+    InputError
+        It cannot be read, or has not the loops that the job picks.
+    """
+    with busy(f"reading {job.part_file.name}"):
+        part = read_drawing(job.part_file, unit=job.part_unit)
+    job.tasks(part)
+    return part
+
+
+def summary(part: Part) -> str:
+    """Return the size of a part, its unit, and its loops with their lengths and faults."""
+    size = (part.bounding_box[1] - part.bounding_box[0]) * 1000
+    lengths = [loop.length * 1000 for loop in part.loops]
+    return (
+        f"{part.faces} faces, {len(part.loops)} loops"
+        f"{f' of {min(lengths):.1f} to {max(lengths):.1f} mm' if lengths else ''}, "
+        f"{' x '.join(f'{v:.1f}' for v in size)} mm (file in {part.unit}); "
+        f"largest gap {part.largest_gap * 1000:.4f} mm, "
+        f"shortest edge {part.shortest_edge * 1000:.4f} mm"
+    )
+
+
+def show_drawing(part: Part) -> None:
+    """Print what a part holds, and what was assumed, repaired or left out in reading it."""
+    out.print(escape(f"{part.path}: {summary(part)}"))
+    for note in part.notes:
+        out.print(escape(f"note: {note}"))
+
+
+def drawing_entry(part: Part) -> dict[str, Any]:
+    """Return the same for JSON."""
+    return {
+        "file": str(part.path),
+        "unit": part.unit,
+        "bounding_box_m": part.bounding_box.tolist(),
+        "faces": part.faces,
+        "largest_gap_m": part.largest_gap,
+        "shortest_edge_m": part.shortest_edge,
+        "notes": list(part.notes),
+    }

@@ -1,0 +1,239 @@
+"""From plans to the neutral program."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from kerfpath._arrays import Array, freeze, scalar
+from kerfpath.air import AirMove, backed_off
+from kerfpath.errors import InputError
+from kerfpath.plans import Plan
+from kerfpath.post._arcs import with_arcs
+from kerfpath.post._names import identifier, identifiers
+from kerfpath.post._program import (
+    Comment,
+    JointMove,
+    LinearMove,
+    Program,
+    Section,
+    Step,
+    Switch,
+    Wait,
+)
+from kerfpath.robots import Robot, posture_name
+
+__all__ = ["build_program"]
+
+PLAN_AND_CONTOUR = 1e-5
+"""Distance (m) and sine of an angle by which the planned joints may miss the contour."""
+
+
+def build_program(
+    plans: Sequence[Plan],
+    *,
+    moves: Sequence[AirMove] = (),
+    name: str | None = None,
+    retract: float = 0.05,
+    zone: float = 0.0003,
+    lead_time: float = 0.02,
+    gas_lead: float | None = None,
+    pierce_time: float = 0.0,
+    approach_speed: float = 0.1,
+    air_speed: float = 0.25,
+    arc_tolerance: float | None = None,
+) -> Program:
+    """Return the program that cuts the planned contours one after the other.
+
+    For each contour: a joint move to a pose backed off the start along the tool axis, a straight
+    move to the start with a stop, laser on, straight moves through all nodes with a stop at the
+    last, laser off, and a straight move back along the tool axis. Along micro joints the laser is
+    off. The gas, if it is switched, flows from before the start to the end of the contour.
+
+    Parameters
+    ----------
+    plans : sequence of Plan
+        In the order of cutting; same robot, tool and placement.
+    moves : sequence of AirMove
+        Between the contours, as `kerfpath.sequence.plan_part` returns them, one less than plans or,
+        from and to a home position, one more; default: joint moves straight to each start.
+    name : str, optional
+        Name of the program, made an identifier; default: "cut" and the first contour.
+    retract : float m
+        How far the tool backs off before and after a contour.
+    zone : float m
+        Radius in which the corners at the inner nodes may be rounded; halved, where nodes are
+        nearer to each other, until zones do not overlap.
+    lead_time : float s
+        How long before the tip arrives the laser is switched.
+    gas_lead : float s, optional
+        How long before the tip arrives at the start the gas is switched on; default: the program
+        does not switch it.
+    pierce_time : float s
+        How long to wait at the start, laser on, until the beam is through.
+    approach_speed : float m/s
+        Speed along the tool axis before and after a contour.
+    air_speed : float
+        Share of the full speed for the joint moves between contours.
+    arc_tolerance : float m, optional
+        Arcs that stay so near to the planned path are written as circular moves, see `with_arcs`.
+
+    Raises
+    ------
+    InputError
+        No plans, plans that do not belong together, joints that do not lead the tool along the
+        contour, or no way to back off by `retract`.
+    """
+    if not plans:
+        raise InputError("build_program: expected at least one plan, got none")
+    first = plans[0]
+    for axis in (plan.robot.external for plan in plans):
+        if axis is not None:
+            raise InputError(f"program: no language writes the {axis.kind} of a plan yet")
+    for plan in plans[1:]:
+        _require_same_cell(first, plan)
+    retract = scalar(retract, "retract", unit="m", above=0.0)
+    zone = scalar(zone, "zone", unit="m", above=-1e-300)
+    pierce_time = scalar(pierce_time, "pierce_time", unit="s", above=-1e-300)
+    approach_speed = scalar(approach_speed, "approach_speed", unit="m/s", above=0.0)
+    title = identifier(f"cut {first.name}" if name is None else name)
+    names = identifiers((plan.name for plan in plans), taken=(title,))
+    *ways, home = _corners(plans, moves, retract)
+    starts: tuple[Switch, ...] = (Switch(signal="laser", on=True, lead_time=lead_time),)
+    ends: tuple[Switch, ...] = (Switch(signal="laser", on=False, lead_time=lead_time),)
+    if gas_lead is not None:
+        starts = (Switch(signal="gas", on=True, lead_time=gas_lead), *starts)
+        ends = (*ends, Switch(signal="gas", on=False))
+    sections = []
+    for plan, section_name, way in zip(plans, names, ways, strict=True):
+        q = plan.q[0] + np.vstack([np.zeros_like(plan.q[0]), np.cumsum(plan.increments, axis=0)])
+        T_part_tip = _tip_poses(plan, q)
+        T_out = T_part_tip[-1].copy()
+        T_out[:3, 3] -= retract * T_out[:3, 2]
+        slow: dict[str, Any] = {"speed": approach_speed, "duration": retract / approach_speed}
+        steps: tuple[Step, ...] = (
+            Comment(
+                f"{plan.name}: {len(q)} nodes, {plan.contour.length * 1e3:.1f} mm, "
+                f"posture {posture_name(int(plan.posture[0]))}"
+            ),
+            *(JointMove(q=corner, speed=air_speed) for corner in way),
+            LinearMove(T_part_tip=T_part_tip[0], q=q[0], switches=starts, **slow),
+            *([Wait(time=pierce_time)] if pierce_time > 0 else []),
+            *_cut(plan, T_part_tip, q, zone, lead_time, ends),
+            LinearMove(T_part_tip=T_out, q=backed_off(plan, "end", retract), **slow),
+        )
+        sections.append(Section(name=section_name, steps=steps))
+    if home:
+        back = tuple(JointMove(q=corner, speed=air_speed) for corner in home)
+        sections[-1] = replace(sections[-1], steps=sections[-1].steps + back)
+    program = Program(
+        name=title,
+        robot=first.robot,
+        T_flange_tip=first.T_flange_tip,
+        T_base_part=first.T_base_part,
+        sections=tuple(sections),
+        air_checked=len(moves) > 0 and all(move.clear for move in moves),
+    )
+    return program if arc_tolerance is None else with_arcs(program, arc_tolerance)
+
+
+def _cut(
+    plan: Plan, T_part_tip: Array, q: Array, zone: float, lead_time: float,
+    ends: tuple[Switch, ...],
+) -> Iterator[LinearMove]:  # fmt: skip
+    """Yield the moves of a contour to its second node and on, the laser off along micro joints."""
+    took = np.diff(plan.time)
+    speed = np.diff(plan.contour.s) / took
+    joint = np.array([kind == "micro joint" for kind in plan.contour.kinds])
+    for k, radius in enumerate(_zones(plan.contour.points, zone), 1):
+        switches: tuple[Switch, ...] = ()
+        if k == len(took):
+            switches = ends[int(joint[k - 1]) :]  # at the end of a joint the laser is off already
+        elif joint[k] != joint[k - 1]:
+            on = bool(joint[k - 1])
+            switches = (Switch(signal="laser", on=on, lead_time=lead_time),)
+        yield LinearMove(
+            T_part_tip=T_part_tip[k],
+            q=q[k],
+            speed=float(speed[k - 1]),
+            duration=float(took[k - 1]),
+            zone=radius,
+            switches=switches,
+        )
+
+
+def _zones(points: Array, zone: float) -> list[float]:
+    """Return the zone (m) at each node but the first; 0 at the last, where the robot stops."""
+    if zone == 0:
+        return [0.0] * (len(points) - 1)
+    gaps = np.linalg.norm(np.diff(points, axis=0), axis=1)
+    room = np.minimum(gaps[:-1], gaps[1:]) / 2
+    halvings = np.ceil(np.maximum(np.log2(zone / room), 0.0))
+    return [*(zone * 0.5**halvings).tolist(), 0.0]
+
+
+def _corners(plans: Sequence[Plan], moves: Sequence[AirMove], retract: float) -> list[list[Array]]:
+    """Return the joint vectors on the way to each of P plans, and P + 1st those after the last."""
+    if not moves:
+        return [*([backed_off(plan, "start", retract)] for plan in plans), []]
+    ways = [list(move.q[1:]) for move in moves]
+    if len(moves) == len(plans) - 1:
+        return [[backed_off(plans[0], "start", retract)], *ways, []]
+    if len(moves) == len(plans) + 1:
+        return [list(moves[0].q), *ways[1:]]
+    raise InputError(
+        f"build_program: {len(plans)} plans need {len(plans) - 1} moves between them, or "
+        f"{len(plans) + 1} from and to a home position, got {len(moves)}"
+    )
+
+
+def _require_same_cell(first: Plan, plan: Plan) -> None:
+    same = {
+        "robot": _kinematics(first.robot) == _kinematics(plan.robot),
+        "tool (T_flange_tip)": np.allclose(first.T_flange_tip, plan.T_flange_tip, 0, 1e-9),
+        "placement (T_base_part)": np.allclose(first.T_base_part, plan.T_base_part, 0, 1e-9),
+    }
+    if differing := [what for what, is_same in same.items() if not is_same]:
+        raise InputError(
+            f"contours {first.name!r} and {plan.name!r} differ in {', '.join(differing)}; write "
+            "one program for each"
+        )
+
+
+def _kinematics(robot: Robot) -> tuple[object, ...]:
+    chain = robot.chain
+    parts = [robot.sign, robot.offset, robot.T_base_foot, robot.T_end_flange]
+    parts += [] if chain is None else [chain.origins, chain.axes, chain.end]
+    numbers = np.concatenate([part.ravel() for part in parts])
+    return robot.id, robot.kinematics, *robot.geometry.values(), *numbers.tolist()
+
+
+def _tip_poses(plan: Plan, q: Array) -> Array:
+    """Return tip poses (K, 4, 4) in the part frame: point of the contour, orientation of FK(q)."""
+    T = _inverse(plan.T_base_part) @ plan.robot.forward(q) @ plan.T_flange_tip
+    off = np.linalg.norm(T[:, :3, 3] - plan.contour.points, axis=1)
+    axes = plan.axes @ plan.T_base_part[:3, :3]
+    turned = np.linalg.norm(np.cross(T[:, :3, 2], axes), axis=1)
+    turned[(T[:, :3, 2] * axes).sum(axis=1) < 0] = 1.0
+    k = int(np.argmax(np.maximum(off, turned)))
+    if max(off[k], turned[k]) > PLAN_AND_CONTOUR:
+        raise InputError(
+            f"contour {plan.name!r}, node {k}: the planned joints put the tool tip "
+            f"{off[k] * 1e3:.4f} mm and {np.degrees(np.arcsin(turned[k])):.4f} deg off the "
+            "contour; the plan belongs to another contour, tool or placement"
+        )
+    # A placement of few printed decimals is not quite a rotation; a quaternion can say only one.
+    T[:, :3, :3] = Rotation.from_matrix(T[:, :3, :3]).as_matrix()
+    T[:, :3, 3], T[:, 3] = plan.contour.points, (0.0, 0.0, 0.0, 1.0)
+    return freeze(T)
+
+
+def _inverse(T: Array) -> Array:
+    inverse = np.eye(4)
+    inverse[:3, :3] = T[:3, :3].T
+    inverse[:3, 3] = -T[:3, :3].T @ T[:3, 3]
+    return inverse

@@ -1,0 +1,190 @@
+"""Whether a program that was read back says what was to be written."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Any
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from kerfpath._arrays import Array
+from kerfpath.post._issue import ProgramIssue
+from kerfpath.post._languages import Language
+from kerfpath.post._program import CircularMove, Comment, JointMove, LinearMove, Move, Program, Wait
+from kerfpath.post._read import ReadMove, ReadProgram, ReadWait
+from kerfpath.post._settings import Rules, Settings
+
+__all__ = ["deviations"]
+
+POINT = 1e-6
+"""How far (m) a target that is read back may be from the one written, beyond its digits."""
+ANGLE = np.radians(1e-3)
+"""The same of the tool's orientation and of joints, rad."""
+FRAME = 1e-7
+"""The same of frames, m and sine."""
+LEAD = 6e-4
+"""The same of lead times and waits (s): controllers count milliseconds."""
+DURATION = 1e-6
+"""The same of durations (s), where a text says times."""
+REACH = 4.0
+"""Farther (m) than a tip is from any axis: the lever of what digits leave of joints."""
+SHARE = 6e-3
+"""The same of shares of the full speed: controllers count per cent."""
+
+
+def deviations(
+    program: Program, read: ReadProgram, language: Language, settings: Settings
+) -> list[ProgramIssue]:
+    """Return every difference between a program and what was read back of it; empty = the same.
+
+    Parameters
+    ----------
+    program : Program
+    read : ReadProgram
+        What the reader of the language made of the text.
+    language : Language
+    settings : Settings
+        With which it was written.
+    """
+    issues = list(_frames(program, read))
+    ours = [step for step in program.steps if not isinstance(step, Comment)]
+    theirs = list(read.steps)
+    if len(ours) != len(theirs):
+        said = f"{len(theirs)} moves and waits are read back, expected {len(ours)}"
+        return [*issues, ProgramIssue("error", "read-back", said, "program")]
+    pairs: list[tuple[Move, ReadMove]] = []
+    for step, back in zip(ours, theirs, strict=True):
+        if isinstance(step, Wait) and isinstance(back, ReadWait):
+            if abs(step.time - back.time) > LEAD:
+                issues.append(_issue(back, f"waits {back.time:g} s, expected {step.time:g} s"))
+        elif not isinstance(back, ReadMove) or _kind(step) != back.kind:
+            got = back.kind if isinstance(back, ReadMove) else "wait"
+            issues.append(_issue(back, f"is a {got}, expected a {_kind(step)}"))
+        else:
+            assert not isinstance(step, Wait | Comment)
+            pairs.append((step, back))
+    rules = language.rules(settings)
+    issues += _places(program, pairs, rules)
+    issues += _motion(pairs, rules)
+    issues += _postures(program, pairs, language, settings)
+    return issues
+
+
+def _issue(back: ReadMove | ReadWait, message: str) -> ProgramIssue:
+    return ProgramIssue("error", "read-back", f"{message}, as planned", back.place)
+
+
+def _kind(step: object) -> str:
+    kinds = (("joint", JointMove), ("circular", CircularMove), ("linear", LinearMove))
+    return next((word for word, kind in kinds if isinstance(step, kind)), "wait")
+
+
+def _frames(program: Program, read: ReadProgram) -> Iterator[ProgramIssue]:
+    for what in ("T_flange_tip", "T_base_part"):
+        back = getattr(read, what)
+        if back is not None and np.abs(back - getattr(program, what)).max() > FRAME:
+            name = "tool" if what == "T_flange_tip" else "part frame"
+            yield ProgramIssue("error", "read-back", f"the {name} is another", "program")
+
+
+def _places(
+    program: Program, pairs: list[tuple[Move, ReadMove]], rules: Rules
+) -> Iterator[ProgramIssue]:
+    """Compare the tips of all targets, by joints where the text says them."""
+    point, angle = POINT + rules.point_step, ANGLE + rules.angle_step
+    tips = program.tips([m for m, _ in pairs])
+    posed = [
+        (b, T, b.T_part_tip)
+        for (_, b), T in zip(pairs, tips, strict=True)
+        if b.T_part_tip is not None
+    ]
+    posed += [
+        (b, m.T_part_via, b.T_part_via)
+        for m, b in pairs
+        if isinstance(m, CircularMove) and b.T_part_via is not None
+    ]
+    if posed:
+        yield from _apart(
+            [b for b, _, _ in posed],
+            np.array([ours for _, ours, _ in posed]),
+            np.array([theirs for _, _, theirs in posed]),
+            point,
+            angle,
+        )
+    jointed = [(m, b) for m, b in pairs if b.q is not None]
+    if jointed:
+        q, q_back = np.array([m.q for m, _ in jointed]), np.array([b.q for _, b in jointed])
+        forward = program.robot.forward
+        backs = [b for _, b in jointed]
+        tool = program.T_flange_tip
+        left = q.shape[1] * rules.angle_step
+        tips, tips_back = forward(q) @ tool, forward(q_back) @ tool
+        yield from _apart(backs, tips, tips_back, point + REACH * left, angle + left)
+        off = np.abs(q - q_back).max(axis=1)
+        for k in np.flatnonzero(off > angle).tolist():
+            joint = int(np.abs(q[k] - q_back[k]).argmax()) + 1
+            yield _issue(backs[k], f"joint {joint} is {np.degrees(off[k]):.4f} deg off")
+    for _, back in pairs:
+        if back.q is None and back.T_part_tip is None:
+            yield _issue(back, "says no target")
+
+
+def _apart(
+    backs: list[ReadMove], ours: Array, theirs: Array, point: float, angle: float
+) -> Iterator[ProgramIssue]:
+    off = np.linalg.norm(ours[:, :3, 3] - theirs[:, :3, 3], axis=1)
+    between = np.swapaxes(ours[:, :3, :3], 1, 2) @ theirs[:, :3, :3]
+    turned = np.asarray(Rotation.from_matrix(between).magnitude())
+    for k in np.flatnonzero((off > point) | (turned > angle)).tolist():
+        said = f"the tip is {off[k] * 1e3:.4f} mm and {np.degrees(turned[k]):.4f} deg off"
+        yield _issue(backs[k], said)
+
+
+def _motion(pairs: list[tuple[Move, ReadMove]], rules: Rules) -> Iterator[ProgramIssue]:
+    for move, back in pairs:
+        joint = isinstance(move, JointMove)
+        off = SHARE if joint else 0.51 * rules.speed_step + 1e-9
+        if back.speed is not None and abs(move.speed - back.speed) > off:
+            unit, scale = ("of the full speed", 1.0) if joint else ("mm/s", 1e3)
+            said = f"the speed is {back.speed * scale:g} {unit}, expected {move.speed * scale:g}"
+            yield _issue(back, said)
+        if (
+            isinstance(move, LinearMove)
+            and (took := back.duration) is not None
+            and abs(move.duration - took) > DURATION
+        ):
+            yield _issue(back, f"takes {took:g} s, expected {move.duration:g} s")
+        if back.zone is None and move.zone == 0:
+            yield _issue(back, "does not stop, but should")
+        if back.zone is not None and abs(move.zone - back.zone) > POINT:
+            said = f"the zone is {back.zone * 1e3:g} mm, expected {move.zone * 1e3:g} mm"
+            yield _issue(back, said)
+        ours: Any = getattr(move, "switches", ())
+        same = [(s.signal, s.on) for s in ours] == [(s.signal, s.on) for s in back.switches]
+        if not same or any(
+            abs(s.lead_time - b.lead_time) > LEAD for s, b in zip(ours, back.switches, strict=True)
+        ):
+            said = f"switches {_events(back.switches)}, expected {_events(ours)}"
+            yield _issue(back, said)
+
+
+def _events(switches: Any) -> str:
+    words = [f"{s.signal} {'on' if s.on else 'off'} {s.lead_time:g} s ahead" for s in switches]
+    return " and ".join(words) or "nothing"
+
+
+def _postures(
+    program: Program, pairs: list[tuple[Move, ReadMove]], language: Language, settings: Settings
+) -> Iterator[ProgramIssue]:
+    told = [(move, back) for move, back in pairs if back.posture]
+    if not told or language.posture is None:
+        return
+    expected = language.posture(program.robot, np.array([m.q for m, _ in told]), settings)
+    for (_, back), ours in zip(told, expected, strict=True):
+        if back.posture != ours:
+            yield _issue(back, f"the posture is {_words(back.posture)}, expected {_words(ours)}")
+
+
+def _words(posture: tuple[int | str, ...]) -> str:
+    return " ".join(str(code) for code in posture)

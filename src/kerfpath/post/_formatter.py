@@ -1,0 +1,115 @@
+"""Steps to lines: what every formatter has in common."""
+
+from __future__ import annotations
+
+import re
+from abc import ABC, abstractmethod
+from collections.abc import Iterator
+from typing import Any
+
+from kerfpath.errors import InputError
+from kerfpath.post._program import (
+    CircularMove,
+    Comment,
+    JointMove,
+    LinearMove,
+    Program,
+    Section,
+    Signal,
+    Step,
+    Wait,
+)
+from kerfpath.post._settings import Settings
+
+__all__ = ["Formatter", "number", "plain"]
+
+
+class Formatter(ABC):
+    """Writes one program in one language; each kind of step has a method of its own.
+
+    A dialect is a subclass that says one thing otherwise. `preflight` has approved the program.
+
+    Parameters
+    ----------
+    program : Program
+    settings : Settings
+        Those of the language.
+    """
+
+    program: Program
+    settings: Any
+
+    def __init__(self, program: Program, settings: Settings) -> None:
+        self.program, self.settings = program, settings
+
+    @abstractmethod
+    def files(self) -> dict[str, str]:
+        """Return the text of every file by its name, the one to start first."""
+
+    @abstractmethod
+    def names(self) -> list[tuple[str, str]]:
+        """Return every name that the text defines or uses, with what it names."""
+
+    @abstractmethod
+    def joint_move(self, move: JointMove) -> Iterator[str]:
+        """Yield the lines of a joint move."""
+
+    @abstractmethod
+    def linear_move(self, move: LinearMove) -> Iterator[str]:
+        """Yield the lines of a linear move and of what is switched at its end."""
+
+    @abstractmethod
+    def circular_move(self, move: CircularMove) -> Iterator[str]:
+        """Yield the lines of a circular move and of what is switched at its end."""
+
+    @abstractmethod
+    def wait(self, wait: Wait) -> Iterator[str]:
+        """Yield the lines of a wait."""
+
+    @abstractmethod
+    def comment(self, text: str) -> Iterator[str]:
+        """Yield the lines of a comment; `text` is on one line, in plain characters."""
+
+    def lines(self, section: Section) -> Iterator[str]:
+        """Yield the lines of all steps of a section."""
+        for step in section.steps:
+            yield from self.step(step)
+
+    def step(self, step: Step) -> Iterator[str]:
+        """Yield the lines of one step."""
+        if isinstance(step, JointMove):
+            yield from self.joint_move(step)
+        elif isinstance(step, CircularMove):
+            yield from self.circular_move(step)
+        elif isinstance(step, LinearMove):
+            yield from self.linear_move(step)
+        elif isinstance(step, Wait):
+            yield from self.wait(step)
+        elif isinstance(step, Comment):
+            yield from self.comment(plain(step.text))
+
+    def output(self, signal: Signal) -> Any:
+        """Return the output of a signal, from the settings `laser_output` and `gas_output`.
+
+        Raises
+        ------
+        InputError
+            None is named.
+        """
+        name = getattr(self.settings, f"{signal}_output")
+        if name is None:
+            raise InputError(
+                f"the program switches the {signal}, but no output is named for it; say which "
+                f"with {signal}_output"
+            )
+        return name
+
+
+def number(value: float, decimals: int) -> str:
+    """Return a number with so many decimals, and no minus before zero."""
+    return f"{round(float(value), decimals) + 0.0:.{decimals}f}"
+
+
+def plain(text: str) -> str:
+    """Return `text` on one line, in the characters that every controller reads."""
+    return re.sub(r"[^ -~]", "?", text)

@@ -1,0 +1,38 @@
+"""Identifiers made of what people call their contours."""
+
+from __future__ import annotations
+
+import re
+import unicodedata
+from collections.abc import Iterable
+
+__all__ = ["LONGEST_NAME", "identifier", "identifiers"]
+
+LONGEST_NAME = 32
+"""Characters that a name keeps when it is made from a contour's name; ABB's bound."""
+
+
+def identifiers(
+    texts: Iterable[str], taken: Iterable[str], longest: int = LONGEST_NAME
+) -> list[str]:
+    """Return an identifier for each text, unique also where a language ignores capitals."""
+    used = {name.lower() for name in taken}
+    names = []
+    for text in texts:
+        name = plain = identifier(text)[:longest]
+        number = 1
+        while name.lower() in used:
+            number += 1
+            suffix = f"_{number}"
+            name = plain[: longest - len(suffix)] + suffix
+        used.add(name.lower())
+        names.append(name)
+    return names
+
+
+def identifier(text: str) -> str:
+    plain = unicodedata.normalize("NFKD", text).encode("ascii", "ignore").decode()
+    name = re.sub(r"[^A-Za-z0-9]+", "_", plain).strip("_")
+    if not name or name[0].isdigit():
+        name = f"c_{name}".rstrip("_")
+    return name[:LONGEST_NAME]

@@ -1,0 +1,33 @@
+"""Orientations of many targets at once, without jumps along the path."""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from kerfpath._arrays import Array
+
+__all__ = ["quaternions", "rotation_vectors"]
+
+
+def quaternions(T: Array) -> Array:
+    """Return unit quaternions (K, 4), w first, of poses (K, 4, 4).
+
+    The first has w >= 0; each other has of its two signs the one nearer to that before.
+    """
+    wxyz = Rotation.from_matrix(T[:, :3, :3]).as_quat(canonical=True, scalar_first=True)
+    turned = (wxyz[1:] * wxyz[:-1]).sum(axis=1) < 0
+    sign = np.cumprod(np.concatenate([np.ones(min(len(T), 1)), np.where(turned, -1.0, 1.0)]))
+    return np.asarray(wxyz * sign[:, None])
+
+
+def rotation_vectors(T: Array) -> Array:
+    """Return axis times angle (K, 3) rad of poses (K, 4, 4).
+
+    Angles run to 2 pi, as the signs of `quaternions` say, so that vectors do not jump at pi.
+    """
+    wxyz = quaternions(T)
+    sine = np.linalg.norm(wxyz[:, 1:], axis=1)
+    angle = 2 * np.arctan2(sine, wxyz[:, 0])
+    scale = np.divide(angle, sine, out=np.full(len(T), 2.0), where=sine > 0)
+    return np.asarray(wxyz[:, 1:] * scale[:, None])

@@ -1,0 +1,151 @@
+"""What a program's text says, read back: positions, speeds and events, in SI units."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any, Literal, Protocol
+
+from kerfpath._arrays import Array
+from kerfpath.errors import InputError
+from kerfpath.post._program import Switch
+from kerfpath.robots import Robot
+
+__all__ = [
+    "ReadMove", "ReadProgram", "ReadSection", "ReadStep", "ReadWait", "Reader", "same_output",
+]  # fmt: skip
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class ReadMove:
+    """One move as its text says it.
+
+    Parameters
+    ----------
+    kind : {"joint", "linear", "circular"}
+    file, line
+        Where it stands.
+    speed : float or None
+        Of the tip, m/s; of a joint move the share of the full speed; None where the text has none.
+    duration : float s or None
+        How long it takes, where the text says times.
+    zone : float m or None
+        None where the language has no length for it.
+    q : (n,) rad or None
+        Joints of the target, of the robot's model, where the text says them.
+    T_part_tip : (4, 4) m or None
+        Tip pose in the part frame, where the text says it.
+    T_part_via : (4, 4) m or None
+        That of the point on the way of a circular move.
+    posture : tuple
+        What the text says of posture and turns, as `Language.posture` does; empty where nothing.
+    switches : tuple of Switch
+    """
+
+    kind: Literal["joint", "linear", "circular"]
+    file: str
+    line: int
+    speed: float | None
+    duration: float | None = None
+    zone: float | None = 0.0
+    q: Array | None = None
+    T_part_tip: Array | None = None
+    T_part_via: Array | None = None
+    posture: tuple[int | str, ...] = ()
+    switches: tuple[Switch, ...] = ()
+
+    @property
+    def place(self) -> str:
+        """Where it stands."""
+        return f"{self.file}, line {self.line}"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ReadWait:
+    """A wait of `time` (s) where the robot stands."""
+
+    time: float
+    file: str
+    line: int
+
+    @property
+    def place(self) -> str:
+        """Where it stands."""
+        return f"{self.file}, line {self.line}"
+
+
+ReadStep = ReadMove | ReadWait
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ReadSection:
+    """One routine of the program and its steps."""
+
+    name: str
+    steps: tuple[ReadStep, ...]
+
+    @property
+    def moves(self) -> tuple[ReadMove, ...]:
+        """Its moves in order."""
+        return tuple(step for step in self.steps if isinstance(step, ReadMove))
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class ReadProgram:
+    """A program as its text says it.
+
+    Parameters
+    ----------
+    name : str
+    sections : tuple of ReadSection
+        In the order in which they run.
+    T_flange_tip, T_base_part : (4, 4) m or None
+        Tool and work object; None where the text only gives their numbers.
+    """
+
+    name: str
+    sections: tuple[ReadSection, ...]
+    T_flange_tip: Array | None = None
+    T_base_part: Array | None = None
+
+    @property
+    def steps(self) -> tuple[ReadStep, ...]:
+        """All steps in order, over all sections."""
+        return tuple(step for section in self.sections for step in section.steps)
+
+    @property
+    def moves(self) -> tuple[ReadMove, ...]:
+        """All moves in order, over all sections."""
+        return tuple(move for section in self.sections for move in section.moves)
+
+
+class Reader(Protocol):
+    """Reads what the formatter of the same language writes, and nothing else."""
+
+    def __call__(
+        self, main: str, files: Mapping[str, str], robot: Robot, settings: Any
+    ) -> ReadProgram:
+        """Return the program that starts with the file `main`.
+
+        Parameters
+        ----------
+        main : str
+            A name in `files`.
+        files : mapping of str to str
+            Text of each file by its name; others than `main` are looked up as it calls them.
+        robot : Robot
+            Whose joints the controller's axes are turned into.
+        settings : Settings
+            Those of the language.
+
+        Raises
+        ------
+        InputError
+            A line that is not of our making, or that does not fit the others: file and line.
+        """
+
+
+def same_output(said: object, expected: object, place: str) -> None:
+    """Raise InputError where a switch is of another output than the settings name."""
+    if said != expected:
+        raise InputError(f"{place}: switches the output {said}; expected {expected}")

@@ -1,0 +1,60 @@
+"""What a controller can do and what it calls things, as a person states it for one language."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Annotated, Any
+
+import numpy as np
+from pydantic import BaseModel, ConfigDict, Field
+
+__all__ = ["Rules", "Settings", "setting"]
+
+
+def setting(expected: str, example: str, **bounds: Any) -> Any:
+    """Return the bounds of a setting, with what is expected and an example, for messages."""
+    return Field(description=expected, examples=[example], **bounds)
+
+
+class Settings(BaseModel):
+    """The settings of one language; in jobs the table [program.LANGUAGE]."""
+
+    model_config = ConfigDict(extra="forbid", strict=True, frozen=True)
+
+    lines_per_file: Annotated[
+        int,
+        setting("a whole number of lines from 100 to 1000000", "5000", ge=100, le=1_000_000),
+    ] = 5000
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Rules:
+    """What programs in a language must keep to, with given settings.
+
+    Parameters
+    ----------
+    longest_name : int
+        Characters of a name.
+    name : str
+        Regular expression that every name matches.
+    slowest, fastest : float m/s
+        Speeds of the tip that can be said.
+    speed_step : float m/s
+        Speeds are written as multiples of this.
+    turning_speed : float rad/s
+        How fast the tool may turn in linear moves before the controller slows down.
+    longest_lead : float s
+        The longest lead time of a switch on the path.
+    point_step, angle_step : float m, rad
+        What the digits of targets leave of positions and angles.
+    """
+
+    longest_name: int = 32
+    name: str = r"[A-Za-z][A-Za-z0-9_]*"
+    slowest: float = 1e-5
+    fastest: float = np.inf
+    speed_step: float = 0.0
+    turning_speed: float = np.inf
+    longest_lead: float = np.inf
+    point_step: float = 0.0
+    angle_step: float = 0.0

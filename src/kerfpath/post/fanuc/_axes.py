@@ -1,0 +1,93 @@
+"""What a FANUC controller calls the joints, the configuration of a pose, and the frames.
+
+Axes: J2 is 0 with the lower arm upright and grows forwards; J3 is the height of the upper arm over
+the horizontal, whatever J2 is; J4, J5 and J6 are 0 with the tool straight ahead. All of them follow
+from the geometry of the arm, so that a robot from any description is turned into them.
+
+Configuration: F where J5 is above 0 (beyond half a turn, its sine), else N; D where the wrist
+centre lies behind the line of the lower arm, prolonged, else U; B where it lies behind axis 1, else
+T; then the turns of three axes, 0 within 180 deg, 1 from 180 to 540 deg, -1 from -180 to -540 deg.
+
+The frames of the controller: its world has its origin on axis 1 at the height of axis 2; its
+faceplate has z out of the flange and, with all axes at 0, x upwards.
+
+Measured by others on FANUC's simulated controller for an M-20iD/25: LeroyDu56/robconv,
+tests/fixtures/probes/results/CFGPROBE_roboguide.LS @ d0efb3210bd6c3692a3bba8adad6fefa8af5c146.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from kerfpath._arrays import Array, Ints, floats, freeze
+from kerfpath.post.fanuc._settings import FanucSettings
+from kerfpath.robots import Robot
+
+__all__ = [
+    "axes_from_joints", "faceplate", "joints_from_axes", "posture", "turns", "world",
+]  # fmt: skip
+
+NOISE_DECIMALS = 6
+"""Angles are rounded to this many decimals (deg) before their turns are counted."""
+NOISE = 1e-8
+"""Sine that counts as zero."""
+MATRIX = np.diag([1.0, 1.0, -1.0, -1.0, -1.0, -1.0])
+MATRIX[2, 1] = -1.0
+SHIFT = np.array([0.0, 0.0, np.pi / 2, 0.0, 0.0, np.pi])
+"""Axes = MATRIX @ angles + SHIFT; angles are those of the ortho-parallel model, upright at 0."""
+TURNING = {"J1 J4 J6": [0, 3, 5], "J4 J5 J6": [3, 4, 5]}
+
+
+def axes_from_joints(robot: Robot, q: ArrayLike) -> Array:
+    """Return the controller's axes (K, 6) rad of joint vectors q (K, 6) rad."""
+    angles = robot.sign * floats(q, "q", (None, 6)) - robot.offset
+    return freeze(np.asarray(angles @ MATRIX.T + SHIFT, dtype=np.float64))
+
+
+def joints_from_axes(robot: Robot, axes: ArrayLike) -> Array:
+    """Return the joint vectors (K, 6) rad of a controller's axes (K, 6) rad."""
+    angles = (floats(axes, "axes", (None, 6)) - SHIFT) @ np.linalg.inv(MATRIX).T
+    return freeze(np.asarray(robot.sign * (angles + robot.offset), dtype=np.float64))
+
+
+def world(robot: Robot) -> Array:
+    """Return the pose (4, 4) m of the controller's world in the robot base."""
+    T = np.eye(4)
+    T[2, 3] = robot.geometry["c1"]
+    return freeze(np.asarray(robot.T_base_foot @ T))
+
+
+def faceplate(robot: Robot) -> Array:
+    """Return the pose (4, 4) m of the controller's faceplate in the robot's flange."""
+    return freeze(np.asarray(np.linalg.inv(robot.T_end_flange), dtype=np.float64))
+
+
+def turns(robot: Robot, q: ArrayLike, settings: FanucSettings) -> Ints:
+    """Return the turns (K, 3) of the axes that the settings name, of joint vectors (K, 6) rad."""
+    axes_deg = np.degrees(axes_from_joints(robot, q))[:, TURNING[settings.turns]]
+    axes_deg = np.round(axes_deg, NOISE_DECIMALS)
+    return freeze((np.sign(axes_deg) * np.floor((np.abs(axes_deg) + 180) / 360)).astype(np.int64))
+
+
+def posture(robot: Robot, q: Array, settings: FanucSettings) -> list[tuple[int | str, ...]]:
+    """Return the configurations of joint vectors q (K, 6) rad: three letters and three turns.
+
+    In the plane of the arm, with x ahead and z up, the wrist centre lies at
+    w = c3 (sin q23, cos q23) + a2 (cos q23, -sin q23) from axis 3; it lies behind the lower arm,
+    which points along (sin q2, cos q2), where c3 sin q3 + a2 cos q3 < 0.
+    """
+    q = floats(q, "q", (None, 6))
+    arm = robot.arm()
+    _, q2, q3, *_ = (robot.sign * q - robot.offset).T
+    ahead = arm.a1 + arm.c2 * np.sin(q2) + arm.c3 * np.sin(q2 + q3) + arm.a2 * np.cos(q2 + q3)
+    bend = arm.c3 * np.sin(q3) + arm.a2 * np.cos(q3)
+    flipped = np.sin(axes_from_joints(robot, q)[:, 4]) > NOISE
+    letters = zip(
+        np.where(flipped, "F", "N").tolist(),
+        np.where(bend < 0, "D", "U").tolist(),
+        np.where(ahead < 0, "B", "T").tolist(),
+        strict=True,
+    )
+    numbers = turns(robot, q, settings).tolist()
+    return [(*words, *three) for words, three in zip(letters, numbers, strict=True)]

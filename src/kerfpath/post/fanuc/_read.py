@@ -1,0 +1,342 @@
+"""Read back the listings that `Fanuc` writes, and nothing else: what it does not know, it refuses.
+
+Attributes that controllers add when they list a program again are let pass.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from kerfpath._arrays import Array, freeze
+from kerfpath.errors import InputError
+from kerfpath.post._program import Signal, Switch
+from kerfpath.post._read import (
+    ReadMove,
+    ReadProgram,
+    ReadSection,
+    ReadStep,
+    ReadWait,
+    same_output,
+)
+from kerfpath.post.fanuc._axes import faceplate, joints_from_axes, world
+from kerfpath.post.fanuc._settings import UNITS, FanucSettings
+from kerfpath.robots import Robot
+
+__all__ = ["read"]
+
+
+def read(main: str, files: Mapping[str, str], robot: Robot, settings: FanucSettings) -> ReadProgram:
+    """Return the program that listings of ours say; see `kerfpath.post.Reader`."""
+    top = _Main(main, files[main], robot, settings)
+    sections = []
+    for name in top.calls:
+        listing = _Section(f"{name}.ls", files[f"{name}.ls"], robot, settings)
+        sections.append(ReadSection(name=listing.name, steps=listing.steps()))
+    return ReadProgram(
+        name=top.name,
+        sections=tuple(sections),
+        T_flange_tip=faceplate(robot) @ top.frame("UTOOL"),
+        T_base_part=world(robot) @ top.frame("UFRAME"),
+    )
+
+
+_NUMBER = r"(-?\d*\.\d+)"
+_END = r"(\d+)(cm/min|mm/sec) (?:(FINE)|CNT(\d+)|CR(\d+))"
+_TB = r"((?: TB +\d*\.\d\dsec,DO\[\d+\]=O(?:N|FF))*)"
+_ATTRIBUTE = re.compile(
+    r"(?:(?:OWNER|COMMENT|PROG_SIZE|CREATE|MODIFIED|FILE_NAME|VERSION|MEMORY_SIZE|PROTECT|"
+    r"CONTROL_CODE|LOCAL_REGISTERS)\s*=[^;]*;|DEFAULT_GROUP\s*= 1(?:,\*){4,7};|"
+    r"(?:TCD:)?\s+[A-Z_]+\s*= \d+[,;])"
+)
+_COUNT = re.compile(r"LINE_COUNT\s*= (\d+);")
+_NUMBERED = re.compile(r" *(\d+):(.*?) *;")
+_VIA = re.compile(r" *\d+:C P\[\d+\] *")
+_SWITCH = re.compile(r" TB +(\d*\.\d\d)sec,DO\[(\d+)\]=(ON|OFF)")
+_MAIN = {
+    kind: re.compile(pattern)
+    for kind, pattern in {
+        "told": rf"  !(UFRAME|UTOOL) (\d+) ([XYZWPR]) {_NUMBER}",
+        "remark": r"  !.*",
+        "select": r"  (UFRAME|UTOOL)_NUM=(\d+)",
+        "reset": r"  DO\[(\d+)\]=OFF",
+        "call": r"  CALL ([A-Z][A-Z0-9_]*)",
+    }.items()
+}
+_SECTION = {
+    kind: re.compile(pattern)
+    for kind, pattern in {
+        "linear": rf"L P\[(\d+)\] {_END}{_TB}",
+        "joint": r"J P\[(\d+)\] (\d+)% (?:(FINE)|CNT\d+)",
+        "circular": rf"C P\[(\d+)\] *:  P\[(\d+)\] {_END}{_TB}",
+        "remark": r"  !.*",
+        "wait": r"  WAIT +(\d*\.\d\d)\(sec\)",
+        "switch": r"  DO\[(\d+)\]=(ON|OFF)",
+    }.items()
+}
+_POSITION = re.compile(
+    r"P\[(\d+)\]\{\n\s*GP1:\n\s*UF : (\d+), UT : (\d+),\s*(?:"
+    r"CONFIG : '([NF]) ([UD]) ([TB]), (-?\d+), (-?\d+), (-?\d+)',\s*"
+    + r",\s*".join(rf"{k} = *{_NUMBER} +mm" for k in "XYZ")
+    + r",\s*"
+    + r",\s*".join(rf"{k} = *{_NUMBER} deg" for k in "WPR")
+    + "|"
+    + r",\s*".join(rf"J{k}= *{_NUMBER} deg" for k in range(1, 7))
+    + r")\n\};\n"
+)
+
+
+class _Listing:
+    """One program: attributes, then numbered lines, each read by the method of its kind."""
+
+    def __init__(self, file: str, text: str, robot: Robot, settings: FanucSettings) -> None:
+        self.file, self.robot, self.settings = file, robot, settings
+        self.rows = [row.rstrip() for row in text.splitlines()]
+        self.line = 0
+        self.name = ""
+
+    def take(self) -> str:
+        """Return the next row."""
+        self.line += 1
+        if self.line > len(self.rows):
+            raise self.fault("the listing ends too early; /END is missing")
+        return self.rows[self.line - 1]
+
+    def body(self, kinds: Mapping[str, re.Pattern[str]]) -> None:
+        """Read the attributes and the numbered lines, up to /POS."""
+        match = re.fullmatch(r"/PROG  ([A-Z][A-Z0-9_]*)", self.take())
+        self.name = match[1] if match else ""
+        if f"{self.name}.ls" != self.file.rpartition("/")[2]:
+            raise self.fault(f"expected /PROG and the name of the file, got {self.shown()}")
+        if self.take() != "/ATTR":
+            raise self.fault(f"expected /ATTR, got {self.shown()}")
+        counted = None
+        while (row := self.take()) != "/MN":
+            if match := _COUNT.fullmatch(row):
+                counted = int(match[1])
+            elif not _ATTRIBUTE.fullmatch(row):
+                raise self.fault(f"not an attribute: {self.shown()}")
+        number = 0
+        while (row := self.take()) != "/POS":
+            number += 1
+            if _VIA.fullmatch(row):
+                row += self.take()
+            match = _NUMBERED.fullmatch(row)
+            if not match or int(match[1]) != number:
+                raise self.fault(f"expected line number {number}, got {self.shown()}")
+            for kind, pattern in kinds.items():
+                if said := pattern.fullmatch(match[2]):
+                    getattr(self, kind)(*said.groups())
+                    break
+            else:
+                raise self.fault(f"not expected here: {self.shown()}")
+        if counted != number:
+            raise self.fault(f"LINE_COUNT is {counted}, but there are {number} lines")
+
+    def end(self) -> None:
+        """Read the end."""
+        if self.take() != "/END" or any(self.rows[self.line :]):
+            raise self.fault(f"expected /END and nothing after it, got {self.shown()}")
+
+    def remark(self) -> None:
+        """Keep nothing."""
+
+    def signal(self, output: str) -> Signal:
+        if int(output) == self.settings.gas_output:
+            return "gas"
+        expected = f"DO[{self.settings.laser_output}]"
+        same_output(f"DO[{output}]", expected, f"{self.file}, line {self.line}")
+        return "laser"
+
+    def frames(self, user: str, tool: str) -> None:
+        """Refuse frames of other numbers than those of the settings."""
+        expected = [self.settings.user_frame, self.settings.tool_frame]
+        if [int(user), int(tool)] != expected:
+            raise self.fault(
+                f"user frame {user} and tool frame {tool}, expected {expected[0]} and {expected[1]}"
+            )
+
+    def shown(self) -> str:
+        return repr(self.rows[self.line - 1][:60])
+
+    def fault(self, message: str) -> InputError:
+        return InputError(f"{self.file}, line {self.line}: {message}")
+
+
+class _Main(_Listing):
+    """The main program: frames told in remarks, and calls."""
+
+    def __init__(self, file: str, text: str, robot: Robot, settings: FanucSettings) -> None:
+        super().__init__(file, text, robot, settings)
+        self.values: dict[tuple[str, str], float] = {}
+        self.selected: dict[str, str] = {}
+        self.calls: list[str] = []
+        self.body(_MAIN)
+        self.end()
+        for kind in ("UFRAME", "UTOOL"):
+            if kind not in self.selected:
+                raise self.fault(f"{kind}_NUM is not set")
+        self.frames(self.selected["UFRAME"], self.selected["UTOOL"])
+
+    def told(self, kind: str, number: str, letter: str, value: str) -> None:
+        if (kind, letter) in self.values:
+            raise self.fault(f"{letter} of {kind} is told twice")
+        self.frames(
+            number if kind == "UFRAME" else str(self.settings.user_frame),
+            number if kind == "UTOOL" else str(self.settings.tool_frame),
+        )
+        self.values[kind, letter] = float(value)
+
+    def select(self, kind: str, number: str) -> None:
+        if kind in self.selected or self.calls:
+            raise self.fault(f"{kind}_NUM must be set once, before the first CALL")
+        self.selected[kind] = number
+
+    def reset(self, output: str) -> None:
+        self.signal(output)
+        if self.calls:
+            raise self.fault("outputs must be reset before the first CALL")
+
+    def call(self, name: str) -> None:
+        if name in self.calls:
+            raise self.fault(f"{name} is called twice")
+        self.calls.append(name)
+
+    def frame(self, kind: str) -> Array:
+        """Return a frame that remarks tell, (4, 4) m."""
+        missing = [letter for letter in "XYZWPR" if (kind, letter) not in self.values]
+        if missing:
+            raise self.fault(f"no remark tells {', '.join(missing)} of {kind}")
+        values = np.array([[self.values[kind, letter] for letter in "XYZWPR"]])
+        return freeze(_poses(values)[0])
+
+
+class _Section(_Listing):
+    """A program that is called: motions, waits and switches, and then their positions."""
+
+    def __init__(self, file: str, text: str, robot: Robot, settings: FanucSettings) -> None:
+        super().__init__(file, text, robot, settings)
+        self.read_steps: list[ReadWait | dict[str, Any]] = []
+        self.targets: dict[int, tuple[str | None, ...]] = {}
+        self.body(_SECTION)
+        self.positions()
+        self.end()
+
+    def joint(self, target: str, per_cent: str, fine: str | None) -> None:
+        zone = 0.0 if fine else None
+        self.motion("joint", [target], int(per_cent) / 100, zone, "")
+
+    def linear(self, target: str, *end: Any) -> None:
+        self.motion("linear", [target], *_path_end(*end))
+
+    def circular(self, via: str, target: str, *end: Any) -> None:
+        self.motion("circular", [target, via], *_path_end(*end))
+
+    def motion(
+        self, kind: str, targets: list[str], speed: float, zone: float | None, before: str
+    ) -> None:
+        switches = tuple(
+            Switch(signal=self.signal(output), on=value == "ON", lead_time=float(lead))
+            for lead, output, value in _SWITCH.findall(before)
+        )
+        self.read_steps.append(
+            {
+                "kind": kind,
+                "line": self.line,
+                "targets": [int(target) for target in targets],
+                "speed": speed,
+                "zone": zone,
+                "switches": switches,
+            }
+        )
+
+    def wait(self, time: str) -> None:
+        self.read_steps.append(ReadWait(time=float(time), file=self.file, line=self.line))
+
+    def switch(self, output: str, value: str) -> None:
+        move = self.read_steps[-1] if self.read_steps else None
+        if not isinstance(move, dict) or move["zone"] != 0 or move["kind"] == "joint":
+            raise self.fault("an output may only be switched here after a path motion with FINE")
+        move["switches"] += (Switch(signal=self.signal(output), on=value == "ON"),)
+
+    def positions(self) -> None:
+        """Read the positions, each a block of rows."""
+        rows = self.rows[self.line :]
+        last = rows.index("/END") if "/END" in rows else len(rows)
+        text, at = "\n".join([*rows[:last], ""]), 0
+        while at < len(text) and last:
+            match = _POSITION.match(text, at)
+            if not match:
+                raise self.fault("no position of ours begins after this line")
+            number, user, tool, *said = match.groups()
+            self.line += match[0].count("\n")
+            self.frames(user, tool)
+            if int(number) in self.targets:
+                raise self.fault(f"P[{number}] is there twice")
+            self.targets[int(number)] = tuple(said)
+            at = match.end()
+
+    def steps(self) -> tuple[ReadStep, ...]:
+        """Return the steps with their targets, all of which are turned into SI units at once."""
+        numbers = {number: k for k, number in enumerate(self.targets)}
+        said = list(self.targets.values())
+        posed = [words[0] is not None for words in said]
+        values = np.array([_six(words) for words in said], dtype=np.float64).reshape(-1, 6)
+        q = joints_from_axes(self.robot, np.radians(values))
+        poses = _poses(values)
+        steps: list[ReadStep] = []
+        used: set[int] = set()
+        for step in self.read_steps:
+            if isinstance(step, ReadWait):
+                steps.append(step)
+                continue
+            self.line = step["line"]
+            targets = step.pop("targets")
+            used.update(targets)
+            if unknown := [n for n in targets if n not in numbers]:
+                raise self.fault(f"P[{unknown[0]}] is not there")
+            at, *vias = [numbers[n] for n in targets]
+            wrong = [n for n in targets if posed[numbers[n]] == (step["kind"] == "joint")]
+            if wrong:
+                form = "J1 to J6" if step["kind"] == "joint" else "X to R"
+                raise self.fault(f"P[{wrong[0]}] must be given by {form}")
+            if step["kind"] == "joint":
+                step["q"] = q[at]
+            else:
+                step |= {"T_part_tip": poses[at], "posture": _posture(said[at])}
+            if vias:
+                step["T_part_via"] = poses[vias[0]]
+            steps.append(ReadMove(file=self.file, **step))
+        if unused := [number for number in self.targets if number not in used]:
+            self.line = len(self.rows)
+            raise self.fault(f"P[{unused[0]}] is used by no motion")
+        return tuple(steps)
+
+
+def _path_end(
+    speed: str, unit: str, fine: str | None, cnt: str | None, corner: str | None, before: str
+) -> tuple[float, float | None, str]:
+    """Return speed (m/s), zone (m, None for CNT) and what is switched, of the end of a line."""
+    zone = None if corner is None else int(corner) * 1e-3
+    return int(speed) * UNITS[unit], 0.0 if fine else zone, before
+
+
+def _six(words: tuple[str | None, ...]) -> list[float]:
+    return [float(word) for word in words[6:] if word is not None]
+
+
+def _posture(words: tuple[str | None, ...]) -> tuple[int | str, ...]:
+    letters, numbers = words[:3], words[3:6]
+    return (*map(str, letters), *(int(str(number)) for number in numbers))
+
+
+def _poses(values: Array) -> Array:
+    """Return the poses (K, 4, 4) m of X, Y, Z in mm and W, P, R in deg, (K, 6)."""
+    T = np.tile(np.eye(4), (len(values), 1, 1))
+    T[:, :3, :3] = Rotation.from_euler("xyz", values[:, 3:], degrees=True).as_matrix()
+    T[:, :3, 3] = values[:, :3] * 1e-3
+    return freeze(T)

@@ -1,0 +1,84 @@
+"""What a FANUC controller can do and what it calls things."""
+
+from __future__ import annotations
+
+import re
+from typing import Annotated, Literal
+
+import numpy as np
+
+from kerfpath.post._settings import Rules, Settings, setting
+
+__all__ = ["FanucSettings", "is_reserved", "rules", "unit"]
+
+UNITS = {"cm/min": 0.01 / 60, "mm/sec": 1e-3}
+"""Units of speeds in m/s; controllers count both in whole numbers."""
+LONGEST_LEAD = 30.0
+"""s; the longest time of TB."""
+SPECIAL = re.compile(r"(RSR|PNS|STYLE)\d*|CON|PRN|AUX|NUL|(COM|LPT)\d", re.IGNORECASE)
+"""Programs that signals start by their name, and names that are devices where files are kept."""
+WORDS = (
+    "abort call do else end endfor endif for gi go if ir jmp lbl macro message monitor override "
+    "p pause payload pl pr r resume_prog return ro rs run select skip sr stop then timer ualm "
+    "uframe uframe_num utool utool_num wait"
+)
+"""Words of the language, where a contour may be named so."""
+
+Output = Annotated[int, setting("the number of a digital output, 1 to 4096", "5", ge=1, le=4096)]
+
+
+class FanucSettings(Settings):
+    """Frames, outputs and options of the controller."""
+
+    lines_per_file: Annotated[
+        int, setting("a whole number of lines from 100 to 9999", "9999", ge=100, le=9999)
+    ] = 9999
+    laser_output: Output = 1
+    gas_output: Output | None = None
+    user_frame: Annotated[int, setting("a user frame, 1 to 61", "2", ge=1, le=61)] = 1
+    tool_frame: Annotated[int, setting("a tool frame, 1 to 29", "2", ge=1, le=29)] = 1
+    longest_name: Annotated[
+        int, setting("the characters of a program's name, 8 to 36", "8", ge=8, le=36)
+    ] = 36
+    speed_unit: Annotated[Literal["cm/min", "mm/sec"], setting("cm/min or mm/sec", '"mm/sec"')] = (
+        "cm/min"
+    )
+    fastest_mm_s: Annotated[
+        float, setting("the largest speed of linear moves, in mm/s", "4000.0", ge=1, le=20_000)
+    ] = 2000.0
+    corner: Annotated[
+        Literal["CNT", "CR"], setting("CNT, or CR where the controller has it", '"CR"')
+    ] = "CNT"
+    cnt_percent: Annotated[int, setting("a CNT value, 0 to 100", "50", ge=0, le=100)] = 100
+    turns: Annotated[
+        Literal["J1 J4 J6", "J4 J5 J6"],
+        setting("the axes whose turns are counted, J1 J4 J6 or J4 J5 J6", '"J4 J5 J6"'),
+    ] = "J1 J4 J6"
+    decimals: Annotated[
+        int, setting("the decimals of mm and deg in positions, 3 to 6", "3", ge=3, le=6)
+    ] = 4
+
+
+def unit(settings: FanucSettings) -> float:
+    """Return the step of speeds, m/s."""
+    return UNITS[settings.speed_unit]
+
+
+def rules(settings: FanucSettings) -> Rules:
+    """Return what TP programs must keep to."""
+    half_digit = 0.5 * 10.0**-settings.decimals
+    return Rules(
+        longest_name=settings.longest_name,
+        name=r"[A-Z][A-Z0-9_]*",
+        slowest=unit(settings),
+        fastest=settings.fastest_mm_s * 1e-3,
+        speed_step=unit(settings),
+        longest_lead=LONGEST_LEAD,
+        point_step=half_digit * 1e-3,
+        angle_step=float(np.radians(half_digit)),
+    )
+
+
+def is_reserved(name: str) -> bool:
+    """Return whether a controller gives programs called `name` another meaning."""
+    return name.lower() in WORDS.split() or SPECIAL.fullmatch(name) is not None

@@ -1,0 +1,261 @@
+"""TP, the language of FANUC controllers, as listings: this module only formats.
+
+Units of TP: mm, deg, cm/min or mm/sec, per cent, seconds in hundredths. A listing is one program:
+attributes, numbered lines, and the positions that they name. TB on the line of a motion switches an
+output so long before the tip reaches its end; a line of its own after a motion that stops does so
+once the tip is there.
+
+The layout is that of controllers' own listings: LeroyDu56/robconv, docs/fanuc_ls_format.md and
+tests/fixtures/fanuc/roboguide_export, JuniorNatalin/VASC (TB).
+"""
+
+from __future__ import annotations
+
+import textwrap
+from collections.abc import Iterator
+from dataclasses import replace
+from itertools import count
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from kerfpath._arrays import Array
+from kerfpath.post._divide import divided
+from kerfpath.post._formatter import Formatter, number, plain
+from kerfpath.post._names import identifiers
+from kerfpath.post._program import (
+    CircularMove,
+    Comment,
+    JointMove,
+    LinearMove,
+    Program,
+    Section,
+    Switch,
+    Wait,
+)
+from kerfpath.post.fanuc._axes import axes_from_joints, faceplate, posture, world
+from kerfpath.post.fanuc._settings import FanucSettings, unit
+
+__all__ = ["Fanuc", "divide_switches", "xyzwpr"]
+
+NEW_LINE = "\r\n"
+PADDING = "    "
+REMARK = 32
+"""Characters of a remark that every controller keeps."""
+MOST_REMARKS = 3
+"""Lines that a comment is cut to."""
+MOST_LINES = 3
+"""Lines of a step: those of a comment, or a motion and what is switched after it."""
+FRAME_DECIMALS = (4, 6)
+"""Decimals of mm and of deg with which a person is told the frames."""
+JOINT_WORDS = tuple((f"J{k}=", "deg") for k in range(1, 7))
+POSE_WORDS = tuple((f"{k} =", " mm") for k in "XYZ") + tuple((f"{k} =", "deg") for k in "WPR")
+ATTRIBUTES = """/ATTR
+OWNER\t\t= MNEDITOR;
+COMMENT\t\t= "kerfpath";
+PROG_SIZE\t= 0;
+FILE_NAME\t= ;
+VERSION\t\t= 0;
+LINE_COUNT\t= {count};
+MEMORY_SIZE\t= 0;
+PROTECT\t\t= READ_WRITE;
+TCD:  STACK_SIZE\t= 0,
+      TASK_PRIORITY\t= 50,
+      TIME_SLICE\t= 0,
+      BUSY_LAMP_OFF\t= 0,
+      ABORT_REQUEST\t= 0,
+      PAUSE_REQUEST\t= 0;
+DEFAULT_GROUP\t= 1,*,*,*,*;
+CONTROL_CODE\t= 00000000 00000000;
+"""
+"""Controllers count sizes and dates themselves."""
+
+
+class Fanuc(Formatter):
+    """Writes one listing for each section, and a main program that calls them."""
+
+    settings: FanucSettings
+
+    def __init__(self, program: Program, settings: FanucSettings) -> None:
+        (name,) = identifiers([program.name], (), settings.longest_name)
+        whole = replace(program, name=name)
+        more = max((_more_lines(section) for section in program.sections), default=0)
+        most = max(settings.lines_per_file - more, settings.lines_per_file // MOST_LINES)
+        whole = divided(whole, most, longest_name=settings.longest_name)
+        sections = tuple(replace(part, name=part.name.upper()) for part in whole.sections)
+        super().__init__(replace(whole, name=name.upper(), sections=sections), settings)
+        self._target = count(1)
+
+    def files(self) -> dict[str, str]:
+        """Return the main program and those that it calls."""
+        files = {f"{self.program.name}.ls": _listing(self.program.name, self.main(), [])}
+        for section in self.program.sections:
+            lines = list(self.lines(section))
+            positions = self._positions(section)
+            files[f"{section.name}.ls"] = _listing(section.name, lines, positions)
+        return files
+
+    def main(self) -> list[str]:
+        """Return the lines of the main program."""
+        program, settings = self.program, self.settings
+        clear = "proved clear in the planned cell"
+        checked = clear if program.air_checked else "not checked for collisions"
+        moves = [move for move in program.moves if isinstance(move, LinearMove)]
+        switched = [switch.signal for move in moves for switch in move.switches]
+        lines = [
+            *self.comment(f"kerfpath, for {plain(program.robot.model)}"),
+            *self.comment(f"Moves through the air: {checked}."),
+            *self.comment("A stop does not switch the laser off: the cell's safety has to."),
+            *self.comment("Enter these frames (mm, deg). World: on J1, at the height of J2."),
+        ]
+        frame = np.linalg.inv(world(program.robot)) @ program.T_base_part
+        tool = np.linalg.inv(faceplate(program.robot)) @ program.T_flange_tip
+        lines += _frame(f"UFRAME {settings.user_frame}", frame)
+        lines += _frame(f"UTOOL {settings.tool_frame}", tool)
+        lines += [f"  UFRAME_NUM={settings.user_frame} ;", f"  UTOOL_NUM={settings.tool_frame} ;"]
+        lines += [f"  DO[{self.output(s)}]=OFF ;" for s in dict.fromkeys(["laser", *switched])]
+        return lines + [f"  CALL {section.name}{PADDING};" for section in program.sections]
+
+    def names(self) -> list[tuple[str, str]]:
+        """Return the names of all programs."""
+        sections = ((section.name, "a contour") for section in self.program.sections)
+        return [(self.program.name, "the program"), *sections]
+
+    def lines(self, section: Section) -> Iterator[str]:
+        """Yield the lines of all steps of a section, its targets numbered from 1."""
+        self._target = count(1)
+        yield from super().lines(section)
+
+    def joint_move(self, move: JointMove) -> Iterator[str]:
+        """Yield a J motion; it knows no corner region."""
+        end = "FINE" if move.zone == 0 else f"CNT{self.settings.cnt_percent}"
+        yield f"J P[{next(self._target)}] {number(move.speed * 100, 0)}% {end}{PADDING};"
+
+    def linear_move(self, move: LinearMove) -> Iterator[str]:
+        """Yield an L motion and what is switched after it."""
+        yield f"L P[{next(self._target)}] {self._path_end(move)}{PADDING};"
+        yield from self._after(move)
+
+    def circular_move(self, move: CircularMove) -> Iterator[str]:
+        """Yield a C motion, in two rows under one number, and what is switched after it."""
+        via, end = next(self._target), next(self._target)
+        row = f"C P[{via}]{PADDING}{NEW_LINE}    :  P[{end}]"
+        yield f"{row} {self._path_end(move)}{PADDING};"
+        yield from self._after(move)
+
+    def wait(self, wait: Wait) -> Iterator[str]:
+        """Yield a WAIT."""
+        yield f"  WAIT {_seconds(wait.time)}(sec) ;"
+
+    def comment(self, text: str) -> Iterator[str]:
+        """Yield remarks; a semicolon would end them, and the frames are told without a space."""
+        yield from (f"  ! {line} ;" for line in _remarks(text))
+
+    def _path_end(self, move: LinearMove) -> str:
+        """Say how fast a move is, how it ends, and what is switched on the way there."""
+        settings = self.settings
+        end = "FINE"
+        if move.zone > 0 and settings.corner == "CNT":
+            end = f"CNT{settings.cnt_percent}"
+        elif move.zone > 0:
+            end = f"CR{number(move.zone * 1e3, 0)}"
+        timed, _ = divide_switches(move)
+        before = "".join(f" TB {_seconds(s.lead_time)}sec,{self._set(s)}" for s in timed)
+        return f"{number(move.speed / unit(settings), 0)}{settings.speed_unit} {end}{before}"
+
+    def _after(self, move: LinearMove) -> Iterator[str]:
+        yield from (f"  {self._set(switch)} ;" for switch in divide_switches(move)[1])
+
+    def _set(self, switch: Switch) -> str:
+        return f"DO[{self.output(switch.signal)}]={'ON' if switch.on else 'OFF'}"
+
+    def _positions(self, section: Section) -> list[str]:
+        """Return the targets of a section in the order in which its lines number them."""
+        targets: list[tuple[Array, Array | None]] = []
+        for move in section.moves:
+            if isinstance(move, CircularMove):
+                targets.append((move.q_via, move.T_part_via))
+            targets.append((move.q, getattr(move, "T_part_tip", None)))
+        if not targets:
+            return []
+        robot, settings = self.program.robot, self.settings
+        q = np.array([q for q, _ in targets])
+        axes_deg = np.degrees(axes_from_joints(robot, q)).tolist()
+        poses = xyzwpr(np.array([np.eye(4) if T is None else T for _, T in targets])).tolist()
+        configurations = posture(robot, q, settings)
+        frames = f"\tUF : {settings.user_frame}, UT : {settings.tool_frame},\t"
+        texts = []
+        for n, (_, T) in enumerate(targets):
+            if T is None:
+                rows = [frames, *self._values(JOINT_WORDS, axes_deg[n])]
+            else:
+                *letters, first, second, third = configurations[n]
+                words = f"{' '.join(map(str, letters))}, {first}, {second}, {third}"
+                rows = [f"{frames}\tCONFIG : '{words}',", *self._values(POSE_WORDS, poses[n])]
+            texts.append(NEW_LINE.join([f"P[{n + 1}]{{", "   GP1:", *rows, "};"]))
+        return texts
+
+    def _values(self, words: tuple[tuple[str, str], ...], values: list[float]) -> list[str]:
+        """Return six values in two rows."""
+        decimals = self.settings.decimals
+        said = [
+            f"{word}{number(value, decimals):>{6 + decimals}} {measure}"
+            for (word, measure), value in zip(words, values, strict=True)
+        ]
+        return ["\t" + ",\t".join(said[:3]) + ",", "\t" + ",\t".join(said[3:])]
+
+
+def divide_switches(move: LinearMove) -> tuple[tuple[Switch, ...], tuple[Switch, ...]]:
+    """Return the switches on the way to the end of a move, and those once the tip stands there."""
+    switches = move.switches
+    after = 0
+    while move.zone == 0 and after < len(switches) and switches[-1 - after].lead_time == 0:
+        after += 1
+    return switches[: len(switches) - after], switches[len(switches) - after :]
+
+
+def xyzwpr(T: Array) -> Array:
+    """Return poses (K, 4, 4) m as X, Y, Z in mm and W, P, R in deg, (K, 6).
+
+    The rotation is W about x, then P about y, then R about z, all axes fixed.
+    """
+    turned = Rotation.from_matrix(T[:, :3, :3])
+    angles = turned.as_euler("xyz", degrees=True, suppress_warnings=True)
+    return np.hstack([T[:, :3, 3] * 1e3, angles])
+
+
+def _more_lines(section: Section) -> int:
+    """Return how many more lines a section has than steps."""
+    more = 0
+    for step in section.steps:
+        if isinstance(step, Comment):
+            more += len(_remarks(plain(step.text)))
+        elif isinstance(step, LinearMove):
+            more += len(divide_switches(step)[1])
+    return more
+
+
+def _remarks(text: str) -> list[str]:
+    """Return a text as remarks, cut where there would be too many."""
+    words = text.replace(";", ",")
+    return textwrap.wrap(words, REMARK - 1, max_lines=MOST_REMARKS, placeholder=" ...")
+
+
+def _frame(name: str, T: Array) -> Iterator[str]:
+    """Yield a frame as remarks, to be entered by a person and read back."""
+    for k, (letter, value) in enumerate(zip("XYZWPR", xyzwpr(T[None])[0], strict=True)):
+        yield f"  !{name} {letter} {number(value, FRAME_DECIMALS[k // 3])} ;"
+
+
+def _seconds(time: float) -> str:
+    """Return a time as controllers say it, without a zero before the point."""
+    said = number(time, 2)
+    return f"{said.removeprefix('0') if time >= 0.005 else said:>6}"
+
+
+def _listing(name: str, lines: list[str], positions: list[str]) -> str:
+    """Return a program as a listing."""
+    numbered = [f"{n:4d}:{line}" for n, line in enumerate(lines, 1)]
+    head = ATTRIBUTES.format(count=len(lines)).splitlines()
+    rows = [f"/PROG  {name}", *head, "/MN", *numbered, "/POS", *positions, "/END", ""]
+    return NEW_LINE.join(rows)

@@ -1,0 +1,29 @@
+"""KRL, the language of KUKA controllers (KSS 8)."""
+
+from kerfpath.post._languages import Language
+from kerfpath.post.krl._axes import axes_from_joints as axes_from_joints
+from kerfpath.post.krl._axes import joints_from_axes as joints_from_axes
+from kerfpath.post.krl._axes import posture
+from kerfpath.post.krl._axes import status_and_turn as status_and_turn
+from kerfpath.post.krl._check import check
+from kerfpath.post.krl._names import is_reserved
+from kerfpath.post.krl._read import read
+from kerfpath.post.krl._settings import KrlSettings as KrlSettings
+from kerfpath.post.krl._settings import rules
+from kerfpath.post.krl._write import Krl as Krl
+
+KRL = Language(
+    name="krl",
+    title="KUKA KRL",
+    manufacturers=("KUKA",),
+    families=("opw",),
+    suffix=".src",
+    settings=KrlSettings,
+    rules=rules,
+    formatter=Krl,
+    is_reserved=is_reserved,
+    posture=posture,
+    check=check,
+    read=read,
+)
+"""What is registered."""

@@ -1,0 +1,62 @@
+"""What a KUKA controller calls the joints: its axes, and Status and Turn of a pose.
+
+KUKA's axes 1, 4 and 6 turn positive against the right hand, and all axes are zero where the arm
+lies stretched ahead: the candle pose is A2 = -90 deg, A3 = 0. Library robots by KUKA say their
+joints so. From KUKA's manuals: bit 0 of the Status is set where the wrist centre lies behind axis 1
+(x below zero in a frame that turns with it), bit 1 where A3 is not below the angle at which the arm
+is stretched (0 deg without an offset between axes 3 and 4), bit 2 where A5 is negative; bit n of
+the Turn where axis n + 1 is negative. What a manual says of bit 2 at A5 = 0 differs: here it is 0.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from kerfpath._arrays import Array, Ints, floats, freeze
+from kerfpath.robots import Robot
+
+__all__ = ["axes_from_joints", "joints_from_axes", "posture", "status_and_turn"]
+
+SIGN = np.array([-1.0, 1.0, 1.0, -1.0, 1.0, -1.0])
+OFFSET = np.radians([0.0, -90.0, 0.0, 0.0, 0.0, 0.0])
+"""KUKA's axes of an ortho-parallel arm: joints of the model = SIGN * axes - OFFSET."""
+NOISE_DECIMALS = 6
+"""Angles are rounded to this many decimals (deg) before their sign: -1e-15 deg is zero."""
+
+
+def axes_from_joints(robot: Robot, q: ArrayLike) -> Array:
+    """Return the controller's axes (K, 6) rad of joint vectors q (K, 6) rad."""
+    model = robot.sign * floats(q, "q", (None, 6)) - robot.offset
+    return freeze(SIGN * (model + OFFSET))
+
+
+def joints_from_axes(robot: Robot, axes: ArrayLike) -> Array:
+    """Return the joint vectors (K, 6) rad of a controller's axes (K, 6) rad."""
+    model = SIGN * floats(axes, "axes", (None, 6)) - OFFSET
+    return freeze(robot.sign * (model + robot.offset))
+
+
+def status_and_turn(robot: Robot, q: ArrayLike) -> Ints:
+    """Return Status and Turn, (K, 2), of joint vectors q (K, 6) rad.
+
+    An endless axis counts modulo 360 deg, from -180 deg on.
+    """
+    q = floats(q, "q", (None, 6))
+    arm = robot.arm()
+    _, q2, q3, *_ = (arm.sign * q - arm.offset).T
+    ahead = arm.a1 + arm.c2 * np.sin(q2) + arm.c3 * np.sin(q2 + q3) + arm.a2 * np.cos(q2 + q3)
+    axes_deg = np.degrees(axes_from_joints(robot, q))
+    stretched_deg = np.degrees(np.arctan2(-arm.a2, arm.c3))
+    bent = np.round(axes_deg[:, 2] - stretched_deg, NOISE_DECIMALS) >= 0
+    once = (axes_deg + 180.0) % 360.0 - 180.0
+    negative = np.round(np.where(robot.endless, once, axes_deg), NOISE_DECIMALS) < 0
+    found = np.empty((len(q), 2), dtype=np.int64)
+    found[:, 0] = (ahead < 0) + 2 * bent + 4 * negative[:, 4]
+    found[:, 1] = negative @ (1 << np.arange(6))
+    return freeze(found)
+
+
+def posture(robot: Robot, q: Array, settings: object) -> list[tuple[int | str, ...]]:
+    """Return `status_and_turn` of joint vectors q (K, 6) rad, as tuples."""
+    return [tuple(row) for row in status_and_turn(robot, q).tolist()]

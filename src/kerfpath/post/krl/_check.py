@@ -1,0 +1,84 @@
+"""Issues that only KRL has: the controller's frames, turns that it cannot say, the short way."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from kerfpath._arrays import Array
+from kerfpath.post._issue import ProgramIssue
+from kerfpath.post._program import JointMove, Program
+from kerfpath.post.krl._axes import axes_from_joints, joints_from_axes
+from kerfpath.post.krl._settings import KrlSettings
+from kerfpath.robots import Robot
+
+__all__ = ["check"]
+
+HOME = np.radians([[0.0, -90.0, 90.0, 0.0, 0.0, 0.0]])
+"""Axes at which the lower arm stands upright and the rest points ahead."""
+FLANGE = np.array([[0.0, 0.0, 1.0], [0.0, 1.0, 0.0], [-1.0, 0.0, 0.0]])
+"""Orientation of the controller's flange there: z ahead, x down."""
+FRAME = 1e-6
+"""How far (m and sine) a description's frames may be from the controller's."""
+TURN_DEG = 360.0
+"""Turn has one bit for each axis: beyond this either way it cannot say where the axis is."""
+HALF_TURN_DEG = 180.0 - 1e-3
+"""An endless axis that is to turn farther in one motion turns the other way."""
+
+
+def check(program: Program, settings: KrlSettings) -> Iterator[ProgramIssue]:
+    """Yield what KRL or a KUKA controller cannot say or do of a program."""
+    if settings.laser_output is not None and settings.laser_output == settings.gas_output:
+        said = f"laser and gas are switched by the same output, {settings.gas_output}"
+        yield ProgramIssue("error", "output", said, "program")
+    yield from _frames(program.robot)
+    moves = program.moves
+    places = [
+        f"{s.name}, move {number}" for s in program.sections for number in range(len(s.moves))
+    ]
+    axes_deg = np.degrees(axes_from_joints(program.robot, np.array([move.q for move in moves])))
+    beyond = (np.abs(axes_deg) > TURN_DEG) & ~program.robot.endless
+    for k, i in np.argwhere(beyond).tolist():
+        said = f"A{i + 1} = {axes_deg[k, i]:.1f} deg cannot be said by Status and Turn"
+        fix = "only an endless axis may pass 360 deg: set endless, or bound the axis"
+        yield ProgramIssue("error", "turn", f"{said}; {fix}", places[k])
+    for k, move in enumerate(moves):
+        if isinstance(move, JointMove) and move.zone > 0:
+            said = "a joint move cannot round its corner by a length; give it no zone"
+            yield ProgramIssue("error", "zone", said, places[k])
+        if isinstance(move, JointMove) and k > 0:
+            yield from _short_way(program, axes_deg[k] - axes_deg[k - 1], places[k])
+
+
+def _frames(robot: Robot) -> Iterator[ProgramIssue]:
+    """Check that the robot's base and flange are $ROBROOT and the controller's flange."""
+    g = robot.geometry
+    T = robot.forward(joints_from_axes(robot, HOME))[0]
+    point = np.array([g["a1"] + g["c3"] + g["c4"], g["b"], g["c1"] + g["c2"] - g["a2"]])
+    off = max(np.abs(T[:3, 3] - point).max(), np.abs(T[:3, :3] - FLANGE).max())
+    if off > FRAME:
+        yield ProgramIssue(
+            "error",
+            "frames",
+            f"base or flange of {robot.id!r} are not the controller's: at A1 to A6 = 0, -90, 90, "
+            f"0, 0, 0 deg the flange must be at {np.round(point * 1e3, 3).tolist()} mm, z ahead "
+            "and x down; choose those links of the description",
+            "program",
+        )
+
+
+def _short_way(program: Program, step_deg: Array, place: str) -> Iterator[ProgramIssue]:
+    """Check the joint moves of endless axes, which turn by less than half a turn in a motion.
+
+    Where the way through the air has been checked, another one is an error.
+    """
+    for i in np.flatnonzero(program.robot.endless & (np.abs(step_deg) > HALF_TURN_DEG)).tolist():
+        short = (step_deg[i] + 180.0) % 360.0 - 180.0
+        yield ProgramIssue(
+            "error" if program.air_checked else "warning",
+            "short-way",
+            f"A{i + 1} is endless and would turn the short way, by {short:.1f} deg, not by "
+            f"{step_deg[i]:.1f} deg as planned",
+            place,
+        )

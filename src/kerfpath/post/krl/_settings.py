@@ -1,0 +1,58 @@
+"""What a person states of a KUKA controller, and what its programs must keep to."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+import numpy as np
+
+from kerfpath.post._settings import Rules, Settings, setting
+
+__all__ = ["LONGEST_NAME", "KrlSettings", "rules"]
+
+LONGEST_NAME = 24
+"""Characters of a name."""
+SLOWEST = 1e-5
+"""Lowest speed (m/s) that is written to within a tenth."""
+SPEED_STEP = 1e-6
+"""Speeds have six decimals of m/s."""
+LONGEST_LEAD = 10.0
+"""The longest lead (s) of a trigger that is no mistake in its unit; KUKA's bound is 10000 s."""
+
+Output = Annotated[
+    int | None, setting("the number of a digital output, 1 to 8192", "5", ge=1, le=8192)
+]
+
+
+class KrlSettings(Settings):
+    """Which outputs, tool and base, and what the machine data allow."""
+
+    lines_per_file: Annotated[
+        int, setting("a whole number of lines from 100 to 1000000", "1400", ge=100, le=1_000_000)
+    ] = 1400
+    laser_output: Output = None
+    gas_output: Output = None
+    tool_number: Annotated[
+        int | None, setting("the number of a TOOL_DATA, 1 to 128", "1", ge=1, le=128)
+    ] = None
+    base_number: Annotated[
+        int | None, setting("the number of a BASE_DATA, 1 to 128", "1", ge=1, le=128)
+    ] = None
+    largest_speed_m_s: Annotated[
+        float, setting("a speed from 0.01 to 10, in m/s ($VEL_MA.CP)", "3.0", ge=0.01, le=10)
+    ] = 3.0
+    turning_speed_deg_s: Annotated[
+        float, setting("a speed from 1 to 1000, in deg/s ($VEL.ORI1)", "200.0", ge=1, le=1000)
+    ] = 200.0
+
+
+def rules(settings: KrlSettings) -> Rules:
+    """Return what KRL programs must keep to."""
+    return Rules(
+        longest_name=LONGEST_NAME,
+        slowest=SLOWEST,
+        fastest=settings.largest_speed_m_s,
+        speed_step=SPEED_STEP,
+        turning_speed=float(np.radians(settings.turning_speed_deg_s)),
+        longest_lead=LONGEST_LEAD,
+    )

@@ -1,0 +1,248 @@
+"""KRL, the language of KUKA controllers: this module only formats.
+
+Units of KRL: mm, deg, m/s, seconds, and milliseconds in triggers; A, B, C turn about Z, the new Y,
+the new X. What holds until it is changed (speed, corner radius) is written where it changes, and at
+the start of each routine. ``TRIGGER WHEN PATH=0 DELAY=-ms`` switches an output so long before the
+end of the linear or circular motion that follows it, or before the point of a rounded corner that
+is nearest to that end (KUKA's mxAutomation manual, KRC_SetPathTrigger); a plain assignment of an
+output would stop the advance run and with it the blending.
+"""
+
+from __future__ import annotations
+
+import sys
+import warnings
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from kerfpath._arrays import Array
+from kerfpath.errors import InputError
+from kerfpath.post._divide import divided, in_files
+from kerfpath.post._formatter import Formatter, number, plain
+from kerfpath.post._names import identifiers
+from kerfpath.post._program import CircularMove, JointMove, LinearMove, Move, Program, Section, Wait
+from kerfpath.post.krl._axes import axes_from_joints, status_and_turn
+from kerfpath.post.krl._settings import LONGEST_NAME, KrlSettings
+
+__all__ = ["HEAD", "Krl", "data_list", "opening"]
+
+HEAD = ("&ACCESS RVP", "&REL 1")
+"""Attributes of every file."""
+NEW_LINE = "\r\n"
+"""The controllers run Windows."""
+MOST_ROUTINES = 255
+"""Local routines that a file may have."""
+LINES_OF_A_FILE = 5
+"""HEAD, DEF and END of its first routine, and the empty line at its end."""
+LINES_OF_A_ROUTINE = 4
+"""DEF, END, the empty line before them, and the call."""
+AXES = ("A1", "A2", "A3", "A4", "A5", "A6")
+NOT_CHECKED = "not been checked for collisions"
+
+
+def opening(settings: KrlSettings) -> list[str]:
+    """Return the statements that a main routine makes before it calls others, but for frames."""
+    turning_deg_s = number(settings.turning_speed_deg_s, 1)
+    outputs = (settings.laser_output, settings.gas_output)
+    numbered = (("TOOL", settings.tool_number), ("BASE", settings.base_number))
+    return [
+        "BAS(#INITMOV,0)",
+        "$ADVANCE=5",
+        "$IPO_MODE=#BASE",
+        "$ORI_TYPE=#VAR",
+        "$CIRC_TYPE=#BASE",
+        f"$VEL.ORI1={turning_deg_s}",
+        f"$VEL.ORI2={turning_deg_s}",
+        *(f"BAS(#{kind},{n})" for kind, n in numbered if n is not None),
+        *(f"$OUT[{output}]=FALSE" for output in outputs if output is not None),
+    ]
+
+
+def data_list(name: str, called: Sequence[str]) -> list[str]:
+    """Return the lines of the .dat of a file that calls others: it declares what is not in it."""
+    calls = (f"EXT {other}()" for other in called)
+    return [*HEAD, f"DEFDAT {name}", "EXT BAS(BAS_COMMAND :IN,REAL :IN)", *calls, "ENDDAT", ""]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _File:
+    """One .src: its first routine, named as the file is, and the local ones."""
+
+    name: str
+    first: Sequence[str]
+    routines: Mapping[str, Sequence[str]]
+
+    def lines(self) -> list[str]:
+        lines = [*HEAD, f"DEF {self.name}()", *self.first, "END"]
+        for name, routine in self.routines.items():
+            lines += ["", f"DEF {name}()", *routine, "END"]
+        return [*lines, ""]
+
+
+class Krl(Formatter):
+    """Writes a main .src with a routine for each section, and more files where it is too long."""
+
+    settings: KrlSettings
+
+    def __init__(self, program: Program, settings: KrlSettings) -> None:
+        named = replace(program, name=program.name[:LONGEST_NAME])
+        super().__init__(divided(named, sys.maxsize, longest_name=LONGEST_NAME), settings)
+        self._held: dict[str, str] = {}
+        self._target = self._target_texts()
+        self._files = self._in_one_file() or self._in_more_files()
+
+    def files(self) -> dict[str, str]:
+        """Return the .src and the .dat of each file, the main program first."""
+        others = [file.name for file in self._files[1:]]
+        texts: dict[str, str] = {}
+        for file in self._files:
+            called = others if file is self._files[0] else []
+            texts[f"{file.name}.src"] = NEW_LINE.join(file.lines())
+            texts[f"{file.name}.dat"] = NEW_LINE.join(data_list(file.name, called))
+        return texts
+
+    def names(self) -> list[tuple[str, str]]:
+        """Return every name of a routine or file, with what it names."""
+        main, *others = self._files
+        return [
+            (main.name, "the program"),
+            *((file.name, "a file") for file in others),
+            *((name, "a contour") for file in self._files for name in file.routines),
+        ]
+
+    def lines(self, section: Section) -> Iterator[str]:
+        """Yield the lines of a section, which takes nothing over from the one before."""
+        self._held.clear()
+        yield from super().lines(section)
+
+    def joint_move(self, move: JointMove) -> Iterator[str]:
+        """Yield a PTP to axes."""
+        yield from self._hold("share", f"BAS(#VEL_PTP,{max(round(move.speed * 100), 1)})")
+        yield f"PTP {self._target[move]}"
+
+    def linear_move(self, move: LinearMove) -> Iterator[str]:
+        """Yield a LIN, after the triggers of what is switched at its end."""
+        yield from self._path_move("LIN", move)
+
+    def circular_move(self, move: CircularMove) -> Iterator[str]:
+        """Yield a CIRC, after the triggers of what is switched at its end."""
+        yield from self._path_move("CIRC", move)
+
+    def wait(self, wait: Wait) -> Iterator[str]:
+        """Yield a WAIT SEC."""
+        yield f"WAIT SEC {number(wait.time, 3)}"
+
+    def comment(self, text: str) -> Iterator[str]:
+        """Yield a comment; a bar keeps one that says FOLD from folding the program."""
+        yield f"; | {text}"
+
+    def _path_move(self, word: str, move: LinearMove) -> Iterator[str]:
+        yield from self._hold("speed", f"$VEL.CP={number(move.speed, 6)}")
+        if move.zone > 0:
+            yield from self._hold("zone", f"$APO.CDIS={number(move.zone * 1e3, 3)}")
+        for switch in move.switches:
+            ahead_ms, state = round(switch.lead_time * 1e3), "TRUE" if switch.on else "FALSE"
+            output = self.output(switch.signal)
+            yield f"TRIGGER WHEN PATH=0 DELAY={-ahead_ms} DO $OUT[{output}]={state}"
+        yield f"{word} {self._target[move]}{' C_DIS' if move.zone > 0 else ''}"
+
+    def _hold(self, what: str, line: str) -> Iterator[str]:
+        """Yield a line that sets what holds from there on, where it changes that."""
+        if self._held.get(what) != line:
+            self._held[what] = line
+            yield line
+
+    def _in_one_file(self) -> list[_File]:
+        """Return the program as one file; nothing where that is too long."""
+        sections = self.program.sections
+        routines = {section.name: list(self.lines(section)) for section in sections}
+        file = self._main([section.name for section in sections], routines)
+        fits = len(file.lines()) <= self.settings.lines_per_file
+        return [file] if fits and len(sections) <= MOST_ROUTINES else []
+
+    def _in_more_files(self) -> list[_File]:
+        """Return a main program and the files it calls, sections divided until they fit."""
+        most = self.settings.lines_per_file
+        room = most - LINES_OF_A_FILE
+        switches = max((len(getattr(m, "switches", ())) for m in self.program.moves), default=0)
+        steps = max((room - LINES_OF_A_ROUTINE) // (3 + switches), 1)
+        parts = divided(self.program, steps, longest_name=LONGEST_NAME)
+        routines = {section.name: list(self.lines(section)) for section in parts.sections}
+        share = -(-room // MOST_ROUTINES)
+        counts = [max(len(lines) + LINES_OF_A_ROUTINE, share) for lines in routines.values()]
+        groups = in_files(parts.sections, counts, room)
+        taken = [self.program.name, *routines]
+        names = identifiers([self.program.name] * len(groups), taken=taken, longest=LONGEST_NAME)
+        others = []
+        for name, group in zip(names, groups, strict=True):
+            called = [section.name for section in group]
+            first, own = [f"{other}()" for other in called], {n: routines[n] for n in called}
+            others.append(_File(name=name, first=first, routines=own))
+        files = [self._main(names, {}), *others]
+        if max(len(file.lines()) for file in files) > most:
+            raise InputError(
+                f"program {self.program.name!r}: {len(others)} files of {most} lines are more "
+                "than its main program can call; raise lines_per_file"
+            )
+        return files
+
+    def _main(self, called: Sequence[str], routines: Mapping[str, Sequence[str]]) -> _File:
+        calls = [f"{name}()" for name in called]
+        return _File(name=self.program.name, first=[*self._start(), *calls], routines=routines)
+
+    def _start(self) -> Iterator[str]:
+        program, settings = self.program, self.settings
+        checked = "been proved clear in the planned cell" if program.air_checked else NOT_CHECKED
+        yield f"; Written by kerfpath for {plain(program.robot.model)} ({plain(program.robot.id)})."
+        if settings.tool_number is None:
+            yield "; Complete the load of the tool: $LOAD."
+        if settings.base_number is None:
+            yield "; $BASE is the part in the robot's base, which is $WORLD, too."
+        yield f"; Moves through the air have {checked}."
+        yield "; A stop does not switch the laser off: the safety circuit of the cell has to."
+        yield from opening(settings)
+        if settings.tool_number is None:
+            yield f"$TOOL={{{_frames(program.T_flange_tip[None])[0]}}}"
+        if settings.base_number is None:
+            yield f"$BASE={{{_frames(program.T_base_part[None])[0]}}}"
+
+    def _target_texts(self) -> dict[Move, str]:
+        """Return the targets of each move, all at once."""
+        robot, moves = self.program.robot, self.program.moves
+        q = np.array([move.q for move in moves]).reshape(-1, robot.joints)
+        axes_deg = np.degrees(axes_from_joints(robot, q)).tolist()
+        words = status_and_turn(robot, q).tolist()
+        path = [move for move in moves if isinstance(move, LinearMove)]
+        frames = dict(zip(path, _frames([move.T_part_tip for move in path]), strict=True))
+        arcs = [move for move in path if isinstance(move, CircularMove)]
+        vias = dict(zip(arcs, _frames([arc.T_part_via for arc in arcs]), strict=True))
+        texts: dict[Move, str] = {}
+        for move, axes, (status, turn) in zip(moves, axes_deg, words, strict=True):
+            if isinstance(move, JointMove):
+                texts[move] = f"{{{_fields(AXES, axes, 6)}}}"
+                continue
+            via = f"{{{vias[move]}}}," if isinstance(move, CircularMove) else ""
+            texts[move] = f"{via}{{{frames[move]},S {status},T {turn}}}"
+        return texts
+
+
+def _frames(T: Array | Sequence[Array]) -> list[str]:
+    """Return the fields of poses (K, 4, 4) m: mm, and deg about Z, the new Y, the new X."""
+    poses = np.asarray(T).reshape(-1, 4, 4)
+    points = (poses[:, :3, 3] * 1e3).tolist()
+    rotations = Rotation.from_matrix(poses[:, :3, :3])
+    with warnings.catch_warnings():
+        warnings.filterwarnings("ignore", "Gimbal lock", UserWarning)  # C is 0 there
+        turns = rotations.as_euler("ZYX", degrees=True).tolist()
+    return [
+        f"{_fields('XYZ', point, 4)},{_fields('ABC', turn, 6)}"
+        for point, turn in zip(points, turns, strict=True)
+    ]
+
+
+def _fields(names: Sequence[str], values: Sequence[float], decimals: int) -> str:
+    pairs = zip(names, values, strict=True)
+    return ",".join(f"{name} {number(value, decimals)}" for name, value in pairs)

@@ -1,0 +1,82 @@
+"""How a program in URScript switches an output ahead of a target, and at what distance.
+
+No instruction of URScript switches an output along a path. An instruction after a move acts as the
+tip enters the blend at its end, or as it stops there. To switch earlier, a thread compares in every
+control cycle how far the tip is from the target, and switches once it is near enough; the
+instruction after the move then says the same again, so that an output is never switched later.
+"""
+
+from __future__ import annotations
+
+from math import sqrt
+
+from kerfpath.post._program import Signal
+
+__all__ = ["LOCAL", "distance_ahead", "names", "time_ahead", "words"]
+
+LOCAL = ("due", "gap", "near", "on", "target", "value")
+"""Names inside the thread and the functions of `words`; a contour of that name would hide them."""
+
+
+def distance_ahead(lead_time: float, speed: float, acceleration: float, *, stops: bool) -> float:
+    """Return how far (m) from a target the tip is `lead_time` (s) before it arrives.
+
+    At constant speed (m/s), or where it stops braking with the acceleration (m/s^2).
+    """
+    braking = speed / acceleration if stops else 0.0
+    if lead_time <= braking:
+        return acceleration * lead_time**2 / 2
+    return speed * (lead_time - braking / 2)
+
+
+def time_ahead(distance: float, speed: float, acceleration: float, *, stops: bool) -> float:
+    """Return the inverse of `distance_ahead`, s."""
+    braking = speed / acceleration if stops else 0.0
+    if distance <= speed * braking / 2:
+        return sqrt(2 * distance / acceleration)
+    return distance / speed + braking / 2
+
+
+def names(signal: Signal) -> list[str]:
+    """Return every name that the lines of `words` define."""
+    parts = ("waits", "point", "distance", "value", "thread", "ahead", "set", "run")
+    return [f"{signal}_{part}" for part in parts]
+
+
+def words(signal: Signal, output: int) -> list[str]:
+    """Return the lines that define how a signal is switched, by which digital output."""
+    put = f"set_standard_digital_out({output}, "
+    return [
+        f"global {signal}_waits = False",
+        f"global {signal}_point = p[0, 0, 0, 0, 0, 0]",
+        f"global {signal}_distance = 0.0",
+        f"global {signal}_value = False",
+        f"thread {signal}_thread():",
+        "  while True:",
+        "    enter_critical",
+        f"    gap = point_dist(get_actual_tcp_pose(), {signal}_point)",
+        f"    value = {signal}_value",
+        f"    due = {signal}_waits and (gap <= {signal}_distance)",
+        "    if due:",
+        f"      {signal}_waits = False",
+        "    end",
+        "    exit_critical",
+        "    if due:",
+        f"      {put}value)",
+        "    end",
+        "    sync()",
+        "  end",
+        "end",
+        f"def {signal}_ahead(target, near, on):",
+        "  enter_critical",
+        f"  {signal}_point = pose_trans(part_frame, target)",
+        f"  {signal}_distance = near",
+        f"  {signal}_value = on",
+        f"  {signal}_waits = True",
+        "  exit_critical",
+        "end",
+        f"def {signal}_set(on):",
+        f"  {signal}_waits = False",
+        f"  {put}on)",
+        "end",
+    ]

@@ -1,0 +1,191 @@
+"""URScript, the language of Universal Robots' controllers: this module only formats.
+
+Units of URScript: m, rad, s. A pose is a position and a rotation vector in the robot's base; that
+of the part stands once, and targets follow it by ``pose_trans``. A pose says neither posture nor
+turns: the joint move before a contour fixes them, and ``movel`` keeps them. ``movel``, not
+``movep``: each move of a plan has a speed of its own, and ``movep`` forbids that the program waits
+on the way. ``movec`` with mode 0 turns the tool evenly from start to end.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Annotated
+
+import numpy as np
+
+from kerfpath._arrays import Array
+from kerfpath.errors import InputError
+from kerfpath.post._divide import in_one_file
+from kerfpath.post._formatter import Formatter, number, plain
+from kerfpath.post._orientations import rotation_vectors
+from kerfpath.post._program import CircularMove, JointMove, LinearMove, Move, Signal, Wait
+from kerfpath.post._settings import Rules, Settings, setting
+from kerfpath.post.urscript._switching import LOCAL, distance_ahead, names, words
+from kerfpath.robots import Robot
+
+__all__ = ["URScript", "URScriptSettings", "full_joint_speed", "rules"]
+
+SPEED_STEP = 1e-6
+"""Speeds (m/s) have six decimals."""
+NOT_CHECKED = "not been checked for collisions"
+
+Output = Annotated[int, setting("a standard digital output from 0 to 7", "0", ge=0, le=7)]
+
+
+class URScriptSettings(Settings):
+    """What is wired to the controller, and how fast it may speed up."""
+
+    laser_output: Output = 0
+    gas_output: Output | None = None
+    acceleration_mm_s2: Annotated[
+        float, setting("a number from 1 to 50000, in mm/s^2", "1200", ge=1, le=50_000)
+    ] = 1200.0
+    joint_acceleration_deg_s2: Annotated[
+        float, setting("a number from 1 to 5000, in deg/s^2", "80", ge=1, le=5000)
+    ] = 80.0
+
+    @property
+    def acceleration(self) -> float:
+        """Of the tip, m/s^2."""
+        return self.acceleration_mm_s2 * 1e-3
+
+
+def rules(settings: URScriptSettings) -> Rules:
+    """Return what programs in URScript must keep to."""
+    return Rules(slowest=SPEED_STEP, speed_step=SPEED_STEP)
+
+
+def full_joint_speed(robot: Robot) -> float:
+    """Return the speed (rad/s) of the leading joint that is the full one: that of the slowest.
+
+    Raises
+    ------
+    InputError
+        The joint speeds are not known.
+    """
+    if robot.velocity is None:
+        raise InputError(f"robot {robot.id!r}: its joint velocities are not known; give velocity=")
+    return float(robot.velocity.min())
+
+
+class URScript(Formatter):
+    """Writes one program: frames, switching, a function for each section, and their calls."""
+
+    settings: URScriptSettings
+
+    def files(self) -> dict[str, str]:
+        """Return the one file."""
+        self.target = self._target_texts()
+        lines = [*self._program()]
+        return in_one_file(f"{self.program.name}.script", lines, self.settings.lines_per_file)
+
+    def _program(self) -> Iterator[str]:
+        program, robot = self.program, self.program.robot
+        checked = "been proved clear in the planned cell" if program.air_checked else NOT_CHECKED
+        yield f"# Written by kerfpath for {plain(robot.model)} ({plain(robot.id)})."
+        yield f"# Moves through the air have {checked}."
+        yield "# Payload and centre of gravity are those of the installation."
+        yield "# A stop does not switch the laser off: the safety circuit of the cell has to."
+        yield f"def {program.name}():"
+        # The controller's flange and base are those of Denavit and Hartenberg's model.
+        tool = robot.T_end_flange @ program.T_flange_tip
+        part = np.linalg.inv(robot.T_base_foot) @ program.T_base_part
+        yield f"  set_tcp({_pose(tool)})"
+        yield f"  global part_frame = {_pose(part)}"
+        for signal in self.signals:
+            yield from (f"  {line}" for line in words(signal, self.output(signal)))
+        for section in program.sections:
+            yield f"  def {section.name}():"
+            yield from (f"    {line}" for line in self.lines(section))
+            yield "  end"
+        for signal in self.signals:
+            yield f"  {signal}_set(False)"
+            yield f"  {signal}_run = run {signal}_thread()"
+        yield from (f"  {section.name}()" for section in program.sections)
+        yield from (f"  kill {signal}_run" for signal in self.signals)
+        yield "end"
+
+    @property
+    def signals(self) -> list[Signal]:
+        """What the program can switch."""
+        moves = [move for move in self.program.moves if isinstance(move, LinearMove)]
+        gas = any(switch.signal == "gas" for move in moves for switch in move.switches)
+        return ["laser", "gas"] if gas else ["laser"]
+
+    def names(self) -> list[tuple[str, str]]:
+        """Return every name in the program, with what it names."""
+        return [
+            (self.program.name, "the program"),
+            ("part_frame", "the part's frame"),
+            *((name, "the switching") for name in LOCAL),
+            *((name, "the switching") for signal in self.signals for name in names(signal)),
+            *((section.name, "a contour") for section in self.program.sections),
+        ]
+
+    def joint_move(self, move: JointMove) -> Iterator[str]:
+        """Yield a movej; its speed is that of the joint with the longest way."""
+        robot = self.program.robot
+        q = ", ".join(number(angle, 8) for angle in robot.sign * move.q - robot.offset)
+        a = number(np.radians(self.settings.joint_acceleration_deg_s2), 6)
+        v = number(move.speed * full_joint_speed(robot), 6)
+        yield f"movej([{q}], a={a}, v={v}, r={number(move.zone, 7)})"
+
+    def linear_move(self, move: LinearMove) -> Iterator[str]:
+        """Yield a movel, and what is switched at its end."""
+        yield from self._switched(move, f"movel({self._targets(move)}, {self._motion(move)})")
+
+    def circular_move(self, move: CircularMove) -> Iterator[str]:
+        """Yield a movec, and what is switched at its end."""
+        targets, motion = self._targets(move), self._motion(move)
+        yield from self._switched(move, f"movec({targets}, {motion}, mode=0)")
+
+    def wait(self, wait: Wait) -> Iterator[str]:
+        """Yield a sleep."""
+        yield f"sleep({number(wait.time, 3)})"
+
+    def comment(self, text: str) -> Iterator[str]:
+        """Yield a comment."""
+        yield f"# {text}"
+
+    def _switched(self, move: LinearMove, line: str) -> Iterator[str]:
+        """Yield a move between what is switched ahead of its end and what is switched there."""
+        for switch in move.switches:
+            stops, acceleration = move.zone == 0, self.settings.acceleration
+            near = distance_ahead(switch.lead_time, move.speed, acceleration, stops=stops)
+            if near > 0:
+                target = self.target[move][-1]
+                yield f"{switch.signal}_ahead({target}, {number(near, 9)}, {switch.on})"
+        yield line
+        for switch in move.switches:
+            yield f"{switch.signal}_set({switch.on})"
+
+    def _targets(self, move: LinearMove) -> str:
+        return ", ".join(f"pose_trans(part_frame, {target})" for target in self.target[move])
+
+    def _motion(self, move: LinearMove) -> str:
+        a, v = number(self.settings.acceleration, 6), number(move.speed, 6)
+        return f"a={a}, v={v}, r={number(move.zone, 7)}"
+
+    def _target_texts(self) -> dict[Move, list[str]]:
+        """Return the poses of each move in the part frame, those on the way first."""
+        points: list[tuple[Move, Array]] = []
+        for move in dict.fromkeys(self.program.moves):
+            if isinstance(move, CircularMove):
+                points.append((move, move.T_part_via))
+            if isinstance(move, LinearMove):
+                points.append((move, move.T_part_tip))
+        T = np.array([T for _, T in points]).reshape(-1, 4, 4)
+        texts: dict[Move, list[str]] = {move: [] for move, _ in points}
+        for (move, _), point, turn in zip(points, T[:, :3, 3], rotation_vectors(T), strict=True):
+            texts[move].append(_pose_text(point, turn, 7))
+        return texts
+
+
+def _pose(T: Array) -> str:
+    return _pose_text(T[:3, 3], rotation_vectors(T[None])[0], 9)
+
+
+def _pose_text(point: Array, turn: Array, decimals: int) -> str:
+    xyz = ", ".join(number(value, decimals) for value in point)
+    return f"p[{xyz}, {', '.join(number(value, 9) for value in turn)}]"

@@ -1,0 +1,95 @@
+"""Small programs for the tests of robot languages: made by hand, no search that might change."""
+
+from dataclasses import replace
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from kerfpath import Contour
+from kerfpath.plans import Plan, Proof, Settings
+from kerfpath.post import Section, preflight, read_program
+
+STEEP = np.radians(20.0)
+
+
+def hand_plan(contour, arm, tool, placement, speed=0.1, posture=0):
+    """A plan at gamma 0, each node solved next to the one before; no search that might change."""
+    T = placement @ contour.frames() @ np.linalg.inv(tool)
+    q = []
+    for k, pose in enumerate(T):
+        found = arm.inverse(pose)
+        near = found.q[found.posture == posture]
+        before = q[-1] if q else np.radians([0, 0, 0, 0, 45, 0])
+        assert len(near), k
+        q.append(near[np.argmin(np.abs(near - before).max(axis=1))])
+    K = len(contour)
+    return Plan(
+        contour=contour,
+        robot=arm,
+        T_flange_tip=tool,
+        T_base_part=placement,
+        q=np.array(q),
+        gamma=np.zeros(K),
+        posture=np.full(K, posture),
+        turn=np.zeros((K, 6), int),
+        time=np.arange(K) * contour.length / (K - 1) / speed,
+        settings=Settings(
+            gamma_step=0.1,
+            frames="tangent",
+            method="paper",
+            objective="sum",
+            metric="manhattan",
+            weights=np.ones(6),
+            eta_v=1.0,
+            eta_a=1.0,
+        ),
+        cost=0.0,
+        proof=Proof(optimal=False, statement="made by hand"),
+        counts={},
+    )
+
+
+def frames():
+    """A tool whose beam leaves the flange by 35 deg, and a part turned about all axes."""
+    tool, placement = np.eye(4), np.eye(4)
+    tool[:3, :3] = Rotation.from_euler("y", 35, degrees=True).as_matrix()
+    tool[:3, 3] = 0.0513, 0.0, 0.2487
+    placement[:3, :3] = Rotation.from_euler("zyx", [31, 3, -2], degrees=True).as_matrix()
+    placement[:3, 3] = 1.0537, -0.1511, 0.6123
+    return tool, placement
+
+
+def arc(name="skin/outer", count=8, radius=0.0871):
+    t = np.linspace(0.2, 1.9, 200)
+    points = np.c_[radius * np.cos(t), radius * np.sin(t), 0.0123 * np.cos(3 * t)]
+    axes = np.c_[-np.sin(STEEP) * np.cos(t), -np.sin(STEEP) * np.sin(t), -np.ones_like(t)]
+    return Contour(points, axes, name=name).resample(count=count)
+
+
+def changed(program, number, **changes):
+    """The program with one step of its first section replaced in part."""
+    steps = list(program.sections[0].steps)
+    steps[number] = replace(steps[number], **changes)
+    return with_steps(program, steps)
+
+
+def with_steps(program, steps):
+    """The program with other steps in its one section."""
+    return replace(program, sections=(Section(name=program.sections[0].name, steps=tuple(steps)),))
+
+
+def codes(program, level=None, language="rapid", settings=None):
+    """Codes of the issues that a preflight finds."""
+    found = preflight(program, language, settings)
+    return [issue.code for issue in found if level in (None, issue.level)]
+
+
+def read_text(text, robot, language="rapid", settings=None):
+    """What the text of a program of one file says."""
+    return read_program({"a program": text}, language, robot, settings)
+
+
+def text_of(files):
+    """The text of a program of one file."""
+    (text,) = files.values()
+    return text

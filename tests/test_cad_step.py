@@ -1,0 +1,180 @@
+"""STEP files as CAD systems write them: protocols, nested assemblies, colours and layers."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from OCP.BRepPrimAPI import BRepPrimAPI_MakeBox
+from OCP.gp import gp_Ax1, gp_Dir, gp_Pnt, gp_Trsf, gp_Vec
+from OCP.Interface import Interface_Static
+from OCP.Message import Message
+from OCP.Quantity import Quantity_Color, Quantity_TypeOfColor
+from OCP.STEPCAFControl import STEPCAFControl_Writer
+from OCP.STEPControl import STEPControl_StepModelType
+from OCP.TCollection import TCollection_ExtendedString
+from OCP.TDataStd import TDataStd_Name
+from OCP.TDF import TDF_Label
+from OCP.TDocStd import TDocStd_Document
+from OCP.TopAbs import TopAbs_ShapeEnum
+from OCP.TopLoc import TopLoc_Location
+from OCP.XCAFDoc import XCAFDoc_ColorType, XCAFDoc_DocumentTool
+
+from kerfpath.cad import Part, read
+from kerfpath.cad._shape import explored
+from kerfpath.errors import InputError
+
+SCHEMAS = {"AP203": "CONFIG_CONTROL_DESIGN", "AP214IS": "AUTOMOTIVE", "AP242DIS": "AP242"}
+QUARTER = gp_Trsf()
+QUARTER.SetRotation(gp_Ax1(gp_Pnt(), gp_Dir(0, 0, 1)), np.pi / 2)
+ALONG = gp_Trsf()
+ALONG.SetTranslation(gp_Vec(100, 0, 0))
+EXACT = 1e-8
+"""m: STEP writes 13 digits, of inches and metres fewer are left."""
+
+
+class Model:
+    """A STEP file to be: shapes, assemblies, their names, colours and layers."""
+
+    def __init__(self) -> None:
+        Message.DefaultMessenger_s().ChangePrinters().Clear()
+        self.document = TDocStd_Document(TCollection_ExtendedString("XmlXCAF"))
+        main = self.document.Main()
+        self.shapes = XCAFDoc_DocumentTool.ShapeTool_s(main)
+        self.colours = XCAFDoc_DocumentTool.ColorTool_s(main)
+        self.layers = XCAFDoc_DocumentTool.LayerTool_s(main)
+
+    def assembly(self, name: str, *placed: tuple[TDF_Label, gp_Trsf]) -> TDF_Label:
+        whole = self.shapes.NewShape()
+        for label, move in placed:
+            self.shapes.AddComponent(whole, label, TopLoc_Location(move))
+        return named(whole, name)
+
+    def coloured(self, label: TDF_Label, red: float, green: float, blue: float) -> None:
+        colour = Quantity_Color(red, green, blue, Quantity_TypeOfColor.Quantity_TOC_sRGB)
+        self.colours.SetColor(label, colour, XCAFDoc_ColorType.XCAFDoc_ColorSurf)
+
+    def write(self, path: Path, *, schema: str = "AP214IS", unit: str = "MM") -> Path:
+        self.shapes.UpdateAssemblies()
+        writer = STEPCAFControl_Writer()
+        Interface_Static.SetCVal_s("write.step.schema", schema)
+        Interface_Static.SetCVal_s("write.step.unit", unit)
+        try:
+            writer.Transfer(self.document, STEPControl_StepModelType.STEPControl_AsIs)
+            writer.Write(str(path))
+        finally:
+            Interface_Static.SetCVal_s("write.step.schema", "AP214IS")
+            Interface_Static.SetCVal_s("write.step.unit", "MM")
+        return path
+
+
+def named(label: TDF_Label, name: str) -> TDF_Label:
+    TDataStd_Name.Set_s(label, TCollection_ExtendedString(name))
+    return label
+
+
+def painted() -> Model:
+    """A blue box, its first face orange, its second on layer CUT."""
+    model, box = Model(), BRepPrimAPI_MakeBox(10.0, 20.0, 30.0).Shape()
+    label = model.shapes.AddShape(box, False)
+    first, second = explored(box, TopAbs_ShapeEnum.TopAbs_FACE)[:2]
+    model.coloured(label, 0, 0, 1)
+    model.coloured(model.shapes.AddSubShape(label, first), 1, 0.5, 0)
+    model.layers.SetLayer(
+        model.shapes.AddSubShape(label, second), TCollection_ExtendedString("CUT")
+    )
+    return model
+
+
+@pytest.mark.parametrize("schema", SCHEMAS)
+def test_colours_and_layers_are_read_of_every_protocol(tmp_path: Path, schema: str) -> None:
+    path = painted().write(tmp_path / "box.step", schema=schema)
+    assert SCHEMAS[schema] in path.read_text("ascii")
+    part = read(path)
+    looks = [(loop.layer, loop.colour) for loop in part.loops]
+    assert looks == [("", "#ff8000"), ("CUT", "blue"), *[("", "blue")] * 4]
+    assert [loop.name for loop in part.pick(layer="CUT")] == ["face2/outer"]
+    assert [loop.name for loop in part.pick(colour="#ff8000")] == ["face1/outer"]
+
+
+def test_damaged_styles_are_left_out_with_a_note(tmp_path: Path) -> None:
+    path = painted().write(tmp_path / "box.step")
+    path.write_text(path.read_text("ascii").replace("COLOUR_RGB('',1.,", "COLOUR_RGB('',$,"))
+    part = read(path)
+    assert part.notes == ("colours and layers are damaged and not read",)
+    assert {loop.colour for loop in part.loops} == {""}
+
+
+def test_names_in_another_encoding_are_no_reason_to_refuse(tmp_path: Path) -> None:
+    path = painted().write(tmp_path / "box.step")
+    path.write_bytes(path.read_bytes().replace(b"'CUT'", "'T\u00dcR'".encode("latin-1")))
+    assert read(path).loops[1].layer.startswith("T")
+
+
+def nested(path: Path, unit: str) -> Part:
+    """A box of 10 x 20 x 30 mm in a quarter turn in an assembly that is moved along x, twice."""
+    model = Model()
+    box = named(
+        model.shapes.AddShape(BRepPrimAPI_MakeBox(10.0, 20.0, 30.0).Shape(), False), "plate"
+    )
+    inner = model.assembly("inner", (box, gp_Trsf()), (box, QUARTER))
+    model.assembly("outer", (inner, gp_Trsf()), (inner, ALONG.Multiplied(QUARTER)))
+    return read(model.write(path, unit=unit))
+
+
+@pytest.mark.parametrize(("unit", "shown"), [("MM", "mm"), ("INCH", "in"), ("M", "m")])
+def test_placements_nested_twice_are_applied(tmp_path: Path, unit: str, shown: str) -> None:
+    part = nested(tmp_path / "nested.step", unit)
+    assert part.unit == shown
+    assert part.faces == 24
+    boxes: dict[str, list[np.ndarray]] = {}
+    for loop in part.loops:
+        boxes.setdefault(loop.name.rsplit("/", 2)[0], []).append(loop.bounding_box)
+    found = sorted(
+        np.round(
+            [np.min([b[0] for b in of], axis=0), np.max([b[1] for b in of], axis=0)], 6
+        ).tolist()
+        for of in boxes.values()
+    )
+    # Turned once: x from -20 to 0, y from 0 to 10; turned twice: both negative.
+    wanted = sorted(
+        [[x, y, 0.0], [x + dx, y + dy, 0.03]]
+        for x, y, dx, dy in [
+            (0.0, 0.0, 0.01, 0.02),
+            (-0.02, 0.0, 0.02, 0.01),
+            (0.08, 0.0, 0.02, 0.01),
+            (0.09, -0.02, 0.01, 0.02),
+        ]
+    )
+    np.testing.assert_allclose(found, wanted, atol=1e-6)
+
+
+def test_the_unit_of_an_assembly_can_be_overridden(tmp_path: Path) -> None:
+    size = np.ptp(nested(tmp_path / "nested.step", "INCH").bounding_box, axis=0)
+    told = read(tmp_path / "nested.step", unit="mm")
+    assert told.unit == "mm"
+    np.testing.assert_allclose(np.ptp(told.bounding_box, axis=0), size / 25.4, atol=EXACT)
+
+
+@pytest.mark.parametrize("far", ["1.E8", "-1.E+400"])
+def test_points_that_no_part_has_are_refused_before_occt_spends_minutes_on_them(
+    tmp_path: Path, far: str
+) -> None:
+    path = painted().write(tmp_path / "box.step")
+    path.write_text(path.read_text("ascii").replace("T('',(10.,", f"T('',({far},", 1))
+    with pytest.raises(InputError, match=r"box\.step: a point lies at .* further than 10 km"):
+        read(path)
+
+
+def test_a_curve_on_a_face_that_is_none_is_refused(tmp_path: Path) -> None:
+    path = painted().write(tmp_path / "box.step")
+    text = path.read_text("ascii")
+    path.write_text(
+        text.replace(
+            "DEFINITIONAL_REPRESENTATION('',(#38)", "DEFINITIONAL_REPRESENTATION('',(#17)", 1
+        )
+    )
+    assert path.read_text() != text
+    with pytest.raises(InputError, match=r"damaged .Pcurve: expected a curve"):
+        read(path)
