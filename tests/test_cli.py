@@ -294,7 +294,7 @@ def test_a_drawing_is_shown_before_its_job_is_planned(folder, tmp_path, command)
     first = run(command, folder / "small.toml", *arguments).stdout.splitlines()[0]
     listed = run("contours", folder / "b_pillar.step").stdout.splitlines()[0]
     assert first == listed
-    for words in ("mm (file in mm)", "66 loops of 25.2 to 2906.1 mm", "gap", "shortest edge"):
+    for words in ("mm (file in mm)", "122 loops of 16.9 to 2906.1 mm", "gap", "shortest edge"):
         assert words in first
 
 
