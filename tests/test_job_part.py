@@ -238,7 +238,7 @@ BAD = [
     ("home_deg = [0, -20, 10, 0, 60, 0]", "home_deg = [0, 0]", "6 numbers, one for every joint"),
     ("slow_share = 0.1", "round_mm = 0.1\nloop_mm = 1", "round_mm or loop_mm, got both"),
     ("ramp_mm = 6", "ramps_mm = 6", "expected a key of [contour.corners]"),
-    ("spacing_mm = 2\nstart =", "count = 40\nstart =", "expected spacing_mm with overlap_mm"),
+    ("spacing_mm = 2\nstart =", "count = 40\nstart =", "expected spacing_mm or time_step_ms with"),
 ]
 
 
