@@ -19,7 +19,8 @@ from kerfpath.errors import InputError
 from kerfpath.job._cell import cell_of_job
 from kerfpath.job._files import collision_note
 from kerfpath.job._program_read import ReadCut, cuts_of, language_of, program_on_disk
-from kerfpath.job._read import ContourTask, Job, read_job
+from kerfpath.job._read import Job, read_job
+from kerfpath.job._task import ContourTask
 from kerfpath.job._verdict import Audited
 from kerfpath.planner import node_interval
 from kerfpath.plans import Plan, Proof
