@@ -21,6 +21,7 @@ NAMES = (
     "refinement",
     "collision",
     "cad",
+    "part",
 )
 
 
@@ -91,6 +92,10 @@ def _run(name: str, *, quick: bool) -> list[Report]:
         from benchmarks import cad
 
         return [cad.run(quick=quick)]
+    if name == "part":
+        from benchmarks import part
+
+        return part.run(quick=quick)
     from benchmarks import search
 
     return search.run(quick=quick)

@@ -1,27 +1,15 @@
-"""The demo: seconds from the command to the audited program, cold and warm, and where they go.
-
-Run as a module (``python -m benchmarks.demo FOLDER TIMES.json``) this is one demo run with a clock
-around the library's calls; the benchmark starts it in processes of its own.
-"""
+"""The demo: seconds from the command to the audited program, cold and warm, and where they go."""
 
 from __future__ import annotations
 
-import json
-import os
-import subprocess
 import sys
 import tempfile
-from collections.abc import Callable
-from importlib import import_module
 from pathlib import Path
-from time import perf_counter
-from typing import Any
 
 from benchmarks._figures import Figure, Report
+from benchmarks._process import parts, seconds
 
 __all__ = ["run"]
-
-ROOT = Path(__file__).parent.parent
 
 HOW = """\
 `kerfpath demo --out FOLDER` as a user starts it, in a process of its own, interpreter start
@@ -40,8 +28,6 @@ CLOCKS = {
     "audit": ("kerfpath.job._run", "checks"),
     "report": ("kerfpath.job._files", "report_text"),
 }
-"""What is timed: the name by which the caller's module knows each function."""
-
 PARTS = ("import", *CLOCKS, "other")
 
 
@@ -73,68 +59,13 @@ def run(*, quick: bool) -> Report:
 
 def _whole(command: list[str], *, cold: bool) -> float:
     with tempfile.TemporaryDirectory() as folder:
-        environment = dict(os.environ)
-        environment.pop("NUMBA_CACHE_DIR", None)
-        if cold:
-            environment["NUMBA_CACHE_DIR"] = str(Path(folder) / "compiled")
-        start = perf_counter()
-        subprocess.run(
-            [*command, str(Path(folder) / "out")],
-            check=True,
-            cwd=ROOT,
-            env=environment,
-            stdout=subprocess.DEVNULL,
-            stderr=subprocess.DEVNULL,
-        )
-        return perf_counter() - start
+        return seconds([*command, f"{folder}/out"], **_cache(folder, cold=cold))
 
 
 def _parts(*, cold: bool) -> dict[str, float]:
     with tempfile.TemporaryDirectory() as folder:
-        times = Path(folder) / "times.json"
-        module = [sys.executable, "-m", "benchmarks.demo", str(times)]
-        total = _whole(module, cold=cold)
-        parts: dict[str, float] = json.loads(times.read_text())
-    return {**parts, "other": total - sum(parts.values())}
+        return parts(CLOCKS, ["demo", "--out", f"{folder}/out"], **_cache(folder, cold=cold))
 
 
-class _Clock:
-    """Seconds spent in each named call; a call inside another counts for the outer one."""
-
-    def __init__(self) -> None:
-        self.seconds = dict.fromkeys(CLOCKS, 0.0)
-        self._running = False
-
-    def around(self, name: str, function: Callable[..., Any]) -> Callable[..., Any]:
-        def timed(*args: Any, **options: Any) -> Any:
-            if self._running:
-                return function(*args, **options)
-            self._running, start = True, perf_counter()
-            try:
-                return function(*args, **options)
-            finally:
-                self.seconds[name] += perf_counter() - start
-                self._running = False
-
-        return timed
-
-
-def _one_run(times: Path, folder: Path) -> None:
-    start = perf_counter()
-    command = import_module("kerfpath.cli")
-    modules = {name: import_module(module) for name, (module, _) in CLOCKS.items()}
-    imported = perf_counter() - start
-    clock = _Clock()
-    for name, (_, function) in CLOCKS.items():
-        setattr(modules[name], function, clock.around(name, getattr(modules[name], function)))
-    sys.argv = ["kerfpath", "demo", "--out", str(folder)]
-    try:
-        command.main()
-    except SystemExit as done:
-        if done.code:
-            raise
-    times.write_text(json.dumps({"import": imported, **clock.seconds}))
-
-
-if __name__ == "__main__":
-    _one_run(Path(sys.argv[1]), Path(sys.argv[2]))
+def _cache(folder: str, *, cold: bool) -> dict[str, str]:
+    return {"NUMBA_CACHE_DIR": f"{folder}/compiled"} if cold else {}

@@ -214,6 +214,13 @@ def openings() -> list[list[Array]]:
         on_skin(rounded_box(36, 14, 7), 860, 0),  # belt height adjuster
         on_skin(disc(25), 1040, 0),  # belt anchor
         on_skin(disc(16), 1120, 0),  # locating hole
+        *(on_skin(disc(8), 200, v) for v in (-137, 137)),  # flange: door seal
+        *(on_skin(disc(14), 340, v) for v in (-74, 74)),  # flank: tooling holes, 43 deg
+        on_skin(rounded_box(24, 9, 4.5), 560, 74),  # flank: harness clip, 46 deg
+        *(on_skin(disc(11), 660, v) for v in (-52, 52)),  # weld nuts
+        on_skin(rounded_box(24, 9, 4.5), 780, -74),  # flank: harness clip, 46 deg
+        *(on_skin(disc(8), 900, v) for v in (-136, 136)),  # flange: door seal
+        *(on_skin(disc(10), 1080, v) for v in (-52, 52)),  # weld nuts
     ]
 
 

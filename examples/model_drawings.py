@@ -2,7 +2,8 @@
 
     python examples/model_drawings.py [FOLDER]
 
-Writes bracket.step, bracket.iges, tube.step and blank.dxf; all lengths are in mm, as in the files.
+Writes bracket.step, tube.step and blank.dxf beside their jobs in examples/parts; all lengths are in
+mm, as in the files.
 """
 
 from __future__ import annotations
@@ -18,6 +19,7 @@ from OCP.BRepBuilderAPI import (
     BRepBuilderAPI_MakeWire,
 )
 from OCP.BRepPrimAPI import (
+    BRepPrimAPI_MakeBox,
     BRepPrimAPI_MakeCylinder,
     BRepPrimAPI_MakePrism,
     BRepPrimAPI_MakeRevol,
@@ -31,7 +33,7 @@ from OCP.Message import Message
 from OCP.STEPControl import STEPControl_StepModelType, STEPControl_Writer
 from OCP.TopoDS import TopoDS_Edge, TopoDS_Shape
 
-FOLDER = Path("drawings")
+FOLDER = Path(__file__).parent / "parts"
 
 LEG, HEIGHT, WIDTH, WALL, BEND = 58.0, 43.0, 40.0, 2.0, 5.0
 """Of the bracket: its flat lengths, its width, its sheet, and the inner radius of its bend."""
@@ -69,13 +71,14 @@ def bracket() -> TopoDS_Shape:
     shape = BRepPrimAPI_MakePrism(profile, gp_Vec(0, WIDTH, 0)).Shape()
     shape = drilled(shape, 10.0, (25, 12, -1), (0, 0, 1), 5.0)
     shape = drilled(shape, 12.0, (LEG, WIDTH / 2, corner), (1, 0, -1), 20.0)
-    for y in (14.0, 17.0, 20.0, 23.0, 26.0):
+    for y in (14.0, 26.0):  # the slot's round ends, and what is between them
         shape = drilled(shape, 8.0, (outer - WALL - 1, y, 35), (1, 0, 0), 4.0)
-    return shape
+    between = BRepPrimAPI_MakeBox(gp_Pnt(outer - WALL - 1, 14, 31), 4.0, 12.0, 8.0).Shape()
+    return BRepAlgoAPI_Cut(shape, between).Shape()
 
 
 def tube() -> TopoDS_Shape:
-    """Return a round tube bulged in its middle, with holes on the seam at +x and off it."""
+    """Return a round tube bulged in its middle, holes on all four sides; its seam is at +x."""
     inside: list[tuple[float, float]] = []
     outside: list[tuple[float, float]] = []
     for offset, poles in ((0.0, inside), (2.0, outside)):
@@ -94,8 +97,8 @@ def tube() -> TopoDS_Shape:
     profile = BRepBuilderAPI_MakeFace(wire.Wire()).Face()
     shape = BRepPrimAPI_MakeRevol(profile, gp_Ax1(gp_Pnt(), gp_Dir(0, 0, 1))).Shape()
     for z, diameter in ((40, 12), (100, 16)):
-        shape = drilled(shape, diameter, (0, 0, z), (1, 0, 0), 80.0)
-        shape = drilled(shape, diameter, (0, 0, z), (0, 1, 0), 80.0)
+        shape = drilled(shape, diameter, (-80, 0, z), (1, 0, 0), 160.0)
+        shape = drilled(shape, diameter, (0, -80, z), (0, 1, 0), 160.0)
     return shape
 
 
@@ -132,9 +135,10 @@ def write_iges(path: Path, shape: TopoDS_Shape, unit: str = "MM") -> None:
 
 
 def write_blank(path: Path) -> None:
-    """Write a flat blank as DXF: round-cornered trim, holes from a block, a spline, text."""
+    """Write a flat blank as DXF: a trim, holes from a block, a spline, an open line, text."""
     document = new("R2010", units=4)
     document.layers.add("CUT", color=1)
+    document.layers.add("MARK", color=3)
     document.layers.add("NOTES", color=8)
     space = document.modelspace()
     bulge = 0.41421356237309503  # tan(90 deg / 4): a quarter
@@ -150,6 +154,8 @@ def write_blank(path: Path) -> None:
     space.add_ellipse((140, 60), (20, 0), 0.5, dxfattribs={"layer": "CUT", "color": 5})
     bean = [(120, 20), (140, 14), (160, 20), (160, 30), (140, 26), (120, 30), (120, 20)]
     space.add_spline(bean, dxfattribs={"layer": "CUT"})
+    mark = [(20, 75), (70, 75, bulge), (80, 85), (80, 92)]
+    space.add_lwpolyline(mark, format="xyb", dxfattribs={"layer": "MARK"})
     space.add_text("blank 200 x 100", dxfattribs={"layer": "NOTES"}).set_placement((0, -15))
     document.saveas(path)
 
@@ -158,7 +164,6 @@ def write(folder: Path) -> None:
     """Write every drawing."""
     folder.mkdir(parents=True, exist_ok=True)
     write_step(folder / "bracket.step", bracket())
-    write_iges(folder / "bracket.iges", bracket())
     write_step(folder / "tube.step", tube())
     write_blank(folder / "blank.dxf")
 

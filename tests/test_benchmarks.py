@@ -2,6 +2,7 @@
 
 import importlib.util
 import sys
+import time
 from pathlib import Path
 
 import numpy as np
@@ -213,6 +214,25 @@ def test_a_run_keeps_the_sections_that_it_did_not_make():
     assert again.count("## ") == 2
 
 
-def test_the_demo_benchmark_clocks_functions_that_are_there():
-    for module, function in benchmark_module("demo").CLOCKS.values():
+@pytest.mark.parametrize("name", ["demo", "part"])
+def test_a_benchmark_clocks_functions_that_are_there(name):
+    for module, function in benchmark_module(name).CLOCKS.values():
         assert callable(getattr(importlib.import_module(module), function))
+
+
+def test_a_clock_counts_the_outer_of_two_calls():
+    clock = benchmark_module("_process").Clock({"outer": ("", ""), "inner": ("", "")})
+    inner = clock.around("inner", lambda: time.sleep(0.01))
+    clock.around("outer", inner)()
+    assert clock.seconds["inner"] == 0
+    assert clock.seconds["outer"] >= 0.01
+    inner()
+    assert clock.seconds["inner"] >= 0.01
+
+
+def test_the_nearest_order_goes_on_to_the_nearest_that_may_come():
+    at = np.array([0.0, 1.0, 2.5, -1.2, 9.0])  # home, and four contours
+    between = np.abs(at - at[:, None])
+    nearest = benchmark_module("part").nearest_first
+    assert nearest(between, []) == [0, 1, 2, 3]
+    assert nearest(between, [(3, 0), (1, 0)]) == [2, 1, 3, 0]

@@ -561,11 +561,11 @@ def b_pillar() -> Part:
 
 def test_b_pillar_has_its_skin_trim_line_and_holes(b_pillar: Part) -> None:
     skin = [loop for loop in b_pillar.loops if loop.face == "skin"]
-    assert [loop.name for loop in skin] == ["skin/outer"] + [f"skin/hole{k}" for k in range(1, 13)]
+    assert [loop.name for loop in skin] == ["skin/outer"] + [f"skin/hole{k}" for k in range(1, 25)]
     assert all(loop.closed and loop.surface == "bspline" for loop in skin)
     assert b_pillar.loop("skin/outer").length == pytest.approx(2.9, abs=0.1)
     found = sorted(round(loop.diameter * 1e3, 1) for loop in skin if loop.diameter)
-    assert found == [10, 12, 12, 16, 16, 20, 25, 30, 30]
+    assert found == sorted([*[8] * 4, *[10] * 3, 11, 11, 12, 12, 14, 14, 16, 16, 20, 25, 30, 30])
     np.testing.assert_allclose(
         b_pillar.bounding_box[1] - b_pillar.bounding_box[0], [1.2, 0.33, 0.12], atol=0.01
     )
@@ -575,7 +575,8 @@ def test_b_pillar_contours_keep_their_tolerances_and_face_outwards(b_pillar: Par
     for loop in b_pillar.loops:
         if loop.face == "skin":
             contour = b_pillar.contour(loop.name)
-            assert (contour.axes[:, 2] < -0.8).all()
+            # On the flanks the sheet stands at up to 55 deg.
+            assert (contour.axes[:, 2] < -0.57).all()
             turned = np.linalg.norm(np.diff(contour.axes, axis=0), axis=1)
             assert turned.max() <= 0.002
             if loop.name != "skin/outer":

@@ -69,10 +69,10 @@ def test_the_blank_has_its_loops(tmp_path: Path, examples: object) -> None:
     examples.write_blank(tmp_path / "blank.dxf")
     part = read(tmp_path / "blank.dxf")
     names = [loop.name for loop in part.loops]
-    assert names == ["CUT/outer", *(f"CUT/hole{k}" for k in range(1, 6))]
+    assert names == ["CUT/outer", *(f"CUT/hole{k}" for k in range(1, 6)), "MARK/line1"]
     outer = part.loop("CUT/outer")
     assert outer.length == pytest.approx(0.18 * 2 + 0.08 * 2 + 2 * np.pi * 0.01, abs=EXACT)
-    assert [loop.colour for loop in part.loops] == ["red"] * 4 + ["blue", "red"]
+    assert [loop.colour for loop in part.loops] == ["red"] * 4 + ["blue", "red", "green"]
     # The block turned by 30 degrees, inserted at (40, 30): its third hole is 30 mm along y.
     turned = np.radians(30)
     middle = part.loop("CUT/hole1").bounding_box.mean(axis=0)

@@ -294,7 +294,7 @@ def test_a_drawing_is_shown_before_its_job_is_planned(folder, tmp_path, command)
     first = run(command, folder / "small.toml", *arguments).stdout.splitlines()[0]
     listed = run("contours", folder / "b_pillar.step").stdout.splitlines()[0]
     assert first == listed
-    for words in ("mm (file in mm)", "66 loops of 25.2 to 2906.1 mm", "gap", "shortest edge"):
+    for words in ("mm (file in mm)", "122 loops of 16.9 to 2906.1 mm", "gap", "shortest edge"):
         assert words in first
 
 
@@ -339,7 +339,7 @@ def test_help_teaches():
         (("contours", "small.toml"), ["small.toml"]),
         (("contours", "b_pillar.step", "--unit", "ell"), ["ell"]),
         (("robots", "abb_irb9999"), ["not in the library"]),
-        (("plan", "wrong-loop.toml", "--out", "wrong"), ["no loop 'skin/hole99'", "skin/hole9"]),
+        (("plan", "wrong-loop.toml", "--out", "wrong"), ["no loop 'skin/hole99'", "skin/hole1"]),
         (("plan", "slow.toml", "--out", "wrong"), ["slow.toml:", "speed_m_min"]),
         (("plan", "small.toml", "--out", "small.toml"), ["small.toml", "folder"]),
     ],
@@ -348,7 +348,7 @@ def test_bad_input_is_one_line_and_nothing_is_written(planned, folder, arguments
     (folder / "list.json").write_text("[]")
     (folder / "old.json").write_text('{"schema": 0}')
     (folder / "short.json").write_text('{"schema": 3}')
-    (folder / "wrong-loop.toml").write_text(SMALL.replace("skin/hole9", "skin/hole99"))
+    (folder / "wrong-loop.toml").write_text(SMALL.replace("skin/hole16", "skin/hole99"))
     (folder / "slow.toml").write_text(SMALL.replace("speed_m_min = 3", "speed_m_min = -3", 1))
     before = sorted(folder.iterdir())
     refused(run(*arguments, cwd=folder), *words)

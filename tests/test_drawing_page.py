@@ -16,6 +16,7 @@ from test_cli import run
 def drawings(tmp_path_factory, examples):
     folder = tmp_path_factory.mktemp("drawings")
     examples.write(folder)
+    examples.write_iges(folder / "bracket.iges", examples.bracket())
     (folder / "line.csv").write_text("x_mm;y_mm;z_mm;nx;ny;nz\n0;0;0;0;0;1\n10,5;0;0;0;0;1\n")
     return folder
 

@@ -14,6 +14,7 @@ from kerfpath.errors import InputError
 from kerfpath.job import read_job
 from kerfpath.job._heads import heads, pose
 from kerfpath.job._lines import Places
+from kerfpath.operations import micro_joints, slow_corners
 from kerfpath.post.rapid import RapidSettings
 from kerfpath.robots import acceleration_ratios, robot
 from kerfpath.tilt import Tilt
@@ -182,6 +183,7 @@ def test_a_tool_can_be_given_by_its_tip(read):
 def test_a_task_samples_and_names_its_contour(read, circle):
     lines = {
         "spacing_mm = 2": None,
+        "time_step_ms = 20": None,
         "count = 50": 50,
         "tolerance_mm = 0.05": None,
         "tolerance_mm = 1\naxis_tolerance_deg = 1": None,
@@ -194,11 +196,41 @@ def test_a_task_samples_and_names_its_contour(read, circle):
         assert count in (None, len(sampled))
         if task.spacing:
             assert np.diff(sampled.s).max() <= 0.002
+        if task.time_step:
+            assert np.diff(sampled.s).max() <= 0.02 * task.speed * (1 + 1e-12)
 
 
-def test_a_spacing_that_no_memory_holds_is_refused(read, circle):
-    (task,) = read(changed("spacing_mm = 2", "spacing_mm = 1e-9")).contours
-    with pytest.raises(InputError, match="raise spacing_mm"):
+def test_a_time_step_keeps_what_a_spacing_keeps(read):
+    # A square with a micro joint, 9 m/min: steps of 2 mm are steps of 13.3 ms.
+    side = np.linspace(0, 0.1, 101)[:-1]
+    flat = np.r_[np.c_[side, 0 * side], np.c_[0.1 + 0 * side, side],
+                 np.c_[0.1 - side, 0.1 + 0 * side], np.c_[0 * side, 0.1 - side]]  # fmt: skip
+    square = Contour(np.c_[flat, 0 * flat[:, 0]], np.tile([0, 0, -1], (400, 1)), closed=True)
+    joined = micro_joints(square, 0.003, count=3)
+    by_spacing, by_time = (
+        read(changed("spacing_mm = 2", line)).contours[0].sample(joined)
+        for line in ("spacing_mm = 2", f"time_step_ms = {2 / 9 * 60!r}")
+    )
+    assert by_time.time is None  # one speed throughout: the plan lays it on
+    # Lengths through times and back: rounding.
+    np.testing.assert_allclose(by_time.points, by_spacing.points, rtol=0, atol=1e-12)
+    assert by_time.kinds == by_spacing.kinds
+    # At half the speed around the corners nodes lie half as far apart, 13.3 ms all the same.
+    slowed = slow_corners(square, 0.5, distance=0.01, ramp=0.02)
+    (task,) = read(changed("spacing_mm = 2", f"time_step_ms = {2 / 9 * 60!r}")).contours
+    timed = task.sample(slowed)
+    assert np.ptp(np.diff(timed.time)) < 1e-12
+    assert 0.8 * 2 / 150 <= np.diff(timed.time)[0] <= 2 / 150 + 1e-12
+    steps = np.diff(timed.s)
+    assert steps.min() == pytest.approx(steps.max() / 2, rel=0.2)  # stretches are divided evenly
+    corners = [[0, 0, 0], [0.1, 0, 0], [0.1, 0.1, 0], [0, 0.1, 0]]
+    assert all(np.linalg.norm(timed.points - c, axis=1).min() < 1e-9 for c in corners)
+
+
+@pytest.mark.parametrize("key", ["spacing_mm", "time_step_ms"])
+def test_a_sampling_that_no_memory_holds_is_refused(read, circle, key):
+    (task,) = read(changed("spacing_mm = 2", f"{key} = 1e-9")).contours
+    with pytest.raises(InputError, match=f"raise {key}"):
         task.sample(circle)
 
 
@@ -254,8 +286,15 @@ FAULTS = [
     ("= 9", "= 1e-30", 13, "contour.speed_m_min: .*at least 1e-09"),
     ("= 9", "= 2026-09-01", 13, "got 2026-09-01"),
     ("= 9", "= 0x" + "f" * 6000, 13, "more than 20 digits"),
-    ("spacing_mm = 2", "", 11, "expected one of spacing_mm, count and tolerance_mm, got none"),
+    (
+        "spacing_mm = 2",
+        "",
+        11,
+        "one of spacing_mm, time_step_ms, count and tolerance_mm, got none",
+    ),
     ("spacing_mm = 2", "spacing_mm = 2\ncount = 9", 15, "got spacing_mm and count; keep one"),
+    ("spacing_mm = 2", "spacing_mm = 2\ntime_step_ms = 9", 15, "got spacing_mm and time_step_ms"),
+    ("spacing_mm = 2", "time_step_ms = 0", 14, "contour.time_step_ms: expected a number above 0"),
     ("spacing_mm = 2", "count = 1", 14, "contour.count: expected a whole number"),
     ("spacing_mm = 2", "count = 20.0", 14, "contour.count: expected a whole number"),
     ("spacing_mm = 2", "count = 9\naxis_tolerance_deg = 1", 15, "only with tolerance_mm"),

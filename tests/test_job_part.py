@@ -47,7 +47,7 @@ angle_deg = 90
 length_mm = 3
 shape = "arc"
 [[contour]]
-pick = "skin/hole11"
+pick = "skin/hole21"
 name = "joined"
 speed_m_min = 3
 spacing_mm = 2
@@ -56,7 +56,7 @@ direction = "best"
 width_mm = 2
 count = 2
 [[contour]]
-pick = "skin/hole8"
+pick = "skin/hole13"
 name = "cornered"
 speed_m_min = 3
 spacing_mm = 2
@@ -105,10 +105,10 @@ def test_every_cut_says_how_far_its_nodes_leave_the_drawing(done, folder):
     found = {entry["name"]: entry["departure"] for entry in said["contours"]}
     plans = {p.name: p.contour for p in read_plan_file(out / "plan.json").plans}
     assert found["joined"]["against"] == "CAD curve"
-    again = part.departure("skin/hole11", plans["joined"])
+    again = part.departure("skin/hole21", plans["joined"])
     assert found["joined"]["chord_error"] == pytest.approx(again.chord_error, rel=1e-9)
     # Kerf makes another path of the loop, and so does a bevel of the axes.
-    for name, pick in (("led in", "skin/hole1"), ("cornered", "skin/hole8")):
+    for name, pick in (("led in", "skin/hole1"), ("cornered", "skin/hole13")):
         assert found[name]["against"] == "path as cut"
         loop = part.departure(pick, part.contour(pick))
         assert found[name]["path"]["against"] == "CAD curve"
@@ -190,25 +190,25 @@ spacing_mm = 4
 [contour.pick_all]
 kind = "inner"
 face = "skin"
-diameter_mm = [14, 26]
+diameter_mm = [15, 26]
 """
 
 
 def test_loops_are_picked_by_what_they_are(folder):
     job = read_job(with_text(folder / "all.toml", HEAD + ALL + PLAN))
     names = [task.name for task in job.tasks(read(job.part_file))]
-    assert names == ["skin/hole3", "skin/hole8", "skin/hole11", "skin/hole12"]
+    assert names == ["skin/hole3", "skin/hole13", "skin/hole21", "skin/hole24"]
     twice = read_job(with_text(folder / "all.toml", HEAD + ALL + ALL + PLAN))
     with pytest.raises(InputError, match="'skin/hole3' is picked twice"):
         twice.tasks(read(twice.part_file))
-    none = ALL.replace("[14, 26]", "[900, 901]")
+    none = ALL.replace("[15, 26]", "[900, 901]")
     nothing = read_job(with_text(folder / "all.toml", HEAD + none + PLAN))
     with pytest.raises(InputError, match="no loop among"):
         nothing.tasks(read(nothing.part_file))
     for old, new, message in (
         ("[contour.pick_all]", 'pick = "x"\n[contour.pick_all]', "expected pick .* got both"),
         ("speed", 'name = "n"\nspeed', "expected name only with pick"),
-        ("[14, 26]", "[14]", "expected 2 numbers"),
+        ("[15, 26]", "[14]", "expected 2 numbers"),
         ('"inner"', '"iner"', "kind"),
     ):
         with pytest.raises(InputError, match=message):
@@ -238,7 +238,7 @@ BAD = [
     ("home_deg = [0, -20, 10, 0, 60, 0]", "home_deg = [0, 0]", "6 numbers, one for every joint"),
     ("slow_share = 0.1", "round_mm = 0.1\nloop_mm = 1", "round_mm or loop_mm, got both"),
     ("ramp_mm = 6", "ramps_mm = 6", "expected a key of [contour.corners]"),
-    ("spacing_mm = 2\nstart =", "count = 40\nstart =", "expected spacing_mm with overlap_mm"),
+    ("spacing_mm = 2\nstart =", "count = 40\nstart =", "expected spacing_mm or time_step_ms with"),
 ]
 
 
@@ -279,7 +279,7 @@ def test_every_cut_of_the_shipped_part_can_be_made():
     job = read_job(DEMO / "b_pillar_part.toml")
     part = read(job.part_file)
     tasks = job.tasks(part)
-    assert len(tasks) == 13
+    assert len(tasks) == 25
     for task in tasks:
         shaped = task.candidates(part)
         assert len(shaped) == (1 if task.name == "trim" else 2)

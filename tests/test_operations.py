@@ -315,6 +315,21 @@ def test_a_bevel_leans_the_head_to_its_side():
         bevel(square(), 1.2)
 
 
+def test_sharp_corners_of_an_offset_stay_for_what_is_made_of_them():
+    moved = offset(square(), 0.002, sharp=True)
+    # The mitred square is larger by the distance on every side; arcs leave no corner.
+    assert moved.length == pytest.approx(4 * 0.104, abs=1e-12)
+    assert len(moved.corners) == 4
+    assert not len(offset(square(), 0.002).corners)
+    assert KINDS.index("loop") in loop_corners(moved, 0.002).kind
+    assert slow_corners(moved, 0.5).speed_share.min() == 0.5
+    # A spike would be met too far off: it keeps its arc.
+    spike = Contour(
+        [[0, 0, 0], [0.1, 0.005, 0], [0, 0.01, 0]], np.tile([0, 0, -1], (3, 1)), closed=True
+    )
+    assert np.ptp(offset(spike, 0.001, sharp=True).points[:, 0]) < 0.1 + 0.02
+
+
 def test_operations_on_closed_contours_refuse_open_ones():
     line = flat(np.eye(3))
     for operation in (

@@ -9,7 +9,7 @@ import numpy as np
 
 __all__ = ["Check", "Issue", "Level", "Unit"]
 
-Unit = Literal["m", "rad", "m^3", "share", "count"]
+Unit = Literal["m", "rad", "m^3", "s", "share", "count"]
 Level = Literal["error", "warning"]
 
 
@@ -25,7 +25,7 @@ class Check:
         What is checked, in words.
     value, limit : float
         Worst value found and what is allowed, in `unit`.
-    unit : {"m", "rad", "m^3", "share", "count"}
+    unit : {"m", "rad", "m^3", "s", "share", "count"}
     node : int
         Where the worst value stands (for a check between nodes: the node before it).
     level : {"error", "warning"}
@@ -78,6 +78,8 @@ def in_words(value: float, unit: Unit) -> str:
         return f"{value * 1e3:.4g} mm"
     if unit == "rad":
         return f"{np.degrees(value):.4g} deg"
+    if unit == "s":
+        return f"{value:.4g} s"
     if unit == "m^3":
         return f"{value:.4g} m^3"
     return f"{value * 100:.4g} %" if unit == "share" else f"{value:g}"

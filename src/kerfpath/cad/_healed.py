@@ -20,6 +20,8 @@ STEP = 0.5
 """mm between the places on the loop from which the nearest face is found."""
 PRECISION = 1e-6
 """mm of a projection."""
+BESIDE = 1e-3
+"""mm off the normal at its foot from which on a point lies beyond the end of a surface."""
 ENDS = 0.3
 """How far a surface may be from the plane tangent to it at the loop, as a part of the way from the
 loop and of `STEP`; beyond that it is taken to have ended."""
@@ -57,7 +59,10 @@ class HealedSurface:
             on, normal = self._surfaces[self._edge[place]].nearest(point)
             at, flat = self._points[place], self._normals[place]
             foot = point - ((point - at) @ flat) * flat
-            ended = np.linalg.norm(on - foot) > ENDS * (far + STEP)
+            way = point - on
+            ended = np.linalg.norm(way - (way @ normal) * normal) > BESIDE or np.linalg.norm(
+                on - foot
+            ) > ENDS * (far + STEP)
             found[k], normals[k] = (foot, flat) if ended else (on, normal)
         return found * MM, normals
 

@@ -1,4 +1,4 @@
-"""`kerfpath audit`: every check of every contour of a plan, made again."""
+"""`kerfpath audit`: every check of every contour of a plan or a program, made again."""
 
 from __future__ import annotations
 
@@ -8,15 +8,16 @@ from pathlib import Path
 from rich.markup import escape
 
 from kerfpath.auditor import in_words
-from kerfpath.cli._show import out, print_json, table
-from kerfpath.job import audit_file
+from kerfpath.cli._show import busy, out, print_json, table
+from kerfpath.errors import InputError
+from kerfpath.job import Audited, audit_file, audit_program
 
 __all__ = ["show_audit"]
 
 
-def show_audit(plan_file: Path, job: Path | None, *, as_json: bool) -> bool:
-    """Print the audit's table of each contour of a plan; return whether all of them pass."""
-    found = audit_file(plan_file, job)
+def show_audit(file: Path, job: Path | None, *, as_json: bool) -> bool:
+    """Print the audit's table of each contour of a file; return whether all of them pass."""
+    found = _audited(file, job)
     if as_json:
         print_json(
             {
@@ -24,13 +25,16 @@ def show_audit(plan_file: Path, job: Path | None, *, as_json: bool) -> bool:
                 "notes": [found.note],
                 "missing": list(found.missing),
                 "contours": {
-                    name: [asdict(c) | {"ok": c.ok} for c in checks]
+                    name: [asdict(c) | {"ok": c.ok, "place": found.place(name, c)} for c in checks]
                     for name, checks in found.tables.items()
                 },
             }
         )
     else:
         for name, checks in found.tables.items():
+            if found.places and all(c.ok for c in checks):
+                out.print(f"{escape(name)}: {len(checks)} checks passed")
+                continue
             rows = [
                 [
                     escape(c.title),
@@ -47,8 +51,21 @@ def show_audit(plan_file: Path, job: Path | None, *, as_json: bool) -> bool:
                 title=escape(name),
                 numbers=["worst", "allowed", "node"],
             )
+            for c in checks if name in found.places else ():
+                if not c.ok:
+                    said = f"{found.place(name, c)}: {c.issue().message}"
+                    out.print(escape(said), soft_wrap=True)
         for name in found.missing:
-            out.print(f"{escape(name)}: no plan")
+            out.print(f"{escape(name)}: {'not cut' if found.places else 'no plan'}")
         out.print(f"note: {escape(found.note)}")
         out.print("audit passed" if found.passed else "audit FAILED")
     return found.passed
+
+
+def _audited(file: Path, job: Path | None) -> Audited:
+    if file.suffix.lower() == ".json":
+        return audit_file(file, job)
+    if job is None:
+        raise InputError(f"{file}: a program is compared with its job; give it with --job JOB.toml")
+    with busy("auditing the program"):
+        return audit_program(file, job)

@@ -182,23 +182,31 @@ def post(
 
 @app.command()
 def audit(
-    plan_file: PlanFileArgument,
+    file: Annotated[
+        Path, typer.Argument(metavar="PLAN.json|PROGRAM", help="A plan, or a program of ours.")
+    ],
     job: Annotated[
         Path | None,
         typer.Option(metavar="JOB.toml", help="Compare with the drawing that this job names."),
     ] = None,
     as_json: Json = False,
 ) -> None:
-    """Check a plan again, by kinematics that share nothing with the planner.
+    """Check a plan or a program again, by kinematics that share nothing with the planner.
 
-    Without --job the way between nodes is compared with the straight lines between them; with it,
-    with the curve as drawn, and the motion with the cell of the job, if it has one.
+    Of a plan, without --job the way between nodes is compared with the straight lines between
+    them; with it, with the curve as drawn, and the motion with the cell of the job, if it has one.
+
+    A program, also one that a person has edited since, needs its job: its text is read, its targets
+    are led through the robot's kinematics, and the motion is audited as a plan's is; frames,
+    speeds, postures, turns, switches and waits are compared with what the job asks for.
 
     Example: kerfpath audit door/plan.json --job door.toml
+
+    Example: kerfpath audit door/door.mod --job door.toml
     """
     from kerfpath.cli._audit import show_audit
 
-    if not show_audit(plan_file, job, as_json=as_json):
+    if not show_audit(file, job, as_json=as_json):
         raise typer.Exit(1)
 
 

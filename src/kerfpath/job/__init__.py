@@ -1,6 +1,5 @@
 """The job: one file that says what to cut and how, its run, and the files the run leaves."""
 
-from kerfpath.job._again import Audited as Audited
 from kerfpath.job._again import audit_file as audit_file
 from kerfpath.job._again import program_from_file as program_from_file
 from kerfpath.job._cell import cell_of_job as cell_of_job
@@ -15,7 +14,7 @@ from kerfpath.job._files import require_language as require_language
 from kerfpath.job._files import write_outcome as write_outcome
 from kerfpath.job._planfile import PlanFile as PlanFile
 from kerfpath.job._planfile import read_plan_file as read_plan_file
-from kerfpath.job._read import ContourTask as ContourTask
+from kerfpath.job._program_audit import audit_program as audit_program
 from kerfpath.job._read import Job as Job
 from kerfpath.job._read import ProgramOptions as ProgramOptions
 from kerfpath.job._read import program_options as program_options
@@ -26,3 +25,5 @@ from kerfpath.job._run import fastest_speeds as fastest_speeds
 from kerfpath.job._run import run_job as run_job
 from kerfpath.job._run import warm_up as warm_up
 from kerfpath.job._sequencefile import sequence_entry as sequence_entry
+from kerfpath.job._task import ContourTask as ContourTask
+from kerfpath.job._verdict import Audited as Audited

@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, TypeVar
 
 import numpy as np
 from pydantic import BaseModel, ValidationError
 
-from kerfpath.auditor import Check, checks
+from kerfpath.auditor import checks
 from kerfpath.cad import Part
 from kerfpath.cad import read as read_drawing
 from kerfpath.cell import Cell
@@ -21,10 +20,11 @@ from kerfpath.job._files import collision_note, program_of
 from kerfpath.job._planfile import PlanFile, read_plan_file
 from kerfpath.job._read import Job, ProgramOptions, audit_options, program_options, read_job
 from kerfpath.job._tables import AuditTable, ProgramTable
+from kerfpath.job._verdict import Audited
 from kerfpath.plans import Plan
 from kerfpath.post import language as find_language
 
-__all__ = ["Audited", "audit_file", "program_from_file"]
+__all__ = ["audit_file", "program_from_file"]
 
 _M = TypeVar("_M", bound=BaseModel)
 _R = TypeVar("_R")
@@ -32,34 +32,6 @@ _R = TypeVar("_R")
 
 SAME_PLACE = 1e-6
 """m: what a plan.json and its job say of the same place differs by rounding at most."""
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Audited:
-    """What the audit of a plan.json says.
-
-    Parameters
-    ----------
-    tables : dict of str to list of Check
-        The table of each contour that has a plan.
-    missing : tuple of str
-        Names of the contours without one.
-    note : str
-        What was checked for collisions, and what was not.
-    """
-
-    tables: dict[str, list[Check]]
-    missing: tuple[str, ...]
-    note: str
-
-    @property
-    def passed(self) -> bool:
-        """True when every contour has a plan and no check found an error."""
-        return not self.missing and all(
-            check.ok or check.level == "warning"
-            for checks in self.tables.values()
-            for check in checks
-        )
 
 
 def audit_file(plan_file: Path, job_file: Path | None = None) -> Audited:

@@ -9,7 +9,7 @@ from kerfpath.cad import Departure, Part, departure_from
 from kerfpath.contour import Contour
 from kerfpath.errors import NoFeasiblePath
 from kerfpath.graph import LayeredGraph
-from kerfpath.job._read import ContourTask
+from kerfpath.job._task import ContourTask
 from kerfpath.planner import ClearanceMap, FastestSpeed
 from kerfpath.plans import Plan
 from kerfpath.search import Relaxations

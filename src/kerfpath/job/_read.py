@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 import tomllib
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Literal
 
@@ -13,107 +13,25 @@ from pydantic import ValidationError
 
 from kerfpath._arrays import Array, Bools
 from kerfpath.cad import Part
-from kerfpath.contour import Contour
 from kerfpath.errors import InputError
-from kerfpath.job._keys import MOST_NODES
 from kerfpath.job._refusals import error_at, refusal, refused_at
-from kerfpath.job._shape import shaped
+from kerfpath.job._shape import closed_only
 from kerfpath.job._tables import (
     AuditTable,
     CellTable,
-    ContourTable,
     JobFile,
     PlanTable,
     ProgramTable,
     SequenceTable,
 )
+from kerfpath.job._task import ContourTask, task_of
 from kerfpath.post import Settings
 from kerfpath.robots import Robot, postures_named
 
-__all__ = ["ContourTask", "Job", "ProgramOptions", "audit_options", "program_options", "read_job"]
+__all__ = ["Job", "ProgramOptions", "audit_options", "program_options", "read_job"]
 
 _NAME_LENGTH = 32
 """Characters that a robot controller takes in a name."""
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class ContourTask:
-    """One contour to cut: which, how fast, and how it is sampled.
-
-    Parameters
-    ----------
-    pick : str
-        Name of the loop in the part; "" where the table picks several, see `expanded`.
-    name : str
-        What the contour is called in messages, reports and programs.
-    speed : float m/s
-        Speed along the path.
-    spacing : float m, optional
-        Largest distance between nodes; or
-    count : int, optional
-        number of nodes; or
-    tolerance : float m, optional
-        largest distance of the chords from the contour; exactly one of the three is given.
-    axis_tolerance : float rad, optional
-        Largest angle between the axis along a chord and the contour's, with `tolerance`.
-    table : ContourTable
-        What is made of the loop before it is sampled, as the file says it.
-    """
-
-    pick: str
-    name: str
-    speed: float
-    spacing: float | None = None
-    count: int | None = None
-    tolerance: float | None = None
-    axis_tolerance: float | None = None
-    table: ContourTable
-
-    def expanded(self, part: Part) -> list[ContourTask]:
-        """Return a task for each loop of the part that this one picks.
-
-        Raises
-        ------
-        InputError
-            No such loop.
-        """
-        if self.table.pick_all is None:
-            return [replace(self, pick=part.loop(self.pick).name)]
-        loops = part.pick(**self.table.pick_all.resolve())
-        return [replace(self, pick=loop.name, name=loop.name) for loop in loops]
-
-    def candidates(self, part: Part, drawn: Contour | None = None) -> list[Contour]:
-        """Return the contours that may be cut for its loop, see `shaped`.
-
-        `drawn` is the loop as the part has it, where that is at hand.
-        """
-        laid = self.table.lead_in or self.table.lead_out or self.table.corners
-        surface = part.surface(self.pick) if laid else None
-        drawn = part.contour(self.pick) if drawn is None else drawn
-        return shaped(self.table, drawn, surface)
-
-    def sample(self, contour: Contour) -> Contour:
-        """Return the contour sampled as this task says, under the task's name.
-
-        Raises
-        ------
-        InputError
-            A spacing that would make too many nodes, a tolerance that cannot be kept.
-        """
-        if self.spacing is not None and contour.length / self.spacing > MOST_NODES:
-            raise InputError(
-                f"contour {self.name!r}: {self.spacing * 1e3:g} mm between nodes would make more "
-                f"than {MOST_NODES} of them over {contour.length * 1e3:g} mm; raise spacing_mm"
-            )
-        named = replace(contour, name=self.name)
-        if self.spacing is not None and (contour.speed_share < 1).any():
-            return named.resample(dt=self.spacing / self.speed, speed=self.speed)
-        return named.resample(
-            spacing=self.spacing,
-            count=self.count,
-            tolerance=self.tolerance,
-            axis_tolerance=self.axis_tolerance,
-        )
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -226,9 +144,15 @@ class Job:
         Raises
         ------
         InputError
-            A loop that does not exist, or that is picked twice.
+            A loop that does not exist, or that is picked twice; an open line with what only a
+            closed loop can have.
         """
-        tasks = [task for each in self.contours for task in each.expanded(part)]
+        tasks = []
+        for number, table in enumerate(self.contours):
+            for task in table.expanded(part):
+                if part.loop(task.pick).kind == "open":
+                    self._require_open(task, number)
+                tasks.append(task)
         names = [task.name for task in tasks]
         for name in names:
             if names.count(name) > 1:
@@ -237,6 +161,15 @@ class Job:
                     "name, or narrow [contour.pick_all]"
                 )
         return tuple(tasks)
+
+    def _require_open(self, task: ContourTask, number: int) -> None:
+        """Raise InputError where a task of table `number` asks of an open line what it has not."""
+        line = f"loop {task.pick!r} is an open line, which"
+        for key, why in closed_only(task.table).items():
+            raise refused_at(self.path, ("contour", number, key), f"{line} {why}; remove {key}")
+        if self.plan_options["closure"] == "periodic":
+            said = f'{line} does not come back to its start; write closure = "free"'
+            raise refused_at(self.path, ("plan", "closure"), said)
 
 
 def read_job(path: str | Path) -> Job:
@@ -271,7 +204,7 @@ def read_job(path: str | Path) -> Job:
         placement=file.part.resolve(),
         part_file=path.parent / file.part.file,
         part_unit=file.part.unit,
-        contours=tuple(_task(table) for table in file.contour),
+        contours=tuple(task_of(table) for table in file.contour),
         plan_options=_plan_options(file.plan, robot) | {"comfort": file.comfort.resolve()},
         refine_parts=file.plan.refine_parts,
         interruptions=file.plan.interruptions,
@@ -323,24 +256,6 @@ def _tables(path: Path, text: str) -> dict[str, Any]:
     return tables
 
 
-def _task(table: ContourTable) -> ContourTask:
-    angle = table.axis_tolerance_deg
-    return ContourTask(
-        pick=table.pick or "",
-        name=table.name or table.pick or "",
-        speed=table.speed_m_min / 60,
-        spacing=_metres(table.spacing_mm),
-        count=table.count,
-        tolerance=_metres(table.tolerance_mm),
-        axis_tolerance=None if angle is None else float(np.radians(angle)),
-        table=table,
-    )
-
-
-def _metres(mm: float | None) -> float | None:
-    return None if mm is None else mm / 1000
-
-
 def _rotation(degrees: float | None, endless: Bools) -> Array | None:
     return None if degrees is None else np.where(endless, np.radians(degrees), np.inf)
 
@@ -387,6 +302,6 @@ def program_options(table: ProgramTable, stem: str) -> ProgramOptions:
         pierce_time=table.pierce_time_s,
         approach_speed=table.approach_mm_s / 1000,
         air_speed=table.air_speed,
-        arc_tolerance=_metres(table.arcs_mm),
+        arc_tolerance=None if table.arcs_mm is None else table.arcs_mm / 1000,
         gas_lead=table.gas_lead_s,
     )

@@ -20,7 +20,8 @@ from kerfpath.graph import LayeredGraph
 from kerfpath.job._cell import cell_of_job
 from kerfpath.job._cut import Cut
 from kerfpath.job._order import ordered
-from kerfpath.job._read import ContourTask, Job
+from kerfpath.job._read import Job
+from kerfpath.job._task import ContourTask
 from kerfpath.kernels import is_compiled
 from kerfpath.planner import (
     FastestSpeed,
@@ -86,7 +87,7 @@ def run_job(
     part = part or read_drawing(job.part_file, unit=job.part_unit)
     tasks = job.tasks(part)  # a misspelt name shall not wait for the contours before it
     cell = cell_of_job(job, part)
-    loops = [part.contour(task.pick) for task in tasks]
+    loops = [task.drawn(part) for task in tasks]
     tries = [
         [_cut(job, task, shaped, cell, progress) for shaped in task.candidates(part, loop)]
         for task, loop in zip(tasks, loops, strict=True)
@@ -233,7 +234,7 @@ def fastest_speeds(
 ) -> list[tuple[ContourTask, Contour, FastestSpeed | NoFeasiblePath]]:
     """Return, for each contour of a job, its task, its nodes and the fastest constant speed.
 
-    The speeds that the job asks for play no part, nor does what comfort costs.
+    The speeds that the job asks for, and shares of them, play no part, nor does what comfort costs.
 
     Raises
     ------
@@ -247,7 +248,8 @@ def fastest_speeds(
     tasks = job.tasks(part)
     for i, task in enumerate(tasks):
         progress("contours", i, len(tasks))
-        nodes = task.sample(task.candidates(part)[0])
+        shaped = task.candidates(part)[0]
+        nodes = task.sample(replace(shaped, speed_share=np.ones(len(shaped))))
         try:
             found: FastestSpeed | NoFeasiblePath = _fastest(job, nodes, cell, refine=refine)
         except NoFeasiblePath as broken:

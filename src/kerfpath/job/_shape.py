@@ -27,10 +27,21 @@ from kerfpath.operations import (
     start_at,
 )
 
-__all__ = ["shaped"]
+__all__ = ["closed_only", "shaped"]
 
 MM = 1e-3
 OTHER: dict[Side, Side] = {"left": "right", "right": "left"}
+
+
+def closed_only(table: ContourTable) -> dict[str, str]:
+    """Return the keys in use that only a closed loop can have, and what an open line lacks."""
+    ends = 'begins at one of its ends: the other with direction = "reversed"'
+    asked = {
+        "start": (table.start != "drawn", ends),
+        "start_mm": (table.start_mm is not None, ends),
+        "overlap_mm": (table.overlap_mm is not None, "does not come back to its start"),
+    }
+    return {key: lacks for key, (used, lacks) in asked.items() if used}
 
 
 def shaped(table: ContourTable, drawn: Contour, surface: Surface | None) -> list[Contour]:
@@ -62,7 +73,8 @@ def _run(
             limit=float(np.radians(table.smooth_axes.limit_deg)),
         )
     if table.kerf_mm is not None:
-        contour = offset(contour, table.kerf_mm * MM / 2, side=scrap)
+        sharp = table.corners is not None
+        contour = offset(contour, table.kerf_mm * MM / 2, side=scrap, sharp=sharp)
     if table.corners is not None and table.corners.round_mm is not None:
         contour = round_corners(contour, table.corners.round_mm * MM, surface=surface)
     if table.corners is not None and table.corners.loop_mm is not None:

@@ -18,14 +18,17 @@ ENOUGH = 0.98
 LOOK = 20.0
 """How many distances of path an inner corner may take."""
 SLOT = np.radians(165)
-"""Turn of an inner corner from which on it is a slot or a notch that the beam does not fit into."""
+"""Turn of an inner corner from which on it is a slot or a notch that the beam does not fit into,
+and of an outer one from which on its sides meet too far off."""
 PARALLEL = 1e-9
 """Sine of the angle of two segments that have no one crossing."""
 SAME_PLACE = 1e-9
 """m: two nodes nearer than this are one."""
 
 
-def offset(contour: Contour, distance: float, *, side: Side = "right") -> Contour:
+def offset(
+    contour: Contour, distance: float, *, side: Side = "right", sharp: bool = False
+) -> Contour:
     """Return the contour moved sideways by `distance` (m) in the planes across its tool axes.
 
     Outer corners become arcs around the corner; at inner corners the sides are cut back to where
@@ -39,6 +42,9 @@ def offset(contour: Contour, distance: float, *, side: Side = "right") -> Contou
         Half the kerf.
     side : {"left", "right"}
         Seen from the nozzle along the travel; the scrap of loops from CAD is on the right.
+    sharp : bool
+        Outer corners stay corners: the sides go on until they meet, so that the corner can be
+        rounded, run around or slowed down at afterwards.
 
     Raises
     ------
@@ -52,7 +58,7 @@ def offset(contour: Contour, distance: float, *, side: Side = "right") -> Contou
             f"offset: contour {contour.name!r} has leads, joints, loops or slow corners already; "
             "offset it before"
         )
-    points, axes, source = _moved(contour, distance, side)
+    points, axes, source = _moved(contour, distance, side, sharp)
     if contour.closed:
         k = _amid_what_fits(contour, points, distance)
         around = (np.arange(len(points) + 1) + k) % len(points)
@@ -74,7 +80,7 @@ def offset(contour: Contour, distance: float, *, side: Side = "right") -> Contou
     return Contour(points, axes, closed=contour.closed, name=contour.name)
 
 
-def _moved(contour: Contour, distance: float, side: Side) -> tuple[Array, Array, Ints]:
+def _moved(contour: Contour, distance: float, side: Side, sharp: bool) -> tuple[Array, Array, Ints]:
     """Return the images of all nodes, their axes, and the node of each; corners make several."""
     along = unit(np.diff(contour.points, axis=0))
     ends = (along[-1], along[0]) if contour.closed else (along[0], along[-1])
@@ -85,7 +91,7 @@ def _moved(contour: Contour, distance: float, side: Side) -> tuple[Array, Array,
     points, axes, source = [], [], []
     for k in range(len(contour) - contour.closed):
         l0, l1 = across[0][k], across[1][k]
-        if turn[k] <= ARC_STEP:
+        if turn[k] <= ARC_STEP or (sharp and outer[k] and turn[k] <= SLOT):
             ways = (l0 + l1)[None] / (1.0 + float(l0 @ l1))
         elif outer[k]:
             part = np.linspace(0, 1, int(np.ceil(turn[k] / ARC_STEP - 1e-9)) + 1)[:, None]

@@ -26,6 +26,7 @@ from kerfpath.post._read import Reader as Reader
 from kerfpath.post._read import ReadMove as ReadMove
 from kerfpath.post._read import ReadProgram as ReadProgram
 from kerfpath.post._read import ReadSection as ReadSection
+from kerfpath.post._read import ReadStep as ReadStep
 from kerfpath.post._read import ReadWait as ReadWait
 from kerfpath.post._settings import Rules as Rules
 from kerfpath.post._settings import Settings as Settings

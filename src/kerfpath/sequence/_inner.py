@@ -34,7 +34,9 @@ def inner_first(contours: Sequence[Contour]) -> list[tuple[int, int]]:
         ring = outer.points @ plane
         for i, inner in enumerate(contours):
             faces = i != j and float(inner.axes.mean(axis=0) @ n) > 0
-            if faces and _inside(ring, inner.points @ plane).all():
+            at = inner.points @ plane
+            # The first point alone tells for most: they lie far beside.
+            if faces and _inside(ring, at[:1])[0] and _inside(ring, at).all():
                 pairs.append((i, j))
     return pairs
 

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from kerfpath._arrays import Array, Ints, floats, integers
+from kerfpath._arrays import Array, Bools, Ints, floats, integers
 from kerfpath.errors import InputError, NoFeasiblePath
 
 __all__ = ["Order", "best_order"]
@@ -102,34 +102,39 @@ def _solved(
     from ortools.sat.python import cp_model  # loaded where it is needed: half a second
 
     C, G = len(group), int(group.max()) + 1
+    earlier = np.zeros((G, G), bool)
+    for g, h in before:
+        earlier[g, h] = True
+    time = _times(group, own, move, enter, leave, earlier)
     model = cp_model.CpModel()
-    place = [model.new_int_var(0, G - 1, f"place {h}") for h in range(G)]
-    arcs, terms, after = [], [], {}
-    for i in range(C):
-        arcs.append((i + 1, i + 1, model.new_bool_var(f"without {i}")))
-        for ends, time in (((0, i + 1), enter[i] + own[i]), ((i + 1, 0), leave[i])):
-            taken = model.new_bool_var(f"{ends}")
-            arcs.append((*ends, taken))
-            terms.append((taken, time))
-            model.add(place[group[i]] == (0 if ends[0] == 0 else G - 1)).only_enforce_if(taken)
-        for j in np.flatnonzero((group != group[i]) & np.isfinite(move[i])).tolist():
-            taken = after[i, j] = model.new_bool_var(f"{i} to {j}")
-            arcs.append((i + 1, j + 1, taken))
-            terms.append((taken, move[i, j] + own[j]))
-            model.add(place[group[j]] == place[group[i]] + 1).only_enforce_if(taken)
-    model.add_circuit(arcs)
-    without = [arc[2] for arc in arcs if arc[0] == arc[1]]
+    ways = np.argwhere(np.isfinite(time)).tolist()
+    taken = {(a, b): model.new_bool_var(f"{a} to {b}") for a, b in ways}
+    without = [model.new_bool_var(f"without {i}") for i in range(C)]
+    model.add_circuit(
+        [(a, b, taken[a, b]) for a, b in ways] + [(i + 1, i + 1, without[i]) for i in range(C)]
+    )
     for h in range(G):
         members = np.flatnonzero(group == h).tolist()
         model.add(sum(without[i] for i in members) == len(members) - 1)
-    model.add_all_different(place)
-    for earlier, later in before:
-        model.add(place[earlier] < place[later])
-    model.minimize(sum(round(time / TICK) * taken for taken, time in terms))
+    # What waits for all others is last because only it may go home; the rest need their places.
+    last = (earlier.sum(axis=0) == G - 1) & ~earlier.diagonal()
+    waiting = [(g, h) for g, h in before if not last[h]]
+    if waiting:
+        place = [model.new_int_var(0, G - 1, f"place {h}") for h in range(G)]
+        model.add_all_different(place)
+        for (a, b), way in taken.items():
+            here = -1 if a == 0 else place[group[a - 1]]
+            there = G if b == 0 else place[group[b - 1]]
+            model.add(there == here + 1).only_enforce_if(way)
+        for g, h in waiting:
+            model.add(place[g] < place[h])
+    model.minimize(sum(round(time[ends] / TICK) * way for ends, way in taken.items()))
     solver = cp_model.CpSolver()
     solver.parameters.max_time_in_seconds = seconds
     solver.parameters.num_workers = 1  # the same answer each time
     solver.parameters.random_seed = 1
+    # Cuts of the circuit prove a plain tour about ten times sooner; with places they only cost.
+    solver.parameters.linearization_level = 1 if waiting else 2
     status = solver.solve(model)
     if status not in (cp_model.OPTIMAL, cp_model.FEASIBLE):
         proved = status == cp_model.INFEASIBLE
@@ -139,7 +144,7 @@ def _solved(
             proved=proved,
             node=-1,
         )
-    following = {a: b for a, b, taken in arcs if a != b and solver.boolean_value(taken)}
+    following = {a: b for (a, b), way in taken.items() if solver.boolean_value(way)}
     chosen, here = [], following[0]
     while here:
         chosen.append(here - 1)
@@ -151,3 +156,15 @@ def _solved(
         duration=float(duration + leave[order[-1]]),
         at_least=float(min(solver.best_objective_bound * TICK, duration + leave[order[-1]])),
     )
+
+
+def _times(
+    group: Ints, own: Array, move: Array, enter: Array, leave: Array, earlier: Bools
+) -> Array:
+    """Return the time (C + 1, C + 1) of going on to each and cutting it; 0 is home, inf forbids."""
+    time = np.full((len(group) + 1, len(group) + 1), np.inf)
+    same = group[:, None] == group
+    time[1:, 1:] = np.where(same | earlier[group[None], group[:, None]], np.inf, move + own)
+    time[0, 1:] = np.where(earlier[:, group].any(axis=0), np.inf, enter + own)
+    time[1:, 0] = np.where(earlier[group].any(axis=1), np.inf, leave)
+    return time

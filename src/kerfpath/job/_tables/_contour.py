@@ -21,7 +21,8 @@ __all__ = ["ContourTable"]
 
 
 SHAPES = ("overlap_mm", "lead_in", "lead_out", "micro_joints", "corners")
-"""Keys that give a contour features, whose ends sampling by spacing_mm keeps."""
+"""Keys that give a contour features, whose ends sampling by spacing_mm or time_step_ms keeps."""
+SAMPLINGS = ("spacing_mm", "time_step_ms", "count", "tolerance_mm")
 
 
 class ContourTable(Table):
@@ -32,6 +33,7 @@ class ContourTable(Table):
     name: Annotated[Text | None, key("a name that no other contour has", '"trim 2"')] = None
     speed_m_min: Annotated[Positive, key("a number above 0, in m/min", "9")]
     spacing_mm: Annotated[Positive | None, key("a number above 0, in mm", "2")] = None
+    time_step_ms: Annotated[Positive | None, key("a number above 0, in ms", "20")] = None
     count: Annotated[
         int | None, key(f"a whole number of nodes, 2 to {MOST_NODES}", "200", ge=2, le=MOST_NODES)
     ] = None
@@ -77,22 +79,12 @@ class ContourTable(Table):
 
     @model_validator(mode="after")
     def _one_sampling(self) -> ContourTable:
-        ways = ("spacing_mm", "count", "tolerance_mm")
-        found = given(self, *ways)
+        ways = f"one of {', '.join(SAMPLINGS[:-1])} and {SAMPLINGS[-1]}"
+        found = given(self, *SAMPLINGS)
         if not found:
-            raise fault(
-                "one of spacing_mm, count and tolerance_mm",
-                "none",
-                "add, for example, spacing_mm = 2",
-                ways[:1],
-            )
+            raise fault(ways, "none", "add, for example, spacing_mm = 2", SAMPLINGS[:1])
         if len(found) > 1:
-            raise fault(
-                "one of spacing_mm, count and tolerance_mm",
-                " and ".join(found),
-                "keep one",
-                (found[-1],),
-            )
+            raise fault(ways, " and ".join(found), "keep one", (found[-1],))
         if self.axis_tolerance_deg is not None and self.tolerance_mm is None:
             raise fault(
                 "axis_tolerance_deg only with tolerance_mm",
@@ -101,9 +93,9 @@ class ContourTable(Table):
                 ("axis_tolerance_deg",),
             )
         features = given(self, *SHAPES)
-        if features and self.spacing_mm is None:
+        if features and found[0] not in SAMPLINGS[:2]:
             raise fault(
-                f"spacing_mm with {features[0]}, whose ends it keeps",
+                f"spacing_mm or time_step_ms with {features[0]}, whose ends they keep",
                 found[0],
                 "write, for example, spacing_mm = 1",
                 (found[0],),

@@ -19,7 +19,8 @@ class PickTable(Table):
     """[contour.pick_all]: every loop that is all of this is a contour of its own."""
 
     kind: Annotated[
-        Literal["inner", "outer"] | None, key('"inner" for holes, "outer" for trims', '"inner"')
+        Literal["inner", "outer", "open"] | None,
+        key('"inner" for holes, "outer" for trims, "open" for open lines', '"inner"'),
     ] = None
     face: Annotated[Text | None, key("the name of a face or skin", '"skin"')] = None
     side: Annotated[

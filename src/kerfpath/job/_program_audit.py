@@ -1,0 +1,270 @@
+"""The audit of a program on disk: what its text means, against the job that it is to do."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+from scipy.spatial import cKDTree
+
+from kerfpath._arrays import Array
+from kerfpath.air import least_time
+from kerfpath.auditor import Check, Unit, air_checks, checks
+from kerfpath.cad import read as read_drawing
+from kerfpath.cell import Cell
+from kerfpath.contour import Contour
+from kerfpath.errors import InputError
+from kerfpath.job._cell import cell_of_job
+from kerfpath.job._files import collision_note
+from kerfpath.job._program_read import ReadCut, cuts_of, language_of, program_on_disk
+from kerfpath.job._read import Job, read_job
+from kerfpath.job._task import ContourTask
+from kerfpath.job._verdict import Audited
+from kerfpath.planner import node_interval
+from kerfpath.plans import Plan, Proof
+from kerfpath.plans import Settings as PlanSettings
+from kerfpath.post import Language, Settings
+
+__all__ = ["audit_program"]
+
+NEAR = 5e-3
+"""A cut that leaves every contour of the job by more (m), all along, is none of them."""
+SAME_FRAME = 1e-6
+"""How far (m, sine) tool and part may be from those of the job."""
+SAME_SPEED = 0.02
+"""Share by which a speed may differ from the one asked for: controllers round it."""
+SAME_TIME = 2e-3
+"""How far (s) lead times and waits may differ from those asked for: controllers round them."""
+CLIMB = 0.05
+"""What a step along the path counts beside one away from it, where a place on it is looked for."""
+
+
+def audit_program(path: Path, job_file: Path) -> Audited:
+    """Return what the audit says of every cut of a program.
+
+    Its targets are led through the robot's kinematics to joints, and these are audited as those of
+    a plan are: against the drawing, the limits and the cell of the job. Frames, speeds, switches
+    and waits are compared with what the job asks for.
+
+    Parameters
+    ----------
+    path : Path
+        The file that is started.
+    job_file : Path
+        The job that the program was made for.
+
+    Raises
+    ------
+    InputError
+        A file cannot be read, a line is not of our making, or the job is of a kind that programs
+        cannot be compared with.
+    """
+    job = read_job(job_file)
+    if job.interruptions != "none":
+        raise InputError(
+            f"{job_file}: programs of jobs with interruptions cannot be compared with the drawing "
+            "yet; audit the plan.json"
+        )
+    chosen, settings = language_of(path, job)
+    read = program_on_disk(path, chosen, settings, job.robot)
+    part = read_drawing(job.part_file, unit=job.part_unit)
+    cell = cell_of_job(job, part)
+    cuts, home = cuts_of(read, job.robot, job.tool, job.placement)
+    tasks = job.tasks(part)
+    candidates = [task.candidates(part) for task in tasks]
+    tables: dict[str, list[Check]] = {}
+    places: dict[str, tuple[str, ...]] = {}
+    tool = job.tool if read.T_flange_tip is None else read.T_flange_tip
+    placed = job.placement if read.T_base_part is None else read.T_base_part
+    off = max(np.abs(tool - job.tool).max(), np.abs(placed - job.placement).max())
+    tables[path.name] = [_check("frames", "tool and part, off the job's", off, SAME_FRAME, "m")]
+    done: list[int] = []
+    for cut in cuts:
+        which, reference = _closest(cut, candidates)
+        title = f"{cut.name} ({tasks[which].name})" if which >= 0 else cut.name
+        places[title] = tuple(move.place for move in cut.moves)
+        if reference is None:
+            said = "distance from the nearest contour of the job"
+            tables[title] = [_check("contour", said, _distance(cut, candidates), NEAR, "m")]
+            continue
+        tables[title] = _cut_checks(job, tasks[which], cut, reference, cell, chosen, settings)
+        times = done.count(which)
+        tables[title].append(_check("once", "earlier cuts of this contour", times, 0, "count"))
+        done.append(which)
+    tables["air"] = _air(job, cuts, home, cell if job.sequence is not None else None)
+    missing = tuple(task.name for i, task in enumerate(tasks) if i not in done)
+    note = collision_note(cell, moves_too=job.sequence is not None)
+    return Audited(tables=tables, missing=missing, note=note, places=places)
+
+
+def _check(code: str, title: str, value: float, limit: float, unit: Unit, node: int = 0) -> Check:
+    return Check(
+        code=code, title=title, value=float(value), limit=float(limit), unit=unit, node=node
+    )
+
+
+def _scores(cut: ReadCut, candidates: Sequence[Sequence[Contour]]) -> list[tuple[float, int, int]]:
+    """Return how far (m) the cut leaves each candidate at the same share of the way."""
+    points = cut.T_part_tip[:, :3, 3]
+    way = np.append(0.0, np.cumsum(np.linalg.norm(np.diff(points, axis=0), axis=1)))
+    some = np.unique(np.linspace(0, len(points) - 1, 100).round().astype(int))
+    found = []
+    for i, tried in enumerate(candidates):
+        for c, contour in enumerate(tried):
+            s = contour.s[0] + way[some] / way[-1] * contour.length
+            apart = np.linalg.norm(contour.at(s)[0] - points[some], axis=1)
+            found.append((float(np.median(apart)), i, c))
+    return sorted(found)
+
+
+def _closest(cut: ReadCut, candidates: Sequence[Sequence[Contour]]) -> tuple[int, Contour | None]:
+    """Return which task a cut is of, and the contour that it follows; -1 and None for none."""
+    apart, i, c = _scores(cut, candidates)[0]
+    return (i, candidates[i][c]) if apart < NEAR else (-1, None)
+
+
+def _distance(cut: ReadCut, candidates: Sequence[Sequence[Contour]]) -> float:
+    return _scores(cut, candidates)[0][0]
+
+
+def _cut_checks(
+    job: Job, task: ContourTask, cut: ReadCut, reference: Contour, cell: Cell | None,
+    chosen: Language, settings: Settings,
+) -> list[Check]:  # fmt: skip
+    unreached = np.flatnonzero(np.isnan(cut.q).any(axis=1))
+    if unreached.size:
+        said = "targets out of the robot's reach in the posture of the start"
+        return [_check("reach", said, unreached.size, 0, "count", int(unreached[0]))]
+    s, ends = _along(cut, reference)
+    rows = [_check("ends", "ends of the cut, off those of the contour", ends.max(), 1e-4, "m")]
+    if (np.diff(s) <= 0).any():
+        node = int(np.flatnonzero(np.diff(s) <= 0)[0])
+        said = "stretches that go back along the contour"
+        return [*rows, _check("order", said, (np.diff(s) <= 0).sum(), 0, "count", node)]
+    made = _plan(job, task, cut, reference, s)
+    options = dict(job.audit_options)
+    if job.plan_options["tilt"] is not None:
+        options["axis_tolerance"] += job.plan_options["tilt"].cone
+    rows += checks(made, reference=reference, cell=cell, **options)
+    rows += _asked(job, task, cut, reference, s)
+    rows += _postures(job, cut, chosen, settings)
+    return rows
+
+
+def _along(cut: ReadCut, reference: Contour) -> tuple[Array, Array]:
+    """Return arc lengths (K,) of the nodes on the contour, and how far (2,) m its ends are off.
+
+    Where the contour comes by the same place twice, the share of the way decides.
+    """
+    points = cut.T_part_tip[:, :3, 3]
+    way = np.append(0.0, np.cumsum(np.linalg.norm(np.diff(points, axis=0), axis=1)))
+    guess = reference.s[0] + way / way[-1] * reference.length
+    fine = np.linspace(reference.s[0], reference.s[-1], 8 * len(reference))
+    at = np.unique(np.concatenate([reference.s, fine]))
+    tree = cKDTree(np.c_[reference.at(at)[0], CLIMB * at])
+    near = np.asarray(tree.query(np.c_[points, CLIMB * guess])[1])
+    s = at[near]
+    for _ in range(3):  # on the chords beside the nearest sample
+        before, after = (
+            reference.at(np.maximum(s - 1e-5, at[0]))[0],
+            reference.at(np.minimum(s + 1e-5, at[-1]))[0],
+        )
+        chord = after - before
+        step = ((points - reference.at(s)[0]) * chord).sum(axis=1) / np.maximum(
+            np.linalg.norm(chord, axis=1), 1e-12
+        )
+        s = np.clip(s + step, at[0], at[-1])
+    ends = np.linalg.norm(points[[0, -1]] - reference.points[[0, -1]], axis=1)
+    s[0], s[-1] = reference.s[0], reference.s[-1]
+    return s, ends
+
+
+def _plan(job: Job, task: ContourTask, cut: ReadCut, reference: Contour, s: Array) -> Plan:
+    """Return what the text says of a cut as a plan, so that it is audited as one."""
+    options, K = job.plan_options, len(cut.q)
+    weights = options["weights"]
+    return Plan(
+        contour=Contour(cut.T_part_tip[:, :3, 3], cut.T_part_tip[:, :3, 2], s=s, name=task.name),
+        robot=job.robot,
+        T_flange_tip=job.tool,
+        T_base_part=job.placement,
+        q=cut.q,
+        gamma=np.zeros(K),
+        posture=np.zeros(K, dtype=np.int64),
+        turn=np.zeros(cut.q.shape, dtype=np.int64),
+        time=cut.time,
+        settings=PlanSettings(
+            gamma_step=options["gamma_step"],
+            frames=options["frames"],
+            method=options["method"],
+            objective=options["objective"],
+            metric=options["metric"],
+            weights=np.ones(job.robot.joints) if weights is None else np.asarray(weights),
+            eta_v=options["eta_v"],
+            eta_a=options["eta_a"],
+            rotation=options["rotation"],
+            comfort=options["comfort"],
+        ),
+        cost=0.0,
+        proof=Proof(optimal=False, statement="read from a program"),
+        counts={},
+    )
+
+
+def _asked(job: Job, task: ContourTask, cut: ReadCut, reference: Contour, s: Array) -> list[Check]:
+    """Compare speeds, switches and waits with what the job asks for."""
+    middle = (s[1:] + s[:-1]) / 2
+    asked = task.sample(reference)
+    dt = node_interval(asked, task.speed if asked.time is None else None)
+    when = dt * np.arange(len(asked))
+    k = np.clip(np.searchsorted(reference.s, middle, side="right") - 1, 0, len(reference) - 1)
+    wanted = np.array([reference.kinds[j] != "micro joint" for j in k])
+    wrong = wanted != cut.laser
+    excess = np.diff(np.interp(s, asked.s, when)) / np.diff(cut.time) - 1
+    if job.plan_options["feed"] == "constant":
+        excess = np.abs(excess)
+    fast = int(np.argmax(excess))
+    node = int(np.argmax(wrong)) if wrong.any() else 0
+    lead = np.abs(cut.lead_times - job.program.lead_time)
+    wait = abs(float(cut.waits.sum()) - job.program.pierce_time)
+    lengths = np.diff(s)[wrong].sum()
+    return [
+        _check("speed", "speed, off the one asked for", excess[fast], SAME_SPEED, "share", fast),
+        _check("laser", "length with the laser wrongly on or off", lengths, 1e-6, "m", node),
+        _check("laser-off", "laser left on at the end", cut.left_on, 0, "count", len(s) - 1),
+        _check("lead-time", "lead time of the laser, off", lead.max(initial=0), SAME_TIME, "s"),
+        _check("pierce", "wait at the start, off the one asked for", wait, SAME_TIME, "s"),
+    ]
+
+
+def _postures(job: Job, cut: ReadCut, chosen: Language, settings: Settings) -> list[Check]:
+    """Count targets whose words of posture and turns are not those of the joints there."""
+    told = [k for k, move in enumerate(cut.moves) if move.posture and move.kind == "linear"]
+    if not told or chosen.posture is None:
+        return []
+    expected = chosen.posture(job.robot, cut.q[told], settings)
+    wrong = [k for k, ours in zip(told, expected, strict=True) if cut.moves[k].posture != ours]
+    said = "targets whose posture or turn is not the motion's"
+    return [_check("posture", said, len(wrong), 0, "count", wrong[0] if wrong else 0)]
+
+
+def _air(job: Job, cuts: Sequence[ReadCut], home: Array, cell: Cell | None) -> list[Check]:
+    """Check the joint moves to, between and after the cuts; the node is the number of the way."""
+    starts: list[Array | None] = [None, *(cut.q_out for cut in cuts)]
+    corners = [cut.approach for cut in cuts] + [home]
+    velocity, acceleration = job.robot.speed_limits()
+    worst: dict[str, Check] = {}
+    for number, (start, way) in enumerate(zip(starts, corners, strict=True)):
+        q = way if start is None else np.vstack([start[None], way])
+        q = q[~np.isnan(q).any(axis=1)]
+        if len(q) < 2:
+            continue
+        took = np.maximum(least_time(np.diff(q, axis=0), velocity, acceleration), 1e-9)
+        time = np.append(0.0, np.cumsum(took))
+        for check in air_checks(job.robot, q, time, cell=cell):
+            known = worst.get(check.code)
+            if check.code != "air-time" and (known is None or not check.value <= known.value):
+                worst[check.code] = replace(check, node=number)
+    return list(worst.values())

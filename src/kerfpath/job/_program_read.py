@@ -1,0 +1,289 @@
+"""A program on disk, and the motions that its text means."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+from scipy.spatial.transform import Rotation, Slerp
+
+from kerfpath._arrays import Array, Bools
+from kerfpath.errors import InputError
+from kerfpath.job._read import Job
+from kerfpath.job._tables import ProgramTable
+from kerfpath.post import (
+    Language,
+    ReadMove,
+    ReadProgram,
+    ReadStep,
+    ReadWait,
+    Settings,
+    languages,
+    read_program,
+)
+from kerfpath.robots import Robot
+
+__all__ = ["ReadCut", "cuts_of", "language_of", "program_on_disk"]
+
+ARC_STEP = np.radians(2.0)
+"""Sweep between the nodes that an arc is taken to have."""
+
+
+class _Folder(Mapping[str, str]):
+    """The text files of a folder by name, read when they are asked for."""
+
+    def __init__(self, folder: Path) -> None:
+        self.folder = folder
+
+    def __getitem__(self, name: str) -> str:
+        path = self.folder / name
+        if not path.is_file():
+            raise KeyError(name)
+        try:
+            return path.read_bytes().decode("utf-8-sig")
+        except (OSError, UnicodeDecodeError) as error:
+            why = " ".join(str(error).split())
+            raise InputError(f"{path}: cannot be read as a text ({why})") from None
+
+    def __iter__(self) -> Iterator[str]:
+        return (path.name for path in self.folder.iterdir())
+
+    def __len__(self) -> int:
+        return sum(1 for _ in self.folder.iterdir())
+
+
+def language_of(path: Path, job: Job) -> tuple[Language, Settings]:
+    """Return the language of a program by the suffix of its file, and the job's settings for it.
+
+    Raises
+    ------
+    InputError
+        No language, or none with a reader, writes such files.
+    """
+    known = languages()
+    fitting = [each for each in known.values() if each.suffix.lower() == path.suffix.lower()]
+    own = [each for each in fitting if each.name == job.program.language]
+    if not fitting:
+        suffixes = ", ".join(sorted(each.suffix for each in known.values()))
+        raise InputError(f"{path}: expected a program ({suffixes}) or a plan.json")
+    chosen = (own or fitting)[0]
+    table = {**job.source.get("program", {}), "language": chosen.name}
+    settings = ProgramTable.model_validate(table).settings()
+    assert settings is not None
+    return chosen, settings
+
+
+def program_on_disk(path: Path, chosen: Language, settings: Settings, robot: Robot) -> ReadProgram:
+    """Return what the program that starts with the file at `path` says.
+
+    Raises
+    ------
+    InputError
+        The file cannot be read, or is not of our making: where, in one line.
+    """
+    if not path.is_file():
+        raise InputError(f"{path}: no such file; give the path of a program or a plan.json")
+    return read_program(_Folder(path.parent), chosen.name, robot, settings, main=path.name)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class ReadCut:
+    """One cut of a program: what lies between going down to the part and backing off it.
+
+    Parameters
+    ----------
+    name : str
+        Of the routine that it begins in.
+    approach : (m, n) rad
+        Corners of the joint moves on the way to it.
+    q : (K, n) rad
+        Joints at its nodes, on the branch that the joint moves lead to; NaN out of reach.
+    T_part_tip : (K, 4, 4) m
+    time : (K,) s
+        By the speeds that are written.
+    laser : (K-1,) bool
+        Whether the laser is on along each stretch.
+    left_on : bool
+        Whether it is on while the tool backs off.
+    lead_times : (s,) s
+        Of the switches of the laser.
+    waits : (w,) s
+        At its first node.
+    q_out : (n,) rad
+        Where the tool has backed off to.
+    moves : tuple of ReadMove
+        The move to each node.
+    """
+
+    name: str
+    approach: Array
+    q: Array
+    T_part_tip: Array
+    time: Array
+    laser: Bools
+    left_on: bool
+    lead_times: Array
+    waits: Array
+    q_out: Array
+    moves: tuple[ReadMove, ...]
+
+
+@dataclass(slots=True)
+class _Group:
+    """Joint moves, and the moves of the path behind them."""
+
+    name: str = ""
+    joint: list[ReadMove] = field(default_factory=list)
+    path: list[ReadMove] = field(default_factory=list)
+    waits: list[tuple[int, float]] = field(default_factory=list)
+
+
+def cuts_of(
+    read: ReadProgram, robot: Robot, T_flange_tip: Array, T_base_part: Array
+) -> tuple[list[ReadCut], Array]:
+    """Return the cuts of a program in order, and the corners (m, n) rad of the way home.
+
+    Raises
+    ------
+    InputError
+        Moves in an order that makes no cut: where.
+    """
+    groups = _groups(read)
+    home = np.zeros((0, robot.joints))
+    if groups and not groups[-1].path:
+        home = np.array([move.q for move in groups.pop().joint])
+    cuts = []
+    for group in groups:
+        if not group.joint:
+            raise InputError(f"{group.path[0].place}: expected a joint move before the path")
+        if len(group.path) < 4:
+            raise InputError(
+                f"{group.path[-1].place}: expected a way down, a cut and a way back, got "
+                f"{len(group.path)} moves"
+            )
+        cuts.append(_cut(group, robot, T_flange_tip, T_base_part))
+    return cuts, home
+
+
+def _groups(read: ReadProgram) -> list[_Group]:
+    groups: list[_Group] = []
+    for section in read.sections:
+        for step in section.steps:
+            joint = isinstance(step, ReadMove) and step.kind == "joint"
+            if not groups or (joint and groups[-1].path):
+                groups.append(_Group())
+            if not groups[-1].path:
+                groups[-1].name = section.name
+            _add(groups[-1], step)
+    return groups
+
+
+def _add(group: _Group, step: ReadStep) -> None:
+    if isinstance(step, ReadWait):
+        group.waits.append((len(group.path), step.time))
+    elif step.kind == "joint":
+        group.joint.append(step)
+    else:
+        group.path.append(step)
+
+
+def _cut(group: _Group, robot: Robot, T_flange_tip: Array, T_base_part: Array) -> ReadCut:
+    """Return the cut of a group; an arc gets nodes of its own along it."""
+    T_part_base = np.linalg.inv(T_base_part)
+    T: list[Array] = []
+    took: list[float] = []
+    moves: list[ReadMove] = []
+    on: list[bool] = []
+    laser = False
+    for move in group.path:
+        end = move.T_part_tip
+        if end is None:
+            assert move.q is not None
+            end = T_part_base @ robot.forward(move.q) @ T_flange_tip
+        stops = [end]
+        if T and move.kind == "circular" and move.T_part_via is not None:
+            stops = _arc(T[-1], move.T_part_via, end)
+        for stop in stops:
+            if T:
+                took.append(_duration(move, T[-1], stop, len(stops)))
+                on.append(laser)
+            T.append(np.asarray(stop))
+            moves.append(move)
+        for switch in move.switches:
+            laser = switch.on if switch.signal == "laser" else laser
+    poses = np.array(T)
+    q = _followed(robot, T_base_part @ poses @ np.linalg.inv(T_flange_tip), _q(group.joint[-1]))
+    last = len(poses) - 1
+    switches = [s for move in group.path for s in move.switches if s.signal == "laser"]
+    return ReadCut(
+        name=group.name,
+        approach=np.array([_q(move) for move in group.joint]),
+        q=q[:last],
+        T_part_tip=poses[:last],
+        time=np.concatenate([[0.0], np.cumsum(took[: last - 1])]),
+        laser=np.array(on[: last - 1], dtype=bool),
+        left_on=on[last - 1],
+        lead_times=np.array([switch.lead_time for switch in switches]),
+        waits=np.array([time for at, time in group.waits if at == 1]),
+        q_out=q[last],
+        moves=tuple(moves[:last]),
+    )
+
+
+def _duration(move: ReadMove, start: Array, end: Array, parts: int) -> float:
+    """Return how long (s) a move, or one of so many parts of it, takes."""
+    if move.duration is not None:
+        return move.duration / parts
+    if not move.speed:
+        raise InputError(f"{move.place}: neither a speed nor a time is said for the move")
+    return float(np.linalg.norm(end[:3, 3] - start[:3, 3])) / move.speed
+
+
+def _q(move: ReadMove) -> Array:
+    if move.q is None:
+        raise InputError(f"{move.place}: a joint move says no joints")
+    return move.q
+
+
+def _arc(start: Array, via: Array, end: Array) -> list[Array]:
+    """Return poses along the arc after `start`, its end included, the tool turning evenly."""
+    a, b, c = start[:3, 3], via[:3, 3], end[:3, 3]
+    normal = np.cross(b - a, c - a)
+    rows = np.array([b - a, c - a, normal])
+    try:
+        centre = np.linalg.solve(rows, [(b @ b - a @ a) / 2, (c @ c - a @ a) / 2, normal @ a])
+    except np.linalg.LinAlgError:
+        return [via, end]  # on one line
+    x = a - centre
+    y = np.cross(normal / np.linalg.norm(normal), x)
+    sweep = float(np.arctan2((c - centre) @ y, (c - centre) @ x) % (2 * np.pi))
+    parts = np.linspace(0, 1, max(int(np.ceil(sweep / ARC_STEP)), 1) + 1)[1:]
+    poses = np.tile(np.eye(4), (len(parts), 1, 1))
+    turned = Slerp([0.0, 1.0], Rotation.from_matrix(np.array([start[:3, :3], end[:3, :3]])))
+    poses[:, :3, :3] = turned(parts).as_matrix()
+    at = (parts * sweep)[:, None]
+    poses[:, :3, 3] = centre + np.cos(at) * x + np.sin(at) * y
+    return list(poses)
+
+
+def _followed(robot: Robot, T: Array, q0: Array) -> Array:
+    """Return joints (K, n) at flange poses T (K, 4, 4), on the branch of q0; NaN out of reach."""
+    here = robot.forward(q0)[None]
+    solved, reach = robot.inverse_all(here)
+    apart = np.abs((solved[0] - q0 + np.pi) % (2 * np.pi) - np.pi).max(axis=1)
+    posture = int(np.argmin(np.where(reach[0], apart, np.inf)))
+    if robot.family.follow_all is None:
+        q_all, reached = robot.inverse_all(T)
+        q = np.where(reached[:, posture, None], q_all[:, posture], np.nan)
+        bad = np.isnan(q).any(axis=1)
+        good = np.vstack([q0, q[~bad]])
+        q[~bad] = np.unwrap(good, axis=0)[1:]
+        return q
+    q, branch = np.empty((len(T), robot.joints)), np.array([posture])
+    before = q0
+    for k, pose in enumerate(T):
+        q[k] = robot.follow(pose[None], before[None], branch)[0]
+        before = before if np.isnan(q[k]).any() else q[k]
+    return q

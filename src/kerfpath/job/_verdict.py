@@ -1,0 +1,45 @@
+"""What an audit of a file says."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+from kerfpath.auditor import Check
+
+__all__ = ["Audited"]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Audited:
+    """What the audit of a plan.json or of a program says.
+
+    Parameters
+    ----------
+    tables : dict of str to list of Check
+        The table of each contour that has a plan, or of each cut of a program.
+    missing : tuple of str
+        Names of the contours without one.
+    note : str
+        What was checked for collisions, and what was not.
+    places : dict of str to tuple of str
+        Of a program: where the target of each node stands in its files.
+    """
+
+    tables: dict[str, list[Check]]
+    missing: tuple[str, ...]
+    note: str
+    places: dict[str, tuple[str, ...]] = field(default_factory=dict)
+
+    @property
+    def passed(self) -> bool:
+        """True when every contour has a plan and no check found an error."""
+        return not self.missing and all(
+            check.ok or check.level == "warning"
+            for checks in self.tables.values()
+            for check in checks
+        )
+
+    def place(self, name: str, check: Check) -> str:
+        """Say where a check of a table failed: a node, and in a program the file and line."""
+        lines = self.places.get(name, ())
+        return f"{lines[check.node]}" if check.node < len(lines) else f"node {check.node}"

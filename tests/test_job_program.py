@@ -1,0 +1,173 @@
+"""Programs on disk, audited against their job: as written, and as people edit them."""
+
+import json
+import re
+import shutil
+
+import pytest
+
+from test_cli import refused as assert_refused
+from test_cli import run
+from test_job_part import DEMO, WHOLE
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("program")
+    shutil.copy(DEMO / "b_pillar.step", folder)
+    (folder / "job.toml").write_text(WHOLE)
+    result = run("plan", str(folder / "job.toml"), "--out", str(folder / "out"), "--json")
+    assert result.returncode == 0, result.stderr
+    return folder
+
+
+def refused(*words):
+    """The one line that a command is refused with."""
+    result = run(*words)
+    assert_refused(result)
+    return result.stderr
+
+
+def audited(folder, text, name="edited.mod"):
+    """The exit code and JSON of the audit of a text."""
+    (folder / name).write_text(text)
+    result = run("audit", str(folder / name), "--job", str(folder / "job.toml"), "--json")
+    assert result.returncode in (0, 1), result.stderr
+    return result.returncode, json.loads(result.stdout)
+
+
+def failures(found):
+    return {
+        (name, check["code"]): check
+        for name, checks in found["contours"].items()
+        for check in checks
+        if not check["ok"]
+    }
+
+
+@pytest.fixture(scope="module")
+def written(folder):
+    return (folder / "out" / "job.mod").read_text()
+
+
+def test_the_program_that_was_written_passes(folder, written):
+    code, found = audited(folder, written)
+    assert (code, found["passed"], found["missing"]) == (0, True, [])
+    cuts = {name for name in found["contours"] if "(" in name}
+    assert cuts == {"led_in (led in)", "joined (joined)", "cornered (cornered)"}
+    codes = {check["code"] for check in found["contours"]["led_in (led in)"]}
+    assert {"tip-between-nodes", "velocity", "acceleration", "laser", "speed", "posture"} <= codes
+
+
+def test_the_tables_are_for_people(folder, written):
+    (folder / "edited.mod").write_text(written)
+    result = run("audit", str(folder / "edited.mod"), "--job", str(folder / "job.toml"))
+    assert re.search(r"led_in \(led in\): \d+ checks passed", result.stdout)
+    assert "audit passed" in result.stdout
+
+
+def nth(text, pattern, number):
+    """The line number and text of one of the lines that match."""
+    lines = text.splitlines()
+    found = [k for k, line in enumerate(lines) if re.search(pattern, line)]
+    return found[number], lines
+
+
+def test_a_target_moved_by_hand_is_found_with_its_line(folder, written):
+    k, lines = nth(written, r"^    MoveL \[\[", 20)
+    x = re.search(r"MoveL \[\[(-?[\d.]+),", lines[k])
+    lines[k] = lines[k].replace(f"[[{x[1]},", f"[[{float(x[1]) + 0.4:.4f},", 1)
+    code, found = audited(folder, "\n".join(lines))
+    assert code == 1
+    wrong = failures(found)
+    (name,) = {name for name, _ in wrong}
+    check = wrong[name, "tip-between-nodes"]
+    # The move may run partly along the contour: what leaves it is the part across.
+    assert 1e-4 < check["value"] <= 4.1e-4
+    line = int(re.search(r"line (\d+)", check["place"])[1])
+    assert abs(line - (k + 1)) <= 1
+
+
+def test_what_else_people_change_is_found(folder, written):
+    k, lines = nth(written, r"CONST speeddata vCut", 0)
+    doubled = written.replace(
+        lines[k], re.sub(r"\[([\d.]+),", lambda m: f"[{2 * float(m[1]):.2f},", lines[k])
+    )
+    edits = {
+        "speed": doubled,
+        "laser-off": re.sub(r",trOff,", ",trOn,", written, count=1),
+        "laser": re.sub(r"TriggL (.*),trOff,", r"MoveL \1,", written),
+        "pierce": written.replace("WaitTime 0.250;", "WaitTime 0.100;", 1),
+        "lead-time": written.replace(r"TriggIO trOn,0.0050", r"TriggIO trOn,0.0500"),
+        "posture": re.sub(r"(MoveL \[\[[^]]*\],\[[^]]*\],\[)(-?\d)", r"\g<1>9", written, count=1),
+        "frames": re.sub(r'(wobjdata wPart:=\[FALSE,TRUE,"",\[\[)[\d.]+', r"\g<1>1201.0", written),
+    }
+    for code, text in edits.items():
+        assert text != written, code
+        status, found = audited(folder, text)
+        assert status == 1
+        assert code in {which for _, which in failures(found)}, code
+
+
+def test_a_cut_that_is_left_out_or_made_twice_is_found(folder, written):
+    name = re.search(r"    (joined);", written)[0]
+    body = re.search(r"\n  PROC joined\(\)\n.*?ENDPROC\n", written, re.DOTALL)[0]
+    code, found = audited(folder, written.replace(name, "").replace(body, ""))
+    assert (code, found["missing"]) == (1, ["joined"])
+    twice = written.replace(name, f"{name}\n    joined_2;").replace(
+        body, body + body.replace("PROC joined", "PROC joined_2")
+    )
+    code, found = audited(folder, twice)
+    assert code == 1
+    assert ("joined_2 (joined)", "once") in failures(found)
+
+
+def test_a_path_backwards_or_elsewhere_is_no_contour_of_the_job(folder, written):
+    away = re.sub(
+        r"(\n  PROC joined\(\)\n.*?ENDPROC\n)",
+        lambda m: re.sub(
+            r"(MoveL|TriggL) \[\[(-?[\d.]+),",
+            lambda move: f"{move[1]} [[{float(move[2]) + 30:.4f},",
+            m[0],
+        ),
+        written,
+        flags=re.DOTALL,
+    )
+    code, found = audited(folder, away)
+    assert (code, found["missing"]) == (1, ["joined"])
+    assert ("joined", "contour") in failures(found)
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        (
+            lambda t: t[: len(t) // 2],
+            "line .*(not expected here|ENDMODULE is missing)",
+        ),
+        (
+            lambda t: t.replace("MoveL", "MoveX", 1),
+            r"line \d+: not expected here: 'MoveX",
+        ),
+        (lambda t: "", "ENDMODULE is missing"),
+        (lambda t: re.sub(r"    MoveAbsJ.*\n", "", t), "expected a joint move before the path"),
+    ],
+)
+def test_a_text_that_is_not_of_our_making_is_refused_in_one_line(folder, written, change, message):
+    (folder / "edited.mod").write_text(change(written))
+    said = refused("audit", str(folder / "edited.mod"), "--job", str(folder / "job.toml"))
+    assert re.search(message, said)
+
+
+def test_bad_arguments_are_refused(folder, written):
+    (folder / "x.mod").write_bytes(b"\xff\xfe\x00MODULE")
+    assert "cannot be read as a text" in refused(
+        "audit", str(folder / "x.mod"), "--job", str(folder / "job.toml")
+    )
+    assert "a program is compared with its job" in refused("audit", str(folder / "out/job.mod"))
+    assert "no such file" in refused(
+        "audit", str(folder / "none.mod"), "--job", str(folder / "job.toml")
+    )
+    (folder / "x.foo").write_text("")
+    said = refused("audit", str(folder / "x.foo"), "--job", str(folder / "job.toml"))
+    assert "expected a program (" in said
