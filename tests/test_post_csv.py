@@ -69,14 +69,14 @@ def test_the_golden_table_is_written_byte_for_byte(program):
 
 
 def test_another_reader_of_csv_finds_the_planned_targets(program):
-    """Digits: 1e-7 deg, 0.1 um; the pose from the robot, not from the table's writer."""
+    """Digits: 1e-9 deg, 1e-10 m; the pose from the robot, not from the table's writer."""
     rows = list(csv.DictReader(table(program).splitlines()))
     moves = [row for row in rows if row["kind"] != "wait"]
     q = np.radians([[float(row[f"q{i}_deg"]) for i in range(1, 7)] for row in moves])
     np.testing.assert_allclose(q, [move.q for move in program.moves], atol=1e-9)
     T = program.T_base_part @ np.array([pose(row) for row in moves])
     planned = program.robot.forward(q) @ program.T_flange_tip
-    np.testing.assert_allclose(T, planned, atol=2e-6)
+    np.testing.assert_allclose(T, planned, atol=1e-9)
     assert [row["events"] for row in moves][
         1
     ] == "gas on 0.2000 s ahead and laser on 0.0200 s ahead"
@@ -189,9 +189,7 @@ def test_the_reader_refuses_what_it_does_not_know(old, new, message, arm):
 
 
 def test_the_reader_refuses_a_quaternion_that_is_none_and_sections_apart(arm, program):
-    text = re.sub(
-        r"0\.\d{9},(-?\d\.\d{9},-?\d\.\d{9},-?\d\.\d{9},,)", r"0.900000000,\1", table(program)
-    )
+    text = re.sub(r"0\.\d{11},((?:-?\d\.\d{11},){3},)", r"0.900000000,\1", table(program))
     with pytest.raises(InputError, match="must have length 1"):
         reread(text, arm)
     lines = GOLDEN.read_text().splitlines()

@@ -120,10 +120,10 @@ class Csv(Formatter):
             if isinstance(move, CircularMove):
                 points.append((move, move.q_via, move.T_part_via))
             points.append((move, move.q, T))
-        q_deg = np.degrees([q for _, q, _ in points]).round(7)
+        q_deg = np.degrees([q for _, q, _ in points]).round(9)
         T = np.array([T for _, _, T in points])
-        point_mm, wxyz = (T[:, :3, 3] * 1e3).round(4), quaternions(T).round(9)
-        text = ",".join(["%.7f"] * q_deg.shape[1] + ["%.4f"] * 3 + ["%.9f"] * 4)
+        point_mm, wxyz = (T[:, :3, 3] * 1e3).round(7), quaternions(T).round(11)
+        text = ",".join(["%.9f"] * q_deg.shape[1] + ["%.7f"] * 3 + ["%.11f"] * 4)
         texts: dict[Move, list[str]] = {move: [] for move in moves}
         for (move, _, _), row in zip(points, np.hstack([q_deg, point_mm, wxyz]) + 0.0, strict=True):
             texts[move].append(text % tuple(row.tolist()))
