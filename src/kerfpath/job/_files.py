@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 
+from kerfpath._arrays import Array
 from kerfpath.air import AirMove
 from kerfpath.cad import Departure
 from kerfpath.cell import Cell
@@ -36,6 +37,8 @@ __all__ = [
 
 NOT_CHECKED = "Collisions are not checked: simulate the program in the cell before running it."
 """What is said of a job without a [cell]."""
+PER_LEG = 17
+"""Points that a straight joint motion is drawn by."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -291,11 +294,15 @@ def report_text(outcome: Outcome, notes: Sequence[str]) -> str:
         ),
         ("Endless axes", _row(np.flatnonzero(robot.endless) + 1) or "none"),
     ]
+    moves = () if outcome.part is None else outcome.part.moves
+    # From home and back to it the way is long, and would make the part small.
+    between = moves[1:-1] if len(moves) > len(outcome.plans) else moves
     return render(
         f"{job.part_file.stem.replace('_', ' ')}",
         sections,
         mesh=outcome.mesh,
         cell=outcome.cell,
+        moves=[_tips(job, move) for move in between],
         facts=facts,
         notes=notes,
         job_text=job.path.read_text(encoding="utf-8-sig"),
@@ -325,6 +332,13 @@ def _sampling(found: Departure) -> list[tuple[str, str]]:
         told = f"{loop.chord_error * 1e3:.4f} mm and {np.degrees(loop.axis_error):.3f} deg"
         rows.append(("Drawn loop", f"within {told} of {against[loop.against]}"))
     return rows
+
+
+def _tips(job: Job, move: AirMove) -> Array:
+    """Return where the tool tip is along a move, (m, 3) m, part frame."""
+    legs = np.linspace(move.q[:-1], move.q[1:], PER_LEG, axis=1).reshape(-1, move.q.shape[1])
+    T = np.linalg.inv(job.placement) @ job.robot.forward(legs) @ job.tool
+    return np.asarray(T[:, :3, 3])
 
 
 def _row(values: object) -> str:

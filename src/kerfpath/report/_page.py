@@ -26,6 +26,7 @@ def render(
     *,
     mesh: tuple[ArrayLike, ArrayLike] | None = None,
     cell: Cell | None = None,
+    moves: Sequence[ArrayLike] = (),
     facts: Sequence[tuple[str, str]] = (),
     notes: Sequence[str] = (),
     job_text: str = "",
@@ -42,6 +43,8 @@ def render(
         The part, in the part frame.
     cell : Cell, optional
         What stands around it, and robot and head, drawn at a few poses.
+    moves : sequence of (m, 3) m
+        Ways of the tool tip through the air, in the part frame.
     facts : sequence of (what, value)
         Rows such as ("Robot", "ABB IRB 4600-60/2.05").
     notes : sequence of str
@@ -62,8 +65,8 @@ def render(
         "<section><h2>Part and contours</h2>",
         '<p class="caption">Part frame, all axes to the same scale. Dot and cone mark start and '
         "direction; short lines are tool axes, on the side of the nozzle. Drag to turn, scroll to "
-        f"zoom.{'' if cell is None else _CELL}</p>",
-        figures.place(scene(sections, mesh, cell), "scene"),
+        f"zoom.{_AIR if moves else ''}{'' if cell is None else _CELL}</p>",
+        figures.place(scene(sections, mesh, cell, moves), "scene"),
         "</section>",
         "<section><h2>Contours</h2>",
         _tables.summary_table(sections),
@@ -81,6 +84,7 @@ _SPARE = (
     " Where nothing forbids it, the colour says how much more than the near-miss distances is kept;"
     " pairs with a distance of their own, as nozzle and part, count as collisions alone."
 )
+_AIR = " Thin red lines are the moves between contours; the table is in the order of cutting."
 _CELL = " The slider puts robot and head to a few poses; capsules stand in for links."
 
 

@@ -20,8 +20,12 @@ from kerfpath.report._section import ContourSection
 __all__ = ["add_part", "checked", "scene", "space_axis", "xyz"]
 
 HEIGHT = 560
-AXES_DRAWN = 48
-"""Tool axes drawn per contour."""
+AXES_DRAWN = 6, 48
+"""Tool axes drawn per contour, at least and at most."""
+APART = 0.02
+"""How far they stand apart, as a share of the part's size."""
+LARGE = 10.0
+"""How many times larger than a contour the part may be before its marks shrink with it."""
 LABELS = 12
 """With more contours than this, names only show on hover."""
 
@@ -30,8 +34,9 @@ def scene(
     sections: Sequence[ContourSection],
     mesh: tuple[ArrayLike, ArrayLike] | None,
     cell: Cell | None = None,
+    moves: Sequence[ArrayLike] = (),
 ) -> go.Figure:
-    """Return the part (if given as a mesh, m), its contours and its cell, in mm, axes alike."""
+    """Return the part (a mesh, m), its contours, cell and moves between, in mm, axes alike."""
     figure = go.Figure(layout=base_layout(HEIGHT, showlegend=False))
     corners = [section.path.points * 1e3 for section in sections]
     if mesh is not None:
@@ -41,6 +46,8 @@ def scene(
     size = float(np.linalg.norm(np.ptp(np.vstack(corners), axis=0))) if corners else 1.0
     for section in sections:
         _add_contour(figure, section, size)
+    for number, move in enumerate(moves, 1):
+        _add_move(figure, floats(move, "move", (None, 3)) * 1e3, number)
     if cell is not None and cell.T_base_part is not None:
         plans = [section.plan for section in sections if section.plan is not None]
         add_cell(figure, cell, cell.T_base_part, poses_shown(plans))
@@ -84,8 +91,10 @@ def _add_contour(figure: go.Figure, section: ContourSection, size: float) -> Non
     # Lifted towards the nozzle by a hair, or the part's own surface would cover half of the line.
     points = path.points * 1e3 - path.axes * (0.002 * size)
     colour = ACCENT if section.plan is not None else ALERT
-    some = np.unique(np.linspace(0, len(path) - 1, min(AXES_DRAWN, len(path))).round().astype(int))
-    feet, tips = points[some], points[some] - path.axes[some] * (0.035 * size)
+    count = int(np.clip(path.length * 1e3 / (APART * size), *AXES_DRAWN))
+    some = np.unique(np.linspace(0, len(path) - 1, min(count, len(path))).round().astype(int))
+    mark = min(size, LARGE * float(np.linalg.norm(np.ptp(points, axis=0))))
+    feet, tips = points[some], points[some] - path.axes[some] * (0.035 * mark)
     figure.add_scatter3d(
         **_lines(feet, tips),
         mode="lines",
@@ -111,7 +120,7 @@ def _add_contour(figure: go.Figure, section: ContourSection, size: float) -> Non
         **dict(zip("uvw", along[:, None], strict=True)),
         anchor="tail",
         sizemode="raw",
-        sizeref=0.03 * size,
+        sizeref=0.03 * mark,
         colorscale=[[0, INK], [1, INK]],
         showscale=False,
         hoverinfo="skip",
@@ -132,6 +141,16 @@ def _add_contour(figure: go.Figure, section: ContourSection, size: float) -> Non
             hovertemplate=f"path breaks at node {section.broken_at}<extra>{name}</extra>",
             name=f"{name}: break",
         )
+
+
+def _add_move(figure: go.Figure, points: Array, number: int) -> None:
+    figure.add_scatter3d(
+        **xyz(points),
+        mode="lines",
+        line={"color": ALERT, "width": 1.5},
+        hovertemplate=f"move {number}<extra></extra>",
+        name=f"move {number}",
+    )
 
 
 def _labels(sections: Sequence[ContourSection]) -> list[dict[str, Any]]:
