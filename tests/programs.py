@@ -7,7 +7,16 @@ from scipy.spatial.transform import Rotation
 
 from kerfpath import Contour
 from kerfpath.plans import Plan, Proof, Settings
-from kerfpath.post import Section, preflight, read_program
+from kerfpath.post import (
+    JointMove,
+    LinearMove,
+    Program,
+    Section,
+    Switch,
+    preflight,
+    read_program,
+)
+from kerfpath.robots import Robot
 
 STEEP = np.radians(20.0)
 
@@ -93,3 +102,35 @@ def text_of(files):
     """The text of a program of one file."""
     (text,) = files.values()
     return text
+
+
+def five_axis_program():
+    """A program of an arm of five axes, straight from stop to stop and through three nodes."""
+    five = Robot(
+        id="five",
+        kinematics="five",
+        geometry={"a1": 0.3, "a2": -0.1, "b": 0.0, "c1": 0.7, "c2": 0.9, "c3": 0.8, "c4": 0.12},
+        lower=np.radians([-170, -90, -60, -180, -180]),
+        upper=np.radians([170, 120, 170, 180, 180]),
+        velocity=np.radians([120, 110, 130, 300, 300]),
+        acceleration=np.radians([400, 300, 500, 1500, 1500]),
+        endless=[0, 0, 0, 1, 1],
+    )
+    tool, placement = np.eye(4), np.eye(4)
+    tool[:3, 3] = 0.06, 0.02, 0.2
+    q = np.array([0.3, 0.2, 0.4, 0.5, 0.9]) + np.linspace(0, 0.1, 6)[:, None]
+    tips = five.forward(q) @ tool
+    on, off = (Switch(signal="laser", on=state, lead_time=0.01) for state in (True, False))
+    path = [
+        LinearMove(T_part_tip=T, q=joints, speed=0.1, duration=0.3, zone=zone, switches=switches)
+        for T, joints, zone, switches in zip(
+            tips[1:], q[1:], (0, 1e-4, 1e-4, 0, 0), ((on,), (), (), (off,), ()), strict=True
+        )
+    ]
+    return Program(
+        name="five",
+        robot=five,
+        T_flange_tip=tool,
+        T_base_part=placement,
+        sections=(Section(name="cut", steps=(JointMove(q=q[0], speed=0.5), *path)),),
+    )

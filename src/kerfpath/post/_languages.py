@@ -23,9 +23,11 @@ __all__ = ["ENTRY_POINTS", "Language", "language", "languages"]
 ENTRY_POINTS = "kerfpath.languages"
 """Group of entry points whose objects are languages."""
 SHIPPED = {
+    "csv": "kerfpath.post.csv:CSV",
     "fanuc": "kerfpath.post.fanuc:FANUC",
     "krl": "kerfpath.post.krl:KRL",
     "rapid": "kerfpath.post.rapid:RAPID",
+    "ros": "kerfpath.post.ros:ROS",
     "urscript": "kerfpath.post.urscript:URSCRIPT",
 }
 """Where the languages are that come with the package."""

@@ -1,0 +1,58 @@
+"""When each step of a program ends, for languages that say times."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from kerfpath.air import least_time
+from kerfpath.errors import InputError
+from kerfpath.post._issue import ProgramIssue
+from kerfpath.post._program import Comment, JointMove, LinearMove, Move, Program, Wait
+
+__all__ = ["refusals", "timetable"]
+
+SHORTEST = 1e-6
+"""s; a move that takes less has no duration worth writing."""
+
+
+def timetable(program: Program) -> list[tuple[Move | Wait, float]]:
+    """Return each move and wait with the time (s) at which it ends; the first target is at 0.
+
+    Waits and moves along the path take what was planned. A joint move is straight, from stop to
+    stop: the least time that the joint limits leave it, divided by its share of the full speed.
+
+    Raises
+    ------
+    InputError
+        Joint limits that are not known.
+    """
+    steps = [step for step in program.steps if not isinstance(step, Comment)]
+    ways = np.diff(np.array([move.q for move in program.moves]), axis=0)
+    least = iter([0.0, *least_time(ways, *program.robot.speed_limits()).tolist()])
+    took = []
+    for step in steps:
+        full = 0.0 if isinstance(step, Wait) else next(least)
+        if isinstance(step, JointMove):
+            took.append(full / step.speed)
+        else:
+            took.append(step.time if isinstance(step, Wait) else step.duration)
+    return list(zip(steps, np.cumsum(took).tolist(), strict=True))
+
+
+def refusals(program: Program) -> Iterator[ProgramIssue]:
+    """Yield what forbids to say times: unknown limits, no start, a move without a duration."""
+    try:
+        program.robot.speed_limits()
+    except InputError as error:
+        yield ProgramIssue("error", "joint-speed", str(error), "program")
+    if not isinstance(next(iter(program.moves), None), JointMove):
+        said = "times are counted from a first joint move, but there is none"
+        yield ProgramIssue("error", "start", said, "program")
+    for section in program.sections:
+        for number, move in enumerate(section.moves):
+            took = move.duration if isinstance(move, LinearMove) else 1.0
+            if not SHORTEST <= took < np.inf:
+                said = f"the move takes {took:g} s, expected at least {SHORTEST:g} s"
+                yield ProgramIssue("error", "duration", said, f"{section.name}, move {number}")

@@ -1,0 +1,22 @@
+"""A table of all targets (CSV), for spreadsheets and programs of one's own."""
+
+from kerfpath.post._languages import Language
+from kerfpath.post.csv._read import read
+from kerfpath.post.csv._write import Csv as Csv
+from kerfpath.post.csv._write import CsvSettings as CsvSettings
+from kerfpath.post.csv._write import check, is_reserved, rules
+
+CSV = Language(
+    name="csv",
+    title="a CSV table",
+    manufacturers=(),
+    families=(),
+    suffix=".csv",
+    settings=CsvSettings,
+    rules=rules,
+    formatter=Csv,
+    is_reserved=is_reserved,
+    check=check,
+    read=read,
+)
+"""What is registered."""

@@ -1,0 +1,137 @@
+"""Read back the table that `Csv` writes, and nothing else: what it does not know, it refuses."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from kerfpath._arrays import Array, freeze
+from kerfpath.errors import InputError
+from kerfpath.post._program import Switch
+from kerfpath.post._read import ReadMove, ReadProgram, ReadSection, ReadStep, ReadWait
+from kerfpath.post.csv._write import POSE, CsvSettings, columns
+from kerfpath.robots import Robot
+
+__all__ = ["read"]
+
+UNIT = 1e-6
+"""How far the length of a quaternion may be from one."""
+_NUMBER = re.compile(r"-?\d+\.\d+", re.ASCII)
+_EVENT = re.compile(r"(laser|gas) (on|off) (\d+\.\d+) s ahead", re.ASCII)
+_KINDS = ("joint", "linear", "circular", "via", "wait")
+
+
+def read(main: str, files: Mapping[str, str], robot: Robot, settings: CsvSettings) -> ReadProgram:
+    """Return the program that a table of ours says; see `kerfpath.post.Reader`."""
+    header, *lines = files[main].splitlines() or [""]
+    if header != ",".join(columns(robot.joints)):
+        expected = ",".join(columns(robot.joints)[:6])
+        raise InputError(
+            f"{main}, line 1: expected the columns {expected},..., got {header[:60]!r}"
+        )
+    reader = _Reader(main, robot)
+    for number, line in enumerate(lines, 2):
+        reader.row(number, line.split(","))
+    if reader.via is not None:
+        raise reader.fault("a point on the way without its target")
+    name = main.removesuffix(".csv")
+    sections = [ReadSection(name=name, steps=tuple(s)) for name, s in reader.sections.items()]
+    return ReadProgram(name=name, sections=tuple(sections))
+
+
+class _Reader:
+    """Reads row by row; knows the last time and the section."""
+
+    def __init__(self, file: str, robot: Robot) -> None:
+        self.file, self.joints, self.line = file, robot.joints, 1
+        self.time = 0.0
+        self.section = ""
+        self.sections: dict[str, list[ReadStep]] = {}
+        self.via: Array | None = None
+
+    def row(self, number: int, fields: list[str]) -> None:
+        self.line = number
+        if len(fields) != len(columns(self.joints)):
+            raise self.fault(f"expected {len(columns(self.joints))} fields, got {len(fields)}")
+        name, kind, time, *rest = fields
+        target, (speed, share, zone, events) = rest[:-4], rest[-4:]
+        if kind not in _KINDS:
+            raise self.fault(f"kind: expected {', '.join(_KINDS)}, got {kind[:20]!r}")
+        if self.via is not None and kind != "circular":
+            raise self.fault("a point on the way must be followed by the target of its arc")
+        if name != self.section and name in self.sections:
+            raise self.fault(f"the rows of section {name!r} do not stand together")
+        self.section = name
+        steps = self.sections.setdefault(name, [])
+        empty = {
+            "joint": [speed, events],
+            "linear": [share],
+            "circular": [share],
+            "via": [time, speed, share, zone, events],
+            "wait": rest,
+        }[kind]
+        if any(empty):
+            raise self.fault(f"a row of kind {kind} says too much: {max(empty)[:40]!r}")
+        if kind == "via":
+            self.via = self.target(target)[1]
+            return
+        end = self.numbers([time])[0]
+        took, self.time = end - self.time, end
+        if took < 0:
+            raise self.fault("the time runs backwards")
+        if kind == "wait":
+            steps.append(ReadWait(time=took, file=self.file, line=number))
+            return
+        if (kind == "circular") != (self.via is not None):
+            raise self.fault("an arc must follow the point on its way")
+        q, T_part_tip = self.target(target)
+        steps.append(
+            ReadMove(
+                kind=kind,  # type: ignore[arg-type]  # one of the kinds of moves, see above
+                file=self.file,
+                line=number,
+                speed=self.numbers([share])[0] / 100
+                if kind == "joint"
+                else self.numbers([speed])[0] * 1e-3,
+                duration=None if kind == "joint" else took,
+                zone=self.numbers([zone])[0] * 1e-3,
+                q=q,
+                T_part_tip=T_part_tip,
+                T_part_via=self.via,
+                switches=self.switches(events),
+            )
+        )
+        self.via = None
+
+    def target(self, fields: list[str]) -> tuple[Array, Array]:
+        """Return the joints (n,) rad and the tip's pose (4, 4) m."""
+        values = self.numbers(fields)
+        q, point, wxyz = np.split(values, [self.joints, self.joints + len(POSE) - 4])
+        if abs(np.linalg.norm(wxyz) - 1) > UNIT:
+            raise self.fault("the quaternion must have length 1")
+        T = np.eye(4)
+        T[:3, :3] = Rotation.from_quat(wxyz, scalar_first=True).as_matrix()
+        T[:3, 3] = point * 1e-3
+        return freeze(np.radians(q)), freeze(T)
+
+    def switches(self, text: str) -> tuple[Switch, ...]:
+        found = []
+        for words in text.split(" and ") if text else ():
+            if (match := _EVENT.fullmatch(words)) is None:
+                raise self.fault(f"not an event: {words[:40]!r}")
+            signal, state, lead = match.groups()
+            on = state == "on"
+            found.append(Switch(signal=signal, on=on, lead_time=float(lead)))  # type: ignore[arg-type]
+        return tuple(found)
+
+    def numbers(self, fields: list[str]) -> Array:
+        for field in fields:
+            if _NUMBER.fullmatch(field) is None:
+                raise self.fault(f"expected a number with decimals, got {field[:20]!r}")
+        return np.array(fields, dtype=np.float64)
+
+    def fault(self, message: str) -> InputError:
+        return InputError(f"{self.file}, line {self.line}: {message}")

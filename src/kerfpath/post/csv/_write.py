@@ -1,0 +1,130 @@
+"""A table with one row for each target and wait: this module only formats.
+
+The first row names the columns and their units. Joints are in deg, tips in mm and as unit
+quaternions (w first) in the part's frame, times in s from the first target.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from functools import cached_property
+from typing import Annotated
+
+import numpy as np
+
+from kerfpath._arrays import Array
+from kerfpath.post._divide import in_one_file
+from kerfpath.post._formatter import Formatter, number
+from kerfpath.post._issue import ProgramIssue
+from kerfpath.post._orientations import quaternions
+from kerfpath.post._program import CircularMove, JointMove, LinearMove, Move, Program, Switch, Wait
+from kerfpath.post._settings import Rules, Settings, setting
+from kerfpath.post._times import refusals, timetable
+
+__all__ = ["Csv", "CsvSettings", "check", "columns", "event", "is_reserved", "rules"]
+
+POSE = ("x_mm", "y_mm", "z_mm", "qw", "qx", "qy", "qz")
+
+
+class CsvSettings(Settings):
+    """How long a table may be."""
+
+    lines_per_file: Annotated[
+        int,
+        setting("a whole number of lines from 100 to 1000000", "5000", ge=100, le=1_000_000),
+    ] = 1_000_000
+
+
+def rules(settings: CsvSettings) -> Rules:
+    """Return what programs must keep to: the digits of the table."""
+    return Rules(slowest=1e-6, speed_step=1e-6)
+
+
+def is_reserved(name: str) -> bool:
+    """Return whether a run of a job writes a file of that name already."""
+    return name.lower() == "trajectory"
+
+
+def check(program: Program, settings: CsvSettings) -> Iterator[ProgramIssue]:
+    """Yield what forbids to say times."""
+    yield from refusals(program)
+
+
+def columns(joints: int) -> list[str]:
+    """Return the names of the columns of a robot of so many joints."""
+    axes = [f"q{i}_deg" for i in range(1, joints + 1)]
+    rest = ["speed_mm_s", "speed_percent", "zone_mm", "events"]
+    return ["section", "kind", "t_s", *axes, *POSE, *rest]
+
+
+def event(switch: Switch) -> str:
+    """Return a switch in words."""
+    state = "on" if switch.on else "off"
+    return f"{switch.signal} {state} {number(switch.lead_time, 4)} s ahead"
+
+
+class Csv(Formatter):
+    """Writes the one table."""
+
+    settings: CsvSettings
+
+    def files(self) -> dict[str, str]:
+        """Return the one table."""
+        program = self.program
+        self._ends = iter([number(end, 9) for _, end in timetable(program)])
+        lines = [",".join(columns(program.robot.joints))]
+        for section in program.sections:
+            lines += (f"{section.name},{row}" for row in self.lines(section))
+        return in_one_file(f"{program.name}.csv", lines, self.settings.lines_per_file)
+
+    def names(self) -> list[tuple[str, str]]:
+        """Return the name of the file; sections are only words in a column."""
+        return [(self.program.name, "the program")]
+
+    def joint_move(self, move: JointMove) -> Iterator[str]:
+        """Yield the row of a joint move; its speed is in per cent of the full one."""
+        share = number(move.speed * 100, 2)
+        yield self._row("joint", move, f",{share},{number(move.zone * 1e3, 4)},")
+
+    def linear_move(self, move: LinearMove) -> Iterator[str]:
+        """Yield the row of a linear move."""
+        yield self._row("linear", move, self._along(move))
+
+    def circular_move(self, move: CircularMove) -> Iterator[str]:
+        """Yield a row for the point on the way, which has no time, and one for the target."""
+        yield f"via,,{self._targets[move][0]},,,,"
+        yield self._row("circular", move, self._along(move))
+
+    def wait(self, wait: Wait) -> Iterator[str]:
+        """Yield the row of a wait, which says only when it ends."""
+        fields = self.program.robot.joints + len(POSE) + 4
+        yield f"wait,{next(self._ends)}{',' * fields}"
+
+    def comment(self, text: str) -> Iterator[str]:
+        """Yield nothing: a table has no comments."""
+        yield from ()
+
+    def _row(self, kind: str, move: Move, rest: str) -> str:
+        return f"{kind},{next(self._ends)},{self._targets[move][-1]},{rest}"
+
+    def _along(self, move: LinearMove) -> str:
+        speed, zone = number(move.speed * 1e3, 3), number(move.zone * 1e3, 4)
+        return f"{speed},,{zone},{' and '.join(event(switch) for switch in move.switches)}"
+
+    @cached_property
+    def _targets(self) -> dict[Move, list[str]]:
+        """Joints and tip of each target, those on the way first."""
+        program, moves = self.program, list(dict.fromkeys(self.program.moves))
+        points: list[tuple[Move, Array, Array]] = []
+        for move, T in zip(moves, program.tips(moves), strict=True):
+            if isinstance(move, CircularMove):
+                points.append((move, move.q_via, move.T_part_via))
+            points.append((move, move.q, T))
+        q_deg = np.degrees([q for _, q, _ in points]).round(9)
+        T = np.array([T for _, _, T in points])
+        point_mm, wxyz = (T[:, :3, 3] * 1e3).round(7), quaternions(T).round(11)
+        text = ",".join(["%.9f"] * q_deg.shape[1] + ["%.7f"] * 3 + ["%.11f"] * 4)
+        texts: dict[Move, list[str]] = {move: [] for move in moves}
+        for (move, _, _), row in zip(points, np.hstack([q_deg, point_mm, wxyz]) + 0.0, strict=True):
+            texts[move].append(text % tuple(row.tolist()))
+        return texts

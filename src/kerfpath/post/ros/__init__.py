@@ -1,0 +1,25 @@
+"""ROS trajectories: trajectory_msgs/JointTrajectory as YAML, and what is switched when."""
+
+from kerfpath.post._languages import Language
+from kerfpath.post.ros._check import check, is_reserved
+from kerfpath.post.ros._read import read
+from kerfpath.post.ros._trajectory import Trajectory as Trajectory
+from kerfpath.post.ros._trajectory import trajectory as trajectory
+from kerfpath.post.ros._write import Ros as Ros
+from kerfpath.post.ros._write import RosSettings as RosSettings
+from kerfpath.post.ros._write import rules
+
+ROS = Language(
+    name="ros",
+    title="a ROS trajectory",
+    manufacturers=(),
+    families=(),
+    suffix=".yaml",
+    settings=RosSettings,
+    rules=rules,
+    formatter=Ros,
+    is_reserved=is_reserved,
+    check=check,
+    read=read,
+)
+"""What is registered."""

@@ -1,0 +1,70 @@
+"""What forbids a trajectory, or speaks against it."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from kerfpath.errors import InputError
+from kerfpath.post._issue import ProgramIssue
+from kerfpath.post._program import CircularMove, LinearMove, Program
+from kerfpath.post._times import refusals
+from kerfpath.post.ros._trajectory import rates, trajectory
+from kerfpath.post.ros._write import RosSettings, joint_names
+
+__all__ = ["check", "is_reserved"]
+
+NOISE = 1e-3
+"""Share of a limit that rounding, and the parabola through uneven points, may add."""
+
+
+def is_reserved(name: str) -> bool:
+    """Return whether a name means something else: none does, they stand in quotes."""
+    return False
+
+
+def check(program: Program, settings: RosSettings) -> Iterator[ProgramIssue]:
+    """Yield what cannot be said in a trajectory, and where it asks too much of the joints."""
+    issues = [*refusals(program), *_shape(program, settings)]
+    yield from issues
+    if not issues:
+        yield from _limits(program, settings)
+
+
+def _shape(program: Program, settings: RosSettings) -> Iterator[ProgramIssue]:
+    count, joints = len(joint_names(program.robot.joints, settings)), program.robot.joints
+    if count != joints:
+        said = f"joint_names has {count} names, the robot {joints} joints"
+        yield ProgramIssue("error", "joint-names", said, "program")
+    steps = [(section.name, step) for section in program.sections for step in section.moves]
+    for (name, move), (_, after) in zip(steps, [*steps[1:], ("", None)], strict=True):
+        if isinstance(move, CircularMove):
+            said = "a trajectory has no arcs; leave arcs_mm out of the job"
+            yield ProgramIssue("error", "arc", said, name)
+        if move.zone > 0 and not (isinstance(move, LinearMove) and isinstance(after, LinearMove)):
+            said = "only between linear moves can a corner be rounded; expected a stop"
+            yield ProgramIssue("error", "zone", said, name)
+
+
+def _limits(program: Program, settings: RosSettings) -> Iterator[ProgramIssue]:
+    try:
+        motion = trajectory(program, settings.step_ms * 1e-3)
+    except InputError as error:
+        yield ProgramIssue("error", "straight", str(error), "program")
+        return
+    found = rates(motion.time, motion.q, motion.stops)
+    words = (("error", "velocity"), ("warning", "acceleration"))
+    for values, limit, (level, what) in zip(
+        found, program.robot.speed_limits(), words, strict=True
+    ):
+        share = np.abs(values) / limit
+        if share.max() > 1 + NOISE:
+            k, joint = np.unravel_index(int(share.argmax()), share.shape)
+            yield ProgramIssue(
+                level,  # type: ignore[arg-type]  # one of the two levels
+                f"joint-{what}",
+                f"joint {int(joint) + 1} needs {share.max():.0%} of its {what} limit "
+                f"{motion.time[k]:.3f} s after the start",
+                "program",
+            )

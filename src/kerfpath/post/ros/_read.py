@@ -1,0 +1,244 @@
+"""Read back the two files that `Ros` writes, and nothing else: the rest is refused."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping
+from dataclasses import replace
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from kerfpath._arrays import Array, freeze
+from kerfpath.air import least_time
+from kerfpath.errors import InputError
+from kerfpath.post._program import Switch
+from kerfpath.post._read import ReadMove, ReadProgram, ReadSection, ReadStep, ReadWait
+from kerfpath.post.ros._trajectory import rates
+from kerfpath.post.ros._write import SECOND, RosSettings, head, joint_names
+from kerfpath.robots import Robot
+
+__all__ = ["read"]
+
+UNIT = 1e-6
+"""How far the length of a quaternion may be from one."""
+OFF_LINE = 1e-8
+"""How far (rad) points of a joint motion may be off it, and those of a wait from each other."""
+TIP_OFF_LINE = 2e-6
+"""How far (m) the tip may be off a straight move."""
+DIGITS = 1e-9
+"""rad: what the digits of positions leave in a difference of them, generously."""
+
+_NUMBERS = r"\[([-\d., ]*)\]"
+_POINT = re.compile(
+    rf"- {{positions: {_NUMBERS}, velocities: {_NUMBERS}, accelerations: {_NUMBERS}, effort: \[\], "
+    r"time_from_start: {sec: (\d+), nanosec: (\d{1,9})}}",
+    re.ASCII,
+)
+_TIME = r"- {time: (-?\d+\.\d{9}), "
+_NAME = re.compile(r"trajectory: ([A-Za-z]\w*)\.yaml", re.ASCII)
+_FRAMES = {
+    what: re.compile(rf"{what}: {_NUMBERS}", re.ASCII) for what in ("tip_in_flange", "part_in_base")
+}
+_SECTION = re.compile(r'- {section: "([A-Za-z]\w*)"}', re.ASCII)
+_DONE = re.compile(_TIME + "done: (joint|linear|wait)}", re.ASCII)
+_SET = re.compile(_TIME + "set: (laser|gas), to: (true|false)}", re.ASCII)
+
+
+def read(main: str, files: Mapping[str, str], robot: Robot, settings: RosSettings) -> ReadProgram:
+    """Return the program that a trajectory of ours and its events say; see `Reader`."""
+    points = _Points(main, files[main], robot, settings)
+    events = f"{main.removesuffix('.yaml')}.events.yaml"
+    return _Events(events, files[events], robot, points).program()
+
+
+def _lines(text: str) -> list[tuple[int, str]]:
+    """Return lines with their numbers, without those that say nothing."""
+    numbered = [(n, line.rstrip()) for n, line in enumerate(text.splitlines(), 1)]
+    return [(n, line) for n, line in numbered if line and not line.startswith("#")]
+
+
+def _numbers(text: str, count: int, place: str) -> list[float]:
+    try:
+        values = [float(word) for word in text.split(",")]
+    except ValueError:
+        values = []
+    if len(values) != count:
+        raise InputError(f"{place}: expected {count} numbers, got {text[:60]!r}")
+    return values
+
+
+class _Points:
+    """The points of the trajectory, and the lines where they stand."""
+
+    def __init__(self, file: str, text: str, robot: Robot, settings: RosSettings) -> None:
+        self.file = file
+        lines = _lines(text)
+        n = robot.joints
+        expected = head(joint_names(n, settings))
+        for (number, line), word in zip([*lines, (0, "nothing")], expected, strict=False):
+            if line != word:
+                raise InputError(f"{file}, line {number}: expected {word!r}, got {line[:60]!r}")
+        rows, ns = [], []
+        self.line = [number for number, _ in lines[len(expected) :]]
+        for number, line in lines[len(expected) :]:
+            place = f"{file}, line {number}"
+            if (match := _POINT.fullmatch(line)) is None:
+                raise InputError(f"{place}: not a point of a trajectory: {line[:60]!r}")
+            rows.append([value for k in (1, 2, 3) for value in _numbers(match[k], n, place)])
+            ns.append(int(match[4]) * SECOND + int(match[5]))
+            if len(ns) > 1 and ns[-1] <= ns[-2]:
+                raise InputError(f"{place}: expected a time after that of the point before")
+        if not rows or ns[0] != 0:
+            raise InputError(f"{file}: expected points from time 0 on")
+        self.index = {time: k for k, time in enumerate(ns)}
+        self.time = np.array(ns) / SECOND
+        self.q, velocity, acceleration = np.split(np.array(rows), 3, axis=1)
+        self.stops = (velocity == 0).all(axis=1) & (acceleration == 0).all(axis=1)
+        self._require_rates(velocity, acceleration)
+
+    def _require_rates(self, velocity: Array, acceleration: Array) -> None:
+        """Require velocities and accelerations that follow from the positions, up to digits."""
+        if not self.stops[[0, -1]].all():
+            raise InputError(f"{self.file}: the robot must stand at the first and last point")
+        step = np.diff(self.time).min() if len(self.time) > 1 else 1.0
+        left = 1e-6 + DIGITS / step, 1e-6 + 4 * DIGITS / step**2
+        expected = rates(self.time, self.q, self.stops)
+        words = ("velocities", "accelerations")
+        for word, got, ours, most in zip(
+            words, (velocity, acceleration), expected, left, strict=True
+        ):
+            if (bad := np.flatnonzero((np.abs(got - ours) > most).any(axis=1))).size:
+                said = f"the {word} do not follow from the positions"
+                raise InputError(f"{self.file}, line {self.line[bad[0]]}: {said}")
+
+
+class _Events:
+    """Reads the events, and tells moves by the points between them."""
+
+    def __init__(self, file: str, text: str, robot: Robot, points: _Points) -> None:
+        self.file, self.robot, self.points = file, robot, points
+        self.lines = [*_lines(text), (len(text.splitlines()) + 1, "the end of the file")]
+        self.at = 0
+        self.last = -1
+        self.tips = np.empty((0, 3))
+        self.sections: dict[str, list[ReadStep]] = {}
+
+    def program(self) -> ReadProgram:
+        name = self.take(_NAME)[1]
+        if f"{name}.yaml" != self.points.file:
+            raise self.fault(f"are the events of {name}.yaml, expected {self.points.file}")
+        tool, part = (self.frame(self.take(pattern)[1]) for pattern in _FRAMES.values())
+        self.tips = (self.robot.forward(self.points.q) @ tool)[:, :3, 3]
+        self.take(re.compile("events:"))
+        while self.at < len(self.lines) - 1:
+            if match := _SECTION.fullmatch(self.text):
+                if match[1] in self.sections:
+                    raise self.fault(f"a second section {match[1]!r}")
+                self.sections[match[1]] = []
+            elif match := _DONE.fullmatch(self.text):
+                self.done(round(float(match[1]) * SECOND), match[2])
+            elif match := _SET.fullmatch(self.text):
+                self.switch(float(match[1]), match[2], match[3] == "true")
+            else:
+                raise self.fault(f"not expected here: {self.text[:60]!r}")
+            self.at += 1
+        if self.last != len(self.points.time) - 1:
+            raise self.fault("the trajectory goes on after the last event")
+        sections = [ReadSection(name=word, steps=tuple(s)) for word, s in self.sections.items()]
+        return ReadProgram(name=name, sections=tuple(sections), T_flange_tip=tool, T_base_part=part)
+
+    def done(self, ns: int, kind: str) -> None:
+        """Add the step that ends at a time, told by its points."""
+        points, first = self.points, max(self.last, 0)
+        end = points.index.get(ns)
+        if end is None or end < first:
+            raise self.fault("there is no point of the trajectory at this time, or it is earlier")
+        if self.last < 0 and (kind != "joint" or end > 0):
+            raise self.fault("expected a joint move to be done at time 0")
+        took = float(points.time[end] - points.time[first])
+        between = points.q[first : end + 1]
+        if points.stops[first + 1 : end].any():
+            raise self.fault("the robot stands still before this is done")
+        if kind != "linear" and not points.stops[end]:
+            raise self.fault(f"the robot does not stand still at the end of a {kind}")
+        if kind == "wait":
+            if np.abs(between - between[0]).max() > OFF_LINE:
+                raise self.fault("the robot moves in a wait")
+            self.append(ReadWait(time=took, file=self.file, line=self.line))
+            self.last = end
+            return
+        if kind == "joint":
+            self.require_line(between, OFF_LINE)
+        else:
+            self.require_line(self.tips[first : end + 1], TIP_OFF_LINE)
+        self.append(
+            ReadMove(
+                kind="joint" if kind == "joint" else "linear",
+                file=self.file,
+                line=self.line,
+                speed=self.share(between, took) if kind == "joint" and self.last >= 0 else None,
+                duration=took if kind == "linear" else None,
+                zone=0.0 if points.stops[end] else None,
+                q=freeze(points.q[end]),
+            )
+        )
+        self.last = end
+
+    def share(self, q: Array, took: float) -> float | None:
+        """Return the share of the full speed of a joint motion; None where it goes nowhere."""
+        least = least_time((q[-1] - q[0])[None], *self.robot.speed_limits())[0]
+        return float(least / took) if took > 0 else None
+
+    def require_line(self, points: Array, most: float) -> None:
+        """Require that points (m, k) lie on the line from the first to the last, one by one."""
+        if len(points) < 3:
+            return
+        way = points[-1] - points[0]
+        share = (points - points[0]) @ way / max(way @ way, 1e-300)
+        off = np.linalg.norm(points - points[0] - share[:, None] * way, axis=1).max()
+        if off > most or (np.diff(share) < -1e-9).any():
+            raise self.fault("the points before it do not lie on the straight way")
+
+    def switch(self, time: float, signal: str, on: bool) -> None:
+        steps = next(reversed(self.sections.values()), [])
+        move = steps[-1] if steps else None
+        if not isinstance(move, ReadMove) or move.kind != "linear":
+            raise self.fault("a switch must follow a linear move")
+        lead = float(self.points.time[self.last]) - time
+        switch = Switch(signal=signal, on=on, lead_time=lead)  # type: ignore[arg-type]
+        steps[-1] = replace(move, switches=(*move.switches, switch))
+
+    def append(self, step: ReadStep) -> None:
+        if not self.sections:
+            raise self.fault("expected a section first")
+        next(reversed(self.sections.values())).append(step)
+
+    def frame(self, text: str) -> Array:
+        values = _numbers(text, 7, f"{self.file}, line {self.line}")
+        if abs(np.linalg.norm(values[3:]) - 1) > UNIT:
+            raise self.fault("the quaternion must have length 1")
+        T = np.eye(4)
+        T[:3, :3] = Rotation.from_quat(values[3:], scalar_first=True).as_matrix()
+        T[:3, 3] = values[:3]
+        return freeze(T)
+
+    @property
+    def text(self) -> str:
+        return self.lines[self.at][1]
+
+    @property
+    def line(self) -> int:
+        return self.lines[self.at][0]
+
+    def take(self, pattern: re.Pattern[str]) -> re.Match[str]:
+        match = pattern.fullmatch(self.text)
+        if match is None:
+            raise self.fault(
+                f"expected {pattern.pattern.partition(':')[0]}, got {self.text[:60]!r}"
+            )
+        self.at += 1
+        return match
+
+    def fault(self, message: str) -> InputError:
+        return InputError(f"{self.file}, line {self.line}: {message}")

@@ -1,0 +1,157 @@
+"""ROS trajectories as YAML: this module only formats.
+
+One file is the message: joints, their velocities and accelerations over time, in rad and s. The
+other says, by the same clock, when each move and wait is done and what is switched.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator
+from typing import Annotated
+
+import numpy as np
+
+from kerfpath._arrays import Array, Ints
+from kerfpath.post._divide import in_one_file
+from kerfpath.post._formatter import Formatter, number, plain
+from kerfpath.post._orientations import quaternions
+from kerfpath.post._program import CircularMove, JointMove, LinearMove, Wait
+from kerfpath.post._settings import Rules, Settings, setting
+from kerfpath.post.ros._trajectory import Trajectory, rates, trajectory
+
+__all__ = ["Ros", "RosSettings", "head", "joint_names", "rules"]
+
+DECIMALS = {"positions": 10, "velocities": 6, "accelerations": 6}
+NOT_CHECKED = "not been checked for collisions"
+SECOND = 1_000_000_000
+"""In ns."""
+
+
+class RosSettings(Settings):
+    """What the robot's driver calls things, and how densely it is told the way."""
+
+    lines_per_file: Annotated[
+        int,
+        setting("a whole number of lines from 100 to 1000000", "5000", ge=100, le=1_000_000),
+    ] = 1_000_000
+    joint_names: Annotated[
+        list[str] | None, setting("a list of joint names", '["joint_1", "joint_2"]')
+    ] = None
+    step_ms: Annotated[float, setting("a number from 1 to 1000, in ms", "20", ge=1, le=1000)] = 20.0
+
+
+def rules(settings: RosSettings) -> Rules:
+    """Return what trajectories must keep to."""
+    return Rules(slowest=1e-6)
+
+
+def joint_names(joints: int, settings: RosSettings) -> list[str]:
+    """Return the names of so many joints: those of the settings, or joint_1 and so on."""
+    return settings.joint_names or [f"joint_{i}" for i in range(1, joints + 1)]
+
+
+def head(names: list[str]) -> list[str]:
+    """Return the lines of the message before its points."""
+    return [
+        "header:",
+        "  stamp: {sec: 0, nanosec: 0}",
+        '  frame_id: ""',
+        f"joint_names: {json.dumps(names)}",
+        "points:",
+    ]
+
+
+class Ros(Formatter):
+    """Writes the message, and the events beside it."""
+
+    settings: RosSettings
+
+    def files(self) -> dict[str, str]:
+        """Return the trajectory and its events."""
+        program, most = self.program, self.settings.lines_per_file
+        motion = trajectory(program, self.settings.step_ms * 1e-3)
+        self._ends = iter((_ns(motion.time[motion.done]) / SECOND).tolist())
+        name = program.name
+        return in_one_file(f"{name}.yaml", [*self._message(motion)], most) | in_one_file(
+            f"{name}.events.yaml", [*self._events()], most
+        )
+
+    def _message(self, motion: Trajectory) -> Iterator[str]:
+        program = self.program
+        robot = program.robot
+        checked = "been proved clear in the planned cell" if program.air_checked else NOT_CHECKED
+        yield f"# Written by kerfpath for {plain(robot.model)} ({plain(robot.id)})."
+        yield "# A trajectory_msgs/JointTrajectory; rad and s. Bring the robot to its first point."
+        yield f"# Moves through the air have {checked}."
+        yield f"# What is switched when is in {program.name}.events.yaml."
+        yield from head(joint_names(robot.joints, self.settings))
+        ns = _ns(motion.time)
+        velocity, acceleration = rates(ns / SECOND, motion.q, motion.stops)
+        columns = zip(DECIMALS.items(), (motion.q, velocity, acceleration), strict=True)
+        rows = np.hstack([values.round(decimals) + 0.0 for (_, decimals), values in columns])
+        fields = (
+            f"{name}: [{', '.join([f'%.{decimals}f'] * robot.joints)}]"
+            for name, decimals in DECIMALS.items()
+        )
+        text = f"- {{{', '.join(fields)}, effort: [], time_from_start: {{sec: %d, nanosec: %d}}}}"
+        for row, time in zip(rows.tolist(), ns.tolist(), strict=True):
+            yield text % (*row, *divmod(time, SECOND))
+
+    def _events(self) -> Iterator[str]:
+        program = self.program
+        yield "# When, in s on the clock of the trajectory, moves and waits are done, and what is"
+        yield "# switched. Frames: x, y, z in m, and a quaternion w, x, y, z."
+        yield "# A stop does not switch the laser off: the safety circuit of the cell has to."
+        yield f"trajectory: {program.name}.yaml"
+        yield f"tip_in_flange: {_frame(program.T_flange_tip)}"
+        yield f"part_in_base: {_frame(program.T_base_part)}"
+        yield "events:"
+        for section in program.sections:
+            yield f'- {{section: "{section.name}"}}'
+            yield from self.lines(section)
+
+    def names(self) -> list[tuple[str, str]]:
+        """Return the name of the files and those of the joints."""
+        joints = joint_names(self.program.robot.joints, self.settings)
+        return [(self.program.name, "the program"), *((name, "a joint") for name in joints)]
+
+    def joint_move(self, move: JointMove) -> Iterator[str]:
+        """Yield when a joint move is done."""
+        yield self._done("joint")
+
+    def linear_move(self, move: LinearMove) -> Iterator[str]:
+        """Yield when a linear move is done, and what is switched by then."""
+        end = next(self._ends)
+        yield _event(end, "done: linear")
+        for switch in move.switches:
+            to = "true" if switch.on else "false"
+            yield _event(end - switch.lead_time, f"set: {switch.signal}, to: {to}")
+
+    def circular_move(self, move: CircularMove) -> Iterator[str]:
+        """Refuse: `check` does so before."""
+        raise NotImplementedError("arcs are refused")
+
+    def wait(self, wait: Wait) -> Iterator[str]:
+        """Yield when a wait is done."""
+        yield self._done("wait")
+
+    def comment(self, text: str) -> Iterator[str]:
+        """Yield a comment."""
+        yield f"# {text}"
+
+    def _done(self, kind: str) -> str:
+        return _event(next(self._ends), f"done: {kind}")
+
+
+def _ns(time: Array) -> Ints:
+    return np.round(time * SECOND).astype(np.int64)
+
+
+def _event(time: float, what: str) -> str:
+    return f"- {{time: {number(time, 9)}, {what}}}"
+
+
+def _frame(T: Array) -> str:
+    values = [*T[:3, 3], *quaternions(T[None])[0]]
+    return f"[{', '.join(number(value, 9) for value in values)}]"
