@@ -22,6 +22,7 @@ NAMES = (
     "collision",
     "cad",
     "part",
+    "programs",
 )
 
 
@@ -64,6 +65,10 @@ def _run(name: str, *, quick: bool) -> list[Report]:
         from benchmarks import _families, kinematics
 
         return [kinematics.run(quick=quick), _families.run(quick=quick)]
+    if name == "programs":
+        from benchmarks import programs
+
+        return [programs.run(quick=quick)]
     if name == "demo":
         from benchmarks import demo
 

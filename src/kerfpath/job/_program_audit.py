@@ -37,6 +37,10 @@ SAME_SPEED = 0.02
 """Share by which a speed may differ from the one asked for: controllers round it."""
 SAME_TIME = 2e-3
 """How far (s) lead times and waits may differ from those asked for: controllers round them."""
+ROUNDED = 2e-3
+"""Share of a rate that the digits of written speeds may take or give."""
+ROUNDED_ANGLE = 2e-6
+"""How far (rad) joints may be beyond a limit for the digits of written targets."""
 CLIMB = 0.05
 """What a step along the path counts beside one away from it, where a place on it is looked for."""
 
@@ -143,12 +147,13 @@ def _cut_checks(
         node = int(np.flatnonzero(np.diff(s) <= 0)[0])
         said = "stretches that go back along the contour"
         return [*rows, _check("order", said, (np.diff(s) <= 0).sum(), 0, "count", node)]
-    made = _plan(job, task, cut, reference, s)
+    took = np.where(np.isnan(cut.speed), cut.took, np.diff(s) / cut.speed)
+    made = _plan(job, task, cut, s, np.append(0.0, np.cumsum(took)))
     options = dict(job.audit_options)
     if job.plan_options["tilt"] is not None:
         options["axis_tolerance"] += job.plan_options["tilt"].cone
     rows += checks(made, reference=reference, cell=cell, **options)
-    rows += _asked(job, task, cut, reference, s)
+    rows += _asked(job, task, cut, reference, made)
     rows += _postures(job, cut, chosen, settings)
     return rows
 
@@ -181,20 +186,23 @@ def _along(cut: ReadCut, reference: Contour) -> tuple[Array, Array]:
     return s, ends
 
 
-def _plan(job: Job, task: ContourTask, cut: ReadCut, reference: Contour, s: Array) -> Plan:
+def _plan(job: Job, task: ContourTask, cut: ReadCut, s: Array, time: Array) -> Plan:
     """Return what the text says of a cut as a plan, so that it is audited as one."""
     options, K = job.plan_options, len(cut.q)
+    limits = job.robot.joint_limits()
     weights = options["weights"]
     return Plan(
         contour=Contour(cut.T_part_tip[:, :3, 3], cut.T_part_tip[:, :3, 2], s=s, name=task.name),
-        robot=job.robot,
+        robot=job.robot.with_limits(
+            lower=limits.lower - ROUNDED_ANGLE, upper=limits.upper + ROUNDED_ANGLE
+        ),
         T_flange_tip=job.tool,
         T_base_part=job.placement,
         q=cut.q,
         gamma=np.zeros(K),
         posture=np.zeros(K, dtype=np.int64),
         turn=np.zeros(cut.q.shape, dtype=np.int64),
-        time=cut.time,
+        time=time,
         settings=PlanSettings(
             gamma_step=options["gamma_step"],
             frames=options["frames"],
@@ -202,8 +210,8 @@ def _plan(job: Job, task: ContourTask, cut: ReadCut, reference: Contour, s: Arra
             objective=options["objective"],
             metric=options["metric"],
             weights=np.ones(job.robot.joints) if weights is None else np.asarray(weights),
-            eta_v=options["eta_v"],
-            eta_a=options["eta_a"],
+            eta_v=options["eta_v"] * (1 + ROUNDED),
+            eta_a=options["eta_a"] * (1 + ROUNDED),
             rotation=options["rotation"],
             comfort=options["comfort"],
         ),
@@ -213,8 +221,11 @@ def _plan(job: Job, task: ContourTask, cut: ReadCut, reference: Contour, s: Arra
     )
 
 
-def _asked(job: Job, task: ContourTask, cut: ReadCut, reference: Contour, s: Array) -> list[Check]:
+def _asked(
+    job: Job, task: ContourTask, cut: ReadCut, reference: Contour, made: Plan
+) -> list[Check]:
     """Compare speeds, switches and waits with what the job asks for."""
+    s = made.contour.s
     middle = (s[1:] + s[:-1]) / 2
     asked = task.sample(reference)
     dt = node_interval(asked, task.speed if asked.time is None else None)
@@ -222,7 +233,7 @@ def _asked(job: Job, task: ContourTask, cut: ReadCut, reference: Contour, s: Arr
     k = np.clip(np.searchsorted(reference.s, middle, side="right") - 1, 0, len(reference) - 1)
     wanted = np.array([reference.kinds[j] != "micro joint" for j in k])
     wrong = wanted != cut.laser
-    excess = np.diff(np.interp(s, asked.s, when)) / np.diff(cut.time) - 1
+    excess = np.diff(np.interp(s, asked.s, when)) / np.diff(made.time) - 1
     if job.plan_options["feed"] == "constant":
         excess = np.abs(excess)
     fast = int(np.argmax(excess))

@@ -101,8 +101,10 @@ class ReadCut:
     q : (K, n) rad
         Joints at its nodes, on the branch that the joint moves lead to; NaN out of reach.
     T_part_tip : (K, 4, 4) m
-    time : (K,) s
-        By the speeds that are written.
+    took : (K-1,) s
+        How long each stretch takes along its chord, or as long as the text says.
+    speed : (K-1,) m/s
+        Along each stretch; NaN where the text says times.
     laser : (K-1,) bool
         Whether the laser is on along each stretch.
     left_on : bool
@@ -121,7 +123,8 @@ class ReadCut:
     approach: Array
     q: Array
     T_part_tip: Array
-    time: Array
+    took: Array
+    speed: Array
     laser: Bools
     left_on: bool
     lead_times: Array
@@ -222,7 +225,8 @@ def _cut(group: _Group, robot: Robot, T_flange_tip: Array, T_base_part: Array) -
         approach=np.array([_q(move) for move in group.joint]),
         q=q[:last],
         T_part_tip=poses[:last],
-        time=np.concatenate([[0.0], np.cumsum(took[: last - 1])]),
+        took=np.array(took[: last - 1]),
+        speed=np.array([_speed(move) for move in moves[1:last]]),
         laser=np.array(on[: last - 1], dtype=bool),
         left_on=on[last - 1],
         lead_times=np.array([switch.lead_time for switch in switches]),
@@ -239,6 +243,10 @@ def _duration(move: ReadMove, start: Array, end: Array, parts: int) -> float:
     if not move.speed:
         raise InputError(f"{move.place}: neither a speed nor a time is said for the move")
     return float(np.linalg.norm(end[:3, 3] - start[:3, 3])) / move.speed
+
+
+def _speed(move: ReadMove) -> float:
+    return np.nan if move.speed is None or move.duration is not None else move.speed
 
 
 def _q(move: ReadMove) -> Array:
