@@ -21,7 +21,7 @@ from kerfpath.job._read import Job, ProgramOptions
 from kerfpath.job._refusals import refused_at
 from kerfpath.job._run import Outcome
 from kerfpath.plans import Plan
-from kerfpath.post import build_program, language, post, preflight, write_program
+from kerfpath.post import build_program, dry_run, language, post, preflight, write_program
 from kerfpath.report import ContourSection, render
 from kerfpath.sequence import PartPlan
 
@@ -182,10 +182,12 @@ def program_of(
     moves: Sequence[AirMove] = (),
     *,
     strict: bool = False,
+    dry_share: float | None = None,
 ) -> tuple[dict[str, str], list[str]]:
     """Return the files of the program that cuts `plans`, and the warnings of its preflight.
 
-    Between them the robot moves as `moves` say; without any, straight to each.
+    Between them the robot moves as `moves` say; without any, straight to each. With `dry_share` it
+    is a dry run at that share of the speed.
 
     The caller answers for the audit.
 
@@ -213,6 +215,8 @@ def program_of(
         gas_lead=options.gas_lead,
         arc_tolerance=options.arc_tolerance,
     )
+    if dry_share is not None:
+        program = dry_run(program, dry_share)
     written = post(program, options.language, options.settings, strict=strict)
     issues = preflight(program, options.language, options.settings)
     return written, [str(issue) for issue in issues if issue.level == "warning"]
