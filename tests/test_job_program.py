@@ -159,6 +159,17 @@ def test_a_text_that_is_not_of_our_making_is_refused_in_one_line(folder, written
     assert re.search(message, said)
 
 
+def test_a_dry_run_is_written_beside_the_program(folder):
+    out = folder / "out"
+    result = run("post", out / "plan.json", "--dry-run", "0.2", "-o", out)
+    assert result.returncode == 0, result.stderr
+    text = (out / "dry_job.mod").read_text()
+    assert "! DRY RUN at 20 % of the speed" in text
+    assert "Trigg" not in text
+    said = refused("post", out / "plan.json", "--dry-run", "20")
+    assert "dry run: expected a share of the speed of at most 1, got 20" in said
+
+
 def test_bad_arguments_are_refused(folder, written):
     (folder / "x.mod").write_bytes(b"\xff\xfe\x00MODULE")
     assert "cannot be read as a text" in refused(

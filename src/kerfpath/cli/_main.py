@@ -166,6 +166,14 @@ def post(
     strict: Annotated[
         bool, typer.Option("--strict", help="Refuse what is only warned of otherwise.")
     ] = False,
+    dry_share: Annotated[
+        float | None,
+        typer.Option(
+            "--dry-run",
+            metavar="SHARE",
+            help="Switch nothing, wait nowhere, and move at this share of the speed.",
+        ),
+    ] = None,
     as_json: Json = False,
 ) -> None:
     """Write the robot program of a plan, after auditing it again.
@@ -174,10 +182,12 @@ def post(
     the plan was made from.
 
     Example: kerfpath post door/plan.json --language rapid -o door.mod
+
+    Example: kerfpath post door/plan.json --dry-run 0.2 -o dry_door.mod
     """
     from kerfpath.cli._post import write_post
 
-    write_post(plan_file, language, output, strict=strict, as_json=as_json)
+    write_post(plan_file, language, output, strict=strict, as_json=as_json, dry_share=dry_share)
 
 
 @app.command()

@@ -14,13 +14,14 @@ __all__ = ["write_post"]
 
 
 def write_post(
-    plan_file: Path, language: str, output: Path | None, *, strict: bool, as_json: bool
-) -> None:
+    plan_file: Path, language: str, output: Path | None, *, strict: bool, as_json: bool,
+    dry_share: float | None = None,
+) -> None:  # fmt: skip
     """Write the files of a plan's program to `output`; print them without one.
 
     One file is written as `output`; several, or one into a folder that is there, keep their names.
     """
-    files, warnings = program_from_file(plan_file, language, strict=strict)
+    files, warnings = program_from_file(plan_file, language, strict=strict, dry_share=dry_share)
     written: list[Path] = []
     if output is not None and (len(files) > 1 or output.is_dir()):
         written = write_files(output, files)

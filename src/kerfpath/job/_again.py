@@ -67,9 +67,18 @@ def audit_file(plan_file: Path, job_file: Path | None = None) -> Audited:
 
 
 def program_from_file(
-    plan_file: Path, language: str, *, strict: bool = False
+    plan_file: Path, language: str, *, strict: bool = False, dry_share: float | None = None
 ) -> tuple[dict[str, str], list[str]]:
     """Return the files of a plan.json's program in a language, and its preflight's warnings.
+
+    Parameters
+    ----------
+    plan_file : Path
+    language : str
+    strict : bool
+        Refuse what is only warned of otherwise.
+    dry_share : float, optional
+        Make it a dry run at this share of the speed, see `kerfpath.post.dry_run`.
 
     Raises
     ------
@@ -93,7 +102,8 @@ def program_from_file(
                 raise AuditFailed(
                     f"no program: contour {p.name!r} fails its audit: {check.issue()}"
                 )
-    return program_of(file.plans, _options(file, language), file.moves, strict=strict)
+    options = _options(file, language)
+    return program_of(file.plans, options, file.moves, strict=strict, dry_share=dry_share)
 
 
 def _options(file: PlanFile, language: str) -> ProgramOptions:

@@ -5,6 +5,7 @@ from kerfpath.post._build import build_program as build_program
 from kerfpath.post._compare import deviations as deviations
 from kerfpath.post._divide import divided as divided
 from kerfpath.post._divide import in_files as in_files
+from kerfpath.post._dry_run import dry_run as dry_run
 from kerfpath.post._formatter import Formatter as Formatter
 from kerfpath.post._issue import ProgramIssue as ProgramIssue
 from kerfpath.post._languages import ENTRY_POINTS as ENTRY_POINTS

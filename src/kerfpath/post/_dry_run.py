@@ -1,0 +1,58 @@
+"""A program to watch before the first cut: same motions, slower, nothing switched."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from kerfpath._arrays import scalar
+from kerfpath.errors import InputError
+from kerfpath.post._names import identifiers
+from kerfpath.post._preflight import LOWEST_SHARE
+from kerfpath.post._program import Comment, JointMove, LinearMove, Program, Section, Step, Wait
+
+__all__ = ["dry_run"]
+
+
+def dry_run(program: Program, share: float) -> Program:
+    """Return the program with laser and gas never switched, no waits, and lower speeds.
+
+    It stops where the program stops, and passes the same targets in the same posture. Its name and
+    those of its sections begin with "dry_", so that neither program ever calls a routine of the
+    other, and each section begins with a comment.
+
+    Parameters
+    ----------
+    program : Program
+    share : float
+        Speed of every move as a share of the program's, above 0 and at most 1; joint moves are
+        not made slower than 1 % of the full speed, which no language can say.
+
+    Raises
+    ------
+    InputError
+        Another share.
+    """
+    share = scalar(share, "dry run", above=0.0)
+    if share > 1:
+        raise InputError(f"dry run: expected a share of the speed of at most 1, got {share:g}")
+    said = Comment(f"DRY RUN at {share * 100:g} % of the speed: laser and gas are never switched")
+    title, *names = identifiers(
+        [f"dry_{program.name}", *(f"dry_{section.name}" for section in program.sections)], ()
+    )
+    sections = tuple(
+        Section(name=name, steps=(said, *_slowed(section, share)))
+        for name, section in zip(names, program.sections, strict=True)
+    )
+    return replace(program, name=title, sections=sections)
+
+
+def _slowed(section: Section, share: float) -> list[Step]:
+    return [_slow(step, share) for step in section.steps if not isinstance(step, Wait)]
+
+
+def _slow(step: Step, share: float) -> Step:
+    if isinstance(step, LinearMove):
+        return replace(step, speed=share * step.speed, duration=step.duration / share, switches=())
+    if isinstance(step, JointMove):
+        return replace(step, speed=max(share * step.speed, LOWEST_SHARE))
+    return step
