@@ -368,3 +368,21 @@ def test_a_reader_that_leaves_early_is_no_error():
     pipe = f"{sys.executable} -c '{code}' contours {DEMO / 'b_pillar.step'} --json | head -c 10"
     result = subprocess.run(pipe, shell=True, capture_output=True, text=True, check=False)
     assert "Traceback" not in result.stderr
+
+
+def test_a_program_with_a_folder_of_its_own_is_written_audited_and_pointed_out(folder):
+    text = SMALL.replace('model = "abb_irb4600_60_205"', 'model = "staubli_tx2_160l"')
+    text = text.replace('"rapid"', '"val3"\nname = "a_very_long_program_name"')
+    text = text.replace("lead_time_s = 0.01", "lead_time_s = 0")
+    text += "\n[program.val3]\nlaser_output = 'BasicIO-1\\%Q0'\nlines_per_file = 100\n"
+    (folder / "val3.toml").write_text(text)
+    result = run("plan", "val3.toml", "--out", "val3", cwd=folder)
+    assert result.returncode == 0, result.stderr
+    main_file = folder / "val3" / "a_very_long_pro" / "a_very_long_pro.pjx"
+    assert "<Library alias=" in main_file.read_text()
+    result = run("audit", main_file, "--job", "val3.toml", cwd=folder)
+    assert result.returncode == 0, result.stdout + result.stderr
+    (folder / "val3.toml").write_text(text.replace("speed_m_min = ", "speed_m_min = 99"))
+    result = run("plan", "val3.toml", "--out", "val3", cwd=folder)
+    assert result.returncode == 1
+    assert f"{main_file.name} is from an earlier run" in result.stderr

@@ -26,8 +26,8 @@ from kerfpath.post import (
     preflight,
     read_program,
 )
+from kerfpath.post._frames import world
 from kerfpath.post.fanuc import FanucSettings, axes_from_joints, joints_from_axes, posture
-from kerfpath.post.fanuc._axes import world
 from kerfpath.post.fanuc._write import xyzwpr
 from kerfpath.robots import robot_ids
 from programs import arc, changed, codes, frames, hand_plan, with_steps

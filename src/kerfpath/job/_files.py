@@ -21,7 +21,7 @@ from kerfpath.job._read import Job, ProgramOptions
 from kerfpath.job._refusals import refused_at
 from kerfpath.job._run import Outcome
 from kerfpath.plans import Plan
-from kerfpath.post import build_program, dry_run, language, post, preflight, write_program
+from kerfpath.post import build_program, dry_run, language, post, preflight, write_files
 from kerfpath.report import ContourSection, render
 from kerfpath.sequence import PartPlan
 
@@ -37,6 +37,8 @@ __all__ = [
 
 NOT_CHECKED = "Collisions are not checked: simulate the program in the cell before running it."
 """What is said of a job without a [cell]."""
+SHORTEST_CUT = 8
+"""No language cuts names to fewer characters."""
 PER_LEG = 17
 """Points that a straight joint motion is drawn by."""
 
@@ -70,18 +72,17 @@ def write_outcome(outcome: Outcome, folder: Path) -> Written:
         are written.
     """
     job = outcome.job
-    target = _program_file(job, folder)
     part, moves = outcome.part, () if outcome.part is None else outcome.part.moves
-    texts: dict[Path, str] = {}
+    texts: dict[str, str] = {}
     refused = None
     notes = [collision_note(outcome.cell, moves_too=bool(moves))]
     notes += [] if part is None else [order_note(part)]
     notes += [] if outcome.stuck is None else [f"The moves between contours: {outcome.stuck}"]
     notes += [f"The moves between contours: {c.issue()}" for c in outcome.air if not c.ok]
-    if outcome.passed and target is not None:
+    if outcome.passed and job.program.language != "none":
         try:
             program, warnings = program_of(outcome.plans, job.program, moves)
-            texts |= {folder / name: text for name, text in program.items()}
+            texts |= program
             notes += warnings
         except InputError as error:
             refused = error
@@ -92,28 +93,33 @@ def write_outcome(outcome: Outcome, folder: Path) -> Written:
             entries.append(plan_entry(cut.plan, cut.contour, cut.checks))
         elif cut.broken is not None:
             entries.append(broken_entry(cut.task.name, cut.broken, cut.fastest))
-    texts[folder / "plan.json"] = plan_text(
+    texts["plan.json"] = plan_text(
         job.robot, job.tool, job.placement, entries, job.source, outcome.cell, part
     )
-    texts[folder / "trajectory.csv"] = trajectory_text(outcome.plans, moves)
-    texts[folder / "report.html"] = report_text(outcome, notes)
+    texts["trajectory.csv"] = trajectory_text(outcome.plans, moves)
+    texts["report.html"] = report_text(outcome, notes)
     try:
         folder.mkdir(parents=True, exist_ok=True)
     except OSError as error:
         raise InputError(f"{folder}: cannot be made a folder ({error.strerror})") from None
-    for path, text in texts.items():
-        write_program(path, text)
+    written = write_files(folder, texts)
     if refused is not None:
         raise InputError(f"{refused} ({folder / 'plan.json'} and the report are written)")
-    stale = target if target and target not in texts and target.exists() else None
-    return Written(files=tuple(texts), stale=stale, notes=tuple(notes))
+    stale = [path for path in _programs(job, folder) if path not in written]
+    return Written(files=tuple(written), stale=stale[0] if stale else None, notes=tuple(notes))
 
 
-def _program_file(job: Job, folder: Path) -> Path | None:
-    """Return where the program goes; None where the job wants none."""
+def _programs(job: Job, folder: Path) -> list[Path]:
+    """Return the programs of the job's name in a folder, or in one of their own in it.
+
+    Languages cut names, or say them in capitals.
+    """
     if job.program.language == "none":
-        return None
-    return folder / f"{job.program.name}{language(job.program.language).suffix}"
+        return []
+    name, suffix = job.program.name.lower(), language(job.program.language).suffix
+    there = sorted([*folder.glob(f"*{suffix}"), *folder.glob(f"*/*{suffix}")])
+    shortest = min(len(name), SHORTEST_CUT)
+    return [p for p in there if name.startswith(p.stem.lower()) and len(p.stem) >= shortest]
 
 
 def order_note(part: PartPlan) -> str:

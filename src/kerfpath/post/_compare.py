@@ -38,6 +38,8 @@ def deviations(
 ) -> list[ProgramIssue]:
     """Return every difference between a program and what was read back of it; empty = the same.
 
+    Of the program counts what the language can say.
+
     Parameters
     ----------
     program : Program
@@ -47,6 +49,8 @@ def deviations(
     settings : Settings
         With which it was written.
     """
+    if language.sayable is not None:
+        program = language.sayable(program, settings)
     issues = list(_frames(program, read))
     ours = [step for step in program.steps if not isinstance(step, Comment)]
     theirs = list(read.steps)

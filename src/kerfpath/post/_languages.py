@@ -29,6 +29,7 @@ SHIPPED = {
     "rapid": "kerfpath.post.rapid:RAPID",
     "ros": "kerfpath.post.ros:ROS",
     "urscript": "kerfpath.post.urscript:URSCRIPT",
+    "val3": "kerfpath.post.val3:VAL3",
 }
 """Where the languages are that come with the package."""
 BROKEN = (ImportError, AttributeError, NameError, SyntaxError, TypeError, ValueError)
@@ -62,6 +63,9 @@ class Language:
         in the words of its reader; None where a target says nothing of them.
     check : callable, optional
         (program, settings) to the issues that only this language has.
+    sayable : callable, optional
+        (program, settings) to what the language can say of it, where that is less; `check` tells
+        of all that is left out.
     read : Reader, optional
         Reads back what is written; without one a program cannot be audited.
     """
@@ -77,6 +81,7 @@ class Language:
     is_reserved: Callable[[str], bool]
     posture: Callable[[Robot, Array, Any], list[tuple[int | str, ...]]] | None = None
     check: Callable[[Program, Any], Iterator[ProgramIssue]] | None = None
+    sayable: Callable[[Program, Any], Program] | None = None
     read: Reader | None = None
 
     def refusal(self, robot: Robot) -> str:

@@ -24,9 +24,7 @@ from kerfpath._arrays import Array, Ints, floats, freeze
 from kerfpath.post.fanuc._settings import FanucSettings
 from kerfpath.robots import Robot
 
-__all__ = [
-    "axes_from_joints", "faceplate", "joints_from_axes", "posture", "turns", "world",
-]  # fmt: skip
+__all__ = ["axes_from_joints", "joints_from_axes", "posture", "turns"]
 
 NOISE_DECIMALS = 6
 """Angles are rounded to this many decimals (deg) before their turns are counted."""
@@ -49,18 +47,6 @@ def joints_from_axes(robot: Robot, axes: ArrayLike) -> Array:
     """Return the joint vectors (K, 6) rad of a controller's axes (K, 6) rad."""
     angles = (floats(axes, "axes", (None, 6)) - SHIFT) @ np.linalg.inv(MATRIX).T
     return freeze(np.asarray(robot.sign * (angles + robot.offset), dtype=np.float64))
-
-
-def world(robot: Robot) -> Array:
-    """Return the pose (4, 4) m of the controller's world in the robot base."""
-    T = np.eye(4)
-    T[2, 3] = robot.geometry["c1"]
-    return freeze(np.asarray(robot.T_base_foot @ T))
-
-
-def faceplate(robot: Robot) -> Array:
-    """Return the pose (4, 4) m of the controller's faceplate in the robot's flange."""
-    return freeze(np.asarray(np.linalg.inv(robot.T_end_flange), dtype=np.float64))
 
 
 def turns(robot: Robot, q: ArrayLike, settings: FanucSettings) -> Ints:

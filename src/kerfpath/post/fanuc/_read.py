@@ -14,6 +14,7 @@ from scipy.spatial.transform import Rotation
 
 from kerfpath._arrays import Array, freeze
 from kerfpath.errors import InputError
+from kerfpath.post._frames import faceplate, world
 from kerfpath.post._program import Signal, Switch
 from kerfpath.post._read import (
     ReadMove,
@@ -23,7 +24,7 @@ from kerfpath.post._read import (
     ReadWait,
     same_output,
 )
-from kerfpath.post.fanuc._axes import faceplate, joints_from_axes, world
+from kerfpath.post.fanuc._axes import joints_from_axes
 from kerfpath.post.fanuc._settings import UNITS, FanucSettings
 from kerfpath.robots import Robot
 

@@ -22,6 +22,7 @@ from scipy.spatial.transform import Rotation
 from kerfpath._arrays import Array
 from kerfpath.post._divide import divided
 from kerfpath.post._formatter import Formatter, number, plain
+from kerfpath.post._frames import faceplate, world
 from kerfpath.post._names import identifiers
 from kerfpath.post._program import (
     CircularMove,
@@ -33,7 +34,7 @@ from kerfpath.post._program import (
     Switch,
     Wait,
 )
-from kerfpath.post.fanuc._axes import axes_from_joints, faceplate, posture, world
+from kerfpath.post.fanuc._axes import axes_from_joints, posture
 from kerfpath.post.fanuc._settings import FanucSettings, unit
 
 __all__ = ["Fanuc", "divide_switches", "xyzwpr"]

@@ -1,0 +1,30 @@
+"""VAL 3, the language of Staubli controllers, as projects of XML files."""
+
+from kerfpath.post._languages import Language
+from kerfpath.post.val3._axes import axes_from_joints as axes_from_joints
+from kerfpath.post.val3._axes import configurations as configurations
+from kerfpath.post.val3._axes import joints_from_axes as joints_from_axes
+from kerfpath.post.val3._axes import posture as posture
+from kerfpath.post.val3._check import check
+from kerfpath.post.val3._read import read
+from kerfpath.post.val3._settings import Val3Settings as Val3Settings
+from kerfpath.post.val3._settings import is_reserved, rules
+from kerfpath.post.val3._write import Val3 as Val3
+from kerfpath.post.val3._write import stopping_to_switch
+
+VAL3 = Language(
+    name="val3",
+    title="Staubli VAL 3",
+    manufacturers=("Staubli",),
+    families=("opw",),
+    suffix=".pjx",
+    settings=Val3Settings,
+    rules=rules,
+    formatter=Val3,
+    is_reserved=is_reserved,
+    posture=posture,
+    check=check,
+    sayable=stopping_to_switch,
+    read=read,
+)
+"""What is registered."""

@@ -1,0 +1,60 @@
+"""What a Staubli controller calls the joints, and the configuration of a pose.
+
+Axes: all of them turn to the right hand and are zero with the arm upright, the flange then turned
+as the world, which has its origin on axis 1 at the height of axis 2. So they are in a public
+project for a TX90, whose joints lead to a point that it holds, to 1e-5 mm:
+ThenesVara/Checkers_Staubli, AA_Chessie.dtx @ 6129e2fb29f4b3461ddd9c3177d49867b4a5be20.
+
+Configuration: `lefty` where the wrist centre lies ahead of axis 1, as the arm faces, else
+`righty`; `epositive` where axis 3 is not negative, else `enegative`; `wpositive` where axis 5 is
+not negative, else `wnegative`. Two public post processors write them so (RoboDK's, visose/Robots);
+the point of that project agrees in the first two, and says wpositive where axis 5 is -14 deg. A
+straight move keeps the configuration, so that points may say "the same" instead. No point says
+anything of turns.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from kerfpath._arrays import Array, floats, freeze
+from kerfpath.post.val3._settings import Val3Settings
+from kerfpath.robots import Robot
+
+__all__ = ["SAME", "axes_from_joints", "configurations", "joints_from_axes", "posture"]
+
+SAME = ("ssame", "esame", "wsame")
+"""What a point says that keeps the configuration."""
+
+NOISE = 1e-8
+"""Sines and lengths (m) below zero by less than this are zero."""
+
+
+def axes_from_joints(robot: Robot, q: ArrayLike) -> Array:
+    """Return the controller's axes (K, 6) rad of joint vectors q (K, 6) rad."""
+    return freeze(np.asarray(robot.sign * floats(q, "q", (None, 6)) - robot.offset))
+
+
+def joints_from_axes(robot: Robot, axes: ArrayLike) -> Array:
+    """Return the joint vectors (K, 6) rad of a controller's axes (K, 6) rad."""
+    return freeze(np.asarray(robot.sign * (floats(axes, "axes", (None, 6)) + robot.offset)))
+
+
+def posture(robot: Robot, q: Array, settings: Val3Settings) -> list[tuple[int | str, ...]]:
+    """Return what points say of shoulder, elbow and wrist at joint vectors q (K, 6) rad."""
+    return [SAME] * len(q) if settings.configurations == "same" else configurations(robot, q)
+
+
+def configurations(robot: Robot, q: ArrayLike) -> list[tuple[int | str, ...]]:
+    """Return the words for shoulder, elbow and wrist of joint vectors q (K, 6) rad."""
+    axes = axes_from_joints(robot, q)
+    arm = robot.arm()
+    _, q2, q3, _, q5, _ = axes.T
+    ahead = arm.a1 + arm.c2 * np.sin(q2) + arm.c3 * np.sin(q2 + q3) + arm.a2 * np.cos(q2 + q3)
+    words = (
+        np.where(ahead < -NOISE, "righty", "lefty").tolist(),
+        np.where(np.sin(q3) < -NOISE, "enegative", "epositive").tolist(),
+        np.where(np.sin(q5) < -NOISE, "wnegative", "wpositive").tolist(),
+    )
+    return list(zip(*words, strict=True))

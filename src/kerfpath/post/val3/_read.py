@@ -1,0 +1,280 @@
+"""Read back the projects that `Val3` writes; what it does not know, it refuses."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping
+from dataclasses import replace
+from pathlib import PurePosixPath
+from typing import Literal
+
+import numpy as np
+
+from kerfpath._arrays import Array, freeze
+from kerfpath.errors import InputError
+from kerfpath.post._frames import faceplate, world
+from kerfpath.post._program import Signal, Switch
+from kerfpath.post._read import ReadMove, ReadProgram, ReadSection, ReadStep, ReadWait
+from kerfpath.post.val3._read_data import Data
+from kerfpath.post.val3._settings import Val3Settings
+from kerfpath.post.val3._write import (
+    DATA,
+    PROGRAM,
+    PROJECT,
+    opening,
+    parameters,
+    stopping,
+)
+from kerfpath.post.val3._xml import Element, parse
+from kerfpath.robots import Robot
+
+__all__ = ["read"]
+
+_NAME = r"([A-Za-z]\w*)"
+_CALL = re.compile(rf"call (?:{_NAME}:)?{_NAME}\(\)", re.ASCII)
+_LINES = {
+    kind: re.compile(pattern, re.ASCII)
+    for kind, pattern in {
+        "linear": r"movel\(pPath\[(\d+)\],tLaser,mPath\[(\d+)\]\)",
+        "circular": r"movec\(pPath\[(\d+)\],pPath\[(\d+)\],tLaser,mPath\[(\d+)\]\)",
+        "joint": r"movej\(jAir\[(\d+)\],tLaser,mAir\[(\d+)\]\)",
+        "stand": r"waitEndMove\(\)",
+        "switch": r"(dioLaser|dioGas)=(true|false)",
+        "wait": r"delay\((\d+\.\d+)\)",
+    }.items()
+}
+
+
+def read(main: str, files: Mapping[str, str], robot: Robot, settings: Val3Settings) -> ReadProgram:
+    """Return the program that projects of ours say; see `kerfpath.post.Reader`."""
+    top = _Project(main, files, robot, settings)
+    projects = {"": top}
+    for alias, path in top.libraries.items():
+        projects[alias] = _Project(path, files, robot, settings)
+        projects[alias].require_same(top)
+    sections, called = [], set()
+    start = top.routine("start")
+    for line, alias, name in top.calls(start):
+        if alias not in projects or name not in projects[alias].routines:
+            raise start.fault(f"{name} is no routine of {alias or 'the project'}", line)
+        if (alias, name) in called:
+            raise start.fault(f"{name} is called twice", line)
+        called.add((alias, name))
+        sections.append(ReadSection(name=name, steps=projects[alias].steps(name)))
+    there = {(alias, name) for alias, project in projects.items() for name in project.routines}
+    if idle := there - called:
+        raise start.fault(f"{min(idle)[1]} is never called")
+    top.require_stop()
+    return ReadProgram(
+        name=top.name,
+        sections=tuple(sections),
+        T_flange_tip=faceplate(robot) @ top.data.frames["tLaser"],
+        T_base_part=world(robot) @ top.data.frames["fPart"],
+    )
+
+
+class _Project:
+    """One project: what it consists of, its data, and its routines."""
+
+    def __init__(
+        self, file: str, files: Mapping[str, str], robot: Robot, settings: Val3Settings
+    ) -> None:
+        self.files, self.settings = files, settings
+        self.folder = PurePosixPath(file).parent
+        self.name = PurePosixPath(file).stem
+        root = parse(file, files[file], "Project", PROJECT)
+        head, programs, database, libraries = root.only(
+            "Parameters", "Programs", "Database", "Libraries"
+        )
+        head.take(**parameters(settings))
+        self.programs = self._programs(programs)
+        (data,) = database.only("Data")
+        data.take(file=f"{self.name}.dtx")
+        self.libraries = self._libraries(libraries)
+        file = str(self.folder / f"{self.name}.dtx")
+        self.data = Data(parse(file, files[file], "Database", DATA), robot, settings)
+
+    def _programs(self, programs: Element) -> list[str]:
+        names: list[str] = []
+        for row in programs.each("Program"):
+            name = row.attributes.get("file", "").removesuffix(".pgx")
+            row.take(file=f"{name}.pgx")
+            if name in names or not re.fullmatch(_NAME, name, re.ASCII):
+                raise row.fault(f"expected the file of another routine, got {row.shown()}")
+            names.append(name)
+        return names
+
+    @property
+    def routines(self) -> list[str]:
+        """Names of the routines that start() may call."""
+        return [name for name in self.programs if name not in ("start", "stop")]
+
+    def _libraries(self, libraries: Element) -> dict[str, str]:
+        found: dict[str, str] = {}
+        for row in libraries.each("Library"):
+            alias = row.attributes.get("alias", "")
+            row.take(alias=alias, path=f"{self.settings.folder}{alias}/{alias}.pjx")
+            if alias in found or not re.fullmatch(_NAME, alias, re.ASCII):
+                raise row.fault(f"expected another library, got {row.shown()}")
+            beside = self.folder.parent if self.folder.name else PurePosixPath("..")
+            found[alias] = str(beside / alias / f"{alias}.pjx")
+        return found
+
+    def require_same(self, top: _Project) -> None:
+        """Check that a library has the frames of the project and no libraries of its own."""
+        frames = self.data.frames
+        same = all(np.array_equal(T, top.data.frames[name]) for name, T in frames.items())
+        if not same or self.libraries:
+            raise InputError(
+                f"{self.folder / self.name}.pjx: expected a library with the tool and the frame of "
+                f"{top.name}, and without libraries"
+            )
+
+    def routine(self, name: str) -> Element:
+        """Return the code of a routine of its name."""
+        if name not in self.programs:
+            raise InputError(f"{self.folder / self.name}.pjx: {name}.pgx is missing")
+        file = str(self.folder / f"{name}.pgx")
+        root = parse(file, self.files[file], "Programs", PROGRAM)
+        (program,) = root.only("Program")
+        program.take(name=name, access="public")
+        (code,) = program.only("Code")
+        code.take()
+        lines = code.text.split("\n")
+        if code.children or lines[0].strip() != "begin" or lines[-1].strip() != "end":
+            raise code.fault("expected code from begin to end")
+        return code
+
+    def statements(self, code: Element) -> list[tuple[int, str]]:
+        """Return the lines of a routine without comments, with their numbers."""
+        rows = enumerate(code.text.split("\n")[1:-1], code.line + 1)
+        stripped = ((number, row.strip()) for number, row in rows)
+        return [(n, row) for n, row in stripped if row and not row.startswith("//")]
+
+    def calls(self, start: Element) -> list[tuple[int, str, str]]:
+        """Return what start() calls: line, alias of the library or nothing, routine."""
+        rows = self.statements(start)
+        begin, end = opening(self.settings), ["waitEndMove()"]
+        count = len(rows) - len(begin) - len(end)
+        for number, row in enumerate(begin):
+            if [text for _, text in rows[number : number + 1]] != [row]:
+                raise start.fault(f"expected {row} before anything else is done")
+        if count < 0 or rows[-1][1] != end[0]:
+            raise start.fault("expected waitEndMove() at the end of start()")
+        found = []
+        for line, row in rows[len(begin) : -1]:
+            match = _CALL.fullmatch(row)
+            if match is None:
+                raise start.fault(f"not expected here: {row[:60]!r}", line)
+            found.append((line, match[1] or "", match[2]))
+        return found
+
+    def require_stop(self) -> None:
+        """Check that stop() switches everything off."""
+        stop = self.routine("stop")
+        if [row for _, row in self.statements(stop)] != stopping(self.settings):
+            raise stop.fault(f"expected {' and '.join(stopping(self.settings))} in stop()")
+
+    def steps(self, name: str) -> tuple[ReadStep, ...]:
+        """Return what a routine does."""
+        code = self.routine(name)
+        reader = _Routine(self, code)
+        for line, row in self.statements(code):
+            reader.read(line, row)
+        return tuple(reader.found)
+
+
+class _Routine:
+    """Reads the statements of one routine; each kind has a method of its name."""
+
+    def __init__(self, project: _Project, code: Element) -> None:
+        self.project, self.code, self.line = project, code, 0
+        self.found: list[ReadStep] = []
+        self.stands = False
+
+    def read(self, line: int, row: str) -> None:
+        self.line = line
+        for kind, pattern in _LINES.items():
+            if match := pattern.fullmatch(row):
+                getattr(self, kind)(*match.groups())
+                return
+        raise self.fault(f"not expected here: {row[:60]!r}")
+
+    def joint(self, target: str, motion: str) -> None:
+        q = self.project.data.q
+        share, zone = self.motion("mAir", motion)
+        self.found.append(
+            ReadMove(
+                kind="joint",
+                file=self.code.file,
+                line=self.line,
+                q=freeze(q[self.place("jAir", target, len(q))]),
+                speed=share,
+                zone=zone,
+            )
+        )
+        self.stands = False
+
+    def linear(self, target: str, motion: str) -> None:
+        self.path("linear", target, motion)
+
+    def circular(self, via: str, target: str, motion: str) -> None:
+        T = self.project.data.T
+        self.path("circular", target, motion, freeze(T[self.place("pPath", via, len(T))]))
+
+    def path(
+        self,
+        kind: Literal["linear", "circular"],
+        target: str,
+        motion: str,
+        T_part_via: Array | None = None,
+    ) -> None:
+        T = self.project.data.T
+        k = self.place("pPath", target, len(T))
+        speed, zone = self.motion("mPath", motion)
+        self.found.append(
+            ReadMove(
+                kind=kind,
+                file=self.code.file,
+                line=self.line,
+                T_part_tip=freeze(T[k]),
+                T_part_via=T_part_via,
+                posture=self.project.data.words[k],
+                speed=speed,
+                zone=zone,
+            )
+        )
+        self.stands = False
+
+    def stand(self) -> None:
+        last = self.found[-1] if self.found else None
+        if isinstance(last, ReadMove) and last.zone:
+            raise self.fault("the robot is to stand where a corner is to be rounded")
+        self.stands = True
+
+    def switch(self, name: str, state: str) -> None:
+        last = self.found[-1] if self.found else None
+        if not self.stands or not isinstance(last, ReadMove) or last.kind == "joint":
+            raise self.fault("a switch must follow a move of the path and waitEndMove()")
+        signal: Signal = "laser" if name == "dioLaser" else "gas"
+        if self.project.data.link(signal) is None:
+            raise self.fault(f"{name} is not declared")
+        switches = (*last.switches, Switch(signal=signal, on=state == "true"))
+        self.found[-1] = replace(last, switches=switches)
+
+    def wait(self, time: str) -> None:
+        if not self.stands:
+            raise self.fault("a delay must follow waitEndMove()")
+        self.found.append(ReadWait(time=float(time), file=self.code.file, line=self.line))
+
+    def motion(self, name: str, key: str) -> tuple[float, float]:
+        motions = self.project.data.motions[name]
+        return motions[self.place(name, key, len(motions))]
+
+    def place(self, name: str, key: str, count: int) -> int:
+        if int(key) >= count:
+            raise self.fault(f"{name}[{key}] is not declared")
+        return int(key)
+
+    def fault(self, message: str) -> InputError:
+        return self.code.fault(message, self.line)

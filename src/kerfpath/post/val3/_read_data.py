@@ -1,0 +1,150 @@
+"""Read the data of a project that `Val3` writes: frames, targets, speeds and outputs."""
+
+from __future__ import annotations
+
+import re
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from kerfpath._arrays import Array, freeze
+from kerfpath.post._read import same_output
+from kerfpath.post.val3._axes import SAME, joints_from_axes
+from kerfpath.post.val3._settings import Val3Settings
+from kerfpath.post.val3._write import OUTPUTS, TYPES
+from kerfpath.post.val3._xml import Element
+from kerfpath.robots import Robot
+
+__all__ = ["Data"]
+
+_NUMBER = re.compile(r"-?\d+(?:\.\d+)?", re.ASCII)
+_POSE = ("x", "y", "z", "rx", "ry", "rz")
+_WORDS = {
+    "shoulder": ("lefty", "righty", SAME[0]),
+    "elbow": ("epositive", "enegative", SAME[1]),
+    "wrist": ("wpositive", "wnegative", SAME[2]),
+}
+_JOINTS = tuple(f"j{i}" for i in range(1, 7))
+_BOUNDS = {"accel": "100", "decel": "100", "rmax": "99999"}
+
+
+class Data:
+    """What a .dtx declares; each kind of datum has a method.
+
+    `frames` by name, `q` (K, 6) rad, `T` (K, 4, 4) m in the part with their `words`, and of
+    `motions` by name the speed (m/s or share of the full one) and the zone (m).
+    """
+
+    def __init__(self, root: Element, robot: Robot, settings: Val3Settings) -> None:
+        self.robot, self.settings = robot, settings
+        self.frames: dict[str, Array] = {}
+        self.q, self.T = np.empty((0, 6)), np.empty((0, 4, 4))
+        self.words: list[tuple[str, ...]] = []
+        self.motions: dict[str, list[tuple[float, float]]] = {"mAir": [], "mPath": []}
+        seen = set()
+        for datum in root.only("Datas")[0].each("Data"):
+            name = datum.attributes.get("name", "")
+            if name not in _DATA or name in seen:
+                raise datum.fault(f"not expected here: {datum.shown()}")
+            seen.add(name)
+            values = datum.each("Value")
+            kind, reader = _DATA[name]
+            datum.take(
+                **{"name": name, "access": "private", "xsi:type": "array"},
+                type=kind,
+                size=str(len(values)),
+            )
+            if not values or (len(values) > 1 and name not in TYPES):
+                raise datum.fault(f"expected one value of {name}, got {len(values)}")
+            for key, value in enumerate(values):
+                value.only()
+                if value.attributes.pop("key", "") != str(key):
+                    raise value.fault(f"expected the value of key {key}")
+            reader(self, name, values)
+        expected = [OUTPUTS[s] for s in ("laser", "gas") if self.link(s) is not None]
+        for name in ("fPart", "tLaser", *expected):
+            if name not in seen:
+                raise root.fault(f"{name} is not declared")
+
+    def link(self, signal: str) -> str | None:
+        """Return the link of an output, as the settings name it."""
+        link = getattr(self.settings, f"{signal}_output")
+        return None if link is None else str(link)
+
+    def _frame(self, name: str, values: list[Element]) -> None:
+        self.frames[name] = _poses(values, "world[0]" if name == "fPart" else "flange[0]")[0]
+
+    def _output(self, name: str, values: list[Element]) -> None:
+        (value,) = values
+        signal = "laser" if name == "dioLaser" else "gas"
+        link = value.attributes.get("link", "")
+        same_output(link, self.link(signal), f"{value.file}, line {value.line}")
+        value.take(link=link)
+
+    def _air_targets(self, name: str, values: list[Element]) -> None:
+        rows = [_numbers(value, _JOINTS) for value in values]
+        for value in values:
+            value.take(**{k: v for k, v in value.attributes.items() if k in _JOINTS})
+        self.q = joints_from_axes(self.robot, np.radians(np.array(rows)))
+
+    def _points(self, name: str, values: list[Element]) -> None:
+        for value in values:
+            words = tuple(value.attributes.pop(what, "") for what in _WORDS)
+            for (what, known), word in zip(_WORDS.items(), words, strict=True):
+                if word not in known:
+                    raise value.fault(f"expected {what} {' or '.join(known)}, got {word!r}")
+            self.words.append(words)
+        self.T = _poses(values, "fPart[0]")
+
+    def _descriptors(self, name: str, values: list[Element]) -> None:
+        path = name == "mPath"
+        for value in values:
+            (speed,) = _numbers(value, ("tmax" if path else "vel",))
+            free = {"vel": "100"} if path else {"tmax": "99999"}
+            zone, corner = 0.0, {"blend": "off"}
+            if value.attributes.get("blend") != "off":
+                (zone,) = _numbers(value, ("leave",))
+                said = value.attributes["leave"]
+                corner = {"blend": "Cartesian" if path else "joint", "leave": said, "reach": said}
+            value.take(**{**value.attributes, **_BOUNDS, **free, **corner})
+            if set(value.attributes) != {*_BOUNDS, *corner, "vel", "tmax"}:
+                raise value.fault(f"expected a speed and a corner, got {value.shown()}")
+            self.motions[name].append((speed * (1e-3 if path else 1e-2), zone * 1e-3))
+
+
+_DATA = {
+    "fPart": ("frame", Data._frame),
+    "tLaser": ("tool", Data._frame),
+    "dioLaser": ("dio", Data._output),
+    "dioGas": ("dio", Data._output),
+    "jAir": ("jointRx", Data._air_targets),
+    "mAir": ("mdesc", Data._descriptors),
+    "pPath": ("pointRx", Data._points),
+    "mPath": ("mdesc", Data._descriptors),
+}
+"""Type of each datum, and how its values are read."""
+
+
+def _numbers(value: Element, names: tuple[str, ...]) -> list[float]:
+    """Return attributes as numbers."""
+    found = []
+    for name in names:
+        text = value.attributes.get(name, "")
+        if not _NUMBER.fullmatch(text):
+            raise value.fault(f"expected a number as {name}, got {text[:60]!r}")
+        found.append(float(text))
+    return found
+
+
+def _poses(values: list[Element], father: str) -> Array:
+    """Return poses (K, 4, 4) m of x, y, z in mm and rx, ry, rz in deg, in the frame `father`."""
+    rows = np.array([_numbers(value, _POSE) for value in values])
+    for value in values:
+        if value.attributes.keys() != {*_POSE, "fatherId"}:
+            raise value.fault(f"expected a pose, got {value.shown()}")
+        if value.attributes["fatherId"] != father:
+            raise value.fault(f"expected it in {father}, got {value.attributes['fatherId'][:60]!r}")
+    T = np.tile(np.eye(4), (len(rows), 1, 1))
+    T[:, :3, :3] = Rotation.from_euler("XYZ", rows[:, 3:], degrees=True).as_matrix()
+    T[:, :3, 3] = rows[:, :3] * 1e-3
+    return freeze(T)

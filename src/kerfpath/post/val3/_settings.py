@@ -1,0 +1,74 @@
+"""What a person states of a Staubli controller, and what its programs must keep to."""
+
+from __future__ import annotations
+
+from typing import Annotated, Literal
+
+from pydantic import StringConstraints
+
+from kerfpath.post._settings import Rules, Settings, setting
+
+__all__ = ["LONGEST_NAME", "Val3Settings", "is_reserved", "rules"]
+
+LONGEST_NAME = 15
+"""Characters of a name."""
+SPEED_STEP = 1e-6
+"""Speeds (m/s) have three decimals of mm/s."""
+
+KEYWORDS = (
+    "and as begin bnot break call case continue default do else elseif end endfor endif endswitch "
+    "endwhile false for global if in not or out popup return step switch then to true until while "
+    "with xor"
+)
+"""Keywords of the language."""
+MEANINGS = (
+    "start stop world flange aio bool cartesian config configrx configrs dio fieldbus frame joint "
+    "jointrs jointrx mdesc num off point pointrs pointrx screen sio string tool trsf same free "
+    "lefty righty ssame sfree epositive enegative esame efree wpositive wnegative wsame wfree "
+    "abs acos align appro asc asin atan autoconnectmove bit_and bit_or chr clock close cls "
+    "codeascii compose cos delay delete dialog disablepower distance enablepower esstatus exp "
+    "find getdate getkey getlatch getmoveid getspeed getversion gotoxy here herej insert "
+    "interpolatec interpolatel ioget iolink isempty iskeypressed ispowered isinrange iscalibrated "
+    "issettled "
+    "jointtopoint left len libdelete liblist libload libpath libsave limit link ln log logmsg max "
+    "mid min movec movej movel open pi pointtojoint position power put putln random replace "
+    "resetmotion resetturn resize restartmove right round rounddown roundup sel setframe setlatch "
+    "setmonitorspeed setmoveid setmutex setprofile settextmode setvelcmd sin size sqrt stopmove "
+    "tan taskcreate taskcreatesync taskkill taskresume taskstatus tasksuspend title tostring tonum "
+    "userpage wait waitendmove watch workingmode"
+)
+"""Types, data, words and instructions of a controller, where a contour may be named so."""
+RESERVED = frozenset((KEYWORDS + " " + MEANINGS).split())
+
+Output = Annotated[
+    Annotated[str, StringConstraints(pattern=r"^[A-Za-z0-9_.%\\/:\-]{1,80}$")] | None,
+    setting("the link of a digital output, as the controller lists it", r'"BasicIO-1\\%Q0"'),
+]
+
+
+class Val3Settings(Settings):
+    """Which outputs, where the projects lie, and for which version they are."""
+
+    laser_output: Output = None
+    gas_output: Output = None
+    configurations: Annotated[Literal["named", "same"], setting('"named" or "same"', '"named"')] = (
+        "named"
+    )
+    folder: Annotated[
+        Annotated[str, StringConstraints(pattern=r"^[A-Za-z0-9_:/.\-]{1,60}/$")],
+        setting("the folder of projects, as the controller calls it", '"Disk://"'),
+    ] = "Disk://"
+    version: Annotated[
+        Annotated[str, StringConstraints(pattern=r"^s[0-9]+(\.[0-9]+){0,3}$")],
+        setting("the version of VAL 3 that projects are for", '"s7.3.1"'),
+    ] = "s7.3.1"
+
+
+def rules(settings: Val3Settings) -> Rules:
+    """Return what VAL 3 programs must keep to."""
+    return Rules(longest_name=LONGEST_NAME, slowest=SPEED_STEP, speed_step=SPEED_STEP)
+
+
+def is_reserved(name: str) -> bool:
+    """Return whether VAL 3 or every Staubli controller gives `name` another meaning."""
+    return name.lower() in RESERVED

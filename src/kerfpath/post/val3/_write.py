@@ -1,0 +1,331 @@
+"""VAL 3, the language of Staubli controllers: this module only formats.
+
+Units of VAL 3: mm, deg, mm/s, seconds; rx, ry, rz turn about x, the new y, the new z. A program is
+a project, a folder of XML files: what belongs to it, its data, and one file for each routine.
+Targets, speeds and frames are data. Motions are queued while the routine runs on: to switch an
+output where the tip stands, the routine waits for the end of the motion; see `stopping_to_switch`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass, field, replace
+from xml.sax.saxutils import quoteattr
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from kerfpath._arrays import Array
+from kerfpath.errors import InputError
+from kerfpath.post._divide import divided, in_files
+from kerfpath.post._formatter import Formatter, number, plain
+from kerfpath.post._frames import faceplate, world
+from kerfpath.post._names import identifiers
+from kerfpath.post._program import CircularMove, JointMove, LinearMove, Move, Program, Section, Wait
+from kerfpath.post.val3._axes import axes_from_joints, posture
+from kerfpath.post.val3._settings import LONGEST_NAME, Val3Settings
+from kerfpath.post.val3._xml import SCHEMA
+
+__all__ = [
+    "DATA", "OUTPUTS", "PROGRAM", "PROJECT", "Val3", "opening", "parameters", "stopping",
+    "stopping_to_switch",
+]  # fmt: skip
+
+PROJECT = "http://www.staubli.com/robotics/VAL3/Project/3"
+PROGRAM = "http://www.staubli.com/robotics/VAL3/Program/2"
+DATA = "http://www.staubli.com/robotics/VAL3/Data/2"
+HEAD = '<?xml version="1.0" encoding="utf-8"?>'
+TYPES = {"jAir": "jointRx", "mAir": "mdesc", "pPath": "pointRx", "mPath": "mdesc"}
+"""Types of the data that moves refer to."""
+OUTPUTS = {"laser": "dioLaser", "gas": "dioGas"}
+UNBOUNDED = 'tmax="99999" rmax="99999"'
+"""Speeds of tip and tool that bound nothing, the controller's own."""
+AIR_SPEED = 'accel="100" vel="%s" decel="100" ' + UNBOUNDED
+PATH_SPEED = 'accel="100" vel="100" decel="100" tmax="%s" rmax="99999"'
+JOINTS = " ".join(f'j{i}="%.6f"' for i in range(1, 7))
+POSE = 'x="%.4f" y="%.4f" z="%.4f" rx="%.6f" ry="%.6f" rz="%.6f"'
+CONFIGURATION = 'shoulder="%s" elbow="%s" wrist="%s"'
+AROUND = 40
+"""Lines of a file beside those of its steps and their data."""
+LINES_OF_A_STEP = 4
+"""A move with two switches: the move, a wait for its end, and they."""
+DATA_OF_A_STEP = 3
+"""A circular move: two points and a speed."""
+NOT_CHECKED = "not been checked for collisions"
+
+
+def parameters(settings: Val3Settings) -> dict[str, str]:
+    """Return the parameters of a project."""
+    return {"version": settings.version, "stackSize": "5000", "millimeterUnit": "true"}
+
+
+def opening(settings: Val3Settings) -> list[str]:
+    """Return the statements of start() before it calls others."""
+    named = ((settings.laser_output, "laser"), (settings.gas_output, "gas"))
+    return [f"{OUTPUTS[signal]}=false" for output, signal in named if output is not None]
+
+
+def stopping(settings: Val3Settings) -> list[str]:
+    """Return the statements of stop(), which the controller calls when the project is stopped."""
+    return [*opening(settings), "resetMotion()"]
+
+
+def stopping_to_switch(program: Program, settings: object = None) -> Program:
+    """Return what VAL 3 can say of a program: all switches where the tip stands, without a lead."""
+
+    def said(move: LinearMove) -> LinearMove:
+        switches = tuple(replace(switch, lead_time=0.0) for switch in move.switches)
+        return replace(move, switches=switches, zone=0.0)
+
+    sections = tuple(
+        replace(
+            section,
+            steps=tuple(
+                said(s) if isinstance(s, LinearMove) and s.switches else s for s in section.steps
+            ),
+        )
+        for section in program.sections
+    )
+    return replace(program, sections=sections)
+
+
+@dataclass(slots=True)
+class _Database:
+    """The data of one project that its moves refer to."""
+
+    values: dict[str, list[str]] = field(default_factory=lambda: {name: [] for name in TYPES})
+    places: dict[tuple[str, str], str] = field(default_factory=dict)
+
+    def add(self, name: str, value: str) -> str:
+        """Return how a routine names a new value."""
+        self.values[name].append(value)
+        return f"{name}[{len(self.values[name]) - 1}]"
+
+    def shared(self, name: str, value: str) -> str:
+        """Return how a routine names a value that may be there already."""
+        if (name, value) not in self.places:
+            self.places[name, value] = self.add(name, value)
+        return self.places[name, value]
+
+
+class Val3(Formatter):
+    """Writes a project with a routine for each section, and libraries where it is too long."""
+
+    settings: Val3Settings
+
+    def __init__(self, program: Program, settings: Val3Settings) -> None:
+        short = replace(stopping_to_switch(program), name=program.name[:LONGEST_NAME])
+        most = (settings.lines_per_file - AROUND) // LINES_OF_A_STEP
+        super().__init__(divided(short, most, longest_name=LONGEST_NAME), settings)
+        self._target = self._target_texts()
+        self._database = _Database()
+        self._moving = True
+        counts = [DATA_OF_A_STEP * len(section.steps) for section in self.program.sections]
+        room = settings.lines_per_file - AROUND
+        self._parts: dict[str, Sequence[Section]] = {}
+        if sum(counts) > room:
+            groups = in_files(self.program.sections, counts, room)
+            taken = [self.program.name, *(section.name for section in self.program.sections)]
+            names = identifiers(
+                [self.program.name] * len(groups), taken=taken, longest=LONGEST_NAME
+            )
+            self._parts = dict(zip(names, groups, strict=True))
+
+    def files(self) -> dict[str, str]:
+        """Return the files of the project, and those of the libraries that it calls."""
+        name, sections = self.program.name, self.program.sections
+        if not self._parts:
+            return self._project(name, sections, [section.name for section in sections])
+        calls = [f"{part}:{s.name}" for part, own in self._parts.items() for s in own]
+        texts = self._project(name, (), calls)
+        for part, own in self._parts.items():
+            texts |= self._project(part, own, None)
+        most = self.settings.lines_per_file
+        longest = max(text.count("\n") for text in texts.values())
+        if longest > most:
+            raise InputError(
+                f"program {name!r}: {len(self._parts)} libraries need files of {longest} lines, "
+                f"lines_per_file allows {most}; raise it"
+            )
+        return texts
+
+    def names(self) -> list[tuple[str, str]]:
+        """Return every name of a project, routine or datum, with what it names."""
+        return [
+            (self.program.name, "the program"),
+            *((part, "a library") for part in self._parts),
+            *((section.name, "a contour") for section in self.program.sections),
+            ("fPart", "the part's frame"),
+            ("tLaser", "the tool"),
+            *((name, f"the output of the {signal}") for signal, name in OUTPUTS.items()),
+            *((name, "the data of moves") for name in TYPES),
+        ]
+
+    def lines(self, section: Section) -> Iterator[str]:
+        """Yield the lines of a section, which does not know whether the robot stands."""
+        self._moving = True
+        yield from super().lines(section)
+
+    def joint_move(self, move: JointMove) -> Iterator[str]:
+        """Yield a movej to joints."""
+        value = AIR_SPEED % number(move.speed * 100, 2)
+        speed = self._database.shared("mAir", f"{value} {_blend('joint', move)}")
+        yield f"movej({self._database.add('jAir', self._target[move][0])},tLaser,{speed})"
+        self._moving = True
+
+    def linear_move(self, move: LinearMove) -> Iterator[str]:
+        """Yield a movel and what is switched at its end."""
+        yield from self._path_move("movel", move)
+
+    def circular_move(self, move: CircularMove) -> Iterator[str]:
+        """Yield a movec and what is switched at its end."""
+        yield from self._path_move("movec", move)
+
+    def wait(self, wait: Wait) -> Iterator[str]:
+        """Yield a delay, once the robot stands."""
+        yield from self.standing()
+        yield f"delay({number(wait.time, 3)})"
+
+    def comment(self, text: str) -> Iterator[str]:
+        """Yield a comment that does not end the text in which it stands."""
+        yield f"// {text.replace(']]>', ']] >')}"
+
+    def standing(self) -> Iterator[str]:
+        """Yield the line that waits until the robot stands, where it may move."""
+        if self._moving:
+            yield "waitEndMove()"
+        self._moving = False
+
+    def _path_move(self, word: str, move: LinearMove) -> Iterator[str]:
+        value = PATH_SPEED % number(move.speed * 1e3, 3)
+        speed = self._database.shared("mPath", f"{value} {_blend('Cartesian', move)}")
+        points = ",".join(self._database.add("pPath", text) for text in self._target[move])
+        yield f"{word}({points},tLaser,{speed})"
+        self._moving = True
+        for switch in move.switches:
+            yield from self.standing()
+            self.output(switch.signal)
+            yield f"{OUTPUTS[switch.signal]}={'true' if switch.on else 'false'}"
+
+    def _project(
+        self, name: str, sections: Sequence[Section], calls: Sequence[str] | None
+    ) -> dict[str, str]:
+        """Return the files of one project; without calls it is a library that is not started."""
+        self._database = _Database()
+        routines = {section.name: list(self.lines(section)) for section in sections}
+        if calls is not None:
+            called = (f"call {call}()" for call in calls)
+            start = [*self._remarks(), *opening(self.settings), *called, "waitEndMove()"]
+            routines = {"start": start, "stop": stopping(self.settings), **routines}
+        texts = {
+            f"{name}.pjx": self._contents(name, routines, () if calls is None else self._parts)
+        }
+        texts[f"{name}.dtx"] = self._data()
+        texts |= {f"{routine}.pgx": _routine(routine, code) for routine, code in routines.items()}
+        return {f"{name}/{file}": text for file, text in texts.items()}
+
+    def _contents(self, name: str, routines: Iterable[str], parts: Iterable[str]) -> str:
+        folder = self.settings.folder
+        rows = [f'<Project xmlns="{PROJECT}">']
+        rows += [f"  {_tag('Parameters', **parameters(self.settings))}", "  <Programs>"]
+        rows += [f"    {_tag('Program', file=f'{routine}.pgx')}" for routine in routines]
+        rows += ["  </Programs>", "  <Database>", f"    {_tag('Data', file=f'{name}.dtx')}"]
+        rows += ["  </Database>", "  <Libraries>"]
+        paths = {part: f"{folder}{part}/{part}.pjx" for part in parts}
+        rows += [f"    {_tag('Library', alias=part, path=path)}" for part, path in paths.items()]
+        return _text([*rows, "  </Libraries>", "</Project>"])
+
+    def _data(self) -> str:
+        program, settings = self.program, self.settings
+        frame = np.linalg.inv(world(program.robot)) @ program.T_base_part
+        tool = np.linalg.inv(faceplate(program.robot)) @ program.T_flange_tip
+        rows = [f'<Database xmlns:xsi="{SCHEMA}" xmlns="{DATA}">', "  <Datas>"]
+        rows += _array("fPart", "frame", [f'{POSE % _poses(frame)[0]} fatherId="world[0]"'])
+        rows += _array("tLaser", "tool", [f'{POSE % _poses(tool)[0]} fatherId="flange[0]"'])
+        for signal, name in OUTPUTS.items():
+            link = getattr(settings, f"{signal}_output")
+            rows += [] if link is None else _array(name, "dio", [f"link={quoteattr(link)}"])
+        for name, values in self._database.values.items():
+            rows += _array(name, TYPES[name], values)
+        return _text([*rows, "  </Datas>", "</Database>"])
+
+    def _remarks(self) -> Iterator[str]:
+        program = self.program
+        checked = "been proved clear in the planned cell" if program.air_checked else NOT_CHECKED
+        robot = f"{plain(program.robot.model)} ({plain(program.robot.id)})"
+        yield from self.comment(f"Written by kerfpath for {robot}.")
+        yield from self.comment("fPart is the part in the world, which starts at axis 2.")
+        yield from self.comment(f"Moves through the air have {checked}.")
+        yield from self.comment(
+            "stop() switches the laser off; the safety circuit of the cell has to, too."
+        )
+
+    def _target_texts(self) -> dict[Move, list[str]]:
+        """Return the targets of each move as they stand in the data, all at once."""
+        robot, moves = self.program.robot, self.program.moves
+        joint = [move for move in moves if isinstance(move, JointMove)]
+        texts: dict[Move, list[str]] = {move: [] for move in moves}
+        if joint:
+            axes_deg = np.degrees(axes_from_joints(robot, [m.q for m in joint])).round(6) + 0.0
+            for target, row in zip(joint, axes_deg.tolist(), strict=True):
+                texts[target].append(JOINTS % tuple(row))
+        points: list[tuple[Move, Array, Array]] = []
+        for move in moves:
+            if isinstance(move, CircularMove):
+                points.append((move, move.q_via, move.T_part_via))
+            if isinstance(move, LinearMove):
+                points.append((move, move.q, move.T_part_tip))
+        if points:
+            words = posture(robot, np.array([q for _, q, _ in points]), self.settings)
+            poses = _poses([T for _, _, T in points])
+            for (end, _, _), pose, three in zip(points, poses, words, strict=True):
+                texts[end].append(f'{POSE % pose} {CONFIGURATION % three} fatherId="fPart[0]"')
+        return texts
+
+
+def _poses(T: Array | Sequence[Array]) -> list[tuple[float, ...]]:
+    """Return poses (K, 4, 4) m as x, y, z in mm and rx, ry, rz in deg."""
+    poses = np.asarray(T).reshape(-1, 4, 4)
+    turned = Rotation.from_matrix(poses[:, :3, :3])
+    angles = turned.as_euler("XYZ", degrees=True, suppress_warnings=True).round(6) + 0.0
+    points = (poses[:, :3, 3] * 1e3).round(4) + 0.0
+    return [tuple(row) for row in np.hstack([points, angles]).tolist()]
+
+
+def _blend(kind: str, move: Move) -> str:
+    if move.zone == 0:
+        return 'blend="off"'
+    zone = number(move.zone * 1e3, 4)
+    return f'blend="{kind}" leave="{zone}" reach="{zone}"'
+
+
+def _tag(tag: str, **attributes: str) -> str:
+    return f"<{tag}{''.join(f' {k}={quoteattr(v)}' for k, v in attributes.items())} />"
+
+
+def _array(name: str, kind: str, values: Sequence[str]) -> list[str]:
+    """Return the lines of a datum; none where it would be empty."""
+    if not values:
+        return []
+    size = len(values)
+    head = f'    <Data name="{name}" access="private" xsi:type="array" type="{kind}" size="{size}">'
+    rows = (f'      <Value key="{k}" {value} />' for k, value in enumerate(values))
+    return [head, *rows, "    </Data>"]
+
+
+def _routine(name: str, code: Sequence[str]) -> str:
+    return _text(
+        [
+            f'<Programs xmlns:xsi="{SCHEMA}" xmlns="{PROGRAM}">',
+            f'  <Program name="{name}" access="public">',
+            "    <Code><![CDATA[begin",
+            *(f"  {line}" for line in code),
+            "end]]></Code>",
+            "  </Program>",
+            "</Programs>",
+        ]
+    )
+
+
+def _text(rows: Iterable[str]) -> str:
+    return "\n".join([HEAD, *rows, ""])
