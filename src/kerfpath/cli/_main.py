@@ -176,6 +176,15 @@ def post(
             help="Switch nothing, wait nowhere, and move at this share of the speed.",
         ),
     ] = None,
+    measured: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="POINTS.csv", help="Lead the plan to the part as measured, and audit it there."
+        ),
+    ] = None,
+    residual_mm: Annotated[
+        float, typer.Option(help="Most that a measured point may be off the fitted placement.")
+    ] = 0.5,
     as_json: Json = False,
 ) -> None:
     """Write the robot program of a plan, after auditing it again.
@@ -185,11 +194,20 @@ def post(
 
     Example: kerfpath post door/plan.json --language rapid -o door.mod
 
+    A table of measured points has columns nominal_x_mm, nominal_y_mm, nominal_z_mm (in the part)
+    and measured_x_mm, measured_y_mm, measured_z_mm (in the robot base), and three rows at least.
+    Collisions are not checked again at the measured placement: its cell is not known.
+
     Example: kerfpath post door/plan.json --dry-run 0.2 -o dry_door.mod
+
+    Example: kerfpath post door/plan.json --measured points.csv -o door.mod
     """
     from kerfpath.cli._post import write_post
 
-    write_post(plan_file, language, output, strict=strict, as_json=as_json, dry_share=dry_share)
+    write_post(
+        plan_file, language, output, strict=strict, as_json=as_json, dry_share=dry_share,
+        measured=measured, residual_mm=residual_mm,
+    )  # fmt: skip
 
 
 @app.command()
