@@ -4,8 +4,11 @@ import json
 import re
 import shutil
 
+import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
+from kerfpath.job import read_job
 from test_cli import refused as assert_refused
 from test_cli import run
 from test_job_part import DEMO, WHOLE
@@ -168,6 +171,67 @@ def test_a_dry_run_is_written_beside_the_program(folder):
     assert "Trigg" not in text
     said = refused("post", out / "plan.json", "--dry-run", "20")
     assert "dry run: expected a share of the speed of at most 1, got 20" in said
+
+
+def with_points(folder, noise=0.0, shift=12.0):
+    """A table of points on the part, which stands `shift` mm and half a degree off."""
+    T = read_job(folder / "job.toml").placement.copy()
+    T[:3, :3] = Rotation.from_euler("xyz", [0.1, -0.2, 90.5], degrees=True).as_matrix()
+    T[0, 3] += shift / 1e3
+    nominal = np.array([[0, 0, 0], [600, 0, 0], [600, 150, 40], [0, 200, 10]])
+    measured = nominal @ T[:3, :3].T + T[:3, 3] * 1e3
+    measured[2] += [0, 0, noise]
+    sides = [f"{side}_{axis}_mm" for side in ("nominal", "measured") for axis in "xyz"]
+    rows = [",".join(str(v) for v in row) for row in np.hstack([nominal, measured])]
+    path = folder / "points.csv"
+    path.write_text("\n".join([",".join(sides), *rows]))
+    return path, T
+
+
+def test_the_program_of_a_measured_part_passes_the_audit_of_a_job_that_places_it_there(folder):
+    path, T = with_points(folder, noise=0.05)
+    moved = folder / "moved"
+    moved.mkdir()
+    command = ("post", folder / "out/plan.json", "--measured", path, "-o", moved)
+    result = run(*command, "--json")
+    assert result.returncode == 0, result.stderr
+    found = json.loads(result.stdout)
+    frame = found["measured"]
+    assert 0.005e-3 < max(frame["residuals_m"]) < 0.05e-3
+    np.testing.assert_allclose(frame["T_base_part"], T, atol=2e-4)  # 0.05 mm over 250 mm
+    assert "collisions are not checked there" in found["notes"][0]
+    assert "not proved clear" in found["notes"][1]
+    assert "have not been checked for collisions" in " ".join(found["notes"])
+    job = folder / "moved.toml"
+    job.write_text(
+        re.sub("rpy_deg = .*", f"rpy_deg = {frame['rpy_deg']}",
+               WHOLE.replace("[1200, -600, 500]", str(frame["xyz_mm"])), count=1)
+    )  # fmt: skip
+    result = run("audit", moved / "job.mod", "--job", job)
+    assert result.returncode == 0, result.stdout
+    said = run(*command).stdout
+    assert "residuals of 4 points: " in said
+    assert re.search(r"the part is 1[12]\.\d{3} mm and 0\.5\d+ deg from", said)
+    assert f"xyz_mm = {frame['xyz_mm']}, rpy_deg = {frame['rpy_deg']}" in said
+
+
+def test_a_measured_part_that_is_none_or_out_of_reach_gives_no_program(folder):
+    out = folder / "none.mod"
+    path, _ = with_points(folder, noise=3.0)
+    command = ("post", folder / "out/plan.json", "-o", out, "--measured", path)
+    assert "allowed are 0.5 mm" in refused(*command)
+    assert run(*command, "--residual-mm", "4").returncode == 0
+    out.unlink()
+    for shift, reason in (
+        (1200, "out of the robot's reach at this placement"),
+        (300, "fails its audit at the measured placement: error: excess over the joint limits"),
+        (-900, "fails its audit at the measured placement: error: joint acceleration"),
+    ):
+        with_points(folder, shift=shift)
+        result = run(*command)
+        assert result.returncode == 1
+        assert reason in result.stderr
+    assert not out.exists()
 
 
 def test_bad_arguments_are_refused(folder, written):

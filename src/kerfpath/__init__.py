@@ -19,6 +19,8 @@ if TYPE_CHECKING:
     from kerfpath.errors import InputError as InputError
     from kerfpath.errors import KerfpathError as KerfpathError
     from kerfpath.errors import NoFeasiblePath as NoFeasiblePath
+    from kerfpath.placement import placed as placed
+    from kerfpath.placement import placement_from_points as placement_from_points
     from kerfpath.planner import fastest_speed as fastest_speed
     from kerfpath.planner import plan as plan
     from kerfpath.planner import plan_in_pieces as plan_in_pieces
@@ -47,6 +49,8 @@ _HOME = {
     "audit": "auditor",
     "fastest_speed": "planner",
     "join": "contour",
+    "placed": "placement",
+    "placement_from_points": "placement",
     "plan": "planner",
     "plan_in_pieces": "planner",
     "refine": "refiner",

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from typing import Any, Literal
 
 import numpy as np
+from scipy.spatial.transform import Rotation
 
 from kerfpath._arrays import Array, Ints, as_pose, floats, freeze, integers, scalar
 from kerfpath.comfort import Comfort, measures
@@ -253,6 +254,18 @@ class Plan:
         if self.tilt.any():
             H = tilted(H, self.contour.along, self.tilt)
         return freeze(self.T_base_part @ H)
+
+    @property
+    def T_part_tip(self) -> Array:
+        """Tip poses in the part frame, (K, 4, 4) m: points of the contour, orientation of FK(q).
+
+        A placement of few printed decimals is not quite a rotation; these are.
+        """
+        T_base_tip = self.robot.forward(self.q) @ self.T_flange_tip
+        T = np.asarray(np.linalg.solve(self.T_base_part, T_base_tip), dtype=np.float64)
+        T[:, :3, :3] = Rotation.from_matrix(T[:, :3, :3]).as_matrix()
+        T[:, :3, 3], T[:, 3] = self.contour.points, (0.0, 0.0, 0.0, 1.0)
+        return freeze(T)
 
     @property
     def node_cost(self) -> Array | None:

@@ -10,7 +10,7 @@ from kerfpath.cad._part import Part
 from kerfpath.cad._units import GAP, require_unit
 from kerfpath.errors import InputError
 
-__all__ = ["read"]
+__all__ = ["content_of", "read"]
 
 
 def read(path: str | Path, unit: str | None = None, *, gap: float = GAP) -> Part:
@@ -36,7 +36,7 @@ def read(path: str | Path, unit: str | None = None, *, gap: float = GAP) -> Part
     path = Path(path)
     require_unit(unit)
     scalar(gap, "gap", unit="m", above=0.0)
-    content = _content(path)
+    content = content_of(path, _EXPECTED)
     reader = _READERS.get(path.suffix.lower())
     if reader is None:
         raise InputError(f"{path}: expected {_EXPECTED} by its suffix, got {path.suffix!r}")
@@ -45,16 +45,17 @@ def read(path: str | Path, unit: str | None = None, *, gap: float = GAP) -> Part
     return reader(path, content, unit, gap)
 
 
-def _content(path: Path) -> bytes:
+def content_of(path: Path, expected: str) -> bytes:
+    """Return the bytes of a file, or raise InputError that says what it is expected to be."""
     try:
         return path.read_bytes()
     except FileNotFoundError:
-        raise InputError(f"{path}: no such file; expected {_EXPECTED}") from None
+        raise InputError(f"{path}: no such file; expected {expected}") from None
     except IsADirectoryError:
-        raise InputError(f"{path}: is a directory; expected {_EXPECTED}") from None
+        raise InputError(f"{path}: is a directory; expected {expected}") from None
     except (OSError, ValueError) as error:
         why = getattr(error, "strerror", None) or str(error)
-        raise InputError(f"{path}: cannot be read ({why}); expected {_EXPECTED}") from None
+        raise InputError(f"{path}: cannot be read ({why}); expected {expected}") from None
 
 
 # Each reader is loaded when a file asks for it: OCCT alone takes over a second.

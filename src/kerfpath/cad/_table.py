@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import codecs
-import csv
 import re
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
@@ -13,6 +11,7 @@ from pathlib import Path
 import numpy as np
 
 from kerfpath._arrays import Array, freeze
+from kerfpath.cad._cells import Cells, cells_of
 from kerfpath.cad._part import Kind, Part, loop_of
 from kerfpath.cad._sample import Points
 from kerfpath.cad._units import LARGEST, MM, UNITS_MM
@@ -31,7 +30,6 @@ EXPECTED = (
     "x y z, then nx ny nz (outward normal), axis_x axis_y axis_z (tool axis) or qx qy qz qw (pose, "
     "its z the tool axis)"
 )
-COMMENTS = ("#", "%", "//")
 REPEATED = 1e-6
 """Points that follow each other closer than this, mm, are one: they leave no direction."""
 TURNED = float(np.radians(2.0))
@@ -44,13 +42,16 @@ UNIT_QUATERNION = 1e-2
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class _Rows:
-    """The cells of a table, the line each row stands in, and what the columns are."""
+    """The cells of a table, and what the columns are."""
 
     columns: tuple[str, ...]
     unit: str
-    lines: Sequence[int]
-    cells: Sequence[Sequence[str]]
-    has_decimal_comma: bool
+    table: Cells
+
+    @property
+    def lines(self) -> Sequence[int]:
+        """The line that each row stands in."""
+        return self.table.lines
 
 
 def read_table(path: Path, content: bytes, unit: str | None, gap: float) -> Part:
@@ -62,7 +63,7 @@ def read_table(path: Path, content: bytes, unit: str | None, gap: float) -> Part
         Anything wrong with a row (its line is named), columns that are not known, no unit known.
     """
     try:
-        rows = _rows(_text(content))
+        rows = _rows(cells_of(content, EXPECTED))
         if not (unit or rows.unit):
             raise InputError(
                 f"states no length unit; say it with unit= one of {', '.join(UNITS_MM)}, "
@@ -98,65 +99,30 @@ def read_table(path: Path, content: bytes, unit: str | None, gap: float) -> Part
     )
 
 
-def _text(content: bytes) -> str:
-    wide = content.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE))
-    try:
-        return content.decode("utf-16" if wide else "utf-8-sig")
-    except UnicodeDecodeError as error:
-        line = content.count(b"\n", 0, error.start) + 1
-        raise InputError(f"line {line}: expected text in UTF-8; save the table as UTF-8") from None
-
-
-def _rows(text: str) -> _Rows:
-    """Return the cells of a table, split by what its first line is split by."""
-    numbered = [
-        (number, line)
-        for number, line in enumerate(re.split(r"\r\n|\r|\n", text), start=1)
-        if line.strip() and not line.lstrip().startswith(COMMENTS)
-    ]
-    if not numbered:
-        raise InputError(f"holds no rows; expected columns {EXPECTED}")
-    delimiter = next((d for d in (";", "\t", ",") if d in numbered[0][1]), None)
-    has_decimal_comma = delimiter in (";", "\t")
-    lines = [number for number, _ in numbered]
-    if delimiter is None:
-        cells = [line.split() for _, line in numbered]
-    else:
-        try:
-            cells = [
-                [cell.strip() for cell in row]
-                for row in csv.reader((line for _, line in numbered), delimiter=delimiter)
-            ]
-        except csv.Error as error:
-            raise InputError(f"cannot be split into columns ({error})") from None
-        if len(cells) != len(lines):
-            raise InputError("a quoted cell runs over several lines; remove its quotes")
-    columns, unit = _header(cells[0], has_decimal_comma)
+def _rows(table: Cells) -> _Rows:
+    """Return the rows under their columns."""
+    columns, unit = _header(table)
     if columns:
-        cells, lines = cells[1:], lines[1:]
-    elif (count := len(cells[0])) in UNNAMED:
+        table = table.without_header()
+    elif (count := len(table.rows[0])) in UNNAMED:
         columns = UNNAMED[count]
     else:
         raise InputError(
-            f"line {lines[0]}: without a header expected 6 columns (x y z nx ny nz) or 7 (x y z "
-            f"qx qy qz qw), got {count}"
+            f"line {table.lines[0]}: without a header expected 6 columns (x y z nx ny nz) or 7 "
+            f"(x y z qx qy qz qw), got {count}"
         )
-    if not cells:
+    if not table.rows:
         raise InputError("holds a header but no rows of points")
-    for number, row in zip(lines, cells, strict=True):
-        if len(row) != len(columns):
-            raise InputError(f"line {number}: expected {len(columns)} columns, got {len(row)}")
-    return _Rows(
-        columns=columns, unit=unit, lines=lines, cells=cells, has_decimal_comma=has_decimal_comma
-    )
+    table.require_width(len(columns))
+    return _Rows(columns=columns, unit=unit, table=table)
 
 
-def _header(cells: Sequence[str], has_decimal_comma: bool) -> tuple[tuple[str, ...], str]:
-    """Return the names of the columns and their unit, nothing if the cells are numbers."""
-    if all(_is_number(cell, has_decimal_comma) for cell in cells):
+def _header(table: Cells) -> tuple[tuple[str, ...], str]:
+    """Return the names of the columns and their unit, nothing if the first row is numbers."""
+    if table.is_numbers(0):
         return (), ""
     columns, units = [], []
-    for cell in cells:
+    for cell in table.rows[0]:
         name = cell.lower().strip("\"' ")
         parts = re.fullmatch(r"([xyz])\s*[_\[( ]\s*([a-z]+)\s*[\])]?", name)
         columns.append(parts[1] if parts else name)
@@ -175,39 +141,17 @@ def _header(cells: Sequence[str], has_decimal_comma: bool) -> tuple[tuple[str, .
     return tuple(columns), units[0] if units else ""
 
 
-def _is_number(cell: str, has_decimal_comma: bool) -> bool:
-    try:
-        _number(cell, has_decimal_comma)
-    except ValueError:
-        return False
-    return True
-
-
-def _number(cell: str, has_decimal_comma: bool) -> float:
-    if has_decimal_comma and "," in cell:
-        if "." in cell:
-            raise ValueError(cell)
-        cell = cell.replace(",", ".")
-    if "_" in cell:  # which Python takes between digits
-        raise ValueError(cell)
-    return float(cell)
-
-
 def _numbers(rows: _Rows, mm: float) -> tuple[Array, Array]:
     """Return points (K, 3) mm and outward unit normals (K, 3)."""
     at = {name: k for k, name in enumerate(rows.columns)}
     axes = next(a for a in (AXIS, NORMAL, QUATERNION) if set(a) <= set(at))
     wanted = [at[name] for name in (*POSITION, *axes)]
-    values = np.empty((len(rows.cells), len(wanted)))
-    for k, (line, row) in enumerate(zip(rows.lines, rows.cells, strict=True)):
-        for j, column in enumerate(wanted):
-            where = f"line {line}, column {rows.columns[column]}"
-            try:
-                values[k, j] = _number(row[column], rows.has_decimal_comma)
-            except ValueError:
-                raise InputError(f"{where}: expected a number, got {row[column][:40]!r}") from None
-            if not np.isfinite(values[k, j]):
-                raise InputError(f"{where}: expected a finite number, got {row[column]!r}")
+    values = np.array(
+        [
+            [rows.table.number(k, column, rows.columns[column]) for column in wanted]
+            for k in range(len(rows.table.rows))
+        ]
+    )
     points, directions = values[:, :3] * mm, values[:, 3:]
     if (far := np.flatnonzero((np.abs(points) > LARGEST).any(axis=1))).size:
         raise InputError(
@@ -234,11 +178,11 @@ def _numbers(rows: _Rows, mm: float) -> tuple[Array, Array]:
 def _contours(rows: _Rows) -> Iterator[tuple[str, slice]]:
     """Yield each contour's name and rows."""
     if NAME not in rows.columns:
-        yield NAME, slice(len(rows.cells))
+        yield NAME, slice(len(rows.table.rows))
         return
     column = rows.columns.index(NAME)
     first, seen = 0, set()
-    for name, group in groupby(row[column] for row in rows.cells):
+    for name, group in groupby(row[column] for row in rows.table.rows):
         last = first + len(list(group))
         if not name or name in seen:
             what = f"rows of contour {name!r} stand apart" if name else "no name of a contour"

@@ -34,6 +34,9 @@ Out = Annotated[
     Path | None, typer.Option("--out", help="Folder for the files; made if it is not there.")
 ]
 JobArgument = Annotated[Path, typer.Argument(metavar="JOB.toml", help="The job file.")]
+Strict = Annotated[
+    bool, typer.Option("--strict", help="Refuse programs that would only be warned of.")
+]
 PlanFileArgument = Annotated[Path, typer.Argument(metavar="PLAN.json", help="A plan, as written.")]
 
 
@@ -87,6 +90,7 @@ def plan(
     draw_map: Annotated[
         bool, typer.Option("--map", help="Draw every pose by its clearance; needs a cell.")
     ] = False,
+    strict: Strict = False,
     as_json: Json = False,
 ) -> None:
     """Plan and audit every contour of a job; write plan, trajectory, report and program.
@@ -99,7 +103,7 @@ def plan(
     """
     from kerfpath.cli._plan import plan_job
 
-    plan_job(job, to or Path(f"{job.stem}-plan"), as_json=as_json, draw_map=draw_map)
+    plan_job(job, to or Path(f"{job.stem}-plan"), as_json=as_json, draw_map=draw_map, strict=strict)
 
 
 @app.command()
@@ -163,9 +167,7 @@ def post(
             help="File to write, or folder of a program of several files; default: print it.",
         ),
     ] = None,
-    strict: Annotated[
-        bool, typer.Option("--strict", help="Refuse what is only warned of otherwise.")
-    ] = False,
+    strict: Strict = False,
     dry_share: Annotated[
         float | None,
         typer.Option(
@@ -174,6 +176,15 @@ def post(
             help="Switch nothing, wait nowhere, and move at this share of the speed.",
         ),
     ] = None,
+    measured: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="POINTS.csv", help="Lead the plan to the part as measured, and audit it there."
+        ),
+    ] = None,
+    residual_mm: Annotated[
+        float, typer.Option(help="Most that a measured point may be off the fitted placement.")
+    ] = 0.5,
     as_json: Json = False,
 ) -> None:
     """Write the robot program of a plan, after auditing it again.
@@ -183,11 +194,20 @@ def post(
 
     Example: kerfpath post door/plan.json --language rapid -o door.mod
 
+    A table of measured points has columns nominal_x_mm, nominal_y_mm, nominal_z_mm (in the part)
+    and measured_x_mm, measured_y_mm, measured_z_mm (in the robot base), and three rows at least.
+    Collisions are not checked again at the measured placement: its cell is not known.
+
     Example: kerfpath post door/plan.json --dry-run 0.2 -o dry_door.mod
+
+    Example: kerfpath post door/plan.json --measured points.csv -o door.mod
     """
     from kerfpath.cli._post import write_post
 
-    write_post(plan_file, language, output, strict=strict, as_json=as_json, dry_share=dry_share)
+    write_post(
+        plan_file, language, output, strict=strict, as_json=as_json, dry_share=dry_share,
+        measured=measured, residual_mm=residual_mm,
+    )  # fmt: skip
 
 
 @app.command()

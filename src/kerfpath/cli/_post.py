@@ -3,11 +3,15 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
+import numpy as np
 from rich.markup import escape
 
-from kerfpath.cli._show import out, print_json
-from kerfpath.job import program_from_file
+from kerfpath.cad import read_measured
+from kerfpath.cli._show import errors, out, print_json
+from kerfpath.job import program_from_file, read_plan_file
+from kerfpath.placement import MeasuredFrame, placement_from_points
 from kerfpath.post import write_files, write_program
 
 __all__ = ["write_post"]
@@ -15,13 +19,19 @@ __all__ = ["write_post"]
 
 def write_post(
     plan_file: Path, language: str, output: Path | None, *, strict: bool, as_json: bool,
-    dry_share: float | None = None,
+    dry_share: float | None = None, measured: Path | None = None, residual_mm: float = 0.5,
 ) -> None:  # fmt: skip
     """Write the files of a plan's program to `output`; print them without one.
 
     One file is written as `output`; several, or one into a folder that is there, keep their names.
     """
-    files, warnings = program_from_file(plan_file, language, strict=strict, dry_share=dry_share)
+    frame = None
+    if measured is not None:
+        points = read_measured(measured)
+        frame = placement_from_points(*points, most_residual=residual_mm / 1000)
+    files, notes = program_from_file(
+        plan_file, language, strict=strict, dry_share=dry_share, frame=frame
+    )
     written: list[Path] = []
     if output is not None and (len(files) > 1 or output.is_dir()):
         written = write_files(output, files)
@@ -34,16 +44,45 @@ def write_post(
                 "language": language,
                 "files": [str(path) for path in written],
                 "texts": None if written else files,
-                "notes": warnings,
+                "measured": None if frame is None else _frame_entry(frame),
+                "notes": notes,
             }
         )
-    elif not written:
+        return
+    # A program that is printed has stdout for itself.
+    console = out if written else errors
+    if frame is not None:
+        for line in _in_words(frame, plan_file):
+            console.print(line)
+    if not written:
         for name, text in files.items():
             if len(files) > 1:
                 print(f"----- {name} -----")
             print(text, end="")
-    else:
-        for warning in warnings:
-            out.print(f"note: {escape(warning)}")
-        for path in written:
-            out.print(f"wrote {escape(str(path))}")
+    for note in notes if written or frame is not None else ():
+        console.print(f"note: {escape(note)}")
+    for path in written:
+        out.print(f"wrote {escape(str(path))}")
+
+
+def _in_words(frame: MeasuredFrame, plan_file: Path) -> list[str]:
+    """Return the residuals, how far the part is from where it was planned, and its frame."""
+    residuals = ", ".join(f"{r * 1e3:.3f}" for r in frame.residuals)
+    planned = read_plan_file(plan_file).plans[0].T_base_part
+    shift, turn = frame.moved_from(planned)
+    return [
+        f"residuals of {len(frame.residuals)} points: {residuals} mm",
+        f"the part is {shift * 1e3:.3f} mm and {np.degrees(turn):.4f} deg from where it was "
+        "planned",
+        f"as a job says it: xyz_mm = {escape(str(frame.xyz_mm))}, rpy_deg = "
+        f"{escape(str(frame.rpy_deg))}",
+    ]
+
+
+def _frame_entry(frame: MeasuredFrame) -> dict[str, Any]:
+    return {
+        "T_base_part": frame.T_base_part.tolist(),
+        "residuals_m": frame.residuals.tolist(),
+        "xyz_mm": frame.xyz_mm,
+        "rpy_deg": frame.rpy_deg,
+    }

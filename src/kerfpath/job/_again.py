@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -21,11 +22,21 @@ from kerfpath.job._planfile import PlanFile, read_plan_file
 from kerfpath.job._read import Job, ProgramOptions, audit_options, program_options, read_job
 from kerfpath.job._tables import AuditTable, ProgramTable
 from kerfpath.job._verdict import Audited
+from kerfpath.placement import MeasuredFrame, placed, placed_moves
 from kerfpath.plans import Plan
 from kerfpath.post import language as find_language
 
 __all__ = ["audit_file", "program_from_file"]
 
+LED_NOTE = (
+    "The joints are led to the measured part and audited there for path, limits, velocities and "
+    "accelerations; collisions are not checked there, as its cell is not known: simulate the "
+    "program in the cell before running it."
+)
+LED_MOVES_NOTE = (
+    "The moves between contours are straight joint motions between their new ends, and not proved "
+    "clear any more."
+)
 _M = TypeVar("_M", bound=BaseModel)
 _R = TypeVar("_R")
 
@@ -67,7 +78,12 @@ def audit_file(plan_file: Path, job_file: Path | None = None) -> Audited:
 
 
 def program_from_file(
-    plan_file: Path, language: str, *, strict: bool = False, dry_share: float | None = None
+    plan_file: Path,
+    language: str,
+    *,
+    strict: bool = False,
+    dry_share: float | None = None,
+    frame: MeasuredFrame | None = None,
 ) -> tuple[dict[str, str], list[str]]:
     """Return the files of a plan.json's program in a language, and its preflight's warnings.
 
@@ -79,13 +95,18 @@ def program_from_file(
         Refuse what is only warned of otherwise.
     dry_share : float, optional
         Make it a dry run at this share of the speed, see `kerfpath.post.dry_run`.
+    frame : MeasuredFrame, optional
+        Where the part really stands; the plans are led there and audited, but for collisions.
 
     Raises
     ------
     AuditFailed
         A contour has no plan, or its plan fails the audit, which is run again here.
+    NoFeasiblePath
+        The robot does not reach the measured part as planned.
     InputError
-        The file cannot be read, an unknown language, or a program that its preflight refuses.
+        The file cannot be read, an unknown language, a program that its preflight refuses, or moves
+        around obstacles that cannot be led to a measured part.
     """
     file = read_plan_file(plan_file)
     if file.missing:
@@ -95,15 +116,30 @@ def program_from_file(
             f"no program: {', '.join(file.failed)} failed the audit against the drawing when it "
             "was planned; mend the job and plan it again"
         )
+    options = _options(file, language)
+    notes = []
+    if frame is not None:
+        file = _led(file, frame, options.retract)
+        notes = [LED_NOTE, *([LED_MOVES_NOTE] if file.moves else [])]
     asked = _table(file, "audit", AuditTable, audit_options)
     for p in file.plans:
         for check in checks(p, **asked):
             if check.level == "error" and not check.ok:
+                there = "" if frame is None else " at the measured placement"
                 raise AuditFailed(
-                    f"no program: contour {p.name!r} fails its audit: {check.issue()}"
+                    f"no program: contour {p.name!r} fails its audit{there}: {check.issue()}"
                 )
-    options = _options(file, language)
-    return program_of(file.plans, options, file.moves, strict=strict, dry_share=dry_share)
+    files, warnings = program_of(
+        file.plans, options, file.moves, strict=strict, dry_share=dry_share
+    )
+    return files, notes + warnings
+
+
+def _led(file: PlanFile, frame: MeasuredFrame, retract: float) -> PlanFile:
+    """Return a plan.json with its plans and the moves between them led to a measured part."""
+    plans = tuple(placed(p, frame.T_base_part) for p in file.plans)
+    moves = placed_moves(file.moves, plans, retract)
+    return replace(file, plans=plans, moves=moves, in_cell=False)
 
 
 def _options(file: PlanFile, language: str) -> ProgramOptions:

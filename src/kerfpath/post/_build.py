@@ -7,9 +7,8 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
-from scipy.spatial.transform import Rotation
 
-from kerfpath._arrays import Array, freeze, scalar
+from kerfpath._arrays import Array, scalar
 from kerfpath.air import AirMove, backed_off
 from kerfpath.errors import InputError
 from kerfpath.plans import Plan
@@ -111,7 +110,8 @@ def build_program(
     sections = []
     for plan, section_name, way in zip(plans, names, ways, strict=True):
         q = plan.q[0] + np.vstack([np.zeros_like(plan.q[0]), np.cumsum(plan.increments, axis=0)])
-        T_part_tip = _tip_poses(plan, q)
+        _require_on_contour(plan)
+        T_part_tip = plan.T_part_tip
         T_out = T_part_tip[-1].copy()
         T_out[:3, 3] -= retract * T_out[:3, 2]
         slow: dict[str, Any] = {"speed": approach_speed, "duration": retract / approach_speed}
@@ -212,13 +212,11 @@ def _kinematics(robot: Robot) -> tuple[object, ...]:
     return robot.id, robot.kinematics, *robot.geometry.values(), *numbers.tolist()
 
 
-def _tip_poses(plan: Plan, q: Array) -> Array:
-    """Return tip poses (K, 4, 4) in the part frame: point of the contour, orientation of FK(q)."""
-    T = _inverse(plan.T_base_part) @ plan.robot.forward(q) @ plan.T_flange_tip
-    off = np.linalg.norm(T[:, :3, 3] - plan.contour.points, axis=1)
-    axes = plan.axes @ plan.T_base_part[:3, :3]
-    turned = np.linalg.norm(np.cross(T[:, :3, 2], axes), axis=1)
-    turned[(T[:, :3, 2] * axes).sum(axis=1) < 0] = 1.0
+def _require_on_contour(plan: Plan) -> None:
+    T = plan.robot.forward(plan.q) @ plan.T_flange_tip
+    off = np.linalg.norm(T[:, :3, 3] - plan.points, axis=1)
+    turned = np.linalg.norm(np.cross(T[:, :3, 2], plan.axes), axis=1)
+    turned[(T[:, :3, 2] * plan.axes).sum(axis=1) < 0] = 1.0
     k = int(np.argmax(np.maximum(off, turned)))
     if max(off[k], turned[k]) > PLAN_AND_CONTOUR:
         raise InputError(
@@ -226,14 +224,3 @@ def _tip_poses(plan: Plan, q: Array) -> Array:
             f"{off[k] * 1e3:.4f} mm and {np.degrees(np.arcsin(turned[k])):.4f} deg off the "
             "contour; the plan belongs to another contour, tool or placement"
         )
-    # A placement of few printed decimals is not quite a rotation; a quaternion can say only one.
-    T[:, :3, :3] = Rotation.from_matrix(T[:, :3, :3]).as_matrix()
-    T[:, :3, 3], T[:, 3] = plan.contour.points, (0.0, 0.0, 0.0, 1.0)
-    return freeze(T)
-
-
-def _inverse(T: Array) -> Array:
-    inverse = np.eye(4)
-    inverse[:3, :3] = T[:3, :3].T
-    inverse[:3, 3] = -T[:3, :3].T @ T[:3, 3]
-    return inverse

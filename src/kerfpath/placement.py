@@ -1,0 +1,181 @@
+"""The part where it really stands: the frame of measured points, and plans led to it."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import ArrayLike
+from scipy.spatial.transform import Rotation
+
+from kerfpath._arrays import Array, as_pose, floats, freeze, scalar
+from kerfpath.air import AirMove, air_move, backed_off
+from kerfpath.errors import InputError, NoFeasiblePath
+from kerfpath.plans import Plan, Proof, path_cost
+from kerfpath.robots import posture_name
+
+__all__ = ["MeasuredFrame", "placed", "placed_moves", "placement_from_points"]
+
+ON_A_LINE = 0.05
+"""Points whose spread across their best line is a smaller share of that along it tell no frame."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class MeasuredFrame:
+    """A placement of the part, fitted to measured points.
+
+    Parameters
+    ----------
+    T_base_part : (4, 4) m
+    residuals : (K,) m
+        How far each measured point is from where the placement puts it.
+    """
+
+    T_base_part: Array
+    residuals: Array
+
+    @property
+    def xyz_mm(self) -> list[float]:
+        """The part's position as a job says it, to 0.1 um."""
+        return [round(float(v), 4) + 0.0 for v in self.T_base_part[:3, 3] * 1e3]
+
+    @property
+    def rpy_deg(self) -> list[float]:
+        """Its roll, pitch and yaw as a job says them, to 1e-6 deg."""
+        angles = Rotation.from_matrix(self.T_base_part[:3, :3]).as_euler("xyz", degrees=True)
+        return [round(float(v), 6) + 0.0 for v in angles]
+
+    def moved_from(self, T_base_part: ArrayLike) -> tuple[float, float]:
+        """Return how far the part's origin is (m) from another placement, and how turned (rad)."""
+        other = as_pose(T_base_part, "T_base_part")
+        turned = Rotation.from_matrix(other[:3, :3].T @ self.T_base_part[:3, :3]).magnitude()
+        return float(np.linalg.norm(self.T_base_part[:3, 3] - other[:3, 3])), float(turned)
+
+
+def placement_from_points(
+    nominal: ArrayLike, measured: ArrayLike, *, most_residual: float = 5e-4
+) -> MeasuredFrame:
+    """Return the rigid placement that brings points of the part nearest to where they are measured.
+
+    Least squares by singular value decomposition (Kabsch, Acta Cryst. A32, 1976).
+
+    Parameters
+    ----------
+    nominal : (K, 3) m
+        Points in the part frame, at least three and not on a line.
+    measured : (K, 3) m
+        The same points in the robot base.
+    most_residual : float m
+        Largest distance that may be left at a point.
+
+    Raises
+    ------
+    InputError
+        Fewer points, points on a line, or a larger residual.
+    """
+    nominal = floats(nominal, "nominal", (None, 3))
+    measured = floats(measured, "measured", (len(nominal), 3))
+    most_residual = scalar(most_residual, "most_residual", unit="m", above=0.0)
+    if len(nominal) < 3:
+        raise InputError(f"measured frame: expected at least 3 points, got {len(nominal)}")
+    centre, middle = nominal.mean(axis=0), measured.mean(axis=0)
+    spread = np.linalg.svd(nominal - centre, compute_uv=False)
+    if spread[1] <= ON_A_LINE * spread[0]:
+        raise InputError(
+            "measured frame: the points lie on one line, or nearly, and leave the part free to "
+            "turn about it; measure one that stands away from it"
+        )
+    turned, _ = Rotation.align_vectors(measured - middle, nominal - centre)
+    T = np.eye(4)
+    T[:3, :3] = turned.as_matrix()
+    T[:3, 3] = middle - T[:3, :3] @ centre
+    residuals = np.linalg.norm(nominal @ T[:3, :3].T + T[:3, 3] - measured, axis=1)
+    worst = int(residuals.argmax())
+    if residuals[worst] > most_residual:
+        raise InputError(
+            f"measured frame: point {worst + 1} of {len(nominal)} is left "
+            f"{residuals[worst] * 1e3:.3f} mm off, allowed are {most_residual * 1e3:g} mm; check "
+            "its coordinates and the order of the points, or measure it again"
+        )
+    return MeasuredFrame(T_base_part=freeze(T), residuals=freeze(residuals))
+
+
+def placed(plan: Plan, T_base_part: ArrayLike) -> Plan:
+    """Return the plan with the part at another placement: same tool path on it, other joints.
+
+    At every node the tool keeps its pose in the part, so gamma too, and the joints their branch.
+    Times stay; whether the limits are kept there is for the audit to say.
+
+    Parameters
+    ----------
+    plan : Plan
+    T_base_part : (4, 4) m
+
+    Raises
+    ------
+    NoFeasiblePath
+        A node out of reach in its posture.
+    InputError
+        No pose, or a robot with an external axis.
+    """
+    T_base_part = as_pose(T_base_part, "T_base_part")
+    T_base_flange = T_base_part @ plan.T_part_tip @ np.linalg.inv(plan.T_flange_tip)
+    q = plan.robot.follow(T_base_flange, plan.q, plan.posture)
+    lost = np.flatnonzero(np.isnan(q).any(axis=1))
+    if lost.size:
+        k = int(lost[0])
+        raise NoFeasiblePath(
+            f"contour {plan.name!r}, node {k}: out of the robot's reach at this placement in "
+            f"posture {posture_name(int(plan.posture[k]))}; plan the job again with it",
+            proved=False,
+            node=k,
+        )
+    # Nearest turn at the first node, and no jump of a turn from the old joints after it.
+    q = plan.q + np.unwrap(q - plan.q, axis=0)
+    led = replace(
+        plan,
+        T_base_part=T_base_part,
+        q=q,
+        turn=np.ceil((q - np.pi) / (2 * np.pi)).astype(np.int64),
+        proof=Proof(optimal=False, statement=f"{plan.proof.statement}; led to another placement"),
+    )
+    s = plan.settings
+    cost = path_cost(led.increments, s.weights, s.metric, s.objective, led.node_cost)
+    return replace(led, cost=cost)
+
+
+def placed_moves(
+    moves: Sequence[AirMove], plans: Sequence[Plan], retract: float
+) -> tuple[AirMove, ...]:
+    """Return the straight moves between plans that were led to another placement, not `clear`.
+
+    Where a move begins or ends at a home position it stays there.
+
+    Parameters
+    ----------
+    moves : sequence of AirMove
+        Those of the old placement.
+    plans : sequence of Plan
+        At the new one, in the order of cutting.
+    retract : float m
+        How far the tool backs off before and after each contour.
+
+    Raises
+    ------
+    InputError
+        A move that goes around obstacles, or an end beyond the limits.
+    """
+    first = 0 if len(moves) < len(plans) else -1
+    led = []
+    for before, move in enumerate(moves, first):
+        if len(move.q) > 2:
+            raise InputError(
+                f"move {before - first + 1} of {len(moves)} between contours goes around obstacles,"
+                " and nobody knows its way at another placement; plan the job again with it"
+            )
+        after = before + 1
+        q0 = move.q[0] if before < 0 else backed_off(plans[before], "end", retract)
+        q1 = move.q[-1] if after == len(plans) else backed_off(plans[after], "start", retract)
+        led.append(air_move(plans[0].robot, q0, q1))
+    return tuple(led)
