@@ -35,7 +35,8 @@ GOLDEN = Path(__file__).parent / "data" / "golden_fanuc"
 MAIN, CONTOUR = "CUT_SKIN_OUTER.ls", "SKIN_OUTER.ls"
 FANUC = language("fanuc")
 ARMS = [name for name in robot_ids() if name.startswith("fanuc")]
-WIDE = {"lower": np.full(6, -30.0), "upper": np.full(6, 30.0)}
+REACH = np.array([6.0, 6.0, 6.0, 6.0, 6.0, 99.0])
+WIDE = {"lower": -REACH, "upper": REACH}
 
 MEASURED = """
       0   0   0    0 -90    0  N U T 0  0  0   965.000    0.000  965.000  -180   0    0
@@ -361,9 +362,7 @@ def test_preflight_finds_what_only_this_language_cannot_say(program, cell):
     assert codes(early, "error", "fanuc") == ["time-step"]
     same = FanucSettings(gas_output=1)
     assert codes(program, "error", "fanuc", same) == ["output"]
-    wide = replace(
-        program, robot=program.robot.with_limits(lower=np.full(6, -99.0), upper=[99] * 6)
-    )
+    wide = replace(program, robot=program.robot.with_limits(**WIDE))
     steps = [
         replace(step, q=step.q + 18 * np.pi * np.eye(6)[5]) if hasattr(step, "q") else step
         for step in program.sections[0].steps

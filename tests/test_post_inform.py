@@ -43,8 +43,8 @@ JOBS = ("CUT_SKIN_OUTER.JBI", "SKIN_OUTER_AIR.JBI", "SKIN_OUTER.JBI")
 MAIN, AIR, PATH = JOBS
 INFORM = language("inform")
 PULSES = [1341.4, 1341.4, -1203.7, 1000.0, 980.1, 622.2]
-IN_PULSES = InformSettings(gas_output=2, pulses_per_deg=PULSES)
-BY_TYPE = InformSettings(gas_output=2)
+IN_PULSES = InformSettings(laser_output=1, gas_output=2, pulses_per_deg=PULSES)
+BY_TYPE = InformSettings(laser_output=1, gas_output=2)
 ARMS = [name for name in robot_ids() if name.startswith("yaskawa")]
 
 
@@ -243,7 +243,8 @@ def test_the_robot_stops_at_micro_joints_which_is_said(cell):
 
 @pytest.mark.parametrize("turns", [-2, -1, 1, 2])
 def test_turns_are_said_by_pulses_and_up_to_360_deg_by_the_type(program, turns):
-    arm = program.robot.with_limits(lower=np.full(6, -20.0), upper=np.full(6, 20.0))
+    far = np.array([6.0, 6.0, 6.0, 6.0, 6.0, 20.0])
+    arm = program.robot.with_limits(lower=-far, upper=far)
     by = 2 * np.pi * turns * np.eye(6)[5]
     steps = [replace(s, q=s.q + by) if hasattr(s, "q") else s for s in program.sections[0].steps]
     turned = with_steps(replace(program, robot=arm), steps)
@@ -418,6 +419,7 @@ def test_pulses_are_six_numbers_that_are_not_zero(pulses):
     ("update", "code"),
     [
         ({"gas_output": None}, "output"),
+        ({"laser_output": None}, "output"),
         ({"gas_output": 1}, "output"),
         ({"fastest_mm_s": 110.0}, "speed"),
     ],
@@ -447,7 +449,7 @@ def test_preflight_refuses_a_reserved_name_and_warns_of_other_makers(program):
         (MAIN, "'TOOL 0 RZ", "' TOOL 0 RZ", "TOOL 0 is not told whole"),
         (MAIN, "DOUT OT#(1) OFF", "DOUT OT#(1) ON", "not expected here: 'DOUT OT#(1) ON'"),
         (MAIN, "DOUT OT#(1) OFF", "DOUT OT#(3) OFF", "switches the output 3; expected 1"),
-        (MAIN, "DOUT OT#(1) OFF\r\n", "", "the main job does not switch the laser off"),
+        (MAIN, "DOUT OT#(1) OFF\r\n", "", "expected every output that is named to be"),
         (MAIN, "CALL JOB:SKIN_OUTER\r\n", "CALL JOB:SKIN_OUTER_AIR\r\n", "is called twice"),
         (MAIN, "END\r\n", "END\r\nNOP", "nothing may follow END"),
         (MAIN, "END\r\n", "", "the job ends too early; END is missing"),

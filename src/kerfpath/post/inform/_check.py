@@ -25,7 +25,7 @@ WHOLE_TURN_DEG = 360.0
 
 def check(program: Program, settings: InformSettings) -> Iterator[ProgramIssue]:
     """Yield the issues that only this language has."""
-    if settings.laser_output == settings.gas_output:
+    if settings.laser_output is not None and settings.laser_output == settings.gas_output:
         said = f"laser and gas are both switched by OT#({settings.laser_output}); name two outputs"
         yield ProgramIssue("error", "output", said, "program")
     if settings.pulses_per_deg is None and any(isinstance(m, JointMove) for m in program.moves):

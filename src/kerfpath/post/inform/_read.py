@@ -144,8 +144,9 @@ class _Main(_Text):
             raise self.fault("the main job must have no positions")
         self.expect(*middle("main", settings)[1])
         self.read(_MAIN)
-        if "laser" not in self.outputs:
-            raise self.fault("the main job does not switch the laser off")
+        named = {"laser": settings.laser_output, "gas": settings.gas_output}
+        if self.outputs != [signal for signal, output in named.items() if output is not None]:
+            raise self.fault("expected every output that is named to be switched off once")
 
     def told(self, frame: str, number: str, word: str, value: str) -> None:
         if (f"{frame} {number}", word) in self.frames:

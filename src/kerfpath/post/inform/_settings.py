@@ -25,7 +25,7 @@ def _not_zero(values: list[float]) -> list[float]:
     return values
 
 
-_OUTPUT = setting("the number of an output, 1 to 4096", "5", ge=1, le=4096)
+Output = Annotated[int | None, setting("the number of an output, 1 to 4096", "5", ge=1, le=4096)]
 
 
 class InformSettings(Settings):
@@ -34,8 +34,8 @@ class InformSettings(Settings):
     lines_per_file: Annotated[
         int, setting("a whole number of lines from 100 to 9999", "2000", ge=100, le=9999)
     ] = 2000
-    laser_output: Annotated[int, _OUTPUT] = 1
-    gas_output: Annotated[int | None, _OUTPUT] = None
+    laser_output: Output = None
+    gas_output: Output = None
     user_frame: Annotated[int, setting("a user frame, 1 to 63", "2", ge=1, le=63)] = 1
     tool_number: Annotated[int, setting("a tool, 0 to 63", "2", ge=0, le=63)] = 0
     pulses_per_deg: Annotated[

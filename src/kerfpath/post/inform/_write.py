@@ -122,9 +122,8 @@ class Inform(Formatter):
         tool = np.linalg.inv(faceplate(program.robot)) @ program.T_flange_tip
         yield from _frame(f"UFRAME {settings.user_frame}", frame)
         yield from _frame(f"TOOL {settings.tool_number}", tool)
-        switched = (s.signal for m in program.moves for s in getattr(m, "switches", ()))
-        for signal in dict.fromkeys(["laser", *switched]):
-            yield f"DOUT OT#({self.output(signal)}) OFF"
+        outputs = (settings.laser_output, settings.gas_output)
+        yield from (f"DOUT OT#({output}) OFF" for output in outputs if output is not None)
         yield from (f"CALL JOB:{section.name}" for section in program.sections)
 
     def names(self) -> list[tuple[str, str]]:
