@@ -48,6 +48,7 @@ figures: .venv/run.stamp
 LOCK := $(BIN)/uv pip compile --quiet --universal --generate-hashes --no-header --no-annotate --python-version 3.11
 lock: .venv/tools.stamp
 	$(LOCK) requirements/build.in -o requirements/build.txt
+	$(LOCK) requirements/outside.in -o requirements/outside.txt
 	$(LOCK) --extra dev pyproject.toml -c requirements/build.txt -o requirements/dev.txt
 	$(LOCK) pyproject.toml -c requirements/dev.txt -o requirements/run.txt
 	$(LOCK) --extra bench pyproject.toml -c requirements/dev.txt -o requirements/bench.txt

@@ -449,4 +449,4 @@ def test_a_language_that_the_robot_does_not_speak_is_refused_before_planning(fol
     text = free(robot).replace('language = "none"', 'language = "rapid"')
     path = job(folder, text, "ur.toml")
     result = run("plan", path, cwd=folder)
-    refused(result, f"{path}:", "program.language", "for robots by ABB", 'language = "none"')
+    refused(result, f"{path}:", "program.language", "cannot yet say the axes", 'language = "none"')

@@ -301,3 +301,17 @@ def test_a_robot_without_limits_is_refused_until_they_are_given():
 def test_bad_input_is_refused(call, message):
     with pytest.raises(InputError, match=message):
         call()
+
+
+def test_limits_with_more_turns_than_can_be_told_apart_are_refused():
+    """Truncated in silence, they would lose solutions."""
+    arm = robot("abb_irb4600_60_205")
+    wide = np.full(6, 4 * np.pi - 1e-6)  # 4 turns each: 4096 combinations
+    q = np.array([0.3, 0.2, -0.1, 0.4, 0.5, 0.6])
+    none = np.zeros(6, bool)
+    found = arm.with_limits(lower=-wide, upper=wide, endless=none).inverse(arm.forward(q))
+    assert len(found) > 4096
+    with pytest.raises(InputError, match=r"15625 combinations of turns, at most 4096"):
+        arm.with_limits(lower=-wide - 1e-3, upper=wide + 1e-3, endless=none)
+    endless = arm.with_limits(lower=-wide - 1e-3, upper=wide + 1e-3, endless=np.arange(6) > 2)
+    assert len(endless.inverse(arm.forward(q)))

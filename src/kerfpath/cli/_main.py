@@ -34,6 +34,9 @@ Out = Annotated[
     Path | None, typer.Option("--out", help="Folder for the files; made if it is not there.")
 ]
 JobArgument = Annotated[Path, typer.Argument(metavar="JOB.toml", help="The job file.")]
+Strict = Annotated[
+    bool, typer.Option("--strict", help="Refuse programs that would only be warned of.")
+]
 PlanFileArgument = Annotated[Path, typer.Argument(metavar="PLAN.json", help="A plan, as written.")]
 
 
@@ -87,6 +90,7 @@ def plan(
     draw_map: Annotated[
         bool, typer.Option("--map", help="Draw every pose by its clearance; needs a cell.")
     ] = False,
+    strict: Strict = False,
     as_json: Json = False,
 ) -> None:
     """Plan and audit every contour of a job; write plan, trajectory, report and program.
@@ -99,7 +103,7 @@ def plan(
     """
     from kerfpath.cli._plan import plan_job
 
-    plan_job(job, to or Path(f"{job.stem}-plan"), as_json=as_json, draw_map=draw_map)
+    plan_job(job, to or Path(f"{job.stem}-plan"), as_json=as_json, draw_map=draw_map, strict=strict)
 
 
 @app.command()
@@ -163,9 +167,7 @@ def post(
             help="File to write, or folder of a program of several files; default: print it.",
         ),
     ] = None,
-    strict: Annotated[
-        bool, typer.Option("--strict", help="Refuse what is only warned of otherwise.")
-    ] = False,
+    strict: Strict = False,
     dry_share: Annotated[
         float | None,
         typer.Option(

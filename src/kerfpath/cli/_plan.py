@@ -28,7 +28,14 @@ from kerfpath.job import (
 __all__ = ["plan_job"]
 
 
-def plan_job(job_file: Path, folder: Path, *, as_json: bool, draw_map: bool = False) -> None:
+def plan_job(
+    job_file: Path,
+    folder: Path,
+    *,
+    as_json: bool,
+    draw_map: bool = False,
+    strict: bool = False,
+) -> None:
     """Plan a job, write its files into a folder and say what came of it.
 
     Raises
@@ -49,7 +56,7 @@ def plan_job(job_file: Path, folder: Path, *, as_json: bool, draw_map: bool = Fa
     with progress_bars() as progress:
         outcome = run_job(job, part, progress=progress)
     with busy("writing"):
-        written = write_outcome(outcome, folder)
+        written = write_outcome(outcome, folder, strict=strict)
     if as_json:
         print_json(
             {

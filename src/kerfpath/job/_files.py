@@ -62,7 +62,7 @@ class Written:
     notes: tuple[str, ...]
 
 
-def write_outcome(outcome: Outcome, folder: Path) -> Written:
+def write_outcome(outcome: Outcome, folder: Path, *, strict: bool = False) -> Written:
     """Write the files of a run into `folder`; the program only if every audit has passed.
 
     Raises
@@ -81,7 +81,7 @@ def write_outcome(outcome: Outcome, folder: Path) -> Written:
     notes += [f"The moves between contours: {c.issue()}" for c in outcome.air if not c.ok]
     if outcome.passed and job.program.language != "none":
         try:
-            program, warnings = program_of(outcome.plans, job.program, moves)
+            program, warnings = program_of(outcome.plans, job.program, moves, strict=strict)
             texts |= program
             notes += warnings
         except InputError as error:

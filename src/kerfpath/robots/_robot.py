@@ -16,6 +16,7 @@ from kerfpath.kernels import turns
 from kerfpath.robots._coupling import Coupling
 from kerfpath.robots._external import ExternalAxis, Travel, alone, carried, held
 from kerfpath.robots._families import FAMILIES, Family
+from kerfpath.robots._limits import require_limits
 from kerfpath.robots._solutions import Solutions, admitted, every
 from kerfpath.urdf import Body, Chain, read_urdf
 
@@ -121,22 +122,8 @@ class Robot:
         for name in ("velocity", "acceleration"):
             if getattr(self, name) is not None:
                 _set(self, name, positive(getattr(self, name), name, (n,)))
-        self._require_limits_in_order()
-
-    def _require_limits_in_order(self) -> None:
-        if self.lower is None or self.upper is None:
-            return
-        n = self.family.joints
-        if self.external is not None:
-            self.external.require_range(float(self.lower[n]), float(self.upper[n]))
-        reversed_ = np.flatnonzero(~(self.lower[:n] < self.upper[:n]))
-        if reversed_.size:
-            i = int(reversed_[0])
-            raise InputError(
-                f"robot {self.id!r}: limits of joint {i + 1} are reversed, lower "
-                f"{np.degrees(self.lower[i]):g} deg is not below upper "
-                f"{np.degrees(self.upper[i]):g} deg"
-            )
+        if self.lower is not None and self.upper is not None:
+            require_limits(self)
 
     @property
     def family(self) -> Family:
