@@ -5,11 +5,17 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-import numpy as np
-
 from kerfpath.job._program_read import language_of, program_on_disk
-from kerfpath.job._read import Job, read_job
-from kerfpath.post import Difference, ReadMove, ReadProgram, ReadStep, differences, not_compared
+from kerfpath.job._read import read_job
+from kerfpath.post import (
+    Difference,
+    ReadMove,
+    ReadProgram,
+    Rules,
+    differences,
+    not_compared,
+    with_tips,
+)
 
 __all__ = ["Compared", "compare_programs"]
 
@@ -48,38 +54,28 @@ def compare_programs(a: Path, b: Path, job_file: Path) -> Compared:
     job = read_job(job_file)
     (one, settings), (two, other) = language_of(a, job), language_of(b, job)
     reads = [
-        program_on_disk(path, chosen, of, job.robot)
+        with_tips(program_on_disk(path, chosen, of, job.robot), job.robot, job.tool, job.placement)
         for path, chosen, of in ((a, one, settings), (b, two, other))
     ]
-    alike = one.name == two.name
-    rules = () if alike else (one.rules(settings), two.rules(other))
-    first, second = (_comparable(read, job, postures=alike) for read in reads)
-    left = not_compared(first, second)
-    if not alike and any(move.posture for read in reads for move in read.moves):
-        left.append("postures")
-    return Compared(
-        differences=tuple(differences(first, second, rules=rules)), not_compared=tuple(left)
-    )
+    rules: tuple[Rules, ...] = ()
+    said = any(move.posture for read in reads for move in read.moves)
+    if one.name != two.name:  # its words of posture mean something else there
+        rules = (one.rules(settings), two.rules(other))
+        reads = [_without_postures(read) for read in reads]
+    found, left = differences(*reads, rules=rules), not_compared(*reads)
+    left += ["postures"] if said and rules else []
+    return Compared(differences=tuple(found), not_compared=tuple(left))
 
 
-def _comparable(read: ReadProgram, job: Job, *, postures: bool) -> ReadProgram:
-    """Return a program with the tip of every target along its paths, its words of posture or not.
-
-    Those of another language mean something else.
-    """
-    tool = job.tool if read.T_flange_tip is None else read.T_flange_tip
-    part = job.placement if read.T_base_part is None else read.T_base_part
-
-    def changed(step: ReadStep) -> ReadStep:
-        if not isinstance(step, ReadMove):
-            return step
-        T = step.T_part_tip
-        if T is None and step.q is not None and step.kind != "joint":
-            T = np.asarray(np.linalg.solve(part, job.robot.forward(step.q) @ tool), dtype=float)
-        return replace(step, T_part_tip=T, posture=step.posture if postures else ())
-
-    sections = (
-        replace(section, steps=tuple(changed(step) for step in section.steps))
+def _without_postures(read: ReadProgram) -> ReadProgram:
+    sections = [
+        replace(
+            section,
+            steps=tuple(
+                replace(step, posture=()) if isinstance(step, ReadMove) else step
+                for step in section.steps
+            ),
+        )
         for section in read.sections
-    )
+    ]
     return replace(read, sections=tuple(sections))

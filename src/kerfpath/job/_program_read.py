@@ -22,6 +22,7 @@ from kerfpath.post import (
     groups_of,
     languages,
     read_program,
+    with_tips,
 )
 from kerfpath.robots import Robot
 
@@ -143,7 +144,7 @@ def cuts_of(
     InputError
         Moves in an order that makes no cut: where.
     """
-    groups = groups_of(read)
+    groups = groups_of(with_tips(read, robot, T_flange_tip, T_base_part))
     home = np.zeros((0, robot.joints))
     if groups and not groups[-1].path:
         home = np.array([move.q for move in groups.pop().joint])
@@ -162,7 +163,6 @@ def cuts_of(
 
 def _cut(group: ReadGroup, robot: Robot, T_flange_tip: Array, T_base_part: Array) -> ReadCut:
     """Return the cut of a group; an arc gets nodes of its own along it."""
-    T_part_base = np.linalg.inv(T_base_part)
     T: list[Array] = []
     took: list[float] = []
     moves: list[ReadMove] = []
@@ -170,9 +170,7 @@ def _cut(group: ReadGroup, robot: Robot, T_flange_tip: Array, T_base_part: Array
     laser = False
     for move in group.path:
         end = move.T_part_tip
-        if end is None:
-            assert move.q is not None
-            end = T_part_base @ robot.forward(move.q) @ T_flange_tip
+        assert end is not None
         stops = [end]
         if T and move.kind == "circular" and move.T_part_via is not None:
             stops = _arc(T[-1], move.T_part_via, end)

@@ -34,6 +34,7 @@ from kerfpath.post._read import ReadProgram as ReadProgram
 from kerfpath.post._read import ReadSection as ReadSection
 from kerfpath.post._read import ReadStep as ReadStep
 from kerfpath.post._read import ReadWait as ReadWait
+from kerfpath.post._read import with_tips as with_tips
 from kerfpath.post._settings import Rules as Rules
 from kerfpath.post._settings import Settings as Settings
 from kerfpath.post._settings import setting as setting

@@ -69,9 +69,15 @@ def differences(a: ReadProgram, b: ReadProgram, *, rules: Sequence[Rules] = ()) 
     Parameters
     ----------
     a, b : ReadProgram
-        In the same language, or in two whose words of posture have been left out.
+        In the same language, or in two whose words of posture have been left out. One that says
+        joints alone `with_tips`.
     rules : sequence of Rules
         Of languages whose digits may make a difference; none where both texts are in the same one.
+
+    Raises
+    ------
+    InputError
+        A path in joints alone.
     """
     steps = [(r.point_step, r.angle_step, r.speed_step) for r in rules] or [(0.0, 0.0, 0.0)]
     point, angle, speed = np.sum(steps, axis=0).tolist()
@@ -172,7 +178,7 @@ def _targets(both: Both, digits: _Digits) -> Iterator[Difference]:
     if moved.size:
         a, b, _, _ = posed[moved[np.lexsort((turned[moved], off[moved]))[-1]]]
         message = (
-            f"{_count(len(moved), 'target')} moved, at most by {off[moved].max() * 1e3:.4f} mm "
+            f"{len(moved)} moved, at most by {off[moved].max() * 1e3:.4f} mm "
             f"and {np.degrees(turned[moved].max()):.4f} deg"
         )
         yield _found("targets", len(moved), message, a, b)
@@ -187,8 +193,7 @@ def _joints(both: Both, digits: _Digits) -> Iterator[Difference]:
     moved = np.flatnonzero(off > digits.angle)
     if moved.size:
         worst = int(moved[np.argmax(off[moved])])
-        many = _count(len(moved), "target")
-        message = f"{many} moved, at most by {np.degrees(off[worst]):.4f} deg"
+        message = f"{len(moved)} moved, at most by {np.degrees(off[worst]):.4f} deg"
         yield _found("joints", len(moved), message, *said[worst])
 
 

@@ -11,6 +11,7 @@ from scipy.optimize import linear_sum_assignment
 from scipy.spatial import cKDTree
 
 from kerfpath._arrays import Array, Ints
+from kerfpath.errors import InputError
 from kerfpath.post._groups import ReadGroup
 from kerfpath.post._read import ReadMove
 
@@ -72,18 +73,18 @@ def _apart(one: Array | None, two: Array | None) -> float:
 def _trace(group: ReadGroup) -> Array | None:
     """Return points (SAMPLES, 3) along the path of a contour; None behind the last."""
     points = _points(group.path)
-    if points is None or not len(points):
+    if not len(points):
         return None
     way = np.append(0.0, np.cumsum(np.linalg.norm(np.diff(points, axis=0), axis=1)))
     at = np.linspace(0, way[-1], SAMPLES)
     return np.stack([np.interp(at, way, x) for x in points.T], axis=1)
 
 
-def _points(moves: Sequence[ReadMove]) -> Array | None:
-    """Return the ends (K, 3) m of moves in the part; None where one is not said."""
+def _points(moves: Sequence[ReadMove]) -> Array:
+    """Return the ends (K, 3) m of moves in the part."""
     ends = [move.T_part_tip for move in moves if move.T_part_tip is not None]
     if len(ends) < len(moves):
-        return None
+        raise InputError("a program says joints alone along its path; give it with_tips first")
     return np.array(ends).reshape(-1, 4, 4)[:, :3, 3]
 
 
@@ -127,8 +128,8 @@ def _stops(moves: Sequence[ReadMove], waits: Sequence[tuple[int, float]]) -> lis
 def _keys(a: Sequence[ReadMove], b: Sequence[ReadMove], near: float) -> tuple[Ints, Ints]:
     """Return a number for each place that moves of a path end at."""
     one, two = _points(a), _points(b)
-    if one is None or two is None or not len(one):
-        return np.arange(len(a)), np.arange(len(b))
+    if not len(one):
+        return np.zeros(0, np.int64), -1 - np.arange(len(two))
     tree = cKDTree(one)
     first = np.arange(len(one))
     for i, j in sorted(tree.query_pairs(near)):
