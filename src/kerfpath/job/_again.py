@@ -215,8 +215,8 @@ def _require_same(plan: Plan, job: Job, path: Path) -> None:
     for name, (here, there) in pairs.items():
         if np.abs(here - there).max() > SAME_PLACE:
             raise InputError(
-                f"{job.path}: its {name} is not where that of {path} is; give the job of that plan, "
-                "or plan it again"
+                f"{job.path}: its {name} is not where that of {path} is; give the job of that "
+                "plan, or plan it again"
             )
 
 
