@@ -173,6 +173,45 @@ def test_a_dry_run_is_written_beside_the_program(folder):
     assert "dry run: expected a share of the speed of at most 1, got 20" in said
 
 
+def compared(folder, text, name="edited.mod"):
+    (folder / name).write_text(text)
+    result = run("compare", folder / "out/job.mod", folder / name, "--job", folder / "job.toml",
+                 "--json")  # fmt: skip
+    found = json.loads(result.stdout)
+    assert result.returncode == (0 if found["same"] else 1)
+    return {each["code"]: each for each in found["differences"]}
+
+
+def test_an_edited_program_is_compared_in_words(folder, written):
+    assert compared(folder, written) == {}
+    k, lines = nth(written, r"^    MoveL \[\[", 20)
+    x = re.search(r"MoveL \[\[(-?[\d.]+),", lines[k])
+    lines[k] = lines[k].replace(f"[[{x[1]},", f"[[{float(x[1]) + 0.4:.4f},", 1)
+    lines = [line.replace("WaitTime 0.250;", "WaitTime 0.100;") for line in lines]
+    found = compared(folder, "\n".join(lines))
+    assert set(found) == {"targets", "waits"}
+    assert found["targets"]["message"].startswith("1 moved, at most by 0.4000 mm")
+    assert found["targets"]["places"][1].endswith(f"line {k + 1}")
+    assert found["waits"]["count"] == 3
+    result = run("compare", folder / "out/job.mod", folder / "edited.mod", "--job",
+                 folder / "job.toml")  # fmt: skip
+    assert "targets: 1 moved, at most by 0.4000 mm" in result.stdout
+    assert result.stdout.endswith("not the same\n")
+
+
+def test_a_program_in_another_language_is_the_same(folder):
+    other = folder / "other"
+    assert run("post", folder / "out/plan.json", "--language", "csv", "-o", other).returncode == 0
+    (folder / "other.csv").write_bytes(other.read_bytes())
+    result = run("compare", folder / "out/job.mod", folder / "other.csv", "--job",
+                 folder / "job.toml")  # fmt: skip
+    assert result.returncode == 0, result.stdout
+    assert "note: not compared: times, the tool, the part frame, postures" in result.stdout
+    assert "the same in what was compared" in result.stdout
+    assert "no such file" in refused("compare", folder / "out/job.mod", folder / "none.mod",
+                                     "--job", folder / "job.toml")  # fmt: skip
+
+
 def with_points(folder, noise=0.0, shift=12.0):
     """A table of points on the part, which stands `shift` mm and half a degree off."""
     T = read_job(folder / "job.toml").placement.copy()

@@ -247,6 +247,26 @@ def audit(
 
 
 @app.command()
+def compare(
+    a: Annotated[Path, typer.Argument(metavar="A", help="A program of ours.")],
+    b: Annotated[Path, typer.Argument(metavar="B", help="Another, or the same edited.")],
+    job: Annotated[Path, typer.Option(metavar="JOB.toml", help="The job that they were made for.")],
+    as_json: Json = False,
+) -> None:
+    """Say in words what differs between two programs, in the same language or in two.
+
+    Contours are told apart by their paths, targets by their places; of each kind of difference the
+    count and the largest is told, with file and line. Exit code 0: the same, 1: not.
+
+    Example: kerfpath compare door/door.mod edited.mod --job door.toml
+    """
+    from kerfpath.cli._compare import show_differences
+
+    if not show_differences(a, b, job, as_json=as_json):
+        raise typer.Exit(1)
+
+
+@app.command()
 def contours(
     file: Annotated[
         Path, typer.Argument(metavar="FILE", help="STEP, IGES, DXF, or a table of points (CSV).")

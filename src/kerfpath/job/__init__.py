@@ -15,6 +15,8 @@ from kerfpath.job._files import write_outcome as write_outcome
 from kerfpath.job._planfile import PlanFile as PlanFile
 from kerfpath.job._planfile import read_plan_file as read_plan_file
 from kerfpath.job._program_audit import audit_program as audit_program
+from kerfpath.job._program_compare import Compared as Compared
+from kerfpath.job._program_compare import compare_programs as compare_programs
 from kerfpath.job._read import Job as Job
 from kerfpath.job._read import ProgramOptions as ProgramOptions
 from kerfpath.job._read import program_options as program_options

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -15,13 +15,14 @@ from kerfpath.job._read import Job
 from kerfpath.job._tables import ProgramTable
 from kerfpath.post import (
     Language,
+    ReadGroup,
     ReadMove,
     ReadProgram,
-    ReadStep,
-    ReadWait,
     Settings,
+    groups_of,
     languages,
     read_program,
+    with_tips,
 )
 from kerfpath.robots import Robot
 
@@ -133,16 +134,6 @@ class ReadCut:
     moves: tuple[ReadMove, ...]
 
 
-@dataclass(slots=True)
-class _Group:
-    """Joint moves, and the moves of the path behind them."""
-
-    name: str = ""
-    joint: list[ReadMove] = field(default_factory=list)
-    path: list[ReadMove] = field(default_factory=list)
-    waits: list[tuple[int, float]] = field(default_factory=list)
-
-
 def cuts_of(
     read: ReadProgram, robot: Robot, T_flange_tip: Array, T_base_part: Array
 ) -> tuple[list[ReadCut], Array]:
@@ -153,7 +144,7 @@ def cuts_of(
     InputError
         Moves in an order that makes no cut: where.
     """
-    groups = _groups(read)
+    groups = groups_of(with_tips(read, robot, T_flange_tip, T_base_part))
     home = np.zeros((0, robot.joints))
     if groups and not groups[-1].path:
         home = np.array([move.q for move in groups.pop().joint])
@@ -170,31 +161,8 @@ def cuts_of(
     return cuts, home
 
 
-def _groups(read: ReadProgram) -> list[_Group]:
-    groups: list[_Group] = []
-    for section in read.sections:
-        for step in section.steps:
-            joint = isinstance(step, ReadMove) and step.kind == "joint"
-            if not groups or (joint and groups[-1].path):
-                groups.append(_Group())
-            if not groups[-1].path:
-                groups[-1].name = section.name
-            _add(groups[-1], step)
-    return groups
-
-
-def _add(group: _Group, step: ReadStep) -> None:
-    if isinstance(step, ReadWait):
-        group.waits.append((len(group.path), step.time))
-    elif step.kind == "joint":
-        group.joint.append(step)
-    else:
-        group.path.append(step)
-
-
-def _cut(group: _Group, robot: Robot, T_flange_tip: Array, T_base_part: Array) -> ReadCut:
+def _cut(group: ReadGroup, robot: Robot, T_flange_tip: Array, T_base_part: Array) -> ReadCut:
     """Return the cut of a group; an arc gets nodes of its own along it."""
-    T_part_base = np.linalg.inv(T_base_part)
     T: list[Array] = []
     took: list[float] = []
     moves: list[ReadMove] = []
@@ -202,9 +170,7 @@ def _cut(group: _Group, robot: Robot, T_flange_tip: Array, T_base_part: Array) -
     laser = False
     for move in group.path:
         end = move.T_part_tip
-        if end is None:
-            assert move.q is not None
-            end = T_part_base @ robot.forward(move.q) @ T_flange_tip
+        assert end is not None
         stops = [end]
         if T and move.kind == "circular" and move.T_part_via is not None:
             stops = _arc(T[-1], move.T_part_via, end)

@@ -3,10 +3,15 @@
 from kerfpath.post._arcs import with_arcs as with_arcs
 from kerfpath.post._build import build_program as build_program
 from kerfpath.post._compare import deviations as deviations
+from kerfpath.post._differences import Difference as Difference
+from kerfpath.post._differences import differences as differences
+from kerfpath.post._differences import not_compared as not_compared
 from kerfpath.post._divide import divided as divided
 from kerfpath.post._divide import in_files as in_files
 from kerfpath.post._dry_run import dry_run as dry_run
 from kerfpath.post._formatter import Formatter as Formatter
+from kerfpath.post._groups import ReadGroup as ReadGroup
+from kerfpath.post._groups import groups_of as groups_of
 from kerfpath.post._issue import ProgramIssue as ProgramIssue
 from kerfpath.post._languages import ENTRY_POINTS as ENTRY_POINTS
 from kerfpath.post._languages import Language as Language
@@ -29,6 +34,7 @@ from kerfpath.post._read import ReadProgram as ReadProgram
 from kerfpath.post._read import ReadSection as ReadSection
 from kerfpath.post._read import ReadStep as ReadStep
 from kerfpath.post._read import ReadWait as ReadWait
+from kerfpath.post._read import with_tips as with_tips
 from kerfpath.post._settings import Rules as Rules
 from kerfpath.post._settings import Settings as Settings
 from kerfpath.post._settings import setting as setting

@@ -15,7 +15,7 @@ from kerfpath.post._program import CircularMove, Comment, JointMove, LinearMove,
 from kerfpath.post._read import ReadMove, ReadProgram, ReadWait
 from kerfpath.post._settings import Rules, Settings
 
-__all__ = ["deviations"]
+__all__ = ["deviations", "events"]
 
 POINT = 1e-6
 """How far (m) a target that is read back may be from the one written, beyond its digits."""
@@ -169,11 +169,12 @@ def _motion(pairs: list[tuple[Move, ReadMove]], rules: Rules) -> Iterator[Progra
         if not same or any(
             abs(s.lead_time - b.lead_time) > LEAD for s, b in zip(ours, back.switches, strict=True)
         ):
-            said = f"switches {_events(back.switches)}, expected {_events(ours)}"
+            said = f"switches {events(back.switches)}, expected {events(ours)}"
             yield _issue(back, said)
 
 
-def _events(switches: Any) -> str:
+def events(switches: Any) -> str:
+    """Return switches in words."""
     words = [f"{s.signal} {'on' if s.on else 'off'} {s.lead_time:g} s ahead" for s in switches]
     return " and ".join(words) or "nothing"
 

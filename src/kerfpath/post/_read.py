@@ -3,16 +3,19 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, Literal, Protocol
 
-from kerfpath._arrays import Array
+import numpy as np
+
+from kerfpath._arrays import Array, freeze
 from kerfpath.errors import InputError
 from kerfpath.post._program import Switch
 from kerfpath.robots import Robot
 
 __all__ = [
     "ReadMove", "ReadProgram", "ReadSection", "ReadStep", "ReadWait", "Reader", "same_output",
+    "with_tips",
 ]  # fmt: skip
 
 
@@ -117,6 +120,36 @@ class ReadProgram:
     def moves(self) -> tuple[ReadMove, ...]:
         """All moves in order, over all sections."""
         return tuple(move for section in self.sections for move in section.moves)
+
+
+def with_tips(
+    read: ReadProgram, robot: Robot, T_flange_tip: Array, T_base_part: Array
+) -> ReadProgram:
+    """Return the program with the tip poses of its path also where it says joints alone.
+
+    Parameters
+    ----------
+    read : ReadProgram
+    robot : Robot
+    T_flange_tip, T_base_part : (4, 4) m
+        Tool and work object, where the program does not say them.
+    """
+    tool = T_flange_tip if read.T_flange_tip is None else read.T_flange_tip
+    part = T_base_part if read.T_base_part is None else read.T_base_part
+
+    def filled(step: ReadStep) -> ReadStep:
+        if not isinstance(step, ReadMove) or step.kind == "joint" or step.T_part_tip is not None:
+            return step
+        if step.q is None:
+            raise InputError(f"{step.place}: neither a pose nor joints are said for the target")
+        T = np.linalg.solve(part, robot.forward(step.q) @ tool)
+        return replace(step, T_part_tip=freeze(np.asarray(T, dtype=np.float64)))
+
+    sections = [
+        replace(section, steps=tuple(filled(step) for step in section.steps))
+        for section in read.sections
+    ]
+    return replace(read, sections=tuple(sections))
 
 
 class Reader(Protocol):

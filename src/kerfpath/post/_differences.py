@@ -1,0 +1,269 @@
+"""What differs between two programs that were read, in few words."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from kerfpath._arrays import Array
+from kerfpath.post._compare import ANGLE, FRAME, LEAD, POINT, SHARE, events
+from kerfpath.post._groups import ReadGroup, groups_of
+from kerfpath.post._matching import Pair, Stop, matched, pairs_of
+from kerfpath.post._read import ReadMove, ReadProgram
+from kerfpath.post._settings import Rules
+
+__all__ = ["Difference", "differences", "not_compared"]
+
+Both = Sequence[tuple[Stop, Stop]]
+"""Moves that both programs have."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Difference:
+    """One kind of difference between programs A and B.
+
+    Parameters
+    ----------
+    code : str
+        frames, added, removed, order, targets, joints, kinds, speeds, times, zones, switches,
+        waits or postures.
+    count : int
+        How many contours or moves it is found at.
+    message : str
+        How much it is at most.
+    places : tuple of str
+        File and line of the largest in A and in B, as far as it has one there.
+    """
+
+    code: str
+    count: int
+    message: str
+    places: tuple[str, ...] = ()
+
+    def __str__(self) -> str:
+        at = f", at {' / '.join(self.places)}" if self.places else ""
+        return f"{self.code}: {self.message}{at}"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _Digits:
+    """How far (m, rad, sine, m/s, s) what two texts say may be apart for their digits."""
+
+    point: float
+    angle: float
+    frame: float
+    speed: float
+    lead: float
+
+
+def differences(a: ReadProgram, b: ReadProgram, *, rules: Sequence[Rules] = ()) -> list[Difference]:
+    """Return what differs between two programs for the same robot, at most one of each kind.
+
+    Contours are told apart by their paths, and the targets along them by their places, so that one
+    that is added or left out moves no other. Names of routines and comments are not compared, nor
+    what only one of the two says, see `not_compared`.
+
+    Parameters
+    ----------
+    a, b : ReadProgram
+        In the same language, or in two whose words of posture have been left out. One that says
+        joints alone `with_tips`.
+    rules : sequence of Rules
+        Of languages whose digits may make a difference; none where both texts are in the same one.
+
+    Raises
+    ------
+    InputError
+        A path in joints alone.
+    """
+    steps = [(r.point_step, r.angle_step, r.speed_step) for r in rules] or [(0.0, 0.0, 0.0)]
+    point, angle, speed = np.sum(steps, axis=0).tolist()
+    digits = _Digits(
+        point=POINT + point,
+        angle=ANGLE + angle,
+        frame=FRAME + point + angle,
+        speed=1e-9 + 0.51 * speed,
+        lead=LEAD * len(steps),
+    )
+    found = list(_frames(a, b, digits))
+    one, two = groups_of(a), groups_of(b)
+    same = matched(one, two)
+    found += _contours(one, {i for i, _ in same}, "removed", "left out in B")
+    found += _contours(two, {j for _, j in same}, "added", "only in B")
+    found += _order(two, [j for _, j in same])
+    pairs = [pair for i, j in same for pair in pairs_of(one[i], two[j], digits.point)]
+    both = [(pair.a, pair.b) for pair in pairs if pair.a is not None and pair.b is not None]
+    found += _alone(pairs)
+    found += _targets(both, digits)
+    found += _joints(both, digits)
+    found += _said(both, digits)
+    return found
+
+
+def not_compared(a: ReadProgram, b: ReadProgram) -> list[str]:
+    """Return what only one of two programs says, so that it cannot be compared."""
+    said = []
+    for attribute, words in (
+        ("speed", "speeds"), ("duration", "times"), ("zone", "zones"), ("posture", "postures"),
+    ):  # fmt: skip
+        has = [any(getattr(m, attribute) for m in p.moves if m.kind != "joint") for p in (a, b)]
+        said += [words] if has[0] != has[1] else []
+    for attribute, words in (("T_flange_tip", "the tool"), ("T_base_part", "the part frame")):
+        has = [getattr(p, attribute) is not None for p in (a, b)]
+        said += [words] if not all(has) else []
+    return said
+
+
+def _frames(a: ReadProgram, b: ReadProgram, digits: _Digits) -> Iterator[Difference]:
+    for attribute, words in (("T_flange_tip", "tool"), ("T_base_part", "part frame")):
+        one, two = getattr(a, attribute), getattr(b, attribute)
+        if one is None or two is None or np.abs(one - two).max() <= digits.frame:
+            continue
+        off, turned = _apart(one[None], two[None])
+        message = f"the {words} is {off[0] * 1e3:.4f} mm and {np.degrees(turned[0]):.4f} deg off"
+        yield Difference(code="frames", count=1, message=message)
+
+
+def _contours(
+    groups: Sequence[ReadGroup], known: set[int], code: str, words: str
+) -> Iterator[Difference]:
+    names = [group.name for k, group in enumerate(groups) if k not in known]
+    if names:
+        message = f"{_count(len(names), 'contour')} {words}: {', '.join(names)}"
+        yield Difference(code=code, count=len(names), message=message)
+
+
+def _order(groups: Sequence[ReadGroup], numbers: list[int]) -> Iterator[Difference]:
+    """Compare the order of contours, given the numbers in B of those of A."""
+    if numbers != sorted(numbers):
+        names = ", ".join(groups[j].name for j in sorted(numbers) if groups[j].path)
+        message = f"the contours are cut in another order, in B {names}"
+        yield Difference(code="order", count=1, message=message)
+
+
+def _count(number: int, word: str) -> str:
+    return f"{number} {word}{'' if number == 1 else 's'}"
+
+
+def _apart(one: Array, two: Array) -> tuple[Array, Array]:
+    """Return distances (m) and angles (rad) between poses (K, 4, 4)."""
+    off = np.linalg.norm(one[:, :3, 3] - two[:, :3, 3], axis=1)
+    between = np.swapaxes(one[:, :3, :3], 1, 2) @ two[:, :3, :3]
+    return off, np.asarray(Rotation.from_matrix(between).magnitude())
+
+
+def _alone(pairs: Sequence[Pair]) -> Iterator[Difference]:
+    """Tell of moves that only one of the programs has."""
+    for side, code, words in ((1, "removed", "left out in B"), (0, "added", "only in B")):
+        if alone := [pair for pair in pairs if pair[side] is None]:
+            message = f"{_count(len(alone), 'move')} {words}, the first"
+            yield Difference(code=code, count=len(alone), message=message, places=alone[0].places)
+
+
+def _targets(both: Both, digits: _Digits) -> Iterator[Difference]:
+    """Compare the tip poses that moves lead to and by."""
+    posed = [
+        (a, b, getattr(a.move, which), getattr(b.move, which))
+        for a, b in both
+        for which in ("T_part_tip", "T_part_via")
+        if getattr(a.move, which) is not None and getattr(b.move, which) is not None
+    ]
+    if not posed:
+        return
+    off, turned = _apart(np.array([one[2] for one in posed]), np.array([one[3] for one in posed]))
+    moved = np.flatnonzero((off > digits.point) | (turned > digits.angle))
+    if moved.size:
+        a, b, _, _ = posed[moved[np.lexsort((turned[moved], off[moved]))[-1]]]
+        message = (
+            f"{len(moved)} moved, at most by {off[moved].max() * 1e3:.4f} mm "
+            f"and {np.degrees(turned[moved].max()):.4f} deg"
+        )
+        yield _found("targets", len(moved), message, a, b)
+
+
+def _joints(both: Both, digits: _Digits) -> Iterator[Difference]:
+    """Compare the joints of targets, where both programs say them."""
+    said = [(a, b) for a, b in both if a.move.q is not None and b.move.q is not None]
+    if not said:
+        return
+    off = np.abs(np.array([a.move.q for a, _ in said]) - [b.move.q for _, b in said]).max(axis=1)
+    moved = np.flatnonzero(off > digits.angle)
+    if moved.size:
+        worst = int(moved[np.argmax(off[moved])])
+        message = f"{len(moved)} moved, at most by {np.degrees(off[worst]):.4f} deg"
+        yield _found("joints", len(moved), message, *said[worst])
+
+
+def _found(code: str, count: int, message: str, a: Stop, b: Stop) -> Difference:
+    return Difference(code=code, count=count, message=message, places=(a.move.place, b.move.place))
+
+
+def _said(both: Both, digits: _Digits) -> Iterator[Difference]:
+    """Compare what else moves say, one thing after the other."""
+    rows: tuple[tuple[str, Callable[[Stop, Stop], float], Callable[[Stop], str]], ...] = (
+        ("kinds", lambda a, b: a.move.kind != b.move.kind, lambda a: a.move.kind),
+        ("speeds", lambda a, b: _speeds(a.move, b.move, digits), lambda a: _speed(a.move)),
+        (
+            "times",
+            lambda a, b: _excess(a.move.duration, b.move.duration, digits.lead),
+            lambda a: f"{a.move.duration:g} s",
+        ),
+        (
+            "zones",
+            lambda a, b: _excess(a.move.zone, b.move.zone, digits.point),
+            lambda a: f"{a.move.zone * 1e3:g} mm" if a.move.zone else "a stop",
+        ),
+        (
+            "switches",
+            lambda a, b: _switches(a.move, b.move, digits),
+            lambda a: events(a.move.switches),
+        ),
+        ("waits", lambda a, b: _excess(a.wait, b.wait, digits.lead), lambda a: f"{a.wait:g} s"),
+        (
+            "postures",
+            lambda a, b: (
+                bool(a.move.posture and b.move.posture) and a.move.posture != b.move.posture
+            ),
+            lambda a: " ".join(str(word) for word in a.move.posture),
+        ),
+    )
+    for code, excess, words in rows:
+        off = np.array([float(excess(a, b)) for a, b in both])
+        moved = np.flatnonzero(off > 0)
+        if moved.size:
+            a, b = both[int(moved[np.argmax(off[moved])])]
+            message = f"{_count(len(moved), 'move')}, {words(a)} in A and {words(b)} in B"
+            yield _found(code, len(moved), message, a, b)
+
+
+def _excess(one: float | None, two: float | None, allowed: float) -> float:
+    """Return how far two numbers are apart beyond what is allowed; 0 where one is not said."""
+    return 0.0 if one is None or two is None else max(abs(one - two) - allowed, 0.0)
+
+
+def _words_differ(one: tuple[int | str, ...], two: tuple[int | str, ...]) -> bool:
+    return bool(one and two) and one != two
+
+
+def _speeds(a: ReadMove, b: ReadMove, digits: _Digits) -> float:
+    kinds = {a.kind, b.kind}
+    if "joint" in kinds:
+        return _excess(a.speed, b.speed, SHARE) if len(kinds) == 1 else 0.0
+    return _excess(a.speed, b.speed, digits.speed)
+
+
+def _speed(move: ReadMove) -> str:
+    assert move.speed is not None
+    return f"{move.speed:.1%}" if move.kind == "joint" else f"{move.speed * 1e3:g} mm/s"
+
+
+def _switches(a: ReadMove, b: ReadMove, digits: _Digits) -> bool:
+    """Say whether two moves switch something else, or at another time."""
+    ours, theirs = ([(s.signal, s.on) for s in move.switches] for move in (a, b))
+    return ours != theirs or any(
+        abs(one.lead_time - two.lead_time) > digits.lead
+        for one, two in zip(a.switches, b.switches, strict=True)
+    )

@@ -1,0 +1,51 @@
+"""The contours of a program that was read: joint moves, and the path behind them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+from kerfpath.post._read import ReadMove, ReadProgram, ReadStep, ReadWait
+
+__all__ = ["ReadGroup", "groups_of"]
+
+
+@dataclass(slots=True)
+class ReadGroup:
+    """Joint moves, and the moves of the path behind them: none after the last contour.
+
+    Parameters
+    ----------
+    name : str
+        Of the routine that it begins in.
+    joint, path : list of ReadMove
+    waits : list of (int, float)
+        Behind how many moves of the path the robot waits, and how long (s).
+    """
+
+    name: str = ""
+    joint: list[ReadMove] = field(default_factory=list)
+    path: list[ReadMove] = field(default_factory=list)
+    waits: list[tuple[int, float]] = field(default_factory=list)
+
+
+def groups_of(read: ReadProgram) -> list[ReadGroup]:
+    """Return what a program does contour by contour, over the borders of its routines."""
+    groups: list[ReadGroup] = []
+    for section in read.sections:
+        for step in section.steps:
+            joint = isinstance(step, ReadMove) and step.kind == "joint"
+            if not groups or (joint and groups[-1].path):
+                groups.append(ReadGroup())
+            if not groups[-1].path:
+                groups[-1].name = section.name
+            _add(groups[-1], step)
+    return groups
+
+
+def _add(group: ReadGroup, step: ReadStep) -> None:
+    if isinstance(step, ReadWait):
+        group.waits.append((len(group.path), step.time))
+    elif step.kind == "joint":
+        group.joint.append(step)
+    else:
+        group.path.append(step)
