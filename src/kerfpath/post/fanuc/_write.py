@@ -30,6 +30,7 @@ from kerfpath.post._program import (
     LinearMove,
     Program,
     Section,
+    Signal,
     Switch,
     Wait,
 )
@@ -113,7 +114,8 @@ class Fanuc(Formatter):
         lines += _frame(f"UFRAME {settings.user_frame}", frame)
         lines += _frame(f"UTOOL {settings.tool_frame}", tool)
         lines += [f"  UFRAME_NUM={settings.user_frame} ;", f"  UTOOL_NUM={settings.tool_frame} ;"]
-        lines += [f"  DO[{self.output(s)}]=OFF ;" for s in dict.fromkeys(["laser", *switched])]
+        laser: list[Signal] = [] if self.settings.laser_output is None else ["laser"]
+        lines += [f"  DO[{self.output(s)}]=OFF ;" for s in dict.fromkeys([*laser, *switched])]
         return lines + [f"  CALL {section.name}{PADDING};" for section in program.sections]
 
     def names(self) -> list[tuple[str, str]]:
