@@ -138,7 +138,9 @@ def test_plan_json_carries_everything_and_round_trips(planned, folder):
 
 def test_post_takes_the_settings_of_a_language_from_the_job_as_it_is_now(planned, folder):
     post = ("post", "small-plan/plan.json", "--language", "krl")
-    refused(run(*post, "-o", "krl", cwd=folder), "say which with laser_output")
+    refused(run(*post, "--strict", cwd=folder), "krl")
+    guessed = run(*post, "-o", "guessed", cwd=folder)
+    assert "laser, 1 is taken; say which with laser_output in [program.krl]" in guessed.stdout
     text = (folder / "small.toml").read_text() + "\n[program.krl]\nlaser_output = 7\n"
     (folder / "krl.toml").write_text(text)
     done = run(*post, "-o", "krl", "--job", "krl.toml", cwd=folder)
