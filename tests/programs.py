@@ -26,10 +26,11 @@ def hand_plan(contour, arm, tool, placement, speed=0.1, posture=0):
     T = placement @ contour.frames() @ np.linalg.inv(tool)
     q = []
     for k, pose in enumerate(T):
-        found = arm.inverse(pose)
+        found = arm.inverse(pose, within_limits=False)
         near = found.q[found.posture == posture]
         before = q[-1] if q else np.radians([0, 0, 0, 0, 45, 0])
         assert len(near), k
+        near = near + 2 * np.pi * np.round((before - near) / (2 * np.pi))
         q.append(near[np.argmin(np.abs(near - before).max(axis=1))])
     K = len(contour)
     return Plan(

@@ -136,6 +136,20 @@ def test_plan_json_carries_everything_and_round_trips(planned, folder):
     np.testing.assert_array_equal(plan.robot.lower, robot("abb_irb4600_60_205").lower)
 
 
+def test_post_takes_the_settings_of_a_language_from_the_job_as_it_is_now(planned, folder):
+    post = ("post", "small-plan/plan.json", "--language", "krl")
+    refused(run(*post, "-o", "krl", cwd=folder), "say which with laser_output")
+    text = (folder / "small.toml").read_text() + "\n[program.krl]\nlaser_output = 7\n"
+    (folder / "krl.toml").write_text(text)
+    done = run(*post, "-o", "krl", "--job", "krl.toml", cwd=folder)
+    assert done.returncode == 0, done.stderr
+    assert "$OUT[7]=TRUE" in (folder / "krl" / "krl.src").read_text()
+    other = text.replace("xyz_mm = [1", "xyz_mm = [2", 1)
+    assert other != text
+    (folder / "other.toml").write_text(other)
+    refused(run(*post, "--job", "other.toml", cwd=folder), "other.toml")
+
+
 def test_the_same_job_gives_the_same_bytes(planned, folder):
     again = run("plan", "small.toml", "--out", "again", cwd=folder)
     assert again.returncode == 0

@@ -26,17 +26,18 @@ from kerfpath.post import (
     preflight,
     read_program,
 )
-from kerfpath.post._frames import world
+from kerfpath.post._frames import world, xyzwpr
 from kerfpath.post.fanuc import FanucSettings, axes_from_joints, joints_from_axes, posture
-from kerfpath.post.fanuc._write import xyzwpr
 from kerfpath.robots import robot_ids
 from programs import arc, changed, codes, frames, hand_plan, with_steps
 
 GOLDEN = Path(__file__).parent / "data" / "golden_fanuc"
 MAIN, CONTOUR = "CUT_SKIN_OUTER.ls", "SKIN_OUTER.ls"
 FANUC = language("fanuc")
+OPTIONS = FanucSettings(laser_output=1)
 ARMS = [name for name in robot_ids() if name.startswith("fanuc")]
-WIDE = {"lower": np.full(6, -30.0), "upper": np.full(6, 30.0)}
+REACH = np.array([6.0, 6.0, 6.0, 6.0, 6.0, 99.0])
+WIDE = {"lower": -REACH, "upper": REACH}
 
 MEASURED = """
       0   0   0    0 -90    0  N U T 0  0  0   965.000    0.000  965.000  -180   0    0
@@ -79,7 +80,7 @@ def golden():
     return {name: (GOLDEN / name).read_bytes().decode("ascii") for name in (MAIN, CONTOUR)}
 
 
-def read(program, options=None):
+def read(program, options=OPTIONS):
     """What the listings of a program say; post() has compared them with it."""
     return read_program(post(program, "fanuc", options), "fanuc", program.robot, options)
 
@@ -94,7 +95,7 @@ def test_axes_configurations_and_frames_are_those_measured_on_a_controller():
     q = joints_from_axes(arm, np.radians(axes_deg))
     np.testing.assert_allclose(np.degrees(axes_from_joints(arm, q)), axes_deg, atol=1e-9)
     expected = [(*row[6:9], *map(int, row[9:12])) for row in rows]
-    assert posture(arm, q, FanucSettings()) == expected
+    assert posture(arm, q, OPTIONS) == expected
     T = np.linalg.inv(world(arm)) @ arm.forward(q)
     said = np.array([row[12:] for row in rows], float)
     np.testing.assert_allclose(T[:, :3, 3] * 1e3, said[:, :3], atol=6e-4)  # printed digits
@@ -129,7 +130,7 @@ def test_an_arm_described_otherwise_has_the_same_axes():
     q = np.random.default_rng(5).uniform(-1, 1, (5, 6))
     same = joints_from_axes(other, axes_from_joints(arm, q))
     np.testing.assert_allclose(other.forward(same), arm.forward(q) @ turned, atol=1e-12)
-    assert posture(other, same, FanucSettings()) == posture(arm, q, FanucSettings())
+    assert posture(other, same, OPTIONS) == posture(arm, q, OPTIONS)
 
 
 @pytest.mark.parametrize("number", range(8))
@@ -170,7 +171,7 @@ def test_configurations_agree_with_a_construction_from_points(axes):
         while abs(rest) > 180:
             turn, rest = turn + int(np.sign(rest)), rest - 360 * np.sign(rest)
         expected.append(turn)
-    assert posture(arm, q, FanucSettings()) == [tuple(expected)]
+    assert posture(arm, q, OPTIONS) == [tuple(expected)]
 
 
 def test_turns_begin_at_half_a_turn_and_the_axes_counted_are_a_setting():
@@ -179,8 +180,8 @@ def test_turns_begin_at_half_a_turn_and_the_axes_counted_are_a_setting():
     axes[:, 5] = np.radians([179.9, 180, 539.9, 540, -180, -540])
     axes[:, 4] = np.radians(400)
     q = joints_from_axes(arm, axes)
-    assert [words[5] for words in posture(arm, q, FanucSettings())] == [0, 1, 1, 2, -1, -2]
-    other = posture(arm, q, FanucSettings(turns="J4 J5 J6"))
+    assert [words[5] for words in posture(arm, q, OPTIONS)] == [0, 1, 1, 2, -1, -2]
+    other = posture(arm, q, FanucSettings(laser_output=1, turns="J4 J5 J6"))
     assert [words[3:] for words in other] == [(0, 1, n) for n in (0, 1, 1, 2, -1, -2)]
 
 
@@ -213,7 +214,7 @@ def test_x_y_z_w_p_r_turn_about_fixed_axes_one_after_the_other():
 
 
 def test_the_golden_listings_are_written_byte_for_byte(small):
-    assert post([small], "fanuc") == golden()
+    assert post([small], "fanuc", OPTIONS) == golden()
 
 
 def test_listings_are_numbered_counted_and_short():
@@ -235,8 +236,8 @@ def test_listings_are_numbered_counted_and_short():
 
 
 def test_the_golden_listings_read_back_as_planned(small, program):
-    back = read_program(golden(), "fanuc", program.robot)
-    assert deviations(program, back, FANUC, FanucSettings()) == []
+    back = read_program(golden(), "fanuc", program.robot, OPTIONS)
+    assert deviations(program, back, FANUC, OPTIONS) == []
     np.testing.assert_allclose(back.T_flange_tip, small.T_flange_tip, atol=1e-7)
     np.testing.assert_allclose(back.T_base_part, small.T_base_part, atol=1e-7)
     T = back.T_base_part @ np.array([move.T_part_tip for move in back.moves[1:-1]])
@@ -260,8 +261,8 @@ def test_frames_are_told_in_the_controllers_world(program):
     moved = replace(program, robot=arm, T_base_part=foot @ program.T_base_part)
     tool = np.linalg.inv(flange) @ program.T_flange_tip
     moved = replace(moved, T_flange_tip=tool)
-    assert post(moved, "fanuc") == post(program, "fanuc")
-    assert deviations(moved, read(moved), FANUC, FanucSettings()) == []
+    assert post(moved, "fanuc", OPTIONS) == post(program, "fanuc", OPTIONS)
+    assert deviations(moved, read(moved), FANUC, OPTIONS) == []
 
 
 def test_several_contours_gas_waits_and_micro_joints(cell):
@@ -271,7 +272,7 @@ def test_several_contours_gas_waits_and_micro_joints(cell):
     )  # fmt: skip
     plans = [hand_plan(replace(contour, name=name), *cell) for name in ("Loch ø8", "2. hole")]
     program = build_program(plans, gas_lead=0.3, pierce_time=0.4, name="Teil 4711")
-    assert codes(program, "error", "fanuc") == ["output"]
+    assert codes(program, "error", "fanuc", OPTIONS) == ["output"]
     options = FanucSettings(gas_output=7, laser_output=3, user_frame=4, tool_frame=5)
     files = post(program, "fanuc", options)
     assert list(files) == ["TEIL_4711.ls", "LOCH_8.ls", "C_2_HOLE.ls"]
@@ -296,7 +297,7 @@ def test_arcs_are_one_line_in_two_rows(program):
     fields = {k: getattr(end, k) for k in ("T_part_tip", "q", "speed", "duration", "zone")}
     circle = CircularMove(T_part_via=via.T_part_tip, q_via=via.q, **fields)
     made = with_steps(program, [*steps[:4], circle, *steps[6:]])
-    text = post(made, "fanuc")[CONTOUR]
+    text = post(made, "fanuc", OPTIONS)[CONTOUR]
     assert "   6:C P[4]    \r\n    :  P[5] 720cm/min CNT100    ;\r\n   7:L P[6]" in text
     (back,) = [move for move in read(made).moves if move.kind == "circular"]
     np.testing.assert_allclose(back.T_part_via, via.T_part_tip, atol=2e-6)
@@ -304,7 +305,7 @@ def test_arcs_are_one_line_in_two_rows(program):
 
 def test_a_long_contour_is_divided_and_the_laser_stays_on(cell):
     made = hand_plan(arc(count=250), *cell)
-    options = FanucSettings(lines_per_file=100)
+    options = FanucSettings(laser_output=1, lines_per_file=100)
     program = build_program([made])
     files = post(program, "fanuc", options)
     assert list(files)[1:] == ["SKIN_OUTER.ls", "SKIN_OUTER_2.ls", "SKIN_OUTER_3.ls"]
@@ -318,26 +319,26 @@ def test_a_long_contour_is_divided_and_the_laser_stays_on(cell):
 
 def test_names_are_cut_for_older_controllers_and_stay_different(cell):
     plans = [hand_plan(arc(name), *cell) for name in ("skin/outer edge", "skin/outer rim")]
-    files = post(build_program(plans), "fanuc", FanucSettings(longest_name=8))
+    files = post(build_program(plans), "fanuc", FanucSettings(laser_output=1, longest_name=8))
     assert list(files) == ["CUT_SKIN.ls", "SKIN_OUT.ls", "SKIN_O_2.ls"]
 
 
 def test_speeds_are_whole_numbers_of_the_finer_unit(cell, small):
     odd = build_program([hand_plan(arc(), *cell, speed=0.0504)])
-    assert "302cm/min" in post(odd, "fanuc")[CONTOUR]
-    assert codes(odd, language="fanuc") == ["air-moves"]
-    coarse = FanucSettings(speed_unit="mm/sec")
+    assert "302cm/min" in post(odd, "fanuc", OPTIONS)[CONTOUR]
+    assert codes(odd, language="fanuc", settings=OPTIONS) == ["air-moves"]
+    coarse = FanucSettings(laser_output=1, speed_unit="mm/sec")
     assert "50mm/sec" in post(odd, "fanuc", coarse)[CONTOUR]
     assert "speed-step" in codes(odd, "warning", "fanuc", coarse)
     slow = build_program([small], approach_speed=0.0001)
-    assert codes(slow, "error", "fanuc") == ["speed", "speed"]
-    fast = FanucSettings(fastest_mm_s=100.0)
+    assert codes(slow, "error", "fanuc", OPTIONS) == ["speed", "speed"]
+    fast = FanucSettings(laser_output=1, fastest_mm_s=100.0)
     assert set(codes(odd, "error", "fanuc", fast)) == set()
     assert "speed" in codes(build_program([small]), "error", "fanuc", fast)
 
 
 def test_corner_regions_say_the_zone_in_whole_mm(small):
-    options = FanucSettings(corner="CR")
+    options = FanucSettings(laser_output=1, corner="CR")
     program = build_program([small], zone=0.002)
     assert " CR2    ;" in post(program, "fanuc", options)[CONTOUR]
     assert read(program, options).moves[3].zone == pytest.approx(0.002)
@@ -346,7 +347,7 @@ def test_corner_regions_say_the_zone_in_whole_mm(small):
 
 @pytest.mark.parametrize("decimals", [3, 6])
 def test_targets_have_the_digits_asked_for(program, decimals):
-    options = FanucSettings(decimals=decimals, cnt_percent=30)
+    options = FanucSettings(laser_output=1, decimals=decimals, cnt_percent=30)
     text = post(program, "fanuc", options)[CONTOUR]
     digits = re.findall(r"\.(\d+)  ?(?:mm|deg)", text.partition("/POS")[2])
     assert {len(said) for said in digits} == {decimals}
@@ -357,36 +358,40 @@ def test_targets_have_the_digits_asked_for(program, decimals):
 
 
 def test_preflight_finds_what_only_this_language_cannot_say(program, cell):
-    assert codes(program, language="fanuc") == ["air-moves"]
+    assert codes(program, language="fanuc", settings=OPTIONS) == ["air-moves"]
     early = changed(program, 2, switches=(Switch(signal="laser", on=True, lead_time=0.005),))
-    assert codes(early, "error", "fanuc") == ["time-step"]
-    same = FanucSettings(gas_output=1)
+    assert codes(early, "error", "fanuc", OPTIONS) == ["time-step"]
+    same = FanucSettings(laser_output=1, gas_output=1)
     assert codes(program, "error", "fanuc", same) == ["output"]
-    wide = replace(
-        program, robot=program.robot.with_limits(lower=np.full(6, -99.0), upper=[99] * 6)
-    )
+    wide = replace(program, robot=program.robot.with_limits(**WIDE))
     steps = [
         replace(step, q=step.q + 18 * np.pi * np.eye(6)[5]) if hasattr(step, "q") else step
         for step in program.sections[0].steps
     ]
-    assert "turns" in codes(with_steps(wide, steps), "error", "fanuc")
+    assert "turns" in codes(with_steps(wide, steps), "error", "fanuc", OPTIONS)
     bent = program.sections[0].steps[5].q * [1, 1, 1, 1, -1, 1]
     bent = changed(replace(program, robot=program.robot.with_limits(**WIDE)), 5, q=bent)
-    assert codes(bent, "warning", "fanuc").count("posture-change") == 2
+    assert codes(bent, "warning", "fanuc", OPTIONS).count("posture-change") == 2
     many = replace(program, sections=program.sections * 90)
-    assert "file-length" in codes(many, "error", "fanuc", FanucSettings(lines_per_file=100))
+    assert "file-length" in codes(
+        many, "error", "fanuc", FanucSettings(laser_output=1, lines_per_file=100)
+    )
 
 
 @pytest.mark.parametrize("name", ["PNS0001", "rsr12", "con", "End"])
 def test_names_that_a_controller_treats_specially_are_refused(program, name):
     section = replace(program.sections[0], name=name)
-    assert codes(replace(program, sections=(section,)), "error", "fanuc") == ["name-reserved"]
+    assert codes(replace(program, sections=(section,)), "error", "fanuc", OPTIONS) == [
+        "name-reserved"
+    ]
 
 
 def test_robots_of_another_kind_or_maker(program):
-    assert "wrong-arm" in codes(replace(program, robot=robot("ur_ur10e")), "error", "fanuc")
+    assert "wrong-arm" in codes(
+        replace(program, robot=robot("ur_ur10e")), "error", "fanuc", OPTIONS
+    )
     other = replace(program, robot=replace(program.robot, manufacturer="KUKA"))
-    assert [i.code for i in preflight(other, "fanuc")] == ["wrong-robot", "air-moves"]
+    assert [i.code for i in preflight(other, "fanuc", OPTIONS)] == ["wrong-robot", "air-moves"]
 
 
 @pytest.mark.parametrize(
@@ -428,7 +433,7 @@ def test_the_reader_refuses_what_it_does_not_know(file, old, new, message):
     assert old in files[file]
     files[file] = files[file].replace(old, new, 1)
     with pytest.raises(InputError, match=re.escape(message)) as caught:
-        read_program(files, "fanuc", robot("fanuc_m20id_25"))
+        read_program(files, "fanuc", robot("fanuc_m20id_25"), OPTIONS)
     assert "\n" not in str(caught.value)
 
 
@@ -447,8 +452,8 @@ def test_an_edited_listing_is_read_as_edited(program, old, new, message):
     files = golden()
     assert old in files[CONTOUR]
     files[CONTOUR] = files[CONTOUR].replace(old, new, 1)
-    back = read_program(files, "fanuc", program.robot)
-    issues = deviations(program, back, FANUC, FanucSettings())
+    back = read_program(files, "fanuc", program.robot, OPTIONS)
+    issues = deviations(program, back, FANUC, OPTIONS)
     assert message in " ".join(map(str, issues))
 
 
@@ -460,8 +465,8 @@ def test_a_listing_that_a_controller_lists_again_is_read(program):
         for name, text in golden().items()
     }  # fmt: skip
     files[CONTOUR] = files[CONTOUR].replace(" -0.0687 deg", "  -.0687 deg")
-    back = read_program(files, "fanuc", program.robot)
-    assert deviations(program, back, FANUC, FanucSettings()) == []
+    back = read_program(files, "fanuc", program.robot, OPTIONS)
+    assert deviations(program, back, FANUC, OPTIONS) == []
 
 
 TEXT = st.text(max_size=60) | st.sampled_from(
@@ -476,8 +481,8 @@ def test_no_text_of_a_plan_becomes_an_instruction(small, name, model, remark):
     made = replace(small, contour=replace(small.contour, name=name), robot=arm)
     program = build_program([made], name="whole")
     program = with_steps(program, [Comment(remark), *program.sections[0].steps])
-    assume("name-reserved" not in codes(program, "error", "fanuc"))
-    files = post(program, "fanuc")
+    assume("name-reserved" not in codes(program, "error", "fanuc", OPTIONS))
+    files = post(program, "fanuc", OPTIONS)
     main, section = (file.removesuffix(".ls") for file in files)
     assert main == "WHOLE"
     assert re.fullmatch(r"[A-Z][A-Z0-9_]{0,35}", section)

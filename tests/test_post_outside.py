@@ -63,7 +63,7 @@ def as_python(text):
 
 
 def test_urscript_is_python_but_for_its_ends():
-    settings = URScriptSettings(gas_output=1)
+    settings = URScriptSettings(laser_output=0, gas_output=1)
     for _, program in programs(robot("ur_ur10e"), (0.75, 0.1, 0.2)):
         (text,) = post(program, "urscript", settings).values()
         assert text.count("\nend") + text.count("  end") >= len(program.sections) + 1

@@ -29,7 +29,8 @@ from programs import arc, changed, codes, frames, hand_plan, read_text, text_of,
 
 GOLDEN = Path(__file__).parent / "data" / "golden_urscript.script"
 URSCRIPT = language("urscript")
-GAS = URScriptSettings(gas_output=1)
+WIRED = URScriptSettings(laser_output=0)
+GAS = URScriptSettings(laser_output=0, gas_output=1)
 
 
 def of(text):
@@ -139,7 +140,7 @@ def test_all_postures_read_back(cell, posture):
     placement = np.eye(4)
     placement[:3, 3] = 0.5, 0.2, 0.3
     made = hand_plan(arc(count=20, radius=0.03), arm, tool, placement, posture=posture)
-    read = same(build_program([made]), URScriptSettings())
+    read = same(build_program([made]), WIRED)
     start = read.moves[0].q
     assert (
         arm.inverse(arm.forward(start)).posture[
@@ -156,15 +157,15 @@ def test_turns_of_the_wrist_stay_as_planned(cell):
     for turns in (-1, 0, 1, 3):
         wound = build_program([replace(made, q=made.q + 2 * np.pi * turns * np.eye(6)[5])])
         steps = wound.sections[0].steps
-        read = same(wound, URScriptSettings())
+        read = same(wound, WIRED)
         np.testing.assert_allclose(read.moves[0].q, steps[1].q, atol=1e-8)
         beyond = max(abs(move.q).max() for move in wound.moves) > 2 * np.pi
-        assert ("turns" in codes(wound, "warning", "urscript")) == beyond
+        assert ("turns" in codes(wound, "warning", "urscript", WIRED)) == beyond
 
 
 def test_several_contours_are_called_in_order(cell):
     plans = [hand_plan(arc(name), *cell) for name in ("skin", "hole 1", "hole 2")]
-    read = same(build_program(plans), URScriptSettings())
+    read = same(build_program(plans), WIRED)
     assert [section.name for section in read.sections] == ["skin", "hole_1", "hole_2"]
 
 
@@ -221,7 +222,7 @@ def test_every_switch_is_written_ahead_of_its_move_and_at_its_end(program):
 
 def test_a_switch_without_lead_needs_no_thread(cell):
     made = hand_plan(arc(), *cell)
-    text = script(build_program([made], lead_time=0.0), URScriptSettings())
+    text = script(build_program([made], lead_time=0.0), WIRED)
     assert "laser_ahead(p" not in text
     assert text.count("    laser_set(True)\n") == text.count("    laser_set(False)\n") == 1
 
@@ -242,10 +243,12 @@ def test_blends_that_meet_are_refused(small):
     wide = build_program([small])
     for number in range(3, 9):
         wide = changed(wide, number, zone=0.02)
-    assert codes(wide, "error", "urscript") == ["blend-overlap"]
+    assert codes(wide, "error", "urscript", WIRED) == ["blend-overlap"]
     with pytest.raises(InputError, match=r"lower zone_mm or use fewer nodes"):
-        post(wide, "urscript")
-    assert codes(build_program([small], zone=0.1), "error", "urscript") == []  # halved to fit
+        post(wide, "urscript", WIRED)
+    assert (
+        codes(build_program([small], zone=0.1), "error", "urscript", WIRED) == []
+    )  # halved to fit
 
 
 @pytest.mark.parametrize("name", ["movel", "Thread", "get_inverse_kin", "sin", "laser_set", "p"])
@@ -311,12 +314,12 @@ def test_the_reader_refuses_what_it_does_not_know(old, new, message):
 
 
 def test_the_reader_refuses_a_signal_that_is_not_defined(cell):
-    text = script([hand_plan(arc(), *cell)], URScriptSettings())
+    text = script([hand_plan(arc(), *cell)], WIRED)
     bad = text.replace("    laser_set(True)", "    gas_set(True)\n    laser_set(True)", 1)
     with pytest.raises(InputError, match="does not say how it switches the gas"):
         reread(bad, cell[0])
     with pytest.raises(InputError, match="say by which output with gas_output"):
-        reread(GOLDEN.read_text(), cell[0], URScriptSettings())
+        reread(GOLDEN.read_text(), cell[0], WIRED)
 
 
 def test_an_edited_program_is_read_as_edited(program):
@@ -347,9 +350,9 @@ def test_no_text_of_a_person_becomes_a_line_of_the_program(name, comment, model)
     first, *rest = odd.sections[0].steps
     assert isinstance(first, Comment)
     odd = with_steps(odd, [Comment(comment), *rest])
-    if codes(odd, "error", "urscript"):
+    if codes(odd, "error", "urscript", WIRED):
         return
-    same(odd, URScriptSettings())
+    same(odd, WIRED)
     lines = script(odd).splitlines()
     assert len(lines) == len(plain)
     assert [line for line in lines if not line.strip().startswith(("#", "def"))] == [

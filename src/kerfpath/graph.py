@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from kerfpath._arrays import Array, Bools, Ints, freeze, scalar
 from kerfpath.errors import InputError
 from kerfpath.kernels import turns
-from kerfpath.robots import Robot
+from kerfpath.robots import Robot, require_few_turns
 
 __all__ = ["LayeredGraph", "build", "gamma_grid"]
 
@@ -177,10 +177,12 @@ def build(
     Raises
     ------
     InputError
-        The robot's joint limits are not known, or a posture that does not exist.
+        The robot's joint limits are not known or leave too many turns, or a posture that does not
+        exist.
     """
     wanted = _wanted(postures, robot.postures)
     arm = robot.alone()
+    require_few_turns(arm)
     limits = arm.joint_limits()
     if not robot.family.free_rotation:
         gamma = freeze(np.zeros(1))

@@ -167,6 +167,12 @@ def post(
             help="File to write, or folder of a program of several files; default: print it.",
         ),
     ] = None,
+    job: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="JOB.toml", help="Take [program] from this job, and audit in its cell."
+        ),
+    ] = None,
     strict: Strict = False,
     dry_share: Annotated[
         float | None,
@@ -190,7 +196,7 @@ def post(
     """Write the robot program of a plan, after auditing it again.
 
     Options such as names, retract and zone are taken from the [program] table of the job that
-    the plan was made from.
+    the plan was made from, or of --job: there, [program.LANGUAGE] has the settings of a language.
 
     Example: kerfpath post door/plan.json --language rapid -o door.mod
 
@@ -205,8 +211,8 @@ def post(
     from kerfpath.cli._post import write_post
 
     write_post(
-        plan_file, language, output, strict=strict, as_json=as_json, dry_share=dry_share,
-        measured=measured, residual_mm=residual_mm,
+        plan_file, language, output, strict=strict, as_json=as_json, job=job,
+        dry_share=dry_share, measured=measured, residual_mm=residual_mm,
     )  # fmt: skip
 
 
@@ -276,8 +282,8 @@ def touch_up(
     """Plan a job again around the targets that a person has moved in its program.
 
     Moved targets keep tip and tool axis as taught, and the path eases back to the planned one; the
-    rotation about the beam is planned again, in the posture of the plan. The files, as of a plan, go
-    to the folder PROGRAM-touched beside you unless --out names another; the audit is that of the
+    rotation about the beam is planned again, in the posture of the plan. The files, as of a plan,
+    go to the folder PROGRAM-touched beside you unless --out names another; the audit is that of the
     touched-up path.
 
     Example: kerfpath touch-up edited.mod --job door.toml --plan door/plan.json --out door-2

@@ -19,7 +19,8 @@ __all__ = ["write_post"]
 
 def write_post(
     plan_file: Path, language: str, output: Path | None, *, strict: bool, as_json: bool,
-    dry_share: float | None = None, measured: Path | None = None, residual_mm: float = 0.5,
+    job: Path | None = None, dry_share: float | None = None, measured: Path | None = None,
+    residual_mm: float = 0.5,
 ) -> None:  # fmt: skip
     """Write the files of a plan's program to `output`; print them without one.
 
@@ -30,7 +31,7 @@ def write_post(
         points = read_measured(measured)
         frame = placement_from_points(*points, most_residual=residual_mm / 1000)
     files, notes = program_from_file(
-        plan_file, language, strict=strict, dry_share=dry_share, frame=frame
+        plan_file, language, strict=strict, job_file=job, dry_share=dry_share, frame=frame
     )
     written: list[Path] = []
     if output is not None and (len(files) > 1 or output.is_dir()):

@@ -71,7 +71,7 @@ def audit_file(plan_file: Path, job_file: Path | None = None) -> Audited:
     asked = _table(file, "audit", AuditTable, audit_options)
     tables = {}
     for p in file.plans:
-        if cell is not None:
+        if job_file is not None:
             require_same(p, job, file.path)
         tables[p.name] = checks(p, reference=drawn.get(p.name), cell=cell, **asked)
     return Audited(tables=tables, missing=file.missing, note=_note(file, cell, job_file))
@@ -82,6 +82,7 @@ def program_from_file(
     language: str,
     *,
     strict: bool = False,
+    job_file: Path | None = None,
     dry_share: float | None = None,
     frame: MeasuredFrame | None = None,
 ) -> tuple[dict[str, str], list[str]]:
@@ -93,6 +94,9 @@ def program_from_file(
     language : str
     strict : bool
         Refuse what is only warned of otherwise.
+    job_file : Path, optional
+        The job as it is now: its [program] is taken, and the plans are audited against its drawing
+        and in its cell. Default: [program] as it was when the plan was made, and no cell.
     dry_share : float, optional
         Make it a dry run at this share of the speed, see `kerfpath.post.dry_run`.
     frame : MeasuredFrame, optional
@@ -116,11 +120,19 @@ def program_from_file(
             f"no program: {', '.join(file.failed)} failed the audit against the drawing when it "
             "was planned; mend the job and plan it again"
         )
-    options = _options(file, language)
     notes = []
+    if job_file is not None:
+        if frame is not None:
+            raise InputError(
+                f"{job_file}: the cell of a job says nothing of a part that was measured; give "
+                "one of the two"
+            )
+        _require_passed(audit_file(plan_file, job_file))
+        file = replace(file, job=read_job(job_file).source)
+    options = _options(file, language, (job_file or plan_file).stem)
     if frame is not None:
         file = _led(file, frame, options.retract)
-        notes = [LED_NOTE, *([LED_MOVES_NOTE] if file.moves else [])]
+        notes += [LED_NOTE, *([LED_MOVES_NOTE] if file.moves else [])]
     asked = _table(file, "audit", AuditTable, audit_options)
     for p in file.plans:
         for check in checks(p, **asked):
@@ -135,6 +147,13 @@ def program_from_file(
     return files, notes + warnings
 
 
+def _require_passed(found: Audited) -> None:
+    for name, table in found.tables.items():
+        for check in table:
+            if check.level == "error" and not check.ok:
+                raise AuditFailed(f"no program: contour {name!r} fails its audit: {check.issue()}")
+
+
 def _led(file: PlanFile, frame: MeasuredFrame, retract: float) -> PlanFile:
     """Return a plan.json with its plans and the moves between them led to a measured part."""
     plans = tuple(placed(p, frame.T_base_part) for p in file.plans)
@@ -142,13 +161,13 @@ def _led(file: PlanFile, frame: MeasuredFrame, retract: float) -> PlanFile:
     return replace(file, plans=plans, moves=moves, in_cell=False)
 
 
-def _options(file: PlanFile, language: str) -> ProgramOptions:
+def _options(file: PlanFile, language: str, stem: str) -> ProgramOptions:
     find_language(language)
     return _table(
         file,
         "program",
         ProgramTable,
-        lambda table: program_options(table, file.path.stem),
+        lambda table: program_options(table, stem),
         language=language,
     )
 
@@ -187,7 +206,7 @@ def _apart(planned: Contour, cut: Contour) -> float:
 
 
 def require_same(plan: Plan, job: Job, path: Path) -> None:
-    """Raise InputError where a plan's tool, part or arm is not where the job's cell has it."""
+    """Raise InputError where a plan's tool, part or arm is not where the job has it."""
     pairs = {
         "tool": (plan.T_flange_tip, job.tool),
         "part": (plan.T_base_part, job.placement),
@@ -196,8 +215,8 @@ def require_same(plan: Plan, job: Job, path: Path) -> None:
     for name, (here, there) in pairs.items():
         if np.abs(here - there).max() > SAME_PLACE:
             raise InputError(
-                f"{job.path}: its {name} is not where that of {path} is, so that its cell cannot "
-                "be checked; give the job of that plan, or plan it again"
+                f"{job.path}: its {name} is not where that of {path} is; give the job of that "
+                "plan, or plan it again"
             )
 
 

@@ -25,6 +25,7 @@ ENTRY_POINTS = "kerfpath.languages"
 SHIPPED = {
     "csv": "kerfpath.post.csv:CSV",
     "fanuc": "kerfpath.post.fanuc:FANUC",
+    "inform": "kerfpath.post.inform:INFORM",
     "krl": "kerfpath.post.krl:KRL",
     "rapid": "kerfpath.post.rapid:RAPID",
     "ros": "kerfpath.post.ros:ROS",

@@ -12,35 +12,46 @@ from kerfpath.kernels.turns import MOST_TURNS
 if TYPE_CHECKING:
     from kerfpath.robots._robot import Robot
 
-__all__ = ["require_limits"]
+__all__ = ["require_few_turns", "require_order"]
 
 
-def require_limits(robot: Robot) -> None:
-    """Require of known position limits that they are in order, and leave a finite choice of turns.
+def require_order(robot: Robot) -> None:
+    """Require of position limits, where both are known, that they are in order.
 
     Raises
     ------
     InputError
-        Limits of a joint that are reversed, or ranges with more combinations of turns than the
-        kernels have room for.
+        Limits of a joint that are reversed.
     """
-    assert robot.lower is not None
-    assert robot.upper is not None
+    if robot.lower is None or robot.upper is None:
+        return
     n = robot.family.joints
-    lower, upper = robot.lower[:n], robot.upper[:n]
     if robot.external is not None:
         robot.external.require_range(float(robot.lower[n]), float(robot.upper[n]))
-    reversed_ = np.flatnonzero(~(lower < upper))
+    reversed_ = np.flatnonzero(~(robot.lower[:n] < robot.upper[:n]))
     if reversed_.size:
         i = int(reversed_[0])
         raise InputError(
             f"robot {robot.id!r}: limits of joint {i + 1} are reversed, lower "
-            f"{np.degrees(lower[i]):g} deg is not below upper {np.degrees(upper[i]):g} deg"
+            f"{np.degrees(robot.lower[i]):g} deg is not below upper "
+            f"{np.degrees(robot.upper[i]):g} deg"
         )
-    turns = np.where(robot.endless[:n], 1.0, np.floor((upper - lower) / (2 * np.pi)) + 1)
-    if turns.prod() > MOST_TURNS:
+
+
+def require_few_turns(robot: Robot) -> None:
+    """Require of position limits that the kernels have room for every combination of turns.
+
+    Raises
+    ------
+    InputError
+        Limits that are not known, or that leave more: some would be lost.
+    """
+    n, limits = robot.family.joints, robot.joint_limits()
+    span = (limits.upper - limits.lower)[:n] / (2 * np.pi)
+    turns = np.where(limits.endless[:n], 1.0, np.floor(span) + 1).prod()
+    if turns > MOST_TURNS:
         raise InputError(
-            f"robot {robot.id!r}: its limits leave {turns.prod():g} combinations of turns, at most "
+            f"robot {robot.id!r}: its limits leave {turns:g} combinations of turns, at most "
             f"{MOST_TURNS} are told apart; call joints that turn without end endless, or narrow "
             "their limits"
         )

@@ -16,7 +16,7 @@ from kerfpath.kernels import turns
 from kerfpath.robots._coupling import Coupling
 from kerfpath.robots._external import ExternalAxis, Travel, alone, carried, held
 from kerfpath.robots._families import FAMILIES, Family
-from kerfpath.robots._limits import require_limits
+from kerfpath.robots._limits import require_few_turns, require_order
 from kerfpath.robots._solutions import Solutions, admitted, every
 from kerfpath.urdf import Body, Chain, read_urdf
 
@@ -122,8 +122,7 @@ class Robot:
         for name in ("velocity", "acceleration"):
             if getattr(self, name) is not None:
                 _set(self, name, positive(getattr(self, name), name, (n,)))
-        if self.lower is not None and self.upper is not None:
-            require_limits(self)
+        require_order(self)
 
     @property
     def family(self) -> Family:
@@ -249,7 +248,10 @@ class Robot:
         poses = np.asarray(T, dtype=float)
         poses = floats(poses[None] if poses.ndim == 2 else poses, "T", (None, 4, 4))
         q, reach = self.inverse_all(poses)
-        return admitted(q, reach, self.joint_limits()) if within_limits else every(q, reach)
+        if not within_limits:
+            return every(q, reach)
+        require_few_turns(self)
+        return admitted(q, reach, self.joint_limits())
 
     def inverse_all(self, T: Array) -> tuple[Array, Bools]:
         """Return every posture of flange poses T (B, 4, 4), limits ignored, as bare arrays.

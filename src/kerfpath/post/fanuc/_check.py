@@ -32,7 +32,7 @@ FEWEST_TURNS, MOST_TURNS = -8, 7
 
 def check(program: Program, settings: FanucSettings) -> Iterator[ProgramIssue]:
     """Yield the issues that only this language has."""
-    if settings.laser_output == settings.gas_output:
+    if settings.laser_output is not None and settings.laser_output == settings.gas_output:
         said = f"laser and gas are both switched by DO[{settings.laser_output}]; name two outputs"
         yield ProgramIssue("error", "output", said, "program")
     lines, most = len(Fanuc(program, settings).main()), settings.lines_per_file

@@ -33,7 +33,7 @@ class FanucSettings(Settings):
     lines_per_file: Annotated[
         int, setting("a whole number of lines from 100 to 9999", "9999", ge=100, le=9999)
     ] = 9999
-    laser_output: Output = 1
+    laser_output: Output | None = None
     gas_output: Output | None = None
     user_frame: Annotated[int, setting("a user frame, 1 to 61", "2", ge=1, le=61)] = 1
     tool_frame: Annotated[int, setting("a tool frame, 1 to 29", "2", ge=1, le=29)] = 1

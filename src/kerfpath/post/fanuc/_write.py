@@ -17,12 +17,11 @@ from dataclasses import replace
 from itertools import count
 
 import numpy as np
-from scipy.spatial.transform import Rotation
 
 from kerfpath._arrays import Array
 from kerfpath.post._divide import divided
 from kerfpath.post._formatter import Formatter, number, plain
-from kerfpath.post._frames import faceplate, world
+from kerfpath.post._frames import faceplate, world, xyzwpr
 from kerfpath.post._names import identifiers
 from kerfpath.post._program import (
     CircularMove,
@@ -31,13 +30,14 @@ from kerfpath.post._program import (
     LinearMove,
     Program,
     Section,
+    Signal,
     Switch,
     Wait,
 )
 from kerfpath.post.fanuc._axes import axes_from_joints, posture
 from kerfpath.post.fanuc._settings import FanucSettings, unit
 
-__all__ = ["Fanuc", "divide_switches", "xyzwpr"]
+__all__ = ["Fanuc", "divide_switches"]
 
 NEW_LINE = "\r\n"
 PADDING = "    "
@@ -114,7 +114,8 @@ class Fanuc(Formatter):
         lines += _frame(f"UFRAME {settings.user_frame}", frame)
         lines += _frame(f"UTOOL {settings.tool_frame}", tool)
         lines += [f"  UFRAME_NUM={settings.user_frame} ;", f"  UTOOL_NUM={settings.tool_frame} ;"]
-        lines += [f"  DO[{self.output(s)}]=OFF ;" for s in dict.fromkeys(["laser", *switched])]
+        laser: list[Signal] = [] if self.settings.laser_output is None else ["laser"]
+        lines += [f"  DO[{self.output(s)}]=OFF ;" for s in dict.fromkeys([*laser, *switched])]
         return lines + [f"  CALL {section.name}{PADDING};" for section in program.sections]
 
     def names(self) -> list[tuple[str, str]]:
@@ -213,16 +214,6 @@ def divide_switches(move: LinearMove) -> tuple[tuple[Switch, ...], tuple[Switch,
     while move.zone == 0 and after < len(switches) and switches[-1 - after].lead_time == 0:
         after += 1
     return switches[: len(switches) - after], switches[len(switches) - after :]
-
-
-def xyzwpr(T: Array) -> Array:
-    """Return poses (K, 4, 4) m as X, Y, Z in mm and W, P, R in deg, (K, 6).
-
-    The rotation is W about x, then P about y, then R about z, all axes fixed.
-    """
-    turned = Rotation.from_matrix(T[:, :3, :3])
-    angles = turned.as_euler("xyz", degrees=True, suppress_warnings=True)
-    return np.hstack([T[:, :3, 3] * 1e3, angles])
 
 
 def _more_lines(section: Section) -> int:

@@ -5,13 +5,14 @@ from __future__ import annotations
 import re
 from collections.abc import Mapping
 from dataclasses import replace
+from typing import get_args
 
 import numpy as np
 from scipy.spatial.transform import Rotation
 
 from kerfpath._arrays import Array, freeze
 from kerfpath.errors import InputError
-from kerfpath.post._program import Switch
+from kerfpath.post._program import Signal, Switch
 from kerfpath.post._read import ReadMove, ReadProgram, ReadSection, ReadStep, ReadWait
 from kerfpath.post.urscript._switching import time_ahead, words
 from kerfpath.post.urscript._write import URScriptSettings, full_joint_speed
@@ -68,13 +69,15 @@ class _Reader:
         (name,) = self.take(_DEFINITION, "def NAME():")
         tool = _pose(self.take(_TOOL, "set_tcp(p[...])"))
         part = _pose(self.take(_PART, "global part_frame = p[...]"))
-        signals = self.signals = ["laser"]
-        self.expect(words("laser", self.settings.laser_output))
-        if self.line == "global gas_waits = False":
-            if self.settings.gas_output is None:
-                raise self.fault("switches the gas; say by which output with gas_output")
-            signals.append("gas")
-            self.expect(words("gas", self.settings.gas_output))
+        signals = self.signals
+        for signal in get_args(Signal):
+            if self.line != f"global {signal}_waits = False":
+                continue
+            output = getattr(self.settings, f"{signal}_output")
+            if output is None:
+                raise self.fault(f"switches the {signal}; say by which output with {signal}_output")
+            signals.append(signal)
+            self.expect(words(signal, output))
         sections: dict[str, ReadSection] = {}
         while match := _DEFINITION.fullmatch(self.line):
             if match[1] in sections:

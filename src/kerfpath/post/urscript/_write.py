@@ -36,7 +36,7 @@ Output = Annotated[int, setting("a standard digital output from 0 to 7", "0", ge
 class URScriptSettings(Settings):
     """What is wired to the controller, and how fast it may speed up."""
 
-    laser_output: Output = 0
+    laser_output: Output | None = None
     gas_output: Output | None = None
     acceleration_mm_s2: Annotated[
         float, setting("a number from 1 to 50000, in mm/s^2", "1200", ge=1, le=50_000)
@@ -111,7 +111,8 @@ class URScript(Formatter):
         """What the program can switch."""
         moves = [move for move in self.program.moves if isinstance(move, LinearMove)]
         gas = any(switch.signal == "gas" for move in moves for switch in move.switches)
-        return ["laser", "gas"] if gas else ["laser"]
+        found: list[Signal] = [] if self.settings.laser_output is None else ["laser"]
+        return [*found, "gas"] if gas else found
 
     def names(self) -> list[tuple[str, str]]:
         """Return every name in the program, with what it names."""
