@@ -241,6 +241,7 @@ def many(text):
     [
         (lambda t: t, "no target on a contour was moved"),
         (lambda t: edited(t, "joined", 0, (0, 0, 1)), "the start of contour 'joined' was moved"),
+        (lambda t: edited(t, "joined", 41, (0, 0, 1)), "the end of contour 'joined' was moved"),
         (many, "targets were moved; a part that stands elsewhere is measured"),
         (
             lambda t: re.sub(r'(wobjdata wPart:=\[FALSE,TRUE,"",\[\[)[\d.]+', r"\g<1>1201.0", t),

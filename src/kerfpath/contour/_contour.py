@@ -22,6 +22,9 @@ FRAME_KINDS: tuple[FrameKind, ...] = ("tangent", "rotation-minimising")
 REPEATED_POINT = 1e-9
 """Consecutive nodes closer than this (m) are one point: they leave no direction of travel."""
 
+SAME_PLACE = 1e-6
+"""m; a path whose ends are nearer returns to its start."""
+
 KINDS = ("cut", "pierce", "lead-in", "micro joint", "overlap", "lead-out", "loop")
 """What a stretch of a contour is; `Contour.kind` holds places in this tuple."""
 
@@ -141,6 +144,11 @@ class Contour:
         part = ((where - self.s[k]) / (self.s[k + 1] - self.s[k]))[..., None]
         points = self.points[k] + part * (self.points[k + 1] - self.points[k])
         return points, turned(self.axes[k], self.axes[k + 1], part)
+
+    @property
+    def returns(self) -> bool:
+        """Whether it ends within 1 um of where it begins, closed or not."""
+        return bool(np.linalg.norm(self.points[0] - self.points[-1]) < SAME_PLACE)
 
     @property
     def kinds(self) -> tuple[str, ...]:

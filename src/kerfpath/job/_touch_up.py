@@ -118,7 +118,7 @@ def touch_up(
         _taught(p, group.path[: len(p.contour)])
         for p, group in zip(file.plans, groups, strict=True)
     ]
-    _require_few(program, targets, sum(len(p.contour) for p in file.plans))
+    _require_few(program, targets, file.plans)
     given = {}
     tasks = {task.name: task for task in job.tasks(part)}
     if set(tasks) != set(file.contours.values()):
@@ -201,18 +201,22 @@ def _taught(p: Plan, moves: Sequence[ReadMove]) -> list[Taught]:
     ]
 
 
-def _require_few(program: Path, targets: Sequence[Sequence[Taught]], total: int) -> None:
+def _require_few(program: Path, targets: Sequence[Sequence[Taught]], plans: Sequence[Plan]) -> None:
     moved = [target for each in targets for target in each]
+    total = sum(len(p.contour) for p in plans)
     if not moved:
         raise InputError(f"{program}: no target on a contour was moved; there is nothing to do")
     if len(moved) > MOST_MOVED * total:
         raise InputError(f"{program}: {len(moved)} of {total} targets were moved; {MEASURE}")
-    for target in moved:
-        if target.node == 0:
-            raise InputError(
-                f"{target.place}: the start of contour {target.contour!r} was moved; say "
-                f"another in the job and plan it again; {MEASURE}"
-            )
+    for p, each in zip(plans, targets, strict=True):
+        ends = (0, len(p.contour) - 1) if p.contour.returns else (0,)
+        for target in each:
+            if target.node in ends:
+                raise InputError(
+                    f"{target.place}: the {'end' if target.node else 'start'} of contour "
+                    f"{target.contour!r} was moved; say another start in the job and plan it again;"
+                    f" {MEASURE}"
+                )
 
 
 def _planned_from(

@@ -14,8 +14,6 @@ __all__ = ["touched_up"]
 
 PARTS = 16
 """Parts of a step between nodes at which the eased path has points of its own."""
-SAME_POINT = 1e-6
-"""A path whose ends are nearer (m) than this returns to its start."""
 
 
 def touched_up(
@@ -58,12 +56,12 @@ def touched_up(
     points = floats(points, "points", (len(moved), 3))
     axes = unit(floats(axes, "axes", (len(moved), 3)))
     last = len(nodes) - 1
-    returns = np.linalg.norm(nodes.points[0] - nodes.points[-1]) < SAME_POINT
     ordered = len(moved) > 0 and (np.diff(moved) > 0).all()
-    if not (ordered and moved[0] > 0 and moved[-1] <= last - returns):
+    most = last - nodes.returns
+    if not (ordered and moved[0] > 0 and moved[-1] <= most):
         raise InputError(
-            f"contour {nodes.name!r}: expected nodes from 1 to {last - returns} that were moved, "
-            f"increasing, got {moved.tolist()}"
+            f"contour {nodes.name!r}: expected nodes from 1 to {most} that were moved, increasing, "
+            f"got {moved.tolist()}"
         )
     step = np.arange(last * PARTS + 1) / PARTS
     s = np.unique(np.concatenate([np.interp(step, np.arange(last + 1), nodes.s), nodes.s]))
