@@ -158,7 +158,12 @@ def speed(
 @app.command()
 def post(
     plan_file: PlanFileArgument,
-    language: Annotated[str, typer.Option(help="Robot language.")] = "rapid",
+    language: Annotated[
+        str,
+        typer.Option(
+            help="Robot language: rapid, krl, fanuc, val3, inform, urscript, ros, csv, or your own."
+        ),
+    ] = "rapid",
     output: Annotated[
         Path | None,
         typer.Option(

@@ -81,6 +81,7 @@ def program_from_file(
     plan_file: Path,
     language: str,
     *,
+    name: str | None = None,
     strict: bool = False,
     job_file: Path | None = None,
     dry_share: float | None = None,
@@ -92,6 +93,8 @@ def program_from_file(
     ----------
     plan_file : Path
     language : str
+    name : str, optional
+        Of the program, where it is not to be that of the job.
     strict : bool
         Refuse what is only warned of otherwise.
     job_file : Path, optional
@@ -130,6 +133,7 @@ def program_from_file(
         _require_passed(audit_file(plan_file, job_file))
         file = replace(file, job=read_job(job_file).source)
     options = _options(file, language, (job_file or plan_file).stem)
+    options = options if name is None else replace(options, name=name)
     if frame is not None:
         file = _led(file, frame, options.retract)
         notes += [LED_NOTE, *([LED_MOVES_NOTE] if file.moves else [])]
