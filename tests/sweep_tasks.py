@@ -8,8 +8,6 @@ from pathlib import Path
 
 from kerfpath.errors import InputError, NoFeasiblePath
 
-unpicklable = object
-
 
 class Stubborn(Exception):
     """An exception that does not survive the way back from a process."""
@@ -52,6 +50,4 @@ def troubled(what):
 
 
 def threads():
-    from kerfpath import graph
-
-    return [os.environ["NUMBA_NUM_THREADS"], os.environ["OMP_NUM_THREADS"], graph.__name__]
+    return [os.environ["NUMBA_NUM_THREADS"], os.environ["OMP_NUM_THREADS"]]

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator
-from concurrent.futures import CancelledError
+from collections.abc import Callable, Generator, Iterable, Iterator
 from importlib.metadata import version
 from itertools import islice
 from typing import Any
@@ -23,7 +22,7 @@ PATIENCE = 10.0
 
 def on_cluster(
     function: Callable[..., Any], tasks: Iterable[Task], address: str
-) -> Iterator[list[Outcome]]:
+) -> Generator[list[Outcome], None, None]:
     """Yield the outcomes as they come; closing it takes the rest back from the scheduler.
 
     Dask gives the tasks of a worker that is lost to the others; a task that has lost several is
@@ -48,15 +47,16 @@ def on_cluster(
             f"scheduler {address}: no answer within {PATIENCE:g} s; is `dask scheduler` running "
             f"there, and the address right?"
         ) from error
-    with client:
-        try:
+    try:
+        with client:
             _check(client, address)
             yield from _gathered(distributed, client, function, iter(tasks))
-        except (CancelledError, OSError) as error:
-            raise InputError(
-                f"scheduler {address}: lost on the way; the results so far are kept: run the same "
-                f"sweep again"
-            ) from error
+    except (distributed.CancelledError, OSError, RuntimeError) as error:
+        # Closing a client that has lost its scheduler may end in a RuntimeError of Dask's own.
+        raise InputError(
+            f"scheduler {address}: lost on the way; the results so far are kept: run the same "
+            f"sweep again"
+        ) from error
 
 
 def _check(client: Any, address: str) -> None:
@@ -88,7 +88,7 @@ def _gathered(
             for task in islice(tasks, count)
         ]
 
-    coming = distributed.as_completed(handed_out(AHEAD))
+    coming = distributed.as_completed(handed_out(AHEAD), loop=client.loop)
     for batch in coming.batches():
         whole = [future for future in batch if future.status == "finished"]
         yield [*client.gather(whole), *(_failed(distributed, f) for f in batch if f not in whole)]
@@ -101,6 +101,6 @@ def _failed(distributed: Any, future: Any) -> Outcome:
     if isinstance(error, distributed.KilledWorker):
         failure = Failure(kind="WorkerDied", message="the task took several workers with it")
         return Outcome(key=future.key, value=None, failure=failure, seconds=0.0)
-    if isinstance(error, InputError | CancelledError):
+    if isinstance(error, InputError | distributed.CancelledError):
         raise error
     raise InputError(f"a worker cannot do the task: {type(error).__name__}: {error}")

@@ -6,9 +6,10 @@ import os
 import pickle
 import signal
 from collections import deque
-from collections.abc import Callable, Generator, Iterable, Iterator
+from collections.abc import Callable, Generator, Iterable
 from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
 from concurrent.futures.process import BrokenProcessPool
+from contextlib import suppress
 from multiprocessing import get_context
 from multiprocessing.connection import Connection
 from threading import Thread
@@ -28,7 +29,7 @@ ONE_THREAD = dict.fromkeys(("NUMBA_NUM_THREADS", "OMP_NUM_THREADS", "OPENBLAS_NU
 
 def on_processes(
     function: Callable[..., Any], tasks: Iterable[Task], processes: int
-) -> Iterator[list[Outcome]]:
+) -> Generator[list[Outcome], None, None]:
     """Yield the outcomes as they come; closing it stops the processes at once.
 
     When a process dies, nobody can say which task did it: those handed out are tried again one by
@@ -101,7 +102,8 @@ def _begin(link: Connection) -> None:
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     os.environ.update(ONE_THREAD)
     Thread(target=_leave_with, args=(link,), daemon=True).start()
-    link.send(None)
+    with suppress(OSError):  # a sweep that was killed meanwhile hears nothing
+        link.send(None)
 
 
 def _leave_with(link: Connection) -> None:

@@ -35,6 +35,7 @@ REASONS = {
     sqlite3.SQLITE_BUSY: "another sweep holds this store: wait for its end, or name another store",
     sqlite3.SQLITE_FULL: "the disk is full; the results so far are kept: make room and run the "
     "same sweep again",
+    sqlite3.SQLITE_IOERR: "cannot be read or written: is the disk full, or does it fail?",
     sqlite3.SQLITE_NOTADB: "this file is no store of a sweep: name another",
     sqlite3.SQLITE_CANTOPEN: "cannot be opened: is its folder there, and may you write in it?",
     sqlite3.SQLITE_READONLY: "may not be written to: change that, or name another store",

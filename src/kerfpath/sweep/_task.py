@@ -73,7 +73,9 @@ def name_of(function: Callable[..., Any]) -> str:
     if module == "__main__":
         spec, file = getattr(home, "__spec__", None), getattr(home, "__file__", None)
         if spec is None and file is None:
-            raise InputError(f"{name} was typed in, and workers cannot import it: save it in a file")
+            raise InputError(
+                f"{name} was typed in, and workers cannot import it: save it in a file"
+            )
         module = spec.name if spec else Path(str(file)).stem
     return f"{module}:{name}"
 
