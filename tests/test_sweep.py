@@ -2,6 +2,7 @@
 
 import json
 import os
+import re
 import signal
 import sqlite3
 import subprocess
@@ -52,6 +53,13 @@ STORE = {str(tmp_path / "store.sqlite")!r}
 RUN = """
 if __name__ == "__main__":
     sweep.run(sweep_tasks.marked, TASKS, store=STORE, processes=2)
+"""
+
+REFUSED = """
+try:
+    sweep.run(sweep_tasks.square, TASKS, store=STORE, processes=1)
+except InputError as error:
+    sys.exit("refused: " + str(error))
 """
 
 
@@ -188,16 +196,20 @@ def test_after_ctrl_c_the_processes_leave_and_the_results_stay(tmp_path):
 
 
 def test_a_second_sweep_on_a_store_is_refused(tmp_path):
-    nested = []
+    said = "store.sqlite: another sweep holds this store"
+    store, other = tmp_path / "store.sqlite", script(tmp_path, numbers(1), REFUSED)
+    lines = []
 
     def again(done, total, left):
-        with pytest.raises(InputError, match="s: another sweep holds this store") as refused:
-            sweep.run(sweep_tasks.square, numbers(1), store=tmp_path / "s")
-        nested.append(str(refused.value))
+        with pytest.raises(InputError, match=said) as refused:
+            sweep.run(sweep_tasks.square, numbers(1), store=store)
+        lines.append(str(refused.value))
+        ran = subprocess.run(other, capture_output=True, text=True, check=False)
+        lines.append(ran.stderr.strip())
 
-    sweep.run(sweep_tasks.square, numbers(1), store=tmp_path / "s", progress=again)
-    assert nested
-    assert all("\n" not in line for line in nested)
+    sweep.run(sweep_tasks.square, numbers(1), store=store, progress=again)
+    assert len(lines) == 4
+    assert all(said in line and "\n" not in line for line in lines)
 
 
 @pytest.mark.parametrize(
@@ -269,17 +281,29 @@ def test_parameters_and_functions_that_cannot_travel_are_refused_before_anything
 
 
 def test_a_script_without_its_guard_is_told_so(tmp_path):
-    unguarded = """
-try:
-    sweep.run(sweep_tasks.square, TASKS, store=STORE, processes=1)
-except InputError as error:
-    sys.exit("refused: " + str(error))
-"""
     ran = subprocess.run(
-        script(tmp_path, numbers(3), unguarded), capture_output=True, text=True, check=False
+        script(tmp_path, numbers(3), REFUSED), capture_output=True, text=True, check=False
     )
     assert "if __name__ == '__main__'" in ran.stderr.splitlines()[-1]
     assert query(tmp_path / "store.sqlite", "SELECT count(*) FROM result") == [(0,)]
+
+
+def test_the_example_of_the_docs_runs(tmp_path):
+    text = (HERE.parent / "docs" / "sweeps.md").read_text()
+    (code,) = re.findall(r"```python\n(.*?)```", text, re.DOTALL)
+    (tmp_path / "example.py").write_text(code)
+    ran = subprocess.run(
+        [sys.executable, tmp_path / "example.py"],
+        env={**os.environ, "TMPDIR": str(tmp_path), "PYTHONPATH": os.pathsep.join(sys.path)},
+        capture_output=True,
+        text=True,
+        check=True,
+    )
+    low, high, far = ran.stdout.splitlines()
+    assert low.startswith("-0.2 {'speed_m_s': ")
+    assert high.startswith("0.2 {'speed_m_s': ")
+    assert far.startswith("3.0 Failure(kind='NoFeasiblePath'")
+    assert ran.stderr == ""
 
 
 @pytest.fixture(scope="module")
