@@ -26,9 +26,8 @@ from kerfpath.post import (
     preflight,
     read_program,
 )
-from kerfpath.post._frames import world
+from kerfpath.post._frames import world, xyzwpr
 from kerfpath.post.fanuc import FanucSettings, axes_from_joints, joints_from_axes, posture
-from kerfpath.post.fanuc._write import xyzwpr
 from kerfpath.robots import robot_ids
 from programs import arc, changed, codes, frames, hand_plan, with_steps
 
@@ -37,7 +36,8 @@ MAIN, CONTOUR = "CUT_SKIN_OUTER.ls", "SKIN_OUTER.ls"
 FANUC = language("fanuc")
 OPTIONS = FanucSettings(laser_output=1)
 ARMS = [name for name in robot_ids() if name.startswith("fanuc")]
-WIDE = {"lower": np.full(6, -30.0), "upper": np.full(6, 30.0)}
+REACH = np.array([6.0, 6.0, 6.0, 6.0, 6.0, 99.0])
+WIDE = {"lower": -REACH, "upper": REACH}
 
 MEASURED = """
       0   0   0    0 -90    0  N U T 0  0  0   965.000    0.000  965.000  -180   0    0
@@ -363,9 +363,7 @@ def test_preflight_finds_what_only_this_language_cannot_say(program, cell):
     assert codes(early, "error", "fanuc", OPTIONS) == ["time-step"]
     same = FanucSettings(laser_output=1, gas_output=1)
     assert codes(program, "error", "fanuc", same) == ["output"]
-    wide = replace(
-        program, robot=program.robot.with_limits(lower=np.full(6, -99.0), upper=[99] * 6)
-    )
+    wide = replace(program, robot=program.robot.with_limits(**WIDE))
     steps = [
         replace(step, q=step.q + 18 * np.pi * np.eye(6)[5]) if hasattr(step, "q") else step
         for step in program.sections[0].steps

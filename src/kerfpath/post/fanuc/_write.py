@@ -17,12 +17,11 @@ from dataclasses import replace
 from itertools import count
 
 import numpy as np
-from scipy.spatial.transform import Rotation
 
 from kerfpath._arrays import Array
 from kerfpath.post._divide import divided
 from kerfpath.post._formatter import Formatter, number, plain
-from kerfpath.post._frames import faceplate, world
+from kerfpath.post._frames import faceplate, world, xyzwpr
 from kerfpath.post._names import identifiers
 from kerfpath.post._program import (
     CircularMove,
@@ -38,7 +37,7 @@ from kerfpath.post._program import (
 from kerfpath.post.fanuc._axes import axes_from_joints, posture
 from kerfpath.post.fanuc._settings import FanucSettings, unit
 
-__all__ = ["Fanuc", "divide_switches", "xyzwpr"]
+__all__ = ["Fanuc", "divide_switches"]
 
 NEW_LINE = "\r\n"
 PADDING = "    "
@@ -215,16 +214,6 @@ def divide_switches(move: LinearMove) -> tuple[tuple[Switch, ...], tuple[Switch,
     while move.zone == 0 and after < len(switches) and switches[-1 - after].lead_time == 0:
         after += 1
     return switches[: len(switches) - after], switches[len(switches) - after :]
-
-
-def xyzwpr(T: Array) -> Array:
-    """Return poses (K, 4, 4) m as X, Y, Z in mm and W, P, R in deg, (K, 6).
-
-    The rotation is W about x, then P about y, then R about z, all axes fixed.
-    """
-    turned = Rotation.from_matrix(T[:, :3, :3])
-    angles = turned.as_euler("xyz", degrees=True, suppress_warnings=True)
-    return np.hstack([T[:, :3, 3] * 1e3, angles])
 
 
 def _more_lines(section: Section) -> int:

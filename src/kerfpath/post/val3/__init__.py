@@ -1,6 +1,7 @@
 """VAL 3, the language of Staubli controllers, as projects of XML files."""
 
 from kerfpath.post._languages import Language
+from kerfpath.post._standing import stopping_to_switch
 from kerfpath.post.val3._axes import axes_from_joints as axes_from_joints
 from kerfpath.post.val3._axes import configurations as configurations
 from kerfpath.post.val3._axes import joints_from_axes as joints_from_axes
@@ -10,7 +11,6 @@ from kerfpath.post.val3._read import read
 from kerfpath.post.val3._settings import Val3Settings as Val3Settings
 from kerfpath.post.val3._settings import is_reserved, rules
 from kerfpath.post.val3._write import Val3 as Val3
-from kerfpath.post.val3._write import stopping_to_switch
 
 VAL3 = Language(
     name="val3",
@@ -25,6 +25,7 @@ VAL3 = Language(
     posture=posture,
     check=check,
     sayable=stopping_to_switch,
+    assumed={"laser_output": r"BasicIO-1\%Q0"},
     read=read,
 )
 """What is registered."""

@@ -22,13 +22,13 @@ from kerfpath.post._formatter import Formatter, number, plain
 from kerfpath.post._frames import faceplate, world
 from kerfpath.post._names import identifiers
 from kerfpath.post._program import CircularMove, JointMove, LinearMove, Move, Program, Section, Wait
+from kerfpath.post._standing import stopping_to_switch
 from kerfpath.post.val3._axes import axes_from_joints, posture
 from kerfpath.post.val3._settings import LONGEST_NAME, Val3Settings
 from kerfpath.post.val3._xml import SCHEMA
 
 __all__ = [
     "DATA", "OUTPUTS", "PROGRAM", "PROJECT", "Val3", "opening", "parameters", "stopping",
-    "stopping_to_switch",
 ]  # fmt: skip
 
 PROJECT = "http://www.staubli.com/robotics/VAL3/Project/3"
@@ -68,25 +68,6 @@ def opening(settings: Val3Settings) -> list[str]:
 def stopping(settings: Val3Settings) -> list[str]:
     """Return the statements of stop(), which the controller calls when the project is stopped."""
     return [*opening(settings), "resetMotion()"]
-
-
-def stopping_to_switch(program: Program, settings: object = None) -> Program:
-    """Return what VAL 3 can say of a program: all switches where the tip stands, without a lead."""
-
-    def said(move: LinearMove) -> LinearMove:
-        switches = tuple(replace(switch, lead_time=0.0) for switch in move.switches)
-        return replace(move, switches=switches, zone=0.0)
-
-    sections = tuple(
-        replace(
-            section,
-            steps=tuple(
-                said(s) if isinstance(s, LinearMove) and s.switches else s for s in section.steps
-            ),
-        )
-        for section in program.sections
-    )
-    return replace(program, sections=sections)
 
 
 @dataclass(slots=True)

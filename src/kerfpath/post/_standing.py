@@ -1,0 +1,52 @@
+"""Switches for languages that know none on the path: where the robot stands, without a lead."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import replace
+
+from kerfpath.post._issue import ProgramIssue
+from kerfpath.post._program import LinearMove, Program, Section
+
+__all__ = ["stopping_to_switch", "switched_later"]
+
+
+def stopping_to_switch(program: Program, settings: object = None) -> Program:
+    """Return a program with all its switches where the tip stands, and without a lead."""
+
+    def said(move: LinearMove) -> LinearMove:
+        switches = tuple(replace(switch, lead_time=0.0) for switch in move.switches)
+        return replace(move, switches=switches, zone=0.0)
+
+    sections = tuple(
+        replace(
+            section,
+            steps=tuple(
+                said(s) if isinstance(s, LinearMove) and s.switches else s for s in section.steps
+            ),
+        )
+        for section in program.sections
+    )
+    return replace(program, sections=sections)
+
+
+def switched_later(section: Section, title: str) -> Iterator[ProgramIssue]:
+    """Tell of switches that come later than planned, and of stops that they need."""
+    moves = [m for m in section.moves if isinstance(m, LinearMove) and m.switches]
+    leads = [switch.lead_time for m in moves for switch in m.switches if switch.lead_time > 0]
+    if leads:
+        yield ProgramIssue(
+            "warning",
+            "lead-time",
+            f"{len(leads)} switches are to come up to {max(leads) * 1e3:g} ms ahead, which {title} "
+            "cannot say: they come once the tip stands; measure the delay, and give no lead",
+            section.name,
+        )
+    if flying := sum(move.zone > 0 for move in moves):
+        yield ProgramIssue(
+            "warning",
+            "stop-to-switch",
+            f"the robot will stop at {flying} places to switch there, as at each micro joint: "
+            f"{title} switches only where it stands",
+            section.name,
+        )

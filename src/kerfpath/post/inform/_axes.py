@@ -1,0 +1,66 @@
+"""What a Yaskawa controller calls the joints, and the manipulator type (RCONF) of a pose.
+
+Axes S, L, U, R, B, T: zero with the lower arm upright and the rest straight ahead, the flange's x
+up; S and L turn to the right hand, U lifts the upper arm off the lower one. So the joints of the
+library's arms count (their descriptions are those of the ROS drivers, which turn pulses into
+radians by a factor for each axis); other descriptions are converted by the arm's model.
+
+The type of a position, six bits, by the manuals (NX100 149235-1CD, 3.9; DX100 156191-1CD, 4.1):
+no-flip where R lies beyond a quarter turn either way (at -90 deg, and from 90 to 270 deg); lower
+arm; rear; and of R, T and S whether the angle lies beyond -180 to 180 deg. Our reading of the
+figures: lower arm where the wrist centre lies behind the line of the lower arm, prolonged; rear
+where it lies behind axis S. The world of the controller has its origin on axis S at the height of
+axis L.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from kerfpath._arrays import Array, Ints, floats, freeze
+from kerfpath.robots import Robot
+
+__all__ = ["axes_from_joints", "joints_from_axes", "manipulator_type", "posture"]
+
+SIGN = np.array([1.0, 1.0, -1.0, -1.0, -1.0, -1.0])
+SHIFT = np.array([0.0, 0.0, np.pi / 2, 0.0, 0.0, np.pi])
+"""Axes = SIGN * angles + SHIFT; angles are those of the ortho-parallel model, upright at 0."""
+NOISE_DECIMALS = 6
+"""Angles are rounded to this many decimals (deg) before they are compared."""
+
+
+def axes_from_joints(robot: Robot, q: ArrayLike) -> Array:
+    """Return the controller's axes (K, 6) rad of joint vectors q (K, 6) rad."""
+    angles = robot.sign * floats(q, "q", (None, 6)) - robot.offset
+    return freeze(np.asarray(SIGN * angles + SHIFT))
+
+
+def joints_from_axes(robot: Robot, axes: ArrayLike) -> Array:
+    """Return the joint vectors (K, 6) rad of a controller's axes (K, 6) rad."""
+    angles = SIGN * (floats(axes, "axes", (None, 6)) - SHIFT)
+    return freeze(np.asarray(robot.sign * (angles + robot.offset)))
+
+
+def manipulator_type(robot: Robot, q: ArrayLike) -> Ints:
+    """Return the six bits of RCONF, (K, 6), of joint vectors q (K, 6) rad.
+
+    In the plane of the arm, with x ahead and z up, the wrist centre lies at
+    w = c3 (sin q23, cos q23) + a2 (cos q23, -sin q23) from axis 3; it lies behind the lower arm,
+    which points along (sin q2, cos q2), where c3 sin q3 + a2 cos q3 < 0.
+    """
+    q = floats(q, "q", (None, 6))
+    arm = robot.arm()
+    _, q2, q3, *_ = (robot.sign * q - robot.offset).T
+    ahead = arm.a1 + arm.c2 * np.sin(q2) + arm.c3 * np.sin(q2 + q3) + arm.a2 * np.cos(q2 + q3)
+    bend = arm.c3 * np.sin(q3) + arm.a2 * np.cos(q3)
+    axes_deg = np.round(np.degrees(axes_from_joints(robot, q)), NOISE_DECIMALS)
+    turned = axes_deg[:, 3] % 360.0
+    far = (axes_deg > 180) | (axes_deg <= -180)
+    bits = [(turned > 90) & (turned <= 270), bend < 0, ahead < 0, far[:, 3], far[:, 5], far[:, 0]]
+    return freeze(np.array(bits, dtype=np.int64).T)
+
+
+def posture(robot: Robot, q: Array, settings: object) -> list[tuple[int | str, ...]]:
+    """Return `manipulator_type` of joint vectors q (K, 6) rad, as tuples."""
+    return [tuple(row) for row in manipulator_type(robot, q).tolist()]

@@ -1,0 +1,73 @@
+"""What INFORM says otherwise than planned, or not at all."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from kerfpath.post._issue import ProgramIssue
+from kerfpath.post._program import JointMove, Program, Section, Wait
+from kerfpath.post._standing import switched_later
+from kerfpath.post.inform._axes import axes_from_joints
+from kerfpath.post.inform._settings import InformSettings
+
+__all__ = ["check"]
+
+TICK = 0.01
+"""Times are written in whole numbers of this (s)."""
+TICK_NOISE = 1e-4
+"""How far (s) a time may be from them."""
+TURNING = {3: "R", 5: "T", 0: "S"}
+"""The axes whose turns a type tells, within 360 deg."""
+WHOLE_TURN_DEG = 360.0
+
+
+def check(program: Program, settings: InformSettings) -> Iterator[ProgramIssue]:
+    """Yield the issues that only this language has."""
+    if settings.laser_output is not None and settings.laser_output == settings.gas_output:
+        said = f"laser and gas are both switched by OT#({settings.laser_output}); name two outputs"
+        yield ProgramIssue("error", "output", said, "program")
+    if settings.pulses_per_deg is None and any(isinstance(m, JointMove) for m in program.moves):
+        yield ProgramIssue(
+            "warning",
+            "joint-targets",
+            "joint moves go to positions by their manipulator type (RCONF), not to joints: give "
+            "pulses_per_deg, from the robot's parameters, or check each start at low speed",
+            "program",
+        )
+    for section in program.sections:
+        yield from switched_later(section, "INFORM")
+        yield from _times(section)
+        yield from _turns(program, section, settings)
+
+
+def _times(section: Section) -> Iterator[ProgramIssue]:
+    for number, step in enumerate(section.steps):
+        if isinstance(step, Wait) and abs(step.time - TICK * round(step.time / TICK)) > TICK_NOISE:
+            yield ProgramIssue(
+                "error",
+                "time-step",
+                f"waits are written in whole {TICK * 1e3:g} ms, got {step.time * 1e3:g} ms",
+                f"{section.name}, step {number}",
+            )
+
+
+def _turns(program: Program, section: Section, settings: InformSettings) -> Iterator[ProgramIssue]:
+    """Check that the turns of R, T and S can be said where a position is no pulses."""
+    if not section.moves:
+        return
+    q = np.array([move.q for move in section.moves])
+    axes_deg = np.degrees(axes_from_joints(program.robot, q))
+    for k, move in enumerate(section.moves):
+        if isinstance(move, JointMove) and settings.pulses_per_deg is not None:
+            continue
+        for i, name in TURNING.items():
+            if abs(axes_deg[k, i]) > WHOLE_TURN_DEG:
+                yield ProgramIssue(
+                    "error",
+                    "turns",
+                    f"{name} = {axes_deg[k, i]:.1f} deg cannot be said by a position, only up to "
+                    f"{WHOLE_TURN_DEG:g} deg either way; bound the axis",
+                    f"{section.name}, move {k}",
+                )

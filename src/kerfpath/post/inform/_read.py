@@ -1,0 +1,322 @@
+"""Read back the jobs that `Inform` writes, and nothing else: what it does not know, it refuses."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping
+from dataclasses import replace
+from typing import Any, Literal
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from kerfpath._arrays import Array, freeze
+from kerfpath.errors import InputError
+from kerfpath.post._frames import faceplate, world
+from kerfpath.post._program import Signal, Switch
+from kerfpath.post._read import (
+    ReadMove,
+    ReadProgram,
+    ReadSection,
+    ReadStep,
+    ReadWait,
+    same_output,
+)
+from kerfpath.post.inform._axes import joints_from_axes
+from kerfpath.post.inform._settings import InformSettings
+from kerfpath.post.inform._write import FRAME_WORDS, SUFFIX, head, middle
+from kerfpath.robots import Robot
+
+__all__ = ["read"]
+
+_NUMBER, _WHOLE = r"(-?\d+\.\d+)", r"(-?\d+)"
+_POSE = re.compile(rf"C(\d{{5}})={','.join([_NUMBER] * 6)}", re.ASCII)
+_PULSES = re.compile(rf"C(\d{{5}})={','.join([_WHOLE] * 6)}", re.ASCII)
+_TYPE = re.compile(r"///RCONF ([01](?:,[01])*)", re.ASCII)
+_COUNT = re.compile(r"///NPOS (\d+),0,0,0,0,0", re.ASCII)
+_MAIN = {
+    kind: re.compile(pattern, re.ASCII)
+    for kind, pattern in {
+        "remark": r"' .*",
+        "told": rf"'(UFRAME|TOOL) (\d+) (R?[XYZ]) {_NUMBER}",
+        "reset": r"DOUT OT#\((\d+)\) OFF",
+        "call": r"CALL JOB:([A-Z][A-Z0-9_]*)",
+    }.items()
+}
+_JOB = {
+    kind: re.compile(pattern, re.ASCII)
+    for kind, pattern in {
+        "linear": r"MOVL C(\d{5}) V=(\d+\.\d) PL=(\d)",
+        "arc": r"MOVC C(\d{5}) V=(\d+\.\d)(?: PL=(\d))?",
+        "part": r"MOVL C(\d{5}) V=(\d+\.\d)",
+        "joint": r"MOVJ C(\d{5}) VJ=(\d+\.\d\d) PL=(\d)",
+        "switch": r"DOUT OT#\((\d+)\) (ON|OFF)",
+        "wait": r"TIMER T=(\d+\.\d\d)",
+        "remark": r"' .*",
+    }.items()
+}
+
+
+def read(
+    main: str, files: Mapping[str, str], robot: Robot, settings: InformSettings
+) -> ReadProgram:
+    """Return the program that jobs of ours say; see `kerfpath.post.Reader`."""
+    top = _Main(main, files[main], robot, settings)
+    sections, last = [], None
+    for name in top.calls:
+        job = _Job(f"{name}{SUFFIX}", files[f"{name}{SUFFIX}"], robot, settings, last)
+        sections.append(ReadSection(name=name, steps=tuple(job.found)))
+        last = job.last
+    return ReadProgram(
+        name=top.name,
+        sections=tuple(sections),
+        T_flange_tip=faceplate(robot) @ top.frame(f"TOOL {settings.tool_number}"),
+        T_base_part=world(robot) @ top.frame(f"UFRAME {settings.user_frame}"),
+    )
+
+
+class _Text:
+    """The lines of one job, taken one after the other."""
+
+    def __init__(self, file: str, text: str, robot: Robot, settings: InformSettings) -> None:
+        self.file, self.robot, self.settings = file, robot, settings
+        self.rows = [row.rstrip() for row in text.splitlines()]
+        self.line = 0
+        self.name = file.rpartition("/")[2].removesuffix(SUFFIX)
+
+    def take(self) -> str:
+        """Return the next line."""
+        self.line += 1
+        if self.line > len(self.rows):
+            raise self.fault("the job ends too early; END is missing")
+        return self.rows[self.line - 1]
+
+    def expect(self, *lines: str) -> None:
+        """Take lines that are known."""
+        for line in lines:
+            if (row := self.take()) != line:
+                raise self.fault(f"expected {line!r}, got {row[:60]!r}")
+
+    def begin(self) -> int:
+        """Take the first lines; return how many positions the job is said to have."""
+        *known, _ = head(self.name, 0)
+        self.expect(*known)
+        match = _COUNT.fullmatch(self.take())
+        if match is None:
+            raise self.fault("expected the number of positions, ///NPOS n,0,0,0,0,0")
+        return int(match[1])
+
+    def read(self, kinds: Mapping[str, re.Pattern[str]]) -> None:
+        """Read instructions to END, each by the method of its kind."""
+        while (row := self.take()) != "END":
+            for kind, pattern in kinds.items():
+                if match := pattern.fullmatch(row):
+                    getattr(self, kind)(*match.groups())
+                    break
+            else:
+                raise self.fault(f"not expected here: {row[:60]!r}")
+        if any(self.rows[self.line :]):
+            self.line += 1
+            raise self.fault("nothing may follow END")
+
+    def remark(self) -> None:
+        """Keep nothing of a remark."""
+
+    def signal(self, output: str) -> Signal:
+        if int(output) == self.settings.gas_output:
+            return "gas"
+        same_output(int(output), self.settings.laser_output, f"{self.file}, line {self.line}")
+        return "laser"
+
+    def fault(self, message: str) -> InputError:
+        return InputError(f"{self.file}, line {self.line}: {message}")
+
+
+class _Main(_Text):
+    """The main job: frames as they are told, outputs, calls."""
+
+    def __init__(self, file: str, text: str, robot: Robot, settings: InformSettings) -> None:
+        super().__init__(file, text, robot, settings)
+        self.frames: dict[tuple[str, str], float] = {}
+        self.outputs: list[Signal] = []
+        self.calls: list[str] = []
+        if self.begin():
+            raise self.fault("the main job must have no positions")
+        self.expect(*middle("main", settings)[1])
+        self.read(_MAIN)
+        named = {"laser": settings.laser_output, "gas": settings.gas_output}
+        if self.outputs != [signal for signal, output in named.items() if output is not None]:
+            raise self.fault("expected every output that is named to be switched off once")
+
+    def told(self, frame: str, number: str, word: str, value: str) -> None:
+        if (f"{frame} {number}", word) in self.frames:
+            raise self.fault(f"{frame} {number} {word} is told twice")
+        self.frames[f"{frame} {number}", word] = float(value)
+
+    def reset(self, output: str) -> None:
+        if self.calls:
+            raise self.fault("outputs must be switched off before the first job is called")
+        self.outputs.append(self.signal(output))
+
+    def call(self, name: str) -> None:
+        if name in self.calls:
+            raise self.fault(f"{name} is called twice")
+        self.calls.append(name)
+
+    def frame(self, name: str) -> Array:
+        """Return a frame (4, 4) m that is told."""
+        values = [self.frames.get((name, word)) for word in FRAME_WORDS]
+        if None in values:
+            raise self.fault(f"{name} is not told whole")
+        return freeze(_poses(np.array([values], dtype=np.float64))[0])
+
+
+class _Job(_Text):
+    """One job that is called: its positions, then its instructions."""
+
+    def __init__(
+        self, file: str, text: str, robot: Robot, settings: InformSettings, last: Array | None
+    ) -> None:
+        super().__init__(file, text, robot, settings)
+        self.last = last
+        self.found: list[ReadStep] = []
+        self.arc_poses: list[Array] = []
+        self.stands = False
+        count = self.begin()
+        pulses = self.rows[self.line + 1 : self.line + 2] == ["///POSTYPE PULSE"]
+        before, after = middle("pulse" if pulses else "user", settings)
+        self.expect(*before)
+        self.q = np.empty((0, 6))
+        self.T = np.empty((0, 4, 4))
+        self.types: list[tuple[int, ...]] = []
+        if pulses:
+            self._read_pulses(count)
+        else:
+            self._read_poses(count)
+        self.expect(*after)
+        self.read(_JOB)
+        if self.arc_poses:
+            raise self.fault("an arc needs three MOVC, one after the other")
+
+    def _read_pulses(self, count: int) -> None:
+        if self.settings.pulses_per_deg is None:
+            raise self.fault("positions are in pulses: give pulses_per_deg")
+        rows = [self._position(_PULSES, self.take(), k) for k in range(count)]
+        pulses = np.array(rows, dtype=np.float64).reshape(-1, 6)
+        axes = np.radians(pulses / np.array(self.settings.pulses_per_deg))
+        self.q = joints_from_axes(self.robot, axes)
+
+    def _read_poses(self, count: int) -> None:
+        rows: list[Any] = []
+        bits: tuple[int, ...] | None = None
+        while len(rows) < count:
+            row = self.take()
+            if match := _TYPE.fullmatch(row):
+                bits = tuple(int(bit) for bit in match[1].split(","))
+                if len(bits) != self.settings.rconf_values or any(bits[6:]):
+                    raise self.fault(
+                        f"expected {self.settings.rconf_values} values, 0 from the seventh on"
+                    )
+                continue
+            rows.append(self._position(_POSE, row, len(rows)))
+            if bits is None:
+                raise self.fault("expected ///RCONF before the first position")
+            self.types.append(bits[:6])
+        self.T = _poses(np.array(rows, dtype=np.float64).reshape(-1, 6))
+
+    def _position(self, pattern: re.Pattern[str], row: str, number: int) -> tuple[str, ...]:
+        match = pattern.fullmatch(row)
+        if match is None or int(match[1]) != number:
+            raise self.fault(f"expected position C{number:05d}, got {row[:60]!r}")
+        return match.groups()[1:]
+
+    def joint(self, target: str, share: str, level: str) -> None:
+        k = self.place(target)
+        in_pulses = len(self.q) > 0
+        self.last = None if in_pulses else self.T[k]
+        self.move(
+            "joint",
+            float(share) * 1e-2,
+            level,
+            q=freeze(self.q[k]) if in_pulses else None,
+            T_part_tip=None if in_pulses else freeze(self.T[k]),
+            posture=() if in_pulses else self.types[k],
+        )
+
+    def linear(self, target: str, speed: str, level: str) -> None:
+        T, posture = self.pose(target)
+        self.last = T
+        self.move("linear", float(speed) * 1e-3, level, T_part_tip=T, posture=posture)
+
+    def part(self, target: str, speed: str) -> None:
+        """Check a move to where the tip is already, which parts two arcs."""
+        self.require_here(self.pose(target)[0])
+
+    def arc(self, target: str, speed: str, level: str | None) -> None:
+        T, posture = self.pose(target)
+        if not self.arc_poses:
+            self.require_here(T)
+        if (level is None) != (len(self.arc_poses) < 2):
+            raise self.fault("an arc has its position level at the third MOVC")
+        self.arc_poses.append(T)
+        if level is None:
+            self.stands = False
+            return
+        via, self.arc_poses, self.last = self.arc_poses[1], [], T
+        self.move(
+            "circular",
+            float(speed) * 1e-3,
+            level,
+            T_part_tip=T,
+            T_part_via=via,
+            posture=posture,
+        )
+
+    def switch(self, output: str, state: str) -> None:
+        signal, last = self.signal(output), self.found[-1] if self.found else None
+        if not self.stands or not isinstance(last, ReadMove) or last.kind == "joint":
+            raise self.fault("a switch must follow a move of the path with PL=0")
+        switches = (*last.switches, Switch(signal=signal, on=state == "ON"))
+        self.found[-1] = replace(last, switches=switches)
+
+    def wait(self, time: str) -> None:
+        if not self.stands:
+            raise self.fault("a wait must follow a move with PL=0")
+        self.found.append(ReadWait(time=float(time), file=self.file, line=self.line))
+
+    def move(
+        self, kind: Literal["joint", "linear", "circular"], speed: float, level: str, **said: Any
+    ) -> None:
+        """Add a move; a position level above 0 is no length."""
+        if self.arc_poses:
+            raise self.fault("an arc needs three MOVC, one after the other")
+        if level not in ("0", str(self.settings.position_level)):
+            raise self.fault(f"expected PL=0 or PL={self.settings.position_level}, got PL={level}")
+        self.stands = level == "0"
+        zone = 0.0 if self.stands else None
+        place: dict[str, Any] = {"file": self.file, "line": self.line}
+        self.found.append(ReadMove(kind=kind, speed=speed, zone=zone, **place, **said))
+
+    def pose(self, target: str) -> tuple[Array, tuple[int, ...]]:
+        k = self.place(target)
+        if len(self.q):
+            raise self.fault("a move of the path needs a position in the user frame")
+        return freeze(self.T[k]), self.types[k]
+
+    def require_here(self, T: Array) -> None:
+        if self.last is not None and not np.array_equal(T, self.last):
+            raise self.fault("an arc must begin where the move before it ends")
+
+    def place(self, target: str) -> int:
+        if int(target) >= max(len(self.q), len(self.T)):
+            raise self.fault(f"C{target} is not there")
+        return int(target)
+
+
+def _poses(rows: Array) -> Array:
+    """Return poses (K, 4, 4) m of mm and deg about fixed x, y, z."""
+    T = np.tile(np.eye(4), (len(rows), 1, 1))
+    if len(rows):
+        T[:, :3, :3] = Rotation.from_euler("xyz", rows[:, 3:], degrees=True).as_matrix()
+    T[:, :3, 3] = rows[:, :3] * 1e-3
+    return T

@@ -1,0 +1,84 @@
+"""What a person states of a Yaskawa controller, and what its jobs must keep to."""
+
+from __future__ import annotations
+
+from typing import Annotated, Literal
+
+import numpy as np
+from pydantic import AfterValidator, StringConstraints
+
+from kerfpath.post._settings import Rules, Settings, setting
+
+__all__ = ["InformSettings", "is_reserved", "rules"]
+
+SPEED_STEP = 1e-4
+"""Speeds (m/s) have one decimal of mm/s."""
+POINT_STEP = 0.5e-6
+"""Positions (m) have three decimals of mm."""
+ANGLE_STEP_DEG = 0.5e-4
+"""Angles have four decimals of deg."""
+
+
+def _not_zero(values: list[float]) -> list[float]:
+    if not all(np.isfinite(values)) or not all(values):
+        raise ValueError("zero pulses")
+    return values
+
+
+Output = Annotated[int | None, setting("the number of an output, 1 to 4096", "5", ge=1, le=4096)]
+
+
+class InformSettings(Settings):
+    """Frames, outputs and the pulses of the very robot."""
+
+    lines_per_file: Annotated[
+        int, setting("a whole number of lines from 100 to 9999", "2000", ge=100, le=9999)
+    ] = 2000
+    laser_output: Output = None
+    gas_output: Output = None
+    user_frame: Annotated[int, setting("a user frame, 1 to 63", "2", ge=1, le=63)] = 1
+    tool_number: Annotated[int, setting("a tool, 0 to 63", "2", ge=0, le=63)] = 0
+    pulses_per_deg: Annotated[
+        Annotated[list[float], AfterValidator(_not_zero)] | None,
+        setting(
+            "six numbers, the pulses per deg of S, L, U, R, B and T",
+            "[1341.4, 1341.4, 1000.0, 1000.0, 800.0, 500.0]",
+            min_length=6,
+            max_length=6,
+        ),
+    ] = None
+    position_level: Annotated[
+        int, setting("a position level for corners, 1 to 8", "1", ge=1, le=8)
+    ] = 1
+    fastest_mm_s: Annotated[
+        float, setting("the largest speed of MOVL, in mm/s", "1500.0", ge=1, le=20_000)
+    ] = 1500.0
+    longest_name: Annotated[
+        int, setting("the characters of a job's name, 8 to 32", "8", ge=8, le=32)
+    ] = 32
+    rconf_values: Annotated[
+        Literal[6, 8, 24], setting("the values after RCONF: 6, 8 or 24", "6")
+    ] = 24
+    date: Annotated[
+        Annotated[str, StringConstraints(pattern=r"^\d{4}/\d\d/\d\d \d\d:\d\d$")],
+        setting("a date as YYYY/MM/DD HH:MM", '"2026/11/21 10:00"'),
+    ] = "2000/01/01 00:00"
+
+
+def rules(settings: InformSettings) -> Rules:
+    """Return what jobs must keep to."""
+    pulses = np.abs(settings.pulses_per_deg or [np.inf])
+    return Rules(
+        longest_name=settings.longest_name,
+        name=r"[A-Z][A-Z0-9_]*",
+        slowest=SPEED_STEP,
+        fastest=settings.fastest_mm_s * 1e-3,
+        speed_step=SPEED_STEP,
+        point_step=POINT_STEP,
+        angle_step=float(np.radians(max(ANGLE_STEP_DEG, 0.5 / pulses.min()))),
+    )
+
+
+def is_reserved(name: str) -> bool:
+    """Return whether a job cannot be called `name`: any may be; MASTER is the controller's own."""
+    return name.upper() == "MASTER"

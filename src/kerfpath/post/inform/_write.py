@@ -1,0 +1,254 @@
+"""INFORM, the language of Yaskawa controllers, as jobs (.JBI): this module only formats.
+
+Units: mm, deg, mm/s, per cent of the joint speed, seconds. A job holds its positions, then its
+instructions. The main job has none of the first: it tells a person the frames, which are the
+controller's, and calls the others. Each of them is of one kind: joint positions in pulses, or a
+relative job with positions in the user frame. Outputs are switched where the tip stands.
+"""
+
+from __future__ import annotations
+
+import textwrap
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from kerfpath._arrays import Array
+from kerfpath.errors import InputError
+from kerfpath.post._divide import divided
+from kerfpath.post._formatter import Formatter, number, plain
+from kerfpath.post._frames import faceplate, world, xyzwpr
+from kerfpath.post._names import identifiers
+from kerfpath.post._program import (
+    CircularMove,
+    JointMove,
+    LinearMove,
+    Move,
+    Program,
+    Section,
+    Step,
+    Wait,
+)
+from kerfpath.post._standing import stopping_to_switch
+from kerfpath.post.inform._axes import axes_from_joints, manipulator_type
+from kerfpath.post.inform._settings import InformSettings
+
+__all__ = ["FRAME_WORDS", "SUFFIX", "Inform", "head", "middle"]
+
+SUFFIX = ".JBI"
+NEW_LINE = "\r\n"
+REMARK = 30
+"""Characters of a remark, which with its mark may have 32."""
+MOST_REMARKS = 3
+"""Lines that a comment is cut to."""
+AROUND = 16
+"""Lines of a job beside those of its steps."""
+LINES_OF_A_MOVE = 5
+"""A position, its type, the move and two switches."""
+LINES_OF_AN_ARC = 12
+"""Three positions and their types, four moves and two switches."""
+POSE = "%.3f,%.3f,%.3f,%.4f,%.4f,%.4f"
+"""mm and deg."""
+FRAME_WORDS = ("X", "Y", "Z", "RX", "RY", "RZ")
+FRAME_DECIMALS = (4, 4, 4, 6, 6, 6)
+"""Of mm and deg, with which a person is told the frames."""
+
+
+def head(name: str, count: int) -> list[str]:
+    """Return the first lines of a job with so many positions."""
+    return ["/JOB", f"//NAME {name}", "//POS", f"///NPOS {count},0,0,0,0,0"]
+
+
+def middle(kind: str, settings: InformSettings) -> tuple[list[str], list[str]]:
+    """Return the lines before and after the positions of a job: "pulse", "user" or "main"."""
+    user, tool = f"///USER {settings.user_frame}", f"///TOOL {settings.tool_number}"
+    before = {
+        "main": [],
+        "pulse": [tool, "///POSTYPE PULSE", "///PULSE"],
+        "user": [user, tool, "///POSTYPE USER", "///RECTAN"],
+    }[kind]
+    relative = kind == "user"
+    after = ["//INST", f"///DATE {settings.date}", f"///ATTR SC,RW{',RJ' if relative else ''}"]
+    after += [f"////FRAME USER {settings.user_frame}"] if relative else []
+    return before, [*after, "///GROUP1 RB1", "NOP"]
+
+
+class Inform(Formatter):
+    """Writes a main job, and one for the way to each contour and for its path."""
+
+    settings: InformSettings
+
+    def __init__(self, program: Program, settings: InformSettings) -> None:
+        longest = settings.longest_name
+        (name,) = identifiers([program.name], (), longest)
+        whole = by_kind(replace(stopping_to_switch(program), name=name))
+        arcs = any(isinstance(move, CircularMove) for move in whole.moves)
+        most = (settings.lines_per_file - AROUND) // (LINES_OF_AN_ARC if arcs else LINES_OF_A_MOVE)
+        whole = divided(whole, most, longest_name=longest)
+        sections = tuple(replace(part, name=part.name.upper()) for part in whole.sections)
+        super().__init__(replace(whole, name=name.upper(), sections=sections), settings)
+        self._targets: list[tuple[Array, Array | None]] = []
+        moves = self.program.moves
+        self._before = dict(zip(moves[1:], moves, strict=False))
+
+    def files(self) -> dict[str, str]:
+        """Return the main job and those that it calls."""
+        program, settings = self.program, self.settings
+        main = list(self.main())
+        if len(main) + AROUND > settings.lines_per_file:
+            raise InputError(
+                f"program {program.name!r}: its main job would have {len(main) + AROUND} lines, "
+                f"lines_per_file allows {settings.lines_per_file}; raise it"
+            )
+        texts = {f"{program.name}{SUFFIX}": self._job(program.name, "main", [], main)}
+        for section in program.sections:
+            lines = list(self.lines(section))
+            kind = "pulse" if self._in_pulses(section) else "user"
+            positions = self._pulses() if kind == "pulse" else self._poses()
+            texts[f"{section.name}{SUFFIX}"] = self._job(section.name, kind, positions, lines)
+        return texts
+
+    def main(self) -> Iterator[str]:
+        """Yield the instructions of the main job."""
+        program, settings = self.program, self.settings
+        clear = "proved clear in the planned cell"
+        checked = clear if program.air_checked else "not checked for collisions"
+        yield from self.comment(f"kerfpath, for {plain(program.robot.model)}")
+        yield from self.comment(f"Moves through the air: {checked}.")
+        yield from self.comment("A stop does not switch the laser off: the cell's safety has to.")
+        yield from self.comment("Enter these frames (mm, deg). Robot frame: on S, as high as L.")
+        frame = np.linalg.inv(world(program.robot)) @ program.T_base_part
+        tool = np.linalg.inv(faceplate(program.robot)) @ program.T_flange_tip
+        yield from _frame(f"UFRAME {settings.user_frame}", frame)
+        yield from _frame(f"TOOL {settings.tool_number}", tool)
+        outputs = (settings.laser_output, settings.gas_output)
+        yield from (f"DOUT OT#({output}) OFF" for output in outputs if output is not None)
+        yield from (f"CALL JOB:{section.name}" for section in program.sections)
+
+    def names(self) -> list[tuple[str, str]]:
+        """Return the names of all jobs."""
+        sections = ((section.name, "a contour") for section in self.program.sections)
+        return [(self.program.name, "the program"), *sections]
+
+    def lines(self, section: Section) -> Iterator[str]:
+        """Yield the instructions of a section, its positions numbered from 0."""
+        self._targets = []
+        yield from super().lines(section)
+
+    def joint_move(self, move: JointMove) -> Iterator[str]:
+        """Yield a MOVJ."""
+        T = None if self.settings.pulses_per_deg else self.program.tips([move])[0]
+        yield f"MOVJ {self._position(move.q, T)} VJ={number(move.speed * 100, 2)}{self._end(move)}"
+
+    def linear_move(self, move: LinearMove) -> Iterator[str]:
+        """Yield a MOVL and what is switched at its end."""
+        yield f"MOVL {self._position(move.q, move.T_part_tip)} {_speed(move)}{self._end(move)}"
+        yield from self._switched(move)
+
+    def circular_move(self, move: CircularMove) -> Iterator[str]:
+        """Yield the three MOVC of an arc and what is switched at its end.
+
+        A MOVL to where it begins, without a position level, parts it from an arc before it.
+        """
+        before = self._before.get(move)
+        if before is None:
+            raise InputError(f"program {self.program.name!r}: nothing is before an arc")
+        start = self._position(before.q, self.program.tips([before])[0])
+        if isinstance(before, CircularMove):
+            yield f"MOVL {start} {_speed(move)}"
+        yield f"MOVC {start} {_speed(move)}"
+        yield f"MOVC {self._position(move.q_via, move.T_part_via)} {_speed(move)}"
+        yield f"MOVC {self._position(move.q, move.T_part_tip)} {_speed(move)}{self._end(move)}"
+        yield from self._switched(move)
+
+    def wait(self, wait: Wait) -> Iterator[str]:
+        """Yield a TIMER."""
+        yield f"TIMER T={number(wait.time, 2)}"
+
+    def comment(self, text: str) -> Iterator[str]:
+        """Yield remarks; the frames are told in remarks without a space."""
+        rows = textwrap.wrap(text, REMARK, max_lines=MOST_REMARKS, placeholder=" ...")
+        yield from (f"' {row}" for row in rows)
+
+    def _end(self, move: Move) -> str:
+        return f" PL={0 if move.zone == 0 else self.settings.position_level}"
+
+    def _switched(self, move: LinearMove) -> Iterator[str]:
+        for switch in move.switches:
+            yield f"DOUT OT#({self.output(switch.signal)}) {'ON' if switch.on else 'OFF'}"
+
+    def _position(self, q: Array, T: Array | None) -> str:
+        self._targets.append((q, T))
+        return f"C{len(self._targets) - 1:05d}"
+
+    def _in_pulses(self, section: Section) -> bool:
+        joint = any(isinstance(move, JointMove) for move in section.moves)
+        return joint and self.settings.pulses_per_deg is not None
+
+    def _pulses(self) -> list[str]:
+        """Return the lines of the positions so far, in pulses."""
+        axes = axes_from_joints(self.program.robot, [q for q, _ in self._targets])
+        pulses = np.round(np.degrees(axes) * np.array(self.settings.pulses_per_deg))
+        rows = pulses.astype(np.int64).tolist()
+        return [f"C{k:05d}={','.join(map(str, row))}" for k, row in enumerate(rows)]
+
+    def _poses(self) -> list[str]:
+        """Return the lines of the positions so far, in the user frame, types where they change."""
+        if not self._targets:
+            return []
+        types = manipulator_type(self.program.robot, [q for q, _ in self._targets]).tolist()
+        poses = xyzwpr(np.array([T for _, T in self._targets]))
+        poses = np.hstack([poses[:, :3].round(3), poses[:, 3:].round(4)]) + 0.0
+        unused = [0] * (self.settings.rconf_values - 6)
+        lines, said = [], None
+        for k, (bits, pose) in enumerate(zip(types, poses.tolist(), strict=True)):
+            if bits != said:
+                lines.append(f"///RCONF {','.join(map(str, bits + unused))}")
+                said = bits
+            lines.append(f"C{k:05d}={POSE % tuple(pose)}")
+        return lines
+
+    def _job(self, name: str, kind: str, positions: Sequence[str], lines: Sequence[str]) -> str:
+        before, after = middle(kind, self.settings)
+        count = sum(line.startswith("C") for line in positions)
+        rows = [*head(name, count), *before, *positions, *after, *lines, "END", ""]
+        return NEW_LINE.join(rows)
+
+
+def by_kind(program: Program) -> Program:
+    """Return the program with joint moves in sections of their own.
+
+    Comments and waits stay with the move before them, at the start with the one behind.
+    """
+    parts: list[Section] = []
+    for section in program.sections:
+        groups: list[tuple[bool, list[Step]]] = []
+        for step in section.steps:
+            joint = isinstance(step, JointMove)
+            moves = joint or isinstance(step, LinearMove)
+            first = len(groups) == 1 and not any(_moves(s) for s in groups[0][1])
+            if groups and (not moves or first or groups[-1][0] == joint):
+                groups[-1] = (joint if moves else groups[-1][0], [*groups[-1][1], step])
+            else:
+                groups.append((joint, [step]))
+        parts += [
+            Section(name=f"{section.name}{'_air' if joint else ''}", steps=tuple(steps))
+            for joint, steps in groups
+        ]
+    return replace(program, sections=tuple(parts))
+
+
+def _speed(move: LinearMove) -> str:
+    return f"V={number(move.speed * 1e3, 1)}"
+
+
+def _frame(name: str, T: Array) -> Iterator[str]:
+    """Yield a frame as remarks, to be entered by a person and read back."""
+    values = xyzwpr(T[None])[0]
+    for word, value, decimals in zip(FRAME_WORDS, values, FRAME_DECIMALS, strict=True):
+        yield f"'{name} {word} {number(value, decimals)}"
+
+
+def _moves(step: Step) -> bool:
+    return isinstance(step, JointMove | LinearMove)
