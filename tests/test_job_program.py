@@ -204,6 +204,9 @@ def test_a_dry_run_is_written_beside_the_program(folder):
     text = (out / "dry_job.mod").read_text()
     assert "! DRY RUN at 20 % of the speed" in text
     assert "Trigg" not in text
+    named = run("post", out / "plan.json", "--dry-run", "0.2", "-o", folder / "dry_mine.mod")
+    assert named.returncode == 0, named.stderr
+    assert "MODULE dry_mine" in (folder / "dry_mine.mod").read_text()
     said = refused("post", out / "plan.json", "--dry-run", "20")
     assert "dry run: expected a share of the speed of at most 1, got 20" in said
 

@@ -30,6 +30,8 @@ def write_post(
     program of one file is written as `output`, and one of several into that folder.
     """
     name = _name(output, find_language(language).suffix)
+    if name is not None and dry_share is not None:
+        name = name.removeprefix("dry_")  # which dry runs begin with by themselves
     frame = None
     if measured is not None:
         points = read_measured(measured)
