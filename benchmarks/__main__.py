@@ -23,6 +23,7 @@ NAMES = (
     "cad",
     "part",
     "programs",
+    "sweeps",
 )
 
 
@@ -69,6 +70,10 @@ def _run(name: str, *, quick: bool) -> list[Report]:
         from benchmarks import programs
 
         return [programs.run(quick=quick)]
+    if name == "sweeps":
+        from benchmarks import sweeps
+
+        return [sweeps.run(quick=quick)]
     if name == "demo":
         from benchmarks import demo
 
