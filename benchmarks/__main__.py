@@ -24,6 +24,7 @@ NAMES = (
     "part",
     "programs",
     "pareto",
+    "sweeps",
 )
 
 
@@ -74,6 +75,10 @@ def _run(name: str, *, quick: bool) -> list[Report]:
         from benchmarks import pareto
 
         return [pareto.run(quick=quick)]
+    if name == "sweeps":
+        from benchmarks import sweeps
+
+        return [sweeps.run(quick=quick)]
     if name == "demo":
         from benchmarks import demo
 

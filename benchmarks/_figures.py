@@ -45,6 +45,7 @@ PACKAGES = (
     "ompl",
     "clarabel",
     "toppra",
+    "distributed",
 )
 COLUMNS = ("figure", "median", "min", "max", "runs", "unit", "note")
 

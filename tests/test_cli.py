@@ -138,7 +138,13 @@ def test_plan_json_carries_everything_and_round_trips(planned, folder):
 
 def test_post_takes_the_settings_of_a_language_from_the_job_as_it_is_now(planned, folder):
     post = ("post", "small-plan/plan.json", "--language", "krl")
-    refused(run(*post, "-o", "krl", cwd=folder), "say which with laser_output")
+    refused(run(*post, "--strict", cwd=folder), "krl")
+    (folder / "there").mkdir()
+    guessed = run(*post, "-o", "there/guessed.src", cwd=folder)
+    assert {path.name for path in (folder / "there").iterdir()} == {"guessed.src", "guessed.dat"}
+    assert "DEF guessed()" in (folder / "there" / "guessed.src").read_text()
+    refused(run(*post, "-o", "no name.src", cwd=folder), "letters, digits and _")
+    assert "laser, 1 is taken; say which with laser_output in [program.krl]" in guessed.stdout
     text = (folder / "small.toml").read_text() + "\n[program.krl]\nlaser_output = 7\n"
     (folder / "krl.toml").write_text(text)
     done = run(*post, "-o", "krl", "--job", "krl.toml", cwd=folder)
@@ -166,7 +172,8 @@ def test_post_writes_the_program_that_plan_wrote(planned, folder):
     read_text(printed.stdout, robot("abb_irb4600_60_205"))
     to_file = run("post", "small-plan/plan.json", "-o", "again.mod", cwd=folder)
     assert to_file.returncode == 0
-    assert (folder / "again.mod").read_text() == printed.stdout
+    named = printed.stdout.replace("MODULE plan", "MODULE again")
+    assert (folder / "again.mod").read_text() == named
 
 
 def test_audit_shows_the_table_and_passes(planned, folder):
@@ -286,7 +293,7 @@ def test_a_job_may_dip_or_be_interrupted_and_is_read_back(folder):
         post = run("post", "over/plan.json", "-o", "over/again.mod", cwd=folder)
         assert post.returncode == 0, post.stderr
         again, first = ((folder / "over" / f).read_text() for f in ("again.mod", "over.mod"))
-        assert again.replace("MODULE plan", "MODULE over") == first
+        assert again.replace("MODULE again", "MODULE over") == first
 
 
 def test_contours_lists_the_loops_by_name():

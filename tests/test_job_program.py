@@ -13,12 +13,24 @@ from test_cli import refused as assert_refused
 from test_cli import run
 from test_job_part import DEMO, WHOLE
 
+SETTINGS = """
+[program.krl]
+laser_output = 5
+[program.fanuc]
+laser_output = 5
+[program.val3]
+laser_output = 'BasicIO-1\\%Q0'
+"""
+"""Of other languages."""
+JOB = WHOLE.replace("0.005", "0.01") + SETTINGS
+"""FANUC counts lead times in whole hundredths of a second."""
+
 
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory):
     folder = tmp_path_factory.mktemp("program")
     shutil.copy(DEMO / "b_pillar.step", folder)
-    (folder / "job.toml").write_text(WHOLE)
+    (folder / "job.toml").write_text(JOB)
     result = run("plan", str(folder / "job.toml"), "--out", str(folder / "out"), "--json")
     assert result.returncode == 0, result.stderr
     return folder
@@ -62,6 +74,29 @@ def test_the_program_that_was_written_passes(folder, written):
     assert {"tip-between-nodes", "velocity", "acceleration", "laser", "speed", "posture"} <= codes
 
 
+@pytest.mark.parametrize(
+    ("language", "main"),
+    [
+        ("krl", "job.src"),
+        ("fanuc", "JOB.ls"),
+        ("val3", "job/job.pjx"),
+        ("ros", "job.yaml"),
+        ("csv", "job.csv"),
+    ],
+)
+def test_every_language_that_can_say_the_plan_passes_its_audit(folder, language, main):
+    """Arms of other makers are a warning; UR's and Yaskawa's languages cannot say this one's."""
+    out = folder / language
+    out.mkdir()
+    job = str(folder / "job.toml")
+    plan = str(folder / "out" / "plan.json")
+    done = run("post", plan, "--job", job, "--language", language, "-o", str(out))
+    assert done.returncode == 0, done.stderr
+    result = run("audit", str(out / main), "--job", job, "--json")
+    found = json.loads(result.stdout)
+    assert (result.returncode, found["missing"], failures(found)) == (0, [], {})
+
+
 def test_the_tables_are_for_people(folder, written):
     (folder / "edited.mod").write_text(written)
     result = run("audit", str(folder / "edited.mod"), "--job", str(folder / "job.toml"))
@@ -101,7 +136,7 @@ def test_what_else_people_change_is_found(folder, written):
         "laser-off": re.sub(r",trOff,", ",trOn,", written, count=1),
         "laser": re.sub(r"TriggL (.*),trOff,", r"MoveL \1,", written),
         "pierce": written.replace("WaitTime 0.250;", "WaitTime 0.100;", 1),
-        "lead-time": written.replace(r"TriggIO trOn,0.0050", r"TriggIO trOn,0.0500"),
+        "lead-time": written.replace(r"TriggIO trOn,0.0100", r"TriggIO trOn,0.0500"),
         "posture": re.sub(r"(MoveL \[\[[^]]*\],\[[^]]*\],\[)(-?\d)", r"\g<1>9", written, count=1),
         "frames": re.sub(r'(wobjdata wPart:=\[FALSE,TRUE,"",\[\[)[\d.]+', r"\g<1>1201.0", written),
     }
@@ -169,6 +204,9 @@ def test_a_dry_run_is_written_beside_the_program(folder):
     text = (out / "dry_job.mod").read_text()
     assert "! DRY RUN at 20 % of the speed" in text
     assert "Trigg" not in text
+    named = run("post", out / "plan.json", "--dry-run", "0.2", "-o", folder / "dry_mine.mod")
+    assert named.returncode == 0, named.stderr
+    assert "MODULE dry_mine" in (folder / "dry_mine.mod").read_text()
     said = refused("post", out / "plan.json", "--dry-run", "20")
     assert "dry run: expected a share of the speed of at most 1, got 20" in said
 
@@ -244,7 +282,7 @@ def test_the_program_of_a_measured_part_passes_the_audit_of_a_job_that_places_it
     job = folder / "moved.toml"
     job.write_text(
         re.sub("rpy_deg = .*", f"rpy_deg = {frame['rpy_deg']}",
-               WHOLE.replace("[1200, -600, 500]", str(frame["xyz_mm"])), count=1)
+               JOB.replace("[1200, -600, 500]", str(frame["xyz_mm"])), count=1)
     )  # fmt: skip
     result = run("audit", moved / "job.mod", "--job", job)
     assert result.returncode == 0, result.stdout

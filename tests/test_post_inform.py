@@ -419,7 +419,6 @@ def test_pulses_are_six_numbers_that_are_not_zero(pulses):
     ("update", "code"),
     [
         ({"gas_output": None}, "output"),
-        ({"laser_output": None}, "output"),
         ({"gas_output": 1}, "output"),
         ({"fastest_mm_s": 110.0}, "speed"),
     ],

@@ -334,7 +334,7 @@ def test_every_setting_says_what_it_expects():
 @pytest.mark.parametrize(
     ("update", "code"),
     [
-        ({"laser_output": None}, "output"),
+        ({"gas_output": None}, "output"),
         ({"gas_output": 5}, "output"),
         ({"largest_speed_m_s": 0.11}, "speed"),
     ],

@@ -447,7 +447,7 @@ def test_the_link_of_an_output_cannot_carry_anything_else(link):
         Val3Settings(laser_output=link)
 
 
-@pytest.mark.parametrize("update", [{"laser_output": None}, {"gas_output": r"BasicIO-1\%Q0"}])
+@pytest.mark.parametrize("update", [{"gas_output": None}, {"gas_output": r"BasicIO-1\%Q0"}])
 def test_preflight_refuses_outputs_that_are_missing_or_the_same(program, update):
     assert set(found_codes(program, "error", OUTPUTS.model_copy(update=update))) == {"output"}
 

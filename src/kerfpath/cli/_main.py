@@ -158,7 +158,12 @@ def speed(
 @app.command()
 def post(
     plan_file: PlanFileArgument,
-    language: Annotated[str, typer.Option(help="Robot language.")] = "rapid",
+    language: Annotated[
+        str,
+        typer.Option(
+            help="Robot language: rapid, krl, fanuc, val3, inform, urscript, ros, csv, or your own."
+        ),
+    ] = "rapid",
     output: Annotated[
         Path | None,
         typer.Option(
@@ -264,6 +269,34 @@ def compare(
 
     if not show_differences(a, b, job, as_json=as_json):
         raise typer.Exit(1)
+
+
+@app.command()
+def touch_up(
+    program: Annotated[
+        Path, typer.Argument(metavar="PROGRAM", help="A program in which targets were moved.")
+    ],
+    job: Annotated[Path, typer.Option(metavar="JOB.toml", help="The job it was made for.")],
+    plan: Annotated[Path, typer.Option(metavar="PLAN.json", help="The plan it was written from.")],
+    to: Out = None,
+    ease_mm: Annotated[
+        float, typer.Option(help="Distance along the path over which a shift fades out.")
+    ] = 10.0,
+    as_json: Json = False,
+) -> None:
+    """Plan a job again around the targets that a person has moved in its program.
+
+    Moved targets keep tip and tool axis as taught, and the path eases back to the planned one; the
+    rotation about the beam is planned again, in the posture of the plan. The files, as of a plan,
+    go to the folder PROGRAM-touched beside you unless --out names another; the audit is that of the
+    touched-up path.
+
+    Example: kerfpath touch-up edited.mod --job door.toml --plan door/plan.json --out door-2
+    """
+    from kerfpath.cli._touch_up import touch_up_program
+
+    folder = to or Path(f"{program.stem}-touched")
+    touch_up_program(program, job, plan, folder, ease_mm, as_json=as_json)
 
 
 @app.command()

@@ -11,10 +11,12 @@ import numpy as np
 import typer
 from rich.markup import escape
 
+from kerfpath.cad import Part
 from kerfpath.cli._drawing import drawing_entry, drawing_of, show_drawing
 from kerfpath.cli._show import busy, errors, out, print_json, progress_bars, table
 from kerfpath.job import (
     Cut,
+    Outcome,
     read_job,
     require_folder,
     require_language,
@@ -25,7 +27,7 @@ from kerfpath.job import (
     write_outcome,
 )
 
-__all__ = ["plan_job"]
+__all__ = ["leave", "plan_job"]
 
 
 def plan_job(
@@ -55,6 +57,25 @@ def plan_job(
         warm_up()
     with progress_bars() as progress:
         outcome = run_job(job, part, progress=progress)
+    leave(outcome, part, folder, as_json=as_json, strict=strict)
+
+
+def leave(
+    outcome: Outcome,
+    part: Part,
+    folder: Path,
+    *,
+    as_json: bool,
+    strict: bool = False,
+    more: dict[str, Any] | None = None,
+) -> None:
+    """Write the files of a run into a folder and say what came of it; `more` is for JSON.
+
+    Raises
+    ------
+    typer.Exit
+        Code 1: some contour has no plan that passes its audit.
+    """
     with busy("writing"):
         written = write_outcome(outcome, folder, strict=strict)
     if as_json:
@@ -66,6 +87,7 @@ def plan_job(
                 "sequence": None if outcome.part is None else sequence_entry(outcome.part),
                 "files": [str(f) for f in written.files],
                 "notes": list(written.notes),
+                **(more or {}),
             }
         )
     else:

@@ -10,9 +10,11 @@ from rich.markup import escape
 
 from kerfpath.cad import read_measured
 from kerfpath.cli._show import errors, out, print_json
+from kerfpath.errors import InputError
 from kerfpath.job import program_from_file, read_plan_file
 from kerfpath.placement import MeasuredFrame, placement_from_points
-from kerfpath.post import write_files, write_program
+from kerfpath.post import identifier, write_files, write_program
+from kerfpath.post import language as find_language
 
 __all__ = ["write_post"]
 
@@ -24,17 +26,27 @@ def write_post(
 ) -> None:  # fmt: skip
     """Write the files of a plan's program to `output`; print them without one.
 
-    One file is written as `output`; several, or one into a folder that is there, keep their names.
+    A file with the suffix of the language names the program, and others go beside it; else a
+    program of one file is written as `output`, and one of several into that folder.
     """
+    name = _name(output, find_language(language).suffix)
+    if name is not None and dry_share is not None:
+        name = name.removeprefix("dry_")  # which dry runs begin with by themselves
     frame = None
     if measured is not None:
         points = read_measured(measured)
         frame = placement_from_points(*points, most_residual=residual_mm / 1000)
     files, notes = program_from_file(
-        plan_file, language, strict=strict, job_file=job, dry_share=dry_share, frame=frame
-    )
+        plan_file, language, name=name, strict=strict, job_file=job, dry_share=dry_share,
+        frame=frame,
+    )  # fmt: skip
     written: list[Path] = []
-    if output is not None and (len(files) > 1 or output.is_dir()):
+    if output is not None and name is not None:
+        main, *_ = files
+        # FANUC's names are in capitals; the file is called as it was asked for.
+        names = {main: output.name} if main.lower() == output.name.lower() else {}
+        written = write_files(output.parent, {names.get(k, k): t for k, t in files.items()})
+    elif output is not None and (len(files) > 1 or output.is_dir()):
         written = write_files(output, files)
     elif output is not None:
         write_program(output, next(iter(files.values())))
@@ -64,6 +76,20 @@ def write_post(
         console.print(f"note: {escape(note)}")
     for path in written:
         out.print(f"wrote {escape(str(path))}")
+
+
+def _name(output: Path | None, suffix: str) -> str | None:
+    """Return the name of a program that is to be written to a file of the language's own suffix."""
+    if output is None or output.is_dir() or output.suffix.lower() != suffix:
+        return None
+    if not output.parent.is_dir():
+        raise InputError(f"cannot write the program to {output}: {output.parent} is no folder")
+    if identifier(output.stem) != output.stem:
+        raise InputError(
+            f"{output}: expected a file named by letters, digits and _ as the program will be, got "
+            f"{output.stem!r}"
+        )
+    return output.stem
 
 
 def _in_words(frame: MeasuredFrame, plan_file: Path) -> list[str]:

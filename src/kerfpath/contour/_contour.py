@@ -22,6 +22,9 @@ FRAME_KINDS: tuple[FrameKind, ...] = ("tangent", "rotation-minimising")
 REPEATED_POINT = 1e-9
 """Consecutive nodes closer than this (m) are one point: they leave no direction of travel."""
 
+SAME_PLACE = 1e-6
+"""m; a path whose ends are nearer returns to its start."""
+
 KINDS = ("cut", "pierce", "lead-in", "micro joint", "overlap", "lead-out", "loop")
 """What a stretch of a contour is; `Contour.kind` holds places in this tuple."""
 
@@ -143,6 +146,11 @@ class Contour:
         return points, turned(self.axes[k], self.axes[k + 1], part)
 
     @property
+    def returns(self) -> bool:
+        """Whether it ends within 1 um of where it begins, closed or not."""
+        return bool(np.linalg.norm(self.points[0] - self.points[-1]) < SAME_PLACE)
+
+    @property
     def kinds(self) -> tuple[str, ...]:
         """What the stretch that begins at each node is, in words."""
         return tuple(KINDS[code] for code in self.kind)
@@ -167,6 +175,7 @@ class Contour:
         axis_tolerance: float | None = None,
         dt: float | None = None,
         speed: ArrayLike | None = None,
+        keep: ArrayLike = (),
     ) -> Contour:
         """Sample the contour anew, uniformly in arc length or in time (Eq. 1).
 
@@ -189,6 +198,8 @@ class Contour:
             steps shorter than the others, it is run through more slowly.
         speed : float or (K,) m/s
             Speed along the path, constant or at each node of this contour; times `speed_share`.
+        keep : (m,) int
+            Nodes of this contour that are nodes again, too, with `spacing` or `dt`.
 
         Raises
         ------
@@ -208,15 +219,21 @@ class Contour:
                 "resample: give one of spacing=, count=, tolerance=, or dt= with speed=; "
                 f"got {', '.join(ways) or 'none'}"
             )
+        keep = integers(keep, "keep", (None,))
+        if len(keep) and spacing is None and dt is None:
+            raise InputError("keep: nodes are kept only with spacing= or dt=")
+        ends = np.union1d(self.feature_ends, keep)
+        if ends[0] < 0 or ends[-1] >= len(self):
+            raise InputError(f"keep: expected nodes from 0 to {len(self) - 1}, got {keep.tolist()}")
         if count is not None:
             if not (isinstance(count, int | np.integer) and count >= 2):
                 raise InputError(f"count: expected a whole number of nodes >= 2, got {count!r}")
             return self.at_nodes(np.linspace(self.s[0], self.s[-1], int(count)))
         if spacing is not None:
             step = scalar(spacing, "spacing", unit="m", above=0.0)
-            return self.at_nodes(_sampling.evenly(self.s, self.feature_ends, step, "mm", self.name))
+            return self.at_nodes(_sampling.evenly(self.s, ends, step, "mm", self.name))
         if dt is not None or speed is not None:
-            return self._in_time(dt, speed)
+            return self._in_time(dt, speed, ends)
         position = np.inf if tolerance is None else scalar(tolerance, "tolerance", above=0.0)
         angle = (
             np.inf if axis_tolerance is None else scalar(axis_tolerance, "axis_tolerance", above=0)
@@ -318,12 +335,12 @@ class Contour:
             name=self.name,
         )
 
-    def _in_time(self, dt: float | None, speed: ArrayLike | None) -> Contour:
+    def _in_time(self, dt: float | None, speed: ArrayLike | None, ends: Ints) -> Contour:
         if dt is None or speed is None:
             raise InputError("resample: sampling in time needs both dt= (s) and speed= (m/s)")
         step = scalar(dt, "dt", unit="s", above=0.0)
         v = positive(np.broadcast_to(np.asarray(speed), len(self)), "speed", (len(self),))
-        s, time = _sampling.in_time(self, v * self.speed_share, step)
+        s, time = _sampling.in_time(self, v * self.speed_share, step, ends)
         return self.at_nodes(s, freeze(time))
 
 

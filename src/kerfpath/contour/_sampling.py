@@ -79,7 +79,7 @@ def evenly(at: Array, ends: Ints, step: float, unit_name: str, name: str) -> Arr
     return np.concatenate([*pieces, at[-1:]])
 
 
-def in_time(line: Contour, speed: Array, dt: float) -> tuple[Array, Array]:
+def in_time(line: Contour, speed: Array, dt: float, ends: Ints) -> tuple[Array, Array]:
     """Return arc lengths (M,) m and times (M,) s of nodes evenly spaced in time, at most `dt`.
 
     Parameters
@@ -88,13 +88,15 @@ def in_time(line: Contour, speed: Array, dt: float) -> tuple[Array, Array]:
     speed : (K,) m/s
         At each node, linear in arc length between them.
     dt : float s
+    ends : (e,) int
+        Nodes that are kept.
     """
     # With the speed linear in s over a segment, its mean slowness is ln(v1/v0)/(v1-v0).
     log_ratio, change = np.log(speed[1:] / speed[:-1]), np.diff(speed)
     even = np.abs(log_ratio) < 1e-6
     slowness = np.where(even, 2.0 / (speed[1:] + speed[:-1]), log_ratio / np.where(even, 1, change))
     t = np.concatenate([[0.0], np.cumsum(np.diff(line.s) * slowness)])
-    at = evenly(t, line.feature_ends, dt, "ms", line.name)
+    at = evenly(t, ends, dt, "ms", line.name)
     k = np.clip(np.searchsorted(t, at, side="right") - 1, 0, len(t) - 2)
     # Within a segment s(t) solves ds/dt = v: exponential where the speed changes.
     rate = np.append(change, 0.0)[k] / np.diff(line.s)[k]

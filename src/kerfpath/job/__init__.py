@@ -28,4 +28,7 @@ from kerfpath.job._run import run_job as run_job
 from kerfpath.job._run import warm_up as warm_up
 from kerfpath.job._sequencefile import sequence_entry as sequence_entry
 from kerfpath.job._task import ContourTask as ContourTask
+from kerfpath.job._touch_up import Taught as Taught
+from kerfpath.job._touch_up import TouchUp as TouchUp
+from kerfpath.job._touch_up import touch_up as touch_up
 from kerfpath.job._verdict import Audited as Audited

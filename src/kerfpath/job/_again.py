@@ -26,7 +26,7 @@ from kerfpath.placement import MeasuredFrame, placed, placed_moves
 from kerfpath.plans import Plan
 from kerfpath.post import language as find_language
 
-__all__ = ["audit_file", "program_from_file"]
+__all__ = ["audit_file", "program_from_file", "require_same"]
 
 LED_NOTE = (
     "The joints are led to the measured part and audited there for path, limits, velocities and "
@@ -72,7 +72,7 @@ def audit_file(plan_file: Path, job_file: Path | None = None) -> Audited:
     tables = {}
     for p in file.plans:
         if job_file is not None:
-            _require_same(p, job, file.path)
+            require_same(p, job, file.path)
         tables[p.name] = checks(p, reference=drawn.get(p.name), cell=cell, **asked)
     return Audited(tables=tables, missing=file.missing, note=_note(file, cell, job_file))
 
@@ -81,6 +81,7 @@ def program_from_file(
     plan_file: Path,
     language: str,
     *,
+    name: str | None = None,
     strict: bool = False,
     job_file: Path | None = None,
     dry_share: float | None = None,
@@ -92,6 +93,8 @@ def program_from_file(
     ----------
     plan_file : Path
     language : str
+    name : str, optional
+        Of the program, where it is not to be that of the job.
     strict : bool
         Refuse what is only warned of otherwise.
     job_file : Path, optional
@@ -130,6 +133,7 @@ def program_from_file(
         _require_passed(audit_file(plan_file, job_file))
         file = replace(file, job=read_job(job_file).source)
     options = _options(file, language, (job_file or plan_file).stem)
+    options = options if name is None else replace(options, name=name)
     if frame is not None:
         file = _led(file, frame, options.retract)
         notes += [LED_NOTE, *([LED_MOVES_NOTE] if file.moves else [])]
@@ -205,7 +209,7 @@ def _apart(planned: Contour, cut: Contour) -> float:
     return float(np.linalg.norm(planned.points - cut.at(planned.s)[0], axis=1).max())
 
 
-def _require_same(plan: Plan, job: Job, path: Path) -> None:
+def require_same(plan: Plan, job: Job, path: Path) -> None:
     """Raise InputError where a plan's tool, part or arm is not where the job has it."""
     pairs = {
         "tool": (plan.T_flange_tip, job.tool),

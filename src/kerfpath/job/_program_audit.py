@@ -153,7 +153,7 @@ def _cut_checks(
     if job.plan_options["tilt"] is not None:
         options["axis_tolerance"] += job.plan_options["tilt"].cone
     rows += checks(made, reference=reference, cell=cell, **options)
-    rows += _asked(job, task, cut, reference, made)
+    rows += _asked(job, task, cut, reference, made, ahead=chosen.sayable is None)
     rows += _postures(job, cut, chosen, settings)
     return rows
 
@@ -222,9 +222,12 @@ def _plan(job: Job, task: ContourTask, cut: ReadCut, s: Array, time: Array) -> P
 
 
 def _asked(
-    job: Job, task: ContourTask, cut: ReadCut, reference: Contour, made: Plan
+    job: Job, task: ContourTask, cut: ReadCut, reference: Contour, made: Plan, *, ahead: bool
 ) -> list[Check]:
-    """Compare speeds, switches and waits with what the job asks for."""
+    """Compare speeds, switches and waits with what the job asks for.
+
+    Where the language cannot switch `ahead` of a target, it has to do so at the target.
+    """
     s = made.contour.s
     middle = (s[1:] + s[:-1]) / 2
     asked = task.sample(reference)
@@ -238,7 +241,7 @@ def _asked(
         excess = np.abs(excess)
     fast = int(np.argmax(excess))
     node = int(np.argmax(wrong)) if wrong.any() else 0
-    lead = np.abs(cut.lead_times - job.program.lead_time)
+    lead = np.abs(cut.lead_times - (job.program.lead_time if ahead else 0.0))
     wait = abs(float(cut.waits.sum()) - job.program.pierce_time)
     lengths = np.diff(s)[wrong].sum()
     return [

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -37,7 +37,7 @@ from kerfpath.refiner import refine
 from kerfpath.robots import robot
 from kerfpath.sequence import PartPlan
 
-__all__ = ["Cut", "Outcome", "Progress", "fastest_speeds", "run_job", "warm_up"]
+__all__ = ["Cut", "Given", "Outcome", "Progress", "fastest_speeds", "run_job", "warm_up"]
 
 Progress = Callable[[str, int, int], None]
 """Called with what is being done, how much of it is done, and how much there is."""
@@ -70,12 +70,26 @@ class Outcome:
         return tuple(cut.plan for cut in self.cuts if cut.plan is not None)
 
 
+class Given(NamedTuple):
+    """The path to cut of a contour, its nodes, the postures, and whether the path is a new one."""
+
+    path: Contour
+    nodes: Contour
+    postures: Sequence[int] | None
+    touched: bool
+
+
 def run_job(
-    job: Job, part: Part | None = None, *, progress: Progress = lambda what, done, total: None
+    job: Job,
+    part: Part | None = None,
+    *,
+    given: Mapping[str, Given] | None = None,
+    progress: Progress = lambda what, done, total: None,
 ) -> Outcome:
     """Return what comes of planning and auditing every contour of a job.
 
-    `part` is what its drawing holds, if that is read already.
+    `part` is what its drawing holds, if that is read already. With `given`, paths for all contours
+    by their names, they are cut along those and come in that order.
 
     A contour without a feasible path does not stop the others; it is reported as such.
 
@@ -86,19 +100,26 @@ def run_job(
     """
     part = part or read_drawing(job.part_file, unit=job.part_unit)
     tasks = job.tasks(part)  # a misspelt name shall not wait for the contours before it
+    if given is not None:
+        tasks = tuple(sorted(tasks, key=lambda task: list(given).index(task.name)))
     cell = cell_of_job(job, part)
     loops = [task.drawn(part) for task in tasks]
-    tries = [
-        [_cut(job, task, shaped, cell, progress) for shaped in task.candidates(part, loop)]
-        for task, loop in zip(tasks, loops, strict=True)
-    ]
+    tries = []
+    for task, loop in zip(tasks, loops, strict=True):
+        if given is not None:
+            paths = [given[task.name]]
+        else:
+            shaped = task.candidates(part, loop)
+            asked = job.plan_options["postures"]
+            paths = [Given(path, task.sample(path), asked, touched=False) for path in shaped]
+        tries.append([_cut(job, task, path, cell, progress) for path in paths])
     if job.sequence is not None:
         progress("order and moves", 0, 1)
     found = ordered(job, loops, tries, cell)
     moved = {
         task.name: part.departure(task.pick, loop)
         for task, loop in zip(tasks, loops, strict=True)
-        if task.table.moves_the_path
+        if task.table.moves_the_path or (given is not None and given[task.name].touched)
     }
     return Outcome(
         job=job,
@@ -112,10 +133,11 @@ def run_job(
 
 
 def _cut(
-    job: Job, task: ContourTask, drawn: Contour, cell: Cell | None, progress: Progress
+    job: Job, task: ContourTask, asked: Given, cell: Cell | None, progress: Progress
 ) -> tuple[Cut, ...]:
     """Return what came of a contour: one cut, or several where it is interrupted."""
-    nodes = task.sample(drawn)
+    drawn, nodes = asked.path, asked.nodes
+    job = replace(job, plan_options=job.plan_options | {"postures": asked.postures})
     options, done = job.plan_options, 0
 
     def solved(count: int) -> None:

@@ -17,6 +17,7 @@ from kerfpath.post._languages import ENTRY_POINTS as ENTRY_POINTS
 from kerfpath.post._languages import Language as Language
 from kerfpath.post._languages import language as language
 from kerfpath.post._languages import languages as languages
+from kerfpath.post._names import identifier as identifier
 from kerfpath.post._preflight import preflight as preflight
 from kerfpath.post._program import CircularMove as CircularMove
 from kerfpath.post._program import Comment as Comment

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import warnings
-from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass, field
 from functools import cache
 from importlib.metadata import EntryPoint, entry_points
 from typing import Any
@@ -67,6 +67,8 @@ class Language:
     sayable : callable, optional
         (program, settings) to what the language can say of it, where that is less; `check` tells
         of all that is left out.
+    assumed : mapping of str to value
+        Settings that are taken where a person has left them None; the preflight warns of outputs.
     read : Reader, optional
         Reads back what is written; without one a program cannot be audited.
     """
@@ -83,7 +85,14 @@ class Language:
     posture: Callable[[Robot, Array, Any], list[tuple[int | str, ...]]] | None = None
     check: Callable[[Program, Any], Iterator[ProgramIssue]] | None = None
     sayable: Callable[[Program, Any], Program] | None = None
+    assumed: Mapping[str, Any] = field(default_factory=dict)
     read: Reader | None = None
+
+    def completed(self, settings: Settings | None) -> Settings:
+        """Return settings, by default the language's defaults, with what is `assumed` of them."""
+        settings = self.settings() if settings is None else settings
+        lacks = {k: v for k, v in self.assumed.items() if getattr(settings, k, v) is None}
+        return settings.model_copy(update=lacks) if lacks else settings
 
     def refusal(self, robot: Robot) -> str:
         """Say why no program in this language can move a robot; empty where one can."""

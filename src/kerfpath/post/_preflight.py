@@ -59,10 +59,12 @@ def preflight(
     rules = chosen.rules(settings)
     issues = list(_robot(program, chosen))
     numbers = [issue for section in program.sections for issue in _numbers(section, rules)]
-    outputs = list(_outputs(program, settings))
+    outputs = list(_outputs(program, chosen, settings))
+    settings = chosen.completed(settings)
     issues += numbers + outputs
     # Speeds and zones are named by their formatted values: only finite ones can be.
-    if not numbers and not outputs and not chosen.refusal(program.robot):
+    unnamed = any(issue.level == "error" for issue in outputs)
+    if not numbers and not unnamed and not chosen.refusal(program.robot):
         issues += _names(program, chosen, rules, settings)
     for section in program.sections:
         issues += _laser(section)
@@ -84,18 +86,18 @@ def preflight(
     return issues
 
 
-def _outputs(program: Program, settings: Settings) -> Iterator[ProgramIssue]:
-    """Check that there is an output for everything that is switched."""
-    linear = [move for move in program.moves if isinstance(move, LinearMove)]
-    for signal in sorted({switch.signal for move in linear for switch in move.switches}):
+def _outputs(program: Program, language: Language, settings: Settings) -> Iterator[ProgramIssue]:
+    """Check that there is an output for everything that is switched, and warn of one assumed."""
+    assumed = [key.removesuffix("_output") for key in language.assumed]
+    for signal in sorted({*program.signals, *assumed}):
         key = f"{signal}_output"
-        if key in type(settings).model_fields and getattr(settings, key) is None:
-            yield ProgramIssue(
-                "error",
-                "output",
-                f"the {signal} is switched, but no output is named for it; say which with {key}",
-                "program",
-            )
+        if key not in type(settings).model_fields or getattr(settings, key) is not None:
+            continue
+        remedy = f"say which with {key} in [program.{language.name}]"
+        said = f"the {signal} is switched, but no output is named for it; {remedy}"
+        if (taken := language.assumed.get(key)) is not None:
+            said = f"no output is named for the {signal}, {taken} is taken; {remedy}"
+        yield ProgramIssue("error" if taken is None else "warning", "output", said, "program")
 
 
 def _robot(program: Program, language: Language) -> Iterator[ProgramIssue]:

@@ -200,6 +200,12 @@ class Program:
         return tuple(step for section in self.sections for step in section.steps)
 
     @property
+    def signals(self) -> tuple[Signal, ...]:
+        """What is switched anywhere."""
+        linear = [move for move in self.moves if isinstance(move, LinearMove)]
+        return tuple(sorted({switch.signal for move in linear for switch in move.switches}))
+
+    @property
     def moves(self) -> tuple[Move, ...]:
         """All moves in order, over all sections."""
         return tuple(move for section in self.sections for move in section.moves)

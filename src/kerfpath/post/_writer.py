@@ -59,6 +59,7 @@ def post(
     program = source if isinstance(source, Program) else build_program(source)
     refused = [i for i in preflight(program, language, settings) if strict or i.level == "error"]
     if not refused:
+        settings = chosen.completed(settings)
         files = chosen.formatter(program, settings).files()
         if chosen.read is None:
             return files
@@ -100,7 +101,7 @@ def read_program(
         of our making, or that does not fit the others: file and line.
     """
     chosen = find_language(language)
-    settings = chosen.settings() if settings is None else settings
+    settings = chosen.completed(settings)
     if chosen.read is None:
         raise InputError(f"language {language!r} has no reader, so that its programs stay unread")
     main = next(iter(files)) if main is None else main

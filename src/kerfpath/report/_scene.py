@@ -56,7 +56,7 @@ def scene(
         scene={
             "aspectmode": "data" if cell is None else "manual",
             "dragmode": "turntable",
-            "camera": _camera(sections),
+            "camera": _camera(sections, cell),
             "annotations": _labels(sections) if len(sections) <= LABELS else [],
             **{f"{a}axis": space_axis(a) for a in "xyz"},
         },
@@ -173,16 +173,22 @@ def _labels(sections: Sequence[ContourSection]) -> list[dict[str, Any]]:
     ]
 
 
-def _camera(sections: Sequence[ContourSection]) -> dict[str, Any]:
-    """Look at the part from the side of the nozzle, a little from above and from the side."""
+def _camera(sections: Sequence[ContourSection], cell: Cell | None) -> dict[str, Any]:
+    """Look at the part from the side of the nozzle, a little from above and from the side.
+
+    Up is up in the cell; without one, of the part.
+    """
+    placed = None if cell is None else cell.T_base_part
+    turn = np.eye(3) if placed is None else placed[:3, :3].T
     axes = [section.path.axes.mean(axis=0) for section in sections]
     towards = -np.mean(axes, axis=0) if axes else np.zeros(3)
     if np.linalg.norm(towards) < 0.3:
         towards = np.zeros(3)
-    eye = towards / max(1.0, float(np.linalg.norm(towards))) + np.array([0.55, -0.75, 0.45])
+    eye = towards / max(1.0, float(np.linalg.norm(towards))) + turn @ np.array([0.55, -0.75, 0.45])
     eye *= 1.85 / float(np.linalg.norm(eye))
     return {
         "eye": dict(zip("xyz", np.round(eye, 4).tolist(), strict=True)),
+        "up": dict(zip("xyz", np.round(turn[:, 2], 4).tolist(), strict=True)),
         "projection": {"type": "orthographic"},
     }
 

@@ -22,6 +22,7 @@ FANUC = Language(
     is_reserved=is_reserved,
     posture=posture,
     check=check,
+    assumed={"laser_output": 1},
     read=read,
 )
 """What is registered."""

@@ -24,6 +24,7 @@ KRL = Language(
     is_reserved=is_reserved,
     posture=posture,
     check=check,
+    assumed={"laser_output": 1},
     read=read,
 )
 """What is registered."""

@@ -18,6 +18,7 @@ URSCRIPT = Language(
     formatter=URScript,
     is_reserved=is_reserved,
     check=check,
+    assumed={"laser_output": 0},
     read=read,
 )
 """What is registered."""
