@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from kerfpath import Contour, InputError, NoFeasiblePath, audit, pareto, plan
+from kerfpath.cell import Mesh, box_between, cell_of
 from kerfpath.front import Run, hypervolume
 from kerfpath.front._runs import grid, whole, within
 from kerfpath.planner import layered_graph
@@ -303,3 +304,23 @@ def test_the_page_on_pareto_sets_runs(capsys):
     for code in re.findall(r"```python\n(.*?)```", page, re.DOTALL):
         exec(compile(code, "pareto.md", "exec"), {})
     assert "hypervolume" in capsys.readouterr().out
+
+
+def test_in_a_cell_every_plan_is_clear(task, tool, placement):
+    blind, arm = plan(**task), task["robot"]
+    slab = box_between([-0.3, -0.3, -0.09], [0.3, 0.3, -0.06])
+    x, y, z = arm.forward(blind.q[15])[:3, 3]  # where the flange of a plan without a cell would be
+    room = cell_of(
+        arm,
+        tool=tool,
+        placement=placement,
+        part=Mesh(vertices=slab.points, triangles=slab.triangles),
+        fixtures={"post": box_between([x - 0.01, y - 0.01, 0.55], [x + 0.01, y + 0.01, z])},
+        near_miss=2e-3,
+    )
+    assert not room.clear(blind.q).all()
+    made = pareto(**task, cell=room, criteria=("displacement", "velocity", "range"), runs=12)
+    assert len(made.plans) > 1
+    for clear in made.plans:
+        assert room.clear(clear.q).all()
+        assert audit(clear, cell=room) == []
