@@ -23,6 +23,7 @@ NAMES = (
     "cad",
     "part",
     "programs",
+    "pareto",
     "sweeps",
 )
 
@@ -70,6 +71,10 @@ def _run(name: str, *, quick: bool) -> list[Report]:
         from benchmarks import programs
 
         return [programs.run(quick=quick)]
+    if name == "pareto":
+        from benchmarks import pareto
+
+        return [pareto.run(quick=quick)]
     if name == "sweeps":
         from benchmarks import sweeps
 

@@ -41,6 +41,7 @@ PACKAGES = (
     "ur-analytic-ik",
     "tesseract-robotics",
     "pymoo",
+    "moocore",
     "ompl",
     "clarabel",
     "toppra",
