@@ -23,6 +23,8 @@ NAMES = (
     "cad",
     "part",
     "programs",
+    "pareto",
+    "sweeps",
 )
 
 
@@ -69,6 +71,14 @@ def _run(name: str, *, quick: bool) -> list[Report]:
         from benchmarks import programs
 
         return [programs.run(quick=quick)]
+    if name == "pareto":
+        from benchmarks import pareto
+
+        return [pareto.run(quick=quick)]
+    if name == "sweeps":
+        from benchmarks import sweeps
+
+        return [sweeps.run(quick=quick)]
     if name == "demo":
         from benchmarks import demo
 

@@ -41,9 +41,11 @@ PACKAGES = (
     "ur-analytic-ik",
     "tesseract-robotics",
     "pymoo",
+    "moocore",
     "ompl",
     "clarabel",
     "toppra",
+    "distributed",
 )
 COLUMNS = ("figure", "median", "min", "max", "runs", "unit", "note")
 

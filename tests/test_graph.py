@@ -1,6 +1,8 @@
 """The layered graph: every admissible pose, every loss counted."""
 
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
+from unittest.mock import Mock
 
 import numpy as np
 import pytest
@@ -70,9 +72,13 @@ def test_pieces_and_threads_leave_no_trace(frames, arm, tool, monkeypatch):
     whole = build(frames, arm, T_flange_tip=tool, gamma=gamma, progress=done.append)
     assert sum(done) == len(frames)
     monkeypatch.setitem(FAMILIES, "opw", replace(FAMILIES["opw"], poses_at_once=300))
+    monkeypatch.setenv("NUMBA_NUM_THREADS", "3")
+    pools = Mock(wraps=ThreadPoolExecutor)
+    monkeypatch.setattr("kerfpath.graph.ThreadPoolExecutor", pools)
     pieces = build(frames, arm, T_flange_tip=tool, gamma=gamma)
     for name in ("q", "start", "sample", "posture", "turn", "reason"):
         np.testing.assert_array_equal(getattr(whole, name), getattr(pieces, name))
+    pools.assert_called_once_with(3)
 
 
 def test_the_gamma_grid_is_even_and_covers_the_circle_once():

@@ -19,6 +19,8 @@ if TYPE_CHECKING:
     from kerfpath.errors import InputError as InputError
     from kerfpath.errors import KerfpathError as KerfpathError
     from kerfpath.errors import NoFeasiblePath as NoFeasiblePath
+    from kerfpath.front import ParetoSet as ParetoSet
+    from kerfpath.front import pareto as pareto
     from kerfpath.placement import placed as placed
     from kerfpath.placement import placement_from_points as placement_from_points
     from kerfpath.planner import fastest_speed as fastest_speed
@@ -42,6 +44,7 @@ _HOME = {
     "KerfpathError": "errors",
     "LayeredPath": "search",
     "NoFeasiblePath": "errors",
+    "ParetoSet": "front",
     "Plan": "plans",
     "Refinement": "refiner",
     "Robot": "robots",
@@ -49,6 +52,7 @@ _HOME = {
     "audit": "auditor",
     "fastest_speed": "planner",
     "join": "contour",
+    "pareto": "front",
     "placed": "placement",
     "placement_from_points": "placement",
     "plan": "planner",

@@ -226,7 +226,8 @@ def build(
 
     nodes = max(1, robot.family.poses_at_once // samples)
     firsts = range(0, len(frames), nodes)
-    with ThreadPoolExecutor(os.cpu_count()) as pool:
+    threads = int(os.environ.get("NUMBA_NUM_THREADS") or os.cpu_count() or 1)
+    with ThreadPoolExecutor(threads) as pool:
         pieces = list(pool.map(lambda f: layers_of(f, min(f + nodes, len(frames))), firsts))
     count = np.concatenate([p.count for p in pieces])
     q, sample = [p.q for p in pieces], [p.sample for p in pieces]

@@ -1,0 +1,148 @@
+"""Sweeps: what the engine costs per task, and what is left after it was killed again and again."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import os
+import sqlite3
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Iterator
+from contextlib import closing, contextmanager
+from importlib.util import find_spec
+from pathlib import Path
+from time import perf_counter
+
+import numpy as np
+
+from benchmarks._figures import Figure, Report
+from kerfpath import sweep
+
+__all__ = ["run"]
+
+HOW = """\
+A task that takes 2 microseconds returns 1 kB; two processes of this machine, or two Dask workers of
+one thread on loopback. Per task: from the first result to the last, over the tasks between, kept in
+the store each. Start: the call until its first result. Killed: SIGKILL to the sweep each time it
+has come to a random number of tasks, the same call again after each; the last is left to end."""
+
+
+def payload(x: int) -> dict[str, str]:
+    """Return 1 kB that only `x` gives, so that a torn or foreign record shows."""
+    return {"text": hashlib.sha256(str(x).encode()).hexdigest() * 16}
+
+
+def sweep_aloud(store: str, count: int) -> None:
+    """Sweep over `count` tasks and print how many are done, for who waits to kill it."""
+    sweep.run(
+        payload,
+        [{"x": x} for x in range(count)],
+        store=store,
+        processes=2,
+        progress=lambda done, _total, _left: print(done, flush=True),
+    )
+
+
+def run(*, quick: bool = False) -> Report:
+    """Measure overhead per task, and kill a sweep many times."""
+    tasks, kills, runs = (1000, 4, 1) if quick else (10_000, 20, 3)
+    figures, findings = [], list[str]()
+    with tempfile.TemporaryDirectory() as folder:
+        at = Path(folder)
+        local = [_timed(at / f"local-{i}", 1000, None) for i in range(runs)]
+        figures += _shown("two processes", local)
+        if find_spec("distributed"):
+            with _cluster(at) as address:
+                _timed(at / "unmeasured", 10, address)
+                dask = [_timed(at / f"dask-{i}", 1000, address) for i in range(runs)]
+            figures += _shown("Dask, two workers", dask)
+        else:
+            figures.append(Figure(what="Dask, two workers", note="distributed is not installed"))
+        findings.append(_killed(at / "killed", tasks, kills))
+    return Report(title="Sweeps", how=HOW, figures=figures, findings=findings)
+
+
+def _shown(what: str, timed: list[tuple[float, float]]) -> list[Figure]:
+    starts, each = zip(*timed, strict=True)
+    return [
+        Figure(what=f"{what}: start", values=starts),
+        Figure(what=f"{what}: per task", values=[1e3 * s for s in each], unit="ms"),
+    ]
+
+
+def _timed(store: Path, count: int, scheduler: str | None) -> tuple[float, float]:
+    """Return the seconds until the first results, and those per task after them."""
+    clock: list[tuple[int, float]] = []
+    sweep.run(
+        payload,
+        [{"x": x} for x in range(count)],
+        store=store,
+        scheduler=scheduler,
+        processes=None if scheduler else 2,
+        progress=lambda done, _total, _left: clock.append((done, perf_counter())),
+    )
+    (_, begun), (first, came), (last, ended) = clock[0], clock[1], clock[-1]
+    return came - begun, (ended - came) / (last - first)
+
+
+@contextmanager
+def _cluster(folder: Path) -> Iterator[str]:
+    """Start a Dask scheduler and two workers on loopback; yield the scheduler's address."""
+    import distributed
+
+    def dask(*arguments: str) -> subprocess.Popen[bytes]:
+        return subprocess.Popen(
+            [sys.executable, "-m", "dask", *arguments, "--host", "127.0.0.1", "--no-dashboard"],
+            stderr=subprocess.DEVNULL,
+            env={**os.environ, "PYTHONPATH": os.pathsep.join(sys.path)},
+        )
+
+    file = folder / "scheduler.json"
+    started = [dask("scheduler", "--port", "0", "--scheduler-file", str(file))]
+    try:
+        while not file.exists() or not file.read_text().endswith("}"):
+            time.sleep(0.02)
+        address = str(json.loads(file.read_text())["address"])
+        options = ("--nthreads", "1", "--no-nanny", "--local-directory", str(folder))
+        started += [dask("worker", address, *options) for _ in range(2)]
+        with distributed.Client(address) as client:
+            client.wait_for_workers(2)
+        yield address
+    finally:
+        for process in started:
+            process.kill()
+            process.wait()
+
+
+def _killed(store: Path, tasks: int, kills: int) -> str:
+    """Kill a sweep at random moments, resume it, and say what its store holds at the end."""
+    code = "import sys; from benchmarks.sweeps import sweep_aloud as s; s(sys.argv[1], {})"
+    moments = sorted(np.random.default_rng(0).integers(0, tasks - 200, kills).tolist())
+    begun = perf_counter()
+    for moment in [*moments, tasks]:
+        with subprocess.Popen(
+            [sys.executable, "-c", code.format(tasks), str(store)],
+            stdout=subprocess.PIPE,
+            stderr=subprocess.DEVNULL,
+            text=True,
+        ) as running:
+            assert running.stdout is not None
+            for line in running.stdout:
+                if moment <= int(line) < tasks:
+                    running.kill()
+                    break
+    seconds = perf_counter() - begun
+    with closing(sqlite3.connect(store)) as base:
+        rows = base.execute("SELECT parameters, value FROM result").fetchall()
+        (checked,) = base.execute("PRAGMA integrity_check").fetchone()
+    numbers = [json.loads(parameters)["x"] for parameters, _ in rows]
+    torn = sum(json.loads(v) != payload(x) for x, (_, v) in zip(numbers, rows, strict=True))
+    once = len(set(numbers) & set(range(tasks)))
+    return (
+        f"{tasks} tasks, killed {kills} times: {once} of them in the store, "
+        f"{len(rows) - once} more than once, {torn} torn, SQLite's integrity check {checked}; "
+        f"{seconds:.0f} s with all {kills + 1} starts"
+    )

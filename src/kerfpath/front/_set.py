@@ -1,0 +1,141 @@
+"""The Pareto set, and how good it is."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import moocore
+import numpy as np
+from numpy.typing import ArrayLike
+
+from kerfpath._arrays import Array, floats, freeze
+from kerfpath.errors import InputError
+from kerfpath.front._criteria import criteria_of
+from kerfpath.front._runs import Run
+from kerfpath.plans import Plan
+
+__all__ = ["ParetoSet", "hypervolume"]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class ParetoSet:
+    """Plans of one contour of which none is as good as another in all criteria and better in one.
+
+    Parameters
+    ----------
+    criteria : tuple of str
+        Names, as `pareto` takes them.
+    units : tuple of str
+    plans : tuple of Plan
+        By the first criterion, the best first; each has passed its audit.
+    runs : tuple of Run
+        What each plan was asked for.
+    values : (P, C)
+        Criteria of each plan, in their units.
+    ideal, reference : (C,)
+        Best values of the first runs, and a point beyond the worst of them: what criteria are
+        scaled by.
+    tried : int
+        Number of runs.
+    feasible : int
+        Number of runs that had a plan.
+    failures : mapping of str to int
+        Why the other runs had none, by count.
+    """
+
+    criteria: tuple[str, ...]
+    units: tuple[str, ...]
+    plans: tuple[Plan, ...]
+    runs: tuple[Run, ...]
+    values: Array
+    ideal: Array
+    reference: Array
+    tried: int
+    feasible: int
+    failures: Mapping[str, int]
+
+    @property
+    def scaled(self) -> Array:
+        """Criteria of each plan (P, C): 0 at the ideal, 1 at the reference, less is better."""
+        return freeze((self.values - self.ideal) / (self.reference - self.ideal))
+
+    @property
+    def hypervolume(self) -> float:
+        """What the set dominates of the criteria better than the reference, scaled.
+
+        It never falls as runs are added; to compare two sets, see `hypervolume`.
+        """
+        return hypervolume(self.scaled, np.ones(len(self.criteria)))
+
+    @property
+    def gap(self) -> float:
+        """Largest distance of neighbours in any one criterion, scaled: how well it is covered."""
+        return float(np.diff(np.sort(self.scaled, axis=0), axis=0).max(initial=0.0))
+
+    def coverage(self, other: ParetoSet) -> float:
+        """Return the share of another set's plans that some plan here is as good as or better.
+
+        The C of Zitzler and Thiele (PPSN V, 1998).
+
+        Raises
+        ------
+        InputError
+            The other set has other criteria.
+        """
+        if other.criteria != self.criteria:
+            raise InputError(f"coverage: expected criteria {self.criteria}, got {other.criteria}")
+        sense = self._sense
+        here, there = self.values * sense, other.values * sense
+        return float((here[:, None] <= there).all(axis=2).any(axis=0).mean())
+
+    def best(self, criterion: str) -> Plan:
+        """Return the plan that is best in a criterion.
+
+        Raises
+        ------
+        InputError
+            Not one of the set's criteria.
+        """
+        if criterion not in self.criteria:
+            raise InputError(f"best: expected one of {', '.join(self.criteria)}, got {criterion!r}")
+        column = self.criteria.index(criterion)
+        return self.plans[int(self.scaled[:, column].argmin())]
+
+    @property
+    def balanced(self) -> Plan:
+        """The plan whose worst criterion, scaled, is the least."""
+        return self.plans[int(self.scaled.max(axis=1).argmin())]
+
+    @property
+    def _sense(self) -> Array:
+        return np.array([c.sense for c in criteria_of(self.criteria, self.plans[0].robot)])
+
+    def __str__(self) -> str:
+        """Say in a few lines what was tried and found."""
+        lines = [
+            f"{len(self.plans)} plans of {self.feasible} feasible runs of {self.tried}; "
+            f"hypervolume {self.hypervolume:.4f}, largest gap {self.gap:.3f}"
+        ]
+        for i, (name, unit) in enumerate(zip(self.criteria, self.units, strict=True)):
+            low, high = self.values[:, i].min(), self.values[:, i].max()
+            lines.append(f"  {name}: {low:.4g} to {high:.4g} {unit}")
+        lines += [f"  no plan in {number} runs: {why}" for why, number in self.failures.items()]
+        return "\n".join(lines)
+
+
+def hypervolume(values: ArrayLike, reference: ArrayLike) -> float:
+    """Return the volume that points (P, C), less being better, dominate up to a reference (C,).
+
+    Exact, by moocore (Guerreiro, Fonseca, Paquete, ACM Comput. Surv. 54(6), 2021). Points that are
+    not better than the reference in every coordinate dominate nothing.
+
+    Raises
+    ------
+    InputError
+        Shapes that do not fit, numbers that are not finite.
+    """
+    reference = floats(reference, "reference", (None,))
+    values = floats(values, "values", (None, len(reference)))
+    inside = values[(values < reference).all(axis=1)]
+    return float(moocore.hypervolume(inside, ref=reference)) if len(inside) else 0.0

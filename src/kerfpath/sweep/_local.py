@@ -1,0 +1,112 @@
+"""Tasks on processes of this machine."""
+
+from __future__ import annotations
+
+import os
+import pickle
+import signal
+from collections import deque
+from collections.abc import Callable, Generator, Iterable
+from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
+from concurrent.futures.process import BrokenProcessPool
+from contextlib import suppress
+from multiprocessing import get_context
+from multiprocessing.connection import Connection
+from threading import Thread
+from typing import Any
+
+from kerfpath import __version__
+from kerfpath.errors import InputError
+from kerfpath.sweep._task import Failure, Outcome, Task, attempt
+
+__all__ = ["on_processes"]
+
+AHEAD = 8
+"""Tasks handed out per process: enough that none waits for the next, few to lose."""
+
+ONE_THREAD = dict.fromkeys(("NUMBA_NUM_THREADS", "OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS"), "1")
+
+
+def on_processes(
+    function: Callable[..., Any], tasks: Iterable[Task], processes: int
+) -> Generator[list[Outcome], None, None]:
+    """Yield the outcomes as they come; closing it stops the processes at once.
+
+    When a process dies, nobody can say which task did it: those handed out are tried again one by
+    one, and the one that is alone with the next death is its cause.
+
+    Raises
+    ------
+    InputError
+        Where the processes do not come up, or cannot import the function.
+    """
+    call = pickle.dumps(function)
+    waiting = deque(tasks)
+    while waiting:
+        suspects = deque((yield from _pooled(call, waiting, processes, processes * AHEAD)))
+        while suspects:
+            for task in (yield from _pooled(call, suspects, 1, 1)):
+                failure = Failure(kind="WorkerDied", message="the task took its process with it")
+                yield [Outcome(key=task.key, value=None, failure=failure, seconds=0.0)]
+
+
+def _pooled(
+    call: bytes, waiting: deque[Task], processes: int, ahead: int
+) -> Generator[list[Outcome], None, list[Task]]:
+    """Take and do what is waiting; return, at the first death, the tasks that it interrupted."""
+    context = get_context("spawn")
+    ours, theirs = context.Pipe()
+    pool = ProcessPoolExecutor(
+        processes, mp_context=context, initializer=_begin, initargs=(theirs,)
+    )
+    flying: dict[Future[Outcome], Task] = {}
+    broken = False
+    try:
+        while flying or (waiting and not broken):
+            while waiting and not broken and len(flying) < ahead:
+                try:
+                    future = pool.submit(attempt, __version__, call, waiting[0])
+                except BrokenProcessPool:
+                    broken = True
+                else:
+                    flying[future] = waiting.popleft()
+            done = wait(flying, return_when=FIRST_COMPLETED).done
+            if any(isinstance(future.exception(), BrokenProcessPool) for future in done):
+                break
+            yield [future.result() for future in done]
+            for future in done:
+                del flying[future]
+        if not flying:
+            return []
+        wait(flying)
+        whole = [future for future in flying if not future.exception()]
+        yield [future.result() for future in whole]
+        for future in whole:
+            del flying[future]
+        if not ours.poll():
+            raise InputError(
+                "the processes of the sweep do not come up; a script that calls a sweep has to do "
+                "so under `if __name__ == '__main__':`"
+            )
+        return list(flying.values())
+    finally:
+        if flying:
+            ours.close()
+        pool.shutdown(cancel_futures=True)
+        ours.close()
+        theirs.close()
+
+
+def _begin(link: Connection) -> None:
+    """Set up a process: one thread, deaf to Ctrl-C, and gone as soon as the sweep lets go."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    os.environ.update(ONE_THREAD)
+    Thread(target=_leave_with, args=(link,), daemon=True).start()
+    with suppress(OSError):  # a sweep that was killed meanwhile hears nothing
+        link.send(None)
+
+
+def _leave_with(link: Connection) -> None:
+    """End this process when the other end of `link` closes: by choice, or because it was killed."""
+    link.poll(None)
+    os._exit(1)

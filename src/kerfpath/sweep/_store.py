@@ -1,0 +1,141 @@
+"""Where results stay: one SQLite file, which one sweep at a time holds."""
+
+from __future__ import annotations
+
+import sqlite3
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from types import TracebackType
+
+from kerfpath import __version__
+from kerfpath.errors import InputError
+from kerfpath.sweep._task import SCHEMA, Failure, Outcome, Task
+
+__all__ = ["Store"]
+
+APPLICATION = 0x6B657266
+"""SQLite's mark of whose file it is: "kerf"."""
+
+TABLES = f"""
+BEGIN EXCLUSIVE;
+PRAGMA application_id = {APPLICATION};
+PRAGMA user_version = {SCHEMA};
+CREATE TABLE package (version TEXT NOT NULL);
+CREATE TABLE result (
+    key TEXT PRIMARY KEY, function TEXT NOT NULL, parameters TEXT NOT NULL,
+    value TEXT, kind TEXT, message TEXT, seconds REAL NOT NULL,
+    CHECK ((value IS NULL) = (kind IS NOT NULL) AND (kind IS NULL) = (message IS NULL))
+);
+INSERT INTO package VALUES ('{__version__}');
+COMMIT;
+"""
+
+REASONS = {
+    sqlite3.SQLITE_BUSY: "another sweep holds this store: wait for its end, or name another store",
+    sqlite3.SQLITE_FULL: "the disk is full; the results so far are kept: make room and run the "
+    "same sweep again",
+    sqlite3.SQLITE_IOERR: "cannot be read or written: is the disk full, or does it fail?",
+    sqlite3.SQLITE_NOTADB: "this file is no store of a sweep: name another",
+    sqlite3.SQLITE_CANTOPEN: "cannot be opened: is its folder there, and may you write in it?",
+    sqlite3.SQLITE_READONLY: "may not be written to: change that, or name another store",
+}
+
+
+class Store:
+    """The results of sweeps, in the order in which they came; a context manager.
+
+    It holds SQLite's own lock while it is open, which the system takes from a process that dies.
+    The write-ahead log keeps every result that was added through `kill -9`; a power cut may cost
+    the last ones, never the file.
+
+    Raises
+    ------
+    InputError
+        Where the file is held by another sweep, is from another version of kerfpath or of the
+        store, or cannot be read or written; from every method.
+    """
+
+    def __init__(self, path: Path) -> None:
+        self._path = path
+        with self._explained():
+            self._base = sqlite3.connect(path, timeout=0)
+            try:
+                self._open()
+            except BaseException:
+                self._base.close()
+                raise
+
+    def _open(self) -> None:
+        self._base.execute("PRAGMA locking_mode = EXCLUSIVE")
+        if not self._number("PRAGMA application_id") and not self._number(
+            "SELECT count(*) FROM sqlite_master"
+        ):
+            self._base.execute("PRAGMA journal_mode = WAL")
+            self._base.executescript(TABLES)
+        if self._number("PRAGMA application_id") != APPLICATION:
+            raise InputError(f"{self._path}: {REASONS[sqlite3.SQLITE_NOTADB]}")
+        again = "name another store, and the sweep is done anew"
+        if (schema := self._number("PRAGMA user_version")) != SCHEMA:
+            raise InputError(
+                f"{self._path}: a store of schema {schema}, this kerfpath writes {SCHEMA}: {again}"
+            )
+        (version,) = self._base.execute("SELECT version FROM package").fetchone()
+        if version != __version__:
+            raise InputError(
+                f"{self._path}: a store of kerfpath {version}, this is {__version__}: {again}"
+            )
+        self._base.execute("PRAGMA synchronous = NORMAL")
+        self._base.executescript("BEGIN EXCLUSIVE; COMMIT")
+
+    def _number(self, query: str) -> int:
+        return int(self._base.execute(query).fetchone()[0])
+
+    @contextmanager
+    def _explained(self) -> Iterator[None]:
+        try:
+            yield
+        except sqlite3.DatabaseError as error:
+            reason = REASONS.get(getattr(error, "sqlite_errorcode", 0) & 0xFF, str(error))
+            raise InputError(f"{self._path}: {reason}") from error
+
+    def keys(self) -> set[str]:
+        """Return the keys of all results."""
+        with self._explained():
+            return {key for (key,) in self._base.execute("SELECT key FROM result")}
+
+    def add(self, function: str, done: Iterable[tuple[Task, Outcome]]) -> None:
+        """Keep outcomes, all or none of them; a key that is there already is an error."""
+        rows = [
+            (
+                task.key,
+                function,
+                task.parameters,
+                outcome.value,
+                outcome.failure and outcome.failure.kind,
+                outcome.failure and outcome.failure.message,
+                outcome.seconds,
+            )
+            for task, outcome in done
+        ]
+        with self._explained(), self._base:
+            self._base.executemany("INSERT INTO result VALUES (?, ?, ?, ?, ?, ?, ?)", rows)
+
+    def outcome(self, key: str) -> Outcome:
+        """Return what is kept under a key."""
+        query = "SELECT value, kind, message, seconds FROM result WHERE key = ?"
+        with self._explained():
+            value, kind, message, seconds = self._base.execute(query, (key,)).fetchone()
+        failure = None if kind is None else Failure(kind=kind, message=message)
+        return Outcome(key=key, value=value, failure=failure, seconds=seconds)
+
+    def __enter__(self) -> Store:
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        self._base.close()

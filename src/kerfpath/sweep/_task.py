@@ -1,0 +1,126 @@
+"""One task of a sweep: its name in the store, and its one attempt, which never raises."""
+
+from __future__ import annotations
+
+import hashlib
+import inspect
+import json
+import pickle
+import sys
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from time import perf_counter
+from typing import Any, NamedTuple
+
+from kerfpath import __version__
+from kerfpath.errors import InputError
+
+__all__ = ["SCHEMA", "Failure", "Outcome", "Task", "attempt", "name_of", "task_of"]
+
+SCHEMA = 1
+"""Counts the ways in which sweeps were kept; another number is another store."""
+
+
+class Task(NamedTuple):
+    """The key under which a result is kept, and the parameters as JSON."""
+
+    key: str
+    parameters: str
+
+
+@dataclass(frozen=True, kw_only=True, slots=True)
+class Failure:
+    """Why a task has no value.
+
+    Parameters
+    ----------
+    kind : str
+        The exception's type: "NoFeasiblePath", "InputError", any other, or "WorkerDied" where the
+        task took its process with it.
+    message : str
+    """
+
+    kind: str
+    message: str
+
+
+@dataclass(frozen=True, kw_only=True, slots=True)
+class Outcome:
+    """What an attempt came to: a value as JSON, or a failure; `seconds` is the time it took."""
+
+    key: str
+    value: str | None
+    failure: Failure | None
+    seconds: float
+
+
+def name_of(function: Callable[..., Any]) -> str:
+    """Return "module:name" of a top-level function; a script counts under its file's name.
+
+    Raises
+    ------
+    InputError
+        Where a worker could not import it.
+    """
+    module, name = getattr(function, "__module__", None), getattr(function, "__qualname__", "")
+    home = sys.modules.get(module or "")
+    if home is None or getattr(home, name, None) is not function:
+        raise InputError(
+            f"a sweep needs a function from the top level of a module, which its workers can "
+            f"import; {function!r} is none: move it there"
+        )
+    if module == "__main__":
+        spec, file = getattr(home, "__spec__", None), getattr(home, "__file__", None)
+        if spec is None and file is None:
+            raise InputError(
+                f"{name} was typed in, and workers cannot import it: save it in a file"
+            )
+        module = spec.name if spec else Path(str(file)).stem
+    return f"{module}:{name}"
+
+
+def task_of(function: Callable[..., Any], parameters: Mapping[str, Any], where: str) -> Task:
+    """Return the task `function(**parameters)`; the key hashes schema, version, name, parameters.
+
+    Raises
+    ------
+    InputError
+        Where the parameters are no JSON, or not those of the function; the message begins with
+        `where`.
+    """
+    try:
+        text = json.dumps(parameters, sort_keys=True, separators=(",", ":"), allow_nan=False)
+        inspect.signature(function).bind(**json.loads(text))
+    except (TypeError, ValueError) as error:
+        raise InputError(
+            f"{where}: expected the parameters of {name_of(function)} as plain data (a mapping of "
+            f"numbers, text, lists, None): {error}"
+        ) from error
+    whole = json.dumps([SCHEMA, __version__, name_of(function), text])
+    return Task(hashlib.sha256(whole.encode()).hexdigest(), text)
+
+
+def attempt(version: str, function: bytes, task: Task) -> Outcome:
+    """Call a pickled function in a worker; whatever it raises becomes part of the outcome.
+
+    Raises
+    ------
+    InputError
+        Where the worker has another version of kerfpath than `version`, or lacks the function:
+        that is no outcome of the task.
+    """
+    if version != __version__:
+        raise InputError(f"a worker has kerfpath {__version__}, this sweep needs {version}")
+    try:
+        call = pickle.loads(function)
+    except (ImportError, AttributeError) as error:
+        raise InputError(f"a worker cannot import the function of the sweep: {error}") from error
+    value, failure = None, None
+    begun = perf_counter()
+    try:
+        value = json.dumps(call(**json.loads(task.parameters)), allow_nan=False)
+    except (Exception, SystemExit) as error:  # recorded, not hidden: the other tasks go on
+        message = str(error).encode(errors="replace").decode()
+        failure = Failure(kind=type(error).__name__, message=message)
+    return Outcome(key=task.key, value=value, failure=failure, seconds=perf_counter() - begun)
