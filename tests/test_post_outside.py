@@ -6,11 +6,13 @@ import re
 import subprocess
 
 import pytest
+from lxml import etree
 
 from kerfpath import robot
 from kerfpath.post import build_program, post, write_files
 from kerfpath.post.rapid import RapidSettings
 from kerfpath.post.urscript import URScriptSettings
+from kerfpath.post.val3 import Val3Settings
 from programs import arc, frames, hand_plan
 from test_post_arcs import slot
 
@@ -70,3 +72,22 @@ def test_urscript_is_python_but_for_its_ends():
         ast.parse(as_python(text))
         with pytest.raises(SyntaxError):
             ast.parse(as_python(text.replace("movel(", "movel((", 1)))
+
+
+VAL3 = "{{http://www.staubli.com/robotics/VAL3/{}}}{}"
+
+
+def test_val3_is_xml_of_its_namespaces_in_which_every_program_is_listed():
+    for _, program in programs(robot("staubli_tx2_160l"), (1.05, -0.15, 0.61)):
+        files = post(program, "val3", Val3Settings(laser_output="a", gas_output="b"))
+        trees = {name: etree.fromstring(text.encode()) for name, text in files.items()}
+        for name, tree in trees.items():
+            kind = {"pjx": ("Project/3", "Project"), "dtx": ("Data/2", "Database")}
+            space, tag = kind.get(name[-3:], ("Program/2", "Programs"))
+            assert tree.tag == VAL3.format(space, tag), name
+        for name, tree in trees.items():
+            if name.endswith(".pjx"):
+                folder = name.rpartition("/")[0]
+                listed = [p.get("file") for p in tree.iter(VAL3.format("Project/3", "Program"))]
+                here = {n for n in files if n.rpartition("/")[0] == folder and n.endswith(".pgx")}
+                assert {f"{folder}/{file}" for file in listed} == here
