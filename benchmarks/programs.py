@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from functools import partial
 from statistics import median
-from typing import Any
 
 import numpy as np
 
@@ -31,6 +30,10 @@ __all__ = ["run"]
 TARGETS, SECTIONS = 50_000, 25
 LIMIT = 5.0
 """What writing, and reading back, may take, s."""
+UNDIVIDED = ("urscript", "ros", "csv")
+"""Languages whose programs are one file."""
+ONE_FILE = 1_000_000
+"""Lines allowed to them."""
 SWING = 0.12
 """How far each joint swings about its place, rad."""
 STEP = 0.004
@@ -49,7 +52,8 @@ def run(*, quick: bool = False) -> Report:
     count = 500 if quick else TARGETS // SECTIONS
     report = Report(title="Robot programs", how=HOW.format(targets=TARGETS, sections=SECTIONS))
     for name, chosen in sorted(languages().items()):
-        settings = _settings(chosen)
+        lines = {"lines_per_file": ONE_FILE} if name in UNDIVIDED else {}
+        settings = chosen.completed(chosen.settings(**lines))
         program = _program(_arm(chosen), count)
         files = chosen.formatter(program, settings).files()
         read = read_program(files, name, program.robot, settings)
@@ -83,19 +87,10 @@ def _write(chosen: Language, program: Program, settings: Settings) -> None:
 def _arm(chosen: Language) -> Robot:
     """Return a robot of the library that the language is for."""
     for name in robot_ids():
-        arm = robot(name, acceleration_ratio="cybertech_8_to_20kg")
+        arm = robot(name)
         if not chosen.doubt(arm) and not chosen.refusal(arm):
             return arm
     raise LookupError(chosen.name)
-
-
-def _settings(chosen: Language) -> Settings:
-    """Return the defaults of a language, with outputs where it has none."""
-    fields = chosen.settings.model_fields
-    named: dict[str, Any] = {}
-    if "laser_output" in fields and fields["laser_output"].default is None:
-        named["laser_output"] = 1
-    return chosen.settings(**named)
 
 
 def _program(arm: Robot, count: int) -> Program:
