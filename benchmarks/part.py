@@ -31,7 +31,7 @@ TARGET = 60.0
 
 CLOCKS = {
     "compiling": ("kerfpath.cli._plan", "warm_up"),
-    "reading the STEP file": ("kerfpath.job._run", "read_drawing"),
+    "reading the STEP file": ("kerfpath.cli._plan", "drawing_of"),
     "planning and audit": ("kerfpath.job._run", "_cut"),
     "order and air moves": ("kerfpath.job._run", "ordered"),
     "writing": ("kerfpath.cli._plan", "write_outcome"),
