@@ -632,3 +632,29 @@ manipulability_margin_m3 = 0.02
         manipulability=Band(margin=0.02),
     )
     assert read(changed("[program]", "[comfort]\n[program]")).plan_options["comfort"] is None
+
+
+def test_every_key_says_what_it_expects():
+    """Where pydantic finds a fault itself, the message is made of the field's own words."""
+    from typing import Literal, get_args, get_origin
+
+    from pydantic import BaseModel
+
+    from kerfpath.job._tables import TABLES
+    from kerfpath.post import languages
+
+    def plain(annotation):
+        kinds = get_args(annotation) if get_origin(annotation) is not Literal else ()
+        return get_origin(annotation) is Literal or any(map(plain, kinds))
+
+    def is_table(annotation):
+        if isinstance(annotation, type) and issubclass(annotation, BaseModel):
+            return True
+        return any(map(is_table, get_args(annotation)))
+
+    models = [*TABLES.items(), *((f"program.{k}", v.settings) for k, v in languages().items())]
+    for table, model in models:
+        for name, field in model.model_fields.items():
+            if not plain(field.annotation) and not is_table(field.annotation):
+                assert field.description, f"[{table}] {name}"
+                assert field.examples, f"[{table}] {name}"

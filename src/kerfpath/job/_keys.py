@@ -106,7 +106,7 @@ Lengths = dict[str, Number]
 # One printable line that is not blank.
 Text = Annotated[str, Field(pattern=r"^[^\p{C}\p{Zl}\p{Zp}]*\S[^\p{C}\p{Zl}\p{Zp}]*$")]
 Identifier = Annotated[
-    str,
+    str | None,
     key(
         "a name of letters, digits and _, a letter first, at most 32 characters",
         '"trim_1"',

@@ -54,14 +54,14 @@ MeshFile = Annotated[
     Text,
     AfterValidator(_mesh_file),
     AfterValidator(existing("an STL or STEP file")),
-    key("the path of an STL or STEP file", '"clamp.stl"'),
 ]
+MESH_FILE = key("the path of an STL or STEP file", '"clamp.stl"')
 
 
 class HeadTable(Table):
     """[cell.head]: a solid from a file, or the generic head's sizes where they differ."""
 
-    file: MeshFile | None = None
+    file: Annotated[MeshFile | None, MESH_FILE] = None
     unit: Annotated[Unit | None, key("the unit of the file's numbers", '"mm"')] = None
     xyz_mm: Annotated[
         Three | None, key("3 numbers, where the file's origin is in the flange in mm", "[0, 0, 0]")
@@ -105,7 +105,7 @@ class FixtureTable(Table):
     size_mm: Annotated[
         ThreePositive | None, key("3 numbers above 0, the edges of a box in mm", "[1000, 800, 50]")
     ] = None
-    file: MeshFile | None = None
+    file: Annotated[MeshFile | None, MESH_FILE] = None
     unit: Annotated[Unit | None, key("the unit of the file's numbers", '"mm"')] = None
     xyz_mm: Annotated[
         Three,

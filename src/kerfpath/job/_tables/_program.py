@@ -22,7 +22,7 @@ class ProgramTable(Table):
     model_config = ConfigDict(extra="allow")
 
     language: Annotated[str, key("a robot language, or none for no program", '"rapid"')] = "rapid"
-    name: Identifier | None = None
+    name: Identifier = None
     retract_mm: Annotated[Positive, key("a number above 0, in mm", "50")] = 50.0
     zone_mm: Annotated[NotNegative, key("a number not below 0, in mm", "0.3")] = 0.3
     lead_time_s: Annotated[NotNegative, key("a number not below 0, in s", "0.02")] = 0.02

@@ -24,7 +24,9 @@ WORDS = (
 )
 """Words of the language, where a contour may be named so."""
 
-Output = Annotated[int, setting("the number of a digital output, 1 to 4096", "5", ge=1, le=4096)]
+Output = Annotated[
+    int | None, setting("the number of a digital output, 1 to 4096", "5", ge=1, le=4096)
+]
 
 
 class FanucSettings(Settings):
@@ -33,8 +35,8 @@ class FanucSettings(Settings):
     lines_per_file: Annotated[
         int, setting("a whole number of lines from 100 to 9999", "9999", ge=100, le=9999)
     ] = 9999
-    laser_output: Output | None = None
-    gas_output: Output | None = None
+    laser_output: Output = None
+    gas_output: Output = None
     user_frame: Annotated[int, setting("a user frame, 1 to 61", "2", ge=1, le=61)] = 1
     tool_frame: Annotated[int, setting("a tool frame, 1 to 29", "2", ge=1, le=29)] = 1
     longest_name: Annotated[

@@ -30,14 +30,14 @@ SPEED_STEP = 1e-6
 """Speeds (m/s) have six decimals."""
 NOT_CHECKED = "not been checked for collisions"
 
-Output = Annotated[int, setting("a standard digital output from 0 to 7", "0", ge=0, le=7)]
+Output = Annotated[int | None, setting("a standard digital output from 0 to 7", "0", ge=0, le=7)]
 
 
 class URScriptSettings(Settings):
     """What is wired to the controller, and how fast it may speed up."""
 
-    laser_output: Output | None = None
-    gas_output: Output | None = None
+    laser_output: Output = None
+    gas_output: Output = None
     acceleration_mm_s2: Annotated[
         float, setting("a number from 1 to 50000, in mm/s^2", "1200", ge=1, le=50_000)
     ] = 1200.0
