@@ -21,6 +21,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from kerfpath._arrays import Array, Ints, floats, freeze
+from kerfpath.post._arm_plane import wrist_in_plane
 from kerfpath.post.fanuc._settings import FanucSettings
 from kerfpath.robots import Robot
 
@@ -59,15 +60,10 @@ def turns(robot: Robot, q: ArrayLike, settings: FanucSettings) -> Ints:
 def posture(robot: Robot, q: Array, settings: FanucSettings) -> list[tuple[int | str, ...]]:
     """Return the configurations of joint vectors q (K, 6) rad: three letters and three turns.
 
-    In the plane of the arm, with x ahead and z up, the wrist centre lies at
-    w = c3 (sin q23, cos q23) + a2 (cos q23, -sin q23) from axis 3; it lies behind the lower arm,
-    which points along (sin q2, cos q2), where c3 sin q3 + a2 cos q3 < 0.
+    Shoulder and elbow as `wrist_in_plane` has them.
     """
     q = floats(q, "q", (None, 6))
-    arm = robot.arm()
-    _, q2, q3, *_ = (robot.sign * q - robot.offset).T
-    ahead = arm.a1 + arm.c2 * np.sin(q2) + arm.c3 * np.sin(q2 + q3) + arm.a2 * np.cos(q2 + q3)
-    bend = arm.c3 * np.sin(q3) + arm.a2 * np.cos(q3)
+    ahead, bend = wrist_in_plane(robot, q)
     flipped = np.sin(axes_from_joints(robot, q)[:, 4]) > NOISE
     letters = zip(
         np.where(flipped, "F", "N").tolist(),

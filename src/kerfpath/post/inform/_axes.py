@@ -19,6 +19,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from kerfpath._arrays import Array, Ints, floats, freeze
+from kerfpath.post._arm_plane import wrist_in_plane
 from kerfpath.robots import Robot
 
 __all__ = ["axes_from_joints", "joints_from_axes", "manipulator_type", "posture"]
@@ -45,15 +46,10 @@ def joints_from_axes(robot: Robot, axes: ArrayLike) -> Array:
 def manipulator_type(robot: Robot, q: ArrayLike) -> Ints:
     """Return the six bits of RCONF, (K, 6), of joint vectors q (K, 6) rad.
 
-    In the plane of the arm, with x ahead and z up, the wrist centre lies at
-    w = c3 (sin q23, cos q23) + a2 (cos q23, -sin q23) from axis 3; it lies behind the lower arm,
-    which points along (sin q2, cos q2), where c3 sin q3 + a2 cos q3 < 0.
+    Shoulder and elbow as `wrist_in_plane` has them.
     """
     q = floats(q, "q", (None, 6))
-    arm = robot.arm()
-    _, q2, q3, *_ = (robot.sign * q - robot.offset).T
-    ahead = arm.a1 + arm.c2 * np.sin(q2) + arm.c3 * np.sin(q2 + q3) + arm.a2 * np.cos(q2 + q3)
-    bend = arm.c3 * np.sin(q3) + arm.a2 * np.cos(q3)
+    ahead, bend = wrist_in_plane(robot, q)
     axes_deg = np.round(np.degrees(axes_from_joints(robot, q)), NOISE_DECIMALS)
     turned = axes_deg[:, 3] % 360.0
     far = (axes_deg > 180) | (axes_deg <= -180)

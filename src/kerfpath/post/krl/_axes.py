@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from kerfpath._arrays import Array, Ints, floats, freeze
+from kerfpath.post._arm_plane import wrist_in_plane
 from kerfpath.robots import Robot
 
 __all__ = ["axes_from_joints", "joints_from_axes", "posture", "status_and_turn"]
@@ -44,8 +45,7 @@ def status_and_turn(robot: Robot, q: ArrayLike) -> Ints:
     """
     q = floats(q, "q", (None, 6))
     arm = robot.arm()
-    _, q2, q3, *_ = (arm.sign * q - arm.offset).T
-    ahead = arm.a1 + arm.c2 * np.sin(q2) + arm.c3 * np.sin(q2 + q3) + arm.a2 * np.cos(q2 + q3)
+    ahead, _ = wrist_in_plane(robot, q)
     axes_deg = np.degrees(axes_from_joints(robot, q))
     stretched_deg = np.degrees(np.arctan2(-arm.a2, arm.c3))
     bent = np.round(axes_deg[:, 2] - stretched_deg, NOISE_DECIMALS) >= 0

@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from kerfpath._arrays import Array, Ints, floats, freeze
+from kerfpath.post._arm_plane import wrist_in_plane
 from kerfpath.robots import Robot
 
 __all__ = ["axes_from_joints", "axis_matrix", "confdata", "joints_from_axes", "posture"]
@@ -50,16 +51,10 @@ def joints_from_axes(robot: Robot, axes: ArrayLike) -> Array:
 def confdata(robot: Robot, q: ArrayLike) -> Ints:
     """Return cf1, cf4, cf6 and cfx, (K, 4), of joint vectors q (K, 6) rad.
 
-    See the module's text for what is ABB's and what is our reading. In the plane of the arm, with
-    x ahead and z up, the lower arm points along u = (sin q2, cos q2) and the wrist centre lies at
-    w = c3 (sin q23, cos q23) + a2 (cos q23, -sin q23) from axis 3; it is behind the lower arm
-    where w turns from u towards the back: u_x w_z > u_z w_x, that is c3 sin q3 + a2 cos q3 < 0.
+    See the module's text for what is ABB's and what is our reading.
     """
     q = floats(q, "q", (None, 6))
-    arm = robot.arm()
-    _, q2, q3, *_ = (arm.sign * q - arm.offset).T
-    ahead = arm.a1 + arm.c2 * np.sin(q2) + arm.c3 * np.sin(q2 + q3) + arm.a2 * np.cos(q2 + q3)
-    bend = arm.c3 * np.sin(q3) + arm.a2 * np.cos(q3)
+    ahead, bend = wrist_in_plane(robot, q)
     axes_deg = np.round(np.degrees(axes_from_joints(robot, q)), NOISE_DECIMALS)
     conf = np.empty((len(q), 4), dtype=np.int64)
     conf[:, :3] = np.floor(axes_deg[:, [0, 3, 5]] / 90.0)

@@ -19,6 +19,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from kerfpath._arrays import Array, floats, freeze
+from kerfpath.post._arm_plane import wrist_in_plane
 from kerfpath.post.val3._settings import Val3Settings
 from kerfpath.robots import Robot
 
@@ -49,9 +50,8 @@ def posture(robot: Robot, q: Array, settings: Val3Settings) -> list[tuple[int | 
 def configurations(robot: Robot, q: ArrayLike) -> list[tuple[int | str, ...]]:
     """Return the words for shoulder, elbow and wrist of joint vectors q (K, 6) rad."""
     axes = axes_from_joints(robot, q)
-    arm = robot.arm()
-    _, q2, q3, _, q5, _ = axes.T
-    ahead = arm.a1 + arm.c2 * np.sin(q2) + arm.c3 * np.sin(q2 + q3) + arm.a2 * np.cos(q2 + q3)
+    ahead, _ = wrist_in_plane(robot, floats(q, "q", (None, 6)))
+    _, _, q3, _, q5, _ = axes.T
     words = (
         np.where(ahead < -NOISE, "righty", "lefty").tolist(),
         np.where(np.sin(q3) < -NOISE, "enegative", "epositive").tolist(),
