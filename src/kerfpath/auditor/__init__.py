@@ -7,5 +7,6 @@ from kerfpath.auditor._chain import JointChain as JointChain
 from kerfpath.auditor._chain import chain_of as chain_of
 from kerfpath.auditor._table import Check as Check
 from kerfpath.auditor._table import Issue as Issue
+from kerfpath.auditor._table import Level as Level
 from kerfpath.auditor._table import Unit as Unit
 from kerfpath.auditor._table import in_words as in_words

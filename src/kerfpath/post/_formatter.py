@@ -58,9 +58,15 @@ class Formatter(ABC):
     def linear_move(self, move: LinearMove) -> Iterator[str]:
         """Yield the lines of a linear move and of what is switched at its end."""
 
-    @abstractmethod
     def circular_move(self, move: CircularMove) -> Iterator[str]:
-        """Yield the lines of a circular move and of what is switched at its end."""
+        """Yield the lines of a circular move and of what is switched at its end.
+
+        Raises
+        ------
+        InputError
+            The language has no arcs; its `check` says so before.
+        """
+        raise InputError("the language has no arcs; leave arcs_mm out of the job")
 
     @abstractmethod
     def wait(self, wait: Wait) -> Iterator[str]:

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Literal
+
+from kerfpath.auditor import Level
 
 __all__ = ["ProgramIssue"]
 
@@ -24,7 +25,7 @@ class ProgramIssue:
         Where in the program.
     """
 
-    level: Literal["error", "warning"]
+    level: Level
     code: str
     message: str
     place: str

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Literal
+from typing import Literal, get_args
 
 import numpy as np
 
@@ -13,6 +13,7 @@ from kerfpath.errors import InputError
 from kerfpath.robots import Robot
 
 __all__ = [
+    "SIGNALS",
     "CircularMove",
     "Comment",
     "JointMove",
@@ -28,6 +29,8 @@ __all__ = [
 ]
 
 Signal = Literal["laser", "gas"]
+SIGNALS: dict[str, Signal] = {word: word for word in get_args(Signal)}
+"""Every signal by its word, for readers."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

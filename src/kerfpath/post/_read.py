@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from typing import Any, Literal, Protocol
+from typing import Any, Literal, Protocol, get_args
 
 import numpy as np
 
@@ -14,9 +14,14 @@ from kerfpath.post._program import Switch
 from kerfpath.robots import Robot
 
 __all__ = [
-    "ReadMove", "ReadProgram", "ReadSection", "ReadStep", "ReadWait", "Reader", "same_output",
-    "with_tips",
+    "MOVE_KINDS", "MoveKind", "ReadMove", "ReadProgram", "ReadSection", "ReadStep", "ReadWait",
+    "Reader", "same_output", "with_tips",
 ]  # fmt: skip
+
+
+MoveKind = Literal["joint", "linear", "circular"]
+MOVE_KINDS: dict[str, MoveKind] = {word: word for word in get_args(MoveKind)}
+"""Every kind of move by its word, for readers."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -45,7 +50,7 @@ class ReadMove:
     switches : tuple of Switch
     """
 
-    kind: Literal["joint", "linear", "circular"]
+    kind: MoveKind
     file: str
     line: int
     speed: float | None

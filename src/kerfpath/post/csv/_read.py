@@ -10,8 +10,8 @@ from scipy.spatial.transform import Rotation
 
 from kerfpath._arrays import Array, freeze
 from kerfpath.errors import InputError
-from kerfpath.post._program import Switch
-from kerfpath.post._read import ReadMove, ReadProgram, ReadSection, ReadStep, ReadWait
+from kerfpath.post._program import SIGNALS, Switch
+from kerfpath.post._read import MOVE_KINDS, ReadMove, ReadProgram, ReadSection, ReadStep, ReadWait
 from kerfpath.post.csv._write import POSE, CsvSettings, columns
 from kerfpath.robots import Robot
 
@@ -21,7 +21,7 @@ UNIT = 1e-6
 """How far the length of a quaternion may be from one."""
 _NUMBER = re.compile(r"-?\d+\.\d+", re.ASCII)
 _EVENT = re.compile(r"(laser|gas) (on|off) (\d+\.\d+) s ahead", re.ASCII)
-_KINDS = ("joint", "linear", "circular", "via", "wait")
+_KINDS = (*MOVE_KINDS, "via", "wait")
 
 
 def read(main: str, files: Mapping[str, str], robot: Robot, settings: CsvSettings) -> ReadProgram:
@@ -90,7 +90,7 @@ class _Reader:
         q, T_part_tip = self.target(target)
         steps.append(
             ReadMove(
-                kind=kind,  # type: ignore[arg-type]  # one of the kinds of moves, see above
+                kind=MOVE_KINDS[kind],
                 file=self.file,
                 line=number,
                 speed=self.numbers([share])[0] / 100
@@ -124,7 +124,7 @@ class _Reader:
                 raise self.fault(f"not an event: {words[:40]!r}")
             signal, state, lead = match.groups()
             on = state == "on"
-            found.append(Switch(signal=signal, on=on, lead_time=float(lead)))  # type: ignore[arg-type]
+            found.append(Switch(signal=SIGNALS[signal], on=on, lead_time=float(lead)))
         return tuple(found)
 
     def numbers(self, fields: list[str]) -> Array:

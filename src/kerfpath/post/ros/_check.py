@@ -6,6 +6,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
+from kerfpath.auditor import Level
 from kerfpath.errors import InputError
 from kerfpath.post._issue import ProgramIssue
 from kerfpath.post._program import CircularMove, LinearMove, Program
@@ -54,7 +55,7 @@ def _limits(program: Program, settings: RosSettings) -> Iterator[ProgramIssue]:
         yield ProgramIssue("error", "straight", str(error), "program")
         return
     found = rates(motion.time, motion.q, motion.stops)
-    words = (("error", "velocity"), ("warning", "acceleration"))
+    words: tuple[tuple[Level, str], ...] = (("error", "velocity"), ("warning", "acceleration"))
     for values, limit, (level, what) in zip(
         found, program.robot.speed_limits(), words, strict=True
     ):
@@ -62,7 +63,7 @@ def _limits(program: Program, settings: RosSettings) -> Iterator[ProgramIssue]:
         if share.max() > 1 + NOISE:
             k, joint = np.unravel_index(int(share.argmax()), share.shape)
             yield ProgramIssue(
-                level,  # type: ignore[arg-type]  # one of the two levels
+                level,
                 f"joint-{what}",
                 f"joint {int(joint) + 1} needs {share.max():.0%} of its {what} limit "
                 f"{motion.time[k]:.3f} s after the start",

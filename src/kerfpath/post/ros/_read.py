@@ -12,7 +12,7 @@ from scipy.spatial.transform import Rotation
 from kerfpath._arrays import Array, freeze
 from kerfpath.air import least_time
 from kerfpath.errors import InputError
-from kerfpath.post._program import Switch
+from kerfpath.post._program import SIGNALS, Switch
 from kerfpath.post._read import ReadMove, ReadProgram, ReadSection, ReadStep, ReadWait
 from kerfpath.post.ros._trajectory import rates
 from kerfpath.post.ros._write import SECOND, RosSettings, head, joint_names
@@ -206,7 +206,7 @@ class _Events:
         if not isinstance(move, ReadMove) or move.kind != "linear":
             raise self.fault("a switch must follow a linear move")
         lead = float(self.points.time[self.last]) - time
-        switch = Switch(signal=signal, on=on, lead_time=lead)  # type: ignore[arg-type]
+        switch = Switch(signal=SIGNALS[signal], on=on, lead_time=lead)
         steps[-1] = replace(move, switches=(*move.switches, switch))
 
     def append(self, step: ReadStep) -> None:

@@ -16,7 +16,7 @@ from kerfpath._arrays import Array, Ints
 from kerfpath.post._divide import in_one_file
 from kerfpath.post._formatter import Formatter, number, plain
 from kerfpath.post._orientations import quaternions
-from kerfpath.post._program import CircularMove, JointMove, LinearMove, Wait
+from kerfpath.post._program import JointMove, LinearMove, Wait
 from kerfpath.post._settings import Rules, Settings, setting
 from kerfpath.post.ros._trajectory import Trajectory, rates, trajectory
 
@@ -127,10 +127,6 @@ class Ros(Formatter):
         for switch in move.switches:
             to = "true" if switch.on else "false"
             yield _event(end - switch.lead_time, f"set: {switch.signal}, to: {to}")
-
-    def circular_move(self, move: CircularMove) -> Iterator[str]:
-        """Refuse: `check` does so before."""
-        raise NotImplementedError("arcs are refused")
 
     def wait(self, wait: Wait) -> Iterator[str]:
         """Yield when a wait is done."""

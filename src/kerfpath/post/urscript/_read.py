@@ -5,14 +5,13 @@ from __future__ import annotations
 import re
 from collections.abc import Mapping
 from dataclasses import replace
-from typing import get_args
 
 import numpy as np
 from scipy.spatial.transform import Rotation
 
 from kerfpath._arrays import Array, freeze
 from kerfpath.errors import InputError
-from kerfpath.post._program import Signal, Switch
+from kerfpath.post._program import SIGNALS, Switch
 from kerfpath.post._read import ReadMove, ReadProgram, ReadSection, ReadStep, ReadWait
 from kerfpath.post.urscript._switching import time_ahead, words
 from kerfpath.post.urscript._write import URScriptSettings, full_joint_speed
@@ -70,7 +69,7 @@ class _Reader:
         tool = _pose(self.take(_TOOL, "set_tcp(p[...])"))
         part = _pose(self.take(_PART, "global part_frame = p[...]"))
         signals = self.signals
-        for signal in get_args(Signal):
+        for signal in SIGNALS.values():
             if self.line != f"global {signal}_waits = False":
                 continue
             output = getattr(self.settings, f"{signal}_output")
@@ -177,7 +176,7 @@ class _Reader:
         lead, before = self.leads.pop(signal, (0.0, on))
         if before != on:
             raise self.fault(f"the {signal} is switched to {before} ahead, to {on} here")
-        switch = Switch(signal=signal, on=on == "True", lead_time=lead)  # type: ignore[arg-type]
+        switch = Switch(signal=SIGNALS[signal], on=on == "True", lead_time=lead)
         self.steps[-1] = replace(move, switches=(*move.switches, switch))
 
     def wait(self, words: tuple[str, ...]) -> None:
