@@ -19,6 +19,7 @@ from kerfpath.post import (
     ReadMove,
     ReadProgram,
     Settings,
+    circle_through,
     groups_of,
     languages,
     read_program,
@@ -224,14 +225,12 @@ def _q(move: ReadMove) -> Array:
 def _arc(start: Array, via: Array, end: Array) -> list[Array]:
     """Return poses along the arc after `start`, its end included, the tool turning evenly."""
     a, b, c = start[:3, 3], via[:3, 3], end[:3, 3]
-    normal = np.cross(b - a, c - a)
-    rows = np.array([b - a, c - a, normal])
-    try:
-        centre = np.linalg.solve(rows, [(b @ b - a @ a) / 2, (c @ c - a @ a) / 2, normal @ a])
-    except np.linalg.LinAlgError:
+    circle = circle_through(a, b, c)
+    if circle is None:
         return [via, end]  # on one line
+    centre, normal, _ = circle
     x = a - centre
-    y = np.cross(normal / np.linalg.norm(normal), x)
+    y = np.cross(normal, x)
     sweep = float(np.arctan2((c - centre) @ y, (c - centre) @ x) % (2 * np.pi))
     parts = np.linspace(0, 1, max(int(np.ceil(sweep / ARC_STEP)), 1) + 1)[1:]
     poses = np.tile(np.eye(4), (len(parts), 1, 1))

@@ -11,7 +11,7 @@ from scipy.spatial.transform import Rotation, Slerp
 from kerfpath._arrays import Array, scalar
 from kerfpath.post._program import CircularMove, LinearMove, Program, Section, Step
 
-__all__ = ["with_arcs"]
+__all__ = ["circle_through", "with_arcs"]
 
 FEWEST = 3
 """Linear moves that a circular one replaces at least."""
@@ -110,8 +110,8 @@ def _arc(
     points = T[:, :3, 3]
     middle = int(np.argmin(np.abs(np.linalg.norm(points - points[0], axis=1)
                                   - np.linalg.norm(points - points[-1], axis=1))))  # fmt: skip
-    circle = _circle(points[0], points[middle], points[-1])
-    if circle is None:
+    circle = circle_through(points[0], points[middle], points[-1])
+    if circle is None or not SMALLEST <= circle[2] <= LARGEST:
         return None
     centre, normal, radius = circle
     arm = points - centre
@@ -142,15 +142,15 @@ def _arc(
     )
 
 
-def _circle(a: Array, b: Array, c: Array) -> tuple[Array, Array, float] | None:
-    """Return centre, unit normal and radius of the circle through three points, or None."""
+def circle_through(a: Array, b: Array, c: Array) -> tuple[Array, Array, float] | None:
+    """Return centre, unit normal and radius of the circle through three points (3,), m.
+
+    None where they lie on one line. Seen against the normal it runs counter-clockwise from a by b.
+    """
     u, v = b - a, c - a
     normal = np.cross(u, v)
     size = float(normal @ normal)
     if size <= (1e-9 * float(u @ u + v @ v)) ** 2:
         return None
     centre = a + (np.cross(normal, u) * (v @ v) + np.cross(v, normal) * (u @ u)) / (2 * size)
-    radius = float(np.linalg.norm(a - centre))
-    if not SMALLEST <= radius <= LARGEST:
-        return None
-    return centre, normal / np.sqrt(size), radius
+    return centre, normal / np.sqrt(size), float(np.linalg.norm(a - centre))

@@ -69,14 +69,14 @@ class _Reader:
         tool = _pose(self.take(_TOOL, "set_tcp(p[...])"))
         part = _pose(self.take(_PART, "global part_frame = p[...]"))
         signals = self.signals
-        for signal in SIGNALS.values():
-            if self.line != f"global {signal}_waits = False":
+        for known in SIGNALS.values():
+            if self.line != f"global {known}_waits = False":
                 continue
-            output = getattr(self.settings, f"{signal}_output")
+            output = getattr(self.settings, f"{known}_output")
             if output is None:
-                raise self.fault(f"switches the {signal}; say by which output with {signal}_output")
-            signals.append(signal)
-            self.expect(words(signal, output))
+                raise self.fault(f"switches the {known}; say by which output with {known}_output")
+            signals.append(known)
+            self.expect(words(known, output))
         sections: dict[str, ReadSection] = {}
         while match := _DEFINITION.fullmatch(self.line):
             if match[1] in sections:
