@@ -3,11 +3,26 @@
 from __future__ import annotations
 
 import numpy as np
+from numpy.typing import ArrayLike
 from scipy.spatial.transform import Rotation
 
-from kerfpath._arrays import Array
+from kerfpath._arrays import Array, freeze
 
-__all__ = ["quaternions", "rotation_vectors"]
+__all__ = ["pose_of", "quaternions", "rotation_vectors"]
+
+UNIT = 1e-6
+"""How far the length of a quaternion may be from one: eight printed decimals pass."""
+
+
+def pose_of(position: ArrayLike, wxyz: ArrayLike) -> Array | None:
+    """Return the pose (4, 4) at a position (3,) m; None where the quaternion (4,) is not unit."""
+    quaternion = np.asarray(wxyz, dtype=np.float64)
+    if abs(np.linalg.norm(quaternion) - 1) > UNIT:
+        return None
+    T = np.eye(4)
+    T[:3, :3] = Rotation.from_quat(quaternion, scalar_first=True).as_matrix()
+    T[:3, 3] = position
+    return freeze(T)
 
 
 def quaternions(T: Array) -> Array:

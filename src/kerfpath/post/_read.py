@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import Any, Literal, Protocol, get_args
@@ -15,7 +16,7 @@ from kerfpath.robots import Robot
 
 __all__ = [
     "MOVE_KINDS", "MoveKind", "ReadMove", "ReadProgram", "ReadSection", "ReadStep", "ReadWait",
-    "Reader", "same_output", "with_tips",
+    "Reader", "patterns", "same_output", "with_tips",
 ]  # fmt: skip
 
 
@@ -181,6 +182,11 @@ class Reader(Protocol):
         InputError
             A line that is not of our making, or that does not fit the others: file and line.
         """
+
+
+def patterns(by_kind: Mapping[str, str]) -> dict[str, re.Pattern[str]]:
+    """Return regular expressions of lines by their kind, compiled; digits and letters are ASCII."""
+    return {kind: re.compile(pattern, re.ASCII) for kind, pattern in by_kind.items()}
 
 
 def same_output(said: object, expected: object, place: str) -> None:

@@ -6,10 +6,10 @@ import re
 from collections.abc import Mapping
 
 import numpy as np
-from scipy.spatial.transform import Rotation
 
 from kerfpath._arrays import Array, freeze
 from kerfpath.errors import InputError
+from kerfpath.post._orientations import pose_of
 from kerfpath.post._program import SIGNALS, Switch
 from kerfpath.post._read import MOVE_KINDS, ReadMove, ReadProgram, ReadSection, ReadStep, ReadWait
 from kerfpath.post.csv._write import POSE, CsvSettings, columns
@@ -17,8 +17,6 @@ from kerfpath.robots import Robot
 
 __all__ = ["read"]
 
-UNIT = 1e-6
-"""How far the length of a quaternion may be from one."""
 _NUMBER = re.compile(r"-?\d+\.\d+", re.ASCII)
 _EVENT = re.compile(r"(laser|gas) (on|off) (\d+\.\d+) s ahead", re.ASCII)
 _KINDS = (*MOVE_KINDS, "via", "wait")
@@ -110,12 +108,10 @@ class _Reader:
         """Return the joints (n,) rad and the tip's pose (4, 4) m."""
         values = self.numbers(fields)
         q, point, wxyz = np.split(values, [self.joints, self.joints + len(POSE) - 4])
-        if abs(np.linalg.norm(wxyz) - 1) > UNIT:
+        T = pose_of(point * 1e-3, wxyz)
+        if T is None:
             raise self.fault("the quaternion must have length 1")
-        T = np.eye(4)
-        T[:3, :3] = Rotation.from_quat(wxyz, scalar_first=True).as_matrix()
-        T[:3, 3] = point * 1e-3
-        return freeze(np.radians(q)), freeze(T)
+        return freeze(np.radians(q)), T
 
     def switches(self, text: str) -> tuple[Switch, ...]:
         found = []

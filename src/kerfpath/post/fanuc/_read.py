@@ -22,6 +22,7 @@ from kerfpath.post._read import (
     ReadSection,
     ReadStep,
     ReadWait,
+    patterns,
     same_output,
 )
 from kerfpath.post.fanuc._axes import joints_from_axes
@@ -58,27 +59,25 @@ _COUNT = re.compile(r"LINE_COUNT\s*= (\d+);")
 _NUMBERED = re.compile(r" *(\d+):(.*?) *;")
 _VIA = re.compile(r" *\d+:C P\[\d+\] *")
 _SWITCH = re.compile(r" TB +(\d*\.\d\d)sec,DO\[(\d+)\]=(ON|OFF)")
-_MAIN = {
-    kind: re.compile(pattern)
-    for kind, pattern in {
+_MAIN = patterns(
+    {
         "told": rf"  !(UFRAME|UTOOL) (\d+) ([XYZWPR]) {_NUMBER}",
         "remark": r"  !.*",
         "select": r"  (UFRAME|UTOOL)_NUM=(\d+)",
         "reset": r"  DO\[(\d+)\]=OFF",
         "call": r"  CALL ([A-Z][A-Z0-9_]*)",
-    }.items()
-}
-_SECTION = {
-    kind: re.compile(pattern)
-    for kind, pattern in {
+    }
+)
+_SECTION = patterns(
+    {
         "linear": rf"L P\[(\d+)\] {_END}{_TB}",
         "joint": r"J P\[(\d+)\] (\d+)% (?:(FINE)|CNT\d+)",
         "circular": rf"C P\[(\d+)\] *:  P\[(\d+)\] {_END}{_TB}",
         "remark": r"  !.*",
         "wait": r"  WAIT +(\d*\.\d\d)\(sec\)",
         "switch": r"  DO\[(\d+)\]=(ON|OFF)",
-    }.items()
-}
+    }
+)
 _POSITION = re.compile(
     r"P\[(\d+)\]\{\n\s*GP1:\n\s*UF : (\d+), UT : (\d+),\s*(?:"
     r"CONFIG : '([NF]) ([UD]) ([TB]), (-?\d+), (-?\d+), (-?\d+)',\s*"

@@ -20,6 +20,7 @@ from kerfpath.post._read import (
     ReadSection,
     ReadStep,
     ReadWait,
+    patterns,
     same_output,
 )
 from kerfpath.post.inform._axes import joints_from_axes
@@ -34,18 +35,16 @@ _POSE = re.compile(rf"C(\d{{5}})={','.join([_NUMBER] * 6)}", re.ASCII)
 _PULSES = re.compile(rf"C(\d{{5}})={','.join([_WHOLE] * 6)}", re.ASCII)
 _TYPE = re.compile(r"///RCONF ([01](?:,[01])*)", re.ASCII)
 _COUNT = re.compile(r"///NPOS (\d+),0,0,0,0,0", re.ASCII)
-_MAIN = {
-    kind: re.compile(pattern, re.ASCII)
-    for kind, pattern in {
+_MAIN = patterns(
+    {
         "remark": r"' .*",
         "told": rf"'(UFRAME|TOOL) (\d+) (R?[XYZ]) {_NUMBER}",
         "reset": r"DOUT OT#\((\d+)\) OFF",
         "call": r"CALL JOB:([A-Z][A-Z0-9_]*)",
-    }.items()
-}
-_JOB = {
-    kind: re.compile(pattern, re.ASCII)
-    for kind, pattern in {
+    }
+)
+_JOB = patterns(
+    {
         "linear": r"MOVL C(\d{5}) V=(\d+\.\d) PL=(\d)",
         "arc": r"MOVC C(\d{5}) V=(\d+\.\d)(?: PL=(\d))?",
         "part": r"MOVL C(\d{5}) V=(\d+\.\d)",
@@ -53,8 +52,8 @@ _JOB = {
         "switch": r"DOUT OT#\((\d+)\) (ON|OFF)",
         "wait": r"TIMER T=(\d+\.\d\d)",
         "remark": r"' .*",
-    }.items()
-}
+    }
+)
 
 
 def read(

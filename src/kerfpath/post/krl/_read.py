@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Mapping, Sequence
 from typing import Any, Literal
 
@@ -18,6 +17,7 @@ from kerfpath.post._read import (
     ReadSection,
     ReadStep,
     ReadWait,
+    patterns,
     same_output,
 )
 from kerfpath.post.krl._axes import joints_from_axes
@@ -30,9 +30,8 @@ __all__ = ["read"]
 _NAME = r"([A-Za-z]\w*)"
 _NUMBER = r"(-?\d+(?:\.\d+)?)"
 _POINT = ",".join(f"{field} {_NUMBER}" for field in "XYZABC")
-_LINES = {
-    kind: re.compile(pattern, re.ASCII)
-    for kind, pattern in {
+_LINES = patterns(
+    {
         "linear": rf"LIN {{{_POINT},S (\d+),T (\d+)}}( C_DIS)?",
         "circular": rf"CIRC {{{_POINT}}},{{{_POINT},S (\d+),T (\d+)}}( C_DIS)?",
         "joint": rf"PTP {{{','.join(f'{axis} {_NUMBER}' for axis in AXES)}}}",
@@ -46,8 +45,8 @@ _LINES = {
         "routine": rf"DEF {_NAME}\(\)",
         "tool": rf"\$TOOL={{{_POINT}}}",
         "base": rf"\$BASE={{{_POINT}}}",
-    }.items()
-}
+    }
+)
 _IN_MAIN = ("tool", "base", "call", "end")
 _IN_FIRST = ("call", "end")
 _IN_ROUTINE = ("linear", "speed", "zone", "trigger", "circular", "joint", "share", "wait", "end")

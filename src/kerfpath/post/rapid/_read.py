@@ -9,10 +9,10 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
-from scipy.spatial.transform import Rotation
 
-from kerfpath._arrays import Array, freeze
+from kerfpath._arrays import Array
 from kerfpath.errors import InputError
+from kerfpath.post._orientations import pose_of
 from kerfpath.post._program import Signal, Switch
 from kerfpath.post._read import (
     ReadMove,
@@ -20,6 +20,7 @@ from kerfpath.post._read import (
     ReadSection,
     ReadStep,
     ReadWait,
+    patterns,
     same_output,
 )
 from kerfpath.post.rapid._axes import joints_from_axes
@@ -27,9 +28,6 @@ from kerfpath.post.rapid._write import FULL_AIR_SPEED, RapidSettings
 from kerfpath.robots import Robot
 
 __all__ = ["read"]
-
-UNIT = 1e-6
-"""How far the length of a quaternion may be from one: eight printed decimals pass."""
 
 
 def read(main: str, files: Mapping[str, str], robot: Robot, settings: RapidSettings) -> ReadProgram:
@@ -46,9 +44,8 @@ _NAME = r"([A-Za-z]\w*)"
 _POSE = r"(\[\[.*?9E9\]\])"
 _TRIGGERS = r"([A-Za-z]\w*(?:\\T\d:=[A-Za-z]\w*)*)"
 _FRAMES = rf"{_NAME}\\WObj:={_NAME}"
-_LINES = {
-    kind: re.compile(pattern)
-    for kind, pattern in {
+_LINES = patterns(
+    {
         "blank": r"(?:!.*)?",
         "module": rf"MODULE {_NAME}",
         "end_module": "ENDMODULE",
@@ -72,8 +69,8 @@ _LINES = {
         "circular_move": rf"MoveC {_POSE},{_POSE},{_NAME},{_NAME},{_FRAMES};",
         "switching_move": rf"TriggL (\[.*\]),{_NAME},{_TRIGGERS},{_NAME},{_FRAMES};",
         "switching_arc": rf"TriggC {_POSE},{_POSE},{_NAME},{_TRIGGERS},{_NAME},{_FRAMES};",
-    }.items()
-}
+    }
+)
 _OUTSIDE = {"tool", "work_object", "speed", "zone", "trigger", "routine", "end_module"}
 _IN_PART = {"routine", "end_module"}
 _IN_MAIN = {
@@ -351,12 +348,10 @@ class _Reader:
         if not isinstance(value, list) or len(value) != 2:
             raise self.fault(f"expected a position and a quaternion, got {value!r}")
         point_mm, wxyz = self.numbers(value[0], 3), self.numbers(value[1], 4)
-        if abs(np.linalg.norm(wxyz) - 1) > UNIT:
+        T = pose_of(point_mm * 1e-3, wxyz)
+        if T is None:
             raise self.fault(f"the quaternion {value[1]} must have length 1")
-        T = np.eye(4)
-        T[:3, :3] = Rotation.from_quat(wxyz, scalar_first=True).as_matrix()
-        T[:3, 3] = point_mm * 1e-3
-        return freeze(T)
+        return T
 
     def fault(self, message: str) -> InputError:
         return InputError(f"{self.file}, line {self.line}: {message}")

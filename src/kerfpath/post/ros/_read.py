@@ -7,11 +7,11 @@ from collections.abc import Mapping
 from dataclasses import replace
 
 import numpy as np
-from scipy.spatial.transform import Rotation
 
 from kerfpath._arrays import Array, freeze
 from kerfpath.air import least_time
 from kerfpath.errors import InputError
+from kerfpath.post._orientations import pose_of
 from kerfpath.post._program import SIGNALS, Switch
 from kerfpath.post._read import ReadMove, ReadProgram, ReadSection, ReadStep, ReadWait
 from kerfpath.post.ros._trajectory import rates
@@ -20,8 +20,6 @@ from kerfpath.robots import Robot
 
 __all__ = ["read"]
 
-UNIT = 1e-6
-"""How far the length of a quaternion may be from one."""
 OFF_LINE = 1e-8
 """How far (rad) points of a joint motion may be off it, and those of a wait from each other."""
 TIP_OFF_LINE = 2e-6
@@ -216,12 +214,10 @@ class _Events:
 
     def frame(self, text: str) -> Array:
         values = _numbers(text, 7, f"{self.file}, line {self.line}")
-        if abs(np.linalg.norm(values[3:]) - 1) > UNIT:
+        T = pose_of(values[:3], values[3:])
+        if T is None:
             raise self.fault("the quaternion must have length 1")
-        T = np.eye(4)
-        T[:3, :3] = Rotation.from_quat(values[3:], scalar_first=True).as_matrix()
-        T[:3, 3] = values[:3]
-        return freeze(T)
+        return T
 
     @property
     def text(self) -> str:

@@ -12,7 +12,7 @@ from scipy.spatial.transform import Rotation
 from kerfpath._arrays import Array, freeze
 from kerfpath.errors import InputError
 from kerfpath.post._program import SIGNALS, Switch
-from kerfpath.post._read import ReadMove, ReadProgram, ReadSection, ReadStep, ReadWait
+from kerfpath.post._read import ReadMove, ReadProgram, ReadSection, ReadStep, ReadWait, patterns
 from kerfpath.post.urscript._switching import time_ahead, words
 from kerfpath.post.urscript._write import URScriptSettings, full_joint_speed
 from kerfpath.robots import Robot
@@ -37,17 +37,16 @@ _DEFINITION = re.compile(r"def ([A-Za-z]\w*)\(\):", re.ASCII)
 _CALL = re.compile(r"([A-Za-z]\w*)\(\)", re.ASCII)
 _TOOL = re.compile(rf"set_tcp\({_POSE}\)", re.ASCII)
 _PART = re.compile(rf"global part_frame = {_POSE}", re.ASCII)
-_STEPS = {
-    kind: re.compile(pattern, re.ASCII)
-    for kind, pattern in {
+_STEPS = patterns(
+    {
         "linear": rf"movel\({_TARGET}, {_MOTION}\)",
         "circular": rf"movec\({_TARGET}, {_TARGET}, {_MOTION}, mode=0\)",
         "joint": rf"movej\(\[{_SIX}\], {_MOTION}\)",
         "switch_ahead": rf"{_SIGNAL}_ahead\({_POSE}, {_NUMBER}, (True|False)\)",
         "switch": rf"{_SIGNAL}_set\((True|False)\)",
         "wait": rf"sleep\({_NUMBER}\)",
-    }.items()
-}
+    }
+)
 
 
 class _Reader:

@@ -14,7 +14,7 @@ from kerfpath._arrays import Array, freeze
 from kerfpath.errors import InputError
 from kerfpath.post._frames import faceplate, world
 from kerfpath.post._program import Signal, Switch
-from kerfpath.post._read import ReadMove, ReadProgram, ReadSection, ReadStep, ReadWait
+from kerfpath.post._read import ReadMove, ReadProgram, ReadSection, ReadStep, ReadWait, patterns
 from kerfpath.post.val3._read_data import Data
 from kerfpath.post.val3._settings import Val3Settings
 from kerfpath.post.val3._write import (
@@ -32,17 +32,16 @@ __all__ = ["read"]
 
 _NAME = r"([A-Za-z]\w*)"
 _CALL = re.compile(rf"call (?:{_NAME}:)?{_NAME}\(\)", re.ASCII)
-_LINES = {
-    kind: re.compile(pattern, re.ASCII)
-    for kind, pattern in {
+_LINES = patterns(
+    {
         "linear": r"movel\(pPath\[(\d+)\],tLaser,mPath\[(\d+)\]\)",
         "circular": r"movec\(pPath\[(\d+)\],pPath\[(\d+)\],tLaser,mPath\[(\d+)\]\)",
         "joint": r"movej\(jAir\[(\d+)\],tLaser,mAir\[(\d+)\]\)",
         "stand": r"waitEndMove\(\)",
         "switch": r"(dioLaser|dioGas)=(true|false)",
         "wait": r"delay\((\d+\.\d+)\)",
-    }.items()
-}
+    }
+)
 
 
 def read(main: str, files: Mapping[str, str], robot: Robot, settings: Val3Settings) -> ReadProgram:
