@@ -99,6 +99,19 @@ def read_text(text, robot, language="rapid", settings=None):
     return read_program({"a program": text}, language, robot, settings)
 
 
+def edited(files, file, old, new, count=1):
+    """The files of a program with a place in one of them edited, which has to be there."""
+    assert old in files[file]
+    return {**files, file: files[file].replace(old, new, count)}
+
+
+def assert_at(T, expected, point=1e-6):
+    """Require a pose where it is expected, within `point` (m) and 1e-3 deg."""
+    assert np.linalg.norm(T[:3, 3] - expected[:3, 3]) < point
+    turned = Rotation.from_matrix(T[:3, :3].T @ expected[:3, :3])
+    assert np.degrees(turned.magnitude()) < 1e-3
+
+
 def text_of(files):
     """The text of a program of one file."""
     (text,) = files.values()

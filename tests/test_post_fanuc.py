@@ -29,7 +29,7 @@ from kerfpath.post import (
 from kerfpath.post._frames import world, xyzwpr
 from kerfpath.post.fanuc import FanucSettings, axes_from_joints, joints_from_axes, posture
 from kerfpath.robots import robot_ids
-from programs import arc, changed, codes, frames, hand_plan, with_steps
+from programs import arc, changed, codes, edited, frames, hand_plan, with_steps
 
 GOLDEN = Path(__file__).parent / "data" / "golden_fanuc"
 MAIN, CONTOUR = "CUT_SKIN_OUTER.ls", "SKIN_OUTER.ls"
@@ -429,9 +429,7 @@ def test_robots_of_another_kind_or_maker(program):
     ],
 )  # fmt: skip
 def test_the_reader_refuses_what_it_does_not_know(file, old, new, message):
-    files = golden()
-    assert old in files[file]
-    files[file] = files[file].replace(old, new, 1)
+    files = edited(golden(), file, old, new)
     with pytest.raises(InputError, match=re.escape(message)) as caught:
         read_program(files, "fanuc", robot("fanuc_m20id_25"), OPTIONS)
     assert "\n" not in str(caught.value)
@@ -449,9 +447,7 @@ def test_the_reader_refuses_what_it_does_not_know(file, old, new, message):
     ],
 )
 def test_an_edited_listing_is_read_as_edited(program, old, new, message):
-    files = golden()
-    assert old in files[CONTOUR]
-    files[CONTOUR] = files[CONTOUR].replace(old, new, 1)
+    files = edited(golden(), CONTOUR, old, new)
     back = read_program(files, "fanuc", program.robot, OPTIONS)
     issues = deviations(program, back, FANUC, OPTIONS)
     assert message in " ".join(map(str, issues))

@@ -36,7 +36,7 @@ from kerfpath.post.inform import (
     manipulator_type,
 )
 from kerfpath.robots import robot_ids
-from programs import arc, changed, codes, frames, hand_plan, with_steps
+from programs import arc, assert_at, changed, codes, edited, frames, hand_plan, with_steps
 
 GOLDEN = Path(__file__).parent / "data" / "golden_inform"
 JOBS = ("CUT_SKIN_OUTER.JBI", "SKIN_OUTER_AIR.JBI", "SKIN_OUTER.JBI")
@@ -88,9 +88,7 @@ def reads_back(program, options=IN_PULSES):
             continue
         T = program.T_base_part @ move.T_part_tip
         # Three decimals of mm, four of deg, the plan's own error.
-        assert np.linalg.norm(T[:3, 3] - expected[:3, 3]) < 2e-6
-        turned = Rotation.from_matrix(T[:3, :3].T @ expected[:3, :3])
-        assert np.degrees(turned.magnitude()) < 1e-3
+        assert_at(T, expected, point=2e-6)
     return files, read
 
 
@@ -480,9 +478,7 @@ def test_preflight_refuses_a_reserved_name_and_warns_of_other_makers(program):
     ],
 )  # fmt: skip
 def test_the_reader_refuses_what_it_does_not_know(cell, file, old, new, message):
-    files = golden()
-    assert old in files[file]
-    files[file] = files[file].replace(old, new, 1)
+    files = edited(golden(), file, old, new)
     with pytest.raises(InputError, match=re.escape(message)) as caught:
         read_program(files, "inform", cell[0], IN_PULSES)
     assert "\n" not in str(caught.value)
@@ -509,9 +505,7 @@ def test_pulses_cannot_be_read_without_those_of_the_robot(cell):
     ],
 )
 def test_an_edited_program_is_read_as_edited(program, file, old, new):
-    files = golden()
-    assert old in files[file]
-    files[file] = files[file].replace(old, new, 1)
+    files = edited(golden(), file, old, new)
     read = read_program(files, "inform", program.robot, IN_PULSES)
     assert deviations(program, read, INFORM, IN_PULSES)
 

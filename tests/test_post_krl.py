@@ -32,7 +32,7 @@ from kerfpath.post.krl import (
     joints_from_axes,
     status_and_turn,
 )
-from programs import arc, changed, codes, frames, hand_plan, with_steps
+from programs import arc, assert_at, changed, codes, frames, hand_plan, with_steps
 
 DATA = Path(__file__).parent / "data"
 KRL = language("krl")
@@ -77,9 +77,7 @@ def reads_back(program, settings=OUTPUTS):
         else:
             T = program.T_base_part @ move.T_part_tip
         # 1e-3 mm and 1e-3 deg: four decimals of mm, six of deg, the plan's own error.
-        assert np.linalg.norm(T[:3, 3] - expected[:3, 3]) < 1e-6
-        turned = Rotation.from_matrix(T[:3, :3].T @ expected[:3, :3])
-        assert np.degrees(turned.magnitude()) < 1e-3
+        assert_at(T, expected)
         assert [s.signal for s in move.switches] == [
             s.signal for s in getattr(ours, "switches", ())
         ]

@@ -27,7 +27,7 @@ from kerfpath.post import (
     write_program,
 )
 from kerfpath.post.rapid import RapidSettings, axes_from_joints, confdata, joints_from_axes
-from programs import arc, changed, codes, frames, hand_plan, read_text, text_of, with_steps
+from programs import arc, changed, codes, edited, frames, hand_plan, read_text, text_of, with_steps
 
 GOLDEN = Path(__file__).parent / "data" / "golden_rapid.mod"
 RAPID = language("rapid")
@@ -561,9 +561,7 @@ def test_a_long_program_is_loaded_module_by_module(long_program):
 )
 def test_modules_that_do_not_fit_each_other_are_refused(long_program, file, old, new, message):
     settings = RapidSettings(lines_per_file=100)
-    files = dict(post(long_program, settings=settings))
-    assert old in files[file]
-    files[file] = files[file].replace(old, new)
+    files = edited(post(long_program, settings=settings), file, old, new, count=-1)
     with pytest.raises(InputError, match=message):
         read_program(files, "rapid", long_program.robot, settings)
 

@@ -40,7 +40,7 @@ from kerfpath.post.val3 import (
     posture,
 )
 from kerfpath.robots import robot_ids
-from programs import arc, changed, codes, frames, hand_plan, with_steps
+from programs import arc, assert_at, changed, codes, edited, frames, hand_plan, with_steps
 
 GOLDEN = Path(__file__).parent / "data" / "golden_val3"
 NAME = "cut_skin_outer"
@@ -92,9 +92,7 @@ def reads_back(program, options=OUTPUTS):
         else:
             T = read.T_base_part @ move.T_part_tip
         # 1e-3 mm and 1e-3 deg: four decimals of mm, six of deg, the plan's own error.
-        assert np.linalg.norm(T[:3, 3] - expected[:3, 3]) < 1e-6
-        turned = Rotation.from_matrix(T[:3, :3].T @ expected[:3, :3])
-        assert np.degrees(turned.magnitude()) < 1e-3
+        assert_at(T, expected)
         said = [(s.signal, s.on) for s in move.switches]
         assert said == [(s.signal, s.on) for s in getattr(ours, "switches", ())]
     return files, read
@@ -533,9 +531,7 @@ START, STOP = f"{NAME}/start.pgx", f"{NAME}/stop.pgx"
     ],
 )  # fmt: skip
 def test_the_reader_refuses_what_it_does_not_know(cell, file, old, new, message):
-    files = golden()
-    assert old in files[file]
-    files[file] = files[file].replace(old, new, 1)
+    files = edited(golden(), file, old, new)
     with pytest.raises(InputError, match=re.escape(message)) as caught:
         read_program(files, "val3", cell[0], OUTPUTS)
     assert "\n" not in str(caught.value)
@@ -565,9 +561,7 @@ def test_a_missing_file_is_said(cell, file):
     ],
 )
 def test_an_edited_project_is_read_as_edited(program, file, old, new):
-    files = golden()
-    assert old in files[file]
-    files[file] = files[file].replace(old, new, 1)
+    files = edited(golden(), file, old, new)
     read = read_program(files, "val3", program.robot, OUTPUTS)
     assert deviations(program, read, VAL3, OUTPUTS)
 
