@@ -10,3 +10,4 @@ from kerfpath.auditor._table import Issue as Issue
 from kerfpath.auditor._table import Level as Level
 from kerfpath.auditor._table import Unit as Unit
 from kerfpath.auditor._table import in_words as in_words
+from kerfpath.auditor._table import worst_of as worst_of

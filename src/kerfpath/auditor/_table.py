@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Iterable
+from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
 
-__all__ = ["Check", "Issue", "Level", "Unit"]
+__all__ = ["Check", "Issue", "Level", "Unit", "worst_of"]
 
 Unit = Literal["m", "rad", "m^3", "s", "share", "count"]
 Level = Literal["error", "warning"]
@@ -70,6 +71,17 @@ class Issue:
 
     def __str__(self) -> str:
         return f"{self.level}: {self.message} [{self.code}]"
+
+
+def worst_of(tables: Iterable[Iterable[Check]]) -> list[Check]:
+    """Return the worst of each check over several tables; its node is the number of the table."""
+    worst: dict[str, Check] = {}
+    for number, table in enumerate(tables):
+        for check in table:
+            known = worst.get(check.code)
+            if known is None or not check.value <= known.value:
+                worst[check.code] = replace(check, node=number)
+    return list(worst.values())
 
 
 def in_words(value: float, unit: Unit) -> str:

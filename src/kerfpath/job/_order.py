@@ -8,7 +8,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from kerfpath.auditor import Check, air_checks
+from kerfpath.auditor import Check, air_checks, worst_of
 from kerfpath.cell import Cell
 from kerfpath.contour import Contour
 from kerfpath.errors import NoFeasiblePath
@@ -100,13 +100,8 @@ def ordered(
 def _audited(job: Job, part: PartPlan, cell: Cell | None) -> tuple[Check, ...]:
     """Return the worst of each check over all moves; its node is the number of the move."""
     etas = {key: job.plan_options[key] for key in ("eta_v", "eta_a")}
-    worst: dict[str, Check] = {}
-    for number, move in enumerate(part.moves):
-        for check in air_checks(job.robot, move.q, move.time, cell=cell, **etas):
-            known = worst.get(check.code)
-            if known is None or not check.value <= known.value:
-                worst[check.code] = replace(check, node=number)
-    return tuple(worst.values())
+    tables = (air_checks(job.robot, m.q, m.time, cell=cell, **etas) for m in part.moves)
+    return tuple(worst_of(tables))
 
 
 def _plan(cut: Cut) -> Plan:

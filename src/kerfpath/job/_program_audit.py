@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -11,7 +10,7 @@ from scipy.spatial import cKDTree
 
 from kerfpath._arrays import Array
 from kerfpath.air import least_time
-from kerfpath.auditor import Check, Unit, air_checks, checks
+from kerfpath.auditor import Check, Unit, air_checks, checks, worst_of
 from kerfpath.cad import read as read_drawing
 from kerfpath.cell import Cell
 from kerfpath.contour import Contour
@@ -86,13 +85,14 @@ def audit_program(path: Path, job_file: Path) -> Audited:
     tables[path.name] = [_check("frames", "tool and part, off the job's", off, SAME_FRAME, "m")]
     done: list[int] = []
     for cut in cuts:
-        which, reference = _closest(cut, candidates)
-        title = f"{cut.name} ({tasks[which].name})" if which >= 0 else cut.name
+        apart, which, candidate = _closest(cut, candidates)
+        title = f"{cut.name} ({tasks[which].name})" if apart < NEAR else cut.name
         places[title] = tuple(move.place for move in cut.moves)
-        if reference is None:
+        if apart >= NEAR:
             said = "distance from the nearest contour of the job"
-            tables[title] = [_check("contour", said, _distance(cut, candidates), NEAR, "m")]
+            tables[title] = [_check("contour", said, apart, NEAR, "m")]
             continue
+        reference = candidates[which][candidate]
         tables[title] = _cut_checks(job, tasks[which], cut, reference, cell, chosen, settings)
         times = done.count(which)
         tables[title].append(_check("once", "earlier cuts of this contour", times, 0, "count"))
@@ -109,8 +109,11 @@ def _check(code: str, title: str, value: float, limit: float, unit: Unit, node: 
     )
 
 
-def _scores(cut: ReadCut, candidates: Sequence[Sequence[Contour]]) -> list[tuple[float, int, int]]:
-    """Return how far (m) the cut leaves each candidate at the same share of the way."""
+def _closest(cut: ReadCut, candidates: Sequence[Sequence[Contour]]) -> tuple[float, int, int]:
+    """Return how far (m) the cut leaves the contour that it follows best, its task and candidate.
+
+    Compared at the same shares of the way.
+    """
     points = cut.T_part_tip[:, :3, 3]
     way = np.append(0.0, np.cumsum(np.linalg.norm(np.diff(points, axis=0), axis=1)))
     some = np.unique(np.linspace(0, len(points) - 1, 100).round().astype(int))
@@ -120,17 +123,7 @@ def _scores(cut: ReadCut, candidates: Sequence[Sequence[Contour]]) -> list[tuple
             s = contour.s[0] + way[some] / way[-1] * contour.length
             apart = np.linalg.norm(contour.at(s)[0] - points[some], axis=1)
             found.append((float(np.median(apart)), i, c))
-    return sorted(found)
-
-
-def _closest(cut: ReadCut, candidates: Sequence[Sequence[Contour]]) -> tuple[int, Contour | None]:
-    """Return which task a cut is of, and the contour that it follows; -1 and None for none."""
-    apart, i, c = _scores(cut, candidates)[0]
-    return (i, candidates[i][c]) if apart < NEAR else (-1, None)
-
-
-def _distance(cut: ReadCut, candidates: Sequence[Sequence[Contour]]) -> float:
-    return _scores(cut, candidates)[0][0]
+    return min(found)
 
 
 def _cut_checks(
@@ -268,17 +261,18 @@ def _air(job: Job, cuts: Sequence[ReadCut], home: Array, cell: Cell | None) -> l
     """Check the joint moves to, between and after the cuts; the node is the number of the way."""
     starts: list[Array | None] = [None, *(cut.q_out for cut in cuts)]
     corners = [cut.approach for cut in cuts] + [home]
-    velocity, acceleration = job.robot.speed_limits()
-    worst: dict[str, Check] = {}
-    for number, (start, way) in enumerate(zip(starts, corners, strict=True)):
-        q = way if start is None else np.vstack([start[None], way])
-        q = q[~np.isnan(q).any(axis=1)]
-        if len(q) < 2:
-            continue
-        took = np.maximum(least_time(np.diff(q, axis=0), velocity, acceleration), 1e-9)
-        time = np.append(0.0, np.cumsum(took))
-        for check in air_checks(job.robot, q, time, cell=cell):
-            known = worst.get(check.code)
-            if check.code != "air-time" and (known is None or not check.value <= known.value):
-                worst[check.code] = replace(check, node=number)
-    return list(worst.values())
+    ways = (
+        way if start is None else np.vstack([start[None], way])
+        for start, way in zip(starts, corners, strict=True)
+    )
+    return worst_of(_way_checks(job, way[~np.isnan(way).any(axis=1)], cell) for way in ways)
+
+
+def _way_checks(job: Job, q: Array, cell: Cell | None) -> list[Check]:
+    """Check straight joint motions between corners (m, n) rad in the least time that they need."""
+    if len(q) < 2:
+        return []
+    took = np.maximum(least_time(np.diff(q, axis=0), *job.robot.speed_limits()), 1e-9)
+    time = np.append(0.0, np.cumsum(took))
+    checked = air_checks(job.robot, q, time, cell=cell)
+    return [check for check in checked if check.code != "air-time"]

@@ -248,11 +248,9 @@ def _followed(robot: Robot, T: Array, q0: Array) -> Array:
     apart = np.abs((solved[0] - q0 + np.pi) % (2 * np.pi) - np.pi).max(axis=1)
     posture = int(np.argmin(np.where(reach[0], apart, np.inf)))
     if robot.family.follow_all is None:
-        q_all, reached = robot.inverse_all(T)
-        q = np.where(reached[:, posture, None], q_all[:, posture], np.nan)
-        bad = np.isnan(q).any(axis=1)
-        good = np.vstack([q0, q[~bad]])
-        q[~bad] = np.unwrap(good, axis=0)[1:]
+        q = robot.follow(T, np.tile(q0, (len(T), 1)), np.full(len(T), posture))
+        good = ~np.isnan(q).any(axis=1)
+        q[good] = np.unwrap(np.vstack([q0, q[good]]), axis=0)[1:]
         return q
     q, branch = np.empty((len(T), robot.joints)), np.array([posture])
     before = q0
