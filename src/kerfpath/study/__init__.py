@@ -3,3 +3,6 @@
 from kerfpath.study._job import Loaded as Loaded
 from kerfpath.study._job import digest as digest
 from kerfpath.study._job import loaded as loaded
+from kerfpath.study._layout import Layout as Layout
+from kerfpath.study._layout import layout as layout
+from kerfpath.study._layout_place import ranges_of as ranges_of
