@@ -281,7 +281,7 @@ def found(job, store, processes=1, **options):
 
 @pytest.mark.slow
 def test_the_search_is_repeatable_goes_on_and_proves_what_it_says(coarse, tmp_path):
-    result, story = found(coarse, tmp_path / "one.sqlite", evaluations=12)
+    result, story = found(coarse, tmp_path / "one.sqlite", evaluations=8)
 
     # Killed half way: the same call goes on, and what was done is not done again.
     def stop(what, done, total):
@@ -290,10 +290,10 @@ def test_the_search_is_repeatable_goes_on_and_proves_what_it_says(coarse, tmp_pa
 
     store = tmp_path / "two.sqlite"
     with pytest.raises(Stopped):
-        found(coarse, store, 2, evaluations=12, progress=stop)
+        found(coarse, store, 2, evaluations=8, progress=stop)
     rows = len(kept(store))
     assert 0 < rows < len(kept(tmp_path / "one.sqlite"))
-    assert found(coarse, store, 2, evaluations=12)[1] == story
+    assert found(coarse, store, 2, evaluations=8)[1] == story
     assert kept(store) == kept(tmp_path / "one.sqlite")
     # Oracle: every placement tried, each contour solved exactly.
     assert result.proved
