@@ -105,6 +105,34 @@ def test_results_come_in_the_order_of_the_tasks_and_equal_tasks_are_done_once(tm
     assert query(tmp_path / "s", "SELECT count(*) FROM result") == [(len({*map(str, tasks)}),)]
 
 
+def test_tasks_may_be_handed_in_as_results_come(tmp_path):
+    told = []
+
+    def squared():
+        with sweep.Sweep(
+            sweep_tasks.square,
+            store=tmp_path / "store.sqlite",
+            processes=2,
+            progress=lambda *state: told.append(state),
+            total=4,
+        ) as tasks:
+            first, second = tasks.submit(x=2), tasks.submit(x=3)
+            found = [tasks.result(second), tasks.result(first)]
+            third = tasks.submit(x=found[1].value["square"])  # the workers were idle meanwhile
+            assert tasks.submit(x=3) == second
+            found.append(tasks.result(third))
+            found.append(tasks.result(tasks.submit(x=found[2].value["square"])))
+        return [result.value["square"] for result in found]
+
+    assert squared() == [9, 4, 16, 256]
+    assert [state[:2] for state in told][:: len(told) - 1] == [(0, 4), (4, 4)]
+    assert told[0][2] is None
+    assert told[-1][2] == 0.0
+    told.clear()
+    assert squared() == [9, 4, 16, 256]
+    assert told == [(2, 4, None)], "nothing was done again, so that no result was waited for"
+
+
 def test_a_second_call_does_only_what_is_new(tmp_path):
     tasks = [{"x": x, "folder": str(tmp_path)} for x in range(12)]
     first = sweep.run(sweep_tasks.marked, tasks[:7], store=tmp_path / "s", processes=1)
@@ -143,6 +171,13 @@ def test_a_failing_task_is_kept_with_its_reason_and_does_not_stop_the_rest(tmp_p
     assert found == list(expected.values())
     assert [r.value for r in done] == [None if e else w for w, e in expected.items()]
     assert sweep.run(sweep_tasks.troubled, tasks, store=tmp_path / "s") == done
+
+
+def test_a_worker_that_is_not_fit_for_a_task_ends_the_sweep_and_nothing_is_kept_of_it(tmp_path):
+    store = tmp_path / "store.sqlite"
+    with pytest.raises(InputError, match="the drawing is not here"):
+        sweep.run(sweep_tasks.troubled, [{"what": "unfit"}], store=store, processes=1)
+    assert query(store, "SELECT count(*) FROM result") == [(0,)]
 
 
 def test_a_process_has_one_thread(tmp_path):
