@@ -341,49 +341,8 @@ def test_the_example_of_the_docs_runs(tmp_path):
     assert ran.stderr == ""
 
 
-@pytest.fixture(scope="module")
-def dask():
-    """Start parts of a cluster; all are stopped at the end."""
-    pytest.importorskip("distributed", reason="the extra 'cluster' is not installed")
-    started = []
-
-    def start(*arguments, path=""):
-        known = os.pathsep.join([path, *sys.path, str(HERE)])
-        process = subprocess.Popen(
-            [sys.executable, "-m", "dask", *arguments, "--host", "127.0.0.1", "--no-dashboard"],
-            stderr=subprocess.DEVNULL,
-            env={**os.environ, "PYTHONPATH": known},
-        )
-        started.append(process)
-        return process
-
-    yield start
-    for process in started:
-        process.kill()
-        process.wait()
-
-
-@pytest.fixture
-def scheduler(dask, tmp_path):
-    file = tmp_path / "scheduler.json"
-    dask("scheduler", "--port", "0", "--scheduler-file", str(file))
-    while not file.exists() or not file.read_text().endswith("}"):
-        time.sleep(0.02)
-    return json.loads(file.read_text())["address"]
-
-
-def workers(dask, scheduler, tmp_path, count, **given):
-    import distributed
-
-    options = ("--nthreads", "1", "--no-nanny", "--local-directory", str(tmp_path))
-    started = [dask("worker", scheduler, *options, **given) for _ in range(count)]
-    with distributed.Client(scheduler) as client:
-        client.wait_for_workers(count, timeout=30)
-    return started
-
-
-def test_a_cluster_that_loses_a_worker_in_the_middle_loses_nothing(dask, scheduler, tmp_path):
-    first, second = workers(dask, scheduler, tmp_path, 2)
+def test_a_cluster_that_loses_a_worker_in_the_middle_loses_nothing(workers, scheduler, tmp_path):
+    first, second = workers(2)
     tasks = [{"x": x, "folder": str(tmp_path), "seconds": 0.01} for x in range(300)]
 
     def kill(done, total, left):
@@ -403,18 +362,18 @@ def test_a_cluster_that_loses_a_worker_in_the_middle_loses_nothing(dask, schedul
     assert failed.failure == sweep.Failure(kind="NoFeasiblePath", message="layer 3 is empty")
 
 
-def test_workers_of_another_version_are_refused_and_named(dask, scheduler, tmp_path):
+def test_workers_of_another_version_are_refused_and_named(workers, scheduler, tmp_path):
     (tmp_path / "kerfpath-0.0.9.dist-info").mkdir()
     (tmp_path / "kerfpath-0.0.9.dist-info" / "METADATA").write_text(
         "Metadata-Version: 2.1\nName: kerfpath\nVersion: 0.0.9\n"
     )
-    workers(dask, scheduler, tmp_path, 1, path=str(tmp_path))
+    workers(1, path=str(tmp_path))
     said = r"every worker needs kerfpath [\d.]+, but tcp://127\.0\.0\.1:\d+ has 0\.0\.9"
     with pytest.raises(InputError, match=said):
         sweep.run(sweep_tasks.square, numbers(3), store=tmp_path / "s", scheduler=scheduler)
 
 
-def test_a_cluster_that_is_not_there_is_refused_in_one_line(dask, scheduler, tmp_path, monkeypatch):
+def test_a_cluster_that_is_not_there_is_refused_in_one_line(scheduler, tmp_path, monkeypatch):
     monkeypatch.setattr(_cluster, "PATIENCE", 0.5)
 
     def refused(address):

@@ -3,6 +3,7 @@
 from kerfpath.report._drawing import DrawnLoop, render_drawing
 from kerfpath.report._front import FrontAxis, FrontPlan
 from kerfpath.report._front_page import render_front
+from kerfpath.report._html import with_library, without_library
 from kerfpath.report._map import feasibility_map
 from kerfpath.report._page import render
 from kerfpath.report._section import ContourSection
@@ -16,4 +17,6 @@ __all__ = [
     "render",
     "render_drawing",
     "render_front",
+    "with_library",
+    "without_library",
 ]

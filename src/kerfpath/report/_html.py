@@ -11,7 +11,15 @@ from importlib.resources import files
 import plotly.graph_objects as go
 from plotly.offline import get_plotlyjs
 
-__all__ = ["Figures", "facts_list", "header", "job_part", "page"]
+__all__ = [
+    "Figures",
+    "facts_list",
+    "header",
+    "job_part",
+    "page",
+    "with_library",
+    "without_library",
+]
 
 _SKELETON = """<!DOCTYPE html>
 <html lang="en">
@@ -28,12 +36,15 @@ _SKELETON = """<!DOCTYPE html>
 {body}
 </main>
 {data}
-<script>{plotly}</script>
+{library}
 <script>
 {script}</script>
 </body>
 </html>
 """
+
+_LEAN = '<script src="plotly.js"></script>'
+"""In place of the library; text from outside is escaped and cannot look like it."""
 
 
 class Figures:
@@ -106,9 +117,23 @@ def page(title: str, body: Sequence[str], figures: Figures, *, also: str = "") -
         style="".join(_resource(f"{name}.css") for name in names),
         body="\n".join(part for part in body if part),
         data="\n".join(figures.data),
-        plotly=get_plotlyjs(),
+        library=_library(),
         script="\n".join(_resource(f"{name}.js") for name in names),
     )
+
+
+def without_library(text: str) -> str:
+    """Return a page without the drawing library that makes up most of it, to be kept or sent."""
+    return text.replace(_library(), _LEAN)
+
+
+def with_library(text: str) -> str:
+    """Return the whole page of what `without_library` gave."""
+    return text.replace(_LEAN, _library())
+
+
+def _library() -> str:
+    return f"<script>{get_plotlyjs()}</script>"
 
 
 def _resource(name: str) -> str:
