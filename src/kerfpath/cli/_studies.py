@@ -10,7 +10,7 @@ import typer
 from kerfpath.cli._main import JobArgument, Json, Out, Strict, app
 from kerfpath.errors import InputError
 
-__all__ = ["pareto"]
+__all__ = ["batch", "pareto"]
 
 Scheduler = Annotated[
     str | None,
@@ -19,7 +19,7 @@ Scheduler = Annotated[
     ),
 ]
 Processes = Annotated[
-    int | None, typer.Option(help="Processes of this machine that do it; default: its cores.")
+    int | None, typer.Option(help="Processes of this machine that do it; default: one per core.")
 ]
 Seed = Annotated[int, typer.Option(help="Of all that is random.")]
 
@@ -86,3 +86,32 @@ def pareto(
         job, folder, contour=contour, criteria=names, runs=runs, search=search, seed=seed,
         ahead=ahead, scheduler=scheduler, processes=processes, as_json=as_json,
     )  # fmt: skip
+
+
+@app.command()
+def batch(
+    jobs: Annotated[list[Path], typer.Argument(metavar="JOB.toml...", help="The job files.")],
+    to: Out = None,
+    scheduler: Scheduler = None,
+    processes: Processes = None,
+    as_json: Json = False,
+) -> None:
+    """Plan, audit and write many jobs, each as `kerfpath plan` does, on all cores or a cluster.
+
+    The files of door.toml go to the folder door in the one that --out names (kerfpath-batch). A job
+    that is refused or has no plan gets its row with the reason, and the others go on.
+
+    What is done is kept in batch.sqlite there: the same command again, after Ctrl-C or a power cut,
+    plans only what is new or has changed, and writes what is missing. On a cluster every worker
+    needs the job files at the same path, as on a shared disk.
+
+    Exit codes: 0 every job has passed, 1 some has not, 2 the command itself was wrong.
+
+    Example: kerfpath batch parts/*.toml --out cut
+
+    Example: kerfpath batch /shared/parts/*.toml --out cut --scheduler tcp://10.0.0.1:8786
+    """
+    from kerfpath.cli._batch import plan_jobs
+
+    if not plan_jobs(jobs, to or Path("kerfpath-batch"), scheduler, processes, as_json=as_json):
+        raise typer.Exit(1)
