@@ -27,7 +27,7 @@ from functools import partial
 from itertools import product
 from pathlib import Path
 from statistics import median
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -146,25 +146,32 @@ def pose(x: float, z: float, about_y_deg: float) -> Array:
     return np.array([[c, 0, s, x], [0, 1, 0, 0], [-s, 0, c, z], [0, 0, 0, 1]])
 
 
+def setting(task: Task) -> tuple[Contour, dict[str, Any]]:
+    """Return the nodes of a task, and what their layered graph is built by."""
+    arm = robot("abb_irb4600_60_205").with_limits(
+        acceleration=np.radians(ASSUMED_ACCELERATION_DEG_S2), endless=[0, 0, 0, 1, 0, 1]
+    )
+    return sheet(task.spacing), {
+        "robot": arm,
+        "tool": pose(0.15, 0.30, 45),
+        "placement": pose(1.2, task.height, -task.tilt_deg),
+        "frames": task.frames,
+        "gamma_step": np.radians(task.gamma_step_deg),
+        "postures": postures_named("front/up", arm.kinematics),
+    }
+
+
 def runs_of(
     task: Task, factors: Mapping[str, Array], etas: Sequence[Eta]
 ) -> Iterator[tuple[Row, Plan | None]]:
     """Plan a task with every weight vector: known once, proposed with every eta, on one graph."""
-    contour = sheet(task.spacing)
-    arm = robot("abb_irb4600_60_205").with_limits(
-        acceleration=np.radians(ASSUMED_ACCELERATION_DEG_S2), endless=[0, 0, 0, 1, 0, 1]
-    )
-    tool, placement = pose(0.15, 0.30, 45), pose(1.2, task.height, -task.tilt_deg)
-    step, dt = np.radians(task.gamma_step_deg), node_interval(contour, task.speed)
-    build = partial(layered_graph, tool=tool, placement=placement, frames=task.frames)
-    graph = build(
-        contour, arm, gamma_step=step, postures=postures_named("front/up", arm.kinematics)
-    )
-    ask = partial(plan, contour, arm, tool=tool, placement=placement, frames=task.frames)
-    ask = partial(ask, speed=task.speed, gamma_step=step, graph=graph)
+    contour, options = setting(task)
+    graph = layered_graph(contour, **options)
+    velocity, dt = options["robot"].speed_limits()[0], node_interval(contour, task.speed)
+    ask = partial(plan, contour, **options, speed=task.speed, graph=graph)
     for objective, (name, factor), eta in product(OBJECTIVES, factors.items(), (None, *etas)):
         method: Method = "paper" if eta else "known"
-        weights, (eta_v, eta_a) = factor / (arm.speed_limits()[0] * dt), eta or (1.0, 1.0)
+        weights, (eta_v, eta_a) = factor / (velocity * dt), eta or (1.0, 1.0)
         choice = partial(ask, method=method, objective=objective, weights=weights)
         try:
             found = choice(eta_v=eta_v, eta_a=eta_a)
