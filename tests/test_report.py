@@ -3,7 +3,6 @@
 import base64
 import json
 import re
-import subprocess
 import zlib
 from dataclasses import replace
 from pathlib import Path
@@ -12,6 +11,7 @@ import numpy as np
 import pytest
 from plotly.offline import get_plotlyjs
 
+from browser import dom_of, needs_chromium
 from kerfpath.auditor import Check
 from kerfpath.contour import Contour
 from kerfpath.errors import InputError
@@ -26,7 +26,6 @@ from kerfpath.report._scene import scene
 from kerfpath.report._tables import audit_table, counts_table, criteria_table, summary_table
 from kerfpath.robots import posture_name, robot
 
-CHROMIUM = Path("/usr/bin/chromium")
 NODES = 41
 
 TOOL = np.eye(4)
@@ -373,22 +372,13 @@ def test_fine_maps_stay_small(section: ContourSection) -> None:
     assert len(_own(render("Part", [fine]))) < 0.8e6
 
 
-@pytest.mark.skipif(not CHROMIUM.exists(), reason="needs the Chromium browser")
+@needs_chromium
 def test_browser_draws_every_figure_in_view(
     section: ContourSection, infeasible: ContourSection, tmp_path: Path
 ) -> None:
     page = tmp_path / "report.html"
     page.write_text(render("Part", [section, infeasible, infeasible]), encoding="utf-8")
-    command = [
-        str(CHROMIUM),
-        *("--headless", "--no-sandbox", "--disable-quic", "--no-first-run"),
-        *("--disable-background-networking", "--disable-component-update", "--disable-sync"),
-        *("--use-angle=swiftshader", "--enable-unsafe-swiftshader"),
-        f"--user-data-dir={tmp_path / 'profile'}",
-        *("--virtual-time-budget=8000", "--dump-dom", page.as_uri() + "#contour-2"),
-    ]
-    done = subprocess.run(command, capture_output=True, text=True, timeout=120, check=True)
-    dom = _without_scripts(done.stdout)
+    dom = dom_of(page, "#contour-2")
     # The scene, three figures of the first contour and the map of the second, which the address
     # names; the third is closed.
     assert dom.count('data-state="drawn"') == 5
@@ -403,10 +393,6 @@ def test_browser_draws_every_figure_in_view(
 
 def _lightness(colour: str) -> int:
     return sum(int(colour[i : i + 2], 16) for i in (1, 3, 5))
-
-
-def _without_scripts(dom: str) -> str:
-    return re.sub(r"<script.*?</script>", "", dom, flags=re.DOTALL)
 
 
 def test_a_feed_that_dips_is_drawn(section: ContourSection) -> None:

@@ -105,6 +105,34 @@ def test_results_come_in_the_order_of_the_tasks_and_equal_tasks_are_done_once(tm
     assert query(tmp_path / "s", "SELECT count(*) FROM result") == [(len({*map(str, tasks)}),)]
 
 
+def test_tasks_may_be_handed_in_as_results_come(tmp_path):
+    told = []
+
+    def squared():
+        with sweep.Sweep(
+            sweep_tasks.square,
+            store=tmp_path / "store.sqlite",
+            processes=2,
+            progress=lambda *state: told.append(state),
+            total=4,
+        ) as tasks:
+            first, second = tasks.submit(x=2), tasks.submit(x=3)
+            found = [tasks.result(second), tasks.result(first)]
+            third = tasks.submit(x=found[1].value["square"])  # the workers were idle meanwhile
+            assert tasks.submit(x=3) == second
+            found.append(tasks.result(third))
+            found.append(tasks.result(tasks.submit(x=found[2].value["square"])))
+        return [result.value["square"] for result in found]
+
+    assert squared() == [9, 4, 16, 256]
+    assert [state[:2] for state in told][:: len(told) - 1] == [(0, 4), (4, 4)]
+    assert told[0][2] is None
+    assert told[-1][2] == 0.0
+    told.clear()
+    assert squared() == [9, 4, 16, 256]
+    assert told == [(2, 4, None)], "nothing was done again, so that no result was waited for"
+
+
 def test_a_second_call_does_only_what_is_new(tmp_path):
     tasks = [{"x": x, "folder": str(tmp_path)} for x in range(12)]
     first = sweep.run(sweep_tasks.marked, tasks[:7], store=tmp_path / "s", processes=1)
@@ -143,6 +171,13 @@ def test_a_failing_task_is_kept_with_its_reason_and_does_not_stop_the_rest(tmp_p
     assert found == list(expected.values())
     assert [r.value for r in done] == [None if e else w for w, e in expected.items()]
     assert sweep.run(sweep_tasks.troubled, tasks, store=tmp_path / "s") == done
+
+
+def test_a_worker_that_is_not_fit_for_a_task_ends_the_sweep_and_nothing_is_kept_of_it(tmp_path):
+    store = tmp_path / "store.sqlite"
+    with pytest.raises(InputError, match="the drawing is not here"):
+        sweep.run(sweep_tasks.troubled, [{"what": "unfit"}], store=store, processes=1)
+    assert query(store, "SELECT count(*) FROM result") == [(0,)]
 
 
 def test_a_process_has_one_thread(tmp_path):
@@ -306,49 +341,8 @@ def test_the_example_of_the_docs_runs(tmp_path):
     assert ran.stderr == ""
 
 
-@pytest.fixture(scope="module")
-def dask():
-    """Start parts of a cluster; all are stopped at the end."""
-    pytest.importorskip("distributed", reason="the extra 'cluster' is not installed")
-    started = []
-
-    def start(*arguments, path=""):
-        known = os.pathsep.join([path, *sys.path, str(HERE)])
-        process = subprocess.Popen(
-            [sys.executable, "-m", "dask", *arguments, "--host", "127.0.0.1", "--no-dashboard"],
-            stderr=subprocess.DEVNULL,
-            env={**os.environ, "PYTHONPATH": known},
-        )
-        started.append(process)
-        return process
-
-    yield start
-    for process in started:
-        process.kill()
-        process.wait()
-
-
-@pytest.fixture
-def scheduler(dask, tmp_path):
-    file = tmp_path / "scheduler.json"
-    dask("scheduler", "--port", "0", "--scheduler-file", str(file))
-    while not file.exists() or not file.read_text().endswith("}"):
-        time.sleep(0.02)
-    return json.loads(file.read_text())["address"]
-
-
-def workers(dask, scheduler, tmp_path, count, **given):
-    import distributed
-
-    options = ("--nthreads", "1", "--no-nanny", "--local-directory", str(tmp_path))
-    started = [dask("worker", scheduler, *options, **given) for _ in range(count)]
-    with distributed.Client(scheduler) as client:
-        client.wait_for_workers(count, timeout=30)
-    return started
-
-
-def test_a_cluster_that_loses_a_worker_in_the_middle_loses_nothing(dask, scheduler, tmp_path):
-    first, second = workers(dask, scheduler, tmp_path, 2)
+def test_a_cluster_that_loses_a_worker_in_the_middle_loses_nothing(workers, scheduler, tmp_path):
+    first, second = workers(2)
     tasks = [{"x": x, "folder": str(tmp_path), "seconds": 0.01} for x in range(300)]
 
     def kill(done, total, left):
@@ -368,18 +362,18 @@ def test_a_cluster_that_loses_a_worker_in_the_middle_loses_nothing(dask, schedul
     assert failed.failure == sweep.Failure(kind="NoFeasiblePath", message="layer 3 is empty")
 
 
-def test_workers_of_another_version_are_refused_and_named(dask, scheduler, tmp_path):
+def test_workers_of_another_version_are_refused_and_named(workers, scheduler, tmp_path):
     (tmp_path / "kerfpath-0.0.9.dist-info").mkdir()
     (tmp_path / "kerfpath-0.0.9.dist-info" / "METADATA").write_text(
         "Metadata-Version: 2.1\nName: kerfpath\nVersion: 0.0.9\n"
     )
-    workers(dask, scheduler, tmp_path, 1, path=str(tmp_path))
+    workers(1, path=str(tmp_path))
     said = r"every worker needs kerfpath [\d.]+, but tcp://127\.0\.0\.1:\d+ has 0\.0\.9"
     with pytest.raises(InputError, match=said):
         sweep.run(sweep_tasks.square, numbers(3), store=tmp_path / "s", scheduler=scheduler)
 
 
-def test_a_cluster_that_is_not_there_is_refused_in_one_line(dask, scheduler, tmp_path, monkeypatch):
+def test_a_cluster_that_is_not_there_is_refused_in_one_line(scheduler, tmp_path, monkeypatch):
     monkeypatch.setattr(_cluster, "PATIENCE", 0.5)
 
     def refused(address):

@@ -11,18 +11,20 @@ import numpy as np
 
 from kerfpath._arrays import Array, freeze
 from kerfpath.front._criteria import Criterion
-from kerfpath.front._runs import Run
+from kerfpath.front._runs import Run, quicker
 from kerfpath.graph import LayeredGraph
 from kerfpath.plans import Plan
 from kerfpath.robots import Robot
 from kerfpath.search import Metric, ObjectiveKind
 
-__all__ = ["AT_ONCE", "Adaptive", "Made", "reach_of"]
+__all__ = ["Adaptive", "Made", "reach_of"]
 
-BOUNDED = ("velocity", "acceleration", "range")
+BOUNDED = ("velocity", "acceleration", "speed", "range", "clearance")
 """Criteria that a run can be held to a value of."""
-AT_ONCE = 4
-"""Runs proposed at a time, the last of them at random: what they are depends on no clock."""
+KNOWN = ("displacement", "increment", "velocity", "acceleration", "speed")
+"""Criteria whose best value the first runs have found."""
+RANDOM = 4
+"""One run in so many is drawn at random."""
 SPREAD = 0.7
 """Standard deviation of the logarithm by which weights are varied: factors of 2 are common."""
 FINEST = 5
@@ -42,7 +44,6 @@ class Made:
     number : int
         Its place among all runs.
     run : Run
-    plan : Plan
     losses : (C,)
         Its criteria, with signs by which less is better.
     reach : (n, 2) rad
@@ -51,7 +52,6 @@ class Made:
 
     number: int
     run: Run
-    plan: Plan
     losses: Array
     reach: Array
 
@@ -67,7 +67,7 @@ class Adaptive:
 
     Neighbours are taken criterion by criterion. What lies between two of them is asked for by the
     epsilon constraint (Haimes, Lasdon, Wismer, IEEE Trans. SMC 1, 1971): the better one's value
-    and some of the way to the other's is allowed, by eta or by windows on the joints, and the rest
+    and some of the way to the other's is allowed, by eta, windows or clearance, and the rest
     is as one of the two was asked for, or minimises what one of the first runs did. Where there is
     no such bound, as on displacements, the weights go between. Each attempt at a gap halves
     its claim to the next.
@@ -79,24 +79,23 @@ class Adaptive:
         first: Sequence[Run],
         robot: Robot,
         graph: LayeredGraph,
+        speed: float,
         rng: np.random.Generator,
     ) -> None:
         self._criteria, self._first, self._rng = criteria, first, rng
-        self._graph, self._endless = graph, robot.endless
+        self._graph, self._endless, self._speed = graph, robot.endless, speed
         self._velocity, _ = robot.speed_limits()
         self._attempts: Counter[tuple[int, int, int]] = Counter()
+        self._proposed = 0
 
-    def next(self, front: Sequence[Made], scale: Array) -> list[Run]:
-        """Return the next runs, from the front (at least one plan) in criteria of a scale (C,)."""
-        runs = []
-        for _ in range(AT_ONCE - 1):
+    def next(self, front: Sequence[Made], scale: Array) -> Run:
+        """Return the next run, from the front (at least one plan) in criteria of a scale (C,)."""
+        self._proposed += 1
+        if self._proposed % RANDOM:
             width, c, a, b = max(self._gaps(front, scale), key=lambda gap: gap[0])
-            if width <= 0:
-                break
-            runs.append(self._between(c, a, b))
-        while len(runs) < AT_ONCE:
-            runs.append(self._varied(front[int(self._rng.integers(len(front)))].run))
-        return runs
+            if width > 0:
+                return self._between(c, a, b)
+        return self._varied(front[int(self._rng.integers(len(front)))].run)
 
     def _gaps(
         self, front: Sequence[Made], scale: Array
@@ -106,11 +105,12 @@ class Adaptive:
             ordered = sorted(front, key=lambda made: (made.losses[c], made.number))
             before: list[Made | None] = [None, *ordered[:-1]]
             for a, b in zip(before, ordered, strict=True):
-                if a is None and criterion.kind != "range":
-                    # The least displacement, velocity and acceleration are known at the outset.
+                if a is not None:
+                    width = float(b.losses[c] - a.losses[c]) / scale[c]
+                elif criterion.kind not in BOUNDED or criterion.kind in KNOWN:
                     width = 0.0
                 else:
-                    width = float(b.losses[c] - (0.0 if a is None else a.losses[c])) / scale[c]
+                    width = abs(float(b.losses[c])) / scale[c]
                 yield width / 2.0 ** self._attempts[self._key(c, a, b)], c, a, b
 
     @staticmethod
@@ -139,12 +139,17 @@ class Adaptive:
         if rng.integers(2):
             aim = self._first[int(rng.integers(len(self._first)))]
             run = replace(run, objective=aim.objective, metric=aim.metric, weights=aim.weights)
-        low = 0.0 if a is None else a.losses[c]
-        value = float(low + share * (b.losses[c] - low))
-        if criterion.kind == "velocity":
-            return replace(run, eta_v=value)
-        if criterion.kind == "acceleration":
-            return replace(run, eta_a=value)
+        low = float(b.losses[c] - abs(b.losses[c]) if a is None else a.losses[c])
+        value = abs(low + share * (float(b.losses[c]) - low))
+        match criterion.kind:
+            case "velocity":
+                return replace(run, eta_v=value)
+            case "acceleration":
+                return replace(run, eta_a=value)
+            case "clearance":
+                return replace(run, clearance=value)
+            case "speed":
+                return quicker(self._at_full(run), value / self._speed)
         return replace(run, window=self._window(criterion, value, a, b, run.window))
 
     def _window(
@@ -192,13 +197,18 @@ class Adaptive:
                 return float(low)
         return otherwise
 
+    def _at_full(self, run: Run) -> Run:
+        """Return a run with all that the limits allow."""
+        return replace(run, eta_v=self._first[0].eta_v, eta_a=self._first[0].eta_a)
+
     def _mixed(self, a: Run, b: Run) -> Run:
         """Return a run that takes what it minimises, its etas and each window from either."""
-        aim, v, e, *windows = self._rng.integers(2, size=3 + len(a.window)).astype(bool)
+        aim, v, e, c, *windows = self._rng.integers(2, size=4 + len(a.window)).astype(bool)
         return replace(
             a if aim else b,
             eta_v=(a if v else b).eta_v,
             eta_a=(a if e else b).eta_a,
+            clearance=(a if c else b).clearance,
             window=freeze(np.where(np.array(windows)[:, None], a.window, b.window)),
         )
 

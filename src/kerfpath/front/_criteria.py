@@ -4,20 +4,35 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
+from numpy.typing import ArrayLike
 
-from kerfpath._arrays import Array, freeze
+from kerfpath._arrays import Array, floats, freeze
+from kerfpath.air import least_time
+from kerfpath.cell import Cell
 from kerfpath.comfort import MEASURES
 from kerfpath.errors import InputError
 from kerfpath.plans import Plan
 from kerfpath.robots import Robot
 
-__all__ = ["Criterion", "criteria_of", "losses"]
+__all__ = ["Criterion", "Judge", "judge_of"]
 
 PER_JOINT = {"displacement": "displacement", "increment": "largest_increment", "range": "range"}
 """Criteria (7) to (9) of one joint, and what `kerfpath.plans.Criteria` calls them."""
-TOGETHER = ("displacement", "range", "velocity", "acceleration")
+TOGETHER = {
+    "displacement": "s",
+    "range": "s",
+    "velocity": "share",
+    "acceleration": "share",
+    "speed": "m/s",
+    "time": "s",
+    "clearance": "m",
+}
+"""Criteria of all joints together, and their units."""
+MORE = ("speed", "clearance", *MEASURES)
+"""Criteria that are better the more they are."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -26,13 +41,16 @@ class Criterion:
 
     Parameters
     ----------
+    name : str
+        As `pareto` takes it.
     kind : str
-        "displacement", "increment", "range", "velocity", "acceleration" or a comfort measure.
+        The name, without its joint.
     joint : int, optional
         The joint it is of, 0-based; None: of all joints together.
     unit : str
     """
 
+    name: str
     kind: str
     joint: int | None
     unit: str
@@ -40,32 +58,108 @@ class Criterion:
     @property
     def sense(self) -> float:
         """1 where less is better, -1 where more is."""
-        return -1.0 if self.kind in MEASURES else 1.0
+        return -1.0 if self.kind in MORE else 1.0
 
-    def of(self, plan: Plan) -> float:
-        """Return its value for a plan, in `unit`."""
-        found = plan.criteria
-        if self.kind in MEASURES:
-            return found.nearest[self.kind][0]
-        if self.kind in ("velocity", "acceleration"):
-            return float(getattr(found, f"peak_{self.kind}").max())
-        values: Array = getattr(found, PER_JOINT[self.kind])
-        if self.joint is not None:
-            return float(values[self.joint])
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Judge:
+    """What plans are judged by: the criteria, and what some of them need beyond the plan.
+
+    Parameters
+    ----------
+    criteria : tuple of Criterion
+    eta_v, eta_a : float
+        Shares of the limits within which a plan could be sped up.
+    cell : Cell, optional
+    home : (n,) rad, optional
+    """
+
+    criteria: tuple[Criterion, ...]
+    eta_v: float
+    eta_a: float
+    cell: Cell | None
+    home: Array | None
+
+    def losses(self, plan: Plan) -> Array:
+        """Return the criteria (C,) of a plan, with signs by which less is better."""
+        return freeze(np.array([c.sense * self._value(c, plan) for c in self.criteria]))
+
+    def _value(self, criterion: Criterion, plan: Plan) -> float:
+        found, kind = plan.criteria, criterion.kind
+        if kind in MEASURES:
+            return found.nearest[kind][0]
+        if kind in ("velocity", "acceleration"):
+            return float(getattr(found, f"peak_{kind}").max())
+        if kind == "speed":
+            faster = [self.eta_v / found.peak_velocity.max()]
+            if (sharpest := found.peak_acceleration.max()) > 0:
+                faster.append(np.sqrt(self.eta_a / sharpest))
+            return plan.contour.length / float(plan.time[-1]) * float(min(faster))
+        if kind == "time":
+            assert self.home is not None
+            return _cycle(plan, self.home)
+        if kind == "clearance":
+            assert self.cell is not None
+            return _clearance(plan, self.cell)
+        values: Array = getattr(found, PER_JOINT[kind])
+        if criterion.joint is not None:
+            return float(values[criterion.joint])
         return float((values / plan.robot.speed_limits()[0]).sum())
 
 
-def criteria_of(names: Sequence[str], robot: Robot) -> tuple[Criterion, ...]:
-    """Return the criteria of these names.
+def _cycle(plan: Plan, home: Array) -> float:
+    """Return the time from home along a plan and back, s: straight joint motions, full limits."""
+    ways = np.stack([plan.q[0] - home, home - plan.q[-1]])
+    short = ways - 2 * np.pi * np.round(ways / (2 * np.pi))
+    ways = np.where(plan.robot.endless, short, ways)
+    return float(plan.time[-1] + least_time(ways, *plan.robot.speed_limits()).sum())
+
+
+def _clearance(plan: Plan, cell: Cell) -> float:
+    """Return the least distance at the nodes beyond what is to be kept, m.
+
+    Of pairs without a near-miss distance of their own, as in the collision map.
+    """
+    counted = ~cell.own
+    wanted = np.broadcast_to(counted, (len(plan.q), len(counted)))
+    return float((cell.distances(plan.q, wanted=wanted) - cell.required)[:, counted].min())
+
+
+def judge_of(
+    names: Sequence[str],
+    robot: Robot,
+    *,
+    eta_v: float,
+    eta_a: float,
+    cell: Cell | None,
+    home: ArrayLike | None,
+) -> Judge:
+    """Return who judges by the criteria of these names.
 
     Raises
     ------
     InputError
-        An unknown name, a joint that the robot does not have, a name given twice, or none.
+        An unknown name, a joint that the robot does not have, a name given twice, or none; a
+        clearance without a cell, a time without home.
     """
     if isinstance(names, str) or not names or len(set(names)) != len(names):
         raise InputError(f"criteria: expected different names, at least one, got {names!r}")
-    return tuple(_criterion(name, robot) for name in names)
+    needs: dict[str, Any] = {"clearance": ("a cell", cell), "time": ("home", home)}
+    for name, (what, given) in needs.items():
+        if name in names and given is None:
+            raise InputError(f"criteria: {name!r} needs {what}; give it, or leave {name!r} out")
+    if cell is not None and "clearance" in names and cell.own.all():
+        raise InputError(
+            "criteria: 'clearance' needs pairs without a near-miss distance of their own, and the "
+            "cell has none"
+        )
+    return Judge(
+        criteria=tuple(_criterion(name, robot) for name in names),
+        eta_v=eta_v,
+        eta_a=eta_a,
+        cell=cell,
+        home=None if home is None else floats(home, "home", (robot.joints,)),
+    )
 
 
 def _criterion(name: str, robot: Robot) -> Criterion:
@@ -73,19 +167,13 @@ def _criterion(name: str, robot: Robot) -> Criterion:
     if kind in PER_JOINT and number in map(str, range(1, robot.joints + 1)):
         joint = int(number) - 1
         unit = robot.external.unit if robot.external and joint == robot.joints - 1 else "rad"
-        return Criterion(kind=kind, joint=joint, unit=unit)
+        return Criterion(name=name, kind=kind, joint=joint, unit=unit)
     if name in MEASURES:
-        return Criterion(kind=name, joint=None, unit=MEASURES[name].unit)
+        return Criterion(name=name, kind=name, joint=None, unit=MEASURES[name].unit)
     if name in TOGETHER:
-        share = name in ("velocity", "acceleration")
-        return Criterion(kind=name, joint=None, unit="share" if share else "s")
+        return Criterion(name=name, kind=name, joint=None, unit=TOGETHER[name])
     raise InputError(
         f"criteria: expected some of {', '.join((*TOGETHER, *MEASURES))}, or "
         f"{', '.join(f'{kind}_J' for kind in PER_JOINT)} of a joint J from 1 to {robot.joints}, "
         f"got {name!r}"
     )
-
-
-def losses(plan: Plan, criteria: Sequence[Criterion]) -> Array:
-    """Return the criteria (C,) of a plan, with signs by which less is better."""
-    return freeze(np.array([criterion.sense * criterion.of(plan) for criterion in criteria]))

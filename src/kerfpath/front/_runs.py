@@ -5,16 +5,16 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from itertools import product
-from typing import get_args
+from typing import Any, get_args
 
 import numpy as np
 
 from kerfpath._arrays import Array, Bools, freeze
 from kerfpath.front._criteria import Criterion
 from kerfpath.graph import LayeredGraph
-from kerfpath.search import Metric, ObjectiveKind
+from kerfpath.search import Metric, ObjectiveKind, Relaxations
 
-__all__ = ["WINDOW", "Run", "anchors", "grid", "whole", "within"]
+__all__ = ["WINDOW", "Run", "anchors", "grid", "quicker", "whole", "within"]
 
 WINDOW = "window of joint"
 """What vertices outside a window are counted under, before the joint's number."""
@@ -22,6 +22,8 @@ FAINT = 1e-6
 """Weight of the other joints where one joint counts: they decide between equals, or as good as."""
 LEVELS = (0.25, 4.0)
 """Multiples of the weight of one joint at a time, in the grid."""
+ROUNDING = 1e-9
+"""Share by which limits are wider than what was found to need them."""
 SHARES = (1.0, 0.9, 0.8)
 """Multiples of eta in the grid."""
 
@@ -39,6 +41,8 @@ class Run:
     window : (n, 2) rad
         Between what each joint has to stay (modulo 2 pi where it is endless), infinite where it is
         free.
+    clearance : float m
+        What is to be kept in a cell beyond its near-miss distance.
     """
 
     objective: ObjectiveKind
@@ -47,6 +51,28 @@ class Run:
     eta_v: float
     eta_a: float
     window: Array
+    clearance: float = 0.0
+
+    def data(self) -> dict[str, Any]:
+        """Return it as plain JSON data; `of_data` gives the very same run back."""
+        window = [pair if np.isfinite(pair).all() else None for pair in self.window.tolist()]
+        return {
+            "objective": self.objective,
+            "metric": self.metric,
+            "weights": self.weights.tolist(),
+            "eta_v": self.eta_v,
+            "eta_a": self.eta_a,
+            "window": window,
+            "clearance": self.clearance,
+        }
+
+    @classmethod
+    def of_data(cls, data: dict[str, Any]) -> Run:
+        """Return the run that `data` was made of."""
+        free = [-np.inf, np.inf]
+        window = [free if pair is None else pair for pair in data["window"]]
+        weights = freeze(np.array(data["weights"], dtype=np.float64))
+        return cls(**data | {"weights": weights, "window": freeze(np.array(window))})
 
 
 def whole(weights: Array, eta_v: float, eta_a: float) -> Run:
@@ -61,30 +87,39 @@ def whole(weights: Array, eta_v: float, eta_a: float) -> Run:
     )
 
 
-def anchors(first: Run, criteria: Sequence[Criterion], least_eta_a: float | None) -> list[Run]:
+def anchors(
+    first: Run, criteria: Sequence[Criterion], least: Relaxations | None, dt: float
+) -> list[Run]:
     """Return a run for the best of each criterion but the displacement of all joints.
 
-    For the displacement and the increment of a joint, peak velocity and peak acceleration it is the
-    best on the graph; for a range it is only where to begin, and for a comfort measure there is
-    none.
+    For the displacement and the increment of a joint, peak velocity, peak acceleration and speed it
+    is the best on the graph; for a range it is only where to begin, and for the others there is
+    none. `least` is what acceleration and speed need, at the node interval `dt` s.
     """
     found = []
     for criterion in criteria:
-        weights = first.weights
+        kind, weights = criterion.kind, first.weights
         if criterion.joint is not None:
             weights = FAINT * weights
             weights[criterion.joint] = first.weights[criterion.joint]
-        if criterion.kind in ("velocity", "increment"):
+        if kind in ("velocity", "increment"):
             found.append(
                 replace(first, objective="max", metric="chebychev", weights=freeze(weights))
             )
         elif criterion.joint is not None:
             found.append(replace(first, weights=freeze(weights)))
-        elif criterion.kind == "range":
+        elif kind == "range":
             found.append(replace(first, metric="euclid"))
-        elif criterion.kind == "acceleration" and least_eta_a is not None:
-            found.append(replace(first, eta_a=least_eta_a))
+        elif kind == "acceleration" and least is not None and least.eta_a is not None:
+            found.append(replace(first, eta_a=least.eta_a * (1 + ROUNDING)))
+        elif kind == "speed" and least is not None:
+            found.append(quicker(first, dt / least.slower.dt * (1 - ROUNDING)))
     return found
+
+
+def quicker(run: Run, factor: float) -> Run:
+    """Return the run whose plans keep the limits at `factor` times the speed, too."""
+    return replace(run, eta_v=run.eta_v / factor, eta_a=run.eta_a / factor**2)
 
 
 def grid(first: Run, rng: np.random.Generator) -> Iterator[Run]:

@@ -1,4 +1,4 @@
-"""The Pareto set, and how good it is."""
+"""The front, how good it is, and the plans of it."""
 
 from __future__ import annotations
 
@@ -11,28 +11,31 @@ from numpy.typing import ArrayLike
 
 from kerfpath._arrays import Array, floats, freeze
 from kerfpath.errors import InputError
-from kerfpath.front._criteria import criteria_of
 from kerfpath.front._runs import Run
 from kerfpath.plans import Plan
 
-__all__ = ["ParetoSet", "hypervolume"]
+__all__ = ["Front", "ParetoSet", "hypervolume"]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class ParetoSet:
-    """Plans of one contour of which none is as good as another in all criteria and better in one.
+class Front:
+    """Runs of one contour of whose plans none is as good as another in all and better in one.
 
     Parameters
     ----------
     criteria : tuple of str
         Names, as `pareto` takes them.
     units : tuple of str
-    plans : tuple of Plan
-        By the first criterion, the best first; each has passed its audit.
+    sense : (C,)
+        1 where less is better, -1 where more is.
+    numbers : tuple of int
+        Place of each run among all that were tried; by the first criterion, the best first.
     runs : tuple of Run
         What each plan was asked for.
     values : (P, C)
-        Criteria of each plan, in their units.
+        Criteria of each plan, in their units; each plan has passed its audit.
+    beaten : (B, C)
+        Those of the plans that others beat.
     ideal, reference : (C,)
         Best values of the first runs, and a point beyond the worst of them: what criteria are
         scaled by.
@@ -46,9 +49,11 @@ class ParetoSet:
 
     criteria: tuple[str, ...]
     units: tuple[str, ...]
-    plans: tuple[Plan, ...]
+    sense: Array
+    numbers: tuple[int, ...]
     runs: tuple[Run, ...]
     values: Array
+    beaten: Array
     ideal: Array
     reference: Array
     tried: int
@@ -73,7 +78,7 @@ class ParetoSet:
         """Largest distance of neighbours in any one criterion, scaled: how well it is covered."""
         return float(np.diff(np.sort(self.scaled, axis=0), axis=0).max(initial=0.0))
 
-    def coverage(self, other: ParetoSet) -> float:
+    def coverage(self, other: Front) -> float:
         """Return the share of another set's plans that some plan here is as good as or better.
 
         The C of Zitzler and Thiele (PPSN V, 1998).
@@ -85,9 +90,50 @@ class ParetoSet:
         """
         if other.criteria != self.criteria:
             raise InputError(f"coverage: expected criteria {self.criteria}, got {other.criteria}")
-        sense = self._sense
-        here, there = self.values * sense, other.values * sense
+        here, there = self.values * self.sense, other.values * self.sense
         return float((here[:, None] <= there).all(axis=2).any(axis=0).mean())
+
+    def best_at(self, criterion: str) -> int:
+        """Return the row of `values` that is best in a criterion.
+
+        Raises
+        ------
+        InputError
+            Not one of the set's criteria.
+        """
+        if criterion not in self.criteria:
+            raise InputError(f"best: expected one of {', '.join(self.criteria)}, got {criterion!r}")
+        return int(self.scaled[:, self.criteria.index(criterion)].argmin())
+
+    @property
+    def balanced_at(self) -> int:
+        """The row of `values` whose worst criterion, scaled, is the least."""
+        return int(self.scaled.max(axis=1).argmin())
+
+    def __str__(self) -> str:
+        """Say in a few lines what was tried and found."""
+        lines = [
+            f"{len(self.runs)} plans of {self.feasible} feasible runs of {self.tried}; "
+            f"hypervolume {self.hypervolume:.4f}, largest gap {self.gap:.3f}"
+        ]
+        for i, (name, unit) in enumerate(zip(self.criteria, self.units, strict=True)):
+            low, high = self.values[:, i].min(), self.values[:, i].max()
+            lines.append(f"  {name}: {low:.4g} to {high:.4g} {unit}")
+        lines += [f"  no plan in {number} runs: {why}" for why, number in self.failures.items()]
+        return "\n".join(lines)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class ParetoSet(Front):
+    """A front with its plans.
+
+    Parameters
+    ----------
+    plans : tuple of Plan
+        One for each run.
+    """
+
+    plans: tuple[Plan, ...]
 
     def best(self, criterion: str) -> Plan:
         """Return the plan that is best in a criterion.
@@ -97,31 +143,12 @@ class ParetoSet:
         InputError
             Not one of the set's criteria.
         """
-        if criterion not in self.criteria:
-            raise InputError(f"best: expected one of {', '.join(self.criteria)}, got {criterion!r}")
-        column = self.criteria.index(criterion)
-        return self.plans[int(self.scaled[:, column].argmin())]
+        return self.plans[self.best_at(criterion)]
 
     @property
     def balanced(self) -> Plan:
         """The plan whose worst criterion, scaled, is the least."""
-        return self.plans[int(self.scaled.max(axis=1).argmin())]
-
-    @property
-    def _sense(self) -> Array:
-        return np.array([c.sense for c in criteria_of(self.criteria, self.plans[0].robot)])
-
-    def __str__(self) -> str:
-        """Say in a few lines what was tried and found."""
-        lines = [
-            f"{len(self.plans)} plans of {self.feasible} feasible runs of {self.tried}; "
-            f"hypervolume {self.hypervolume:.4f}, largest gap {self.gap:.3f}"
-        ]
-        for i, (name, unit) in enumerate(zip(self.criteria, self.units, strict=True)):
-            low, high = self.values[:, i].min(), self.values[:, i].max()
-            lines.append(f"  {name}: {low:.4g} to {high:.4g} {unit}")
-        lines += [f"  no plan in {number} runs: {why}" for why, number in self.failures.items()]
-        return "\n".join(lines)
+        return self.plans[self.balanced_at]
 
 
 def hypervolume(values: ArrayLike, reference: ArrayLike) -> float:

@@ -6,11 +6,14 @@ from kerfpath.job._cell import cell_of_job as cell_of_job
 from kerfpath.job._cell import with_map as with_map
 from kerfpath.job._check import Checked as Checked
 from kerfpath.job._check import check_job as check_job
+from kerfpath.job._files import Texts as Texts
 from kerfpath.job._files import Written as Written
 from kerfpath.job._files import collision_note as collision_note
+from kerfpath.job._files import outcome_texts as outcome_texts
 from kerfpath.job._files import program_of as program_of
 from kerfpath.job._files import require_folder as require_folder
 from kerfpath.job._files import require_language as require_language
+from kerfpath.job._files import stale_program as stale_program
 from kerfpath.job._files import write_outcome as write_outcome
 from kerfpath.job._planfile import PlanFile as PlanFile
 from kerfpath.job._planfile import read_plan_file as read_plan_file

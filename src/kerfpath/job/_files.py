@@ -26,11 +26,14 @@ from kerfpath.report import ContourSection, render
 from kerfpath.sequence import PartPlan
 
 __all__ = [
+    "Texts",
     "Written",
     "collision_note",
+    "outcome_texts",
     "program_of",
     "require_folder",
     "require_language",
+    "stale_program",
     "trajectory_text",
     "write_outcome",
 ]
@@ -62,6 +65,28 @@ class Written:
     notes: tuple[str, ...]
 
 
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Texts:
+    """The files of a run as text, not written yet.
+
+    Parameters
+    ----------
+    files : dict of str to str
+        By their names in the folder, those of the program first.
+    program : tuple of str
+        Which of them are the program, the one that is started first; none without one.
+    refused : str
+        Why there is no program though every audit has passed; empty where there is none to tell.
+    notes : tuple of str
+        Warnings of the program's preflight, and what nobody has checked.
+    """
+
+    files: dict[str, str]
+    program: tuple[str, ...]
+    refused: str
+    notes: tuple[str, ...]
+
+
 def write_outcome(outcome: Outcome, folder: Path, *, strict: bool = False) -> Written:
     """Write the files of a run into `folder`; the program only if every audit has passed.
 
@@ -71,10 +96,24 @@ def write_outcome(outcome: Outcome, folder: Path, *, strict: bool = False) -> Wr
         The folder cannot be made or written to; or the program is refused, and the other files
         are written.
     """
+    texts = outcome_texts(outcome, strict=strict)
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise InputError(f"{folder}: cannot be made a folder ({error.strerror})") from None
+    written = write_files(folder, texts.files)
+    if texts.refused:
+        raise InputError(f"{texts.refused} ({folder / 'plan.json'} and the report are written)")
+    stale = stale_program(outcome.job.program, folder, texts.program)
+    return Written(files=tuple(written), stale=stale, notes=texts.notes)
+
+
+def outcome_texts(outcome: Outcome, *, strict: bool = False) -> Texts:
+    """Return the files of a run as text; the program only if every audit has passed."""
     job = outcome.job
     part, moves = outcome.part, () if outcome.part is None else outcome.part.moves
-    texts: dict[str, str] = {}
-    refused = None
+    program: dict[str, str] = {}
+    refused = ""
     notes = [collision_note(outcome.cell, moves_too=bool(moves))]
     notes += [] if part is None else [order_note(part)]
     notes += [] if outcome.stuck is None else [f"The moves between contours: {outcome.stuck}"]
@@ -82,10 +121,9 @@ def write_outcome(outcome: Outcome, folder: Path, *, strict: bool = False) -> Wr
     if outcome.passed and job.program.language != "none":
         try:
             program, warnings = program_of(outcome.plans, job.program, moves, strict=strict)
-            texts |= program
             notes += warnings
         except InputError as error:
-            refused = error
+            refused = str(error)
             notes.append(f"no program was written: {error}")
     entries = []
     for cut in outcome.cuts:
@@ -93,30 +131,31 @@ def write_outcome(outcome: Outcome, folder: Path, *, strict: bool = False) -> Wr
             entries.append(plan_entry(cut.plan, cut.contour, cut.checks))
         elif cut.broken is not None:
             entries.append(broken_entry(cut.task.name, cut.broken, cut.fastest))
-    texts["plan.json"] = plan_text(
-        job.robot, job.tool, job.placement, entries, job.source, outcome.cell, part
-    )
-    texts["trajectory.csv"] = trajectory_text(outcome.plans, moves)
-    texts["report.html"] = report_text(outcome, notes)
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise InputError(f"{folder}: cannot be made a folder ({error.strerror})") from None
-    written = write_files(folder, texts)
-    if refused is not None:
-        raise InputError(f"{refused} ({folder / 'plan.json'} and the report are written)")
-    stale = [path for path in _programs(job, folder) if path not in written]
-    return Written(files=tuple(written), stale=stale[0] if stale else None, notes=tuple(notes))
+    files = {
+        **program,
+        "plan.json": plan_text(
+            job.robot, job.tool, job.placement, entries, job.source, outcome.cell, part
+        ),
+        "trajectory.csv": trajectory_text(outcome.plans, moves),
+        "report.html": report_text(outcome, notes),
+    }
+    return Texts(files=files, program=tuple(program), refused=refused, notes=tuple(notes))
 
 
-def _programs(job: Job, folder: Path) -> list[Path]:
-    """Return the programs of the job's name in a folder, or in one of their own in it.
+def stale_program(options: ProgramOptions, folder: Path, program: Sequence[str]) -> Path | None:
+    """Return a program of the job's name in its folder that is none of the files of `program`."""
+    written = [folder / name for name in program]
+    return next((path for path in _programs(options, folder) if path not in written), None)
+
+
+def _programs(options: ProgramOptions, folder: Path) -> list[Path]:
+    """Return the programs of a job's name in a folder, or in one of their own in it.
 
     Languages cut names, or say them in capitals.
     """
-    if job.program.language == "none":
+    if options.language == "none":
         return []
-    name, suffix = job.program.name.lower(), language(job.program.language).suffix
+    name, suffix = options.name.lower(), language(options.language).suffix
     there = sorted([*folder.glob(f"*{suffix}"), *folder.glob(f"*/*{suffix}")])
     shortest = min(len(name), SHORTEST_CUT)
     return [p for p in there if name.startswith(p.stem.lower()) and len(p.stem) >= shortest]

@@ -1,8 +1,22 @@
-"""Self-contained HTML pages: the report on a planned and audited job, and a drawing's loops."""
+"""Self-contained HTML pages: the report on a job, a drawing's loops, a Pareto set."""
 
 from kerfpath.report._drawing import DrawnLoop, render_drawing
+from kerfpath.report._front import FrontAxis, FrontPlan
+from kerfpath.report._front_page import render_front
+from kerfpath.report._html import with_library, without_library
 from kerfpath.report._map import feasibility_map
 from kerfpath.report._page import render
 from kerfpath.report._section import ContourSection
 
-__all__ = ["ContourSection", "DrawnLoop", "feasibility_map", "render", "render_drawing"]
+__all__ = [
+    "ContourSection",
+    "DrawnLoop",
+    "FrontAxis",
+    "FrontPlan",
+    "feasibility_map",
+    "render",
+    "render_drawing",
+    "render_front",
+    "with_library",
+    "without_library",
+]

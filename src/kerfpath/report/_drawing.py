@@ -12,10 +12,9 @@ import plotly.graph_objects as go
 from numpy.typing import ArrayLike
 
 from kerfpath._arrays import Array, floats
-from kerfpath.report._html import Figures, page
+from kerfpath.report._html import Figures, header, page
 from kerfpath.report._look import ACCENT, ALERT, FAINT, JOINT_COLOURS, base_layout
 from kerfpath.report._scene import add_part, checked, space_axis, xyz
-from kerfpath.report._tables import facts_list
 
 __all__ = ["DrawnLoop", "render_drawing"]
 
@@ -73,12 +72,7 @@ def render_drawing(
     """
     figures = Figures()
     body = [
-        "<header>",
-        '<p class="kind">Drawing</p>',
-        f"<h1>{escape(title)}</h1>",
-        facts_list(facts),
-        "".join(f'<p class="note"><b>Note</b> {escape(note)}</p>' for note in notes),
-        "</header>",
+        header("Drawing", title, facts=facts, notes=notes),
         "<section><h2>Loops by name</h2>",
         '<p class="caption">Part frame, all axes to the same scale. Names stand at the start of '
         "each loop. Drag to turn, scroll to zoom, point at a loop for its size; click in the "

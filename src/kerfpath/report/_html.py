@@ -11,7 +11,15 @@ from importlib.resources import files
 import plotly.graph_objects as go
 from plotly.offline import get_plotlyjs
 
-__all__ = ["Figures", "page"]
+__all__ = [
+    "Figures",
+    "facts_list",
+    "header",
+    "job_part",
+    "page",
+    "with_library",
+    "without_library",
+]
 
 _SKELETON = """<!DOCTYPE html>
 <html lang="en">
@@ -28,12 +36,15 @@ _SKELETON = """<!DOCTYPE html>
 {body}
 </main>
 {data}
-<script>{plotly}</script>
+{library}
 <script>
 {script}</script>
 </body>
 </html>
 """
+
+_LEAN = '<script src="plotly.js"></script>'
+"""In place of the library; text from outside is escaped and cannot look like it."""
 
 
 class Figures:
@@ -56,16 +67,73 @@ class Figures:
         )
 
 
-def page(title: str, body: Sequence[str], figures: Figures) -> str:
-    """Return a self-contained page: its body in pieces of HTML, and the figures in it."""
+def header(
+    kind: str,
+    title: str,
+    *,
+    facts: Sequence[tuple[str, str]],
+    notes: Sequence[str],
+    verdict: str = "",
+) -> str:
+    """Return the head of a page: what it is, its title, a verdict (HTML), facts and notes."""
+    parts = [
+        "<header>",
+        f'<p class="kind">{escape(kind)}</p>',
+        f"<h1>{escape(title)}</h1>",
+        verdict,
+        facts_list(facts),
+        "".join(f'<p class="note"><b>Note</b> {escape(note)}</p>' for note in notes),
+        "</header>",
+    ]
+    return "\n".join(part for part in parts if part)
+
+
+def facts_list(facts: Sequence[tuple[str, str]]) -> str:
+    """Return the facts as a definition list."""
+    rows = "".join(
+        f"<div><dt>{escape(what)}</dt><dd>{escape(value)}</dd></div>" for what, value in facts
+    )
+    return f'<dl class="facts">{rows}</dl>' if rows else ""
+
+
+def job_part(text: str) -> str:
+    """Return the job file as read, to be opened; nothing without one."""
+    if not text:
+        return ""
+    return (
+        "<section><h2>Job</h2><details><summary><h3>Job file as read</h3></summary>"
+        f"<pre>{escape(text)}</pre></details></section>"
+    )
+
+
+def page(title: str, body: Sequence[str], figures: Figures, *, also: str = "") -> str:
+    """Return a self-contained page: its body in pieces of HTML, and the figures in it.
+
+    `also` names a style sheet and a script that the page has besides those of every page.
+    """
+    names = ("page", also) if also else ("page",)
     return _SKELETON.format(
         title=escape(title),
-        style=_resource("page.css"),
+        style="".join(_resource(f"{name}.css") for name in names),
         body="\n".join(part for part in body if part),
         data="\n".join(figures.data),
-        plotly=get_plotlyjs(),
-        script=_resource("page.js"),
+        library=_library(),
+        script="\n".join(_resource(f"{name}.js") for name in names),
     )
+
+
+def without_library(text: str) -> str:
+    """Return a page without the drawing library that makes up most of it, to be kept or sent."""
+    return text.replace(_library(), _LEAN)
+
+
+def with_library(text: str) -> str:
+    """Return the whole page of what `without_library` gave."""
+    return text.replace(_LEAN, _library())
+
+
+def _library() -> str:
+    return f"<script>{get_plotlyjs()}</script>"
 
 
 def _resource(name: str) -> str:

@@ -11,18 +11,22 @@ import plotly.graph_objects as go
 __all__ = [
     "ACCENT",
     "ALERT",
+    "CHOSEN",
     "FAINT",
     "GRID",
     "INK",
     "JOINT_COLOURS",
     "QUIET",
+    "SCALE",
     "band",
     "base_layout",
     "reason_colours",
 ]
 
 INK, QUIET, FAINT, GRID = "#1d2530", "#5b6675", "#98a1ad", "#e6e9ee"
-ACCENT, ALERT = "#0b6b66", "#b3261e"
+ACCENT, ALERT, CHOSEN = "#0b6b66", "#b3261e", "#e8590c"
+SCALE = ("#440154", "#414487", "#2a788e", "#22a884", "#7ad151")
+"""Viridis up to four fifths: what is lighter is lost on white."""
 
 # Six hues, and a light and a dark shade of each, found by a search that keeps all pairs apart
 # for normal, protan and deutan sight (Machado, Oliveira, Fernandes 2009; CIELAB distance 12).

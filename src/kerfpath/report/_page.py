@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike
 from kerfpath.cell import Cell
 from kerfpath.plans import Plan
 from kerfpath.report import _map, _motion, _tables
-from kerfpath.report._html import Figures, page
+from kerfpath.report._html import Figures, facts_list, header, job_part, page
 from kerfpath.report._scene import scene
 from kerfpath.report._section import ContourSection
 from kerfpath.report._tables import FAIL, PASS, WARN, sign
@@ -55,13 +55,13 @@ def render(
     figures = Figures()
     state, verdict = _verdict(sections)
     body = [
-        "<header>",
-        '<p class="kind">Cutting plan</p>',
-        f"<h1>{escape(title)}</h1>",
-        f'<p class="verdict {state}">{sign(state, verdict)}</p>',
-        _tables.facts_list(facts),
-        "".join(f'<p class="note"><b>Note</b> {escape(note)}</p>' for note in notes),
-        "</header>",
+        header(
+            "Cutting plan",
+            title,
+            facts=facts,
+            notes=notes,
+            verdict=f'<p class="verdict {state}">{sign(state, verdict)}</p>',
+        ),
         "<section><h2>Part and contours</h2>",
         '<p class="caption">Part frame, all axes to the same scale. Dot and cone mark start and '
         "direction; short lines are tool axes, on the side of the nozzle. Drag to turn, scroll to "
@@ -74,7 +74,7 @@ def render(
         '<section class="contours"><h2>Contour by contour</h2>',
         *(_contour(i, section, figures) for i, section in enumerate(sections)),
         "</section>",
-        _job(job_text),
+        job_part(job_text),
         f"<footer>{_origin(sections)}</footer>",
     ]
     return page(title, body, figures)
@@ -102,7 +102,7 @@ def _contour(number: int, section: ContourSection, figures: Figures) -> str:
     else:
         parts.append(f'<p class="caption">{escape(_in_words(plan))}</p>')
     if section.sampling:
-        parts += ["<h4>Sampling</h4>", _tables.facts_list(section.sampling)]
+        parts += ["<h4>Sampling</h4>", facts_list(section.sampling)]
     parts += _map_part(section, figures)
     if plan is not None and plan.feed is not None:
         parts += [
@@ -203,15 +203,6 @@ def _verdict(sections: Sequence[ContourSection]) -> tuple[str, str]:
     if noted:
         return PASS, f"{whole} and the audit passed, with {noted} to note"
     return PASS, f"{whole} and the audit passed"
-
-
-def _job(text: str) -> str:
-    if not text:
-        return ""
-    return (
-        "<section><h2>Job</h2><details><summary><h3>Job file as read</h3></summary>"
-        f"<pre>{escape(text)}</pre></details></section>"
-    )
 
 
 def _origin(sections: Sequence[ContourSection]) -> str:

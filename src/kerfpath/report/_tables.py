@@ -22,12 +22,14 @@ __all__ = [
     "audit_table",
     "counts_table",
     "criteria_table",
-    "facts_list",
     "nearest_table",
     "number",
     "reason_legend",
+    "shown_unit",
     "sign",
     "summary_table",
+    "table",
+    "td",
 ]
 
 PASS, FAIL, WARN = "pass", "fail", "warn"
@@ -36,17 +38,10 @@ _UNITS = {
     "m": (1e3, " mm"),
     "rad": (180.0 / math.pi, "°"),
     "m^3": (1.0, " m³"),
+    "m/s": (60.0, " m/min"),
     "share": (100.0, " %"),
     "count": (1.0, ""),
 }
-
-
-def facts_list(facts: Sequence[tuple[str, str]]) -> str:
-    """Return the facts as a definition list."""
-    rows = "".join(
-        f"<div><dt>{escape(what)}</dt><dd>{escape(value)}</dd></div>" for what, value in facts
-    )
-    return f'<dl class="facts">{rows}</dl>' if rows else ""
 
 
 def summary_table(sections: Sequence[ContourSection]) -> str:
@@ -68,24 +63,24 @@ def summary_table(sections: Sequence[ContourSection]) -> str:
         plan, length = section.plan, section.path.length
         cells = [
             f'<th scope="row"><a href="#contour-{i + 1}">{escape(section.name)}</a></th>',
-            _td(number(length * 1e3, 1)),
-            _td(str(len(section.path))),
+            td(number(length * 1e3, 1)),
+            td(str(len(section.path))),
         ]
         if plan is None:
             cells.append(f'<td colspan="7">{sign(FAIL, "no feasible path")}</td>')
         else:
             duration, criteria = float(plan.time[-1] - plan.time[0]), plan.criteria
             cells += [
-                _td(number(length / duration * 60, 2)),
-                _td(number(duration, 2)),
-                _td(f"{plan.cost:.5g}"),
+                td(number(length / duration * 60, 2)),
+                td(number(duration, 2)),
+                td(f"{plan.cost:.5g}"),
                 f"<td>{_proof(plan)}</td>",
-                _td(_peak(criteria.peak_velocity)),
-                _td(_peak(criteria.peak_acceleration)),
+                td(_peak(criteria.peak_velocity)),
+                td(_peak(criteria.peak_acceleration)),
                 f"<td>{audit_sign(section)}</td>",
             ]
         rows.append(f"<tr>{''.join(cells)}</tr>")
-    return _table(heads, rows, text_columns=(0, 6, 9))
+    return table(heads, rows, text_columns=(0, 6, 9))
 
 
 def _proof(plan: Plan) -> str:
@@ -115,8 +110,8 @@ def criteria_table(plan: Plan) -> str:
             number(c.peak_acceleration[i] * 100, 1),
         )
         head = f'<th scope="row">{_chip(JOINT_COLOURS[i])}joint {i + 1}</th>'
-        rows.append(f"<tr>{head}{''.join(map(_td, values))}</tr>")
-    return _table(heads, rows)
+        rows.append(f"<tr>{head}{''.join(map(td, values))}</tr>")
+    return table(heads, rows)
 
 
 def nearest_table(plan: Plan) -> str:
@@ -129,12 +124,12 @@ def nearest_table(plan: Plan) -> str:
         margin = bands[name].margin if name in bands else 0.0
         rows.append(
             f'<tr><th scope="row">{escape(MEASURES[name].words)}</th>'
-            + _td(_measured(least, unit))
-            + _td(str(node))
-            + _td(_measured(margin, unit) if margin else "&ndash;")
+            + td(_measured(least, unit))
+            + td(str(node))
+            + td(_measured(margin, unit) if margin else "&ndash;")
             + "</tr>"
         )
-    return _table(heads, rows)
+    return table(heads, rows)
 
 
 def audit_table(checks: Sequence[Check]) -> str:
@@ -151,12 +146,12 @@ def audit_table(checks: Sequence[Check]) -> str:
         words = {PASS: "passed", FAIL: "failed", WARN: "warning"}
         rows.append(
             f'<tr class="{state}"><th scope="row">{escape(check.title)}{advice}</th>'
-            + _td(_measured(check.value, check.unit))
-            + _td("≤ " + _measured(check.limit, check.unit))
-            + _td(str(check.node) if check.node >= 0 else "&ndash;")
+            + td(_measured(check.value, check.unit))
+            + td("≤ " + _measured(check.limit, check.unit))
+            + td(str(check.node) if check.node >= 0 else "&ndash;")
             + f"<td>{sign(state, words[state])}</td></tr>"
         )
-    return _table(heads, rows, text_columns=(0, 4))
+    return table(heads, rows, text_columns=(0, 4))
 
 
 def counts_table(graph: LayeredGraph) -> str:
@@ -168,11 +163,11 @@ def counts_table(graph: LayeredGraph) -> str:
         colour = colours[graph.reasons.index(word)]
         rows.append(
             f'<tr><th scope="row">{_chip(colour)}{escape(word)}</th>'
-            + _td(f"{count:,}".replace(",", "\N{THIN SPACE}"))
-            + _td(f"{share:.1f} %")
+            + td(f"{count:,}".replace(",", "\N{THIN SPACE}"))
+            + td(f"{share:.1f} %")
             + f'<td class="bar"><i style="width:{share:.2f}%;background:{colour}"></i></td></tr>'
         )
-    return _table((("Candidate", ""), ("Number", ""), ("Share", ""), ("", "")), rows)
+    return table((("Candidate", ""), ("Number", ""), ("Share", ""), ("", "")), rows)
 
 
 def reason_legend(graph: LayeredGraph, postures: Sequence[int], *, has_plan: bool) -> str:
@@ -212,6 +207,11 @@ def number(value: float, digits: int) -> str:
     return f"{value:.{digits}f}".replace("-", "&minus;")
 
 
+def shown_unit(unit: str) -> tuple[float, str]:
+    """Return what a value in `unit` is multiplied by to be shown, and the unit that follows it."""
+    return _UNITS.get(unit, (1.0, f" {unit}" if unit else ""))
+
+
 def _measured(value: float, unit: str) -> str:
     factor, suffix = _UNITS[unit]
     scaled = value * factor
@@ -226,7 +226,8 @@ def _peak(shares: np.ndarray) -> str:
     return f"{number(float(shares.max()) * 100, 1)} <small>J{int(shares.argmax()) + 1}</small>"
 
 
-def _td(text: str) -> str:
+def td(text: str) -> str:
+    """Return a cell with a number."""
     return f'<td class="n">{text}</td>'
 
 
@@ -234,7 +235,7 @@ def _chip(colour: str) -> str:
     return f'<i class="chip" style="background:{colour}"></i>'
 
 
-def _table(
+def table(
     heads: Sequence[tuple[str, str]], rows: Sequence[str], text_columns: Sequence[int] = (0,)
 ) -> str:
     """Return a table; `heads` are pairs of title and unit, all but `text_columns` flush right."""

@@ -24,6 +24,7 @@ async function draw(element) {
     await Plotly.newPlot(element, figure.data, figure.layout, CONFIG);
     if (element.classList.contains("map")) explain(element);
     element.dataset.state = "drawn";
+    element.dispatchEvent(new Event("drawn", { bubbles: true }));
   } catch (error) {
     element.dataset.state = "failed";
     const note = document.createElement("p");

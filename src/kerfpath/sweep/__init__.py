@@ -1,6 +1,6 @@
 """Many tasks at once: each done exactly once and kept, on local processes or a Dask cluster."""
 
-from kerfpath.sweep._run import Result, run
-from kerfpath.sweep._task import Failure
+from kerfpath.sweep._run import Progress, Result, Sweep, run
+from kerfpath.sweep._task import Failure, UnfitWorker
 
-__all__ = ["Failure", "Result", "run"]
+__all__ = ["Failure", "Progress", "Result", "Sweep", "UnfitWorker", "run"]

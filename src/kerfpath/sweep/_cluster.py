@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Generator, Iterable, Iterator
+from collections import deque
+from collections.abc import Callable, Generator, Iterator
 from importlib.metadata import version
-from itertools import islice
 from typing import Any
 
 from kerfpath import __version__
@@ -21,12 +21,13 @@ PATIENCE = 10.0
 
 
 def on_cluster(
-    function: Callable[..., Any], tasks: Iterable[Task], address: str
+    function: Callable[..., Any], waiting: deque[Task], address: str
 ) -> Generator[list[Outcome], None, None]:
-    """Yield the outcomes as they come; closing it takes the rest back from the scheduler.
+    """Take what is waiting and yield the outcomes as they come, none where there is nothing to do.
 
-    Dask gives the tasks of a worker that is lost to the others; a task that has lost several is
-    its failure (Dask's `allowed-failures`).
+    It goes on for as long as it is asked; closing it takes the rest back from the scheduler. Dask
+    gives the tasks of a worker that is lost to the others; a task that has lost several is its
+    failure (Dask's `allowed-failures`).
 
     Raises
     ------
@@ -50,7 +51,7 @@ def on_cluster(
     try:
         with client:
             _check(client, address)
-            yield from _gathered(distributed, client, function, iter(tasks))
+            yield from _gathered(distributed, client, function, waiting)
     except (distributed.CancelledError, OSError, RuntimeError) as error:
         # Closing a client that has lost its scheduler may end in a RuntimeError of Dask's own.
         raise InputError(
@@ -78,21 +79,28 @@ def _check(client: Any, address: str) -> None:
 
 
 def _gathered(
-    distributed: Any, client: Any, function: Callable[..., Any], tasks: Iterator[Task]
+    distributed: Any, client: Any, function: Callable[..., Any], waiting: deque[Task]
 ) -> Iterator[list[Outcome]]:
     call = distributed.protocol.pickle.dumps(function)
+    coming = distributed.as_completed(loop=client.loop)
 
-    def handed_out(count: int) -> list[Any]:
-        return [
-            client.submit(attempt, __version__, call, task, key=task.key)
-            for task in islice(tasks, count)
-        ]
+    def hand_out() -> None:
+        count = min(len(waiting), AHEAD - coming.count())
+        tasks = [waiting.popleft() for _ in range(count)]
+        coming.update(
+            [client.submit(attempt, __version__, call, task, key=task.key) for task in tasks]
+        )
 
-    coming = distributed.as_completed(handed_out(AHEAD), loop=client.loop)
-    for batch in coming.batches():
-        whole = [future for future in batch if future.status == "finished"]
-        yield [*client.gather(whole), *(_failed(distributed, f) for f in batch if f not in whole)]
-        coming.update(handed_out(len(batch)))
+    while True:
+        hand_out()
+        for batch in coming.batches():
+            whole = [future for future in batch if future.status == "finished"]
+            yield [
+                *client.gather(whole),
+                *(_failed(distributed, f) for f in batch if f not in whole),
+            ]
+            hand_out()
+        yield []
 
 
 def _failed(distributed: Any, future: Any) -> Outcome:

@@ -6,7 +6,7 @@ import os
 import pickle
 import signal
 from collections import deque
-from collections.abc import Callable, Generator, Iterable
+from collections.abc import Callable, Generator
 from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import suppress
@@ -28,12 +28,13 @@ ONE_THREAD = dict.fromkeys(("NUMBA_NUM_THREADS", "OMP_NUM_THREADS", "OPENBLAS_NU
 
 
 def on_processes(
-    function: Callable[..., Any], tasks: Iterable[Task], processes: int
+    function: Callable[..., Any], waiting: deque[Task], processes: int
 ) -> Generator[list[Outcome], None, None]:
-    """Yield the outcomes as they come; closing it stops the processes at once.
+    """Take what is waiting and yield the outcomes as they come, none where there is nothing to do.
 
-    When a process dies, nobody can say which task did it: those handed out are tried again one by
-    one, and the one that is alone with the next death is its cause.
+    It goes on for as long as it is asked; closing it stops the processes at once. When a process
+    dies, nobody can say which task did it: those handed out are tried again one by one, and the one
+    that is alone with the next death is its cause.
 
     Raises
     ------
@@ -41,19 +42,24 @@ def on_processes(
         Where the processes do not come up, or cannot import the function.
     """
     call = pickle.dumps(function)
-    waiting = deque(tasks)
-    while waiting:
+    while True:
+        if not waiting:
+            yield []
+            continue
         suspects = deque((yield from _pooled(call, waiting, processes, processes * AHEAD)))
         while suspects:
-            for task in (yield from _pooled(call, suspects, 1, 1)):
+            for task in (yield from _pooled(call, suspects, 1, 1, lasting=False)):
                 failure = Failure(kind="WorkerDied", message="the task took its process with it")
                 yield [Outcome(key=task.key, value=None, failure=failure, seconds=0.0)]
 
 
 def _pooled(
-    call: bytes, waiting: deque[Task], processes: int, ahead: int
+    call: bytes, waiting: deque[Task], processes: int, ahead: int, *, lasting: bool = True
 ) -> Generator[list[Outcome], None, list[Task]]:
-    """Take and do what is waiting; return, at the first death, the tasks that it interrupted."""
+    """Take and do what is waiting; return, at the first death, the tasks that it interrupted.
+
+    A lasting pool stays when there is nothing to do, and yields no outcomes.
+    """
     context = get_context("spawn")
     ours, theirs = context.Pipe()
     pool = ProcessPoolExecutor(
@@ -62,7 +68,7 @@ def _pooled(
     flying: dict[Future[Outcome], Task] = {}
     broken = False
     try:
-        while flying or (waiting and not broken):
+        while True:
             while waiting and not broken and len(flying) < ahead:
                 try:
                     future = pool.submit(attempt, __version__, call, waiting[0])
@@ -70,14 +76,17 @@ def _pooled(
                     broken = True
                 else:
                     flying[future] = waiting.popleft()
+            if not flying:
+                if broken or not lasting:
+                    return []
+                yield []
+                continue
             done = wait(flying, return_when=FIRST_COMPLETED).done
             if any(isinstance(future.exception(), BrokenProcessPool) for future in done):
                 break
             yield [future.result() for future in done]
             for future in done:
                 del flying[future]
-        if not flying:
-            return []
         wait(flying)
         whole = [future for future in flying if not future.exception()]
         yield [future.result() for future in whole]

@@ -4,20 +4,24 @@ from __future__ import annotations
 
 import json
 import os
-from collections.abc import Callable, Iterable, Mapping
-from contextlib import closing
+from collections import deque
+from collections.abc import Callable, Generator, Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from time import perf_counter
+from types import TracebackType
 from typing import Any
 
 from kerfpath.errors import InputError
 from kerfpath.sweep._cluster import on_cluster
 from kerfpath.sweep._local import on_processes
 from kerfpath.sweep._store import Store
-from kerfpath.sweep._task import Failure, name_of, task_of
+from kerfpath.sweep._task import Failure, Outcome, Task, name_of, task_of
 
-__all__ = ["Result", "run"]
+__all__ = ["Progress", "Result", "Sweep", "run"]
+
+Progress = Callable[[int, int, float | None], None]
+"""Called with the tasks done, all tasks, and the seconds left (None while nothing is known)."""
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)
@@ -41,6 +45,119 @@ class Result:
     seconds: float
 
 
+class Sweep:
+    """Calls of one function, handed in one by one and kept as they come; a context manager.
+
+    For searches whose next task depends on what came of others; `run` has all of them at once.
+    What the store holds already is not done again. Workers start with the first task that is new.
+
+    Parameters
+    ----------
+    function, store, scheduler, processes
+        As in `run`.
+    progress : callable, optional
+        Called with the tasks done, all tasks, and the seconds left (None while nothing is known).
+    total : int, optional
+        How many tasks there will be; default: as many as were handed in so far.
+
+    Raises
+    ------
+    InputError
+        As `run`.
+    """
+
+    def __init__(
+        self,
+        function: Callable[..., Any],
+        *,
+        store: str | os.PathLike[str],
+        scheduler: str | None = None,
+        processes: int | None = None,
+        progress: Progress | None = None,
+        total: int | None = None,
+    ) -> None:
+        if processes is not None and (scheduler is not None or processes < 1):
+            raise InputError(
+                f"processes = {processes}: expected at least 1, and none where a scheduler is given"
+            )
+        self._function, self._name = function, name_of(function)
+        self._waiting: deque[Task] = deque()
+        self._source: Generator[list[Outcome], None, None]
+        if scheduler is None:
+            self._source = on_processes(function, self._waiting, processes or os.cpu_count() or 1)
+        else:
+            self._source = on_cluster(function, self._waiting, scheduler)
+        self._tasks: dict[str, Task] = {}
+        self._coming: set[str] = set()
+        self._known, self._total, self._progress = 0, total, progress
+        self._begun = 0.0
+        self._kept = Store(Path(store))
+        self._there = self._kept.keys()
+
+    def submit(self, **parameters: Any) -> str:
+        """Hand in a call with these parameters and return what `result` knows it by.
+
+        Raises
+        ------
+        InputError
+            Where the parameters are no plain JSON data, or not those of the function.
+        """
+        return self._hand_in(task_of(self._function, parameters, "parameters"))
+
+    def _hand_in(self, task: Task) -> str:
+        if task.key not in self._tasks:
+            self._tasks[task.key] = task
+            if task.key in self._there:
+                self._known += 1
+            else:
+                self._coming.add(task.key)
+                self._waiting.append(task)
+        return task.key
+
+    def result(self, key: str) -> Result:
+        """Return what became of a task, as soon as it is there."""
+        if not self._begun:
+            self._begun = perf_counter()
+            self._tell()
+        while key in self._coming:
+            batch = next(self._source)
+            self._kept.add(self._name, [(self._tasks[done.key], done) for done in batch])
+            self._coming -= {done.key for done in batch}
+            if batch:
+                self._tell()
+        outcome = self._kept.outcome(key)
+        return Result(
+            parameters=json.loads(self._tasks[key].parameters),
+            value=None if outcome.value is None else json.loads(outcome.value),
+            failure=outcome.failure,
+            seconds=outcome.seconds,
+        )
+
+    def _tell(self) -> None:
+        if self._progress is None:
+            return
+        total = len(self._tasks) if self._total is None else self._total
+        done = len(self._tasks) - len(self._coming)
+        left = None if done < total else 0.0
+        if left is None and done > self._known:
+            left = (perf_counter() - self._begun) / (done - self._known) * (total - done)
+        self._progress(done, total, left)
+
+    def __enter__(self) -> Sweep:
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        try:
+            self._source.close()
+        finally:
+            self._kept.__exit__(kind, error, trace)
+
+
 def run(
     function: Callable[..., Any],
     parameters: Iterable[Mapping[str, Any]],
@@ -48,7 +165,7 @@ def run(
     store: str | os.PathLike[str],
     scheduler: str | None = None,
     processes: int | None = None,
-    progress: Callable[[int, int, float | None], None] | None = None,
+    progress: Progress | None = None,
 ) -> list[Result]:
     """Call a function with each of many parameters, exactly once each, and keep the results.
 
@@ -83,38 +200,9 @@ def run(
         Bad parameters; a store that is in use, from another version, unreadable or full; a
         scheduler that cannot be reached or whose workers have another version of kerfpath.
     """
-    if processes is not None and (scheduler is not None or processes < 1):
-        raise InputError(
-            f"processes = {processes}: expected at least 1, and none where a scheduler is given"
-        )
-    name = name_of(function)
     asked = [task_of(function, p, f"parameters[{i}]") for i, p in enumerate(parameters)]
-    tasks = {task.key: task for task in asked}
-    with Store(Path(store)) as kept:
-        known = kept.keys()
-        missing = [task for task in tasks.values() if task.key not in known]
-        before = done = len(tasks) - len(missing)
-        begun = perf_counter()
-        if progress:
-            progress(done, len(tasks), None if missing else 0.0)
-        if scheduler is None:
-            source = on_processes(function, missing, processes or os.cpu_count() or 1)
-        else:
-            source = on_cluster(function, missing, scheduler)
-        with closing(source) as batches:
-            for batch in batches:
-                kept.add(name, [(tasks[outcome.key], outcome) for outcome in batch])
-                done += len(batch)
-                if progress and batch:
-                    each = (perf_counter() - begun) / (done - before)
-                    progress(done, len(tasks), each * (len(tasks) - done))
-        found = {key: kept.outcome(key) for key in tasks}
-    return [
-        Result(
-            parameters=json.loads(task.parameters),
-            value=None if (outcome := found[task.key]).value is None else json.loads(outcome.value),
-            failure=outcome.failure,
-            seconds=outcome.seconds,
-        )
-        for task in asked
-    ]
+    with Sweep(
+        function, store=store, scheduler=scheduler, processes=processes, progress=progress
+    ) as sweep:
+        keys = [sweep._hand_in(task) for task in asked]
+        return [sweep.result(key) for key in keys]

@@ -16,10 +16,14 @@ from typing import Any, NamedTuple
 from kerfpath import __version__
 from kerfpath.errors import InputError
 
-__all__ = ["SCHEMA", "Failure", "Outcome", "Task", "attempt", "name_of", "task_of"]
+__all__ = ["SCHEMA", "Failure", "Outcome", "Task", "UnfitWorker", "attempt", "name_of", "task_of"]
 
 SCHEMA = 1
 """Counts the ways in which sweeps were kept; another number is another store."""
+
+
+class UnfitWorker(InputError):
+    """A worker that cannot do a task as others could: it ends the sweep, and nothing is kept."""
 
 
 class Task(NamedTuple):
@@ -106,20 +110,22 @@ def attempt(version: str, function: bytes, task: Task) -> Outcome:
 
     Raises
     ------
-    InputError
-        Where the worker has another version of kerfpath than `version`, or lacks the function:
-        that is no outcome of the task.
+    UnfitWorker
+        Where the worker has another version of kerfpath than `version`, or lacks the function, or
+        the function says so: that is no outcome of the task.
     """
     if version != __version__:
-        raise InputError(f"a worker has kerfpath {__version__}, this sweep needs {version}")
+        raise UnfitWorker(f"a worker has kerfpath {__version__}, this sweep needs {version}")
     try:
         call = pickle.loads(function)
     except (ImportError, AttributeError) as error:
-        raise InputError(f"a worker cannot import the function of the sweep: {error}") from error
+        raise UnfitWorker(f"a worker cannot import the function of the sweep: {error}") from error
     value, failure = None, None
     begun = perf_counter()
     try:
         value = json.dumps(call(**json.loads(task.parameters)), allow_nan=False)
+    except UnfitWorker:
+        raise
     except (Exception, SystemExit) as error:  # recorded, not hidden: the other tasks go on
         message = str(error).encode(errors="replace").decode()
         failure = Failure(kind=type(error).__name__, message=message)

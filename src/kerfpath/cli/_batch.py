@@ -1,0 +1,73 @@
+"""`kerfpath batch`: many jobs planned, a row for each."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+
+from rich.markup import escape
+
+from kerfpath.cli._show import busy, out, print_json, progress_bars, table
+from kerfpath.job import warm_up
+from kerfpath.study import Planned, batch
+
+__all__ = ["plan_jobs"]
+
+
+def plan_jobs(
+    jobs: Sequence[Path],
+    folder: Path,
+    scheduler: str | None,
+    processes: int | None,
+    *,
+    as_json: bool,
+) -> bool:
+    """Plan jobs, write their files and say what came of each; return whether all have passed."""
+    if scheduler is None:
+        with busy("compiling the kernels, first run only"):
+            warm_up()
+    with progress_bars("jobs") as bars:
+        found = batch(
+            jobs,
+            folder,
+            scheduler=scheduler,
+            processes=processes,
+            progress=lambda done, total, _left: bars("batch", done, total),
+        )
+    passed = sum(row.passed for row in found)
+    if as_json:
+        print_json({"passed": passed == len(found), "jobs": [_entry(row) for row in found]})
+    else:
+        columns = ["job", "contours", "passed", "cutting s", "seconds", "program, or why none"]
+        table(columns, [_cells(row) for row in found], numbers=columns[1:5])
+        out.print(
+            f"{passed} of {len(found)} jobs passed; their files are in {escape(str(folder))}, "
+            "each in a folder of its name"
+        )
+    return passed == len(found)
+
+
+def _entry(row: Planned) -> dict[str, object]:
+    return {
+        "job": str(row.job),
+        "folder": str(row.folder),
+        "passed": row.passed,
+        "contours": row.contours,
+        "contours_passed": row.kept,
+        "cutting_time_s": row.cutting_time,
+        "program": row.program or None,
+        "reason": row.reason or None,
+        "notes": list(row.notes),
+        "seconds": row.seconds,
+    }
+
+
+def _cells(row: Planned) -> list[str]:
+    return [
+        escape(row.job.name),
+        f"{row.kept}/{row.contours}" if row.contours else "-",
+        "yes" if row.passed else "NO",
+        "-" if row.cutting_time is None else f"{row.cutting_time:.2f}",
+        f"{row.seconds:.1f}",
+        escape(row.reason or row.program or 'none: language = "none"'),
+    ]

@@ -1,0 +1,93 @@
+"""One run of the planner over a graph that is kept, and the audit of what comes of it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+from kerfpath.auditor import audit as full_audit
+from kerfpath.cell import Cell
+from kerfpath.contour import Contour
+from kerfpath.errors import NoFeasiblePath
+from kerfpath.front._runs import WINDOW, Run, within
+from kerfpath.graph import LayeredGraph
+from kerfpath.planner import plan
+from kerfpath.plans import Plan
+from kerfpath.robots import Robot
+
+__all__ = ["Attempts"]
+
+RUN_OPTIONS = ("objective", "metric", "weights", "eta_v", "eta_a")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Attempts:
+    """The task that runs are tried on.
+
+    Parameters
+    ----------
+    contour, robot, graph, cell
+        As in `kerfpath.plan`.
+    options : dict
+        What else `kerfpath.plan` is called with, the same for all runs.
+    audit : callable, optional
+        Returns what is wrong with a plan; default: `kerfpath.audit`, with the cell.
+    """
+
+    contour: Contour
+    robot: Robot
+    graph: LayeredGraph
+    cell: Cell | None
+    options: dict[str, Any]
+    audit: Callable[[Plan], Sequence[object]] | None = None
+
+    def of(self, run: Run) -> Plan | str:
+        """Return the plan of a run, which has passed its audit, or in a few words why not."""
+        try:
+            return self._audited(self.planned(run))
+        except NoFeasiblePath as broken:
+            windows = [why for why in broken.counts if why.startswith(WINDOW)]
+            if windows:
+                return f"no pose in the {windows[0]}"
+            counts = broken.counts
+            most = max(counts, key=counts.__getitem__, default="the seam")
+            return f"no edge within {most}"
+
+    def first(self, run: Run) -> Plan | str:
+        """Return the same of the run that has all that is allowed.
+
+        Raises
+        ------
+        NoFeasiblePath
+            It has no path, so that no run can have one.
+        """
+        try:
+            return self._audited(self.planned(run))
+        except NoFeasiblePath as broken:
+            said = f"{broken}; no run can have a plan: this one had all that is allowed"
+            raise broken.retold(said) from None
+
+    def _audited(self, made: Plan) -> Plan | str:
+        wrong = full_audit(made, cell=self.cell) if self.audit is None else self.audit(made)
+        return f"audit: {getattr(wrong[0], 'code', wrong[0])}" if wrong else made
+
+    def planned(self, run: Run) -> Plan:
+        """Return the plan of a run.
+
+        Raises
+        ------
+        NoFeasiblePath
+            As `kerfpath.plan`.
+        """
+        cell = self.cell
+        if cell is not None and run.clearance:
+            cell = replace(cell, near_miss=cell.near_miss + run.clearance)
+        return plan(
+            self.contour,
+            self.robot,
+            graph=within(self.graph, run.window, self.robot.endless),
+            cell=cell,
+            **{name: getattr(run, name) for name in RUN_OPTIONS},
+            **self.options,
+        )

@@ -1,0 +1,247 @@
+"""A batch: many jobs planned, audited and written, each a task of its own."""
+
+from __future__ import annotations
+
+import base64
+import json
+import os
+import zlib
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from kerfpath.errors import InputError
+from kerfpath.job import (
+    Outcome,
+    ProgramOptions,
+    Texts,
+    outcome_texts,
+    read_job,
+    require_folder,
+    require_language,
+    run_job,
+    stale_program,
+)
+from kerfpath.post import write_files
+from kerfpath.report import with_library, without_library
+from kerfpath.study._job import digest, loaded
+from kerfpath.sweep import Progress, Result, Sweep
+
+__all__ = ["STORE", "Planned", "batch"]
+
+STORE = "batch.sqlite"
+"""Name of the store in the folder of a batch."""
+PAGE = "report.html"
+"""The file of a run that is mostly a library, which need not be kept with each."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Planned:
+    """What came of one job of a batch.
+
+    Parameters
+    ----------
+    job, folder : Path
+        The job file, and where the files of its run are.
+    passed : bool
+        Every contour has a plan that passes its audit, the moves too, and the program that the
+        job asks for is written.
+    contours, kept : int
+        How many contours there are, and how many of them have a plan that passes its audit; 0
+        where the job is refused.
+    cutting_time : float s, optional
+        Of all contours; None unless each has a plan.
+    program : str
+        The program's file in the folder; empty without one.
+    reason : str
+        Why it has not passed; empty where it has.
+    notes : tuple of str
+        What the reader of the files must know, as `kerfpath plan` says it.
+    seconds : float
+        Time that reading, planning and auditing took, s.
+    """
+
+    job: Path
+    folder: Path
+    passed: bool
+    contours: int = 0
+    kept: int = 0
+    cutting_time: float | None = None
+    program: str = ""
+    reason: str = ""
+    notes: tuple[str, ...] = ()
+    seconds: float = 0.0
+
+
+def batch(
+    jobs: Sequence[str | os.PathLike[str]],
+    out: str | os.PathLike[str],
+    *,
+    scheduler: str | None = None,
+    processes: int | None = None,
+    progress: Progress | None = None,
+) -> list[Planned]:
+    """Plan, audit and write many jobs, as `kerfpath plan` does each; one that fails stops no other.
+
+    Results are kept in `out` as they come: the same call again plans only what is new or has
+    changed, and writes files that are missing or differ. Files are written here, so that workers
+    need the job files alone.
+
+    Parameters
+    ----------
+    jobs : sequence of path
+        Job files, at the same place on every worker.
+    out : path
+        Folder for a folder per job, named as its file, and for the store.
+    scheduler, processes, progress
+        As in `kerfpath.sweep.run`.
+
+    Returns
+    -------
+    list of Planned
+        In the order of `jobs`.
+
+    Raises
+    ------
+    InputError
+        No jobs; two that would share a folder; a file where a folder should be; a job that changes
+        meanwhile; and as `kerfpath.sweep.run`.
+    """
+    out = Path(out)
+    paths = [Path(job) for job in jobs]
+    folders = _folders(paths, out)
+    try:
+        out.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise InputError(f"{out}: cannot be made a folder ({error.strerror})") from None
+    found: list[Planned] = []
+    with Sweep(
+        planned, store=out / STORE, scheduler=scheduler, processes=processes, progress=progress
+    ) as tasks:
+        asked = [_asked(tasks, path) for path in paths]
+        for path, folder, given in zip(paths, folders, asked, strict=True):
+            if isinstance(given, InputError):
+                found.append(Planned(job=path, folder=folder, passed=False, reason=str(given)))
+            else:
+                options, key = given
+                found.append(_written(path, folder, options, tasks.result(key)))
+    return found
+
+
+def _folders(paths: Sequence[Path], out: Path) -> list[Path]:
+    """Return the folder of each job.
+
+    Raises
+    ------
+    InputError
+        No jobs, two of one name, something else where a folder should be.
+    """
+    if not paths:
+        raise InputError("no jobs: a batch needs one job file at least")
+    first: dict[str, Path] = {}
+    for path in paths:
+        other = first.setdefault(path.stem.casefold(), path)
+        if other is not path:
+            raise InputError(
+                f"{other} and {path} would both be written to {out / path.stem}; rename one, or "
+                "plan it in a batch with another --out"
+            )
+    folders = [out / path.stem for path in paths]
+    for folder in folders:
+        require_folder(folder)
+    return folders
+
+
+def _asked(tasks: Sweep, path: Path) -> tuple[ProgramOptions, str] | InputError:
+    """Hand in a job; return its program's options and its key, or what is wrong with it."""
+    try:
+        key = tasks.submit(path=str(path.resolve()), digest_then=digest(path))
+        return read_job(path).program, key
+    except InputError as error:
+        return error
+
+
+def planned(*, path: str, digest_then: str) -> dict[str, Any]:
+    """Plan and audit a job: what came of it, and its files, packed; the task of a batch.
+
+    Raises
+    ------
+    InputError
+        As `run_job`, and a language that the robot does not speak.
+    """
+    found = loaded(path, digest_then)
+    require_language(found.job)
+    outcome = run_job(found.job, found.part)
+    texts = outcome_texts(outcome)
+    by_contour: dict[str, bool] = {}
+    for cut in outcome.cuts:
+        by_contour[cut.contour] = by_contour.get(cut.contour, True) and cut.passed
+    times = [None if cut.plan is None else float(cut.plan.time[-1]) for cut in outcome.cuts]
+    return {
+        "passed": outcome.passed and not texts.refused,
+        "contours": len(by_contour),
+        "kept": sum(by_contour.values()),
+        "cutting_time": None if None in times else sum(t for t in times if t is not None),
+        "program": list(texts.program),
+        "reason": _reason(outcome, texts),
+        "notes": list(texts.notes),
+        "files": _packed(texts.files),
+    }
+
+
+def _reason(outcome: Outcome, texts: Texts) -> str:
+    """Say why a run has not passed: the first reason, and how many more there are."""
+    reasons = [
+        f"{cut.task.name}: {cut.failure or issue}"
+        for cut in outcome.cuts
+        if not cut.passed
+        for issue in [next((str(c.issue()) for c in cut.checks if not c.ok), "no plan")]
+    ]
+    if outcome.stuck is not None:
+        reasons.append(f"moves between contours: {outcome.stuck}")
+    reasons += [f"moves between contours: {c.issue()}" for c in outcome.air if not c.ok]
+    reasons += [texts.refused] if texts.refused else []
+    more = f" (and {len(reasons) - 1} more)" if len(reasons) > 1 else ""
+    return reasons[0] + more if reasons else ""
+
+
+def _packed(files: dict[str, str]) -> str:
+    """Return files as text of a fifth of their size."""
+    lean = {name: without_library(t) if name == PAGE else t for name, t in files.items()}
+    return base64.b64encode(zlib.compress(json.dumps(lean).encode())).decode()
+
+
+def _unpacked(packed: str) -> dict[str, str]:
+    files = json.loads(zlib.decompress(base64.b64decode(packed)))
+    return {name: with_library(t) if name == PAGE else t for name, t in files.items()}
+
+
+def _written(job: Path, folder: Path, options: ProgramOptions, result: Result) -> Planned:
+    """Write those files of a result that are not there as they are, and return what to tell."""
+    if result.failure is not None:
+        kind, message = result.failure.kind, result.failure.message
+        reason = message if kind in ("InputError", "NoFeasiblePath") else f"{kind}: {message}"
+        return Planned(job=job, folder=folder, passed=False, reason=reason, seconds=result.seconds)
+    told = dict(result.value)
+    files, program = _unpacked(told.pop("files")), told.pop("program")
+    write_files(folder, {n: text for n, text in files.items() if not _is(folder / n, text)})
+    notes = list(told.pop("notes"))
+    if stale := stale_program(options, folder, program):
+        notes.append(f"{stale.name} is from an earlier run and does not belong to this plan")
+    return Planned(
+        job=job,
+        folder=folder,
+        program=program[0] if program else "",
+        notes=tuple(notes),
+        seconds=result.seconds,
+        **told,
+    )
+
+
+def _is(path: Path, text: str) -> bool:
+    """Return whether a file is there with this very text."""
+    try:
+        return path.read_bytes() == text.encode()
+    except OSError:
+        return False
