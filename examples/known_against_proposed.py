@@ -352,15 +352,15 @@ def readme(tasks: Sequence[Task], rows: Sequence[Row]) -> str:
         both = [(k, n) for k, n in zip(*sides, strict=True) if n["found"] == "yes"]
         shake = [np.sign(float(n[SHAKE]) - float(k[SHAKE])) for k, n in both]
         cells.append(" / ".join(str(shake.count(sign)) for sign in (-1, 0, 1)))
-        compared.append(_line(f"{task.name} ({task})", *cells))
+        compared.append(table_line(f"{task.name} ({task})", *cells))
     for eta in dict.fromkeys((r["eta_v"], r["eta_a"]) for r in rows):
         new = _some(rows, "main", "proposed", *eta)
         counts = (f"{_count(new, column)} of {len(new)}" for column in ("found", "acceptable"))
         spreads = (_spread(new, c) for c in ("peak_velocity", "peak_acceleration", SHAKE))
-        etas.append(_line(*eta, *counts, *spreads))
+        etas.append(table_line(*eta, *counts, *spreads))
     for file, why, places in pairs_of(rows):
         lines = [
-            _line(
+            table_line(
                 rows[k]["technique"], str(i), *(rows[k][column.format(i)] for column in PER_JOINT)
             )
             for k, i in product(places, range(1, 7))
@@ -392,8 +392,17 @@ def _spread(rows: Sequence[Row], column: str) -> str:
     return f"{median(values):.3g} to {max(values):.3g}" if values else "no path"
 
 
-def _line(*cells: str) -> str:
+def table_line(*cells: str) -> str:
+    """Return a line of a table in Markdown."""
     return "| " + " | ".join(cells) + " |"
+
+
+def write_table(path: Path, rows: Sequence[Row]) -> None:
+    """Write every row, those of runs without a plan with empty cells."""
+    with path.open("w", encoding="utf-8", newline="") as file:
+        table = csv.DictWriter(file, max(rows, key=len), restval="", lineterminator="\n")
+        table.writeheader()
+        table.writerows(rows)
 
 
 def main(arguments: Sequence[str] | None = None) -> None:
@@ -411,10 +420,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
             rows.append(row)
             plans.append(found)
     options.out.mkdir(parents=True, exist_ok=True)
-    with (options.out / "table.csv").open("w", encoding="utf-8", newline="") as file:
-        table = csv.DictWriter(file, max(rows, key=len), restval="", lineterminator="\n")
-        table.writeheader()
-        table.writerows(rows)
+    write_table(options.out / "table.csv", rows)
     for pair in pairs_of(rows):
         picture = svg(
             [title(rows[i]) for i in pair.runs], [p for i in pair.runs if (p := plans[i])]
