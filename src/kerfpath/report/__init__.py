@@ -1,9 +1,10 @@
-"""Self-contained HTML pages: the report on a job, a drawing's loops, a Pareto set."""
+"""Self-contained HTML pages: the report on a job, a drawing's loops, a Pareto set, a layout."""
 
 from kerfpath.report._drawing import DrawnLoop, render_drawing
 from kerfpath.report._front import FrontAxis, FrontPlan
 from kerfpath.report._front_page import render_front
 from kerfpath.report._html import with_library, without_library
+from kerfpath.report._layout import render_layout
 from kerfpath.report._map import feasibility_map
 from kerfpath.report._page import render
 from kerfpath.report._section import ContourSection
@@ -17,6 +18,7 @@ __all__ = [
     "render",
     "render_drawing",
     "render_front",
+    "render_layout",
     "with_library",
     "without_library",
 ]
