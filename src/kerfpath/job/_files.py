@@ -29,6 +29,7 @@ __all__ = [
     "Texts",
     "Written",
     "collision_note",
+    "make_folder",
     "outcome_texts",
     "program_of",
     "require_folder",
@@ -97,10 +98,7 @@ def write_outcome(outcome: Outcome, folder: Path, *, strict: bool = False) -> Wr
         are written.
     """
     texts = outcome_texts(outcome, strict=strict)
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise InputError(f"{folder}: cannot be made a folder ({error.strerror})") from None
+    make_folder(folder)
     written = write_files(folder, texts.files)
     if texts.refused:
         raise InputError(f"{texts.refused} ({folder / 'plan.json'} and the report are written)")
@@ -201,6 +199,20 @@ def require_folder(folder: Path) -> None:
             return
         if place.exists():
             raise InputError(f"{folder}: expected a folder, but {place} is a file; name another")
+
+
+def make_folder(folder: Path) -> None:
+    """Make a folder for the files, unless it is there.
+
+    Raises
+    ------
+    InputError
+        It cannot be made.
+    """
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise InputError(f"{folder}: cannot be made a folder ({error.strerror})") from None
 
 
 def require_language(job: Job) -> None:

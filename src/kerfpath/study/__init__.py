@@ -5,3 +5,11 @@ from kerfpath.study._batch import batch as batch
 from kerfpath.study._job import Loaded as Loaded
 from kerfpath.study._job import digest as digest
 from kerfpath.study._job import loaded as loaded
+from kerfpath.study._robots import NEAREST as NEAREST
+from kerfpath.study._robots import ContourSpeed as ContourSpeed
+from kerfpath.study._robots import RobotSpeed as RobotSpeed
+from kerfpath.study._robots import contour_speeds as contour_speeds
+from kerfpath.study._robots import which_robots as which_robots
+from kerfpath.study._robots import with_robot as with_robot
+from kerfpath.study._robots_files import robots_entry as robots_entry
+from kerfpath.study._robots_files import write_robots as write_robots
