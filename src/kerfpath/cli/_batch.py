@@ -7,7 +7,7 @@ from pathlib import Path
 
 from rich.markup import escape
 
-from kerfpath.cli._show import busy, out, print_json, progress_bars, table
+from kerfpath.cli._show import busy, out, print_json, sweep_bar, table
 from kerfpath.job import warm_up
 from kerfpath.study import Planned, batch
 
@@ -26,14 +26,8 @@ def plan_jobs(
     if scheduler is None:
         with busy("compiling the kernels, first run only"):
             warm_up()
-    with progress_bars("jobs") as bars:
-        found = batch(
-            jobs,
-            folder,
-            scheduler=scheduler,
-            processes=processes,
-            progress=lambda done, total, _left: bars("batch", done, total),
-        )
+    with sweep_bar("jobs") as progress:
+        found = batch(jobs, folder, scheduler=scheduler, processes=processes, progress=progress)
     passed = sum(row.passed for row in found)
     if as_json:
         print_json({"passed": passed == len(found), "jobs": [_entry(row) for row in found]})

@@ -34,15 +34,6 @@ Out = Annotated[
     Path | None, typer.Option("--out", help="Folder for the files; made if it is not there.")
 ]
 JobArgument = Annotated[Path, typer.Argument(metavar="JOB.toml", help="The job file.")]
-Scheduler = Annotated[
-    str | None,
-    typer.Option(
-        metavar="ADDRESS", help="Dask scheduler whose workers do the work, as tcp://10.0.0.1:8786."
-    ),
-]
-Processes = Annotated[
-    int | None, typer.Option(help="Processes of this machine that do it; default: one per core.")
-]
 Strict = Annotated[
     bool, typer.Option("--strict", help="Refuse programs that would only be warned of.")
 ]
@@ -113,35 +104,6 @@ def plan(
     from kerfpath.cli._plan import plan_job
 
     plan_job(job, to or Path(f"{job.stem}-plan"), as_json=as_json, draw_map=draw_map, strict=strict)
-
-
-@app.command()
-def batch(
-    jobs: Annotated[list[Path], typer.Argument(metavar="JOB.toml...", help="The job files.")],
-    to: Out = None,
-    scheduler: Scheduler = None,
-    processes: Processes = None,
-    as_json: Json = False,
-) -> None:
-    """Plan, audit and write many jobs, each as `kerfpath plan` does, on all cores or a cluster.
-
-    The files of door.toml go to the folder door in the one that --out names (kerfpath-batch). A job
-    that is refused or has no plan gets its row with the reason, and the others go on.
-
-    What is done is kept in batch.sqlite there: the same command again, after Ctrl-C or a power cut,
-    plans only what is new or has changed, and writes what is missing. On a cluster every worker
-    needs the job files at the same path, as on a shared disk.
-
-    Exit codes: 0 every job has passed, 1 some has not, 2 the command itself was wrong.
-
-    Example: kerfpath batch parts/*.toml --out cut
-
-    Example: kerfpath batch /shared/parts/*.toml --out cut --scheduler tcp://10.0.0.1:8786
-    """
-    from kerfpath.cli._batch import plan_jobs
-
-    if not plan_jobs(jobs, to or Path("kerfpath-batch"), scheduler, processes, as_json=as_json):
-        raise typer.Exit(1)
 
 
 @app.command()

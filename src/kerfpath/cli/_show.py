@@ -6,13 +6,16 @@ import json
 import sys
 from collections.abc import Callable, Collection, Iterator, Sequence
 from contextlib import contextmanager
+from datetime import timedelta
 from typing import Any
 
+import typer
 from rich.console import Console
-from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
+from rich.progress import BarColumn, MofNCompleteColumn, TextColumn, TimeRemainingColumn
+from rich.progress import Progress as Bars
 from rich.table import Table
 
-__all__ = ["busy", "errors", "out", "print_json", "progress_bars", "table"]
+__all__ = ["busy", "errors", "out", "print_json", "progress_bars", "sweep_bar", "table"]
 
 _PIPED = 200
 """Columns for output that goes to a file or another program: nothing is cut off there."""
@@ -54,7 +57,7 @@ def progress_bars(unit: str = "nodes") -> Iterator[Callable[[str, int, int], Non
         TimeRemainingColumn(),
     )
     watched = errors.is_terminal
-    with Progress(*columns, console=errors, transient=True, disable=not watched) as bars:
+    with Bars(*columns, console=errors, transient=True, disable=not watched) as bars:
         tasks: dict[str, Any] = {}
 
         def advance(what: str, done: int, total: int) -> None:
@@ -63,6 +66,32 @@ def progress_bars(unit: str = "nodes") -> Iterator[Callable[[str, int, int], Non
             bars.update(tasks[what], completed=done)
 
         yield advance
+
+
+@contextmanager
+def sweep_bar(unit: str) -> Iterator[Callable[[int, int, float | None], None]]:
+    """Give a function that shows how far a sweep is, and the time left; silent where nobody looks.
+
+    Raises
+    ------
+    typer.Exit
+        At Ctrl-C, after saying how to go on.
+    """
+    left_over = TextColumn("{task.fields[left]}")
+    columns = (BarColumn(), MofNCompleteColumn(), TextColumn(unit), left_over)
+    watched = errors.is_terminal
+    with Bars(*columns, console=errors, transient=True, disable=not watched) as bars:
+        bar = bars.add_task("", total=None, left="")
+
+        def advance(done: int, total: int, left: float | None) -> None:
+            told = "" if left is None else f"{timedelta(seconds=round(left))} left"
+            bars.update(bar, completed=done, total=total, left=told)
+
+        try:
+            yield advance
+        except KeyboardInterrupt:
+            errors.print("kerfpath: stopped; the same command goes on from the results so far")
+            raise typer.Exit(130) from None
 
 
 @contextmanager

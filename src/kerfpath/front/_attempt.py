@@ -3,22 +3,20 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any
 
 from kerfpath.auditor import audit as full_audit
 from kerfpath.cell import Cell
 from kerfpath.contour import Contour
 from kerfpath.errors import NoFeasiblePath
-from kerfpath.front._runs import WINDOW, Run, within
+from kerfpath.front._runs import WINDOW, Run
 from kerfpath.graph import LayeredGraph
 from kerfpath.planner import plan
 from kerfpath.plans import Plan
 from kerfpath.robots import Robot
 
 __all__ = ["Attempts"]
-
-RUN_OPTIONS = ("objective", "metric", "weights", "eta_v", "eta_a")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -80,14 +78,11 @@ class Attempts:
         NoFeasiblePath
             As `kerfpath.plan`.
         """
-        cell = self.cell
-        if cell is not None and run.clearance:
-            cell = replace(cell, near_miss=cell.near_miss + run.clearance)
         return plan(
             self.contour,
             self.robot,
-            graph=within(self.graph, run.window, self.robot.endless),
-            cell=cell,
-            **{name: getattr(run, name) for name in RUN_OPTIONS},
+            graph=run.graph(self.graph, self.robot.endless),
+            cell=run.cell(self.cell),
+            **run.options,
             **self.options,
         )

@@ -46,11 +46,13 @@ class Collection:
         How many there are to be.
     search : {"adaptive", "grid"}
     seed : int
+    ahead : int
+        How many may be under way.
 
     Raises
     ------
     InputError
-        An unknown search, fewer than one run.
+        An unknown search, fewer than one run, or none under way.
     """
 
     def __init__(
@@ -64,12 +66,13 @@ class Collection:
         runs: int,
         search: Search,
         seed: int,
+        ahead: int,
     ) -> None:
         if search not in get_args(Search):
             raise InputError(
                 f"search: expected one of {', '.join(get_args(Search))}, got {search!r}"
             )
-        self.runs = whole_number(runs, "runs")
+        self.runs, self._ahead = whole_number(runs, "runs"), whole_number(ahead, "ahead")
         self._name, self._criteria = contour.name, judge.criteria
         self._asked: list[Run] = []
         self._told = 0
@@ -109,7 +112,7 @@ class Collection:
             else:
                 yield next(plain)
 
-    def gather(self, submit: Callable[[Run], Callable[[], Reached | str]], ahead: int) -> None:
+    def gather(self, submit: Callable[[Run], Callable[[], Reached | str]]) -> None:
         """Do all runs, up to `ahead` of them under way.
 
         `submit` begins a run and returns how to wait for what comes of it: a plan's losses and
@@ -117,7 +120,7 @@ class Collection:
         """
         flying: deque[Callable[[], Reached | str]] = deque()
         while self._told < self.runs:
-            room = ahead if self._told else 1
+            room = self._ahead if self._told else 1
             while len(flying) < room and len(self._asked) < self.runs:
                 run = next(self._runs)
                 self._asked.append(run)

@@ -122,7 +122,7 @@ def pareto(
             comfort=comfort,
         )
     collection = Collection(
-        contour, robot, graph, speed, judge=judge, runs=runs, search=search, seed=seed
+        contour, robot, graph, speed, judge=judge, runs=runs, search=search, seed=seed, ahead=ahead
     )
     options: dict[str, Any] = {
         "tool": tool,
@@ -159,7 +159,7 @@ def pareto(
 
             return settled
 
-        collection.gather(submit, whole_number(ahead, "ahead"))
+        collection.gather(submit)
     front = collection.result()
     return ParetoSet(
         **{each.name: getattr(front, each.name) for each in fields(Front)},

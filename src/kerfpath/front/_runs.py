@@ -10,6 +10,7 @@ from typing import Any, get_args
 import numpy as np
 
 from kerfpath._arrays import Array, Bools, freeze
+from kerfpath.cell import Cell
 from kerfpath.front._criteria import Criterion
 from kerfpath.graph import LayeredGraph
 from kerfpath.search import Metric, ObjectiveKind, Relaxations
@@ -18,6 +19,7 @@ __all__ = ["WINDOW", "Run", "anchors", "grid", "quicker", "whole", "within"]
 
 WINDOW = "window of joint"
 """What vertices outside a window are counted under, before the joint's number."""
+OPTIONS = ("objective", "metric", "weights", "eta_v", "eta_a")
 FAINT = 1e-6
 """Weight of the other joints where one joint counts: they decide between equals, or as good as."""
 LEVELS = (0.25, 4.0)
@@ -53,18 +55,26 @@ class Run:
     window: Array
     clearance: float = 0.0
 
+    @property
+    def options(self) -> dict[str, Any]:
+        """What `kerfpath.plan` is to be called with."""
+        return {name: getattr(self, name) for name in OPTIONS}
+
+    def graph(self, graph: LayeredGraph, endless: Bools) -> LayeredGraph:
+        """Return the layered graph of a task without what is outside the window."""
+        return within(graph, self.window, endless)
+
+    def cell(self, cell: Cell | None) -> Cell | None:
+        """Return the cell in which the clearance is kept."""
+        if cell is None or not self.clearance:
+            return cell
+        return replace(cell, near_miss=cell.near_miss + self.clearance)
+
     def data(self) -> dict[str, Any]:
         """Return it as plain JSON data; `of_data` gives the very same run back."""
         window = [pair if np.isfinite(pair).all() else None for pair in self.window.tolist()]
-        return {
-            "objective": self.objective,
-            "metric": self.metric,
-            "weights": self.weights.tolist(),
-            "eta_v": self.eta_v,
-            "eta_a": self.eta_a,
-            "window": window,
-            "clearance": self.clearance,
-        }
+        weights = self.weights.tolist()
+        return self.options | {"weights": weights, "window": window, "clearance": self.clearance}
 
     @classmethod
     def of_data(cls, data: dict[str, Any]) -> Run:

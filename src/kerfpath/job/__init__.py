@@ -25,8 +25,10 @@ from kerfpath.job._read import Job as Job
 from kerfpath.job._read import ProgramOptions as ProgramOptions
 from kerfpath.job._read import program_options as program_options
 from kerfpath.job._read import read_job as read_job
+from kerfpath.job._run import Chosen as Chosen
 from kerfpath.job._run import Cut as Cut
 from kerfpath.job._run import Outcome as Outcome
+from kerfpath.job._run import Progress as Progress
 from kerfpath.job._run import fastest_along as fastest_along
 from kerfpath.job._run import fastest_speeds as fastest_speeds
 from kerfpath.job._run import run_job as run_job

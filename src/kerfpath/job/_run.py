@@ -16,6 +16,7 @@ from kerfpath.cad import read as read_drawing
 from kerfpath.cell import Cell
 from kerfpath.contour import FRAME_KINDS, Contour
 from kerfpath.errors import NoFeasiblePath
+from kerfpath.front import Run
 from kerfpath.graph import LayeredGraph
 from kerfpath.job._cell import cell_of_job
 from kerfpath.job._cut import Cut
@@ -38,6 +39,7 @@ from kerfpath.robots import robot
 from kerfpath.sequence import PartPlan
 
 __all__ = [
+    "Chosen",
     "Cut",
     "Given",
     "Outcome",
@@ -88,17 +90,26 @@ class Given(NamedTuple):
     touched: bool
 
 
+class Chosen(NamedTuple):
+    """The run of a Pareto set that a contour is planned by, and whether its plan is refined."""
+
+    run: Run
+    refine: bool
+
+
 def run_job(
     job: Job,
     part: Part | None = None,
     *,
     given: Mapping[str, Given] | None = None,
+    chosen: Mapping[str, Chosen] | None = None,
     progress: Progress = lambda what, done, total: None,
 ) -> Outcome:
     """Return what comes of planning and auditing every contour of a job.
 
     `part` is what its drawing holds, if that is read already. With `given`, paths for all contours
-    by their names, they are cut along those and come in that order.
+    by their names, they are cut along those and come in that order. What is `chosen` for a contour
+    stands in place of what the job says of its plan; it is cut along the first of its candidates.
 
     A contour without a feasible path does not stop the others; it is reported as such.
 
@@ -119,9 +130,12 @@ def run_job(
             paths = [given[task.name]]
         else:
             shaped = task.candidates(part, loop)
+            if chosen is not None and task.name in chosen:
+                shaped = shaped[:1]
             asked = job.plan_options["postures"]
             paths = [Given(path, task.sample(path), asked, touched=False) for path in shaped]
-        tries.append([_cut(job, task, path, cell, progress) for path in paths])
+        run = None if chosen is None else chosen.get(task.name)
+        tries.append([_cut(job, task, path, cell, run, progress) for path in paths])
     if job.sequence is not None:
         progress("order and moves", 0, 1)
     found = ordered(job, loops, tries, cell)
@@ -142,12 +156,19 @@ def run_job(
 
 
 def _cut(
-    job: Job, task: ContourTask, asked: Given, cell: Cell | None, progress: Progress
+    job: Job,
+    task: ContourTask,
+    asked: Given,
+    cell: Cell | None,
+    chosen: Chosen | None,
+    progress: Progress,
 ) -> tuple[Cut, ...]:
     """Return what came of a contour: one cut, or several where it is interrupted."""
     drawn, nodes = asked.path, asked.nodes
-    job = replace(job, plan_options=job.plan_options | {"postures": asked.postures})
-    options, done = job.plan_options, 0
+    options = job.plan_options | {"postures": asked.postures}
+    if chosen is not None:
+        options |= chosen.run.options | {"feed": "constant", "refine": chosen.refine}
+    job, done = replace(job, plan_options=options), 0
 
     def solved(count: int) -> None:
         nonlocal done
@@ -164,8 +185,11 @@ def _cut(
     whole = Cut(
         contour=task.name, task=task, drawn=drawn, nodes=nodes, graph=graph, clearance=clearance
     )
+    kept = cell
+    if chosen is not None:
+        graph, kept = chosen.run.graph(graph, job.robot.endless), chosen.run.cell(cell)
     try:
-        plans = _plans(job, task, nodes, graph, cell)
+        plans = _plans(job, task, nodes, graph, kept)
     except NoFeasiblePath as broken:
         # With poses everywhere slower would do; for a loop that cannot close, or an axis that may
         # not turn as far, it need not, and a feed that dips has tried.

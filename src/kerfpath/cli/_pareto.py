@@ -1,0 +1,136 @@
+"""`kerfpath pareto`: the front of a contour, and the plan that is picked from it."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+from rich.markup import escape
+
+from kerfpath.cli._drawing import show_drawing
+from kerfpath.cli._plan import leave
+from kerfpath.cli._show import busy, out, print_json, progress_bars, sweep_bar, table
+from kerfpath.front import Front, Search
+from kerfpath.job import read_job, require_folder, require_language, warm_up
+from kerfpath.study import Studied, axes_of, pareto_of_job, picked, plan_picked, write_pareto
+
+__all__ = ["pick_plan", "show_front"]
+
+SHOWN = 12
+"""Rows of the table: the rest is in the report."""
+
+
+def show_front(
+    job_file: Path,
+    folder: Path,
+    *,
+    contour: str | None,
+    criteria: Sequence[str],
+    runs: int,
+    search: Search,
+    seed: int,
+    ahead: int,
+    scheduler: str | None,
+    processes: int | None,
+    as_json: bool,
+) -> None:
+    """Find the front of a contour, write pareto.json and pareto.html, and say what is in it."""
+    require_folder(folder)
+    folder.mkdir(parents=True, exist_ok=True)
+    with busy("compiling the kernels, first run only"):
+        warm_up()
+    with sweep_bar("runs") as progress:
+        studied = pareto_of_job(
+            job_file,
+            store=folder / "pareto.sqlite",
+            contour=contour,
+            criteria=criteria,
+            runs=runs,
+            search=search,
+            seed=seed,
+            ahead=ahead,
+            scheduler=scheduler,
+            processes=processes,
+            progress=progress,
+        )
+    with busy("writing"):
+        written = write_pareto(studied, folder)
+    if as_json:
+        print_json(_entry(studied, written))
+        return
+    front = studied.front
+    chosen = "" if contour or not studied.others else f", the longest of {len(studied.others) + 1}"
+    out.print(
+        f"[bold]{escape(studied.contour)}[/]{chosen}: {len(front.runs)} plans that no other beats, "
+        f"of {front.feasible} feasible runs of {front.tried}; hypervolume {front.hypervolume:.4f}, "
+        f"largest gap {front.gap:.3f}"
+    )
+    _show_plans(front)
+    for why, number in front.failures.items():
+        out.print(f"no plan in {number} runs: {escape(why)}")
+    for path in written:
+        out.print(f"wrote {escape(str(path))}")
+    out.print(
+        f"write one: kerfpath pareto {escape(str(job_file))} --out {escape(str(folder))} "
+        f"--pick {front.numbers[front.balanced_at]} (the balanced one)"
+    )
+
+
+def _show_plans(front: Front) -> None:
+    axes = axes_of(front)
+    columns = ["plan", *(f"{axis.name} {axis.unit_and_arrow}" for axis in axes)]
+    values = front.values * [axis.shown[0] for axis in axes]
+    step = max(1, -(-len(values) // SHOWN))
+    rows = [
+        [str(front.numbers[i]), *(f"{value:.4g}" for value in values[i])]
+        for i in range(0, len(values), step)
+    ]
+    table(columns, rows, numbers=columns)
+    more = f"; one in {step} of the {len(values)} plans, the report has all" if step > 1 else ""
+    out.print(f"arrows: where better is{more}")
+
+
+def _entry(studied: Studied, written: Sequence[Path]) -> dict[str, Any]:
+    front = studied.front
+    return {
+        "contour": studied.contour,
+        "criteria": list(front.criteria),
+        "units": list(front.units),
+        "plans": [
+            {"number": number, "values": values}
+            for number, values in zip(front.numbers, front.values.tolist(), strict=True)
+        ],
+        "balanced": front.numbers[front.balanced_at],
+        "tried": front.tried,
+        "feasible": front.feasible,
+        "failures": dict(front.failures),
+        "hypervolume": front.hypervolume,
+        "gap": front.gap,
+        "files": [str(path) for path in written],
+    }
+
+
+def pick_plan(
+    job_file: Path, folder: Path, which: str, *, refine: bool, strict: bool, as_json: bool
+) -> None:
+    """Plan the job with a contour planned as picked, and write its files.
+
+    Raises
+    ------
+    typer.Exit
+        Code 1: some contour has no plan that passes its audit.
+    """
+    pick = picked(folder, job_file, which)
+    to = folder / f"plan-{pick.number}"
+    require_folder(to)
+    require_language(read_job(job_file))
+    with busy("compiling the kernels, first run only"):
+        warm_up()
+    with progress_bars() as progress:
+        part, outcome = plan_picked(job_file, pick, refine=refine, progress=progress)
+    if not as_json:
+        show_drawing(part)
+        out.print(f"[bold]{escape(pick.contour)}[/] as plan {pick.number} of its front")
+    more = {"picked": {"contour": pick.contour, "number": pick.number, "refined": refine}}
+    leave(outcome, part, to, as_json=as_json, strict=strict, more=more)

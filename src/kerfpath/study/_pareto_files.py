@@ -1,0 +1,220 @@
+"""What the study of a contour leaves: pareto.json and pareto.html; and the plan picked there."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import dataclass
+from pathlib import Path
+from shlex import quote
+from typing import Any
+
+import numpy as np
+
+from kerfpath import __version__
+from kerfpath.cad import Part
+from kerfpath.errors import InputError
+from kerfpath.front import Front, Run
+from kerfpath.job import Chosen, Outcome, Progress, run_job
+from kerfpath.post import write_files
+from kerfpath.report import FrontAxis, FrontPlan, render_front
+from kerfpath.robots import Robot
+from kerfpath.study._job import digest, loaded
+from kerfpath.study._pareto import Studied
+
+__all__ = ["Pick", "axes_of", "picked", "plan_picked", "write_pareto"]
+
+SCHEMA = 1
+"""Counts the ways in which pareto.json was written."""
+WORDS = {
+    "displacement": "total displacement",
+    "increment": "largest increment",
+    "range": "coordinate range",
+    "velocity": "peak velocity",
+    "acceleration": "peak acceleration",
+    "speed": "fastest speed of the path",
+    "time": "time from home and back",
+    "clearance": "clearance in the cell",
+}
+
+
+def write_pareto(studied: Studied, folder: Path) -> list[Path]:
+    """Write pareto.json and pareto.html of a study into a folder.
+
+    Raises
+    ------
+    InputError
+        The folder cannot be made or written to.
+    """
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise InputError(f"{folder}: cannot be made a folder ({error.strerror})") from None
+    data = json.dumps(_entries(studied), indent=1, allow_nan=False) + "\n"
+    return write_files(folder, {"pareto.json": data, "pareto.html": _page(studied, folder)})
+
+
+def _entries(studied: Studied) -> dict[str, Any]:
+    front = studied.front
+    named = zip(front.criteria, front.units, front.sense, strict=True)
+    return {
+        "schema": SCHEMA,
+        "kerfpath": __version__,
+        "job": studied.job.source,
+        "digest": studied.digest,
+        "contour": studied.contour,
+        "criteria": [
+            {"name": name, "unit": unit, "better": "less" if sense > 0 else "more"}
+            for name, unit, sense in named
+        ],
+        "plans": [
+            {"number": number, "values": values, "run": run.data()}
+            for number, values, run in zip(
+                front.numbers, front.values.tolist(), front.runs, strict=True
+            )
+        ],
+        "marks": marks(front),
+        "ideal": front.ideal.tolist(),
+        "reference": front.reference.tolist(),
+        "hypervolume": front.hypervolume,
+        "gap": front.gap,
+        "tried": front.tried,
+        "feasible": front.feasible,
+        "failures": dict(front.failures),
+    }
+
+
+def marks(front: Front) -> dict[str, int]:
+    """Return the numbers of the plans that are best in a criterion, and of the balanced one."""
+    best = {name: front.numbers[front.best_at(name)] for name in front.criteria}
+    return best | {"balanced": front.numbers[front.balanced_at]}
+
+
+def axes_of(front: Front) -> list[FrontAxis]:
+    """Return the criteria of a front in words, and how they are shown to people."""
+    axes = []
+    for name, unit, sense in zip(front.criteria, front.units, front.sense, strict=True):
+        kind, _, joint = name.rpartition("_")
+        words = f"{WORDS[kind]}, joint {joint}" if joint.isdigit() else WORDS.get(name, name)
+        axes.append(FrontAxis(name=name, words=words, unit=unit, sense=float(sense)))
+    return axes
+
+
+def _page(studied: Studied, folder: Path) -> str:
+    front, job, axes = studied.front, studied.job, axes_of(studied.front)
+    plans = [
+        FrontPlan(number=number, values=tuple(values), asked=tuple(asked_for(run, job.robot)))
+        for number, values, run in zip(
+            front.numbers, front.values.tolist(), front.runs, strict=True
+        )
+    ]
+    facts = [
+        ("Job", job.path.name),
+        ("Contour", studied.contour),
+        ("Robot", f"{job.robot.manufacturer} {job.robot.model}".strip() or job.robot.id),
+        ("Runs", f"{front.tried}, {front.feasible} of them with a plan that passed its audit"),
+        ("Front", f"{len(front.runs)} plans that no other beats"),
+        ("Hypervolume", f"{front.hypervolume:.4f} of the box from the ideal to the reference"),
+        ("Largest gap", f"{front.gap:.3f} of that box, between neighbours in one criterion"),
+    ]
+    facts += [(f"{number} runs without a plan", why) for why, number in front.failures.items()]
+    titles = {"balanced": "balanced"} | {axis.name: f"best {axis.words}" for axis in axes}
+    where = quote(str(folder))
+    return render_front(
+        f"{job.part_file.stem.replace('_', ' ')}: {studied.contour}",
+        axes=axes,
+        plans=plans,
+        dominated=front.beaten.tolist(),
+        marks={titles[name]: number for name, number in marks(front).items()},
+        facts=facts,
+        notes=_notes(studied),
+        command=f"kerfpath pareto {quote(str(job.path))} --out {where} --pick {{number}}",
+        job_text=job.path.read_text(encoding="utf-8-sig"),
+    )
+
+
+def _notes(studied: Studied) -> list[str]:
+    notes = [
+        "Every plan is the proved optimum of its run on the grid of gamma, and is not refined; "
+        "the set is a sample of the front."
+    ]
+    if studied.others:
+        notes.append(f"The front is of one contour; the job has {len(studied.others)} more.")
+    return notes
+
+
+def asked_for(run: Run, robot: Robot) -> list[tuple[str, str]]:
+    """Return what a run asks for, in words."""
+    each = run.weights * robot.speed_limits()[0]
+    relative = each / np.exp(np.log(each).mean())
+    units = ["rad"] * robot.joints
+    if robot.external is not None:
+        units[-1] = robot.external.unit
+    rows = [
+        ("minimise", f"{run.objective} of {run.metric} distances"),
+        ("limits", f"{run.eta_v:.1%} of velocity, {run.eta_a:.1%} of acceleration"),
+        ("joints weigh", " ".join(f"{weight:.3g}" for weight in relative)),
+    ]
+    for joint, (low, high) in enumerate(run.window):
+        if np.isfinite(high - low):
+            factor, unit = (1e3, "mm") if units[joint] == "m" else (180 / np.pi, "deg")
+            span = f"{low * factor:.1f} to {high * factor:.1f} {unit}"
+            rows.append((f"window of joint {joint + 1}", span))
+    if run.clearance:
+        rows.append(("clearance", f"{run.clearance * 1e3:.1f} mm"))
+    return rows
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Pick:
+    """A plan of a front: whose it is, its number, and what its run asked for."""
+
+    contour: str
+    number: int
+    run: Run
+
+
+def picked(folder: Path, job_file: Path, which: str) -> Pick:
+    """Return a plan of the front in a folder: by number, "balanced", or a criterion it is best in.
+
+    Raises
+    ------
+    InputError
+        No front there, one of another version or of another state of the job, no such plan.
+    """
+    path = folder / "pareto.json"
+    again = f"run kerfpath pareto {job_file} --out {folder} first"
+    try:
+        data = json.loads(path.read_text(encoding="utf-8"))
+        schema, version, whole = data["schema"], data["kerfpath"], data["digest"]
+        plans = {plan["number"]: plan for plan in data["plans"]}
+        named, contour = data["marks"], data["contour"]
+    except OSError as error:
+        raise InputError(f"{path}: cannot be read ({error.strerror}); {again}") from None
+    except (ValueError, KeyError, TypeError):
+        raise InputError(f"{path}: expected a front as kerfpath writes it; {again}") from None
+    if (schema, version) != (SCHEMA, __version__):
+        raise InputError(
+            f"{path}: written by kerfpath {version}, this is {__version__}; {again}, into another "
+            "folder"
+        )
+    if whole != digest(job_file):
+        raise InputError(f"{path}: the job or a file that it names has changed since; {again}")
+    number = int(which) if which.isdecimal() else named.get(which)
+    if number not in plans:
+        known = ", ".join(map(str, sorted(plans)))
+        raise InputError(
+            f"--pick {which}: expected one of {', '.join(named)}, or a plan of the front: {known}"
+        )
+    return Pick(contour=contour, number=number, run=Run.of_data(plans[number]["run"]))
+
+
+def plan_picked(
+    job_file: Path, pick: Pick, *, refine: bool, progress: Progress = lambda what, done, total: None
+) -> tuple[Part, Outcome]:
+    """Return what comes of the whole job with the contour planned as picked; its part, too.
+
+    With `refine`, the plan is moved off the grid of gamma from there; its criteria then differ.
+    """
+    known = loaded(str(job_file.resolve()), digest(job_file))
+    chosen = {pick.contour: Chosen(run=pick.run, refine=refine)}
+    return known.part, run_job(known.job, known.part, chosen=chosen, progress=progress)
