@@ -6,7 +6,7 @@ from pathlib import Path
 
 from rich.markup import escape
 
-from kerfpath.cli._show import busy, out, print_json, progress_bars, table
+from kerfpath.cli._show import busy, out, print_json, sweep_bar, table
 from kerfpath.job import make_folder, require_folder, warm_up
 from kerfpath.study import robots_entry, which_robots, write_robots
 from kerfpath.study._robots_files import HEADS, MARGIN, NOTE, TEXT_COLUMNS, robots_rows
@@ -35,14 +35,14 @@ def show_robots_for(
         with busy("compiling the kernels, first run only"):
             warm_up()
     make_folder(folder)
-    with progress_bars("robots") as bars:
+    with sweep_bar("robots") as progress:
         found = which_robots(
             job,
             store=folder / "robots.sqlite",
             scheduler=scheduler,
             processes=processes,
             acceleration_ratio=ratio,
-            progress=lambda done, total, _left: bars("robots", done, total),
+            progress=progress,
         )
     written = write_robots(job, found, folder)
     able = any(each.binding and (each.binding.margin or 0.0) >= 1 for each in found)
