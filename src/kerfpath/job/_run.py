@@ -293,8 +293,7 @@ def fastest_speeds(
     tasks = job.tasks(part)
     for i, task in enumerate(tasks):
         progress("contours", i, len(tasks))
-        shaped = task.candidates(part)[0]
-        nodes = task.sample(replace(shaped, speed_share=np.ones(len(shaped))))
+        nodes = task.evenly_fast(part)
         try:
             found: FastestSpeed | NoFeasiblePath = _fastest(job, nodes, cell, refine=refine)
         except NoFeasiblePath as broken:

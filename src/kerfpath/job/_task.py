@@ -87,6 +87,11 @@ class ContourTask:
         drawn = self.drawn(part) if drawn is None else drawn
         return shaped(self.table, drawn, surface)
 
+    def evenly_fast(self, part: Part) -> Contour:
+        """Return the first of its paths, sampled, without shares of the speed."""
+        path = self.candidates(part)[0]
+        return self.sample(replace(path, speed_share=np.ones(len(path))))
+
     def sample(self, contour: Contour) -> Contour:
         """Return the contour sampled as this task says, under the task's name.
 
