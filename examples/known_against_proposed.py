@@ -27,7 +27,7 @@ from functools import partial
 from itertools import product
 from pathlib import Path
 from statistics import median
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -146,25 +146,32 @@ def pose(x: float, z: float, about_y_deg: float) -> Array:
     return np.array([[c, 0, s, x], [0, 1, 0, 0], [-s, 0, c, z], [0, 0, 0, 1]])
 
 
+def setting(task: Task) -> tuple[Contour, dict[str, Any]]:
+    """Return the nodes of a task, and what their layered graph is built by."""
+    arm = robot("abb_irb4600_60_205").with_limits(
+        acceleration=np.radians(ASSUMED_ACCELERATION_DEG_S2), endless=[0, 0, 0, 1, 0, 1]
+    )
+    return sheet(task.spacing), {
+        "robot": arm,
+        "tool": pose(0.15, 0.30, 45),
+        "placement": pose(1.2, task.height, -task.tilt_deg),
+        "frames": task.frames,
+        "gamma_step": np.radians(task.gamma_step_deg),
+        "postures": postures_named("front/up", arm.kinematics),
+    }
+
+
 def runs_of(
     task: Task, factors: Mapping[str, Array], etas: Sequence[Eta]
 ) -> Iterator[tuple[Row, Plan | None]]:
     """Plan a task with every weight vector: known once, proposed with every eta, on one graph."""
-    contour = sheet(task.spacing)
-    arm = robot("abb_irb4600_60_205").with_limits(
-        acceleration=np.radians(ASSUMED_ACCELERATION_DEG_S2), endless=[0, 0, 0, 1, 0, 1]
-    )
-    tool, placement = pose(0.15, 0.30, 45), pose(1.2, task.height, -task.tilt_deg)
-    step, dt = np.radians(task.gamma_step_deg), node_interval(contour, task.speed)
-    build = partial(layered_graph, tool=tool, placement=placement, frames=task.frames)
-    graph = build(
-        contour, arm, gamma_step=step, postures=postures_named("front/up", arm.kinematics)
-    )
-    ask = partial(plan, contour, arm, tool=tool, placement=placement, frames=task.frames)
-    ask = partial(ask, speed=task.speed, gamma_step=step, graph=graph)
+    contour, options = setting(task)
+    graph = layered_graph(contour, **options)
+    velocity, dt = options["robot"].speed_limits()[0], node_interval(contour, task.speed)
+    ask = partial(plan, contour, **options, speed=task.speed, graph=graph)
     for objective, (name, factor), eta in product(OBJECTIVES, factors.items(), (None, *etas)):
         method: Method = "paper" if eta else "known"
-        weights, (eta_v, eta_a) = factor / (arm.speed_limits()[0] * dt), eta or (1.0, 1.0)
+        weights, (eta_v, eta_a) = factor / (velocity * dt), eta or (1.0, 1.0)
         choice = partial(ask, method=method, objective=objective, weights=weights)
         try:
             found = choice(eta_v=eta_v, eta_a=eta_a)
@@ -345,15 +352,15 @@ def readme(tasks: Sequence[Task], rows: Sequence[Row]) -> str:
         both = [(k, n) for k, n in zip(*sides, strict=True) if n["found"] == "yes"]
         shake = [np.sign(float(n[SHAKE]) - float(k[SHAKE])) for k, n in both]
         cells.append(" / ".join(str(shake.count(sign)) for sign in (-1, 0, 1)))
-        compared.append(_line(f"{task.name} ({task})", *cells))
+        compared.append(table_line(f"{task.name} ({task})", *cells))
     for eta in dict.fromkeys((r["eta_v"], r["eta_a"]) for r in rows):
         new = _some(rows, "main", "proposed", *eta)
         counts = (f"{_count(new, column)} of {len(new)}" for column in ("found", "acceptable"))
         spreads = (_spread(new, c) for c in ("peak_velocity", "peak_acceleration", SHAKE))
-        etas.append(_line(*eta, *counts, *spreads))
+        etas.append(table_line(*eta, *counts, *spreads))
     for file, why, places in pairs_of(rows):
         lines = [
-            _line(
+            table_line(
                 rows[k]["technique"], str(i), *(rows[k][column.format(i)] for column in PER_JOINT)
             )
             for k, i in product(places, range(1, 7))
@@ -385,8 +392,17 @@ def _spread(rows: Sequence[Row], column: str) -> str:
     return f"{median(values):.3g} to {max(values):.3g}" if values else "no path"
 
 
-def _line(*cells: str) -> str:
+def table_line(*cells: str) -> str:
+    """Return a line of a table in Markdown."""
     return "| " + " | ".join(cells) + " |"
+
+
+def write_table(path: Path, rows: Sequence[Row]) -> None:
+    """Write every row, those of runs without a plan with empty cells."""
+    with path.open("w", encoding="utf-8", newline="") as file:
+        table = csv.DictWriter(file, max(rows, key=len), restval="", lineterminator="\n")
+        table.writeheader()
+        table.writerows(rows)
 
 
 def main(arguments: Sequence[str] | None = None) -> None:
@@ -404,10 +420,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
             rows.append(row)
             plans.append(found)
     options.out.mkdir(parents=True, exist_ok=True)
-    with (options.out / "table.csv").open("w", encoding="utf-8", newline="") as file:
-        table = csv.DictWriter(file, max(rows, key=len), restval="", lineterminator="\n")
-        table.writeheader()
-        table.writerows(rows)
+    write_table(options.out / "table.csv", rows)
     for pair in pairs_of(rows):
         picture = svg(
             [title(rows[i]) for i in pair.runs], [p for i in pair.runs if (p := plans[i])]

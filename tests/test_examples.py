@@ -1,32 +1,23 @@
 """The example behind the paper's figures 1 and 2: what it writes, and that what is kept agrees."""
 
 import csv
-import importlib.util
 import re
-import sys
 import xml.etree.ElementTree as ET
 from pathlib import Path
 
 import numpy as np
 import pytest
 
+import known_against_proposed as example
+import no_path
+import operations
+
 EXAMPLES = Path(__file__).parent.parent / "examples"
 KEPT = EXAMPLES / "known_against_proposed"
 
 
 @pytest.fixture(scope="module")
-def example():
-    name = "known_against_proposed"
-    spec = importlib.util.spec_from_file_location(name, EXAMPLES / f"{name}.py")
-    module = importlib.util.module_from_spec(spec)
-    sys.modules[name] = module
-    spec.loader.exec_module(module)
-    yield module
-    del sys.modules[name]
-
-
-@pytest.fixture(scope="module")
-def written(example, tmp_path_factory):
+def written(tmp_path_factory):
     folder = tmp_path_factory.mktemp("example")
     example.main(["--quick", "--out", str(folder)])
     return folder
@@ -74,12 +65,12 @@ def test_a_plan_over_a_limit_is_never_called_acceptable(written, place):
             assert max(float(row["peak_velocity"]), float(row["peak_acceleration"])) <= 1.0
 
 
-def test_the_kept_account_states_the_figures_of_the_kept_table(example):
+def test_the_kept_account_states_the_figures_of_the_kept_table():
     kept = (KEPT / "README.md").read_text(encoding="utf-8")
     assert kept == example.readme(example.TASKS, rows_of(KEPT))
 
 
-def test_the_short_answer_of_the_account_is_what_the_table_says(example):
+def test_the_short_answer_of_the_account_is_what_the_table_says():
     said = {
         task.name: [
             "**shows**" in line
@@ -96,13 +87,13 @@ def test_the_short_answer_of_the_account_is_what_the_table_says(example):
     }
 
 
-def test_the_kept_pictures_are_there_and_small(example):
+def test_the_kept_pictures_are_there_and_small():
     named = {f"{pair.file}.svg" for pair in example.pairs_of(rows_of(KEPT))}
     assert named == {f.name for f in KEPT.glob("*.svg")}
     assert all((KEPT / name).stat().st_size < 150_000 for name in named)
 
 
-def test_every_choice_is_planned_by_both_techniques(example):
+def test_every_choice_is_planned_by_both_techniques():
     rows = rows_of(KEPT)
     for task in example.TASKS:
         choices = [
@@ -117,7 +108,7 @@ def test_every_choice_is_planned_by_both_techniques(example):
         assert len(choices[0]) == 2 * len(example.weight_factors())
 
 
-def test_the_sheet_is_closed_flat_and_as_large_as_stated(example):
+def test_the_sheet_is_closed_flat_and_as_large_as_stated():
     contour = example.sheet(0.004)
     size = np.ptp(contour.points, axis=0)
     assert contour.closed
@@ -125,7 +116,7 @@ def test_the_sheet_is_closed_flat_and_as_large_as_stated(example):
     assert size == pytest.approx([0.5, 0.3, 0.0], abs=1e-4)
 
 
-def test_turning_back_is_counted_only_beyond_the_threshold(example):
+def test_turning_back_is_counted_only_beyond_the_threshold():
     x = np.array([0.0, 3.0, 2.0, 5.0, 1.0, 1.5, 0.5, 4.0])
     assert example.reversals(x, 2.0) == 2
     assert example.reversals(x, 0.4) == 6
@@ -133,15 +124,10 @@ def test_turning_back_is_counted_only_beyond_the_threshold(example):
 
 
 def test_the_kept_pictures_of_operations_are_those_of_the_script():
-    spec = importlib.util.spec_from_file_location("operations", EXAMPLES / "operations.py")
-    module = importlib.util.module_from_spec(spec)
-    sys.modules["operations"] = module  # dataclasses look themselves up
-    spec.loader.exec_module(module)
-    del sys.modules["operations"]
-    made = module.pictures()
-    kept = {file.stem: file.read_text(encoding="utf-8") for file in module.FOLDER.glob("*.svg")}
+    made = operations.pictures()
+    kept = {file.stem: file.read_text(encoding="utf-8") for file in operations.FOLDER.glob("*.svg")}
     assert made == kept
-    page = (module.FOLDER.parent / "operations.md").read_text(encoding="utf-8")
+    page = (operations.FOLDER.parent / "operations.md").read_text(encoding="utf-8")
     assert all(f"operations/{name}.svg" in page for name in made)
 
 
@@ -155,10 +141,7 @@ def test_the_example_of_a_whole_part_runs(capsys):
 
 
 def test_no_path_shows_every_way_out(capsys):
-    spec = importlib.util.spec_from_file_location("no_path", EXAMPLES / "no_path.py")
-    module = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(module)
-    module.main()
+    no_path.main()
     said = capsys.readouterr().out
     for words in ("proved: True", "dipped on the grid", "dipped off the grid", "pieces of [32"):
         assert words in said

@@ -15,7 +15,7 @@ from kerfpath.errors import InputError, NoFeasiblePath
 from kerfpath.plans import Plan, Proof, path_cost
 from kerfpath.robots import posture_name
 
-__all__ = ["MeasuredFrame", "placed", "placed_moves", "placement_from_points"]
+__all__ = ["MeasuredFrame", "placed", "placed_moves", "placement_from_points", "xyz_rpy"]
 
 ON_A_LINE = 0.05
 """Points whose spread across their best line is a smaller share of that along it tell no frame."""
@@ -38,19 +38,25 @@ class MeasuredFrame:
     @property
     def xyz_mm(self) -> list[float]:
         """The part's position as a job says it, to 0.1 um."""
-        return [round(float(v), 4) + 0.0 for v in self.T_base_part[:3, 3] * 1e3]
+        return xyz_rpy(self.T_base_part)[0]
 
     @property
     def rpy_deg(self) -> list[float]:
         """Its roll, pitch and yaw as a job says them, to 1e-6 deg."""
-        angles = Rotation.from_matrix(self.T_base_part[:3, :3]).as_euler("xyz", degrees=True)
-        return [round(float(v), 6) + 0.0 for v in angles]
+        return xyz_rpy(self.T_base_part)[1]
 
     def moved_from(self, T_base_part: ArrayLike) -> tuple[float, float]:
         """Return how far the part's origin is (m) from another placement, and how turned (rad)."""
         other = as_pose(T_base_part, "T_base_part")
         turned = Rotation.from_matrix(other[:3, :3].T @ self.T_base_part[:3, :3]).magnitude()
         return float(np.linalg.norm(self.T_base_part[:3, 3] - other[:3, 3])), float(turned)
+
+
+def xyz_rpy(T: Array) -> tuple[list[float], list[float]]:
+    """Return position (mm, to 0.1 um) and roll, pitch, yaw (deg, to 1e-6) of a pose (4, 4) m."""
+    angles = Rotation.from_matrix(T[:3, :3]).as_euler("xyz", degrees=True, suppress_warnings=True)
+    xyz = [round(float(v), 4) + 0.0 for v in T[:3, 3] * 1e3]
+    return xyz, [round(float(v), 6) + 0.0 for v in angles]
 
 
 def placement_from_points(

@@ -16,6 +16,7 @@ from kerfpath.job._files import require_folder as require_folder
 from kerfpath.job._files import require_language as require_language
 from kerfpath.job._files import stale_program as stale_program
 from kerfpath.job._files import write_outcome as write_outcome
+from kerfpath.job._heads import pose as pose
 from kerfpath.job._planfile import PlanFile as PlanFile
 from kerfpath.job._planfile import read_plan_file as read_plan_file
 from kerfpath.job._program_audit import audit_program as audit_program
@@ -34,6 +35,8 @@ from kerfpath.job._run import fastest_speeds as fastest_speeds
 from kerfpath.job._run import run_job as run_job
 from kerfpath.job._run import warm_up as warm_up
 from kerfpath.job._sequencefile import sequence_entry as sequence_entry
+from kerfpath.job._tables import VARIABLES as VARIABLES
+from kerfpath.job._tables import Goal as Goal
 from kerfpath.job._task import ContourTask as ContourTask
 from kerfpath.job._touch_up import Taught as Taught
 from kerfpath.job._touch_up import TouchUp as TouchUp

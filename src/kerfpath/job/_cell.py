@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import replace
+from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
@@ -183,6 +184,13 @@ def _shape(fixture: FixtureTable, folder: Path, deviation: float) -> Shape:
 
 def _read_solid(path: Path, unit: str | None, deviation: float) -> Mesh:
     """Return the solid in an STL file of a unit, or in a STEP file, which says its own."""
+    stamp = path.stat()
+    return _solid_in(path, unit, deviation, (stamp.st_mtime_ns, stamp.st_size))
+
+
+@lru_cache(maxsize=16)
+def _solid_in(path: Path, unit: str | None, deviation: float, _stamp: tuple[int, int]) -> Mesh:
+    """Read a solid; a study that moves the cell asks for the same again and again."""
     if path.suffix.lower() == ".stl":
         assert unit is not None
         return read_stl(path, unit)
@@ -190,5 +198,6 @@ def _read_solid(path: Path, unit: str | None, deviation: float) -> Mesh:
     return Mesh(vertices=vertices, triangles=triangles, deviation=deviation, name=path.name)
 
 
+@lru_cache(maxsize=2)
 def _triangles(part: Part, deviation: float) -> tuple[Array, Ints]:
     return welded(*part.mesh(deviation), SAME)

@@ -20,6 +20,7 @@ from kerfpath.job._tables import (
     AuditTable,
     CellTable,
     JobFile,
+    LayoutTable,
     PlanTable,
     ProgramTable,
     SequenceTable,
@@ -107,6 +108,8 @@ class Job:
         What stands around, as the file says it; without one, collisions are not checked.
     sequence : SequenceTable or None
         How the order and the moves between contours are chosen; without one, neither is.
+    layout : LayoutTable
+        What `kerfpath layout` may move, and how far, as the file says it.
     audit_options : dict
         Keyword arguments of `kerfpath.auditor.checks`, in SI.
     program : ProgramOptions
@@ -127,6 +130,7 @@ class Job:
     interruptions: Literal["none", "fewest"]
     cell: CellTable | None
     sequence: SequenceTable | None
+    layout: LayoutTable
     audit_options: dict[str, Any]
     program: ProgramOptions
     source: dict[str, Any]
@@ -210,6 +214,7 @@ def read_job(path: str | Path) -> Job:
         interruptions=file.plan.interruptions,
         cell=file.cell,
         sequence=file.sequence,
+        layout=file.layout,
         audit_options=audit_options(file.audit),
         program=program_options(file.program, path.stem),
         source=source,

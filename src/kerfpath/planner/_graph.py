@@ -39,13 +39,19 @@ def layered_graph(
     tilt: Tilt | None = None,
     postures: Sequence[int] | None = None,
     comfort: Comfort | None = None,
+    nodes: ArrayLike | None = None,
     progress: Callable[[int], None] | None = None,
 ) -> LayeredGraph:
-    """Return the layered graph that `plan` searches; arguments as there."""
+    """Return the layered graph that `plan` searches; arguments as there.
+
+    With `nodes` (M,) int it has their layers alone, the very ones of the whole graph.
+    """
     H = contour.frames(frames)
     samples = None if tilt is None else tilt.samples()
     if samples is not None and samples.any():
         H = tilted(H[:, None], contour.along[:, None], samples)
+    if nodes is not None:
+        H = H[np.asarray(nodes)]
     T_flange_tip = as_pose(tool, "tool")
     H = np.ascontiguousarray(as_pose(placement, "placement") @ H)
     graph = build(

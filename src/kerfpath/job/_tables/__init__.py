@@ -11,6 +11,9 @@ from kerfpath.job._tables._contour import ContourTable as ContourTable
 from kerfpath.job._tables._job import REPEATED as REPEATED
 from kerfpath.job._tables._job import TABLES as TABLES
 from kerfpath.job._tables._job import JobFile as JobFile
+from kerfpath.job._tables._layout import VARIABLES as VARIABLES
+from kerfpath.job._tables._layout import Goal as Goal
+from kerfpath.job._tables._layout import LayoutTable as LayoutTable
 from kerfpath.job._tables._plan import PlanTable as PlanTable
 from kerfpath.job._tables._program import AuditTable as AuditTable
 from kerfpath.job._tables._program import ProgramTable as ProgramTable

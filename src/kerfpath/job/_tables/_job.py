@@ -18,6 +18,7 @@ from kerfpath.job._tables._cut import (
     PickTable,
     SmoothAxesTable,
 )
+from kerfpath.job._tables._layout import LayoutTable
 from kerfpath.job._tables._part import PartTable
 from kerfpath.job._tables._plan import PlanTable
 from kerfpath.job._tables._program import AuditTable, ProgramTable
@@ -41,6 +42,7 @@ class JobFile(Table):
     cell: CellTable | None = None
     sequence: SequenceTable | None = None
     comfort: ComfortTable = ComfortTable()
+    layout: LayoutTable = LayoutTable()
     audit: AuditTable = AuditTable()
     program: ProgramTable = ProgramTable()
 
@@ -115,6 +117,19 @@ class JobFile(Table):
         return self
 
     @model_validator(mode="after")
+    def _standing_are_fixtures(self) -> JobFile:
+        fixtures = [] if self.cell is None else [fixture.name for fixture in self.cell.fixture]
+        for i, name in enumerate(self.layout.standing):
+            if name not in fixtures:
+                raise fault(
+                    "the name of a fixture",
+                    f'"{name}"',
+                    f"there are {', '.join(fixtures) or 'none'}",
+                    ("layout", "standing", i),
+                )
+        return self
+
+    @model_validator(mode="after")
     def _clearance_is_measured(self) -> JobFile:
         """Refuse a cost of clearance where the planner would not measure it."""
         here, why = ("comfort", "clearance_band_mm"), "with clearance_band_mm"
@@ -155,6 +170,7 @@ TABLES: dict[str, type[BaseModel]] = {
     "cell.pair": PairTable,
     "sequence": SequenceTable,
     "comfort": ComfortTable,
+    "layout": LayoutTable,
     "audit": AuditTable,
     "program": ProgramTable,
 }

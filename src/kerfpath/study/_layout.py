@@ -1,0 +1,206 @@
+"""The best placement: a global search on bounds, then exact searches from the best bound down."""
+
+from __future__ import annotations
+
+import os
+from collections import Counter
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from kerfpath.errors import InputError
+from kerfpath.job import Goal, Job, cell_of_job
+from kerfpath.study._job import digest, loaded
+from kerfpath.study._layout_look import look
+from kerfpath.study._layout_place import DEFAULT_RANGES, Numbers, numbers_of
+from kerfpath.study._layout_search import LEAST_EXACT, MOST_EXACT, Map, Progress, Search, Trial
+from kerfpath.study._layout_subject import middle_of, subjects_of
+from kerfpath.study._layout_worth import Answer
+from kerfpath.sweep import Sweep
+
+__all__ = ["STATUSES", "Layout", "layout"]
+
+STATUSES = ("feasible", "speed", "collision", "unreachable")
+"""What may become of a placement, the best first."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Layout:
+    """What came of looking for the best placement of a job.
+
+    Parameters
+    ----------
+    job : Job
+    goal : {"speed", "margin", "motion"}
+    ranges : mapping of variable to (low, high)
+    tolerance : mapping of variable to float
+        What each variable may be off, either way; empty where nobody asked.
+    seed, evaluations : int
+    tried : tuple of Trial
+        All placements, in order; the first is that of the job.
+    best : Trial or None
+        The best one, unless none is feasible.
+    before, after : mapping
+        What the job's placement and the best one are worth, contour by contour.
+    proved : bool
+        Whether no other of those tried is better.
+    open_bound : float or None
+        What the others can come to at best, where it is not proved.
+    numbers : Numbers
+        What the best placement changes in the job.
+    map : Map or None
+    """
+
+    job: Job
+    goal: Goal
+    ranges: Mapping[str, tuple[float, float]]
+    tolerance: Mapping[str, float]
+    seed: int
+    evaluations: int
+    tried: tuple[Trial, ...]
+    best: Trial | None
+    before: Answer
+    after: Answer
+    proved: bool
+    open_bound: float | None
+    numbers: Numbers
+    map: Map | None
+
+    @property
+    def statuses(self) -> dict[str, int]:
+        """How many placements are feasible, and how many not for which reason."""
+        found = Counter(trial.answer["status"] for trial in self.tried)
+        return {status: found[status] for status in STATUSES if found[status]}
+
+    @property
+    def stages(self) -> dict[str, int]:
+        """How many placements each test decided."""
+        found = Counter(trial.answer["stage"] for trial in self.tried)
+        return {stage: found[stage] for stage in ("reach", "stretch", "exact")}
+
+    @property
+    def nearest(self) -> Trial:
+        """The placement that came nearest to being feasible."""
+        return max(self.tried, key=lambda trial: float(trial.answer.get("progress", np.inf)))
+
+
+def layout(
+    job: str | os.PathLike[str],
+    *,
+    store: str | os.PathLike[str],
+    goal: Goal | None = None,
+    ranges: Mapping[str, tuple[float, float]] | None = None,
+    evaluations: int | None = None,
+    seed: int | None = None,
+    tolerance_mm: float | None = None,
+    tolerance_deg: float | None = None,
+    map_points: int | None = None,
+    scheduler: str | None = None,
+    processes: int | None = None,
+    progress: Progress = lambda what, done, total: None,
+) -> Layout:
+    """Return the best placement that is found in the ranges, never worse than the job's own.
+
+    Differential evolution (Storn and Price, J. Global Optim. 11, 1997) goes by the bounds of
+    `look`; then the exact search takes the placements tried by their bounds, the best first, until
+    the best value is at least the next bound: no other of those tried is better then. Where an
+    exact search shows a stretch that binds and was not in the bound, the bounds are found again
+    with it. The same seed gives the same answer, whatever the number of processes.
+
+    Parameters
+    ----------
+    job : path
+        The job file; what is not given here is as its [layout] says.
+    store : path
+        Keeps what was found: the same call goes on where it was stopped.
+    goal : {"speed", "margin", "motion"}, optional
+        The fastest speed of the slowest contour; the least share of a fastest speed and the speed
+        asked for; or the total displacement of the best motions, at the speeds asked for.
+    ranges : mapping of variable to (low, high), optional
+        What varies; default: the ranges of [layout], or else `DEFAULT_RANGES`.
+    evaluations : int, optional
+        Placements that are looked at.
+    seed : int, optional
+    tolerance_mm, tolerance_deg : float, optional
+        By how much each variable may be off: the worst of its two ends counts, one at a time.
+    map_points : int, optional
+        Points of the map along each of two variables; 0: no map.
+    scheduler, processes
+        As in `kerfpath.sweep.run`.
+    progress : callable, optional
+        Called with what is being done, how much of it is done, and how much there is.
+
+    Raises
+    ------
+    InputError
+        As `read_job`, `cell_of_job` and `kerfpath.sweep.run`; numbers out of range.
+    """
+    path, then = str(Path(job).resolve()), digest(Path(job).resolve())
+    at = loaded(path, then)
+    cell_of_job(at.job, at.part)  # what is wrong with it is told once, not by every placement
+    table = at.job.layout.model_copy(
+        update={
+            name: value
+            for name, value in {
+                "goal": goal,
+                "evaluations": evaluations,
+                "seed": seed,
+                "tolerance_mm": tolerance_mm,
+                "tolerance_deg": tolerance_deg,
+                "map_points": map_points,
+            }.items()
+            if value is not None
+        }
+    )
+    _require(table)
+    spans = dict(ranges or table.ranges or DEFAULT_RANGES)
+    allowed = {"mm": table.tolerance_mm, "deg": table.tolerance_deg}
+    tolerance = {name: allowed[name.rpartition("_")[2]] for name in spans}
+    tolerance = {name: size for name, size in tolerance.items() if size}
+    with Sweep(look, store=store, scheduler=scheduler, processes=processes) as sweep:
+        search = Search(
+            sweep=sweep,
+            task={"job": path, "digest": then, "goal": table.goal},
+            ranges=spans,
+            tolerance=tolerance,
+            most=max(LEAST_EXACT, int(MOST_EXACT * table.evaluations)),
+            progress=progress,
+        )
+        before = search.first()
+        search.evolve(table.evaluations, table.seed)
+        proved, open_bound = search.climb()
+        best = search.best
+        after = search.whole(best) if best is not None else {}
+        drawn = search.map(best or search.trials[0], table.map_points) if table.map_points else None
+    numbers: Numbers = {}
+    if best is not None:
+        middle = middle_of(at.job, subjects_of(path, then, table.goal))
+        numbers = numbers_of(at.job, best.offsets, middle)
+    return Layout(
+        job=at.job,
+        goal=table.goal,
+        ranges=spans,
+        tolerance=tolerance,
+        seed=table.seed,
+        evaluations=table.evaluations,
+        tried=tuple(search.trials),
+        best=best,
+        before=before,
+        after=after,
+        proved=proved,
+        open_bound=open_bound,
+        numbers=numbers,
+        map=drawn,
+    )
+
+
+def _require(table: Any) -> None:
+    """Raise InputError where what was given in place of [layout] is out of range."""
+    for name, low in {
+        "evaluations": 8, "seed": 0, "tolerance_mm": 0, "tolerance_deg": 0, "map_points": 0,
+    }.items():  # fmt: skip
+        if not (value := getattr(table, name)) >= low:
+            raise InputError(f"{name}: expected at least {low}, got {value:g}")

@@ -1,0 +1,172 @@
+"""A placement: offsets of the part, the robot's base or the head, and the job that has them."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import tomlkit
+from scipy.spatial.transform import Rotation
+
+from kerfpath._arrays import Array
+from kerfpath.errors import InputError
+from kerfpath.job import VARIABLES, Job, pose
+from kerfpath.placement import xyz_rpy
+
+__all__ = ["DEFAULT_RANGES", "Numbers", "moved", "numbers_of", "placed_text", "ranges_of"]
+
+Numbers = dict[tuple[str | int, ...], list[float]]
+"""What a placement changes in a job file: values by the keys that lead to them."""
+
+DEFAULT_RANGES = {"x_mm": (-200.0, 200.0), "y_mm": (-200.0, 200.0), "yaw_deg": (-30.0, 30.0)}
+"""What varies where nobody says."""
+
+
+def ranges_of(texts: Sequence[str]) -> dict[str, tuple[float, float]]:
+    """Return the ranges that texts as "x_mm=-200:200" say.
+
+    Raises
+    ------
+    InputError
+        An unknown variable, one that comes twice, no numbers, a reversed or empty range.
+    """
+    found: dict[str, tuple[float, float]] = {}
+    for text in texts:
+        name, _, span = text.partition("=")
+        low, _, high = span.partition(":")
+        name = name.strip()
+        if name not in VARIABLES:
+            raise InputError(f"vary: no variable {name!r}; there are {', '.join(VARIABLES)}")
+        try:
+            ends = float(low), float(high)
+        except ValueError:
+            raise InputError(
+                f'vary: expected {name}=LOW:HIGH, as "{name}=-200:200", got {text!r}'
+            ) from None
+        if not (np.isfinite(ends).all() and ends[0] < ends[1]):
+            raise InputError(f"vary: expected {name} from low to high, got {text!r}; turn it round")
+        if name in found:
+            raise InputError(f"vary: {name} comes twice; keep one")
+        found[name] = ends
+    return found
+
+
+def numbers_of(job: Job, offsets: Mapping[str, float], middle: Array) -> Numbers:
+    """Return what a job file has to say so that everything is where the offsets put it.
+
+    The part is tilted about the base's x, then y, turned about its z, all through `middle`, and
+    then shifted; fixtures go with it but for the standing ones. A robot whose base moves by B sees
+    all else moved by inv(B). The head turns about the flange's z. Numbers are rounded as a file has
+    them, so that the job of the file is the very one that was looked at. Offsets of zero change
+    nothing.
+
+    Parameters
+    ----------
+    job : Job
+    offsets : mapping of variable to float
+        In the units of the variables' names; 0 where one is left out.
+    middle : (3,) m
+        In the robot base.
+    """
+    unknown = set(offsets) - set(VARIABLES)
+    assert not unknown, unknown
+    part, base, turn = _motions({name: offsets.get(name, 0.0) for name in VARIABLES}, middle)
+    numbers: Numbers = {}
+
+    def put(where: tuple[str | int, ...], T: Array, motion: Array) -> None:
+        if not np.array_equal(motion, np.eye(4)):
+            numbers[*where, "xyz_mm"], numbers[*where, "rpy_deg"] = xyz_rpy(motion @ T)
+
+    put(("part",), job.placement, base @ part)
+    put(("tool",), job.tool, turn)
+    if job.cell is not None:
+        for i, fixture in enumerate(job.cell.fixture):
+            stands = fixture.name in job.layout.standing
+            T = pose(fixture.xyz_mm, fixture.rpy_deg)
+            put(("cell", "fixture", i), T, base if stands else base @ part)
+        head = job.cell.head
+        if head.file is not None:
+            put(("cell", "head"), pose(head.xyz_mm or (0, 0, 0), head.rpy_deg or (0, 0, 0)), turn)
+    return numbers
+
+
+def _motions(offsets: Mapping[str, float], middle: Array) -> tuple[Array, Array, Array]:
+    """Return how the part moves, how all moves against the base, and how the head turns."""
+
+    def turned(*names: str) -> Array:
+        T = np.eye(4)
+        angles = [offsets[name] if name else 0.0 for name in names]
+        if any(angles):
+            T[:3, :3] = Rotation.from_euler("xyz", angles, degrees=True).as_matrix()
+        return T
+
+    part = turned("tilt_x_deg", "tilt_y_deg", "yaw_deg")
+    shift = np.array([offsets["x_mm"], offsets["y_mm"], offsets["z_mm"]]) / 1000
+    if not np.array_equal(part, np.eye(4)):
+        shift = shift + middle - part[:3, :3] @ middle
+    part[:3, 3] = shift
+    base = turned("", "", "base_yaw_deg")
+    base[:3, 3] = np.array([offsets[f"base_{axis}_mm"] for axis in "xyz"]) / 1000
+    return part, np.asarray(np.linalg.inv(base)), turned("", "", "mount_deg")
+
+
+def moved(job: Job, numbers: Numbers) -> Job:
+    """Return the job with other numbers, as if its file had them."""
+
+    def at(*where: str | int) -> Array | None:
+        found = numbers.get((*where, "xyz_mm"))
+        return None if found is None else pose(found, numbers[*where, "rpy_deg"])
+
+    part, tool, cell = at("part"), at("tool"), job.cell
+    if cell is not None:
+        tables: dict[str, Any] = {"head": cell.head.model_copy(update=_of(numbers, "cell", "head"))}
+        tables["fixture"] = tuple(
+            fixture.model_copy(update=_of(numbers, "cell", "fixture", i))
+            for i, fixture in enumerate(cell.fixture)
+        )
+        cell = cell.model_copy(update=tables)
+    return replace(
+        job,
+        placement=job.placement if part is None else part,
+        tool=job.tool if tool is None else tool,
+        cell=cell,
+    )
+
+
+def _of(numbers: Numbers, *where: str | int) -> dict[str, tuple[float, ...]]:
+    """Return the new numbers of one table by their keys."""
+    return {
+        str(keys[-1]): tuple(value) for keys, value in numbers.items() if keys[:-1] == (*where,)
+    }
+
+
+def placed_text(job: Job, numbers: Numbers, folder: Path, remark: str) -> str:
+    """Return the text of the job's file with other numbers, its comments kept, for `folder`.
+
+    Files are named relative to `folder`; `remark` becomes the first comment.
+    """
+    file = tomlkit.parse(job.path.read_text(encoding="utf-8-sig"))
+    for where, value in numbers.items():
+        table: Any = file
+        for step in where[:-1]:
+            table = table[step]
+        if where[0] == "tool":
+            table.pop("head", None)
+        table[where[-1]] = value
+    for table, name in _named_files(file):
+        table[name] = os.path.relpath(job.path.parent / str(table[name]), folder)
+    return f"# {remark}\n{tomlkit.dumps(file)}"
+
+
+def _named_files(file: Any) -> list[tuple[Any, str]]:
+    """Return every key of a job that names a file or folder, with its table."""
+    cell, robot = file.get("cell", {}), file["robot"]
+    tables = [file["part"], cell.get("head", {}), *cell.get("fixture", [])]
+    packages = robot.get("packages", {})
+    found = [(table, "file") for table in tables if "file" in table]
+    found += [(robot, "urdf")] if "urdf" in robot else []
+    return found + [(packages, name) for name in packages]

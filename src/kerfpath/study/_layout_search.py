@@ -1,0 +1,303 @@
+"""The search for the best placement: bounds lead it, exact searches end it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+from scipy.optimize import Bounds, differential_evolution
+from scipy.stats import qmc
+
+from kerfpath._arrays import Array
+from kerfpath.errors import InputError
+from kerfpath.study._layout_worth import SLACK, Answer, beats
+from kerfpath.sweep import Sweep
+
+__all__ = ["LEAST_EXACT", "MOST_EXACT", "Map", "Progress", "Search", "Trial"]
+
+Progress = Callable[[str, int, int], None]
+"""Called with what is being done, how much of it is done, and how much there is."""
+
+PER_VARIABLE = 4
+"""Placements of a generation for each variable."""
+AT_ONCE = 4
+"""Placements that are solved exactly at once, however many processes there are."""
+MOST_EXACT = 0.25
+"""Share of the evaluations that may be solved exactly."""
+LEAST_EXACT = 16
+"""Exact searches that there may be at least."""
+HALF = 24
+"""Nodes to each side of a node that binds, which make a stretch with it."""
+CLOSE = 1.3
+"""Contours up to this much faster than the slowest give stretches, too."""
+
+
+@dataclass(slots=True, kw_only=True, eq=False)
+class Trial:
+    """A placement that was looked at.
+
+    Parameters
+    ----------
+    offsets : mapping of variable to float
+        In the units of the variables' names.
+    answer : mapping
+        What is known of it, see `look`.
+    stretches : int
+        How many stretches its bound was found with.
+    searched : bool
+        Whether it was asked for its exact value.
+    """
+
+    offsets: Mapping[str, float]
+    answer: Answer = field(default_factory=dict)
+    stretches: int = 0
+    searched: bool = False
+
+    @property
+    def feasible(self) -> bool:
+        """Whether nothing forbids it, as far as is known."""
+        return bool(self.answer["status"] == "feasible")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Map:
+    """Bounds over the first two variables, the others as in the best placement.
+
+    Parameters
+    ----------
+    x, y : (m,)
+        Values of the first variable and of the second; `y` is empty where there is only one.
+    answers : tuple of mapping
+        Row by row of y.
+    """
+
+    x: Array
+    y: Array
+    answers: tuple[Answer, ...]
+
+
+@dataclass(kw_only=True, eq=False)
+class Search:
+    """The placements tried, and what is asked of them next."""
+
+    sweep: Sweep
+    task: Mapping[str, str]
+    ranges: Mapping[str, tuple[float, float]]
+    tolerance: Mapping[str, float]
+    most: int
+    progress: Progress
+    stretches: list[list[int]] = field(default_factory=list)
+    best: Trial | None = None
+    exact: int = 0
+    known: dict[tuple[float, ...], Trial] = field(default_factory=dict)
+
+    @property
+    def goal(self) -> str:
+        return self.task["goal"]
+
+    @property
+    def trials(self) -> list[Trial]:
+        return list(self.known.values())
+
+    @property
+    def floor(self) -> float | None:
+        return None if self.best is None else self.best.answer["value"]
+
+    def first(self) -> Answer:
+        """Look at the job's own placement, whole."""
+        self.progress("the job's own placement", 0, 1)
+        trial = self._trial(np.zeros(len(self.ranges)))
+        trial.searched, trial.answer = True, self.whole(trial)
+        self.progress("the job's own placement", 1, 1)
+        self._take(trial)
+        return trial.answer
+
+    def whole(self, trial: Trial) -> Answer:
+        """Return what a placement is worth, every contour solved to its own optimum."""
+        return self._asked([trial.offsets], exact=True, whole=True)[0]
+
+    def evolve(self, evaluations: int, seed: int) -> None:
+        """Let the bounds lead differential evolution through the ranges."""
+        low, high = np.array(list(self.ranges.values())).T
+        size = 2 ** int(np.ceil(np.log2(PER_VARIABLE * len(low))))
+        size = max(5, min(max(size, 8), evaluations // 2))
+        drawn = qmc.Sobol(len(low), rng=seed).random_base2(int(np.ceil(np.log2(size))))[:size]
+        points = low + drawn * (high - low)
+        if (low <= 0).all() and (high >= 0).all():
+            points[0] = 0.0
+        generations = max(0, evaluations // size - 1)
+        total, begun = size * (generations + 1), 0
+
+        def energies(points: Array, /) -> Array:
+            nonlocal begun
+            trials = [self._trial(point) for point in points.T]
+            self.look_at(
+                [trial for trial in trials if not trial.answer],
+                told=lambda done: self.progress("placements", min(begun + done, total), total),
+            )
+            begun += len(trials)
+            self.progress("placements", min(begun, total), total)
+            return np.array([self._energy(trial) for trial in trials])
+
+        energies(points.T)
+        if self.best is None:
+            self.climb(until_found=True)  # bounds need a placement that shows what binds
+            self._refresh(self.trials)
+        begun = 0
+        differential_evolution(
+            energies,  # type: ignore[arg-type]  # the stubs know of vectorized=False alone
+            Bounds(low, high),
+            init=points,
+            maxiter=generations,
+            rng=seed,
+            vectorized=True,
+            updating="deferred",
+            polish=False,
+            tol=0,
+            atol=-1,
+        )
+
+    def climb(self, *, until_found: bool = False) -> tuple[bool, float | None]:
+        """Solve placements exactly, the best bound first, until none can beat the best.
+
+        Returns whether that was so, or what the others could still come to.
+        """
+        while True:
+            open_ = [t for t in self.trials if not t.searched and self._may_win(t)]
+            if not open_ or (until_found and self.best is not None):
+                return not open_, None
+            open_.sort(key=self._energy)
+            if self.exact >= self.most:
+                return False, open_[0].answer["bound"]
+            batch = open_[:AT_ONCE]
+            if self._refresh(batch):
+                continue
+            self.progress("exact searches", self.exact, self.exact + len(open_))
+            answers = self._asked([t.offsets for t in batch], exact=True, floor=self.floor)
+            self.exact += len(batch)
+            for trial, answer in zip(batch, answers, strict=True):
+                trial.searched, trial.answer = True, answer
+                self._take(trial)
+            self.progress("exact searches", self.exact, self.exact + len(open_) - len(batch))
+
+    def map(self, trial: Trial, points: int) -> Map:
+        """Return the bounds over the first two variables about a placement."""
+        names = list(self.ranges)[:2]
+        axes = [np.linspace(*self.ranges[name], points) for name in names]
+        grid = np.array(np.meshgrid(*axes)).reshape(len(names), -1).T
+        asked = [{**trial.offsets, **self._named(names, point)} for point in grid]
+        answers = self._asked(asked, told=lambda done: self.progress("map", done, len(asked)))
+        y = axes[1] if len(axes) > 1 else np.zeros(0)
+        return Map(x=axes[0], y=y, answers=tuple(answers))
+
+    def look_at(self, trials: Sequence[Trial], told: Callable[[int], None]) -> None:
+        """Find the bounds of placements."""
+        answers = self._asked([trial.offsets for trial in trials], told=told)
+        for trial, answer in zip(trials, answers, strict=True):
+            trial.answer, trial.stretches = answer, len(self.stretches)
+
+    def _refresh(self, trials: Sequence[Trial]) -> bool:
+        """Find bounds again that were found with fewer stretches; return whether there were any."""
+        stale = [
+            t for t in trials
+            if not t.searched and t.feasible and t.stretches < len(self.stretches)
+        ]  # fmt: skip
+        self.look_at(stale, told=lambda done: None)
+        return bool(stale)
+
+    def _take(self, trial: Trial) -> None:
+        """Learn from an exact search: the best placement, and the stretches that bind."""
+        answer = trial.answer
+        value = answer["value"]
+        if trial.feasible and value is not None and beats(self.goal, value, self.floor):
+            self.best = trial
+        bound = [entry for entry in answer["contours"] if "node" in entry]
+        if bound:
+            limit = CLOSE * min(entry["value"] for entry in bound)
+            bound = [entry for entry in bound if entry["value"] <= limit]
+        if answer.get("index") is not None and answer["status"] != "unreachable":
+            bound.append(answer)
+        for entry in bound:
+            self._add_stretch(entry["index"], entry["node"], entry["nodes"])
+
+    def _add_stretch(self, contour: int, node: int, nodes: int) -> None:
+        """Add the stretch about a node, unless one holds it well inside."""
+        first, last = max(0, node - HALF), min(nodes - 1, node + HALF)
+        for c, begin, end in self.stretches:
+            near = max(begin, first) <= node - HALF // 2 or begin == 0
+            far = min(end, last) >= node + HALF // 2 or end == nodes - 1
+            if c == contour and begin <= node <= end and near and far:
+                return
+        if last - first > 1:
+            self.stretches.append([contour, first, last])
+
+    def _asked(
+        self,
+        offsets: Sequence[Mapping[str, float]],
+        *,
+        exact: bool = False,
+        whole: bool = False,
+        floor: float | None = None,
+        told: Callable[[int], None] = lambda done: None,
+    ) -> list[Answer]:
+        """Return what placements are worth."""
+        keys = [
+            self.sweep.submit(
+                **self.task,
+                places=self._places(at),
+                stretches=self.stretches,
+                exact=exact,
+                whole=whole,
+                floor=floor,
+            )
+            for at in offsets
+        ]
+        answers = []
+        for key in keys:
+            result = self.sweep.result(key)
+            if result.failure is not None:
+                failure = result.failure
+                kind = "" if failure.kind == "InputError" else f"{failure.kind}: "
+                raise InputError(f"a placement could not be looked at: {kind}{failure.message}")
+            answers.append(result.value)
+            told(len(answers))
+        return answers
+
+    def _places(self, offsets: Mapping[str, float]) -> list[dict[str, float]]:
+        """Return a placement, and those at the ends of what each variable may be off."""
+        ends = [
+            {**offsets, name: offsets[name] + side * size}
+            for name, size in self.tolerance.items()
+            for side in (-1, 1)
+        ]
+        return [dict(offsets), *ends]
+
+    def _trial(self, point: Array) -> Trial:
+        """Return the placement at a point, the same one for the same numbers."""
+        offsets = self._named(list(self.ranges), point)
+        return self.known.setdefault(tuple(offsets.values()), Trial(offsets=offsets))
+
+    @staticmethod
+    def _named(names: Sequence[str], point: Array) -> dict[str, float]:
+        """Return offsets by name, to 0.01 mm and 0.001 deg."""
+        digits = [2 if name.endswith("_mm") else 3 for name in names]
+        return {n: round(float(v), d) + 0.0 for n, v, d in zip(names, point, digits, strict=True)}
+
+    def _may_win(self, trial: Trial) -> bool:
+        if not trial.feasible:
+            return False
+        bound = trial.answer["bound"]
+        if bound is None or self.floor is None:
+            return True
+        eased = bound * (1 - SLACK) if self.goal == "motion" else bound * (1 + SLACK)
+        return beats(self.goal, eased, self.floor)
+
+    def _energy(self, trial: Trial) -> float:
+        """Return what evolution makes small: any feasible placement below every other."""
+        answer = trial.answer
+        if not trial.feasible:
+            return 10.0 - float(answer["progress"])
+        if answer["bound"] is None:
+            return 0.0
+        return -1 / float(answer["bound"]) if self.goal == "motion" else -float(answer["bound"])
