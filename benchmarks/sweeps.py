@@ -36,7 +36,7 @@ by two such processes or workers; of 2000 the second half is measured, when all 
 of a task in its worker, a mean. Overhead: two workers times the wall clock of that half, less the
 own times of its tasks, over their number: what workers wait and the engine takes. Kept: what the
 store holds for each. Sleepers: 200 threads of four Dask workers whose tasks sleep and return 0.5
-kB, so that the scheduler, the caller and its store are what limits; over the last three quarters."""
+kB: the scheduler, the caller and its store are what limits. Over the last three quarters."""
 
 WORKERS = 2
 NODES = 31
