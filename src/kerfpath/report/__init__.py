@@ -7,6 +7,7 @@ from kerfpath.report._html import with_library, without_library
 from kerfpath.report._map import feasibility_map
 from kerfpath.report._page import render
 from kerfpath.report._section import ContourSection
+from kerfpath.report._table_page import render_table
 
 __all__ = [
     "ContourSection",
@@ -17,6 +18,7 @@ __all__ = [
     "render",
     "render_drawing",
     "render_front",
+    "render_table",
     "with_library",
     "without_library",
 ]
