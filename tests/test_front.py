@@ -62,7 +62,7 @@ def test_the_values_are_those_of_the_plans(found):
                 np.ptp(at, axis=0)[5],
                 np.abs(made.acceleration_share).max(),
             ],
-            rtol=1e-12,
+            rtol=1e-11,  # 12 digits count
         )
 
 
@@ -378,7 +378,8 @@ def test_more_clearance_is_asked_for_and_found(task, tool, placement):
     for run, chosen, (_, clearance) in zip(made.runs, made.plans, made.values, strict=True):
         apart = room.distances(chosen.q).min(axis=0) - room.required
         named = zip(room.pair_names, apart, strict=True)
-        assert clearance == min(far for names, far in named if "post" in names)
+        near = min(far for names, far in named if "post" in names)
+        assert clearance == pytest.approx(near, rel=1e-11)  # 12 digits count
         assert clearance > run.clearance
         assert len(run.cell(room).pairs) == len(room.pairs)
 

@@ -32,6 +32,8 @@ TOGETHER = {
     "clearance": "m",
 }
 """Criteria of all joints together, and their units."""
+DIGITS = 12
+"""Of a criterion that count."""
 MORE = ("speed", "clearance", *MEASURES)
 """Criteria that are better the more they are."""
 
@@ -82,8 +84,12 @@ class Judge:
     home: Array | None
 
     def losses(self, plan: Plan) -> Array:
-        """Return the criteria (C,) of a plan, with signs by which less is better."""
-        return freeze(np.array([c.sense * self._value(c, plan) for c in self.criteria]))
+        """Return the criteria (C,) of a plan, with signs by which less is better.
+
+        To so many digits that the same motion found twice, its sums rounded otherwise, is one.
+        """
+        values = [c.sense * self._value(c, plan) for c in self.criteria]
+        return freeze(np.array([float(f"{value:.{DIGITS}g}") for value in values]))
 
     def _value(self, criterion: Criterion, plan: Plan) -> float:
         found, kind = plan.criteria, criterion.kind
