@@ -238,7 +238,7 @@ def test_a_job_that_changes_meanwhile_ends_the_batch(tmp_path):
     assert not (out / "good").exists()
 
 
-def test_workers_need_the_job_folder_alone_and_another_copy_there_is_refused(
+def test_workers_of_a_cluster_need_the_job_folder_alone_and_that_they_need(
     workers, scheduler, tmp_path
 ):
     workers(1)
@@ -248,3 +248,11 @@ def test_workers_need_the_job_folder_alone_and_another_copy_there_is_refused(
     (row,) = batch([shared / "good.toml"], out, scheduler=scheduler)
     assert row.passed
     assert {path.name for path in row.folder.iterdir()} == FILES
+    (other,) = write_jobs(shared, {"other": JOB})
+
+    def lost(done, total, left):
+        (shared / other).unlink()
+
+    with pytest.raises(InputError, match="every worker needs job and files at the same path"):
+        batch([shared / other], out, scheduler=scheduler, progress=lost)
+    assert not (out / "other").exists()
