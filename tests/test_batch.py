@@ -1,9 +1,11 @@
 """Batches: a row for each job whatever comes of it, nothing planned twice, files as of a plan."""
 
+import errno
 import json
 import shutil
 import sqlite3
 from contextlib import closing
+from pathlib import Path
 
 import pytest
 
@@ -218,6 +220,25 @@ def test_bad_input_of_the_command_is_one_line(tmp_path, monkeypatch, idle):
         store.execute("UPDATE package SET version = '0.0.9'")
         store.commit()
     assert "a store of kerfpath 0.0.9, this is" in said("good.toml")
+
+
+def test_a_full_disk_under_the_files_is_one_line_and_the_same_command_goes_on(
+    done, idle, monkeypatch
+):
+    folder, command, told = done
+    plan = folder / "out" / "good" / "plan.json"
+    plan.unlink()
+
+    def full(*_):
+        raise OSError(errno.ENOSPC, "No space left on device")
+
+    with monkeypatch.context() as patch:
+        patch.setattr(Path, "write_bytes", full)
+        result = run(*command, cwd=folder)
+    refused(result, "plan.json", "No space left on device")
+    assert not plan.exists()
+    assert json.loads(run(*command, cwd=folder).stdout) == told
+    assert plan.exists()
 
 
 def test_no_jobs_at_all_is_bad_input(tmp_path):
