@@ -148,7 +148,7 @@ def _nsga(
 ) -> tuple[str, ...]:
     """Take the time of NSGA-II, and return its row: the same first runs, box and budget as ours."""
     robot, graph, speed = options["robot"], options["graph"], options["speed"]
-    judge = judge_of(criteria, robot, eta_v=1.0, eta_a=1.0, cell=None, home=None)
+    judge = judge_of(criteria, robot, eta_v=1.0, eta_a=1.0, cell=None, comfort=None, home=None)
     shared = {k: options[k] for k in ("tool", "placement", "speed", "gamma_step", "frames")}
     attempts = Attempts(contour=nodes, robot=robot, graph=graph, cell=None, options=shared)
     dt = node_interval(nodes, speed)

@@ -278,7 +278,7 @@ def picture(rows: Sequence[Row]) -> str:
     for j, (share, pair) in enumerate(columns):
         x = LEFT + j * WIDE
         if pair == PAIRS[0]:
-            words = f"at {float(share):.0%} of the fastest speed"
+            words = f"at {float(share) * 100:g} % of the fastest speed"
             out.append(f"<text x='{x}' y='22' font-size='16'>{words}</text>")
         out.append(f"<text x='{x}' y='44' fill='#5b6675'>up: {CRITERIA[pair[1]]}</text>")
         for i, task in enumerate(tasks):
@@ -346,7 +346,7 @@ def readme(rows: Sequence[Row]) -> str:
     """Return the account of the experiment; every number in it comes from the rows."""
     cases = {case: judged(sides) for case, sides in cases_of(rows).items()}
     speeds = {(row["task"], row["share"]): float(row["speed_m_min"]) for row in rows}
-    names = {case: f"{case[0]} {float(case[1]):.0%}" for case in cases}
+    names = {case: f"{case[0]} {float(case[1]) * 100:g} %" for case in cases}
     claims = [
         table_line("claim", "shows in", *names.values()),
         table_line(*["---"] * (2 + len(cases))),

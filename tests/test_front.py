@@ -11,6 +11,7 @@ import pytest
 from kerfpath import Contour, InputError, NoFeasiblePath, audit, fastest_speed, pareto, plan
 from kerfpath.air import least_time
 from kerfpath.cell import Mesh, box_between, cell_of
+from kerfpath.comfort import Band, Comfort
 from kerfpath.front import Run, hypervolume
 from kerfpath.front._runs import grid, whole, within
 from kerfpath.planner import layered_graph
@@ -61,7 +62,7 @@ def test_the_values_are_those_of_the_plans(found):
                 np.ptp(at, axis=0)[5],
                 np.abs(made.acceleration_share).max(),
             ],
-            rtol=1e-12,
+            rtol=1e-11,  # 12 digits count
         )
 
 
@@ -375,5 +376,20 @@ def test_more_clearance_is_asked_for_and_found(task, tool, placement):
     assert len(made.plans) > 1
     assert made.runs[-1].clearance > 0
     for run, chosen, (_, clearance) in zip(made.runs, made.plans, made.values, strict=True):
-        assert clearance == room.clearance(chosen.q)[0].min()
+        apart = room.distances(chosen.q).min(axis=0) - room.required
+        named = zip(room.pair_names, apart, strict=True)
+        near = min(far for names, far in named if "post" in names)
+        assert clearance == pytest.approx(near, rel=1e-11)  # 12 digits count
         assert clearance > run.clearance
+        assert len(run.cell(room).pairs) == len(room.pairs)
+
+
+def test_clearance_is_one_thing_or_the_other(task, tool, placement):
+    where = {"tool": tool, "placement": placement, "part": None, "near_miss": 2e-3}
+    comfort = Comfort(clearance=Band(width=0.02, cost=1.0))
+    room = cell_of(task["robot"], fixtures={"post": box_between([2, 2, 0], [2.1, 2.1, 1])}, **where)
+    options = task | {"criteria": ["clearance"]}
+    with pytest.raises(InputError, match="a cost of comfort already"):
+        pareto(**options, cell=room, comfort=comfort)
+    with pytest.raises(InputError, match="needs a part or fixtures in the cell"):
+        pareto(**options, cell=cell_of(task["robot"], fixtures={}, **where))

@@ -2,6 +2,7 @@
 
 import json
 import shutil
+import signal
 import sqlite3
 import subprocess
 import sys
@@ -127,6 +128,28 @@ def _done(store):
     """Look at a store that a sweep holds: its log tells how far it is."""
     log = Path(f"{store}-wal")
     return log.stat().st_size // 4096 if log.exists() else 0
+
+
+def test_a_cluster_comes_to_the_same_though_a_worker_is_killed(
+    job, studied, scheduler, workers, tmp_path
+):
+    first, _ = workers(2)
+
+    def kill(done, total, left):
+        if done >= 4:
+            first.kill()
+
+    found = pareto_of_job(
+        job,
+        store=tmp_path / "s",
+        criteria=CRITERIA,
+        runs=24,
+        scheduler=scheduler,
+        progress=kill,
+    )
+    assert first.wait() == -signal.SIGKILL
+    assert rows(tmp_path / "s") == (24, 24)
+    np.testing.assert_array_equal(found.front.values, studied.front.values)
 
 
 def test_a_plan_that_is_picked_has_the_criteria_of_the_front(job, studied, tmp_path):

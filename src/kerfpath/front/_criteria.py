@@ -12,8 +12,9 @@ from numpy.typing import ArrayLike
 from kerfpath._arrays import Array, floats, freeze
 from kerfpath.air import least_time
 from kerfpath.cell import Cell
-from kerfpath.comfort import MEASURES
+from kerfpath.comfort import MEASURES, Comfort
 from kerfpath.errors import InputError
+from kerfpath.front._clearance import clearance, counted
 from kerfpath.plans import Plan
 from kerfpath.robots import Robot
 
@@ -31,6 +32,8 @@ TOGETHER = {
     "clearance": "m",
 }
 """Criteria of all joints together, and their units."""
+DIGITS = 12
+"""Of a criterion that count."""
 MORE = ("speed", "clearance", *MEASURES)
 """Criteria that are better the more they are."""
 
@@ -81,8 +84,12 @@ class Judge:
     home: Array | None
 
     def losses(self, plan: Plan) -> Array:
-        """Return the criteria (C,) of a plan, with signs by which less is better."""
-        return freeze(np.array([c.sense * self._value(c, plan) for c in self.criteria]))
+        """Return the criteria (C,) of a plan, with signs by which less is better.
+
+        To so many digits that the same motion found twice, its sums rounded otherwise, is one.
+        """
+        values = [c.sense * self._value(c, plan) for c in self.criteria]
+        return freeze(np.array([float(f"{value:.{DIGITS}g}") for value in values]))
 
     def _value(self, criterion: Criterion, plan: Plan) -> float:
         found, kind = plan.criteria, criterion.kind
@@ -100,7 +107,7 @@ class Judge:
             return _cycle(plan, self.home)
         if kind == "clearance":
             assert self.cell is not None
-            return _clearance(plan, self.cell)
+            return clearance(plan, self.cell)
         values: Array = getattr(found, PER_JOINT[kind])
         if criterion.joint is not None:
             return float(values[criterion.joint])
@@ -115,16 +122,6 @@ def _cycle(plan: Plan, home: Array) -> float:
     return float(plan.time[-1] + least_time(ways, *plan.robot.speed_limits()).sum())
 
 
-def _clearance(plan: Plan, cell: Cell) -> float:
-    """Return the least distance at the nodes beyond what is to be kept, m.
-
-    Of pairs without a near-miss distance of their own, as in the collision map.
-    """
-    counted = ~cell.own
-    wanted = np.broadcast_to(counted, (len(plan.q), len(counted)))
-    return float((cell.distances(plan.q, wanted=wanted) - cell.required)[:, counted].min())
-
-
 def judge_of(
     names: Sequence[str],
     robot: Robot,
@@ -132,6 +129,7 @@ def judge_of(
     eta_v: float,
     eta_a: float,
     cell: Cell | None,
+    comfort: Comfort | None,
     home: ArrayLike | None,
 ) -> Judge:
     """Return who judges by the criteria of these names.
@@ -140,7 +138,7 @@ def judge_of(
     ------
     InputError
         An unknown name, a joint that the robot does not have, a name given twice, or none; a
-        clearance without a cell, a time without home.
+        clearance without a cell or beside one in `comfort`, a time without home.
     """
     if isinstance(names, str) or not names or len(set(names)) != len(names):
         raise InputError(f"criteria: expected different names, at least one, got {names!r}")
@@ -148,11 +146,16 @@ def judge_of(
     for name, (what, given) in needs.items():
         if name in names and given is None:
             raise InputError(f"criteria: {name!r} needs {what}; give it, or leave {name!r} out")
-    if cell is not None and "clearance" in names and cell.own.all():
-        raise InputError(
-            "criteria: 'clearance' needs pairs without a near-miss distance of their own, and the "
-            "cell has none"
-        )
+    if "clearance" in names:
+        if cell is not None and not counted(cell).any():
+            raise InputError(
+                "criteria: 'clearance' needs a part or fixtures in the cell without near-miss "
+                "distances of their own, and it has none"
+            )
+        if comfort is not None and comfort.clearance is not None:
+            raise InputError(
+                "criteria: 'clearance' is a cost of comfort already; leave one of the two out"
+            )
     return Judge(
         criteria=tuple(_criterion(name, robot) for name in names),
         eta_v=eta_v,

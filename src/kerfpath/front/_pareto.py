@@ -107,7 +107,9 @@ def pareto(
     InputError
         Unknown criteria or search, fewer than one run, and what `kerfpath.plan` refuses.
     """
-    judge = judge_of(criteria, robot, eta_v=eta_v, eta_a=eta_a, cell=cell, home=home)
+    judge = judge_of(
+        criteria, robot, eta_v=eta_v, eta_a=eta_a, cell=cell, comfort=comfort, home=home
+    )
     workers = whole_number((os.cpu_count() or 1) if workers is None else workers, "workers")
     if graph is None:
         graph = layered_graph(

@@ -11,6 +11,7 @@ import numpy as np
 
 from kerfpath._arrays import Array, Bools, freeze
 from kerfpath.cell import Cell
+from kerfpath.front._clearance import roomier
 from kerfpath.front._criteria import Criterion
 from kerfpath.graph import LayeredGraph
 from kerfpath.search import Metric, ObjectiveKind, Relaxations
@@ -44,7 +45,7 @@ class Run:
         Between what each joint has to stay (modulo 2 pi where it is endless), infinite where it is
         free.
     clearance : float m
-        What is to be kept in a cell beyond its near-miss distance.
+        What robot and head are to keep from what stands around beyond the near-miss distance.
     """
 
     objective: ObjectiveKind
@@ -68,7 +69,7 @@ class Run:
         """Return the cell in which the clearance is kept."""
         if cell is None or not self.clearance:
             return cell
-        return replace(cell, near_miss=cell.near_miss + self.clearance)
+        return roomier(cell, self.clearance)
 
     def data(self) -> dict[str, Any]:
         """Return it as plain JSON data; `of_data` gives the very same run back."""

@@ -9,6 +9,7 @@ from kerfpath.job._check import check_job as check_job
 from kerfpath.job._files import Texts as Texts
 from kerfpath.job._files import Written as Written
 from kerfpath.job._files import collision_note as collision_note
+from kerfpath.job._files import make_folder as make_folder
 from kerfpath.job._files import outcome_texts as outcome_texts
 from kerfpath.job._files import program_of as program_of
 from kerfpath.job._files import require_folder as require_folder
@@ -29,6 +30,7 @@ from kerfpath.job._run import Chosen as Chosen
 from kerfpath.job._run import Cut as Cut
 from kerfpath.job._run import Outcome as Outcome
 from kerfpath.job._run import Progress as Progress
+from kerfpath.job._run import fastest_along as fastest_along
 from kerfpath.job._run import fastest_speeds as fastest_speeds
 from kerfpath.job._run import run_job as run_job
 from kerfpath.job._run import warm_up as warm_up

@@ -38,7 +38,17 @@ from kerfpath.refiner import refine
 from kerfpath.robots import robot
 from kerfpath.sequence import PartPlan
 
-__all__ = ["Chosen", "Cut", "Given", "Outcome", "Progress", "fastest_speeds", "run_job", "warm_up"]
+__all__ = [
+    "Chosen",
+    "Cut",
+    "Given",
+    "Outcome",
+    "Progress",
+    "fastest_along",
+    "fastest_speeds",
+    "run_job",
+    "warm_up",
+]
 
 Progress = Callable[[str, int, int], None]
 """Called with what is being done, how much of it is done, and how much there is."""
@@ -191,7 +201,7 @@ def _cut(
         if cell is not None:
             # Shares of the limits at which a clear path exists are not looked for.
             with suppress(NoFeasiblePath):
-                slower = _fastest(job, nodes, cell, refine=False, graph=graph)
+                slower = fastest_along(job, nodes, cell, refine=False, graph=graph)
                 return (replace(whole, broken=broken, fastest=slower),)
             return (replace(whole, broken=broken),)
         least = relaxations(
@@ -202,7 +212,7 @@ def _cut(
     return tuple(_audited(job, whole, made, cell) for made in plans)
 
 
-def _fastest(
+def fastest_along(
     job: Job,
     nodes: Contour,
     cell: Cell | None,
@@ -295,7 +305,7 @@ def fastest_speeds(
         progress("contours", i, len(tasks))
         nodes = task.evenly_fast(part)
         try:
-            found: FastestSpeed | NoFeasiblePath = _fastest(job, nodes, cell, refine=refine)
+            found: FastestSpeed | NoFeasiblePath = fastest_along(job, nodes, cell, refine=refine)
         except NoFeasiblePath as broken:
             found = broken
         answers.append((task, nodes, found))

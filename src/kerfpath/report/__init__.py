@@ -1,4 +1,4 @@
-"""Self-contained HTML pages: the report on a job, a drawing's loops, a Pareto set, a layout."""
+"""Self-contained HTML pages: on a job, a drawing, a Pareto set, a layout; or a table alone."""
 
 from kerfpath.report._drawing import DrawnLoop, render_drawing
 from kerfpath.report._front import FrontAxis, FrontPlan
@@ -8,6 +8,7 @@ from kerfpath.report._layout import render_layout
 from kerfpath.report._map import feasibility_map
 from kerfpath.report._page import render
 from kerfpath.report._section import ContourSection
+from kerfpath.report._table_page import render_table
 
 __all__ = [
     "ContourSection",
@@ -19,6 +20,7 @@ __all__ = [
     "render_drawing",
     "render_front",
     "render_layout",
+    "render_table",
     "with_library",
     "without_library",
 ]

@@ -117,7 +117,7 @@ def page(title: str, body: Sequence[str], figures: Figures, *, also: str = "") -
         style="".join(_resource(f"{name}.css") for name in names),
         body="\n".join(part for part in body if part),
         data="\n".join(figures.data),
-        library=_library(),
+        library=_library() if figures.data else "",
         script="\n".join(_resource(f"{name}.js") for name in names),
     )
 

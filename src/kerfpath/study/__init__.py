@@ -17,3 +17,11 @@ from kerfpath.study._pareto_files import axes_of as axes_of
 from kerfpath.study._pareto_files import picked as picked
 from kerfpath.study._pareto_files import plan_picked as plan_picked
 from kerfpath.study._pareto_files import write_pareto as write_pareto
+from kerfpath.study._robots import NEAREST as NEAREST
+from kerfpath.study._robots import ContourSpeed as ContourSpeed
+from kerfpath.study._robots import RobotSpeed as RobotSpeed
+from kerfpath.study._robots import contour_speeds as contour_speeds
+from kerfpath.study._robots import which_robots as which_robots
+from kerfpath.study._robots import with_robot as with_robot
+from kerfpath.study._robots_files import robots_entry as robots_entry
+from kerfpath.study._robots_files import write_robots as write_robots

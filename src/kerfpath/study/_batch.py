@@ -16,6 +16,7 @@ from kerfpath.job import (
     Outcome,
     ProgramOptions,
     Texts,
+    make_folder,
     outcome_texts,
     read_job,
     require_folder,
@@ -111,10 +112,7 @@ def batch(
     out = Path(out)
     paths = [Path(job) for job in jobs]
     folders = _folders(paths, out)
-    try:
-        out.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise InputError(f"{out}: cannot be made a folder ({error.strerror})") from None
+    make_folder(out)
     found: list[Planned] = []
     with Sweep(
         planned, store=out / STORE, scheduler=scheduler, processes=processes, progress=progress

@@ -31,6 +31,7 @@ from kerfpath.graph import LayeredGraph
 from kerfpath.job import Job, cell_of_job
 from kerfpath.planner import fastest_speed, layered_graph, plan
 from kerfpath.search import shortest_path
+from kerfpath.study._clear import has_clear_pose
 from kerfpath.study._layout_subject import Subject
 
 __all__ = ["SLACK", "Answer", "Worth", "beats", "worst_of"]
@@ -39,8 +40,6 @@ EVERY = 8
 """Nodes between those of the first test."""
 THIN = 4
 """Steps of gamma between the samples of a path that is good enough."""
-TRIED = 8
-"""Poses of a node asked at once for a clear one."""
 SLACK = 1e-9
 """Relative: by how much rounding may lift a value over its bound."""
 PER_METRE = 1e-3
@@ -325,13 +324,5 @@ def _in_order(entries: Mapping[int, Answer]) -> list[Answer]:
 
 def _closed(graph: LayeredGraph, cell: Cell) -> Bools:
     """Return which layers (M,) bool have no pose that is clear of collisions."""
-    checker = Checker(cell, graph.q)
-    closed = np.ones(len(graph.start) - 1, bool)
-    for k in range(len(closed)):
-        layer = np.arange(graph.start[k], graph.start[k + 1])
-        rounds = max(1, len(layer) // TRIED)
-        for r in range(rounds):  # spread over the layer, as neighbours collide together
-            if np.isfinite(checker.price(layer[r::rounds])).any():
-                closed[k] = False
-                break
-    return closed
+    checker, layers = Checker(cell, graph.q), range(len(graph.start) - 1)
+    return np.array([not has_clear_pose(graph, checker, k) for k in layers])

@@ -200,6 +200,7 @@ def _stage(path: str, digest_then: str, contour: str, criteria: tuple[str, ...])
         eta_v=options["eta_v"],
         eta_a=options["eta_a"],
         cell=cell,
+        comfort=options["comfort"],
         home=None if home is None else np.radians(home),
     )
     shared: dict[str, Any] = {key: options[key] for key in OPTIONS}

@@ -1,0 +1,59 @@
+"""Which robots can do a job, and how fast."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from rich.markup import escape
+
+from kerfpath.cli._show import busy, out, print_json, sweep_bar, table
+from kerfpath.job import make_folder, require_folder, warm_up
+from kerfpath.study import robots_entry, which_robots, write_robots
+from kerfpath.study._robots_files import HEADS, MARGIN, NOTE, TEXT_COLUMNS, robots_rows
+
+__all__ = ["show_robots_for"]
+
+
+def show_robots_for(
+    job: Path,
+    folder: Path,
+    scheduler: str | None,
+    processes: int | None,
+    ratio: str | None,
+    *,
+    as_json: bool,
+) -> bool:
+    """Print what each robot can do of a job, and write it; return whether any can do it as asked.
+
+    Raises
+    ------
+    InputError
+        As `which_robots`; a folder that cannot be made.
+    """
+    require_folder(folder)
+    if scheduler is None:
+        with busy("compiling the kernels, first run only"):
+            warm_up()
+    make_folder(folder)
+    with sweep_bar("robots") as progress:
+        found = which_robots(
+            job,
+            store=folder / "robots.sqlite",
+            scheduler=scheduler,
+            processes=processes,
+            acceleration_ratio=ratio,
+            progress=progress,
+        )
+    written = write_robots(job, found, folder)
+    able = any(each.binding and (each.binding.margin or 0.0) >= 1 for each in found)
+    if as_json:
+        files = [str(path) for path in written]
+        print_json({"able": able, "robots": robots_entry(found), "files": files})
+        return able
+    columns = [f"{what.lower()} {unit}".strip() for what, unit in HEADS]
+    numbers = [column for i, column in enumerate(columns) if i not in TEXT_COLUMNS]
+    table(columns, [[escape(v) for v in row] for row in robots_rows(found)], numbers=numbers)
+    out.print(f"{MARGIN} {NOTE}")
+    for path in written:
+        out.print(f"wrote {escape(str(path))}")
+    return able

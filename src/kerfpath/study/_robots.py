@@ -1,0 +1,282 @@
+"""Which robots of the library can cut the part of a job where it lies, and how fast."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from kerfpath.cad import Part
+from kerfpath.cell import Cell, Checker
+from kerfpath.errors import InputError, NoFeasiblePath
+from kerfpath.graph import LayeredGraph
+from kerfpath.job import Job, cell_of_job, fastest_along, read_job
+from kerfpath.planner import layered_graph
+from kerfpath.robots import Robot, acceleration_ratios, postures_named, robot, robot_ids
+from kerfpath.study._clear import has_clear_pose
+from kerfpath.study._job import digest, loaded
+from kerfpath.sweep import Progress, Sweep
+
+__all__ = ["NEAREST", "ContourSpeed", "RobotSpeed", "contour_speeds", "which_robots", "with_robot"]
+
+NEAREST = "nearest"
+"""In place of a ratio: of each robot the one that the library calls its nearest."""
+EVERY = 8
+"""Nodes from one that is looked at for a clear pose to the next."""
+NOT_ASKED = "posture not wanted"
+"""What drops a candidate without telling anything about the robot."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ContourSpeed:
+    """What a robot can do of one contour.
+
+    Parameters
+    ----------
+    name : str
+    asked : float m/s
+        What the job asks for.
+    reached : float
+        Share of its nodes that have a pose.
+    fastest : float m/s, optional
+        The fastest constant speed on the job's grid; None where there is none, or another contour
+        is out of reach.
+    joint : int, optional
+        Which binds, from 1.
+    limit : {"velocity", "acceleration"}, optional
+    reason : str
+        Why there is no speed; empty otherwise.
+    """
+
+    name: str
+    asked: float
+    reached: float
+    fastest: float | None = None
+    joint: int | None = None
+    limit: str | None = None
+    reason: str = ""
+
+    @property
+    def margin(self) -> float | None:
+        """The fastest speed as a multiple of what is asked."""
+        return None if self.fastest is None else self.fastest / self.asked
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class RobotSpeed:
+    """What a robot can do of a job.
+
+    Parameters
+    ----------
+    robot : Robot
+        With the limits that were used.
+    own : bool
+        It is the job's own, with the limits that the job gives.
+    contours : tuple of ContourSpeed
+        Of the whole job; empty where the robot was refused before.
+    reason : str
+        Why not every contour has a speed; empty otherwise.
+    """
+
+    robot: Robot
+    own: bool
+    contours: tuple[ContourSpeed, ...] = ()
+    reason: str = ""
+
+    @property
+    def binding(self) -> ContourSpeed | None:
+        """The contour with the least margin; None unless every contour has a speed."""
+        if self.reason or not self.contours:
+            return None
+        return min(self.contours, key=lambda contour: contour.margin or 0.0)
+
+    @property
+    def reached(self) -> float:
+        """Share of the nodes that have a pose, of the contour that is reached least."""
+        return min((contour.reached for contour in self.contours), default=0.0)
+
+
+def which_robots(
+    job_file: str | os.PathLike[str],
+    *,
+    store: str | os.PathLike[str],
+    scheduler: str | None = None,
+    processes: int | None = None,
+    robots: Sequence[str] | None = None,
+    acceleration_ratio: str | None = None,
+    progress: Progress | None = None,
+) -> list[RobotSpeed]:
+    """Return what each robot can do of a job, the fastest first; each is a task of its own.
+
+    Robot base, head and part stay where the job has them. The job's own robot is judged with its
+    limits as the job gives them, all others with those of the library and the endless axes that
+    are so there.
+
+    Parameters
+    ----------
+    job_file : path
+        At the same place on every worker.
+    store, scheduler, processes, progress
+        As in `kerfpath.sweep.run`.
+    robots : sequence of str, optional
+        Ids of the library; default: all of it. The job's own robot is there in any case.
+    acceleration_ratio : str, optional
+        Of robots whose maker publishes no accelerations, assume them by this ratio to the speeds
+        (one of `kerfpath.robots.acceleration_ratios()`), or by `NEAREST`. Default: the ratio
+        that the job names, if it does; otherwise these robots are refused.
+
+    Raises
+    ------
+    InputError
+        As `read_job` and `kerfpath.sweep.run`; an unknown robot or ratio.
+    """
+    path = Path(job_file)
+    job, known = read_job(path), (NEAREST, *acceleration_ratios())
+    if acceleration_ratio is not None and acceleration_ratio not in known:
+        raise InputError(
+            f"acceleration_ratio: {acceleration_ratio!r} is not one of {', '.join(known)}"
+        )
+    ratio = acceleration_ratio or job.source["robot"].get("acceleration_ratio")
+    names = [name for name in robots or robot_ids() if name != job.robot.id]
+    asked = [(None, None), *((name, _ratio_of(robot(name), ratio)) for name in names)]
+    same = {"path": str(path.resolve()), "digest_then": digest(path)}
+    found = []
+    with Sweep(
+        judged, store=store, scheduler=scheduler, processes=processes, progress=progress
+    ) as tasks:
+        keys = [tasks.submit(**same, name=name, ratio=used) for name, used in asked]
+        for key, (name, used) in zip(keys, asked, strict=True):
+            result = tasks.result(key)
+            judge = job.robot if name is None else robot(name, acceleration_ratio=used)
+            if result.failure is None:
+                contours = tuple(ContourSpeed(**told) for told in result.value)
+                why = _reason(contours)
+            else:
+                contours, why = (), result.failure.message
+            found.append(RobotSpeed(robot=judge, own=name is None, contours=contours, reason=why))
+    return sorted(found, key=_order)
+
+
+def _reason(contours: Sequence[ContourSpeed]) -> str:
+    """Say why not every contour has a speed: of the worst one, and how many there are."""
+    bad = [contour for contour in contours if contour.reason]
+    if not bad:
+        return ""
+    worst = min(bad, key=lambda contour: contour.reached)
+    many = f"{len(bad)} of {len(contours)} contours; " if len(contours) > 1 else ""
+    return f"{many}{worst.name}: {worst.reason}"
+
+
+def _ratio_of(candidate: Robot, ratio: str | None) -> str | None:
+    """Return by which ratio accelerations are assumed; None where they are known, or not at all."""
+    if candidate.acceleration is not None or candidate.velocity is None:
+        return None
+    return candidate.acceleration_ratio if ratio == NEAREST else ratio
+
+
+def _order(found: RobotSpeed) -> tuple[float, float, str]:
+    """Order by margin, then by reach, then by name."""
+    binding = found.binding
+    margin = 0.0 if binding is None else binding.margin or 0.0
+    return -margin, -found.reached, found.robot.id
+
+
+def judged(
+    *, path: str, digest_then: str, name: str | None, ratio: str | None
+) -> list[dict[str, Any]]:
+    """Return what a robot of the library, or the job's own, can do of a job: a task of a sweep."""
+    found = loaded(path, digest_then)
+    job = found.job
+    if name is not None:
+        candidate = robot(name, acceleration_ratio=ratio)
+        if candidate.limits_missing:
+            raise InputError(f"joint limits are not known: {candidate.limits_missing}")
+        job = with_robot(job, candidate)
+    return [asdict(contour) for contour in contour_speeds(job, found.part)]
+
+
+def with_robot(job: Job, candidate: Robot) -> Job:
+    """Return a job with another robot in its place, for `contour_speeds`.
+
+    Raises
+    ------
+    InputError
+        A posture that its family has not; a cell that asks for the links of a description.
+    """
+    words = job.source.get("plan", {}).get("posture")
+    postures = None if words is None else postures_named(words, candidate.kinematics)
+    if job.cell is not None and job.cell.links == "description":
+        raise InputError(
+            'its links are not known, as links = "description" in [cell] describes the job\'s own '
+            'robot alone; write links = "capsules", which stand for those of any'
+        )
+    return replace(job, robot=candidate, plan_options=job.plan_options | {"postures": postures})
+
+
+def contour_speeds(job: Job, part: Part) -> list[ContourSpeed]:
+    """Return what the job's robot can do of each contour, with part and robot where the job says.
+
+    Reach is that of all poses on the job's grid, margins of [comfort] kept. Only where every node
+    of every contour has a pose, and in a cell every `EVERY`-th a clear one, are speeds looked for:
+    exact on that grid, clear in the cell.
+
+    Raises
+    ------
+    InputError
+        Limits that are not known, a cell that cannot be.
+    """
+    cell, comfort = cell_of_job(job, part), job.plan_options["comfort"]
+    margins = comfort and comfort.hard
+    looks = []
+    for task in job.tasks(part):
+        nodes = task.evenly_fast(part)
+        graph = layered_graph(nodes, job.robot, **job.graph_options, comfort=margins)
+        looks.append((_reached(task.name, task.speed, graph), nodes, graph))
+    if all(not contour.reason for contour, _, _ in looks) and cell is not None:
+        looks = [(_clear(contour, graph, cell), nodes, graph) for contour, nodes, graph in looks]
+    if any(contour.reason for contour, _, _ in looks):
+        return [contour for contour, _, _ in looks]
+    if job.robot.acceleration is None:
+        raise InputError(
+            "in reach of every node, but its accelerations are not known: give "
+            "--acceleration-ratio, or acceleration_ratio in [robot], to assume a typical ratio "
+            "to the speeds"
+        )
+    found = []
+    for contour, nodes, graph in looks:
+        try:
+            best = fastest_along(job, nodes, cell, refine=False, graph=graph)
+        except NoFeasiblePath as broken:
+            found.append(replace(contour, reason=str(broken)))
+        else:
+            found.append(
+                replace(contour, fastest=best.speed, joint=best.joint + 1, limit=best.limit)
+            )
+    return found
+
+
+def _reached(name: str, asked: float, graph: LayeredGraph) -> ContourSpeed:
+    """Return which share of the nodes has a pose, and what forbids the first that has none."""
+    empty, nodes = np.flatnonzero(np.diff(graph.start) == 0), len(graph.start) - 1
+    reason = ""
+    if empty.size:
+        counts = graph.counts(int(empty[0]))
+        counts.pop(NOT_ASKED, None)
+        reason = (
+            f"no pose at {empty.size} of {nodes} nodes, at node {empty[0]} mostly: "
+            f"{max(counts, key=lambda word: counts[word])}"
+        )
+    return ContourSpeed(name=name, asked=asked, reached=1 - empty.size / nodes, reason=reason)
+
+
+def _clear(contour: ContourSpeed, graph: LayeredGraph, cell: Cell) -> ContourSpeed:
+    """Return a contour with the reason where, of every `EVERY`-th node, one has no clear pose."""
+    checker = Checker(cell, graph.q)
+    for k in range(0, len(graph.start) - 1, EVERY):
+        if not has_clear_pose(graph, checker, k):
+            return replace(contour, reason=f"collision: no clear pose at node {k}")
+    return contour

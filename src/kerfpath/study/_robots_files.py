@@ -1,0 +1,142 @@
+"""What `which_robots` leaves on disk: robots.json and robots.html."""
+
+from __future__ import annotations
+
+import json
+import os
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+from kerfpath import __version__
+from kerfpath.errors import InputError
+from kerfpath.job import read_job
+from kerfpath.post import write_files
+from kerfpath.report import render_table
+from kerfpath.study._robots import ContourSpeed, RobotSpeed
+
+__all__ = [
+    "HEADS",
+    "MARGIN",
+    "NOTE",
+    "TEXT_COLUMNS",
+    "robots_entry",
+    "robots_rows",
+    "write_robots",
+]
+
+HEADS = (
+    ("Robot", ""),
+    ("Payload", "kg"),
+    ("Reach", "mm"),
+    ("Margin", ""),
+    ("Fastest", "m/min"),
+    ("Accelerations", ""),
+    ("Contour that binds, or why not", ""),
+)
+TEXT_COLUMNS = (0, 5, 6)
+MARGIN = (
+    "Margin: the fastest constant speed, exact on the job's grid, over the speed asked for, of the "
+    "contour where that is least; from 1 on the robot does the job as it asks."
+)
+NOTE = (
+    "Robot base, head and part stay where the job has them. The payload is told, not checked: no "
+    "job says what its head weighs."
+)
+
+
+def robots_entry(found: Sequence[RobotSpeed]) -> list[dict[str, Any]]:
+    """Return what was found as plain data, units in the names."""
+    return [_entry(each) for each in found]
+
+
+def _entry(each: RobotSpeed) -> dict[str, Any]:
+    binding, arm = each.binding, each.robot
+    return {
+        "robot": arm.id,
+        "model": f"{arm.manufacturer} {arm.model}".strip(),
+        "own": each.own,
+        "payload_kg": arm.payload,
+        "reach_m": arm.reach,
+        "acceleration": arm.acceleration_source or None,
+        "margin": binding and binding.margin,
+        "binding_contour": binding and binding.name,
+        "slowest_m_min": _slowest(each),
+        "reached": each.reached if each.contours else None,
+        "reason": each.reason or None,
+        "contours": [_contour_entry(contour) for contour in each.contours],
+    }
+
+
+def _contour_entry(contour: ContourSpeed) -> dict[str, Any]:
+    return {
+        "name": contour.name,
+        "asked_m_min": contour.asked * 60,
+        "reached": contour.reached,
+        "fastest_m_min": None if contour.fastest is None else contour.fastest * 60,
+        "margin": contour.margin,
+        "joint": contour.joint,
+        "limit": contour.limit,
+        "reason": contour.reason or None,
+    }
+
+
+def _slowest(each: RobotSpeed) -> float | None:
+    speeds = [contour.fastest for contour in each.contours if contour.fastest is not None]
+    return min(speeds) * 60 if each.binding else None
+
+
+def write_robots(
+    job_file: str | Path,
+    found: Sequence[RobotSpeed],
+    folder: str | os.PathLike[str],
+) -> list[Path]:
+    """Write robots.json and robots.html into a folder that is there.
+
+    Raises
+    ------
+    InputError
+        As `read_job`; a file that cannot be written.
+    """
+    job = read_job(job_file)
+    whole = {"version": __version__, "job": job.source, "robots": robots_entry(found)}
+    if not found:
+        raise InputError("no robots to write of")
+    able = sum(each.binding is not None for each in found)
+    page = render_table(
+        f"Robots for {job.part_file.stem.replace('_', ' ')}",
+        kind="Which robot",
+        heads=HEADS,
+        rows=robots_rows(found),
+        text_columns=TEXT_COLUMNS,
+        caption=f"{able} of {len(found)} robots can cut every contour. {MARGIN}",
+        facts=[("Job", job.path.name), ("Part", job.part_file.name)],
+        notes=[NOTE],
+        job_text=job.path.read_text(encoding="utf-8-sig"),
+    )
+    texts = {"robots.json": json.dumps(whole, indent=1, allow_nan=False), "robots.html": page}
+    return write_files(folder, texts)
+
+
+def robots_rows(found: Sequence[RobotSpeed]) -> list[list[str]]:
+    """Return a row for each robot, as `HEADS` say."""
+    return [_row(each) for each in found]
+
+
+def _row(each: RobotSpeed) -> list[str]:
+    arm, binding = each.robot, each.binding
+    row = [
+        f"{arm.id} (the job's own)" if each.own else arm.id,
+        "-" if arm.payload is None else f"{arm.payload:g}",
+        "-" if arm.reach is None else f"{arm.reach * 1000:.0f}",
+    ]
+    if binding is None or binding.margin is None or binding.fastest is None:
+        return [*row, "-", "-", "-", each.reason]
+    source = arm.acceleration_source
+    return [
+        *row,
+        f"{binding.margin:.3f}",
+        f"{binding.fastest * 60:.3f}",
+        source.removesuffix(" times the speeds") if source.startswith("assumed") else "known",
+        f"{binding.name}: {binding.limit} of joint {binding.joint}",
+    ]
