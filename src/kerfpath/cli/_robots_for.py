@@ -8,8 +8,15 @@ from rich.markup import escape
 
 from kerfpath.cli._show import busy, out, print_json, sweep_bar, table
 from kerfpath.job import make_folder, require_folder, warm_up
-from kerfpath.study import robots_entry, which_robots, write_robots
-from kerfpath.study._robots_files import HEADS, MARGIN, NOTE, TEXT_COLUMNS, robots_rows
+from kerfpath.study import (
+    ROBOT_COLUMNS,
+    ROBOT_NOTES,
+    ROBOT_WORDS,
+    robot_rows,
+    robots_entry,
+    which_robots,
+    write_robots,
+)
 
 __all__ = ["show_robots_for"]
 
@@ -50,10 +57,10 @@ def show_robots_for(
         files = [str(path) for path in written]
         print_json({"able": able, "robots": robots_entry(found), "files": files})
         return able
-    columns = [f"{what.lower()} {unit}".strip() for what, unit in HEADS]
-    numbers = [column for i, column in enumerate(columns) if i not in TEXT_COLUMNS]
-    table(columns, [[escape(v) for v in row] for row in robots_rows(found)], numbers=numbers)
-    out.print(f"{MARGIN} {NOTE}")
+    columns = [f"{what.lower()} {unit}".strip() for what, unit in ROBOT_COLUMNS]
+    numbers = [column for i, column in enumerate(columns) if i not in ROBOT_WORDS]
+    table(columns, [[escape(v) for v in row] for row in robot_rows(found)], numbers=numbers)
+    out.print(" ".join(ROBOT_NOTES))
     for path in written:
         out.print(f"wrote {escape(str(path))}")
     return able
