@@ -7,6 +7,8 @@ from kerfpath.study._job import digest as digest
 from kerfpath.study._job import loaded as loaded
 from kerfpath.study._layout import Layout as Layout
 from kerfpath.study._layout import layout as layout
+from kerfpath.study._layout_files import layout_entry as layout_entry
+from kerfpath.study._layout_files import write_layout as write_layout
 from kerfpath.study._layout_place import ranges_of as ranges_of
 from kerfpath.study._pareto import Studied as Studied
 from kerfpath.study._pareto import pareto_of_job as pareto_of_job

@@ -42,6 +42,8 @@ THIN = 4
 """Steps of gamma between the samples of a path that is good enough."""
 SLACK = 1e-9
 """Relative: by how much rounding may lift a value over its bound."""
+PER_METRE = 1e-3
+"""What a metre from the base counts between placements that are out of reach alike."""
 TOLERATED = 1e-6
 """Share by which steps over several nodes may exceed the limit: each step has a tolerance."""
 
@@ -159,6 +161,9 @@ class Worth:
     def _require_none(self, status: str, bad: list[Bools], so_far: float) -> None:
         """Lose the placement where any node is bad, and say which is the first."""
         share = 1.0 - float(np.concatenate(bad).mean())
+        middle = np.mean([subject.nodes.points.mean(axis=0) for subject in self.subjects], axis=0)
+        placement = self.job.placement
+        away = float(np.linalg.norm(placement[:3, :3] @ middle + placement[:3, 3]))
         for subject, graph, here in zip(self.subjects, self.graphs, bad, strict=True):
             if here.any():
                 k = int(np.argmax(here))
@@ -168,7 +173,7 @@ class Worth:
                 told = max(counts, key=lambda word: counts[word]) if counts else ""
                 why = "no clear pose" if status == "collision" else f"no pose, most often {told}"
                 where = {"contour": subject.name, "node": EVERY * k, "nodes": len(subject.nodes)}
-                raise Lost(status, so_far + share, reason=why, **where)
+                raise Lost(status, so_far + share - PER_METRE * away, reason=why, **where)
 
     def _bound(self, stretches: Sequence[Sequence[int]]) -> float | None:
         """Return what no path of this placement can beat, None where nothing is known."""
