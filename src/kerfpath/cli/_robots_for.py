@@ -1,8 +1,10 @@
-"""Which robots can do a job, and how fast."""
+"""`kerfpath layout --robots`: which robots can do a job, and how fast."""
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from pathlib import Path
+from typing import Any
 
 from rich.markup import escape
 
@@ -24,13 +26,14 @@ __all__ = ["show_robots_for"]
 def show_robots_for(
     job: Path,
     folder: Path,
-    scheduler: str | None,
-    processes: int | None,
+    workers: Mapping[str, Any],
     ratio: str | None,
     *,
     as_json: bool,
 ) -> bool:
     """Print what each robot can do of a job, and write it; return whether any can do it as asked.
+
+    `workers` are scheduler and processes, as `which_robots` takes them.
 
     Raises
     ------
@@ -38,7 +41,7 @@ def show_robots_for(
         As `which_robots`; a folder that cannot be made.
     """
     require_folder(folder)
-    if scheduler is None:
+    if workers["scheduler"] is None:
         with busy("compiling the kernels, first run only"):
             warm_up()
     make_folder(folder)
@@ -46,8 +49,7 @@ def show_robots_for(
         found = which_robots(
             job,
             store=folder / "robots.sqlite",
-            scheduler=scheduler,
-            processes=processes,
+            **workers,
             acceleration_ratio=ratio,
             progress=progress,
         )
