@@ -9,7 +9,7 @@ from typing import Any
 from rich.markup import escape
 
 from kerfpath.cli._show import busy, out, print_json, progress_bars, resumable, table
-from kerfpath.job import require_folder, warm_up
+from kerfpath.job import make_folder, require_folder, warm_up
 from kerfpath.study import layout, layout_entry, ranges_of, write_layout
 
 __all__ = ["show_layout"]
@@ -29,7 +29,7 @@ def show_layout(
     """Find the best placement, write its files, print it; return whether any is feasible."""
     ranges = ranges_of(vary)
     require_folder(folder)
-    folder.mkdir(parents=True, exist_ok=True)
+    make_folder(folder)
     with busy("compiling the kernels, first run only"):
         warm_up()
     with progress_bars("") as progress, resumable():

@@ -142,6 +142,17 @@ def layout(
     map_points: Annotated[
         int | None, typer.Option(help="Points of the map each way, 0 for none; default: 15.")
     ] = None,
+    robots: Annotated[
+        bool,
+        typer.Option("--robots", help="Move nothing: tell which robots can do the job, how fast."),
+    ] = False,
+    acceleration_ratio: Annotated[
+        str | None,
+        typer.Option(
+            metavar="NAME|nearest",
+            help="With --robots: assume accelerations that the maker does not publish.",
+        ),
+    ] = None,
     scheduler: Scheduler = None,
     processes: Processes = None,
     as_json: Json = False,
@@ -168,13 +179,32 @@ def layout(
     Example: kerfpath layout door.toml --tolerance-mm 2 --tolerance-deg 0.5
 
     Then: kerfpath plan door-layout/placed.toml
-    """
-    from kerfpath.cli._layout import show_layout
 
+    With --robots nothing is moved: every robot of the library is put in the place of the job's own,
+    and told are its reach, the fastest speed of each contour and the margin over what is asked,
+    the best first, in robots.json and robots.html. Exit code 1: none does it as fast as asked.
+
+    Example: kerfpath layout door.toml --robots --acceleration-ratio nearest
+    """
     options = {
         "goal": goal, "evaluations": evaluations, "seed": seed, "tolerance_mm": tolerance_mm,
-        "tolerance_deg": tolerance_deg, "map_points": map_points, "scheduler": scheduler,
-        "processes": processes,
+        "tolerance_deg": tolerance_deg, "map_points": map_points,
     }  # fmt: skip
-    if not show_layout(job, to or Path(f"{job.stem}-layout"), vary or [], options, as_json=as_json):
+    workers = {"scheduler": scheduler, "processes": processes}
+    folder = to or Path(f"{job.stem}-layout")
+    if robots:
+        from kerfpath.cli._robots_for import show_robots_for
+
+        given = [name for name, value in {"vary": vary, **options}.items() if value is not None]
+        if given:
+            said = ", ".join(f"--{name.replace('_', '-')}" for name in given)
+            raise InputError(f"--robots: nothing is moved with it; leave out {said}")
+        found = show_robots_for(job, folder, workers, acceleration_ratio, as_json=as_json)
+    elif acceleration_ratio is not None:
+        raise InputError("--acceleration-ratio: only with --robots; else the job says it")
+    else:
+        from kerfpath.cli._layout import show_layout
+
+        found = show_layout(job, folder, vary or [], options | workers, as_json=as_json)
+    if not found:
         raise typer.Exit(1)

@@ -23,5 +23,9 @@ from kerfpath.study._robots import RobotSpeed as RobotSpeed
 from kerfpath.study._robots import contour_speeds as contour_speeds
 from kerfpath.study._robots import which_robots as which_robots
 from kerfpath.study._robots import with_robot as with_robot
+from kerfpath.study._robots_files import ROBOT_COLUMNS as ROBOT_COLUMNS
+from kerfpath.study._robots_files import ROBOT_NOTES as ROBOT_NOTES
+from kerfpath.study._robots_files import ROBOT_WORDS as ROBOT_WORDS
+from kerfpath.study._robots_files import robot_rows as robot_rows
 from kerfpath.study._robots_files import robots_entry as robots_entry
 from kerfpath.study._robots_files import write_robots as write_robots
