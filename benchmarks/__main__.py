@@ -25,6 +25,7 @@ NAMES = (
     "programs",
     "pareto",
     "sweeps",
+    "layout",
 )
 
 
@@ -75,6 +76,10 @@ def _run(name: str, *, quick: bool) -> list[Report]:
         from benchmarks import pareto
 
         return [pareto.run(quick=quick)]
+    if name == "layout":
+        from benchmarks import layout
+
+        return [layout.run(quick=quick)]
     if name == "sweeps":
         from benchmarks import sweeps
 

@@ -35,10 +35,14 @@ Small plans: a slit of 31 nodes, gamma every 15 degrees, another height each, pl
 by two such processes or workers; of 2000 the second half is measured, when all is loaded. Own time:
 of a task in its worker, a mean. Overhead: two workers times the wall clock of that half, less the
 own times of its tasks, over their number: what workers wait and the engine takes. Kept: what the
-store holds for each."""
+store holds for each. Sleepers: 200 threads of four Dask workers whose tasks sleep and return 0.5
+kB: the scheduler, the caller and its store are what limits. Over the last three quarters."""
 
 WORKERS = 2
 NODES = 31
+SLEEPERS = {"workers": 4, "threads": 50}
+NAPS = {0.05: 6000, 0.4: 4000}
+"""How long tasks sleep, s, and how many there are."""
 
 
 def payload(x: int) -> dict[str, str]:
@@ -78,6 +82,12 @@ def slit(height_m: float) -> dict[str, object]:
     }
 
 
+def nap(x: int, seconds: float) -> dict[str, object]:
+    """Sleep as long as a plan might take; return 0.5 kB."""
+    time.sleep(seconds)
+    return {"x": x, "text": "x" * 500}
+
+
 def sweep_aloud(store: str, count: int) -> None:
     """Sweep over `count` tasks and print how many are done, for who waits to kill it."""
     sweep.run(
@@ -107,6 +117,9 @@ def run(*, quick: bool = False) -> Report:
                 dask = [_timed(at / f"dask-{i}", 1000, address) for i in range(runs)]
                 many = _planned("Dask, two workers", at / "plans-dask", plans, address)
             figures += _shown("Dask, two workers", dask) + many
+            if not quick:
+                with _cluster(at, **SLEEPERS) as address:
+                    figures += [_slept(at / f"naps-{s}", s, n, address) for s, n in NAPS.items()]
         else:
             figures.append(Figure(what="Dask, two workers", note="distributed is not installed"))
         findings.append(_killed(at / "killed", tasks, kills))
@@ -168,9 +181,29 @@ def _planned(what: str, store: Path, count: int, scheduler: str | None) -> list[
     ]
 
 
+def _slept(store: Path, seconds: float, count: int, scheduler: str) -> Figure:
+    """Return at which rate sleepers are served, and which there would be without waiting."""
+    clock: list[tuple[int, float]] = []
+    sweep.run(
+        nap,
+        [{"x": x, "seconds": seconds} for x in range(count)],
+        store=store,
+        scheduler=scheduler,
+        progress=lambda done, _total, _left: clock.append((done, perf_counter())),
+    )
+    (first, begun), (last, ended) = next(c for c in clock if c[0] >= count / 4), clock[-1]
+    ideal = SLEEPERS["workers"] * SLEEPERS["threads"] / seconds
+    return Figure(
+        what=f"Dask, 200 sleepers of {seconds:g} s",
+        values=[(last - first) / (ended - begun)],
+        unit="1/s",
+        note=f"at most {ideal:.0f}",
+    )
+
+
 @contextmanager
-def _cluster(folder: Path) -> Iterator[str]:
-    """Start a Dask scheduler and two workers on loopback; yield the scheduler's address."""
+def _cluster(folder: Path, *, workers: int = WORKERS, threads: int = 1) -> Iterator[str]:
+    """Start a Dask scheduler and workers on loopback; yield the scheduler's address."""
     import distributed
 
     def dask(*arguments: str) -> subprocess.Popen[bytes]:
@@ -180,16 +213,16 @@ def _cluster(folder: Path) -> Iterator[str]:
             env={**os.environ, **ONE_THREAD, "PYTHONPATH": os.pathsep.join(sys.path)},
         )
 
-    file = folder / "scheduler.json"
+    file = folder / f"scheduler-{workers}-{threads}.json"
     started = [dask("scheduler", "--port", "0", "--scheduler-file", str(file))]
     try:
         while not file.exists() or not file.read_text().endswith("}"):
             time.sleep(0.02)
         address = str(json.loads(file.read_text())["address"])
-        options = ("--nthreads", "1", "--no-nanny", "--local-directory", str(folder))
-        started += [dask("worker", address, *options) for _ in range(2)]
+        options = ("--nthreads", str(threads), "--no-nanny", "--local-directory", str(folder))
+        started += [dask("worker", address, *options) for _ in range(workers)]
         with distributed.Client(address) as client:
-            client.wait_for_workers(2)
+            client.wait_for_workers(workers)
         yield address
     finally:
         for process in started:

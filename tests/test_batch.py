@@ -1,9 +1,11 @@
 """Batches: a row for each job whatever comes of it, nothing planned twice, files as of a plan."""
 
+import errno
 import json
 import shutil
 import sqlite3
 from contextlib import closing
+from pathlib import Path
 
 import pytest
 
@@ -220,6 +222,25 @@ def test_bad_input_of_the_command_is_one_line(tmp_path, monkeypatch, idle):
     assert "a store of kerfpath 0.0.9, this is" in said("good.toml")
 
 
+def test_a_full_disk_under_the_files_is_one_line_and_the_same_command_goes_on(
+    done, idle, monkeypatch
+):
+    folder, command, told = done
+    plan = folder / "out" / "good" / "plan.json"
+    plan.unlink()
+
+    def full(*_):
+        raise OSError(errno.ENOSPC, "No space left on device")
+
+    with monkeypatch.context() as patch:
+        patch.setattr(Path, "write_bytes", full)
+        result = run(*command, cwd=folder)
+    refused(result, "plan.json", "No space left on device")
+    assert not plan.exists()
+    assert json.loads(run(*command, cwd=folder).stdout) == told
+    assert plan.exists()
+
+
 def test_no_jobs_at_all_is_bad_input(tmp_path):
     result = run("batch", cwd=tmp_path)
     assert result.returncode == 2
@@ -238,7 +259,7 @@ def test_a_job_that_changes_meanwhile_ends_the_batch(tmp_path):
     assert not (out / "good").exists()
 
 
-def test_workers_need_the_job_folder_alone_and_another_copy_there_is_refused(
+def test_workers_of_a_cluster_need_the_job_folder_alone_and_that_they_need(
     workers, scheduler, tmp_path
 ):
     workers(1)
@@ -248,3 +269,11 @@ def test_workers_need_the_job_folder_alone_and_another_copy_there_is_refused(
     (row,) = batch([shared / "good.toml"], out, scheduler=scheduler)
     assert row.passed
     assert {path.name for path in row.folder.iterdir()} == FILES
+    (other,) = write_jobs(shared, {"other": JOB})
+
+    def lost(done, total, left):
+        (shared / other).unlink()
+
+    with pytest.raises(InputError, match="every worker needs job and files at the same path"):
+        batch([shared / other], out, scheduler=scheduler, progress=lost)
+    assert not (out / "other").exists()

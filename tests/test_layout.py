@@ -4,11 +4,13 @@ import json
 import re
 import sqlite3
 from contextlib import closing
+from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
 import pytest
 
+from browser import CHROMIUM, dom_of
 from kerfpath.cad import read as read_drawing
 from kerfpath.errors import InputError
 from kerfpath.job import cell_of_job, fastest_speeds, pose, read_job
@@ -18,6 +20,7 @@ from kerfpath.study._layout_look import look
 from kerfpath.study._layout_place import moved, numbers_of, placed_text
 from kerfpath.study._layout_subject import middle_of, subjects_of
 from kerfpath.study._layout_worth import EVERY
+from test_cli import refused, run
 
 DEMO = Path(__file__).parent.parent / "src" / "kerfpath" / "demo"
 HEAD = f"""
@@ -97,9 +100,45 @@ def slow(tmp_path_factory):
     return job_file(tmp_path_factory.mktemp("b"), HEAD + CONTOURS.format(speed=0.2, step=10))
 
 
+TABLE = """
+[robot]
+model = "abb_irb4600_60_205"
+acceleration_ratio = "iontec_20_to_70kg"
+[tool]
+head = "laser-head-45"
+[part]
+file = "rings.csv"
+xyz_mm = [{x}, 0, 500]
+rpy_deg = [0, 0, 0]
+[[contour]]
+pick = "small"
+speed_m_min = 2
+count = 41
+[[contour]]
+pick = "large"
+speed_m_min = 2
+count = 61
+[plan]
+gamma_step_deg = 10
+posture = "front/up"
+refine = false
+"""
+
+
+def rings(folder, x):
+    """A job of two rings from a table of points, which workers are quick to read."""
+    rows = ["contour,x_mm,y_mm,z_mm,nx,ny,nz"]
+    for name, radius, middle in (("small", 8, -40), ("large", 20, 40)):
+        for angle in np.linspace(0, 2 * np.pi, 73)[:-1]:
+            x_mm, y_mm = radius * np.cos(angle), middle + radius * np.sin(angle)
+            rows.append(f"{name},{x_mm:.4f},{y_mm:.4f},0,0,0,1")
+    job_file(folder, "\n".join(rows), "rings.csv")
+    return job_file(folder, TABLE.format(x=x))
+
+
 @pytest.fixture(scope="module")
 def coarse(tmp_path_factory):
-    return job_file(tmp_path_factory.mktemp("d"), HEAD + CONTOURS.format(speed=2, step=12))
+    return rings(tmp_path_factory.mktemp("d"), 1200)
 
 
 @pytest.fixture(scope="module")
@@ -174,12 +213,11 @@ def test_what_is_called_unreachable_has_a_node_without_a_pose(plain):
     assert lost
 
 
-def test_infeasible_placements_rank_by_how_much_of_the_contours_is_reached(plain):
-    answers = [worth(plain, {"x_mm": x}) for x in (1000.0, 1400.0, 3000.0)]
+def test_infeasible_placements_rank_by_how_much_is_reached_and_then_by_how_far_it_is(plain):
+    answers = [worth(plain, {"x_mm": x}) for x in (1000.0, 1400.0, 3000.0, 4000.0)]
     assert all(a["status"] == "unreachable" for a in answers)
     progress = [a["progress"] for a in answers]
-    assert progress == sorted(progress, reverse=True)
-    assert progress[0] > progress[-1] == 0.0
+    assert all(near > far for near, far in pairwise(progress))
 
 
 def test_a_floor_ends_early_and_a_better_placement_is_still_found(plain):
@@ -313,16 +351,18 @@ def kept(store):
 
 @pytest.mark.slow
 def test_a_job_that_cannot_be_cut_where_it_lies_is_led_to_where_it_can(tmp_path):
-    far = HEAD.replace("1200, -600", "2300, -600") + CONTOURS.format(speed=2, step=10)
-    job = job_file(tmp_path, far)
+    job = rings(tmp_path, 2600)
     assert worth(job)["status"] == "unreachable"
     result = layout(
         job, store=tmp_path / "s.sqlite", ranges={"x_mm": (-1200.0, 0.0)}, evaluations=24,
-        map_points=5, processes=1,
+        map_points=5, processes=1, tolerance_mm=20,
     )  # fmt: skip
     assert result.before["status"] == "unreachable"
     assert result.best is not None
-    assert result.best.answer["value"] > 0
+    # Worth what the worst is of itself and the ends of its tolerance: the same searches again.
+    x = result.best.offsets["x_mm"]
+    star = [worth(job, {"x_mm": x + off}, exact=True)["value"] for off in (-20.0, 0.0, 20.0)]
+    assert result.best.answer["value"] == pytest.approx(min(star), rel=1e-12)
     assert result.map is not None
     assert [a["status"] for a in result.map.answers][-1] == "unreachable"
 
@@ -371,3 +411,61 @@ def test_numbers_in_place_of_the_table_are_checked(plain, tmp_path):
         layout(plain, store=tmp_path / "s.sqlite", evaluations=2)
     with pytest.raises(InputError, match="tolerance_mm: expected at least 0, got -1"):
         layout(plain, store=tmp_path / "s.sqlite", tolerance_mm=-1)
+
+
+@pytest.mark.slow
+def test_the_command_leaves_a_page_its_data_and_a_job_that_plans(coarse, tmp_path):
+    options = ["--vary", "x_mm=-300:0", "--vary", "yaw_deg=-30:30", "--evaluations", "8",
+               "--map-points", "3", "--processes", "1", "--out", tmp_path / "out"]  # fmt: skip
+    said = run("layout", coarse, *options, "--json")
+    assert said.returncode == 0, said.stderr
+    entry = json.loads(said.stdout)
+    assert [Path(f).name for f in entry["files"]] == ["layout.json", "layout.html", "placed.toml"]
+    data = json.loads((tmp_path / "out" / "layout.json").read_text())
+    assert data == {key: value for key, value in entry.items() if key != "files"}
+    assert set(data["best"]["offsets"]) == {"x_mm", "yaw_deg"}
+    # The map is tried, too: none of its cells is better than what is called the best.
+    bounds = [cell["bound"] for cell in data["map"]["cells"] if cell["status"] == "feasible"]
+    assert len(data["map"]["cells"]) == 9
+    assert max(bounds) <= data["best"]["value"] * (1 + 1e-9)
+    placed = read_job(tmp_path / "out" / "placed.toml")
+    speeds = [found.speed * 60 for _, _, found in fastest_speeds(placed)]
+    # The same graph and search twice.
+    assert min(speeds) == pytest.approx(data["best"]["value"], rel=1e-12)
+    # Again, from the store: the same files, and words for people.
+    before = kept(tmp_path / "out" / "layout.sqlite")
+    page = (tmp_path / "out" / "layout.html").read_bytes()
+    again = run("layout", coarse, *options)
+    assert again.returncode == 0
+    assert kept(tmp_path / "out" / "layout.sqlite") == before
+    assert (tmp_path / "out" / "layout.html").read_bytes() == page
+    assert f"speed: {data['best']['value']:.3f} m/min" in again.stdout
+    assert "no other of them is better, proved" in again.stdout
+    shown = dom_of(tmp_path / "out" / "layout.html") if CHROMIUM.exists() else None
+    if shown is not None:
+        assert shown.count('data-state="drawn"') == 2
+        assert 'data-state="failed"' not in shown
+
+
+@pytest.mark.slow
+def test_the_command_says_why_no_placement_is_feasible(tmp_path):
+    job = rings(tmp_path, 3500)
+    said = run("layout", job, "--evaluations", "8", "--map-points", "0", "--processes", "1",
+               cwd=tmp_path)  # fmt: skip
+    assert said.returncode == 1
+    assert "by default: neither [layout] nor --vary says" in said.stdout
+    assert re.search(
+        r"of (\d+) tried \1 unreachable \(small, node 0\): bring the part nearer", said.stdout
+    )
+    # The nearest of those out of reach alike is the one nearest to the robot.
+    assert re.search(r"nearest: x_mm = -\d", said.stdout)
+    assert not (tmp_path / "job-layout" / "placed.toml").exists()
+
+
+def test_the_command_refuses_what_it_does_not_know(coarse, tmp_path):
+    for given, word in (
+        ("x=0:1", "no variable 'x'"),
+        ("yaw_deg=5:-5", "from low to high"),
+    ):
+        refused(run("layout", coarse, "--vary", given, "--out", tmp_path / "out"), word)
+    assert not (tmp_path / "out").exists()

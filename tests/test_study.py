@@ -40,3 +40,10 @@ def test_a_worker_refuses_a_job_that_has_changed(bracket):
 def test_a_job_that_is_not_there_is_refused(tmp_path):
     with pytest.raises(InputError, match="no such file"):
         digest(tmp_path / "no.toml")
+
+
+def test_a_worker_without_the_job_is_unfit_and_does_not_fail_the_task(bracket):
+    then = digest(bracket)
+    (bracket.parent / "bracket.step").unlink()
+    with pytest.raises(UnfitWorker, match=r"bracket\.step.*every worker needs job and files"):
+        loaded(str(bracket), then)

@@ -341,6 +341,14 @@ def test_the_example_of_the_docs_runs(tmp_path):
     assert ran.stderr == ""
 
 
+def groups(scheduler):
+    """Return the names of the groups of tasks that a scheduler knows or has known."""
+    import distributed
+
+    with distributed.Client(scheduler) as client:
+        return set(client.run_on_scheduler(lambda dask_scheduler: [*dask_scheduler.task_prefixes]))
+
+
 def test_a_cluster_that_loses_a_worker_in_the_middle_loses_nothing(workers, scheduler, tmp_path):
     first, second = workers(2)
     tasks = [{"x": x, "folder": str(tmp_path), "seconds": 0.01} for x in range(300)]
@@ -360,6 +368,8 @@ def test_a_cluster_that_loses_a_worker_in_the_middle_loses_nothing(workers, sche
         sweep_tasks.troubled, [{"what": "path"}], store=tmp_path / "s", scheduler=scheduler
     )
     assert failed.failure == sweep.Failure(kind="NoFeasiblePath", message="layer 3 is empty")
+    # Tasks of one kind to Dask: it queues them, and its memory does not grow with their number.
+    assert groups(scheduler) <= {"task", "attempt"}
 
 
 def test_workers_of_another_version_are_refused_and_named(workers, scheduler, tmp_path):

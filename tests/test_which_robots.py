@@ -1,6 +1,7 @@
 """Which robots can do a job: the same speeds as of a job with that robot, reach pose by pose."""
 
 import json
+import shutil
 import sqlite3
 from contextlib import closing
 from dataclasses import replace
@@ -15,6 +16,7 @@ from kerfpath.job import fastest_speeds, read_job
 from kerfpath.robots import robot
 from kerfpath.study import (
     NEAREST,
+    _robots,
     contour_speeds,
     digest,
     robots_entry,
@@ -25,12 +27,13 @@ from kerfpath.study import (
 from kerfpath.study._robots import judged
 from kerfpath.sweep import _local
 from test_batch import JOB, write_jobs
+from test_cli import refused, run
 
 # The job gives accelerations of its own robot, and none that could be assumed of others.
 KNOWN = JOB.replace(
     'acceleration_ratio = "iontec_20_to_70kg"',
     "acceleration_deg_s2 = [320, 270, 420, 1300, 1400, 2000]\nendless = [4, 6]",
-).replace('pick = "b"\nspeed_m_min = 2', 'pick = "b"\nspeed_m_min = 40')
+).replace('pick = "b"\nspeed_m_min = 2', 'pick = "b"\nspeed_m_min = 400')
 OWN, STATED, SILENT = "abb_irb4600_60_205", "kuka_kr16_r2010_2", "abb_irb2400_155"
 SMALL, UNKNOWN = "staubli_tx60", "kuka_kr120_r2500_pro"
 
@@ -78,7 +81,7 @@ def test_speeds_are_those_of_a_job_with_that_robot(found, folder):
         job = read_job(folder / ("own.toml" if name == OWN else "other.toml"))
         speeds = [best.speed for _, _, best in fastest_speeds(job)]
         assert [contour.fastest for contour in each.contours] == speeds
-        margins = [speed / asked for speed, asked in zip(speeds, (2 / 60, 40 / 60), strict=True)]
+        margins = [speed / asked for speed, asked in zip(speeds, (2 / 60, 400 / 60), strict=True)]
         assert each.binding.margin == pytest.approx(min(margins), rel=1e-12)
         assert each.binding.name == "b"
 
@@ -172,3 +175,34 @@ def test_files_hold_what_was_found(found, folder):
     assert "2 of 5 robots can cut every contour" in page
     assert all(each.robot.id in page for each in found)
     assert len(page) < 100_000, "a table needs no drawing library"
+
+
+def test_the_command_prints_and_writes_what_was_found(folder, found, monkeypatch):
+    names = [each.robot.id for each in found]
+    monkeypatch.setattr(_robots, "robot_ids", lambda: names)
+    (folder / "out").mkdir()
+    shutil.copy(folder / "robots.sqlite", folder / "out")
+    command = ["layout", "job.toml", "--robots", "--out", "out"]
+    result = run(*command, cwd=folder)
+    assert result.returncode == 1, "b is asked for faster than any can"
+    rows = [line.split()[0] for line in result.stdout.splitlines() if line.startswith(tuple(names))]
+    assert rows == names
+    assert f"{OWN} (the job's own)" in result.stdout
+    assert "wrote out/robots.html" in result.stdout
+    told = json.loads(run(*command, "--json", cwd=folder).stdout)
+    assert not told["able"]
+    assert told["robots"] == json.loads(json.dumps(robots_entry(found)))
+
+
+def test_bad_input_of_the_command_is_one_line(folder):
+    def said(*arguments):
+        result = run("layout", "job.toml", *arguments, cwd=folder)
+        refused(result)
+        return result.stderr
+
+    (folder / "file").write_text("")
+    options = ("--goal", "speed", "--map-points", 0)
+    assert "leave out --goal, --map-points" in said("--robots", *options)
+    assert "only with --robots" in said("--acceleration-ratio", "nearest")
+    assert "'heavy' is not one of" in said("--robots", "--acceleration-ratio", "heavy")
+    assert "expected a folder, but file is a file" in said("--robots", "--out", "file")

@@ -12,7 +12,7 @@ from kerfpath.cli._drawing import show_drawing
 from kerfpath.cli._plan import leave
 from kerfpath.cli._show import busy, out, print_json, progress_bars, sweep_bar, table
 from kerfpath.front import Front, Search
-from kerfpath.job import read_job, require_folder, require_language, warm_up
+from kerfpath.job import make_folder, read_job, require_folder, require_language, warm_up
 from kerfpath.study import Studied, axes_of, pareto_of_job, picked, plan_picked, write_pareto
 
 __all__ = ["pick_plan", "show_front"]
@@ -37,7 +37,7 @@ def show_front(
 ) -> None:
     """Find the front of a contour, write pareto.json and pareto.html, and say what is in it."""
     require_folder(folder)
-    folder.mkdir(parents=True, exist_ok=True)
+    make_folder(folder)
     with busy("compiling the kernels, first run only"):
         warm_up()
     with sweep_bar("runs") as progress:

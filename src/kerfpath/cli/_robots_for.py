@@ -1,15 +1,24 @@
-"""Which robots can do a job, and how fast."""
+"""`kerfpath layout --robots`: which robots can do a job, and how fast."""
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from pathlib import Path
+from typing import Any
 
 from rich.markup import escape
 
 from kerfpath.cli._show import busy, out, print_json, sweep_bar, table
 from kerfpath.job import make_folder, require_folder, warm_up
-from kerfpath.study import robots_entry, which_robots, write_robots
-from kerfpath.study._robots_files import HEADS, MARGIN, NOTE, TEXT_COLUMNS, robots_rows
+from kerfpath.study import (
+    ROBOT_COLUMNS,
+    ROBOT_NOTES,
+    ROBOT_WORDS,
+    robot_rows,
+    robots_entry,
+    which_robots,
+    write_robots,
+)
 
 __all__ = ["show_robots_for"]
 
@@ -17,13 +26,14 @@ __all__ = ["show_robots_for"]
 def show_robots_for(
     job: Path,
     folder: Path,
-    scheduler: str | None,
-    processes: int | None,
+    workers: Mapping[str, Any],
     ratio: str | None,
     *,
     as_json: bool,
 ) -> bool:
     """Print what each robot can do of a job, and write it; return whether any can do it as asked.
+
+    `workers` are scheduler and processes, as `which_robots` takes them.
 
     Raises
     ------
@@ -31,7 +41,7 @@ def show_robots_for(
         As `which_robots`; a folder that cannot be made.
     """
     require_folder(folder)
-    if scheduler is None:
+    if workers["scheduler"] is None:
         with busy("compiling the kernels, first run only"):
             warm_up()
     make_folder(folder)
@@ -39,8 +49,7 @@ def show_robots_for(
         found = which_robots(
             job,
             store=folder / "robots.sqlite",
-            scheduler=scheduler,
-            processes=processes,
+            **workers,
             acceleration_ratio=ratio,
             progress=progress,
         )
@@ -50,10 +59,10 @@ def show_robots_for(
         files = [str(path) for path in written]
         print_json({"able": able, "robots": robots_entry(found), "files": files})
         return able
-    columns = [f"{what.lower()} {unit}".strip() for what, unit in HEADS]
-    numbers = [column for i, column in enumerate(columns) if i not in TEXT_COLUMNS]
-    table(columns, [[escape(v) for v in row] for row in robots_rows(found)], numbers=numbers)
-    out.print(f"{MARGIN} {NOTE}")
+    columns = [f"{what.lower()} {unit}".strip() for what, unit in ROBOT_COLUMNS]
+    numbers = [column for i, column in enumerate(columns) if i not in ROBOT_WORDS]
+    table(columns, [[escape(v) for v in row] for row in robot_rows(found)], numbers=numbers)
+    out.print(" ".join(ROBOT_NOTES))
     for path in written:
         out.print(f"wrote {escape(str(path))}")
     return able

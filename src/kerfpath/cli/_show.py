@@ -15,7 +15,16 @@ from rich.progress import BarColumn, MofNCompleteColumn, TextColumn, TimeRemaini
 from rich.progress import Progress as Bars
 from rich.table import Table
 
-__all__ = ["busy", "errors", "out", "print_json", "progress_bars", "sweep_bar", "table"]
+__all__ = [
+    "busy",
+    "errors",
+    "out",
+    "print_json",
+    "progress_bars",
+    "resumable",
+    "sweep_bar",
+    "table",
+]
 
 _PIPED = 200
 """Columns for output that goes to a file or another program: nothing is cut off there."""
@@ -63,7 +72,7 @@ def progress_bars(unit: str = "nodes") -> Iterator[Callable[[str, int, int], Non
         def advance(what: str, done: int, total: int) -> None:
             if what not in tasks:
                 tasks[what] = bars.add_task(what, total=total)
-            bars.update(tasks[what], completed=done)
+            bars.update(tasks[what], completed=done, total=total)
 
         yield advance
 
@@ -87,11 +96,24 @@ def sweep_bar(unit: str) -> Iterator[Callable[[int, int, float | None], None]]:
             told = "" if left is None else f"{timedelta(seconds=round(left))} left"
             bars.update(bar, completed=done, total=total, left=told)
 
-        try:
+        with resumable():
             yield advance
-        except KeyboardInterrupt:
-            errors.print("kerfpath: stopped; the same command goes on from the results so far")
-            raise typer.Exit(130) from None
+
+
+@contextmanager
+def resumable() -> Iterator[None]:
+    """Say at Ctrl-C how to go on.
+
+    Raises
+    ------
+    typer.Exit
+        Code 130, at Ctrl-C.
+    """
+    try:
+        yield
+    except KeyboardInterrupt:
+        errors.print("kerfpath: stopped; the same command goes on from the results so far")
+        raise typer.Exit(130) from None
 
 
 @contextmanager

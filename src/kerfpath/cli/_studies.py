@@ -10,7 +10,7 @@ import typer
 from kerfpath.cli._main import JobArgument, Json, Out, Strict, app
 from kerfpath.errors import InputError
 
-__all__ = ["batch", "pareto"]
+__all__ = ["batch", "layout", "pareto"]
 
 Scheduler = Annotated[
     str | None,
@@ -114,4 +114,97 @@ def batch(
     from kerfpath.cli._batch import plan_jobs
 
     if not plan_jobs(jobs, to or Path("kerfpath-batch"), scheduler, processes, as_json=as_json):
+        raise typer.Exit(1)
+
+
+@app.command()
+def layout(
+    job: JobArgument,
+    to: Out = None,
+    goal: Annotated[
+        Literal["speed", "margin", "motion"] | None,
+        typer.Option(help="What the best placement is best in; default: speed."),
+    ] = None,
+    vary: Annotated[
+        list[str] | None,
+        typer.Option(metavar="NAME=LOW:HIGH", help="What may vary and how far; may come often."),
+    ] = None,
+    evaluations: Annotated[
+        int | None, typer.Option(help="How many placements to look at; default: 240.")
+    ] = None,
+    seed: Annotated[int | None, typer.Option(help="Of all that is random; default: 0.")] = None,
+    tolerance_mm: Annotated[
+        float | None, typer.Option(help="What lengths may be off: the worst counts.")
+    ] = None,
+    tolerance_deg: Annotated[
+        float | None, typer.Option(help="What angles may be off: the worst counts.")
+    ] = None,
+    map_points: Annotated[
+        int | None, typer.Option(help="Points of the map each way, 0 for none; default: 15.")
+    ] = None,
+    robots: Annotated[
+        bool,
+        typer.Option("--robots", help="Move nothing: tell which robots can do the job, how fast."),
+    ] = False,
+    acceleration_ratio: Annotated[
+        str | None,
+        typer.Option(
+            metavar="NAME|nearest",
+            help="With --robots: assume accelerations that the maker does not publish.",
+        ),
+    ] = None,
+    scheduler: Scheduler = None,
+    processes: Processes = None,
+    as_json: Json = False,
+) -> None:
+    """Find where to put the part, or the robot, or how to turn the head, for a chosen goal.
+
+    Goals: speed, the fastest constant speed of the slowest contour; margin, the least share of a
+    fastest speed and the speed asked for; motion, the least total displacement of the joints at
+    the speeds asked for. Placements that cannot cut every contour come after all that can.
+
+    What may vary, as offsets in the robot base: x_mm, y_mm, z_mm, yaw_deg, tilt_x_deg, tilt_y_deg
+    of the part with its fixtures; base_x_mm, base_y_mm, base_z_mm, base_yaw_deg of the robot's
+    base; mount_deg, the turn of the head about the flange. Ranges are those of --vary, or else of
+    the layout table of the job, or else x_mm and y_mm by 200 mm, yaw_deg by 30 deg either way.
+
+    layout.json, layout.html and placed.toml, the job with its new numbers, go to the folder
+    JOB-layout beside you unless --out names another. Stopped, even by kill -9, the same command
+    goes on. Exit code 1: no placement is feasible, and why.
+
+    Example: kerfpath layout door.toml
+
+    Example: kerfpath layout door.toml --vary x_mm=-300:100 --vary yaw_deg=-45:45 --goal margin
+
+    Example: kerfpath layout door.toml --tolerance-mm 2 --tolerance-deg 0.5
+
+    Then: kerfpath plan door-layout/placed.toml
+
+    With --robots nothing is moved: every robot of the library is put in the place of the job's own,
+    and told are its reach, the fastest speed of each contour and the margin over what is asked,
+    the best first, in robots.json and robots.html. Exit code 1: none does it as fast as asked.
+
+    Example: kerfpath layout door.toml --robots --acceleration-ratio nearest
+    """
+    options = {
+        "goal": goal, "evaluations": evaluations, "seed": seed, "tolerance_mm": tolerance_mm,
+        "tolerance_deg": tolerance_deg, "map_points": map_points,
+    }  # fmt: skip
+    workers = {"scheduler": scheduler, "processes": processes}
+    folder = to or Path(f"{job.stem}-layout")
+    if robots:
+        from kerfpath.cli._robots_for import show_robots_for
+
+        given = [name for name, value in {"vary": vary, **options}.items() if value is not None]
+        if given:
+            said = ", ".join(f"--{name.replace('_', '-')}" for name in given)
+            raise InputError(f"--robots: nothing is moved with it; leave out {said}")
+        found = show_robots_for(job, folder, workers, acceleration_ratio, as_json=as_json)
+    elif acceleration_ratio is not None:
+        raise InputError("--acceleration-ratio: only with --robots; else the job says it")
+    else:
+        from kerfpath.cli._layout import show_layout
+
+        found = show_layout(job, folder, vary or [], options | workers, as_json=as_json)
+    if not found:
         raise typer.Exit(1)

@@ -1,9 +1,10 @@
-"""Self-contained HTML pages: the report on a job, a drawing's loops, a Pareto set."""
+"""Self-contained HTML pages: on a job, a drawing, a Pareto set, a layout; or a table alone."""
 
 from kerfpath.report._drawing import DrawnLoop, render_drawing
 from kerfpath.report._front import FrontAxis, FrontPlan
 from kerfpath.report._front_page import render_front
 from kerfpath.report._html import with_library, without_library
+from kerfpath.report._layout import render_layout
 from kerfpath.report._map import feasibility_map
 from kerfpath.report._page import render
 from kerfpath.report._section import ContourSection
@@ -18,6 +19,7 @@ __all__ = [
     "render",
     "render_drawing",
     "render_front",
+    "render_layout",
     "render_table",
     "with_library",
     "without_library",

@@ -7,6 +7,8 @@ from kerfpath.study._job import digest as digest
 from kerfpath.study._job import loaded as loaded
 from kerfpath.study._layout import Layout as Layout
 from kerfpath.study._layout import layout as layout
+from kerfpath.study._layout_files import layout_entry as layout_entry
+from kerfpath.study._layout_files import write_layout as write_layout
 from kerfpath.study._layout_place import ranges_of as ranges_of
 from kerfpath.study._pareto import Studied as Studied
 from kerfpath.study._pareto import pareto_of_job as pareto_of_job
@@ -21,5 +23,9 @@ from kerfpath.study._robots import RobotSpeed as RobotSpeed
 from kerfpath.study._robots import contour_speeds as contour_speeds
 from kerfpath.study._robots import which_robots as which_robots
 from kerfpath.study._robots import with_robot as with_robot
+from kerfpath.study._robots_files import ROBOT_COLUMNS as ROBOT_COLUMNS
+from kerfpath.study._robots_files import ROBOT_NOTES as ROBOT_NOTES
+from kerfpath.study._robots_files import ROBOT_WORDS as ROBOT_WORDS
+from kerfpath.study._robots_files import robot_rows as robot_rows
 from kerfpath.study._robots_files import robots_entry as robots_entry
 from kerfpath.study._robots_files import write_robots as write_robots

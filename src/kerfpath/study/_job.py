@@ -76,9 +76,13 @@ def loaded(path: str, digest_then: str) -> Loaded:
     Raises
     ------
     UnfitWorker
-        The files here are not those.
+        The files here are not those, or not here.
     """
-    if digest(Path(path)) != digest_then:
+    try:
+        here = digest(Path(path))
+    except InputError as error:
+        raise UnfitWorker(f"{error}; every worker needs job and files at the same path") from None
+    if here != digest_then:
         raise UnfitWorker(
             f"{path}: this job or a file that it names has changed, or is another one on this "
             "worker; start the study again"

@@ -36,11 +36,15 @@ class Layout:
     job : Job
     goal : {"speed", "margin", "motion"}
     ranges : mapping of variable to (low, high)
+    by_default : bool
+        Whether nobody said what varies.
     tolerance : mapping of variable to float
         What each variable may be off, either way; empty where nobody asked.
     seed, evaluations : int
     tried : tuple of Trial
         All placements, in order; the first is that of the job.
+    evolved : int
+        How many there were before those of the map.
     best : Trial or None
         The best one, unless none is feasible.
     before, after : mapping
@@ -57,10 +61,12 @@ class Layout:
     job: Job
     goal: Goal
     ranges: Mapping[str, tuple[float, float]]
+    by_default: bool
     tolerance: Mapping[str, float]
     seed: int
     evaluations: int
     tried: tuple[Trial, ...]
+    evolved: int
     best: Trial | None
     before: Answer
     after: Answer
@@ -108,7 +114,8 @@ def layout(
     `look`; then the exact search takes the placements tried by their bounds, the best first, until
     the best value is at least the next bound: no other of those tried is better then. Where an
     exact search shows a stretch that binds and was not in the bound, the bounds are found again
-    with it. The same seed gives the same answer, whatever the number of processes.
+    with it. The points of the map about the best are tried in the same way. The same seed gives the
+    same answer, whatever the number of processes.
 
     Parameters
     ----------
@@ -127,7 +134,7 @@ def layout(
     tolerance_mm, tolerance_deg : float, optional
         By how much each variable may be off: the worst of its two ends counts, one at a time.
     map_points : int, optional
-        Points of the map along each of two variables; 0: no map.
+        Points of the map along each of two variables, which are tried, too; 0: no map.
     scheduler, processes
         As in `kerfpath.sweep.run`.
     progress : callable, optional
@@ -172,9 +179,14 @@ def layout(
         before = search.first()
         search.evolve(table.evaluations, table.seed)
         proved, open_bound = search.climb()
+        evolved, drawn = len(search.trials), None
+        if table.map_points:
+            axes, cells = search.mapped(search.best or search.trials[0], table.map_points)
+            proved, open_bound = search.climb()
+            y = axes[1] if len(axes) > 1 else np.zeros(0)
+            drawn = Map(x=axes[0], y=y, answers=tuple(cell.answer for cell in cells))
         best = search.best
         after = search.whole(best) if best is not None else {}
-        drawn = search.map(best or search.trials[0], table.map_points) if table.map_points else None
     numbers: Numbers = {}
     if best is not None:
         middle = middle_of(at.job, subjects_of(path, then, table.goal))
@@ -183,10 +195,12 @@ def layout(
         job=at.job,
         goal=table.goal,
         ranges=spans,
+        by_default=not (ranges or table.ranges),
         tolerance=tolerance,
         seed=table.seed,
         evaluations=table.evaluations,
         tried=tuple(search.trials),
+        evolved=evolved,
         best=best,
         before=before,
         after=after,

@@ -181,15 +181,23 @@ class Search:
                 self._take(trial)
             self.progress("exact searches", self.exact, self.exact + len(open_) - len(batch))
 
-    def map(self, trial: Trial, points: int) -> Map:
-        """Return the bounds over the first two variables about a placement."""
+    def mapped(self, about: Trial, points: int) -> tuple[list[Array], list[Trial]]:
+        """Look at a grid over the first two variables about a placement: its axes, its placements.
+
+        They are tried as all others are: what the grid shows to be better is not left lying.
+        """
         names = list(self.ranges)[:2]
         axes = [np.linspace(*self.ranges[name], points) for name in names]
         grid = np.array(np.meshgrid(*axes)).reshape(len(names), -1).T
-        asked = [{**trial.offsets, **self._named(names, point)} for point in grid]
-        answers = self._asked(asked, told=lambda done: self.progress("map", done, len(asked)))
-        y = axes[1] if len(axes) > 1 else np.zeros(0)
-        return Map(x=axes[0], y=y, answers=tuple(answers))
+        at = np.tile([*about.offsets.values()], (len(grid), 1))
+        at[:, : len(names)] = grid
+        trials = [self._trial(point) for point in at]
+        self.look_at(
+            [trial for trial in trials if not trial.answer],
+            told=lambda done: self.progress("map", done, len(grid)),
+        )
+        self._refresh(trials)
+        return axes, trials
 
     def look_at(self, trials: Sequence[Trial], told: Callable[[int], None]) -> None:
         """Find the bounds of placements."""
@@ -274,15 +282,12 @@ class Search:
         return [dict(offsets), *ends]
 
     def _trial(self, point: Array) -> Trial:
-        """Return the placement at a point, the same one for the same numbers."""
-        offsets = self._named(list(self.ranges), point)
+        """Return the placement at a point, rounded to 0.01 mm and 0.001 deg; one for one."""
+        offsets = {
+            name: round(float(value), 2 if name.endswith("_mm") else 3) + 0.0
+            for name, value in zip(self.ranges, point, strict=True)
+        }
         return self.known.setdefault(tuple(offsets.values()), Trial(offsets=offsets))
-
-    @staticmethod
-    def _named(names: Sequence[str], point: Array) -> dict[str, float]:
-        """Return offsets by name, to 0.01 mm and 0.001 deg."""
-        digits = [2 if name.endswith("_mm") else 3 for name in names]
-        return {n: round(float(v), d) + 0.0 for n, v, d in zip(names, point, digits, strict=True)}
 
     def _may_win(self, trial: Trial) -> bool:
         if not trial.feasible:

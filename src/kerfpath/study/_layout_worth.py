@@ -31,6 +31,7 @@ from kerfpath.graph import LayeredGraph
 from kerfpath.job import Job, cell_of_job
 from kerfpath.planner import fastest_speed, layered_graph, plan
 from kerfpath.search import shortest_path
+from kerfpath.study._clear import has_clear_pose
 from kerfpath.study._layout_subject import Subject
 
 __all__ = ["SLACK", "Answer", "Worth", "beats", "worst_of"]
@@ -39,10 +40,10 @@ EVERY = 8
 """Nodes between those of the first test."""
 THIN = 4
 """Steps of gamma between the samples of a path that is good enough."""
-TRIED = 8
-"""Poses of a node asked at once for a clear one."""
 SLACK = 1e-9
 """Relative: by how much rounding may lift a value over its bound."""
+PER_METRE = 1e-3
+"""What a metre from the base counts between placements that are out of reach alike."""
 TOLERATED = 1e-6
 """Share by which steps over several nodes may exceed the limit: each step has a tolerance."""
 
@@ -160,6 +161,9 @@ class Worth:
     def _require_none(self, status: str, bad: list[Bools], so_far: float) -> None:
         """Lose the placement where any node is bad, and say which is the first."""
         share = 1.0 - float(np.concatenate(bad).mean())
+        middle = np.mean([subject.nodes.points.mean(axis=0) for subject in self.subjects], axis=0)
+        placement = self.job.placement
+        away = float(np.linalg.norm(placement[:3, :3] @ middle + placement[:3, 3]))
         for subject, graph, here in zip(self.subjects, self.graphs, bad, strict=True):
             if here.any():
                 k = int(np.argmax(here))
@@ -169,7 +173,7 @@ class Worth:
                 told = max(counts, key=lambda word: counts[word]) if counts else ""
                 why = "no clear pose" if status == "collision" else f"no pose, most often {told}"
                 where = {"contour": subject.name, "node": EVERY * k, "nodes": len(subject.nodes)}
-                raise Lost(status, so_far + share, reason=why, **where)
+                raise Lost(status, so_far + share - PER_METRE * away, reason=why, **where)
 
     def _bound(self, stretches: Sequence[Sequence[int]]) -> float | None:
         """Return what no path of this placement can beat, None where nothing is known."""
@@ -320,13 +324,5 @@ def _in_order(entries: Mapping[int, Answer]) -> list[Answer]:
 
 def _closed(graph: LayeredGraph, cell: Cell) -> Bools:
     """Return which layers (M,) bool have no pose that is clear of collisions."""
-    checker = Checker(cell, graph.q)
-    closed = np.ones(len(graph.start) - 1, bool)
-    for k in range(len(closed)):
-        layer = np.arange(graph.start[k], graph.start[k + 1])
-        rounds = max(1, len(layer) // TRIED)
-        for r in range(rounds):  # spread over the layer, as neighbours collide together
-            if np.isfinite(checker.price(layer[r::rounds])).any():
-                closed[k] = False
-                break
-    return closed
+    checker, layers = Checker(cell, graph.q), range(len(graph.start) - 1)
+    return np.array([not has_clear_pose(graph, checker, k) for k in layers])

@@ -11,12 +11,13 @@ from typing import Any
 import numpy as np
 
 from kerfpath.cad import Part
-from kerfpath.cell import Cell
+from kerfpath.cell import Cell, Checker
 from kerfpath.errors import InputError, NoFeasiblePath
 from kerfpath.graph import LayeredGraph
 from kerfpath.job import Job, cell_of_job, fastest_along, read_job
 from kerfpath.planner import layered_graph
 from kerfpath.robots import Robot, acceleration_ratios, postures_named, robot, robot_ids
+from kerfpath.study._clear import has_clear_pose
 from kerfpath.study._job import digest, loaded
 from kerfpath.sweep import Progress, Sweep
 
@@ -26,8 +27,6 @@ NEAREST = "nearest"
 """In place of a ratio: of each robot the one that the library calls its nearest."""
 EVERY = 8
 """Nodes from one that is looked at for a clear pose to the next."""
-TRIED = 8
-"""Poses of a node that are looked at together."""
 NOT_ASKED = "posture not wanted"
 """What drops a candidate without telling anything about the robot."""
 
@@ -276,9 +275,8 @@ def _reached(name: str, asked: float, graph: LayeredGraph) -> ContourSpeed:
 
 def _clear(contour: ContourSpeed, graph: LayeredGraph, cell: Cell) -> ContourSpeed:
     """Return a contour with the reason where, of every `EVERY`-th node, one has no clear pose."""
+    checker = Checker(cell, graph.q)
     for k in range(0, len(graph.start) - 1, EVERY):
-        poses = graph.q[graph.start[k] : graph.start[k + 1]]
-        rounds = -(-len(poses) // TRIED)  # spread over the layer, as neighbours collide together
-        if not any(cell.clear(poses[r::rounds]).any() for r in range(rounds)):
+        if not has_clear_pose(graph, checker, k):
             return replace(contour, reason=f"collision: no clear pose at node {k}")
     return contour

@@ -16,16 +16,15 @@ from kerfpath.report import render_table
 from kerfpath.study._robots import ContourSpeed, RobotSpeed
 
 __all__ = [
-    "HEADS",
-    "MARGIN",
-    "NOTE",
-    "TEXT_COLUMNS",
+    "ROBOT_COLUMNS",
+    "ROBOT_NOTES",
+    "ROBOT_WORDS",
+    "robot_rows",
     "robots_entry",
-    "robots_rows",
     "write_robots",
 ]
 
-HEADS = (
+ROBOT_COLUMNS = (
     ("Robot", ""),
     ("Payload", "kg"),
     ("Reach", "mm"),
@@ -34,15 +33,14 @@ HEADS = (
     ("Accelerations", ""),
     ("Contour that binds, or why not", ""),
 )
-TEXT_COLUMNS = (0, 5, 6)
-MARGIN = (
+ROBOT_WORDS = (0, 5, 6)
+ROBOT_NOTES = (
     "Margin: the fastest constant speed, exact on the job's grid, over the speed asked for, of the "
-    "contour where that is least; from 1 on the robot does the job as it asks."
-)
-NOTE = (
+    "contour where that is least; from 1 on the robot does the job as it asks.",
     "Robot base, head and part stay where the job has them. The payload is told, not checked: no "
-    "job says what its head weighs."
+    "job says what its head weighs.",
 )
+"""What a reader of the table must know."""
 
 
 def robots_entry(found: Sequence[RobotSpeed]) -> list[dict[str, Any]]:
@@ -106,20 +104,20 @@ def write_robots(
     page = render_table(
         f"Robots for {job.part_file.stem.replace('_', ' ')}",
         kind="Which robot",
-        heads=HEADS,
-        rows=robots_rows(found),
-        text_columns=TEXT_COLUMNS,
-        caption=f"{able} of {len(found)} robots can cut every contour. {MARGIN}",
+        heads=ROBOT_COLUMNS,
+        rows=robot_rows(found),
+        text_columns=ROBOT_WORDS,
+        caption=f"{able} of {len(found)} robots can cut every contour.",
         facts=[("Job", job.path.name), ("Part", job.part_file.name)],
-        notes=[NOTE],
+        notes=ROBOT_NOTES,
         job_text=job.path.read_text(encoding="utf-8-sig"),
     )
     texts = {"robots.json": json.dumps(whole, indent=1, allow_nan=False), "robots.html": page}
     return write_files(folder, texts)
 
 
-def robots_rows(found: Sequence[RobotSpeed]) -> list[list[str]]:
-    """Return a row for each robot, as `HEADS` say."""
+def robot_rows(found: Sequence[RobotSpeed]) -> list[list[str]]:
+    """Return a row for each robot, as `ROBOT_COLUMNS` say."""
     return [_row(each) for each in found]
 
 

@@ -16,6 +16,11 @@ __all__ = ["on_cluster"]
 AHEAD = 4096
 """Tasks at the scheduler at a time: more than a cluster has workers, few for its memory."""
 
+GROUP = "task-"
+"""What the keys of tasks begin with: Dask takes them for one group, which it keeps in a queue.
+
+Without it each task would be a group of its own, which the scheduler never forgets."""
+
 PATIENCE = 10.0
 """How long a scheduler, and then its first worker, is waited for, s."""
 
@@ -88,7 +93,7 @@ def _gathered(
         count = min(len(waiting), AHEAD - coming.count())
         tasks = [waiting.popleft() for _ in range(count)]
         coming.update(
-            [client.submit(attempt, __version__, call, task, key=task.key) for task in tasks]
+            [client.submit(attempt, __version__, call, t, key=f"{GROUP}{t.key}") for t in tasks]
         )
 
     while True:
@@ -108,7 +113,8 @@ def _failed(distributed: Any, future: Any) -> Outcome:
     error = future.exception()
     if isinstance(error, distributed.KilledWorker):
         failure = Failure(kind="WorkerDied", message="the task took several workers with it")
-        return Outcome(key=future.key, value=None, failure=failure, seconds=0.0)
+        key = future.key.removeprefix(GROUP)
+        return Outcome(key=key, value=None, failure=failure, seconds=0.0)
     if isinstance(error, InputError | distributed.CancelledError):
         raise error
     raise InputError(f"a worker cannot do the task: {type(error).__name__}: {error}")

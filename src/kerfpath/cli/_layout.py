@@ -1,0 +1,105 @@
+"""`kerfpath layout`: the best placement, what it gains, and why others are not feasible."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+from rich.markup import escape
+
+from kerfpath.cli._show import busy, out, print_json, progress_bars, resumable, table
+from kerfpath.job import make_folder, require_folder, warm_up
+from kerfpath.study import layout, layout_entry, ranges_of, write_layout
+
+__all__ = ["show_layout"]
+
+REMEDIES = {
+    "unreachable": "bring the part nearer, allow another posture, or widen the ranges",
+    "collision": "give the head more room, lower near_miss_mm, or widen the ranges",
+    "speed": "ask for lower speeds, or widen the ranges",
+}
+ON_ONE_LINE = 200
+"""Characters of a reason that are printed."""
+
+
+def show_layout(
+    job: Path, folder: Path, vary: Sequence[str], options: Mapping[str, Any], *, as_json: bool
+) -> bool:
+    """Find the best placement, write its files, print it; return whether any is feasible."""
+    ranges = ranges_of(vary)
+    require_folder(folder)
+    make_folder(folder)
+    with busy("compiling the kernels, first run only"):
+        warm_up()
+    with progress_bars("") as progress, resumable():
+        found = layout(
+            job, store=folder / "layout.sqlite", ranges=ranges, progress=progress, **options
+        )
+    with busy("writing"):
+        written = write_layout(found, folder)
+    entry = layout_entry(found)
+    if as_json:
+        print_json(entry | {"files": [str(path) for path in written]})
+        return bool(entry["feasible"])
+    by_default = " (by default: neither [layout] nor --vary says)" if found.by_default else ""
+    spans = ", ".join(f"{name} {low:g} to {high:g}" for name, (low, high) in found.ranges.items())
+    out.print(escape(f"varied{by_default}: {spans}"))
+    if entry["feasible"]:
+        _show_best(entry)
+    else:
+        _show_why(entry)
+    for path in written:
+        out.print(f"wrote {escape(str(path))}")
+    return bool(entry["feasible"])
+
+
+def _show_best(entry: Mapping[str, Any]) -> None:
+    best, shipped, unit = entry["best"], entry["shipped"], f" {entry['unit']}".rstrip()
+    tried, solved = len(entry["tried"]), entry["exact_searches"]
+    motion = entry["goal"] == "motion"
+    rows = []
+    for contour in entry["contours"]:
+        row = [escape(contour["name"])]
+        for side in (contour["before"], contour["after"]):
+            value = None if side is None else side.get("value" if motion else "fastest_m_min")
+            row.append("-" if value is None else f"{value:.3f}")
+            known = side is not None and "joint" in side
+            binds = f"joint {side['joint']} {side['limit']}" if known else ""
+            row += [] if motion else [binds, str(side["node"]) if known else ""]
+        rows.append(row)
+    what = "displacement" if motion else "m/min"
+    sides = [[f"{when} {what}", *([] if motion else [f"binds {when}", f"node {when}"])]
+             for when in ("before", "after")]  # fmt: skip
+    columns = ["contour", *sides[0], *sides[1]]
+    table(columns, rows, numbers=[c for c in columns if what in c or "node" in c])
+    told = ", ".join(f"{name} = {value:g}" for name, value in best["offsets"].items())
+    out.print(f"[bold]best placement[/]: {escape(told)}")
+    was = f"{shipped['value']:.3f}{unit}" if shipped["value"] is not None else shipped["status"]
+    gain = "" if best["gain"] is None else f", {100 * best['gain']:+.1f} %"
+    out.print(f"{entry['goal']}: {best['value']:.3f}{unit}, as the job has it {was}{gain}")
+    proved = (
+        "no other of them is better, proved"
+        if entry["proved"]
+        else f"others of them may come to {entry['open_bound']:.3f}{unit}"
+    )
+    count = entry["statuses"].get("feasible", 0)
+    out.print(f"{tried} placements tried, {count} feasible, {solved} solved exactly; {proved}")
+
+
+def _show_why(entry: Mapping[str, Any]) -> None:
+    parts = []
+    for why in entry["reasons"]:
+        at = f" ({why['contour']}, node {why['node']})" if why["contour"] else ""
+        parts.append(f"{why['count']} {why['status']}{at}")
+    worst = max(REMEDIES, key=lambda status: entry["statuses"].get(status, 0))
+    out.print(
+        escape(
+            f"no placement is feasible: of {len(entry['tried'])} tried {', '.join(parts)}: "
+            f"{REMEDIES[worst]}"
+        )
+    )
+    near = entry["nearest"]
+    told = ", ".join(f"{name} = {value:g}" for name, value in near["offsets"].items())
+    where = f"{near['contour']}, node {near['node']} of {near['nodes']}: " if "node" in near else ""
+    out.print(escape(f"nearest: {told}; {where}{near['reason'][:ON_ONE_LINE]}"))

@@ -1,0 +1,234 @@
+"""The page of a layout: the best placement, what it gains, and what became of the others."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from html import escape
+from typing import Any
+
+from kerfpath.report._html import Figures, header, job_part, page
+from kerfpath.report._layout_plots import convergence, placement_map
+from kerfpath.report._tables import FAIL, PASS, WARN, number, sign, table, td
+
+__all__ = ["render_layout"]
+
+GOALS = {
+    "speed": "fastest speed of the slowest contour",
+    "margin": "least margin of a contour over its speed",
+    "motion": "least total displacement of the joints",
+}
+STATUSES = {
+    "feasible": "feasible",
+    "speed": "a speed asked for cannot be held",
+    "collision": "a collision that no path avoids",
+    "unreachable": "a node that no admissible pose reaches",
+}
+STAGES = {
+    "reach": "reach: poses of every eighth node",
+    "stretch": "stretches that bind, solved exactly",
+    "exact": "all contours, solved exactly",
+}
+
+LONGEST = 160
+"""Characters of a reason that are shown."""
+
+
+def render_layout(entry: Mapping[str, Any], *, job_text: str = "") -> str:
+    """Return the page of a layout as one self-contained HTML page.
+
+    Parameters
+    ----------
+    entry : mapping
+        What layout.json holds.
+    job_text : str
+        The job file as read.
+    """
+    figures = Figures()
+    verdict = f'<p class="verdict {(state := _verdict(entry))[0]}">{sign(*state)}</p>'
+    body = [
+        header(
+            "Placement", entry["job"], facts=_facts(entry), notes=_notes(entry), verdict=verdict
+        ),
+        *_placement(entry),
+        *_contours(entry),
+        *_map(entry, figures),
+        "<section><h2>Search</h2>",
+        '<p class="caption">Each dot is a placement, in the order in which they were tried: what '
+        "it can come to at best, as far as was found out. Filled ones were solved exactly; the "
+        f"line is the best so far. {_foot(entry)}</p>",
+        figures.place(convergence(entry), "convergence"),
+        _tallies(entry),
+        "</section>",
+        job_part(job_text),
+        f"<footer>kerfpath {escape(entry['kerfpath'])} · seed {entry['seed']}</footer>",
+    ]
+    return page(f"{entry['job']}: placement", body, figures)
+
+
+def _foot(entry: Mapping[str, Any]) -> str:
+    lost = "Infeasible placements stand at the foot. " if entry["reasons"] else ""
+    return lost + (f"From {entry['evolved']} on they are the map's." if entry["map"] else "")
+
+
+def _value(entry: Mapping[str, Any], value: float | None) -> str:
+    """Return a value of the goal in words."""
+    if value is None:
+        return "none"
+    if entry["goal"] == "motion":
+        return f"{value:.2f}"
+    return f"{value:.3f} {'m/min' if entry['goal'] == 'speed' else 'times'}"
+
+
+def _verdict(entry: Mapping[str, Any]) -> tuple[str, str]:
+    best, shipped = entry["best"], entry["shipped"]
+    if best is None:
+        return FAIL, f"None of {len(entry['tried'])} placements is feasible"
+    told = f"{GOALS[entry['goal']].capitalize()}: {_value(entry, best['value'])}"
+    if best["gain"] is None:
+        return PASS, f"{told}; where the job has it, it is not feasible ({shipped['status']})"
+    if best["gain"] <= 0:
+        return WARN, f"{told}, as the job has it: none of those tried is better"
+    return PASS, f"{told}, {best['gain'] * 100:.1f} % better than where the job has it"
+
+
+def _facts(entry: Mapping[str, Any]) -> list[tuple[str, str]]:
+    tried, exact = len(entry["tried"]), entry["exact_searches"]
+    facts = [
+        ("Goal", GOALS[entry["goal"]]),
+        ("Placements tried", f"{tried}, {entry['statuses'].get('feasible', 0)} of them feasible"),
+        ("Solved exactly", f"{exact} of {tried}"),
+    ]
+    if entry["best"] is not None:
+        facts.append(("As the job has it", _value(entry, entry["shipped"]["value"])))
+        proved = "the best of those tried, proved"
+        still = f"others may come to {_value(entry, entry['open_bound'])}"
+        facts.append(("Claim", proved if entry["proved"] else still))
+    if entry["tolerance"]:
+        told = ", ".join(f"{name} ±{size:g}" for name, size in entry["tolerance"].items())
+        facts.append(("The worst within", f"{told}, one at a time"))
+    if entry["standing"]:
+        facts.append(("Standing", ", ".join(entry["standing"])))
+    return facts
+
+
+def _notes(entry: Mapping[str, Any]) -> list[str]:
+    notes = []
+    if entry["default_ranges"]:
+        notes.append("Nobody said what may vary: these ranges are a default.")
+    best = entry["best"]
+    if entry["goal"] == "margin" and best is not None and best["value"] < 1:
+        notes.append("Some contour cannot be cut at the speed asked for, even there.")
+    if best is None and entry["reasons"]:
+        told = entry["reasons"][0]
+        where = f" {told['contour']}, node {told['node']}:" if told["contour"] else ""
+        notes.append(f"Most common:{where} {told['reason']} ({told['count']} placements).")
+    return notes
+
+
+def _placement(entry: Mapping[str, Any]) -> list[str]:
+    best = entry["best"] or entry["nearest"]
+    what = "Best" if entry["best"] else "Nearest to feasible"
+    rows = []
+    for name, (low, high) in entry["ranges"].items():
+        value, unit = best["offsets"][name], name.rpartition("_")[2]
+        at_end = min(value - low, high - value) < 0.01 * (high - low)
+        told = number(value, 2 if unit == "mm" else 3)
+        told += " <small>at the end</small>" if at_end else ""
+        rows.append(
+            f'<tr><th scope="row">{escape(name)}</th>{td(f"{low:g}".replace("-", "&minus;"))}'
+            f"{td(f'{high:g}'.replace('-', '&minus;'))}{td(told)}</tr>"
+        )
+    parts = [
+        "<section><h2>The placement</h2>",
+        '<p class="caption">Offsets from where the job has things, along the axes of the robot '
+        "base. The part turns about the middle of its contours, and fixtures go with it but for "
+        "the standing ones. Where the best one is at the end of a range, a wider range may hold a "
+        "better one.</p>",
+        table((("Variable", ""), ("From", ""), ("To", ""), (what, "")), rows),
+    ]
+    if entry["best"]:
+        numbers = "".join(
+            f"<li><b>{escape(key)}</b> = {escape(str(value))}</li>"
+            for key, value in best["numbers"].items()
+        )
+        parts.append(
+            f'<ul class="others">{numbers or "<li>The job stays as it is.</li>"}</ul>'
+            '<p class="caption"><b>placed.toml</b> is the job with these numbers.</p>'
+        )
+    return [*parts, "</section>"]
+
+
+def _contours(entry: Mapping[str, Any]) -> list[str]:
+    if not entry["contours"]:
+        return []
+    motion = entry["goal"] == "motion"
+    unit = "displacement" if motion else "m/min"
+    heads = [("Contour", ""), ("As the job has it", unit), ("Best", unit), ("Change", "%")]
+    heads += [] if motion else [("What binds, before", ""), ("after", "")]
+    rows = []
+    for contour in entry["contours"]:
+        sides = [contour["before"], contour["after"]]
+        values = [
+            None if s is None else s.get("value" if motion else "fastest_m_min") for s in sides
+        ]
+        change = ""
+        if values[0] is not None and values[1] is not None:
+            change = f"{(values[1] / values[0] - 1) * 100:+.1f}".replace("-", "&minus;")
+        shown = [number(v, 2 if motion else 3) if v is not None else "" for v in values]
+        cells = "".join(td(text) for text in [*shown, change])
+        binds = "" if motion else "".join(f"<td>{_binds(side)}</td>" for side in sides)
+        rows.append(f'<tr><th scope="row">{escape(contour["name"])}</th>{cells}{binds}</tr>')
+    return [
+        "<section><h2>Contours</h2>",
+        '<p class="caption">On the job\'s own grid, each solved to its own optimum'
+        f"{'' if motion else ': the fastest constant speed'}.</p>",
+        table(heads, rows, text_columns=(0, 4, 5)),
+        "</section>",
+    ]
+
+
+def _binds(side: Mapping[str, Any] | None) -> str:
+    if side is None or "joint" not in side:
+        return ""
+    return f"joint {side['joint']} {side['limit']} <small>node {side['node']}</small>"
+
+
+def _map(entry: Mapping[str, Any], figures: Figures) -> list[str]:
+    if entry["map"] is None:
+        return []
+    others = [name for name in entry["ranges"] if name not in entry["map"]["variables"]]
+    held = f", {' and '.join(others)} as in the best placement" if others else ""
+    over = f"{' and '.join(entry['map']['variables'])}{held}"
+    return [
+        "<section><h2>Map</h2>",
+        f'<p class="caption">What the goal can come to at best over {over}; elsewhere why nothing '
+        "can be cut there. Small dots are the placements tried, wherever the "
+        "other variables were then.</p>",
+        figures.place(placement_map(entry), "placements"),
+        "</section>",
+    ]
+
+
+def _tallies(entry: Mapping[str, Any]) -> str:
+    parts, total = [], len(entry["tried"])
+    for title, words, key in (("Decided by", STAGES, "stages"), ("Outcome", STATUSES, "statuses")):
+        tally = {name: count for name in words if (count := entry[key].get(name))}
+        rows = [
+            f'<tr><th scope="row">{words[name]}</th>{td(str(count))}'
+            f"{td(f'{100 * count / total:.0f}')}</tr>"
+            for name, count in tally.items()
+        ]
+        heads = [("", ""), ("Placements", ""), ("", "%")]
+        parts += [f"<h4>{title}</h4>", table(heads, rows)]
+    reasons = [
+        f'<tr><th scope="row">{STATUSES[told["status"]]}</th>'
+        f"<td>{escape(told['contour'] or '')}</td>"
+        f"{td('' if told['node'] is None else str(told['node']))}{td(str(told['count']))}"
+        f"<td>{escape(told['reason'][:LONGEST])}</td></tr>"
+        for told in entry["reasons"]
+    ]
+    if reasons:
+        heads = [("", ""), ("Contour", ""), ("Node, most often", ""), ("Placements", "")]
+        told = table([*heads, ("Such as", "")], reasons, text_columns=(0, 1, 4))
+        parts += ["<h4>Why not</h4>", told]
+    return "\n".join(parts)

@@ -1,0 +1,170 @@
+"""The figures of a layout's page: the map of placements, and how the search came on."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+import plotly.graph_objects as go
+
+from kerfpath.report._look import (
+    ACCENT,
+    ALERT,
+    FAINT,
+    INK,
+    QUIET,
+    axis,
+    axis_title,
+    base_layout,
+)
+
+__all__ = ["convergence", "placement_map"]
+
+HEIGHT = 560
+WHY = {"unreachable": "#b4bac4", "collision": "#f2b8b5", "speed": "#f8d9a0"}
+"""Colours of placements that are not feasible, by status."""
+SCALE = [[0.0, "#f3f8e6"], [0.35, "#bfe0c4"], [0.7, "#4fa897"], [1.0, "#0b5c58"]]
+WORDS = {"speed": "m/min", "margin": "times asked", "motion": "displacement"}
+
+
+def placement_map(entry: Mapping[str, Any]) -> go.Figure:
+    """Return the bounds over the first two variables, or over the only one, and those tried."""
+    return _plane(entry) if entry["map"]["y"] else _line(entry)
+
+
+def _title(name: str) -> dict[str, Any]:
+    words, _, unit = name.rpartition("_")
+    return axis_title(f"{words.replace('_', ' ')} ({unit})")
+
+
+def _hover(entry: Mapping[str, Any], cell: Mapping[str, Any]) -> str:
+    if cell["status"] != "feasible":
+        where = f"{cell['contour']}, node {cell['node']}: " if "contour" in cell else ""
+        return f"{cell['status']}<br>{where}{str(cell.get('reason', ''))[:90]}"
+    if cell["bound"] is None:
+        return "feasible as far as is known"
+    least = "at least" if entry["goal"] == "motion" else "at most"
+    return f"{least} {cell['bound']:.3f} {WORDS[entry['goal']]}"
+
+
+def _plane(entry: Mapping[str, Any]) -> go.Figure:
+    drawn, (first, second) = entry["map"], entry["map"]["variables"]
+    shape = len(drawn["y"]), len(drawn["x"])
+    cells = np.array(drawn["cells"], dtype=object).reshape(shape)
+    bound = [[c["bound"] if c["status"] == "feasible" else None for c in row] for row in cells]
+    figure = go.Figure(layout=base_layout(HEIGHT, legend={"orientation": "h", "y": 1.09}))
+    grid = {"x": drawn["x"], "y": drawn["y"]}
+    for status, colour in WHY.items():
+        here = [[1 if c["status"] == status else None for c in row] for row in cells]
+        if not any(any(row) for row in here):
+            continue
+        figure.add_heatmap(
+            **grid, z=here, colorscale=[[0, colour], [1, colour]], showscale=False,
+            text=[[_hover(entry, c) for c in row] for row in cells],
+            hovertemplate="%{text}<extra></extra>",
+        )  # fmt: skip
+        mark = {"color": colour, "symbol": "square", "size": 11}
+        figure.add_scatter(x=[None], y=[None], mode="markers", marker=mark, name=status)
+    figure.add_heatmap(
+        **grid, z=bound, colorscale=SCALE, reversescale=entry["goal"] == "motion",
+        colorbar={
+            "title": {"text": WORDS[entry["goal"]], "side": "right"},
+            "thickness": 14, "outlinewidth": 0, "tickfont": {"color": QUIET, "size": 11},
+        },
+        text=[[_hover(entry, c) for c in row] for row in cells],
+        hovertemplate="%{text}<extra></extra>",
+    )  # fmt: skip
+    tried = [t["offsets"] for t in entry["tried"][: entry["evolved"]]]
+    dots = {"size": 4, "color": "rgba(29, 37, 48, 0.45)"}
+    figure.add_scatter(
+        x=[o[first] for o in tried], y=[o[second] for o in tried], mode="markers", marker=dots,
+        name="tried", hoverinfo="skip",
+    )  # fmt: skip
+    _mark(figure, 0.0, 0.0, "as the job has it", "x", INK, 11)
+    if entry["best"]:
+        at = entry["best"]["offsets"]
+        _mark(figure, at[first], at[second], "best", "star", "#ffb000", 19)
+    figure.update_xaxes(**axis(title=_title(first), showgrid=False, range=_ends(drawn["x"])))
+    figure.update_yaxes(**axis(title=_title(second), showgrid=False, range=_ends(drawn["y"])))
+    return figure
+
+
+def _ends(values: list[float]) -> list[float]:
+    half = (values[1] - values[0]) / 2 if len(values) > 1 else 1.0
+    return [values[0] - half, values[-1] + half]
+
+
+def _mark(
+    figure: go.Figure, x: float, y: float, name: str, symbol: str, colour: str, size: int
+) -> None:
+    look = {"symbol": symbol, "size": size, "color": colour, "line": {"width": 1.5, "color": INK}}
+    figure.add_scatter(x=[x], y=[y], mode="markers", marker=look, name=name)
+
+
+def _line(entry: Mapping[str, Any]) -> go.Figure:
+    drawn, (name, *_) = entry["map"], entry["map"]["variables"]
+    figure = go.Figure(layout=base_layout(380, legend={"orientation": "h", "y": 1.12}))
+    bounds = [c["bound"] if c["status"] == "feasible" else None for c in drawn["cells"]]
+    figure.add_scatter(
+        x=drawn["x"], y=bounds, mode="lines+markers", line={"color": ACCENT}, name="bound",
+        text=[_hover(entry, c) for c in drawn["cells"]], hovertemplate="%{text}<extra></extra>",
+    )  # fmt: skip
+    half = (drawn["x"][1] - drawn["x"][0]) / 2 if len(drawn["x"]) > 1 else 1.0
+    for x, cell in zip(drawn["x"], drawn["cells"], strict=True):
+        if cell["status"] != "feasible":
+            figure.add_vrect(
+                x0=x - half, x1=x + half, fillcolor=WHY[cell["status"]], line_width=0,
+                layer="below",
+            )  # fmt: skip
+    for status, colour in WHY.items():
+        if any(c["status"] == status for c in drawn["cells"]):
+            mark = {"color": colour, "symbol": "square", "size": 11}
+            figure.add_scatter(x=[None], y=[None], mode="markers", marker=mark, name=status)
+    if entry["shipped"]["value"] is not None:
+        _mark(figure, 0.0, entry["shipped"]["value"], "as the job has it", "x", INK, 11)
+    if entry["best"]:
+        at = entry["best"]
+        _mark(figure, at["offsets"][name], at["value"], "best", "star", "#ffb000", 19)
+    figure.update_xaxes(**axis(title=_title(name), range=_ends(drawn["x"])))
+    figure.update_yaxes(**axis(title=axis_title(WORDS[entry["goal"]])))
+    return figure
+
+
+def convergence(entry: Mapping[str, Any]) -> go.Figure:
+    """Return what each placement tried can come to, in order, and the best so far."""
+    tried, less = entry["tried"], entry["goal"] == "motion"
+    figure = go.Figure(layout=base_layout(360, legend={"orientation": "h", "y": 1.12}))
+    feasible = [i for i, t in enumerate(tried) if t["status"] == "feasible" and t["bound"]]
+    bounds = np.array([tried[i]["bound"] for i in feasible], dtype=float)
+    solved = [i for i in feasible if tried[i]["value"] is not None]
+    open_ = {"size": 6, "color": "white", "line": {"width": 1.2, "color": ACCENT}}
+    hover = "placement %{x}: %{y:.3f}<extra></extra>"
+    figure.add_scatter(
+        x=feasible, y=bounds.tolist(), mode="markers", marker=open_, name="bound",
+        hovertemplate=hover,
+    )  # fmt: skip
+    figure.add_scatter(
+        x=solved, y=[tried[i]["value"] for i in solved], mode="markers", name="solved exactly",
+        marker={"size": 8, "color": ACCENT}, hovertemplate=hover,
+    )  # fmt: skip
+    if len(feasible):
+        so_far = np.minimum.accumulate(bounds) if less else np.maximum.accumulate(bounds)
+        figure.add_scatter(
+            x=feasible, y=so_far.tolist(), mode="lines", name="best bound so far",
+            line={"color": FAINT, "width": 1.5, "shape": "hv"}, hoverinfo="skip",
+        )  # fmt: skip
+    lost = [i for i, t in enumerate(tried) if t["status"] != "feasible"]
+    foot = float(bounds.min()) if len(bounds) else 0.0
+    if lost:
+        span = float(np.ptp(bounds)) if len(bounds) else 1.0
+        cross = {"size": 6, "symbol": "x-thin", "line": {"width": 1.2, "color": ALERT}}
+        figure.add_scatter(
+            x=lost, y=[foot - 0.06 * (span or 1.0)] * len(lost), mode="markers",
+            name="infeasible", marker=cross,
+            text=[t["status"] for t in (tried[i] for i in lost)],
+            hovertemplate="placement %{x}: %{text}<extra></extra>",
+        )  # fmt: skip
+    figure.update_xaxes(**axis(title=axis_title("placement")))
+    figure.update_yaxes(**axis(title=axis_title(WORDS[entry["goal"]])))
+    return figure

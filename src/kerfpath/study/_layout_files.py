@@ -1,0 +1,149 @@
+"""What the study of a layout leaves: layout.json, layout.html, and placed.toml, the job moved."""
+
+from __future__ import annotations
+
+import json
+from collections import Counter
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+from kerfpath import __version__
+from kerfpath.errors import InputError
+from kerfpath.post import write_files
+from kerfpath.report import render_layout
+from kerfpath.study._layout import Layout
+from kerfpath.study._layout_place import placed_text
+from kerfpath.study._layout_search import Trial
+from kerfpath.study._layout_worth import Answer
+
+__all__ = ["layout_entry", "write_layout"]
+
+SCHEMA = 1
+"""Counts the ways in which layout.json was written."""
+UNITS = {"speed": "m/min", "margin": "times the speed asked for", "motion": ""}
+OF_CONTOUR = ("value", "at_least", "fastest_m_min", "joint", "limit", "node")
+WHY = ("reason", "contour", "node", "nodes", "progress")
+
+
+def layout_entry(found: Layout) -> dict[str, Any]:
+    """Return what layout.json holds: plain data, the same for the same seed."""
+    best, before = found.best, found.before
+    return {
+        "schema": SCHEMA,
+        "kerfpath": __version__,
+        "job": found.job.path.name,
+        "goal": found.goal,
+        "unit": UNITS[found.goal],
+        "ranges": {name: list(span) for name, span in found.ranges.items()},
+        "default_ranges": found.by_default,
+        "standing": list(found.job.layout.standing),
+        "tolerance": dict(found.tolerance),
+        "seed": found.seed,
+        "evaluations": found.evaluations,
+        "feasible": best is not None,
+        "shipped": {key: before[key] for key in ("status", "value", *WHY) if key in before},
+        "best": None if best is None else _best(found, best),
+        "contours": _contours(before, found.after),
+        "proved": found.proved,
+        "open_bound": found.open_bound,
+        "statuses": found.statuses,
+        "stages": found.stages,
+        "exact_searches": sum(trial.searched for trial in found.tried),
+        "reasons": _reasons(found),
+        "nearest": None if best is not None else _trial(found.nearest),
+        "evolved": found.evolved,
+        "tried": [_trial(trial) for trial in found.tried],
+        "map": _map(found),
+    }
+
+
+def _best(found: Layout, best: Trial) -> dict[str, Any]:
+    value, shipped = best.answer["value"], found.before["value"]
+    gain = None
+    if shipped is not None:
+        gain = shipped / value - 1 if found.goal == "motion" else value / shipped - 1
+    cell = found.job.cell
+    fixtures = () if cell is None else cell.fixture
+    numbers = {
+        ".".join(fixtures[step].name if isinstance(step, int) else step for step in where): value
+        for where, value in found.numbers.items()
+    }
+    return {"offsets": dict(best.offsets), "value": value, "gain": gain, "numbers": numbers}
+
+
+def _contours(before: Answer, after: Answer) -> list[dict[str, Any]]:
+    """Return each contour's value in the job's placement and in the best one."""
+    sides = [
+        {entry["name"]: {key: entry[key] for key in OF_CONTOUR if key in entry} for entry in side}
+        for side in (before.get("contours", []), after.get("contours", []))
+    ]
+    names = dict.fromkeys([*sides[0], *sides[1]])
+    return [{"name": n, "before": sides[0].get(n), "after": sides[1].get(n)} for n in names]
+
+
+def _trial(trial: Trial) -> dict[str, Any]:
+    told = {key: trial.answer[key] for key in WHY if key in trial.answer}
+    kept = {key: trial.answer[key] for key in ("status", "stage", "bound", "value")}
+    return {"offsets": dict(trial.offsets), **kept, **told}
+
+
+def _reasons(found: Layout) -> list[dict[str, Any]]:
+    """Return why placements are infeasible, by contour, the most common first."""
+    lost = [trial.answer for trial in found.tried if not trial.feasible]
+    count = Counter((answer["status"], answer.get("contour", "")) for answer in lost)
+    told = []
+    for (status, contour), number in count.most_common():
+        same = [a for a in lost if (a["status"], a.get("contour", "")) == (status, contour)]
+        nodes = Counter(a["node"] for a in same if "node" in a).most_common(1)
+        told.append(
+            {
+                "status": status,
+                "contour": contour or None,
+                "count": number,
+                "node": nodes[0][0] if nodes else None,
+                "reason": Counter(a["reason"] for a in same).most_common(1)[0][0],
+            }
+        )
+    return told
+
+
+def _map(found: Layout) -> dict[str, Any] | None:
+    if found.map is None:
+        return None
+    keys = ("status", "bound", "reason", "contour", "node")
+    return {
+        "variables": list(found.ranges)[:2],
+        "x": found.map.x.tolist(),
+        "y": found.map.y.tolist(),
+        "cells": [{key: a[key] for key in keys if key in a} for a in found.map.answers],
+    }
+
+
+def write_layout(found: Layout, folder: Path) -> list[Path]:
+    """Write layout.json and layout.html into a folder, and placed.toml where one is feasible.
+
+    Raises
+    ------
+    InputError
+        The folder cannot be made or written to.
+    """
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise InputError(f"{folder}: cannot be made a folder ({error.strerror})") from None
+    entry = layout_entry(found)
+    files = {
+        "layout.json": json.dumps(entry, indent=1, allow_nan=False) + "\n",
+        "layout.html": render_layout(entry, job_text=found.job.path.read_text("utf-8-sig")),
+    }
+    if found.best is not None:
+        files["placed.toml"] = placed_text(
+            found.job, found.numbers, folder.resolve(), _remark(found.job.path, found.best.offsets)
+        )
+    return write_files(folder, files)
+
+
+def _remark(job: Path, offsets: Mapping[str, float]) -> str:
+    told = ", ".join(f"{name} = {value:g}" for name, value in offsets.items())
+    return f"{job.name} as placed by kerfpath layout: {told}. Ranges count from here now."
