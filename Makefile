@@ -23,7 +23,7 @@ bench: .venv/bench.stamp
 figures: .venv/run.stamp
 	$(BIN)/python examples/feasibility_map.py
 	$(BIN)/python examples/known_against_proposed.py
-	$(BIN)/python examples/three_techniques.py
+	$(BIN)/python examples/techniques.py
 
 # One environment, filled in steps: what running needs, what developing adds, what benchmarks add.
 .venv/tools.stamp: requirements/build.txt

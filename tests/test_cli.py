@@ -407,3 +407,9 @@ def test_a_program_with_a_folder_of_its_own_is_written_audited_and_pointed_out(f
     result = run("plan", "val3.toml", "--out", "val3", cwd=folder)
     assert result.returncode == 1
     assert f"{main_file.name} is from an earlier run" in result.stderr
+
+
+def test_help_keeps_the_names_of_tables():
+    """Rich would take words in brackets for its own marks."""
+    assert "[sequence]" in run("pareto", "--help").stdout
+    assert "[program.LANGUAGE]" in run("post", "--help").stdout

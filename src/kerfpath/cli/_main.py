@@ -21,11 +21,11 @@ app = typer.Typer(
     add_completion=False,
     no_args_is_help=True,
     pretty_exceptions_enable=False,
-    rich_markup_mode="rich",
+    rich_markup_mode="markdown",
     help="Plan laser-cutting robots: from a CAD drawing to an audited robot program.\n\n"
-    "Begin with [bold]kerfpath demo[/bold]: it plans the shipped part and writes everything. "
-    "Then copy its job file, put in your part (see [bold]kerfpath contours[/bold]) and your robot "
-    "(see [bold]kerfpath robots[/bold]), and run [bold]kerfpath plan[/bold].\n\n"
+    "Begin with **kerfpath demo**: it plans the shipped part and writes everything. "
+    "Then copy its job file, put in your part (see **kerfpath contours**) and your robot "
+    "(see **kerfpath robots**), and run **kerfpath plan**.\n\n"
     "Exit codes: 0 done, 1 no feasible plan or failed audit, 2 bad input.",
 )
 

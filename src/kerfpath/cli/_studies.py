@@ -60,8 +60,8 @@ def pareto(
 ) -> None:
     """Find plans of a contour that weigh its criteria differently, none better than another in all.
 
-    Criteria: displacement, range, velocity, acceleration, speed, time (from home_deg in the
-    sequence table), clearance (in the cell), wrist, elbow, shoulder, limits, manipulability,
+    Criteria: displacement, range, velocity, acceleration, speed, time (from home_deg in
+    [sequence]), clearance (in the cell), wrist, elbow, shoulder, limits, manipulability,
     and displacement_J, increment_J, range_J of joint J. Every plan is the proved optimum of its
     run on the grid, and audited. pareto.json and pareto.html go to the folder JOB-pareto beside
     you unless --out names another. Stopped, even by kill -9, the same command goes on.
@@ -90,7 +90,7 @@ def pareto(
 
 @app.command()
 def batch(
-    jobs: Annotated[list[Path], typer.Argument(metavar="JOB.toml...", help="The job files.")],
+    jobs: Annotated[list[Path], typer.Argument(metavar="JOB.toml", help="The job files.")],
     to: Out = None,
     scheduler: Scheduler = None,
     processes: Processes = None,

@@ -1,4 +1,4 @@
-"""Three techniques by their fronts: the known one, the paper's procedure, and the exact search.
+"""Techniques by their fronts: the known one, the paper's procedure, the exact search, and ours.
 
 The paper's section 4 says that its technique "simplifies obtaining smooth solutions with the
 balanced values of the partial criteria". `known_against_proposed` looks at single plans of one
@@ -6,14 +6,14 @@ planar task; here are whole fronts of three tasks: that sheet, and the trim line
 parts as their jobs have them, in the open. Each is cut at shares of the fastest constant speed
 at which its grid has a path at all, so that limits bind and there is something to find.
 
-Every technique has as many runs. Known (one posture, limits untested) and the paper's procedure
-(greedy on acceleration) have the same grid of objective, metric and weights; the procedure also
-alters eta_v and eta_a between 1 and halfway to the least with which there is a path. Ours is
-`kerfpath.pareto`: the exact search, its runs placed where the front is sparse, with windows. A plan
-is acceptable when its peak velocity and acceleration shares are at most 1 and the audit finds
-nothing. README.md and the figure are made from table.csv.
+Every technique has as many runs. Known (one posture, limits untested), paper (the procedure,
+greedy on acceleration) and exact (the optimum) have the same grid of objective, metric and weights;
+paper and exact have the same eta_v and eta_a, too: 1 or halfway to the least with which there is a
+path. Ours is `kerfpath.pareto`: exact as well, but its runs are placed where the front is sparse,
+with windows. A plan is acceptable when its peak velocity and acceleration shares are at most 1 and
+the audit finds nothing. README.md and the figure are made from table.csv.
 
-Run: python examples/three_techniques.py [--out DIR] [--quick]
+Run: python examples/techniques.py [--out DIR] [--quick]
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from functools import partial
 from importlib.resources import files
-from itertools import cycle, islice, product
+from itertools import cycle, product
 from pathlib import Path
 from statistics import median
 from typing import Any, get_args
@@ -58,12 +58,13 @@ Case = tuple[str, str]
 """Task, and the share of its fastest speed."""
 Choice = tuple[ObjectiveKind, Metric, str]
 """Objective, metric, and the name of the weights."""
+Wish = tuple[Choice, Eta]
+"""What a run is asked for."""
 
 HERE = Path(__file__).with_suffix("")
 CASE = ("task", "share", "speed_m_min", "technique")
 ASKED = ("objective", "metric", "weights", "eta_v", "eta_a")
 SHARES = (0.95, 0.8)
-TECHNIQUES = ("known", "paper", "ours")
 CRITERIA = {
     "displacement": "displacement (7), s",
     "velocity": "largest increment (8), share of limit",
@@ -85,8 +86,9 @@ CLAIMS = {
 LEFT, TOP, WIDE, HIGH, GAP = 62, 54, 300, 240, 32
 """px, of the figure: beside and above the panels, from panel to panel, and between two rows."""
 SMALL = "font-size='11' fill='#5b6675'"
-COLOURS = {"known": "#d95f02", "paper": "#1b6fb5", "ours": "#0a8a5f"}
-RADII = {"known": 4.5, "paper": 3.5, "ours": 2.2}
+COLOURS = {"known": "#d95f02", "paper": "#1b6fb5", "exact": "#c02a9a", "ours": "#0a8a5f"}
+TECHNIQUES = tuple(COLOURS)
+RADII = {"known": 5.5, "paper": 4.4, "exact": 3.3, "ours": 2.2}
 """px: equal plans of several techniques are drawn on top of each other, all to be seen."""
 
 
@@ -115,25 +117,25 @@ def runs_of(task: str, made: Made, factors: Mapping[str, Array]) -> Iterator[Row
     choices = list(product(get_args(ObjectiveKind), get_args(Metric), factors))
     velocity = options["robot"].speed_limits()[0]
 
-    def planned(method: Method, speed: float, choice: Choice, eta: Eta) -> Plan | None:
-        objective, metric, name = choice
+    def planned(method: Method, speed: float, wish: Wish) -> Plan | None:
+        (objective, metric, name), (eta_v, eta_a) = wish
         ask = partial(plan, contour, **options, graph=graph, method=method, speed=speed)
         weights = factors[name] / (velocity * node_interval(contour, speed))
         ask = partial(ask, objective=objective, metric=metric, weights=weights)
         try:
-            return ask(eta_v=eta[0], eta_a=eta[1])
+            return ask(eta_v=eta_v, eta_a=eta_a)
         except NoFeasiblePath:
             return None
 
     with ThreadPoolExecutor(os.cpu_count()) as pool:
         # The known technique sees no limits, so its paths are the same at any speed.
-        ones = [(1.0, 1.0)] * len(choices)
-        known = list(pool.map(partial(planned, "known", fastest), choices, ones))
+        plain: list[Wish] = [(choice, (1.0, 1.0)) for choice in choices]
+        known = list(pool.map(partial(planned, "known", fastest), plain))
         for share in SHARES:
             speed = share * fastest
             least = relaxations(contour, options["robot"], graph, speed)
             v, a = ((1 + (eta or 1.0)) / 2 for eta in (least.eta_v, least.eta_a))
-            etas = list(islice(cycle([(1.0, 1.0), (1.0, a), (v, 1.0), (v, a)]), len(choices)))
+            grid = list(zip(choices, cycle([(1.0, 1.0), (1.0, a), (v, 1.0), (v, a)])))
             ours: list[Plan] = []
             pareto(
                 contour,
@@ -146,15 +148,10 @@ def runs_of(task: str, made: Made, factors: Mapping[str, Array]) -> Iterator[Row
             )
             settings = [p.settings for p in ours]
             took = [((s.objective, s.metric, ""), (s.eta_v, s.eta_a)) for s in settings]
-            sides: dict[str, tuple[Iterable[tuple[Choice, Eta]], Iterable[Plan | None]]] = {
-                "known": (
-                    zip(choices, ones, strict=True),
-                    (p and replace(p, time=p.time / share) for p in known),
-                ),
-                "paper": (
-                    zip(choices, etas, strict=True),
-                    pool.map(partial(planned, "paper", speed), choices, etas),
-                ),
+            sides: dict[str, tuple[list[Wish], Iterable[Plan | None]]] = {
+                "known": (plain, (p and replace(p, time=p.time / share) for p in known)),
+                "paper": (grid, pool.map(partial(planned, "paper", speed), grid)),
+                "exact": (grid, pool.map(partial(planned, "exact", speed), grid)),
                 "ours": (took, ours),
             }
             for technique, (wishes, plans) in sides.items():
@@ -354,8 +351,7 @@ def readme(rows: Sequence[Row]) -> str:
     for claim, (key, form) in CLAIMS.items():
         cells, held = [], 0
         for told in cases.values():
-            known, paper, _ = told.values()
-            here = shows(key, known, paper)
+            here = shows(key, told["known"], told["paper"])
             held += here
             numbers = " → ".join(_number(side[key], form) for side in told.values())
             cells.append(f"**{numbers}**" if here else numbers)
