@@ -9,6 +9,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from scipy.spatial.distance import cdist
 
 from browser import CHROMIUM, dom_of
 from kerfpath.cad import read as read_drawing
@@ -272,6 +273,39 @@ def test_fixtures_go_with_the_part_but_for_the_standing_ones_and_all_against_the
             np.sort(corners, axis=0), np.sort(after[name].shape.corners, axis=0), atol=1e-6
         )
     assert np.allclose(there.placement, base @ part @ job.placement, atol=1e-6)
+
+
+def test_a_head_from_a_file_turns_with_its_mount(tmp_path):
+    cone = stl_cone(tmp_path / "cone.stl")
+    text = HEAD.replace('head = "laser-head-45"', "xyz_mm = [40, 0, 200]\nrpy_deg = [0, 0, 0]")
+    file = f'[cell.head]\nfile = "{cone}"\nunit = "mm"\nxyz_mm = [40, 0, 100]\n'
+    cell = CELL.replace("[[cell.fixture]]", f"{file}nozzle_length_mm = 40\n\n[[cell.fixture]]", 1)
+    job = read_job(job_file(tmp_path, text + CONTOURS.format(speed=2, step=10) + cell))
+    there = moved(job, numbers_of(job, {"mount_deg": 50.0}, np.zeros(3)))
+    drawing = read_drawing(job.part_file)
+    before, after = ({b.name: b for b in cell_of_job(j, drawing).bodies} for j in (job, there))
+    end = cell_of_job(job, drawing).chain.end
+    motion = end @ pose([0, 0, 0], [0, 0, 50]) @ np.linalg.inv(end)
+    for name in ("nozzle", "head"):
+        corners = before[name].shape.vertices @ motion[:3, :3].T + motion[:3, 3]
+        # 1 um: numbers of a file are to 0.1 um and 1e-6 deg. A cut may order corners anew.
+        far = cdist(corners, after[name].shape.vertices)
+        assert max(far.min(axis=0).max(), far.min(axis=1).max()) < 1e-6
+    assert np.allclose(there.tool, pose([0, 0, 0], [0, 0, 50]) @ job.tool, atol=1e-6)
+
+
+def stl_cone(path):
+    """Write a four-sided cone whose point is at z = 98 mm and base at z = 0; return its name."""
+    base = np.array([[30, 20, 0], [-30, 20, 0], [-30, -20, 0], [30, -20, 0]], float)
+    sides = [(base[i], base[(i + 1) % 4], [0, 0, 98]) for i in range(4)]
+    faces = [*sides, (base[2], base[1], base[0]), (base[3], base[2], base[0])]
+    lines = ["solid cone"]
+    for face in faces:
+        lines += ["facet normal 0 0 0", "outer loop"]
+        lines += [f"vertex {x} {y} {z}" for x, y, z in face]
+        lines += ["endloop", "endfacet"]
+    path.write_text("\n".join([*lines, "endsolid cone"]))
+    return path.name
 
 
 def test_a_base_that_moves_is_a_part_that_moves_the_other_way(plain):

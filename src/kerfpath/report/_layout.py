@@ -29,6 +29,7 @@ STAGES = {
     "exact": "all contours, solved exactly",
 }
 
+DOTS = " Small dots are the placements tried, wherever the other variables were then."
 LONGEST = 160
 """Characters of a reason that are shown."""
 
@@ -202,8 +203,7 @@ def _map(entry: Mapping[str, Any], figures: Figures) -> list[str]:
     return [
         "<section><h2>Map</h2>",
         f'<p class="caption">What the goal can come to at best over {over}; elsewhere why nothing '
-        "can be cut there. Small dots are the placements tried, wherever the "
-        "other variables were then.</p>",
+        f"can be cut there.{DOTS if entry['map']['y'] else ''}</p>",
         figures.place(placement_map(entry), "placements"),
         "</section>",
     ]
