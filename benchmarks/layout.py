@@ -15,9 +15,9 @@ from kerfpath.job import Job, warm_up
 from kerfpath.planner import layered_graph
 from kerfpath.search import least_interval
 from kerfpath.study import Layout, digest, layout
-from kerfpath.study._layout_place import moved, numbers_of
-from kerfpath.study._layout_search import HALF
-from kerfpath.study._layout_subject import Subject, middle_of, subjects_of
+from kerfpath.study.placing._place import moved, numbers_of
+from kerfpath.study.placing._search import HALF
+from kerfpath.study.placing._subject import Subject, middle_of, subjects_of
 
 __all__ = ["run"]
 

@@ -17,10 +17,10 @@ from kerfpath.errors import InputError
 from kerfpath.job import cell_of_job, fastest_speeds, pose, read_job
 from kerfpath.planner import layered_graph
 from kerfpath.study import digest, layout, ranges_of
-from kerfpath.study._layout_look import look
-from kerfpath.study._layout_place import moved, numbers_of, placed_text
-from kerfpath.study._layout_subject import middle_of, subjects_of
-from kerfpath.study._layout_worth import EVERY
+from kerfpath.study.placing._look import look
+from kerfpath.study.placing._place import moved, numbers_of, placed_text
+from kerfpath.study.placing._subject import middle_of, subjects_of
+from kerfpath.study.placing._worth import EVERY
 from test_cli import refused, run
 
 DEMO = Path(__file__).parent.parent / "src" / "kerfpath" / "demo"

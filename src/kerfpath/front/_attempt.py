@@ -28,7 +28,7 @@ class Attempts:
     contour, robot, graph, cell
         As in `kerfpath.plan`.
     options : dict
-        What else `kerfpath.plan` is called with, the same for all runs.
+        What else `kerfpath.plan` is called with, the same for all runs: the speed at least.
     audit : callable, optional
         Returns what is wrong with a plan; default: `kerfpath.audit`, with the cell.
     """

@@ -10,15 +10,13 @@ import moocore
 import numpy as np
 
 from kerfpath._arrays import Array, freeze
-from kerfpath.contour import Contour
 from kerfpath.errors import InputError, NoFeasiblePath
 from kerfpath.front._adaptive import Adaptive, Made
+from kerfpath.front._attempt import Attempts
 from kerfpath.front._criteria import Judge
 from kerfpath.front._runs import Run, anchors, grid, whole
 from kerfpath.front._set import Front
-from kerfpath.graph import LayeredGraph
 from kerfpath.planner import node_interval, relaxations
-from kerfpath.robots import Robot
 
 __all__ = ["AHEAD", "Collection", "Reached", "Search"]
 
@@ -39,8 +37,8 @@ class Collection:
 
     Parameters
     ----------
-    contour, robot, graph, speed
-        The task, as in `kerfpath.plan`.
+    attempts : Attempts
+        The task.
     judge : Judge
     runs : int
         How many there are to be.
@@ -57,10 +55,7 @@ class Collection:
 
     def __init__(
         self,
-        contour: Contour,
-        robot: Robot,
-        graph: LayeredGraph,
-        speed: float | None,
+        attempts: Attempts,
         *,
         judge: Judge,
         runs: int,
@@ -73,24 +68,19 @@ class Collection:
                 f"search: expected one of {', '.join(get_args(Search))}, got {search!r}"
             )
         self.runs, self._ahead = whole_number(runs, "runs"), whole_number(ahead, "ahead")
-        self._name, self._criteria = contour.name, judge.criteria
+        self._name, self._criteria = attempts.contour.name, judge.criteria
         self._asked: list[Run] = []
         self._told = 0
         self._made: list[Made] = []
         self._failures: Counter[str] = Counter()
-        self._runs = self._proposed(contour, robot, graph, speed, judge, search, seed)
+        self._runs = self._proposed(attempts, judge, search, seed)
 
     def _proposed(
-        self,
-        contour: Contour,
-        robot: Robot,
-        graph: LayeredGraph,
-        speed: float | None,
-        judge: Judge,
-        search: Search,
-        seed: int,
+        self, attempts: Attempts, judge: Judge, search: Search, seed: int
     ) -> Iterator[Run]:
         """Yield the runs: the first, those for the best of each criterion, and then the search."""
+        contour, robot, graph = attempts.contour, attempts.robot, attempts.graph
+        speed = attempts.options["speed"]
         dt = node_interval(contour, speed)
         velocity, _ = robot.speed_limits()
         first = whole(freeze(1 / (velocity * dt)), judge.eta_v, judge.eta_a)

@@ -123,9 +123,6 @@ def pareto(
             postures=postures,
             comfort=comfort,
         )
-    collection = Collection(
-        contour, robot, graph, speed, judge=judge, runs=runs, search=search, seed=seed, ahead=ahead
-    )
     options: dict[str, Any] = {
         "tool": tool,
         "placement": placement,
@@ -140,6 +137,7 @@ def pareto(
     attempts = Attempts(
         contour=contour, robot=robot, graph=graph, cell=cell, options=options, audit=audit
     )
+    collection = Collection(attempts, judge=judge, runs=runs, search=search, seed=seed, ahead=ahead)
     plans: dict[int, Plan] = {}
     begun = 0
 

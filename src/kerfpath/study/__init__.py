@@ -5,11 +5,6 @@ from kerfpath.study._batch import batch as batch
 from kerfpath.study._job import Loaded as Loaded
 from kerfpath.study._job import digest as digest
 from kerfpath.study._job import loaded as loaded
-from kerfpath.study._layout import Layout as Layout
-from kerfpath.study._layout import layout as layout
-from kerfpath.study._layout_files import layout_entry as layout_entry
-from kerfpath.study._layout_files import write_layout as write_layout
-from kerfpath.study._layout_place import ranges_of as ranges_of
 from kerfpath.study._pareto import Studied as Studied
 from kerfpath.study._pareto import pareto_of_job as pareto_of_job
 from kerfpath.study._pareto_files import Pick as Pick
@@ -29,3 +24,8 @@ from kerfpath.study._robots_files import ROBOT_WORDS as ROBOT_WORDS
 from kerfpath.study._robots_files import robot_rows as robot_rows
 from kerfpath.study._robots_files import robots_entry as robots_entry
 from kerfpath.study._robots_files import write_robots as write_robots
+from kerfpath.study.placing import Layout as Layout
+from kerfpath.study.placing import layout as layout
+from kerfpath.study.placing import layout_entry as layout_entry
+from kerfpath.study.placing import ranges_of as ranges_of
+from kerfpath.study.placing import write_layout as write_layout

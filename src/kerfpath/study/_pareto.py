@@ -101,10 +101,7 @@ def pareto_of_job(
     name, others = _picked(known, contour)
     stage = _stage(here, whole, name, tuple(criteria))
     collection = Collection(
-        stage.attempts.contour,
-        stage.attempts.robot,
-        stage.attempts.graph,
-        stage.attempts.options["speed"],
+        stage.attempts,
         judge=stage.judge,
         runs=runs,
         search=search,

@@ -14,7 +14,7 @@ from kerfpath import __version__
 from kerfpath.cad import Part
 from kerfpath.errors import InputError
 from kerfpath.front import Front, Run
-from kerfpath.job import Chosen, Outcome, Progress, run_job
+from kerfpath.job import Chosen, Outcome, Progress, make_folder, run_job
 from kerfpath.post import write_files
 from kerfpath.report import FrontAxis, FrontPlan, render_front
 from kerfpath.robots import Robot
@@ -45,10 +45,7 @@ def write_pareto(studied: Studied, folder: Path) -> list[Path]:
     InputError
         The folder cannot be made or written to.
     """
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise InputError(f"{folder}: cannot be made a folder ({error.strerror})") from None
+    make_folder(folder)
     data = json.dumps(_entries(studied), indent=1, allow_nan=False) + "\n"
     return write_files(folder, {"pareto.json": data, "pareto.html": _page(studied, folder)})
 

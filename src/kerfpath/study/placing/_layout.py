@@ -14,11 +14,11 @@ import numpy as np
 from kerfpath.errors import InputError
 from kerfpath.job import Goal, Job, cell_of_job
 from kerfpath.study._job import digest, loaded
-from kerfpath.study._layout_look import look
-from kerfpath.study._layout_place import DEFAULT_RANGES, Numbers, numbers_of
-from kerfpath.study._layout_search import LEAST_EXACT, MOST_EXACT, Map, Progress, Search, Trial
-from kerfpath.study._layout_subject import middle_of, subjects_of
-from kerfpath.study._layout_worth import Answer
+from kerfpath.study.placing._look import look
+from kerfpath.study.placing._place import DEFAULT_RANGES, Numbers, numbers_of
+from kerfpath.study.placing._search import LEAST_EXACT, MOST_EXACT, Map, Progress, Search, Trial
+from kerfpath.study.placing._subject import middle_of, subjects_of
+from kerfpath.study.placing._worth import Answer
 from kerfpath.sweep import Sweep
 
 __all__ = ["STATUSES", "Layout", "layout"]

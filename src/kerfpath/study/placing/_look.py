@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from kerfpath.study._job import loaded
-from kerfpath.study._layout_place import moved, numbers_of
-from kerfpath.study._layout_subject import middle_of, subjects_of
-from kerfpath.study._layout_worth import Answer, Worth, beats, worst_of
+from kerfpath.study.placing._place import moved, numbers_of
+from kerfpath.study.placing._subject import middle_of, subjects_of
+from kerfpath.study.placing._worth import Answer, Worth, beats, worst_of
 
 __all__ = ["look"]
 

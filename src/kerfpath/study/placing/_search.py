@@ -11,7 +11,7 @@ from scipy.stats import qmc
 
 from kerfpath._arrays import Array
 from kerfpath.errors import InputError
-from kerfpath.study._layout_worth import SLACK, Answer, beats
+from kerfpath.study.placing._worth import SLACK, Answer, beats
 from kerfpath.sweep import Sweep
 
 __all__ = ["LEAST_EXACT", "MOST_EXACT", "Map", "Progress", "Search", "Trial"]

@@ -32,7 +32,7 @@ from kerfpath.job import Job, cell_of_job
 from kerfpath.planner import fastest_speed, layered_graph, plan
 from kerfpath.search import shortest_path
 from kerfpath.study._clear import has_clear_pose
-from kerfpath.study._layout_subject import Subject
+from kerfpath.study.placing._subject import Subject
 
 __all__ = ["SLACK", "Answer", "Worth", "beats", "worst_of"]
 

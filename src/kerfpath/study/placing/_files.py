@@ -9,13 +9,13 @@ from pathlib import Path
 from typing import Any
 
 from kerfpath import __version__
-from kerfpath.errors import InputError
+from kerfpath.job import make_folder
 from kerfpath.post import write_files
 from kerfpath.report import render_layout
-from kerfpath.study._layout import Layout
-from kerfpath.study._layout_place import placed_text
-from kerfpath.study._layout_search import Trial
-from kerfpath.study._layout_worth import Answer
+from kerfpath.study.placing._layout import Layout
+from kerfpath.study.placing._place import placed_text
+from kerfpath.study.placing._search import Trial
+from kerfpath.study.placing._worth import Answer
 
 __all__ = ["layout_entry", "write_layout"]
 
@@ -128,10 +128,7 @@ def write_layout(found: Layout, folder: Path) -> list[Path]:
     InputError
         The folder cannot be made or written to.
     """
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise InputError(f"{folder}: cannot be made a folder ({error.strerror})") from None
+    make_folder(folder)
     entry = layout_entry(found)
     files = {
         "layout.json": json.dumps(entry, indent=1, allow_nan=False) + "\n",
