@@ -410,10 +410,10 @@ def test_ranges_on_the_command_line():
         "x=-1:1": "no variable 'x'; there are x_mm, y_mm",
         "x_mm=1": "expected x_mm=LOW:HIGH",
         "x_mm=a:b": "expected x_mm=LOW:HIGH",
-        "x_mm=2:-2": "from low to high",
-        "x_mm=2:2": "from low to high",
-        "x_mm=0:inf": "from low to high",
-        "x_mm=0:nan": "from low to high",
+        "x_mm=2:-2": "with LOW below HIGH",
+        "x_mm=2:2": "with LOW below HIGH",
+        "x_mm=0:inf": "with LOW below HIGH",
+        "x_mm=0:nan": "with LOW below HIGH",
     }.items():
         with pytest.raises(InputError, match=re.escape(said)):
             ranges_of([text])
@@ -499,7 +499,7 @@ def test_the_command_says_why_no_placement_is_feasible(tmp_path):
 def test_the_command_refuses_what_it_does_not_know(coarse, tmp_path):
     for given, word in (
         ("x=0:1", "no variable 'x'"),
-        ("yaw_deg=5:-5", "from low to high"),
+        ("yaw_deg=5:-5", "with LOW below HIGH"),
     ):
         refused(run("layout", coarse, "--vary", given, "--out", tmp_path / "out"), word)
     assert not (tmp_path / "out").exists()

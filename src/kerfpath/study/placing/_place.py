@@ -48,7 +48,7 @@ def ranges_of(texts: Sequence[str]) -> dict[str, tuple[float, float]]:
                 f'vary: expected {name}=LOW:HIGH, as "{name}=-200:200", got {text!r}'
             ) from None
         if not (np.isfinite(ends).all() and ends[0] < ends[1]):
-            raise InputError(f"vary: expected {name} from low to high, got {text!r}; turn it round")
+            raise InputError(f"vary: expected {name}=LOW:HIGH with LOW below HIGH, got {text!r}")
         if name in found:
             raise InputError(f"vary: {name} comes twice; keep one")
         found[name] = ends
