@@ -134,6 +134,12 @@ def test_where_there_is_one_criterion_more_runs_change_nothing(task):
     assert len(several.plans) == 1
 
 
+def test_one_run_alone_has_its_plan(task):
+    only = pareto(**task, criteria=["displacement", "acceleration"], runs=1)
+    assert only.numbers == (0,)
+    assert only.hypervolume == pytest.approx(1.0)
+
+
 def test_progress_is_told_run_by_run(task):
     told = []
     pareto(**task, criteria=["displacement"], runs=11, progress=told.append)

@@ -70,7 +70,7 @@ class Collection:
         self.runs, self._ahead = whole_number(runs, "runs"), whole_number(ahead, "ahead")
         self._name, self._criteria = attempts.contour.name, judge.criteria
         self._asked: list[Run] = []
-        self._told = 0
+        self._told, self._beginning = 0, 1
         self._made: list[Made] = []
         self._failures: Counter[str] = Counter()
         self._runs = self._proposed(attempts, judge, search, seed)

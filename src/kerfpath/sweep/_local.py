@@ -63,7 +63,7 @@ def _pooled(
     context = get_context("spawn")
     ours, theirs = context.Pipe()
     pool = ProcessPoolExecutor(
-        processes, mp_context=context, initializer=_begin, initargs=(theirs,)
+        processes, mp_context=context, initializer=_begin, initargs=(theirs, call)
     )
     flying: dict[Future[Outcome], Task] = {}
     broken = False
@@ -106,13 +106,18 @@ def _pooled(
         theirs.close()
 
 
-def _begin(link: Connection) -> None:
-    """Set up a process: one thread, deaf to Ctrl-C, and gone as soon as the sweep lets go."""
+def _begin(link: Connection, call: bytes) -> None:
+    """Set up a process: one thread, deaf to Ctrl-C, and gone as soon as the sweep lets go.
+
+    What the function needs is imported at once, not by the first task.
+    """
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     os.environ.update(ONE_THREAD)
     Thread(target=_leave_with, args=(link,), daemon=True).start()
     with suppress(OSError):  # a sweep that was killed meanwhile hears nothing
         link.send(None)
+    with suppress(ImportError, AttributeError):  # the task tells
+        pickle.loads(call)
 
 
 def _leave_with(link: Connection) -> None:
