@@ -11,7 +11,7 @@ import numpy as np
 
 from kerfpath._arrays import Array, freeze
 from kerfpath.front._criteria import Criterion
-from kerfpath.front._runs import Run, quicker
+from kerfpath.front._runs import Run, in_window, quicker
 from kerfpath.graph import LayeredGraph
 from kerfpath.plans import Plan
 from kerfpath.robots import Robot
@@ -191,8 +191,7 @@ class Adaptive:
         q, start = self._graph.q[:, joint], self._graph.start
         for _ in range(TRIES):
             low = q[self._rng.integers(len(q))]
-            above = (q - low) % (2 * np.pi) if self._endless[joint] else q - low
-            inside = (above >= 0) & (above <= width)
+            inside = in_window(q, low, width, endless=bool(self._endless[joint]))
             if np.logical_or.reduceat(inside, start[:-1]).all():
                 return float(low)
         return otherwise

@@ -128,10 +128,8 @@ class Collection:
 
     def _front(self) -> list[Made]:
         """Return those that none dominates, of equal ones the first."""
-        return [made for made, keep in zip(self._made, self._kept(), strict=True) if keep]
-
-    def _kept(self) -> Array:
-        return np.asarray(moocore.is_nondominated(np.array([made.losses for made in self._made])))
+        kept = moocore.is_nondominated(np.array([made.losses for made in self._made]))
+        return [made for made, keep in zip(self._made, kept, strict=True) if keep]
 
     def _box(self) -> tuple[Array, Array]:
         """Return the ideal and the reference (C,) that the first runs leave, less being better.
@@ -155,8 +153,10 @@ class Collection:
                 node=-1,
                 counts=failures,
             )
-        front = sorted(self._front(), key=lambda made: (*made.losses,))
-        beaten = [made for made, keep in zip(self._made, self._kept(), strict=True) if not keep]
+        front = self._front()
+        numbers = {made.number for made in front}
+        beaten = [made for made in self._made if made.number not in numbers]
+        front.sort(key=lambda made: (*made.losses,))
         sense = np.array([c.sense for c in self._criteria])
         ideal, reference = self._box()
         return Front(

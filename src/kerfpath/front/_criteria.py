@@ -15,7 +15,8 @@ from kerfpath.cell import Cell
 from kerfpath.comfort import MEASURES, Comfort
 from kerfpath.errors import InputError
 from kerfpath.front._clearance import clearance, counted
-from kerfpath.plans import Plan
+from kerfpath.kernels.metric import increments
+from kerfpath.plans import Criteria, Plan
 from kerfpath.robots import Robot
 
 __all__ = ["Criterion", "Judge", "judge_of"]
@@ -88,11 +89,12 @@ class Judge:
 
         To so many digits that the same motion found twice, its sums rounded otherwise, is one.
         """
-        values = [c.sense * self._value(c, plan) for c in self.criteria]
+        found = plan.criteria
+        values = [c.sense * self._value(c, plan, found) for c in self.criteria]
         return freeze(np.array([float(f"{value:.{DIGITS}g}") for value in values]))
 
-    def _value(self, criterion: Criterion, plan: Plan) -> float:
-        found, kind = plan.criteria, criterion.kind
+    def _value(self, criterion: Criterion, plan: Plan, found: Criteria) -> float:
+        kind = criterion.kind
         if kind in MEASURES:
             return found.nearest[kind][0]
         if kind in ("velocity", "acceleration"):
@@ -116,9 +118,8 @@ class Judge:
 
 def _cycle(plan: Plan, home: Array) -> float:
     """Return the time from home along a plan and back, s: straight joint motions, full limits."""
-    ways = np.stack([plan.q[0] - home, home - plan.q[-1]])
-    short = ways - 2 * np.pi * np.round(ways / (2 * np.pi))
-    ways = np.where(plan.robot.endless, short, ways)
+    ends = np.stack([home, plan.q[0]]), np.stack([plan.q[-1], home])
+    ways = np.vstack([increments(pair, plan.robot.endless) for pair in ends])
     return float(plan.time[-1] + least_time(ways, *plan.robot.speed_limits()).sum())
 
 

@@ -16,7 +16,7 @@ from kerfpath.front._criteria import Criterion
 from kerfpath.graph import LayeredGraph
 from kerfpath.search import Metric, ObjectiveKind, Relaxations
 
-__all__ = ["WINDOW", "Run", "anchors", "grid", "quicker", "whole", "within"]
+__all__ = ["WINDOW", "Run", "anchors", "grid", "in_window", "quicker", "whole", "within"]
 
 WINDOW = "window of joint"
 """What vertices outside a window are counted under, before the joint's number."""
@@ -163,8 +163,12 @@ def within(graph: LayeredGraph, window: Array, endless: Bools) -> LayeredGraph:
     for joint, (low, high) in enumerate(window):
         if not np.isfinite(high - low) or (endless[joint] and high - low >= 2 * np.pi):
             continue
-        above = graph.q[:, joint] - low
-        if endless[joint]:
-            above %= 2 * np.pi
-        outside[f"{WINDOW} {joint + 1}"] = (above < 0) | (above > high - low)
+        inside = in_window(graph.q[:, joint], low, high - low, endless=bool(endless[joint]))
+        outside[f"{WINDOW} {joint + 1}"] = ~inside
     return graph.without(outside) if outside else graph
+
+
+def in_window(q: Array, low: float, width: float, *, endless: bool) -> Bools:
+    """Return which values (N,) of a joint are in a window, modulo 2 pi where it is endless."""
+    above = (q - low) % (2 * np.pi) if endless else q - low
+    return np.asarray((above >= 0) & (above <= width))
