@@ -7,8 +7,7 @@ from pathlib import Path
 
 from rich.markup import escape
 
-from kerfpath.cli._show import busy, out, print_json, sweep_bar, table
-from kerfpath.job import warm_up
+from kerfpath.cli._show import compile_kernels, out, print_json, sweep_bar, table
 from kerfpath.study import Planned, batch
 
 __all__ = ["plan_jobs"]
@@ -24,8 +23,7 @@ def plan_jobs(
 ) -> bool:
     """Plan jobs, write their files and say what came of each; return whether all have passed."""
     if scheduler is None:
-        with busy("compiling the kernels, first run only"):
-            warm_up()
+        compile_kernels()
     with sweep_bar("jobs") as progress:
         found = batch(jobs, folder, scheduler=scheduler, processes=processes, progress=progress)
     passed = sum(row.passed for row in found)

@@ -8,8 +8,16 @@ from typing import Any
 
 from rich.markup import escape
 
-from kerfpath.cli._show import busy, out, print_json, progress_bars, resumable, table
-from kerfpath.job import make_folder, require_folder, warm_up
+from kerfpath.cli._show import (
+    busy,
+    compile_kernels,
+    out,
+    print_json,
+    progress_bars,
+    resumable,
+    table,
+)
+from kerfpath.job import make_folder
 from kerfpath.study import layout, layout_entry, ranges_of, write_layout
 
 __all__ = ["show_layout"]
@@ -28,10 +36,8 @@ def show_layout(
 ) -> bool:
     """Find the best placement, write its files, print it; return whether any is feasible."""
     ranges = ranges_of(vary)
-    require_folder(folder)
     make_folder(folder)
-    with busy("compiling the kernels, first run only"):
-        warm_up()
+    compile_kernels()
     with progress_bars("") as progress, resumable():
         found = layout(
             job, store=folder / "layout.sqlite", ranges=ranges, progress=progress, **options

@@ -12,7 +12,7 @@ import typer
 from rich.markup import escape
 
 from kerfpath import __version__
-from kerfpath.cli._show import busy, errors, out, progress_bars
+from kerfpath.cli._show import busy, compile_kernels, errors, out, progress_bars
 from kerfpath.errors import AuditFailed, KerfpathError, NoFeasiblePath
 
 __all__ = ["app", "main"]
@@ -117,14 +117,13 @@ def check(job: JobArgument, as_json: Json = False) -> None:
     """
     from kerfpath.cli._check import show_check
     from kerfpath.cli._drawing import drawing_of, show_drawing
-    from kerfpath.job import check_job, read_job, warm_up
+    from kerfpath.job import check_job, read_job
 
     read = read_job(job)
     part = drawing_of(read)
     if not as_json:
         show_drawing(part)
-    with busy("compiling the kernels, first run only"):
-        warm_up()
+    compile_kernels()
     with busy("looking at the cell"):
         checked = check_job(read, part)
     show_check(checked, as_json=as_json)
@@ -144,11 +143,10 @@ def speed(
     Example: kerfpath speed door.toml
     """
     from kerfpath.cli._speed import show_speeds
-    from kerfpath.job import fastest_speeds, read_job, warm_up
+    from kerfpath.job import fastest_speeds, read_job
 
     read = read_job(job)
-    with busy("compiling the kernels, first run only"):
-        warm_up()
+    compile_kernels()
     with progress_bars("contours") as progress:
         answers = fastest_speeds(read, progress=progress)
     if not show_speeds(answers, as_json=as_json):

@@ -10,9 +10,17 @@ from rich.markup import escape
 
 from kerfpath.cli._drawing import show_drawing
 from kerfpath.cli._plan import leave
-from kerfpath.cli._show import busy, out, print_json, progress_bars, sweep_bar, table
+from kerfpath.cli._show import (
+    busy,
+    compile_kernels,
+    out,
+    print_json,
+    progress_bars,
+    sweep_bar,
+    table,
+)
 from kerfpath.front import Front, Search
-from kerfpath.job import make_folder, read_job, require_folder, require_language, warm_up
+from kerfpath.job import make_folder, read_job, require_folder, require_language
 from kerfpath.study import Studied, axes_of, pareto_of_job, picked, plan_picked, write_pareto
 
 __all__ = ["pick_plan", "show_front"]
@@ -36,10 +44,8 @@ def show_front(
     as_json: bool,
 ) -> None:
     """Find the front of a contour, write pareto.json and pareto.html, and say what is in it."""
-    require_folder(folder)
     make_folder(folder)
-    with busy("compiling the kernels, first run only"):
-        warm_up()
+    compile_kernels()
     with sweep_bar("runs") as progress:
         studied = pareto_of_job(
             job_file,
@@ -125,8 +131,7 @@ def pick_plan(
     to = folder / f"plan-{pick.number}"
     require_folder(to)
     require_language(read_job(job_file))
-    with busy("compiling the kernels, first run only"):
-        warm_up()
+    compile_kernels()
     with progress_bars() as progress:
         part, outcome = plan_picked(job_file, pick, refine=refine, progress=progress)
     if not as_json:

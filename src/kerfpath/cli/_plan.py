@@ -13,7 +13,7 @@ from rich.markup import escape
 
 from kerfpath.cad import Part
 from kerfpath.cli._drawing import drawing_entry, drawing_of, show_drawing
-from kerfpath.cli._show import busy, errors, out, print_json, progress_bars, table
+from kerfpath.cli._show import busy, compile_kernels, errors, out, print_json, progress_bars, table
 from kerfpath.job import (
     Cut,
     Outcome,
@@ -22,7 +22,6 @@ from kerfpath.job import (
     require_language,
     run_job,
     sequence_entry,
-    warm_up,
     with_map,
     write_outcome,
 )
@@ -53,8 +52,7 @@ def plan_job(
     part = drawing_of(job)
     if not as_json:
         show_drawing(part)
-    with busy("compiling the kernels, first run only"):
-        warm_up()
+    compile_kernels()
     with progress_bars() as progress:
         outcome = run_job(job, part, progress=progress)
     leave(outcome, part, folder, as_json=as_json, strict=strict)

@@ -8,8 +8,8 @@ from typing import Any
 
 from rich.markup import escape
 
-from kerfpath.cli._show import busy, out, print_json, sweep_bar, table
-from kerfpath.job import make_folder, require_folder, warm_up
+from kerfpath.cli._show import compile_kernels, out, print_json, sweep_bar, table
+from kerfpath.job import make_folder
 from kerfpath.study import (
     ROBOT_COLUMNS,
     ROBOT_NOTES,
@@ -40,11 +40,9 @@ def show_robots_for(
     InputError
         As `which_robots`; a folder that cannot be made.
     """
-    require_folder(folder)
-    if workers["scheduler"] is None:
-        with busy("compiling the kernels, first run only"):
-            warm_up()
     make_folder(folder)
+    if workers["scheduler"] is None:
+        compile_kernels()
     with sweep_bar("robots") as progress:
         found = which_robots(
             job,

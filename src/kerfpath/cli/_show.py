@@ -17,6 +17,7 @@ from rich.table import Table
 
 __all__ = [
     "busy",
+    "compile_kernels",
     "errors",
     "out",
     "print_json",
@@ -124,3 +125,11 @@ def busy(what: str) -> Iterator[None]:
             yield
     else:
         yield
+
+
+def compile_kernels() -> None:
+    """Compile the kernels if this copy never has, and show it."""
+    from kerfpath.job import warm_up
+
+    with busy("compiling the kernels, first run only"):
+        warm_up()

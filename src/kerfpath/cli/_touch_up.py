@@ -9,8 +9,8 @@ import numpy as np
 from rich.markup import escape
 
 from kerfpath.cli._plan import leave
-from kerfpath.cli._show import busy, out, progress_bars
-from kerfpath.job import require_folder, touch_up, warm_up
+from kerfpath.cli._show import compile_kernels, out, progress_bars
+from kerfpath.job import require_folder, touch_up
 
 __all__ = ["touch_up_program"]
 
@@ -20,8 +20,7 @@ def touch_up_program(
 ) -> None:
     """Plan a job again around the moved targets of a program, and say what came of it."""
     require_folder(folder)
-    with busy("compiling the kernels, first run only"):
-        warm_up()
+    compile_kernels()
     with progress_bars() as progress:
         done = touch_up(program, plan, job, ease=ease_mm / 1000, progress=progress)
     more = {"targets": [asdict(each) for each in done.targets], "not_kept": list(done.notes)}

@@ -203,8 +203,9 @@ def make_folder(folder: Path) -> None:
     Raises
     ------
     InputError
-        It cannot be made.
+        As `require_folder`; it cannot be made.
     """
+    require_folder(folder)
     try:
         folder.mkdir(parents=True, exist_ok=True)
     except OSError as error:
