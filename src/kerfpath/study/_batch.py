@@ -218,8 +218,7 @@ def _unpacked(packed: str) -> dict[str, str]:
 def _written(job: Path, folder: Path, options: ProgramOptions, result: Result) -> Planned:
     """Write those files of a result that are not there as they are, and return what to tell."""
     if result.failure is not None:
-        kind, message = result.failure.kind, result.failure.message
-        reason = message if kind in ("InputError", "NoFeasiblePath") else f"{kind}: {message}"
+        reason = result.failure.reason
         return Planned(job=job, folder=folder, passed=False, reason=reason, seconds=result.seconds)
     told = dict(result.value)
     files, program = _unpacked(told.pop("files")), told.pop("program")

@@ -171,7 +171,7 @@ def _settled(result: Result) -> Reached | str:
         raise NoFeasiblePath(failure.message, proved=False, node=-1)
     if failure.kind == "InputError":
         raise InputError(failure.message)
-    return f"{failure.kind}: {failure.message}"
+    return failure.reason
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)

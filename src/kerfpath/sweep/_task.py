@@ -48,6 +48,12 @@ class Failure:
     kind: str
     message: str
 
+    @property
+    def reason(self) -> str:
+        """The message, after the kind where that is not one of kerfpath's own errors."""
+        own = self.kind in ("InputError", "NoFeasiblePath")
+        return self.message if own else f"{self.kind}: {self.message}"
+
 
 @dataclass(frozen=True, kw_only=True, slots=True)
 class Outcome:

@@ -265,9 +265,7 @@ class Search:
         for key in keys:
             result = self.sweep.result(key)
             if result.failure is not None:
-                failure = result.failure
-                kind = "" if failure.kind == "InputError" else f"{failure.kind}: "
-                raise InputError(f"a placement could not be looked at: {kind}{failure.message}")
+                raise InputError(f"a placement could not be looked at: {result.failure.reason}")
             answers.append(result.value)
             told(len(answers))
         return answers
