@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -19,7 +20,7 @@ LOOK = 64
 """Points per stretch of a spline from which its bounding box is taken."""
 
 
-class _Flat:
+class _Flat(ABC):
     """What all flat curves have in common; each gives `start`, `end`, `at` and `speed`."""
 
     start: float
@@ -55,13 +56,13 @@ class _Flat:
         """Return points (K, 3) mm and normals (K, 3), all up."""
         return self.at(t), np.tile(UP, (len(t), 1))
 
+    @abstractmethod
     def at(self, t: Array) -> Array:
         """Return points (K, 3) mm."""
-        raise NotImplementedError
 
+    @abstractmethod
     def speed(self, t: Array) -> Array:
         """Return the length (K,) mm of the derivative."""
-        raise NotImplementedError
 
 
 @dataclass(frozen=True)

@@ -110,16 +110,26 @@ def _document(content: bytes) -> tuple[Drawing, list[str]]:
     return document, [" ".join(fault.split())[:200] for fault in faults]
 
 
+class _Listener(logging.Handler):
+    """Keeps what is logged."""
+
+    def __init__(self, level: int) -> None:
+        super().__init__(level)
+        self.said: list[str] = []
+
+    def emit(self, record: logging.LogRecord) -> None:
+        """Keep a message."""
+        self.said.append(record.getMessage())
+
+
 @contextmanager
 def _overheard() -> Iterator[list[str]]:
     """Give what ezdxf logs about faults, which would go to the terminal otherwise."""
-    said: list[str] = []
-    handler = logging.Handler(logging.WARNING)
-    handler.emit = lambda record: said.append(record.getMessage())  # type: ignore[method-assign]
+    handler = _Listener(logging.WARNING)
     propagates, logger.propagate = logger.propagate, False
     logger.addHandler(handler)
     try:
-        yield said
+        yield handler.said
     finally:
         logger.removeHandler(handler)
         logger.propagate = propagates

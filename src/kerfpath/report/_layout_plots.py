@@ -64,8 +64,7 @@ def _plane(entry: Mapping[str, Any]) -> go.Figure:
             text=[[_hover(entry, c) for c in row] for row in cells],
             hovertemplate="%{text}<extra></extra>",
         )  # fmt: skip
-        mark = {"color": colour, "symbol": "square", "size": 11}
-        figure.add_scatter(x=[None], y=[None], mode="markers", marker=mark, name=status)
+        _add_to_legend(figure, status)
     figure.add_heatmap(
         **grid, z=bound, colorscale=SCALE, reversescale=entry["goal"] == "motion",
         colorbar={
@@ -90,9 +89,18 @@ def _plane(entry: Mapping[str, Any]) -> go.Figure:
     return figure
 
 
+def _half(values: list[float]) -> float:
+    """Return half the distance of even values."""
+    return (values[1] - values[0]) / 2 if len(values) > 1 else 1.0
+
+
 def _ends(values: list[float]) -> list[float]:
-    half = (values[1] - values[0]) / 2 if len(values) > 1 else 1.0
-    return [values[0] - half, values[-1] + half]
+    return [values[0] - _half(values), values[-1] + _half(values)]
+
+
+def _add_to_legend(figure: go.Figure, status: str) -> None:
+    mark = {"color": WHY[status], "symbol": "square", "size": 11}
+    figure.add_scatter(x=[None], y=[None], mode="markers", marker=mark, name=status)
 
 
 def _mark(
@@ -110,17 +118,16 @@ def _line(entry: Mapping[str, Any]) -> go.Figure:
         x=drawn["x"], y=bounds, mode="lines+markers", line={"color": ACCENT}, name="bound",
         text=[_hover(entry, c) for c in drawn["cells"]], hovertemplate="%{text}<extra></extra>",
     )  # fmt: skip
-    half = (drawn["x"][1] - drawn["x"][0]) / 2 if len(drawn["x"]) > 1 else 1.0
+    half = _half(drawn["x"])
     for x, cell in zip(drawn["x"], drawn["cells"], strict=True):
         if cell["status"] != "feasible":
             figure.add_vrect(
                 x0=x - half, x1=x + half, fillcolor=WHY[cell["status"]], line_width=0,
                 layer="below",
             )  # fmt: skip
-    for status, colour in WHY.items():
+    for status in WHY:
         if any(c["status"] == status for c in drawn["cells"]):
-            mark = {"color": colour, "symbol": "square", "size": 11}
-            figure.add_scatter(x=[None], y=[None], mode="markers", marker=mark, name=status)
+            _add_to_legend(figure, status)
     if entry["shipped"]["value"] is not None:
         _mark(figure, 0.0, entry["shipped"]["value"], "as the job has it", "x", INK, 11)
     if entry["best"]:
