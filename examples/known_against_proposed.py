@@ -405,12 +405,17 @@ def write_table(path: Path, rows: Sequence[Row]) -> None:
         table.writerows(rows)
 
 
+def options_of(arguments: Sequence[str] | None, doc: str, here: Path) -> argparse.Namespace:
+    """Return the options of an example: where it writes to, and whether it is a quick one."""
+    parser = argparse.ArgumentParser(description=doc.partition("\n")[0])
+    parser.add_argument("--out", type=Path, default=here, help="folder to write to")
+    parser.add_argument("--quick", action="store_true", help="one coarse task, few weights")
+    return parser.parse_args(arguments)
+
+
 def main(arguments: Sequence[str] | None = None) -> None:
     """Plan everything and write table.csv, README.md and the figures."""
-    parser = argparse.ArgumentParser(description=str(__doc__).partition("\n")[0])
-    parser.add_argument("--out", type=Path, default=HERE, help="folder to write to")
-    parser.add_argument("--quick", action="store_true", help="one coarse task, few weights")
-    options = parser.parse_args(arguments)
+    options = options_of(arguments, str(__doc__), HERE)
     tasks, factors = TASKS, weight_factors()
     if options.quick:
         tasks, factors = (QUICK,), {name: factors[name] for name in ("default", "arm x 100")}

@@ -18,7 +18,6 @@ Run: python examples/techniques.py [--out DIR] [--quick]
 
 from __future__ import annotations
 
-import argparse
 import os
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
@@ -45,6 +44,7 @@ from known_against_proposed import (
     Array,
     Eta,
     Row,
+    options_of,
     reversals,
     setting,
     table_line,
@@ -375,10 +375,7 @@ def _number(value: float, form: str) -> str:
 
 def main(arguments: Sequence[str] | None = None) -> None:
     """Plan everything and write table.csv, README.md and the figure."""
-    parser = argparse.ArgumentParser(description=str(__doc__).partition("\n")[0])
-    parser.add_argument("--out", type=Path, default=HERE, help="folder to write to")
-    parser.add_argument("--quick", action="store_true", help="one coarse task, few weights")
-    options = parser.parse_args(arguments)
+    options = options_of(arguments, str(__doc__), HERE)
     tasks, factors = TASKS, weight_factors()
     if options.quick:
         tasks = {"sheet": partial(setting, QUICK)}

@@ -19,18 +19,12 @@ from kerfpath.cad import read as read_drawing
 from kerfpath.job import read_job, read_plan_file
 from kerfpath.study import pareto_of_job, picked, plan_picked, write_pareto
 from test_cli import run
+from test_job_part import HEAD
 
 CRITERIA = ("displacement", "velocity", "range_6")
-TABLES = """[robot]
-model = "abb_irb4600_60_205"
-endless = [4, 6]
-acceleration_deg_s2 = [320, 270, 420, 1300, 1400, 2000]
-[tool]
-head = "laser-head-45"
-[part]
-file = "b_pillar.step"
-xyz_mm = [1200, -600, 500]
-rpy_deg = [0, 0, 90]
+TABLES = (
+    HEAD
+    + """\
 [[contour]]
 pick = "skin/hole16"
 name = "small"
@@ -49,6 +43,7 @@ eta_acceleration = 0.8
 [sequence]
 home_deg = [0, -20, 10, 0, 60, 0]
 """
+)
 
 
 @pytest.fixture(scope="module")

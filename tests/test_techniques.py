@@ -1,6 +1,5 @@
 """The example of fronts: what it writes, and that what is kept agrees with its table."""
 
-import csv
 import xml.etree.ElementTree as ET
 from collections import Counter
 
@@ -8,6 +7,7 @@ import numpy as np
 import pytest
 
 import techniques as example
+from test_examples import rows_of
 
 KEPT = example.HERE
 
@@ -17,11 +17,6 @@ def written(tmp_path_factory):
     folder = tmp_path_factory.mktemp("techniques")
     example.main(["--quick", "--out", str(folder)])
     return folder
-
-
-def rows_of(folder):
-    with (folder / "table.csv").open(encoding="utf-8", newline="") as file:
-        return list(csv.DictReader(file))
 
 
 def test_the_reduced_example_writes_a_table_an_account_and_a_figure(written):
