@@ -30,7 +30,7 @@ TARGET = 60.0
 """s, of a warm run on two cores."""
 
 CLOCKS = {
-    "compiling": ("kerfpath.cli._plan", "warm_up"),
+    "compiling": ("kerfpath.cli._plan", "compile_kernels"),
     "reading the STEP file": ("kerfpath.cli._plan", "drawing_of"),
     "planning and audit": ("kerfpath.job._run", "_cut"),
     "order and air moves": ("kerfpath.job._run", "ordered"),
