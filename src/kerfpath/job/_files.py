@@ -268,6 +268,7 @@ def program_of(
         air_speed=options.air_speed,
         gas_lead=options.gas_lead,
         arc_tolerance=options.arc_tolerance,
+        handshakes=options.handshakes,
     )
     if dry_share is not None:
         program = dry_run(program, dry_share)
