@@ -15,7 +15,7 @@ from kerfpath import __version__
 from kerfpath.cli._show import busy, compile_kernels, errors, out, progress_bars
 from kerfpath.errors import AuditFailed, KerfpathError, NoFeasiblePath
 
-__all__ = ["app", "main"]
+__all__ = ["app", "run"]
 
 app = typer.Typer(
     add_completion=False,
@@ -40,7 +40,7 @@ Strict = Annotated[
 PlanFileArgument = Annotated[Path, typer.Argument(metavar="PLAN.json", help="A plan, as written.")]
 
 
-def main() -> None:
+def run() -> None:
     """Run the command line and leave with its exit code."""
     try:
         app()

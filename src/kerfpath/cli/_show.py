@@ -5,15 +5,16 @@ from __future__ import annotations
 import json
 import sys
 from collections.abc import Callable, Collection, Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import AbstractContextManager, contextmanager
 from datetime import timedelta
 from typing import Any
 
-import typer
 from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, TextColumn, TimeRemainingColumn
 from rich.progress import Progress as Bars
 from rich.table import Table
+
+from kerfpath.cli._stop import in_order
 
 __all__ = [
     "busy",
@@ -80,13 +81,7 @@ def progress_bars(unit: str = "nodes") -> Iterator[Callable[[str, int, int], Non
 
 @contextmanager
 def sweep_bar(unit: str) -> Iterator[Callable[[int, int, float | None], None]]:
-    """Give a function that shows how far a sweep is, and the time left; silent where nobody looks.
-
-    Raises
-    ------
-    typer.Exit
-        At Ctrl-C, after saying how to go on.
-    """
+    """Give a function that shows how far a sweep is, and the time left; see `resumable`."""
     left_over = TextColumn("{task.fields[left]}")
     columns = (BarColumn(), MofNCompleteColumn(), TextColumn(unit), left_over)
     watched = errors.is_terminal
@@ -101,20 +96,9 @@ def sweep_bar(unit: str) -> Iterator[Callable[[int, int, float | None], None]]:
             yield advance
 
 
-@contextmanager
-def resumable() -> Iterator[None]:
-    """Say at Ctrl-C how to go on.
-
-    Raises
-    ------
-    typer.Exit
-        Code 130, at Ctrl-C.
-    """
-    try:
-        yield
-    except KeyboardInterrupt:
-        errors.print("kerfpath: stopped; the same command goes on from the results so far")
-        raise typer.Exit(130) from None
+def resumable() -> AbstractContextManager[None]:
+    """Say at Ctrl-C how to go on, and leave with code 130."""
+    return in_order("kerfpath: stopped; the same command goes on from the results so far")
 
 
 @contextmanager

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import os
 from collections.abc import Mapping, Sequence
-from contextlib import suppress
 from pathlib import Path
 
+from kerfpath._writing import write_whole
 from kerfpath.errors import InputError
 from kerfpath.plans import Plan
 from kerfpath.post._build import build_program
@@ -144,11 +144,7 @@ def write_program(path: str | os.PathLike[str], text: str) -> None:
     target = Path(path)
     if not target.name:
         raise InputError(f"cannot write the program to {str(path)!r}: expected a file name")
-    beside = target.with_name(f".{target.name}.{os.getpid()}.tmp")
     try:
-        beside.write_bytes(text.encode("utf-8"))
-        beside.replace(target)
+        write_whole(target, text.encode("utf-8"))
     except OSError as error:
-        with suppress(OSError):
-            beside.unlink(missing_ok=True)
         raise InputError(f"cannot write the program to {target}: {error.strerror}") from None
