@@ -296,6 +296,27 @@ def test_a_job_may_dip_or_be_interrupted_and_is_read_back(folder):
         assert again.replace("MODULE again", "MODULE over") == first
 
 
+def test_short_pieces_are_warned_of_and_a_job_may_ask_for_longer_ones(folder):
+    base = SMALL.replace("speed_m_min = 3", "speed_m_min = 3.7", 1).replace("= 50", "= 1", 1)
+    base = base.replace("[plan]", '[plan]\nrefine = false\ninterruptions = "fewest"\nKEY')
+
+    def cut(key):
+        (folder / "pieces.toml").write_text(base.replace("KEY", key))
+        done = run("plan", "pieces.toml", "--out", "pieces", cwd=folder)
+        plans = read_plan_file(folder / "pieces" / "plan.json").plans if not done.returncode else ()
+        return done, [np.ptp(p.contour.s) * 1e3 for p in plans if "piece" in p.name]
+
+    done, free = cut("")
+    assert (f"pieces is {min(free):.1f} mm" in done.stdout) == (min(free) < 20)
+    done, longer = cut(f"least_piece_mm = {min(free) + 1:.3f}")
+    assert done.returncode == 0, done.stdout + done.stderr
+    assert min(longer) >= min(free) + 1
+    assert "shortest of its" not in done.stdout
+    done, _ = cut("least_piece_mm = 16.5")  # more than half of it
+    assert done.returncode == 1
+    assert "no division into pieces of 0.0165 m or more keeps the limits" in done.stdout
+
+
 def test_contours_lists_the_loops_by_name():
     result = run("contours", DEMO / "b_pillar.step")
     assert result.returncode == 0

@@ -253,6 +253,14 @@ def test_the_pieces_of_an_interrupted_cut(corner, arm, tool, placement):
     assert all(r.cost <= p.cost for r, p in zip(refined, pieces, strict=True))
     whole = plan_in_pieces(corner, arm, **options | {"speed": 0.05})
     assert [p.name for p in whole] == ["corner"]
+    shortest = min(float(np.ptp(p.contour.s)) for p in pieces)
+    longer = plan_in_pieces(corner, arm, least_piece=shortest + 0.004, **options)
+    assert min(float(np.ptp(p.contour.s)) for p in longer) >= shortest + 0.004 - 1e-9
+    assert all(audit(p) == [] for p in longer)
+    with pytest.raises(NoFeasiblePath, match="no division into pieces of 0.15 m or more"):
+        plan_in_pieces(corner, arm, least_piece=0.15, **options)
+    with pytest.raises(InputError, match=r"least_piece: expected a number above 0 m"):
+        plan_in_pieces(corner, arm, least_piece=0.0, **options)
     with pytest.raises(InputError, match='needs method "exact"'):
         plan_in_pieces(corner, arm, method="paper", **options)
     for wrong in ({"closure": "periodic"}, {"rotation": np.full(6, np.inf)}):

@@ -39,6 +39,8 @@ __all__ = [
 
 NOT_CHECKED = "Collisions are not checked: simulate the program in the cell before running it."
 """What is said of a job without a [cell]."""
+SHORT_PIECE = 0.02
+"""m: a shorter piece has hardly room for its leads, and is warned of."""
 SHORTEST_CUT = 8
 """No language cuts names to fewer characters."""
 
@@ -110,6 +112,7 @@ def outcome_texts(outcome: Outcome, *, strict: bool = False) -> Texts:
     refused = ""
     notes = [collision_note(outcome.cell, moves_too=bool(moves))]
     notes += [] if part is None else [order_note(part)]
+    notes += short_pieces(outcome)
     notes += [] if outcome.stuck is None else [f"The moves between contours: {outcome.stuck}"]
     notes += [f"The moves between contours: {c.issue()}" for c in outcome.air if not c.ok]
     if outcome.passed and job.program.language != "none":
@@ -168,6 +171,22 @@ def order_note(part: PartPlan) -> str:
         f"{part.air_time:.1f} s, piercing {part.piercing_time:.1f} s; by these candidates and "
         f"moves {proved}."
     )
+
+
+def short_pieces(outcome: Outcome) -> list[str]:
+    """Say of interrupted contours which piece is shortest, if it is short and nobody asked."""
+    if outcome.job.least_piece is not None:
+        return []
+    lengths: dict[str, list[float]] = {}
+    for cut in outcome.cuts:
+        if cut.plan is not None:
+            lengths.setdefault(cut.contour, []).append(float(np.ptp(cut.plan.contour.s)))
+    return [
+        f"{name}: the shortest of its {len(pieces)} pieces is {min(pieces) * 1e3:.1f} mm; with "
+        "least_piece_mm in [plan] none is shorter than that"
+        for name, pieces in lengths.items()
+        if len(pieces) > 1 and min(pieces) < SHORT_PIECE
+    ]
 
 
 def collision_note(cell: Cell | None, *, moves_too: bool = False) -> str:

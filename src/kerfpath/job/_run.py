@@ -248,6 +248,7 @@ def _plans(
         if job.interruptions == "none" or not np.diff(graph.start).all():
             raise
     plain = {key: value for key, value in options.items() if key not in ("feed", "rotation")}
+    plain["least_piece"] = job.least_piece
     return plan_in_pieces(nodes, job.robot, cell=cell, **setting, **plain)
 
 

@@ -23,6 +23,7 @@ def plan_in_pieces(
     *,
     refine: bool = False,
     cell: Cell | None = None,
+    least_piece: float | None = None,
     **options: Unpack[Options],
 ) -> tuple[Plan, ...]:
     """Return the plans of the pieces that the contour is cut in, with the fewest interruptions.
@@ -37,6 +38,9 @@ def plan_in_pieces(
     contour, robot, refine, cell, options
         As in `plan`, with method "exact", closure "free" (a closed contour need not return to its
         first pose), no rotation limit and no tilt. Comfort: a node in two pieces costs in both.
+    least_piece : float m, optional
+        Every piece is at least as long, measured along the nodes; the number of interruptions is
+        then the least with which that can be. A cut in one go may be shorter.
 
     Returns
     -------
@@ -48,7 +52,7 @@ def plan_in_pieces(
     ------
     NoFeasiblePath
         No number of interruptions helps: a node without a pose, or an interval between two nodes
-        that no poses can pass.
+        that no poses can pass; or no pieces of the least length.
     InputError
         As `plan`; another method or closure, a rotation limit, a tilt.
     """
@@ -67,7 +71,7 @@ def plan_in_pieces(
         raise InputError("plan_in_pieces: the tool axis cannot be tilted in pieces; leave out tilt")
     finder = Finder(task, cell)
     try:
-        found = finder.best(interrupted_path, **task.aim)
+        found = finder.best(interrupted_path, **task.aim, s=contour.s, least_piece=least_piece)
     except NoFeasiblePath as broken:
         raise broken.retold(
             f"contour {contour.name!r}: no number of interruptions helps: {broken}"
