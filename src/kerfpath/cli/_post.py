@@ -10,7 +10,7 @@ from rich.markup import escape
 
 from kerfpath.cad import read_measured
 from kerfpath.cli._show import errors, out, print_json
-from kerfpath.errors import InputError
+from kerfpath.errors import InputError, KerfpathError
 from kerfpath.job import program_from_file, read_plan_file
 from kerfpath.placement import MeasuredFrame, placement_from_points
 from kerfpath.post import identifier, write_files, write_program
@@ -29,17 +29,25 @@ def write_post(
     A file with the suffix of the language names the program, and others go beside it; else a
     program of one file is written as `output`, and one of several into that folder.
     """
-    name = _name(output, find_language(language).suffix)
-    if name is not None and dry_share is not None:
-        name = name.removeprefix("dry_")  # which dry runs begin with by themselves
     frame = None
     if measured is not None:
         points = read_measured(measured)
         frame = placement_from_points(*points, most_residual=residual_mm / 1000)
-    files, notes = program_from_file(
-        plan_file, language, name=name, strict=strict, job_file=job, dry_share=dry_share,
-        frame=frame,
-    )  # fmt: skip
+        if not as_json:  # first of all: also where no program comes of it
+            for line in _in_words(frame, plan_file):
+                (errors if output is None else out).print(line)
+    name = _name(output, find_language(language).suffix)
+    if name is not None and dry_share is not None:
+        name = name.removeprefix("dry_")  # which dry runs begin with by themselves
+    try:
+        files, notes = program_from_file(
+            plan_file, language, name=name, strict=strict, job_file=job, dry_share=dry_share,
+            frame=frame,
+        )  # fmt: skip
+    except KerfpathError:
+        for line in _in_words(frame, plan_file) if as_json and frame is not None else ():
+            errors.print(line)
+        raise
     written: list[Path] = []
     if output is not None and name is not None:
         main, *_ = files
@@ -64,9 +72,6 @@ def write_post(
         return
     # A program that is printed has stdout for itself.
     console = out if written else errors
-    if frame is not None:
-        for line in _in_words(frame, plan_file):
-            console.print(line)
     if not written:
         for name, text in files.items():
             if len(files) > 1:

@@ -113,15 +113,15 @@ def outcome_texts(outcome: Outcome, *, strict: bool = False) -> Texts:
     notes = [collision_note(outcome.cell, moves_too=bool(moves))]
     notes += [] if part is None else [order_note(part)]
     notes += short_pieces(outcome)
-    notes += [] if outcome.stuck is None else [f"The moves between contours: {outcome.stuck}"]
-    notes += [f"The moves between contours: {c.issue()}" for c in outcome.air if not c.ok]
+    faults = [] if outcome.stuck is None else [f"The moves between contours: {outcome.stuck}"]
+    faults += [f"The moves between contours: {c.issue()}" for c in outcome.air if not c.ok]
     if outcome.passed and job.program.language != "none":
         try:
             program, warnings = program_of(outcome.plans, job.program, moves, strict=strict)
             notes += warnings
         except InputError as error:
             refused = str(error)
-            notes.append(f"no program was written: {error}")
+            faults.append(f"no program was written: {error}")
     entries = []
     for cut in outcome.cuts:
         if cut.plan is not None:
@@ -134,9 +134,10 @@ def outcome_texts(outcome: Outcome, *, strict: bool = False) -> Texts:
             job.robot, job.tool, job.placement, entries, job.source, outcome.cell, part
         ),
         "trajectory.csv": trajectory_text(outcome.plans, moves),
-        "report.html": report_text(outcome, notes),
+        "report.html": report_text(outcome, notes, faults),
     }
-    return Texts(files=files, program=tuple(program), refused=refused, notes=tuple(notes))
+    told = (*notes, *faults)
+    return Texts(files=files, program=tuple(program), refused=refused, notes=told)
 
 
 def stale_program(options: ProgramOptions, folder: Path, program: Sequence[str]) -> Path | None:
