@@ -105,7 +105,9 @@ def test_a_part_out_of_reach_is_an_answer_with_node_and_counts(circle, arm, tool
 
 
 def test_too_fast_is_an_answer_with_the_joint(circle, arm, tool, placement):
-    with pytest.raises(NoFeasiblePath, match=r"contour 'circle': no admissible edge") as caught:
+    with pytest.raises(
+        NoFeasiblePath, match=r"contour 'circle': on this grid of the rotation no admissible edge"
+    ) as caught:
         plan(circle, arm, tool=tool, placement=placement, speed=20.0, gamma_step=STEP)
     assert any(reason.startswith("velocity, joint") for reason in caught.value.counts)
 

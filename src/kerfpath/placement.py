@@ -192,9 +192,10 @@ def planned_again(plan: Plan, T_base_part: ArrayLike) -> Plan:
     dt = plan.dt  # from node to node at the speed asked for
     if slowest is not None and slowest.node >= 0:
         dt = float(np.diff(plan.time)[slowest.node]) * slowest.slowest
+    refined = "refined off the grid" in plan.proof.statement
     comfort = s.comfort and replace(s.comfort, clearance=None)
     made = plan_contour(
-        replace(plan.contour, time=dt * np.arange(len(plan.time))),
+        replace(plan.contour, time=dt * np.arange(len(plan.time), dtype=np.float64)),
         plan.robot,
         tool=plan.T_flange_tip,
         placement=T_base_part,
@@ -211,7 +212,7 @@ def planned_again(plan: Plan, T_base_part: ArrayLike) -> Plan:
         closure=s.closure,
         rotation=s.rotation,
         feed="constant" if plan.feed is None else "dip",
-        refine=plan.proof.grid_cost is not None,
+        refine=refined,
         comfort=comfort,
     )
     return replace(made, contour=plan.contour)

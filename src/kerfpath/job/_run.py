@@ -201,13 +201,15 @@ def _cut(
         if cell is not None:
             # Shares of the limits at which a clear path exists are not looked for.
             with suppress(NoFeasiblePath):
-                slower = fastest_along(job, nodes, cell, refine=False, graph=graph)
+                slower = fastest_along(job, nodes, cell, refine=options["refine"], graph=graph)
                 return (replace(whole, broken=broken, fastest=slower),)
             return (replace(whole, broken=broken),)
         least = relaxations(
             nodes, job.robot, graph, task.speed, eta_v=options["eta_v"], eta_a=options["eta_a"]
         )
         fastest = FastestSpeed.of(nodes, least.slower)
+        if options["refine"]:
+            fastest = fastest_along(job, nodes, None, refine=True, graph=graph)
         return (replace(whole, broken=broken, fastest=fastest, relaxations=least),)
     return tuple(_audited(job, whole, made, cell) for made in plans)
 

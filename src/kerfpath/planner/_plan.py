@@ -17,6 +17,7 @@ from kerfpath.planner._clear import Finder
 from kerfpath.planner._dip import slowed
 from kerfpath.planner._refined import off_grid, refined
 from kerfpath.planner._task import Task, task_of
+from kerfpath.planner._words import ON_THIS_GRID
 from kerfpath.plans import Plan, Proof
 from kerfpath.robots import Robot, posture_name
 from kerfpath.search import Closure, Method, Metric, ObjectiveKind, shortest_path
@@ -163,8 +164,9 @@ def plan(
         if found is not None and found.done:
             return found.plan
         tried = "" if found is None else f"; off the grid {found.statement}"
+        where = f"{ON_THIS_GRID} " if task.robot.family.free_rotation else ""
         raise broken.retold(
-            f"contour {contour.name!r}: {broken}{_bracket(broken, task)}{tried}"
+            f"contour {contour.name!r}: {where}{broken}{_bracket(broken, task)}{tried}"
         ) from None
     made = task.plan(path.index, path.cost, _proof(method, path.optimal, finder))
     return refined(task, finder, made) if refine else made
