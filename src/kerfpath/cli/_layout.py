@@ -103,8 +103,8 @@ def _show_why(entry: Mapping[str, Any]) -> None:
     worst = max(REMEDIES, key=lambda status: entry["statuses"].get(status, 0))
     out.print(
         escape(
-            f"no placement is feasible {ON_THIS_GRID}: of {len(entry['tried'])} tried {', '.join(parts)}: "
-            f"{REMEDIES[worst]}"
+            f"no placement is feasible {ON_THIS_GRID}: of {len(entry['tried'])} tried "
+            f"{', '.join(parts)}: {REMEDIES[worst]}; {FINER}"
         )
     )
     near = entry["nearest"]
