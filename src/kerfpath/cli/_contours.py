@@ -53,7 +53,9 @@ def list_contours(
             ]
         )
     columns = ["loop", "surface", "length mm", "diameter mm", "edges", "gap mm", "middle mm"]
-    table([*columns, *(head for head, _ in optional), ""], rows, numbers=columns[2:6])
+    heads = [*columns, *(head for head, _ in optional), "ends"]
+    spare = ["gap mm", "edges", "middle mm"]
+    table(heads, rows, numbers=columns[2:6], whole=["ends"], spare=spare)
     if len(shown) < len(part.loops):
         out.print(
             f"and {len(part.loops) - len(shown)} loops of single faces in skins and around the "

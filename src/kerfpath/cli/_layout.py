@@ -79,7 +79,8 @@ def _show_best(entry: Mapping[str, Any]) -> None:
     sides = [[f"{when} {what}", *([] if motion else [f"binds {when}", f"node {when}"])]
              for when in ("before", "after")]  # fmt: skip
     columns = ["contour", *sides[0], *sides[1]]
-    table(columns, rows, numbers=[c for c in columns if what in c or "node" in c])
+    spare = [c for c in columns if "node" in c or c == "binds before"]
+    table(columns, rows, numbers=[c for c in columns if what in c or "node" in c], spare=spare)
     told = ", ".join(f"{name} = {value:g}" for name, value in best["offsets"].items())
     out.print(f"[bold]best placement[/]: {escape(told)}")
     was = f"{shipped['value']:.3f}{unit}" if shipped["value"] is not None else shipped["status"]

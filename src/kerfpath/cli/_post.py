@@ -9,7 +9,7 @@ import numpy as np
 from rich.markup import escape
 
 from kerfpath.cad import read_measured
-from kerfpath.cli._show import errors, out, print_json
+from kerfpath.cli._show import errors, out, print_json, told_once
 from kerfpath.errors import InputError, KerfpathError
 from kerfpath.job import program_from_file, read_plan_file
 from kerfpath.placement import MeasuredFrame, placement_from_points
@@ -77,7 +77,7 @@ def write_post(
             if len(files) > 1:
                 print(f"----- {name} -----")
             print(text, end="")
-    for note in notes if written or frame is not None else ():
+    for note in told_once(notes) if written or frame is not None else ():
         console.print(f"note: {escape(note)}")
     for path in written:
         out.print(f"wrote {escape(str(path))}")

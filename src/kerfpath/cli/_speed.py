@@ -48,7 +48,8 @@ def show_speeds(
         print_json({"contours": entries})
     else:
         columns = ["contour", "asked m/min", "on the grid", "refined", "node", "what binds"]
-        table([*columns, "at x y z mm"], rows, numbers=columns[1:5])
+        at = "at x y z mm"
+        table([*columns, at], rows, numbers=columns[1:5], spare=[at])
         out.print(
             "on the grid: the fastest constant speed there, exactly; refined: the nearest optimum "
             "that is found from that path off the grid, not proved to be the fastest"

@@ -53,6 +53,7 @@ def plan(
     comfort: Comfort | None = None,
     graph: LayeredGraph | None = None,
     progress: Callable[[int], None] | None = None,
+    phase: Callable[[str], None] | None = None,
 ) -> Plan:
     """Return the best joint motion along the contour.
 
@@ -96,6 +97,8 @@ def plan(
         The layered graph of this very task, kept from `layered_graph`.
     progress : callable, optional
         Called with the number of nodes whose poses have been solved since the last call.
+    phase : callable, optional
+        Called with what begins once the poses are solved: "search", then "refinement".
 
     Raises
     ------
@@ -142,6 +145,8 @@ def plan(
         progress=progress,
     )
     finder = Finder(task, cell)
+    begin = phase or (lambda what: None)
+    begin("search")
     try:
         path = finder.best(
             shortest_path,
@@ -160,6 +165,7 @@ def plan(
                 broken = at_any
         found = None
         if refine and closure == "free" and feed == "constant":
+            begin("refinement")
             found = off_grid(task, finder)
         if found is not None and found.done:
             return found.plan
@@ -169,7 +175,10 @@ def plan(
             f"contour {contour.name!r}: {where}{broken}{_bracket(broken, task)}{tried}"
         ) from None
     made = task.plan(path.index, path.cost, _proof(method, path.optimal, finder))
-    return refined(task, finder, made) if refine else made
+    if not refine:
+        return made
+    begin("refinement")
+    return refined(task, finder, made)
 
 
 def _bracket(broken: NoFeasiblePath, task: Task) -> str:
