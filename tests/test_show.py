@@ -4,7 +4,7 @@ import io
 import json
 import shutil
 import time
-from contextlib import redirect_stderr
+from contextlib import redirect_stderr, redirect_stdout
 
 import numpy as np
 import pytest
@@ -75,8 +75,7 @@ def test_a_table_leaves_columns_out_before_it_hides_what_matters(width):
     columns = ["contour", *(f"figure {i}" for i in range(9)), "audit"]
     rows = [[name, *(["1234.56"] * 9), "no feasible path"] for name in LONG]
     out = io.StringIO()
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(_show.out, "file", out)
+    with redirect_stdout(out):
         table(columns, rows, numbers=columns[1:-1], whole=["audit"], spare=columns[-2:2:-1])
     lines = out.getvalue().splitlines()
     kept = [line for line in lines if line.rstrip().endswith("no feasible path")]
@@ -122,8 +121,8 @@ def test_bars_have_their_phases(monkeypatch):
     terminal = io.StringIO()
     monkeypatch.setenv("TERM", "xterm")
     monkeypatch.setattr(_show.errors, "_force_terminal", True)
-    monkeypatch.setattr(_show.errors, "file", terminal)
-    with progress_bars() as progress:
+    monkeypatch.setattr(_show.errors, "is_interactive", True)
+    with redirect_stderr(terminal), progress_bars() as progress:
         progress("trim", 9, 9)
         progress("trim: search", 0, 0)
         time.sleep(0.3)
