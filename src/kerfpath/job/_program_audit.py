@@ -11,7 +11,7 @@ from scipy.spatial import cKDTree
 
 from kerfpath._arrays import Array
 from kerfpath.air import least_time
-from kerfpath.auditor import Check, Unit, air_checks, checks, worst_of
+from kerfpath.auditor import Check, Rounding, Unit, air_checks, checks, rounding_of, worst_of
 from kerfpath.cad import read as read_drawing
 from kerfpath.cell import Cell
 from kerfpath.contour import Contour
@@ -24,7 +24,7 @@ from kerfpath.job._verdict import Audited, collision_note
 from kerfpath.planner import node_interval
 from kerfpath.plans import Plan, Proof
 from kerfpath.plans import Settings as PlanSettings
-from kerfpath.post import Language, ReadProgram, Settings
+from kerfpath.post import Language, ReadProgram, Rules, Settings
 
 __all__ = ["ProgramAsked", "audit_program"]
 
@@ -33,13 +33,9 @@ NEAR = 5e-3
 SAME_FRAME = 1e-6
 """How far (m, sine) tool and part may be from those of the job."""
 SAME_SPEED = 0.02
-"""Share by which a speed may differ from the one asked for: controllers round it."""
+"""Share by which a speed may differ from the one asked for, beyond its digits."""
 SAME_TIME = 2e-3
 """How far (s) lead times and waits may differ from those asked for: controllers round them."""
-ROUNDED = 2e-3
-"""Share of a rate that the digits of written speeds may take or give."""
-ROUNDED_ANGLE = 2e-6
-"""How far (rad) joints may be beyond a limit for the digits of written targets."""
 CLIMB = 0.05
 """What a step along the path counts beside one away from it, where a place on it is looked for."""
 
@@ -184,9 +180,11 @@ def _cut_checks(
     options = dict(job.audit_options)
     if job.plan_options["tilt"] is not None:
         options["axis_tolerance"] += job.plan_options["tilt"].cone
-    rows += checks(made, reference=reference, cell=cell, **options)
-    rows += _asked(job, task, cut, reference, made, ahead=chosen.sayable is None)
-    rows += _postures(job, cut, chosen, settings)
+    rules = chosen.rules(settings)
+    digits = _rounding(cut, made, rules)
+    rows += checks(made, reference=reference, cell=cell, rounding=digits, **options)
+    rows += _asked(job, task, cut, reference, made, digits.time, ahead=chosen.sayable is None)
+    rows += _postures(job, cut, chosen, settings, digits.q)
     return rows
 
 
@@ -221,13 +219,10 @@ def _along(cut: ReadCut, reference: Contour) -> tuple[Array, Array]:
 def _plan(job: Job, task: ContourTask, cut: ReadCut, s: Array, time: Array) -> Plan:
     """Return what the text says of a cut as a plan, so that it is audited as one."""
     options, K = job.plan_options, len(cut.q)
-    limits = job.robot.joint_limits()
     weights = options["weights"]
     return Plan(
         contour=Contour(cut.T_part_tip[:, :3, 3], cut.T_part_tip[:, :3, 2], s=s, name=task.name),
-        robot=job.robot.with_limits(
-            lower=limits.lower - ROUNDED_ANGLE, upper=limits.upper + ROUNDED_ANGLE
-        ),
+        robot=job.robot,
         T_flange_tip=job.tool,
         T_base_part=job.placement,
         q=cut.q,
@@ -242,8 +237,8 @@ def _plan(job: Job, task: ContourTask, cut: ReadCut, s: Array, time: Array) -> P
             objective=options["objective"],
             metric=options["metric"],
             weights=np.ones(job.robot.joints) if weights is None else np.asarray(weights),
-            eta_v=options["eta_v"] * (1 + ROUNDED),
-            eta_a=options["eta_a"] * (1 + ROUNDED),
+            eta_v=options["eta_v"],
+            eta_a=options["eta_a"],
             rotation=options["rotation"],
             comfort=options["comfort"],
         ),
@@ -253,9 +248,17 @@ def _plan(job: Job, task: ContourTask, cut: ReadCut, s: Array, time: Array) -> P
     )
 
 
+def _rounding(cut: ReadCut, made: Plan, rules: Rules) -> Rounding:
+    """Return what the digits of a language leave of the joints and times of a cut."""
+    jointed = all(move.T_part_tip is None for move in cut.moves)
+    time = np.where(np.isnan(cut.speed), 0.0, rules.speed_step / 2 / cut.speed)
+    return rounding_of(made, rules.point_step, rules.angle_step, time, jointed=jointed)
+
+
 def _asked(
-    job: Job, task: ContourTask, cut: ReadCut, reference: Contour, made: Plan, *, ahead: bool
-) -> list[Check]:
+    job: Job, task: ContourTask, cut: ReadCut, reference: Contour, made: Plan, digits: Array,
+    *, ahead: bool,
+) -> list[Check]:  # fmt: skip
     """Compare speeds, switches and waits with what the job asks for.
 
     Where the language cannot switch `ahead` of a target, it has to do so at the target.
@@ -271,13 +274,20 @@ def _asked(
     excess = np.diff(np.interp(s, asked.s, when)) / np.diff(made.time) - 1
     if job.plan_options["feed"] == "constant":
         excess = np.abs(excess)
-    fast = int(np.argmax(excess))
+    fast = int(np.argmax(excess - digits))
     node = int(np.argmax(wrong)) if wrong.any() else 0
     lead = np.abs(cut.lead_times - (job.program.lead_time if ahead else 0.0))
     wait = abs(float(cut.waits.sum()) - job.program.pierce_time)
     lengths = np.diff(s)[wrong].sum()
     return [
-        _check("speed", "speed, off the one asked for", excess[fast], SAME_SPEED, "share", fast),
+        _check(
+            "speed",
+            "speed, off the one asked for",
+            excess[fast],
+            SAME_SPEED + digits[fast],
+            "share",
+            fast,
+        ),
         _check("laser", "length with the laser wrongly on or off", lengths, 1e-6, "m", node),
         _check("laser-off", "laser left on at the end", cut.left_on, 0, "count", len(s) - 1),
         _check("lead-time", "lead time of the laser, off", lead.max(initial=0), SAME_TIME, "s"),
@@ -285,13 +295,25 @@ def _asked(
     ]
 
 
-def _postures(job: Job, cut: ReadCut, chosen: Language, settings: Settings) -> list[Check]:
-    """Count targets whose words of posture and turns are not those of the joints there."""
+def _postures(
+    job: Job, cut: ReadCut, chosen: Language, settings: Settings, left: Array
+) -> list[Check]:
+    """Count targets whose words of posture and turns are not those of the joints there.
+
+    Joints are `left` (K, n) rad to digits: where they are that near to where a word changes, both
+    words are right.
+    """
     told = [k for k, move in enumerate(cut.moves) if move.posture and move.kind == "linear"]
     if not told or chosen.posture is None:
         return []
-    expected = chosen.posture(job.robot, cut.q[told], settings)
-    wrong = [k for k, ours in zip(told, expected, strict=True) if cut.moves[k].posture != ours]
+    ways = [cut.q[told] + sign * left[told] for sign in (0, -1, 1)]
+    expected = zip(*(chosen.posture(job.robot, q, settings) for q in ways), strict=True)
+    wrong = [
+        k
+        for k, words in zip(told, expected, strict=True)
+        if len(cut.moves[k].posture) != len(words[0])
+        or any(said not in right for said, *right in zip(cut.moves[k].posture, *words, strict=True))
+    ]
     said = "targets whose posture or turn is not the motion's"
     return [_check("posture", said, len(wrong), 0, "count", wrong[0] if wrong else 0)]
 

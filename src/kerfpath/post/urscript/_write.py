@@ -28,6 +28,8 @@ __all__ = ["URScript", "URScriptSettings", "full_joint_speed", "rules"]
 
 SPEED_STEP = 1e-6
 """Speeds (m/s) have six decimals."""
+POINT_STEP, ANGLE_STEP = 0.5e-7, 0.5e-9
+"""What seven decimals of m leave of positions, and nine of rad of turns."""
 NOT_CHECKED = "not been checked for collisions"
 
 Output = Annotated[int | None, setting("a standard digital output from 0 to 7", "0", ge=0, le=7)]
@@ -53,7 +55,9 @@ class URScriptSettings(Settings):
 
 def rules(settings: URScriptSettings) -> Rules:
     """Return what programs in URScript must keep to."""
-    return Rules(slowest=SPEED_STEP, speed_step=SPEED_STEP)
+    return Rules(
+        slowest=SPEED_STEP, speed_step=SPEED_STEP, point_step=POINT_STEP, angle_step=ANGLE_STEP
+    )
 
 
 def full_joint_speed(robot: Robot) -> float:
