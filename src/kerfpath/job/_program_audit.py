@@ -17,7 +17,7 @@ from kerfpath.cell import Cell
 from kerfpath.contour import Contour
 from kerfpath.errors import InputError
 from kerfpath.job._cell import cell_of_job
-from kerfpath.job._program_read import ReadCut, cuts_of, language_of, program_on_disk
+from kerfpath.job._program_read import ReadCut, at_interval, cuts_of, language_of, program_on_disk
 from kerfpath.job._read import Job, read_job
 from kerfpath.job._task import ContourTask
 from kerfpath.job._verdict import Audited, collision_note
@@ -128,6 +128,9 @@ class ProgramAsked:
                 tables[title] = [_check("contour", said, apart, NEAR, "m")]
                 continue
             reference = candidates[which][candidate]
+            dt = _asked_times(tasks[which], reference)[1]
+            cut = at_interval(cut, dt, job.robot, job.tool, job.placement)
+            places[title] = tuple(move.place for move in cut.moves)
             tables[title] = _cut_checks(job, tasks[which], cut, reference, cell, chosen, settings)
             times = done.count(which)
             tables[title].append(_check("once", "earlier cuts of this contour", times, 0, "count"))
@@ -265,8 +268,7 @@ def _asked(
     """
     s = made.contour.s
     middle = (s[1:] + s[:-1]) / 2
-    asked = task.sample(reference)
-    dt = node_interval(asked, task.speed if asked.time is None else None)
+    asked, dt = _asked_times(task, reference)
     when = dt * np.arange(len(asked))
     k = np.clip(np.searchsorted(reference.s, middle, side="right") - 1, 0, len(reference) - 1)
     wanted = np.array([reference.kinds[j] != "micro joint" for j in k])
@@ -293,6 +295,12 @@ def _asked(
         _check("lead-time", "lead time of the laser, off", lead.max(initial=0), SAME_TIME, "s"),
         _check("pierce", "wait at the start, off the one asked for", wait, SAME_TIME, "s"),
     ]
+
+
+def _asked_times(task: ContourTask, reference: Contour) -> tuple[Contour, float]:
+    """Return the nodes that are asked for and the time (s) between them."""
+    asked = task.sample(reference)
+    return asked, node_interval(asked, task.speed if asked.time is None else None)
 
 
 def _postures(

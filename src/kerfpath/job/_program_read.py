@@ -27,10 +27,12 @@ from kerfpath.post import (
 )
 from kerfpath.robots import Robot
 
-__all__ = ["ReadCut", "cuts_of", "language_of", "program_on_disk"]
+__all__ = ["ReadCut", "at_interval", "cuts_of", "language_of", "program_on_disk"]
 
 ARC_STEP = np.radians(2.0)
-"""Sweep between the nodes that an arc is taken to have."""
+"""Sweep between the nodes that an arc has, where it is not known which contour it is of."""
+COARSEST = np.radians(45.0)
+"""The same at most, where it is."""
 
 
 class _Folder(Mapping[str, str]):
@@ -119,6 +121,8 @@ class ReadCut:
         Where the tool has backed off to.
     moves : tuple of ReadMove
         The move to each node.
+    group : ReadGroup
+        What it was made of.
     """
 
     name: str
@@ -133,6 +137,7 @@ class ReadCut:
     waits: Array
     q_out: Array
     moves: tuple[ReadMove, ...]
+    group: ReadGroup
 
 
 def cuts_of(
@@ -162,7 +167,25 @@ def cuts_of(
     return cuts, home
 
 
-def _cut(group: ReadGroup, robot: Robot, T_flange_tip: Array, T_base_part: Array) -> ReadCut:
+def at_interval(
+    cut: ReadCut, interval: float, robot: Robot, T_flange_tip: Array, T_base_part: Array
+) -> ReadCut:
+    """Return a cut whose arcs have a node at each interval (s), as straight moves would have.
+
+    So rates along arcs, and where arcs end, are judged over the same times as all others.
+    """
+    if all(move.kind != "circular" for move in cut.moves):
+        return cut
+    return _cut(cut.group, robot, T_flange_tip, T_base_part, interval)
+
+
+def _cut(
+    group: ReadGroup,
+    robot: Robot,
+    T_flange_tip: Array,
+    T_base_part: Array,
+    interval: float | None = None,
+) -> ReadCut:
     """Return the cut of a group; an arc gets nodes of its own along it."""
     T: list[Array] = []
     took: list[float] = []
@@ -174,7 +197,7 @@ def _cut(group: ReadGroup, robot: Robot, T_flange_tip: Array, T_base_part: Array
         assert end is not None
         stops = [end]
         if T and move.kind == "circular" and move.T_part_via is not None:
-            stops = _arc(T[-1], move.T_part_via, end)
+            stops = _arc(T[-1], move.T_part_via, end, move, interval)
         for stop in stops:
             if T:
                 took.append(_duration(move, T[-1], stop, len(stops)))
@@ -200,6 +223,7 @@ def _cut(group: ReadGroup, robot: Robot, T_flange_tip: Array, T_base_part: Array
         waits=np.array([time for at, time in group.waits if at == 1]),
         q_out=q[last],
         moves=tuple(moves[:last]),
+        group=group,
     )
 
 
@@ -222,8 +246,14 @@ def _q(move: ReadMove) -> Array:
     return move.q
 
 
-def _arc(start: Array, via: Array, end: Array) -> list[Array]:
-    """Return poses along the arc after `start`, its end included, the tool turning evenly."""
+def _arc(
+    start: Array, via: Array, end: Array, move: ReadMove, interval: float | None
+) -> list[Array]:
+    """Return poses along the arc after `start`, its end included, the tool turning evenly.
+
+    They are `ARC_STEP` apart, or as far as the robot comes in an interval (s), but no farther than
+    `COARSEST`.
+    """
     a, b, c = start[:3, 3], via[:3, 3], end[:3, 3]
     circle = circle_through(a, b, c)
     if circle is None:
@@ -232,7 +262,14 @@ def _arc(start: Array, via: Array, end: Array) -> list[Array]:
     x = a - centre
     y = np.cross(normal, x)
     sweep = float(np.arctan2((c - centre) @ y, (c - centre) @ x) % (2 * np.pi))
-    parts = np.linspace(0, 1, max(int(np.ceil(sweep / ARC_STEP)), 1) + 1)[1:]
+    count = int(np.ceil(sweep / ARC_STEP))
+    if interval is not None:
+        took = move.duration
+        if took is None and move.speed:
+            took = sweep * float(np.linalg.norm(x)) / move.speed
+        if took is not None:
+            count = max(round(took / interval), int(np.ceil(sweep / COARSEST)))
+    parts = np.linspace(0, 1, max(count, 1) + 1)[1:]
     poses = np.tile(np.eye(4), (len(parts), 1, 1))
     turned = Slerp([0.0, 1.0], Rotation.from_matrix(np.array([start[:3, :3], end[:3, :3]])))
     poses[:, :3, :3] = turned(parts).as_matrix()
