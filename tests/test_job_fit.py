@@ -11,6 +11,7 @@ from kerfpath.job import program_from_file, read_job, read_plan_file, run_job
 from kerfpath.job._files import write_outcome
 from kerfpath.job._program_audit import audit_program
 from kerfpath.post import write_files
+from kerfpath.post._languages import SHIPPED
 from test_cli import refused, run
 
 HEAD = """\
