@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -24,9 +25,9 @@ from kerfpath.job._verdict import Audited
 from kerfpath.planner import node_interval
 from kerfpath.plans import Plan, Proof
 from kerfpath.plans import Settings as PlanSettings
-from kerfpath.post import Language, Settings
+from kerfpath.post import Language, ReadProgram, Settings
 
-__all__ = ["audit_program"]
+__all__ = ["ProgramAsked", "audit_program"]
 
 NEAR = 5e-3
 """A cut that leaves every contour of the job by more (m), all along, is none of them."""
@@ -64,43 +65,84 @@ def audit_program(path: Path, job_file: Path) -> Audited:
         A file cannot be read, a line is not of our making, or the job is of a kind that programs
         cannot be compared with.
     """
-    job = read_job(job_file)
-    if job.interruptions != "none":
-        raise InputError(
-            f"{job_file}: programs of jobs with interruptions cannot be compared with the drawing "
-            "yet; audit the plan.json"
+    asked = ProgramAsked.of(job_file)
+    chosen, settings = language_of(path, asked.job)
+    read = program_on_disk(path, chosen, settings, asked.job.robot)
+    return asked.audit(read, chosen, settings, path.name)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class ProgramAsked:
+    """A job and its drawing, read once, to audit programs by.
+
+    Parameters
+    ----------
+    job : Job
+    tasks : tuple of ContourTask
+    candidates : tuple of tuples of Contour
+        The paths that each of them may be cut along.
+    cell : Cell or None
+    """
+
+    job: Job
+    tasks: tuple[ContourTask, ...]
+    candidates: tuple[tuple[Contour, ...], ...]
+    cell: Cell | None
+
+    @classmethod
+    def of(cls, job_file: Path) -> ProgramAsked:
+        """Return what a job asks of its program.
+
+        Raises
+        ------
+        InputError
+            A file cannot be read, or the job is of a kind that programs cannot be compared with.
+        """
+        job = read_job(job_file)
+        if job.interruptions != "none":
+            raise InputError(
+                f"{job_file}: programs of jobs with interruptions cannot be compared with the "
+                "drawing yet; audit the plan.json"
+            )
+        part = read_drawing(job.part_file, unit=job.part_unit)
+        tasks = tuple(job.tasks(part))
+        return cls(
+            job=job,
+            tasks=tasks,
+            candidates=tuple(tuple(task.candidates(part)) for task in tasks),
+            cell=cell_of_job(job, part),
         )
-    chosen, settings = language_of(path, job)
-    read = program_on_disk(path, chosen, settings, job.robot)
-    part = read_drawing(job.part_file, unit=job.part_unit)
-    cell = cell_of_job(job, part)
-    cuts, home = cuts_of(read, job.robot, job.tool, job.placement)
-    tasks = job.tasks(part)
-    candidates = [task.candidates(part) for task in tasks]
-    tables: dict[str, list[Check]] = {}
-    places: dict[str, tuple[str, ...]] = {}
-    tool = job.tool if read.T_flange_tip is None else read.T_flange_tip
-    placed = job.placement if read.T_base_part is None else read.T_base_part
-    off = max(np.abs(tool - job.tool).max(), np.abs(placed - job.placement).max())
-    tables[path.name] = [_check("frames", "tool and part, off the job's", off, SAME_FRAME, "m")]
-    done: list[int] = []
-    for cut in cuts:
-        apart, which, candidate = _closest(cut, candidates)
-        title = f"{cut.name} ({tasks[which].name})" if apart < NEAR else cut.name
-        places[title] = tuple(move.place for move in cut.moves)
-        if apart >= NEAR:
-            said = "distance from the nearest contour of the job"
-            tables[title] = [_check("contour", said, apart, NEAR, "m")]
-            continue
-        reference = candidates[which][candidate]
-        tables[title] = _cut_checks(job, tasks[which], cut, reference, cell, chosen, settings)
-        times = done.count(which)
-        tables[title].append(_check("once", "earlier cuts of this contour", times, 0, "count"))
-        done.append(which)
-    tables["air"] = _air(job, cuts, home, cell if job.sequence is not None else None)
-    missing = tuple(task.name for i, task in enumerate(tasks) if i not in done)
-    note = collision_note(cell, moves_too=job.sequence is not None)
-    return Audited(tables=tables, missing=missing, note=note, places=places)
+
+    def audit(
+        self, read: ReadProgram, chosen: Language, settings: Settings, name: str
+    ) -> Audited:
+        """Return what the audit says of every cut of a program that was read."""
+        job, tasks, candidates, cell = self.job, self.tasks, self.candidates, self.cell
+        cuts, home = cuts_of(read, job.robot, job.tool, job.placement)
+        tables: dict[str, list[Check]] = {}
+        places: dict[str, tuple[str, ...]] = {}
+        tool = job.tool if read.T_flange_tip is None else read.T_flange_tip
+        placed = job.placement if read.T_base_part is None else read.T_base_part
+        off = max(np.abs(tool - job.tool).max(), np.abs(placed - job.placement).max())
+        tables[name] = [_check("frames", "tool and part, off the job's", off, SAME_FRAME, "m")]
+        done: list[int] = []
+        for cut in cuts:
+            apart, which, candidate = _closest(cut, candidates)
+            title = f"{cut.name} ({tasks[which].name})" if apart < NEAR else cut.name
+            places[title] = tuple(move.place for move in cut.moves)
+            if apart >= NEAR:
+                said = "distance from the nearest contour of the job"
+                tables[title] = [_check("contour", said, apart, NEAR, "m")]
+                continue
+            reference = candidates[which][candidate]
+            tables[title] = _cut_checks(job, tasks[which], cut, reference, cell, chosen, settings)
+            times = done.count(which)
+            tables[title].append(_check("once", "earlier cuts of this contour", times, 0, "count"))
+            done.append(which)
+        tables["air"] = _air(job, cuts, home, cell if job.sequence is not None else None)
+        missing = tuple(task.name for i, task in enumerate(tasks) if i not in done)
+        note = collision_note(cell, moves_too=job.sequence is not None)
+        return Audited(tables=tables, missing=missing, note=note, places=places)
 
 
 def _check(code: str, title: str, value: float, limit: float, unit: Unit, node: int = 0) -> Check:
