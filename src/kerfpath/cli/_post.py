@@ -11,16 +11,16 @@ from rich.markup import escape
 from kerfpath.cad import read_measured
 from kerfpath.cli._show import errors, out, print_json
 from kerfpath.errors import InputError
-from kerfpath.job import program_from_file, read_plan_file
+from kerfpath.job import program_from_file, program_language, read_job, read_plan_file
 from kerfpath.placement import MeasuredFrame, placement_from_points
-from kerfpath.post import identifier, write_files, write_program
+from kerfpath.post import Language, identifier, languages, write_files, write_program
 from kerfpath.post import language as find_language
 
 __all__ = ["write_post"]
 
 
 def write_post(
-    plan_file: Path, language: str, output: Path | None, *, strict: bool, as_json: bool,
+    plan_file: Path, language: str | None, output: Path | None, *, strict: bool, as_json: bool,
     job: Path | None = None, dry_share: float | None = None, measured: Path | None = None,
     residual_mm: float = 0.5,
 ) -> None:  # fmt: skip
@@ -29,7 +29,10 @@ def write_post(
     A file with the suffix of the language names the program, and others go beside it; else a
     program of one file is written as `output`, and one of several into that folder.
     """
-    name = _name(output, find_language(language).suffix)
+    if language is None:
+        source = read_plan_file(plan_file).job if job is None else read_job(job).source
+        language = program_language(source, job or plan_file)
+    name = _name(output, find_language(language))
     if name is not None and dry_share is not None:
         name = name.removeprefix("dry_")  # which dry runs begin with by themselves
     frame = None
@@ -78,9 +81,25 @@ def write_post(
         out.print(f"wrote {escape(str(path))}")
 
 
-def _name(output: Path | None, suffix: str) -> str | None:
-    """Return the name of a program that is to be written to a file of the language's own suffix."""
-    if output is None or output.is_dir() or output.suffix.lower() != suffix:
+def _name(output: Path | None, chosen: Language) -> str | None:
+    """Return the name of a program that is to be written to a file of the language's own suffix.
+
+    Raises
+    ------
+    InputError
+        The file has the suffix of another language, its folder is not there, or no program can be
+        called like it.
+    """
+    if output is None or output.is_dir():
+        return None
+    suffix = output.suffix.lower()
+    if suffix != chosen.suffix.lower():
+        others = [each.name for each in languages().values() if each.suffix.lower() == suffix]
+        if others:
+            raise InputError(
+                f"{output}: the program is to be in {chosen.name}, whose files end in "
+                f"{chosen.suffix}; name it so, or say --language {others[0]}"
+            )
         return None
     if not output.parent.is_dir():
         raise InputError(f"cannot write the program to {output}: {output.parent} is no folder")

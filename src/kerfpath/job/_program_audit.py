@@ -17,11 +17,10 @@ from kerfpath.cell import Cell
 from kerfpath.contour import Contour
 from kerfpath.errors import InputError
 from kerfpath.job._cell import cell_of_job
-from kerfpath.job._files import collision_note
 from kerfpath.job._program_read import ReadCut, cuts_of, language_of, program_on_disk
 from kerfpath.job._read import Job, read_job
 from kerfpath.job._task import ContourTask
-from kerfpath.job._verdict import Audited
+from kerfpath.job._verdict import Audited, collision_note
 from kerfpath.planner import node_interval
 from kerfpath.plans import Plan, Proof
 from kerfpath.plans import Settings as PlanSettings
@@ -113,9 +112,7 @@ class ProgramAsked:
             cell=cell_of_job(job, part),
         )
 
-    def audit(
-        self, read: ReadProgram, chosen: Language, settings: Settings, name: str
-    ) -> Audited:
+    def audit(self, read: ReadProgram, chosen: Language, settings: Settings, name: str) -> Audited:
         """Return what the audit says of every cut of a program that was read."""
         job, tasks, candidates, cell = self.job, self.tasks, self.candidates, self.cell
         cuts, home = cuts_of(read, job.robot, job.tool, job.placement)

@@ -40,7 +40,9 @@ from kerfpath.post._read import with_tips as with_tips
 from kerfpath.post._settings import Rules as Rules
 from kerfpath.post._settings import Settings as Settings
 from kerfpath.post._settings import setting as setting
+from kerfpath.post._writer import Posted as Posted
 from kerfpath.post._writer import post as post
+from kerfpath.post._writer import posted as posted
 from kerfpath.post._writer import read_program as read_program
 from kerfpath.post._writer import write_files as write_files
 from kerfpath.post._writer import write_program as write_program
