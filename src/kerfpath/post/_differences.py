@@ -9,7 +9,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from kerfpath._arrays import Array
-from kerfpath.post._compare import ANGLE, FRAME, LEAD, POINT, SHARE, events
+from kerfpath.post._compare import ANGLE, FRAME, LEAD, POINT, SHARE, events, handshake
 from kerfpath.post._groups import ReadGroup, groups_of
 from kerfpath.post._matching import Pair, Stop, matched, pairs_of
 from kerfpath.post._read import ReadMove, ReadProgram
@@ -29,7 +29,7 @@ class Difference:
     ----------
     code : str
         frames, added, removed, order, targets, joints, kinds, speeds, times, zones, switches,
-        waits or postures.
+        waits, postures or handshakes.
     count : int
         How many contours or moves it is found at.
     message : str
@@ -100,6 +100,7 @@ def differences(a: ReadProgram, b: ReadProgram, *, rules: Sequence[Rules] = ()) 
     found += _targets(both, digits)
     found += _joints(both, digits)
     found += _said(both, digits)
+    found += _handshakes([(one[i], two[j]) for i, j in same])
     return found
 
 
@@ -237,6 +238,18 @@ def _said(both: Both, digits: _Digits) -> Iterator[Difference]:
             a, b = both[int(moved[np.argmax(off[moved])])]
             message = f"{_count(len(moved), 'move')}, {words(a)} in A and {words(b)} in B"
             yield _found(code, len(moved), message, a, b)
+
+
+def _handshakes(groups: Sequence[tuple[ReadGroup, ReadGroup]]) -> Iterator[Difference]:
+    """Compare who is asked and awaited, and when."""
+    differ = [(a, b) for a, b in groups if a.handshakes != b.handshakes]
+    if differ:
+        words = [
+            ", ".join(handshake(what) for _, what in group.handshakes) or "none"
+            for group in differ[0]
+        ]
+        message = f"{_count(len(differ), 'contour')}, in A {words[0]}, in B {words[1]}"
+        yield Difference(code="handshakes", count=len(differ), message=message)
 
 
 def _excess(one: float | None, two: float | None, allowed: float) -> float:

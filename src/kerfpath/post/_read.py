@@ -11,12 +11,12 @@ import numpy as np
 
 from kerfpath._arrays import Array, freeze
 from kerfpath.errors import InputError
-from kerfpath.post._program import Switch
+from kerfpath.post._program import Handshake, Switch
 from kerfpath.robots import Robot
 
 __all__ = [
-    "MOVE_KINDS", "MoveKind", "ReadMove", "ReadProgram", "ReadSection", "ReadStep", "ReadWait",
-    "Reader", "patterns", "same_output", "with_tips",
+    "MOVE_KINDS", "MoveKind", "ReadHandshake", "ReadMove", "ReadProgram", "ReadSection",
+    "ReadStep", "ReadWait", "Reader", "patterns", "same_output", "with_tips",
 ]  # fmt: skip
 
 
@@ -83,7 +83,21 @@ class ReadWait:
         return f"{self.file}, line {self.line}"
 
 
-ReadStep = ReadMove | ReadWait
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ReadHandshake:
+    """A handshake with a partner where the robot stands."""
+
+    what: Handshake
+    file: str
+    line: int
+
+    @property
+    def place(self) -> str:
+        """Where it stands."""
+        return f"{self.file}, line {self.line}"
+
+
+ReadStep = ReadMove | ReadWait | ReadHandshake
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
