@@ -197,7 +197,7 @@ def _cut(group: ReadGroup, robot: Robot, T_flange_tip: Array, T_base_part: Array
         laser=np.array(on[: last - 1], dtype=bool),
         left_on=on[last - 1],
         lead_times=np.array([switch.lead_time for switch in switches]),
-        waits=np.array([time for at, time in group.waits if at == 1]),
+        waits=np.array([wait.time for at, wait in group.waits if at == 1]),
         q_out=q[last],
         moves=tuple(moves[:last]),
     )
