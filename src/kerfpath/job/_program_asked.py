@@ -10,7 +10,7 @@ import numpy as np
 from kerfpath._arrays import Array, Bools, Ints
 from kerfpath.air import AirMove, backed_off
 from kerfpath.contour import Contour
-from kerfpath.job._program_read import ReadCut, poses_on_arc, followed
+from kerfpath.job._program_read import ReadCut, branch_of, followed, poses_on_arc
 from kerfpath.job._read import Job
 from kerfpath.job._task import ContourTask
 from kerfpath.planner import node_interval
@@ -73,7 +73,9 @@ class AskedNodes:
         return not self.alone.any() and self.at[-1] == len(self.nodes) - 1
 
 
-def asked_nodes(job: Job, task: ContourTask, cut: ReadCut, reference: Contour, s: Array) -> AskedNodes:
+def asked_nodes(
+    job: Job, task: ContourTask, cut: ReadCut, reference: Contour, s: Array
+) -> AskedNodes:
     """Return the nodes that the job asks for along a cut, by the arc lengths s (m,) of its targets.
 
     Where the job asks for finer intervals, those are taken if there are as many targets.
@@ -117,7 +119,7 @@ def asked_program(
         There is no such program: joints that leave the path, no way to back off.
     """
     rules, options = language.rules(settings), job.program
-    plans = [_whole(cut, asked, plan) for cut, asked, plan in cuts]
+    plans = [_whole(job, cut, asked, plan) for cut, asked, plan in cuts]
     program = build_program(
         plans,
         moves=_moves(job, [cut for cut, _, _ in cuts], plans, home),
@@ -129,43 +131,117 @@ def asked_program(
         pierce_time=options.pierce_time,
         approach_speed=options.approach_speed,
         air_speed=options.air_speed,
+        handshakes=options.handshakes,
     )
     sections = []
     for section, (cut, asked, _) in zip(program.sections, cuts, strict=True):
-        steps = _as_led(program, section.steps, cut, rules)
+        steps = [
+            replace(step, q=_same_pose(program, step.q, cut.approach[-1], rules))
+            if isinstance(step, JointMove)
+            else step
+            for step in section.steps
+        ]
         if options.arc_tolerance is not None:
             steps = _with_arcs(steps, cut, asked)
         sections.append(replace(section, steps=tuple(steps)))
-    program = replace(program, sections=tuple(sections))
-    if language.sayable is not None:
-        program = language.sayable(program, settings)
-    return said_in(program, language, settings)
+    return said_in(replace(program, sections=tuple(sections)), language, settings)
 
 
-def _whole(cut: ReadCut, asked: AskedNodes, plan: Plan) -> Plan:
+def _whole(job: Job, cut: ReadCut, asked: AskedNodes, plan: Plan) -> Plan:
     """Return the plan of a cut with a node wherever the job asks for one, along arcs, too."""
     targets, at = cut.ends, asked.at
-    T = np.empty((len(asked.nodes), 4, 4))
-    q = np.empty((len(asked.nodes), cut.q.shape[1]))
+    K = len(asked.nodes)
+    T, q = np.empty((K, 4, 4)), np.empty((K, cut.q.shape[1]))
     T[at], q[at] = cut.T_part_tip[targets], cut.q[targets]
     flange = np.linalg.inv(plan.T_flange_tip)
     for j, move in enumerate(cut.targets):
-        first, last = (at[j - 1] if j else at[0]), at[j]
-        if move.T_part_via is None or last - first < 2:
-            continue
-        s = asked.nodes.s[first : last + 1]
-        parts = ((s - s[0]) / (s[-1] - s[0]))[1:-1]
-        T[first + 1 : last] = poses_on_arc(T[first], move.T_part_via, T[last], parts)
-        q[first + 1 : last] = followed(
-            plan.robot, plan.T_base_part @ T[first + 1 : last] @ flange, q[first]
-        )
-    dips = plan.time[targets]
-    time = np.interp(np.arange(len(T)), at, dips) if plan.settings.feed == "dip" else asked.time
-    contour = replace(
-        asked.nodes, points=T[:, :3, 3], axes=T[:, :3, 2], time=None, name=plan.name
-    )
-    K = len(T)
+        first, last = at[max(j - 1, 0)], at[j]
+        if move.T_part_via is not None and last - first > 1:
+            inner = slice(first + 1, last)
+            s = asked.nodes.s[first : last + 1]
+            parts = ((s - s[0]) / (s[-1] - s[0]))[1:-1]
+            T[inner] = poses_on_arc(T[first], move.T_part_via, T[last], parts)
+            q[inner] = followed(plan.robot, plan.T_base_part @ T[inner] @ flange, q[first])
+    time = asked.time
+    if job.plan_options["feed"] != "constant":  # it may be slower, which is judged by itself
+        time = np.interp(np.arange(K), at, plan.time[targets])
     return replace(
-        plan, contour=contour, q=q, gamma=np.zeros(K), time=time,
-        posture=np.full(K, plan.posture[0]), turn=np.zeros(q.shape, dtype=np.int64),
-    )  # fmt: skip
+        plan,
+        contour=Contour(
+            T[:, :3, 3], T[:, :3, 2], s=asked.nodes.s, kind=asked.nodes.kind, name=plan.name
+        ),
+        q=q,
+        gamma=np.zeros(K),
+        time=time,
+        posture=np.full(K, branch_of(plan.robot, q[0])),
+        turn=np.zeros(q.shape, dtype=np.int64),
+    )
+
+
+def _moves(
+    job: Job, cuts: Sequence[ReadCut], plans: Sequence[Plan], home: Array
+) -> list[AirMove]:
+    """Return the moves between cuts with the corners that were read, and the job's home."""
+    if job.sequence is None:
+        return []
+    corners = [
+        [*cut.approach[:-1], backed_off(plan, "start", job.program.retract)]
+        for cut, plan in zip(cuts, plans, strict=True)
+    ]
+    backs = [backed_off(plan, "end", job.program.retract) for plan in plans]
+    ways = [[back, *way] for back, way in zip(backs, corners[1:], strict=False)]
+    if job.sequence.home_deg is not None:
+        there = np.radians(job.sequence.home_deg)
+        ways = [[there, *corners[0][1:]], *ways, [backs[-1], *home[:-1], there]]
+    return [
+        AirMove(q=np.array(way), time=np.arange(len(way), dtype=float), clear=True) for way in ways
+    ]
+
+
+def _same_pose(program: Program, asked: Array, read: Array, rules: Rules) -> Array:
+    """Return the joints that were read, where they bring the tool to the pose that is asked for.
+
+    Near a singularity the digits of a pose leave more of joints than of the pose.
+    """
+    T = program.robot.forward(np.array([asked, read])) @ program.T_flange_tip
+    left = len(asked) * rules.angle_step
+    off = np.linalg.norm(T[0, :3, 3] - T[1, :3, 3])
+    turned = np.linalg.norm(T[0, :3, :3] - T[1, :3, :3]) / np.sqrt(2)
+    near = off <= POINT + rules.point_step + REACH * left and turned <= ANGLE + left
+    return read if near and np.abs(asked - read).max() <= SAME_BRANCH else asked
+
+
+def _with_arcs(steps: Sequence[Step], cut: ReadCut, asked: AskedNodes) -> list[Step]:
+    """Return the steps of a cut with arcs where it was read with arcs, as far as there may be one."""
+    path = [k for k, step in enumerate(steps) if isinstance(step, LinearMove)]
+    found, done = list(steps[: path[0] + 1]), path[0] + 1
+    for j, move in enumerate(cut.targets[1:], 1):
+        first, last = path[asked.at[j - 1] + 1], path[asked.at[j]]
+        run = [step for step in steps[first : last + 1] if isinstance(step, LinearMove)]
+        found += steps[done:first]
+        done = last + 1
+        arc = move.T_part_via is not None and _is_one(run)
+        found += [_arc(run, move.T_part_via)] if arc else run
+    return [*found, *steps[done:]]
+
+
+def _is_one(run: Sequence[LinearMove]) -> bool:
+    """Return whether linear moves may be one: passed through, nothing switched, of one speed."""
+    speeds = [move.speed for move in run]
+    through = all(move.zone > 0 and not move.switches for move in run[:-1])
+    return through and max(speeds) - min(speeds) <= SAME_SPEED * speeds[0]
+
+
+def _arc(run: Sequence[LinearMove], T_part_via: Array | None) -> CircularMove:
+    end, via = run[-1], run[(len(run) - 1) // 2]
+    assert T_part_via is not None
+    return CircularMove(
+        T_part_via=T_part_via,
+        q_via=via.q,
+        T_part_tip=end.T_part_tip,
+        q=end.q,
+        speed=run[0].speed,
+        duration=sum(move.duration for move in run),
+        zone=end.zone,
+        switches=end.switches,
+    )

@@ -32,6 +32,7 @@ from kerfpath.post._program import Partner as Partner
 from kerfpath.post._program import Program as Program
 from kerfpath.post._program import Request as Request
 from kerfpath.post._program import Section as Section
+from kerfpath.post._program import Signal as Signal
 from kerfpath.post._program import Step as Step
 from kerfpath.post._program import Switch as Switch
 from kerfpath.post._program import Wait as Wait
@@ -50,5 +51,6 @@ from kerfpath.post._writer import Posted as Posted
 from kerfpath.post._writer import post as post
 from kerfpath.post._writer import posted as posted
 from kerfpath.post._writer import read_program as read_program
+from kerfpath.post._writer import said_in as said_in
 from kerfpath.post._writer import write_files as write_files
 from kerfpath.post._writer import write_program as write_program
