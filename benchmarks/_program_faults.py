@@ -134,7 +134,6 @@ def _section_faults(
     # Where it goes.
     yield "approach from afar", _backed(steps, joint[-1], start, 10)
     yield "start joint moved", changed(joint[-1], q=_nudged(steps[joint[-1]].q, rng, 2.0))  # type: ignore[union-attr]
-    yield "start joint a turn off", changed(joint[-1], q=steps[joint[-1]].q + np.eye(6)[5] * 2 * np.pi)  # type: ignore[union-attr]  # fmt: skip
     move = steps[back]
     assert isinstance(move, LinearMove)
     for kind, way in (("retract into the part", -1), ("retract ten times as far", 10)):

@@ -192,7 +192,9 @@ def _moves(
     ways = [[back, *way] for back, way in zip(backs, corners[1:], strict=False)]
     if job.sequence.home_deg is not None:
         there = np.radians(job.sequence.home_deg)
-        ways = [[there, *corners[0][1:]], *ways, [backs[-1], *home[:-1], there]]
+        way = there - backs[-1]
+        short = np.where(job.robot.endless, way - 2 * np.pi * np.round(way / (2 * np.pi)), way)
+        ways = [[there, *corners[0][1:]], *ways, [backs[-1], *home[:-1], backs[-1] + short]]
     return [
         AirMove(q=np.array(way), time=np.arange(len(way), dtype=float), clear=True) for way in ways
     ]

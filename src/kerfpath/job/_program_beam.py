@@ -126,7 +126,9 @@ def _row(
     value, step = max(found, default=(0.0, 0), key=lambda one: (one[0], -one[1]))
     if unit == "count":
         value = float(sum(one for one, _ in found))
-    return Check(code=code, title=title, value=value, limit=limit, unit=unit, node=step)
+    return Check(
+        code=code, title=title, value=float(value), limit=float(limit), unit=unit, node=step
+    )
 
 
 def _timeline(read: ReadProgram, robot: Robot) -> tuple[list[_Span], list[_Event]]:
