@@ -264,7 +264,7 @@ def _cut_checks(
     if job.plan_options["tilt"] is not None:
         options["axis_tolerance"] += job.plan_options["tilt"].cone
     rows += checks(made, reference=reference, cell=cell, **options)
-    rows += _asked(job, task, cut, reference, made, ahead=chosen.sayable is None)
+    rows += _asked(job, task, cut, reference, made, ahead=chosen.ahead)
     rows += _postures(job, cut, chosen, settings)
     asked = asked_nodes(job, task, cut, reference, s)
     off, alone = int(np.argmax(asked.off)), int(np.argmax(asked.alone))

@@ -7,8 +7,8 @@ from kerfpath.post._compare import deviations as deviations
 from kerfpath.post._differences import Difference as Difference
 from kerfpath.post._differences import differences as differences
 from kerfpath.post._differences import not_compared as not_compared
-from kerfpath.post._divide import divided as divided
 from kerfpath.post._divide import in_files as in_files
+from kerfpath.post._divide import renamed as renamed
 from kerfpath.post._dry_run import dry_run as dry_run
 from kerfpath.post._formatter import Formatter as Formatter
 from kerfpath.post._groups import ReadGroup as ReadGroup

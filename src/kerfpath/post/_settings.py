@@ -8,7 +8,7 @@ from typing import Annotated, Any
 import numpy as np
 from pydantic import BaseModel, ConfigDict, Field
 
-from kerfpath.post._program import PARTNERS
+from kerfpath.post._program import PARTNERS, Partner
 
 __all__ = ["Rules", "Settings", "handshakes", "setting"]
 
@@ -29,11 +29,11 @@ class Settings(BaseModel):
     ] = 5000
 
 
-def handshakes(settings: Settings) -> dict[tuple[str, str], Any]:
+def handshakes(settings: Settings) -> dict[tuple[Partner, str], Any]:
     """Return the inputs and outputs of handshakes that settings can name, by partner and way."""
     fields = (name.rpartition("_") for name in type(settings).model_fields)
     return {
-        (partner, way): getattr(settings, f"{partner}_{way}")
+        (PARTNERS[partner], way): getattr(settings, f"{partner}_{way}")
         for partner, _, way in fields
         if partner in PARTNERS and way in ("input", "output")
     }

@@ -13,7 +13,7 @@ from kerfpath.post import PARTNERS, Await, Handshake, Partner, Request, Settings
 __all__ = ["AuditTable", "ProgramTable"]
 
 
-PARTNERS_SAID = ", ".join(PARTNERS)
+PARTNERS_SAID = f"a list of {', '.join(PARTNERS)}"
 
 
 class ProgramTable(Table):
@@ -37,25 +37,22 @@ class ProgramTable(Table):
         Positive, key("a number from 0.01 to 1, of the full speed", "0.25", ge=0.01, le=1)
     ] = 0.25
 
-    request: Annotated[
-        list[Partner], key(f"a list of {PARTNERS_SAID}", '["shutter"]', default_factory=list)
-    ]
-    wait_for: Annotated[
-        list[Partner], key(f"a list of {PARTNERS_SAID}", '["ready"]', default_factory=list)
-    ]
+    request: Annotated[list[Partner] | None, key(PARTNERS_SAID, '["shutter"]')] = None
+    wait_for: Annotated[list[Partner] | None, key(PARTNERS_SAID, '["ready"]')] = None
     wait_timeout_s: Annotated[Positive, key("a number from 0 to 600, in s", "5", le=600)] = 5.0
 
     @field_validator("request", "wait_for")
     @classmethod
-    def _is_said_once(cls, partners: list[Partner]) -> list[Partner]:
-        if len(set(partners)) < len(partners):
+    def _is_said_once(cls, partners: list[Partner] | None) -> list[Partner] | None:
+        if partners and len(set(partners)) < len(partners):
             raise fault("each partner once", repr(partners), "leave the second out")
         return partners
 
     def handshakes(self) -> tuple[Handshake, ...]:
         """Return what is done before each contour."""
-        requests = (Request(partner=partner, on=True) for partner in self.request)
-        waits = (Await(partner=partner, timeout=self.wait_timeout_s) for partner in self.wait_for)
+        requests = (Request(partner=partner, on=True) for partner in self.request or ())
+        timeout = self.wait_timeout_s
+        waits = (Await(partner=partner, timeout=timeout) for partner in self.wait_for or ())
         return *requests, *waits
 
     @field_validator("language")
