@@ -210,7 +210,7 @@ def subjects(folder: Path, only: tuple[str, ...] = (), more: str = "") -> Iterat
         path.write_text(
             JOB.format(
                 arm=arm, acceleration=ACCELERATION, reach=1200 if arm == ARM else 800,
-                language=name, lead=0.0 if chosen.sayable else 0.01, more=more,
+                language=name, lead=0.01 if chosen.ahead else 0.0, more=more,
             )
         )  # fmt: skip
         asked = ProgramAsked.of(path)

@@ -11,21 +11,21 @@ from scipy.spatial import cKDTree
 
 from kerfpath._arrays import Array
 from kerfpath.air import least_time
-from kerfpath.auditor import Check, Unit, air_checks, checks, worst_of
+from kerfpath.auditor import Check, Rounding, Unit, air_checks, checks, rounding_of, worst_of
 from kerfpath.cell import Cell
 from kerfpath.contour import Contour
 from kerfpath.errors import InputError
 from kerfpath.job._asked import asked_of
 from kerfpath.job._program_asked import AskedNodes, asked_nodes, asked_program
 from kerfpath.job._program_beam import Process, beam_checks
-from kerfpath.job._program_read import ReadCut, cuts_of, language_of, program_on_disk
+from kerfpath.job._program_read import ReadCut, at_interval, cuts_of, language_of, program_on_disk
 from kerfpath.job._read import Job, read_job
 from kerfpath.job._task import ContourTask
 from kerfpath.job._verdict import Audited, collision_note
 from kerfpath.planner import node_interval
 from kerfpath.plans import Plan, Proof
 from kerfpath.plans import Settings as PlanSettings
-from kerfpath.post import Language, ReadProgram, Settings, differences, with_tips
+from kerfpath.post import Language, ReadProgram, Rules, Settings, differences, with_tips
 
 __all__ = ["ProgramAsked", "audit_program"]
 
@@ -34,13 +34,9 @@ NEAR = 5e-3
 SAME_FRAME = 1e-6
 """How far (m, sine) tool and part may be from those of the job."""
 SAME_SPEED = 0.02
-"""Share by which a speed may differ from the one asked for: controllers round it."""
+"""Share by which a speed may differ from the one asked for, beyond its digits."""
 SAME_TIME = 2e-3
 """How far (s) lead times and waits may differ from those asked for: controllers round them."""
-ROUNDED = 2e-3
-"""Share of a rate that the digits of written speeds may take or give."""
-ROUNDED_ANGLE = 2e-6
-"""How far (rad) joints may be beyond a limit for the digits of written targets."""
 FOLLOWED = ("postures",)
 """Differences that follow from the path that was read, and are judged with it."""
 WHAT = {
@@ -139,7 +135,7 @@ class ProgramAsked:
         tool = job.tool if read.T_flange_tip is None else read.T_flange_tip
         placed = job.placement if read.T_base_part is None else read.T_base_part
         off = max(np.abs(tool - job.tool).max(), np.abs(placed - job.placement).max())
-        process = Process.of(job.program, ahead=chosen.sayable is None)
+        process = Process.of(job.program, ahead=chosen.ahead)
         tables[name] = [
             _check("frames", "tool and part, off the job's", off, SAME_FRAME, "m"),
             *beam_checks(read, job.robot, process),
@@ -155,6 +151,9 @@ class ProgramAsked:
                 tables[title] = [_check("contour", said, apart, NEAR, "m")]
                 continue
             reference = candidates[which][candidate]
+            dt = _asked_times(tasks[which], reference)[1]
+            cut = at_interval(cut, dt, job.robot, job.tool, job.placement)
+            places[title] = tuple(move.place for move in (*cut.moves, cut.group.path[-1]))
             tables[title], along = _cut_checks(
                 job, tasks[which], cut, reference, cell, chosen, settings
             )
@@ -263,9 +262,11 @@ def _cut_checks(
     options = dict(job.audit_options)
     if job.plan_options["tilt"] is not None:
         options["axis_tolerance"] += job.plan_options["tilt"].cone
-    rows += checks(made, reference=reference, cell=cell, **options)
-    rows += _asked(job, task, cut, reference, made, ahead=chosen.ahead)
-    rows += _postures(job, cut, chosen, settings)
+    rules = chosen.rules(settings)
+    digits = _rounding(cut, made, rules)
+    rows += checks(made, reference=reference, cell=cell, rounding=digits, **options)
+    rows += _asked(job, task, cut, reference, made, digits.time, ahead=chosen.ahead)
+    rows += _postures(job, cut, chosen, settings, digits.q)
     asked = asked_nodes(job, task, cut, reference, s)
     off, alone = int(np.argmax(asked.off)), int(np.argmax(asked.alone))
     said = "targets that leave a node of the job out, or are none"
@@ -308,13 +309,10 @@ def _along(cut: ReadCut, reference: Contour) -> tuple[Array, Array]:
 def _plan(job: Job, task: ContourTask, cut: ReadCut, s: Array, time: Array) -> Plan:
     """Return what the text says of a cut as a plan, so that it is audited as one."""
     options, K = job.plan_options, len(cut.q)
-    limits = job.robot.joint_limits()
     weights = options["weights"]
     return Plan(
         contour=Contour(cut.T_part_tip[:, :3, 3], cut.T_part_tip[:, :3, 2], s=s, name=task.name),
-        robot=job.robot.with_limits(
-            lower=limits.lower - ROUNDED_ANGLE, upper=limits.upper + ROUNDED_ANGLE
-        ),
+        robot=job.robot,
         T_flange_tip=job.tool,
         T_base_part=job.placement,
         q=cut.q,
@@ -329,8 +327,8 @@ def _plan(job: Job, task: ContourTask, cut: ReadCut, s: Array, time: Array) -> P
             objective=options["objective"],
             metric=options["metric"],
             weights=np.ones(job.robot.joints) if weights is None else np.asarray(weights),
-            eta_v=options["eta_v"] * (1 + ROUNDED),
-            eta_a=options["eta_a"] * (1 + ROUNDED),
+            eta_v=options["eta_v"],
+            eta_a=options["eta_a"],
             rotation=options["rotation"],
             comfort=options["comfort"],
         ),
@@ -340,17 +338,24 @@ def _plan(job: Job, task: ContourTask, cut: ReadCut, s: Array, time: Array) -> P
     )
 
 
+def _rounding(cut: ReadCut, made: Plan, rules: Rules) -> Rounding:
+    """Return what the digits of a language leave of the joints and times of a cut."""
+    jointed = all(move.T_part_tip is None for move in cut.moves)
+    time = np.where(np.isnan(cut.speed), 0.0, rules.speed_step / 2 / cut.speed)
+    return rounding_of(made, rules.point_step, rules.angle_step, time, jointed=jointed)
+
+
 def _asked(
-    job: Job, task: ContourTask, cut: ReadCut, reference: Contour, made: Plan, *, ahead: bool
-) -> list[Check]:
+    job: Job, task: ContourTask, cut: ReadCut, reference: Contour, made: Plan, digits: Array,
+    *, ahead: bool,
+) -> list[Check]:  # fmt: skip
     """Compare speeds, switches and waits with what the job asks for.
 
     Where the language cannot switch `ahead` of a target, it has to do so at the target.
     """
     s = made.contour.s
     middle = (s[1:] + s[:-1]) / 2
-    asked = task.sample(reference)
-    dt = node_interval(asked, task.speed if asked.time is None else None)
+    asked, dt = _asked_times(task, reference)
     when = dt * np.arange(len(asked))
     k = np.clip(np.searchsorted(reference.s, middle, side="right") - 1, 0, len(reference) - 1)
     wanted = np.array([reference.kinds[j] != "micro joint" for j in k])
@@ -358,13 +363,20 @@ def _asked(
     excess = np.diff(np.interp(s, asked.s, when)) / np.diff(made.time) - 1
     if job.plan_options["feed"] == "constant":
         excess = np.abs(excess)
-    fast = int(np.argmax(excess))
+    fast = int(np.argmax(excess - digits))
     node = int(np.argmax(wrong)) if wrong.any() else 0
     lead = np.abs(cut.lead_times - (job.program.lead_time if ahead else 0.0))
     wait = abs(float(cut.waits.sum()) - job.program.pierce_time)
     lengths = np.diff(s)[wrong].sum()
     return [
-        _check("speed", "speed, off the one asked for", excess[fast], SAME_SPEED, "share", fast),
+        _check(
+            "speed",
+            "speed, off the one asked for",
+            excess[fast],
+            SAME_SPEED + digits[fast],
+            "share",
+            fast,
+        ),
         _check("laser", "length with the laser wrongly on or off", lengths, 1e-6, "m", node),
         _check("laser-off", "laser left on at the end", cut.left_on, 0, "count", len(s) - 1),
         _check("lead-time", "lead time of the laser, off", lead.max(initial=0), SAME_TIME, "s"),
@@ -372,13 +384,33 @@ def _asked(
     ]
 
 
-def _postures(job: Job, cut: ReadCut, chosen: Language, settings: Settings) -> list[Check]:
-    """Count targets whose words of posture and turns are not those of the joints there."""
-    told = [k for k, move in enumerate(cut.moves) if move.posture and move.kind == "linear"]
+def _asked_times(task: ContourTask, reference: Contour) -> tuple[Contour, float]:
+    """Return the nodes that are asked for and the time (s) between them."""
+    asked = task.sample(reference)
+    return asked, node_interval(asked, task.speed if asked.time is None else None)
+
+
+def _postures(
+    job: Job, cut: ReadCut, chosen: Language, settings: Settings, left: Array
+) -> list[Check]:
+    """Count targets whose words of posture and turns are not those of the joints there.
+
+    Joints are `left` (K, n) rad to digits: where they are that near to where a word changes, both
+    words are right.
+    """
+    moves, q = (*cut.moves, cut.group.path[-1]), np.vstack([cut.q, cut.q_out])
+    left = np.vstack([left, left[-1:]])
+    told = [k for k in (*cut.ends.tolist(), len(cut.moves)) if moves[k].posture]
     if not told or chosen.posture is None:
         return []
-    expected = chosen.posture(job.robot, cut.q[told], settings)
-    wrong = [k for k, ours in zip(told, expected, strict=True) if cut.moves[k].posture != ours]
+    ways = [q[told] + sign * left[told] for sign in (0, -1, 1)]
+    expected = zip(*(chosen.posture(job.robot, way, settings) for way in ways), strict=True)
+    wrong = [
+        k
+        for k, words in zip(told, expected, strict=True)
+        if len(moves[k].posture) != len(words[0])
+        or any(said not in right for said, *right in zip(moves[k].posture, *words, strict=True))
+    ]
     said = "targets whose posture or turn is not the motion's"
     return [_check("posture", said, len(wrong), 0, "count", wrong[0] if wrong else 0)]
 

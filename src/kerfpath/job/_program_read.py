@@ -29,6 +29,7 @@ from kerfpath.robots import Robot
 
 __all__ = [
     "ReadCut",
+    "at_interval",
     "branch_of",
     "cuts_of",
     "followed",
@@ -38,7 +39,9 @@ __all__ = [
 ]
 
 ARC_STEP = np.radians(2.0)
-"""Sweep between the nodes that an arc is taken to have."""
+"""Sweep between the nodes that an arc has, where it is not known which contour it is of."""
+COARSEST = np.radians(45.0)
+"""The same at most, where it is."""
 
 
 class _Folder(Mapping[str, str]):
@@ -129,6 +132,8 @@ class ReadCut:
         The move to each node.
     ends : (m,) int
         The node that each target of the text stands at; an arc has nodes between.
+    group : ReadGroup
+        What it was made of.
     """
 
     name: str
@@ -144,6 +149,7 @@ class ReadCut:
     q_out: Array
     moves: tuple[ReadMove, ...]
     ends: Ints
+    group: ReadGroup
 
     @property
     def targets(self) -> tuple[ReadMove, ...]:
@@ -178,7 +184,25 @@ def cuts_of(
     return cuts, home
 
 
-def _cut(group: ReadGroup, robot: Robot, T_flange_tip: Array, T_base_part: Array) -> ReadCut:
+def at_interval(
+    cut: ReadCut, interval: float, robot: Robot, T_flange_tip: Array, T_base_part: Array
+) -> ReadCut:
+    """Return a cut whose arcs have a node at each interval (s), as straight moves would have.
+
+    So rates along arcs, and where arcs end, are judged over the same times as all others.
+    """
+    if all(move.kind != "circular" for move in cut.moves):
+        return cut
+    return _cut(cut.group, robot, T_flange_tip, T_base_part, interval)
+
+
+def _cut(
+    group: ReadGroup,
+    robot: Robot,
+    T_flange_tip: Array,
+    T_base_part: Array,
+    interval: float | None = None,
+) -> ReadCut:
     """Return the cut of a group; an arc gets nodes of its own along it."""
     T: list[Array] = []
     took: list[float] = []
@@ -191,7 +215,7 @@ def _cut(group: ReadGroup, robot: Robot, T_flange_tip: Array, T_base_part: Array
         assert end is not None
         stops = [end]
         if T and move.kind == "circular" and move.T_part_via is not None:
-            stops = _arc(T[-1], move.T_part_via, end)
+            stops = _arc(T[-1], move.T_part_via, end, move, interval)
         for stop in stops:
             if T:
                 took.append(_duration(move, T[-1], stop, len(stops)))
@@ -219,6 +243,7 @@ def _cut(group: ReadGroup, robot: Robot, T_flange_tip: Array, T_base_part: Array
         q_out=q[last],
         moves=tuple(moves[:last]),
         ends=np.array(ends[:-1]),
+        group=group,
     )
 
 
@@ -241,13 +266,26 @@ def _q(move: ReadMove) -> Array:
     return move.q
 
 
-def _arc(start: Array, via: Array, end: Array) -> list[Array]:
-    """Return poses along the arc after `start`, its end included, the tool turning evenly."""
+def _arc(
+    start: Array, via: Array, end: Array, move: ReadMove, interval: float | None
+) -> list[Array]:
+    """Return poses along the arc after `start`, its end included, the tool turning evenly.
+
+    They are `ARC_STEP` apart, or as far as the robot comes in an interval (s), but no farther than
+    `COARSEST`.
+    """
     circle = circle_through(start[:3, 3], via[:3, 3], end[:3, 3])
     if circle is None:
         return [via, end]  # on one line
-    count = max(int(np.ceil(_sweep(circle, start, end) / ARC_STEP)), 1)
-    return list(poses_on_arc(start, via, end, np.linspace(0, 1, count + 1)[1:]))
+    sweep = _sweep(circle, start, end)
+    count = int(np.ceil(sweep / ARC_STEP))
+    if interval is not None:
+        took = move.duration
+        if took is None and move.speed:
+            took = sweep * circle[2] / move.speed
+        if took is not None:
+            count = max(round(took / interval), int(np.ceil(sweep / COARSEST)))
+    return list(poses_on_arc(start, via, end, np.linspace(0, 1, max(count, 1) + 1)[1:]))
 
 
 def poses_on_arc(start: Array, via: Array, end: Array, parts: Array) -> Array:

@@ -148,7 +148,11 @@ def build_program(
         sections=tuple(sections),
         air_checked=len(moves) > 0 and all(move.clear for move in moves),
     )
-    return program if arc_tolerance is None else with_arcs(program, arc_tolerance)
+    if arc_tolerance is None:
+        return program
+    eta_v = min(plan.settings.eta_v for plan in plans)
+    eta_a = min(plan.settings.eta_a for plan in plans)
+    return with_arcs(program, arc_tolerance, eta_v=eta_v, eta_a=eta_a)
 
 
 def _cut(
