@@ -18,6 +18,7 @@ from kerfpath.job._files import write_outcome as write_outcome
 from kerfpath.job._heads import pose as pose
 from kerfpath.job._planfile import PlanFile as PlanFile
 from kerfpath.job._planfile import read_plan_file as read_plan_file
+from kerfpath.job._program_audit import ProgramAsked as ProgramAsked
 from kerfpath.job._program_audit import audit_program as audit_program
 from kerfpath.job._program_compare import Compared as Compared
 from kerfpath.job._program_compare import compare_programs as compare_programs

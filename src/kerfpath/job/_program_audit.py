@@ -12,11 +12,12 @@ from scipy.spatial import cKDTree
 from kerfpath._arrays import Array
 from kerfpath.air import least_time
 from kerfpath.auditor import Check, Rounding, Unit, air_checks, checks, rounding_of, worst_of
-from kerfpath.cad import read as read_drawing
 from kerfpath.cell import Cell
 from kerfpath.contour import Contour
 from kerfpath.errors import InputError
-from kerfpath.job._cell import cell_of_job
+from kerfpath.job._asked import asked_of
+from kerfpath.job._program_asked import AskedNodes, asked_nodes, asked_program
+from kerfpath.job._program_beam import Process, beam_checks
 from kerfpath.job._program_read import ReadCut, at_interval, cuts_of, language_of, program_on_disk
 from kerfpath.job._read import Job, read_job
 from kerfpath.job._task import ContourTask
@@ -24,7 +25,7 @@ from kerfpath.job._verdict import Audited, collision_note
 from kerfpath.planner import node_interval
 from kerfpath.plans import Plan, Proof
 from kerfpath.plans import Settings as PlanSettings
-from kerfpath.post import Language, ReadProgram, Rules, Settings
+from kerfpath.post import Language, ReadProgram, Rules, Settings, differences, with_tips
 
 __all__ = ["ProgramAsked", "audit_program"]
 
@@ -36,6 +37,19 @@ SAME_SPEED = 0.02
 """Share by which a speed may differ from the one asked for, beyond its digits."""
 SAME_TIME = 2e-3
 """How far (s) lead times and waits may differ from those asked for: controllers round them."""
+FOLLOWED = ("postures",)
+"""Differences that follow from the path that was read, and are judged with it."""
+WHAT = {
+    "added": "moves",
+    "removed": "moves",
+    "targets": "targets beside the cut",
+    "joints": "joint targets",
+    "times": "times of moves",
+    "zones": "corners and stops",
+    "switches": "laser and gas",
+    "kinds": "kinds of moves",
+}
+"""What differs, by the code of the difference."""
 CLIMB = 0.05
 """What a step along the path counts beside one away from it, where a place on it is looked for."""
 
@@ -77,12 +91,15 @@ class ProgramAsked:
     candidates : tuple of tuples of Contour
         The paths that each of them may be cut along.
     cell : Cell or None
+    inner_first : tuple of (int, int)
+        Contours of which the first is to be cut before the second.
     """
 
     job: Job
     tasks: tuple[ContourTask, ...]
     candidates: tuple[tuple[Contour, ...], ...]
     cell: Cell | None
+    inner_first: tuple[tuple[int, int], ...] = ()
 
     @classmethod
     def of(cls, job_file: Path) -> ProgramAsked:
@@ -99,26 +116,32 @@ class ProgramAsked:
                 f"{job_file}: programs of jobs with interruptions cannot be compared with the "
                 "drawing yet; audit the plan.json"
             )
-        part = read_drawing(job.part_file, unit=job.part_unit)
-        tasks = tuple(job.tasks(part))
+        asked = asked_of(job)
         return cls(
             job=job,
-            tasks=tasks,
-            candidates=tuple(tuple(task.candidates(part)) for task in tasks),
-            cell=cell_of_job(job, part),
+            tasks=asked.tasks,
+            candidates=tuple(tuple(way.path for way in ways) for ways in asked.candidates),
+            cell=asked.cell,
+            inner_first=asked.inner_first,
         )
 
     def audit(self, read: ReadProgram, chosen: Language, settings: Settings, name: str) -> Audited:
         """Return what the audit says of every cut of a program that was read."""
         job, tasks, candidates, cell = self.job, self.tasks, self.candidates, self.cell
+        read = with_tips(read, job.robot, job.tool, job.placement)
         cuts, home = cuts_of(read, job.robot, job.tool, job.placement)
         tables: dict[str, list[Check]] = {}
-        places: dict[str, tuple[str, ...]] = {}
+        places: dict[str, tuple[str, ...]] = {name: tuple(step.place for step in read.steps)}
         tool = job.tool if read.T_flange_tip is None else read.T_flange_tip
         placed = job.placement if read.T_base_part is None else read.T_base_part
         off = max(np.abs(tool - job.tool).max(), np.abs(placed - job.placement).max())
-        tables[name] = [_check("frames", "tool and part, off the job's", off, SAME_FRAME, "m")]
+        process = Process.of(job.program, ahead=chosen.ahead)
+        tables[name] = [
+            _check("frames", "tool and part, off the job's", off, SAME_FRAME, "m"),
+            *beam_checks(read, job.robot, process),
+        ]
         done: list[int] = []
+        followed: list[tuple[ReadCut, AskedNodes, Plan]] = []
         for cut in cuts:
             apart, which, candidate = _closest(cut, candidates)
             title = f"{cut.name} ({tasks[which].name})" if apart < NEAR else cut.name
@@ -130,15 +153,70 @@ class ProgramAsked:
             reference = candidates[which][candidate]
             dt = _asked_times(tasks[which], reference)[1]
             cut = at_interval(cut, dt, job.robot, job.tool, job.placement)
-            places[title] = tuple(move.place for move in cut.moves)
-            tables[title] = _cut_checks(job, tasks[which], cut, reference, cell, chosen, settings)
+            places[title] = tuple(move.place for move in (*cut.moves, cut.group.path[-1]))
+            tables[title], along = _cut_checks(
+                job, tasks[which], cut, reference, cell, chosen, settings
+            )
             times = done.count(which)
             tables[title].append(_check("once", "earlier cuts of this contour", times, 0, "count"))
             done.append(which)
+            followed += [] if along is None else [(cut, *along)]
+        tables[name] += self._order(done, cuts, places[name])
+        tables[name] += _asked_for(job, followed, home, read, chosen, settings)
         tables["air"] = _air(job, cuts, home, cell if job.sequence is not None else None)
         missing = tuple(task.name for i, task in enumerate(tasks) if i not in done)
         note = collision_note(cell, moves_too=job.sequence is not None)
         return Audited(tables=tables, missing=missing, note=note, places=places)
+
+    def _order(
+        self, done: Sequence[int], cuts: Sequence[ReadCut], places: Sequence[str]
+    ) -> list[Check]:
+        """Compare the order of contours with that of the job, or with the rules of [sequence]."""
+        sequence = self.job.sequence
+        given = sequence is None or sequence.order == "given"
+        wrong = [
+            k
+            for k, i in enumerate(done)
+            if (given and any(j > i for j in done[:k]))
+            or any(inner == i and outer in done[:k] for inner, outer in self.inner_first)
+        ]
+        said = "contours cut after one that comes later in the job, or that they lie in"
+        node = places.index(cuts[wrong[0]].moves[0].place) if wrong else 0
+        return [_check("order", said, len(wrong), 0, "count", node)]
+
+
+def _asked_for(
+    job: Job, followed: Sequence[tuple[ReadCut, AskedNodes, Plan]], home: Array,
+    read: ReadProgram, chosen: Language, settings: Settings,
+) -> list[Check]:  # fmt: skip
+    """Compare a program with the one that the job would have along the same paths.
+
+    Whatever differs is a finding: how many moves, and where the largest stands.
+    """
+    if not followed:
+        return []
+    try:
+        asked = asked_program(job, followed, home, chosen, settings)
+    except InputError as error:
+        said = f"a program as the job asks for cannot be made along these paths ({error})"
+        return [_check("asked", said, 1, 0, "count")]
+    rules = chosen.rules(settings)
+    asked = with_tips(asked, job.robot, job.tool, job.placement)
+    found = differences(asked, read, rules=(rules,), names=("the job", "the text"))
+    places = [step.place for step in read.steps]
+    rows = [
+        _check(
+            f"asked-{each.code}",
+            f"not as asked for, {WHAT.get(each.code, each.code)}: {each.message}",
+            each.count,
+            0,
+            "count",
+            places.index(each.place) if each.place in places else 0,
+        )
+        for each in found
+        if each.code not in FOLLOWED
+    ]
+    return rows or [_check("asked", "moves that are not as asked for", 0, 0, "count")]
 
 
 def _check(code: str, title: str, value: float, limit: float, unit: Unit, node: int = 0) -> Check:
@@ -167,17 +245,18 @@ def _closest(cut: ReadCut, candidates: Sequence[Sequence[Contour]]) -> tuple[flo
 def _cut_checks(
     job: Job, task: ContourTask, cut: ReadCut, reference: Contour, cell: Cell | None,
     chosen: Language, settings: Settings,
-) -> list[Check]:  # fmt: skip
+) -> tuple[list[Check], tuple[AskedNodes, Plan] | None]:  # fmt: skip
+    """Return the checks of a cut, and its nodes and plan where it can be compared with the job."""
     unreached = np.flatnonzero(np.isnan(cut.q).any(axis=1))
     if unreached.size:
         said = "targets out of the robot's reach in the posture of the start"
-        return [_check("reach", said, unreached.size, 0, "count", int(unreached[0]))]
+        return [_check("reach", said, unreached.size, 0, "count", int(unreached[0]))], None
     s, ends = _along(cut, reference)
     rows = [_check("ends", "ends of the cut, off those of the contour", ends.max(), 1e-4, "m")]
     if (np.diff(s) <= 0).any():
         node = int(np.flatnonzero(np.diff(s) <= 0)[0])
         said = "stretches that go back along the contour"
-        return [*rows, _check("order", said, (np.diff(s) <= 0).sum(), 0, "count", node)]
+        return [*rows, _check("order", said, (np.diff(s) <= 0).sum(), 0, "count", node)], None
     took = np.where(np.isnan(cut.speed), cut.took, np.diff(s) / cut.speed)
     made = _plan(job, task, cut, s, np.append(0.0, np.cumsum(took)))
     options = dict(job.audit_options)
@@ -186,9 +265,17 @@ def _cut_checks(
     rules = chosen.rules(settings)
     digits = _rounding(cut, made, rules)
     rows += checks(made, reference=reference, cell=cell, rounding=digits, **options)
-    rows += _asked(job, task, cut, reference, made, digits.time, ahead=chosen.sayable is None)
+    rows += _asked(job, task, cut, reference, made, digits.time, ahead=chosen.ahead)
     rows += _postures(job, cut, chosen, settings, digits.q)
-    return rows
+    asked = asked_nodes(job, task, cut, reference, s)
+    off, alone = int(np.argmax(asked.off)), int(np.argmax(asked.alone))
+    said = "targets that leave a node of the job out, or are none"
+    rows += [
+        _check("nodes", "targets, off the nodes that the job asks for", asked.off[off],
+               options["path_tolerance"], "m", int(cut.ends[off])),
+        _check("every-node", said, asked.alone.sum(), 0, "count", int(cut.ends[alone])),
+    ]  # fmt: skip
+    return rows, (asked, made) if asked.complete else None
 
 
 def _along(cut: ReadCut, reference: Contour) -> tuple[Array, Array]:
@@ -311,16 +398,18 @@ def _postures(
     Joints are `left` (K, n) rad to digits: where they are that near to where a word changes, both
     words are right.
     """
-    told = [k for k, move in enumerate(cut.moves) if move.posture and move.kind == "linear"]
+    moves, q = (*cut.moves, cut.group.path[-1]), np.vstack([cut.q, cut.q_out])
+    left = np.vstack([left, left[-1:]])
+    told = [k for k in (*cut.ends.tolist(), len(cut.moves)) if moves[k].posture]
     if not told or chosen.posture is None:
         return []
-    ways = [cut.q[told] + sign * left[told] for sign in (0, -1, 1)]
-    expected = zip(*(chosen.posture(job.robot, q, settings) for q in ways), strict=True)
+    ways = [q[told] + sign * left[told] for sign in (0, -1, 1)]
+    expected = zip(*(chosen.posture(job.robot, way, settings) for way in ways), strict=True)
     wrong = [
         k
         for k, words in zip(told, expected, strict=True)
-        if len(cut.moves[k].posture) != len(words[0])
-        or any(said not in right for said, *right in zip(cut.moves[k].posture, *words, strict=True))
+        if len(moves[k].posture) != len(words[0])
+        or any(said not in right for said, *right in zip(moves[k].posture, *words, strict=True))
     ]
     said = "targets whose posture or turn is not the motion's"
     return [_check("posture", said, len(wrong), 0, "count", wrong[0] if wrong else 0)]

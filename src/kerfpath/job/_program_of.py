@@ -114,6 +114,7 @@ def program_of(
         air_speed=options.air_speed,
         gas_lead=options.gas_lead,
         arc_tolerance=options.arc_tolerance,
+        handshakes=options.handshakes,
     )
     written = posted(program, options.language, options.settings, strict=strict)
     if written.read is not None:

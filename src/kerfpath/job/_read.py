@@ -26,7 +26,7 @@ from kerfpath.job._tables import (
     SequenceTable,
 )
 from kerfpath.job._task import ContourTask, task_of
-from kerfpath.post import Settings
+from kerfpath.post import Handshake, Settings
 from kerfpath.robots import Robot, postures_named
 
 __all__ = ["Job", "ProgramOptions", "audit_options", "program_options", "read_job"]
@@ -63,6 +63,8 @@ class ProgramOptions:
         How near to the path circular moves stay; None: there are none.
     gas_lead : float s or None
         How long before the start the gas is switched on; None: not by the program.
+    handshakes : tuple of Request or Await
+        Before each contour.
     """
 
     language: str
@@ -76,6 +78,7 @@ class ProgramOptions:
     air_speed: float
     arc_tolerance: float | None
     gas_lead: float | None
+    handshakes: tuple[Handshake, ...] = ()
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -309,4 +312,5 @@ def program_options(table: ProgramTable, stem: str) -> ProgramOptions:
         air_speed=table.air_speed,
         arc_tolerance=None if table.arcs_mm is None else table.arcs_mm / 1000,
         gas_lead=table.gas_lead_s,
+        handshakes=table.handshakes(),
     )

@@ -16,9 +16,11 @@ from kerfpath.post._arcs import with_arcs
 from kerfpath.post._names import identifier, identifiers
 from kerfpath.post._program import (
     Comment,
+    Handshake,
     JointMove,
     LinearMove,
     Program,
+    Request,
     Section,
     Step,
     Switch,
@@ -45,6 +47,7 @@ def build_program(
     approach_speed: float = 0.1,
     air_speed: float = 0.25,
     arc_tolerance: float | None = None,
+    handshakes: Sequence[Handshake] = (),
 ) -> Program:
     """Return the program that cuts the planned contours one after the other.
 
@@ -80,6 +83,9 @@ def build_program(
         Share of the full speed for the joint moves between contours.
     arc_tolerance : float m, optional
         Arcs that stay so near to the planned path are written as circular moves, see `with_arcs`.
+    handshakes : sequence of Request or Await
+        What is done before each contour where the tool has backed off, in order; what has been
+        asked for is withdrawn after it.
 
     Raises
     ------
@@ -107,6 +113,8 @@ def build_program(
     if gas_lead is not None:
         starts = (Switch(signal="gas", on=True, lead_time=gas_lead), *starts)
         ends = (*ends, Switch(signal="gas", on=False))
+    asked = [step for step in handshakes if isinstance(step, Request) and step.on]
+    withdrawn = [replace(step, on=False) for step in reversed(asked)]
     sections = []
     for plan, section_name, way in zip(plans, names, ways, strict=True):
         q = plan.q[0] + np.vstack([np.zeros_like(plan.q[0]), np.cumsum(plan.increments, axis=0)])
@@ -121,10 +129,12 @@ def build_program(
                 f"posture {posture_name(int(plan.posture[0]))}"
             ),
             *(JointMove(q=corner, speed=air_speed) for corner in way),
+            *handshakes,
             LinearMove(T_part_tip=T_part_tip[0], q=q[0], switches=starts, **slow),
             *([Wait(time=pierce_time)] if pierce_time > 0 else []),
             *_cut(plan, T_part_tip, q, zone, lead_time, ends),
             LinearMove(T_part_tip=T_out, q=backed_off(plan, "end", retract), **slow),
+            *withdrawn,
         )
         sections.append(Section(name=section_name, steps=steps))
     if home:

@@ -11,11 +11,22 @@ from scipy.spatial.transform import Rotation
 from kerfpath._arrays import Array
 from kerfpath.post._issue import ProgramIssue
 from kerfpath.post._languages import Language
-from kerfpath.post._program import CircularMove, Comment, JointMove, LinearMove, Move, Program, Wait
-from kerfpath.post._read import ReadMove, ReadProgram, ReadWait
+from kerfpath.post._program import (
+    Await,
+    CircularMove,
+    Comment,
+    Handshake,
+    JointMove,
+    LinearMove,
+    Move,
+    Program,
+    Request,
+    Wait,
+)
+from kerfpath.post._read import ReadHandshake, ReadMove, ReadProgram, ReadStep, ReadWait
 from kerfpath.post._settings import Rules, Settings
 
-__all__ = ["deviations", "events"]
+__all__ = ["deviations", "events", "handshake"]
 
 POINT = 1e-6
 """How far (m) a target that is read back may be from the one written, beyond its digits."""
@@ -62,11 +73,14 @@ def deviations(
         if isinstance(step, Wait) and isinstance(back, ReadWait):
             if abs(step.time - back.time) > LEAD:
                 issues.append(_issue(back, f"waits {back.time:g} s, expected {step.time:g} s"))
+        elif isinstance(step, Request | Await) and isinstance(back, ReadHandshake):
+            if step != back.what:
+                said = f"{handshake(back.what)}, expected {handshake(step)}"
+                issues.append(_issue(back, said))
         elif not isinstance(back, ReadMove) or _kind(step) != back.kind:
-            got = back.kind if isinstance(back, ReadMove) else "wait"
-            issues.append(_issue(back, f"is a {got}, expected a {_kind(step)}"))
+            issues.append(_issue(back, f"is a {_kind_read(back)}, expected a {_kind(step)}"))
         else:
-            assert not isinstance(step, Wait | Comment)
+            assert isinstance(step, JointMove | LinearMove)
             pairs.append((step, back))
     rules = language.rules(settings)
     issues += _places(program, pairs, rules)
@@ -75,13 +89,31 @@ def deviations(
     return issues
 
 
-def _issue(back: ReadMove | ReadWait, message: str) -> ProgramIssue:
+def _issue(back: ReadStep, message: str) -> ProgramIssue:
     return ProgramIssue("error", "read-back", f"{message}, as planned", back.place)
 
 
 def _kind(step: object) -> str:
-    kinds = (("joint", JointMove), ("circular", CircularMove), ("linear", LinearMove))
-    return next((word for word, kind in kinds if isinstance(step, kind)), "wait")
+    kinds = (
+        ("joint", JointMove),
+        ("circular", CircularMove),
+        ("linear", LinearMove),
+        ("wait", Wait),
+    )
+    return next((word for word, kind in kinds if isinstance(step, kind)), "handshake")
+
+
+def _kind_read(back: ReadStep) -> str:
+    if isinstance(back, ReadMove):
+        return back.kind
+    return "wait" if isinstance(back, ReadWait) else "handshake"
+
+
+def handshake(what: Handshake) -> str:
+    """Return a handshake in words."""
+    if isinstance(what, Await):
+        return f"awaits {what.partner} for {what.timeout:g} s"
+    return f"{what.partner} request {'on' if what.on else 'off'}"
 
 
 def _frames(program: Program, read: ReadProgram) -> Iterator[ProgramIssue]:

@@ -11,12 +11,13 @@ import numpy as np
 
 from kerfpath._arrays import Array, freeze
 from kerfpath.errors import InputError
-from kerfpath.post._program import Switch
+from kerfpath.post._program import Handshake, Partner, Switch
+from kerfpath.post._settings import Settings, handshakes
 from kerfpath.robots import Robot
 
 __all__ = [
-    "MOVE_KINDS", "MoveKind", "ReadMove", "ReadProgram", "ReadSection", "ReadStep", "ReadWait",
-    "Reader", "patterns", "same_output", "with_tips",
+    "MOVE_KINDS", "MoveKind", "ReadHandshake", "ReadMove", "ReadProgram", "ReadSection",
+    "ReadStep", "ReadWait", "Reader", "partner_of", "patterns", "same_output", "with_tips",
 ]  # fmt: skip
 
 
@@ -83,7 +84,21 @@ class ReadWait:
         return f"{self.file}, line {self.line}"
 
 
-ReadStep = ReadMove | ReadWait
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ReadHandshake:
+    """A handshake with a partner where the robot stands."""
+
+    what: Handshake
+    file: str
+    line: int
+
+    @property
+    def place(self) -> str:
+        """Where it stands."""
+        return f"{self.file}, line {self.line}"
+
+
+ReadStep = ReadMove | ReadWait | ReadHandshake
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -187,6 +202,16 @@ class Reader(Protocol):
 def patterns(by_kind: Mapping[str, str]) -> dict[str, re.Pattern[str]]:
     """Return regular expressions of lines by their kind, compiled; digits and letters are ASCII."""
     return {kind: re.compile(pattern, re.ASCII) for kind, pattern in by_kind.items()}
+
+
+def partner_of(
+    port: object, way: Literal["input", "output"], settings: Settings, place: str
+) -> Partner:
+    """Return whose input or output a port is, by the settings, or raise InputError."""
+    for (partner, its_way), name in handshakes(settings).items():
+        if its_way == way and name == port:
+            return partner
+    raise InputError(f"{place}: {port} is the {way} of no partner that the settings name")
 
 
 def same_output(said: object, expected: object, place: str) -> None:

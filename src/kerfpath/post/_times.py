@@ -9,7 +9,7 @@ import numpy as np
 from kerfpath.air import least_time
 from kerfpath.errors import InputError
 from kerfpath.post._issue import ProgramIssue
-from kerfpath.post._program import Comment, JointMove, LinearMove, Move, Program, Wait
+from kerfpath.post._program import JointMove, LinearMove, Move, Program, Wait
 
 __all__ = ["refusals", "timetable"]
 
@@ -28,7 +28,7 @@ def timetable(program: Program) -> list[tuple[Move | Wait, float]]:
     InputError
         Joint limits that are not known.
     """
-    steps = [step for step in program.steps if not isinstance(step, Comment)]
+    steps = [step for step in program.steps if isinstance(step, JointMove | LinearMove | Wait)]
     ways = np.diff(np.array([move.q for move in program.moves]), axis=0)
     least = iter([0.0, *least_time(ways, *program.robot.speed_limits()).tolist()])
     took = []

@@ -13,6 +13,7 @@ from kerfpath.plans import Plan
 from kerfpath.post._build import build_program
 from kerfpath.post._compare import deviations
 from kerfpath.post._issue import ProgramIssue
+from kerfpath.post._languages import Language
 from kerfpath.post._languages import language as find_language
 from kerfpath.post._preflight import preflight
 from kerfpath.post._program import Program
@@ -20,7 +21,7 @@ from kerfpath.post._read import ReadProgram
 from kerfpath.post._settings import Settings
 from kerfpath.robots import Robot
 
-__all__ = ["Posted", "post", "posted", "read_program", "write_files", "write_program"]
+__all__ = ["Posted", "post", "posted", "read_program", "said_in", "write_files", "write_program"]
 
 
 def post(
@@ -145,6 +146,28 @@ def read_program(
         return chosen.read(main, files, robot, settings)
     except KeyError as missing:
         raise InputError(f"{main}: the file {missing.args[0]!r} is not there") from None
+
+
+def said_in(program: Program, chosen: Language, settings: Settings) -> ReadProgram:
+    """Return what the reader of a language makes of a program that its formatter writes.
+
+    Neither refused nor compared: what a text would say, as a measure for another.
+
+    Parameters
+    ----------
+    program : Program
+    chosen : Language
+        With a reader.
+    settings : Settings
+
+    Raises
+    ------
+    InputError
+        The language cannot say it.
+    """
+    settings = chosen.completed(settings)
+    files = chosen.formatter(program, settings).files()
+    return read_program(files, chosen.name, program.robot, settings)
 
 
 def write_files(folder: str | os.PathLike[str], files: Mapping[str, str]) -> list[Path]:

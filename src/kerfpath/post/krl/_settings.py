@@ -26,6 +26,11 @@ Output = Annotated[
 ]
 
 
+Input = Annotated[
+    int | None, setting("the number of a digital input, 1 to 8192", "5", ge=1, le=8192)
+]
+
+
 class KrlSettings(Settings):
     """Which outputs, tool and base, and what the machine data allow."""
 
@@ -34,6 +39,14 @@ class KrlSettings(Settings):
     ] = 1400
     laser_output: Output = None
     gas_output: Output = None
+    ready_input: Input = None
+    shutter_input: Input = None
+    gas_pressure_input: Input = None
+    height_input: Input = None
+    interlock_input: Input = None
+    ready_output: Output = None
+    shutter_output: Output = None
+    height_output: Output = None
     tool_number: Annotated[
         int | None, setting("the number of a TOOL_DATA, 1 to 128", "1", ge=1, le=128)
     ] = None

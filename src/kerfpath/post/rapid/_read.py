@@ -13,18 +13,21 @@ import numpy as np
 from kerfpath._arrays import Array
 from kerfpath.errors import InputError
 from kerfpath.post._orientations import pose_of
-from kerfpath.post._program import Signal, Switch
+from kerfpath.post._program import Await, Handshake, Request, Signal, Switch
 from kerfpath.post._read import (
+    ReadHandshake,
     ReadMove,
     ReadProgram,
     ReadSection,
     ReadStep,
     ReadWait,
+    partner_of,
     patterns,
     same_output,
 )
 from kerfpath.post.rapid._axes import joints_from_axes
-from kerfpath.post.rapid._write import FULL_AIR_SPEED, RapidSettings
+from kerfpath.post.rapid._settings import SWITCH_OFF, RapidSettings
+from kerfpath.post.rapid._write import FIRST, FULL_AIR_SPEED, ending, switched_off
 from kerfpath.robots import Robot
 
 __all__ = ["read"]
@@ -56,14 +59,17 @@ _LINES = patterns(
         "trigger": rf"VAR triggdata {_NAME};",
         "routine": rf"PROC {_NAME}\(\)",
         "end_routine": "ENDPROC",
-        "no_supervision": r"ConfL\\Off;",
-        "reset": rf"SetDO {_NAME},0;",
+        "first": rf"PERS num {FIRST}:=(\d+);",
+        "request": rf"SetDO {_NAME},([01]);",
+        "wait_for": rf"WaitDI {_NAME},1\\MaxTime:=([\d.]+);",
         "set_trigger": rf"TriggIO {_NAME},([\d.]+)\\Time\\DOp:={_NAME},([01]);",
         "wait": r"WaitTime ([\d.]+);",
         "load": r'Load \\Dynamic,"([^"]*)/([^"/]*)";',
-        "late_call": rf'%"{_NAME}"%;',
+        "late_call": rf'IF {FIRST}<=(\d+) %"{_NAME}"%;',
+        "part": rf"IF {FIRST}<=(\d+) THEN",
+        "end_part": "ENDIF",
         "unload": r'UnLoad "([^"]*)/([^"/]*)";',
-        "call": rf"{_NAME};",
+        "call": rf"IF {FIRST}<=(\d+) {_NAME};",
         "joint_move": rf"MoveAbsJ (\[.*\]),{_NAME},{_NAME},{_FRAMES};",
         "linear_move": rf"MoveL (\[.*\]),{_NAME},{_NAME},{_FRAMES};",
         "circular_move": rf"MoveC {_POSE},{_POSE},{_NAME},{_NAME},{_FRAMES};",
@@ -71,14 +77,17 @@ _LINES = patterns(
         "switching_arc": rf"TriggC {_POSE},{_POSE},{_NAME},{_TRIGGERS},{_NAME},{_FRAMES};",
     }
 )
-_OUTSIDE = {"tool", "work_object", "speed", "zone", "trigger", "routine", "end_module"}
+_OUTSIDE = {
+    "tool", "work_object", "speed", "zone", "trigger", "first", "routine", "end_module",
+}  # fmt: skip
 _IN_PART = {"routine", "end_module"}
 _IN_MAIN = {
-    "no_supervision", "reset", "set_trigger", "load", "late_call", "unload", "call", "end_routine",
+    "set_trigger", "part", "load", "late_call", "unload", "end_part", "call",
+    "end_routine",
 }  # fmt: skip
 _IN_ROUTINE = {
     "joint_move", "linear_move", "circular_move", "switching_move", "switching_arc", "wait",
-    "end_routine",
+    "request", "wait_for", "end_routine",
 }  # fmt: skip
 
 
@@ -102,6 +111,9 @@ class _Reader:
         self.called_in: dict[str, str] = {}
         self.routines: dict[str, list[ReadStep]] = {}
         self.homes: dict[str, str] = {}
+        self.first_number = 0
+        self.last_of_part = 0
+        self.must_say: list[str] = []
 
     def read_module(self, file: str) -> None:
         self.file, self.line, self.ended, self.name = file, 0, False, ""
@@ -117,6 +129,15 @@ class _Reader:
             return
         if self.ended:
             raise self.fault("nothing may follow ENDMODULE")
+        if self.must_say:
+            if line != self.must_say[0]:
+                raise self.fault(f"expected {self.must_say[0]!r}, got {line[:60]!r}")
+            del self.must_say[0]
+            return
+        if self.routine_name == "main" and line == "ERROR":
+            self.must_say = [*(row.strip() for row in ending()[1:]), "ENDPROC"]
+            self.routine_name = None
+            return
         if not self.name:
             expected = {"module"}
         elif self.routine_name is None:
@@ -133,7 +154,9 @@ class _Reader:
         for kind in ("tool", "work_object"):
             if kind not in self.frames:
                 raise self.fault(f"the module declares no {kind.replace('_', ' ')}")
-        unknown = set(self.called_in.items()) ^ set(self.homes.items())
+        if not 1 <= self.first_number <= len(self.called_in):
+            raise self.fault(f"{FIRST} must be the number of a contour")
+        unknown = {*self.called_in.items(), (SWITCH_OFF, self.main)} ^ set(self.homes.items())
         if unknown or "main" not in self.routines:
             names = ", ".join(sorted({name for name, _ in unknown}))
             raise self.fault(f"main and routines do not match: {names}")
@@ -142,7 +165,8 @@ class _Reader:
             T_flange_tip=self.frames["tool"][1],
             T_base_part=self.frames["work_object"][1],
             sections=tuple(
-                ReadSection(name=name, steps=tuple(self.routines[name])) for name in self.called_in
+                ReadSection(name=name, steps=tuple(self.routines[name]))
+                for name in list(self.called_in)[self.first_number - 1 :]
             ),
         )
 
@@ -187,20 +211,38 @@ class _Reader:
 
     def routine(self, name: str) -> None:
         self.unused(name, self.routines)
+        if name == SWITCH_OFF and self.file == self.main:
+            self.must_say = [*switched_off(self.settings), "ENDPROC"]
+            self.homes[name] = self.main
+            return
         self.routine_name, self.routines[name] = name, []
+        if name == "main":
+            self.must_say = [r"ConfL\Off;", f"{SWITCH_OFF};"]
         if name != "main":
             self.homes[name] = self.file
         elif self.file != self.main:
             raise self.fault("a second main")
 
     def end_routine(self) -> None:
+        if self.routine_name == "main":
+            raise self.fault("expected ERROR, and what main does then, before its end")
         self.routine_name = None
 
-    def no_supervision(self) -> None:
-        """Keep nothing: configurations are not supervised along linear moves."""
+    def first(self, number: str) -> None:
+        if self.first_number:
+            raise self.fault(f"a second {FIRST}")
+        self.first_number = int(number)
 
-    def reset(self, output: str) -> None:
-        self.signal(output)
+    def request(self, output: str, value: str) -> None:
+        partner = partner_of(output, "output", self.settings, f"{self.file}, line {self.line}")
+        self.handshake(Request(partner=partner, on=value == "1"))
+
+    def wait_for(self, name: str, timeout: str) -> None:
+        partner = partner_of(name, "input", self.settings, f"{self.file}, line {self.line}")
+        self.handshake(Await(partner=partner, timeout=float(timeout)))
+
+    def handshake(self, what: Handshake) -> None:
+        self.append(ReadHandshake(what=what, file=self.file, line=self.line))
 
     def set_trigger(self, name: str, lead_time: str, output: str, value: str) -> None:
         if name not in self.triggers or self.triggers[name] is not None:
@@ -214,8 +256,18 @@ class _Reader:
         same_output(output, self.settings.laser_output, f"{self.file}, line {self.line}")
         return "laser"
 
+    def part(self, last: str) -> None:
+        if self.last_of_part or self.loaded:
+            raise self.fault("expected one module at a time")
+        self.last_of_part = int(last)
+
+    def end_part(self) -> None:
+        if self.loaded or self.last_of_part != len(self.called_in):
+            raise self.fault("the number in IF must be that of the last contour of the module")
+        self.last_of_part = 0
+
     def load(self, folder: str, file: str) -> None:
-        if self.loaded or folder != self.settings.folder:
+        if self.loaded or not self.last_of_part or folder != self.settings.folder:
             raise self.fault(f"expected one module at a time, from {self.settings.folder}")
         self.loaded = file
 
@@ -224,14 +276,16 @@ class _Reader:
             raise self.fault(f"{folder}/{file} is not loaded")
         self.loaded = ""
 
-    def late_call(self, name: str) -> None:
+    def late_call(self, number: str, name: str) -> None:
         if not self.loaded:
             raise self.fault(f"{name} is called while no module is loaded")
-        self.call(name)
+        self.call(number, name)
 
-    def call(self, name: str) -> None:
+    def call(self, number: str, name: str) -> None:
         if name in self.called_in:
             raise self.fault(f"{name} is called twice")
+        if int(number) != len(self.called_in) + 1:
+            raise self.fault(f"{name} is contour {len(self.called_in) + 1}, not {number}")
         self.called_in[name] = self.loaded or self.main
 
     def joint_move(self, text: str, speed: str, zone: str, tool: str, work_object: str) -> None:

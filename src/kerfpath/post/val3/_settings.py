@@ -49,11 +49,29 @@ Output = Annotated[
 ]
 
 
+Input = Annotated[
+    Annotated[str, StringConstraints(pattern=r"^[A-Za-z0-9_.%\\/:\-]{1,80}$")] | None,
+    setting("the link of a digital input, as the controller lists it", r'"BasicIO-1\\%I0"'),
+]
+
+
 class Val3Settings(Settings):
     """Which outputs, where the projects lie, and for which version they are."""
 
     laser_output: Output = None
     gas_output: Output = None
+    ready_input: Input = None
+    shutter_input: Input = None
+    gas_pressure_input: Input = None
+    height_input: Input = None
+    interlock_input: Input = None
+    ready_output: Output = None
+    shutter_output: Output = None
+    height_output: Output = None
+    tool_link: Annotated[
+        Annotated[str, StringConstraints(pattern=r"^[A-Za-z0-9_.%\\/:\-]{1,80}$")],
+        setting("the link of the tool's own output, as the controller lists it", '"valve1"'),
+    ] = "valve1"
     configurations: Annotated[Literal["named", "same"], setting('"named" or "same"', '"named"')] = (
         "named"
     )
