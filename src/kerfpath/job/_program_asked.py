@@ -178,9 +178,7 @@ def _whole(job: Job, cut: ReadCut, asked: AskedNodes, plan: Plan) -> Plan:
     )
 
 
-def _moves(
-    job: Job, cuts: Sequence[ReadCut], plans: Sequence[Plan], home: Array
-) -> list[AirMove]:
+def _moves(job: Job, cuts: Sequence[ReadCut], plans: Sequence[Plan], home: Array) -> list[AirMove]:
     """Return the moves between cuts with the corners that were read, and the job's home."""
     if job.sequence is None:
         return []
