@@ -209,7 +209,7 @@ def subjects(folder: Path, only: tuple[str, ...] = (), more: str = "") -> Iterat
         path = folder / f"{name}.toml"
         path.write_text(
             JOB.format(
-                arm=arm, acceleration=ACCELERATION, reach=1200 if arm == ARM else 800,
+                arm=arm, acceleration=ACCELERATION, reach=1200 if arm == ARM else 900,
                 language=name, lead=0.01 if chosen.ahead else 0.0, more=more,
             )
         )  # fmt: skip

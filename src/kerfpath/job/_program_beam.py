@@ -305,7 +305,8 @@ def _gas(
         (process.gas_lead - _overlap(span.end - process.gas_lead, span.end, gas), span.step)
         for span in starts
     ]
-    ahead = [(span.end - process.gas_lead, span.end, span.step) for span in starts]
+    # It may come as the tool sets out on its way down, too.
+    ahead = [(min(span.end - process.gas_lead, span.start), span.end, span.step) for span in starts]
     idle = [
         (_overlap(span.start, span.end, gas) - _overlap(span.start, span.end, _both(gas, ahead)),
          span.step)
