@@ -36,6 +36,9 @@ def read(
     return _Reader(main, files[main], robot, settings).program()
 
 
+DIGIT = 1e-6
+"""What the digits of an acceleration leave, m/s^2 or rad/s^2."""
+
 _NUMBER = r"(-?\d+\.\d+)"
 _SIX = ", ".join([_NUMBER] * 6)
 _POSE = rf"p\[{_SIX}\]"
@@ -137,7 +140,8 @@ class _Reader:
 
     def joint(self, words: tuple[str, ...]) -> None:
         self.settled()
-        *angles, _, v, r = (float(word) for word in words)
+        *angles, a, v, r = (float(word) for word in words)
+        self.require_acceleration(a, np.radians(self.settings.joint_acceleration_deg_s2))
         robot = self.robot
         self.steps.append(
             ReadMove(
@@ -149,6 +153,11 @@ class _Reader:
                 zone=r,
             )
         )
+
+    def require_acceleration(self, said: float, expected: float) -> None:
+        """Refuse another acceleration than that of the settings."""
+        if abs(said - expected) > DIGIT:
+            raise self.fault(f"expected the acceleration a={expected:.6f}, got {said:g}")
 
     def linear(self, words: tuple[str, ...]) -> None:
         self.path_move(words[:6], words[6:], None)
@@ -164,6 +173,7 @@ class _Reader:
         a, v, r = (float(word) for word in motion)
         if min(a, v) <= 0:
             raise self.fault("speed and acceleration must be above 0")
+        self.require_acceleration(a, self.settings.acceleration)
         for signal, (point, near, on) in armed.items():
             if point != target:
                 raise self.fault(f"the {signal} is switched ahead of another point")
