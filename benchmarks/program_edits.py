@@ -218,12 +218,14 @@ def subjects(folder: Path, only: tuple[str, ...] = (), more: str = "") -> Iterat
         if arm not in plans:
             outcome = run_job(asked.job)
             assert outcome.passed, outcome
-            plans[arm] = outcome.plans
+            plans[arm] = outcome.plans, () if outcome.part is None else outcome.part.moves
+        made, moves = plans[arm]
         program = build_program(
-            plans[arm], name=options.name, retract=options.retract, zone=options.zone,
+            made, moves=moves, name=options.name, retract=options.retract, zone=options.zone,
             lead_time=options.lead_time, gas_lead=options.gas_lead,
             pierce_time=options.pierce_time, approach_speed=options.approach_speed,
             air_speed=options.air_speed, arc_tolerance=options.arc_tolerance,
+            handshakes=options.handshakes,
         )  # fmt: skip
         settings = chosen.completed(options.settings)
         files = chosen.formatter(program, settings).files()

@@ -9,7 +9,7 @@ when the beam is on, or off.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import pairwise
 from typing import Literal
 
@@ -51,11 +51,14 @@ class Process:
     pierce_time : float s
     gas_lead : float s or None
         How long before the start the gas is to flow; None: it is not switched by the program.
+    stops : bool
+        Whether the job asks for a stop at every node.
     """
 
     lead_time: float
     pierce_time: float
     gas_lead: float | None
+    stops: bool
 
     @classmethod
     def of(cls, options: ProgramOptions, *, ahead: bool) -> Process:
@@ -65,6 +68,7 @@ class Process:
             lead_time=options.lead_time if ahead else 0.0,
             pierce_time=options.pierce_time,
             gas_lead=gas if gas is None or ahead else 0.0,
+            stops=options.zone == 0,
         )
 
 
@@ -107,7 +111,8 @@ def beam_checks(read: ReadProgram, robot: Robot, process: Process) -> list[Check
         for what in WORDS
     ]
     said = "stop points in the cut with the laser on"
-    rows.append(_row("beam-stop", said, _stops(spans, beam), 0, "count"))
+    stops = _row("beam-stop", said, _stops(spans, beam), 0, "count")
+    rows.append(replace(stops, level="warning") if process.stops else stops)
     said = "borders of files in the cut with the laser on"
     rows.append(_row("beam-file", said, _borders(spans, beam), 0, "count"))
     said = "laser switched on when it is, or off"
