@@ -286,6 +286,7 @@ class _Section(_Listing):
         super().__init__(file, text, robot, settings)
         self.read_steps: list[ReadWait | ReadHandshake | dict[str, Any]] = []
         self.targets: dict[int, tuple[str | None, ...]] = {}
+        self.said_at: dict[int, str] = {}
         self.early: dict[int, tuple[Switch, ...]] = {}
         self.pending: tuple[Switch, ...] = ()
         self.timeout_s: float | None = None
@@ -350,6 +351,7 @@ class _Section(_Listing):
                 "speed": speed,
                 "zone": zone,
                 "switches": switches,
+                "elsewhere": {},
             }
         )
 
@@ -370,6 +372,7 @@ class _Section(_Listing):
         if not isinstance(move, dict) or move["zone"] != 0 or move["kind"] == "joint":
             raise self.fault("an output may only be switched here after a path motion with FINE")
         move["switches"] += (Switch(signal=self.signal(output), on=value == "ON"),)
+        move["elsewhere"]["switches"] = self.place
 
     def timeout(self, hundredths: str) -> None:
         if self.timeout_s is not None:
@@ -400,6 +403,7 @@ class _Section(_Listing):
             if not match:
                 raise self.fault("no position of ours begins after this line")
             number, user, tool, *said = match.groups()
+            self.said_at[int(number)] = f"{self.file}, line {self.line + 1}"
             self.line += match[0].count("\n")
             self.frames(user, tool)
             if int(number) in self.targets:
@@ -431,6 +435,7 @@ class _Section(_Listing):
             if wrong:
                 form = "J1 to J6" if step["kind"] == "joint" else "X to R"
                 raise self.fault(f"P[{wrong[0]}] must be given by {form}")
+            step["elsewhere"]["target"] = self.said_at[targets[0]]
             if step["kind"] == "joint":
                 step["q"] = q[at]
             else:

@@ -116,6 +116,7 @@ class _Reader:
         self.frames: dict[str, tuple[str, Array]] = {}
         self.speeds: dict[str, float] = {}
         self.speed_data: dict[str, Array] = {}
+        self.said_at: dict[str, str] = {}
         self.zones: dict[str, float] = {"fine": 0.0}
         self.triggers: dict[str, Switch | None] = {}
         self.called_in: dict[str, str] = {}
@@ -210,6 +211,7 @@ class _Reader:
         self.unused(name, self.speeds)
         self.speeds[name] = float(values[0]) * 1e-3
         self.speed_data[name] = values
+        self.said_at[name] = self.place
 
     def zone(self, name: str, text: str) -> None:
         stop, *sizes = self.values(text, 7)
@@ -219,6 +221,7 @@ class _Reader:
         values = self.numbers(sizes, 6)
         self.zones[name] = float(values[0]) * 1e-3
         self.require_same(values, zone_data(self.zones[name]), "sizes of the zone")
+        self.said_at[name] = self.place
 
     def trigger(self, name: str) -> None:
         self.unused(name, self.triggers)
@@ -265,6 +268,7 @@ class _Reader:
         if name not in self.triggers or self.triggers[name] is not None:
             raise self.fault(f"{name} must be declared once and set once")
         lead = float(self.numbers([float(lead_time)], 1)[0])
+        self.said_at[name] = self.place
         self.triggers[name] = Switch(signal=self.signal(output), on=value == "1", lead_time=lead)
 
     def signal(self, output: str) -> Signal:
@@ -317,6 +321,7 @@ class _Reader:
                 q=joints_from_axes(self.robot, axes[None])[0],
                 speed=self.named(speed, self.speeds) / FULL_AIR_SPEED,
                 zone=self.named(zone, self.zones),
+                elsewhere=self.elsewhere(speed=speed, zone=zone),
             )
         )
         data = air_speed_data(self.speeds[speed] / FULL_AIR_SPEED)
@@ -333,6 +338,7 @@ class _Reader:
                 posture=quarters,
                 speed=self.named(speed, self.speeds),
                 zone=self.named(zone, self.zones),
+                elsewhere=self.elsewhere(speed=speed, zone=zone),
             )
         )
         data = linear_speed_data(self.speeds[speed])
@@ -349,13 +355,13 @@ class _Reader:
         self, text: str, speed: str, triggers: str, zone: str, tool: str, work_object: str
     ) -> None:
         self.linear_move(text, speed, zone, tool, work_object)
-        self.amend(switches=self.switches(triggers))
+        self.amend_switches(triggers)
 
     def switching_arc(
         self, via: str, text: str, speed: str, triggers: str, zone: str, tool: str, work: str
     ) -> None:
         self.circular_move(via, text, speed, zone, tool, work)
-        self.amend(switches=self.switches(triggers))
+        self.amend_switches(triggers)
 
     def target(self, text: str, tool: str, work_object: str) -> tuple[Array, tuple[int, ...]]:
         point, wxyz, conf, external = self.values(text, 4)
@@ -386,6 +392,13 @@ class _Reader:
         assert self.routine_name is not None
         steps = self.routines[self.routine_name]
         steps[-1] = replace(steps[-1], **changes)
+
+    def amend_switches(self, text: str) -> None:
+        assert self.routine_name is not None
+        said = self.elsewhere(switches=re.split(r"\\T\d:=", text)[0])
+        before = self.routines[self.routine_name][-1]
+        assert isinstance(before, ReadMove)
+        self.amend(switches=self.switches(text), elsewhere={**before.elsewhere, **said})
 
     def require_frames(self, tool: str, work_object: str, external: Any) -> None:
         known = [self.frames[kind][0] for kind in ("tool", "work_object") if kind in self.frames]
@@ -434,5 +447,13 @@ class _Reader:
             raise self.fault(f"the quaternion {value[1]} must have length 1")
         return T
 
+    def elsewhere(self, **named: str) -> dict[str, str]:
+        """Return where the data that a move names are declared or set."""
+        return {what: self.said_at[name] for what, name in named.items() if name in self.said_at}
+
+    @property
+    def place(self) -> str:
+        return f"{self.file}, line {self.line}"
+
     def fault(self, message: str) -> InputError:
-        return InputError(f"{self.file}, line {self.line}: {message}")
+        return InputError(f"{self.place}: {message}")

@@ -181,6 +181,7 @@ class _Events:
                 duration=took if kind == "linear" else None,
                 zone=0.0 if points.stops[end] else None,
                 q=freeze(points.q[end]),
+                elsewhere={"target": f"{points.file}, line {points.line[end]}"},
             )
         )
         self.last = end

@@ -77,6 +77,7 @@ class _Reader:
         self.signals: list[str] = []
         self.can_wait = False
         self.ahead: dict[str, tuple[tuple[str, ...], float, str]] = {}
+        self.ahead_at: dict[str, str] = {}
         self.leads: dict[str, tuple[float, str]] = {}
 
     def program(self) -> ReadProgram:
@@ -196,6 +197,7 @@ class _Reader:
         if signal in self.ahead:
             raise self.fault(f"the {signal} is switched ahead twice")
         self.ahead[signal] = tuple(target), float(near), on
+        self.ahead_at[signal] = f"{self.file}, line {self.number}"
 
     def switch(self, words: tuple[str, str]) -> None:
         signal, on = words
@@ -207,7 +209,12 @@ class _Reader:
         if before != on:
             raise self.fault(f"the {signal} is switched to {before} ahead, to {on} here")
         switch = Switch(signal=SIGNALS[signal], on=on == "True", lead_time=lead)
-        self.steps[-1] = replace(move, switches=(*move.switches, switch))
+        at = self.ahead_at.pop(signal, f"{self.file}, line {self.number}")
+        self.steps[-1] = replace(
+            move,
+            switches=(*move.switches, switch),
+            elsewhere={"switches": at, **move.elsewhere},
+        )
 
     def wait(self, words: tuple[str, ...]) -> None:
         self.settled()
