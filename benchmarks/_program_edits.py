@@ -50,12 +50,15 @@ class Words:
         Each matches words that stand for one another.
     orderless : tuple of str
         Each matches lines whose order among themselves means nothing, twice the same as once.
+    held : tuple of str
+        Each matches lines that do nothing but what the reader makes of the moves behind them.
     """
 
     remark: str
     idle: tuple[str, ...] = ()
     families: tuple[str, ...] = ()
     orderless: tuple[str, ...] = ()
+    held: tuple[str, ...] = ()
 
 
 STATES = (r"\b(?:ON|OFF)\b", r"\b(?:TRUE|FALSE)\b", r"\b(?:true|false)\b", r"\b(?:True|False)\b",
@@ -72,8 +75,9 @@ WORDS = {
     "krl": Words(
         remark=r"\s*(;.*)?",
         families=(*STATES, r"\$OUT\[\d\]", r"\$VEL\.ORI\d", r"\b(?:LIN|PTP)\b"),
-        orderless=(r"\$OUT\[\d\]=FALSE", r"\$(?:TOOL|BASE)=.*", r"BAS\(#VEL_PTP,.*",
-                   r"\$VEL\.CP=.*", r"\$APO\.CDIS=.*", r"\$(?:ADV|IPO|ORI|CIRC|VEL\.ORI).*"),
+        orderless=(r"\$OUT\[\d\]=FALSE", r"\$(?:TOOL|BASE)=.*",
+                   r"\$(?:ADV|IPO|ORI|CIRC|VEL\.ORI).*"),
+        held=(r"BAS\(#VEL_PTP,.*", r"\$VEL\.CP=.*", r"\$APO\.CDIS=.*"),
     ),
     "fanuc": Words(
         remark=r"\s*\d+:  !(?!UFRAME|UTOOL).*|",
@@ -91,6 +95,7 @@ WORDS = {
     ),
     "val3": Words(
         remark=r"\s*(//.*)?",
+        idle=(r"(<\?xml.*)", r"<\w+ (xmlns.*)"),
         families=(*STATES, r"\bdio(?:Laser|Gas)\b", r"\bmPath\[\d+\]", r"\bpPath\[\d+\]",
                   r"\bjAir\[\d+\]", r"blend=\"\w+\"", r"elbow=\"\w+\"", r"shoulder=\"\w+\""),
         orderless=(r"\s*waitEndMove\(\)",),
@@ -98,9 +103,10 @@ WORDS = {
     "urscript": Words(
         remark=r"\s*(#.*)?",
         families=(*STATES, r"\b(?:laser|gas)\b", r"\bmove[lj]\b"),
-        orderless=(),
+        held=(r"\s*(?:laser|gas)_ahead.*",),
     ),
-    "ros": Words(remark=r"\s*(#.*)?", families=(*STATES, r"\b(?:laser|gas)\b")),
+    "ros": Words(remark=r"\s*(#.*)?", families=(*STATES, r"\b(?:laser|gas)\b"),
+                 held=(r"- {positions.*",)),
     "csv": Words(remark=r"", families=(*STATES, r"\b(?:laser|gas)\b", r"\b(?:linear|joint)\b")),
 }  # fmt: skip
 """By language."""
@@ -118,7 +124,9 @@ class Edit:
     files : mapping of str to str
         The program with it.
     idle : bool
-        Whether no controller acts on what was changed.
+        Whether nothing acts on what was changed, but by the moves, waits and switches that are read.
+    remark : bool
+        Whether it is a remark.
     said : str
         What was changed, for people.
     """
@@ -128,6 +136,7 @@ class Edit:
     line: int
     files: Mapping[str, str]
     idle: bool
+    remark: bool
     said: str
 
 
@@ -150,7 +159,16 @@ def edits(files: Mapping[str, str], language: str, rng: np.random.Generator) -> 
             continue
         end = "\r\n" if "\r\n" in files[name] else "\n"
         yield Edit(kind=kind, file=name, line=line + 1, files={**files, name: text.replace("\n", end)},
-                   idle=idle, said=said)  # fmt: skip
+                   idle=idle, remark=_in_remarks(files[name], text, words), said=said)  # fmt: skip
+
+
+def _in_remarks(before: str, after: str, words: Words) -> bool:
+    """Return whether two texts are the same but for their remarks, line for line."""
+    one, two = (
+        [line.rstrip() for line in text.splitlines() if not re.fullmatch(words.remark, line)]
+        for text in (before, after)
+    )
+    return one == two
 
 
 Made = tuple[str, int, list[str], bool, str] | None
@@ -174,7 +192,9 @@ def _numbered(lines: list[str], language: str) -> str:
 
 
 def _is_remark(line: str, words: Words) -> bool:
-    return re.fullmatch(words.remark, line) is not None
+    """Return whether nothing acts on a line, or only by what the reader makes of the moves."""
+    whole = (words.remark, *words.held, *(p for p in words.idle if not p.startswith(".*")))
+    return any(re.fullmatch(pattern, line) for pattern in whole)
 
 
 def _line(lines: list[str], rng: np.random.Generator) -> int:
@@ -217,7 +237,8 @@ def _swap(lines: list[str], words: Words, rng: np.random.Generator) -> Made:
 def _copy(lines: list[str], words: Words, rng: np.random.Generator) -> Made:
     """Copy a line elsewhere: one more move, wait, switch or call."""
     k, to = _line(lines, rng), _line(lines, rng)
-    idle = _is_remark(lines[k], words)
+    beside = lines[max(to - 1, 0) : to + 1]
+    idle = _is_remark(lines[k], words) or any(_same_kind(lines[k], x, words) for x in beside)
     return "line inserted", to, [*lines[:to], lines[k], *lines[to:]], idle, lines[k].strip()
 
 
@@ -262,7 +283,7 @@ def _nudge(lines: list[str], words: Words, rng: np.random.Generator) -> Made:
         return None
     k, match, idle = found
     value = float(match[0])
-    value = -value if rng.random() < 0.3 else value + float(rng.choice([-20, -1, 1, 0.5, 5, 20]))
+    value = -value if value and rng.random() < 0.3 else value + float(rng.choice([-20, -1, 1, 0.5, 5, 20]))
     said = f"{match[0]} to {value:g} in {lines[k].strip()}"
     return "number nudged", k, _with_number(lines, k, match, value), idle, said
 
@@ -298,7 +319,9 @@ def _taken(
 
 def _remark(lines: list[str], words: Words, rng: np.random.Generator) -> Made:
     """Say something else in a remark."""
-    remarks = [k for k, line in enumerate(lines) if line.strip() and _is_remark(line, words)]
+    remarks = [
+        k for k, line in enumerate(lines) if line.strip() and re.fullmatch(words.remark, line)
+    ]
     if not remarks:
         return None
     k = remarks[int(rng.integers(len(remarks)))]
@@ -311,9 +334,9 @@ def _remark(lines: list[str], words: Words, rng: np.random.Generator) -> Made:
 def verdict(edit: Edit, before: ReadProgram, after: ReadProgram) -> Verdict:
     """Return what the oracle says of an edit, by what the text meant before and after it."""
     found = _compared(before, after)
-    if found == "same":
-        return "harmless" if edit.idle else "harmful"
-    return found
+    if found == "same" and edit.idle:
+        return "harmless" if edit.remark else "either"
+    return "harmful" if found == "same" else found
 
 
 def _compared(one: ReadProgram, two: ReadProgram) -> Literal["same", "either", "harmful"]:

@@ -143,14 +143,23 @@ class Tally:
     counts : Counter of (language, kind, verdict, outcome)
     wrong : list of str
         What passed and does harm, and what was caught and is harmless.
+    told : Counter of "told" or "elsewhere"
+        Whether a finding names the line of the edit, or one beside it.
     """
 
     counts: Counter[tuple[str, str, str, str]] = field(default_factory=Counter)
     wrong: list[str] = field(default_factory=list)
+    told: Counter[str] = field(default_factory=Counter)
 
-    def add(self, subject: Subject, kind: str, said: str, judged: str, files: Mapping[str, str]) -> None:
-        """Audit an edited program, and count it."""
+    def add(
+        self, subject: Subject, kind: str, said: str, judged: str, files: Mapping[str, str],
+        at: tuple[str, int] | None = None,
+    ) -> None:  # fmt: skip
+        """Audit an edited program, and count it, and whether its line is told where it is known."""
         outcome, first = subject.outcome(files)
+        if at is not None and judged == "harmful" and outcome != "passed":
+            near = any(f"{at[0]}, line {at[1] + k}" in first for k in (-1, 0, 1))
+            self.told["told" if near else "elsewhere"] += 1
         self.counts[subject.language.name, kind, judged, outcome] += 1
         missed = judged == "harmful" and outcome == "passed"
         alarm = judged == "harmless" and outcome != "passed"
@@ -185,7 +194,7 @@ class Tally:
             except InputError:
                 judged = "unread"
             said = f"{edit.file}, line {edit.line}: {edit.said}"
-            self.add(subject, edit.kind, said, judged, edit.files)
+            self.add(subject, edit.kind, said, judged, edit.files, (edit.file, edit.line))
 
 
 def subjects(folder: Path, only: tuple[str, ...] = (), more: str = "") -> Iterator[Subject]:
@@ -209,7 +218,7 @@ def subjects(folder: Path, only: tuple[str, ...] = (), more: str = "") -> Iterat
         path = folder / f"{name}.toml"
         path.write_text(
             JOB.format(
-                arm=arm, acceleration=ACCELERATION, reach=1200 if arm == ARM else 800,
+                arm=arm, acceleration=ACCELERATION, reach=1200 if arm == ARM else 900,
                 language=name, lead=0.01 if chosen.ahead else 0.0, more=more,
             )
         )  # fmt: skip
@@ -218,12 +227,14 @@ def subjects(folder: Path, only: tuple[str, ...] = (), more: str = "") -> Iterat
         if arm not in plans:
             outcome = run_job(asked.job)
             assert outcome.passed, outcome
-            plans[arm] = outcome.plans
+            plans[arm] = outcome.plans, () if outcome.part is None else outcome.part.moves
+        made, moves = plans[arm]
         program = build_program(
-            plans[arm], name=options.name, retract=options.retract, zone=options.zone,
+            made, moves=moves, name=options.name, retract=options.retract, zone=options.zone,
             lead_time=options.lead_time, gas_lead=options.gas_lead,
             pierce_time=options.pierce_time, approach_speed=options.approach_speed,
             air_speed=options.air_speed, arc_tolerance=options.arc_tolerance,
+            handshakes=options.handshakes,
         )  # fmt: skip
         settings = chosen.completed(options.settings)
         files = chosen.formatter(program, settings).files()

@@ -164,7 +164,7 @@ def _whole(job: Job, cut: ReadCut, asked: AskedNodes, plan: Plan) -> Plan:
             q[inner] = followed(plan.robot, plan.T_base_part @ T[inner] @ flange, q[first])
     time = asked.time
     if job.plan_options["feed"] != "constant":  # it may be slower, which is judged by itself
-        time = np.interp(np.arange(K), at, plan.time[targets])
+        time = np.interp(np.arange(K), at, _as_fast(cut, asked.nodes.s[at]))
     return replace(
         plan,
         contour=Contour(
@@ -176,6 +176,15 @@ def _whole(job: Job, cut: ReadCut, asked: AskedNodes, plan: Plan) -> Plan:
         posture=np.full(K, branch_of(plan.robot, q[0])),
         turn=np.zeros(q.shape, dtype=np.int64),
     )
+
+
+def _as_fast(cut: ReadCut, s: Array) -> Array:
+    """Return when (s) the targets of a cut are reached at the speeds of the text, from 0 on."""
+    took = [
+        float(cut.took[a:b].sum()) if np.isnan(cut.speed[a]) else float(way / cut.speed[a])
+        for a, b, way in zip(cut.ends[:-1], cut.ends[1:], np.diff(s), strict=True)
+    ]
+    return np.append(0.0, np.cumsum(took))
 
 
 def _moves(job: Job, cuts: Sequence[ReadCut], plans: Sequence[Plan], home: Array) -> list[AirMove]:

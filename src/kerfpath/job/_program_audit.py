@@ -207,7 +207,8 @@ def _asked_for(
     rows = [
         _check(
             f"asked-{each.code}",
-            f"not as asked for, {WHAT.get(each.code, each.code)}: {each.message}",
+            f"not as asked for, {WHAT.get(each.code, each.code)}: {each.message}"
+            + (f" (said in {each.said_at})" if each.said_at else ""),
             each.count,
             0,
             "count",

@@ -9,7 +9,7 @@ when the beam is on, or off.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import pairwise
 from typing import Literal
 
@@ -51,11 +51,14 @@ class Process:
     pierce_time : float s
     gas_lead : float s or None
         How long before the start the gas is to flow; None: it is not switched by the program.
+    stops : bool
+        Whether the job asks for a stop at every node.
     """
 
     lead_time: float
     pierce_time: float
     gas_lead: float | None
+    stops: bool
 
     @classmethod
     def of(cls, options: ProgramOptions, *, ahead: bool) -> Process:
@@ -65,6 +68,7 @@ class Process:
             lead_time=options.lead_time if ahead else 0.0,
             pierce_time=options.pierce_time,
             gas_lead=gas if gas is None or ahead else 0.0,
+            stops=options.zone == 0,
         )
 
 
@@ -107,7 +111,8 @@ def beam_checks(read: ReadProgram, robot: Robot, process: Process) -> list[Check
         for what in WORDS
     ]
     said = "stop points in the cut with the laser on"
-    rows.append(_row("beam-stop", said, _stops(spans, beam), 0, "count"))
+    stops = _row("beam-stop", said, _stops(spans, beam), 0, "count")
+    rows.append(replace(stops, level="warning") if process.stops else stops)
     said = "borders of files in the cut with the laser on"
     rows.append(_row("beam-file", said, _borders(spans, beam), 0, "count"))
     said = "laser switched on when it is, or off"
@@ -307,7 +312,8 @@ def _gas(
         (process.gas_lead - _overlap(span.end - process.gas_lead, span.end, gas), span.step)
         for span in starts
     ]
-    ahead = [(span.end - process.gas_lead, span.end, span.step) for span in starts]
+    # It may come as the tool sets out on its way down, too.
+    ahead = [(min(span.end - process.gas_lead, span.start), span.end, span.step) for span in starts]
     idle = [
         (_overlap(span.start, span.end, gas) - _overlap(span.start, span.end, _both(gas, ahead)),
          span.step)

@@ -19,6 +19,8 @@ __all__ = ["Difference", "differences", "not_compared"]
 
 Both = Sequence[tuple[Stop, Stop]]
 """Moves that both programs have."""
+SAID = {"speeds": "speed", "zones": "zone", "switches": "switches", "postures": "target"}
+"""Which of `ReadMove.elsewhere` a difference is about."""
 Names = tuple[str, str]
 """What programs A and B are called."""
 
@@ -38,6 +40,8 @@ class Difference:
         How much it is at most.
     places : tuple of str
         File and line of the largest in A and in B, as far as it has one there.
+    said_at : str
+        File and line in B of what differs, where it is not said where the move stands.
     near : str
         Of what is left out in B: file and line there before which it is missing.
     """
@@ -46,6 +50,7 @@ class Difference:
     count: int
     message: str
     places: tuple[str, ...] = ()
+    said_at: str = ""
     near: str = ""
 
     @property
@@ -227,7 +232,9 @@ def _joints(both: Both, digits: _Digits) -> Iterator[Difference]:
 
 
 def _found(code: str, count: int, message: str, a: Stop, b: Stop) -> Difference:
-    return Difference(code=code, count=count, message=message, places=(a.move.place, b.move.place))
+    said_at = b.move.elsewhere.get("target", "")
+    places = (a.move.place, b.move.place)
+    return Difference(code=code, count=count, message=message, places=places, said_at=said_at)
 
 
 def _said(both: Both, digits: _Digits, names: Names) -> Iterator[Difference]:
@@ -270,7 +277,10 @@ def _said(both: Both, digits: _Digits, names: Names) -> Iterator[Difference]:
             said = f"{words(a)} in {names[0]} and {words(b)} in {names[1]}"
             message = f"{_count(len(moved), 'move')}, {said}"
             places = tuple((code == "waits" and s.waits_at) or s.move.place for s in (a, b))
-            yield Difference(code=code, count=len(moved), message=message, places=places)
+            said_at = b.move.elsewhere.get(SAID[code], "") if code in SAID else ""
+            yield Difference(
+                code=code, count=len(moved), message=message, places=places, said_at=said_at
+            )
 
 
 def _handshakes(

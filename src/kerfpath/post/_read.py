@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Any, Literal, Protocol, get_args
 
 import numpy as np
@@ -53,6 +53,9 @@ class ReadMove:
     posture : tuple
         What the text says of posture and turns, as `Language.posture` does; empty where nothing.
     switches : tuple of Switch
+    elsewhere : mapping of str to str
+        File and line of what is not said where the move stands: "target", "speed", "zone",
+        "switches".
     """
 
     kind: MoveKind
@@ -67,6 +70,7 @@ class ReadMove:
     T_part_via: Array | None = None
     posture: tuple[int | str, ...] = ()
     switches: tuple[Switch, ...] = ()
+    elsewhere: Mapping[str, str] = field(default_factory=dict)
 
     @property
     def place(self) -> str:

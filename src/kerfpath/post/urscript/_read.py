@@ -36,6 +36,9 @@ def read(
     return _Reader(main, files[main], robot, settings).program()
 
 
+DIGIT = 1e-6
+"""What the digits of an acceleration leave, m/s^2 or rad/s^2."""
+
 _NUMBER = r"(-?\d+\.\d+)"
 _SIX = ", ".join([_NUMBER] * 6)
 _POSE = rf"p\[{_SIX}\]"
@@ -74,6 +77,7 @@ class _Reader:
         self.signals: list[str] = []
         self.can_wait = False
         self.ahead: dict[str, tuple[tuple[str, ...], float, str]] = {}
+        self.ahead_at: dict[str, str] = {}
         self.leads: dict[str, tuple[float, str]] = {}
 
     def program(self) -> ReadProgram:
@@ -137,7 +141,8 @@ class _Reader:
 
     def joint(self, words: tuple[str, ...]) -> None:
         self.settled()
-        *angles, _, v, _, r = (float(word or "nan") for word in words)
+        *angles, a, v, _, r = (float(word or "nan") for word in words)
+        self.require_acceleration(a, np.radians(self.settings.joint_acceleration_deg_s2))
         timed = words[-2]
         robot = self.robot
         self.steps.append(
@@ -151,6 +156,11 @@ class _Reader:
                 zone=r,
             )
         )
+
+    def require_acceleration(self, said: float, expected: float) -> None:
+        """Refuse another acceleration than that of the settings."""
+        if abs(said - expected) > DIGIT:
+            raise self.fault(f"expected the acceleration a={expected:.6f}, got {said:g}")
 
     def linear(self, words: tuple[str, ...]) -> None:
         self.path_move(words[:6], words[6:], None)
@@ -166,6 +176,7 @@ class _Reader:
         a, v, r = (float(word) for word in motion)
         if min(a, v) <= 0:
             raise self.fault("speed and acceleration must be above 0")
+        self.require_acceleration(a, self.settings.acceleration)
         for signal, (point, near, on) in armed.items():
             if point != target:
                 raise self.fault(f"the {signal} is switched ahead of another point")
@@ -188,6 +199,7 @@ class _Reader:
         if signal in self.ahead:
             raise self.fault(f"the {signal} is switched ahead twice")
         self.ahead[signal] = tuple(target), float(near), on
+        self.ahead_at[signal] = f"{self.file}, line {self.number}"
 
     def switch(self, words: tuple[str, str]) -> None:
         signal, on = words
@@ -199,7 +211,12 @@ class _Reader:
         if before != on:
             raise self.fault(f"the {signal} is switched to {before} ahead, to {on} here")
         switch = Switch(signal=SIGNALS[signal], on=on == "True", lead_time=lead)
-        self.steps[-1] = replace(move, switches=(*move.switches, switch))
+        at = self.ahead_at.pop(signal, f"{self.file}, line {self.number}")
+        self.steps[-1] = replace(
+            move,
+            switches=(*move.switches, switch),
+            elsewhere={"switches": at, **move.elsewhere},
+        )
 
     def wait(self, words: tuple[str, ...]) -> None:
         self.settled()
