@@ -145,7 +145,7 @@ class _Reader:
                 raise self.fault(f"expected {self.must_say[0]!r}, got {line[:60]!r}")
             del self.must_say[0]
             return
-        if self.routine_name == "main" and line == "ERROR":
+        if self.routine_name == "main" and line == ending()[0].strip():
             self.must_say = [*(row.strip() for row in ending()[1:]), "ENDPROC"]
             self.routine_name = None
             return
@@ -167,12 +167,12 @@ class _Reader:
         for kind in ("tool", "work_object"):
             if kind not in self.frames:
                 raise self.fault(f"the module declares no {kind.replace('_', ' ')}")
-        if not 1 <= self.first_number <= len(self.called_in):
-            raise self.fault(f"{FIRST} must be the number of a contour")
         unknown = {*self.called_in.items(), (SWITCH_OFF, self.main)} ^ set(self.homes.items())
         if unknown or "main" not in self.routines:
             names = ", ".join(sorted({name for name, _ in unknown}))
             raise self.fault(f"main and routines do not match: {names}")
+        if not 1 <= self.first_number <= len(self.called_in):
+            raise self.fault(f"{FIRST} must be the number of a contour")
         return ReadProgram(
             name=self.modules[self.main],
             T_flange_tip=self.frames["tool"][1],
@@ -243,7 +243,7 @@ class _Reader:
 
     def end_routine(self) -> None:
         if self.routine_name == "main":
-            raise self.fault("expected ERROR, and what main does then, before its end")
+            raise self.fault(f"expected {ending()[0].strip()}, ERROR and UNDO before its end")
         self.routine_name = None
 
     def first(self, number: str) -> None:

@@ -72,7 +72,7 @@ class Rapid(Formatter):
     settings: RapidSettings
 
     def __init__(self, program: Program, settings: RapidSettings) -> None:
-        super().__init__(renamed(program), settings)
+        super().__init__(renamed(program, (FIRST, SWITCH_OFF)), settings)
         moves = program.moves
         joint = [move for move in moves if isinstance(move, JointMove)]
         self._cruise = cruises(self.program)
@@ -273,11 +273,13 @@ class Rapid(Formatter):
 
 
 def ending() -> list[str]:
-    """Return the handlers of main: of an error, and of leaving it before its end.
+    """Return how main ends: the next time with the first contour; and its handlers.
 
-    What is not handled below ends here: everything is off, the robot stops, the error is shown.
+    Those are of an error, and of leaving main before its end. What is not handled below ends here:
+    everything is off, the robot stops, the error is shown.
     """
-    return ["ERROR", f"  {SWITCH_OFF};", "  StopMove;", "  RAISE;", "UNDO", f"  {SWITCH_OFF};"]
+    off = f"  {SWITCH_OFF};"
+    return [f"  {FIRST}:=1;", "ERROR", off, "  StopMove;", "  RAISE;", "UNDO", off]
 
 
 def switched_off(settings: RapidSettings) -> list[str]:
