@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Any, Literal, Protocol, get_args
 
 import numpy as np
@@ -39,6 +39,9 @@ class ReadMove:
         Of the tip, m/s; of a joint move the share of the full speed; None where the text has none.
     duration : float s or None
         How long it takes, where the text says times.
+    cruise : float s or None
+        How long a joint move takes at its speed throughout, neither gaining nor losing it, where
+        the text says that.
     zone : float m or None
         None where the language has no length for it.
     q : (n,) rad or None
@@ -50,6 +53,9 @@ class ReadMove:
     posture : tuple
         What the text says of posture and turns, as `Language.posture` does; empty where nothing.
     switches : tuple of Switch
+    elsewhere : mapping of str to str
+        File and line of what is not said where the move stands: "target", "speed", "zone",
+        "switches".
     """
 
     kind: MoveKind
@@ -57,12 +63,14 @@ class ReadMove:
     line: int
     speed: float | None
     duration: float | None = None
+    cruise: float | None = None
     zone: float | None = 0.0
     q: Array | None = None
     T_part_tip: Array | None = None
     T_part_via: Array | None = None
     posture: tuple[int | str, ...] = ()
     switches: tuple[Switch, ...] = ()
+    elsewhere: Mapping[str, str] = field(default_factory=dict)
 
     @property
     def place(self) -> str:

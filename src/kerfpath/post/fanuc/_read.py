@@ -92,7 +92,7 @@ _MAIN = patterns(
 _SECTION = patterns(
     {
         "linear": rf"L P\[(\d+)\] {_END}{_TB}",
-        "joint": r"J P\[(\d+)\] (\d+)% (?:(FINE)|CNT\d+)",
+        "joint": r"J P\[(\d+)\] (\d+)% (?:(FINE)|CNT(\d+))",
         "circular": rf"C P\[(\d+)\] *:  P\[(\d+)\] {_END}{_TB}",
         "remark": r"  !.*",
         "wait": r"  WAIT +(\d*\.\d\d)\(sec\)",
@@ -182,6 +182,7 @@ class _Section(Listing):
         super().__init__(file, text, robot, settings)
         self.read_steps: list[ReadWait | ReadHandshake | dict[str, Any]] = []
         self.targets: dict[int, tuple[str | None, ...]] = {}
+        self.said_at: dict[int, str] = {}
         self.early: dict[int, tuple[Switch, ...]] = {}
         self.pending: tuple[Switch, ...] = ()
         self.timeout_s: float | None = None
@@ -199,15 +200,33 @@ class _Section(Listing):
         self.positions()
         self.end()
 
-    def joint(self, target: str, per_cent: str, fine: str | None) -> None:
-        zone = 0.0 if fine else None
-        self.motion("joint", [target], int(per_cent) / 100, zone, "")
+    def joint(self, target: str, per_cent: str, fine: str | None, cnt: str | None) -> None:
+        self.motion("joint", [target], int(per_cent) / 100, self.zone(fine, cnt, None), "")
 
     def linear(self, target: str, *end: Any) -> None:
-        self.motion("linear", [target], *_path_end(*end))
+        self.motion("linear", [target], *self.path_end(*end))
 
     def circular(self, via: str, target: str, *end: Any) -> None:
-        self.motion("circular", [target, via], *_path_end(*end))
+        self.motion("circular", [target, via], *self.path_end(*end))
+
+    def path_end(
+        self, speed: str, unit: str, fine: str | None, cnt: str | None, corner: str | None,
+        before: str,
+    ) -> tuple[float, float | None, str]:  # fmt: skip
+        """Return speed (m/s), zone and what is switched, of the end of a line."""
+        if corner is not None and self.settings.corner != "CR":
+            raise self.fault(f"expected CNT{self.settings.cnt_percent} or FINE, got CR{corner}")
+        if cnt is not None and self.settings.corner != "CNT":
+            raise self.fault(f"expected CR or FINE, got CNT{cnt}")
+        return int(speed) * UNITS[unit], self.zone(fine, cnt, corner), before
+
+    def zone(self, fine: str | None, cnt: str | None, corner: str | None) -> float | None:
+        """Return the zone (m) at the end of a motion, None for CNT."""
+        if cnt is not None and int(cnt) != self.settings.cnt_percent:
+            raise self.fault(f"expected CNT{self.settings.cnt_percent}, got CNT{cnt}")
+        if fine:
+            return 0.0
+        return None if corner is None else int(corner) * 1e-3
 
     def motion(
         self, kind: str, targets: list[str], speed: float, zone: float | None, before: str
@@ -228,6 +247,7 @@ class _Section(Listing):
                 "speed": speed,
                 "zone": zone,
                 "switches": switches,
+                "elsewhere": {},
             }
         )
 
@@ -248,6 +268,7 @@ class _Section(Listing):
         if not isinstance(move, dict) or move["zone"] != 0 or move["kind"] == "joint":
             raise self.fault("an output may only be switched here after a path motion with FINE")
         move["switches"] += (Switch(signal=self.signal(output), on=value == "ON"),)
+        move["elsewhere"]["switches"] = self.place
 
     def timeout(self, hundredths: str) -> None:
         if self.timeout_s is not None:
@@ -278,6 +299,7 @@ class _Section(Listing):
             if not match:
                 raise self.fault("no position of ours begins after this line")
             number, user, tool, *said = match.groups()
+            self.said_at[int(number)] = f"{self.file}, line {self.line + 1}"
             self.line += match[0].count("\n")
             self.frames(user, tool)
             if int(number) in self.targets:
@@ -309,6 +331,7 @@ class _Section(Listing):
             if wrong:
                 form = "J1 to J6" if step["kind"] == "joint" else "X to R"
                 raise self.fault(f"P[{wrong[0]}] must be given by {form}")
+            step["elsewhere"]["target"] = self.said_at[targets[0]]
             if step["kind"] == "joint":
                 step["q"] = q[at]
             else:
@@ -320,14 +343,6 @@ class _Section(Listing):
             self.line = len(self.rows)
             raise self.fault(f"P[{unused[0]}] is used by no motion")
         return tuple(steps)
-
-
-def _path_end(
-    speed: str, unit: str, fine: str | None, cnt: str | None, corner: str | None, before: str
-) -> tuple[float, float | None, str]:
-    """Return speed (m/s), zone (m, None for CNT) and what is switched, of the end of a line."""
-    zone = None if corner is None else int(corner) * 1e-3
-    return int(speed) * UNITS[unit], 0.0 if fine else zone, before
 
 
 def _six(words: tuple[str | None, ...]) -> list[float]:

@@ -218,6 +218,9 @@ class _Job(_Text):
         pulses = self.rows[self.line + 1 : self.line + 2] == ["///POSTYPE PULSE"]
         before, after = middle("pulse" if pulses else "user", settings)
         self.expect(*before)
+        self.said_at: list[str] = []
+        self.target_at = ""
+        self.arc_speed = ""
         self.q = np.empty((0, 6))
         self.T = np.empty((0, 4, 4))
         self.types: list[tuple[int, ...]] = []
@@ -258,6 +261,7 @@ class _Job(_Text):
 
     def _position(self, pattern: re.Pattern[str], row: str, number: int) -> tuple[str, ...]:
         match = pattern.fullmatch(row)
+        self.said_at.append(self.place)
         if match is None or int(match[1]) != number:
             raise self.fault(f"expected position C{number:05d}, got {row[:60]!r}")
         return match.groups()[1:]
@@ -288,11 +292,15 @@ class _Job(_Text):
     def part(self, target: str, speed: str) -> None:
         """Check a move to where the tip is already, which parts two arcs."""
         self.require_here(self.pose(target)[0])
+        self.arc_speed = speed
 
     def arc(self, target: str, speed: str, level: str | None) -> None:
         T, posture = self.pose(target)
         if not self.arc_poses:
             self.require_here(T)
+            self.arc_speed = self.arc_speed or speed
+        if speed != self.arc_speed:
+            raise self.fault(f"the speed of an arc changes from V={self.arc_speed} to V={speed}")
         if (level is None) != (len(self.arc_poses) < 2):
             raise self.fault("an arc has its position level at the third MOVC")
         self.arc_poses.append(T)
@@ -300,6 +308,7 @@ class _Job(_Text):
             self.stands = False
             return
         via, self.arc_poses, self.last = self.arc_poses[1], [], T
+        self.arc_speed = ""
         self.move(
             "circular",
             float(speed) * 1e-3,
@@ -318,7 +327,8 @@ class _Job(_Text):
         if not self.stands or not isinstance(last, ReadMove) or last.kind == "joint":
             raise self.fault("a switch must follow a move of the path with PL=0")
         switches = (*last.switches, Switch(signal=signal, on=state == "ON"))
-        self.found[-1] = replace(last, switches=switches)
+        elsewhere = {**last.elsewhere, "switches": self.place}
+        self.found[-1] = replace(last, switches=switches, elsewhere=elsewhere)
 
     def wait_for(self, label: str) -> None:
         said = re.match(r"WAIT IN#\((\d+)\)=ON T=(\d+\.\d\d)$", "".join(self.rows[self.line :][:1]))
@@ -350,6 +360,7 @@ class _Job(_Text):
         self.stands = level == "0"
         zone = 0.0 if self.stands else None
         place: dict[str, Any] = {"file": self.file, "line": self.line}
+        place["elsewhere"] = {"target": self.target_at}
         self.found.append(ReadMove(kind=kind, speed=speed, zone=zone, **place, **said))
 
     def pose(self, target: str) -> tuple[Array, tuple[int, ...]]:
@@ -365,6 +376,7 @@ class _Job(_Text):
     def number(self, target: str) -> int:
         if int(target) >= max(len(self.q), len(self.T)):
             raise self.fault(f"C{target} is not there")
+        self.target_at = self.said_at[int(target)]
         return int(target)
 
 

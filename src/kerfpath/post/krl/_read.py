@@ -128,6 +128,7 @@ class _File:
         self.steps: dict[str, list[ReadStep]] = {}
         self.frames: dict[str, Array] = {}
         self.held: dict[str, float] = {}
+        self.held_at: dict[str, str] = {}
         self.switches: tuple[Switch, ...] = ()
         self.line = 0
         self.rows = [row.strip() for row in files[file].splitlines()]
@@ -283,13 +284,16 @@ class _File:
         self.frames[kind] = _pose(point)
 
     def share(self, percent: str) -> None:
-        self.held["share"] = int(percent) / 100
+        self.hold("share", int(percent) / 100)
 
     def speed(self, speed_m_s: str) -> None:
-        self.held["speed"] = float(speed_m_s)
+        self.hold("speed", float(speed_m_s))
 
     def zone(self, radius_mm: str) -> None:
-        self.held["zone"] = float(radius_mm) * 1e-3
+        self.hold("zone", float(radius_mm) * 1e-3)
+
+    def hold(self, what: str, value: float) -> None:
+        self.held[what], self.held_at[what] = value, self.place
 
     def trigger(self, delay_ms: str, output: str, state: str) -> None:
         if int(delay_ms) > 0:
@@ -298,6 +302,7 @@ class _File:
         if signal == "laser":
             same_output(int(output), self.settings.laser_output, self.place)
         lead = -int(delay_ms) * 1e-3
+        self.held_at.setdefault("switches", self.place)
         self.switches += (Switch(signal=signal, on=state == "TRUE", lead_time=lead),)
 
     def wait(self, time: str) -> None:
@@ -312,6 +317,7 @@ class _File:
                 line=self.line,
                 q=joints_from_axes(self.robot, axes)[0],
                 speed=self.holds("share", "BAS(#VEL_PTP,...)"),
+                elsewhere={"speed": self.held_at["share"]},
             )
         )
 
@@ -336,12 +342,18 @@ class _File:
                 speed=self.holds("speed", "$VEL.CP"),
                 zone=self.holds("zone", "$APO.CDIS") if blended else 0.0,
                 switches=self.switches,
+                elsewhere=self.elsewhere("speed", *(["zone"] if blended else []), "switches"),
             )
         )
         self.switches = ()
+        self.held_at.pop("switches", None)
 
     def append(self, step: ReadStep) -> None:
         self.steps[self.routines[-1]].append(step)
+
+    def elsewhere(self, *whats: str) -> dict[str, str]:
+        """Return where what holds for a motion has been set."""
+        return {what: self.held_at[what] for what in whats if what in self.held_at}
 
     def holds(self, what: str, word: str) -> float:
         if what not in self.held:

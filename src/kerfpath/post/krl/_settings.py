@@ -14,6 +14,8 @@ LONGEST_NAME = 24
 """Characters of a name."""
 SLOWEST = 1e-5
 """Lowest speed (m/s) that is written to within a tenth."""
+POINT_STEP, ANGLE_STEP = 0.5e-7, float(np.radians(0.5e-6))
+"""What four decimals of mm leave of positions (m), and six of deg of angles (rad)."""
 SPEED_STEP = 1e-6
 """Speeds have six decimals of m/s."""
 LONGEST_LEAD = 10.0
@@ -66,6 +68,8 @@ def rules(settings: KrlSettings) -> Rules:
         slowest=SLOWEST,
         fastest=settings.largest_speed_m_s,
         speed_step=SPEED_STEP,
+        point_step=POINT_STEP,
+        angle_step=ANGLE_STEP,
         turning_speed=float(np.radians(settings.turning_speed_deg_s)),
         longest_lead=LONGEST_LEAD,
     )

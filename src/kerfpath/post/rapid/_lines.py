@@ -5,7 +5,7 @@ from __future__ import annotations
 from kerfpath.post._read import patterns
 from kerfpath.post.rapid._write import FIRST
 
-__all__ = ["IN_MAIN", "IN_PART", "IN_ROUTINE", "LINES", "OUTSIDE"]
+__all__ = ["DECLARED", "IN_MAIN", "IN_PART", "IN_ROUTINE", "LINES", "OUTSIDE"]
 
 _NAME = r"([A-Za-z]\w*)"
 _POSE = r"(\[\[.*?9E9\]\])"
@@ -33,7 +33,7 @@ LINES = patterns(
         "late_call": rf'%"{_NAME}"%;',
         "unload": r'UnLoad "([^"]*)/([^"/]*)";',
         "call": rf"IF {FIRST}<=(\d+) {_NAME};",
-        "joint_move": rf"MoveAbsJ (\[.*\]),{_NAME},{_NAME},{_FRAMES};",
+        "joint_move": rf"MoveAbsJ (\[.*\]),{_NAME}(?:\\T:=(\d+\.\d+))?,{_NAME},{_FRAMES};",
         "linear_move": rf"MoveL (\[.*\]),{_NAME},{_NAME},{_FRAMES};",
         "circular_move": rf"MoveC {_POSE},{_POSE},{_NAME},{_NAME},{_FRAMES};",
         "switching_move": rf"TriggL (\[.*\]),{_NAME},{_TRIGGERS},{_NAME},{_FRAMES};",
@@ -43,6 +43,7 @@ LINES = patterns(
 OUTSIDE = {
     "tool", "work_object", "speed", "zone", "trigger", "first", "routine", "end_module",
 }  # fmt: skip
+DECLARED = OUTSIDE - {"routine", "end_module"}
 IN_PART = {"routine", "end_module"}
 IN_MAIN = {
     "set_trigger", "load", "condition", "late_call", "unload", "call", "end_routine",

@@ -25,9 +25,24 @@ from kerfpath.post._read import (
     same_output,
 )
 from kerfpath.post.rapid._axes import joints_from_axes
-from kerfpath.post.rapid._lines import IN_MAIN, IN_PART, IN_ROUTINE, LINES, OUTSIDE
+from kerfpath.post.rapid._lines import (
+    DECLARED,
+    IN_MAIN,
+    IN_PART,
+    IN_ROUTINE,
+    LINES,
+    OUTSIDE,
+)
 from kerfpath.post.rapid._settings import SWITCH_OFF, RapidSettings
-from kerfpath.post.rapid._write import FIRST, FULL_AIR_SPEED, ending, switched_off
+from kerfpath.post.rapid._write import (
+    FIRST,
+    FULL_AIR_SPEED,
+    air_speed_data,
+    ending,
+    linear_speed_data,
+    switched_off,
+    zone_data,
+)
 from kerfpath.robots import Robot
 
 __all__ = ["read"]
@@ -58,6 +73,8 @@ class _Reader:
         self.ended = False
         self.frames: dict[str, tuple[str, Array]] = {}
         self.speeds: dict[str, float] = {}
+        self.speed_data: dict[str, Array] = {}
+        self.said_at: dict[str, str] = {}
         self.zones: dict[str, float] = {"fine": 0.0}
         self.triggers: dict[str, Switch | None] = {}
         self.called_in: dict[str, str] = {}
@@ -98,6 +115,8 @@ class _Reader:
             expected = IN_MAIN if self.routine_name == "main" else IN_ROUTINE
         for kind in expected:
             if match := LINES[kind].fullmatch(line):
+                if kind in DECLARED and self.routines:
+                    raise self.fault("data must be declared before the first routine")
                 getattr(self, kind)(*match.groups())
                 return
         raise self.fault(f"not expected here: {line[:60]!r}")
@@ -146,16 +165,21 @@ class _Reader:
         self.frames[kind] = (name, self.pose(pose))
 
     def speed(self, name: str, text: str) -> None:
-        speed_mm_s = self.numbers(self.values(text, 4), 4)[0]
+        values = self.numbers(self.values(text, 4), 4)
         self.unused(name, self.speeds)
-        self.speeds[name] = float(speed_mm_s) * 1e-3
+        self.speeds[name] = float(values[0]) * 1e-3
+        self.speed_data[name] = values
+        self.said_at[name] = self.place
 
     def zone(self, name: str, text: str) -> None:
         stop, *sizes = self.values(text, 7)
         if stop is not False:
             raise self.fault("expected a zone to pass through, FALSE first")
         self.unused(name, self.zones)
-        self.zones[name] = float(self.numbers(sizes, 6)[0]) * 1e-3
+        values = self.numbers(sizes, 6)
+        self.zones[name] = float(values[0]) * 1e-3
+        self.require_same(values, zone_data(self.zones[name]), "sizes of the zone")
+        self.said_at[name] = self.place
 
     def trigger(self, name: str) -> None:
         self.unused(name, self.triggers)
@@ -197,9 +221,12 @@ class _Reader:
         self.append(ReadHandshake(what=what, file=self.file, line=self.line))
 
     def set_trigger(self, name: str, lead_time: str, output: str, value: str) -> None:
+        if self.called_in:
+            raise self.fault("triggers must be set before the first contour is called")
         if name not in self.triggers or self.triggers[name] is not None:
             raise self.fault(f"{name} must be declared once and set once")
         lead = float(self.numbers([float(lead_time)], 1)[0])
+        self.said_at[name] = self.place
         self.triggers[name] = Switch(signal=self.signal(output), on=value == "1", lead_time=lead)
 
     def signal(self, output: str) -> Signal:
@@ -236,20 +263,26 @@ class _Reader:
             raise self.fault(f"{name} is contour {len(self.called_in) + 1}, not {number}")
         self.called_in[name] = self.loaded or self.main
 
-    def joint_move(self, text: str, speed: str, zone: str, tool: str, work_object: str) -> None:
+    def joint_move(
+        self, text: str, speed: str, timed: str | None, zone: str, tool: str, work_object: str
+    ) -> None:
         axes_deg, external = self.values(text, 2)
         self.require_frames(tool, work_object, external)
-        axes = np.radians(self.numbers(axes_deg, 6))
+        axes, said = np.radians(self.numbers(axes_deg, 6)), self.named(speed, self.speeds)
         self.append(
             ReadMove(
                 kind="joint",
                 file=self.file,
                 line=self.line,
                 q=joints_from_axes(self.robot, axes[None])[0],
-                speed=self.named(speed, self.speeds) / FULL_AIR_SPEED,
+                speed=said / FULL_AIR_SPEED if timed is None else None,
+                cruise=None if timed is None else float(timed),
                 zone=self.named(zone, self.zones),
+                elsewhere=self.elsewhere(speed=speed, zone=zone),
             )
         )
+        data = air_speed_data(self.speeds[speed] / FULL_AIR_SPEED)
+        self.require_same(self.speed_data[speed], data, f"speeds of {speed}")
 
     def linear_move(self, text: str, speed: str, zone: str, tool: str, work_object: str) -> None:
         T_part_tip, quarters = self.target(text, tool, work_object)
@@ -262,8 +295,11 @@ class _Reader:
                 posture=quarters,
                 speed=self.named(speed, self.speeds),
                 zone=self.named(zone, self.zones),
+                elsewhere=self.elsewhere(speed=speed, zone=zone),
             )
         )
+        data = linear_speed_data(self.speeds[speed])
+        self.require_same(self.speed_data[speed], data, f"speeds of {speed}")
 
     def circular_move(
         self, via: str, text: str, speed: str, zone: str, tool: str, work_object: str
@@ -276,13 +312,13 @@ class _Reader:
         self, text: str, speed: str, triggers: str, zone: str, tool: str, work_object: str
     ) -> None:
         self.linear_move(text, speed, zone, tool, work_object)
-        self.amend(switches=self.switches(triggers))
+        self.amend_switches(triggers)
 
     def switching_arc(
         self, via: str, text: str, speed: str, triggers: str, zone: str, tool: str, work: str
     ) -> None:
         self.circular_move(via, text, speed, zone, tool, work)
-        self.amend(switches=self.switches(triggers))
+        self.amend_switches(triggers)
 
     def target(self, text: str, tool: str, work_object: str) -> tuple[Array, tuple[int, ...]]:
         point, wxyz, conf, external = self.values(text, 4)
@@ -314,12 +350,25 @@ class _Reader:
         steps = self.routines[self.routine_name]
         steps[-1] = replace(steps[-1], **changes)
 
+    def amend_switches(self, text: str) -> None:
+        assert self.routine_name is not None
+        said = self.elsewhere(switches=re.split(r"\\T\d:=", text)[0])
+        before = self.routines[self.routine_name][-1]
+        assert isinstance(before, ReadMove)
+        self.amend(switches=self.switches(text), elsewhere={**before.elsewhere, **said})
+
     def require_frames(self, tool: str, work_object: str, external: Any) -> None:
         known = [self.frames[kind][0] for kind in ("tool", "work_object") if kind in self.frames]
         if [tool, work_object] != known:
             raise self.fault(f"tool {tool} and work object {work_object} are not the module's")
         if external != [9e9] * 6:
             raise self.fault("external axes are not expected")
+
+    def require_same(self, values: Array, data: str, what: str) -> None:
+        """Require what follows the first value of data (of zones, the second) as it is written."""
+        expected = np.array(self.values(data.replace("FALSE,", ""), len(values)), dtype=np.float64)
+        if not np.array_equal(values[1:], expected[1:]):
+            raise self.fault(f"{what}: expected {data}, got {values.tolist()}")
 
     def named(self, name: str, known: dict[str, float]) -> float:
         if name not in known:
@@ -355,5 +404,13 @@ class _Reader:
             raise self.fault(f"the quaternion {value[1]} must have length 1")
         return T
 
+    def elsewhere(self, **named: str) -> dict[str, str]:
+        """Return where the data that a move names are declared or set."""
+        return {what: self.said_at[name] for what, name in named.items() if name in self.said_at}
+
+    @property
+    def place(self) -> str:
+        return f"{self.file}, line {self.line}"
+
     def fault(self, message: str) -> InputError:
-        return InputError(f"{self.file}, line {self.line}: {message}")
+        return InputError(f"{self.place}: {message}")

@@ -20,6 +20,8 @@ SLOWEST = 1e-5
 """Lowest speed (m/s) that two decimals of mm/s say to within half."""
 SPEED_STEP = 1e-5
 """Speeds (m/s) have two decimals of mm/s."""
+POINT_STEP, ANGLE_STEP = 0.5e-7, 1e-8
+"""What four decimals of mm leave (m), and eight of a quaternion (rad)."""
 LONGEST_LEAD = 0.5
 r"""Longest lead (s) that ``TriggIO \Time`` takes."""
 
@@ -74,6 +76,8 @@ def rules(settings: RapidSettings) -> Rules:
         longest_name=32,
         slowest=SLOWEST,
         speed_step=SPEED_STEP,
+        point_step=POINT_STEP,
+        angle_step=ANGLE_STEP,
         turning_speed=float(TURNING_SPEED),
         longest_lead=LONGEST_LEAD,
     )

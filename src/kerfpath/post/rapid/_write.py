@@ -33,10 +33,20 @@ from kerfpath.post._program import (
     Wait,
 )
 from kerfpath.post._settings import handshakes
+from kerfpath.post._times import SHORTEST_CRUISE, cruises
 from kerfpath.post.rapid._axes import axes_from_joints, confdata
 from kerfpath.post.rapid._settings import SWITCH_OFF, TURNING_SPEED, RapidSettings
 
-__all__ = ["FIRST", "FULL_AIR_SPEED", "Rapid", "ending", "switched_off"]
+__all__ = [
+    "FIRST",
+    "FULL_AIR_SPEED",
+    "Rapid",
+    "air_speed_data",
+    "ending",
+    "linear_speed_data",
+    "switched_off",
+    "zone_data",
+]
 
 _Key = TypeVar("_Key", bound=Hashable)
 
@@ -65,12 +75,13 @@ class Rapid(Formatter):
         super().__init__(renamed(program, (FIRST, SWITCH_OFF)), settings)
         moves = program.moves
         joint = [move for move in moves if isinstance(move, JointMove)]
-        self.air_speed = _numbered("vAir", (_air_speed(move.speed) for move in joint))
+        self._cruise = cruises(self.program)
+        self.air_speed = _numbered("vAir", (air_speed_data(move.speed) for move in joint))
         self._laser_on = dict(_with_laser(moves))
-        linear = [(on, _linear_speed(move.speed)) for move, on in self._laser_on.items()]
+        linear = [(on, linear_speed_data(move.speed)) for move, on in self._laser_on.items()]
         self.linear_speed = _numbered("vApproach", (key for key in linear if not key[0]))
         self.linear_speed |= _numbered("vCut", (key for key in linear if key[0]))
-        self.zone = _numbered("zCorner", (_zone(move.zone) for move in moves if move.zone > 0))
+        self.zone = _numbered("zCorner", (zone_data(move.zone) for move in moves if move.zone > 0))
         switches = [s for m in moves if isinstance(m, LinearMove) for s in m.switches]
         self.trigger: dict[Switch, str] = {}
         for signal, prefix in (("laser", "tr"), ("gas", "trGas")):
@@ -188,8 +199,10 @@ class Rapid(Formatter):
 
     def joint_move(self, move: JointMove) -> Iterator[str]:
         """Yield a MoveAbsJ."""
-        speed = self.air_speed[_air_speed(move.speed)]
-        yield f"MoveAbsJ {self.target[move][-1]},{speed},{self.end(move)};"
+        speed = self.air_speed[air_speed_data(move.speed)]
+        cruise = self._cruise.get(move, 0.0)
+        timed = rf"\T:={number(cruise, 4)}" if cruise >= SHORTEST_CRUISE else ""
+        yield f"MoveAbsJ {self.target[move][-1]},{speed}{timed},{self.end(move)};"
 
     def linear_move(self, move: LinearMove) -> Iterator[str]:
         """Yield a MoveL, or a TriggL where something is switched."""
@@ -248,7 +261,7 @@ class Rapid(Formatter):
 
     def speed(self, move: LinearMove) -> str:
         """Return the name of the speed data of a move."""
-        return self.linear_speed[self._laser_on[move], _linear_speed(move.speed)]
+        return self.linear_speed[self._laser_on[move], linear_speed_data(move.speed)]
 
     def _switched(self, path: str, move: LinearMove) -> tuple[str, str]:
         names = [self.trigger[s] for s in move.switches]
@@ -257,7 +270,7 @@ class Rapid(Formatter):
 
     def end(self, move: Move) -> str:
         """Return the zone, tool and work object at the end of a move."""
-        zone = self.zone[_zone(move.zone)] if move.zone > 0 else "fine"
+        zone = self.zone[zone_data(move.zone)] if move.zone > 0 else "fine"
         return rf"{zone},{self.settings.tool_name}\WObj:={self.settings.work_object}"
 
 
@@ -301,21 +314,26 @@ def _pose(T: Array) -> str:
 
 
 @cache
-def _linear_speed(speed: float) -> str:
+def linear_speed_data(speed: float) -> str:
+    """Return the speed data of path moves at a speed of the tip (m/s)."""
     return f"[{number(speed * 1e3, 2)},{number(np.degrees(TURNING_SPEED), 0)},{EXTERNAL_SPEEDS}]"
 
 
 @cache
-def _air_speed(share: float) -> str:
+def air_speed_data(share: float) -> str:
+    """Return the speed data of joint moves at a share of the full speed."""
     speed_mm_s = share * FULL_AIR_SPEED * 1e3
     turning_deg_s = share * np.degrees(TURNING_SPEED)
     return f"[{number(speed_mm_s, 2)},{number(turning_deg_s, 0)},{EXTERNAL_SPEEDS}]"
 
 
 @cache
-def _zone(zone: float) -> str:
-    # ABB's own zones turn the tool within 1.5 times the path zone at most; here within the same,
-    # and 0.1 deg for each mm.
+def zone_data(zone: float) -> str:
+    """Return the zone data of a radius (m).
+
+    ABB's own zones turn the tool within 1.5 times the path zone at most; here within the same, and
+    0.1 deg for each mm.
+    """
     zone_mm = number(zone * 1e3, 3)
     zone_deg = number(zone * 1e3 * 0.1, 3)
     return f"[FALSE,{zone_mm},{zone_mm},{zone_mm},{zone_deg},{zone_mm},{zone_deg}]"

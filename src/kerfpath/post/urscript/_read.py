@@ -36,6 +36,9 @@ def read(
     return _Reader(main, files[main], robot, settings).program()
 
 
+DIGIT = 1e-6
+"""What the digits of an acceleration leave, m/s^2 or rad/s^2."""
+
 _NUMBER = r"(-?\d+\.\d+)"
 _SIX = ", ".join([_NUMBER] * 6)
 _POSE = rf"p\[{_SIX}\]"
@@ -51,7 +54,7 @@ _STEPS = patterns(
     {
         "linear": rf"movel\({_TARGET}, {_MOTION}\)",
         "circular": rf"movec\({_TARGET}, {_TARGET}, {_MOTION}, mode=0\)",
-        "joint": rf"movej\(\[{_SIX}\], {_MOTION}\)",
+        "joint": rf"movej\(\[{_SIX}\], a={_NUMBER}, v={_NUMBER}, (?:t={_NUMBER}, )?r={_NUMBER}\)",
         "switch_ahead": rf"{_SIGNAL}_ahead\({_POSE}, {_NUMBER}, (True|False)\)",
         "switch": rf"{_SIGNAL}_set\((True|False)\)",
         "wait": rf"sleep\({_NUMBER}\)",
@@ -74,6 +77,7 @@ class _Reader:
         self.signals: list[str] = []
         self.can_wait = False
         self.ahead: dict[str, tuple[tuple[str, ...], float, str]] = {}
+        self.ahead_at: dict[str, str] = {}
         self.leads: dict[str, tuple[float, str]] = {}
 
     def program(self) -> ReadProgram:
@@ -137,7 +141,9 @@ class _Reader:
 
     def joint(self, words: tuple[str, ...]) -> None:
         self.settled()
-        *angles, _, v, r = (float(word) for word in words)
+        *angles, a, v, _, r = (float(word or "nan") for word in words)
+        self.require_acceleration(a, np.radians(self.settings.joint_acceleration_deg_s2))
+        timed = words[-2]
         robot = self.robot
         self.steps.append(
             ReadMove(
@@ -145,10 +151,16 @@ class _Reader:
                 file=self.file,
                 line=self.number,
                 q=freeze(robot.sign * (np.array(angles) + robot.offset)),
-                speed=v / full_joint_speed(robot),
+                speed=v / full_joint_speed(robot) if timed is None else None,
+                duration=None if timed is None else float(timed),
                 zone=r,
             )
         )
+
+    def require_acceleration(self, said: float, expected: float) -> None:
+        """Refuse another acceleration than that of the settings."""
+        if abs(said - expected) > DIGIT:
+            raise self.fault(f"expected the acceleration a={expected:.6f}, got {said:g}")
 
     def linear(self, words: tuple[str, ...]) -> None:
         self.path_move(words[:6], words[6:], None)
@@ -164,6 +176,7 @@ class _Reader:
         a, v, r = (float(word) for word in motion)
         if min(a, v) <= 0:
             raise self.fault("speed and acceleration must be above 0")
+        self.require_acceleration(a, self.settings.acceleration)
         for signal, (point, near, on) in armed.items():
             if point != target:
                 raise self.fault(f"the {signal} is switched ahead of another point")
@@ -186,6 +199,7 @@ class _Reader:
         if signal in self.ahead:
             raise self.fault(f"the {signal} is switched ahead twice")
         self.ahead[signal] = tuple(target), float(near), on
+        self.ahead_at[signal] = f"{self.file}, line {self.number}"
 
     def switch(self, words: tuple[str, str]) -> None:
         signal, on = words
@@ -197,7 +211,12 @@ class _Reader:
         if before != on:
             raise self.fault(f"the {signal} is switched to {before} ahead, to {on} here")
         switch = Switch(signal=SIGNALS[signal], on=on == "True", lead_time=lead)
-        self.steps[-1] = replace(move, switches=(*move.switches, switch))
+        at = self.ahead_at.pop(signal, f"{self.file}, line {self.number}")
+        self.steps[-1] = replace(
+            move,
+            switches=(*move.switches, switch),
+            elsewhere={"switches": at, **move.elsewhere},
+        )
 
     def wait(self, words: tuple[str, ...]) -> None:
         self.settled()

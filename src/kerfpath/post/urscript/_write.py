@@ -46,6 +46,8 @@ SPEED_STEP = 1e-6
 """Speeds (m/s) have six decimals."""
 FIRST = "first_contour"
 """Number of the contour at which the program begins, for a restart."""
+POINT_STEP, ANGLE_STEP = 0.5e-7, 0.5e-9
+"""What seven decimals of m leave of positions, and nine of rad of turns."""
 NOT_CHECKED = "not been checked for collisions"
 
 Output = Annotated[int | None, setting("a standard digital output from 0 to 7", "0", ge=0, le=7)]
@@ -89,7 +91,9 @@ def outputs(settings: URScriptSettings) -> list[int]:
 
 def rules(settings: URScriptSettings) -> Rules:
     """Return what programs in URScript must keep to."""
-    return Rules(slowest=SPEED_STEP, speed_step=SPEED_STEP)
+    return Rules(
+        slowest=SPEED_STEP, speed_step=SPEED_STEP, point_step=POINT_STEP, angle_step=ANGLE_STEP
+    )
 
 
 def full_joint_speed(robot: Robot) -> float:
@@ -175,7 +179,8 @@ class URScript(Formatter):
         q = ", ".join(number(angle, 8) for angle in robot.sign * move.q - robot.offset)
         a = number(np.radians(self.settings.joint_acceleration_deg_s2), 6)
         v = number(move.speed * full_joint_speed(robot), 6)
-        yield f"movej([{q}], a={a}, v={v}, r={number(move.zone, 7)})"
+        timed = "" if move.duration is None else f"t={number(move.duration, 4)}, "
+        yield f"movej([{q}], a={a}, v={v}, {timed}r={number(move.zone, 7)})"
 
     def linear_move(self, move: LinearMove) -> Iterator[str]:
         """Yield a movel, and what is switched at its end."""

@@ -242,6 +242,7 @@ class _Routine:
                 q=freeze(q[self.place("jAir", target, len(q))]),
                 speed=share,
                 zone=zone,
+                elsewhere=self.elsewhere("jAir", target, "mAir", motion),
             )
         )
         self.stands = False
@@ -273,6 +274,7 @@ class _Routine:
                 posture=self.project.data.words[k],
                 speed=speed,
                 zone=zone,
+                elsewhere=self.elsewhere("pPath", target, "mPath", motion),
             )
         )
         self.stands = False
@@ -291,7 +293,8 @@ class _Routine:
         if name not in links(self.project.settings):
             raise self.fault(f"{name} is not declared")
         switches = (*last.switches, Switch(signal=signal, on=state == "true"))
-        self.found[-1] = replace(last, switches=switches)
+        elsewhere = {**last.elsewhere, "switches": f"{self.code.file}, line {self.line}"}
+        self.found[-1] = replace(last, switches=switches, elsewhere=elsewhere)
 
     def request(self, name: str, state: str) -> None:
         self.handshake(Request(partner=self.partner(name, "output"), on=state == "true"))
@@ -317,6 +320,12 @@ class _Routine:
         if not self.stands:
             raise self.fault("a delay must follow waitEndMove()")
         self.found.append(ReadWait(time=float(time), file=self.code.file, line=self.line))
+
+    def elsewhere(self, targets: str, target: str, motions: str, motion: str) -> dict[str, str]:
+        """Return where the data of a move stand."""
+        at = self.project.data.said_at
+        moves = at[motions][int(motion)]
+        return {"target": at[targets][int(target)], "speed": moves, "zone": moves}
 
     def motion(self, name: str, key: str) -> tuple[float, float]:
         motions = self.project.data.motions[name]

@@ -37,6 +37,7 @@ class Data:
 
     def __init__(self, root: Element, robot: Robot, settings: Val3Settings) -> None:
         self.robot, self.settings = robot, settings
+        self.said_at: dict[str, list[str]] = {}
         self.frames: dict[str, Array] = {}
         self.first: int | None = None
         self.q, self.T = np.empty((0, 6)), np.empty((0, 4, 4))
@@ -61,6 +62,7 @@ class Data:
                 value.only()
                 if value.attributes.pop("key", "") != str(key):
                     raise value.fault(f"expected the value of key {key}")
+            self.said_at[name] = [f"{value.file}, line {value.line}" for value in values]
             reader(self, name, values)
         expected = links(settings)
         for name in ("fPart", "tLaser", *expected):
