@@ -2,7 +2,6 @@ r"""Read back the RAPID that `Rapid` writes, and nothing else: what it does not 
 
 from __future__ import annotations
 
-import json
 import re
 from collections.abc import Mapping
 from dataclasses import replace
@@ -11,8 +10,6 @@ from typing import Any
 import numpy as np
 
 from kerfpath._arrays import Array
-from kerfpath.errors import InputError
-from kerfpath.post._orientations import pose_of
 from kerfpath.post._program import Await, Handshake, Request, Signal, Switch
 from kerfpath.post._read import (
     ReadHandshake,
@@ -24,6 +21,7 @@ from kerfpath.post._read import (
     partner_of,
     same_output,
 )
+from kerfpath.post.rapid._aggregates import Aggregates
 from kerfpath.post.rapid._axes import joints_from_axes
 from kerfpath.post.rapid._lines import (
     DECLARED,
@@ -58,7 +56,7 @@ def read(main: str, files: Mapping[str, str], robot: Robot, settings: RapidSetti
     return reader.program()
 
 
-class _Reader:
+class _Reader(Aggregates):
     """Reads line by line; each kind of line has a method of its name."""
 
     def __init__(
@@ -379,38 +377,6 @@ class _Reader:
         if name in known:
             raise self.fault(f"{name} is declared twice")
 
-    def values(self, text: str, count: int) -> list[Any]:
-        """Return the `count` parts of an aggregate; RAPID writes it almost as JSON does."""
-        try:
-            values = json.loads(text.replace("TRUE", "true").replace("FALSE", "false"))
-        except json.JSONDecodeError as error:
-            raise self.fault(f"not an aggregate: {error}") from None
-        if not isinstance(values, list) or len(values) != count:
-            raise self.fault(f"expected {count} values, got {text[:60]!r}")
-        return values
-
-    def numbers(self, values: Any, count: int) -> Array:
-        is_list = isinstance(values, list) and len(values) == count
-        if not is_list or any(type(value) not in (int, float) for value in values):
-            raise self.fault(f"expected {count} numbers, got {values!r}")
-        return np.array(values, dtype=np.float64)
-
-    def pose(self, value: Any) -> Array:
-        if not isinstance(value, list) or len(value) != 2:
-            raise self.fault(f"expected a position and a quaternion, got {value!r}")
-        point_mm, wxyz = self.numbers(value[0], 3), self.numbers(value[1], 4)
-        T = pose_of(point_mm * 1e-3, wxyz)
-        if T is None:
-            raise self.fault(f"the quaternion {value[1]} must have length 1")
-        return T
-
     def elsewhere(self, **named: str) -> dict[str, str]:
         """Return where the data that a move names are declared or set."""
         return {what: self.said_at[name] for what, name in named.items() if name in self.said_at}
-
-    @property
-    def place(self) -> str:
-        return f"{self.file}, line {self.line}"
-
-    def fault(self, message: str) -> InputError:
-        return InputError(f"{self.place}: {message}")
