@@ -13,7 +13,7 @@ from kerfpath._arrays import Array
 from kerfpath.air import least_time
 from kerfpath.auditor import Check, Rounding, Unit, air_checks, checks, rounding_of, worst_of
 from kerfpath.cell import Cell
-from kerfpath.contour import Contour
+from kerfpath.contour import KINDS, Contour
 from kerfpath.errors import InputError
 from kerfpath.job._asked import asked_of
 from kerfpath.job._program_asked import AskedNodes, asked_nodes, asked_program
@@ -359,7 +359,7 @@ def _asked(
     asked, dt = _asked_times(task, reference)
     when = dt * np.arange(len(asked))
     k = np.clip(np.searchsorted(reference.s, middle, side="right") - 1, 0, len(reference) - 1)
-    wanted = np.array([reference.kinds[j] != "micro joint" for j in k])
+    wanted = reference.kind[k] != KINDS.index("micro joint")
     wrong = wanted != cut.laser
     excess = np.diff(np.interp(s, asked.s, when)) / np.diff(made.time) - 1
     if job.plan_options["feed"] == "constant":
