@@ -81,7 +81,7 @@ WORDS = {
     ),
     "fanuc": Words(
         remark=r"\s*\d+:  !(?!UFRAME|UTOOL).*|",
-        idle=(r"(?:OWNER|COMMENT|PROG_SIZE|FILE_NAME|VERSION|MEMORY_SIZE|PROTECT|CONTROL_CODE|"
+        idle=(r"(?:OWNER|COMMENT|PROG_SIZE|FILE_NAME|VERSION|LINE_COUNT|MEMORY_SIZE|PROTECT|CONTROL_CODE|"
               r"CREATE|MODIFIED)(.*)", r"((?:TCD:)?\s+[A-Z_]+\s*= .*)", r"(DEFAULT_GROUP.*)"),
         families=(*STATES, r"\bDO\[\d\]", r"\bP\[\d+\]", r"\b(?:FINE|CNT\d+)\b", r"'[NF] [UD] [TB]"),
         orderless=(r"\s*\d+:  DO\[\d\]=OFF ;", r"\s*\d+:  U(?:FRAME|TOOL)_NUM.*",
@@ -98,7 +98,7 @@ WORDS = {
         idle=(r"(<\?xml.*)", r"<\w+ (xmlns.*)"),
         families=(*STATES, r"\bdio(?:Laser|Gas)\b", r"\bmPath\[\d+\]", r"\bpPath\[\d+\]",
                   r"\bjAir\[\d+\]", r"blend=\"\w+\"", r"elbow=\"\w+\"", r"shoulder=\"\w+\""),
-        orderless=(r"\s*waitEndMove\(\)",),
+        orderless=(r"\s*waitEndMove\(\)", r"\s*<Program file=.*/>"),
     ),
     "urscript": Words(
         remark=r"\s*(#.*)?",

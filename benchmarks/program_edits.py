@@ -22,7 +22,7 @@ from kerfpath.post import read_program
 
 __all__ = ["Outcome", "Subject", "Tally", "run", "subjects"]
 
-EDITS = 2000
+EDITS = 1000
 """Of the text, in every language."""
 ARMS = {"inform": "yaskawa_gp25", "urscript": "ur_ur10e"}
 """Robots of languages that cannot say the axes of the one below."""
@@ -175,9 +175,11 @@ class Tally:
             if said == judged and outcome in (None, came) and language in (None, lang)
         )
 
-    def try_faults(self, subject: Subject, rng: np.random.Generator) -> None:
-        """Write every fault of the program out, and audit it."""
-        for fault in faults(subject.program, rng):
+    def try_faults(
+        self, subject: Subject, rng: np.random.Generator, *, every: int = 1, first: int = 0
+    ) -> None:
+        """Write every fault of the program out, or `every` so manyth, and audit it."""
+        for fault in islice(faults(subject.program, rng), first % every, None, every):
             try:
                 files = subject.written(fault.program)
             except InputError:
@@ -279,5 +281,11 @@ def run(*, quick: bool = False) -> Report:
                     Figure(what=f"{name}: harmless {what}", values=[fine], unit=""),
                     Figure(what=f"{name}: of these caught or refused", values=[alarms], unit=""),
                 ]
+                told = tally.told["told"], sum(tally.told.values())
+                if what == "edits":
+                    report.findings.append(
+                        f"{name}: of {told[1]} harmful edits that were found, {told[0]} are told with "
+                        "their own line or the one beside it"
+                    )
                 report.findings += tally.wrong[:20]
     return report
