@@ -1,4 +1,4 @@
-"""Programs spoilt by a grammar of edits: what does harm does not pass the audit, in any language."""
+"""Programs spoilt by a grammar of edits: what does harm passes no audit, in any language."""
 
 import re
 
@@ -8,7 +8,7 @@ import pytest
 from test_benchmarks import benchmark_module
 
 FAULTS, EDITS = 4, 15
-"""One fault in so many, and so many edits of the text, in each language; the benchmark makes all."""
+"""One fault in so many, and so many edits of the text, for each; the benchmark makes all."""
 LANGUAGES = ("csv", "fanuc", "inform", "krl", "rapid", "ros", "urscript", "val3")
 RESETS = {
     "rapid": r"SetDO doGas,0;",

@@ -208,7 +208,9 @@ def _took(move: ReadMove, robot: Robot, q: object, T: object) -> float:
     return float(np.linalg.norm(way)) / move.speed
 
 
-def _on(events: Sequence[_Event], signal: Signal, *, shift: float) -> list[tuple[float, float, int]]:
+def _on(
+    events: Sequence[_Event], signal: Signal, *, shift: float
+) -> list[tuple[float, float, int]]:
     """Return from when to when (s) a signal is on, and the step that switched it so."""
     found: list[tuple[float, float, int]] = []
     since: tuple[float, int] | None = None

@@ -159,9 +159,7 @@ def _contours(
         yield Difference(code=code, count=len(alone), message=message, places=places)
 
 
-def _order(
-    groups: Sequence[ReadGroup], numbers: list[int], both: Names
-) -> Iterator[Difference]:
+def _order(groups: Sequence[ReadGroup], numbers: list[int], both: Names) -> Iterator[Difference]:
     """Compare the order of contours, given the numbers in B of those of A."""
     if numbers != sorted(numbers):
         names = ", ".join(groups[j].name for j in sorted(numbers) if groups[j].path)
