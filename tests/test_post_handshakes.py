@@ -29,13 +29,14 @@ def test_partners_are_asked_before_the_way_down_and_released_after_the_way_back(
 def test_a_trajectory_cannot_wait(language):
     found = preflight(program(handshakes=ASKED), language)
     said = [issue.message for issue in found if issue.code == "handshake"]
-    assert len(said) == 2 and all("leave it out" in text for text in said)
+    assert len(said) == 2
+    assert all("leave it out" in text for text in said)
 
 
 def test_handshakes_belong_where_the_robot_stands_with_the_laser_off():
     made = program(handshakes=ASKED)
     steps = list(made.steps)
-    moving = steps[:6] + [ASKED[1]] + steps[6:]
+    moving = [*steps[:6], ASKED[1], *steps[6:]]
     assert codes(with_steps(made, moving), "error", "csv").count("handshake") == 3
 
 

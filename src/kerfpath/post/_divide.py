@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from typing import Literal
 
@@ -14,10 +14,12 @@ from kerfpath.post._program import Program, Section
 __all__ = ["in_files", "in_one_file", "long_contours", "renamed"]
 
 
-def renamed(program: Program, *, longest_name: int = LONGEST_NAME) -> Program:
-    """Return the program with names of sections cut to `longest_name`, and different."""
+def renamed(
+    program: Program, taken: Iterable[str] = (), *, longest_name: int = LONGEST_NAME
+) -> Program:
+    """Return the program with names of sections cut to `longest_name`, and none twice or taken."""
     texts = (section.name for section in program.sections)
-    names = identifiers(texts, taken=(program.name,), longest=longest_name)
+    names = identifiers(texts, taken=(program.name, *taken), longest=longest_name)
     sections = (replace(s, name=name) for s, name in zip(program.sections, names, strict=True))
     return replace(program, sections=tuple(sections))
 

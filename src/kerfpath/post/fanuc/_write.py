@@ -152,9 +152,9 @@ class Fanuc(Formatter):
             *self.comment(f"kerfpath, for {plain(program.robot.model)}"),
             *self.comment(f"Moves through the air: {checked}."),
             *self.comment(
-                f"{off_name(program.name, settings)} as BG logic switches off at a stop;"
+                f"{off_name(program.name, settings)} as BG logic switches off at a stop."
             ),
-            *self.comment("the cell's safety has to switch the laser off, too."),
+            *self.comment("The cell's safety has to switch the laser off, too."),
             *self.comment("Enter these frames (mm, deg). World: on J1, at the height of J2."),
         ]
         frame = np.linalg.inv(world(program.robot)) @ program.T_base_part

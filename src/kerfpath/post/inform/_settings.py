@@ -35,8 +35,8 @@ class InformSettings(Settings):
     """Frames, outputs and the pulses of the very robot."""
 
     lines_per_file: Annotated[
-        int, setting("a whole number of lines from 100 to 9999", "2000", ge=100, le=9999)
-    ] = 2000
+        int, setting("a whole number of lines from 100 to 9999", "9999", ge=100, le=9999)
+    ] = 9999
     laser_output: Output = None
     gas_output: Output = None
     ready_input: Input = None

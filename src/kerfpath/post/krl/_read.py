@@ -56,6 +56,7 @@ _LINES = patterns(
         "condition": rf"IF ({FIRST}|{PASSED})<=(\d+) THEN",
         "call": rf"{_NAME}\((|{FIRST})\)",
         "end_condition": "ENDIF",
+        "again": rf"{FIRST}=1",
         "request": r"\$OUT\[(\d+)\]=(TRUE|FALSE)",
         "wait_for": r"\$TIMER\[\d+\]=-(\d+)",
         "end": "END",
@@ -65,7 +66,7 @@ _LINES = patterns(
     }
 )
 _CALLS = ("condition", "call", "end_condition", "end")
-_IN_MAIN = ("tool", "base", *_CALLS)
+_IN_MAIN = ("tool", "base", "again", *_CALLS)
 _IN_FIRST = _CALLS
 _IN_ROUTINE = (
     "linear", "speed", "zone", "trigger", "circular", "joint", "share", "wait", "request",
@@ -123,6 +124,7 @@ class _File:
         self.calls: dict[str, int] = {}
         self.before, self.condition_open, self.number = before, False, 0
         self.must_say: list[str] = []
+        self.begins_again = False
         self.steps: dict[str, list[ReadStep]] = {}
         self.frames: dict[str, Array] = {}
         self.held: dict[str, float] = {}
@@ -207,11 +209,22 @@ class _File:
         self.require_opening()
         if self.condition_open:
             raise self.fault("ENDIF is missing")
+        if self.is_main and len(self.routines) == 1 and not self.begins_again:
+            raise self.fault(f"expected {FIRST}=1 before")
         self.inside = False
+
+    def again(self) -> None:
+        if self.condition_open or self.begins_again or not self.calls:
+            raise self.fault(f"{FIRST} must be set once, after all calls")
+        self.begins_again = True
 
     def condition(self, variable: str, number: str) -> None:
         self.require_opening()
-        if self.condition_open or variable != (FIRST if self.is_main else PASSED):
+        if (
+            self.begins_again
+            or self.condition_open
+            or variable != (FIRST if self.is_main else PASSED)
+        ):
             raise self.fault("a call must have one condition of its own")
         self.condition_open, self.number = True, int(number)
 

@@ -144,7 +144,9 @@ class Krl(Formatter):
 
     def __init__(self, program: Program, settings: KrlSettings) -> None:
         named = replace(program, name=program.name[:LONGEST_NAME])
-        super().__init__(renamed(named, longest_name=LONGEST_NAME), settings)
+        super().__init__(
+            renamed(named, (FIRST, PASSED, SWITCH_OFF), longest_name=LONGEST_NAME), settings
+        )
         self._held: dict[str, str] = {}
         self._target = self._target_texts()
         self._files = self._in_one_file() or self._in_more_files()
@@ -268,7 +270,8 @@ class Krl(Formatter):
 
     def _main(self, calls: Sequence[str], routines: Mapping[str, Sequence[str]]) -> _File:
         every = {SWITCH_OFF: switched_off(self.settings), **routines}
-        return _File(name=self.program.name, first=[*self._start(), *calls], routines=every)
+        first = [*self._start(), *calls, f"{FIRST}=1"]
+        return _File(name=self.program.name, first=first, routines=every)
 
     def _start(self) -> Iterator[str]:
         program, settings = self.program, self.settings

@@ -73,9 +73,8 @@ _LINES = patterns(
         "set_trigger": rf"TriggIO {_NAME},([\d.]+)\\Time\\DOp:={_NAME},([01]);",
         "wait": r"WaitTime ([\d.]+);",
         "load": r'Load \\Dynamic,"([^"]*)/([^"/]*)";',
-        "late_call": rf'IF {FIRST}<=(\d+) %"{_NAME}"%;',
-        "part": rf"IF {FIRST}<=(\d+) THEN",
-        "end_part": "ENDIF",
+        "condition": rf"IF {FIRST}<=(\d+) THEN",
+        "late_call": rf'%"{_NAME}"%;',
         "unload": r'UnLoad "([^"]*)/([^"/]*)";',
         "call": rf"IF {FIRST}<=(\d+) {_NAME};",
         "joint_move": rf"MoveAbsJ (\[.*\]),{_NAME},{_NAME},{_FRAMES};",
@@ -91,8 +90,7 @@ _OUTSIDE = {
 _DECLARED = _OUTSIDE - {"routine", "end_module"}
 _IN_PART = {"routine", "end_module"}
 _IN_MAIN = {
-    "set_trigger", "part", "load", "late_call", "unload", "end_part", "call",
-    "end_routine",
+    "set_trigger", "load", "condition", "late_call", "unload", "call", "end_routine",
 }  # fmt: skip
 _IN_ROUTINE = {
     "joint_move", "linear_move", "circular_move", "switching_move", "switching_arc", "wait",
@@ -123,8 +121,8 @@ class _Reader:
         self.routines: dict[str, list[ReadStep]] = {}
         self.homes: dict[str, str] = {}
         self.first_number = 0
-        self.last_of_part = 0
         self.must_say: list[str] = []
+        self.number: str | None = None
 
     def read_module(self, file: str) -> None:
         self.file, self.line, self.ended, self.name = file, 0, False, ""
@@ -145,7 +143,7 @@ class _Reader:
                 raise self.fault(f"expected {self.must_say[0]!r}, got {line[:60]!r}")
             del self.must_say[0]
             return
-        if self.routine_name == "main" and line == "ERROR":
+        if self.routine_name == "main" and self.number is None and line == ending()[0].strip():
             self.must_say = [*(row.strip() for row in ending()[1:]), "ENDPROC"]
             self.routine_name = None
             return
@@ -167,12 +165,12 @@ class _Reader:
         for kind in ("tool", "work_object"):
             if kind not in self.frames:
                 raise self.fault(f"the module declares no {kind.replace('_', ' ')}")
-        if not 1 <= self.first_number <= len(self.called_in):
-            raise self.fault(f"{FIRST} must be the number of a contour")
         unknown = {*self.called_in.items(), (SWITCH_OFF, self.main)} ^ set(self.homes.items())
         if unknown or "main" not in self.routines:
             names = ", ".join(sorted({name for name, _ in unknown}))
             raise self.fault(f"main and routines do not match: {names}")
+        if not 1 <= self.first_number <= len(self.called_in):
+            raise self.fault(f"{FIRST} must be the number of a contour")
         return ReadProgram(
             name=self.modules[self.main],
             T_flange_tip=self.frames["tool"][1],
@@ -243,7 +241,7 @@ class _Reader:
 
     def end_routine(self) -> None:
         if self.routine_name == "main":
-            raise self.fault("expected ERROR, and what main does then, before its end")
+            raise self.fault(f"expected {ending()[0].strip()}, ERROR and UNDO before its end")
         self.routine_name = None
 
     def first(self, number: str) -> None:
@@ -277,18 +275,8 @@ class _Reader:
         same_output(output, self.settings.laser_output, f"{self.file}, line {self.line}")
         return "laser"
 
-    def part(self, last: str) -> None:
-        if self.last_of_part or self.loaded:
-            raise self.fault("expected one module at a time")
-        self.last_of_part = int(last)
-
-    def end_part(self) -> None:
-        if self.loaded or self.last_of_part != len(self.called_in):
-            raise self.fault("the number in IF must be that of the last contour of the module")
-        self.last_of_part = 0
-
     def load(self, folder: str, file: str) -> None:
-        if self.loaded or not self.last_of_part or folder != self.settings.folder:
+        if self.loaded or folder != self.settings.folder:
             raise self.fault(f"expected one module at a time, from {self.settings.folder}")
         self.loaded = file
 
@@ -297,10 +285,16 @@ class _Reader:
             raise self.fault(f"{folder}/{file} is not loaded")
         self.loaded = ""
 
-    def late_call(self, number: str, name: str) -> None:
-        if not self.loaded:
-            raise self.fault(f"{name} is called while no module is loaded")
-        self.call(number, name)
+    def condition(self, number: str) -> None:
+        if self.number is not None:
+            raise self.fault("a condition must have one call")
+        self.number = number
+
+    def late_call(self, name: str) -> None:
+        if not self.loaded or self.number is None:
+            raise self.fault(f"{name} is called while no module is loaded, or without a condition")
+        self.call(self.number, name)
+        self.number, self.must_say = None, ["ENDIF"]
 
     def call(self, number: str, name: str) -> None:
         if name in self.called_in:

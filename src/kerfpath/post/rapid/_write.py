@@ -71,7 +71,7 @@ class Rapid(Formatter):
     settings: RapidSettings
 
     def __init__(self, program: Program, settings: RapidSettings) -> None:
-        super().__init__(renamed(program), settings)
+        super().__init__(renamed(program, (FIRST, SWITCH_OFF)), settings)
         moves = program.moves
         joint = [move for move in moves if isinstance(move, JointMove)]
         self.air_speed = _numbered("vAir", (air_speed_data(move.speed) for move in joint))
@@ -102,9 +102,11 @@ class Rapid(Formatter):
         parts = in_files(sections, list(self.lengths().values()), most)
         for module, part in zip(self._modules(), parts, strict=False):
             place = f'"{self.settings.folder}/{module}.mod"'
-            calls += [f"IF {FIRST}<={numbers[part[-1]]} THEN", rf"  Load \Dynamic,{place};"]
-            calls += [f'  IF {FIRST}<={numbers[section]} %"{section.name}"%;' for section in part]
-            calls += [f"  UnLoad {place};", "ENDIF"]
+            calls += [rf"Load \Dynamic,{place};"]
+            for section in part:
+                called = f'  %"{section.name}"%;'
+                calls += [f"IF {FIRST}<={numbers[section]} THEN", called, "ENDIF"]
+            calls += [f"UnLoad {place};"]
             body = (line for section in part for line in self._routine(section))
             files[f"{module}.mod"] = _text([f"MODULE {module}", *body, "ENDMODULE"])
         return {f"{name}.mod": _text(self._module(calls, ()))} | files
@@ -269,11 +271,13 @@ class Rapid(Formatter):
 
 
 def ending() -> list[str]:
-    """Return the handlers of main: of an error, and of leaving it before its end.
+    """Return how main ends: the next time with the first contour; and its handlers.
 
-    What is not handled below ends here: everything is off, the robot stops, the error is shown.
+    Those are of an error, and of leaving main before its end. What is not handled below ends here:
+    everything is off, the robot stops, the error is shown.
     """
-    return ["ERROR", f"  {SWITCH_OFF};", "  StopMove;", "  RAISE;", "UNDO", f"  {SWITCH_OFF};"]
+    off = f"  {SWITCH_OFF};"
+    return [f"  {FIRST}:=1;", "ERROR", off, "  StopMove;", "  RAISE;", "UNDO", off]
 
 
 def switched_off(settings: RapidSettings) -> list[str]:

@@ -32,6 +32,7 @@ from kerfpath.post.val3._write import (
     PROGRAM,
     PROJECT,
     awaiting,
+    closing,
     links,
     opening,
     parameters,
@@ -173,15 +174,15 @@ class _Project:
     def calls(self, start: Element) -> list[tuple[int, str, str]]:
         """Return what start() calls: line, alias of the library or nothing, routine."""
         rows = self.statements(start)
-        begin, end = opening(self.settings), ["waitEndMove()"]
+        begin, end = opening(self.settings), closing()
         count = len(rows) - len(begin) - len(end)
         for number, row in enumerate(begin):
             if [text for _, text in rows[number : number + 1]] != [row]:
                 raise start.fault(f"expected {row} before anything else is done")
-        if count < 0 or rows[-1][1] != end[0]:
-            raise start.fault("expected waitEndMove() at the end of start()")
+        if count < 0 or [text for _, text in rows[-len(end) :]] != end:
+            raise start.fault(f"expected {' and '.join(end)} at the end of start()")
         found: list[tuple[int, str, str]] = []
-        body = rows[len(begin) : -1]
+        body = rows[len(begin) : -len(end)]
         for k in range(0, len(body), 3):
             line, row = body[k + 1] if k + 1 < len(body) else body[k]
             match = _CALL.fullmatch(row)

@@ -39,8 +39,8 @@ from kerfpath.post.val3._settings import LONGEST_NAME, Val3Settings
 from kerfpath.post.val3._xml import SCHEMA
 
 __all__ = [
-    "DATA", "FIRST", "OUTPUTS", "PORTS", "PROGRAM", "PROJECT", "Val3", "awaiting", "links",
-    "opening", "parameters", "stopping",
+    "DATA", "FIRST", "OUTPUTS", "PORTS", "PROGRAM", "PROJECT", "Val3", "awaiting", "closing",
+    "links", "opening", "parameters", "stopping",
 ]  # fmt: skip
 
 PROJECT = "http://www.staubli.com/robotics/VAL3/Project/3"
@@ -111,6 +111,11 @@ def awaiting(partner: str, timeout: float, settings: Val3Settings) -> list[str]:
     ]
 
 
+def closing() -> list[str]:
+    """Return the last statements of start(); the next time it begins with the first contour."""
+    return ["waitEndMove()", f"{FIRST}=1"]
+
+
 def stopping(settings: Val3Settings) -> list[str]:
     """Return the statements of stop(), which the controller calls when the project is stopped."""
     return [*opening(settings), "resetMotion()"]
@@ -142,7 +147,7 @@ class Val3(Formatter):
 
     def __init__(self, program: Program, settings: Val3Settings) -> None:
         short = replace(stopping_to_switch(program), name=program.name[:LONGEST_NAME])
-        super().__init__(renamed(short, longest_name=LONGEST_NAME), settings)
+        super().__init__(renamed(short, (FIRST,), longest_name=LONGEST_NAME), settings)
         self._target = self._target_texts()
         self._database = _Database()
         self._moving = True
@@ -258,7 +263,7 @@ class Val3(Formatter):
             start = [*self._remarks(), *opening(self.settings)]
             for n, call in enumerate(calls, 1):
                 start += [f"if {FIRST}<={n}", f"  call {call}()", "endIf"]
-            start += ["waitEndMove()"]
+            start += closing()
         routines = {"start": start, "stop": stopping(self.settings), **routines}
         texts = {
             f"{name}.pjx": self._contents(name, routines, () if calls is None else self._parts)
