@@ -13,7 +13,7 @@ from kerfpath.cli._show import errors, out, print_json
 from kerfpath.errors import InputError
 from kerfpath.job import program_from_file, program_language, read_job, read_plan_file
 from kerfpath.placement import MeasuredFrame, placement_from_points
-from kerfpath.post import Language, identifier, languages, write_files, write_program
+from kerfpath.post import Language, Replaced, identifier, languages, replace_program, write_program
 from kerfpath.post import language as find_language
 
 __all__ = ["write_post"]
@@ -44,13 +44,17 @@ def write_post(
         frame=frame,
     )  # fmt: skip
     written: list[Path] = []
+    replaced: Replaced | None = None
     if output is not None and name is not None:
         main, *_ = files
         # FANUC's names are in capitals; the file is called as it was asked for.
         names = {main: output.name} if main.lower() == output.name.lower() else {}
-        written = write_files(output.parent, {names.get(k, k): t for k, t in files.items()})
+        files = {names.get(k, k): t for k, t in files.items()}
+        replaced = replace_program(output.parent, files, list(files), only=output.name)
+        written = list(replaced.written)
     elif output is not None and (len(files) > 1 or output.is_dir()):
-        written = write_files(output, files)
+        replaced = replace_program(output, files, list(files), only=next(iter(files)))
+        written = list(replaced.written)
     elif output is not None:
         write_program(output, next(iter(files.values())))
         written = [output]
@@ -59,6 +63,7 @@ def write_post(
             {
                 "language": language,
                 "files": [str(path) for path in written],
+                "removed": [] if replaced is None else [str(p) for p in replaced.removed],
                 "texts": None if written else files,
                 "measured": None if frame is None else _frame_entry(frame),
                 "notes": notes,
@@ -77,6 +82,8 @@ def write_post(
             print(text, end="")
     for note in notes if written or frame is not None else ():
         console.print(f"note: {escape(note)}")
+    for path in () if replaced is None else replaced.removed:
+        out.print(f"removed {escape(str(path))}, of the earlier program")
     for path in written:
         out.print(f"wrote {escape(str(path))}")
 

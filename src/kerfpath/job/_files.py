@@ -21,7 +21,7 @@ from kerfpath.job._reportfile import report_text
 from kerfpath.job._run import Outcome
 from kerfpath.job._verdict import collision_note
 from kerfpath.plans import Plan
-from kerfpath.post import language, write_files
+from kerfpath.post import language, replace_program
 from kerfpath.sequence import PartPlan
 
 __all__ = [
@@ -48,13 +48,16 @@ class Written:
     ----------
     files : tuple of Path
         Written, in this order.
+    removed : tuple of Path
+        Of the program of an earlier run, and removed: they do not belong to this one.
     stale : Path or None
-        A program of an earlier run that lies in the folder and does not belong to this one.
+        The same, but edited since or of unknown origin, and so left.
     notes : tuple of str
         Warnings of the program's preflight, and what nobody has checked.
     """
 
     files: tuple[Path, ...]
+    removed: tuple[Path, ...]
     stale: Path | None
     notes: tuple[str, ...]
 
@@ -97,12 +100,17 @@ def write_outcome(outcome: Outcome, folder: Path, *, strict: bool = False) -> Wr
     """
     texts = outcome_texts(outcome, strict=strict)
     make_folder(folder)
-    written = write_files(folder, texts.files)
+    replaced = replace_program(folder, texts.files, texts.program)
     if texts.refused:
         said = f"{texts.refused} ({folder / 'plan.json'} and the report are written)"
         raise AuditFailed(said) if texts.unsafe else InputError(said)
     stale = stale_program(outcome.job.program, folder, texts.program)
-    return Written(files=tuple(written), stale=stale, notes=texts.notes)
+    return Written(
+        files=replaced.written,
+        removed=replaced.removed,
+        stale=next(iter(replaced.edited), stale),
+        notes=texts.notes,
+    )
 
 
 def outcome_texts(outcome: Outcome, *, strict: bool = False) -> Texts:

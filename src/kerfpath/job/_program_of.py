@@ -27,6 +27,7 @@ REMEDIES = {
     "again; with arcs_mm, lower it or leave it out",
     "velocity": "lower eta_velocity in [plan], and plan again",
     "velocity-between": "lower eta_velocity in [plan], and plan again",
+    "beam-stop": "write a zone_mm above 0, and cut without stops",
     "lead-time": "write a lead_time_s that the language can count",
     "pierce": "write a pierce_time_s that the language can count",
     "speed": "write a speed that the language can say",

@@ -57,8 +57,8 @@ class ProgramOptions:
         How long the laser stays on at the start before the cut goes on.
     approach_speed : float m/s
         Along the tool axis before and after a contour.
-    air_speed : float
-        Share of the full speed of joint moves.
+    air_speed : float or None
+        Share of the full speed of joint moves; None: what is usual for planned moves and others.
     arc_tolerance : float m or None
         How near to the path circular moves stay; None: there are none.
     gas_lead : float s or None
@@ -75,7 +75,7 @@ class ProgramOptions:
     lead_time: float
     pierce_time: float
     approach_speed: float
-    air_speed: float
+    air_speed: float | None
     arc_tolerance: float | None
     gas_lead: float | None
     handshakes: tuple[Handshake, ...] = ()

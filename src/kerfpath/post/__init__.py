@@ -10,6 +10,11 @@ from kerfpath.post._differences import not_compared as not_compared
 from kerfpath.post._divide import in_files as in_files
 from kerfpath.post._divide import renamed as renamed
 from kerfpath.post._dry_run import dry_run as dry_run
+from kerfpath.post._folder import MANIFEST as MANIFEST
+from kerfpath.post._folder import Replaced as Replaced
+from kerfpath.post._folder import replace_program as replace_program
+from kerfpath.post._folder import write_files as write_files
+from kerfpath.post._folder import write_program as write_program
 from kerfpath.post._formatter import Formatter as Formatter
 from kerfpath.post._groups import ReadGroup as ReadGroup
 from kerfpath.post._groups import groups_of as groups_of
@@ -52,5 +57,3 @@ from kerfpath.post._writer import post as post
 from kerfpath.post._writer import posted as posted
 from kerfpath.post._writer import read_program as read_program
 from kerfpath.post._writer import said_in as said_in
-from kerfpath.post._writer import write_files as write_files
-from kerfpath.post._writer import write_program as write_program

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from typing import Any
 
 import numpy as np
@@ -25,6 +25,7 @@ from kerfpath.post._program import (
 )
 from kerfpath.post._read import ReadHandshake, ReadMove, ReadProgram, ReadStep, ReadWait
 from kerfpath.post._settings import Rules, Settings
+from kerfpath.post._times import cruises
 
 __all__ = ["deviations", "events", "handshake"]
 
@@ -84,7 +85,7 @@ def deviations(
             pairs.append((step, back))
     rules = language.rules(settings)
     issues += _places(program, pairs, rules)
-    issues += _motion(pairs, rules)
+    issues += _motion(pairs, rules, cruises(program))
     issues += _postures(program, pairs, language, settings)
     return issues
 
@@ -177,11 +178,17 @@ def _apart(
         yield _issue(backs[k], said)
 
 
-def _motion(pairs: list[tuple[Move, ReadMove]], rules: Rules) -> Iterator[ProgramIssue]:
+def _motion(
+    pairs: list[tuple[Move, ReadMove]], rules: Rules, cruise: Mapping[Move, float]
+) -> Iterator[ProgramIssue]:
     for move, back in pairs:
-        joint = isinstance(move, JointMove)
+        joint, timed = isinstance(move, JointMove), False
+        if isinstance(move, JointMove):
+            timed = move.duration is not None and back.duration is not None
+            if said := _air_time(move, back, cruise):
+                yield _issue(back, said)
         off = SHARE if joint else 0.51 * rules.speed_step + 1e-9
-        if back.speed is not None and abs(move.speed - back.speed) > off:
+        if back.speed is not None and not timed and abs(move.speed - back.speed) > off:
             unit, scale = ("of the full speed", 1.0) if joint else ("mm/s", 1e3)
             said = f"the speed is {back.speed * scale:g} {unit}, expected {move.speed * scale:g}"
             yield _issue(back, said)
@@ -203,6 +210,14 @@ def _motion(pairs: list[tuple[Move, ReadMove]], rules: Rules) -> Iterator[Progra
         ):
             said = f"switches {events(back.switches)}, expected {events(ours)}"
             yield _issue(back, said)
+
+
+def _air_time(move: JointMove, back: ReadMove, cruise: Mapping[Move, float]) -> str:
+    """Say how the time of a joint move is another; empty where it is not, or not said."""
+    for took, planned in ((back.duration, move.duration), (back.cruise, cruise.get(move))):
+        if took is not None and planned is not None and abs(took - planned) > LEAD:
+            return f"takes {took:g} s, expected {planned:g} s"
+    return ""
 
 
 def events(switches: Any) -> str:

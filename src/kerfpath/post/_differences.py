@@ -244,8 +244,11 @@ def _said(both: Both, digits: _Digits, names: Names) -> Iterator[Difference]:
         ("speeds", lambda a, b: _speeds(a.move, b.move, digits), lambda a: _speed(a.move)),
         (
             "times",
-            lambda a, b: _excess(a.move.duration, b.move.duration, digits.lead),
-            lambda a: f"{a.move.duration:g} s",
+            lambda a, b: max(
+                _excess(a.move.duration, b.move.duration, digits.lead),
+                _excess(a.move.cruise, b.move.cruise, digits.lead),
+            ),
+            lambda a: f"{a.move.cruise if a.move.duration is None else a.move.duration:g} s",
         ),
         (
             "zones",

@@ -65,5 +65,7 @@ def _slow(step: Step, share: float) -> Step:
     if isinstance(step, LinearMove):
         return replace(step, speed=share * step.speed, duration=step.duration / share, switches=())
     if isinstance(step, JointMove):
-        return replace(step, speed=max(share * step.speed, LOWEST_SHARE))
+        slow = max(share * step.speed, LOWEST_SHARE)
+        took = None if step.duration is None else step.duration * step.speed / slow
+        return replace(step, speed=slow, duration=took)
     return step

@@ -68,13 +68,17 @@ class JointMove:
     q : (n,) rad
         Joints of the target.
     speed : float
-        Share of the full speed, from 0.01 to 1.
+        Share of the full speed, from 0.01 to 1; the acceleration is the full one.
+    duration : float s or None
+        How long the move was planned to take, from stop to stop; None where it is not known from
+        where it comes.
     zone : float m
         Radius in which the corner may be rounded; 0 = stop at the target.
     """
 
     q: Array
     speed: float
+    duration: float | None = None
     zone: float = 0.0
 
     def __post_init__(self) -> None:

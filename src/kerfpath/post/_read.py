@@ -39,6 +39,9 @@ class ReadMove:
         Of the tip, m/s; of a joint move the share of the full speed; None where the text has none.
     duration : float s or None
         How long it takes, where the text says times.
+    cruise : float s or None
+        How long a joint move takes at its speed throughout, neither gaining nor losing it, where
+        the text says that.
     zone : float m or None
         None where the language has no length for it.
     q : (n,) rad or None
@@ -60,6 +63,7 @@ class ReadMove:
     line: int
     speed: float | None
     duration: float | None = None
+    cruise: float | None = None
     zone: float | None = 0.0
     q: Array | None = None
     T_part_tip: Array | None = None

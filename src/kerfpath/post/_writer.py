@@ -2,11 +2,8 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Mapping, Sequence
-from contextlib import suppress
 from dataclasses import dataclass
-from pathlib import Path
 
 from kerfpath.errors import InputError
 from kerfpath.plans import Plan
@@ -21,7 +18,7 @@ from kerfpath.post._read import ReadProgram
 from kerfpath.post._settings import Settings
 from kerfpath.robots import Robot
 
-__all__ = ["Posted", "post", "posted", "read_program", "said_in", "write_files", "write_program"]
+__all__ = ["Posted", "post", "posted", "read_program", "said_in"]
 
 
 def post(
@@ -168,46 +165,3 @@ def said_in(program: Program, chosen: Language, settings: Settings) -> ReadProgr
     settings = chosen.completed(settings)
     files = chosen.formatter(program, settings).files()
     return read_program(files, chosen.name, program.robot, settings)
-
-
-def write_files(folder: str | os.PathLike[str], files: Mapping[str, str]) -> list[Path]:
-    """Write the files of a program into a folder, each whole or not at all, the first one last.
-
-    So the program that is started calls no file that is not there yet.
-
-    Raises
-    ------
-    InputError
-        A file cannot be written.
-    """
-    paths = {name: Path(folder) / name for name in files}
-    for name in reversed(list(files)):
-        try:
-            paths[name].parent.mkdir(parents=True, exist_ok=True)
-        except OSError as error:
-            raise InputError(f"{paths[name].parent}: no folder can be made ({error})") from None
-        write_program(paths[name], files[name])
-    return list(paths.values())
-
-
-def write_program(path: str | os.PathLike[str], text: str) -> None:
-    """Write `text` to the file at `path`, whole or not at all.
-
-    The text goes to a file beside it first, so that no controller ever loads half a program.
-
-    Raises
-    ------
-    InputError
-        The file cannot be written.
-    """
-    target = Path(path)
-    if not target.name:
-        raise InputError(f"cannot write the program to {str(path)!r}: expected a file name")
-    beside = target.with_name(f".{target.name}.{os.getpid()}.tmp")
-    try:
-        beside.write_bytes(text.encode("utf-8"))
-        beside.replace(target)
-    except OSError as error:
-        with suppress(OSError):
-            beside.unlink(missing_ok=True)
-        raise InputError(f"cannot write the program to {target}: {error.strerror}") from None

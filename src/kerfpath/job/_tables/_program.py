@@ -34,8 +34,8 @@ class ProgramTable(Table):
     pierce_time_s: Annotated[NotNegative, key("a number from 0 to 60, in s", "0.3", le=60)] = 0.0
     approach_mm_s: Annotated[Positive, key("a number above 0, in mm/s", "100")] = 100.0
     air_speed: Annotated[
-        Positive, key("a number from 0.01 to 1, of the full speed", "0.25", ge=0.01, le=1)
-    ] = 0.25
+        Positive | None, key("a number from 0.01 to 1, of the full speed", "0.25", ge=0.01, le=1)
+    ] = None
 
     request: Annotated[list[Partner] | None, key(PARTNERS_SAID, '["shutter"]')] = None
     wait_for: Annotated[list[Partner] | None, key(PARTNERS_SAID, '["ready"]')] = None

@@ -77,7 +77,7 @@ _LINES = patterns(
         "late_call": rf'%"{_NAME}"%;',
         "unload": r'UnLoad "([^"]*)/([^"/]*)";',
         "call": rf"IF {FIRST}<=(\d+) {_NAME};",
-        "joint_move": rf"MoveAbsJ (\[.*\]),{_NAME},{_NAME},{_FRAMES};",
+        "joint_move": rf"MoveAbsJ (\[.*\]),{_NAME}(?:\\T:=(\d+\.\d+))?,{_NAME},{_FRAMES};",
         "linear_move": rf"MoveL (\[.*\]),{_NAME},{_NAME},{_FRAMES};",
         "circular_move": rf"MoveC {_POSE},{_POSE},{_NAME},{_NAME},{_FRAMES};",
         "switching_move": rf"TriggL (\[.*\]),{_NAME},{_TRIGGERS},{_NAME},{_FRAMES};",
@@ -303,17 +303,20 @@ class _Reader:
             raise self.fault(f"{name} is contour {len(self.called_in) + 1}, not {number}")
         self.called_in[name] = self.loaded or self.main
 
-    def joint_move(self, text: str, speed: str, zone: str, tool: str, work_object: str) -> None:
+    def joint_move(
+        self, text: str, speed: str, timed: str | None, zone: str, tool: str, work_object: str
+    ) -> None:
         axes_deg, external = self.values(text, 2)
         self.require_frames(tool, work_object, external)
-        axes = np.radians(self.numbers(axes_deg, 6))
+        axes, said = np.radians(self.numbers(axes_deg, 6)), self.named(speed, self.speeds)
         self.append(
             ReadMove(
                 kind="joint",
                 file=self.file,
                 line=self.line,
                 q=joints_from_axes(self.robot, axes[None])[0],
-                speed=self.named(speed, self.speeds) / FULL_AIR_SPEED,
+                speed=said / FULL_AIR_SPEED if timed is None else None,
+                cruise=None if timed is None else float(timed),
                 zone=self.named(zone, self.zones),
                 elsewhere=self.elsewhere(speed=speed, zone=zone),
             )

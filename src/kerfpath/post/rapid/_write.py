@@ -33,6 +33,7 @@ from kerfpath.post._program import (
     Wait,
 )
 from kerfpath.post._settings import handshakes
+from kerfpath.post._times import SHORTEST_CRUISE, cruises
 from kerfpath.post.rapid._axes import axes_from_joints, confdata
 from kerfpath.post.rapid._settings import SWITCH_OFF, TURNING_SPEED, RapidSettings
 
@@ -74,6 +75,7 @@ class Rapid(Formatter):
         super().__init__(renamed(program, (FIRST, SWITCH_OFF)), settings)
         moves = program.moves
         joint = [move for move in moves if isinstance(move, JointMove)]
+        self._cruise = cruises(self.program)
         self.air_speed = _numbered("vAir", (air_speed_data(move.speed) for move in joint))
         self._laser_on = dict(_with_laser(moves))
         linear = [(on, linear_speed_data(move.speed)) for move, on in self._laser_on.items()]
@@ -198,7 +200,9 @@ class Rapid(Formatter):
     def joint_move(self, move: JointMove) -> Iterator[str]:
         """Yield a MoveAbsJ."""
         speed = self.air_speed[air_speed_data(move.speed)]
-        yield f"MoveAbsJ {self.target[move][-1]},{speed},{self.end(move)};"
+        cruise = self._cruise.get(move, 0.0)
+        timed = rf"\T:={number(cruise, 4)}" if cruise >= SHORTEST_CRUISE else ""
+        yield f"MoveAbsJ {self.target[move][-1]},{speed}{timed},{self.end(move)};"
 
     def linear_move(self, move: LinearMove) -> Iterator[str]:
         """Yield a MoveL, or a TriggL where something is switched."""

@@ -178,7 +178,7 @@ class _Events:
                 file=self.file,
                 line=self.line,
                 speed=self.share(between, took) if kind == "joint" and self.last >= 0 else None,
-                duration=took if kind == "linear" else None,
+                duration=took if kind == "linear" or self.last >= 0 else None,
                 zone=0.0 if points.stops[end] else None,
                 q=freeze(points.q[end]),
                 elsewhere={"target": f"{points.file}, line {points.line[end]}"},

@@ -54,7 +54,7 @@ _STEPS = patterns(
     {
         "linear": rf"movel\({_TARGET}, {_MOTION}\)",
         "circular": rf"movec\({_TARGET}, {_TARGET}, {_MOTION}, mode=0\)",
-        "joint": rf"movej\(\[{_SIX}\], {_MOTION}\)",
+        "joint": rf"movej\(\[{_SIX}\], a={_NUMBER}, v={_NUMBER}, (?:t={_NUMBER}, )?r={_NUMBER}\)",
         "switch_ahead": rf"{_SIGNAL}_ahead\({_POSE}, {_NUMBER}, (True|False)\)",
         "switch": rf"{_SIGNAL}_set\((True|False)\)",
         "wait": rf"sleep\({_NUMBER}\)",
@@ -141,8 +141,9 @@ class _Reader:
 
     def joint(self, words: tuple[str, ...]) -> None:
         self.settled()
-        *angles, a, v, r = (float(word) for word in words)
+        *angles, a, v, _, r = (float(word or "nan") for word in words)
         self.require_acceleration(a, np.radians(self.settings.joint_acceleration_deg_s2))
+        timed = words[-2]
         robot = self.robot
         self.steps.append(
             ReadMove(
@@ -150,7 +151,8 @@ class _Reader:
                 file=self.file,
                 line=self.number,
                 q=freeze(robot.sign * (np.array(angles) + robot.offset)),
-                speed=v / full_joint_speed(robot),
+                speed=v / full_joint_speed(robot) if timed is None else None,
+                duration=None if timed is None else float(timed),
                 zone=r,
             )
         )

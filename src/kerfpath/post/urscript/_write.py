@@ -179,7 +179,8 @@ class URScript(Formatter):
         q = ", ".join(number(angle, 8) for angle in robot.sign * move.q - robot.offset)
         a = number(np.radians(self.settings.joint_acceleration_deg_s2), 6)
         v = number(move.speed * full_joint_speed(robot), 6)
-        yield f"movej([{q}], a={a}, v={v}, r={number(move.zone, 7)})"
+        timed = "" if move.duration is None else f"t={number(move.duration, 4)}, "
+        yield f"movej([{q}], a={a}, v={v}, {timed}r={number(move.zone, 7)})"
 
     def linear_move(self, move: LinearMove) -> Iterator[str]:
         """Yield a movel, and what is switched at its end."""
