@@ -87,6 +87,7 @@ WORDS = {
     "urscript": Words(
         remark=r"\s*(#.*)?",
         families=(*STATES, r"\b(?:laser|gas)\b", r"\bmove[lj]\b"),
+        idle=(r".*movej\(.*, (v=[\d.]+), t=.*",),  # the time counts
         held=(r"\s*(?:laser|gas)_ahead.*",),
     ),
     "ros": Words(remark=r"\s*(#.*)?", families=(*STATES, r"\b(?:laser|gas)\b"),

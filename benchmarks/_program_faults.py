@@ -126,7 +126,9 @@ def _section_faults(steps: Sequence[Step], rng: np.random.Generator) -> Iterator
     for k, what in ((joint[-1], "air"), (start, "approach"), (back, "retract"), (middle, "cut")):
         share = float(rng.choice([0.3, 0.5, 2.0, 3.0]))
         if what == "air":
-            yield f"speed of {what}", changed(k, speed=away_from.speed * share)
+            took = away_from.duration
+            slow = {"speed": away_from.speed * share, "duration": took and took / share}
+            yield f"speed of {what}", changed(k, **slow)
         else:
             slow = {"speed": way(k).speed * share, "duration": way(k).duration / share}
             yield f"speed of {what}", changed(k, **slow)

@@ -194,7 +194,7 @@ def _asked_for(
         return [row("asked", said, 1, 0, "count")]
     rules = chosen.rules(settings)
     asked = with_tips(asked, job.robot, job.tool, job.placement)
-    found = differences(asked, read, rules=(rules,), names=("the job", "the text"))
+    found = differences(asked, read, rules=(rules,), names=("the job", "the text"), strict=True)
     places = [step.place for step in read.steps]
     rows = [
         row(
