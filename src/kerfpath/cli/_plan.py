@@ -13,7 +13,16 @@ from rich.markup import escape
 
 from kerfpath.cad import Part
 from kerfpath.cli._drawing import drawing_entry, drawing_of, show_drawing
-from kerfpath.cli._show import busy, compile_kernels, errors, out, print_json, progress_bars, table
+from kerfpath.cli._show import (
+    busy,
+    compile_kernels,
+    errors,
+    out,
+    print_json,
+    progress_bars,
+    table,
+    told_once,
+)
 from kerfpath.job import (
     Cut,
     Outcome,
@@ -103,7 +112,7 @@ def leave(
             for check in cut.checks:
                 if not check.ok:
                     out.print(f"[bold]{escape(cut.task.name)}[/]: {escape(str(check.issue()))}")
-        for note in written.notes:
+        for note in told_once(written.notes, [cut.task.name for cut in outcome.cuts]):
             out.print(f"note: {escape(note)}")
         for path in written.removed:
             out.print(f"removed {escape(str(path))}, of an earlier run")
@@ -180,7 +189,8 @@ def _show_cuts(cuts: Sequence[Cut]) -> None:
         )
     columns = ["contour", "mm", "nodes", "m/min", "s", "grid", "cost", "vel", "acc"]
     columns += ["chord mm", "step deg", "audit"]
-    table(columns, rows, numbers=columns[1:-1])
+    spare = ["step deg", "chord mm", "grid", "m/min"]
+    table(columns, rows, numbers=columns[1:-1], whole=["audit"], spare=spare)
     out.print(
         "cost: what is minimised; grid: the best on the gamma grid, before the refinement; "
         "vel, acc: highest share of a joint's velocity and acceleration limit; chord: largest "

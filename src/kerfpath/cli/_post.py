@@ -9,8 +9,8 @@ import numpy as np
 from rich.markup import escape
 
 from kerfpath.cad import read_measured
-from kerfpath.cli._show import errors, out, print_json
-from kerfpath.errors import InputError
+from kerfpath.cli._show import errors, out, print_json, told_once
+from kerfpath.errors import InputError, KerfpathError
 from kerfpath.job import program_from_file, program_language, read_job, read_plan_file
 from kerfpath.placement import MeasuredFrame, placement_from_points
 from kerfpath.post import Language, Replaced, identifier, languages, replace_program, write_program
@@ -32,17 +32,25 @@ def write_post(
     if language is None:
         source = read_plan_file(plan_file).job if job is None else read_job(job).source
         language = program_language(source, job or plan_file)
-    name = _name(output, find_language(language))
-    if name is not None and dry_share is not None:
-        name = name.removeprefix("dry_")  # which dry runs begin with by themselves
     frame = None
     if measured is not None:
         points = read_measured(measured)
         frame = placement_from_points(*points, most_residual=residual_mm / 1000)
-    files, notes = program_from_file(
-        plan_file, language, name=name, strict=strict, job_file=job, dry_share=dry_share,
-        frame=frame,
-    )  # fmt: skip
+        if not as_json:  # first of all: also where no program comes of it
+            for line in _in_words(frame, plan_file):
+                (errors if output is None else out).print(line)
+    name = _name(output, find_language(language))
+    if name is not None and dry_share is not None:
+        name = name.removeprefix("dry_")  # which dry runs begin with by themselves
+    try:
+        files, notes = program_from_file(
+            plan_file, language, name=name, strict=strict, job_file=job, dry_share=dry_share,
+            frame=frame,
+        )  # fmt: skip
+    except KerfpathError:
+        for line in _in_words(frame, plan_file) if as_json and frame is not None else ():
+            errors.print(line)
+        raise
     written: list[Path] = []
     replaced: Replaced | None = None
     if output is not None and name is not None:
@@ -72,15 +80,12 @@ def write_post(
         return
     # A program that is printed has stdout for itself.
     console = out if written else errors
-    if frame is not None:
-        for line in _in_words(frame, plan_file):
-            console.print(line)
     if not written:
         for name, text in files.items():
             if len(files) > 1:
                 print(f"----- {name} -----")
             print(text, end="")
-    for note in notes if written or frame is not None else ():
+    for note in told_once(notes) if written or frame is not None else ():
         console.print(f"note: {escape(note)}")
     for path in () if replaced is None else replaced.removed:
         out.print(f"removed {escape(str(path))}, of the earlier program")

@@ -33,6 +33,7 @@ from kerfpath.job._run import Outcome as Outcome
 from kerfpath.job._run import Progress as Progress
 from kerfpath.job._run import fastest_along as fastest_along
 from kerfpath.job._run import fastest_speeds as fastest_speeds
+from kerfpath.job._run import is_compiled as is_compiled
 from kerfpath.job._run import run_job as run_job
 from kerfpath.job._run import warm_up as warm_up
 from kerfpath.job._sequencefile import sequence_entry as sequence_entry

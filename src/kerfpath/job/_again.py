@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import fields, replace
 from pathlib import Path
 from typing import Any, TypeVar
@@ -10,12 +10,12 @@ from typing import Any, TypeVar
 import numpy as np
 from pydantic import BaseModel, ValidationError
 
-from kerfpath.auditor import checks
+from kerfpath.auditor import Check, checks
 from kerfpath.cad import Part
 from kerfpath.cad import read as read_drawing
 from kerfpath.cell import Cell
 from kerfpath.contour import Contour
-from kerfpath.errors import AuditFailed, InputError
+from kerfpath.errors import AuditFailed, InputError, NoFeasiblePath
 from kerfpath.job._cell import cell_of_job
 from kerfpath.job._planfile import PlanFile, read_plan_file
 from kerfpath.job._program_audit import ProgramAsked
@@ -23,7 +23,7 @@ from kerfpath.job._program_of import asked_of_plans, program_of
 from kerfpath.job._read import Job, ProgramOptions, audit_options, program_options, read_job
 from kerfpath.job._tables import AuditTable, LayoutTable, ProgramTable, SequenceTable
 from kerfpath.job._verdict import Audited, collision_note
-from kerfpath.placement import MeasuredFrame, placed, placed_moves
+from kerfpath.placement import MeasuredFrame, placed, placed_moves, planned_again
 from kerfpath.plans import Plan
 from kerfpath.post import language as find_language
 
@@ -142,8 +142,8 @@ def program_from_file(
     )
     options = options if name is None else replace(options, name=name)
     if frame is not None:
-        file = _led(file, frame, options.retract)
-        notes += [LED_NOTE, *([LED_MOVES_NOTE] if file.moves else [])]
+        file, again = _led(file, frame, options.retract)
+        notes += [*again, LED_NOTE, *([LED_MOVES_NOTE] if file.moves else [])]
     asked = _table(file, "audit", AuditTable, audit_options)
     for p in file.plans:
         for check in checks(p, **asked):
@@ -194,6 +194,7 @@ def _job_of(file: PlanFile, options: ProgramOptions) -> Job:
         | {"feed": "constant" if all(p.feed is None for p in file.plans) else "dip"},
         refine_parts=1,
         interruptions="none",
+        least_piece=None,
         cell=None,
         sequence=None if sequence is None else _table(file, "sequence", SequenceTable, _same),
         layout=LayoutTable(),
@@ -214,11 +215,41 @@ def _require_passed(found: Audited) -> None:
                 raise AuditFailed(f"no program: contour {name!r} fails its audit: {check.issue()}")
 
 
-def _led(file: PlanFile, frame: MeasuredFrame, retract: float) -> PlanFile:
-    """Return a plan.json with its plans and the moves between them led to a measured part."""
-    plans = tuple(placed(p, frame.T_base_part) for p in file.plans)
+def _led(file: PlanFile, frame: MeasuredFrame, retract: float) -> tuple[PlanFile, list[str]]:
+    """Return a plan.json with its plans and the moves between them led to a measured part.
+
+    A contour that would not pass its audit there is planned again around it; notes say which.
+    """
+    asked, plans, notes = _table(file, "audit", AuditTable, audit_options), [], []
+    for p in file.plans:
+        led, why = _there(p, frame, asked)
+        if why:
+            try:
+                led = planned_again(p, frame.T_base_part)
+            except NoFeasiblePath as broken:
+                raise broken.retold(
+                    f"contour {p.name!r}: led to the measured placement {why}, and planned again "
+                    f"there: {broken}"
+                ) from None
+            notes.append(f"Contour {p.name!r} was planned again there; only led there {why}.")
+        plans.append(led)
     moves = placed_moves(file.moves, plans, retract)
-    return replace(file, plans=plans, moves=moves, in_cell=False)
+    return replace(file, plans=tuple(plans), moves=moves, in_cell=False), notes
+
+
+def _there(p: Plan, frame: MeasuredFrame, asked: dict[str, Any]) -> tuple[Plan, str]:
+    """Return a plan led to a measured part, and what then fails; empty where nothing does."""
+    try:
+        led = placed(p, frame.T_base_part)
+    except NoFeasiblePath as away:
+        return p, f"it fails: {away}"
+    failed = first_failed(checks(led, **asked))
+    return led, "" if failed is None else f"it fails: {failed.issue()}"
+
+
+def first_failed(table: Sequence[Check]) -> Check | None:
+    """Return the first check that is an error; None where the plan passes."""
+    return next((check for check in table if check.level == "error" and not check.ok), None)
 
 
 def _options(file: PlanFile, language: str, stem: str) -> ProgramOptions:

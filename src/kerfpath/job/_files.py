@@ -36,6 +36,8 @@ __all__ = [
     "write_outcome",
 ]
 
+SHORT_PIECE = 0.02
+"""m: a shorter piece has hardly room for its leads, and is warned of."""
 SHORTEST_CUT = 8
 """No language cuts names to fewer characters."""
 
@@ -121,8 +123,9 @@ def outcome_texts(outcome: Outcome, *, strict: bool = False) -> Texts:
     refused, unsafe = "", False
     notes = [collision_note(outcome.cell, moves_too=bool(moves))]
     notes += [] if part is None else [order_note(part)]
-    notes += [] if outcome.stuck is None else [f"The moves between contours: {outcome.stuck}"]
-    notes += [f"The moves between contours: {c.issue()}" for c in outcome.air if not c.ok]
+    notes += short_pieces(outcome)
+    faults = [] if outcome.stuck is None else [f"The moves between contours: {outcome.stuck}"]
+    faults += [f"The moves between contours: {c.issue()}" for c in outcome.air if not c.ok]
     if outcome.passed and job.program.language != "none":
         try:
             asked = asked_of_cuts(job, outcome.cuts, outcome.cell)
@@ -132,7 +135,7 @@ def outcome_texts(outcome: Outcome, *, strict: bool = False) -> Texts:
             notes += warnings
         except (InputError, AuditFailed) as error:
             refused, unsafe = str(error), isinstance(error, AuditFailed)
-            notes.append(refused if unsafe else f"no program was written: {error}")
+            faults.append(refused if unsafe else f"no program was written: {error}")
     entries = []
     for cut in outcome.cuts:
         if cut.plan is not None:
@@ -145,11 +148,10 @@ def outcome_texts(outcome: Outcome, *, strict: bool = False) -> Texts:
             job.robot, job.tool, job.placement, entries, job.source, outcome.cell, part
         ),
         "trajectory.csv": trajectory_text(outcome.plans, moves),
-        "report.html": report_text(outcome, notes),
+        "report.html": report_text(outcome, notes, faults),
     }
-    return Texts(
-        files=files, program=tuple(program), refused=refused, unsafe=unsafe, notes=tuple(notes)
-    )
+    told = (*notes, *faults)
+    return Texts(files=files, program=tuple(program), refused=refused, unsafe=unsafe, notes=told)
 
 
 def stale_program(options: ProgramOptions, folder: Path, program: Sequence[str]) -> Path | None:
@@ -184,6 +186,22 @@ def order_note(part: PartPlan) -> str:
         f"{part.air_time:.1f} s, piercing {part.piercing_time:.1f} s; by these candidates and "
         f"moves {proved}."
     )
+
+
+def short_pieces(outcome: Outcome) -> list[str]:
+    """Say of interrupted contours which piece is shortest, if it is short and nobody asked."""
+    if outcome.job.least_piece is not None:
+        return []
+    lengths: dict[str, list[float]] = {}
+    for cut in outcome.cuts:
+        if cut.plan is not None:
+            lengths.setdefault(cut.contour, []).append(float(np.ptp(cut.plan.contour.s)))
+    return [
+        f"{name}: the shortest of its {len(pieces)} pieces is {min(pieces) * 1e3:.1f} mm; with "
+        "least_piece_mm in [plan] none is shorter than that"
+        for name, pieces in lengths.items()
+        if len(pieces) > 1 and min(pieces) < SHORT_PIECE
+    ]
 
 
 def require_folder(folder: Path) -> None:

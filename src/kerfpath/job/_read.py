@@ -107,6 +107,8 @@ class Job:
         Parts into which the refinement divides every interval between nodes.
     interruptions : {"none", "fewest"}
         Whether a contour that cannot be cut in one go is cut in pieces.
+    least_piece : float m or None
+        Length that every such piece has at least.
     cell : CellTable or None
         What stands around, as the file says it; without one, collisions are not checked.
     sequence : SequenceTable or None
@@ -131,6 +133,7 @@ class Job:
     plan_options: dict[str, Any]
     refine_parts: int
     interruptions: Literal["none", "fewest"]
+    least_piece: float | None
     cell: CellTable | None
     sequence: SequenceTable | None
     layout: LayoutTable
@@ -215,6 +218,7 @@ def read_job(path: str | Path) -> Job:
         plan_options=_plan_options(file.plan, robot) | {"comfort": file.comfort.resolve()},
         refine_parts=file.plan.refine_parts,
         interruptions=file.plan.interruptions,
+        least_piece=None if file.plan.least_piece_mm is None else file.plan.least_piece_mm / 1000,
         cell=file.cell,
         sequence=file.sequence,
         layout=file.layout,

@@ -10,6 +10,7 @@ from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 
+from kerfpath._writing import write_whole
 from kerfpath.errors import InputError
 
 __all__ = ["MANIFEST", "Replaced", "replace_program", "write_files", "write_program"]
@@ -107,22 +108,12 @@ def write_files(folder: str | os.PathLike[str], files: Mapping[str, str]) -> lis
         A file cannot be written.
     """
     paths = {name: Path(folder) / name for name in files}
-    ready: list[tuple[Path, Path]] = []
-    try:
-        for name in reversed(list(files)):
-            try:
-                paths[name].parent.mkdir(parents=True, exist_ok=True)
-            except OSError as error:
-                raise InputError(f"{paths[name].parent}: no folder can be made ({error})") from None
-            ready.append((_beside(paths[name], files[name]), paths[name]))
-        while ready:
-            beside, path = ready[0]
-            _into_place(beside, path)
-            ready.pop(0)
-    finally:
-        for beside, _ in ready:
-            with suppress(OSError):
-                beside.unlink(missing_ok=True)
+    for path in paths.values():
+        try:
+            path.parent.mkdir(parents=True, exist_ok=True)
+        except OSError as error:
+            raise InputError(f"{path.parent}: no folder can be made ({error})") from None
+    _write({paths[name]: files[name] for name in reversed(list(files))})
     return list(paths.values())
 
 
@@ -139,31 +130,16 @@ def write_program(path: str | os.PathLike[str], text: str) -> None:
     target = Path(path)
     if not target.name:
         raise InputError(f"cannot write the program to {str(path)!r}: expected a file name")
-    beside = _beside(target, text)
-    try:
-        _into_place(beside, target)
-    finally:
-        with suppress(OSError):
-            beside.unlink(missing_ok=True)
+    _write({target: text})
 
 
-def _beside(target: Path, text: str) -> Path:
-    """Return a new file beside `target` that holds `text`."""
-    beside = target.with_name(f".{target.name}.{os.getpid()}.tmp")
+def _write(texts: Mapping[Path, str]) -> None:
     try:
-        beside.write_bytes(text.encode("utf-8"))
+        write_whole({path: text.encode("utf-8") for path, text in texts.items()})
     except OSError as error:
-        with suppress(OSError):
-            beside.unlink(missing_ok=True)
-        raise InputError(f"cannot write the program to {target}: {error.strerror}") from None
-    return beside
-
-
-def _into_place(beside: Path, target: Path) -> None:
-    try:
-        beside.replace(target)
-    except OSError as error:
-        raise InputError(f"cannot write the program to {target}: {error.strerror}") from None
+        raise InputError(
+            f"cannot write the program to {error.filename}: {error.strerror}"
+        ) from None
 
 
 def _listed(folder: Path) -> dict[str, dict[str, str]]:

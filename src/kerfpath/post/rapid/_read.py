@@ -22,10 +22,17 @@ from kerfpath.post._read import (
     ReadStep,
     ReadWait,
     partner_of,
-    patterns,
     same_output,
 )
 from kerfpath.post.rapid._axes import joints_from_axes
+from kerfpath.post.rapid._lines import (
+    DECLARED,
+    IN_MAIN,
+    IN_PART,
+    IN_ROUTINE,
+    LINES,
+    OUTSIDE,
+)
 from kerfpath.post.rapid._settings import SWITCH_OFF, RapidSettings
 from kerfpath.post.rapid._write import (
     FIRST,
@@ -49,53 +56,6 @@ def read(main: str, files: Mapping[str, str], robot: Robot, settings: RapidSetti
         if file != main:
             reader.read_module(file)
     return reader.program()
-
-
-_NAME = r"([A-Za-z]\w*)"
-_POSE = r"(\[\[.*?9E9\]\])"
-_TRIGGERS = r"([A-Za-z]\w*(?:\\T\d:=[A-Za-z]\w*)*)"
-_FRAMES = rf"{_NAME}\\WObj:={_NAME}"
-_LINES = patterns(
-    {
-        "blank": r"(?:!.*)?",
-        "module": rf"MODULE {_NAME}",
-        "end_module": "ENDMODULE",
-        "tool": rf"PERS tooldata {_NAME}:=(\[.*\]);",
-        "work_object": rf"PERS wobjdata {_NAME}:=(\[.*\]);",
-        "speed": rf"CONST speeddata {_NAME}:=(\[.*\]);",
-        "zone": rf"CONST zonedata {_NAME}:=(\[.*\]);",
-        "trigger": rf"VAR triggdata {_NAME};",
-        "routine": rf"PROC {_NAME}\(\)",
-        "end_routine": "ENDPROC",
-        "first": rf"PERS num {FIRST}:=(\d+);",
-        "request": rf"SetDO {_NAME},([01]);",
-        "wait_for": rf"WaitDI {_NAME},1\\MaxTime:=([\d.]+);",
-        "set_trigger": rf"TriggIO {_NAME},([\d.]+)\\Time\\DOp:={_NAME},([01]);",
-        "wait": r"WaitTime ([\d.]+);",
-        "load": r'Load \\Dynamic,"([^"]*)/([^"/]*)";',
-        "condition": rf"IF {FIRST}<=(\d+) THEN",
-        "late_call": rf'%"{_NAME}"%;',
-        "unload": r'UnLoad "([^"]*)/([^"/]*)";',
-        "call": rf"IF {FIRST}<=(\d+) {_NAME};",
-        "joint_move": rf"MoveAbsJ (\[.*\]),{_NAME}(?:\\T:=(\d+\.\d+))?,{_NAME},{_FRAMES};",
-        "linear_move": rf"MoveL (\[.*\]),{_NAME},{_NAME},{_FRAMES};",
-        "circular_move": rf"MoveC {_POSE},{_POSE},{_NAME},{_NAME},{_FRAMES};",
-        "switching_move": rf"TriggL (\[.*\]),{_NAME},{_TRIGGERS},{_NAME},{_FRAMES};",
-        "switching_arc": rf"TriggC {_POSE},{_POSE},{_NAME},{_TRIGGERS},{_NAME},{_FRAMES};",
-    }
-)
-_OUTSIDE = {
-    "tool", "work_object", "speed", "zone", "trigger", "first", "routine", "end_module",
-}  # fmt: skip
-_DECLARED = _OUTSIDE - {"routine", "end_module"}
-_IN_PART = {"routine", "end_module"}
-_IN_MAIN = {
-    "set_trigger", "load", "condition", "late_call", "unload", "call", "end_routine",
-}  # fmt: skip
-_IN_ROUTINE = {
-    "joint_move", "linear_move", "circular_move", "switching_move", "switching_arc", "wait",
-    "request", "wait_for", "end_routine",
-}  # fmt: skip
 
 
 class _Reader:
@@ -134,7 +94,7 @@ class _Reader:
 
     def read(self, number: int, line: str) -> None:
         self.line = number
-        if _LINES["blank"].fullmatch(line):
+        if LINES["blank"].fullmatch(line):
             return
         if self.ended:
             raise self.fault("nothing may follow ENDMODULE")
@@ -150,12 +110,12 @@ class _Reader:
         if not self.name:
             expected = {"module"}
         elif self.routine_name is None:
-            expected = _OUTSIDE if self.file == self.main else _IN_PART
+            expected = OUTSIDE if self.file == self.main else IN_PART
         else:
-            expected = _IN_MAIN if self.routine_name == "main" else _IN_ROUTINE
+            expected = IN_MAIN if self.routine_name == "main" else IN_ROUTINE
         for kind in expected:
-            if match := _LINES[kind].fullmatch(line):
-                if kind in _DECLARED and self.routines:
+            if match := LINES[kind].fullmatch(line):
+                if kind in DECLARED and self.routines:
                     raise self.fault("data must be declared before the first routine")
                 getattr(self, kind)(*match.groups())
                 return
