@@ -39,6 +39,9 @@ LEAD = 6e-4
 """The same of lead times and waits (s): controllers count milliseconds."""
 DURATION = 1e-6
 """The same of durations (s), where a text says times."""
+DERIVED = np.radians(1.0)
+"""How far (rad) joints may be off that follow from a pose and its words: the digits of the pose,
+near a singular stand; another posture is farther."""
 REACH = 4.0
 """Farther (m) than a tip is from any axis: the lever of what digits leave of joints."""
 SHARE = 6e-3
@@ -149,7 +152,7 @@ def _places(
             point,
             angle,
         )
-    jointed = [(m, b) for m, b in pairs if b.q is not None]
+    jointed = [(m, b) for m, b in pairs if b.q is not None and b.T_part_tip is None]
     if jointed:
         q, q_back = np.array([m.q for m, _ in jointed]), np.array([b.q for _, b in jointed])
         forward = program.robot.forward
@@ -162,7 +165,11 @@ def _places(
         for k in np.flatnonzero(off > angle).tolist():
             joint = int(np.abs(q[k] - q_back[k]).argmax()) + 1
             yield _issue(backs[k], f"joint {joint} is {np.degrees(off[k]):.4f} deg off")
-    for _, back in pairs:
+    for move, back in pairs:
+        if back.q is not None and back.T_part_tip is not None:
+            off_by = float(np.abs(move.q - back.q).max())
+            if off_by > DERIVED:
+                yield _issue(back, f"its words lead to joints {np.degrees(off_by):.1f} deg off")
         if back.q is None and back.T_part_tip is None:
             yield _issue(back, "says no target")
 

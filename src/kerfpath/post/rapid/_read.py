@@ -22,10 +22,17 @@ from kerfpath.post._read import (
     ReadStep,
     ReadWait,
     partner_of,
-    patterns,
     same_output,
 )
 from kerfpath.post.rapid._axes import joints_from_axes
+from kerfpath.post.rapid._lines import (
+    DECLARED,
+    IN_MAIN,
+    IN_PART,
+    IN_ROUTINE,
+    LINES,
+    OUTSIDE,
+)
 from kerfpath.post.rapid._settings import SWITCH_OFF, RapidSettings
 from kerfpath.post.rapid._write import (
     FIRST,
@@ -51,55 +58,6 @@ def read(main: str, files: Mapping[str, str], robot: Robot, settings: RapidSetti
     return reader.program()
 
 
-_NAME = r"([A-Za-z]\w*)"
-_POSE = r"(\[\[.*?9E9\]\])"
-_TRIGGERS = r"([A-Za-z]\w*(?:\\T\d:=[A-Za-z]\w*)*)"
-_FRAMES = rf"{_NAME}\\WObj:={_NAME}"
-_LINES = patterns(
-    {
-        "blank": r"(?:!.*)?",
-        "module": rf"MODULE {_NAME}",
-        "end_module": "ENDMODULE",
-        "tool": rf"PERS tooldata {_NAME}:=(\[.*\]);",
-        "work_object": rf"PERS wobjdata {_NAME}:=(\[.*\]);",
-        "speed": rf"CONST speeddata {_NAME}:=(\[.*\]);",
-        "zone": rf"CONST zonedata {_NAME}:=(\[.*\]);",
-        "trigger": rf"VAR triggdata {_NAME};",
-        "routine": rf"PROC {_NAME}\(\)",
-        "end_routine": "ENDPROC",
-        "first": rf"PERS num {FIRST}:=(\d+);",
-        "request": rf"SetDO {_NAME},([01]);",
-        "wait_for": rf"WaitDI {_NAME},1\\MaxTime:=([\d.]+);",
-        "set_trigger": rf"TriggIO {_NAME},([\d.]+)\\Time\\DOp:={_NAME},([01]);",
-        "wait": r"WaitTime ([\d.]+);",
-        "load": r'Load \\Dynamic,"([^"]*)/([^"/]*)";',
-        "late_call": rf'IF {FIRST}<=(\d+) %"{_NAME}"%;',
-        "part": rf"IF {FIRST}<=(\d+) THEN",
-        "end_part": "ENDIF",
-        "unload": r'UnLoad "([^"]*)/([^"/]*)";',
-        "call": rf"IF {FIRST}<=(\d+) {_NAME};",
-        "joint_move": rf"MoveAbsJ (\[.*\]),{_NAME}(?:\\T:=(\d+\.\d+))?,{_NAME},{_FRAMES};",
-        "linear_move": rf"MoveL (\[.*\]),{_NAME},{_NAME},{_FRAMES};",
-        "circular_move": rf"MoveC {_POSE},{_POSE},{_NAME},{_NAME},{_FRAMES};",
-        "switching_move": rf"TriggL (\[.*\]),{_NAME},{_TRIGGERS},{_NAME},{_FRAMES};",
-        "switching_arc": rf"TriggC {_POSE},{_POSE},{_NAME},{_TRIGGERS},{_NAME},{_FRAMES};",
-    }
-)
-_OUTSIDE = {
-    "tool", "work_object", "speed", "zone", "trigger", "first", "routine", "end_module",
-}  # fmt: skip
-_DECLARED = _OUTSIDE - {"routine", "end_module"}
-_IN_PART = {"routine", "end_module"}
-_IN_MAIN = {
-    "set_trigger", "part", "load", "late_call", "unload", "end_part", "call",
-    "end_routine",
-}  # fmt: skip
-_IN_ROUTINE = {
-    "joint_move", "linear_move", "circular_move", "switching_move", "switching_arc", "wait",
-    "request", "wait_for", "end_routine",
-}  # fmt: skip
-
-
 class _Reader:
     """Reads line by line; each kind of line has a method of its name."""
 
@@ -123,8 +81,8 @@ class _Reader:
         self.routines: dict[str, list[ReadStep]] = {}
         self.homes: dict[str, str] = {}
         self.first_number = 0
-        self.last_of_part = 0
         self.must_say: list[str] = []
+        self.number: str | None = None
 
     def read_module(self, file: str) -> None:
         self.file, self.line, self.ended, self.name = file, 0, False, ""
@@ -136,7 +94,7 @@ class _Reader:
 
     def read(self, number: int, line: str) -> None:
         self.line = number
-        if _LINES["blank"].fullmatch(line):
+        if LINES["blank"].fullmatch(line):
             return
         if self.ended:
             raise self.fault("nothing may follow ENDMODULE")
@@ -145,19 +103,19 @@ class _Reader:
                 raise self.fault(f"expected {self.must_say[0]!r}, got {line[:60]!r}")
             del self.must_say[0]
             return
-        if self.routine_name == "main" and line == ending()[0].strip():
+        if self.routine_name == "main" and self.number is None and line == ending()[0].strip():
             self.must_say = [*(row.strip() for row in ending()[1:]), "ENDPROC"]
             self.routine_name = None
             return
         if not self.name:
             expected = {"module"}
         elif self.routine_name is None:
-            expected = _OUTSIDE if self.file == self.main else _IN_PART
+            expected = OUTSIDE if self.file == self.main else IN_PART
         else:
-            expected = _IN_MAIN if self.routine_name == "main" else _IN_ROUTINE
+            expected = IN_MAIN if self.routine_name == "main" else IN_ROUTINE
         for kind in expected:
-            if match := _LINES[kind].fullmatch(line):
-                if kind in _DECLARED and self.routines:
+            if match := LINES[kind].fullmatch(line):
+                if kind in DECLARED and self.routines:
                     raise self.fault("data must be declared before the first routine")
                 getattr(self, kind)(*match.groups())
                 return
@@ -277,18 +235,8 @@ class _Reader:
         same_output(output, self.settings.laser_output, f"{self.file}, line {self.line}")
         return "laser"
 
-    def part(self, last: str) -> None:
-        if self.last_of_part or self.loaded:
-            raise self.fault("expected one module at a time")
-        self.last_of_part = int(last)
-
-    def end_part(self) -> None:
-        if self.loaded or self.last_of_part != len(self.called_in):
-            raise self.fault("the number in IF must be that of the last contour of the module")
-        self.last_of_part = 0
-
     def load(self, folder: str, file: str) -> None:
-        if self.loaded or not self.last_of_part or folder != self.settings.folder:
+        if self.loaded or folder != self.settings.folder:
             raise self.fault(f"expected one module at a time, from {self.settings.folder}")
         self.loaded = file
 
@@ -297,10 +245,16 @@ class _Reader:
             raise self.fault(f"{folder}/{file} is not loaded")
         self.loaded = ""
 
-    def late_call(self, number: str, name: str) -> None:
-        if not self.loaded:
-            raise self.fault(f"{name} is called while no module is loaded")
-        self.call(number, name)
+    def condition(self, number: str) -> None:
+        if self.number is not None:
+            raise self.fault("a condition must have one call")
+        self.number = number
+
+    def late_call(self, name: str) -> None:
+        if not self.loaded or self.number is None:
+            raise self.fault(f"{name} is called while no module is loaded, or without a condition")
+        self.call(self.number, name)
+        self.number, self.must_say = None, ["ENDIF"]
 
     def call(self, number: str, name: str) -> None:
         if name in self.called_in:
