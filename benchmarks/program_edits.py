@@ -34,7 +34,7 @@ COLUMNS = (
     "harm: caught", "refused", "passed", "harmless: passed", "not", "not of our making", "either",
 )  # fmt: skip
 """Of the tables: what does harm, what is harmless, what no reader takes, and what may do either."""
-EDITS = 1000
+EDITS = 300
 """Of the text, in every language."""
 ARMS = {"inform": "yaskawa_gp25", "urscript": "ur_ur10e"}
 """Robots of languages that cannot say the axes of the one below."""
