@@ -144,7 +144,7 @@ class Subject:
         if found.passed:
             return "passed", ""
         wrong = [(n, c) for n, table in found.tables.items() for c in table if not c.ok]
-        said = [f"{found.place(n, c)}: {c.issue().message}" for n, c in wrong]
+        said = [found.said(n, c) for n, c in wrong]
         return "caught", "; ".join([*said, *found.missing])
 
 
