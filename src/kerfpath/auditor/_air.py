@@ -55,7 +55,8 @@ def air_checks(
         raise InputError(f"air move: it is not known yet how a {robot.external.kind} moves in it")
     corners = floats(q, "q", (None, robot.joints))
     duration = np.diff(floats(time, "time", (len(corners),)))
-    late = _needed(robot, np.abs(np.diff(corners, axis=0)), eta_v, eta_a) / duration
+    needed = _needed(robot, np.abs(np.diff(corners, axis=0)), eta_v, eta_a)
+    late = np.where(duration > 0, needed / np.where(duration > 0, duration, 1.0), np.inf)
     limits = robot.joint_limits()
     beyond = np.maximum(limits.lower - corners, corners - limits.upper)
     beyond[:, robot.endless] = -np.inf

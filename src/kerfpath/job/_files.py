@@ -29,6 +29,7 @@ __all__ = [
     "collision_note",
     "make_folder",
     "outcome_texts",
+    "planned_text",
     "program_of",
     "require_folder",
     "require_language",
@@ -119,21 +120,27 @@ def outcome_texts(outcome: Outcome, *, strict: bool = False) -> Texts:
         except InputError as error:
             refused = str(error)
             notes.append(f"no program was written: {error}")
+    files = {
+        **program,
+        "plan.json": planned_text(outcome),
+        "trajectory.csv": trajectory_text(outcome.plans, moves),
+        "report.html": report_text(outcome, notes),
+    }
+    return Texts(files=files, program=tuple(program), refused=refused, notes=tuple(notes))
+
+
+def planned_text(outcome: Outcome) -> str:
+    """Return the text of the plan.json of a run."""
+    job = outcome.job
     entries = []
     for cut in outcome.cuts:
         if cut.plan is not None:
             entries.append(plan_entry(cut.plan, cut.contour, cut.checks))
         elif cut.broken is not None:
             entries.append(broken_entry(cut.task.name, cut.broken, cut.fastest))
-    files = {
-        **program,
-        "plan.json": plan_text(
-            job.robot, job.tool, job.placement, entries, job.source, outcome.cell, part
-        ),
-        "trajectory.csv": trajectory_text(outcome.plans, moves),
-        "report.html": report_text(outcome, notes),
-    }
-    return Texts(files=files, program=tuple(program), refused=refused, notes=tuple(notes))
+    return plan_text(
+        job.robot, job.tool, job.placement, entries, job.source, outcome.cell, outcome.part
+    )
 
 
 def stale_program(options: ProgramOptions, folder: Path, program: Sequence[str]) -> Path | None:
