@@ -199,7 +199,7 @@ def leaf_edit(data: Any, rng: random.Random) -> tuple[str, str, Any] | None:
 
 
 def _anywhere(data: Any, rng: random.Random) -> tuple[Path, Any]:
-    """Go down from the top, each branch as likely as the next: large arrays get few of the edits."""
+    """Go down from the top, each branch as likely as the next, large or small."""
     path: Path = ()
     while isinstance(data, dict | list) and data:
         step = rng.choice(list(data) if isinstance(data, dict) else range(len(data)))

@@ -135,7 +135,7 @@ def planned_text(outcome: Outcome) -> str:
     entries = []
     for cut in outcome.cuts:
         if cut.plan is not None:
-            entries.append(plan_entry(cut.plan, cut.contour, cut.checks))
+            entries.append(plan_entry(cut.plan, cut.contour, cut.checks, picked=cut.picked))
         elif cut.broken is not None:
             entries.append(broken_entry(cut.task.name, cut.broken, cut.fastest))
     return plan_text(

@@ -183,7 +183,13 @@ def _cut(
     if cell is not None and job.cell is not None and job.cell.map:
         clearance = clearance_map(graph, cell)
     whole = Cut(
-        contour=task.name, task=task, drawn=drawn, nodes=nodes, graph=graph, clearance=clearance
+        contour=task.name,
+        task=task,
+        drawn=drawn,
+        nodes=nodes,
+        graph=graph,
+        clearance=clearance,
+        picked=chosen is not None,
     )
     kept = cell
     if chosen is not None:
