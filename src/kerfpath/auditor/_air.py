@@ -9,7 +9,7 @@ from numpy.typing import ArrayLike
 
 from kerfpath._arrays import Array, Ints, floats
 from kerfpath.auditor._chain import chain_of
-from kerfpath.auditor._collision import collision_at
+from kerfpath.auditor._collision import collision_along
 from kerfpath.auditor._table import Check, Unit
 from kerfpath.cell import Cell
 from kerfpath.errors import InputError
@@ -66,7 +66,10 @@ def air_checks(
     ]
     if cell is not None and len(cell.pairs):
         samples, leg = _sampled(corners)
-        rows += collision_at(cell, samples, leg, chain_of(robot))
+        steps = np.flatnonzero(leg[1:] == leg[:-1])
+        rows += collision_along(
+            cell, samples[steps], samples[steps + 1], leg[steps], chain_of(robot)
+        )
     return rows
 
 

@@ -1,11 +1,11 @@
 """What the joints do between the samples of a straight move: bisected until nothing can hide.
 
-On a straight move J(q) q' = V, the tool's twist per interval. If s is the least singular value of J
-at a sample and J changes by at most L for each radian that the joints turn, then within a step h of
-the interval the joints stay within r of the sample, where L r^2 - s r + |V| h = 0; the least singular
-value stays above s - L r, joint speeds below S = |V| / (s - L r), and their change per step below
-Q h with Q = (L S^2 + |V'|) / (s - L r). A step is divided until what it can hide is too small to
-matter, or cannot reach a limit. Lengths count in m, so that 1 m weighs as much as 1 rad.
+On a straight move J(q) q' = V, the tool's twist per interval. If s is the least singular value of
+J at a sample and J changes by at most L for each radian that the joints turn, then within a step h
+of the interval the joints stay within r of the sample, where L r^2 - s r + |V| h = 0; the least
+singular value stays above s - L r, joint speeds below S = |V| / (s - L r), and their change per
+step below Q h with Q = (L S^2 + |V'|) / (s - L r). A step is divided until what it can hide is too
+small to matter, or cannot reach a limit. Lengths are in m, so that 1 m weighs as much as 1 rad.
 """
 
 from __future__ import annotations
@@ -211,7 +211,7 @@ class _Task:
         most = np.maximum(np.abs(steps.v0), np.abs(steps.v1))[:, own]
         slow = ((most + faster <= fast) | (faster <= HIDDEN_SPEED * fast)).all(axis=1)
         joined = np.linalg.norm((steps.q1 - steps.q0)[:, own], axis=1) <= r + 1e-6
-        return known & joined & slow & (inside | (hidden <= HIDDEN_ANGLE))
+        return np.asarray(known & joined & slow & (inside | (hidden <= HIDDEN_ANGLE)))
 
     def halved(self, steps: _Steps) -> tuple[_Steps, Array]:
         """Return the two halves of each step after each other, and what their middles miss."""
