@@ -23,6 +23,7 @@ NAMES = (
     "cad",
     "part",
     "programs",
+    "plan_edits",
     "pareto",
     "sweeps",
     "layout",
@@ -72,6 +73,10 @@ def _run(name: str, *, quick: bool) -> list[Report]:
         from benchmarks import programs
 
         return [programs.run(quick=quick)]
+    if name == "plan_edits":
+        from benchmarks import plan_edits
+
+        return [plan_edits.run(quick=quick)]
     if name == "pareto":
         from benchmarks import pareto
 

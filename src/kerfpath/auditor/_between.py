@@ -26,10 +26,12 @@ HIDDEN_ANGLE = 1e-5
 """rad that a joint may be beyond what its samples show."""
 HIDDEN_SPEED = 1e-2
 """Share of its limit by which a joint may be faster than at the samples."""
+BY_FAR = 5.0
+"""Times a speed limit from which on a speed need not be known better."""
 DEEPEST = 14
 """Times that a part of an interval is halved at most: to a hundred thousandth of it."""
-MOST = 400_000
-"""Samples of a plan at most."""
+MOST = 60
+"""Samples of an interval at most, on the average of a plan, beyond the first and 5000 in all."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -111,25 +113,23 @@ def between(plan: Plan, chain: JointChain, motion: Motion, interpolation: Interp
     )  # fmt: skip
     values = motion.q @ task.rows.T
     low, high, residual = values.min(axis=1), values.max(axis=1), np.zeros(K)
-    speed = np.abs(v).reshape(K, parts + 1, -1).max(axis=1)
+    speed = task.fastest(steps).reshape(K, parts, -1).max(axis=1)
     left, count = np.zeros(K, bool), len(flat)
     for _ in range(DEEPEST):
         steps = steps.rows(~task.settled(steps))
         if not len(steps.k):
             break
-        if count + len(steps.k) > MOST:
+        if count + len(steps.k) > len(flat) + MOST * K + 5000:
             break
         steps, missed = task.halved(steps)
         count += len(steps.k) // 2
         np.maximum.at(residual, steps.k[::2], missed)
         np.minimum.at(low, steps.k, steps.q0 @ task.rows.T)
         np.maximum.at(high, steps.k, steps.q0 @ task.rows.T)
-        np.maximum.at(speed, steps.k, np.abs(steps.v0))
+        np.maximum.at(speed, steps.k, task.fastest(steps))
     else:
         steps = steps.rows(~task.settled(steps))
     left[steps.k] = True
-    # A jump from one branch to another between two samples is a speed, too.
-    np.maximum.at(speed, steps.k, np.abs(steps.q1 - steps.q0) / steps.h[:, None])
     return Between(low=low, high=high, speed=speed, residual=residual, open=left)
 
 
@@ -208,10 +208,17 @@ class _Task:
             (np.minimum(one, two) - by >= self._low) & (np.maximum(one, two) + by <= self._high)
         ).all(axis=1)
         fast = self._fast[steps.k]
-        most = np.maximum(np.abs(steps.v0), np.abs(steps.v1))[:, own]
+        most = self.fastest(steps)[:, own]
         slow = ((most + faster <= fast) | (faster <= HIDDEN_SPEED * fast)).all(axis=1)
         joined = np.linalg.norm((steps.q1 - steps.q0)[:, own], axis=1) <= r + 1e-6
-        return np.asarray(known & joined & slow & (inside | (hidden <= HIDDEN_ANGLE)))
+        safe = known & joined & slow & (inside | (hidden <= HIDDEN_ANGLE))
+        # What breaks a limit by far is seen, and need not be known better.
+        return np.asarray(safe | (most > BY_FAR * fast).any(axis=1))
+
+    def fastest(self, steps: _Steps) -> Array:
+        """Return the speeds (S, n) per interval seen in steps; a jump to another branch is one."""
+        ends = np.maximum(np.abs(steps.v0), np.abs(steps.v1))
+        return np.asarray(np.maximum(ends, np.abs(steps.q1 - steps.q0) / steps.h[:, None]))
 
     def halved(self, steps: _Steps) -> tuple[_Steps, Array]:
         """Return the two halves of each step after each other, and what their middles miss."""

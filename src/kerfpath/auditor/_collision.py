@@ -41,7 +41,7 @@ def collisions(cell: Cell, motion: Motion, chain: JointChain) -> list[Check]:
 def collision_along(cell: Cell, q0: Array, q1: Array, node: Ints, chain: JointChain) -> list[Check]:
     """Return the same checks of motions from q0 to q1 (S, n) rad, each of a node (S,).
 
-    They are divided until nothing nearer can hide; where that cannot be said, a warning counts it.
+    They are divided until nothing nearer can hide; where that cannot be said, it is counted.
     """
     between, nodes, open_ = in_between(cell, q0, q1, node, chain)
     q, node = np.vstack([q0, q1, between]), np.concatenate([node, node, nodes])
@@ -53,7 +53,6 @@ def collision_along(cell: Cell, q0: Array, q1: Array, node: Ints, chain: JointCh
         limit=0.0,
         unit="count",
         node=int(open_[0]) if len(open_) else 0,
-        level="warning",
     )
     rows = [("collision", "", ~cell.own), ("collision-own", " of their own", cell.own)]
     found = [

@@ -22,6 +22,8 @@ FAR = 0.1
 """m beyond the near-miss distance up to which distances are measured."""
 DEEPEST = 10
 """Times that a step is halved at most."""
+MOST = 8
+"""Joint vectors looked at for each of the first steps, at most, on the average."""
 CURVED = 2.0
 """Joints on a straight move do not run quite evenly: what that bends is taken as much again."""
 
@@ -44,10 +46,12 @@ def in_between(
     nodes: list[Ints] = []
     F0, F1 = frames_of(chain, q0), frames_of(chain, q1)
     d0, d1 = moves.apart(F0), moves.apart(F1)
+    most = MOST * len(q0) + 1000
     for _ in range(DEEPEST):
         left = moves.left(q1 - q0, F0, F1, d0, d1)
         q0, q1, node = q0[left], q1[left], node[left]
-        if not len(node):
+        if not len(node) or sum(map(len, nodes)) + len(node) > most:
+            F0, F1, d0, d1 = F0[left], F1[left], d0[left], d1[left]
             break
         half = (q0 + q1) / 2
         F, d = frames_of(chain, half), moves.apart(frames_of(chain, half))
