@@ -28,9 +28,9 @@ EDITS = 3000
 """Of each of the jobs."""
 SEED = 14
 HOW = (
-    "Every value of four small plan.json files, and values of their jobs, edited by a seeded grammar; "
-    "an oracle that owes the audit nothing says which edits are harmless. Counted is what the audit "
-    "with the job makes of them: a finding (caught), bad input (refused), nothing (passed)."
+    "Every value of four small plan.json files, and values of their jobs, edited by a seeded "
+    "grammar; an oracle that owes the audit nothing says which edits are harmless. Counted is what "
+    "the audit with the job makes of them: a finding (caught), bad input (refused), or nothing."
 )
 JOB_EDITS: tuple[tuple[str, str], ...] = (
     ("eta_velocity = 0.9", "eta_velocity = 0.01"),

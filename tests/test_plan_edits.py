@@ -12,7 +12,7 @@ from kerfpath.job import PlanAudit, audit_file, read_plan_file
 from test_benchmarks import benchmark_module
 from test_cli import run
 
-EDITS = 60
+EDITS = 45
 """Of each of four jobs: what a few seconds allow. `python -m benchmarks plan_edits` does 3000."""
 
 
@@ -27,13 +27,12 @@ def made(folder):
     return {name: jobs.planned(folder, name) for name in jobs.JOBS}
 
 
-@pytest.mark.parametrize("seed", [1, 2])
-def test_no_harmful_edit_of_a_plan_passes(made, seed):
+def test_no_harmful_edit_of_a_plan_passes(made):
     bench = benchmark_module("plan_edits")
     tally = bench.Tally()
     for job, plan in made.values():
         audit = PlanAudit.of(job)
-        bench.edited_plans(tally, lambda p, a=audit: a.audited(p).passed, plan, EDITS, seed)
+        bench.edited_plans(tally, lambda p, a=audit: a.audited(p).passed, plan, EDITS, seed=1)
     assert tally.passed == []
     assert tally.broke == []
     assert tally.total("caught") > EDITS  # the edits do get as far as the audit

@@ -10,7 +10,6 @@ from typing import Any
 from kerfpath import __version__
 from kerfpath.auditor import Check, air_checks, checks, worst_of
 from kerfpath.job._asked import Asked, asked_of, order_checks
-from kerfpath.job._files import collision_note
 from kerfpath.job._plan_differs import disagreement, job_disagreement
 from kerfpath.job._plan_expected import Expected, expected_plans
 from kerfpath.job._plan_follows import SAME, following
@@ -19,7 +18,7 @@ from kerfpath.job._planfile import plan_data, plan_entry
 from kerfpath.job._planread import PlanFile, read_plan_file, table_of
 from kerfpath.job._read import audit_options, read_job
 from kerfpath.job._tables import AuditTable
-from kerfpath.job._verdict import Audited
+from kerfpath.job._verdict import Audited, collision_note
 from kerfpath.plans import Plan
 
 __all__ = ["PlanAudit", "audit_file"]
