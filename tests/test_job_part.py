@@ -180,7 +180,11 @@ def test_the_audit_against_the_drawing_knows_what_was_made_of_it(folder, done):
     # Another kerf is another path.
     other = folder / "other.toml"
     other.write_text(WHOLE.replace("kerf_mm = 0.2", "kerf_mm = 1.2"))
-    refused(run("audit", str(out / "plan.json"), "--job", str(other)), "reference: ")
+    result = run("audit", str(out / "plan.json"), "--job", str(other), "--json")
+    assert result.returncode == 1, result.stderr
+    found = json.loads(result.stdout)["contours"]
+    assert any("kerf_mm" in c["title"] for c in found["plan.json"])
+    assert not all(c["ok"] for c in found["led in"])
 
 
 ALL = """\

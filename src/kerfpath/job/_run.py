@@ -186,7 +186,13 @@ def _cut(
         progress(f"{task.name}: map of the cell", 0, 0)
         clearance = clearance_map(graph, cell)
     whole = Cut(
-        contour=task.name, task=task, drawn=drawn, nodes=nodes, graph=graph, clearance=clearance
+        contour=task.name,
+        task=task,
+        drawn=drawn,
+        nodes=nodes,
+        graph=graph,
+        clearance=clearance,
+        picked=chosen is not None,
     )
     kept = cell
     if chosen is not None:
