@@ -11,6 +11,7 @@ from typing import Generic, Protocol, TypeVar
 import numpy as np
 
 from kerfpath._arrays import Array
+from kerfpath._told import told
 from kerfpath.contour import Contour
 from kerfpath.errors import InputError
 
@@ -121,6 +122,8 @@ class Chain(Generic[E]):
     is_closed: bool = True
     next_end: str = ""
 
+    __repr__ = told
+
     @property
     def curves(self) -> Sequence[Curve]:
         """Its edges."""
@@ -191,6 +194,8 @@ class Polyline:
 
     line: Contour
 
+    __repr__ = told
+
     def breaks(self) -> Array:
         """Return the parameters of the nodes."""
         return self.line.s
@@ -208,6 +213,8 @@ class Points:
     points: Array
     normals: Array
     is_closed: bool
+
+    __repr__ = told
 
     @cached_property
     def lengths(self) -> Array:

@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 
+from kerfpath._told import told
 from kerfpath.air import AirMove
 from kerfpath.cell import Cell
 from kerfpath.errors import AuditFailed, InputError
@@ -63,6 +64,8 @@ class Written:
     stale: Path | None
     notes: tuple[str, ...]
 
+    __repr__ = told
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Texts:
@@ -84,6 +87,8 @@ class Texts:
     program: tuple[str, ...]
     refused: str
     notes: tuple[str, ...]
+
+    __repr__ = told
 
 
 def write_outcome(outcome: Outcome, folder: Path, *, strict: bool = False) -> Written:

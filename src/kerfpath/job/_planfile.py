@@ -13,6 +13,7 @@ import numpy as np
 
 from kerfpath import __version__
 from kerfpath._arrays import Array
+from kerfpath._told import told
 from kerfpath.air import AirMove
 from kerfpath.auditor import Check
 from kerfpath.cell import Cell
@@ -67,6 +68,8 @@ class PlanFile:
     contours: dict[str, str]
     moves: tuple[AirMove, ...]
     in_cell: bool
+
+    __repr__ = told
 
 
 def plan_text(

@@ -10,6 +10,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation, Slerp
 
 from kerfpath._arrays import Array, Bools
+from kerfpath._told import told
 from kerfpath.errors import InputError
 from kerfpath.job._read import Job
 from kerfpath.job._tables import ProgramTable
@@ -133,6 +134,8 @@ class ReadCut:
     waits: Array
     q_out: Array
     moves: tuple[ReadMove, ...]
+
+    __repr__ = told
 
 
 def cuts_of(

@@ -9,6 +9,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from kerfpath._arrays import Array
+from kerfpath._told import told
 from kerfpath.post._compare import ANGLE, FRAME, LEAD, POINT, SHARE, events
 from kerfpath.post._groups import ReadGroup, groups_of
 from kerfpath.post._matching import Pair, Stop, matched, pairs_of
@@ -42,6 +43,8 @@ class Difference:
     count: int
     message: str
     places: tuple[str, ...] = ()
+
+    __repr__ = told
 
     def __str__(self) -> str:
         at = f", at {' / '.join(self.places)}" if self.places else ""

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 
+from kerfpath._told import told
 from kerfpath.post._read import ReadMove, ReadProgram, ReadStep, ReadWait
 
 __all__ = ["ReadGroup", "groups_of"]
@@ -26,6 +27,8 @@ class ReadGroup:
     joint: list[ReadMove] = field(default_factory=list)
     path: list[ReadMove] = field(default_factory=list)
     waits: list[tuple[int, float]] = field(default_factory=list)
+
+    __repr__ = told
 
 
 def groups_of(read: ReadProgram) -> list[ReadGroup]:

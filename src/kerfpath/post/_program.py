@@ -9,6 +9,7 @@ from typing import Literal, get_args
 import numpy as np
 
 from kerfpath._arrays import Array, as_pose, floats
+from kerfpath._told import told
 from kerfpath.errors import InputError
 from kerfpath.robots import Robot
 
@@ -69,6 +70,8 @@ class JointMove:
     speed: float
     zone: float = 0.0
 
+    __repr__ = told
+
     def __post_init__(self) -> None:
         object.__setattr__(self, "q", floats(self.q, "q", (None,)))
 
@@ -100,6 +103,8 @@ class LinearMove:
     zone: float = 0.0
     switches: tuple[Switch, ...] = ()
 
+    __repr__ = told
+
     def __post_init__(self) -> None:
         object.__setattr__(self, "T_part_tip", as_pose(self.T_part_tip, "T_part_tip"))
         object.__setattr__(self, "q", floats(self.q, "q", (None,)))
@@ -119,6 +124,8 @@ class CircularMove(LinearMove):
 
     T_part_via: Array
     q_via: Array
+
+    __repr__ = told
 
     def __post_init__(self) -> None:
         super(CircularMove, self).__post_init__()
@@ -144,6 +151,8 @@ class Comment:
 
     text: str
 
+    __repr__ = told
+
 
 PathMove = LinearMove | CircularMove
 Move = JointMove | LinearMove | CircularMove
@@ -156,6 +165,8 @@ class Section:
 
     name: str
     steps: tuple[Step, ...]
+
+    __repr__ = told
 
     @property
     def moves(self) -> tuple[Move, ...]:
@@ -186,6 +197,8 @@ class Program:
     T_base_part: Array
     sections: tuple[Section, ...]
     air_checked: bool = False
+
+    __repr__ = told
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "T_flange_tip", as_pose(self.T_flange_tip, "T_flange_tip"))

@@ -10,6 +10,7 @@ from typing import Any, Literal, Protocol, get_args
 import numpy as np
 
 from kerfpath._arrays import Array, freeze
+from kerfpath._told import told
 from kerfpath.errors import InputError
 from kerfpath.post._program import Switch
 from kerfpath.robots import Robot
@@ -63,6 +64,8 @@ class ReadMove:
     posture: tuple[int | str, ...] = ()
     switches: tuple[Switch, ...] = ()
 
+    __repr__ = told
+
     @property
     def place(self) -> str:
         """Where it stands."""
@@ -76,6 +79,8 @@ class ReadWait:
     time: float
     file: str
     line: int
+
+    __repr__ = told
 
     @property
     def place(self) -> str:
@@ -92,6 +97,8 @@ class ReadSection:
 
     name: str
     steps: tuple[ReadStep, ...]
+
+    __repr__ = told
 
     @property
     def moves(self) -> tuple[ReadMove, ...]:
@@ -116,6 +123,8 @@ class ReadProgram:
     sections: tuple[ReadSection, ...]
     T_flange_tip: Array | None = None
     T_base_part: Array | None = None
+
+    __repr__ = told
 
     @property
     def steps(self) -> tuple[ReadStep, ...]:

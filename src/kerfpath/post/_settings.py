@@ -8,6 +8,8 @@ from typing import Annotated, Any
 import numpy as np
 from pydantic import BaseModel, ConfigDict, Field
 
+from kerfpath._told import told
+
 __all__ = ["Rules", "Settings", "setting"]
 
 
@@ -58,3 +60,5 @@ class Rules:
     longest_lead: float = np.inf
     point_step: float = 0.0
     angle_step: float = 0.0
+
+    __repr__ = told
