@@ -33,8 +33,6 @@ FINER = "sample the contour more finely"
 """What helps where the nodes lie on the path and the way between them does not."""
 OFF_THE_PATH = "the target itself is off the path there: put it back, or plan the path meant"
 """What helps where a node was moved, as by hand."""
-    "the target itself is off the path there: put it back, or plan the path that is meant"
-)
 
 
 def audit(
