@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import os
-from contextlib import suppress
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from threading import Lock
 
@@ -12,22 +13,36 @@ __all__ = ["no_more_writing", "write_whole"]
 _WRITING = Lock()
 
 
-def write_whole(target: Path, content: bytes) -> None:
-    """Write `content` to a file beside `target` first, then put that in its place.
+def write_whole(files: Mapping[Path, bytes]) -> None:
+    """Write all files or none: each beside its place first, then all into their places in order.
 
     Raises
     ------
     OSError
-        It cannot be written; nothing is left beside the target.
+        One cannot be written, `filename` says which; nothing is left beside the others.
     """
-    beside = target.with_name(f".{target.name}.{os.getpid()}.tmp")
+    beside = {path: path.with_name(f".{path.name}.{os.getpid()}.tmp") for path in files}
     with _WRITING:
         try:
-            beside.write_bytes(content)
-            beside.replace(target)
+            for path, content in files.items():
+                with _about(path):
+                    beside[path].write_bytes(content)
+            for path in files:
+                with _about(path):
+                    beside[path].replace(path)
         finally:
-            with suppress(OSError):
-                beside.unlink(missing_ok=True)
+            for path in files:
+                with suppress(OSError):
+                    beside[path].unlink(missing_ok=True)
+
+
+@contextmanager
+def _about(path: Path) -> Iterator[None]:
+    """Let errors name the file that was to be written."""
+    try:
+        yield
+    except OSError as error:
+        raise OSError(error.errno, error.strerror, str(path)) from None
 
 
 def no_more_writing(timeout: float) -> None:

@@ -163,11 +163,12 @@ def speed(
 def post(
     plan_file: PlanFileArgument,
     language: Annotated[
-        str,
+        str | None,
         typer.Option(
-            help="Robot language: rapid, krl, fanuc, val3, inform, urscript, ros, csv, or your own."
+            help="Robot language: rapid, krl, fanuc, val3, inform, urscript, ros, csv, or your "
+            "own; default: the one that the job asks for."
         ),
-    ] = "rapid",
+    ] = None,
     output: Annotated[
         Path | None,
         typer.Option(

@@ -93,6 +93,7 @@ def leave(
                 "contours": [_cut_entry(cut) for cut in outcome.cuts],
                 "sequence": None if outcome.part is None else sequence_entry(outcome.part),
                 "files": [str(f) for f in written.files],
+                "removed": [str(f) for f in written.removed],
                 "notes": list(written.notes),
                 **(more or {}),
             }
@@ -113,12 +114,14 @@ def leave(
                     out.print(f"[bold]{escape(cut.task.name)}[/]: {escape(str(check.issue()))}")
         for note in told_once(written.notes, [cut.task.name for cut in outcome.cuts]):
             out.print(f"note: {escape(note)}")
+        for path in written.removed:
+            out.print(f"removed {escape(str(path))}, of an earlier run")
         for path in written.files:
             out.print(f"wrote {escape(str(path))}")
     if written.stale is not None:
         errors.print(
             f"kerfpath: {escape(str(written.stale))} is from an earlier run and does not belong "
-            "to this plan; no program was written"
+            "to this plan; it is left, as it was edited or is not known to be ours: move it away"
         )
     if not outcome.passed:
         raise typer.Exit(1)

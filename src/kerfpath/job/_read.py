@@ -27,7 +27,7 @@ from kerfpath.job._tables import (
     SequenceTable,
 )
 from kerfpath.job._task import ContourTask, task_of
-from kerfpath.post import Settings
+from kerfpath.post import Handshake, Settings
 from kerfpath.robots import Robot, postures_named
 
 __all__ = ["Job", "ProgramOptions", "audit_options", "program_options", "read_job"]
@@ -58,12 +58,14 @@ class ProgramOptions:
         How long the laser stays on at the start before the cut goes on.
     approach_speed : float m/s
         Along the tool axis before and after a contour.
-    air_speed : float
-        Share of the full speed of joint moves.
+    air_speed : float or None
+        Share of the full speed of joint moves; None: what is usual for planned moves and others.
     arc_tolerance : float m or None
         How near to the path circular moves stay; None: there are none.
     gas_lead : float s or None
         How long before the start the gas is switched on; None: not by the program.
+    handshakes : tuple of Request or Await
+        Before each contour.
     """
 
     language: str
@@ -74,9 +76,10 @@ class ProgramOptions:
     lead_time: float
     pierce_time: float
     approach_speed: float
-    air_speed: float
+    air_speed: float | None
     arc_tolerance: float | None
     gas_lead: float | None
+    handshakes: tuple[Handshake, ...] = ()
 
     __repr__ = told
 
@@ -318,4 +321,5 @@ def program_options(table: ProgramTable, stem: str) -> ProgramOptions:
         air_speed=table.air_speed,
         arc_tolerance=None if table.arcs_mm is None else table.arcs_mm / 1000,
         gas_lead=table.gas_lead_s,
+        handshakes=table.handshakes(),
     )
