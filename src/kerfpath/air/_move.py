@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from kerfpath._arrays import Array, floats, freeze
+from kerfpath._told import told
 from kerfpath.air._around import way_around
 from kerfpath.cell import Cell
 from kerfpath.errors import InputError, NoFeasiblePath
@@ -36,6 +37,8 @@ class AirMove:
     q: Array
     time: Array
     clear: bool
+
+    __repr__ = told
 
     @property
     def duration(self) -> float:

@@ -13,10 +13,11 @@ from OCP.GeomAbs import GeomAbs_SurfaceType
 from OCP.TopoDS import TopoDS_Face, TopoDS_Shape
 
 from kerfpath._arrays import freeze
+from kerfpath._told import told
 from kerfpath.cad._loops import FaceLoop, bounds_of, loops_of
 from kerfpath.cad._mesh import triangulate
-from kerfpath.cad._part import Kind, Loop, Part, Side, loop_of, numbered
-from kerfpath.cad._sample import Trace
+from kerfpath.cad._part import Kind, Loop, Part, Side, loop_of
+from kerfpath.cad._sample import Trace, numbered
 from kerfpath.cad._skins import Skin, skins_of
 from kerfpath.cad._units import MM
 
@@ -57,6 +58,8 @@ class NamedFace:
     component: str = ""
     layer: str = ""
     colour: str = ""
+
+    __repr__ = told
 
 
 def part_of(

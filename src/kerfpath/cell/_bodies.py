@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Literal
 
+from kerfpath._told import told
 from kerfpath.cell._shapes import Shape
 
 __all__ = ["Body", "Kind"]
@@ -34,3 +35,5 @@ class Body:
     frame: int
     kind: Kind
     approximate: bool = False
+
+    __repr__ = told

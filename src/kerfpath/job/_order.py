@@ -8,6 +8,7 @@ from itertools import pairwise
 
 import numpy as np
 
+from kerfpath._told import told
 from kerfpath.auditor import Check, air_checks, worst_of
 from kerfpath.cell import Cell
 from kerfpath.contour import Contour
@@ -42,6 +43,8 @@ class Ordered:
     part: PartPlan | None = None
     stuck: NoFeasiblePath | None = None
     air: tuple[Check, ...] = ()
+
+    __repr__ = told
 
 
 def ordered(

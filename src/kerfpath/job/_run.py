@@ -10,6 +10,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from kerfpath._arrays import Array, Ints
+from kerfpath._told import told
 from kerfpath.auditor import Check, checks
 from kerfpath.cad import Part
 from kerfpath.cad import read as read_drawing
@@ -70,6 +71,8 @@ class Outcome:
     part: PartPlan | None = None
     stuck: NoFeasiblePath | None = None
     air: tuple[Check, ...] = ()
+
+    __repr__ = told
 
     @property
     def passed(self) -> bool:

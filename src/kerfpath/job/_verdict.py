@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 
+from kerfpath._told import told
 from kerfpath.auditor import Check, in_words
 from kerfpath.cell import Cell
 
@@ -33,6 +34,8 @@ class Audited:
     missing: tuple[str, ...]
     note: str
     places: dict[str, tuple[str, ...]] = field(default_factory=dict)
+
+    __repr__ = told
 
     @property
     def passed(self) -> bool:

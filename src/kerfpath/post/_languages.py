@@ -10,6 +10,7 @@ from importlib.metadata import EntryPoint, entry_points
 from typing import Any
 
 from kerfpath._arrays import Array
+from kerfpath._told import told
 from kerfpath.errors import InputError
 from kerfpath.post._formatter import Formatter
 from kerfpath.post._issue import ProgramIssue
@@ -90,6 +91,8 @@ class Language:
     ahead: bool = True
     assumed: Mapping[str, Any] = field(default_factory=dict)
     read: Reader | None = None
+
+    __repr__ = told
 
     def completed(self, settings: Settings | None) -> Settings:
         """Return settings, by default the language's defaults, with what is `assumed` of them."""

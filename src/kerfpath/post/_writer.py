@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
+from kerfpath._told import told
 from kerfpath.errors import InputError
 from kerfpath.plans import Plan
 from kerfpath.post._build import build_program
@@ -75,6 +76,8 @@ class Posted:
     files: dict[str, str]
     read: ReadProgram | None
     warnings: tuple[ProgramIssue, ...]
+
+    __repr__ = told
 
 
 def posted(

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from kerfpath._arrays import Array, floats
+from kerfpath._told import told
 from kerfpath.errors import InputError
 
 __all__ = ["Coupling"]
@@ -30,6 +31,8 @@ class Coupling:
     lower: float
     upper: float
     note: str = ""
+
+    __repr__ = told
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "row", floats(self.row, "coupling row", (None,)))

@@ -96,6 +96,13 @@ class Robot:
     frames: dict[str, object] = field(default_factory=dict)
     sources: dict[str, str] = field(default_factory=dict)
 
+    def __repr__(self) -> str:
+        known = "known" if self.acceleration is not None else "not known"
+        return (
+            f"Robot({self.id!r}, {self.manufacturer} {self.model}, {self.joints} joints, "
+            f"{self.kinematics}, accelerations {known})"
+        )
+
     def __post_init__(self) -> None:
         _set = object.__setattr__
         if self.kinematics not in FAMILIES:

@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from kerfpath._arrays import Array, Bools, Ints, floats, integers
+from kerfpath._told import told
 from kerfpath.errors import InputError, NoFeasiblePath
 
 __all__ = ["Order", "best_order"]
@@ -39,6 +40,8 @@ class Order:
     candidates: Ints
     duration: float
     at_least: float
+
+    __repr__ = told
 
     @property
     def optimal(self) -> bool:

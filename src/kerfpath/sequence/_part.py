@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike
 from scipy.spatial import cKDTree
 
 from kerfpath._arrays import Bools, floats, scalar
+from kerfpath._told import told
 from kerfpath.air import AirMove, End, backed_off
 from kerfpath.cell import Cell
 from kerfpath.contour import Contour
@@ -56,6 +57,8 @@ class PartPlan:
     retract: float
     approach_speed: float
     pierce_time: float
+
+    __repr__ = told
 
     @property
     def cutting_time(self) -> float:
