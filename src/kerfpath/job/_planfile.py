@@ -264,6 +264,7 @@ def _robot_entry(robot: Robot) -> dict[str, Any]:
         "geometry_m": dict(robot.geometry),
         "sign": robot.sign.tolist(),
         "offset_rad": robot.offset.tolist(),
+        "axis_3": robot.axis_3,
         "T_base_foot": robot.T_base_foot.tolist(),
         "T_end_flange": robot.T_end_flange.tolist(),
         "chain": None
@@ -313,6 +314,7 @@ def _read_robot(robot: dict[str, Any], limits: dict[str, Any]) -> Robot:
         geometry={k: float(v) for k, v in robot["geometry_m"].items()},
         sign=robot["sign"],
         offset=robot["offset_rad"],
+        axis_3=str(robot.get("axis_3", "")),
         T_base_foot=robot.get("T_base_foot", np.eye(4)),
         T_end_flange=robot.get("T_end_flange", np.eye(4)),
         chain=Chain(**robot["chain"]) if robot.get("chain") else None,

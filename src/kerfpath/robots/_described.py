@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike
 
 from kerfpath._arrays import Array
 from kerfpath.errors import InputError
+from kerfpath.robots._axis_three import with_axis_3
 from kerfpath.robots._recognise import model_of
 from kerfpath.robots._robot import Robot
 from kerfpath.urdf import Description
@@ -20,6 +21,9 @@ __all__ = ["robot_of"]
 def robot_of(
     description: Description,
     *,
+    manufacturer: str = "",
+    axis_3: str = "",
+    axis_3_limits: ArrayLike | None = None,
     lower: ArrayLike | None = None,
     upper: ArrayLike | None = None,
     velocity: ArrayLike | None = None,
@@ -31,7 +35,8 @@ def robot_of(
     Raises
     ------
     InputError
-        The chain is of no family; a limit that is missing, or zero, and is not given.
+        The chain is of no family; a limit that is missing, or zero, and is not given; as
+        `with_axis_3`.
     """
     where = f"{description.path} ({description.base} to {description.tip})"
     try:
@@ -41,8 +46,9 @@ def robot_of(
     continuous = np.array([joint.kind == "continuous" for joint in description.joints])
     left_out = ", ".join(description.left_out)
     outside = [f"Links on joints outside the chain are left out: {left_out}."] if left_out else []
-    return Robot(
+    found = Robot(
         id=description.name,
+        manufacturer=manufacturer,
         notes=(*model.pop("notes", ()), *outside),
         **model,
         **_ranges(description, lower, upper, endless),
@@ -55,6 +61,7 @@ def robot_of(
         frames={"base": description.base, "tip": description.tip},
         sources={"geometry_limits_velocity": f"URDF {Path(description.path).name}"},
     )
+    return with_axis_3(found, axis_3, axis_3_limits)
 
 
 def _ranges(
