@@ -5,3 +5,4 @@ from kerfpath.air._move import air_move as air_move
 from kerfpath.air._move import least_time as least_time
 from kerfpath.air._retract import End as End
 from kerfpath.air._retract import backed_off as backed_off
+from kerfpath.air._told import why_not_clear as why_not_clear
