@@ -295,7 +295,7 @@ def test_where_no_way_is_found_the_contours_the_bodies_and_what_was_tried_are_na
     assert not none.value.proved
     assert re.search(r"contour '(near|far)' in posture (rear|front)/up/plus", said)
     assert re.search(
-        r"'(left|right)' and '.*' come \d+ mm nearer than allowed \d+ % of the way", said
+        r"'(left|right)' and '.*' come [\d.]+ mm nearer than allowed \d+ % of the way", said
     )
     assert "no order is left" in said
     # No search goes on from an end that is locked in: two of them told that.
@@ -341,9 +341,7 @@ def test_what_is_in_the_way_of_backing_off_is_named(lane, arm, tool):
         order_plans([[ahead[0]]], cell=lowest, retract=0.3, seconds=0.5)
     said = str(none.value)
     assert said.startswith("contour 'near': in posture front/up/plus")
-    assert re.search(
-        r"('roof' and '.*'|'.*' and 'roof') come \d+ mm nearer than allowed", said
-    )
+    assert re.search(r"('roof' and '.*'|'.*' and 'roof') come [\d.]+ mm nearer than allowed", said)
 
 
 def test_an_end_that_may_not_be_first_or_last_is_left_in_the_middle():
