@@ -482,7 +482,9 @@ def test_an_arm_whose_axis_3_is_not_known_is_asked_for_it_before_planning(folder
         require_language(held := read_job(job(folder, text.replace(table, table + told), "a.toml")))
         (bound,) = held.robot.couplings
         upright = 90 * number  # lengths alone count joint 3 from the upright arm
-        assert np.degrees([bound.lower, bound.upper]) == pytest.approx([-60 + upright, 65 + upright])
+        assert np.degrees([bound.lower, bound.upper]) == pytest.approx(
+            [-60 + upright, 65 + upright]
+        )
         for wrong, where in (
             ('axis_3 = "horizontal"\n', r"robot\.axis_3_deg: expected the two limits of axis 3"),
             (told.replace("horizontal", "serial"), r"robot\.axis_3_deg: .*got them with 'serial'"),
