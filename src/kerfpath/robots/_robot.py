@@ -18,7 +18,7 @@ from kerfpath.robots._external import ExternalAxis, Travel, alone, carried, held
 from kerfpath.robots._families import FAMILIES, Family
 from kerfpath.robots._limits import for_each, require_few_turns, require_order
 from kerfpath.robots._solutions import Solutions, admitted, every
-from kerfpath.urdf import Body, Chain, read_urdf
+from kerfpath.urdf import Body, Chain
 
 __all__ = ["Robot"]
 
@@ -154,7 +154,7 @@ class Robot:
         tip: str | None = None,
         packages: Mapping[str, str | Path] | None = None,
         meshes: bool = True,
-        snap: float = 0.0,
+        snap: float | None = None,
         manufacturer: str = "",
         axis_3: str = "",
         axis_3_limits: ArrayLike | None = None,
@@ -168,11 +168,10 @@ class Robot:
         ----------
         path, base, tip, packages, meshes, snap
             As in `kerfpath.urdf.read_urdf`. Poses of the robot are of link `tip` in link `base`.
-        manufacturer, axis_3 : str
-            Whose controller moves it, and what its axis 3 measures; default: as a robot of the
-            library with the same lengths, if there is one.
-        axis_3_limits : (2,) rad
-            Limits of an axis 3 that is "horizontal", as the controller shows them.
+            Without snap, an arm that has a family by its angles rounded is refused; 0 keeps it.
+        manufacturer, axis_3, axis_3_limits : str, str, (2,) rad
+            Whose controller moves it; what its axis 3 measures and, if "horizontal", its limits as
+            shown there; default: as a robot of the library with the same lengths has it.
         **limits : (n,) rad, rad/s, rad/s^2
             lower, upper, velocity, acceleration, endless: instead of what is written there. No
             description states accelerations. Continuous joints are endless.
@@ -182,10 +181,11 @@ class Robot:
         InputError
             A bad description; a chain of no family; limits that are missing or zero, and not given.
         """
-        from kerfpath.robots._described import robot_of
+        from kerfpath.robots._described import described, robot_of
 
         return robot_of(
-            read_urdf(path, base=base, tip=tip, packages=packages, meshes=meshes, snap=snap),
+            described(path, snap, base=base, tip=tip, packages=packages, meshes=meshes),
+            as_written=snap == 0,
             manufacturer=manufacturer,
             axis_3=axis_3,
             axis_3_limits=axis_3_limits,

@@ -16,8 +16,8 @@ from kerfpath.job._keys import (
     Joints,
     JointsPositive,
     Lengths,
+    NotNegative,
     Number,
-    Positive,
     Ratio,
     Signs,
     Text,
@@ -46,7 +46,11 @@ IN_KEYS = {
     "lower= and upper=": "lower_deg and upper_deg",
     "velocity=": "velocity_deg_s",
     "(rad, rad/s)": "(deg, deg/s)",
-    "snap=1e-4": "snap_deg = 0.006",
+    "snap=5e-06": "snap_deg = 0.0003",
+    "snap=5e-05": "snap_deg = 0.003",
+    "snap=0.0005": "snap_deg = 0.03",
+    "snap=0.005": "snap_deg = 0.3",
+    "snap=0": "snap_deg = 0",
     'packages={"NAME": "FOLDER"}, or read the kinematics alone with meshes=False': (
         'packages = { NAME = "FOLDER" }'
     ),
@@ -75,9 +79,9 @@ class RobotTable(Table):
         dict[str, Text] | None,
         key("folders by the name of their package", '{ arm_description = "meshes" }'),
     ] = None
-    snap_deg: Annotated[
-        Positive | None, key("a number above 0, at most 1, in deg", "0.006", le=1)
-    ] = None
+    snap_deg: Annotated[NotNegative | None, key("a number from 0 to 1, in deg", "0.006", le=1)] = (
+        None
+    )
     kinematics: Annotated[
         Literal["opw", "ur", "five"] | None, key("a family of arms", '"five"')
     ] = None
@@ -288,7 +292,8 @@ class RobotTable(Table):
     def joints(self, folder: Path) -> int:
         """Return how many joints the robot has."""
         if self.urdf is not None:
-            return len(read_urdf(folder / self.urdf, **self._chain(folder), meshes=False).joints)
+            chain = self._chain(folder) | {"meshes": False, "snap": 0.0}
+            return len(read_urdf(folder / self.urdf, **chain).joints)
         return robot(self.model).joints if self.model else FAMILIES[self.kinematics or ""].joints
 
     def _chain(self, folder: Path) -> dict[str, Any]:
@@ -297,7 +302,7 @@ class RobotTable(Table):
             "base": self.base,
             "tip": self.tip,
             "packages": {name: folder / place for name, place in (self.packages or {}).items()},
-            "snap": float(np.radians(self.snap_deg or 0.0)),
+            "snap": None if self.snap_deg is None else float(np.radians(self.snap_deg)),
         }
 
     def _limits(self, n: int) -> dict[str, Any]:
