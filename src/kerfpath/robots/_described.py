@@ -63,7 +63,8 @@ def described(
         f"{found.path} ({found.base} to {found.tip}): as it is written the arm is of no family "
         f"with a closed form, with its angles rounded to 15 deg it is: snap={least:g} takes them "
         f"as meant, which moves the tip by up to {off * 1e3:.2g} mm and "
-        f"{np.degrees(turned):.2g} deg; snap=0 keeps what is written, as a general arm, whose solver may need minutes to prepare"
+        f"{np.degrees(turned):.2g} deg; snap=0 keeps what is written, as a general "
+        "arm, whose solver may need minutes to prepare"
     )
 
 
