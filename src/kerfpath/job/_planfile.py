@@ -191,6 +191,7 @@ def _robot_entry(robot: Robot) -> dict[str, Any]:
         "geometry_m": dict(robot.geometry),
         "sign": robot.sign.tolist(),
         "offset_rad": robot.offset.tolist(),
+        "axis_3": robot.axis_3,
         "T_base_foot": robot.T_base_foot.tolist(),
         "T_end_flange": robot.T_end_flange.tolist(),
         "chain": None

@@ -143,6 +143,7 @@ def _read_robot(robot: dict[str, Any], limits: dict[str, Any]) -> Robot:
         geometry=robot["geometry_m"],
         sign=robot["sign"],
         offset=robot["offset_rad"],
+        axis_3=robot["axis_3"],
         T_base_foot=robot["T_base_foot"],
         T_end_flange=robot["T_end_flange"],
         chain=Chain(**robot["chain"]) if robot["chain"] else None,

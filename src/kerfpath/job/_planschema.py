@@ -50,6 +50,7 @@ class _Robot(_Entry):
     geometry_m: dict[str, Real]
     sign: Row
     offset_rad: Row
+    axis_3: str
     T_base_foot: Rows
     T_end_flange: Rows
     chain: _Chain | None
