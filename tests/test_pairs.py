@@ -1,0 +1,306 @@
+"""Which pairs are judged, and that asking for more never checks less; boxes are the oracle."""
+
+from dataclasses import replace
+from itertools import combinations
+
+import numpy as np
+import pytest
+
+from kerfpath import robot
+from kerfpath.cell import (
+    Body,
+    Capsule,
+    Cell,
+    Hull,
+    Mesh,
+    box,
+    box_between,
+    cell_of,
+    link_capsules,
+)
+from kerfpath.cell._pairs import BY_DESIGN
+from kerfpath.robots import chain_of
+from kerfpath.urdf import Chain
+from test_cell import at, mesh_of
+
+ARM = robot("abb_irb2600_12_165")
+LADDER = [0.0, 2e-3, 0.01, 0.02, 0.2]
+"""m: near-miss distances, each asking for more than the one before."""
+
+
+def boxes_apart(T_a, half_a, T_b, half_b):
+    """Say for boxes at T (B, 4, 4) whether any of fifteen axes separates them (Gottschalk)."""
+    A, B = T_a[:, :3, :3], T_b[:, :3, :3]
+    crossed = np.cross(A[:, :, :, None], B[:, :, None, :], axis=1).reshape(len(A), 3, 9)
+    axes = np.concatenate([A, B, crossed], axis=2)
+    between = np.einsum("bi,bik->bk", T_b[:, :3, 3] - T_a[:, :3, 3], axes)
+    reach = np.einsum("bij,bik->bjk", A, axes), np.einsum("bij,bik->bjk", B, axes)
+    held = half_a @ np.abs(reach[0]) + half_b @ np.abs(reach[1])
+    return (np.abs(between) > held).any(axis=1)
+
+
+def union(boxes, name="head"):
+    """A mesh of boxes, each a closed piece, that may overlap."""
+    hulls = [box_between(low, high) for low, high in boxes]
+    start = np.cumsum([0, *(len(h.points) for h in hulls)])
+    return Mesh(
+        vertices=np.vstack([h.points for h in hulls]),
+        triangles=np.vstack([h.triangles + s for h, s in zip(hulls, start, strict=False)]),
+        name=name,
+    )
+
+
+class Boxes:
+    """Solids made of boxes in frames of an arm: bodies of a cell, and their overlaps by formula."""
+
+    def __init__(self, arm, solids):
+        self.chain = chain_of(arm)
+        self.solids = solids  # name: (frame, kind, [(T, half)])
+
+    def bodies(self, meshes):
+        made = []
+        for name, (frame, kind, boxes) in self.solids.items():
+            hulls = [box(2 * half, T) for T, half in boxes]
+            start = np.cumsum([0, *(len(h.points) for h in hulls)])
+            shape = Mesh(
+                vertices=np.vstack([h.points for h in hulls]),
+                triangles=np.vstack([h.triangles + s for h, s in zip(hulls, start, strict=False)]),
+                name=name,
+            )
+            if not meshes and kind == "robot":
+                shape = Hull(shape.vertices)
+            made.append(Body(name=name, shape=shape, frame=frame, kind=kind))
+        return made
+
+    def overlap(self, one, two, q, depth=0.0):
+        """Say at which of q (B, n) two solids overlap, the first shaved by a depth."""
+        frames = self.chain.frames(q)
+        (i, _, first), (j, _, second) = self.solids[one], self.solids[two]
+        hit = np.zeros(len(q), bool)
+        for T, half in first:
+            for U, other in second:
+                hit |= ~boxes_apart(frames[:, i] @ T, half - depth, frames[:, j] @ U, other)
+        return hit
+
+
+def along(low, high):
+    low, high = np.array(low, float), np.array(high, float)
+    return at((low + high) / 2), (high - low) / 2
+
+
+def solids_of(arm, gap, behind):
+    """An arm of boxes about its lines; a head from the flange, `behind` m of it behind that."""
+    solids = {}
+    for body in link_capsules(arm):
+        line, radius = body.shape.end - body.shape.start, 0.5 * body.shape.radius
+        z = line / np.linalg.norm(line)
+        x = np.cross(np.eye(3)[np.argmin(np.abs(z))], z)
+        x /= np.linalg.norm(x)
+        T = np.eye(4)
+        T[:3, :3] = np.array([x, np.cross(z, x), z]).T
+        T[:3, 3] = (body.shape.start + body.shape.end) / 2
+        half = np.array([radius, radius, np.linalg.norm(line) / 2])
+        solids[body.name] = (body.frame, "robot", [(T, half)])
+    end = chain_of(arm).end  # of the flange in the last joint's frame
+    flange = np.linalg.norm(end[:3, 3])
+    # Link 5 about the flange's axis at joint 5 zero, its face `gap` before the flange.
+    to = chain_of(arm).frames(np.zeros((1, arm.joints)))[0]
+    wrist = np.linalg.inv(to[5]) @ to[6] @ end
+    T, half = along([-0.05, -0.05, -flange - 0.05], [0.05, 0.05, -gap])
+    solids["link 5"] = (5, "robot", [(wrist @ T, half)])
+    head = [
+        along([-0.06, -0.05, 0], [0.061, 0.05, 0.2]),
+        along([0.06, -0.03, -behind], [0.12, 0.03, 0.1]),
+    ]
+    solids["head"] = (6, "head", [(end @ T, half) for T, half in head])
+    return solids
+
+
+@pytest.mark.parametrize("meshes", [False, True])
+@pytest.mark.parametrize("gap", [0.012, 0.0, -4e-3])
+def test_a_head_that_reaches_behind_the_flange_is_never_called_clear_inside_a_link(gap, meshes):
+    """Against boxes by formula: no pose called clear overlaps, but for what does so by design."""
+    world = Boxes(ARM, solids_of(ARM, gap, behind=0.12))
+    cell = Cell(chain=world.chain, bodies=world.bodies(meshes), endless=ARM.endless)
+    judged = dict(zip(cell.pair_names, cell.depth, strict=True))
+    assert not [pair for pair in cell.unjudged if "head" in pair]
+    # The face by which the head is mounted overlaps by design, to no more than its depth.
+    assert judged["link 5", "head"] <= max(0, -gap) * 1.5 + 5e-4 + 1e-9
+    assert (judged["link 5", "head"] > 0) == (gap <= 0)
+    rng = np.random.default_rng(11)
+    limits = ARM.joint_limits()
+    q = rng.uniform(limits.lower, limits.upper, (1500, 6))
+    clear, hit, beside = cell.clear(q), np.zeros(len(q), bool), np.zeros(len(q), bool)
+    for one, two in combinations(world.solids, 2):
+        pair = (one, two) if (one, two) in judged else (two, one)
+        if pair in judged:
+            there = world.overlap(*pair, q, depth=judged[pair])
+            hit |= there
+            beside |= there & (set(pair) == {"link 5", "head"})
+    assert not (clear & hit).any()
+    assert beside.sum() > 100, "the collimator hits link 5 at many of them"
+    assert clear.sum() > 100
+    assert beside[~clear].sum() == beside.sum()
+
+
+def some_cell(rng, **asked):
+    """Arms of random chains and bodies: long and short, thick and thin, of every shape."""
+    n = 6
+    origins = np.tile(np.eye(4), (n, 1, 1))
+    origins[:, :3, 3] = rng.uniform(-0.4, 0.4, (n, 3)) * rng.choice([0.1, 1], (n, 1))
+    axes = rng.normal(size=(n, 3))
+    chain = Chain(
+        origins=origins, axes=axes / np.linalg.norm(axes, axis=1, keepdims=True), end=np.eye(4)
+    )
+    bodies = [
+        Body(
+            name="post",
+            shape=box([0.1, 0.1, 0.3], at(rng.uniform(-1, 1, 3))),
+            frame=0,
+            kind="fixture",
+        )
+    ]
+    for frame in range(n + 1):
+        size = rng.uniform(0.02, 0.25, 3)
+        centre = rng.uniform(-0.2, 0.2, 3) * rng.integers(0, 2)
+        kind = rng.integers(3)
+        shape = box(size, at(centre))
+        if kind == 1:
+            shape = Capsule(
+                start=centre, end=centre + rng.uniform(-0.2, 0.2, 3), radius=size[0] / 2
+            )
+        elif kind == 2:
+            shape = mesh_of(shape)
+        bodies.append(
+            Body(
+                name=f"body {frame}",
+                shape=shape,
+                frame=frame,
+                kind="head" if frame > 4 else "robot",
+            )
+        )
+    return Cell(chain=chain, bodies=bodies, endless=np.zeros(n, bool), **asked)
+
+
+def refuses_as_much(cells, q, rng):
+    """Require of cells, each asking for more, that none judges less or clears what one refused."""
+    ends = q[:8] + rng.normal(0, 0.05, (8, 6))
+    before = cells[0]
+    clear, passes = before.clear(q), before.clear_motion(q[:8], ends)
+    for cell in cells[1:]:
+        # What is proved to keep one distance at every angle need not keep another.
+        assert set(cell.pair_names) >= set(before.pair_names)
+        same = [cell.pair_names.index(pair) for pair in before.pair_names]
+        np.testing.assert_array_equal(cell.depth[same], before.depth)
+        assert (cell.required[same] >= before.required).all()
+        assert (cell.required <= cell.asked).all()
+        now, then = cell.clear(q), cell.clear_motion(q[:8], ends)
+        assert not (now & ~clear).any()
+        assert not (then & ~passes).any()
+        assert (cell.clearance(q)[0] <= before.clearance(q)[0] + 1e-5).all()
+        before, clear, passes = cell, now, then
+
+
+@pytest.mark.parametrize("seed", range(8))
+def test_asking_for_more_never_checks_less(seed):
+    rng = np.random.default_rng(seed)
+    q = rng.uniform(-np.pi, np.pi, (120, 6))
+    state = rng.bit_generator.state
+
+    def again(**asked):
+        rng.bit_generator.state = state
+        return some_cell(rng, **asked)
+
+    cells = [again(near_miss=near) for near in LADDER]
+    refuses_as_much(cells, q, rng)
+    # One pair's own distance, whichever.
+    pair = cells[0].pair_names[rng.integers(len(cells[0].pairs))]
+    refuses_as_much([again(near_miss_of={pair: near}) for near in LADDER], q, rng)
+
+
+@pytest.mark.parametrize("arm", ["abb_irb1200_5_90", "kuka_kr16_2", "staubli_tx2_90", "ur_ur10e"])
+def test_a_library_robot_loses_no_pair_for_its_distance(arm):
+    tool = at([0.15, 0, 0.3])
+    cells = [cell_of(robot(arm), tool=tool, near_miss=near) for near in LADDER]
+    rng = np.random.default_rng(3)
+    refuses_as_much(cells, rng.uniform(-2, 2, (100, 6)), rng)
+    # The arm of the head is never 200 mm from the forearm; it keeps what the wrist leaves it.
+    fallen = dict(zip(cells[-1].pair_names, cells[-1].required, strict=True))
+    assert fallen["link 3", "arm"] < 0.2
+    links = [{pair for pair, why in cell.unjudged.items() if why == BY_DESIGN} for cell in cells]
+    assert links[0] == links[-1]
+
+
+def wristed(gap, size=0.08):
+    """A forearm and, two joints on, a head that stands `gap` before it at zero."""
+    origins = np.tile(np.eye(4), (3, 1, 1))
+    origins[1:, 2, 3] = 0.1, 0.04
+    chain = Chain(
+        origins=origins, axes=np.array([[0, 0, 1.0], [0, 0, 1], [0, 1, 0]]), end=np.eye(4)
+    )
+    bodies = [
+        Body(
+            name="forearm",
+            shape=box_between([-0.04, -0.04, -0.5], [0.04, 0.04, 0.1]),
+            frame=1,
+            kind="robot",
+        ),
+        Body(
+            name="head",
+            shape=box_between([-size / 2, -size / 2, gap], [size / 2, size / 2, 0.25]),
+            frame=3,
+            kind="head",
+        ),
+    ]
+    return chain, bodies
+
+
+def test_a_distance_that_cannot_be_had_falls_to_what_the_design_leaves():
+    """The head folds back into the forearm; straight it is 15 mm away, so 20 cannot be kept."""
+    chain, bodies = wristed(gap=-0.025)
+    q = np.zeros((40, 3))
+    q[:, 2] = np.linspace(0, np.pi, 40)
+    for asked, kept in ((0.01, 0.01), (0.02, 0.0135), (0.5, 0.0135)):
+        cell = Cell(chain=chain, bodies=bodies, endless=[0, 0, 0], near_miss=asked)
+        assert cell.pair_names == (("forearm", "head"),)
+        assert cell.asked == [asked]
+        assert cell.required == pytest.approx([kept], abs=1e-5)
+        assert cell.clear(q[:1])[0]
+        assert not cell.clear(q[-1:])[0]
+
+
+def test_what_touches_by_design_is_told_apart_from_what_hits():
+    """A face that turns on another is judged but for a skin; a spur of it hits at times."""
+    chain, bodies = swivel_pair(gap=0.0)
+    cell = Cell(chain=chain, bodies=bodies, endless=[0])
+    assert cell.depth == [5e-4]
+    assert cell.clear([[0.0]])[0]
+    turned = np.linspace(-np.pi, np.pi, 400)[:, None]
+    hits = ~cell.clear(turned)
+    spur = np.abs(np.abs(turned[:, 0]) - np.pi) < 0.3  # where the spur passes the boss
+    assert hits[np.abs(np.abs(turned[:, 0]) - np.pi) < 0.2].all()
+    assert not hits[~spur & (np.abs(turned[:, 0]) < 2.0)].any()
+    # Links of the robot that touch all round do so by their maker's design.
+    links = [replace(body, kind="robot") for body in bodies]
+    assert Cell(chain=chain, bodies=links, endless=[0]).unjudged == {
+        ("boss", "face"): "they touch at every pose tried, by design"
+    }
+
+
+def swivel_pair(gap):
+    """A round face that turns on another which has a boss; a spur of it reaches over the edge."""
+    chain = Chain(origins=np.eye(4)[None], axes=np.array([[0, 0, 1.0]]), end=np.eye(4))
+    still = union(
+        [([-0.05, -0.05, -0.2], [0.05, 0.05, 0]), ([-0.1, -0.01, -0.1], [-0.05, 0.01, -0.05])]
+    )
+    turning = union(
+        [
+            ([-0.05, -0.05, gap], [0.05, 0.05, 0.1]),
+            ([0.075, -0.01, -0.08], [0.09, 0.01, 0.05]),
+            ([0.04, -0.01, 0.02], [0.09, 0.01, 0.05]),
+        ]
+    )
+    return chain, [
+        Body(name="boss", shape=still, frame=0, kind="robot"),
+        Body(name="face", shape=turning, frame=1, kind="head"),
+    ]
