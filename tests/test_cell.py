@@ -529,3 +529,24 @@ def test_bad_numbers_are_refused_and_never_free(monkeypatch):
 def test_shapes_without_volume_are_refused(make):
     with pytest.raises(InputError):
         make()
+
+
+def cone(sides, T):
+    """A cone, its tip at the origin of T; every corner of its rim is a neighbour of the tip."""
+    turn = np.linspace(0, 2 * np.pi, sides, endpoint=False)
+    rim = np.c_[0.2 * np.cos(turn), 0.2 * np.sin(turn), np.full(sides, 0.3)]
+    return Hull(np.vstack([[[0.0, 0, 0]], rim])).moved(T)
+
+
+@pytest.mark.parametrize("sides", [60, 254, 255, 3000])
+def test_a_convex_solid_of_any_corners_is_judged(sides):
+    """Beyond 254 neighbours of a corner coal has no convex solid; the surface stands for it."""
+    tip = cone(sides, at([0.5, 0, 0]))
+    assert tip.crowded == (sides > 254)
+    for gap in (0.1, 0.02):
+        wall = box_between([-0.1, -1, -1], [0.5 - 0.2 - gap, 1, 1])
+        # Of 255 corners none faces it: the rim is 0.2 (1 - cos(pi / 255)) m farther.
+        assert distance(wall, tip) == pytest.approx(gap, abs=2e-5)
+    assert distance(box([0.01, 0.01, 0.01], at([0.5, 0, 0.2])), tip) < 0, "inside, off the surface"
+    assert distance(box([2, 2, 2]), tip) < 0, "holds it"
+    assert distance(box_between([0.45, -1, -1], [0.55, 1, 0.1]), tip) <= 0

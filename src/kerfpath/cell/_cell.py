@@ -70,7 +70,7 @@ class Cell:
     depth : (P,) m
         How deep each may overlap, as it does by design; its distance is less by no more than this.
     own : (P,) bool
-        Those that have a near-miss distance of their own.
+        Those that have a near-miss distance of their own, asked for or by the arm's design.
     unjudged : mapping of (name, name) to str
         Every other pair, and why it need not, or cannot, be judged.
 
@@ -119,7 +119,8 @@ class Cell:
         _set(self, "asked", freeze(asked))
         _set(self, "required", freeze(required))
         _set(self, "depth", freeze(depth))
-        _set(self, "own", freeze(np.array([pair in own for pair in judged], dtype=np.bool_)))
+        given = np.array([pair in own for pair in judged], dtype=np.bool_)
+        _set(self, "own", freeze(given | (required < asked) | (depth > 0)))
         _set(self, "_scene", _scene(bodies, judged))
         _set(self, "_sweep", Sweep(self.chain, bodies, self.pairs))
         self._require_room_for_the_base()
@@ -138,6 +139,11 @@ class Cell:
     def approximate(self) -> tuple[str, ...]:
         """Names of the bodies whose shape only stands in for the real one."""
         return tuple(body.name for body in self.bodies if body.approximate)
+
+    @property
+    def unproved(self) -> tuple[str, ...]:
+        """Names of bodies that need not hold the real ones, so that clear of them proves little."""
+        return tuple(body.name for body in self.bodies if not body.holds)
 
     @property
     def queries(self) -> int:

@@ -217,7 +217,10 @@ def _inside(inner: _Solid, outer: _Solid, frames: Array) -> bool:
 
 
 def _solid(body: Body) -> _Solid:
-    shape = body.shape
+    shape: Shape = body.shape
+    if isinstance(shape, Hull) and shape.crowded:
+        # Coal has no such convex solid. Its surface bounds the same one, at more work a query.
+        shape = Mesh(vertices=shape.points, triangles=shape.triangles, name=body.name)
     low, high = (f(shape.corners, axis=0) for f in (np.min, np.max))
     centre = (low + high) / 2
     geometry, place = _geometry(shape, body.name)

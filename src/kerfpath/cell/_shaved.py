@@ -80,9 +80,10 @@ def _core(hull: Hull, depth: float) -> Hull | None:
         b_ub=-planes[:, 3],
         bounds=[(None, None)] * 4,
     )
-    if found.status != 0 or found.x[3] <= CORE:
+    core = found.x
+    if found.status != 0 or core is None or core[3] <= CORE:
         return None
     try:
-        return Hull(HalfspaceIntersection(planes, found.x[:3]).intersections)
+        return Hull(HalfspaceIntersection(planes, core[:3]).intersections)
     except (QhullError, InputError):
         return None

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from kerfpath.air import AirMove
-from kerfpath.cell import Cell
+from kerfpath.cell import Cell, caveats
 from kerfpath.errors import AuditFailed, InputError
 from kerfpath.job._planfile import broken_entry, plan_entry, plan_text
 from kerfpath.job._read import Job, ProgramOptions
@@ -175,11 +175,12 @@ def collision_note(cell: Cell | None, *, moves_too: bool = False) -> str:
     if cell is None:
         return NOT_CHECKED
     about = f" (approximate: {', '.join(cell.approximate)})" if cell.approximate else ""
-    return (
+    checked = (
         f"Collisions are checked along the contours, among {len(cell.bodies)} bodies of the "
         f"cell{about}; the moves to and between contours are "
         f"{'checked, too' if moves_too else 'not checked'}."
     )
+    return " ".join([checked, *caveats(cell)])
 
 
 def require_folder(folder: Path) -> None:

@@ -10,6 +10,7 @@ import numpy as np
 
 from kerfpath._arrays import Array, scalar
 from kerfpath.air import AirMove, backed_off
+from kerfpath.cell import UNPROVED
 from kerfpath.errors import InputError
 from kerfpath.plans import Plan
 from kerfpath.post._arcs import with_arcs
@@ -28,6 +29,8 @@ from kerfpath.robots import Robot, posture_name
 
 __all__ = ["build_program"]
 
+CAPSULES = "The links were drawn as capsules: clear of the real ones is not proved."
+"""Said at the head of a program whose plans say so of their proof."""
 PLAN_AND_CONTOUR = 1e-5
 """Distance (m) and sine of an angle by which the planned joints may miss the contour."""
 
@@ -137,6 +140,7 @@ def build_program(
         T_base_part=first.T_base_part,
         sections=tuple(sections),
         air_checked=len(moves) > 0 and all(move.clear for move in moves),
+        caveats=(CAPSULES,) if any(UNPROVED in plan.proof.statement for plan in plans) else (),
     )
     return program if arc_tolerance is None else with_arcs(program, arc_tolerance)
 

@@ -178,6 +178,8 @@ class Program:
         One for each contour, in order.
     air_checked : bool
         Whether the moves to and between the contours have been proved clear.
+    caveats : tuple of str
+        What the plans do not prove, sentences for the comment at its head.
     """
 
     name: str
@@ -186,6 +188,7 @@ class Program:
     T_base_part: Array
     sections: tuple[Section, ...]
     air_checked: bool = False
+    caveats: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "T_flange_tip", as_pose(self.T_flange_tip, "T_flange_tip"))

@@ -106,6 +106,7 @@ class Fanuc(Formatter):
         lines = [
             *self.comment(f"kerfpath, for {plain(program.robot.model)}"),
             *self.comment(f"Moves through the air: {checked}."),
+            *(line for said in program.caveats for line in self.comment(said)),
             *self.comment("A stop does not switch the laser off: the cell's safety has to."),
             *self.comment("Enter these frames (mm, deg). World: on J1, at the height of J2."),
         ]

@@ -116,6 +116,8 @@ class Inform(Formatter):
         checked = clear if program.air_checked else "not checked for collisions"
         yield from self.comment(f"kerfpath, for {plain(program.robot.model)}")
         yield from self.comment(f"Moves through the air: {checked}.")
+        for said in program.caveats:
+            yield from self.comment(said)
         yield from self.comment("A stop does not switch the laser off: the cell's safety has to.")
         yield from self.comment("Enter these frames (mm, deg). Robot frame: on S, as high as L.")
         frame = np.linalg.inv(world(program.robot)) @ program.T_base_part

@@ -202,6 +202,7 @@ class Krl(Formatter):
         if settings.base_number is None:
             yield "; $BASE is the part in the robot's base, which is $WORLD, too."
         yield f"; Moves through the air have {checked}."
+        yield from (f"; {said}" for said in program.caveats)
         yield "; A stop does not switch the laser off: the safety circuit of the cell has to."
         yield from opening(settings)
         if settings.tool_number is None:

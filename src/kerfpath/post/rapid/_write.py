@@ -167,6 +167,7 @@ class Rapid(Formatter):
         yield "  ! Complete the load of the tool: mass -1 stands for not known."
         yield "  ! The work object is the part in the robot's base, which is the world's, too."
         yield f"  ! Moves through the air have {checked}."
+        yield from (f"  ! {said}" for said in program.caveats)
         yield "  ! A stop does not switch the laser off: the safety circuit of the cell has to."
         load = "[-1,[0,0,0],[1,0,0,0],0,0,0]"
         yield f"  PERS tooldata {settings.tool_name}:=[TRUE,{tool},{load}];"
