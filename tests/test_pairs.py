@@ -5,6 +5,8 @@ from itertools import combinations
 
 import numpy as np
 import pytest
+from benchmarks._boxes import with_collimator
+from scipy.spatial import ConvexHull
 
 from kerfpath import robot
 from kerfpath.cell import (
@@ -16,27 +18,17 @@ from kerfpath.cell import (
     box,
     box_between,
     cell_of,
-    link_capsules,
+    frustum,
+    odd_sizes,
 )
 from kerfpath.cell._pairs import BY_DESIGN
-from kerfpath.robots import chain_of
+from kerfpath.cell._shaved import shaved
 from kerfpath.urdf import Chain
 from test_cell import at, mesh_of
 
 ARM = robot("abb_irb2600_12_165")
 LADDER = [0.0, 2e-3, 0.01, 0.02, 0.2]
 """m: near-miss distances, each asking for more than the one before."""
-
-
-def boxes_apart(T_a, half_a, T_b, half_b):
-    """Say for boxes at T (B, 4, 4) whether any of fifteen axes separates them (Gottschalk)."""
-    A, B = T_a[:, :3, :3], T_b[:, :3, :3]
-    crossed = np.cross(A[:, :, :, None], B[:, :, None, :], axis=1).reshape(len(A), 3, 9)
-    axes = np.concatenate([A, B, crossed], axis=2)
-    between = np.einsum("bi,bik->bk", T_b[:, :3, 3] - T_a[:, :3, 3], axes)
-    reach = np.einsum("bij,bik->bjk", A, axes), np.einsum("bij,bik->bjk", B, axes)
-    held = half_a @ np.abs(reach[0]) + half_b @ np.abs(reach[1])
-    return (np.abs(between) > held).any(axis=1)
 
 
 def union(boxes, name="head"):
@@ -50,78 +42,12 @@ def union(boxes, name="head"):
     )
 
 
-class Boxes:
-    """Solids made of boxes in frames of an arm: bodies of a cell, and their overlaps by formula."""
-
-    def __init__(self, arm, solids):
-        self.chain = chain_of(arm)
-        self.solids = solids  # name: (frame, kind, [(T, half)])
-
-    def bodies(self, meshes):
-        made = []
-        for name, (frame, kind, boxes) in self.solids.items():
-            hulls = [box(2 * half, T) for T, half in boxes]
-            start = np.cumsum([0, *(len(h.points) for h in hulls)])
-            shape = Mesh(
-                vertices=np.vstack([h.points for h in hulls]),
-                triangles=np.vstack([h.triangles + s for h, s in zip(hulls, start, strict=False)]),
-                name=name,
-            )
-            if not meshes and kind == "robot":
-                shape = Hull(shape.vertices)
-            made.append(Body(name=name, shape=shape, frame=frame, kind=kind))
-        return made
-
-    def overlap(self, one, two, q, depth=0.0):
-        """Say at which of q (B, n) two solids overlap, the first shaved by a depth."""
-        frames = self.chain.frames(q)
-        (i, _, first), (j, _, second) = self.solids[one], self.solids[two]
-        hit = np.zeros(len(q), bool)
-        for T, half in first:
-            for U, other in second:
-                hit |= ~boxes_apart(frames[:, i] @ T, half - depth, frames[:, j] @ U, other)
-        return hit
-
-
-def along(low, high):
-    low, high = np.array(low, float), np.array(high, float)
-    return at((low + high) / 2), (high - low) / 2
-
-
-def solids_of(arm, gap, behind):
-    """An arm of boxes about its lines; a head from the flange, `behind` m of it behind that."""
-    solids = {}
-    for body in link_capsules(arm):
-        line, radius = body.shape.end - body.shape.start, 0.5 * body.shape.radius
-        z = line / np.linalg.norm(line)
-        x = np.cross(np.eye(3)[np.argmin(np.abs(z))], z)
-        x /= np.linalg.norm(x)
-        T = np.eye(4)
-        T[:3, :3] = np.array([x, np.cross(z, x), z]).T
-        T[:3, 3] = (body.shape.start + body.shape.end) / 2
-        half = np.array([radius, radius, np.linalg.norm(line) / 2])
-        solids[body.name] = (body.frame, "robot", [(T, half)])
-    end = chain_of(arm).end  # of the flange in the last joint's frame
-    flange = np.linalg.norm(end[:3, 3])
-    # Link 5 about the flange's axis at joint 5 zero, its face `gap` before the flange.
-    to = chain_of(arm).frames(np.zeros((1, arm.joints)))[0]
-    wrist = np.linalg.inv(to[5]) @ to[6] @ end
-    T, half = along([-0.05, -0.05, -flange - 0.05], [0.05, 0.05, -gap])
-    solids["link 5"] = (5, "robot", [(wrist @ T, half)])
-    head = [
-        along([-0.06, -0.05, 0], [0.061, 0.05, 0.2]),
-        along([0.06, -0.03, -behind], [0.12, 0.03, 0.1]),
-    ]
-    solids["head"] = (6, "head", [(end @ T, half) for T, half in head])
-    return solids
-
-
 @pytest.mark.parametrize("meshes", [False, True])
 @pytest.mark.parametrize("gap", [0.012, 0.0, -4e-3])
 def test_a_head_that_reaches_behind_the_flange_is_never_called_clear_inside_a_link(gap, meshes):
     """Against boxes by formula: no pose called clear overlaps, but for what does so by design."""
-    world = Boxes(ARM, solids_of(ARM, gap, behind=0.12))
-    cell = Cell(chain=world.chain, bodies=world.bodies(meshes), endless=ARM.endless)
+    world = with_collimator(ARM, gap=gap, behind=0.12)
+    cell = Cell(chain=world.chain, bodies=world.bodies(meshes=meshes), endless=ARM.endless)
     judged = dict(zip(cell.pair_names, cell.depth, strict=True))
     assert not [pair for pair in cell.unjudged if "head" in pair]
     # The face by which the head is mounted overlaps by design, to no more than its depth.
@@ -134,7 +60,7 @@ def test_a_head_that_reaches_behind_the_flange_is_never_called_clear_inside_a_li
     for one, two in combinations(world.solids, 2):
         pair = (one, two) if (one, two) in judged else (two, one)
         if pair in judged:
-            there = world.overlap(*pair, q, depth=judged[pair])
+            there = world.overlap(*pair, q, judged[pair])
             hit |= there
             beside |= there & (set(pair) == {"link 5", "head"})
     assert not (clear & hit).any()
@@ -304,3 +230,44 @@ def swivel_pair(gap):
         Body(name="boss", shape=still, frame=0, kind="robot"),
         Body(name="face", shape=turning, frame=1, kind="head"),
     ]
+
+
+def test_a_body_of_a_wrong_unit_is_warned_of():
+    tool = at([0, 0, 0.3])
+    assert odd_sizes(cell_of(ARM, tool=tool)) == ()
+    for scale, odd in ((1.0, False), (1e-3, True), (100.0, True)):
+        bench = box(scale * np.array([0.8, 0.5, 0.3]), at([60, 0, 0]))
+        cell = cell_of(ARM, tool=tool, fixtures={"bench": bench})
+        found = odd_sizes(cell)
+        assert bool(found) == odd
+        assert all("'bench' is " in said and "is its unit right?" in said for said in found)
+    links = [Body(name="forearm", shape=box([30, 20, 20], at([0, 0, 100])), frame=3, kind="robot")]
+    (said,) = odd_sizes(cell_of(ARM, tool=tool, links=links))
+    assert "'forearm' is 3e+04 mm long beside an arm of" in said
+
+
+def test_what_is_shaved_lies_inside_and_no_deeper_than_asked():
+    rng = np.random.default_rng(8)
+    for shape in (
+        Hull(rng.normal(0, 0.1, (40, 3))),
+        frustum([0, 0, 0], [0.1, 0.2, 0.3], (0.05, 0.08)),
+        Capsule(start=[0, 0, 0], end=[0, 0, 0.2], radius=0.05),
+        box([0.2, 0.1, 0.3]),
+    ):
+        for depth in (5e-4, 4e-3, 0.02):
+            left = shaved(shape, depth)
+            if isinstance(shape, Capsule):
+                assert left.radius == shape.radius - depth
+                continue
+            planes = ConvexHull(shape.points).equations
+            behind = -(left.points @ planes[:, :3].T + planes[:, 3])
+            # Every corner lies on three faces that have gone in by the depth, behind all others.
+            assert behind.min() == pytest.approx(depth, abs=1e-9)
+            assert (np.sort(behind, axis=1)[:, 2] < depth + 1e-9).all()
+        assert shaved(shape, 0.5) is None
+    solid = union([([0, 0, 0], [0.1, 0.2, 0.3]), ([0.5, 0, 0], [0.6, 0.1, 0.1])])
+    left = shaved(solid, 2e-3)
+    np.testing.assert_allclose(left.bounds, solid.bounds + 2e-3 * np.array([[1], [-1]]), atol=2e-5)
+    moved = np.linalg.norm(left.vertices - solid.vertices, axis=1)
+    assert (moved <= 2 * 2e-3).all()
+    assert shaved(solid, 0.05) is None
