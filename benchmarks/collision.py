@@ -191,7 +191,9 @@ def _verdicts(arms: Sequence[str], poses: int) -> Report:
     for name, gap, meshes in product(arms, (0.012, 0.0, -0.004), (False, True)):
         arm = robot(name)
         world = with_collimator(arm, gap=gap, behind=0.12)
-        cell = Cell(chain=world.chain, bodies=world.bodies(meshes=meshes), endless=arm.endless)
+        cell = Cell(
+            chain=world.chain, bodies=tuple(world.bodies(meshes=meshes)), endless=arm.endless
+        )
         limits = arm.joint_limits()
         found = world.verdicts(cell, rng.uniform(limits.lower, limits.upper, (poses, arm.joints)))
         wrong += found.wrong

@@ -127,7 +127,7 @@ def refuses_as_much(cells, q, rng):
         before, clear, passes = cell, now, then
 
 
-@pytest.mark.parametrize("seed", range(8))
+@pytest.mark.parametrize("seed", range(6))
 def test_asking_for_more_never_checks_less(seed):
     rng = np.random.default_rng(seed)
     q = rng.uniform(-np.pi, np.pi, (120, 6))
@@ -141,7 +141,7 @@ def test_asking_for_more_never_checks_less(seed):
     refuses_as_much(cells, q, rng)
     # One pair's own distance, whichever.
     pair = cells[0].pair_names[rng.integers(len(cells[0].pairs))]
-    refuses_as_much([again(near_miss_of={pair: near}) for near in LADDER], q, rng)
+    refuses_as_much([again(near_miss_of={pair: near}) for near in LADDER[1::2]], q, rng)
 
 
 @pytest.mark.parametrize("arm", ["abb_irb1200_5_90", "kuka_kr16_2", "staubli_tx2_90", "ur_ur10e"])
@@ -271,3 +271,27 @@ def test_what_is_shaved_lies_inside_and_no_deeper_than_asked():
     moved = np.linalg.norm(left.vertices - solid.vertices, axis=1)
     assert (moved <= 2 * 2e-3).all()
     assert shaved(solid, 0.05) is None
+
+
+def test_links_that_touch_at_most_poses_by_a_skin_are_judged_but_for_it():
+    """A foot slides on a plate at zero over two thirds of a turn; what stands on the plate hits."""
+    chain = Chain(origins=np.eye(4)[None], axes=np.array([[0, 0, 1.0]]), end=np.eye(4))
+    plate = ([-0.3, -0.3, -0.05], [0.07, 0.3, 0])
+    foot = Body(
+        name="foot", frame=1, kind="robot", shape=box_between([0.1, -0.01, 0], [0.12, 0.01, 0.05])
+    )
+
+    def turned(*pieces):
+        still = Body(name="plate", shape=union(pieces), frame=0, kind="robot")
+        cell = Cell(chain=chain, bodies=[still, foot], endless=[1], near_miss=0.01)
+        q = np.linspace(-np.pi, np.pi, 181)[:, None]
+        return cell, cell.clear(q), np.abs(np.abs(q[:, 0]) - np.pi)
+
+    sliding, clear, _ = turned(plate)
+    assert "but for 0.5 mm that they overlap by design" in sliding.unjudged["plate", "foot"]
+    assert clear.all()
+    cell, clear, off = turned(plate, ([-0.13, -0.02, 0], [-0.09, 0.02, 0.03]))
+    assert cell.depth == [5e-4]
+    assert not clear[off < 0.2].any()
+    assert clear[off > 0.4].all()
+    assert cell.own.all(), "it is asked for no distance besides, which is told as its own"

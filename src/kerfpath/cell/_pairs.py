@@ -46,6 +46,8 @@ SKIN = (5e-4, 1e-3, 2e-3)
 """m: depths to which bodies that touch by design may overlap."""
 DEEPER = (3e-3, 4e-3, 6e-3, 8e-3, 0.012, 0.016, 0.024, 0.032, 0.048, 0.064, 0.096, 0.128)
 """m: depths to which a head may overlap a link at every pose and still be judged for more."""
+HALVED = 3
+"""Times that the step before a depth is halved to find the least that does."""
 OFTEN, GONE, FREE = 0.5, 0.5, 0.25
 """Shares of the poses: at so many a pair touches that may do so by design, and of those so many are
 freed by a skin where it does; of all, so many where a head touches a link at every pose.
@@ -199,15 +201,27 @@ def _touching(
     most, always = float(apart.max()), bool(touching.all())
     if always and {bodies[i].kind for i in pair} == {"robot"}:
         return Design(most=most, judged=False)
-    for depth in (*SKIN, *(DEEPER if always else ())):
+
+    def freed(depth: float) -> Design | None:
+        """Return the design where shaving by a depth frees as many poses as it must."""
         solid = _first_shaved(bodies, pair, depth)
         if solid is None:
-            continue
+            return None
         found = Design(depth=depth, solid=solid)
         two = left_of(bodies, pair, found)
         left = _apart(two, [(0, 1)], frames[touching], np.array([enough]))[:, 0]
-        if (left > TOUCH).mean() >= (FREE if always else GONE):
+        return found if (left > TOUCH).mean() >= (FREE if always else GONE) else None
+
+    less = 0.0
+    for depth in (*SKIN, *(DEEPER if always else ())):
+        if (found := freed(depth)) is not None:
+            # No more than need be, unless the shapes are but typical ones.
+            for _ in range(HALVED if all(bodies[i].holds for i in pair) and less > 0 else 0):
+                middle = (less + found.depth) / 2
+                nearer = freed(middle)
+                less, found = (middle, found) if nearer is None else (less, nearer)
             return found
+        less = depth
     return Design(most=most, judged=False) if always else _design(most, enough)
 
 

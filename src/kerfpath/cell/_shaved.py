@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from functools import lru_cache
+
 import numpy as np
 from scipy.optimize import linprog
 from scipy.spatial import ConvexHull, HalfspaceIntersection, QhullError
@@ -71,19 +73,30 @@ def _inward(mesh: Mesh) -> Array:
 
 def _core(hull: Hull, depth: float) -> Hull | None:
     """Return the points of a convex solid that are `depth` (m) or more behind each of its faces."""
+    planes, heart, radius = _heart(hull)
+    if radius - depth <= CORE:
+        return None
+    try:
+        return Hull(
+            HalfspaceIntersection(planes + np.array([0.0, 0.0, 0.0, depth]), heart).intersections
+        )
+    except (QhullError, InputError):
+        return None
+
+
+@lru_cache(maxsize=64)
+def _heart(hull: Hull) -> tuple[Array, Array, float]:
+    """Return the planes (F, 4) of a convex solid, and centre (3,) and radius m of a ball in it.
+
+    The largest there is: its centre stays the deepest point however far the planes go in.
+    """
     planes = np.unique(ConvexHull(hull.points).equations, axis=0)
-    planes[:, 3] += depth
-    # The ball that fits best between the planes: its centre is well inside what they hold.
     found = linprog(
         [0.0, 0.0, 0.0, -1.0],
         A_ub=np.c_[planes[:, :3], np.ones(len(planes))],
         b_ub=-planes[:, 3],
         bounds=[(None, None)] * 4,
     )
-    core = found.x
-    if found.status != 0 or core is None or core[3] <= CORE:
-        return None
-    try:
-        return Hull(HalfspaceIntersection(planes, core[:3]).intersections)
-    except (QhullError, InputError):
-        return None
+    if found.x is None:
+        return planes, hull.points.mean(axis=0), 0.0
+    return planes, found.x[:3], float(found.x[3])
