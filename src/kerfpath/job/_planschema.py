@@ -16,7 +16,7 @@ from kerfpath.search import Closure, Method, Metric, ObjectiveKind
 
 __all__ = ["SCHEMA", "read_document"]
 
-SCHEMA = 3
+SCHEMA = 4
 """Version of the layout of plan.json; it grows when a reader of the old one would go wrong."""
 LARGEST = 1e12
 """No number of a plan is larger, in SI: not even the sum of all it counts."""

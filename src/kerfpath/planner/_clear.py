@@ -8,7 +8,7 @@ from typing import Any, TypeVar
 import numpy as np
 
 from kerfpath._arrays import Array, Ints
-from kerfpath.cell import Cell, Checker
+from kerfpath.cell import UNPROVED, Cell, Checker
 from kerfpath.comfort import Band
 from kerfpath.errors import InputError, NoFeasiblePath
 from kerfpath.graph import LayeredGraph
@@ -42,6 +42,7 @@ class Finder:
 
     def __init__(self, task: Task, cell: Cell | None) -> None:
         self._limits, self._cell, self._graph = task.limits, cell, task.graph
+        self._but = f" ({UNPROVED})" if cell is not None and cell.unproved else ""
         if cell is None:
             return
         _require_same_cell(task, cell)
@@ -132,7 +133,8 @@ class Finder:
             return claim
         seen = self._checker
         return (
-            f"{claim}, clear in the cell: {seen.asked} of {len(self._known.cost)} poses and "
+            f"{claim}, clear in the cell{self._but}: "
+            f"{seen.asked} of {len(self._known.cost)} poses and "
             f"{seen.motions_asked} motions looked at in {self._known.searches} searches, "
             f"distances found at {seen.measured} poses and on {seen.motions_measured} motions"
         )

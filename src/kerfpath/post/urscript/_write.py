@@ -126,6 +126,7 @@ class URScript(Formatter):
         checked = "been proved clear in the planned cell" if program.air_checked else NOT_CHECKED
         yield f"# Written by kerfpath for {plain(robot.model)} ({plain(robot.id)})."
         yield f"# Moves through the air have {checked}."
+        yield from (f"# {said}" for said in program.caveats)
         yield "# Payload and centre of gravity are those of the installation."
         yield "# The controller sets the outputs low while no program runs; the safety circuit of"
         yield "# the cell has to switch the laser off, too."
