@@ -23,7 +23,7 @@ from kerfpath.contour import Contour
 from kerfpath.errors import InputError
 from kerfpath.operations import Ribbon, Surface
 
-__all__ = ["Kind", "Loop", "Part", "Side", "loop_of", "numbered"]
+__all__ = ["Kind", "LeftOut", "Loop", "Part", "Side", "loop_of", "numbered"]
 
 Kind = Literal["outer", "inner", "open"]
 Side = Literal["outer", "inner", "edge", ""]
@@ -99,6 +99,30 @@ class Loop:
         return freeze(points if self.kind == "open" else np.vstack([points, points[:1]]))
 
 
+@dataclass(frozen=True, slots=True, kw_only=True)
+class LeftOut:
+    """Entities of a drawing that are in no loop.
+
+    Parameters
+    ----------
+    kind : str
+        As the format calls it: SPLINE, TEXT, INSERT (a block), ...
+    reason : str
+    count : int
+    may_cut : bool
+        Whether it may have been a line to cut; texts, dimensions and the like are none.
+    """
+
+    kind: str
+    reason: str
+    count: int
+    may_cut: bool
+
+    def __str__(self) -> str:
+        doubt = "; this may have been to cut" if self.may_cut else ""
+        return f"left out: {self.count} {self.kind} ({self.reason}){doubt}"
+
+
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Part:
     """What a drawing holds: its loops by name, in the part's own frame.
@@ -117,6 +141,8 @@ class Part:
         Those of the skins, then those of the faces in their order; outer before inner.
     notes : tuple of str
         What was assumed, repaired or left out in reading.
+    left_out : tuple of LeftOut
+        What was left out, by kind and reason; in the notes, too.
     """
 
     path: Path
@@ -125,6 +151,7 @@ class Part:
     faces: int
     loops: tuple[Loop, ...]
     notes: tuple[str, ...] = ()
+    left_out: tuple[LeftOut, ...] = ()
     _gap: float = field(repr=False)
     _triangulate: Callable[[float], tuple[Array, Ints]] | None = field(default=None, repr=False)
 
