@@ -1,4 +1,4 @@
-"""Spoil files of every reader by the thousand, and print what is neither read nor refused in a line.
+"""Spoil files of every reader by the thousand, and print what is neither read nor refused.
 
     python tests/fuzz.py [--seconds S] [--mutants N] [--first SEED] [--out FOLDER] [READER ...]
 
@@ -74,7 +74,7 @@ def _limit() -> None:
 
 
 class Campaign:
-    """Mutants of one reader, read by a child, and the kinds of faults that they brought to light."""
+    """Mutants of one reader, read by a child, and the kinds of faults that they brought out."""
 
     def __init__(self, name: str, out: Path) -> None:
         self.name, self.out = name, out

@@ -20,17 +20,16 @@ from OCP.TopoDS import TopoDS_Compound, TopoDS_Shape
 from kerfpath.cad import read, read_measured
 from kerfpath.cell import Hull, link_bodies
 from kerfpath.cell._stl import closed, read_surface
+from kerfpath.cli._audit import show_audit
 from kerfpath.cli._contours import list_contours
+from kerfpath.errors import InputError, about
 from kerfpath.job import (
-    audit_file,
-    audit_program,
     cell_of_job,
     program_from_file,
     read_job,
     run_job,
     write_outcome,
 )
-from kerfpath.errors import InputError
 from kerfpath.placement import placement_from_points
 from kerfpath.post import languages
 from kerfpath.robots import Robot
@@ -87,12 +86,17 @@ file = "clamp.stl"
 unit = "mm"
 xyz_mm = [1500, 400, 300]
 """
+PULSES = "[program.inform]\npulses_per_deg = [1000, 900, 1000, 700, 700, 400]\n"
 LANGUAGES = {
     "rapid": ("abb_irb4600_60_205", [1100, 0, 600], ""),
     "krl": ("kuka_kr60_ha", [1100, 0, 600], "[program.krl]\nlaser_output = 5\n"),
     "fanuc": ("fanuc_m20ia", [1000, 0, 400], "[program.fanuc]\nlaser_output = 5\n"),
     "val3": ("staubli_rx160", [900, 0, 300], "[program.val3]\nlaser_output = 'BasicIO-1\\%Q0'\n"),
-    "inform": ("yaskawa_gp25", [1000, 0, 400], "[program.inform]\npulses_per_deg = [1000, 900, 1000, 700, 700, 400]\n"),
+    "inform": (
+        "yaskawa_gp25",
+        [1000, 0, 400],
+        "{PULSES}",
+    ),
     "urscript": ("ur_ur10e", [700, 0, 200], ""),
     "ros": ("abb_irb4600_60_205", [1100, 0, 600], ""),
     "csv": ("abb_irb4600_60_205", [1100, 0, 600], ""),
@@ -268,7 +272,8 @@ def write_meshes(folder: Path, corners, faces) -> None:
 def read_mesh(path: Path) -> None:
     """Read it as a head or fixture is read, and as a link is."""
     vertices, triangles = read_surface(path, path.name)
-    Hull(vertices[np.unique(triangles)])
+    with about(path):
+        Hull(vertices[np.unique(triangles)])
     closed(vertices, triangles, 1.0, path.name)
 
 
@@ -348,9 +353,10 @@ def plans(folder: Path) -> list[Whole]:
 
 
 def read_plan(path: Path) -> None:
-    audit_file(path)
-    program_from_file(path, "csv")
-    audit_file(path, path.parents[1] / "job.toml")
+    show_audit(path, None, as_json=True)
+    show_audit(path, path.parents[1] / "job.toml", as_json=True)
+    with about(path):
+        program_from_file(path, "csv")
 
 
 def programs(language: str, folder: Path) -> list[Whole]:
@@ -372,10 +378,10 @@ def _main_of(language: str, texts: list[Path]) -> Path:
 
 def read_a_program(path: Path) -> None:
     at = next(folder for folder in path.parents if (folder / "job.toml").exists())
-    audit_program(path, at / "job.toml")
+    show_audit(path, at / "job.toml", as_json=True)
 
 
-# ---------------------------------------------------------------------------------- measured, stores
+# ------------------------------------------------------------------------------ measured, stores
 
 
 def measured(folder: Path) -> list[Whole]:

@@ -107,7 +107,7 @@ def _answer(request: bytes, seconds: int) -> tuple[str, Any]:
                 "it again"
             ) from None
         finally:
-            if done[0] != "value" and not isinstance(done[1], InputError):
+            if done[0] == _LEAVES or isinstance(done[1], MemoryError):
                 worker.end()
                 _worker = None
     return done

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import logging
 import re
+import struct
 from collections import Counter
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -20,7 +21,7 @@ __all__ = ["DAMAGED", "document_of"]
 logger = logging.getLogger("ezdxf")
 DAMAGED = (
     DXFError, ArithmeticError, AssertionError, AttributeError, LookupError, RecursionError,
-    TypeError, ValueError,
+    TypeError, ValueError, struct.error,
 )  # fmt: skip
 """What ezdxf and splines raise on values that are none, and on structures that are torn."""
 BINARY = b"AutoCAD Binary DXF"

@@ -7,11 +7,14 @@ from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from pathlib import Path
 
+import numpy as np
+
 from kerfpath.errors import InputError
 from kerfpath.plans import Plan
 from kerfpath.post._build import build_program
 from kerfpath.post._compare import deviations
 from kerfpath.post._languages import language as find_language
+from kerfpath.post._meant import Meant
 from kerfpath.post._preflight import preflight
 from kerfpath.post._program import Program
 from kerfpath.post._read import ReadProgram
@@ -106,9 +109,16 @@ def read_program(
         raise InputError(f"language {language!r} has no reader, so that its programs stay unread")
     main = next(iter(files)) if main is None else main
     try:
-        return chosen.read(main, files, robot, settings)
+        with np.errstate(over="raise", divide="raise", invalid="raise"):
+            return chosen.read(main, Meant(files), robot, settings)
     except KeyError as missing:
         raise InputError(f"{main}: the file {missing.args[0]!r} is not there") from None
+    except InputError:
+        raise
+    except (ArithmeticError, ValueError) as error:
+        raise InputError(
+            f"{main}: numbers in it make no pose or joints ({error}); write the program again"
+        ) from None
 
 
 def write_files(folder: str | os.PathLike[str], files: Mapping[str, str]) -> list[Path]:
