@@ -105,10 +105,11 @@ def second_order(q, start, closure, passable=None, **o):
     return cost, best("sum", np.inf if o["objective"] == "sum" else cost * (1 + 1e-12))
 
 
-def interrupted(q, start, passable=None, **o):
+def interrupted(q, start, passable=None, s=None, least_piece=0.0, **o):
     """Fewest interruptions, and of plans with that many the optimal (cost, tie-breaking sum)."""
     layers = [q[a:b] for a, b in itertools.pairwise(start)]
     vertex = [o["vertex_cost"][a:b] for a, b in itertools.pairwise(start)]
+    s = np.arange(len(layers)) if s is None else s
     if len(layers) == 1:
         return (0, vertex[0].min(), vertex[0].min()) if len(vertex[0]) else None
     D, bound_a, steps = _edges(layers, vertex, o, passable)
@@ -117,19 +118,25 @@ def interrupted(q, start, passable=None, **o):
         """By the number of interruptions: the least cost."""
         join = np.add if objective == "sum" else np.maximum
         enter, step = steps(join, cap)
-        # d[i][p, j]: least cost of a plan with i interruptions whose last edge is p, j.
-        d = [join(enter, step[0])]
+        # d[i, a][p, j]: least cost with i interruptions, the last at node a, and last edge p, j.
+        d = {(0, 0): join(enter, step[0])}
         for k in range(1, len(D)):
             ok = (np.abs(D[k][None] - D[k - 1][:, :, None]) <= bound_a).all(-1)
             there = np.where(vertex[k] <= cap, vertex[k], np.inf)[:, None]
-            on = [
-                join(np.where(ok, e[:, :, None], np.inf).min(axis=0, initial=np.inf), step[k])
-                for e in d
-            ]
-            anew = [join(join(e.min(initial=np.inf), there), step[k]) for e in d]
-            never = np.full(step[k].shape, np.inf)
-            d = [np.minimum(a, b) for a, b in zip([*on, never], [never, *anew], strict=True)]
-        return np.array([e.min(initial=np.inf) for e in d])
+            on = {
+                key: join(np.where(ok, e[:, :, None], np.inf).min(axis=0, initial=np.inf), step[k])
+                for key, e in d.items()
+            }
+            for (i, a), e in d.items():
+                if s[k] - s[a] >= least_piece:
+                    anew = join(join(e.min(initial=np.inf), there), step[k])
+                    on[i + 1, k] = np.minimum(on.get((i + 1, k), np.inf), anew)
+            d = on
+        cost = np.full(len(layers), np.inf)
+        for (i, a), e in d.items():
+            if i == 0 or s[-1] - s[a] >= least_piece:
+                cost[i] = min(cost[i], e.min(initial=np.inf))
+        return cost
 
     cost = best(o["objective"], np.inf)
     if not np.isfinite(cost).any():

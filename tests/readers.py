@@ -95,7 +95,7 @@ LANGUAGES = {
     "inform": (
         "yaskawa_gp25",
         [1000, 0, 400],
-        "{PULSES}",
+        PULSES,
     ),
     "urscript": ("ur_ur10e", [700, 0, 200], ""),
     "ros": ("abb_irb4600_60_205", [1100, 0, 600], ""),

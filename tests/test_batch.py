@@ -101,7 +101,7 @@ def test_each_job_has_its_row_with_what_came_of_it(done):
     assert [rows["fast"][key] for key in ("contours", "contours_passed")] == [2, 1]
     assert rows["fast"]["cutting_time_s"] is None
     reasons = {
-        "fast": "a: contour 'a': no admissible edge",
+        "fast": "a: contour 'a': on this grid of the rotation no admissible edge",
         "misspelt": "plan.gama_step_deg: expected a key of [plan]",
         "unknown": "'c'",
         "mute": "A6 = 360.0 deg cannot be said by Status and Turn",

@@ -14,10 +14,13 @@ from typing import NamedTuple
 
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
 from kerfpath import robot
 from kerfpath.cli import main
 from kerfpath.job import read_plan_file
+from kerfpath.planner import at_least, at_most
 from programs import read_text
 
 DEMO = Path(str(files("kerfpath") / "demo"))
@@ -219,12 +222,47 @@ def test_a_contour_that_is_too_fast_is_told_how_fast_it_could_be(folder):
     (folder / "fast.toml").write_text(SMALL.replace("speed_m_min = 3", "speed_m_min = 30", 1))
     result = run("plan", "fast.toml", cwd=folder)
     assert result.returncode == 1
-    told = re.search(r"a path exists up to ([\d.]+) m/min, where the acceleration", result.stdout)
-    assert 3 < float(told[1]) < 30
+    told = re.search(
+        r"on this grid of the rotation a path exists up to ([\d.]+) m/min, refined up to "
+        r"([\d.]+) m/min, where the acceleration", result.stdout,
+    )  # fmt: skip
+    assert 3 < float(told[1]) < float(told[2]) < 30
+    # As `speed` has it, and the limits of a robot cannot be raised.
+    found = json.loads(run("speed", "small.toml", "--json", cwd=folder).stdout)["contours"][0]
+    for shown, key in ((told[1], "on_grid_m_min"), (told[2], "fastest_m_min")):
+        assert float(shown) <= found[key] == pytest.approx(float(shown), rel=1e-3)
+    assert "no eta_velocity and no eta_acceleration up to 1 is enough there" in result.stdout
+    assert "a finer gamma_step_deg or the refinement may do more" in result.stdout
     data = json.loads((folder / "fast-plan" / "plan.json").read_text())["contours"][0]
-    assert data["fastest_speed_m_s"] * 60 == pytest.approx(float(told[1]), rel=1e-3)
+    assert data["fastest_speed_m_s"] * 60 == pytest.approx(float(told[2]), rel=1e-3)
     assert data["proved"]
     assert "a path exists up to" in (folder / "fast-plan" / "report.html").read_text()
+
+
+def test_what_a_message_advises_can_be_done(folder):
+    """A little over the fastest speed of the grid: either remedy, as it is printed, is one."""
+    grid = SMALL.replace("[plan]", "[plan]\nrefine = false")
+    found = json.loads(run("speed", "small.toml", "--json", cwd=folder).stdout)["contours"][0]
+    over = found["on_grid_m_min"] * 1.0001
+    asked = grid.replace("speed_m_min = 3", f"speed_m_min = {over!r}", 1)
+    (folder / "over.toml").write_text(asked)
+    result = run("plan", "over.toml", "--out", "advised", cwd=folder)
+    assert result.returncode == 1
+    told = re.search(r"up to ([\d.]+) m/min.* with eta_acceleration = ([\d.]+); no", result.stdout)
+    assert float(told[1]) < over
+    assert 0.9 < float(told[2]) <= 1
+    for remedy in (
+        grid.replace("speed_m_min = 3", f"speed_m_min = {told[1]}", 1),
+        asked.replace("eta_acceleration = 0.9", f"eta_acceleration = {told[2]}"),
+    ):
+        (folder / "advised.toml").write_text(remedy)
+        assert run("plan", "advised.toml", "--out", "advised", cwd=folder).returncode == 0
+
+
+@given(st.floats(1e-6, 1e6), st.integers(1, 6))
+def test_rounded_figures_keep_what_they_say(value, digits):
+    assert value * (1 - 10.0 ** (1 - digits)) <= float(at_most(value, digits)) <= value
+    assert value <= float(at_least(value, digits)) <= value * (1 + 10.0 ** (1 - digits))
 
 
 def test_the_tolerance_between_nodes_is_the_jobs(folder):
@@ -294,6 +332,27 @@ def test_a_job_may_dip_or_be_interrupted_and_is_read_back(folder):
         assert post.returncode == 0, post.stderr
         again, first = ((folder / "over" / f).read_text() for f in ("again.mod", "over.mod"))
         assert again.replace("MODULE again", "MODULE over") == first
+
+
+def test_short_pieces_are_warned_of_and_a_job_may_ask_for_longer_ones(folder):
+    base = SMALL.replace("speed_m_min = 3", "speed_m_min = 3.7", 1).replace("= 50", "= 1", 1)
+    base = base.replace("[plan]", '[plan]\nrefine = false\ninterruptions = "fewest"\nKEY')
+
+    def cut(key):
+        (folder / "pieces.toml").write_text(base.replace("KEY", key))
+        done = run("plan", "pieces.toml", "--out", "pieces", cwd=folder)
+        plans = read_plan_file(folder / "pieces" / "plan.json").plans if not done.returncode else ()
+        return done, [np.ptp(p.contour.s) * 1e3 for p in plans if "piece" in p.name]
+
+    done, free = cut("")
+    assert (f"pieces is {min(free):.1f} mm" in done.stdout) == (min(free) < 20)
+    done, longer = cut(f"least_piece_mm = {min(free) + 1:.3f}")
+    assert done.returncode == 0, done.stdout + done.stderr
+    assert min(longer) >= min(free) + 1
+    assert "shortest of its" not in done.stdout
+    done, _ = cut("least_piece_mm = 16.5")  # more than half of it
+    assert done.returncode == 1
+    assert "no division into pieces of 0.0165 m or more keeps the limits" in done.stdout
 
 
 def test_contours_lists_the_loops_by_name():

@@ -7,6 +7,7 @@ import pytest
 
 import naive
 from kerfpath import InputError, NoFeasiblePath, shortest_path
+from kerfpath.search import _long_enough as long_enough
 from kerfpath.search import interrupted_path
 
 ONE = {"dt": 1.0, "velocity": [1.0], "acceleration": [0.1]}
@@ -39,16 +40,23 @@ def cut(q, start, pieces, o):
     return np.array(edges).reshape(-1, q.shape[1]), visits
 
 
-def agree(rng, **sizes):
+def agree(rng, make=instance, *, long=False, **sizes):
     """Compare one random instance with the oracle; return the number of interruptions or None."""
-    q, start, o = instance(rng, **sizes)
-    want = naive.interrupted(q, start, **o)
+    q, start, o = make(rng, **sizes)
+    least = {}
+    if long:
+        s = np.cumsum(rng.choice([0.5, 1.0, 1.0, 1.5], size=len(start) - 1))
+        least = {"s": s, "least_piece": rng.choice([0.4, 1.2, 1.6, 2.5, 3.3])}
+    want = naive.interrupted(q, start, **least, **o)
     if want is None:
         with pytest.raises(NoFeasiblePath) as caught:
-            interrupted_path(q, start, **o)
+            interrupted_path(q, start, **least, **o)
         assert caught.value.proved
         return None
-    got = interrupted_path(q, start, **o)
+    got = interrupted_path(q, start, **least, **o)
+    if long and got.interruptions:
+        ends = [*(p.first for p in got.pieces), len(start) - 2]
+        assert (np.diff(s[ends]) >= least["least_piece"] - 1e-9).all()
     assert got.optimal
     assert got.interruptions == want[0]
     edges, visits = cut(q, start, got.pieces, o)
@@ -69,27 +77,87 @@ def test_number_and_cost_agree_with_trying_everything(count):
     assert max(i for i in seen if i is not None) > 4
 
 
+def tracks(rng):
+    """Overlapping stretches that are held without a change: much freedom where to interrupt."""
+    K, spans = int(rng.integers(14, 24)), [(0, int(rng.integers(3, 7)))]
+    while spans[-1][1] < K - 1:
+        a, b = spans[-1]
+        spans.append((int(rng.integers(max(a + 1, b - 4), b + 1)), b + int(rng.integers(2, 7))))
+    layers = [[10.0 * i for i, (a, b) in enumerate(spans) if a <= k <= b] for k in range(K)]
+    start = np.cumsum([0, *map(len, layers)])
+    o = {
+        "dt": 1.0, "velocity": np.ones(1), "acceleration": np.ones(1), "endless": np.zeros(1, bool),
+        "weights": np.ones(1), "metric": "manhattan", "objective": rng.choice(["sum", "max"]),
+        "eta_v": 1.0, "eta_a": 1.0, "vertex_cost": rng.uniform(0.1, 1, size=start[-1]).round(1),
+    }  # fmt: skip
+    return np.concatenate(layers)[:, None], start, o
+
+
+@pytest.mark.parametrize(("make", "count"), [(instance, 400), (tracks, 200)])
+def test_pieces_of_a_least_length_agree_with_trying_everything(make, count, monkeypatch):
+    looked_at = []
+    tight = long_enough._tight
+    monkeypatch.setattr(
+        long_enough, "_tight", lambda *given: looked_at.append(given) or tight(*given)
+    )
+    rng = np.random.default_rng(35 + count)
+    seen = [agree(rng, make, long=True) for _ in range(count)]
+    cut = sum(bool(i) for i in seen)
+    assert min(seen.count(None), cut) > count / 20
+    assert max(i for i in seen if i is not None) > 4
+    if make is tracks:  # spans had to be halved
+        assert len(looked_at) > cut + 5
+
+
+def test_a_least_length_moves_an_interruption_or_refuses():
+    # Three vertices in a row at a time go straight; the greedy reach leaves one edge at the end.
+    q = [[0.0], [0.5], [1.0], [1.0], [1.0], [1.0]]
+    s = np.arange(6) * 0.01
+
+    def ends(**least):
+        cut = interrupted_path(q, np.arange(7), weights=[1.0], **least, **ONE)
+        return [p.first for p in cut.pieces]
+
+    assert ends() == [0, 2]
+    assert ends(s=s, least_piece=0.02) == [0, 2]
+    with pytest.raises(
+        NoFeasiblePath, match=r"pieces of 0.025 m or more .* 1 interruptions do"
+    ) as e:
+        ends(s=s, least_piece=0.025)
+    assert (e.value.node, e.value.proved) == (2, True)
+
+
+def test_a_least_length_needs_to_know_where_the_nodes_are():
+    q = [[0.0], [0.5], [1.0]]
+    for s, words in ((None, "got nothing"), ([0.0, 0.2, 0.1], "farther"), ([0.0, 1.0], "s: ")):
+        with pytest.raises(InputError, match=words):
+            interrupted_path(q, np.arange(4), s=s, least_piece=0.1, **ONE)
+
+
 def test_the_oracle_itself_agrees_with_enumeration():
     rng = np.random.default_rng(32)
     interrupted = 0
-    for _ in range(150):
+    for i in range(150):
         q, start, o = instance(rng, layers=(1, 5), size=(1, 4))
-        want = naive.interrupted(q, start, **o)
-        best = min(plans(q, start, o), default=None)
+        least = {"least_piece": 2.0} if i % 2 else {}
+        want = naive.interrupted(q, start, **least, **o)
+        best = min(plans(q, start, o, **least), default=None)
         assert (want is None) == (best is None)
         if want is not None:
             np.testing.assert_allclose(want, best, rtol=1e-9)
             interrupted += want[0] > 0
-    assert interrupted > 30
+    assert interrupted > 20
 
 
-def plans(q, start, o):
+def plans(q, start, o, least_piece=0):
     """(number, cost, sum) of every admissible plan, one by one."""
     bound_v = o["eta_v"] * o["velocity"] * o["dt"] + naive.TOLERANCE
     bound_a = o["eta_a"] * o["acceleration"] * o["dt"] ** 2 + naive.TOLERANCE
     layers = [range(a, b) for a, b in itertools.pairwise(start)]
     inner = range(1, len(layers) - 1)
     for breaks in itertools.chain(*(itertools.combinations(inner, m) for m in range(len(layers)))):
+        if breaks and (np.diff([0, *breaks, len(layers) - 1]) < least_piece).any():
+            continue
         nodes = sorted([*range(len(layers)), *breaks])
         for path in itertools.product(*(layers[k] for k in nodes)):
             path = np.array(path)

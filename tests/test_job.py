@@ -571,6 +571,8 @@ def test_a_posture_that_does_not_exist_is_refused_at_its_line(read, words):
         ('feed = "dip"\nrefine_parts = 3', 'expected refine_parts = 1 with feed = "dip", got 3'),
         ('feed = "dip"\nrotation_deg = 90', 'expected no rotation_deg with feed = "dip", got 90'),
         ('interruptions = "fewest"\nmethod = "paper"', 'plan.method: expected method = "exact"'),
+        ("least_piece_mm = 5", 'expected interruptions = "fewest" with least_piece_mm, got none'),
+        ("least_piece_mm = 0", "plan.least_piece_mm: expected a number above 0, in mm, got 0"),
         ('rotation_deg = 90\nmethod = "known"', 'method = "exact" with rotation_deg, got "known"'),
         (
             'tilt_deg = 3\ninterruptions = "fewest"',

@@ -8,9 +8,11 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from kerfpath.job import read_job
+from kerfpath import audit, placed, plan
+from kerfpath.job import read_job, read_plan_file
+from kerfpath.placement import planned_again
+from test_cli import SMALL, run
 from test_cli import refused as assert_refused
-from test_cli import run
 from test_job_part import DEMO, WHOLE
 
 SETTINGS = """
@@ -299,16 +301,59 @@ def test_a_measured_part_that_is_none_or_out_of_reach_gives_no_program(folder):
     assert "allowed are 0.5 mm" in refused(*command)
     assert run(*command, "--residual-mm", "4").returncode == 0
     out.unlink()
-    for shift, reason in (
-        (1200, "out of the robot's reach at this placement"),
-        (300, "fails its audit at the measured placement: error: excess over the joint limits"),
-        (-900, "fails its audit at the measured placement: error: joint acceleration"),
-    ):
+    with_points(folder, shift=1200)
+    result = run(*command)
+    assert result.returncode == 1
+    assert "led to the measured placement it fails" in result.stderr
+    assert "out of the robot's reach at this placement" in result.stderr
+    assert "and planned again there: " in result.stderr
+    # Where the part stands is told all the same, so that a job can be planned there.
+    assert re.search(r"as a job says it: xyz_mm = \[.*\], rpy_deg = \[.*\]", result.stdout)
+    assert "xyz_mm = [" in run(*command, "--json").stderr
+    assert not out.exists()
+    for shift, reason in ((300, "excess over the joint limits"), (-900, "joint acceleration")):
         with_points(folder, shift=shift)
         result = run(*command)
-        assert result.returncode == 1
-        assert reason in result.stderr
-    assert not out.exists()
+        assert result.returncode == 0, shift
+        assert f"was planned again there; only led there it fails: error: {reason}" in result.stdout
+
+
+def test_a_plan_on_its_limits_is_planned_again_around_a_part_that_was_measured(folder):
+    """Refined, a plan uses all of eta: a part a little off asks for a little more."""
+    (folder / "edge.toml").write_text(SMALL)
+    assert run("plan", folder / "edge.toml", "--out", folder / "edge").returncode == 0
+    plans = read_plan_file(folder / "edge" / "plan.json").plans
+    assert [np.abs(p.acceleration_share).max() > 0.899 for p in plans] == [True, True]
+    over = 0
+    for shift in (2.6, -2.6):
+        path, T = with_points(folder, shift=shift)
+        led = [placed(p, T) for p in plans]
+        beyond = [p.name for p in led if np.abs(p.acceleration_share).max() > 0.9 + 1e-6]
+        moved = folder / "edge_moved.mod"
+        result = run("post", folder / "edge/plan.json", "--measured", path, "-o", moved)
+        assert result.returncode == 0, result.stdout + result.stderr
+        for name in beyond:
+            assert f"Contour '{name}' was planned again there; only led there it" in result.stdout
+        over += len(beyond)
+    assert over
+
+
+@pytest.mark.parametrize("feed", ["constant", "dip"])
+def test_planning_again_keeps_speed_postures_and_limits(folder, circle, arm, tool, placement, feed):
+    speed = 0.3 if feed == "constant" else 0.8
+    made = plan(
+        circle, arm, tool=tool, placement=placement, speed=speed, gamma_step=np.radians(4),
+        feed=feed, refine=feed == "constant", postures=[0],
+    )  # fmt: skip
+    assert (made.feed is None) == (feed == "constant")
+    T = placement.copy()
+    T[:3, 3] += [0.02, -0.03, 0.01]
+    again = planned_again(made, T)
+    assert audit(again) == []
+    np.testing.assert_array_equal(again.T_base_part, T)
+    assert set(again.posture) == set(made.posture)
+    fastest = np.diff(again.contour.s) / np.diff(again.time)
+    assert fastest.max() == pytest.approx(speed, rel=1e-6)
 
 
 def test_bad_arguments_are_refused(folder, written):

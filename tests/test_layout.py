@@ -474,7 +474,7 @@ def test_the_command_leaves_a_page_its_data_and_a_job_that_plans(coarse, tmp_pat
     assert kept(tmp_path / "out" / "layout.sqlite") == before
     assert (tmp_path / "out" / "layout.html").read_bytes() == page
     assert f"speed: {data['best']['value']:.3f} m/min" in again.stdout
-    assert "no other of them is better, proved" in again.stdout
+    assert "no other of them is better there, proved" in again.stdout
     shown = dom_of(tmp_path / "out" / "layout.html") if CHROMIUM.exists() else None
     if shown is not None:
         assert shown.count('data-state="drawn"') == 2

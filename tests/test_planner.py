@@ -105,7 +105,9 @@ def test_a_part_out_of_reach_is_an_answer_with_node_and_counts(circle, arm, tool
 
 
 def test_too_fast_is_an_answer_with_the_joint(circle, arm, tool, placement):
-    with pytest.raises(NoFeasiblePath, match=r"contour 'circle': no admissible edge") as caught:
+    with pytest.raises(
+        NoFeasiblePath, match=r"contour 'circle': on this grid of the rotation no admissible edge"
+    ) as caught:
         plan(circle, arm, tool=tool, placement=placement, speed=20.0, gamma_step=STEP)
     assert any(reason.startswith("velocity, joint") for reason in caught.value.counts)
 
@@ -253,6 +255,14 @@ def test_the_pieces_of_an_interrupted_cut(corner, arm, tool, placement):
     assert all(r.cost <= p.cost for r, p in zip(refined, pieces, strict=True))
     whole = plan_in_pieces(corner, arm, **options | {"speed": 0.05})
     assert [p.name for p in whole] == ["corner"]
+    shortest = min(float(np.ptp(p.contour.s)) for p in pieces)
+    longer = plan_in_pieces(corner, arm, least_piece=shortest + 0.004, **options)
+    assert min(float(np.ptp(p.contour.s)) for p in longer) >= shortest + 0.004 - 1e-9
+    assert all(audit(p) == [] for p in longer)
+    with pytest.raises(NoFeasiblePath, match=r"no division into pieces of 0.15 m or more"):
+        plan_in_pieces(corner, arm, least_piece=0.15, **options)
+    with pytest.raises(InputError, match=r"least_piece: expected a number above 0 m"):
+        plan_in_pieces(corner, arm, least_piece=0.0, **options)
     with pytest.raises(InputError, match='needs method "exact"'):
         plan_in_pieces(corner, arm, method="paper", **options)
     for wrong in ({"closure": "periodic"}, {"rotation": np.full(6, np.inf)}):

@@ -21,6 +21,7 @@ from kerfpath.post import (
 from programs import frames, hand_plan, read_text, text_of
 
 RADIUS = 0.04
+ARM = robot("abb_irb4600_60_205", acceleration_ratio="iontec_20_to_70kg")
 
 
 def slot(step=0.0015):
@@ -35,7 +36,7 @@ def slot(step=0.0015):
 
 @pytest.fixture(scope="module")
 def made():
-    return hand_plan(slot(), robot("abb_irb4600_60_205"), *frames(), speed=0.05)
+    return hand_plan(slot(), ARM, *frames(), speed=0.05)
 
 
 def distance_to_slot(points):
@@ -109,7 +110,7 @@ def test_a_polygon_is_no_circle():
     t = np.linspace(0, 2 * np.pi, 25)[:-1]
     points = np.c_[RADIUS * np.cos(t), RADIUS * np.sin(t), 0 * t]
     polygon = Contour(points, np.tile([0.0, 0.0, -1.0], (24, 1)), closed=True)
-    made = hand_plan(polygon, robot("abb_irb4600_60_205"), *frames())
+    made = hand_plan(polygon, ARM, *frames(), speed=0.02)
     sagitta = RADIUS * (1 - np.cos(np.pi / 24))
     for tolerance, expected in ((0.9 * sagitta, False), (1.1 * sagitta, True)):
         program = build_program([made], arc_tolerance=tolerance)

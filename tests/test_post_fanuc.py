@@ -32,7 +32,7 @@ from kerfpath.robots import robot_ids
 from programs import arc, changed, codes, edited, frames, hand_plan, with_steps
 
 GOLDEN = Path(__file__).parent / "data" / "golden_fanuc"
-MAIN, CONTOUR = "CUT_SKIN_OUTER.ls", "SKIN_OUTER.ls"
+MAIN, CONTOUR, OFF = "CUT_SKIN_OUTER.ls", "SKIN_OUTER.ls", "CUT_SKIN_OUTER_OFF.ls"
 FANUC = language("fanuc")
 OPTIONS = FanucSettings(laser_output=1)
 ARMS = [name for name in robot_ids() if name.startswith("fanuc")]
@@ -77,7 +77,7 @@ def program(small):
 
 
 def golden():
-    return {name: (GOLDEN / name).read_bytes().decode("ascii") for name in (MAIN, CONTOUR)}
+    return {name: (GOLDEN / name).read_bytes().decode("ascii") for name in (MAIN, CONTOUR, OFF)}
 
 
 def read(program, options=OPTIONS):
@@ -275,11 +275,14 @@ def test_several_contours_gas_waits_and_micro_joints(cell):
     assert codes(program, "error", "fanuc", OPTIONS) == ["output"]
     options = FanucSettings(gas_output=7, laser_output=3, user_frame=4, tool_frame=5)
     files = post(program, "fanuc", options)
-    assert list(files) == ["TEIL_4711.ls", "LOCH_8.ls", "C_2_HOLE.ls"]
+    assert list(files) == ["TEIL_4711.ls", "LOCH_8.ls", "C_2_HOLE.ls", "TEIL_4711_OFF.ls"]
     assert "  DO[3]=OFF ;" in files["TEIL_4711.ls"]
     assert "  DO[7]=OFF ;" in files["TEIL_4711.ls"]
     text = files["LOCH_8.ls"]
-    assert "FINE TB    .30sec,DO[7]=ON TB    .02sec,DO[3]=ON    ;" in text
+    assert re.search(
+        r"DO\[7\]=ON ;\r\n +\d+:L P\[2\] 600cm/min FINE TB +\.02sec,DO\[3\]=ON +;", text
+    )
+    assert not re.search("TB.*TB", text), "controllers take one TB on a line"
     assert "  WAIT    .40(sec) ;" in text
     assert re.search(r"FINE TB +\.02sec,DO\[3\]=OFF +;\r\n  \d+:  DO\[7\]=OFF ;", text)
     assert "two-switches" in codes(program, "warning", "fanuc", options)
@@ -289,6 +292,21 @@ def test_several_contours_gas_waits_and_micro_joints(cell):
     laser = [on for signal, on in events if signal == "laser"]
     assert laser == [True, False, True, False]
     assert [on for signal, on in events if signal == "gas"] == [True, False]
+    leads = [s.lead_time for step in steps for s in getattr(step, "switches", ())]
+    assert leads[0] == pytest.approx(0.5, abs=1e-3)  # 50 mm at 100 mm/s: gas as the tool sets out
+    off = files["TEIL_4711_OFF.ls"]
+    assert [row[5:] for row in off.split("\r\n") if "UO" in row] == [
+        "  IF (!UO[3]),DO[3]=(OFF) ;",
+        "  IF (!UO[3]),DO[7]=(OFF) ;",
+    ]
+    assert "DEFAULT_GROUP\t= *,*,*,*,*;" in off
+
+
+def test_what_cannot_be_switched_with_one_tb_is_refused(program):
+    gas = Switch(signal="gas", on=True, lead_time=0.1)
+    inside = changed(program, 4, switches=(gas, Switch(signal="gas", on=False, lead_time=0.02)))
+    options = FanucSettings(laser_output=1, gas_output=2)
+    assert "two-switches" in codes(inside, "error", "fanuc", options)
 
 
 def test_arcs_are_one_line_in_two_rows(program):
@@ -298,29 +316,25 @@ def test_arcs_are_one_line_in_two_rows(program):
     circle = CircularMove(T_part_via=via.T_part_tip, q_via=via.q, **fields)
     made = with_steps(program, [*steps[:4], circle, *steps[6:]])
     text = post(made, "fanuc", OPTIONS)[CONTOUR]
-    assert "   6:C P[4]    \r\n    :  P[5] 720cm/min CNT100    ;\r\n   7:L P[6]" in text
+    assert "   8:C P[4]    \r\n    :  P[5] 720cm/min CNT100    ;\r\n   9:L P[6]" in text
     (back,) = [move for move in read(made).moves if move.kind == "circular"]
     np.testing.assert_allclose(back.T_part_via, via.T_part_tip, atol=2e-6)
 
 
-def test_a_long_contour_is_divided_and_the_laser_stays_on(cell):
-    made = hand_plan(arc(count=250), *cell)
+def test_a_contour_longer_than_a_program_is_refused_not_divided(cell):
+    program = build_program([hand_plan(arc(count=250), *cell)])
     options = FanucSettings(laser_output=1, lines_per_file=100)
-    program = build_program([made])
-    files = post(program, "fanuc", options)
-    assert list(files)[1:] == ["SKIN_OUTER.ls", "SKIN_OUTER_2.ls", "SKIN_OUTER_3.ls"]
-    counts = [int(re.search(r"LINE_COUNT\t= (\d+)", text)[1]) for text in files.values()]
-    assert max(counts) <= 100
-    assert sum(counts[1:]) == 254  # the joint move, a remark in two lines, 250 nodes, the retract
-    assert [re.findall(r"DO\[1\]=(\w+)", text) for text in files.values()] == [
-        ["OFF"], ["ON"], [], ["OFF"],
-    ]  # fmt: skip
+    assert codes(program, "error", "fanuc", options) == ["file-length"]
+    with pytest.raises(InputError, match=r"256 lines.* not divided.* lines_per_file"):
+        post(program, "fanuc", options)
+    files = post(program, "fanuc", options.model_copy(update={"lines_per_file": 256}))
+    assert list(files)[1:-1] == ["SKIN_OUTER.ls"]
 
 
 def test_names_are_cut_for_older_controllers_and_stay_different(cell):
     plans = [hand_plan(arc(name), *cell) for name in ("skin/outer edge", "skin/outer rim")]
     files = post(build_program(plans), "fanuc", FanucSettings(laser_output=1, longest_name=8))
-    assert list(files) == ["CUT_SKIN.ls", "SKIN_OUT.ls", "SKIN_O_2.ls"]
+    assert list(files) == ["CUT_SKIN.ls", "SKIN_OUT.ls", "SKIN_O_2.ls", "CUT__OFF.ls"]
 
 
 def test_speeds_are_whole_numbers_of_the_finer_unit(cell, small):
@@ -399,9 +413,9 @@ def test_robots_of_another_kind_or_maker(program):
     [
         (MAIN, "/PROG  CUT", "/PROG  PUT", "line 1: expected /PROG and the name of the file"),
         (MAIN, "/ATTR", "/APPL", "line 2: expected /ATTR"),
-        (MAIN, "VERSION", "VISION", "line 7: not an attribute: 'VISION"),
+        (MAIN, "VERSION", "VISION", "line 9: not an attribute: 'VISION"),
         (MAIN, "1,*,*,*,*", "1,1,*,*,*", "not an attribute"),
-        (MAIN, "LINE_COUNT\t= 26", "LINE_COUNT\t= 25", "LINE_COUNT is 25, but there are 26"),
+        (MAIN, "LINE_COUNT\t= 27", "LINE_COUNT\t= 26", "LINE_COUNT is 26, but there are 27"),
         (MAIN, "  11:", "  12:", "expected line number 11"),
         (MAIN, "/END\r\n", "", "/END is missing"),
         (MAIN, "/END", "/END\r\nx", "nothing after it"),
@@ -412,10 +426,14 @@ def test_robots_of_another_kind_or_maker(program):
         (MAIN, "UFRAME_NUM=1", "UTOOL_NUM=1", "UTOOL_NUM must be set once"),
         (MAIN, "UTOOL_NUM=1", "! nothing", "UTOOL_NUM is not set"),
         (MAIN, "DO[1]=OFF", "DO[1]=ON", "not expected here"),
-        (MAIN, "DO[1]=OFF", "DO[2]=OFF", "switches the output DO[2]; expected DO[1]"),
+        (MAIN, "DO[1]=OFF", "DO[2]=OFF", "expected every output that is named to be reset once"),
+        (OFF, "DO[1]=(OFF)", "DO[2]=(OFF)", "expected '  IF (!UO[3]),DO[1]=(OFF)'"),
+        (OFF, "!UO[3]", "UO[3]", "expected '  IF (!UO[3]),DO[1]=(OFF)'"),
+        (CONTOUR, "UFRAME_NUM=1", "UFRAME_NUM=2", "expected '  UFRAME_NUM=1'"),
+        (CONTOUR, "  ! skin", "  DO[9]=ON ;! skin", "not expected here"),
         (MAIN, "DO[1]=OFF", "CALL SKIN_OUTER", "called twice"),
         (MAIN, "CALL SKIN_OUTER", "CALL OTHER", "the file 'OTHER.ls' is not there"),
-        (CONTOUR, "cm/min CNT100", "inch/min CNT100", "line 24: not expected here"),
+        (CONTOUR, "cm/min CNT100", "inch/min CNT100", "line 28: not expected here"),
         (CONTOUR, "CNT100 ", "CNT100 ACC50 ", "not expected here"),
         (CONTOUR, "L P[3]", "L P[99]", "P[99] is not there"),
         (CONTOUR, "L P[3]", "L P[4]", "P[3] is used by no motion"),
@@ -479,8 +497,8 @@ def test_no_text_of_a_plan_becomes_an_instruction(small, name, model, remark):
     program = with_steps(program, [Comment(remark), *program.sections[0].steps])
     assume("name-reserved" not in codes(program, "error", "fanuc", OPTIONS))
     files = post(program, "fanuc", OPTIONS)
-    main, section = (file.removesuffix(".ls") for file in files)
-    assert main == "WHOLE"
+    main, section, off = (file.removesuffix(".ls") for file in files)
+    assert (main, off) == ("WHOLE", "WHOLE_OFF")
     assert re.fullmatch(r"[A-Z][A-Z0-9_]{0,35}", section)
     for text, expected in zip(files.values(), golden().values(), strict=True):
         assert instructions(text, section) == instructions(expected, "SKIN_OUTER")

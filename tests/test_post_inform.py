@@ -39,8 +39,8 @@ from kerfpath.robots import robot_ids
 from programs import arc, assert_at, changed, codes, edited, frames, hand_plan, with_steps
 
 GOLDEN = Path(__file__).parent / "data" / "golden_inform"
-JOBS = ("CUT_SKIN_OUTER.JBI", "SKIN_OUTER_AIR.JBI", "SKIN_OUTER.JBI")
-MAIN, AIR, PATH = JOBS
+JOBS = ("CUT_SKIN_OUTER.JBI", "SKIN_OUTER_AIR.JBI", "SKIN_OUTER.JBI", "CUT_SKIN_OUTER_OFF.JBI")
+MAIN, AIR, PATH, OFF = JOBS
 INFORM = language("inform")
 PULSES = [1341.4, 1341.4, -1203.7, 1000.0, 980.1, 622.2]
 IN_PULSES = InformSettings(laser_output=1, gas_output=2, pulses_per_deg=PULSES)
@@ -205,7 +205,8 @@ def test_several_contours_become_jobs_called_in_order(cell):
     program = build_program([hand_plan(arc(name), *cell) for name in names], name="B-pillar 4711")
     files, _ = reads_back(program)
     calls = re.findall(r"CALL JOB:(\w+)", files["B_PILLAR_4711.JBI"])
-    assert calls[:4] == ["SKIN_OUTER_AIR", "SKIN_OUTER", "SKIN_OUTER_2_AIR", "SKIN_OUTER_2"]
+    assert calls[:3] == ["B_PILLAR_4711_OFF", "SKIN_OUTER_AIR", "SKIN_OUTER"]
+    assert calls[3:5] == ["SKIN_OUTER_2_AIR", "SKIN_OUTER_2"]
     assert max(map(len, calls)) == 32
     short = IN_PULSES.model_copy(update={"longest_name": 8})
     files, _ = reads_back(program, short)
@@ -302,7 +303,7 @@ def test_flip_and_the_angle_of_r_are_those_of_the_manuals_table(r_deg, no_flip, 
     """NX100 149235-1CD, 3.9: flip -90 < R <= 90, 270 < R <= 360, -360 < R <= -270."""
     arm = robot("yaskawa_gp25")
     q = joints_from_axes(arm, np.radians([[0.0, 0, 0, r_deg, -30, 0]]))
-    np.testing.assert_array_equal(manipulator_type(arm, q)[0, [0, 3]], [no_flip, beyond])
+    np.testing.assert_array_equal(manipulator_type(arm, q, "R")[0, [0, 3]], [no_flip, beyond])
 
 
 @pytest.mark.parametrize("number", range(8))
@@ -315,13 +316,14 @@ def test_types_follow_the_posture_in_all_eight_postures(cell, number):
     made = hand_plan(arc(count=20, radius=0.03), free, tool, placement, posture=number)
     program = build_program([made], lead_time=0.0)
     rear, down = number // 4, number // 2 % 2
-    for options in (IN_PULSES, BY_TYPE):
+    for options in (IN_PULSES, BY_TYPE, BY_TYPE.model_copy(update={"flip": "R"})):
         _, read = reads_back(program, options)
         cut = [move.posture for move in read.moves if move.kind == "linear"]
         assert {bits[1:3] for bits in cut[:-1]} == {(rear ^ down, rear)}
         q = np.array([move.q for move in program.moves[1:]])
-        r, t, s = (np.degrees(axes_from_joints(free, q))[:, k] for k in (3, 5, 0))
-        assert [bits[0] for bits in cut] == (np.cos(np.radians(r)) < 0).astype(int).tolist()
+        r, b, t, s = (np.degrees(axes_from_joints(free, q))[:, k] for k in (3, 4, 5, 0))
+        no_flip = np.cos(np.radians(r)) < 0 if options.flip == "R" else b < 0
+        assert [bits[0] for bits in cut] == no_flip.astype(int).tolist()
         for place, angle in ((3, r), (4, t), (5, s)):
             assert [bits[place] for bits in cut] == (np.abs(angle) > 180).astype(int).tolist()
 
@@ -357,43 +359,23 @@ def long(cell):
     return build_program(plans, name="long", lead_time=0.0)
 
 
-def test_long_contours_become_several_jobs(long):
+def test_a_contour_longer_than_a_job_is_refused_not_divided(long):
     tight = IN_PULSES.model_copy(update={"lines_per_file": 100, "longest_name": 12})
-    files, read = reads_back(long, tight)
-    assert len(files) > 20
-    assert max(text.count("\n") for text in files.values()) <= 100
+    assert "file-length" in found_codes(long, "error", tight)
+    with pytest.raises(InputError, match=r"not divided.* lines_per_file"):
+        post(long, "inform", tight)
     names = [name for name, _ in Inform(long, tight).names()]
     assert max(map(len, names)) == 12
     assert len(set(names)) == len(names)
-    cut = [s for s in read.sections if s.name.startswith("A_CONTOUR")]
-    # The laser stays on from a part of a contour to the next.
-    assert not any(move.switches for s in cut[3:-2] for move in s.moves)
-
-
-def test_an_arc_may_begin_a_part_of_a_contour(program):
-    steps = program.sections[0].steps[:4]
-    via, end = program.moves[3], program.moves[4]
-    there, back = (
-        CircularMove(
-            T_part_tip=tip.T_part_tip, q=tip.q, speed=0.1, duration=1.0,
-            T_part_via=via.T_part_tip, q_via=via.q,
-        )
-        for tip in (end, program.moves[2])
-    )  # fmt: skip
-    out = program.moves[-3:]
-    steps = [*steps, program.moves[2], *[replace(m) for m in (there, back) * 20], *out]
-    tight = IN_PULSES.model_copy(update={"lines_per_file": 100})
-    files, _ = reads_back(with_steps(program, steps), tight)
-    assert max(text.count("\n") for text in files.values()) <= 100
-    begun = [text for text in files.values() if re.search(r"NOP\r\nMOV[LC] C00000 V=\d", text)]
-    assert len(begun) > 3
+    files, _ = reads_back(long, tight.model_copy(update={"lines_per_file": 1000}))
+    assert len(files) == 8  # main, two for each contour, and the one that switches off
 
 
 def test_more_jobs_than_a_main_job_can_call_are_refused(program):
-    moves = [replace(move) for move in program.moves[2:-1] for _ in range(300)]
-    endless = with_steps(program, [*program.sections[0].steps[:4], *moves])
+    (section,) = program.sections
+    many = replace(program, sections=tuple(replace(section, name=f"c{k}") for k in range(100)))
     with pytest.raises(InputError, match="lines_per_file allows 100; raise it"):
-        Inform(endless, IN_PULSES.model_copy(update={"lines_per_file": 100})).files()
+        Inform(many, IN_PULSES.model_copy(update={"lines_per_file": 100})).files()
 
 
 # Settings and preflight.
@@ -444,9 +426,10 @@ def test_preflight_refuses_a_reserved_name_and_warns_of_other_makers(program):
         (MAIN, "'UFRAME 1 X", "'UFRAME 2 X", "UFRAME 1 is not told whole"),
         (MAIN, "'UFRAME 1 Y", "'UFRAME 1 X", "UFRAME 1 X is told twice"),
         (MAIN, "'TOOL 0 RZ", "' TOOL 0 RZ", "TOOL 0 is not told whole"),
-        (MAIN, "DOUT OT#(1) OFF", "DOUT OT#(1) ON", "not expected here: 'DOUT OT#(1) ON'"),
-        (MAIN, "DOUT OT#(1) OFF", "DOUT OT#(3) OFF", "switches the output 3; expected 1"),
-        (MAIN, "DOUT OT#(1) OFF\r\n", "", "expected every output that is named to be"),
+        (OFF, "DOUT OT#(1) OFF", "DOUT OT#(1) ON", "expected 'DOUT OT#(1) OFF'"),
+        (OFF, "DOUT OT#(1) OFF", "DOUT OT#(3) OFF", "expected 'DOUT OT#(1) OFF'"),
+        (OFF, "DOUT OT#(2) OFF\r\n", "", "'DOUT OT#(2) OFF' is missing"),
+        (MAIN, "CALL JOB:CUT_SKIN_OUTER_OFF\r\n", "", "expected CUT_SKIN_OUTER_OFF to be called"),
         (MAIN, "CALL JOB:SKIN_OUTER\r\n", "CALL JOB:SKIN_OUTER_AIR\r\n", "is called twice"),
         (MAIN, "END\r\n", "END\r\nNOP", "nothing may follow END"),
         (MAIN, "END\r\n", "", "the job ends too early; END is missing"),
@@ -460,8 +443,8 @@ def test_preflight_refuses_a_reserved_name_and_warns_of_other_makers(program):
         (AIR, "MOVJ C00000", "MOVJ C00001", "C00001 is not there"),
         (AIR, "MOVJ C00000 VJ=25.00", "MOVL C00000 V=25.0", "needs a position in the user frame"),
         (AIR, "PL=0", "PL=2", "expected PL=0 or PL=1, got PL=2"),
-        (PATH, "///RCONF 0", "///RCONF 2", "expected position C00000"),
-        (PATH, "///RCONF 0,", "///RCONF ", "expected 24 values, 0 from the seventh on"),
+        (PATH, "///RCONF 1", "///RCONF 2", "expected position C00000"),
+        (PATH, "///RCONF 1,", "///RCONF ", "expected 24 values, 0 from the seventh on"),
         (PATH, ",0\r\nC00000", ",1\r\nC00000", "expected 24 values, 0 from the seventh on"),
         (PATH, "////FRAME USER 1", "////FRAME USER 2", "expected '////FRAME USER 1'"),
         (PATH, "///USER 1", "///USER 2", "line 5: expected '///USER 1'"),
@@ -492,7 +475,7 @@ def test_pulses_cannot_be_read_without_those_of_the_robot(cell):
 @pytest.mark.parametrize(
     ("file", "old", "new"),
     [
-        (PATH, "///RCONF 0", "///RCONF 1"),
+        (PATH, "///RCONF 1", "///RCONF 0"),
         (PATH, "V=120.0", "V=121.0"),
         (PATH, "C00001=", "C00001=1"),
         (PATH, "OT#(2) ON", "OT#(2) OFF"),

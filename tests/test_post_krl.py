@@ -32,7 +32,7 @@ from kerfpath.post.krl import (
     joints_from_axes,
     status_and_turn,
 )
-from programs import arc, assert_at, changed, codes, frames, hand_plan, with_steps
+from programs import arc, assert_at, changed, codes, edited, frames, hand_plan, with_steps
 
 DATA = Path(__file__).parent / "data"
 KRL = language("krl")
@@ -287,8 +287,6 @@ def long(kuka):
 def test_long_programs_become_files_that_the_main_program_calls(long):
     tight = OUTPUTS.model_copy(update={"lines_per_file": 100})
     files, read = reads_back(long, tight)
-    assert len(files) > 10
-    assert max(len(text.splitlines()) for text in files.values()) <= 100
     names = [name for name, _ in Krl(long, tight).names()]
     assert max(len(name) for name in names) == 24
     assert len({name.lower() for name in names}) == len(names)
@@ -298,12 +296,12 @@ def test_long_programs_become_files_that_the_main_program_calls(long):
     for name in files:
         if name.endswith(".src") and name != main:
             assert name.removesuffix(".src") in names
-            assert f"EXT {name.removesuffix('.src')}()" in files[f"{main[:-4]}.dat"]
-    # The laser stays on from a part of a contour to the next, and every part says speed and zone.
-    cut = [s for s in read.sections if s.name.startswith("a_contour")]
-    assert len(cut) > 5
-    assert not any(move.switches for s in cut[1:-1] for move in s.moves)
-    assert all(move.zone > 0 for s in cut[1:-1] for move in s.moves)
+            assert f"EXT {name.removesuffix('.src')}(INT :IN)" in files[f"{main[:-4]}.dat"]
+    # No contour is divided: longer than a file, it is the only one of its own, and is warned of.
+    assert [s.name for s in read.sections] == [s.name for s in Krl(long, tight).program.sections]
+    assert all(s.moves[0].kind == "joint" for s in read.sections)
+    found = found_codes(long, "warning", tight)
+    assert found.count("file-length") == sum(len(s.steps) > 100 for s in long.sections) > 0
 
 
 def test_a_program_that_fits_is_one_file(long):
@@ -312,10 +310,10 @@ def test_a_program_that_fits_is_one_file(long):
 
 
 def test_more_files_than_a_main_program_can_call_are_refused(program):
-    moves = [replace(move) for move in program.moves[2:-1] for _ in range(1000)]
-    endless = with_steps(program, [*program.sections[0].steps[:4], *moves])
+    (section,) = program.sections
+    many = replace(program, sections=tuple(replace(section, name=f"c{k}") for k in range(300)))
     with pytest.raises(InputError, match="can call; raise lines_per_file"):
-        Krl(endless, OUTPUTS.model_copy(update={"lines_per_file": 100}))
+        Krl(many, OUTPUTS.model_copy(update={"lines_per_file": 100}))
 
 
 # Settings and preflight.
@@ -391,19 +389,28 @@ def test_preflight_refuses_a_joint_move_that_rounds_its_corner(program):
         ("&REL 1\r\n", "", "line 2: expected &REL 1 before"),
         ("DEF cut_skin_outer()", "DEF other()", "line 3: the first routine must be named"),
         ("END\r\n\r\nDEF", "END\r\n\r\nHALT\r\nDEF", "not expected here: 'HALT'"),
-        ("BAS(#INITMOV,0)\r\n", "", "line 9: not expected here: '$ADVANCE=5'"),
-        ("$OUT[5]=FALSE\r\n", "", "not expected here: '$OUT[6]=FALSE'"),
-        ("$ADVANCE=5", "$ADVANCE=3", "line 10: not expected here"),
+        ("BAS(#INITMOV,0)\r\n", "", "line 13: not expected here: '$ADVANCE=5'"),
+        (
+            "DEF switch_off()\r\n$OUT[5]=FALSE\r\n",
+            "DEF switch_off()\r\n",
+            "expected '$OUT[5]=FALSE'",
+        ),
+        ("INTERRUPT ON 20\r\n", "", "not expected here: 'BAS(#INITMOV,0)'"),
+        ("first_contour=1\r\n", "", "expected first_contour=1 before"),
+        ("first_contour<=1", "first_contour<=2", "called for contours up to 2, not 1"),
+        ("IF first_contour<=1 THEN\r\n", "", "must be called alone under a condition"),
+        ("ENDIF\r\n", "", "must be set once, after all calls"),
+        ("$ADVANCE=5", "$ADVANCE=3", "line 14: not expected here"),
         ("$CIRC_TYPE=#BASE", "$CIRC_TYPE=#PATH", "not expected here"),
         ("$TOOL={", "; $TOOL={", "expected $TOOL before"),
         ("$BASE={", "$TOOL={", "another tool"),
         ("$BASE={X", "$BASE={FRAME: X", "not expected here"),
-        ("skin_outer()\r\nEND", "END", "do not match: skin_outer"),
+        ("IF first_contour<=1 THEN\r\nskin_outer()\r\nENDIF\r\n", "", "set once, after all calls"),
         ("skin_outer()\r\nEND", "skin_outer()\r\nskin_outer()\r\nEND", "called twice"),
         (
-            "skin_outer()\r\nEND",
-            "skin_outer()\r\nhole()\r\nEND",
-            "dat, line 5: expected 'EXT hole()'",
+            "first_contour=1\r\n",
+            "IF first_contour<=2 THEN\r\nhole()\r\nENDIF\r\nfirst_contour=1\r\n",
+            "dat, line 5: expected 'EXT hole(INT :IN)'",
         ),
         ("$VEL.CP=0.100000\r\n", "", "$VEL.CP has not been set in this routine"),
         ("$APO.CDIS=0.300\r\n", "", "$APO.CDIS has not been set"),
@@ -416,8 +423,8 @@ def test_preflight_refuses_a_joint_move_that_rounds_its_corner(program):
         ("LIN {X", "LIN_REL {X", "not expected here"),
         ("PTP {A1", "PTP {X 0,A1", "not expected here"),
         ("WAIT SEC 0.400", "WAIT FOR $IN[1]", "not expected here"),
-        ("WAIT SEC 0.400", "$OUT[5]=TRUE", "not expected here"),
-        ("\r\nEND\r\n\r\nDEF", "\r\n\r\nDEF", "not expected here: 'DEF skin_outer()'"),
+        ("WAIT SEC 0.400", "$OUT[5]=TRUE", "5 is the output of no partner"),
+        ("\r\nEND\r\n\r\nDEF skin", "\r\n\r\nDEF skin", "expected 'END'"),
     ],
 )
 def test_the_reader_refuses_what_it_does_not_know(kuka, old, new, message):
@@ -441,9 +448,10 @@ def test_the_reader_refuses_what_ends_too_early(kuka):
     ("old", "new", "message"),
     [
         ("DEFDAT cut_skin_outer", "DEFDAT other", "line 3: expected 'DEFDAT cut_skin_outer'"),
-        ("ENDDAT", "EXT other()\r\nENDDAT", "line 5: expected 'ENDDAT'"),
-        ("ENDDAT", "ENDDAT\r\nDECL INT x=1", "line 6: nothing may follow ENDDAT"),
-        ("ENDDAT", "", "line 5: expected 'ENDDAT'"),
+        ("ENDDAT", "EXT other()\r\nENDDAT", "line 6: expected 'ENDDAT'"),
+        ("INT first_contour=1\r\n", "", "line 5: expected 'INT first_contour=0'"),
+        ("ENDDAT", "ENDDAT\r\nDECL INT x=1", "line 7: nothing may follow ENDDAT"),
+        ("ENDDAT", "", "line 6: expected 'ENDDAT'"),
     ],
 )
 def test_the_reader_refuses_another_dat(kuka, old, new, message):
@@ -451,6 +459,20 @@ def test_the_reader_refuses_another_dat(kuka, old, new, message):
     files["cut_skin_outer.dat"] = files["cut_skin_outer.dat"].replace(old, new, 1)
     with pytest.raises(InputError, match=f"cut_skin_outer.dat, {re.escape(message)}"):
         read_program(files, "krl", kuka, OUTPUTS)
+
+
+def test_a_program_begins_at_the_contour_that_its_dat_names(kuka, long):
+    files = post(long, "krl", OUTPUTS)
+    data = "a_program_with_a_very_lo.dat"
+    begun = edited(files, data, "first_contour=1", "first_contour=2")
+    names = [s.name for s in read_program(files, "krl", kuka, OUTPUTS).sections]
+    assert [s.name for s in read_program(begun, "krl", kuka, OUTPUTS).sections] == names[1:]
+    for wrong in ("0", "4"):
+        with pytest.raises(InputError, match=f"must be the number of a contour, got {wrong}"):
+            read_program(
+                edited(files, data, "first_contour=1", f"first_contour={wrong}"),
+                "krl", kuka, OUTPUTS,
+            )  # fmt: skip
 
 
 def test_a_missing_dat_is_said(kuka):

@@ -5,6 +5,7 @@ import os
 import re
 import subprocess
 
+import numpy as np
 import pytest
 from lxml import etree
 
@@ -24,6 +25,7 @@ def programs(arm, place):
     """Programs with everything that a program can have, of a part at `place` (m)."""
     tool, placement = frames()
     placement[:3, 3] = place
+    arm = arm.with_limits(acceleration=np.full(arm.joints, 20.0))  # rad/s^2; arcs need them
     plain = hand_plan(arc(count=60), arm, tool, placement)
     round_ = hand_plan(slot(), arm, tool, placement)
     yield "plain", build_program([plain])

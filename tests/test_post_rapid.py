@@ -157,7 +157,7 @@ def test_several_contours_become_routines_called_in_order(cell):
     assert [section.name for section in program.sections] == names
     reads_back(plans, program)
     text = text_of(post(program))
-    assert text.index("    skin_outer;") < text.index("    skin_outer_2;")
+    assert text.index("IF nFirst<=1 skin_outer;") < text.index("IF nFirst<=2 skin_outer_2;")
     assert "! 7. Bohrung ?12: 8 nodes" in text
 
 
@@ -448,20 +448,32 @@ def test_writing_replaces_the_file_at_one_stroke(tmp_path):
         ("MODULE cut_skin_outer", "SYSMODULE x", "line 1: not expected here"),
         ("ENDMODULE", "", "ENDMODULE is missing"),
         ("ENDMODULE", "ENDMODULE\nx;", "nothing may follow"),
-        (r"ConfL\Off;", r"ConfJ\On;", "line 17: not expected"),
-        ("    skin_outer;", "", "do not match: skin_outer"),
-        ("    skin_outer;", "    skin_outer;\n    skin_outer;", "called twice"),
+        (r"ConfL\Off;", r"ConfJ\On;", "line 20: expected"),
+        ("IF nFirst<=1 skin_outer;", "", "do not match: skin_outer"),
+        (
+            "IF nFirst<=1 skin_outer;",
+            "IF nFirst<=1 skin_outer;\nIF nFirst<=2 skin_outer;",
+            "called twice",
+        ),
+        ("IF nFirst<=1 skin_outer;", "IF nFirst<=2 skin_outer;", "is contour 1, not 2"),
+        ("IF nFirst<=1 skin_outer;", "skin_outer;", "not expected here"),
+        ("PERS num nFirst:=1;", "PERS num nFirst:=2;", "must be the number of a contour"),
+        ("PERS num nFirst:=1;", "", "must be the number of a contour"),
+        ("    nFirst:=1;\n", "", "not expected here: 'ERROR'"),
+        ("    RAISE;\n", "", "expected 'RAISE;'"),
+        ("  UNDO\n    switchOff;\n", "", "expected 'UNDO'"),
+        ("    SetDO doLaser,0;\n", "", "expected 'SetDO doLaser,0;'"),
         (",trOff,fine", ",trX,fine", "trX has not been set"),
         (",fine,tLaser", ",z10,tLaser", "z10 is not declared"),
         (r"fine,tLaser\WObj", r"fine,tool0\WObj", "are not the module's"),
-        ("[FALSE,TRUE,", "[TRUE,TRUE,", "line 8: expected a fixed work object"),
+        ("[FALSE,TRUE,", "[TRUE,TRUE,", "line 10: expected a fixed work object"),
         ("tLaser:=[TRUE,", "tLaser:=[FALSE,", "expected a tool held by the robot"),
         ("zCorner:=[FALSE,", "zCorner:=[TRUE,", "expected a zone"),
         ("vAir:=[250.00,", "vAir:=[", "expected 4 values"),
         ("vAir:=[250.00,", "vAir:=[TRUE,", "expected 4 numbers"),
         ("vAir:=[250.00,", "vAir:=[25O,", "not an aggregate"),
         ("speeddata vCut", "speeddata vAir", "vAir is declared twice"),
-        ("SetDO doLaser", "SetDO doOther", "switches the output doOther; expected doLaser"),
+        ("SetDO doLaser", "SetDO doOther", "expected 'SetDO doLaser,0;'"),
         ("TriggIO trOff", "TriggIO trOn", "set once"),
         ("9E9]],vAir", "0]],vAir", "external axes"),
         ("[0,-1,0,0]", "[0.5,-1,0,0]", "must be whole numbers"),
@@ -552,7 +564,9 @@ def test_a_long_program_is_loaded_module_by_module(long_program):
     ("file", "old", "new", "message"),
     [
         ("long.mod", "UnLoad", "Reload", "long.mod, line .*not expected here: 'Reload"),
-        ("long.mod", '%"hole_0"%;', "", "do not match: hole_0"),
+        ("long.mod", 'IF nFirst<=1 %"hole_0"%;', "", "must be that of the last contour"),
+        ("long.mod", "ENDIF", "", "one module at a time"),
+        ("long.mod", "<=2 THEN", "<=1 THEN", "must be that of the last contour"),
         ("long.mod", "HOME:/long_part.mod", "HOME:/other.mod", "the file 'other.mod' is not there"),
         ("long.mod", 'UnLoad "HOME:/long_part.mod', 'UnLoad "HOME:/x.mod', "x.mod is not loaded"),
         ("long_part.mod", "PROC hole_0()", "PROC main()", "main is declared twice"),

@@ -378,18 +378,19 @@ def test_long_programs_become_libraries_that_the_project_calls(long):
     tight = OUTPUTS.model_copy(update={"lines_per_file": 100})
     files, read = reads_back(long, tight)
     projects = [name for name in files if name.endswith(".pjx")]
-    assert len(projects) > 10
-    assert max(text.count("\n") for text in files.values()) <= 100
+    assert [name.rpartition("/")[2] for name in files if name.endswith("start.pgx")] == [
+        "start.pgx" for _ in projects
+    ]
     assert len({name.lower() for name in files}) == len(files)
     names = [name for name, _ in Val3(long, tight).names()]
     assert max(len(name) for name in names) == 15
     main = next(iter(files))
     assert main == "a_program_with_/a_program_with_.pjx"
     assert 'path="Disk://a_program_wit_2/a_program_wit_2.pjx"' in files[main]
-    # The laser stays on from a part of a contour to the next.
-    cut = [s for s in read.sections if s.name.startswith("a_contour")]
-    assert len(cut) > 5
-    assert not any(move.switches for s in cut[1:-1] for move in s.moves)
+    # No contour is divided: longer than a file, it is the only one of its library.
+    assert [s.name for s in read.sections] == [s.name for s in Val3(long, tight).program.sections]
+    found = found_codes(long, "warning", tight)
+    assert found.count("file-length") == sum(3 * len(s.steps) > 60 for s in long.sections) > 0
 
 
 def test_a_program_that_fits_is_one_project(long):
@@ -398,8 +399,8 @@ def test_a_program_that_fits_is_one_project(long):
 
 
 def test_more_libraries_than_a_project_can_list_are_refused(program):
-    moves = [replace(move) for move in program.moves[2:-1] for _ in range(400)]
-    endless = with_steps(program, [*program.sections[0].steps[:4], *moves])
+    (section,) = program.sections
+    endless = replace(program, sections=tuple(replace(section, name=f"c{k}") for k in range(60)))
     with pytest.raises(InputError, match="lines_per_file allows 100; raise it"):
         Val3(endless, OUTPUTS.model_copy(update={"lines_per_file": 100})).files()
 
@@ -409,7 +410,9 @@ def test_more_libraries_than_a_project_can_list_are_refused(program):
     [
         (0, 'alias="long_2"', 'alias="other"', 'expected <Library alias=\'other\' path='),
         (0, '<Library alias="long_2" path="Disk://long_2/long_2.pjx" />', "", "routine of long_2"),
-        ("start.pgx", "call long_2:hole()", "", "hole is never called"),
+        ("start.pgx", "if nFirst<=1\n    call long_2:hole()\n  endIf\n", "", "not expected here"),
+        ("long_2/start.pgx", "begin", "begin\n  dioLaser=true", "must not do anything"),
+        ("long_2/stop.pgx", "dioLaser=false", "dioLaser=true", "in stop()"),
         ("start.pgx", "call long_2:hole()", "call hole()", "hole is no routine of the project"),
         ("long_2.dtx", 'x="51.3000"', 'x="51.4000"', "with the tool and the frame of long"),
         ("long_2.pjx", "<Libraries>", '<Libraries><Library alias="long_2" path="Disk://long_2/'
@@ -422,7 +425,11 @@ def test_libraries_that_do_not_fit_are_refused(cell, file, old, new, message):
     tight = OUTPUTS.model_copy(update={"lines_per_file": 100})
     files = post(program, "val3", tight)
     names = list(files)
-    (name,) = [names[0]] if file == 0 else [name for name in names if name.endswith(f"/{file}")]
+    (name,) = (
+        [names[0]]
+        if file == 0
+        else [name for name in names if name == file or name.endswith(f"/{file}")][:1]
+    )
     assert old in files[name]
     with pytest.raises(InputError, match=re.escape(message)):
         read_program(files | {name: files[name].replace(old, new)}, "val3", cell[0], tight)
@@ -505,13 +512,18 @@ START, STOP = f"{NAME}/start.pgx", f"{NAME}/stop.pgx"
         (DTX, "%Q0", "%Q7", r"switches the output BasicIO-1\%Q7; expected BasicIO-1\%Q0"),
         (DTX, ' link="BasicIO-1\\%Q0"', "", "switches the output ; expected"),
         (START, "dioLaser=false", "", "expected dioLaser=false before anything else"),
-        (START, "waitEndMove()", "", "expected waitEndMove() at the end"),
-        (START, "call skin_outer()", "", "skin_outer is never called"),
-        (START, "call skin_outer()", "call hole()", "line 11: hole is no routine"),
-        (START, "call skin_outer()", "call start()\n  call skin_outer()",
-         "line 11: start is no routine"),
-        (START, "waitEndMove()", "call skin_outer()\n  waitEndMove()", "is called twice"),
-        (START, "call skin_outer()", "movej(jAir[0],flange,mAir[0])", "line 11: not expected here"),
+        (START, "waitEndMove()", "", "expected waitEndMove() and nFirst=1 at the end"),
+        (START, "nFirst=1", "nFirst=2", "expected waitEndMove() and nFirst=1 at the end"),
+        (START, "if nFirst<=1", "if nFirst<=2", "not expected here"),
+        (DTX, 'value="1"', 'value="2"', "nFirst must be the number of a contour"),
+        (DTX, 'value="1"', 'value="0"', "must be the number of a contour, got \'0\'"),
+        (DTX, "valve1", "valve2", "expected ioLink \'valve1\' of a tool"),
+        (START, "if nFirst<=1\n    call skin_outer()\n  endIf\n", "", "number of a contour"),
+        (START, "call skin_outer()", "call hole()", "hole is no routine"),
+        (START, "call skin_outer()", "call start()", "start is no routine"),
+        (START, "waitEndMove()", "if nFirst<=2\n  call skin_outer()\n  endIf\n  waitEndMove()",
+         "is called twice"),
+        (START, "call skin_outer()", "movej(jAir[0],flange,mAir[0])", "line 13: not expected here"),
         (START, 'name="start"', 'name="begin"', "expected <Program name='start'"),
         (STOP, "dioLaser=false", "dioLaser=true", "expected dioLaser=false and dioGas=false and"),
         (CODE, "begin", "begin x", "expected code from begin to end"),

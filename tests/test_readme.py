@@ -19,7 +19,7 @@ def test_every_link_leads_somewhere():
 
 
 def test_every_command_it_shows_exists():
-    from kerfpath.cli._main import app
+    from kerfpath.cli._studies import app
 
     known = {command.callback.__name__ for command in app.registered_commands}
     shown = set(re.findall(r"^    kerfpath (\w+)", README, re.MULTILINE))

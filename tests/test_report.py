@@ -209,7 +209,7 @@ def test_graph_without_any_admitted_candidate_still_has_a_map(section: ContourSe
     assert shown_postures(replace(section.graph, reason=reason)) == [3]
 
 
-def test_chosen_line_breaks_where_gamma_wraps_and_where_the_posture_changes(
+def test_chosen_line_passes_the_edge_and_breaks_where_the_posture_changes(
     section: ContourSection,
 ) -> None:
     gamma = np.radians(np.linspace(100, 260, NODES))
@@ -219,7 +219,11 @@ def test_chosen_line_breaks_where_gamma_wraps_and_where_the_posture_changes(
     made_up = replace(section.plan, gamma=gamma, posture=posture)
     wrap = int(np.flatnonzero(np.diff(gamma) < 0)[0])
     pieces = chosen_line(made_up, 1)
-    assert [(p[0][0], p[0][-1]) for p in pieces] == [(0, wrap), (wrap + 1, 29), (33, NODES - 1)]
+    # On either side of the wrap the line goes on over the edge, to where the other side comes from.
+    ends = [(p[0][0], p[0][-1]) for p in pieces]
+    assert ends == [(0, wrap + 1), (wrap, 29), (33, NODES - 1)]
+    assert pieces[0][1][-1] > 180
+    assert pieces[1][1][0] <= -180
     assert [list(p[0]) for p in chosen_line(made_up, 0)] == [[30, 31, 32]]
     assert chosen_line(made_up, 7) == []
     assert all(np.abs(np.diff(g)).max() < 180 for _, g in pieces)
@@ -259,18 +263,40 @@ def test_shares_show_the_limits_and_what_planning_may_use(section: ContourSectio
     )
 
 
-def test_positions_show_finite_limits_and_leave_gaps_where_an_endless_joint_wraps(
+def test_positions_are_to_the_scale_of_the_motion_and_endless_joints_unrolled(
     section: ContourSection,
 ) -> None:
     arm = section.plan.robot.with_limits(endless=[0, 0, 0, 0, 0, 1])
     q = section.plan.q.copy()
     q[:, 5] = np.angle(np.exp(1j * np.linspace(2, 8, NODES)))
+    q[:, 4] = 0.3
     figure = joint_positions(replace(section.plan, robot=arm, q=q))
     assert len(figure.layout.shapes) == 10, "two limits for each of the five other joints"
-    assert int(np.isnan(figure.data[5].y).sum()) == 1
+    np.testing.assert_allclose(figure.data[5].y, np.degrees(np.linspace(2, 8, NODES)), rtol=1e-6)
     np.testing.assert_allclose(
         figure.data[0].y, np.degrees(section.plan.q[:, 0]), rtol=1e-6, atol=1e-5
     )
+    low, high = figure.layout.yaxis.range
+    moved = np.degrees(np.ptp(section.plan.q[:, 0]))
+    assert low < min(figure.data[0].y) < max(figure.data[0].y) < high
+    assert moved < high - low < 1.2 * moved
+    low, high = figure.layout.yaxis5.range
+    assert high - low > 1, "a joint at rest is not drawn as if it moved"
+    # Rounded to two decimals, as the title says it.
+    spare = np.degrees(min(arm.upper[0] - q[:, 0].max(), q[:, 0].min() - arm.lower[0]))
+    assert f"{spare:.2f}".rstrip("0") + "° to spare" in figure.layout.annotations[0].text
+
+
+def test_every_figure_says_where_its_nodes_lie(section: ContourSection) -> None:
+    plan = section.plan
+    for figure, x in (
+        (joint_positions(plan), plan.time),
+        (limit_shares(plan), plan.time),
+        (cutting_speed(plan), (plan.contour.s - plan.contour.s[0]) * 1e3),
+        (feasibility_map(section.graph, plan), np.arange(NODES)),
+    ):
+        # Four decimals of seconds, two of millimetres.
+        np.testing.assert_allclose(figure.layout.meta["nodes"], x, atol=6e-3)
 
 
 def test_changes_of_posture_are_shaded_and_told(section: ContourSection) -> None:
@@ -283,6 +309,44 @@ def test_changes_of_posture_are_shaded_and_told(section: ContourSection) -> None
     assert "2 changes of posture" in render("Part", [replace(section, plan=made_up)])
 
 
+def test_a_failed_report_opens_at_the_failed_contour_and_says_first_what_to_do(
+    section: ContourSection, infeasible: ContourSection
+) -> None:
+    advice = "sample the contour more finely"
+    bad = replace(section, name="rim", checks=[replace(CHECKS[0], value=1.0, advice=advice)])
+    stuck = replace(infeasible, remedy="slow down to 3 m/min")
+    facts = [("Robot", "ABB")]
+    sections = [section, bad, stuck]
+    html = _own(render("Part", sections, facts=facts, faults=["no way between <holes>"]))
+    assert html.count("<details") == 3
+    assert '<details id="contour-2" open>' in html
+    assert html.count("open>") == 1
+    head = html[: html.index("</header>")]
+    first = head[head.index("What to do first") : head.index('<dl class="facts">')]
+    assert first.index("contour-2") < first.index(advice) < first.index("contour-3")
+    assert "tool tip, node 3" in first
+    assert "path breaks at node 7): slow down to 3 m/min" in first
+    assert "no way between &lt;holes&gt;" in first
+    assert "What to do first" not in render("Part", [section])
+    assert "not ready to be cut" in render("Part", [section], faults=["no program"])
+
+
+def test_places_of_failure_are_marked_on_map_and_part(
+    section: ContourSection, infeasible: ContourSection
+) -> None:
+    bad = replace(section, checks=[replace(CHECKS[0], value=1.0), CHECKS[1]])
+    for failed, node in ((bad, 3), (infeasible, 7)):
+        figure = scene([section, failed], None)
+        (mark,) = [t for t in figure.data if (t.name or "").endswith("fails here")]
+        np.testing.assert_allclose(
+            [mark.x[0], mark.y[0], mark.z[0]], failed.path.points[node] * 1e3, atol=1e-3
+        )
+        (label,) = [a for a in figure.layout.scene.annotations if "node" in a.text]
+        assert label.text.endswith(f"node {node}")
+        drawn = _figures(render("Part", [failed]))[1]
+        assert {shape["x0"] for shape in drawn["layout"]["shapes"]} == {node}
+
+
 def test_scene_draws_part_and_contour_in_millimetres(
     section: ContourSection, infeasible: ContourSection
 ) -> None:
@@ -293,7 +357,7 @@ def test_scene_draws_part_and_contour_in_millimetres(
     assert max(part.x) == 1000.0
     assert figure.layout.scene.aspectmode == "data"
     assert figure.layout.scene.xaxis.title.text == "x, mm"
-    assert [t.name for t in figure.data].count("slot: break") == 1
+    assert [t.name for t in figure.data].count("slot: fails here") == 1
     with pytest.raises(InputError, match="mesh triangles: expected indices from 0 to 2"):
         scene([section], (vertices, [[0, 1, 3]]))
 
@@ -378,9 +442,9 @@ def test_browser_draws_every_figure_in_view(
 ) -> None:
     page = tmp_path / "report.html"
     page.write_text(render("Part", [section, infeasible, infeasible]), encoding="utf-8")
-    dom = dom_of(page, "#contour-2")
-    # The scene, three figures of the first contour and the map of the second, which the address
-    # names; the third is closed.
+    dom = dom_of(page, "#contour-1")
+    # The scene, three figures of the first contour, which the address names, and the map of the
+    # second, the first that failed; the third is closed.
     assert dom.count('data-state="drawn"') == 5
     assert dom.count("data-figure=") == 6
     assert dom.count('class="main-svg"') >= 5
@@ -389,6 +453,34 @@ def test_browser_draws_every_figure_in_view(
     assert "WebGL is not supported" not in dom
     assert "Share chart" not in dom, "the button that uploads the data to plotly"
     assert "Download plot" in dom
+
+
+@needs_chromium
+def test_pointing_at_a_figure_marks_the_node_in_all_of_the_contour_and_on_the_part(
+    section: ContourSection, tmp_path: Path
+) -> None:
+    page = tmp_path / "report.html"
+    script = """<script>
+    document.addEventListener("drawn", async () => {
+      const plots = [...document.querySelectorAll("#contour-1 [data-figure]")];
+      if (plots.some((plot) => plot.dataset.state !== "drawn") || window.tried) return;
+      if (SCENE.dataset.state !== "drawn") return;
+      window.tried = true;
+      const x = plots[1].layout.meta.nodes[20];
+      plots[1].emit("plotly_hover", { points: [{ x, data: plots[1].data[0] }] });
+      await new Promise((done) => setTimeout(done, 500));
+      const { x: at } = SCENE.data.find((trace) => trace.name === "cursor");
+      const lines = plots.map((plot) => plot.querySelectorAll(".cursor").length);
+      document.body.dataset.seen = JSON.stringify({ lines, at: at[0] });
+    });
+    </script></body>"""
+    html = render("Part", [section])
+    page.write_text(script.join(html.rsplit("</body>", 1)), encoding="utf-8")
+    dom = dom_of(page)
+    seen = json.loads(re.search(r'data-seen="([^"]+)"', dom)[1].replace("&quot;", '"'))
+    panels = len(shown_postures(section.graph))
+    assert seen["lines"] == [panels, 6, 2]
+    assert seen["at"] == pytest.approx(section.path.points[20, 0] * 1e3, abs=1.0)
 
 
 def _lightness(colour: str) -> int:

@@ -12,10 +12,19 @@ from scipy.spatial.transform import Rotation
 from kerfpath._arrays import Array, as_pose, floats, freeze, scalar
 from kerfpath.air import AirMove, air_move, backed_off
 from kerfpath.errors import InputError, NoFeasiblePath
+from kerfpath.planner import plan as plan_contour
 from kerfpath.plans import Plan, Proof, path_cost
+from kerfpath.refiner import refine
 from kerfpath.robots import posture_name
 
-__all__ = ["MeasuredFrame", "placed", "placed_moves", "placement_from_points", "xyz_rpy"]
+__all__ = [
+    "MeasuredFrame",
+    "placed",
+    "placed_moves",
+    "placement_from_points",
+    "planned_again",
+    "xyz_rpy",
+]
 
 ON_A_LINE = 0.05
 """Points whose spread across their best line is a smaller share of that along it tell no frame."""
@@ -99,14 +108,16 @@ def placement_from_points(
     T[:3, :3] = turned.as_matrix()
     T[:3, 3] = middle - T[:3, :3] @ centre
     residuals = np.linalg.norm(nominal @ T[:3, :3].T + T[:3, 3] - measured, axis=1)
+    fitted = MeasuredFrame(T_base_part=freeze(T), residuals=freeze(residuals))
     worst = int(residuals.argmax())
     if residuals[worst] > most_residual:
         raise InputError(
             f"measured frame: point {worst + 1} of {len(nominal)} is left "
             f"{residuals[worst] * 1e3:.3f} mm off, allowed are {most_residual * 1e3:g} mm; check "
-            "its coordinates and the order of the points, or measure it again"
+            "its coordinates and the order of the points, or measure it again (fitted: xyz_mm = "
+            f"{fitted.xyz_mm}, rpy_deg = {fitted.rpy_deg})"
         )
-    return MeasuredFrame(T_base_part=freeze(T), residuals=freeze(residuals))
+    return fitted
 
 
 def placed(plan: Plan, T_base_part: ArrayLike) -> Plan:
@@ -151,6 +162,62 @@ def placed(plan: Plan, T_base_part: ArrayLike) -> Plan:
     s = plan.settings
     cost = path_cost(led.increments, s.weights, s.metric, s.objective, led.node_cost)
     return replace(led, cost=cost)
+
+
+def planned_again(plan: Plan, T_base_part: ArrayLike) -> Plan:
+    """Return the plan at another placement, where the limits ask for another motion than `placed`.
+
+    Gamma is moved from where the plan has it so that the limits are kept there. Where that cannot
+    be, the contour is planned anew with the settings of the plan, in its postures, refined; what
+    clearance costs is left out, as the cell is not known there.
+
+    Parameters
+    ----------
+    plan : Plan
+        At the old placement.
+    T_base_part : (4, 4) m
+
+    Raises
+    ------
+    NoFeasiblePath
+        The limits cannot be kept there in the postures of the plan.
+    InputError
+        As `placed`.
+    """
+    try:
+        found = refine(placed(plan, T_base_part))
+    except NoFeasiblePath:  # out of reach as it was, with another gamma perhaps not
+        found = None
+    if found is not None and found.done:
+        return found.plan
+    s, slowest = plan.settings, plan.feed
+    dt = plan.dt  # from node to node at the speed asked for
+    if slowest is not None and slowest.node >= 0:
+        dt = float(np.diff(plan.time)[slowest.node]) * slowest.slowest
+    refined = "refined off the grid" in plan.proof.statement
+    comfort = s.comfort and replace(s.comfort, clearance=None)
+    made = plan_contour(
+        replace(plan.contour, time=dt * np.arange(len(plan.time), dtype=np.float64)),
+        plan.robot,
+        tool=plan.T_flange_tip,
+        placement=T_base_part,
+        gamma_step=s.gamma_step,
+        frames=s.frames,
+        tilt=s.tilt,
+        postures=sorted(set(plan.posture.tolist())),
+        method=s.method,
+        objective=s.objective,
+        metric=s.metric,
+        weights=s.weights,
+        eta_v=s.eta_v,
+        eta_a=s.eta_a,
+        closure=s.closure,
+        rotation=s.rotation,
+        feed="constant" if plan.feed is None else "dip",
+        refine=refined,
+        comfort=comfort,
+    )
+    return replace(made, contour=plan.contour)
 
 
 def placed_moves(

@@ -71,7 +71,8 @@ class Proof:
     statement : str
         The claim in words.
     grid_cost : float or None
-        Where the plan is refined: the cost of the path on the graph that it was refined from.
+        Where the plan is refined: the cost of the path on the graph that it was refined from, if
+        that keeps all limits.
     """
 
     optimal: bool

@@ -3,7 +3,9 @@ MODULE cut_skin_outer
   ! Complete the load of the tool: mass -1 stands for not known.
   ! The work object is the part in the robot's base, which is the world's, too.
   ! Moves through the air have not been checked for collisions.
-  ! A stop does not switch the laser off: the safety circuit of the cell has to.
+  ! switchOff is for the events STOP and QSTOP: enter it there. A stop switches
+  ! the laser off only then; the safety circuit of the cell has to, too.
+  ! To begin at a contour, set nFirst to its number and move PP to Main.
   PERS tooldata tLaser:=[TRUE,[[51.3000,0.0000,248.7000],[0.95371695,0.00000000,0.30070580,0.00000000]],[-1,[0,0,0],[1,0,0,0],0,0,0]];
   PERS wobjdata wPart:=[FALSE,TRUE,"",[[1053.7000,-151.1000,612.3000],[0.96327561,-0.00981749,0.02988342,0.26666588]],[[0,0,0],[1,0,0,0]]];
   CONST speeddata vAir:=[250.00,125,5000,1000];
@@ -12,13 +14,25 @@ MODULE cut_skin_outer
   CONST zonedata zCorner:=[FALSE,0.300,0.300,0.300,0.030,0.300,0.030];
   VAR triggdata trOn;
   VAR triggdata trOff;
+  PERS num nFirst:=1;
 
   PROC main()
     ConfL\Off;
-    SetDO doLaser,0;
+    switchOff;
     TriggIO trOn,0.0200\Time\DOp:=doLaser,1;
     TriggIO trOff,0.0200\Time\DOp:=doLaser,0;
-    skin_outer;
+    IF nFirst<=1 skin_outer;
+    nFirst:=1;
+  ERROR
+    switchOff;
+    StopMove;
+    RAISE;
+  UNDO
+    switchOff;
+  ENDPROC
+
+  PROC switchOff()
+    SetDO doLaser,0;
   ENDPROC
 
   PROC skin_outer()

@@ -13,7 +13,7 @@ from kerfpath.cell import Cell
 from kerfpath.errors import InputError, NoFeasiblePath
 from kerfpath.robots import Robot
 
-__all__ = ["AirMove", "air_move", "least_time"]
+__all__ = ["AirMove", "air_move", "least_time", "speed_share"]
 
 SECONDS = 10.0
 """How long a way around is looked for."""
@@ -58,6 +58,21 @@ def least_time(dq: ArrayLike, velocity: ArrayLike, acceleration: ArrayLike) -> A
     full = cross**2 >= gain
     over = np.where(cross > 0, cross, 1.0)
     return np.asarray(np.where(full, cross + gain / over, 2 * np.sqrt(gain)))
+
+
+def speed_share(dq: ArrayLike, velocity: ArrayLike, acceleration: ArrayLike, time: Array) -> Array:
+    """Return the shares (B,) of the full speed at which motions dq (B, n) rad take times (B,) s.
+
+    From stop to stop, the acceleration being the full one: the inverse of `least_time` with that
+    share of the velocities. 1 for a motion that goes nowhere.
+    """
+    step = np.abs(floats(dq, "dq", (None, None)))
+    n = step.shape[1]
+    cross = (step / floats(velocity, "velocity", (n,))).max(axis=1)
+    gain = (step / floats(acceleration, "acceleration", (n,))).max(axis=1)
+    # Without gaining and losing speed it would take this long; half, where that is all it does.
+    even = (time + np.sqrt(np.maximum(time**2 - 4 * gain, 0.0))) / 2
+    return np.asarray(np.where(cross > 0, cross / np.maximum(even, 1e-300), 1.0))
 
 
 def air_move(

@@ -39,13 +39,15 @@ def backed_off(plan: Plan, end: End, retract: float) -> Array:
     T[:3, 3] -= retract * T[:3, 2]
     found = plan.robot.inverse(T @ np.linalg.inv(plan.T_flange_tip))
     q_found = found.q[found.posture == plan.posture[node]]
+    # An endless joint is solved within one turn: bring it onto the turn that the contour is on.
+    turns = np.round((q - q_found) / (2 * np.pi)) * plan.robot.endless
+    q_found = q_found + 2 * np.pi * turns
+    # A straight move leads to no joints that are a turn away, where the limits end before.
+    q_found = q_found[(np.abs(q_found - q) <= np.pi).all(axis=1)]
     if not len(q_found):
         raise InputError(
             f"contour {plan.name!r}, node {node}: the tool cannot back off by {retract * 1e3:g} mm "
             f"in posture {posture_name(int(plan.posture[node]))} within the joint limits; lower "
             "the retract"
         )
-    # An endless joint is solved within one turn: bring it onto the turn that the contour is on.
-    turns = np.round((q - q_found) / (2 * np.pi)) * plan.robot.endless
-    q_found = q_found + 2 * np.pi * turns
     return freeze(q_found[int(np.argmin(np.abs(q_found - q).max(axis=1)))])

@@ -10,6 +10,7 @@ from kerfpath.auditor._collision import collisions
 from kerfpath.auditor._margins import margins
 from kerfpath.auditor._motion import Interpolation, Motion, joint_increments, motion_of
 from kerfpath.auditor._nominal import axes_asked_for, tilt_turns
+from kerfpath.auditor._rounding import MOST_ROUNDED, Rounding
 from kerfpath.auditor._table import Check, Issue, Unit
 from kerfpath.cell import Cell
 from kerfpath.contour import Contour
@@ -62,6 +63,7 @@ def checks(
     axis_tolerance: float = np.pi / 180,
     parts: int = 8,
     cell: Cell | None = None,
+    rounding: Rounding | None = None,
 ) -> list[Check]:
     """Return the whole table of checks.
 
@@ -81,6 +83,9 @@ def checks(
         Into how many parts the way between two nodes is divided.
     cell : Cell, optional
         Whose near-miss distances the motion is to keep.
+    rounding : Rounding, optional
+        Of a plan that was read from a text: what its digits leave of joints and times. The limits
+        at each node are wider by what they explain, and the rows say by how much.
 
     Raises
     ------
@@ -106,8 +111,8 @@ def checks(
     return [
         *_at_nodes(plan, chain.forward(plan.q) @ plan.T_flange_tip),
         *_between_nodes(plan, motion, path, path_tolerance, axis_tolerance),
-        *_positions(plan, motion),
-        *_rates(plan, motion),
+        *_positions(plan, motion, rounding),
+        *_rates(plan, motion, rounding),
         *margins(plan, chain),
         *([] if cell is None else collisions(cell, motion, chain)),
     ]
@@ -186,8 +191,10 @@ def _between_nodes(
     ]
 
 
-def _positions(plan: Plan, motion: Motion) -> list[Check]:
+def _positions(plan: Plan, motion: Motion, rounding: Rounding | None) -> list[Check]:
     limits = plan.robot.joint_limits()
+    left = np.zeros(plan.q.shape) if rounding is None else rounding.q
+    left = np.maximum(left[:-1], left[1:])
     bound, axis = ~plan.robot.endless, plan.robot.external
     rows, own = [], slice(plan.robot.family.joints)
     if axis is not None:
@@ -196,20 +203,24 @@ def _positions(plan: Plan, motion: Motion) -> list[Check]:
         title = f"excess over the limits of the {axis.kind}"
         rows.append(_worst("external-limits", title, over, LIMIT_SLACK, axis.unit))
     if bound.any():
-        excess = np.maximum(limits.lower - motion.q, motion.q - limits.upper)[..., bound]
-        joint = np.flatnonzero(bound)[np.unravel_index(np.argmax(excess), excess.shape)[-1]] + 1
+        beyond = np.maximum(limits.lower - motion.q, motion.q - limits.upper).max(axis=1)
+        excess = (beyond - left)[:, bound]
+        node, column = np.unravel_index(np.argmax(excess), excess.shape)
+        joint = int(np.flatnonzero(bound)[column])
         rows.append(
-            _worst(
-                "joint-limits",
-                f"excess over the joint limits (nearest: joint {joint})",
-                excess.max(axis=(1, 2)),
-                LIMIT_SLACK,
-                "rad",
+            Check(
+                code="joint-limits",
+                title=f"excess over the joint limits (nearest: joint {joint + 1})",
+                value=float(beyond[node, joint]),
+                limit=LIMIT_SLACK + float(left[node, joint]),
+                unit="rad",
+                node=int(node),
             )
         )
     for coupling in plan.robot.couplings:
         value = motion.q @ coupling.row
         over = np.maximum(coupling.lower - value, value - coupling.upper).max(axis=1)
+        over = over - left @ np.abs(coupling.row)
         title = f"excess over the limits of {coupling.name}"
         rows.append(_worst("coupled-limits", title, over, LIMIT_SLACK, "rad"))
     if plan.settings.rotation is not None:
@@ -222,7 +233,7 @@ def _positions(plan: Plan, motion: Motion) -> list[Check]:
     return rows
 
 
-def _rates(plan: Plan, motion: Motion) -> list[Check]:
+def _rates(plan: Plan, motion: Motion, rounding: Rounding | None) -> list[Check]:
     velocity, acceleration = plan.robot.speed_limits()
     eta_v, eta_a = plan.settings.eta_v, plan.settings.eta_a
     dt = np.diff(plan.time)
@@ -230,28 +241,41 @@ def _rates(plan: Plan, motion: Motion) -> list[Check]:
     speed = np.abs(dq / dt[:, None]) / velocity
     parts = motion.q.shape[1] - 1
     fine = np.abs(np.diff(motion.q, axis=1)) / (dt[:, None, None] / parts) / velocity
+    left = None if rounding is None else rounding.of_velocity(dq, dt) / velocity
     rows = [
-        _per_joint("velocity", "joint velocity from node to node", speed, eta_v),
-        _per_joint("velocity-between", "joint velocity between the nodes", fine.max(axis=1), 1.0),
+        _per_joint("velocity", "joint velocity from node to node", speed, eta_v, left),
+        _per_joint(
+            "velocity-between", "joint velocity between the nodes", fine.max(axis=1), 1.0, left
+        ),
     ]
     if len(dq) > 1:
         change = np.diff(dq / dt[:, None], axis=0) / ((dt[1:] + dt[:-1]) / 2)[:, None]
         share = np.abs(change) / acceleration
-        rows.append(_per_joint("acceleration", "joint acceleration at the nodes", share, eta_a, 1))
+        left = None if rounding is None else rounding.of_acceleration(dq, dt) / acceleration
+        rows.append(
+            _per_joint("acceleration", "joint acceleration at the nodes", share, eta_a, left, 1)
+        )
     return rows
 
 
-def _per_joint(code: str, title: str, share: Array, limit: float, first: int = 0) -> Check:
-    """Check shares (rows, joints) of a limit; row 0 belongs to node `first`."""
-    joint = int(np.argmax(share.max(axis=0))) + 1
-    node = np.arange(first, first + len(share))
-    return _worst(
-        code,
-        f"{title} (highest: joint {joint})",
-        share.max(axis=1),
-        limit * (1 + SHARE_SLACK),
-        "share",
-        node,
+def _per_joint(
+    code: str, title: str, share: Array, limit: float, left: Array | None, first: int = 0
+) -> Check:
+    """Check shares (rows, joints) of a limit, wider by what is `left` to digits at each.
+
+    Row 0 belongs to node `first`.
+    """
+    wider = np.zeros(share.shape) if left is None else np.minimum(left, MOST_ROUNDED)
+    over = np.where(np.isnan(share), np.inf, share - wider)
+    row, joint = (int(i) for i in np.unravel_index(np.argmax(over), over.shape))
+    digits = f"; {wider[row, joint] * 100:.2g} % of it for digits" if left is not None else ""
+    return Check(
+        code=code,
+        title=f"{title} (highest: joint {joint + 1}{digits})",
+        value=float(share[row, joint]),
+        limit=limit * (1 + SHARE_SLACK) + float(wider[row, joint]),
+        unit="share",
+        node=first + row,
         advice="lower the speed or eta, or move the part",
     )
 

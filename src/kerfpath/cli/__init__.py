@@ -1,4 +1,15 @@
 """The command line: `kerfpath --help`."""
 
-from kerfpath.cli import _studies as _studies  # its commands
-from kerfpath.cli._main import main as main
+from kerfpath.cli._stop import stoppable
+
+__all__ = ["main"]
+
+
+def main() -> None:
+    """Run the command line and leave with its exit code."""
+    with stoppable():  # from the first import on
+        from kerfpath.cli import _studies
+        from kerfpath.cli._main import run
+
+        assert _studies  # its commands
+        run()

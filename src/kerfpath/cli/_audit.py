@@ -46,10 +46,11 @@ def show_audit(file: Path, job: Path | None, *, as_json: bool) -> bool:
                 for c in checks
             ]
             table(
-                ["check", "worst", "allowed", "node", ""],
+                ["check", "worst", "allowed", "node", "verdict"],
                 rows,
                 title=escape(name),
                 numbers=["worst", "allowed", "node"],
+                whole=["verdict"],
             )
             for c in checks if name in found.places else ():
                 if not c.ok:

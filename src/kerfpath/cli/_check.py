@@ -38,7 +38,7 @@ def show_check(checked: Checked, *, as_json: bool) -> None:
                     }
                     for s in checked.starts
                 ],
-                "notes": [collision_note(cell)],
+                "notes": [_note(checked)],
             }
         )
         return
@@ -54,8 +54,14 @@ def show_check(checked: Checked, *, as_json: bool) -> None:
         rows.append(row)
     columns = ["contour", "nodes", "poses at its start"]
     columns += [] if cell is None else ["clear", "clearance mm", "nearest"]
-    table(columns, rows, numbers=columns[1:5])
-    out.print(f"note: {escape(collision_note(cell))}")
+    table(columns, rows, numbers=columns[1:5], spare=["nodes"])
+    out.print(f"note: {escape(_note(checked))}")
+
+
+def _note(checked: Checked) -> str:
+    """Say what `kerfpath plan` checks for collisions; here only the starts are looked at."""
+    moves_too = checked.job.sequence is not None and checked.cell is not None
+    return collision_note(checked.cell, moves_too=moves_too)
 
 
 def _show_cell(cell: Cell) -> None:

@@ -10,6 +10,7 @@ from kerfpath.cad import Loop, Part
 from kerfpath.cad import read as read_drawing
 from kerfpath.cli._drawing import drawing_entry, show_drawing, summary
 from kerfpath.cli._show import busy, out, print_json, table
+from kerfpath.post import write_program
 from kerfpath.report import DrawnLoop, render_drawing
 
 __all__ = ["list_contours"]
@@ -24,7 +25,7 @@ def list_contours(
     main = [loop for loop in part.loops if not loop.skin and loop.side != "edge"]
     if html is not None:
         with busy(f"drawing {html.name}"):
-            html.write_text(_page(part, main), encoding="utf-8")
+            write_program(html, _page(part, main))
     if as_json:
         print_json(_as_json(part, html))
         return
@@ -52,7 +53,9 @@ def list_contours(
             ]
         )
     columns = ["loop", "surface", "length mm", "diameter mm", "edges", "gap mm", "middle mm"]
-    table([*columns, *(head for head, _ in optional), ""], rows, numbers=columns[2:6])
+    heads = [*columns, *(head for head, _ in optional), "ends"]
+    spare = ["gap mm", "edges", "middle mm"]
+    table(heads, rows, numbers=columns[2:6], whole=["ends"], spare=spare)
     if len(shown) < len(part.loops):
         out.print(
             f"and {len(part.loops) - len(shown)} loops of single faces in skins and around the "

@@ -18,6 +18,7 @@ from kerfpath.cli._show import (
     table,
 )
 from kerfpath.job import make_folder
+from kerfpath.planner import FINER, ON_THIS_GRID
 from kerfpath.study import layout, layout_entry, ranges_of, write_layout
 
 __all__ = ["show_layout"]
@@ -78,19 +79,21 @@ def _show_best(entry: Mapping[str, Any]) -> None:
     sides = [[f"{when} {what}", *([] if motion else [f"binds {when}", f"node {when}"])]
              for when in ("before", "after")]  # fmt: skip
     columns = ["contour", *sides[0], *sides[1]]
-    table(columns, rows, numbers=[c for c in columns if what in c or "node" in c])
+    spare = [c for c in columns if "node" in c or c == "binds before"]
+    table(columns, rows, numbers=[c for c in columns if what in c or "node" in c], spare=spare)
     told = ", ".join(f"{name} = {value:g}" for name, value in best["offsets"].items())
     out.print(f"[bold]best placement[/]: {escape(told)}")
     was = f"{shipped['value']:.3f}{unit}" if shipped["value"] is not None else shipped["status"]
     gain = "" if best["gain"] is None else f", {100 * best['gain']:+.1f} %"
     out.print(f"{entry['goal']}: {best['value']:.3f}{unit}, as the job has it {was}{gain}")
     proved = (
-        "no other of them is better, proved"
+        "no other of them is better there, proved"
         if entry["proved"]
         else f"others of them may come to {entry['open_bound']:.3f}{unit}"
     )
     count = entry["statuses"].get("feasible", 0)
     out.print(f"{tried} placements tried, {count} feasible, {solved} solved exactly; {proved}")
+    out.print(f"speeds and displacements are those {ON_THIS_GRID}; {FINER}: see kerfpath speed")
 
 
 def _show_why(entry: Mapping[str, Any]) -> None:
@@ -101,8 +104,8 @@ def _show_why(entry: Mapping[str, Any]) -> None:
     worst = max(REMEDIES, key=lambda status: entry["statuses"].get(status, 0))
     out.print(
         escape(
-            f"no placement is feasible: of {len(entry['tried'])} tried {', '.join(parts)}: "
-            f"{REMEDIES[worst]}"
+            f"no placement is feasible {ON_THIS_GRID}: of {len(entry['tried'])} tried "
+            f"{', '.join(parts)}: {REMEDIES[worst]}; {FINER}"
         )
     )
     near = entry["nearest"]

@@ -12,10 +12,10 @@ import typer
 from rich.markup import escape
 
 from kerfpath import __version__
-from kerfpath.cli._show import busy, compile_kernels, errors, out, progress_bars
+from kerfpath.cli._show import busy, compile_kernels, errors, out, progress_bars, quiet
 from kerfpath.errors import AuditFailed, KerfpathError, NoFeasiblePath
 
-__all__ = ["app", "main"]
+__all__ = ["app", "run"]
 
 app = typer.Typer(
     add_completion=False,
@@ -40,7 +40,7 @@ Strict = Annotated[
 PlanFileArgument = Annotated[Path, typer.Argument(metavar="PLAN.json", help="A plan, as written.")]
 
 
-def main() -> None:
+def run() -> None:
     """Run the command line and leave with its exit code."""
     try:
         app()
@@ -67,8 +67,14 @@ def _root(
     version: Annotated[
         bool, typer.Option("--version", callback=_version, is_eager=True, help="Print the version.")
     ] = False,
+    silent: Annotated[
+        bool, typer.Option("--quiet", help="Show no progress: results, notes and errors alone.")
+    ] = False,
 ) -> None:
-    pass
+    if silent:
+        quiet.set()
+    else:
+        quiet.clear()
 
 
 @app.command()
@@ -157,11 +163,12 @@ def speed(
 def post(
     plan_file: PlanFileArgument,
     language: Annotated[
-        str,
+        str | None,
         typer.Option(
-            help="Robot language: rapid, krl, fanuc, val3, inform, urscript, ros, csv, or your own."
+            help="Robot language: rapid, krl, fanuc, val3, inform, urscript, ros, csv, or your "
+            "own; default: the one that the job asks for."
         ),
-    ] = "rapid",
+    ] = None,
     output: Annotated[
         Path | None,
         typer.Option(

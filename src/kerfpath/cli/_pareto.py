@@ -92,7 +92,7 @@ def _show_plans(front: Front) -> None:
         [str(front.numbers[i]), *(f"{value:.4g}" for value in values[i])]
         for i in range(0, len(values), step)
     ]
-    table(columns, rows, numbers=columns)
+    table(columns, rows, numbers=columns, spare=columns[:3:-1])
     more = f"; one in {step} of the {len(values)} plans, the report has all" if step > 1 else ""
     out.print(f"arrows: where better is{more}")
 

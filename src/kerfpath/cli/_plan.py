@@ -13,7 +13,16 @@ from rich.markup import escape
 
 from kerfpath.cad import Part
 from kerfpath.cli._drawing import drawing_entry, drawing_of, show_drawing
-from kerfpath.cli._show import busy, compile_kernels, errors, out, print_json, progress_bars, table
+from kerfpath.cli._show import (
+    busy,
+    compile_kernels,
+    errors,
+    out,
+    print_json,
+    progress_bars,
+    table,
+    told_once,
+)
 from kerfpath.job import (
     Cut,
     Outcome,
@@ -84,6 +93,7 @@ def leave(
                 "contours": [_cut_entry(cut) for cut in outcome.cuts],
                 "sequence": None if outcome.part is None else sequence_entry(outcome.part),
                 "files": [str(f) for f in written.files],
+                "removed": [str(f) for f in written.removed],
                 "notes": list(written.notes),
                 **(more or {}),
             }
@@ -102,14 +112,16 @@ def leave(
             for check in cut.checks:
                 if not check.ok:
                     out.print(f"[bold]{escape(cut.task.name)}[/]: {escape(str(check.issue()))}")
-        for note in written.notes:
+        for note in told_once(written.notes, [cut.task.name for cut in outcome.cuts]):
             out.print(f"note: {escape(note)}")
+        for path in written.removed:
+            out.print(f"removed {escape(str(path))}, of an earlier run")
         for path in written.files:
             out.print(f"wrote {escape(str(path))}")
     if written.stale is not None:
         errors.print(
             f"kerfpath: {escape(str(written.stale))} is from an earlier run and does not belong "
-            "to this plan; no program was written"
+            "to this plan; it is left, as it was edited or is not known to be ours: move it away"
         )
     if not outcome.passed:
         raise typer.Exit(1)
@@ -177,7 +189,8 @@ def _show_cuts(cuts: Sequence[Cut]) -> None:
         )
     columns = ["contour", "mm", "nodes", "m/min", "s", "grid", "cost", "vel", "acc"]
     columns += ["chord mm", "step deg", "audit"]
-    table(columns, rows, numbers=columns[1:-1])
+    spare = ["step deg", "chord mm", "grid", "m/min"]
+    table(columns, rows, numbers=columns[1:-1], whole=["audit"], spare=spare)
     out.print(
         "cost: what is minimised; grid: the best on the gamma grid, before the refinement; "
         "vel, acc: highest share of a joint's velocity and acceleration limit; chord: largest "

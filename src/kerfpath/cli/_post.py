@@ -9,18 +9,18 @@ import numpy as np
 from rich.markup import escape
 
 from kerfpath.cad import read_measured
-from kerfpath.cli._show import errors, out, print_json
-from kerfpath.errors import InputError
-from kerfpath.job import program_from_file, read_plan_file
+from kerfpath.cli._show import errors, out, print_json, told_once
+from kerfpath.errors import InputError, KerfpathError
+from kerfpath.job import program_from_file, program_language, read_job, read_plan_file
 from kerfpath.placement import MeasuredFrame, placement_from_points
-from kerfpath.post import identifier, write_files, write_program
+from kerfpath.post import Language, Replaced, identifier, languages, replace_program, write_program
 from kerfpath.post import language as find_language
 
 __all__ = ["write_post"]
 
 
 def write_post(
-    plan_file: Path, language: str, output: Path | None, *, strict: bool, as_json: bool,
+    plan_file: Path, language: str | None, output: Path | None, *, strict: bool, as_json: bool,
     job: Path | None = None, dry_share: float | None = None, measured: Path | None = None,
     residual_mm: float = 0.5,
 ) -> None:  # fmt: skip
@@ -29,25 +29,40 @@ def write_post(
     A file with the suffix of the language names the program, and others go beside it; else a
     program of one file is written as `output`, and one of several into that folder.
     """
-    name = _name(output, find_language(language).suffix)
-    if name is not None and dry_share is not None:
-        name = name.removeprefix("dry_")  # which dry runs begin with by themselves
+    if language is None:
+        source = read_plan_file(plan_file).job if job is None else read_job(job).source
+        language = program_language(source, job or plan_file)
     frame = None
     if measured is not None:
         points = read_measured(measured)
         frame = placement_from_points(*points, most_residual=residual_mm / 1000)
-    files, notes = program_from_file(
-        plan_file, language, name=name, strict=strict, job_file=job, dry_share=dry_share,
-        frame=frame,
-    )  # fmt: skip
+        if not as_json:  # first of all: also where no program comes of it
+            for line in _in_words(frame, plan_file):
+                (errors if output is None else out).print(line)
+    name = _name(output, find_language(language))
+    if name is not None and dry_share is not None:
+        name = name.removeprefix("dry_")  # which dry runs begin with by themselves
+    try:
+        files, notes = program_from_file(
+            plan_file, language, name=name, strict=strict, job_file=job, dry_share=dry_share,
+            frame=frame,
+        )  # fmt: skip
+    except KerfpathError:
+        for line in _in_words(frame, plan_file) if as_json and frame is not None else ():
+            errors.print(line)
+        raise
     written: list[Path] = []
+    replaced: Replaced | None = None
     if output is not None and name is not None:
         main, *_ = files
         # FANUC's names are in capitals; the file is called as it was asked for.
         names = {main: output.name} if main.lower() == output.name.lower() else {}
-        written = write_files(output.parent, {names.get(k, k): t for k, t in files.items()})
+        files = {names.get(k, k): t for k, t in files.items()}
+        replaced = replace_program(output.parent, files, list(files), only=output.name)
+        written = list(replaced.written)
     elif output is not None and (len(files) > 1 or output.is_dir()):
-        written = write_files(output, files)
+        replaced = replace_program(output, files, list(files), only=next(iter(files)))
+        written = list(replaced.written)
     elif output is not None:
         write_program(output, next(iter(files.values())))
         written = [output]
@@ -56,6 +71,7 @@ def write_post(
             {
                 "language": language,
                 "files": [str(path) for path in written],
+                "removed": [] if replaced is None else [str(p) for p in replaced.removed],
                 "texts": None if written else files,
                 "measured": None if frame is None else _frame_entry(frame),
                 "notes": notes,
@@ -64,23 +80,38 @@ def write_post(
         return
     # A program that is printed has stdout for itself.
     console = out if written else errors
-    if frame is not None:
-        for line in _in_words(frame, plan_file):
-            console.print(line)
     if not written:
         for name, text in files.items():
             if len(files) > 1:
                 print(f"----- {name} -----")
             print(text, end="")
-    for note in notes if written or frame is not None else ():
+    for note in told_once(notes) if written or frame is not None else ():
         console.print(f"note: {escape(note)}")
+    for path in () if replaced is None else replaced.removed:
+        out.print(f"removed {escape(str(path))}, of the earlier program")
     for path in written:
         out.print(f"wrote {escape(str(path))}")
 
 
-def _name(output: Path | None, suffix: str) -> str | None:
-    """Return the name of a program that is to be written to a file of the language's own suffix."""
-    if output is None or output.is_dir() or output.suffix.lower() != suffix:
+def _name(output: Path | None, chosen: Language) -> str | None:
+    """Return the name of a program that is to be written to a file of the language's own suffix.
+
+    Raises
+    ------
+    InputError
+        The file has the suffix of another language, its folder is not there, or no program can be
+        called like it.
+    """
+    if output is None or output.is_dir():
+        return None
+    suffix = output.suffix.lower()
+    if suffix != chosen.suffix.lower():
+        others = [each.name for each in languages().values() if each.suffix.lower() == suffix]
+        if others:
+            raise InputError(
+                f"{output}: the program is to be in {chosen.name}, whose files end in "
+                f"{chosen.suffix}; name it so, or say --language {others[0]}"
+            )
         return None
     if not output.parent.is_dir():
         raise InputError(f"cannot write the program to {output}: {output.parent} is no folder")

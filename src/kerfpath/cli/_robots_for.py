@@ -59,7 +59,8 @@ def show_robots_for(
         return able
     columns = [f"{what.lower()} {unit}".strip() for what, unit in ROBOT_COLUMNS]
     numbers = [column for i, column in enumerate(columns) if i not in ROBOT_WORDS]
-    table(columns, [[escape(v) for v in row] for row in robot_rows(found)], numbers=numbers)
+    rows = [[escape(v) for v in row] for row in robot_rows(found)]
+    table(columns, rows, numbers=numbers, spare=[columns[1], columns[2], columns[5]])
     out.print(" ".join(ROBOT_NOTES))
     for path in written:
         out.print(f"wrote {escape(str(path))}")

@@ -7,11 +7,11 @@ from typing import Any
 
 from rich.markup import escape
 
-from kerfpath.cli._show import print_json, table
+from kerfpath.cli._show import out, print_json, table
 from kerfpath.contour import Contour
 from kerfpath.errors import NoFeasiblePath
 from kerfpath.job import ContourTask
-from kerfpath.planner import FastestSpeed
+from kerfpath.planner import FastestSpeed, at_most
 
 __all__ = ["show_speeds"]
 
@@ -37,8 +37,9 @@ def show_speeds(
             }
             what = f"joint {found.joint + 1} {found.limit}"
             at = " ".join(f"{v:g}" for v in place)
-            grid = "" if found.on_grid is None else f"{found.on_grid * 60:.3f}"
-            rows.append([*row, grid, f"{found.speed * 60:.3f}", str(found.node), what, at])
+            on_grid = found.speed if found.on_grid is None else found.on_grid
+            off_grid = "-" if found.on_grid is None else at_most(found.speed * 60)
+            rows.append([*row, at_most(on_grid * 60), off_grid, str(found.node), what, at])
         else:
             entry |= {"fastest_m_min": None, "reason": str(found)}
             rows.append([*row, "-", "-", str(found.node + 1), "no admissible pose", ""])
@@ -46,6 +47,11 @@ def show_speeds(
     if as_json:
         print_json({"contours": entries})
     else:
-        columns = ["contour", "asked m/min", "on the grid", "fastest m/min", "node", "what binds"]
-        table([*columns, "at x y z mm"], rows, numbers=columns[1:5])
+        columns = ["contour", "asked m/min", "on the grid", "refined", "node", "what binds"]
+        at = "at x y z mm"
+        table([*columns, at], rows, numbers=columns[1:5], spare=[at])
+        out.print(
+            "on the grid: the fastest constant speed there, exactly; refined: the nearest optimum "
+            "that is found from that path off the grid, not proved to be the fastest"
+        )
     return all(entry["fastest_m_min"] is not None for entry in entries)

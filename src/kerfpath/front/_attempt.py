@@ -63,7 +63,11 @@ class Attempts:
         try:
             return self._audited(self.planned(run))
         except NoFeasiblePath as broken:
-            said = f"{broken}; no run can have a plan: this one had all that is allowed"
+            said = (
+                f"{broken}; no run can have a plan: this one had all that is allowed. Runs stand "
+                "on the grid of the rotation: where kerfpath plan finds a motion by refining it, "
+                "choose a finer gamma_step_deg or a lower speed here"
+            )
             raise broken.retold(said) from None
 
     def _audited(self, made: Plan) -> Plan | str:

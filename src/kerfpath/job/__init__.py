@@ -2,16 +2,15 @@
 
 from kerfpath.job._again import audit_file as audit_file
 from kerfpath.job._again import program_from_file as program_from_file
+from kerfpath.job._again import program_language as program_language
 from kerfpath.job._cell import cell_of_job as cell_of_job
 from kerfpath.job._cell import with_map as with_map
 from kerfpath.job._check import Checked as Checked
 from kerfpath.job._check import check_job as check_job
 from kerfpath.job._files import Texts as Texts
 from kerfpath.job._files import Written as Written
-from kerfpath.job._files import collision_note as collision_note
 from kerfpath.job._files import make_folder as make_folder
 from kerfpath.job._files import outcome_texts as outcome_texts
-from kerfpath.job._files import program_of as program_of
 from kerfpath.job._files import require_folder as require_folder
 from kerfpath.job._files import require_language as require_language
 from kerfpath.job._files import stale_program as stale_program
@@ -19,9 +18,11 @@ from kerfpath.job._files import write_outcome as write_outcome
 from kerfpath.job._heads import pose as pose
 from kerfpath.job._planfile import PlanFile as PlanFile
 from kerfpath.job._planfile import read_plan_file as read_plan_file
+from kerfpath.job._program_audit import ProgramAsked as ProgramAsked
 from kerfpath.job._program_audit import audit_program as audit_program
 from kerfpath.job._program_compare import Compared as Compared
 from kerfpath.job._program_compare import compare_programs as compare_programs
+from kerfpath.job._program_of import program_of as program_of
 from kerfpath.job._read import Job as Job
 from kerfpath.job._read import ProgramOptions as ProgramOptions
 from kerfpath.job._read import program_options as program_options
@@ -32,6 +33,7 @@ from kerfpath.job._run import Outcome as Outcome
 from kerfpath.job._run import Progress as Progress
 from kerfpath.job._run import fastest_along as fastest_along
 from kerfpath.job._run import fastest_speeds as fastest_speeds
+from kerfpath.job._run import is_compiled as is_compiled
 from kerfpath.job._run import run_job as run_job
 from kerfpath.job._run import warm_up as warm_up
 from kerfpath.job._sequencefile import sequence_entry as sequence_entry
@@ -42,3 +44,4 @@ from kerfpath.job._touch_up import Taught as Taught
 from kerfpath.job._touch_up import TouchUp as TouchUp
 from kerfpath.job._touch_up import touch_up as touch_up
 from kerfpath.job._verdict import Audited as Audited
+from kerfpath.job._verdict import collision_note as collision_note

@@ -2,31 +2,32 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import replace
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import fields, replace
 from pathlib import Path
 from typing import Any, TypeVar
 
 import numpy as np
 from pydantic import BaseModel, ValidationError
 
-from kerfpath.auditor import checks
+from kerfpath.auditor import Check, checks
 from kerfpath.cad import Part
 from kerfpath.cad import read as read_drawing
 from kerfpath.cell import Cell
 from kerfpath.contour import Contour
-from kerfpath.errors import AuditFailed, InputError
+from kerfpath.errors import AuditFailed, InputError, NoFeasiblePath
 from kerfpath.job._cell import cell_of_job
-from kerfpath.job._files import collision_note, program_of
 from kerfpath.job._planfile import PlanFile, read_plan_file
+from kerfpath.job._program_audit import ProgramAsked
+from kerfpath.job._program_of import asked_of_plans, program_of
 from kerfpath.job._read import Job, ProgramOptions, audit_options, program_options, read_job
-from kerfpath.job._tables import AuditTable, ProgramTable
-from kerfpath.job._verdict import Audited
-from kerfpath.placement import MeasuredFrame, placed, placed_moves
+from kerfpath.job._tables import AuditTable, LayoutTable, ProgramTable, SequenceTable
+from kerfpath.job._verdict import Audited, collision_note
+from kerfpath.placement import MeasuredFrame, placed, placed_moves, planned_again
 from kerfpath.plans import Plan
 from kerfpath.post import language as find_language
 
-__all__ = ["audit_file", "program_from_file", "require_same"]
+__all__ = ["audit_file", "program_from_file", "program_language", "require_same"]
 
 LED_NOTE = (
     "The joints are led to the measured part and audited there for path, limits, velocities and "
@@ -79,7 +80,7 @@ def audit_file(plan_file: Path, job_file: Path | None = None) -> Audited:
 
 def program_from_file(
     plan_file: Path,
-    language: str,
+    language: str | None = None,
     *,
     name: str | None = None,
     strict: bool = False,
@@ -92,7 +93,8 @@ def program_from_file(
     Parameters
     ----------
     plan_file : Path
-    language : str
+    language : str, optional
+        Default: that of the job.
     name : str, optional
         Of the program, where it is not to be that of the job.
     strict : bool
@@ -108,7 +110,8 @@ def program_from_file(
     Raises
     ------
     AuditFailed
-        A contour has no plan, or its plan fails the audit, which is run again here.
+        A contour has no plan, its plan fails the audit, which is run again here, or the program
+        does, as its language says it.
     NoFeasiblePath
         The robot does not reach the measured part as planned.
     InputError
@@ -132,11 +135,15 @@ def program_from_file(
             )
         _require_passed(audit_file(plan_file, job_file))
         file = replace(file, job=read_job(job_file).source)
-    options = _options(file, language, (job_file or plan_file).stem)
+    options = _options(
+        file,
+        language or program_language(file.job, job_file or plan_file),
+        (job_file or plan_file).stem,
+    )
     options = options if name is None else replace(options, name=name)
     if frame is not None:
-        file = _led(file, frame, options.retract)
-        notes += [LED_NOTE, *([LED_MOVES_NOTE] if file.moves else [])]
+        file, again = _led(file, frame, options.retract)
+        notes += [*again, LED_NOTE, *([LED_MOVES_NOTE] if file.moves else [])]
     asked = _table(file, "audit", AuditTable, audit_options)
     for p in file.plans:
         for check in checks(p, **asked):
@@ -145,10 +152,60 @@ def program_from_file(
                 raise AuditFailed(
                     f"no program: contour {p.name!r} fails its audit{there}: {check.issue()}"
                 )
+    if job_file is not None and read_job(job_file).interruptions == "none":
+        to_do = ProgramAsked.of(job_file)
+    else:
+        to_do = asked_of_plans(_job_of(file, options), file.plans)
     files, warnings = program_of(
-        file.plans, options, file.moves, strict=strict, dry_share=dry_share
+        file.plans, options, file.moves, asked=to_do, strict=strict, dry_share=dry_share
     )
     return files, notes + warnings
+
+
+def program_language(source: Mapping[str, Any], path: Path) -> str:
+    """Return the language that a job, as it was read, asks for; `path` is where it stands.
+
+    Raises
+    ------
+    InputError
+        It asks for none.
+    """
+    name = str(source.get("program", {}).get("language", ProgramTable().language))
+    if name == "none":
+        raise InputError(
+            f"{path}: its job asks for no program; say with --language in which one is to be"
+        )
+    return name
+
+
+def _job_of(file: PlanFile, options: ProgramOptions) -> Job:
+    """Return what a plan.json keeps of its job: all but the drawing and the cell."""
+    first = file.plans[0]
+    asked, sequence = first.settings, file.job.get("sequence")
+    return Job(
+        path=file.path,
+        robot=first.robot,
+        tool=first.T_flange_tip,
+        placement=first.T_base_part,
+        part_file=file.path,
+        part_unit=None,
+        contours=(),
+        plan_options={field.name: getattr(asked, field.name) for field in fields(asked)}
+        | {"feed": "constant" if all(p.feed is None for p in file.plans) else "dip"},
+        refine_parts=1,
+        interruptions="none",
+        least_piece=None,
+        cell=None,
+        sequence=None if sequence is None else _table(file, "sequence", SequenceTable, _same),
+        layout=LayoutTable(),
+        audit_options=_table(file, "audit", AuditTable, audit_options),
+        program=options,
+        source=file.job,
+    )
+
+
+def _same(table: _M) -> _M:
+    return table
 
 
 def _require_passed(found: Audited) -> None:
@@ -158,11 +215,41 @@ def _require_passed(found: Audited) -> None:
                 raise AuditFailed(f"no program: contour {name!r} fails its audit: {check.issue()}")
 
 
-def _led(file: PlanFile, frame: MeasuredFrame, retract: float) -> PlanFile:
-    """Return a plan.json with its plans and the moves between them led to a measured part."""
-    plans = tuple(placed(p, frame.T_base_part) for p in file.plans)
+def _led(file: PlanFile, frame: MeasuredFrame, retract: float) -> tuple[PlanFile, list[str]]:
+    """Return a plan.json with its plans and the moves between them led to a measured part.
+
+    A contour that would not pass its audit there is planned again around it; notes say which.
+    """
+    asked, plans, notes = _table(file, "audit", AuditTable, audit_options), [], []
+    for p in file.plans:
+        led, why = _there(p, frame, asked)
+        if why:
+            try:
+                led = planned_again(p, frame.T_base_part)
+            except NoFeasiblePath as broken:
+                raise broken.retold(
+                    f"contour {p.name!r}: led to the measured placement {why}, and planned again "
+                    f"there: {broken}"
+                ) from None
+            notes.append(f"Contour {p.name!r} was planned again there; only led there {why}.")
+        plans.append(led)
     moves = placed_moves(file.moves, plans, retract)
-    return replace(file, plans=plans, moves=moves, in_cell=False)
+    return replace(file, plans=tuple(plans), moves=moves, in_cell=False), notes
+
+
+def _there(p: Plan, frame: MeasuredFrame, asked: dict[str, Any]) -> tuple[Plan, str]:
+    """Return a plan led to a measured part, and what then fails; empty where nothing does."""
+    try:
+        led = placed(p, frame.T_base_part)
+    except NoFeasiblePath as away:
+        return p, f"it fails: {away}"
+    failed = first_failed(checks(led, **asked))
+    return led, "" if failed is None else f"it fails: {failed.issue()}"
+
+
+def first_failed(table: Sequence[Check]) -> Check | None:
+    """Return the first check that is an error; None where the plan passes."""
+    return next((check for check in table if check.level == "error" and not check.ok), None)
 
 
 def _options(file: PlanFile, language: str, stem: str) -> ProgramOptions:

@@ -10,7 +10,7 @@ from kerfpath.contour import Contour
 from kerfpath.errors import NoFeasiblePath
 from kerfpath.graph import LayeredGraph
 from kerfpath.job._task import ContourTask
-from kerfpath.planner import ClearanceMap, FastestSpeed
+from kerfpath.planner import FINER, ON_THIS_GRID, ClearanceMap, FastestSpeed, at_least, at_most
 from kerfpath.plans import Plan
 from kerfpath.search import Relaxations
 
@@ -92,19 +92,35 @@ class Cut:
             return ""
         if self.fastest is None:
             return str(self.broken)
-        least = self.relaxations
-        ways = [
-            f"{name} {share:.4g}"
-            for name, share in (
-                ("eta_velocity", None if least is None else least.eta_v),
-                ("eta_acceleration", None if least is None else least.eta_a),
-            )
-            if share is not None
-        ]
-        node = self.nodes.points[self.fastest.node] * 1000
-        return (
-            f"{self.broken}; a path exists up to {self.fastest.speed * 60:.4g} m/min, where the "
-            f"{self.fastest.limit} of joint {self.fastest.joint + 1} binds at node "
-            f"{self.fastest.node}, {' '.join(f'{v:.1f}' for v in node)} mm"
-            f"{'; or from ' + ' or from '.join(ways) + ' on' if ways else ''}"
+        return f"{self.broken}; {self._speeds(self.fastest)}{self._shares()}; {FINER}"
+
+    def _speeds(self, found: FastestSpeed) -> str:
+        """Say up to which speed a path exists on the grid, and which one is known off it."""
+        point = self.nodes.points[found.node] * 1000
+        binds = (
+            f", where the {found.limit} of joint {found.joint + 1} binds at node {found.node}, "
+            f"{' '.join(f'{v:.1f}' for v in point)} mm"
         )
+        if found.on_grid is None:
+            return f"{ON_THIS_GRID} a path exists up to {at_most(found.speed * 60)} m/min{binds}"
+        on_grid = f"{ON_THIS_GRID} a path exists up to {at_most(found.on_grid * 60)} m/min"
+        if found.speed < self.task.speed:
+            return f"{on_grid}, refined up to {at_most(found.speed * 60)} m/min{binds}"
+        return (
+            f"{on_grid}; a refined one was found at {at_most(found.speed * 60)} m/min, but none at "
+            "the speed asked for"
+        )
+
+    def _shares(self) -> str:
+        """Say which larger share of one limit would open the way on the grid, or that none does."""
+        if self.relaxations is None:
+            return ""
+        shares = {
+            "eta_velocity": self.relaxations.eta_v,
+            "eta_acceleration": self.relaxations.eta_a,
+        }
+        told = {k: "none" if v is None or v > 1 else at_least(v) for k, v in shares.items()}
+        ways = [f"{name} = {share}" for name, share in told.items() if share != "none"]
+        closed = [name for name, share in told.items() if share == "none"]
+        said = f"; at the speed asked for with {' or '.join(ways)}" if ways else ""
+        return said + (f"; no {' and no '.join(closed)} up to 1 is enough there" if closed else "")

@@ -12,24 +12,23 @@ from typing import Any
 import numpy as np
 
 from kerfpath.air import AirMove
-from kerfpath.cell import Cell
 from kerfpath.errors import AuditFailed, InputError
 from kerfpath.job._planfile import broken_entry, plan_entry, plan_text
+from kerfpath.job._program_of import asked_of_cuts, program_of
 from kerfpath.job._read import Job, ProgramOptions
 from kerfpath.job._refusals import refused_at
 from kerfpath.job._reportfile import report_text
 from kerfpath.job._run import Outcome
+from kerfpath.job._verdict import collision_note
 from kerfpath.plans import Plan
-from kerfpath.post import build_program, dry_run, language, post, preflight, write_files
+from kerfpath.post import language, replace_program
 from kerfpath.sequence import PartPlan
 
 __all__ = [
     "Texts",
     "Written",
-    "collision_note",
     "make_folder",
     "outcome_texts",
-    "program_of",
     "require_folder",
     "require_language",
     "stale_program",
@@ -37,8 +36,8 @@ __all__ = [
     "write_outcome",
 ]
 
-NOT_CHECKED = "Collisions are not checked: simulate the program in the cell before running it."
-"""What is said of a job without a [cell]."""
+SHORT_PIECE = 0.02
+"""m: a shorter piece has hardly room for its leads, and is warned of."""
 SHORTEST_CUT = 8
 """No language cuts names to fewer characters."""
 
@@ -51,13 +50,16 @@ class Written:
     ----------
     files : tuple of Path
         Written, in this order.
+    removed : tuple of Path
+        Of the program of an earlier run, and removed: they do not belong to this one.
     stale : Path or None
-        A program of an earlier run that lies in the folder and does not belong to this one.
+        The same, but edited since or of unknown origin, and so left.
     notes : tuple of str
         Warnings of the program's preflight, and what nobody has checked.
     """
 
     files: tuple[Path, ...]
+    removed: tuple[Path, ...]
     stale: Path | None
     notes: tuple[str, ...]
 
@@ -73,7 +75,9 @@ class Texts:
     program : tuple of str
         Which of them are the program, the one that is started first; none without one.
     refused : str
-        Why there is no program though every audit has passed; empty where there is none to tell.
+        Why there is no program though every plan has passed; empty where there is none to tell.
+    unsafe : bool
+        Whether that is because the program, as its language says it, fails its audit.
     notes : tuple of str
         Warnings of the program's preflight, and what nobody has checked.
     """
@@ -81,6 +85,7 @@ class Texts:
     files: dict[str, str]
     program: tuple[str, ...]
     refused: str
+    unsafe: bool
     notes: tuple[str, ...]
 
 
@@ -92,14 +97,22 @@ def write_outcome(outcome: Outcome, folder: Path, *, strict: bool = False) -> Wr
     InputError
         The folder cannot be made or written to; or the program is refused, and the other files
         are written.
+    AuditFailed
+        The program fails its audit; the other files are written.
     """
     texts = outcome_texts(outcome, strict=strict)
     make_folder(folder)
-    written = write_files(folder, texts.files)
+    replaced = replace_program(folder, texts.files, texts.program)
     if texts.refused:
-        raise InputError(f"{texts.refused} ({folder / 'plan.json'} and the report are written)")
+        said = f"{texts.refused} ({folder / 'plan.json'} and the report are written)"
+        raise AuditFailed(said) if texts.unsafe else InputError(said)
     stale = stale_program(outcome.job.program, folder, texts.program)
-    return Written(files=tuple(written), stale=stale, notes=texts.notes)
+    return Written(
+        files=replaced.written,
+        removed=replaced.removed,
+        stale=next(iter(replaced.edited), stale),
+        notes=texts.notes,
+    )
 
 
 def outcome_texts(outcome: Outcome, *, strict: bool = False) -> Texts:
@@ -107,18 +120,22 @@ def outcome_texts(outcome: Outcome, *, strict: bool = False) -> Texts:
     job = outcome.job
     part, moves = outcome.part, () if outcome.part is None else outcome.part.moves
     program: dict[str, str] = {}
-    refused = ""
+    refused, unsafe = "", False
     notes = [collision_note(outcome.cell, moves_too=bool(moves))]
     notes += [] if part is None else [order_note(part)]
-    notes += [] if outcome.stuck is None else [f"The moves between contours: {outcome.stuck}"]
-    notes += [f"The moves between contours: {c.issue()}" for c in outcome.air if not c.ok]
+    notes += short_pieces(outcome)
+    faults = [] if outcome.stuck is None else [f"The moves between contours: {outcome.stuck}"]
+    faults += [f"The moves between contours: {c.issue()}" for c in outcome.air if not c.ok]
     if outcome.passed and job.program.language != "none":
         try:
-            program, warnings = program_of(outcome.plans, job.program, moves, strict=strict)
+            asked = asked_of_cuts(job, outcome.cuts, outcome.cell)
+            program, warnings = program_of(
+                outcome.plans, job.program, moves, asked=asked, strict=strict
+            )
             notes += warnings
-        except InputError as error:
-            refused = str(error)
-            notes.append(f"no program was written: {error}")
+        except (InputError, AuditFailed) as error:
+            refused, unsafe = str(error), isinstance(error, AuditFailed)
+            faults.append(refused if unsafe else f"no program was written: {error}")
     entries = []
     for cut in outcome.cuts:
         if cut.plan is not None:
@@ -131,9 +148,10 @@ def outcome_texts(outcome: Outcome, *, strict: bool = False) -> Texts:
             job.robot, job.tool, job.placement, entries, job.source, outcome.cell, part
         ),
         "trajectory.csv": trajectory_text(outcome.plans, moves),
-        "report.html": report_text(outcome, notes),
+        "report.html": report_text(outcome, notes, faults),
     }
-    return Texts(files=files, program=tuple(program), refused=refused, notes=tuple(notes))
+    told = (*notes, *faults)
+    return Texts(files=files, program=tuple(program), refused=refused, unsafe=unsafe, notes=told)
 
 
 def stale_program(options: ProgramOptions, folder: Path, program: Sequence[str]) -> Path | None:
@@ -170,16 +188,20 @@ def order_note(part: PartPlan) -> str:
     )
 
 
-def collision_note(cell: Cell | None, *, moves_too: bool = False) -> str:
-    """Say what was checked for collisions, and what was not."""
-    if cell is None:
-        return NOT_CHECKED
-    about = f" (approximate: {', '.join(cell.approximate)})" if cell.approximate else ""
-    return (
-        f"Collisions are checked along the contours, among {len(cell.bodies)} bodies of the "
-        f"cell{about}; the moves to and between contours are "
-        f"{'checked, too' if moves_too else 'not checked'}."
-    )
+def short_pieces(outcome: Outcome) -> list[str]:
+    """Say of interrupted contours which piece is shortest, if it is short and nobody asked."""
+    if outcome.job.least_piece is not None:
+        return []
+    lengths: dict[str, list[float]] = {}
+    for cut in outcome.cuts:
+        if cut.plan is not None:
+            lengths.setdefault(cut.contour, []).append(float(np.ptp(cut.plan.contour.s)))
+    return [
+        f"{name}: the shortest of its {len(pieces)} pieces is {min(pieces) * 1e3:.1f} mm; with "
+        "least_piece_mm in [plan] none is shorter than that"
+        for name, pieces in lengths.items()
+        if len(pieces) > 1 and min(pieces) < SHORT_PIECE
+    ]
 
 
 def require_folder(folder: Path) -> None:
@@ -228,52 +250,6 @@ def require_language(job: Job) -> None:
             ("program", "language"),
             f'{refusal}; write language = "none" in [program] to plan without a program',
         )
-
-
-def program_of(
-    plans: Sequence[Plan],
-    options: ProgramOptions,
-    moves: Sequence[AirMove] = (),
-    *,
-    strict: bool = False,
-    dry_share: float | None = None,
-) -> tuple[dict[str, str], list[str]]:
-    """Return the files of the program that cuts `plans`, and the warnings of its preflight.
-
-    Between them the robot moves as `moves` say; without any, straight to each. With `dry_share` it
-    is a dry run at that share of the speed.
-
-    The caller answers for the audit.
-
-    Raises
-    ------
-    AuditFailed
-        There is no plan.
-    InputError
-        The preflight refuses.
-    """
-    if not plans:
-        raise AuditFailed("no program: there is no plan to write one from")
-    if refusal := language(options.language).refusal(plans[0].robot):
-        raise InputError(f"no program: {refusal}")
-    program = build_program(
-        plans,
-        moves=moves,
-        name=options.name,
-        retract=options.retract,
-        zone=options.zone,
-        lead_time=options.lead_time,
-        pierce_time=options.pierce_time,
-        approach_speed=options.approach_speed,
-        air_speed=options.air_speed,
-        gas_lead=options.gas_lead,
-        arc_tolerance=options.arc_tolerance,
-    )
-    if dry_share is not None:
-        program = dry_run(program, dry_share)
-    written = post(program, options.language, options.settings, strict=strict)
-    issues = preflight(program, options.language, options.settings)
-    return written, [str(issue) for issue in issues if issue.level == "warning"]
 
 
 def trajectory_text(plans: Sequence[Plan], moves: Sequence[AirMove] = ()) -> str:

@@ -84,6 +84,7 @@ def ordered(
             heat_spacing=job.sequence.heat_spacing_mm / 1000,
             given_order=job.sequence.order == "given",
             retract=job.program.retract,
+            air_speed=job.program.air_speed or 1.0,
             approach_speed=job.program.approach_speed,
             pierce_time=job.program.pierce_time,
             seconds=job.sequence.seconds,

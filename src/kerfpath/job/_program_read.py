@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 from scipy.spatial.transform import Rotation, Slerp
 
-from kerfpath._arrays import Array, Bools
+from kerfpath._arrays import Array, Bools, Ints
 from kerfpath.errors import InputError
 from kerfpath.job._read import Job
 from kerfpath.job._tables import ProgramTable
@@ -27,10 +27,21 @@ from kerfpath.post import (
 )
 from kerfpath.robots import Robot
 
-__all__ = ["ReadCut", "cuts_of", "language_of", "program_on_disk"]
+__all__ = [
+    "ReadCut",
+    "at_interval",
+    "branch_of",
+    "cuts_of",
+    "followed",
+    "language_of",
+    "poses_on_arc",
+    "program_on_disk",
+]
 
 ARC_STEP = np.radians(2.0)
-"""Sweep between the nodes that an arc is taken to have."""
+"""Sweep between the nodes that an arc has, where it is not known which contour it is of."""
+COARSEST = np.radians(45.0)
+"""The same at most, where it is."""
 
 
 class _Folder(Mapping[str, str]):
@@ -119,6 +130,10 @@ class ReadCut:
         Where the tool has backed off to.
     moves : tuple of ReadMove
         The move to each node.
+    ends : (m,) int
+        The node that each target of the text stands at; an arc has nodes between.
+    group : ReadGroup
+        What it was made of.
     """
 
     name: str
@@ -133,6 +148,13 @@ class ReadCut:
     waits: Array
     q_out: Array
     moves: tuple[ReadMove, ...]
+    ends: Ints
+    group: ReadGroup
+
+    @property
+    def targets(self) -> tuple[ReadMove, ...]:
+        """The moves to its first node and on, each once."""
+        return tuple(self.moves[k] for k in self.ends)
 
 
 def cuts_of(
@@ -162,11 +184,30 @@ def cuts_of(
     return cuts, home
 
 
-def _cut(group: ReadGroup, robot: Robot, T_flange_tip: Array, T_base_part: Array) -> ReadCut:
+def at_interval(
+    cut: ReadCut, interval: float, robot: Robot, T_flange_tip: Array, T_base_part: Array
+) -> ReadCut:
+    """Return a cut whose arcs have a node at each interval (s), as straight moves would have.
+
+    So rates along arcs, and where arcs end, are judged over the same times as all others.
+    """
+    if all(move.kind != "circular" for move in cut.moves):
+        return cut
+    return _cut(cut.group, robot, T_flange_tip, T_base_part, interval)
+
+
+def _cut(
+    group: ReadGroup,
+    robot: Robot,
+    T_flange_tip: Array,
+    T_base_part: Array,
+    interval: float | None = None,
+) -> ReadCut:
     """Return the cut of a group; an arc gets nodes of its own along it."""
     T: list[Array] = []
     took: list[float] = []
     moves: list[ReadMove] = []
+    ends: list[int] = []
     on: list[bool] = []
     laser = False
     for move in group.path:
@@ -174,17 +215,18 @@ def _cut(group: ReadGroup, robot: Robot, T_flange_tip: Array, T_base_part: Array
         assert end is not None
         stops = [end]
         if T and move.kind == "circular" and move.T_part_via is not None:
-            stops = _arc(T[-1], move.T_part_via, end)
+            stops = _arc(T[-1], move.T_part_via, end, move, interval)
         for stop in stops:
             if T:
                 took.append(_duration(move, T[-1], stop, len(stops)))
                 on.append(laser)
             T.append(np.asarray(stop))
             moves.append(move)
+        ends.append(len(T) - 1)
         for switch in move.switches:
             laser = switch.on if switch.signal == "laser" else laser
     poses = np.array(T)
-    q = _followed(robot, T_base_part @ poses @ np.linalg.inv(T_flange_tip), _q(group.joint[-1]))
+    q = followed(robot, T_base_part @ poses @ np.linalg.inv(T_flange_tip), _q(group.joint[-1]))
     last = len(poses) - 1
     switches = [s for move in group.path for s in move.switches if s.signal == "laser"]
     return ReadCut(
@@ -197,9 +239,11 @@ def _cut(group: ReadGroup, robot: Robot, T_flange_tip: Array, T_base_part: Array
         laser=np.array(on[: last - 1], dtype=bool),
         left_on=on[last - 1],
         lead_times=np.array([switch.lead_time for switch in switches]),
-        waits=np.array([time for at, time in group.waits if at == 1]),
+        waits=np.array([wait.time for at, wait in group.waits if at == 1]),
         q_out=q[last],
         moves=tuple(moves[:last]),
+        ends=np.array(ends[:-1]),
+        group=group,
     )
 
 
@@ -222,31 +266,64 @@ def _q(move: ReadMove) -> Array:
     return move.q
 
 
-def _arc(start: Array, via: Array, end: Array) -> list[Array]:
-    """Return poses along the arc after `start`, its end included, the tool turning evenly."""
-    a, b, c = start[:3, 3], via[:3, 3], end[:3, 3]
-    circle = circle_through(a, b, c)
+def _arc(
+    start: Array, via: Array, end: Array, move: ReadMove, interval: float | None
+) -> list[Array]:
+    """Return poses along the arc after `start`, its end included, the tool turning evenly.
+
+    They are `ARC_STEP` apart, or as far as the robot comes in an interval (s), but no farther than
+    `COARSEST`.
+    """
+    circle = circle_through(start[:3, 3], via[:3, 3], end[:3, 3])
     if circle is None:
         return [via, end]  # on one line
-    centre, normal, _ = circle
-    x = a - centre
-    y = np.cross(normal, x)
-    sweep = float(np.arctan2((c - centre) @ y, (c - centre) @ x) % (2 * np.pi))
-    parts = np.linspace(0, 1, max(int(np.ceil(sweep / ARC_STEP)), 1) + 1)[1:]
+    sweep = _sweep(circle, start, end)
+    count = int(np.ceil(sweep / ARC_STEP))
+    if interval is not None:
+        took = move.duration
+        if took is None and move.speed:
+            took = sweep * circle[2] / move.speed
+        if took is not None:
+            count = max(round(took / interval), int(np.ceil(sweep / COARSEST)))
+    return list(poses_on_arc(start, via, end, np.linspace(0, 1, max(count, 1) + 1)[1:]))
+
+
+def poses_on_arc(start: Array, via: Array, end: Array, parts: Array) -> Array:
+    """Return the poses (m, 4, 4) at shares (m,) of the arc from `start` by `via` to `end`.
+
+    On a straight line where the three points are.
+    """
+    circle = circle_through(start[:3, 3], via[:3, 3], end[:3, 3])
     poses = np.tile(np.eye(4), (len(parts), 1, 1))
     turned = Slerp([0.0, 1.0], Rotation.from_matrix(np.array([start[:3, :3], end[:3, :3]])))
     poses[:, :3, :3] = turned(parts).as_matrix()
-    at = (parts * sweep)[:, None]
-    poses[:, :3, 3] = centre + np.cos(at) * x + np.sin(at) * y
-    return list(poses)
+    if circle is None:
+        poses[:, :3, 3] = start[:3, 3] + parts[:, None] * (end[:3, 3] - start[:3, 3])
+        return poses
+    centre, normal, _ = circle
+    x = start[:3, 3] - centre
+    at = (parts * _sweep(circle, start, end))[:, None]
+    poses[:, :3, 3] = centre + np.cos(at) * x + np.sin(at) * np.cross(normal, x)
+    return poses
 
 
-def _followed(robot: Robot, T: Array, q0: Array) -> Array:
+def _sweep(circle: tuple[Array, Array, float], start: Array, end: Array) -> float:
+    """Return how far (rad) an arc turns from its start to its end."""
+    centre, normal, _ = circle
+    x, last = start[:3, 3] - centre, end[:3, 3] - centre
+    return float(np.arctan2(last @ np.cross(normal, x), last @ x) % (2 * np.pi))
+
+
+def branch_of(robot: Robot, q: Array) -> int:
+    """Return which posture joints (n,) are in."""
+    solved, reach = robot.inverse_all(robot.forward(q)[None])
+    apart = np.abs((solved[0] - q + np.pi) % (2 * np.pi) - np.pi).max(axis=1)
+    return int(np.argmin(np.where(reach[0], apart, np.inf)))
+
+
+def followed(robot: Robot, T: Array, q0: Array) -> Array:
     """Return joints (K, n) at flange poses T (K, 4, 4), on the branch of q0; NaN out of reach."""
-    here = robot.forward(q0)[None]
-    solved, reach = robot.inverse_all(here)
-    apart = np.abs((solved[0] - q0 + np.pi) % (2 * np.pi) - np.pi).max(axis=1)
-    posture = int(np.argmin(np.where(reach[0], apart, np.inf)))
+    posture = branch_of(robot, q0)
     if robot.family.follow_all is None:
         q = robot.follow(T, np.tile(q0, (len(T), 1)), np.full(len(T), posture))
         good = ~np.isnan(q).any(axis=1)

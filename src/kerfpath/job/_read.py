@@ -26,7 +26,7 @@ from kerfpath.job._tables import (
     SequenceTable,
 )
 from kerfpath.job._task import ContourTask, task_of
-from kerfpath.post import Settings
+from kerfpath.post import Handshake, Settings
 from kerfpath.robots import Robot, postures_named
 
 __all__ = ["Job", "ProgramOptions", "audit_options", "program_options", "read_job"]
@@ -57,12 +57,14 @@ class ProgramOptions:
         How long the laser stays on at the start before the cut goes on.
     approach_speed : float m/s
         Along the tool axis before and after a contour.
-    air_speed : float
-        Share of the full speed of joint moves.
+    air_speed : float or None
+        Share of the full speed of joint moves; None: what is usual for planned moves and others.
     arc_tolerance : float m or None
         How near to the path circular moves stay; None: there are none.
     gas_lead : float s or None
         How long before the start the gas is switched on; None: not by the program.
+    handshakes : tuple of Request or Await
+        Before each contour.
     """
 
     language: str
@@ -73,9 +75,10 @@ class ProgramOptions:
     lead_time: float
     pierce_time: float
     approach_speed: float
-    air_speed: float
+    air_speed: float | None
     arc_tolerance: float | None
     gas_lead: float | None
+    handshakes: tuple[Handshake, ...] = ()
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -104,6 +107,8 @@ class Job:
         Parts into which the refinement divides every interval between nodes.
     interruptions : {"none", "fewest"}
         Whether a contour that cannot be cut in one go is cut in pieces.
+    least_piece : float m or None
+        Length that every such piece has at least.
     cell : CellTable or None
         What stands around, as the file says it; without one, collisions are not checked.
     sequence : SequenceTable or None
@@ -128,6 +133,7 @@ class Job:
     plan_options: dict[str, Any]
     refine_parts: int
     interruptions: Literal["none", "fewest"]
+    least_piece: float | None
     cell: CellTable | None
     sequence: SequenceTable | None
     layout: LayoutTable
@@ -212,6 +218,7 @@ def read_job(path: str | Path) -> Job:
         plan_options=_plan_options(file.plan, robot) | {"comfort": file.comfort.resolve()},
         refine_parts=file.plan.refine_parts,
         interruptions=file.plan.interruptions,
+        least_piece=None if file.plan.least_piece_mm is None else file.plan.least_piece_mm / 1000,
         cell=file.cell,
         sequence=file.sequence,
         layout=file.layout,
@@ -309,4 +316,5 @@ def program_options(table: ProgramTable, stem: str) -> ProgramOptions:
         air_speed=table.air_speed,
         arc_tolerance=None if table.arcs_mm is None else table.arcs_mm / 1000,
         gas_lead=table.gas_lead_s,
+        handshakes=table.handshakes(),
     )

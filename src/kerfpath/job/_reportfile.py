@@ -19,8 +19,8 @@ PER_LEG = 17
 """Points that a straight joint motion is drawn by."""
 
 
-def report_text(outcome: Outcome, notes: Sequence[str]) -> str:
-    """Return the HTML report of a run."""
+def report_text(outcome: Outcome, notes: Sequence[str], faults: Sequence[str] = ()) -> str:
+    """Return the HTML report of a run; `faults` say why it is not to be cut though planned."""
     job = outcome.job
     sections = [
         ContourSection(
@@ -65,6 +65,7 @@ def report_text(outcome: Outcome, notes: Sequence[str]) -> str:
         cell=outcome.cell,
         moves=[_tips(job, move) for move in between],
         facts=facts,
+        faults=faults,
         notes=notes,
         job_text=job.path.read_text(encoding="utf-8-sig"),
     )

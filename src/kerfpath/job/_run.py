@@ -46,12 +46,14 @@ __all__ = [
     "Progress",
     "fastest_along",
     "fastest_speeds",
+    "is_compiled",
     "run_job",
     "warm_up",
 ]
 
 Progress = Callable[[str, int, int], None]
-"""Called with what is being done, how much of it is done, and how much there is."""
+"""Called with what is being done, how much of it is done, and how much there is: 0 of what has no
+measure, like a search."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -137,7 +139,7 @@ def run_job(
         run = None if chosen is None else chosen.get(task.name)
         tries.append([_cut(job, task, path, cell, run, progress) for path in paths])
     if job.sequence is not None:
-        progress("order and moves", 0, 1)
+        progress("order and moves", 0, 0)
     found = ordered(job, loops, tries, cell)
     moved = {
         task.name: part.departure(task.pick, loop)
@@ -181,6 +183,7 @@ def _cut(
     )
     clearance = None
     if cell is not None and job.cell is not None and job.cell.map:
+        progress(f"{task.name}: map of the cell", 0, 0)
         clearance = clearance_map(graph, cell)
     whole = Cut(
         contour=task.name, task=task, drawn=drawn, nodes=nodes, graph=graph, clearance=clearance
@@ -188,8 +191,12 @@ def _cut(
     kept = cell
     if chosen is not None:
         graph, kept = chosen.run.graph(graph, job.robot.endless), chosen.run.cell(cell)
+
+    def phase(what: str) -> None:
+        progress(f"{task.name}: {what}", 0, 0)
+
     try:
-        plans = _plans(job, task, nodes, graph, kept)
+        plans = _plans(job, task, nodes, graph, kept, phase)
     except NoFeasiblePath as broken:
         # With poses everywhere slower would do; for a loop that cannot close, or an axis that may
         # not turn as far, it need not, and a feed that dips has tried.
@@ -197,18 +204,21 @@ def _cut(
         constant = options["feed"] == "constant" and nodes.time is None
         if not (np.diff(graph.start).all() and plain and constant):
             return (replace(whole, broken=broken),)
-        progress(f"{task.name}: fastest speed", 0, 1)
+        phase("fastest speed")
         if cell is not None:
             # Shares of the limits at which a clear path exists are not looked for.
             with suppress(NoFeasiblePath):
-                slower = fastest_along(job, nodes, cell, refine=False, graph=graph)
+                slower = fastest_along(job, nodes, cell, refine=options["refine"], graph=graph)
                 return (replace(whole, broken=broken, fastest=slower),)
             return (replace(whole, broken=broken),)
         least = relaxations(
             nodes, job.robot, graph, task.speed, eta_v=options["eta_v"], eta_a=options["eta_a"]
         )
         fastest = FastestSpeed.of(nodes, least.slower)
+        if options["refine"]:
+            fastest = fastest_along(job, nodes, None, refine=True, graph=graph)
         return (replace(whole, broken=broken, fastest=fastest, relaxations=least),)
+    phase("audit")
     return tuple(_audited(job, whole, made, cell) for made in plans)
 
 
@@ -236,11 +246,17 @@ def fastest_along(
 
 
 def _plans(
-    job: Job, task: ContourTask, nodes: Contour, graph: LayeredGraph, cell: Cell | None
+    job: Job,
+    task: ContourTask,
+    nodes: Contour,
+    graph: LayeredGraph,
+    cell: Cell | None,
+    phase: Callable[[str], None],
 ) -> tuple[Plan, ...]:
     """Return the plan of a contour, or those of its pieces where the job lets it be interrupted."""
     options = job.plan_options
     setting: dict[str, Any] = {"tool": job.tool, "placement": job.placement, "graph": graph}
+    setting["phase"] = phase
     setting["speed"] = task.speed if nodes.time is None else None
     try:
         return (plan(nodes, job.robot, cell=cell, **setting, **options),)
@@ -248,6 +264,7 @@ def _plans(
         if job.interruptions == "none" or not np.diff(graph.start).all():
             raise
     plain = {key: value for key, value in options.items() if key not in ("feed", "rotation")}
+    plain["least_piece"] = job.least_piece
     return plan_in_pieces(nodes, job.robot, cell=cell, **setting, **plain)
 
 
@@ -303,6 +320,7 @@ def fastest_speeds(
     tasks = job.tasks(part)
     for i, task in enumerate(tasks):
         progress("contours", i, len(tasks))
+        progress(f"{task.name}: fastest speed", 0, 0)
         nodes = task.evenly_fast(part)
         try:
             found: FastestSpeed | NoFeasiblePath = fastest_along(job, nodes, cell, refine=refine)

@@ -14,8 +14,8 @@ from kerfpath.cad import read as read_drawing
 from kerfpath.contour import Contour, angle_between
 from kerfpath.errors import InputError
 from kerfpath.job._again import require_same
-from kerfpath.job._files import program_of
 from kerfpath.job._planfile import PlanFile, read_plan_file
+from kerfpath.job._program_of import asked_of_plans, program_of
 from kerfpath.job._program_read import language_of, program_on_disk
 from kerfpath.job._read import Job, read_job
 from kerfpath.job._run import Given, Outcome, Progress, run_job
@@ -167,7 +167,7 @@ def _edited(program: Path, job: Job, file: PlanFile) -> tuple[list[ReadGroup], l
     """Return what an edited program does, a group for each plan, and what else was changed."""
     chosen, settings = language_of(program, job)
     options = replace(job.program, language=chosen.name, settings=settings)
-    texts, _ = program_of(file.plans, options, file.moves)
+    texts, _ = program_of(file.plans, options, file.moves, asked=asked_of_plans(job, file.plans))
     planned, edited = (
         with_tips(read, job.robot, job.tool, job.placement)
         for read in (

@@ -5,8 +5,12 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 
 from kerfpath.auditor import Check
+from kerfpath.cell import Cell
 
-__all__ = ["Audited"]
+__all__ = ["Audited", "collision_note"]
+
+NOT_CHECKED = "Collisions are not checked: simulate the program in the cell before running it."
+"""What is said of a job without a [cell]."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -43,3 +47,15 @@ class Audited:
         """Say where a check of a table failed: a node, and in a program the file and line."""
         lines = self.places.get(name, ())
         return f"{lines[check.node]}" if check.node < len(lines) else f"node {check.node}"
+
+
+def collision_note(cell: Cell | None, *, moves_too: bool = False) -> str:
+    """Say what was checked for collisions, and what was not."""
+    if cell is None:
+        return NOT_CHECKED
+    about = f" (approximate: {', '.join(cell.approximate)})" if cell.approximate else ""
+    return (
+        f"Collisions are checked along the contours, among {len(cell.bodies)} bodies of the "
+        f"cell{about}; the moves to and between contours are "
+        f"{'checked, too' if moves_too else 'not checked'}."
+    )

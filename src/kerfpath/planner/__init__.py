@@ -10,3 +10,7 @@ from kerfpath.planner._map import clearance_map as clearance_map
 from kerfpath.planner._pieces import plan_in_pieces as plan_in_pieces
 from kerfpath.planner._plan import FeedKind as FeedKind
 from kerfpath.planner._plan import plan as plan
+from kerfpath.planner._words import FINER as FINER
+from kerfpath.planner._words import ON_THIS_GRID as ON_THIS_GRID
+from kerfpath.planner._words import at_least as at_least
+from kerfpath.planner._words import at_most as at_most

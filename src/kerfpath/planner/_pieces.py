@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Unpack
 
 from kerfpath.cell import Cell
@@ -23,6 +24,8 @@ def plan_in_pieces(
     *,
     refine: bool = False,
     cell: Cell | None = None,
+    least_piece: float | None = None,
+    phase: Callable[[str], None] | None = None,
     **options: Unpack[Options],
 ) -> tuple[Plan, ...]:
     """Return the plans of the pieces that the contour is cut in, with the fewest interruptions.
@@ -34,9 +37,12 @@ def plan_in_pieces(
 
     Parameters
     ----------
-    contour, robot, refine, cell, options
+    contour, robot, refine, cell, phase, options
         As in `plan`, with method "exact", closure "free" (a closed contour need not return to its
         first pose), no rotation limit and no tilt. Comfort: a node in two pieces costs in both.
+    least_piece : float m, optional
+        Every piece is at least as long, measured along the nodes; the number of interruptions is
+        then the least with which that can be. A cut in one go may be shorter.
 
     Returns
     -------
@@ -48,7 +54,7 @@ def plan_in_pieces(
     ------
     NoFeasiblePath
         No number of interruptions helps: a node without a pose, or an interval between two nodes
-        that no poses can pass.
+        that no poses can pass; or no pieces of the least length.
     InputError
         As `plan`; another method or closure, a rotation limit, a tilt.
     """
@@ -66,8 +72,10 @@ def plan_in_pieces(
     if settings.tilt is not None:
         raise InputError("plan_in_pieces: the tool axis cannot be tilted in pieces; leave out tilt")
     finder = Finder(task, cell)
+    begin = phase or (lambda what: None)
+    begin("search for pieces")
     try:
-        found = finder.best(interrupted_path, **task.aim)
+        found = finder.best(interrupted_path, **task.aim, s=contour.s, least_piece=least_piece)
     except NoFeasiblePath as broken:
         raise broken.retold(
             f"contour {contour.name!r}: no number of interruptions helps: {broken}"
@@ -75,6 +83,8 @@ def plan_in_pieces(
     plans = []
     for number, piece in enumerate(found.pieces, 1):
         part, made = _planned(task, finder, piece, number, len(found.pieces))
+        if refine:
+            begin(f"refinement of piece {number} of {len(found.pieces)}")
         plans.append(refined(part, Finder(part, cell), made) if refine else made)
     return tuple(plans)
 

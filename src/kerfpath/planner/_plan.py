@@ -17,6 +17,7 @@ from kerfpath.planner._clear import Finder
 from kerfpath.planner._dip import slowed
 from kerfpath.planner._refined import off_grid, refined
 from kerfpath.planner._task import Task, task_of
+from kerfpath.planner._words import ON_THIS_GRID
 from kerfpath.plans import Plan, Proof
 from kerfpath.robots import Robot, posture_name
 from kerfpath.search import Closure, Method, Metric, ObjectiveKind, shortest_path
@@ -52,6 +53,7 @@ def plan(
     comfort: Comfort | None = None,
     graph: LayeredGraph | None = None,
     progress: Callable[[int], None] | None = None,
+    phase: Callable[[str], None] | None = None,
 ) -> Plan:
     """Return the best joint motion along the contour.
 
@@ -95,6 +97,8 @@ def plan(
         The layered graph of this very task, kept from `layered_graph`.
     progress : callable, optional
         Called with the number of nodes whose poses have been solved since the last call.
+    phase : callable, optional
+        Called with what begins once the poses are solved: "search", then "refinement".
 
     Raises
     ------
@@ -141,6 +145,8 @@ def plan(
         progress=progress,
     )
     finder = Finder(task, cell)
+    begin = phase or (lambda what: None)
+    begin("search")
     try:
         path = finder.best(
             shortest_path,
@@ -159,15 +165,20 @@ def plan(
                 broken = at_any
         found = None
         if refine and closure == "free" and feed == "constant":
+            begin("refinement")
             found = off_grid(task, finder)
         if found is not None and found.done:
             return found.plan
         tried = "" if found is None else f"; off the grid {found.statement}"
+        where = f"{ON_THIS_GRID} " if task.robot.family.free_rotation else ""
         raise broken.retold(
-            f"contour {contour.name!r}: {broken}{_bracket(broken, task)}{tried}"
+            f"contour {contour.name!r}: {where}{broken}{_bracket(broken, task)}{tried}"
         ) from None
     made = task.plan(path.index, path.cost, _proof(method, path.optimal, finder))
-    return refined(task, finder, made) if refine else made
+    if not refine:
+        return made
+    begin("refinement")
+    return refined(task, finder, made)
 
 
 def _bracket(broken: NoFeasiblePath, task: Task) -> str:

@@ -9,12 +9,15 @@ import numpy as np
 from scipy.spatial.transform import Rotation, Slerp
 
 from kerfpath._arrays import Array, scalar
-from kerfpath.post._program import CircularMove, LinearMove, Program, Section, Step
+from kerfpath.post._arc_motion import ArcLimits, Stretch
+from kerfpath.post._program import CircularMove, LinearMove, Program, Step
 
 __all__ = ["circle_through", "with_arcs"]
 
 FEWEST = 3
 """Linear moves that a circular one replaces at least."""
+MOST = 1000
+"""Linear moves that a circular one replaces at most."""
 LONGEST = np.radians(150.0)
 """Sweep of one circular move: none of the controllers wants half a circle at once."""
 MOST_TURN = np.radians(80.0)
@@ -25,12 +28,20 @@ SMALLEST, LARGEST = 1e-3, 10.0
 """Radii (m) that are written as arcs."""
 
 
-def with_arcs(program: Program, tolerance: float, *, angle: float = np.radians(0.2)) -> Program:
+def with_arcs(
+    program: Program,
+    tolerance: float,
+    *,
+    angle: float = np.radians(0.2),
+    eta_v: float = 1.0,
+    eta_a: float = 1.0,
+) -> Program:
     """Return the program with circular moves where its linear ones run along an arc.
 
     Between two targets the tool is taken to turn evenly along the arc, as controllers do; where
-    the plan turns it otherwise, moves stay linear. A move at whose end something is switched, or
-    where the robot stops or changes its speed, ends an arc.
+    the plan turns it otherwise, or the joints would break a limit along the arc or as they come
+    and leave, moves stay linear. A move at whose end something is switched, or where the robot
+    stops or changes its speed, ends an arc.
 
     Parameters
     ----------
@@ -39,44 +50,110 @@ def with_arcs(program: Program, tolerance: float, *, angle: float = np.radians(0
         How far arcs may leave the targets that they replace, and the straight lines between them.
     angle : float rad
         How far the tool may be turned from the targets that an arc replaces.
+    eta_v, eta_a : float
+        Share of the velocity and acceleration limits that the joints may use.
 
     Raises
     ------
     InputError
-        A tolerance that is not above 0.
+        A tolerance that is not above 0, limits of the joints that are not known.
     """
     tolerance = scalar(tolerance, "tolerance", unit="m", above=0.0)
     angle = scalar(angle, "angle", unit="rad", above=0.0)
+    limits = ArcLimits(program, eta_v=eta_v, eta_a=eta_a)
     return replace(
         program,
         sections=tuple(
-            replace(section, steps=tuple(_steps(section, tolerance, angle)))
+            replace(section, steps=tuple(_Arcs(section.steps, tolerance, angle, limits)))
             for section in program.sections
         ),
     )
 
 
-def _steps(section: Section, tolerance: float, angle: float) -> Iterator[Step]:
-    """Yield the steps of a section, each arc as long as may be from where the last one ended."""
-    steps, k = section.steps, 0
-    while k < len(steps):
-        start, step = steps[k - 1] if k else None, steps[k]
-        run = _run(steps, k) if type(start) in (LinearMove, CircularMove) else []
-        arc = None
-        if isinstance(start, LinearMove) and len(run) >= FEWEST:
-            arc, count = _longest(start, run, tolerance, angle)
-        if arc is None:
-            yield step
-            k += 1
-        else:
-            yield arc
+class _Arcs:
+    """The steps of a section, each arc as long as may be from where the last one ended."""
+
+    def __init__(
+        self, steps: Sequence[Step], tolerance: float, angle: float, limits: ArcLimits
+    ) -> None:
+        self._steps, self._tolerance, self._angle = steps, tolerance, angle
+        self._limits = limits
+        self._before: tuple[Array, float] | None = None
+        """The node before the last one done, and how long the way from there took."""
+
+    def __iter__(self) -> Iterator[Step]:
+        """Yield the steps."""
+        steps, k = self._steps, 0
+        done: Step | None = None
+        while k < len(steps):
+            arc: CircularMove | None = None
+            if isinstance(done, LinearMove) and len(run := _run(steps, k)) >= FEWEST:
+                arc, count = self._longest(done, run, k)
+            if arc is None:
+                count, before, done = 1, done, steps[k]
+                if isinstance(before, LinearMove) and isinstance(done, LinearMove):
+                    self._before = None if done.zone == 0 else (before.q, done.duration)
+            else:
+                done = arc
+            yield done
             k += count
+
+    def _longest(
+        self, start: LinearMove, run: Sequence[LinearMove], k: int
+    ) -> tuple[CircularMove | None, int]:
+        """Return the arc that replaces the most moves of a run, by bisection, and their number."""
+        found, good, bad = None, FEWEST - 1, len(run) + 1
+        while bad - good > 1:
+            count = min(2 * good, (good + bad) // 2) if found is None else (good + bad) // 2
+            tried = self._arc(start, run[:count], k)
+            if tried is None:
+                bad = count
+            else:
+                found, good = tried, count
+        if found is None:
+            return None, 1
+        arc, q = found
+        self._before = None if arc.zone == 0 else (q[-2], arc.duration / good)
+        return arc, good
+
+    def _arc(
+        self, start: LinearMove, moves: Sequence[LinearMove], k: int
+    ) -> tuple[CircularMove, Array] | None:
+        """Return the circular move that replaces `moves`, the joints along it, or None."""
+        poses = _evenly(start, moves, self._tolerance, self._angle)
+        if poses is None:
+            return None
+        end, after = moves[-1], None
+        behind = self._steps[k + len(moves)] if k + len(moves) < len(self._steps) else None
+        if end.zone > 0 and isinstance(behind, LinearMove):
+            after = (behind.q, behind.duration)
+        stretch = Stretch(
+            before=self._before,
+            after=after,
+            q=np.array([start.q, *(move.q for move in moves)]),
+            dt=np.array([move.duration for move in moves]),
+        )
+        q = self._limits.along(poses, stretch)
+        if q is None:
+            return None
+        via = moves[_middle(np.array([start.T_part_tip, *(m.T_part_tip for m in moves)])) - 1]
+        arc = CircularMove(
+            T_part_via=via.T_part_tip,
+            q_via=via.q,
+            T_part_tip=end.T_part_tip,
+            q=end.q,
+            speed=moves[0].speed,
+            duration=sum(move.duration for move in moves),
+            zone=end.zone,
+            switches=end.switches,
+        )
+        return arc, q
 
 
 def _run(steps: Sequence[Step], first: int) -> list[LinearMove]:
     """Return the linear moves from `first` on that one move could be."""
     run: list[LinearMove] = []
-    for step in steps[first:]:
+    for step in steps[first : first + MOST]:
         if type(step) is not LinearMove:
             break
         if run and abs(step.speed - run[0].speed) > SAME_SPEED * run[0].speed:
@@ -87,30 +164,23 @@ def _run(steps: Sequence[Step], first: int) -> list[LinearMove]:
     return run
 
 
-def _longest(
-    start: LinearMove, run: Sequence[LinearMove], tolerance: float, angle: float
-) -> tuple[CircularMove | None, int]:
-    """Return the arc that replaces the most moves of a run, by bisection, and their number."""
-    found, good, bad = None, FEWEST - 1, len(run) + 1
-    while bad - good > 1:
-        count = min(2 * good, (good + bad) // 2) if found is None else (good + bad) // 2
-        arc = _arc(start, run[:count], tolerance, angle)
-        if arc is None:
-            bad = count
-        else:
-            found, good = arc, count
-    return found, good
+def _middle(T: Array) -> int:
+    """Return which of poses (m, 4, 4) is about as far from the first as from the last."""
+    points = T[:, :3, 3]
+    ends = np.linalg.norm(points[:, None] - points[[0, -1]], axis=2)
+    return int(np.argmin(np.abs(ends[:, 0] - ends[:, 1])))
 
 
-def _arc(
+def _evenly(
     start: LinearMove, moves: Sequence[LinearMove], tolerance: float, angle: float
-) -> CircularMove | None:
-    """Return the circular move that replaces `moves` (K,), or None."""
+) -> Array | None:
+    """Return the poses (m, 4, 4) m at even shares of an arc through m moves; None: there is none.
+
+    The last is the end of the last move.
+    """
     T = np.array([start.T_part_tip, *(move.T_part_tip for move in moves)])
     points = T[:, :3, 3]
-    middle = int(np.argmin(np.abs(np.linalg.norm(points - points[0], axis=1)
-                                  - np.linalg.norm(points - points[-1], axis=1))))  # fmt: skip
-    circle = circle_through(points[0], points[middle], points[-1])
+    circle = circle_through(points[0], points[_middle(T)], points[-1])
     if circle is None or not SMALLEST <= circle[2] <= LARGEST:
         return None
     centre, normal, radius = circle
@@ -118,7 +188,8 @@ def _arc(
     height = arm @ normal
     off = np.hypot(height, np.linalg.norm(arm - np.outer(height, normal), axis=1) - radius)
     x = arm[0] / radius
-    turned = np.unwrap(np.arctan2(arm @ np.cross(normal, x), arm @ x))
+    y = np.cross(normal, x)
+    turned = np.unwrap(np.arctan2(arm @ y, arm @ x))
     steps = np.diff(turned)
     sagitta = radius * (1 - np.cos(steps / 2))
     if not (steps > 0).all() or turned[-1] > LONGEST or max(off.max(), sagitta.max()) > tolerance:
@@ -126,20 +197,17 @@ def _arc(
     rotations = Rotation.from_matrix(T[:, :3, :3])
     if (rotations[0].inv() * rotations[-1]).magnitude() > MOST_TURN:
         return None
-    even = Slerp([0.0, 1.0], rotations[[0, -1]])(np.clip(turned / turned[-1], 0, 1))
+    turning = Slerp([0.0, 1.0], rotations[[0, -1]])
+    even = turning(np.clip(turned / turned[-1], 0, 1))
     if np.asarray((even.inv() * rotations).magnitude()).max() > angle:
         return None
-    end, via = moves[-1], moves[middle - 1]
-    return CircularMove(
-        T_part_via=via.T_part_tip,
-        q_via=via.q,
-        T_part_tip=end.T_part_tip,
-        q=end.q,
-        speed=moves[0].speed,
-        duration=sum(move.duration for move in moves),
-        zone=end.zone,
-        switches=end.switches,
-    )
+    shares = np.arange(1, len(T)) / len(moves)
+    poses = T[1:].copy()
+    poses[:, :3, :3] = turning(shares).as_matrix()
+    at = (shares * turned[-1])[:, None]
+    poses[:, :3, 3] = centre + radius * (np.cos(at) * x + np.sin(at) * y)
+    poses[-1] = T[-1]
+    return poses
 
 
 def circle_through(a: Array, b: Array, c: Array) -> tuple[Array, Array, float] | None:

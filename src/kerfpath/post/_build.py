@@ -9,16 +9,18 @@ from typing import Any
 import numpy as np
 
 from kerfpath._arrays import Array, scalar
-from kerfpath.air import AirMove, backed_off
+from kerfpath.air import AirMove, End, backed_off, least_time, speed_share
 from kerfpath.errors import InputError
 from kerfpath.plans import Plan
 from kerfpath.post._arcs import with_arcs
 from kerfpath.post._names import identifier, identifiers
 from kerfpath.post._program import (
     Comment,
+    Handshake,
     JointMove,
     LinearMove,
     Program,
+    Request,
     Section,
     Step,
     Switch,
@@ -28,6 +30,12 @@ from kerfpath.robots import Robot, posture_name
 
 __all__ = ["build_program"]
 
+PLANNED, UNPLANNED = 1.0, 0.25
+"""Shares of the full speed of joint moves that are planned and that are not."""
+LOWEST_SHARE = 0.01
+"""Controllers count shares in per cent."""
+MEETS = 1e-5
+"""How far (m) planned moves may be from where the tool backs off to."""
 PLAN_AND_CONTOUR = 1e-5
 """Distance (m) and sine of an angle by which the planned joints may miss the contour."""
 
@@ -43,8 +51,9 @@ def build_program(
     gas_lead: float | None = None,
     pierce_time: float = 0.0,
     approach_speed: float = 0.1,
-    air_speed: float = 0.25,
+    air_speed: float | None = None,
     arc_tolerance: float | None = None,
+    handshakes: Sequence[Handshake] = (),
 ) -> Program:
     """Return the program that cuts the planned contours one after the other.
 
@@ -76,10 +85,15 @@ def build_program(
         How long to wait at the start, laser on, until the beam is through.
     approach_speed : float m/s
         Speed along the tool axis before and after a contour.
-    air_speed : float
-        Share of the full speed for the joint moves between contours.
+    air_speed : float, optional
+        Share of the full speed of joint moves: they take the least time that their limits leave
+        them, by this share. Default: all where `moves` are planned, a quarter where they are not;
+        the first, of which nobody knows where it begins, has a quarter at most.
     arc_tolerance : float m, optional
         Arcs that stay so near to the planned path are written as circular moves, see `with_arcs`.
+    handshakes : sequence of Request or Await
+        What is done before each contour where the tool has backed off, in order; what has been
+        asked for is withdrawn after it.
 
     Raises
     ------
@@ -107,6 +121,9 @@ def build_program(
     if gas_lead is not None:
         starts = (Switch(signal="gas", on=True, lead_time=gas_lead), *starts)
         ends = (*ends, Switch(signal="gas", on=False))
+    asked = [step for step in handshakes if isinstance(step, Request) and step.on]
+    withdrawn = [replace(step, on=False) for step in reversed(asked)]
+    air = _Air(first, air_speed or (PLANNED if moves else UNPLANNED))
     sections = []
     for plan, section_name, way in zip(plans, names, ways, strict=True):
         q = plan.q[0] + np.vstack([np.zeros_like(plan.q[0]), np.cumsum(plan.increments, axis=0)])
@@ -120,15 +137,18 @@ def build_program(
                 f"{plan.name}: {len(q)} nodes, {plan.contour.length * 1e3:.1f} mm, "
                 f"posture {posture_name(int(plan.posture[0]))}"
             ),
-            *(JointMove(q=corner, speed=air_speed) for corner in way),
+            *air.moves(way),
+            *handshakes,
             LinearMove(T_part_tip=T_part_tip[0], q=q[0], switches=starts, **slow),
             *([Wait(time=pierce_time)] if pierce_time > 0 else []),
             *_cut(plan, T_part_tip, q, zone, lead_time, ends),
             LinearMove(T_part_tip=T_out, q=backed_off(plan, "end", retract), **slow),
+            *withdrawn,
         )
         sections.append(Section(name=section_name, steps=steps))
+        air.here = backed_off(plan, "end", retract)
     if home:
-        back = tuple(JointMove(q=corner, speed=air_speed) for corner in home)
+        back = tuple(air.moves(home))
         sections[-1] = replace(sections[-1], steps=sections[-1].steps + back)
     program = Program(
         name=title,
@@ -138,7 +158,42 @@ def build_program(
         sections=tuple(sections),
         air_checked=len(moves) > 0 and all(move.clear for move in moves),
     )
-    return program if arc_tolerance is None else with_arcs(program, arc_tolerance)
+    if arc_tolerance is None:
+        return program
+    eta_v = min(plan.settings.eta_v for plan in plans)
+    eta_a = min(plan.settings.eta_a for plan in plans)
+    return with_arcs(program, arc_tolerance, eta_v=eta_v, eta_a=eta_a)
+
+
+class _Air:
+    """Joint moves that take the times that are planned.
+
+    A controller runs all joints from stop to stop together, the slowest at the share of its full
+    speed that it is told, and gains speed as fast as it may; the share is that which takes the
+    time.
+    """
+
+    def __init__(self, plan: Plan, share: float) -> None:
+        self._plan, self._share = plan, share
+        self.here: Array | None = None
+        """Where the robot comes from."""
+
+    def moves(self, corners: Sequence[Array]) -> Iterator[JointMove]:
+        """Yield a move to each of some corners."""
+        robot, eta_v, eta_a = self._plan.robot, self._plan.settings.eta_v, self._plan.settings.eta_a
+        for q in corners:
+            here, self.here = self.here, q
+            way = None if here is None else (q - here)[None]
+            if way is None:
+                yield JointMove(q=q, speed=min(self._share, UNPLANNED))
+                continue
+            if not way.any() or robot.velocity is None or robot.acceleration is None:
+                yield JointMove(q=q, speed=self._share)
+                continue
+            limits = robot.speed_limits()
+            took = least_time(way, eta_v * limits[0], eta_a * limits[1]) / self._share
+            speed = np.clip(speed_share(way, *limits, took), LOWEST_SHARE, 1.0)
+            yield JointMove(q=q, speed=float(speed[0]), duration=float(took[0]))
 
 
 def _cut(
@@ -182,13 +237,33 @@ def _corners(plans: Sequence[Plan], moves: Sequence[AirMove], retract: float) ->
         return [*([backed_off(plan, "start", retract)] for plan in plans), []]
     ways = [list(move.q[1:]) for move in moves]
     if len(moves) == len(plans) - 1:
+        _require_meeting(plans, moves, retract)
         return [[backed_off(plans[0], "start", retract)], *ways, []]
     if len(moves) == len(plans) + 1:
+        _require_meeting(plans, moves, retract)
         return [list(moves[0].q), *ways[1:]]
     raise InputError(
         f"build_program: {len(plans)} plans need {len(plans) - 1} moves between them, or "
         f"{len(plans) + 1} from and to a home position, got {len(moves)}"
     )
+
+
+def _require_meeting(plans: Sequence[Plan], moves: Sequence[AirMove], retract: float) -> None:
+    """Raise InputError where moves do not begin and end where the tool has backed off to."""
+    between = len(moves) < len(plans)
+    into, starts = (moves, plans[1:]) if between else (moves[:-1], plans)
+    out, ends = (moves, plans[:-1]) if between else (moves[1:], plans)
+    meetings: list[tuple[Array, Plan, End]] = []
+    meetings += [(move.q[-1], p, "start") for move, p in zip(into, starts, strict=True)]
+    meetings += [(move.q[0], p, "end") for move, p in zip(out, ends, strict=True)]
+    for q, plan, end in meetings:
+        T = plan.robot.forward(np.array([q, backed_off(plan, end, retract)])) @ plan.T_flange_tip
+        if (off := np.linalg.norm(T[0, :3, 3] - T[1, :3, 3])) > MEETS:
+            raise InputError(
+                f"contour {plan.name!r}: the planned move through the air is {off * 1e3:.4g} mm "
+                f"off where the tool backs off to by {retract * 1e3:g} mm; write the retract_mm "
+                "that it was planned with, or plan again"
+            )
 
 
 def _require_same_cell(first: Plan, plan: Plan) -> None:

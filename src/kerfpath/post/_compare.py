@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from typing import Any
 
 import numpy as np
@@ -11,11 +11,23 @@ from scipy.spatial.transform import Rotation
 from kerfpath._arrays import Array
 from kerfpath.post._issue import ProgramIssue
 from kerfpath.post._languages import Language
-from kerfpath.post._program import CircularMove, Comment, JointMove, LinearMove, Move, Program, Wait
-from kerfpath.post._read import ReadMove, ReadProgram, ReadWait
+from kerfpath.post._program import (
+    Await,
+    CircularMove,
+    Comment,
+    Handshake,
+    JointMove,
+    LinearMove,
+    Move,
+    Program,
+    Request,
+    Wait,
+)
+from kerfpath.post._read import ReadHandshake, ReadMove, ReadProgram, ReadStep, ReadWait
 from kerfpath.post._settings import Rules, Settings
+from kerfpath.post._times import cruises
 
-__all__ = ["deviations", "events"]
+__all__ = ["deviations", "events", "handshake"]
 
 POINT = 1e-6
 """How far (m) a target that is read back may be from the one written, beyond its digits."""
@@ -62,26 +74,47 @@ def deviations(
         if isinstance(step, Wait) and isinstance(back, ReadWait):
             if abs(step.time - back.time) > LEAD:
                 issues.append(_issue(back, f"waits {back.time:g} s, expected {step.time:g} s"))
+        elif isinstance(step, Request | Await) and isinstance(back, ReadHandshake):
+            if step != back.what:
+                said = f"{handshake(back.what)}, expected {handshake(step)}"
+                issues.append(_issue(back, said))
         elif not isinstance(back, ReadMove) or _kind(step) != back.kind:
-            got = back.kind if isinstance(back, ReadMove) else "wait"
-            issues.append(_issue(back, f"is a {got}, expected a {_kind(step)}"))
+            issues.append(_issue(back, f"is a {_kind_read(back)}, expected a {_kind(step)}"))
         else:
-            assert not isinstance(step, Wait | Comment)
+            assert isinstance(step, JointMove | LinearMove)
             pairs.append((step, back))
     rules = language.rules(settings)
     issues += _places(program, pairs, rules)
-    issues += _motion(pairs, rules)
+    issues += _motion(pairs, rules, cruises(program))
     issues += _postures(program, pairs, language, settings)
     return issues
 
 
-def _issue(back: ReadMove | ReadWait, message: str) -> ProgramIssue:
+def _issue(back: ReadStep, message: str) -> ProgramIssue:
     return ProgramIssue("error", "read-back", f"{message}, as planned", back.place)
 
 
 def _kind(step: object) -> str:
-    kinds = (("joint", JointMove), ("circular", CircularMove), ("linear", LinearMove))
-    return next((word for word, kind in kinds if isinstance(step, kind)), "wait")
+    kinds = (
+        ("joint", JointMove),
+        ("circular", CircularMove),
+        ("linear", LinearMove),
+        ("wait", Wait),
+    )
+    return next((word for word, kind in kinds if isinstance(step, kind)), "handshake")
+
+
+def _kind_read(back: ReadStep) -> str:
+    if isinstance(back, ReadMove):
+        return back.kind
+    return "wait" if isinstance(back, ReadWait) else "handshake"
+
+
+def handshake(what: Handshake) -> str:
+    """Return a handshake in words."""
+    if isinstance(what, Await):
+        return f"awaits {what.partner} for {what.timeout:g} s"
+    return f"{what.partner} request {'on' if what.on else 'off'}"
 
 
 def _frames(program: Program, read: ReadProgram) -> Iterator[ProgramIssue]:
@@ -145,11 +178,17 @@ def _apart(
         yield _issue(backs[k], said)
 
 
-def _motion(pairs: list[tuple[Move, ReadMove]], rules: Rules) -> Iterator[ProgramIssue]:
+def _motion(
+    pairs: list[tuple[Move, ReadMove]], rules: Rules, cruise: Mapping[Move, float]
+) -> Iterator[ProgramIssue]:
     for move, back in pairs:
-        joint = isinstance(move, JointMove)
+        joint, timed = isinstance(move, JointMove), False
+        if isinstance(move, JointMove):
+            timed = move.duration is not None and back.duration is not None
+            if said := _air_time(move, back, cruise):
+                yield _issue(back, said)
         off = SHARE if joint else 0.51 * rules.speed_step + 1e-9
-        if back.speed is not None and abs(move.speed - back.speed) > off:
+        if back.speed is not None and not timed and abs(move.speed - back.speed) > off:
             unit, scale = ("of the full speed", 1.0) if joint else ("mm/s", 1e3)
             said = f"the speed is {back.speed * scale:g} {unit}, expected {move.speed * scale:g}"
             yield _issue(back, said)
@@ -171,6 +210,14 @@ def _motion(pairs: list[tuple[Move, ReadMove]], rules: Rules) -> Iterator[Progra
         ):
             said = f"switches {events(back.switches)}, expected {events(ours)}"
             yield _issue(back, said)
+
+
+def _air_time(move: JointMove, back: ReadMove, cruise: Mapping[Move, float]) -> str:
+    """Say how the time of a joint move is another; empty where it is not, or not said."""
+    for took, planned in ((back.duration, move.duration), (back.cruise, cruise.get(move))):
+        if took is not None and planned is not None and abs(took - planned) > LEAD:
+            return f"takes {took:g} s, expected {planned:g} s"
+    return ""
 
 
 def events(switches: Any) -> str:

@@ -9,7 +9,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from kerfpath._arrays import Array
-from kerfpath.post._compare import ANGLE, FRAME, LEAD, POINT, SHARE, events
+from kerfpath.post._compare import ANGLE, FRAME, LEAD, POINT, SHARE, events, handshake
 from kerfpath.post._groups import ReadGroup, groups_of
 from kerfpath.post._matching import Pair, Stop, matched, pairs_of
 from kerfpath.post._read import ReadMove, ReadProgram
@@ -19,6 +19,10 @@ __all__ = ["Difference", "differences", "not_compared"]
 
 Both = Sequence[tuple[Stop, Stop]]
 """Moves that both programs have."""
+SAID = {"speeds": "speed", "zones": "zone", "switches": "switches", "postures": "target"}
+"""Which of `ReadMove.elsewhere` a difference is about."""
+Names = tuple[str, str]
+"""What programs A and B are called."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -29,19 +33,30 @@ class Difference:
     ----------
     code : str
         frames, added, removed, order, targets, joints, kinds, speeds, times, zones, switches,
-        waits or postures.
+        waits, postures or handshakes.
     count : int
         How many contours or moves it is found at.
     message : str
         How much it is at most.
     places : tuple of str
         File and line of the largest in A and in B, as far as it has one there.
+    said_at : str
+        File and line in B of what differs, where it is not said where the move stands.
+    near : str
+        Of what is left out in B: file and line there before which it is missing.
     """
 
     code: str
     count: int
     message: str
     places: tuple[str, ...] = ()
+    said_at: str = ""
+    near: str = ""
+
+    @property
+    def place(self) -> str:
+        """File and line in B; empty where it has none there."""
+        return self.near or (self.places[-1] if self.places else "")
 
     def __str__(self) -> str:
         at = f", at {' / '.join(self.places)}" if self.places else ""
@@ -59,7 +74,9 @@ class _Digits:
     lead: float
 
 
-def differences(a: ReadProgram, b: ReadProgram, *, rules: Sequence[Rules] = ()) -> list[Difference]:
+def differences(
+    a: ReadProgram, b: ReadProgram, *, rules: Sequence[Rules] = (), names: Names = ("A", "B")
+) -> list[Difference]:
     """Return what differs between two programs for the same robot, at most one of each kind.
 
     Contours are told apart by their paths, and the targets along them by their places, so that one
@@ -73,6 +90,8 @@ def differences(a: ReadProgram, b: ReadProgram, *, rules: Sequence[Rules] = ()) 
         joints alone `with_tips`.
     rules : sequence of Rules
         Of languages whose digits may make a difference; none where both texts are in the same one.
+    names : (str, str)
+        What the two are called in messages.
 
     Raises
     ------
@@ -91,15 +110,16 @@ def differences(a: ReadProgram, b: ReadProgram, *, rules: Sequence[Rules] = ()) 
     found = list(_frames(a, b, digits))
     one, two = groups_of(a), groups_of(b)
     same = matched(one, two)
-    found += _contours(one, {i for i, _ in same}, "removed", "left out in B")
-    found += _contours(two, {j for _, j in same}, "added", "only in B")
-    found += _order(two, [j for _, j in same])
+    found += _contours(one, {i for i, _ in same}, "removed", f"left out in {names[1]}")
+    found += _contours(two, {j for _, j in same}, "added", f"only in {names[1]}")
+    found += _order(two, [j for _, j in same], names)
     pairs = [pair for i, j in same for pair in pairs_of(one[i], two[j], digits.point)]
     both = [(pair.a, pair.b) for pair in pairs if pair.a is not None and pair.b is not None]
-    found += _alone(pairs)
+    found += _alone(pairs, names)
     found += _targets(both, digits)
     found += _joints(both, digits)
-    found += _said(both, digits)
+    found += _said(both, digits, names)
+    found += _handshakes([(one[i], two[j]) for i, j in same], names)
     return found
 
 
@@ -130,17 +150,20 @@ def _frames(a: ReadProgram, b: ReadProgram, digits: _Digits) -> Iterator[Differe
 def _contours(
     groups: Sequence[ReadGroup], known: set[int], code: str, words: str
 ) -> Iterator[Difference]:
-    names = [group.name for k, group in enumerate(groups) if k not in known]
-    if names:
-        message = f"{_count(len(names), 'contour')} {words}: {', '.join(names)}"
-        yield Difference(code=code, count=len(names), message=message)
+    alone = [group for k, group in enumerate(groups) if k not in known]
+    if alone:
+        names = ", ".join(group.name for group in alone)
+        message = f"{_count(len(alone), 'contour')} {words}: {names}"
+        first = [*alone[0].joint, *alone[0].path][:1] if code == "added" else []
+        places = tuple(move.place for move in first)
+        yield Difference(code=code, count=len(alone), message=message, places=places)
 
 
-def _order(groups: Sequence[ReadGroup], numbers: list[int]) -> Iterator[Difference]:
+def _order(groups: Sequence[ReadGroup], numbers: list[int], both: Names) -> Iterator[Difference]:
     """Compare the order of contours, given the numbers in B of those of A."""
     if numbers != sorted(numbers):
         names = ", ".join(groups[j].name for j in sorted(numbers) if groups[j].path)
-        message = f"the contours are cut in another order, in B {names}"
+        message = f"the contours are cut in another order, in {both[1]} {names}"
         yield Difference(code="order", count=1, message=message)
 
 
@@ -155,12 +178,23 @@ def _apart(one: Array, two: Array) -> tuple[Array, Array]:
     return off, np.asarray(Rotation.from_matrix(between).magnitude())
 
 
-def _alone(pairs: Sequence[Pair]) -> Iterator[Difference]:
-    """Tell of moves that only one of the programs has."""
-    for side, code, words in ((1, "removed", "left out in B"), (0, "added", "only in B")):
-        if alone := [pair for pair in pairs if pair[side] is None]:
-            message = f"{_count(len(alone), 'move')} {words}, the first"
-            yield Difference(code=code, count=len(alone), message=message, places=alone[0].places)
+def _alone(pairs: Sequence[Pair], names: Names) -> Iterator[Difference]:
+    """Tell of moves that only one of the programs has; one left out, before which of the other."""
+    for side, code, words in (
+        (1, "removed", f"left out in {names[1]}"), (0, "added", f"only in {names[1]}"),
+    ):  # fmt: skip
+        alone = [k for k, pair in enumerate(pairs) if pair[side] is None]
+        if not alone:
+            continue
+        around = [*pairs[alone[0] :], *reversed(pairs[: alone[0]])]
+        near = [pair.b.move.place for pair in around if pair.b is not None]
+        yield Difference(
+            code=code,
+            count=len(alone),
+            message=f"{_count(len(alone), 'move')} {words}, the first",
+            places=pairs[alone[0]].places,
+            near=near[0] if side == 1 and near else "",
+        )
 
 
 def _targets(both: Both, digits: _Digits) -> Iterator[Difference]:
@@ -198,23 +232,28 @@ def _joints(both: Both, digits: _Digits) -> Iterator[Difference]:
 
 
 def _found(code: str, count: int, message: str, a: Stop, b: Stop) -> Difference:
-    return Difference(code=code, count=count, message=message, places=(a.move.place, b.move.place))
+    said_at = b.move.elsewhere.get("target", "")
+    places = (a.move.place, b.move.place)
+    return Difference(code=code, count=count, message=message, places=places, said_at=said_at)
 
 
-def _said(both: Both, digits: _Digits) -> Iterator[Difference]:
+def _said(both: Both, digits: _Digits, names: Names) -> Iterator[Difference]:
     """Compare what else moves say, one thing after the other."""
     rows: tuple[tuple[str, Callable[[Stop, Stop], float], Callable[[Stop], str]], ...] = (
         ("kinds", lambda a, b: a.move.kind != b.move.kind, lambda a: a.move.kind),
         ("speeds", lambda a, b: _speeds(a.move, b.move, digits), lambda a: _speed(a.move)),
         (
             "times",
-            lambda a, b: _excess(a.move.duration, b.move.duration, digits.lead),
-            lambda a: f"{a.move.duration:g} s",
+            lambda a, b: max(
+                _excess(a.move.duration, b.move.duration, digits.lead),
+                _excess(a.move.cruise, b.move.cruise, digits.lead),
+            ),
+            lambda a: f"{a.move.cruise if a.move.duration is None else a.move.duration:g} s",
         ),
         (
             "zones",
-            lambda a, b: _excess(a.move.zone, b.move.zone, digits.point),
-            lambda a: f"{a.move.zone * 1e3:g} mm" if a.move.zone else "a stop",
+            lambda a, b: _zones(a.move, b.move, digits),
+            _zone,
         ),
         (
             "switches",
@@ -235,8 +274,32 @@ def _said(both: Both, digits: _Digits) -> Iterator[Difference]:
         moved = np.flatnonzero(off > 0)
         if moved.size:
             a, b = both[int(moved[np.argmax(off[moved])])]
-            message = f"{_count(len(moved), 'move')}, {words(a)} in A and {words(b)} in B"
-            yield _found(code, len(moved), message, a, b)
+            said = f"{words(a)} in {names[0]} and {words(b)} in {names[1]}"
+            message = f"{_count(len(moved), 'move')}, {said}"
+            places = tuple((code == "waits" and s.waits_at) or s.move.place for s in (a, b))
+            said_at = b.move.elsewhere.get(SAID[code], "") if code in SAID else ""
+            yield Difference(
+                code=code, count=len(moved), message=message, places=places, said_at=said_at
+            )
+
+
+def _handshakes(
+    groups: Sequence[tuple[ReadGroup, ReadGroup]], names: Names
+) -> Iterator[Difference]:
+    """Compare who is asked and awaited, and when."""
+    said = [[[(k, h.what) for k, h in g.handshakes] for g in both] for both in groups]
+    differ = [both for both, (one, two) in zip(groups, said, strict=True) if one != two]
+    if differ:
+        one, two = (
+            ", ".join(handshake(h.what) for _, h in group.handshakes) or "none"
+            for group in differ[0]
+        )
+        message = f"{_count(len(differ), 'contour')}, {one} in {names[0]}, {two} in {names[1]}"
+        there = [h.place for _, h in differ[0][1].handshakes]
+        near = [move.place for move in (*differ[0][1].path, *differ[0][1].joint)]
+        yield Difference(
+            code="handshakes", count=len(differ), message=message, near=[*there, *near, ""][0]
+        )
 
 
 def _excess(one: float | None, two: float | None, allowed: float) -> float:
@@ -244,8 +307,17 @@ def _excess(one: float | None, two: float | None, allowed: float) -> float:
     return 0.0 if one is None or two is None else max(abs(one - two) - allowed, 0.0)
 
 
-def _words_differ(one: tuple[int | str, ...], two: tuple[int | str, ...]) -> bool:
-    return bool(one and two) and one != two
+def _zones(a: ReadMove, b: ReadMove, digits: _Digits) -> float:
+    """Return how far two zones are apart; a stop is none, whatever its length is."""
+    if (a.zone is None) != (b.zone is None) and 0.0 in (a.zone, b.zone):
+        return np.inf
+    return _excess(a.zone, b.zone, digits.point)
+
+
+def _zone(stop: Stop) -> str:
+    if stop.move.zone is None:
+        return "a corner passed by"
+    return f"{stop.move.zone * 1e3:g} mm" if stop.move.zone else "a stop"
 
 
 def _speeds(a: ReadMove, b: ReadMove, digits: _Digits) -> float:

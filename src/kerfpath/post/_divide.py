@@ -1,31 +1,27 @@
-"""Programs too long for one routine or file, divided."""
+"""Programs too long for one file, divided between contours: never where the beam is on."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
+from typing import Literal
 
 from kerfpath.errors import InputError
+from kerfpath.post._issue import ProgramIssue
 from kerfpath.post._names import LONGEST_NAME, identifiers
 from kerfpath.post._program import Program, Section
 
-__all__ = ["divided", "in_files", "in_one_file"]
+__all__ = ["in_files", "in_one_file", "long_contours", "renamed"]
 
 
-def divided(program: Program, most_steps: int, *, longest_name: int = LONGEST_NAME) -> Program:
-    """Return the program with no section of more than `most_steps` steps.
-
-    The parts of a section that is longer are called by its name and a number; the laser may stay
-    on from one to the next. Names are cut to `longest_name` characters, and stay different.
-    """
-    parts = [
-        replace(section, steps=section.steps[first : first + most_steps])
-        for section in program.sections
-        for first in range(0, max(len(section.steps), 1), most_steps)
-    ]
-    names = identifiers((part.name for part in parts), taken=(program.name,), longest=longest_name)
-    named = [replace(part, name=name) for part, name in zip(parts, names, strict=True)]
-    return replace(program, sections=tuple(named))
+def renamed(
+    program: Program, taken: Iterable[str] = (), *, longest_name: int = LONGEST_NAME
+) -> Program:
+    """Return the program with names of sections cut to `longest_name`, and none twice or taken."""
+    texts = (section.name for section in program.sections)
+    names = identifiers(texts, taken=(program.name, *taken), longest=longest_name)
+    sections = (replace(s, name=name) for s, name in zip(program.sections, names, strict=True))
+    return replace(program, sections=tuple(sections))
 
 
 def in_files(
@@ -33,7 +29,8 @@ def in_files(
 ) -> list[list[Section]]:
     """Return sections, of so many lines each, in order, in files of at most `most_lines` lines.
 
-    A section that is longer by itself has a file of its own.
+    A section that is longer by itself has a file of its own: a file ends where the robot stands
+    with the beam off, as between two sections.
     """
     files: list[list[Section]] = []
     room = 0
@@ -44,6 +41,29 @@ def in_files(
         files[-1].append(section)
         room -= count
     return files
+
+
+def long_contours(
+    lines: Mapping[str, int], most_lines: int, level: Literal["error", "warning"]
+) -> Iterator[ProgramIssue]:
+    """Yield the contours of more lines, by name, than a file is to have: none is divided.
+
+    Parameters
+    ----------
+    lines : mapping of str to int
+    most_lines : int
+    level : {"error", "warning"}
+        A warning where a file may be longer than that.
+    """
+    remedy = "allow more with lines_per_file, or take fewer nodes (spacing_mm) or arcs (arcs_mm)"
+    kept = "" if level == "error" else ", and has a file of its own"
+    for name, count in lines.items():
+        if count > most_lines:
+            said = (
+                f"the contour has {count} lines, lines_per_file allows {most_lines}; it is not "
+                f"divided, as the robot could stop there with the beam on{kept}: {remedy}"
+            )
+            yield ProgramIssue(level, "file-length", said, name)
 
 
 def in_one_file(name: str, lines: Sequence[str], most_lines: int) -> dict[str, str]:

@@ -8,13 +8,23 @@ from kerfpath._arrays import scalar
 from kerfpath.errors import InputError
 from kerfpath.post._names import identifiers
 from kerfpath.post._preflight import LOWEST_SHARE
-from kerfpath.post._program import Comment, JointMove, LinearMove, Program, Section, Step, Wait
+from kerfpath.post._program import (
+    Await,
+    Comment,
+    JointMove,
+    LinearMove,
+    Program,
+    Request,
+    Section,
+    Step,
+    Wait,
+)
 
 __all__ = ["dry_run"]
 
 
 def dry_run(program: Program, share: float) -> Program:
-    """Return the program with laser and gas never switched, no waits, and lower speeds.
+    """Return the program, slower, with nothing switched and no waits or handshakes.
 
     It stops where the program stops, and passes the same targets in the same posture. Its name and
     those of its sections begin with "dry_", so that neither program ever calls a routine of the
@@ -47,12 +57,15 @@ def dry_run(program: Program, share: float) -> Program:
 
 
 def _slowed(section: Section, share: float) -> list[Step]:
-    return [_slow(step, share) for step in section.steps if not isinstance(step, Wait)]
+    left_out = Wait | Request | Await
+    return [_slow(step, share) for step in section.steps if not isinstance(step, left_out)]
 
 
 def _slow(step: Step, share: float) -> Step:
     if isinstance(step, LinearMove):
         return replace(step, speed=share * step.speed, duration=step.duration / share, switches=())
     if isinstance(step, JointMove):
-        return replace(step, speed=max(share * step.speed, LOWEST_SHARE))
+        slow = max(share * step.speed, LOWEST_SHARE)
+        took = None if step.duration is None else step.duration * step.speed / slow
+        return replace(step, speed=slow, duration=took)
     return step

@@ -5,15 +5,18 @@ from __future__ import annotations
 import re
 from abc import ABC, abstractmethod
 from collections.abc import Iterator
-from typing import Any
+from typing import Any, Literal
 
 from kerfpath.errors import InputError
 from kerfpath.post._program import (
+    Await,
     CircularMove,
     Comment,
     JointMove,
     LinearMove,
+    Partner,
     Program,
+    Request,
     Section,
     Signal,
     Step,
@@ -72,6 +75,26 @@ class Formatter(ABC):
     def wait(self, wait: Wait) -> Iterator[str]:
         """Yield the lines of a wait."""
 
+    def request(self, request: Request) -> Iterator[str]:
+        """Yield the lines that set or reset the output of a partner.
+
+        Raises
+        ------
+        InputError
+            The language has no such outputs; the preflight says so before.
+        """
+        raise InputError("the language cannot ask a partner; leave request out of the job")
+
+    def wait_for(self, awaited: Await) -> Iterator[str]:
+        """Yield the lines that wait for an input, and end the program safely where it stays off.
+
+        Raises
+        ------
+        InputError
+            The language has no inputs; the preflight says so before.
+        """
+        raise InputError("the language waits for no inputs; leave wait_for out of the job")
+
     @abstractmethod
     def comment(self, text: str) -> Iterator[str]:
         """Yield the lines of a comment; `text` is on one line, in plain characters."""
@@ -91,6 +114,10 @@ class Formatter(ABC):
             yield from self.linear_move(step)
         elif isinstance(step, Wait):
             yield from self.wait(step)
+        elif isinstance(step, Request):
+            yield from self.request(step)
+        elif isinstance(step, Await):
+            yield from self.wait_for(step)
         elif isinstance(step, Comment):
             yield from self.comment(plain(step.text))
 
@@ -109,6 +136,10 @@ class Formatter(ABC):
                 f"with {signal}_output"
             )
         return name
+
+    def port(self, partner: Partner, way: Literal["input", "output"]) -> Any:
+        """Return the input or output of a partner, by which it answers or is asked."""
+        return getattr(self.settings, f"{partner}_{way}")
 
 
 def number(value: float, decimals: int) -> str:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 
-from kerfpath.post._read import ReadMove, ReadProgram, ReadStep, ReadWait
+from kerfpath.post._read import ReadHandshake, ReadMove, ReadProgram, ReadStep, ReadWait
 
 __all__ = ["ReadGroup", "groups_of"]
 
@@ -18,14 +18,17 @@ class ReadGroup:
     name : str
         Of the routine that it begins in.
     joint, path : list of ReadMove
-    waits : list of (int, float)
-        Behind how many moves of the path the robot waits, and how long (s).
+    waits : list of (int, ReadWait)
+        Behind how many moves of the path the robot waits, and how long.
+    handshakes : list of (int, ReadHandshake)
+        Behind how many moves of the path a partner is asked or awaited.
     """
 
     name: str = ""
     joint: list[ReadMove] = field(default_factory=list)
     path: list[ReadMove] = field(default_factory=list)
-    waits: list[tuple[int, float]] = field(default_factory=list)
+    waits: list[tuple[int, ReadWait]] = field(default_factory=list)
+    handshakes: list[tuple[int, ReadHandshake]] = field(default_factory=list)
 
 
 def groups_of(read: ReadProgram) -> list[ReadGroup]:
@@ -44,7 +47,9 @@ def groups_of(read: ReadProgram) -> list[ReadGroup]:
 
 def _add(group: ReadGroup, step: ReadStep) -> None:
     if isinstance(step, ReadWait):
-        group.waits.append((len(group.path), step.time))
+        group.waits.append((len(group.path), step))
+    elif isinstance(step, ReadHandshake):
+        group.handshakes.append((len(group.path), step))
     elif step.kind == "joint":
         group.joint.append(step)
     else:

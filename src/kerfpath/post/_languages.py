@@ -67,6 +67,8 @@ class Language:
     sayable : callable, optional
         (program, settings) to what the language can say of it, where that is less; `check` tells
         of all that is left out.
+    ahead : bool
+        Whether outputs are switched ahead of a target, on the path; else where the tip stands.
     assumed : mapping of str to value
         Settings that are taken where a person has left them None; the preflight warns of outputs.
     read : Reader, optional
@@ -85,6 +87,7 @@ class Language:
     posture: Callable[[Robot, Array, Any], list[tuple[int | str, ...]]] | None = None
     check: Callable[[Program, Any], Iterator[ProgramIssue]] | None = None
     sayable: Callable[[Program, Any], Program] | None = None
+    ahead: bool = True
     assumed: Mapping[str, Any] = field(default_factory=dict)
     read: Reader | None = None
 

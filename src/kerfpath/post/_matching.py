@@ -13,7 +13,7 @@ from scipy.spatial import cKDTree
 from kerfpath._arrays import Array, Ints
 from kerfpath.errors import InputError
 from kerfpath.post._groups import ReadGroup
-from kerfpath.post._read import ReadMove
+from kerfpath.post._read import ReadMove, ReadWait
 
 __all__ = ["Pair", "Stop", "matched", "pairs_of"]
 
@@ -26,10 +26,11 @@ NEVER = 1e6
 
 
 class Stop(NamedTuple):
-    """A move, and how long (s) the robot waits where it ends."""
+    """A move, how long (s) the robot waits where it ends, and where that is said."""
 
     move: ReadMove
-    wait: float
+    wait: float = 0.0
+    waits_at: str = ""
 
 
 class Pair(NamedTuple):
@@ -100,7 +101,7 @@ def pairs_of(a: ReadGroup, b: ReadGroup, near: float) -> list[Pair]:
         Distance up to which two places are the same.
     """
     joint = min(len(a.joint), len(b.joint))
-    ways = [_stops(g.joint, [(len(g.joint), t) for k, t in g.waits if k == 0]) for g in (a, b)]
+    ways = [_stops(g.joint, [(len(g.joint), w) for k, w in g.waits if k == 0]) for g in (a, b)]
     pairs = [Pair(stop, None) for stop in ways[0][: len(ways[0]) - joint]]
     pairs += [Pair(None, stop) for stop in ways[1][: len(ways[1]) - joint]]
     pairs += [Pair(*both) for both in zip(*(way[len(way) - joint :] for way in ways), strict=True)]
@@ -117,12 +118,14 @@ def pairs_of(a: ReadGroup, b: ReadGroup, near: float) -> list[Pair]:
     return pairs
 
 
-def _stops(moves: Sequence[ReadMove], waits: Sequence[tuple[int, float]]) -> list[Stop]:
+def _stops(moves: Sequence[ReadMove], waits: Sequence[tuple[int, ReadWait]]) -> list[Stop]:
     """Return moves with the waits behind them."""
-    times = np.zeros(len(moves) + 1)
-    for behind, time in waits:
-        times[behind] += time
-    return [Stop(move, time) for move, time in zip(moves, times[1:].tolist(), strict=True)]
+    stops = [Stop(move) for move in moves]
+    for behind, wait in waits:
+        if behind > 0:
+            move, time, at = stops[behind - 1]
+            stops[behind - 1] = Stop(move, time + wait.time, at or wait.place)
+    return stops
 
 
 def _keys(a: Sequence[ReadMove], b: Sequence[ReadMove], near: float) -> tuple[Ints, Ints]:

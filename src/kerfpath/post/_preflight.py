@@ -12,8 +12,8 @@ from kerfpath.errors import InputError
 from kerfpath.post._issue import ProgramIssue
 from kerfpath.post._languages import Language
 from kerfpath.post._languages import language as find_language
-from kerfpath.post._program import JointMove, LinearMove, Program, Section, Wait
-from kerfpath.post._settings import Rules, Settings
+from kerfpath.post._program import Await, JointMove, LinearMove, Program, Request, Section, Wait
+from kerfpath.post._settings import Rules, Settings, handshakes
 
 __all__ = ["preflight"]
 
@@ -25,6 +25,8 @@ LOWEST_SHARE = 0.01
 """Smallest share of the full speed of a joint move: controllers count it in percent."""
 LONGEST_WAIT = 60.0
 """s; a longer one is a mistake in its unit."""
+LONGEST_TIMEOUT = 600.0
+"""s; nobody waits longer for an input."""
 ROUNDING = 1e-9
 """Share by which half a distance may be exceeded for rounding."""
 LIMIT_NOISE = 1e-9
@@ -60,6 +62,7 @@ def preflight(
     issues = list(_robot(program, chosen))
     numbers = [issue for section in program.sections for issue in _numbers(section, rules)]
     outputs = list(_outputs(program, chosen, settings))
+    outputs += _ports(program, chosen, settings)
     settings = chosen.completed(settings)
     issues += numbers + outputs
     # Speeds and zones are named by their formatted values: only finite ones can be.
@@ -69,6 +72,7 @@ def preflight(
     for section in program.sections:
         issues += _laser(section)
         issues += _waits(section)
+        issues += _handshakes(section)
         issues += _motion(program, section, rules)
         issues += _limits(program, section)
     if chosen.check is not None and not any(issue.level == "error" for issue in issues):
@@ -98,6 +102,31 @@ def _outputs(program: Program, language: Language, settings: Settings) -> Iterat
         if (taken := language.assumed.get(key)) is not None:
             said = f"no output is named for the {signal}, {taken} is taken; {remedy}"
         yield ProgramIssue("error" if taken is None else "warning", "output", said, "program")
+
+
+def _ports(program: Program, language: Language, settings: Settings) -> Iterator[ProgramIssue]:
+    """Check that every handshake has an input or output of its own."""
+    known = handshakes(settings)
+    steps = dict.fromkeys(s for s in program.steps if isinstance(s, Request | Await))
+    wanted = {(s.partner, "input" if isinstance(s, Await) else "output") for s in steps}
+    for partner, way in sorted(wanted):
+        if (partner, way) not in known:
+            said = f"{language.title} has no {way} for the handshake {partner}; leave it out"
+            yield ProgramIssue("error", "handshake", said, "program")
+        elif known[partner, way] is None:
+            said = (
+                f"no {way} is named for the handshake {partner}; say which with {partner}_{way} in "
+                f"[program.{language.name}]"
+            )
+            yield ProgramIssue("error", "handshake", said, "program")
+    taken = {
+        ("output", getattr(settings, key, None)): key for key in ("laser_output", "gas_output")
+    }
+    for (name, way), port in known.items():
+        key = f"{name}_{way}"
+        if port is not None and (other := taken.setdefault((way, port), key)) != key:
+            said = f"{other} and {key} are both {port}; name one for each"
+            yield ProgramIssue("error", "handshake", said, "program")
 
 
 def _robot(program: Program, language: Language) -> Iterator[ProgramIssue]:
@@ -198,6 +227,30 @@ def _waits(section: Section) -> Iterator[ProgramIssue]:
             )
         if not stopped:
             yield ProgramIssue("error", "wait", "a wait must follow a move that stops", place)
+
+
+def _handshakes(section: Section) -> Iterator[ProgramIssue]:
+    """Check that partners are asked and awaited where the robot stands with the laser off."""
+    stopped, on = False, False
+    for number, step in enumerate(section.steps):
+        if isinstance(step, JointMove | LinearMove):
+            stopped = step.zone == 0
+        for switch in step.switches if isinstance(step, LinearMove) else ():
+            on = switch.on if switch.signal == "laser" else on
+        if not isinstance(step, Request | Await):
+            continue
+        place = f"{section.name}, step {number}"
+        if not stopped or on:
+            said = "a handshake must follow a move that stops, with the laser off"
+            yield ProgramIssue("error", "handshake", said, place)
+        if isinstance(step, Await) and not 0 < step.timeout <= LONGEST_TIMEOUT:
+            yield ProgramIssue(
+                "error",
+                "handshake",
+                f"a timeout must be more than 0 s and at most {LONGEST_TIMEOUT:g} s, got "
+                f"{step.timeout:g} s",
+                place,
+            )
 
 
 def _laser(section: Section) -> Iterator[ProgramIssue]:

@@ -13,14 +13,19 @@ from kerfpath.errors import InputError
 from kerfpath.robots import Robot
 
 __all__ = [
+    "PARTNERS",
     "SIGNALS",
+    "Await",
     "CircularMove",
     "Comment",
+    "Handshake",
     "JointMove",
     "LinearMove",
     "Move",
+    "Partner",
     "PathMove",
     "Program",
+    "Request",
     "Section",
     "Signal",
     "Step",
@@ -31,6 +36,9 @@ __all__ = [
 Signal = Literal["laser", "gas"]
 SIGNALS: dict[str, Signal] = {word: word for word in get_args(Signal)}
 """Every signal by its word, for readers."""
+Partner = Literal["ready", "shutter", "gas_pressure", "height", "interlock"]
+PARTNERS: dict[str, Partner] = {word: word for word in get_args(Partner)}
+"""Every partner of a handshake by its word: source, shutter, gas, height control, cell."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -60,13 +68,17 @@ class JointMove:
     q : (n,) rad
         Joints of the target.
     speed : float
-        Share of the full speed, from 0.01 to 1.
+        Share of the full speed, from 0.01 to 1; the acceleration is the full one.
+    duration : float s or None
+        How long the move was planned to take, from stop to stop; None where it is not known from
+        where it comes.
     zone : float m
         Radius in which the corner may be rounded; 0 = stop at the target.
     """
 
     q: Array
     speed: float
+    duration: float | None = None
     zone: float = 0.0
 
     def __post_init__(self) -> None:
@@ -138,6 +150,37 @@ class Wait:
     time: float
 
 
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Request:
+    """Set or reset the output that asks a partner for something, where the robot stands.
+
+    Parameters
+    ----------
+    partner : Partner
+        Who is asked; the settings of a language say by which output, as `shutter_output`.
+    on : bool
+    """
+
+    partner: Partner
+    on: bool
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Await:
+    """Wait where the robot stands, beam off, until an input is on; else end the program safely.
+
+    Parameters
+    ----------
+    partner : Partner
+        Who answers; the settings of a language say by which input, as `shutter_input`.
+    timeout : float s
+        After which the program switches everything off and ends.
+    """
+
+    partner: Partner
+    timeout: float
+
+
 @dataclass(frozen=True, slots=True)
 class Comment:
     """A remark for the person who reads the program."""
@@ -147,7 +190,8 @@ class Comment:
 
 PathMove = LinearMove | CircularMove
 Move = JointMove | LinearMove | CircularMove
-Step = Move | Wait | Comment
+Handshake = Request | Await
+Step = Move | Wait | Handshake | Comment
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -4,19 +4,20 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Any, Literal, Protocol, get_args
 
 import numpy as np
 
 from kerfpath._arrays import Array, freeze
 from kerfpath.errors import InputError
-from kerfpath.post._program import Switch
+from kerfpath.post._program import Handshake, Partner, Switch
+from kerfpath.post._settings import Settings, handshakes
 from kerfpath.robots import Robot
 
 __all__ = [
-    "MOVE_KINDS", "MoveKind", "ReadMove", "ReadProgram", "ReadSection", "ReadStep", "ReadWait",
-    "Reader", "patterns", "same_output", "with_tips",
+    "MOVE_KINDS", "MoveKind", "ReadHandshake", "ReadMove", "ReadProgram", "ReadSection",
+    "ReadStep", "ReadWait", "Reader", "partner_of", "patterns", "same_output", "with_tips",
 ]  # fmt: skip
 
 
@@ -38,6 +39,9 @@ class ReadMove:
         Of the tip, m/s; of a joint move the share of the full speed; None where the text has none.
     duration : float s or None
         How long it takes, where the text says times.
+    cruise : float s or None
+        How long a joint move takes at its speed throughout, neither gaining nor losing it, where
+        the text says that.
     zone : float m or None
         None where the language has no length for it.
     q : (n,) rad or None
@@ -49,6 +53,9 @@ class ReadMove:
     posture : tuple
         What the text says of posture and turns, as `Language.posture` does; empty where nothing.
     switches : tuple of Switch
+    elsewhere : mapping of str to str
+        File and line of what is not said where the move stands: "target", "speed", "zone",
+        "switches".
     """
 
     kind: MoveKind
@@ -56,12 +63,14 @@ class ReadMove:
     line: int
     speed: float | None
     duration: float | None = None
+    cruise: float | None = None
     zone: float | None = 0.0
     q: Array | None = None
     T_part_tip: Array | None = None
     T_part_via: Array | None = None
     posture: tuple[int | str, ...] = ()
     switches: tuple[Switch, ...] = ()
+    elsewhere: Mapping[str, str] = field(default_factory=dict)
 
     @property
     def place(self) -> str:
@@ -83,7 +92,21 @@ class ReadWait:
         return f"{self.file}, line {self.line}"
 
 
-ReadStep = ReadMove | ReadWait
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ReadHandshake:
+    """A handshake with a partner where the robot stands."""
+
+    what: Handshake
+    file: str
+    line: int
+
+    @property
+    def place(self) -> str:
+        """Where it stands."""
+        return f"{self.file}, line {self.line}"
+
+
+ReadStep = ReadMove | ReadWait | ReadHandshake
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -187,6 +210,16 @@ class Reader(Protocol):
 def patterns(by_kind: Mapping[str, str]) -> dict[str, re.Pattern[str]]:
     """Return regular expressions of lines by their kind, compiled; digits and letters are ASCII."""
     return {kind: re.compile(pattern, re.ASCII) for kind, pattern in by_kind.items()}
+
+
+def partner_of(
+    port: object, way: Literal["input", "output"], settings: Settings, place: str
+) -> Partner:
+    """Return whose input or output a port is, by the settings, or raise InputError."""
+    for (partner, its_way), name in handshakes(settings).items():
+        if its_way == way and name == port:
+            return partner
+    raise InputError(f"{place}: {port} is the {way} of no partner that the settings name")
 
 
 def same_output(said: object, expected: object, place: str) -> None:

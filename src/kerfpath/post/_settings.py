@@ -8,7 +8,9 @@ from typing import Annotated, Any
 import numpy as np
 from pydantic import BaseModel, ConfigDict, Field
 
-__all__ = ["Rules", "Settings", "setting"]
+from kerfpath.post._program import PARTNERS, Partner
+
+__all__ = ["Rules", "Settings", "handshakes", "setting"]
 
 
 def setting(expected: str, example: str, **bounds: Any) -> Any:
@@ -25,6 +27,16 @@ class Settings(BaseModel):
         int,
         setting("a whole number of lines from 100 to 1000000", "5000", ge=100, le=1_000_000),
     ] = 5000
+
+
+def handshakes(settings: Settings) -> dict[tuple[Partner, str], Any]:
+    """Return the inputs and outputs of handshakes that settings can name, by partner and way."""
+    fields = (name.rpartition("_") for name in type(settings).model_fields)
+    return {
+        (PARTNERS[partner], way): getattr(settings, f"{partner}_{way}")
+        for partner, _, way in fields
+        if partner in PARTNERS and way in ("input", "output")
+    }
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -3,16 +3,19 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from itertools import pairwise
 
 import numpy as np
 
 from kerfpath.air import least_time
 from kerfpath.errors import InputError
 from kerfpath.post._issue import ProgramIssue
-from kerfpath.post._program import Comment, JointMove, LinearMove, Move, Program, Wait
+from kerfpath.post._program import JointMove, LinearMove, Move, Program, Wait
 
-__all__ = ["refusals", "timetable"]
+__all__ = ["SHORTEST_CRUISE", "cruises", "refusals", "timetable"]
 
+SHORTEST_CRUISE = 1e-3
+"""s; a joint move that takes less goes nowhere worth a time."""
 SHORTEST = 1e-6
 """s; a move that takes less has no duration worth writing."""
 
@@ -20,25 +23,40 @@ SHORTEST = 1e-6
 def timetable(program: Program) -> list[tuple[Move | Wait, float]]:
     """Return each move and wait with the time (s) at which it ends; the first target is at 0.
 
-    Waits and moves along the path take what was planned. A joint move is straight, from stop to
-    stop: the least time that the joint limits leave it, divided by its share of the full speed.
+    Waits and moves take what was planned. A joint move is straight, from stop to stop; where it is
+    not planned how long it takes, it is the least time that the joint limits leave it, divided by
+    its share of the full speed.
 
     Raises
     ------
     InputError
         Joint limits that are not known.
     """
-    steps = [step for step in program.steps if not isinstance(step, Comment)]
+    steps = [step for step in program.steps if isinstance(step, JointMove | LinearMove | Wait)]
     ways = np.diff(np.array([move.q for move in program.moves]), axis=0)
     least = iter([0.0, *least_time(ways, *program.robot.speed_limits()).tolist()])
     took = []
     for step in steps:
         full = 0.0 if isinstance(step, Wait) else next(least)
         if isinstance(step, JointMove):
-            took.append(full / step.speed)
+            took.append(full / step.speed if step.duration is None or not full else step.duration)
         else:
             took.append(step.time if isinstance(step, Wait) else step.duration)
     return list(zip(steps, np.cumsum(took).tolist(), strict=True))
+
+
+def cruises(program: Program) -> dict[Move, float]:
+    """Return how long planned joint moves take (s) at their speed throughout.
+
+    Neither gaining nor losing it: the way of the slowest joint by its share of its full speed.
+    """
+    if program.robot.velocity is None:
+        return {}
+    return {
+        move: float((np.abs(move.q - before.q) / program.robot.velocity).max() / move.speed)
+        for before, move in pairwise(program.moves)
+        if isinstance(move, JointMove) and move.duration is not None
+    }
 
 
 def refusals(program: Program) -> Iterator[ProgramIssue]:

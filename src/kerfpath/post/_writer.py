@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Mapping, Sequence
-from contextlib import suppress
-from pathlib import Path
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -13,6 +11,8 @@ from kerfpath.errors import InputError
 from kerfpath.plans import Plan
 from kerfpath.post._build import build_program
 from kerfpath.post._compare import deviations
+from kerfpath.post._issue import ProgramIssue
+from kerfpath.post._languages import Language
 from kerfpath.post._languages import language as find_language
 from kerfpath.post._meant import Meant
 from kerfpath.post._preflight import preflight
@@ -21,7 +21,7 @@ from kerfpath.post._read import ReadProgram
 from kerfpath.post._settings import Settings
 from kerfpath.robots import Robot
 
-__all__ = ["post", "read_program", "write_files", "write_program"]
+__all__ = ["Posted", "post", "posted", "read_program", "said_in"]
 
 
 def post(
@@ -57,21 +57,55 @@ def post(
         An unknown language, settings of another language, a program that its preflight refuses,
         or one that does not read back as it was meant.
     """
+    program = source if isinstance(source, Program) else build_program(source)
+    return posted(program, language, settings, strict=strict).files
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Posted:
+    """A program as text.
+
+    Parameters
+    ----------
+    files : dict of str to str
+        Text of every file by its name, the one to start first.
+    read : ReadProgram or None
+        What the text says; None where the language has no reader.
+    warnings : tuple of ProgramIssue
+        Of the preflight.
+    """
+
+    files: dict[str, str]
+    read: ReadProgram | None
+    warnings: tuple[ProgramIssue, ...]
+
+
+def posted(
+    program: Program,
+    language: str = "rapid",
+    settings: Settings | None = None,
+    *,
+    strict: bool = False,
+) -> Posted:
+    """Return a program as text, what was read back of it, and the warnings of its preflight.
+
+    Arguments and refusals are those of `post`.
+    """
     chosen = find_language(language)
     settings = chosen.settings() if settings is None else settings
-    program = source if isinstance(source, Program) else build_program(source)
-    refused = [i for i in preflight(program, language, settings) if strict or i.level == "error"]
+    issues = preflight(program, language, settings)
+    refused = [i for i in issues if strict or i.level == "error"]
+    read = None
     if not refused:
         settings = chosen.completed(settings)
         files = chosen.formatter(program, settings).files()
-        if chosen.read is None:
-            return files
-        read = read_program(files, language, program.robot, settings)
-        refused = deviations(program, read, chosen, settings)
+        if chosen.read is not None:
+            read = read_program(files, language, program.robot, settings)
+            refused = deviations(program, read, chosen, settings)
     if refused:
         more = f" (and {len(refused) - 1} more)" if len(refused) > 1 else ""
         raise InputError(f"program {program.name!r}: {refused[0]}{more}")
-    return files
+    return Posted(files=files, read=read, warnings=tuple(issues))
 
 
 def read_program(
@@ -121,44 +155,23 @@ def read_program(
         ) from None
 
 
-def write_files(folder: str | os.PathLike[str], files: Mapping[str, str]) -> list[Path]:
-    """Write the files of a program into a folder, each whole or not at all, the first one last.
+def said_in(program: Program, chosen: Language, settings: Settings) -> ReadProgram:
+    """Return what the reader of a language makes of a program that its formatter writes.
 
-    So the program that is started calls no file that is not there yet.
+    Neither refused nor compared: what a text would say, as a measure for another.
 
-    Raises
-    ------
-    InputError
-        A file cannot be written.
-    """
-    paths = {name: Path(folder) / name for name in files}
-    for name in reversed(list(files)):
-        try:
-            paths[name].parent.mkdir(parents=True, exist_ok=True)
-        except OSError as error:
-            raise InputError(f"{paths[name].parent}: no folder can be made ({error})") from None
-        write_program(paths[name], files[name])
-    return list(paths.values())
-
-
-def write_program(path: str | os.PathLike[str], text: str) -> None:
-    """Write `text` to the file at `path`, whole or not at all.
-
-    The text goes to a file beside it first, so that no controller ever loads half a program.
+    Parameters
+    ----------
+    program : Program
+    chosen : Language
+        With a reader.
+    settings : Settings
 
     Raises
     ------
     InputError
-        The file cannot be written.
+        The language cannot say it.
     """
-    target = Path(path)
-    if not target.name:
-        raise InputError(f"cannot write the program to {str(path)!r}: expected a file name")
-    beside = target.with_name(f".{target.name}.{os.getpid()}.tmp")
-    try:
-        beside.write_bytes(text.encode("utf-8"))
-        beside.replace(target)
-    except OSError as error:
-        with suppress(OSError):
-            beside.unlink(missing_ok=True)
-        raise InputError(f"cannot write the program to {target}: {error.strerror}") from None
+    settings = chosen.completed(settings)
+    files = chosen.formatter(program, settings).files()
+    return read_program(files, chosen.name, program.robot, settings)

@@ -116,9 +116,11 @@ def refine(
     broken = comfort and comfort.broken(plan.robot, refined.q, plan.T_flange_tip)
     if broken:
         return _unrefined(plan, f"off the grid it would break the {' and the '.join(broken)}")
-    grid_cost = plan.cost if plan.proof.grid_cost is None else plan.proof.grid_cost
+    grid_cost = plan.proof.grid_cost
+    if grid_cost is None and start.admitted:
+        grid_cost = plan.cost
     proof = Proof(
-        optimal=plan.proof.optimal and start.admitted and refined.cost <= grid_cost,
+        optimal=plan.proof.optimal and start.admitted and refined.cost <= (grid_cost or 0.0),
         statement=f"{plan.proof.statement}; {_done(plan, asked, start, refined.cost)}",
         grid_cost=grid_cost,
     )

@@ -74,10 +74,15 @@ def header(
     facts: Sequence[tuple[str, str]],
     notes: Sequence[str],
     verdict: str = "",
+    tools: str = "",
 ) -> str:
-    """Return the head of a page: what it is, its title, a verdict (HTML), facts and notes."""
+    """Return the head of a page: what it is, its title, a verdict (HTML), facts and notes.
+
+    `tools` (HTML) stand beside the title.
+    """
     parts = [
         "<header>",
+        tools,
         f'<p class="kind">{escape(kind)}</p>',
         f"<h1>{escape(title)}</h1>",
         verdict,

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from html import escape
 from itertools import product
 
 import numpy as np
@@ -26,6 +28,8 @@ __all__ = ["chosen_line", "feasibility_map", "hidden_postures", "shown_postures"
 ROW, GAP, TOP, BOTTOM = 150, 34, 48, 50
 """Height of a panel, of the space between two, and of the margins (the upper with buttons), px."""
 
+HALF_TURN = 180.0
+"""deg: the map ends there, and begins at its negative."""
 ADMITTED = 0
 """The reason code of a candidate that is not dropped, see `LayeredGraph`."""
 
@@ -35,7 +39,7 @@ def feasibility_map(
     plan: Plan | None = None,
     *,
     s: Array | None = None,
-    broken_at: int | None = None,
+    marks: Sequence[tuple[float, str]] = (),
 ) -> go.Figure:
     """Return the feasibility map of a layered graph, with the chosen gamma drawn on it.
 
@@ -48,17 +52,17 @@ def feasibility_map(
     graph : LayeredGraph
         Its `reason_by_gamma` is drawn.
     plan : Plan, optional
-        Its gamma is drawn as a line on the posture in use, broken where the posture changes and
-        where gamma passes from 180 to -180 deg.
+        Its gamma is drawn as a line on the posture in use, broken where the posture changes; where
+        gamma passes 180 deg it leaves at one edge and comes in at the other.
     s : (K,) m, optional
         Arc length of the nodes, for the hover text; default: the plan's.
-    broken_at : int, optional
-        Node to mark as the first that no admissible path reaches.
+    marks : sequence of (float, str)
+        Nodes to mark, as where the path breaks, and what to write beside the first.
 
     Returns
     -------
     plotly.graph_objects.Figure
-        ``layout.meta`` holds `reasons`, `postures` and `s_mm` for hover handlers.
+        ``layout.meta`` holds `reasons`, `postures`, `s_mm` and `nodes` for hover handlers.
     """
     postures = shown_postures(graph)
     gamma = np.degrees(graph.gamma)
@@ -99,16 +103,18 @@ def feasibility_map(
         )
         if plan is not None and mu in used:
             _add_choice(figure, plan, mu, row, (len(plan.q) - 1) // (len(graph.reason) - 1))
-    if broken_at is not None:
-        _mark_break(figure, broken_at, len(postures))
+    _add_marks(figure, marks, len(postures))
     _add_legend(figure, graph, postures, has_plan=plan is not None)
     if s is None and plan is not None:
         s = plan.contour.s
+    nodes = len(graph.reason)
+    parts = 1 if plan is None else (len(plan.q) - 1) // (nodes - 1)
     figure.update_layout(
         meta={
             "reasons": list(graph.reasons),
             "postures": [posture_name(mu) for mu in postures],
             "s_mm": [] if s is None else np.round((s - s[0]) * 1e3, 2).tolist(),
+            "nodes": np.round(np.arange((nodes - 1) * parts + 1) / parts, 4).tolist(),
         }
     )
     return figure
@@ -145,16 +151,21 @@ def hidden_postures(graph: LayeredGraph) -> list[str]:
 def chosen_line(plan: Plan, posture: int, parts: int = 1) -> list[tuple[Array, Array]]:
     """Return the chosen gamma on one posture as unbroken pieces of (node, gamma in deg).
 
-    A piece ends where the posture changes and where gamma wraps from 180 to -180 deg; a refined
-    plan may divide the intervals between the nodes into `parts`.
+    A piece ends where the posture changes and where gamma passes 180 deg; there it goes on beyond
+    the edge to the next node, where the next piece comes from. A refined plan may divide the
+    intervals between the nodes into `parts`.
     """
-    wraps = np.abs(np.diff(plan.gamma)) > np.pi
+    gamma = np.degrees(np.unwrap(plan.gamma))
+    turn = np.round((np.degrees(plan.gamma) - gamma) / 360)
     nodes = np.flatnonzero(plan.posture == posture)
     if not nodes.size:
         return []
-    breaks = (np.diff(nodes) > 1) | wraps[nodes[:-1]]
-    pieces = np.split(nodes, np.flatnonzero(breaks) + 1)
-    return [(piece / parts, np.degrees(plan.gamma[piece])) for piece in pieces]
+    pieces = []
+    for run in np.split(nodes, np.flatnonzero(np.diff(nodes) > 1) + 1):
+        for piece in np.split(run, np.flatnonzero(np.diff(turn[run])) + 1):
+            shown = np.arange(max(piece[0] - 1, run[0]), min(piece[-1] + 1, run[-1]) + 1)
+            pieces.append((shown / parts, gamma[shown] + 360 * turn[piece[0]]))
+    return pieces
 
 
 def _add_axes(figure: go.Figure, row: int, rows: int, height: int, nodes: int) -> None:
@@ -204,7 +215,8 @@ def _add_choice(figure: go.Figure, plan: Plan, posture: int, row: int, parts: in
             hovertemplate=None if colour == "white" else template,
             **where,
         )
-    ends = [(piece[0][i], piece[1][i]) for piece in pieces for i in (0, -1)]
+    every = ((piece[0][i], piece[1][i]) for piece in pieces for i in (0, -1))
+    ends = [end for end in every if abs(end[1]) <= HALF_TURN]
     figure.add_scatter(
         x=[end[0] for end in ends],
         y=[end[1] for end in ends],
@@ -217,9 +229,9 @@ def _add_choice(figure: go.Figure, plan: Plan, posture: int, row: int, parts: in
     )
 
 
-def _mark_break(figure: go.Figure, node: int, rows: int) -> None:
-    halo, mark = {"color": "white", "width": 4}, {"color": ALERT, "width": 2, "dash": "dot"}
-    for row, line in product(range(rows), (halo, mark)):
+def _add_marks(figure: go.Figure, marks: Sequence[tuple[float, str]], rows: int) -> None:
+    halo, dots = {"color": "white", "width": 4}, {"color": ALERT, "width": 2, "dash": "dot"}
+    for (node, _), row, line in product(marks, range(rows), (halo, dots)):
         figure.add_shape(
             type="line",
             x0=node,
@@ -230,17 +242,18 @@ def _mark_break(figure: go.Figure, node: int, rows: int) -> None:
             yref=f"{_axis('y', row)} domain",
             line=line,
         )
-    figure.add_annotation(
-        text=f"┊ path breaks at node {node}",
-        font={"size": 12, "color": ALERT},
-        x=1,
-        xref="paper",
-        xanchor="right",
-        y=1,
-        yref="y domain",
-        yanchor="bottom",
-        showarrow=False,
-    )
+    if marks:
+        figure.add_annotation(
+            text=f"┊ {escape(marks[0][1])}",
+            font={"size": 12, "color": ALERT},
+            x=1,
+            xref="paper",
+            xanchor="right",
+            y=1,
+            yref="y domain",
+            yanchor="bottom",
+            showarrow=False,
+        )
 
 
 def _add_legend(

@@ -1,4 +1,8 @@
-"""Joint motion over time: positions within their limits, speeds and accelerations as shares."""
+"""Joint motion over time: positions, and speeds and accelerations as shares of their limits.
+
+``layout.meta["nodes"]`` of each figure says where on its horizontal axis every node lies, so that
+figures of one contour can share a cursor.
+"""
 
 from __future__ import annotations
 
@@ -26,6 +30,8 @@ __all__ = ["cutting_speed", "joint_positions", "limit_shares", "posture_runs"]
 ROW, GAP, TOP, BOTTOM = 130, 36, 48, 48
 SHARE_ROW, SHARE_TOP = 210, 74
 SPEED_HEIGHT = 220
+LEAST_SPAN = 1.0
+"""deg: a joint that hardly moves is not drawn as if it did."""
 
 
 def posture_runs(plan: Plan) -> list[tuple[int, int, int]]:
@@ -37,19 +43,24 @@ def posture_runs(plan: Plan) -> list[tuple[int, int, int]]:
 
 
 def joint_positions(plan: Plan) -> go.Figure:
-    """Return a panel per joint: position over time, deg, between its limits."""
+    """Return a panel per joint: position over time, deg, to the scale of its motion.
+
+    Endless joints are unrolled. The title of a panel says how far its joint stays from its limits.
+    """
     height = TOP + BOTTOM + 3 * ROW + 2 * GAP
     figure = go.Figure(layout=base_layout(height, hovermode="x unified", showlegend=False))
     figure.update_layout(margin={"l": 54, "r": 16, "t": TOP, "b": BOTTOM})
     _add_posture_bands(figure, plan, panels=plan.robot.joints, labelled=range(2))
+    figure.update_layout(meta={"nodes": np.round(plan.time, 4).tolist()})
     limits = plan.robot.joint_limits()
+    unrolled = np.degrees(plan.q[0] + np.vstack([0 * plan.q[:1], plan.increments.cumsum(axis=0)]))
     for joint in range(plan.robot.joints):
         row, column = divmod(joint, 2)
         x, y = _axis("x", joint), _axis("y", joint)
         top = 1 - row * (ROW + GAP) / (height - TOP - BOTTOM)
         low, high = np.degrees(limits.lower[joint]), np.degrees(limits.upper[joint])
-        endless = bool(limits.endless[joint])
-        room = 0.08 * (high - low)
+        q, endless = unrolled[:, joint], bool(limits.endless[joint])
+        middle, half = (q.max() + q.min()) / 2, 0.58 * max(float(np.ptp(q)), LEAST_SPAN)
         figure.update_layout(
             {
                 _axis("xaxis", joint): axis(
@@ -64,14 +75,13 @@ def joint_positions(plan: Plan) -> go.Figure:
                     anchor=x,
                     domain=[max(0.0, top - ROW / (height - TOP - BOTTOM)), min(1.0, top)],
                     ticksuffix="°",
-                    range=None if endless else [low - room, high + room],
+                    range=[float(middle - half), float(middle + half)],
                     nticks=6,
                 ),
             }
         )
-        t, q = _without_wraps(plan, joint)
         figure.add_scatter(
-            x=_short(t),
+            x=_short(plan.time),
             y=_short(q),
             mode="lines",
             line={"color": JOINT_COLOURS[joint], "width": 2},
@@ -80,7 +90,10 @@ def joint_positions(plan: Plan) -> go.Figure:
             xaxis=x,
             yaxis=y,
         )
-        span = "endless" if endless else f"limits {_deg(low)} to {_deg(high)}"
+        span = "endless"
+        if not endless:
+            spare = min(float(q.min()) - low, high - float(q.max()))
+            span = f"limits {_deg(low)} to {_deg(high)}, {_deg(spare)} to spare"
         figure.add_annotation(
             text=f"joint {joint + 1} <span style='color:{QUIET}'>· {span}</span>",
             font={"size": 12, "color": INK},
@@ -102,6 +115,7 @@ def cutting_speed(plan: Plan) -> go.Figure:
     figure = go.Figure(layout=base_layout(SPEED_HEIGHT, hovermode="x unified", showlegend=False))
     figure.update_layout(margin={"l": 62, "r": 44, "t": 16, "b": BOTTOM})
     s = (plan.contour.s - plan.contour.s[0]) * 1e3
+    figure.update_layout(meta={"nodes": np.round(s, 2).tolist()})
     speed = np.diff(plan.contour.s) / np.diff(plan.time) * 60
     figure.add_scatter(
         x=_short(s),
@@ -125,6 +139,7 @@ def limit_shares(plan: Plan) -> go.Figure:
         margin={"l": 62, "r": 44, "t": SHARE_TOP, "b": BOTTOM},
         legend={"orientation": "h", "x": 0, "y": 1.03, "yanchor": "bottom", "font": {"size": 12}},
     )
+    figure.update_layout(meta={"nodes": np.round(plan.time, 4).tolist()})
     _add_posture_bands(figure, plan, panels=2, labelled=())
     middle = (plan.time[:-1] + plan.time[1:]) / 2
     panels = (
@@ -210,13 +225,6 @@ def _add_posture_bands(figure: go.Figure, plan: Plan, *, panels: int, labelled: 
                     yanchor="bottom",
                     showarrow=False,
                 )
-
-
-def _without_wraps(plan: Plan, joint: int) -> tuple[Array, Array]:
-    """Return time and position (deg), with a gap where an endless joint passes 180 deg."""
-    q = np.degrees(plan.q[:, joint])
-    wraps = np.flatnonzero((np.abs(np.diff(q)) > 180) & plan.robot.endless[joint]) + 1
-    return np.insert(plan.time, wraps, np.nan), np.insert(q, wraps, np.nan)
 
 
 def _share_range(share: Array) -> list[float]:

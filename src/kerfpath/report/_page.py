@@ -28,6 +28,7 @@ def render(
     cell: Cell | None = None,
     moves: Sequence[ArrayLike] = (),
     facts: Sequence[tuple[str, str]] = (),
+    faults: Sequence[str] = (),
     notes: Sequence[str] = (),
     job_text: str = "",
 ) -> str:
@@ -47,20 +48,25 @@ def render(
         Ways of the tool tip through the air, in the part frame.
     facts : sequence of (what, value)
         Rows such as ("Robot", "ABB IRB 4600-60/2.05").
+    faults : sequence of str
+        Why the job is not to be cut although its contours are planned, and what to do.
     notes : sequence of str
         Warnings, shown at the top.
     job_text : str
         The job file as read.
     """
     figures = Figures()
-    state, verdict = _verdict(sections)
+    shown = next((i for i, section in enumerate(sections) if section.failed), 0)
+    state, verdict = _verdict(sections, faults)
     body = [
         header(
             "Cutting plan",
             title,
             facts=facts,
             notes=notes,
-            verdict=f'<p class="verdict {state}">{sign(state, verdict)}</p>',
+            verdict=f'<p class="verdict {state}">{sign(state, verdict)}</p>'
+            + _first_steps(sections, faults),
+            tools='<button class="whole" type="button">Print every contour</button>',
         ),
         "<section><h2>Part and contours</h2>",
         '<p class="caption">Part frame, all axes to the same scale. Dot and cone mark start and '
@@ -72,14 +78,16 @@ def render(
         _tables.summary_table(sections),
         "</section>",
         '<section class="contours"><h2>Contour by contour</h2>',
-        *(_contour(i, section, figures) for i, section in enumerate(sections)),
+        *(_contour(i, section, i == shown, figures) for i, section in enumerate(sections)),
         "</section>",
         job_part(job_text),
         f"<footer>{_origin(sections)}</footer>",
     ]
-    return page(title, body, figures)
+    return page(title, body, figures, also="plan")
 
 
+MOST_STEPS = 5
+"""Failed contours named at the top; the others are listed below."""
 _SPARE = (
     " Where nothing forbids it, the colour says how much more than the near-miss distances is kept;"
     " pairs with a distance of their own, as nozzle and part, count as collisions alone."
@@ -88,12 +96,12 @@ _AIR = " Thin red lines are the moves between contours; the table is in the orde
 _CELL = " The slider puts robot and head to a few poses; capsules stand in for links."
 
 
-def _contour(number: int, section: ContourSection, figures: Figures) -> str:
+def _contour(number: int, section: ContourSection, is_open: bool, figures: Figures) -> str:
     plan = section.plan
     result = _tables.audit_sign(section) if plan else sign(FAIL, "no feasible path")
     size = f"{_tables.number(section.path.length * 1e3, 1)} mm, {len(section.path)} nodes"
     parts = [
-        f'<details id="contour-{number + 1}"{" open" if number == 0 else ""}>',
+        f'<details id="contour-{number + 1}"{" open" if is_open else ""}>',
         f'<summary><h3>{escape(section.name)}</h3><span class="quiet">{size}</span>'
         f"{result}</summary>",
     ]
@@ -139,7 +147,8 @@ def _contour(number: int, section: ContourSection, figures: Figures) -> str:
 
 def _map_part(section: ContourSection, figures: Figures) -> list[str]:
     graph, plan = section.mapped, section.plan
-    figure = _map.feasibility_map(graph, plan, s=section.path.s, broken_at=section.broken_at)
+    marks = [(mark.node, mark.words) for mark in section.marks]
+    figure = _map.feasibility_map(graph, plan, s=section.path.s, marks=marks)
     # The page has a legend of its own, which wraps, and a hover text that knows the reason.
     figure.update_layout(showlegend=False)
     figure.update_traces(hovertemplate=None, hoverinfo="none", selector={"type": "heatmap"})
@@ -159,10 +168,34 @@ def _map_part(section: ContourSection, figures: Figures) -> list[str]:
 def _failure(section: ContourSection) -> str:
     where = "" if section.broken_at is None else f" The path breaks at node {section.broken_at}."
     reason = section.failure or "The search found no admissible path."
+    remedy = f"<p>{escape(section.remedy)}</p>" if section.remedy else ""
     return (
         f'<div class="failure">{sign(FAIL, "No feasible path")}<p>{escape(reason)}</p>'
-        f"<p>{escape(where.strip())}</p></div>"
+        f"<p>{escape(where.strip())}</p>{remedy}</div>"
     )
+
+
+def _first_steps(sections: Sequence[ContourSection], faults: Sequence[str]) -> str:
+    """Return what to do first, where something failed: the first failed contours, and faults."""
+    failed = [(i, section) for i, section in enumerate(sections) if section.failed]
+    items = []
+    for i, section in failed[:MOST_STEPS]:
+        place = f" ({escape(section.marks[0].words)})" if section.marks else ""
+        link = f'<a href="#contour-{i + 1}">{escape(section.name)}</a>{place}'
+        items.append(f"<li>{link}: {escape(_what_to_do(section))}</li>")
+    if len(failed) > MOST_STEPS:
+        items.append(f"<li>and {len(failed) - MOST_STEPS} more contours, listed below</li>")
+    items += [f"<li>{escape(fault)}</li>" for fault in faults]
+    if not items:
+        return ""
+    return f'<div class="failure first"><b>What to do first</b><ul>{"".join(items)}</ul></div>'
+
+
+def _what_to_do(section: ContourSection) -> str:
+    if section.plan is None:
+        return section.remedy or section.failure or "give way on the limits that the map shows"
+    worst = section.errors[0]
+    return worst.advice or f"{worst.title} is beyond what is allowed; see its audit"
 
 
 def _in_words(plan: Plan) -> str:
@@ -183,7 +216,7 @@ def _postures_in_words(plan: Plan) -> str:
     return f"{len(runs) - 1} changes of posture, shaded: {', '.join(told)}{more}."
 
 
-def _verdict(sections: Sequence[ContourSection]) -> tuple[str, str]:
+def _verdict(sections: Sequence[ContourSection], faults: Sequence[str]) -> tuple[str, str]:
     count = len(sections)
     contours = "1 contour" if count == 1 else f"{count} contours"
     unplanned = sum(section.plan is None for section in sections)
@@ -197,6 +230,8 @@ def _verdict(sections: Sequence[ContourSection]) -> tuple[str, str]:
         return FAIL, f"No feasible path for {unplanned} of {contours}{audit}"
     if failed:
         return FAIL, f"Planned, but the audit failed for {failed} of {contours}"
+    if faults:
+        return FAIL, "Planned, but not ready to be cut"
     whole = "The contour is planned" if count == 1 else f"All {contours} are planned"
     if unchecked:
         return WARN, f"{whole}; {unchecked} not audited"

@@ -14,7 +14,7 @@ from kerfpath._arrays import Array, floats, integers
 from kerfpath.cell import Cell
 from kerfpath.errors import InputError
 from kerfpath.report._cell import add_cell, poses_shown
-from kerfpath.report._look import ACCENT, ALERT, FAINT, GRID, INK, QUIET, base_layout
+from kerfpath.report._look import ACCENT, ALERT, CHOSEN, FAINT, GRID, INK, QUIET, base_layout
 from kerfpath.report._section import ContourSection
 
 __all__ = ["add_part", "checked", "scene", "space_axis", "xyz"]
@@ -44,10 +44,19 @@ def scene(
         corners.append(vertices * 1e3)
         add_part(figure, vertices * 1e3, triangles)
     size = float(np.linalg.norm(np.ptp(np.vstack(corners), axis=0))) if corners else 1.0
-    for section in sections:
-        _add_contour(figure, section, size)
+    for number, section in enumerate(sections, 1):
+        _add_contour(figure, section, number, size)
     for number, move in enumerate(moves, 1):
         _add_move(figure, floats(move, "move", (None, 3)) * 1e3, number)
+    figure.add_scatter3d(
+        x=[None],
+        y=[None],
+        z=[None],
+        mode="markers",
+        marker={"color": CHOSEN, "size": 7},
+        hoverinfo="skip",
+        name="cursor",
+    )
     if cell is not None and cell.T_base_part is not None:
         plans = [section.plan for section in sections if section.plan is not None]
         add_cell(figure, cell, cell.T_base_part, poses_shown(plans))
@@ -57,7 +66,7 @@ def scene(
             "aspectmode": "data" if cell is None else "manual",
             "dragmode": "turntable",
             "camera": _camera(sections, cell),
-            "annotations": _labels(sections) if len(sections) <= LABELS else [],
+            "annotations": _labels(sections),
             **{f"{a}axis": space_axis(a) for a in "xyz"},
         },
     )
@@ -86,11 +95,11 @@ def add_part(figure: go.Figure, vertices: Array, triangles: Any) -> None:
     )
 
 
-def _add_contour(figure: go.Figure, section: ContourSection, size: float) -> None:
+def _add_contour(figure: go.Figure, section: ContourSection, number: int, size: float) -> None:
     path, name = section.path, escape(section.name)
     # Lifted towards the nozzle by a hair, or the part's own surface would cover half of the line.
     points = path.points * 1e3 - path.axes * (0.002 * size)
-    colour = ACCENT if section.plan is not None else ALERT
+    colour = ALERT if section.failed else ACCENT
     count = int(np.clip(path.length * 1e3 / (APART * size), *AXES_DRAWN))
     some = np.unique(np.linspace(0, len(path) - 1, min(count, len(path))).round().astype(int))
     mark = min(size, LARGE * float(np.linalg.norm(np.ptp(points, axis=0))))
@@ -112,6 +121,7 @@ def _add_contour(figure: go.Figure, section: ContourSection, size: float) -> Non
             "x %{x:.1f} y %{y:.1f} z %{z:.1f} mm<extra>" + name + "</extra>"
         ),
         name=name,
+        meta={"contour": number},
     )
     along = points[min(3, len(points) - 1)] - points[0]
     along = along / np.linalg.norm(along)
@@ -133,13 +143,13 @@ def _add_contour(figure: go.Figure, section: ContourSection, size: float) -> Non
         hovertemplate="start<extra>" + name + "</extra>",
         name=f"{name}: start",
     )
-    if section.broken_at is not None and 0 <= section.broken_at < len(points):
+    for place in section.marks:
         figure.add_scatter3d(
-            **xyz(points[section.broken_at][None]),
+            **xyz(place.point[None] * 1e3),
             mode="markers",
-            marker={"color": ALERT, "size": 6, "symbol": "x"},
-            hovertemplate=f"path breaks at node {section.broken_at}<extra>{name}</extra>",
-            name=f"{name}: break",
+            marker={"color": ALERT, "size": 9, "symbol": "x"},
+            hovertemplate=f"{escape(place.words)}<extra>{name}</extra>",
+            name=f"{name}: fails here",
         )
 
 
@@ -154,12 +164,19 @@ def _add_move(figure: go.Figure, points: Array, number: int) -> None:
 
 
 def _labels(sections: Sequence[ContourSection]) -> list[dict[str, Any]]:
-    """Name each contour at its start; alternate heights keep neighbouring names apart."""
+    """Name contours at their starts, and the first place where each failed one fails.
+
+    Alternate heights keep neighbouring names apart.
+    """
+    named = sections if len(sections) <= LABELS else ()
+    told = [(section.path.points[0], section.name, INK) for section in named]
+    failed = [section for section in sections if section.marks][:LABELS]
+    told += [(s.marks[0].point, f"{s.name}: {s.marks[0].words}", ALERT) for s in failed]
     return [
         {
-            **dict(zip("xyz", (section.path.points[0] * 1e3).tolist(), strict=True)),
-            "text": escape(section.name),
-            "font": {"size": 13, "color": INK},
+            **dict(zip("xyz", (point * 1e3).tolist(), strict=True)),
+            "text": escape(text),
+            "font": {"size": 13, "color": colour},
             "bgcolor": "rgba(255, 255, 255, 0.8)",
             "showarrow": True,
             "arrowhead": 0,
@@ -169,7 +186,7 @@ def _labels(sections: Sequence[ContourSection]) -> list[dict[str, Any]]:
             "ay": (-34, 34, -66, 66)[i % 4],
             "xanchor": "left",
         }
-        for i, section in enumerate(sections)
+        for i, (point, text, colour) in enumerate(told)
     ]
 
 

@@ -5,9 +5,11 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
+from typing import NamedTuple
 
 import numpy as np
 
+from kerfpath._arrays import Array
 from kerfpath.auditor import Check
 from kerfpath.contour import Contour
 from kerfpath.errors import InputError
@@ -15,7 +17,7 @@ from kerfpath.graph import LayeredGraph
 from kerfpath.planner import ClearanceMap
 from kerfpath.plans import Plan
 
-__all__ = ["COLLISION", "SPARE", "ContourSection", "with_clearance"]
+__all__ = ["COLLISION", "SPARE", "ContourSection", "Mark", "with_clearance"]
 
 COLLISION = "collision"
 SPARE = (0.25, 0.5, 1.0)
@@ -41,6 +43,14 @@ def with_clearance(graph: LayeredGraph, found: ClearanceMap) -> LayeredGraph:
     return replace(graph, reason=reason, reasons=reasons)
 
 
+class Mark(NamedTuple):
+    """A place where a contour fails: a node of its map, the point (m) in the part, and why."""
+
+    node: float
+    point: Array
+    words: str
+
+
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class ContourSection:
     """One contour of a report: what was searched, what came of it, and what the audit says.
@@ -59,6 +69,8 @@ class ContourSection:
         The audit's table; empty when the audit was not run.
     failure : str
         Why there is no plan, in words.
+    remedy : str
+        What to do about it, in words.
     clearance : ClearanceMap, optional
         How clear each vertex of the graph is in the cell.
     broken_at : int, optional
@@ -78,6 +90,7 @@ class ContourSection:
     plan: Plan | None = None
     checks: Sequence[Check] = ()
     failure: str = ""
+    remedy: str = ""
     broken_at: int | None = None
     clearance: ClearanceMap | None = None
     sampling: Sequence[tuple[str, str]] = ()
@@ -102,6 +115,31 @@ class ContourSection:
     def mapped(self) -> LayeredGraph:
         """The graph, its vertices told apart by how clear they are where that is known."""
         return self.graph if self.clearance is None else with_clearance(self.graph, self.clearance)
+
+    @property
+    def failed(self) -> bool:
+        """True where there is no plan, or one that its audit refuses."""
+        return self.plan is None or bool(self.errors)
+
+    @property
+    def parts(self) -> int:
+        """Into how many parts the plan divides the intervals between the nodes."""
+        return 1 if self.plan is None else (len(self.plan.q) - 1) // (len(self.path) - 1)
+
+    @property
+    def marks(self) -> list[Mark]:
+        """Where it fails: the node at which the path breaks, or the worst of each failed check."""
+        if self.plan is None:
+            if self.broken_at is None or not 0 <= self.broken_at < len(self.path):
+                return []
+            words = f"path breaks at node {self.broken_at}"
+            return [Mark(self.broken_at, self.path.points[self.broken_at], words)]
+        points = self.plan.contour.points
+        return [
+            Mark(check.node / self.parts, points[check.node], f"{check.title}, node {check.node}")
+            for check in self.errors
+            if 0 <= check.node < len(points)
+        ]
 
     @property
     def errors(self) -> list[Check]:

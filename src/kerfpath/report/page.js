@@ -8,7 +8,7 @@ const CONFIG = {
   showSendToCloud: false,
   plotlyServerURL: "",
 };
-const PAPER = { width: 700, height: 620 }; // px, on A4 and Letter, below a heading
+const PAPER = { width: 700, height: 820 }; // px, on A4 and Letter, below a heading
 
 async function unpacked(id) {
   const bytes = Uint8Array.from(atob(document.getElementById(id).textContent), (c) => c.charCodeAt(0));
@@ -16,8 +16,15 @@ async function unpacked(id) {
   return JSON.parse(await new Response(stream).text());
 }
 
-async function draw(element) {
-  if (element.dataset.state) return;
+const underway = new Map();
+
+// Draws a figure once; a second call waits for the first.
+function draw(element) {
+  if (!underway.has(element)) underway.set(element, drawn(element));
+  return underway.get(element);
+}
+
+async function drawn(element) {
   element.dataset.state = "drawing";
   try {
     const figure = await unpacked(element.dataset.figure);
@@ -70,15 +77,25 @@ document.querySelectorAll("details").forEach((section) => {
   section.addEventListener("toggle", () => section.open && drawIn(section));
 });
 window.addEventListener("hashchange", openTarget);
-// What is open is printed, at the width of the paper and no higher than a page.
+// What is open is printed, at the width of the paper and no higher than a page. A scene in space is
+// not drawn again before the page is printed: what is on the screen is printed smaller.
 window.addEventListener("beforeprint", () => {
   for (const plot of document.querySelectorAll(".js-plotly-plot")) {
+    if (plot.classList.contains("scene")) {
+      plot.style.width = `${plot.clientWidth}px`;
+      plot.style.zoom = Math.min(1, PAPER.width / plot.clientWidth);
+      continue;
+    }
     plot.dataset.height ??= plot.layout.height;
     Plotly.relayout(plot, { width: PAPER.width, height: Math.min(plot.dataset.height, PAPER.height) });
   }
 });
 window.addEventListener("afterprint", () => {
   for (const plot of document.querySelectorAll(".js-plotly-plot")) {
+    if (plot.classList.contains("scene")) {
+      plot.style.width = plot.style.zoom = "";
+      continue;
+    }
     Plotly.relayout(plot, { width: null, height: Number(plot.dataset.height), autosize: true });
   }
 });

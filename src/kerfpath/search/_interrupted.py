@@ -3,7 +3,8 @@
 A piece of an admissible path is itself admissible. So a plan that reaches as far as any path can
 before each interruption (the greedy reach) never falls behind another one with as many, and its
 number is the least. From the front the reach says which node interruption i lies before at the
-latest, from the back which at the earliest, and these spans of nodes do not overlap.
+latest, from the back which at the earliest, and these spans of nodes do not overlap. Where pieces
+must have a least length, `_long_enough` finds the spans.
 """
 
 from __future__ import annotations
@@ -13,10 +14,19 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from kerfpath._arrays import Bools, Ints, freeze
+from kerfpath._arrays import Array, Bools, Ints, floats, freeze, scalar
+from kerfpath.errors import InputError, NoFeasiblePath
 from kerfpath.kernels.search import Layers, Objective
-from kerfpath.search._exact import Best, best_path, dead_end, layers_reached
+from kerfpath.search._exact import (
+    NO_SEAM,
+    Best,
+    best_allowed,
+    best_path,
+    dead_end,
+    layers_reached,
+)
 from kerfpath.search._layers import backwards, broken_edge, empty_layer, sorted_layers
+from kerfpath.search._long_enough import Lengths, Spans, all_reaches, cheapest, fewest
 from kerfpath.search._problem import Metric, ObjectiveKind, Problem, checked
 
 __all__ = ["InterruptedPath", "Piece", "interrupted_path"]
@@ -77,6 +87,8 @@ def interrupted_path(
     objective: ObjectiveKind = "sum",
     eta_v: float = 1.0,
     eta_a: float = 1.0,
+    s: ArrayLike | None = None,
+    least_piece: float | None = None,
 ) -> InterruptedPath:
     """Return the cheapest of the plans with the fewest interruptions, exactly.
 
@@ -91,12 +103,18 @@ def interrupted_path(
     q, start, dt, velocity, acceleration, endless, vertex_cost, shut, weights, metric, objective, \
 eta_v, eta_a
         As in `shortest_path`.
+    s : (K,) m, optional
+        How far along the cut each node is, increasing; what `least_piece` is measured on.
+    least_piece : float m, optional
+        Where the cut is interrupted every piece is at least as long. The number of interruptions is
+        the least with which that can be, and of all such plans the cost is the least.
 
     Raises
     ------
     NoFeasiblePath
         No number of interruptions helps: a layer is empty, or no edge between two neighbouring
-        layers is open and keeps (5). `node` is the last one before.
+        layers is open and keeps (5). `node` is the last one before. Or no division has only pieces
+        of the least length; `node` is then where the first one breaks at the latest.
     InputError
         As `shortest_path`.
     """
@@ -115,13 +133,65 @@ eta_v, eta_a
         eta_v=eta_v,
         eta_a=eta_a,
     )
+    if least_piece is not None:
+        least_piece = scalar(least_piece, "least_piece", unit="m", above=0.0)
+        s = _increasing(s, len(problem.start) - 1)
     layers, aim, _ = sorted_layers(problem)
     last = _reach(problem, layers, aim)
+    if least_piece is not None and len(last) > 1:
+        return _long_enough(layers, aim, last, np.asarray(s), least_piece)
     first = np.zeros(1, np.int64) if len(last) == 1 else _first(problem)
     layers, aim, nodes = _in_stages(layers, aim, first, last)
     found = best_path(layers, aim)
     assert isinstance(found, Best), "a plan with this number of interruptions has been found"
     return InterruptedPath(pieces=_pieces(layers, nodes, found.path), cost=found.cost, optimal=True)
+
+
+def _increasing(s: ArrayLike | None, K: int) -> Array:
+    if s is None:
+        raise InputError("s: expected where each node is, which least_piece needs, got nothing")
+    s = floats(s, "s", (K,))
+    if not (np.diff(s) > 0).all():
+        raise InputError(
+            "s: expected nodes farther and farther along the cut, got some that are not"
+        )
+    return s
+
+
+def _long_enough(
+    layers: Layers, aim: Objective, last: Ints, s: Array, least_piece: float
+) -> InterruptedPath:
+    """Return the cheapest plan of the fewest pieces that are all long enough.
+
+    `last` is how far the greedy reach comes with each interruption.
+    """
+    K, apart = len(s), Lengths.of(s, least_piece)
+
+    def reach(k: int) -> int:
+        return k + layers_reached(layers._replace(start=layers.start[k:]), aim) - 1
+
+    reached = all_reaches(reach, K)
+    spans = fewest(reached, apart)
+    if spans is None:
+        raise NoFeasiblePath(
+            f"no division into pieces of {least_piece:g} m or more keeps the limits; "
+            f"{len(last) - 1} interruptions do where pieces may be shorter",
+            proved=True,
+            node=int(last[0]),
+        )
+
+    def solve(spans: Spans) -> tuple[tuple[float, float], Ints, InterruptedPath] | None:
+        staged, asked, nodes = _in_stages(layers, aim, spans.low[:-1], spans.high[1:])
+        every = np.ones(len(staged.low), np.bool_)
+        best = best_allowed(staged, asked, every, NO_SEAM, 0.0)
+        if best is None:
+            return None
+        pieces = _pieces(staged, nodes, best.path)
+        begun = np.array([*(piece.first for piece in pieces), K - 1])
+        cut = InterruptedPath(pieces=pieces, cost=best.cost, optimal=True)
+        return (best.cost, best.total), begun, cut
+
+    return cheapest(spans, reached, apart, solve)
 
 
 def _reach(problem: Problem, layers: Layers, aim: Objective) -> Ints:

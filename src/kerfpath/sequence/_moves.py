@@ -28,8 +28,10 @@ class Moves:
         cell: Cell | None,
         retract: float,
         seconds: float,
+        air_speed: float = 1.0,
     ) -> None:
         self._robot, self._plans, self._cell, self._seconds = plans[0].robot, plans, cell, seconds
+        self._air_speed = air_speed
         self._eta_v, self._eta_a = plans[0].settings.eta_v, plans[0].settings.eta_a
         self._starts = np.array([backed_off(p, "start", retract) for p in plans])
         self._ends = np.array([backed_off(p, "end", retract) for p in plans])
@@ -102,10 +104,11 @@ class Moves:
         return list(pairwise(around))
 
     def _planned(self, one: Array, two: Array) -> AirMove:
-        return air_move(
+        move = air_move(
             self._robot, one, one + self._wrapped(two - one), cell=self._cell,
             eta_v=self._eta_v, eta_a=self._eta_a, seconds=self._seconds,
         )  # fmt: skip
+        return replace(move, time=freeze(move.time / self._air_speed))
 
     def _wrapped(self, dq: Array) -> Array:
         short = dq - 2 * np.pi * np.round(dq / (2 * np.pi))
@@ -114,7 +117,8 @@ class Moves:
     def _least(self, one: Array, two: Array) -> Array:
         velocity, acceleration = self._robot.speed_limits()
         dq = self._wrapped(two - one)
-        return least_time(dq, self._eta_v * velocity, self._eta_a * acceleration)
+        least = least_time(dq, self._eta_v * velocity, self._eta_a * acceleration)
+        return np.asarray(least / self._air_speed)
 
     def _shifted(self, candidate: int, shift: Array) -> Plan:
         made, turns = self._plans[candidate], np.round(shift / (2 * np.pi)).astype(np.int64)

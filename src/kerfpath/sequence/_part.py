@@ -93,6 +93,7 @@ def plan_part(
     given_order: bool = False,
     retract: float = 0.05,
     approach_speed: float = 0.1,
+    air_speed: float = 1.0,
     pierce_time: float = 0.0,
     seconds: float = 10.0,
     progress: Callable[[int], None] | None = None,
@@ -109,7 +110,8 @@ def plan_part(
     robot, tool, placement, cell, **options
         As in `kerfpath.plan`, for every contour.
     speed : float m/s, or one for each contour
-    home, before, heat_spacing, given_order, retract, approach_speed, pierce_time, seconds
+    home, before, heat_spacing, given_order, retract, approach_speed, air_speed, pierce_time,
+    seconds
         As in `order_plans`.
     progress : callable, optional
         Called with the number of candidates planned since the last call.
@@ -153,6 +155,7 @@ def plan_part(
         given_order=given_order,
         retract=retract,
         approach_speed=approach_speed,
+        air_speed=air_speed,
         pierce_time=pierce_time,
         seconds=seconds,
     )
@@ -168,6 +171,7 @@ def order_plans(
     given_order: bool = False,
     retract: float = 0.05,
     approach_speed: float = 0.1,
+    air_speed: float = 1.0,
     pierce_time: float = 0.0,
     seconds: float = 10.0,
 ) -> PartPlan:
@@ -193,6 +197,8 @@ def order_plans(
         Keep the order of `candidates`; `before` must agree with it.
     retract, approach_speed : float m, m/s
         How far and how fast the tool backs off along its axis.
+    air_speed : float
+        Share of the full speed of the moves between contours: they take their least time by it.
     pierce_time : float s
     seconds : float s
         How long the solver of the order, and each search for a way around, may take.
@@ -208,12 +214,13 @@ def order_plans(
     approach_speed = scalar(approach_speed, "approach_speed", unit="m/s", above=0.0)
     heat_spacing = scalar(heat_spacing, "heat_spacing", unit="m", above=-1e-300)
     pierce_time = scalar(pierce_time, "pierce_time", unit="s", above=-1e-300)
+    air_speed = scalar(air_speed, "air_speed", above=0.0)
     places = _reachable(candidates, cell, retract)
     plans = [candidates[i][c] for i, c in places]
     group = np.array([i for i, _ in places])
     if given_order:
         before = [*before, *((i, i + 1) for i in range(len(candidates) - 1))]
-    air = Moves(plans, group, cell, retract, seconds)
+    air = Moves(plans, group, cell, retract, seconds, air_speed)
     air.forbid(_too_warm([c[0].contour for c in candidates], heat_spacing)[np.ix_(group, group)])
     if home is not None:
         air.home = floats(home, "home", (plans[0].robot.joints,))

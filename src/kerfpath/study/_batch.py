@@ -24,7 +24,7 @@ from kerfpath.job import (
     run_job,
     stale_program,
 )
-from kerfpath.post import write_files
+from kerfpath.post import replace_program
 from kerfpath.report import with_library, without_library
 from kerfpath.study._job import digest, loaded
 from kerfpath.sweep import Progress, Result, Sweep
@@ -222,9 +222,10 @@ def _written(job: Path, folder: Path, options: ProgramOptions, result: Result) -
         return Planned(job=job, folder=folder, passed=False, reason=reason, seconds=result.seconds)
     told = dict(result.value)
     files, program = _unpacked(told.pop("files")), told.pop("program")
-    write_files(folder, {n: text for n, text in files.items() if not _is(folder / n, text)})
+    replaced = replace_program(folder, files, program)
     notes = list(told.pop("notes"))
-    if stale := stale_program(options, folder, program):
+    notes += [f"{path.name} is from an earlier run and was removed" for path in replaced.removed]
+    if stale := next(iter(replaced.edited), stale_program(options, folder, program)):
         notes.append(f"{stale.name} is from an earlier run and does not belong to this plan")
     return Planned(
         job=job,
@@ -234,11 +235,3 @@ def _written(job: Path, folder: Path, options: ProgramOptions, result: Result) -
         seconds=result.seconds,
         **told,
     )
-
-
-def _is(path: Path, text: str) -> bool:
-    """Return whether a file is there with this very text."""
-    try:
-        return path.read_bytes() == text.encode()
-    except OSError:
-        return False

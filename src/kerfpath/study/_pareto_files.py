@@ -131,7 +131,8 @@ def _page(studied: Studied, folder: Path) -> str:
 
 def _notes(studied: Studied) -> list[str]:
     notes = [
-        "Every plan is the proved optimum of its run on the grid of gamma, and is not refined; "
+        "Every plan is the proved optimum of its run on the grid of the rotation, and is not "
+        "refined: off the grid others may be better or faster; "
         "the set is a sample of the front."
     ]
     if studied.others:

@@ -11,6 +11,7 @@ from typing import Any
 from kerfpath import __version__
 from kerfpath.errors import InputError
 from kerfpath.job import read_job
+from kerfpath.planner import FINER
 from kerfpath.post import write_files
 from kerfpath.report import render_table
 from kerfpath.study._robots import ContourSpeed, RobotSpeed
@@ -36,7 +37,7 @@ ROBOT_COLUMNS = (
 ROBOT_WORDS = (0, 5, 6)
 ROBOT_NOTES = (
     "Margin: the fastest constant speed, exact on the job's grid, over the speed asked for, of the "
-    "contour where that is least; from 1 on the robot does the job as it asks.",
+    f"contour where that is least; from 1 on the robot does the job as it asks; {FINER}.",
     "Robot base, head and part stay where the job has them. The payload is told, not checked: no "
     "job says what its head weighs.",
 )

@@ -3,9 +3,11 @@
 OWNER		= MNEDITOR;
 COMMENT		= "kerfpath";
 PROG_SIZE	= 0;
+CREATE		= DATE 00-01-01  TIME 00:00:00;
+MODIFIED	= DATE 00-01-01  TIME 00:00:00;
 FILE_NAME	= ;
 VERSION		= 0;
-LINE_COUNT	= 12;
+LINE_COUNT	= 14;
 MEMORY_SIZE	= 0;
 PROTECT		= READ_WRITE;
 TCD:  STACK_SIZE	= 0,
@@ -17,18 +19,20 @@ TCD:  STACK_SIZE	= 0,
 DEFAULT_GROUP	= 1,*,*,*,*;
 CONTROL_CODE	= 00000000 00000000;
 /MN
-   1:  ! skin/outer: 8 nodes, 155.7 mm, ;
-   2:  ! posture front/up/plus ;
-   3:J P[1] 25% FINE    ;
-   4:L P[2] 600cm/min FINE TB    .02sec,DO[1]=ON    ;
-   5:L P[3] 720cm/min CNT100    ;
-   6:L P[4] 720cm/min CNT100    ;
-   7:L P[5] 720cm/min CNT100    ;
-   8:L P[6] 720cm/min CNT100    ;
-   9:L P[7] 720cm/min CNT100    ;
-  10:L P[8] 720cm/min CNT100    ;
-  11:L P[9] 720cm/min FINE TB    .02sec,DO[1]=OFF    ;
-  12:L P[10] 600cm/min FINE    ;
+   1:  UFRAME_NUM=1 ;
+   2:  UTOOL_NUM=1 ;
+   3:  ! skin/outer: 8 nodes, 155.7 mm, ;
+   4:  ! posture front/up/plus ;
+   5:J P[1] 25% FINE    ;
+   6:L P[2] 600cm/min FINE TB    .02sec,DO[1]=ON    ;
+   7:L P[3] 720cm/min CNT100    ;
+   8:L P[4] 720cm/min CNT100    ;
+   9:L P[5] 720cm/min CNT100    ;
+  10:L P[6] 720cm/min CNT100    ;
+  11:L P[7] 720cm/min CNT100    ;
+  12:L P[8] 720cm/min CNT100    ;
+  13:L P[9] 720cm/min FINE TB    .02sec,DO[1]=OFF    ;
+  14:L P[10] 600cm/min FINE    ;
 /POS
 P[1]{
    GP1:

@@ -55,6 +55,7 @@ class PlanTable(Table):
     closure: Closure = "free"
     rotation_deg: Annotated[NotNegative | None, key("a number not below 0, in deg", "360")] = None
     interruptions: Literal["none", "fewest"] = "none"
+    least_piece_mm: Annotated[Positive | None, key("a number above 0, in mm", "20")] = None
     frames: FrameKind = "rotation-minimising"
     tilt_deg: Annotated[
         Annotated[Positive, Field(lt=90)] | None, key("a number above 0, below 90, in deg", "3")
@@ -86,6 +87,9 @@ class PlanTable(Table):
                 if (got := getattr(self, name)) != (plain := PLAIN[name]):
                     expected = f"{name} = {_toml(plain)}" if plain else f"no {name}"
                     raise fault(f"{expected} with {why}", _toml(got), "change one", (name,))
+        if self.least_piece_mm is not None and self.interruptions == "none":
+            expected = 'interruptions = "fewest" with least_piece_mm'
+            raise fault(expected, "none", "add it, or remove the length", ("least_piece_mm",))
         for name in given(self, "tilt_steps", "tilt_cost_per_deg"):
             if self.tilt_deg is None:
                 raise fault(f"tilt_deg with {name}", "none", "add tilt_deg", (name,))

@@ -8,9 +8,12 @@ from pydantic import ConfigDict, ValidationError, field_validator, model_validat
 
 from kerfpath.job._keys import Identifier, NotNegative, Positive, fault, key, nearest
 from kerfpath.job._tables._table import Table
-from kerfpath.post import Settings, languages
+from kerfpath.post import PARTNERS, Await, Handshake, Partner, Request, Settings, languages
 
 __all__ = ["AuditTable", "ProgramTable"]
+
+
+PARTNERS_SAID = f"a list of {', '.join(PARTNERS)}"
 
 
 class ProgramTable(Table):
@@ -31,8 +34,26 @@ class ProgramTable(Table):
     pierce_time_s: Annotated[NotNegative, key("a number from 0 to 60, in s", "0.3", le=60)] = 0.0
     approach_mm_s: Annotated[Positive, key("a number above 0, in mm/s", "100")] = 100.0
     air_speed: Annotated[
-        Positive, key("a number from 0.01 to 1, of the full speed", "0.25", ge=0.01, le=1)
-    ] = 0.25
+        Positive | None, key("a number from 0.01 to 1, of the full speed", "0.25", ge=0.01, le=1)
+    ] = None
+
+    request: Annotated[list[Partner] | None, key(PARTNERS_SAID, '["shutter"]')] = None
+    wait_for: Annotated[list[Partner] | None, key(PARTNERS_SAID, '["ready"]')] = None
+    wait_timeout_s: Annotated[Positive, key("a number from 0 to 600, in s", "5", le=600)] = 5.0
+
+    @field_validator("request", "wait_for")
+    @classmethod
+    def _is_said_once(cls, partners: list[Partner] | None) -> list[Partner] | None:
+        if partners and len(set(partners)) < len(partners):
+            raise fault("each partner once", repr(partners), "leave the second out")
+        return partners
+
+    def handshakes(self) -> tuple[Handshake, ...]:
+        """Return what is done before each contour."""
+        requests = (Request(partner=partner, on=True) for partner in self.request or ())
+        timeout = self.wait_timeout_s
+        waits = (Await(partner=partner, timeout=timeout) for partner in self.wait_for or ())
+        return *requests, *waits
 
     @field_validator("language")
     @classmethod

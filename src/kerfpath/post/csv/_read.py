@@ -94,7 +94,7 @@ class _Reader:
                 speed=self.numbers([share])[0] / 100
                 if kind == "joint"
                 else self.numbers([speed])[0] * 1e-3,
-                duration=None if kind == "joint" else took,
+                duration=took,
                 zone=self.numbers([zone])[0] * 1e-3,
                 q=q,
                 T_part_tip=T_part_tip,

@@ -37,7 +37,7 @@ class CsvSettings(Settings):
 
 def rules(settings: CsvSettings) -> Rules:
     """Return what programs must keep to: the digits of the table."""
-    return Rules(slowest=1e-6, speed_step=1e-6)
+    return Rules(slowest=1e-6, speed_step=1e-6, point_step=0.5e-10, angle_step=1e-11)
 
 
 def is_reserved(name: str) -> bool:

@@ -8,6 +8,7 @@ from kerfpath.post.fanuc._check import check
 from kerfpath.post.fanuc._read import read
 from kerfpath.post.fanuc._settings import FanucSettings as FanucSettings
 from kerfpath.post.fanuc._settings import is_reserved, rules
+from kerfpath.post.fanuc._switching import sayable
 from kerfpath.post.fanuc._write import Fanuc as Fanuc
 
 FANUC = Language(
@@ -22,6 +23,7 @@ FANUC = Language(
     is_reserved=is_reserved,
     posture=posture,
     check=check,
+    sayable=sayable,
     assumed={"laser_output": 1},
     read=read,
 )

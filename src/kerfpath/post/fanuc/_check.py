@@ -6,11 +6,22 @@ from collections.abc import Iterator
 
 import numpy as np
 
+from kerfpath.post._divide import long_contours
 from kerfpath.post._issue import ProgramIssue
-from kerfpath.post._program import JointMove, LinearMove, Move, Program, Section, Wait
+from kerfpath.post._program import (
+    Await,
+    JointMove,
+    LinearMove,
+    Move,
+    Program,
+    Section,
+    Switch,
+    Wait,
+)
 from kerfpath.post.fanuc._axes import posture, turns
 from kerfpath.post.fanuc._settings import FanucSettings, unit
-from kerfpath.post.fanuc._write import Fanuc, divide_switches
+from kerfpath.post.fanuc._switching import switching
+from kerfpath.post.fanuc._write import Fanuc
 
 __all__ = ["check"]
 
@@ -35,7 +46,9 @@ def check(program: Program, settings: FanucSettings) -> Iterator[ProgramIssue]:
     if settings.laser_output is not None and settings.laser_output == settings.gas_output:
         said = f"laser and gas are both switched by DO[{settings.laser_output}]; name two outputs"
         yield ProgramIssue("error", "output", said, "program")
-    lines, most = len(Fanuc(program, settings).main()), settings.lines_per_file
+    written, most = Fanuc(program, settings), settings.lines_per_file
+    yield from long_contours(written.lengths(), most, "error")
+    lines = len(written.main())
     if lines > most:
         said = (
             f"the main program would have {lines} lines, {most} are allowed; raise lines_per_file"
@@ -52,28 +65,39 @@ def check(program: Program, settings: FanucSettings) -> Iterator[ProgramIssue]:
 
 
 def _times(section: Section) -> Iterator[ProgramIssue]:
-    doubled = 0
+    stands = False
     for number, step in enumerate(section.steps):
+        place = f"{section.name}, step {number}"
         times = [step.time] if isinstance(step, Wait) else []
+        times += [step.timeout] if isinstance(step, Await) else []
         if isinstance(step, LinearMove):
-            times = [switch.lead_time for switch in step.switches]
-            doubled += len(divide_switches(step)[0]) > 1
+            before, timed, _ = switching(step)
+            times = [switch.lead_time for switch in timed]
+            if before:
+                yield from _early(before, stands, place)
         for time in times:
             if abs(time - TICK * round(time / TICK)) > TICK_NOISE:
-                yield ProgramIssue(
-                    "error",
-                    "time-step",
-                    f"times are written in whole {TICK * 1e3:g} ms, got {time * 1e3:g} ms",
-                    f"{section.name}, step {number}",
-                )
-    if doubled:
-        yield ProgramIssue(
-            "warning",
-            "two-switches",
-            f"{doubled} moves switch two outputs ahead of their end (two TB in one line), which "
-            "not every controller may load",
-            section.name,
+                said = f"times are written in whole {TICK * 1e3:g} ms, got {time * 1e3:g} ms"
+                yield ProgramIssue("error", "time-step", said, place)
+        if isinstance(step, JointMove | LinearMove):
+            stands = step.zone == 0
+
+
+def _early(before: tuple[Switch, ...], stands: bool, place: str) -> Iterator[ProgramIssue]:
+    """Tell of what is switched before a motion, as one TB on its line switches something else."""
+    signals = " and ".join(switch.signal for switch in before)
+    if not stands or any(switch.signal == "laser" for switch in before):
+        said = (
+            f"the {signals} cannot be switched here: one TB stands on the line of a motion, and "
+            "before it the robot does not stand, or the laser would be on"
         )
+        yield ProgramIssue("error", "two-switches", said, place)
+    else:
+        said = (
+            f"the {signals} is switched as the motion begins, earlier than planned: one TB stands "
+            "on the line of a motion"
+        )
+        yield ProgramIssue("warning", "two-switches", said, place)
 
 
 def _corners(section: Section) -> Iterator[ProgramIssue]:

@@ -6,7 +6,8 @@ Attributes that controllers add when they list a program again are let pass.
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -15,18 +16,22 @@ from scipy.spatial.transform import Rotation
 from kerfpath._arrays import Array, freeze
 from kerfpath.errors import InputError
 from kerfpath.post._frames import faceplate, world
-from kerfpath.post._program import Signal, Switch
+from kerfpath.post._program import Await, Handshake, Request, Signal, Switch
 from kerfpath.post._read import (
+    ReadHandshake,
     ReadMove,
     ReadProgram,
     ReadSection,
     ReadStep,
     ReadWait,
+    partner_of,
     patterns,
     same_output,
 )
 from kerfpath.post.fanuc._axes import joints_from_axes
 from kerfpath.post.fanuc._settings import UNITS, FanucSettings
+from kerfpath.post.fanuc._switching import time_before
+from kerfpath.post.fanuc._write import aborting, off_name, selection, switched_off, watching
 from kerfpath.robots import Robot
 
 __all__ = ["read"]
@@ -35,16 +40,43 @@ __all__ = ["read"]
 def read(main: str, files: Mapping[str, str], robot: Robot, settings: FanucSettings) -> ReadProgram:
     """Return the program that listings of ours say; see `kerfpath.post.Reader`."""
     top = _Main(main, files[main], robot, settings)
+    tool = faceplate(robot) @ top.frame("UTOOL")
+    part = world(robot) @ top.frame("UFRAME")
+    off = off_name(top.name, settings)
+    _Watching(f"{off}.ls", files[f"{off}.ls"], robot, settings)
     sections = []
     for name in top.calls:
         listing = _Section(f"{name}.ls", files[f"{name}.ls"], robot, settings)
-        sections.append(ReadSection(name=listing.name, steps=listing.steps()))
-    return ReadProgram(
-        name=top.name,
-        sections=tuple(sections),
-        T_flange_tip=faceplate(robot) @ top.frame("UTOOL"),
-        T_base_part=world(robot) @ top.frame("UFRAME"),
-    )
+        steps = _timed(listing.steps(), listing.early, robot, part, tool)
+        sections.append(ReadSection(name=listing.name, steps=steps))
+    return ReadProgram(name=top.name, sections=tuple(sections), T_flange_tip=tool, T_base_part=part)
+
+
+def _timed(
+    steps: Sequence[ReadStep], early: Mapping[int, tuple[Switch, ...]], robot: Robot,
+    part: Array, tool: Array,
+) -> tuple[ReadStep, ...]:  # fmt: skip
+    """Return the steps with what is switched before a motion ahead of its end, by its line."""
+    found: list[ReadStep] = []
+    start: Array | None = None
+    for step in steps:
+        if not isinstance(step, ReadMove):
+            found.append(step)
+            continue
+        end = step.T_part_tip
+        if (before := early.get(step.line)) is not None:
+            assert start is not None
+            assert end is not None
+            if not step.speed:
+                raise InputError(f"{step.place}: the motion has no speed")
+            lead = time_before(start, end, step.speed)
+            moved = tuple(replace(switch, lead_time=lead) for switch in before)
+            step = replace(step, switches=(*moved, *step.switches))
+        found.append(step)
+        start = end
+        if step.q is not None:
+            start = np.asarray(np.linalg.solve(part, robot.forward(step.q) @ tool))
+    return tuple(found)
 
 
 _NUMBER = r"(-?\d*\.\d+)"
@@ -52,7 +84,7 @@ _END = r"(\d+)(cm/min|mm/sec) (?:(FINE)|CNT(\d+)|CR(\d+))"
 _TB = r"((?: TB +\d*\.\d\dsec,DO\[\d+\]=O(?:N|FF))*)"
 _ATTRIBUTE = re.compile(
     r"(?:(?:OWNER|COMMENT|PROG_SIZE|CREATE|MODIFIED|FILE_NAME|VERSION|MEMORY_SIZE|PROTECT|"
-    r"CONTROL_CODE|LOCAL_REGISTERS)\s*=[^;]*;|DEFAULT_GROUP\s*= 1(?:,\*){4,7};|"
+    r"CONTROL_CODE|LOCAL_REGISTERS)\s*=[^;]*;|DEFAULT_GROUP\s*= [1*](?:,\*){4,7};|"
     r"(?:TCD:)?\s+[A-Z_]+\s*= \d+[,;])"
 )
 _COUNT = re.compile(r"LINE_COUNT\s*= (\d+);")
@@ -64,18 +96,21 @@ _MAIN = patterns(
         "told": rf"  !(UFRAME|UTOOL) (\d+) ([XYZWPR]) {_NUMBER}",
         "remark": r"  !.*",
         "select": r"  (UFRAME|UTOOL)_NUM=(\d+)",
-        "reset": r"  DO\[(\d+)\]=OFF",
+        "reset": r"  (DO\[\d+\]=OFF)",
         "call": r"  CALL ([A-Z][A-Z0-9_]*)",
     }
 )
 _SECTION = patterns(
     {
         "linear": rf"L P\[(\d+)\] {_END}{_TB}",
-        "joint": r"J P\[(\d+)\] (\d+)% (?:(FINE)|CNT\d+)",
+        "joint": r"J P\[(\d+)\] (\d+)% (?:(FINE)|CNT(\d+))",
         "circular": rf"C P\[(\d+)\] *:  P\[(\d+)\] {_END}{_TB}",
         "remark": r"  !.*",
         "wait": r"  WAIT +(\d*\.\d\d)\(sec\)",
         "switch": r"  DO\[(\d+)\]=(ON|OFF)",
+        "timeout": r"  \$WAITTMOUT=(\d+)",
+        "answer": r"  WAIT DI\[(\d+)\]=ON TIMEOUT,LBL\[1\]",
+        "aborting": r"  END",
     }
 )
 _POSITION = re.compile(
@@ -98,6 +133,7 @@ class _Listing:
         self.rows = [row.rstrip() for row in text.splitlines()]
         self.line = 0
         self.name = ""
+        self.must_say: list[str] = []
 
     def take(self) -> str:
         """Return the next row."""
@@ -128,6 +164,11 @@ class _Listing:
             match = _NUMBERED.fullmatch(row)
             if not match or int(match[1]) != number:
                 raise self.fault(f"expected line number {number}, got {self.shown()}")
+            if self.must_say:
+                if match[2] != self.must_say[0]:
+                    raise self.fault(f"expected {self.must_say[0]!r}, got {self.shown()}")
+                del self.must_say[0]
+                continue
             for kind, pattern in kinds.items():
                 if said := pattern.fullmatch(match[2]):
                     getattr(self, kind)(*said.groups())
@@ -137,8 +178,14 @@ class _Listing:
         if counted != number:
             raise self.fault(f"LINE_COUNT is {counted}, but there are {number} lines")
 
+    def say(self, lines: Sequence[str]) -> None:
+        """Require that these lines come next."""
+        self.must_say = [line.removesuffix(" ;").rstrip() for line in lines]
+
     def end(self) -> None:
         """Read the end."""
+        if self.must_say:
+            raise self.fault(f"{self.must_say[0]!r} is missing")
         if self.take() != "/END" or any(self.rows[self.line :]):
             raise self.fault(f"expected /END and nothing after it, got {self.shown()}")
 
@@ -164,7 +211,11 @@ class _Listing:
         return repr(self.rows[self.line - 1][:60])
 
     def fault(self, message: str) -> InputError:
-        return InputError(f"{self.file}, line {self.line}: {message}")
+        return InputError(f"{self.place}: {message}")
+
+    @property
+    def place(self) -> str:
+        return f"{self.file}, line {self.line}"
 
 
 class _Main(_Listing):
@@ -175,8 +226,11 @@ class _Main(_Listing):
         self.values: dict[tuple[str, str], float] = {}
         self.selected: dict[str, str] = {}
         self.calls: list[str] = []
+        self.resets: list[str] = []
         self.body(_MAIN)
         self.end()
+        if self.resets != [line.strip(" ;") for line in switched_off(settings)]:
+            raise self.fault("expected every output that is named to be reset once")
         for kind in ("UFRAME", "UTOOL"):
             if kind not in self.selected:
                 raise self.fault(f"{kind}_NUM is not set")
@@ -197,7 +251,7 @@ class _Main(_Listing):
         self.selected[kind] = number
 
     def reset(self, output: str) -> None:
-        self.signal(output)
+        self.resets.append(output)
         if self.calls:
             raise self.fault("outputs must be reset before the first CALL")
 
@@ -215,26 +269,68 @@ class _Main(_Listing):
         return freeze(_poses(values)[0])
 
 
+class _Watching(_Listing):
+    """The program that the background logic runs: exactly what switches off."""
+
+    def __init__(self, file: str, text: str, robot: Robot, settings: FanucSettings) -> None:
+        super().__init__(file, text, robot, settings)
+        self.say(watching(settings))
+        self.body({})
+        self.end()
+
+
 class _Section(_Listing):
     """A program that is called: motions, waits and switches, and then their positions."""
 
     def __init__(self, file: str, text: str, robot: Robot, settings: FanucSettings) -> None:
         super().__init__(file, text, robot, settings)
-        self.read_steps: list[ReadWait | dict[str, Any]] = []
+        self.read_steps: list[ReadWait | ReadHandshake | dict[str, Any]] = []
         self.targets: dict[int, tuple[str | None, ...]] = {}
+        self.said_at: dict[int, str] = {}
+        self.early: dict[int, tuple[Switch, ...]] = {}
+        self.pending: tuple[Switch, ...] = ()
+        self.timeout_s: float | None = None
+        self.says_abort = False
+        self.say(selection(settings))
         self.body(_SECTION)
+        if self.pending or self.timeout_s is not None:
+            raise self.fault("expected a motion, or the wait of a timeout, before the end")
+        awaited = any(
+            isinstance(step, ReadHandshake) and isinstance(step.what, Await)
+            for step in self.read_steps
+        )
+        if self.says_abort != awaited:
+            raise self.fault("a program that waits for inputs must say what it does without them")
         self.positions()
         self.end()
 
-    def joint(self, target: str, per_cent: str, fine: str | None) -> None:
-        zone = 0.0 if fine else None
-        self.motion("joint", [target], int(per_cent) / 100, zone, "")
+    def joint(self, target: str, per_cent: str, fine: str | None, cnt: str | None) -> None:
+        self.motion("joint", [target], int(per_cent) / 100, self.zone(fine, cnt, None), "")
 
     def linear(self, target: str, *end: Any) -> None:
-        self.motion("linear", [target], *_path_end(*end))
+        self.motion("linear", [target], *self.path_end(*end))
 
     def circular(self, via: str, target: str, *end: Any) -> None:
-        self.motion("circular", [target, via], *_path_end(*end))
+        self.motion("circular", [target, via], *self.path_end(*end))
+
+    def path_end(
+        self, speed: str, unit: str, fine: str | None, cnt: str | None, corner: str | None,
+        before: str,
+    ) -> tuple[float, float | None, str]:  # fmt: skip
+        """Return speed (m/s), zone and what is switched, of the end of a line."""
+        if corner is not None and self.settings.corner != "CR":
+            raise self.fault(f"expected CNT{self.settings.cnt_percent} or FINE, got CR{corner}")
+        if cnt is not None and self.settings.corner != "CNT":
+            raise self.fault(f"expected CR or FINE, got CNT{cnt}")
+        return int(speed) * UNITS[unit], self.zone(fine, cnt, corner), before
+
+    def zone(self, fine: str | None, cnt: str | None, corner: str | None) -> float | None:
+        """Return the zone (m) at the end of a motion, None for CNT."""
+        if cnt is not None and int(cnt) != self.settings.cnt_percent:
+            raise self.fault(f"expected CNT{self.settings.cnt_percent}, got CNT{cnt}")
+        if fine:
+            return 0.0
+        return None if corner is None else int(corner) * 1e-3
 
     def motion(
         self, kind: str, targets: list[str], speed: float, zone: float | None, before: str
@@ -243,6 +339,10 @@ class _Section(_Listing):
             Switch(signal=self.signal(output), on=value == "ON", lead_time=float(lead))
             for lead, output, value in _SWITCH.findall(before)
         )
+        if self.pending and (kind == "joint" or not self.read_steps):
+            raise self.fault("an output must not be switched before this motion")
+        if self.pending:
+            self.early[self.line], self.pending = self.pending, ()
         self.read_steps.append(
             {
                 "kind": kind,
@@ -251,6 +351,7 @@ class _Section(_Listing):
                 "speed": speed,
                 "zone": zone,
                 "switches": switches,
+                "elsewhere": {},
             }
         )
 
@@ -258,10 +359,39 @@ class _Section(_Listing):
         self.read_steps.append(ReadWait(time=float(time), file=self.file, line=self.line))
 
     def switch(self, output: str, value: str) -> None:
+        signals = (self.settings.laser_output, self.settings.gas_output)
+        if int(output) not in signals:
+            partner = partner_of(int(output), "output", self.settings, self.place)
+            self.handshake(Request(partner=partner, on=value == "ON"))
+            return
         move = self.read_steps[-1] if self.read_steps else None
+        stands = [s for s in self.read_steps if isinstance(s, dict)][-1:]
+        if stands and stands[0]["kind"] == "joint" and stands[0]["zone"] == 0:
+            self.pending += (Switch(signal=self.signal(output), on=value == "ON"),)
+            return
         if not isinstance(move, dict) or move["zone"] != 0 or move["kind"] == "joint":
             raise self.fault("an output may only be switched here after a path motion with FINE")
         move["switches"] += (Switch(signal=self.signal(output), on=value == "ON"),)
+        move["elsewhere"]["switches"] = self.place
+
+    def timeout(self, hundredths: str) -> None:
+        if self.timeout_s is not None:
+            raise self.fault("a timeout must be followed by its wait")
+        self.timeout_s = int(hundredths) / 100
+
+    def answer(self, number: str) -> None:
+        if self.timeout_s is None:
+            raise self.fault("expected $WAITTMOUT before the wait")
+        partner = partner_of(int(number), "input", self.settings, self.place)
+        self.handshake(Await(partner=partner, timeout=self.timeout_s))
+        self.timeout_s = None
+
+    def aborting(self) -> None:
+        self.says_abort = True
+        self.say(aborting(self.settings)[1:])
+
+    def handshake(self, what: Handshake) -> None:
+        self.read_steps.append(ReadHandshake(what=what, file=self.file, line=self.line))
 
     def positions(self) -> None:
         """Read the positions, each a block of rows."""
@@ -273,6 +403,7 @@ class _Section(_Listing):
             if not match:
                 raise self.fault("no position of ours begins after this line")
             number, user, tool, *said = match.groups()
+            self.said_at[int(number)] = f"{self.file}, line {self.line + 1}"
             self.line += match[0].count("\n")
             self.frames(user, tool)
             if int(number) in self.targets:
@@ -291,7 +422,7 @@ class _Section(_Listing):
         steps: list[ReadStep] = []
         used: set[int] = set()
         for step in self.read_steps:
-            if isinstance(step, ReadWait):
+            if not isinstance(step, dict):
                 steps.append(step)
                 continue
             self.line = step["line"]
@@ -304,6 +435,7 @@ class _Section(_Listing):
             if wrong:
                 form = "J1 to J6" if step["kind"] == "joint" else "X to R"
                 raise self.fault(f"P[{wrong[0]}] must be given by {form}")
+            step["elsewhere"]["target"] = self.said_at[targets[0]]
             if step["kind"] == "joint":
                 step["q"] = q[at]
             else:
@@ -315,14 +447,6 @@ class _Section(_Listing):
             self.line = len(self.rows)
             raise self.fault(f"P[{unused[0]}] is used by no motion")
         return tuple(steps)
-
-
-def _path_end(
-    speed: str, unit: str, fine: str | None, cnt: str | None, corner: str | None, before: str
-) -> tuple[float, float | None, str]:
-    """Return speed (m/s), zone (m, None for CNT) and what is switched, of the end of a line."""
-    zone = None if corner is None else int(corner) * 1e-3
-    return int(speed) * UNITS[unit], 0.0 if fine else zone, before
 
 
 def _six(words: tuple[str | None, ...]) -> list[float]:

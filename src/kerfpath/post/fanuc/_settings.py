@@ -6,6 +6,7 @@ import re
 from typing import Annotated, Literal
 
 import numpy as np
+from pydantic import StringConstraints
 
 from kerfpath.post._settings import Rules, Settings, setting
 
@@ -29,6 +30,11 @@ Output = Annotated[
 ]
 
 
+Input = Annotated[
+    int | None, setting("the number of a digital input, 1 to 4096", "5", ge=1, le=4096)
+]
+
+
 class FanucSettings(Settings):
     """Frames, outputs and options of the controller."""
 
@@ -37,6 +43,18 @@ class FanucSettings(Settings):
     ] = 9999
     laser_output: Output = None
     gas_output: Output = None
+    ready_input: Input = None
+    shutter_input: Input = None
+    gas_pressure_input: Input = None
+    height_input: Input = None
+    interlock_input: Input = None
+    ready_output: Output = None
+    shutter_output: Output = None
+    height_output: Output = None
+    date: Annotated[
+        Annotated[str, StringConstraints(pattern=r"^\d\d-\d\d-\d\d \d\d:\d\d:\d\d$")],
+        setting("a date as YY-MM-DD hh:mm:ss", '"26-11-21 10:00:00"'),
+    ] = "00-01-01 00:00:00"
     user_frame: Annotated[int, setting("a user frame, 1 to 61", "2", ge=1, le=61)] = 1
     tool_frame: Annotated[int, setting("a tool frame, 1 to 29", "2", ge=1, le=29)] = 1
     longest_name: Annotated[

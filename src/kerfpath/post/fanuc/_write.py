@@ -19,25 +19,26 @@ from itertools import count
 import numpy as np
 
 from kerfpath._arrays import Array
-from kerfpath.post._divide import divided
 from kerfpath.post._formatter import Formatter, number, plain
 from kerfpath.post._frames import faceplate, world, xyzwpr
 from kerfpath.post._names import identifiers
 from kerfpath.post._program import (
+    Await,
     CircularMove,
-    Comment,
     JointMove,
     LinearMove,
     Program,
+    Request,
     Section,
-    Signal,
     Switch,
     Wait,
 )
+from kerfpath.post._settings import handshakes
 from kerfpath.post.fanuc._axes import axes_from_joints, posture
 from kerfpath.post.fanuc._settings import FanucSettings, unit
+from kerfpath.post.fanuc._switching import switching
 
-__all__ = ["Fanuc", "divide_switches"]
+__all__ = ["Fanuc", "aborting", "off_name", "selection", "switched_off", "watching"]
 
 NEW_LINE = "\r\n"
 PADDING = "    "
@@ -45,8 +46,10 @@ REMARK = 32
 """Characters of a remark that every controller keeps."""
 MOST_REMARKS = 3
 """Lines that a comment is cut to."""
-MOST_LINES = 3
-"""Lines of a step: those of a comment, or a motion and what is switched after it."""
+NO_ANSWER = 1
+"""The label to which a wait for an input jumps when nobody answers."""
+OFF = "_OFF"
+"""End of the name of the program that the background logic runs."""
 FRAME_DECIMALS = (4, 6)
 """Decimals of mm and of deg with which a person is told the frames."""
 JOINT_WORDS = tuple((f"J{k}=", "deg") for k in range(1, 7))
@@ -55,6 +58,8 @@ ATTRIBUTES = """/ATTR
 OWNER\t\t= MNEDITOR;
 COMMENT\t\t= "kerfpath";
 PROG_SIZE\t= 0;
+CREATE\t\t= DATE {day}  TIME {time};
+MODIFIED\t= DATE {day}  TIME {time};
 FILE_NAME\t= ;
 VERSION\t\t= 0;
 LINE_COUNT\t= {count};
@@ -66,10 +71,43 @@ TCD:  STACK_SIZE\t= 0,
       BUSY_LAMP_OFF\t= 0,
       ABORT_REQUEST\t= 0,
       PAUSE_REQUEST\t= 0;
-DEFAULT_GROUP\t= 1,*,*,*,*;
+DEFAULT_GROUP\t= {group},*,*,*,*;
 CONTROL_CODE\t= 00000000 00000000;
 """
-"""Controllers count sizes and dates themselves."""
+"""Controllers count sizes themselves; the date is that of the settings, so that bytes repeat."""
+
+
+def selection(settings: FanucSettings) -> list[str]:
+    """Return the lines that select the frames; each program has them, to be started alone."""
+    return [f"  UFRAME_NUM={settings.user_frame} ;", f"  UTOOL_NUM={settings.tool_frame} ;"]
+
+
+def outputs(settings: FanucSettings) -> list[int]:
+    """Return all outputs that the settings name."""
+    requests = (n for (_, way), n in handshakes(settings).items() if way == "output")
+    named = (settings.laser_output, settings.gas_output, *requests)
+    return [output for output in named if output is not None]
+
+
+def switched_off(settings: FanucSettings) -> list[str]:
+    """Return the lines that switch everything off."""
+    return [f"  DO[{output}]=OFF ;" for output in outputs(settings)]
+
+
+def aborting(settings: FanucSettings) -> list[str]:
+    """Return the last lines of a program that waits for inputs: what is done without an answer."""
+    return ["  END ;", f"  LBL[{NO_ANSWER}] ;", *switched_off(settings), "  ABORT ;"]
+
+
+def off_name(name: str, settings: FanucSettings) -> str:
+    """Return the name of the program that the background logic is to run, by that of the main."""
+    return name[: settings.longest_name - len(OFF)] + OFF
+
+
+def watching(settings: FanucSettings) -> list[str]:
+    """Return the lines of that program: all is off wherever no program runs (UO[3])."""
+    off = (f"  IF (!UO[3]),DO[{output}]=(OFF) ;" for output in outputs(settings))
+    return ["  ! Run this as BG logic (SETUP) ;", *off]
 
 
 class Fanuc(Formatter):
@@ -79,54 +117,70 @@ class Fanuc(Formatter):
 
     def __init__(self, program: Program, settings: FanucSettings) -> None:
         (name,) = identifiers([program.name], (), settings.longest_name)
-        whole = replace(program, name=name)
-        more = max((_more_lines(section) for section in program.sections), default=0)
-        most = max(settings.lines_per_file - more, settings.lines_per_file // MOST_LINES)
-        whole = divided(whole, most, longest_name=settings.longest_name)
-        sections = tuple(replace(part, name=part.name.upper()) for part in whole.sections)
+        taken, longest = (name, off_name(name, settings)), settings.longest_name
+        names = identifiers((section.name for section in program.sections), taken, longest)
+        sections = tuple(
+            replace(section, name=own.upper())
+            for section, own in zip(program.sections, names, strict=True)
+        )
+        whole = program
         super().__init__(replace(whole, name=name.upper(), sections=sections), settings)
         self._target = count(1)
 
     def files(self) -> dict[str, str]:
         """Return the main program and those that it calls."""
-        files = {f"{self.program.name}.ls": _listing(self.program.name, self.main(), [])}
+        name, settings = self.program.name, self.settings
+        files = {f"{name}.ls": _listing(name, self.main(), [], settings)}
         for section in self.program.sections:
             lines = list(self.lines(section))
             positions = self._positions(section)
-            files[f"{section.name}.ls"] = _listing(section.name, lines, positions)
+            files[f"{section.name}.ls"] = _listing(section.name, lines, positions, settings)
+        off = off_name(name, settings)
+        files[f"{off}.ls"] = _listing(off, watching(settings), [], settings, group="*")
         return files
+
+    def lengths(self) -> dict[str, int]:
+        """Return how many lines each contour takes, by its name."""
+        return {s.name: sum(1 for _ in self.lines(s)) for s in self.program.sections}
 
     def main(self) -> list[str]:
         """Return the lines of the main program."""
         program, settings = self.program, self.settings
         clear = "proved clear in the planned cell"
         checked = clear if program.air_checked else "not checked for collisions"
-        moves = [move for move in program.moves if isinstance(move, LinearMove)]
-        switched = [switch.signal for move in moves for switch in move.switches]
         lines = [
             *self.comment(f"kerfpath, for {plain(program.robot.model)}"),
             *self.comment(f"Moves through the air: {checked}."),
-            *self.comment("A stop does not switch the laser off: the cell's safety has to."),
+            *self.comment(
+                f"{off_name(program.name, settings)} as BG logic switches off at a stop."
+            ),
+            *self.comment("The cell's safety has to switch the laser off, too."),
             *self.comment("Enter these frames (mm, deg). World: on J1, at the height of J2."),
         ]
         frame = np.linalg.inv(world(program.robot)) @ program.T_base_part
         tool = np.linalg.inv(faceplate(program.robot)) @ program.T_flange_tip
         lines += _frame(f"UFRAME {settings.user_frame}", frame)
         lines += _frame(f"UTOOL {settings.tool_frame}", tool)
-        lines += [f"  UFRAME_NUM={settings.user_frame} ;", f"  UTOOL_NUM={settings.tool_frame} ;"]
-        laser: list[Signal] = [] if self.settings.laser_output is None else ["laser"]
-        lines += [f"  DO[{self.output(s)}]=OFF ;" for s in dict.fromkeys([*laser, *switched])]
+        lines += [*selection(settings), *switched_off(settings)]
         return lines + [f"  CALL {section.name}{PADDING};" for section in program.sections]
 
     def names(self) -> list[tuple[str, str]]:
         """Return the names of all programs."""
         sections = ((section.name, "a contour") for section in self.program.sections)
-        return [(self.program.name, "the program"), *sections]
+        off = off_name(self.program.name, self.settings)
+        return [
+            (self.program.name, "the program"),
+            (off, "the program that is watching"),
+            *sections,
+        ]
 
     def lines(self, section: Section) -> Iterator[str]:
         """Yield the lines of all steps of a section, its targets numbered from 1."""
         self._target = count(1)
+        yield from selection(self.settings)
         yield from super().lines(section)
+        if any(isinstance(step, Await) for step in section.steps):
+            yield from aborting(self.settings)
 
     def joint_move(self, move: JointMove) -> Iterator[str]:
         """Yield a J motion; it knows no corner region."""
@@ -134,12 +188,14 @@ class Fanuc(Formatter):
         yield f"J P[{next(self._target)}] {number(move.speed * 100, 0)}% {end}{PADDING};"
 
     def linear_move(self, move: LinearMove) -> Iterator[str]:
-        """Yield an L motion and what is switched after it."""
+        """Yield an L motion, what is switched before it, and what after it."""
+        yield from self._before(move)
         yield f"L P[{next(self._target)}] {self._path_end(move)}{PADDING};"
         yield from self._after(move)
 
     def circular_move(self, move: CircularMove) -> Iterator[str]:
         """Yield a C motion, in two rows under one number, and what is switched after it."""
+        yield from self._before(move)
         via, end = next(self._target), next(self._target)
         row = f"C P[{via}]{PADDING}{NEW_LINE}    :  P[{end}]"
         yield f"{row} {self._path_end(move)}{PADDING};"
@@ -148,6 +204,16 @@ class Fanuc(Formatter):
     def wait(self, wait: Wait) -> Iterator[str]:
         """Yield a WAIT."""
         yield f"  WAIT {_seconds(wait.time)}(sec) ;"
+
+    def request(self, request: Request) -> Iterator[str]:
+        """Yield an output; the robot stands."""
+        yield f"  DO[{self.port(request.partner, 'output')}]={'ON' if request.on else 'OFF'} ;"
+
+    def wait_for(self, awaited: Await) -> Iterator[str]:
+        """Yield a WAIT for an input; without an answer the program aborts with all off."""
+        yield f"  $WAITTMOUT={round(awaited.timeout * 100)} ;"
+        number = self.port(awaited.partner, "input")
+        yield f"  WAIT DI[{number}]=ON TIMEOUT,LBL[{NO_ANSWER}] ;"
 
     def comment(self, text: str) -> Iterator[str]:
         """Yield remarks; a semicolon would end them, and the frames are told without a space."""
@@ -161,12 +227,15 @@ class Fanuc(Formatter):
             end = f"CNT{settings.cnt_percent}"
         elif move.zone > 0:
             end = f"CR{number(move.zone * 1e3, 0)}"
-        timed, _ = divide_switches(move)
+        timed = switching(move).timed
         before = "".join(f" TB {_seconds(s.lead_time)}sec,{self._set(s)}" for s in timed)
         return f"{number(move.speed / unit(settings), 0)}{settings.speed_unit} {end}{before}"
 
+    def _before(self, move: LinearMove) -> Iterator[str]:
+        yield from (f"  {self._set(switch)} ;" for switch in switching(move).before)
+
     def _after(self, move: LinearMove) -> Iterator[str]:
-        yield from (f"  {self._set(switch)} ;" for switch in divide_switches(move)[1])
+        yield from (f"  {self._set(switch)} ;" for switch in switching(move).after)
 
     def _set(self, switch: Switch) -> str:
         return f"DO[{self.output(switch.signal)}]={'ON' if switch.on else 'OFF'}"
@@ -207,26 +276,6 @@ class Fanuc(Formatter):
         return ["\t" + ",\t".join(said[:3]) + ",", "\t" + ",\t".join(said[3:])]
 
 
-def divide_switches(move: LinearMove) -> tuple[tuple[Switch, ...], tuple[Switch, ...]]:
-    """Return the switches on the way to the end of a move, and those once the tip stands there."""
-    switches = move.switches
-    after = 0
-    while move.zone == 0 and after < len(switches) and switches[-1 - after].lead_time == 0:
-        after += 1
-    return switches[: len(switches) - after], switches[len(switches) - after :]
-
-
-def _more_lines(section: Section) -> int:
-    """Return how many more lines a section has than steps."""
-    more = 0
-    for step in section.steps:
-        if isinstance(step, Comment):
-            more += len(_remarks(plain(step.text)))
-        elif isinstance(step, LinearMove):
-            more += len(divide_switches(step)[1])
-    return more
-
-
 def _remarks(text: str) -> list[str]:
     """Return a text as remarks, cut where there would be too many."""
     words = text.replace(";", ",")
@@ -245,9 +294,12 @@ def _seconds(time: float) -> str:
     return f"{said.removeprefix('0') if time >= 0.005 else said:>6}"
 
 
-def _listing(name: str, lines: list[str], positions: list[str]) -> str:
-    """Return a program as a listing."""
+def _listing(
+    name: str, lines: list[str], positions: list[str], settings: FanucSettings, group: str = "1"
+) -> str:
+    """Return a program as a listing; that of no motion has the group "*"."""
     numbered = [f"{n:4d}:{line}" for n, line in enumerate(lines, 1)]
-    head = ATTRIBUTES.format(count=len(lines)).splitlines()
+    day, time = settings.date.split(" ")
+    head = ATTRIBUTES.format(count=len(lines), day=day, time=time, group=group).splitlines()
     rows = [f"/PROG  {name}", *head, "/MN", *numbered, "/POS", *positions, "/END", ""]
     return NEW_LINE.join(rows)

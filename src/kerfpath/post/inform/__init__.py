@@ -25,6 +25,7 @@ INFORM = Language(
     posture=posture,
     check=check,
     sayable=stopping_to_switch,
+    ahead=False,
     assumed={"laser_output": 1},
     read=read,
 )

@@ -6,11 +6,13 @@ from collections.abc import Iterator
 
 import numpy as np
 
+from kerfpath.post._divide import long_contours
 from kerfpath.post._issue import ProgramIssue
-from kerfpath.post._program import JointMove, Program, Section, Wait
+from kerfpath.post._program import Await, JointMove, Program, Section, Wait
 from kerfpath.post._standing import switched_later
 from kerfpath.post.inform._axes import axes_from_joints
 from kerfpath.post.inform._settings import InformSettings
+from kerfpath.post.inform._write import Inform
 
 __all__ = ["check"]
 
@@ -32,10 +34,11 @@ def check(program: Program, settings: InformSettings) -> Iterator[ProgramIssue]:
         yield ProgramIssue(
             "warning",
             "joint-targets",
-            "joint moves go to positions by their manipulator type (RCONF), not to joints: give "
+            "joint moves go to positions by their manipulator type (RCONF), not to pulses: give "
             "pulses_per_deg, from the robot's parameters, or check each start at low speed",
             "program",
         )
+    yield from long_contours(Inform(program, settings).lengths(), settings.lines_per_file, "error")
     for section in program.sections:
         yield from switched_later(section, "INFORM")
         yield from _times(section)
@@ -44,11 +47,13 @@ def check(program: Program, settings: InformSettings) -> Iterator[ProgramIssue]:
 
 def _times(section: Section) -> Iterator[ProgramIssue]:
     for number, step in enumerate(section.steps):
-        if isinstance(step, Wait) and abs(step.time - TICK * round(step.time / TICK)) > TICK_NOISE:
+        times = [step.time] if isinstance(step, Wait) else []
+        times += [step.timeout] if isinstance(step, Await) else []
+        if any(abs(time - TICK * round(time / TICK)) > TICK_NOISE for time in times):
             yield ProgramIssue(
                 "error",
                 "time-step",
-                f"waits are written in whole {TICK * 1e3:g} ms, got {step.time * 1e3:g} ms",
+                f"waits are written in whole {TICK * 1e3:g} ms, got {times[0] * 1e3:g} ms",
                 f"{section.name}, step {number}",
             )
 

@@ -11,30 +11,35 @@ from __future__ import annotations
 import textwrap
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
+from itertools import count
 
 import numpy as np
 
 from kerfpath._arrays import Array
 from kerfpath.errors import InputError
-from kerfpath.post._divide import divided
 from kerfpath.post._formatter import Formatter, number, plain
 from kerfpath.post._frames import faceplate, world, xyzwpr
 from kerfpath.post._names import identifiers
 from kerfpath.post._program import (
+    Await,
     CircularMove,
     JointMove,
     LinearMove,
     Move,
     Program,
+    Request,
     Section,
     Step,
     Wait,
 )
+from kerfpath.post._settings import handshakes
 from kerfpath.post._standing import stopping_to_switch
 from kerfpath.post.inform._axes import axes_from_joints, manipulator_type
 from kerfpath.post.inform._settings import InformSettings
 
-__all__ = ["FRAME_WORDS", "SUFFIX", "Inform", "head", "middle"]
+__all__ = [
+    "FRAME_WORDS", "SUFFIX", "Inform", "awaiting", "head", "middle", "off_name", "switched_off",
+]  # fmt: skip
 
 SUFFIX = ".JBI"
 NEW_LINE = "\r\n"
@@ -44,10 +49,8 @@ MOST_REMARKS = 3
 """Lines that a comment is cut to."""
 AROUND = 16
 """Lines of a job beside those of its steps."""
-LINES_OF_A_MOVE = 5
-"""A position, its type, the move and two switches."""
-LINES_OF_AN_ARC = 12
-"""Three positions and their types, four moves and two switches."""
+OFF = "_OFF"
+"""End of the name of the job that switches everything off."""
 POSE = "%.3f,%.3f,%.3f,%.4f,%.4f,%.4f"
 """mm and deg."""
 FRAME_WORDS = ("X", "Y", "Z", "RX", "RY", "RZ")
@@ -74,6 +77,34 @@ def middle(kind: str, settings: InformSettings) -> tuple[list[str], list[str]]:
     return before, [*after, "///GROUP1 RB1", "NOP"]
 
 
+def off_name(name: str, settings: InformSettings) -> str:
+    """Return the name of the job that switches everything off, by that of the main job."""
+    return name[: settings.longest_name - len(OFF)] + OFF
+
+
+def switched_off(settings: InformSettings) -> list[str]:
+    """Return the instructions that switch off everything that the settings name."""
+    requests = (n for (_, way), n in handshakes(settings).items() if way == "output")
+    outputs = (settings.laser_output, settings.gas_output, *requests)
+    return [f"DOUT OT#({output}) OFF" for output in outputs if output is not None]
+
+
+def awaiting(label: int, number: int, timeout: float, settings: InformSettings) -> list[str]:
+    """Return the instructions that wait for an input.
+
+    After `timeout` (s) everything is off and the job pauses; started again it waits again.
+    """
+    return [
+        f"*WAIT{label}",
+        f"WAIT IN#({number})=ON T={timeout:.2f}",
+        f"JUMP *GO{label} IF IN#({number})=ON",
+        *switched_off(settings),
+        "PAUSE",
+        f"JUMP *WAIT{label}",
+        f"*GO{label}",
+    ]
+
+
 class Inform(Formatter):
     """Writes a main job, and one for the way to each contour and for its path."""
 
@@ -83,12 +114,14 @@ class Inform(Formatter):
         longest = settings.longest_name
         (name,) = identifiers([program.name], (), longest)
         whole = by_kind(replace(stopping_to_switch(program), name=name))
-        arcs = any(isinstance(move, CircularMove) for move in whole.moves)
-        most = (settings.lines_per_file - AROUND) // (LINES_OF_AN_ARC if arcs else LINES_OF_A_MOVE)
-        whole = divided(whole, most, longest_name=longest)
-        sections = tuple(replace(part, name=part.name.upper()) for part in whole.sections)
+        taken = (name, off_name(name, settings))
+        names = identifiers((section.name for section in whole.sections), taken, longest)
+        sections = tuple(
+            replace(part, name=own.upper()) for part, own in zip(whole.sections, names, strict=True)
+        )
         super().__init__(replace(whole, name=name.upper(), sections=sections), settings)
         self._targets: list[tuple[Array, Array | None]] = []
+        self._labels = count(1)
         moves = self.program.moves
         self._before = dict(zip(moves[1:], moves, strict=False))
 
@@ -102,12 +135,20 @@ class Inform(Formatter):
                 f"lines_per_file allows {settings.lines_per_file}; raise it"
             )
         texts = {f"{program.name}{SUFFIX}": self._job(program.name, "main", [], main)}
-        for section in program.sections:
-            lines = list(self.lines(section))
-            kind = "pulse" if self._in_pulses(section) else "user"
-            positions = self._pulses() if kind == "pulse" else self._poses()
-            texts[f"{section.name}{SUFFIX}"] = self._job(section.name, kind, positions, lines)
+        texts |= {f"{s.name}{SUFFIX}": self._section(s) for s in program.sections}
+        off = off_name(program.name, settings)
+        texts[f"{off}{SUFFIX}"] = self._job(off, "main", [], switched_off(settings))
         return texts
+
+    def lengths(self) -> dict[str, int]:
+        """Return how many lines each job of a contour has, by its name."""
+        return {s.name: self._section(s).count(NEW_LINE) for s in self.program.sections}
+
+    def _section(self, section: Section) -> str:
+        lines = list(self.lines(section))
+        kind = "pulse" if self._in_pulses(section) else "user"
+        positions = self._pulses() if kind == "pulse" else self._poses()
+        return self._job(section.name, kind, positions, lines)
 
     def main(self) -> Iterator[str]:
         """Yield the instructions of the main job."""
@@ -116,24 +157,26 @@ class Inform(Formatter):
         checked = clear if program.air_checked else "not checked for collisions"
         yield from self.comment(f"kerfpath, for {plain(program.robot.model)}")
         yield from self.comment(f"Moves through the air: {checked}.")
+        off = off_name(program.name, settings)
+        yield from self.comment(f"{off} switches off: run it after a stop.")
         yield from self.comment("A stop does not switch the laser off: the cell's safety has to.")
         yield from self.comment("Enter these frames (mm, deg). Robot frame: on S, as high as L.")
         frame = np.linalg.inv(world(program.robot)) @ program.T_base_part
         tool = np.linalg.inv(faceplate(program.robot)) @ program.T_flange_tip
         yield from _frame(f"UFRAME {settings.user_frame}", frame)
         yield from _frame(f"TOOL {settings.tool_number}", tool)
-        outputs = (settings.laser_output, settings.gas_output)
-        yield from (f"DOUT OT#({output}) OFF" for output in outputs if output is not None)
+        yield f"CALL JOB:{off}"
         yield from (f"CALL JOB:{section.name}" for section in program.sections)
 
     def names(self) -> list[tuple[str, str]]:
         """Return the names of all jobs."""
         sections = ((section.name, "a contour") for section in self.program.sections)
-        return [(self.program.name, "the program"), *sections]
+        off = off_name(self.program.name, self.settings)
+        return [(self.program.name, "the program"), (off, "the job that switches off"), *sections]
 
     def lines(self, section: Section) -> Iterator[str]:
         """Yield the instructions of a section, its positions numbered from 0."""
-        self._targets = []
+        self._targets, self._labels = [], count(1)
         yield from super().lines(section)
 
     def joint_move(self, move: JointMove) -> Iterator[str]:
@@ -166,6 +209,16 @@ class Inform(Formatter):
         """Yield a TIMER."""
         yield f"TIMER T={number(wait.time, 2)}"
 
+    def request(self, request: Request) -> Iterator[str]:
+        """Yield a DOUT; the robot stands."""
+        state = "ON" if request.on else "OFF"
+        yield f"DOUT OT#({self.port(request.partner, 'output')}) {state}"
+
+    def wait_for(self, awaited: Await) -> Iterator[str]:
+        """Yield a WAIT with a time, and what is done without an answer."""
+        port = self.port(awaited.partner, "input")
+        yield from awaiting(next(self._labels), port, awaited.timeout, self.settings)
+
     def comment(self, text: str) -> Iterator[str]:
         """Yield remarks; the frames are told in remarks without a space."""
         rows = textwrap.wrap(text, REMARK, max_lines=MOST_REMARKS, placeholder=" ...")
@@ -197,7 +250,9 @@ class Inform(Formatter):
         """Return the lines of the positions so far, in the user frame, types where they change."""
         if not self._targets:
             return []
-        types = manipulator_type(self.program.robot, [q for q, _ in self._targets]).tolist()
+        types = manipulator_type(
+            self.program.robot, [q for q, _ in self._targets], self.settings.flip
+        ).tolist()
         poses = xyzwpr(np.array([T for _, T in self._targets]))
         poses = np.hstack([poses[:, :3].round(3), poses[:, 3:].round(4)]) + 0.0
         unused = [0] * (self.settings.rconf_values - 6)
@@ -211,8 +266,8 @@ class Inform(Formatter):
 
     def _job(self, name: str, kind: str, positions: Sequence[str], lines: Sequence[str]) -> str:
         before, after = middle(kind, self.settings)
-        count = sum(line.startswith("C") for line in positions)
-        rows = [*head(name, count), *before, *positions, *after, *lines, "END", ""]
+        targets = sum(line.startswith("C") for line in positions)
+        rows = [*head(name, targets), *before, *positions, *after, *lines, "END", ""]
         return NEW_LINE.join(rows)
 
 

@@ -14,6 +14,8 @@ LONGEST_NAME = 24
 """Characters of a name."""
 SLOWEST = 1e-5
 """Lowest speed (m/s) that is written to within a tenth."""
+POINT_STEP, ANGLE_STEP = 0.5e-7, float(np.radians(0.5e-6))
+"""What four decimals of mm leave of positions (m), and six of deg of angles (rad)."""
 SPEED_STEP = 1e-6
 """Speeds have six decimals of m/s."""
 LONGEST_LEAD = 10.0
@@ -21,6 +23,11 @@ LONGEST_LEAD = 10.0
 
 Output = Annotated[
     int | None, setting("the number of a digital output, 1 to 8192", "5", ge=1, le=8192)
+]
+
+
+Input = Annotated[
+    int | None, setting("the number of a digital input, 1 to 8192", "5", ge=1, le=8192)
 ]
 
 
@@ -32,6 +39,14 @@ class KrlSettings(Settings):
     ] = 1400
     laser_output: Output = None
     gas_output: Output = None
+    ready_input: Input = None
+    shutter_input: Input = None
+    gas_pressure_input: Input = None
+    height_input: Input = None
+    interlock_input: Input = None
+    ready_output: Output = None
+    shutter_output: Output = None
+    height_output: Output = None
     tool_number: Annotated[
         int | None, setting("the number of a TOOL_DATA, 1 to 128", "1", ge=1, le=128)
     ] = None
@@ -53,6 +68,8 @@ def rules(settings: KrlSettings) -> Rules:
         slowest=SLOWEST,
         fastest=settings.largest_speed_m_s,
         speed_step=SPEED_STEP,
+        point_step=POINT_STEP,
+        angle_step=ANGLE_STEP,
         turning_speed=float(np.radians(settings.turning_speed_deg_s)),
         longest_lead=LONGEST_LEAD,
     )

@@ -10,7 +10,6 @@ output would stop the advance run and with it the blending.
 
 from __future__ import annotations
 
-import sys
 import warnings
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -20,25 +19,48 @@ from scipy.spatial.transform import Rotation
 
 from kerfpath._arrays import Array
 from kerfpath.errors import InputError
-from kerfpath.post._divide import divided, in_files
+from kerfpath.post._divide import in_files, renamed
 from kerfpath.post._formatter import Formatter, number, plain
 from kerfpath.post._names import identifiers
-from kerfpath.post._program import CircularMove, JointMove, LinearMove, Move, Program, Section, Wait
+from kerfpath.post._program import (
+    Await,
+    CircularMove,
+    JointMove,
+    LinearMove,
+    Move,
+    Program,
+    Request,
+    Section,
+    Wait,
+)
+from kerfpath.post._settings import handshakes
 from kerfpath.post.krl._axes import axes_from_joints, status_and_turn
 from kerfpath.post.krl._settings import LONGEST_NAME, KrlSettings
 
-__all__ = ["HEAD", "Krl", "data_list", "opening"]
+__all__ = [
+    "FIRST", "HEAD", "SWITCH_OFF", "Krl", "awaiting", "called_from", "data_list", "opening",
+    "switched_off",
+]  # fmt: skip
 
 HEAD = ("&ACCESS RVP", "&REL 1")
 """Attributes of every file."""
 NEW_LINE = "\r\n"
 """The controllers run Windows."""
-MOST_ROUTINES = 255
-"""Local routines that a file may have."""
+MOST_ROUTINES = 254
+"""Local routines that a file may have, but for the one that switches off."""
 LINES_OF_A_FILE = 5
 """HEAD, DEF and END of its first routine, and the empty line at its end."""
-LINES_OF_A_ROUTINE = 4
-"""DEF, END, the empty line before them, and the call."""
+LINES_OF_A_ROUTINE = 6
+"""DEF, END, the empty line before them, and the call with its condition."""
+FIRST = "first_contour"
+"""Number of the contour at which the program begins, for a restart; in the .dat."""
+PASSED = "first"
+"""The same, as a file that is called takes it."""
+SWITCH_OFF = "switch_off"
+"""The routine that switches everything off."""
+INTERRUPT = 20
+TIMER = 20
+"""The interrupt and the timer that are used; KUKA's own programs take others."""
 AXES = ("A1", "A2", "A3", "A4", "A5", "A6")
 NOT_CHECKED = "not been checked for collisions"
 
@@ -46,9 +68,10 @@ NOT_CHECKED = "not been checked for collisions"
 def opening(settings: KrlSettings) -> list[str]:
     """Return the statements that a main routine makes before it calls others, but for frames."""
     turning_deg_s = number(settings.turning_speed_deg_s, 1)
-    outputs = (settings.laser_output, settings.gas_output)
     numbered = (("TOOL", settings.tool_number), ("BASE", settings.base_number))
     return [
+        f"INTERRUPT DECL {INTERRUPT} WHEN $STOPMESS==TRUE DO {SWITCH_OFF}()",
+        f"INTERRUPT ON {INTERRUPT}",
         "BAS(#INITMOV,0)",
         "$ADVANCE=5",
         "$IPO_MODE=#BASE",
@@ -57,14 +80,45 @@ def opening(settings: KrlSettings) -> list[str]:
         f"$VEL.ORI1={turning_deg_s}",
         f"$VEL.ORI2={turning_deg_s}",
         *(f"BAS(#{kind},{n})" for kind, n in numbered if n is not None),
-        *(f"$OUT[{output}]=FALSE" for output in outputs if output is not None),
+        f"{SWITCH_OFF}()",
     ]
 
 
-def data_list(name: str, called: Sequence[str]) -> list[str]:
-    """Return the lines of the .dat of a file that calls others: it declares what is not in it."""
-    calls = (f"EXT {other}()" for other in called)
-    return [*HEAD, f"DEFDAT {name}", "EXT BAS(BAS_COMMAND :IN,REAL :IN)", *calls, "ENDDAT", ""]
+def switched_off(settings: KrlSettings) -> list[str]:
+    """Return the lines that switch off everything that the settings name."""
+    requests = (n for (_, way), n in handshakes(settings).items() if way == "output")
+    outputs = (settings.laser_output, settings.gas_output, *requests)
+    return [f"$OUT[{output}]=FALSE" for output in outputs if output is not None]
+
+
+def awaiting(number: int, timeout: float, settings: KrlSettings) -> list[str]:
+    """Return the lines that wait for an input; after `timeout` (s) all is off until it comes."""
+    return [
+        f"$TIMER[{TIMER}]={-round(timeout * 1e3)}",
+        f"$TIMER_STOP[{TIMER}]=FALSE",
+        f"WAIT FOR $IN[{number}] OR $TIMER_FLAG[{TIMER}]",
+        f"$TIMER_STOP[{TIMER}]=TRUE",
+        f"WHILE NOT $IN[{number}]",
+        *switched_off(settings),
+        "HALT",
+        "ENDWHILE",
+    ]
+
+
+def called_from(first: str, number: int, call: str) -> list[str]:
+    """Return the lines that call a contour, or a file up to it, unless the program begins later."""
+    return [f"IF {first}<={number} THEN", call, "ENDIF"]
+
+
+def data_list(name: str, called: Sequence[str], first: int | None = None) -> list[str]:
+    """Return the lines of the .dat of a file that calls others: it declares what is not in it.
+
+    That of the main file says at which contour the program begins.
+    """
+    calls = (f"EXT {other}(INT :IN)" for other in called)
+    begin = [] if first is None else [f"INT {FIRST}={first}"]
+    bas = "EXT BAS(BAS_COMMAND :IN,REAL :IN)"
+    return [*HEAD, f"DEFDAT {name}", bas, *calls, *begin, "ENDDAT", ""]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -74,9 +128,10 @@ class _File:
     name: str
     first: Sequence[str]
     routines: Mapping[str, Sequence[str]]
+    passed: str = ""
 
     def lines(self) -> list[str]:
-        lines = [*HEAD, f"DEF {self.name}()", *self.first, "END"]
+        lines = [*HEAD, f"DEF {self.name}({self.passed})", *self.first, "END"]
         for name, routine in self.routines.items():
             lines += ["", f"DEF {name}()", *routine, "END"]
         return [*lines, ""]
@@ -89,7 +144,9 @@ class Krl(Formatter):
 
     def __init__(self, program: Program, settings: KrlSettings) -> None:
         named = replace(program, name=program.name[:LONGEST_NAME])
-        super().__init__(divided(named, sys.maxsize, longest_name=LONGEST_NAME), settings)
+        super().__init__(
+            renamed(named, (FIRST, PASSED, SWITCH_OFF), longest_name=LONGEST_NAME), settings
+        )
         self._held: dict[str, str] = {}
         self._target = self._target_texts()
         self._files = self._in_one_file() or self._in_more_files()
@@ -99,9 +156,10 @@ class Krl(Formatter):
         others = [file.name for file in self._files[1:]]
         texts: dict[str, str] = {}
         for file in self._files:
-            called = others if file is self._files[0] else []
             texts[f"{file.name}.src"] = NEW_LINE.join(file.lines())
-            texts[f"{file.name}.dat"] = NEW_LINE.join(data_list(file.name, called))
+            is_main = file is self._files[0]
+            data = data_list(file.name, others, 1) if is_main else data_list(file.name, [])
+            texts[f"{file.name}.dat"] = NEW_LINE.join(data)
         return texts
 
     def names(self) -> list[tuple[str, str]]:
@@ -110,7 +168,10 @@ class Krl(Formatter):
         return [
             (main.name, "the program"),
             *((file.name, "a file") for file in others),
-            *((name, "a contour") for file in self._files for name in file.routines),
+            (FIRST, "the number of the first contour"),
+            (PASSED, "the number of the first contour"),
+            (SWITCH_OFF, "the routine that switches off"),
+            *((section.name, "a contour") for section in self.program.sections),
         ]
 
     def lines(self, section: Section) -> Iterator[str]:
@@ -135,6 +196,15 @@ class Krl(Formatter):
         """Yield a WAIT SEC."""
         yield f"WAIT SEC {number(wait.time, 3)}"
 
+    def request(self, request: Request) -> Iterator[str]:
+        """Yield an assignment; the robot stands."""
+        state = "TRUE" if request.on else "FALSE"
+        yield f"$OUT[{self.port(request.partner, 'output')}]={state}"
+
+    def wait_for(self, awaited: Await) -> Iterator[str]:
+        """Yield a wait for an input with its timer."""
+        yield from awaiting(self.port(awaited.partner, "input"), awaited.timeout, self.settings)
+
     def comment(self, text: str) -> Iterator[str]:
         """Yield a comment; a bar keeps one that says FOLD from folding the program."""
         yield f"; | {text}"
@@ -155,43 +225,53 @@ class Krl(Formatter):
             self._held[what] = line
             yield line
 
+    def lengths(self) -> dict[str, int]:
+        """Return how many lines each contour takes, by its name."""
+        return {
+            section.name: sum(1 for _ in self.lines(section)) + LINES_OF_A_ROUTINE
+            for section in self.program.sections
+        }
+
     def _in_one_file(self) -> list[_File]:
         """Return the program as one file; nothing where that is too long."""
         sections = self.program.sections
         routines = {section.name: list(self.lines(section)) for section in sections}
-        file = self._main([section.name for section in sections], routines)
+        calls = (called_from(FIRST, n, f"{name}()") for n, name in enumerate(routines, 1))
+        file = self._main([line for call in calls for line in call], routines)
         fits = len(file.lines()) <= self.settings.lines_per_file
         return [file] if fits and len(sections) <= MOST_ROUTINES else []
 
     def _in_more_files(self) -> list[_File]:
-        """Return a main program and the files it calls, sections divided until they fit."""
-        most = self.settings.lines_per_file
-        room = most - LINES_OF_A_FILE
-        switches = max((len(getattr(m, "switches", ())) for m in self.program.moves), default=0)
-        steps = max((room - LINES_OF_A_ROUTINE) // (3 + switches), 1)
-        parts = divided(self.program, steps, longest_name=LONGEST_NAME)
-        routines = {section.name: list(self.lines(section)) for section in parts.sections}
+        """Return a main program and the files it calls between contours, the beam off."""
+        sections = self.program.sections
+        room = self.settings.lines_per_file - LINES_OF_A_FILE
         share = -(-room // MOST_ROUTINES)
-        counts = [max(len(lines) + LINES_OF_A_ROUTINE, share) for lines in routines.values()]
-        groups = in_files(parts.sections, counts, room)
-        taken = [self.program.name, *routines]
+        counts = [max(count, share) for count in self.lengths().values()]
+        groups = in_files(sections, counts, room)
+        taken = [self.program.name, *(section.name for section in sections)]
         names = identifiers([self.program.name] * len(groups), taken=taken, longest=LONGEST_NAME)
-        others = []
+        others, calls, number = [], [], 0
         for name, group in zip(names, groups, strict=True):
-            called = [section.name for section in group]
-            first, own = [f"{other}()" for other in called], {n: routines[n] for n in called}
-            others.append(_File(name=name, first=first, routines=own))
-        files = [self._main(names, {}), *others]
-        if max(len(file.lines()) for file in files) > most:
+            first = [f"INT {PASSED}"]
+            for section in group:
+                number += 1
+                first += called_from(PASSED, number, f"{section.name}()")
+            own = {section.name: list(self.lines(section)) for section in group}
+            others.append(_File(name=name, first=first, routines=own, passed=f"{PASSED} :IN"))
+            calls += called_from(FIRST, number, f"{name}({FIRST})")
+        main = self._main(calls, {})
+        if len(main.lines()) > self.settings.lines_per_file:
             raise InputError(
-                f"program {self.program.name!r}: {len(others)} files of {most} lines are more "
-                "than its main program can call; raise lines_per_file"
+                f"program {self.program.name!r}: {len(others)} files of "
+                f"{self.settings.lines_per_file} lines are more than its main program can call; "
+                "raise lines_per_file"
             )
-        return files
+        return [main, *others]
 
-    def _main(self, called: Sequence[str], routines: Mapping[str, Sequence[str]]) -> _File:
-        calls = [f"{name}()" for name in called]
-        return _File(name=self.program.name, first=[*self._start(), *calls], routines=routines)
+    def _main(self, calls: Sequence[str], routines: Mapping[str, Sequence[str]]) -> _File:
+        every = {SWITCH_OFF: switched_off(self.settings), **routines}
+        first = [*self._start(), *calls, f"{FIRST}=1"]
+        return _File(name=self.program.name, first=first, routines=every)
 
     def _start(self) -> Iterator[str]:
         program, settings = self.program, self.settings
@@ -202,7 +282,9 @@ class Krl(Formatter):
         if settings.base_number is None:
             yield "; $BASE is the part in the robot's base, which is $WORLD, too."
         yield f"; Moves through the air have {checked}."
-        yield "; A stop does not switch the laser off: the safety circuit of the cell has to."
+        yield f"; {SWITCH_OFF}() runs at a stop message; the safety circuit of the cell has to"
+        yield "; switch the laser off, too."
+        yield f"; To begin at a contour set {FIRST} in the .dat to its number, and reset."
         yield from opening(settings)
         if settings.tool_number is None:
             yield f"$TOOL={{{_frames(program.T_flange_tip[None])[0]}}}"

@@ -5,10 +5,11 @@ from kerfpath.post.rapid._axes import axes_from_joints as axes_from_joints
 from kerfpath.post.rapid._axes import confdata as confdata
 from kerfpath.post.rapid._axes import joints_from_axes as joints_from_axes
 from kerfpath.post.rapid._axes import posture
+from kerfpath.post.rapid._check import check
 from kerfpath.post.rapid._read import read
+from kerfpath.post.rapid._settings import RapidSettings as RapidSettings
+from kerfpath.post.rapid._settings import is_reserved, rules
 from kerfpath.post.rapid._write import Rapid as Rapid
-from kerfpath.post.rapid._write import RapidSettings as RapidSettings
-from kerfpath.post.rapid._write import is_reserved, rules
 
 RAPID = Language(
     name="rapid",
@@ -21,6 +22,7 @@ RAPID = Language(
     formatter=Rapid,
     is_reserved=is_reserved,
     posture=posture,
+    check=check,
     read=read,
 )
 """What is registered."""

@@ -13,18 +13,29 @@ import numpy as np
 from kerfpath._arrays import Array
 from kerfpath.errors import InputError
 from kerfpath.post._orientations import pose_of
-from kerfpath.post._program import Signal, Switch
+from kerfpath.post._program import Await, Handshake, Request, Signal, Switch
 from kerfpath.post._read import (
+    ReadHandshake,
     ReadMove,
     ReadProgram,
     ReadSection,
     ReadStep,
     ReadWait,
+    partner_of,
     patterns,
     same_output,
 )
 from kerfpath.post.rapid._axes import joints_from_axes
-from kerfpath.post.rapid._write import FULL_AIR_SPEED, RapidSettings
+from kerfpath.post.rapid._settings import SWITCH_OFF, RapidSettings
+from kerfpath.post.rapid._write import (
+    FIRST,
+    FULL_AIR_SPEED,
+    air_speed_data,
+    ending,
+    linear_speed_data,
+    switched_off,
+    zone_data,
+)
 from kerfpath.robots import Robot
 
 __all__ = ["read"]
@@ -56,29 +67,36 @@ _LINES = patterns(
         "trigger": rf"VAR triggdata {_NAME};",
         "routine": rf"PROC {_NAME}\(\)",
         "end_routine": "ENDPROC",
-        "no_supervision": r"ConfL\\Off;",
-        "reset": rf"SetDO {_NAME},0;",
+        "first": rf"PERS num {FIRST}:=(\d+);",
+        "request": rf"SetDO {_NAME},([01]);",
+        "wait_for": rf"WaitDI {_NAME},1\\MaxTime:=([\d.]+);",
         "set_trigger": rf"TriggIO {_NAME},([\d.]+)\\Time\\DOp:={_NAME},([01]);",
         "wait": r"WaitTime ([\d.]+);",
         "load": r'Load \\Dynamic,"([^"]*)/([^"/]*)";',
-        "late_call": rf'%"{_NAME}"%;',
+        "late_call": rf'IF {FIRST}<=(\d+) %"{_NAME}"%;',
+        "part": rf"IF {FIRST}<=(\d+) THEN",
+        "end_part": "ENDIF",
         "unload": r'UnLoad "([^"]*)/([^"/]*)";',
-        "call": rf"{_NAME};",
-        "joint_move": rf"MoveAbsJ (\[.*\]),{_NAME},{_NAME},{_FRAMES};",
+        "call": rf"IF {FIRST}<=(\d+) {_NAME};",
+        "joint_move": rf"MoveAbsJ (\[.*\]),{_NAME}(?:\\T:=(\d+\.\d+))?,{_NAME},{_FRAMES};",
         "linear_move": rf"MoveL (\[.*\]),{_NAME},{_NAME},{_FRAMES};",
         "circular_move": rf"MoveC {_POSE},{_POSE},{_NAME},{_NAME},{_FRAMES};",
         "switching_move": rf"TriggL (\[.*\]),{_NAME},{_TRIGGERS},{_NAME},{_FRAMES};",
         "switching_arc": rf"TriggC {_POSE},{_POSE},{_NAME},{_TRIGGERS},{_NAME},{_FRAMES};",
     }
 )
-_OUTSIDE = {"tool", "work_object", "speed", "zone", "trigger", "routine", "end_module"}
+_OUTSIDE = {
+    "tool", "work_object", "speed", "zone", "trigger", "first", "routine", "end_module",
+}  # fmt: skip
+_DECLARED = _OUTSIDE - {"routine", "end_module"}
 _IN_PART = {"routine", "end_module"}
 _IN_MAIN = {
-    "no_supervision", "reset", "set_trigger", "load", "late_call", "unload", "call", "end_routine",
+    "set_trigger", "part", "load", "late_call", "unload", "end_part", "call",
+    "end_routine",
 }  # fmt: skip
 _IN_ROUTINE = {
     "joint_move", "linear_move", "circular_move", "switching_move", "switching_arc", "wait",
-    "end_routine",
+    "request", "wait_for", "end_routine",
 }  # fmt: skip
 
 
@@ -97,11 +115,16 @@ class _Reader:
         self.ended = False
         self.frames: dict[str, tuple[str, Array]] = {}
         self.speeds: dict[str, float] = {}
+        self.speed_data: dict[str, Array] = {}
+        self.said_at: dict[str, str] = {}
         self.zones: dict[str, float] = {"fine": 0.0}
         self.triggers: dict[str, Switch | None] = {}
         self.called_in: dict[str, str] = {}
         self.routines: dict[str, list[ReadStep]] = {}
         self.homes: dict[str, str] = {}
+        self.first_number = 0
+        self.last_of_part = 0
+        self.must_say: list[str] = []
 
     def read_module(self, file: str) -> None:
         self.file, self.line, self.ended, self.name = file, 0, False, ""
@@ -117,6 +140,15 @@ class _Reader:
             return
         if self.ended:
             raise self.fault("nothing may follow ENDMODULE")
+        if self.must_say:
+            if line != self.must_say[0]:
+                raise self.fault(f"expected {self.must_say[0]!r}, got {line[:60]!r}")
+            del self.must_say[0]
+            return
+        if self.routine_name == "main" and line == ending()[0].strip():
+            self.must_say = [*(row.strip() for row in ending()[1:]), "ENDPROC"]
+            self.routine_name = None
+            return
         if not self.name:
             expected = {"module"}
         elif self.routine_name is None:
@@ -125,6 +157,8 @@ class _Reader:
             expected = _IN_MAIN if self.routine_name == "main" else _IN_ROUTINE
         for kind in expected:
             if match := _LINES[kind].fullmatch(line):
+                if kind in _DECLARED and self.routines:
+                    raise self.fault("data must be declared before the first routine")
                 getattr(self, kind)(*match.groups())
                 return
         raise self.fault(f"not expected here: {line[:60]!r}")
@@ -133,16 +167,19 @@ class _Reader:
         for kind in ("tool", "work_object"):
             if kind not in self.frames:
                 raise self.fault(f"the module declares no {kind.replace('_', ' ')}")
-        unknown = set(self.called_in.items()) ^ set(self.homes.items())
+        unknown = {*self.called_in.items(), (SWITCH_OFF, self.main)} ^ set(self.homes.items())
         if unknown or "main" not in self.routines:
             names = ", ".join(sorted({name for name, _ in unknown}))
             raise self.fault(f"main and routines do not match: {names}")
+        if not 1 <= self.first_number <= len(self.called_in):
+            raise self.fault(f"{FIRST} must be the number of a contour")
         return ReadProgram(
             name=self.modules[self.main],
             T_flange_tip=self.frames["tool"][1],
             T_base_part=self.frames["work_object"][1],
             sections=tuple(
-                ReadSection(name=name, steps=tuple(self.routines[name])) for name in self.called_in
+                ReadSection(name=name, steps=tuple(self.routines[name]))
+                for name in list(self.called_in)[self.first_number - 1 :]
             ),
         )
 
@@ -170,16 +207,21 @@ class _Reader:
         self.frames[kind] = (name, self.pose(pose))
 
     def speed(self, name: str, text: str) -> None:
-        speed_mm_s = self.numbers(self.values(text, 4), 4)[0]
+        values = self.numbers(self.values(text, 4), 4)
         self.unused(name, self.speeds)
-        self.speeds[name] = float(speed_mm_s) * 1e-3
+        self.speeds[name] = float(values[0]) * 1e-3
+        self.speed_data[name] = values
+        self.said_at[name] = self.place
 
     def zone(self, name: str, text: str) -> None:
         stop, *sizes = self.values(text, 7)
         if stop is not False:
             raise self.fault("expected a zone to pass through, FALSE first")
         self.unused(name, self.zones)
-        self.zones[name] = float(self.numbers(sizes, 6)[0]) * 1e-3
+        values = self.numbers(sizes, 6)
+        self.zones[name] = float(values[0]) * 1e-3
+        self.require_same(values, zone_data(self.zones[name]), "sizes of the zone")
+        self.said_at[name] = self.place
 
     def trigger(self, name: str) -> None:
         self.unused(name, self.triggers)
@@ -187,25 +229,46 @@ class _Reader:
 
     def routine(self, name: str) -> None:
         self.unused(name, self.routines)
+        if name == SWITCH_OFF and self.file == self.main:
+            self.must_say = [*switched_off(self.settings), "ENDPROC"]
+            self.homes[name] = self.main
+            return
         self.routine_name, self.routines[name] = name, []
+        if name == "main":
+            self.must_say = [r"ConfL\Off;", f"{SWITCH_OFF};"]
         if name != "main":
             self.homes[name] = self.file
         elif self.file != self.main:
             raise self.fault("a second main")
 
     def end_routine(self) -> None:
+        if self.routine_name == "main":
+            raise self.fault(f"expected {ending()[0].strip()}, ERROR and UNDO before its end")
         self.routine_name = None
 
-    def no_supervision(self) -> None:
-        """Keep nothing: configurations are not supervised along linear moves."""
+    def first(self, number: str) -> None:
+        if self.first_number:
+            raise self.fault(f"a second {FIRST}")
+        self.first_number = int(number)
 
-    def reset(self, output: str) -> None:
-        self.signal(output)
+    def request(self, output: str, value: str) -> None:
+        partner = partner_of(output, "output", self.settings, f"{self.file}, line {self.line}")
+        self.handshake(Request(partner=partner, on=value == "1"))
+
+    def wait_for(self, name: str, timeout: str) -> None:
+        partner = partner_of(name, "input", self.settings, f"{self.file}, line {self.line}")
+        self.handshake(Await(partner=partner, timeout=float(timeout)))
+
+    def handshake(self, what: Handshake) -> None:
+        self.append(ReadHandshake(what=what, file=self.file, line=self.line))
 
     def set_trigger(self, name: str, lead_time: str, output: str, value: str) -> None:
+        if self.called_in:
+            raise self.fault("triggers must be set before the first contour is called")
         if name not in self.triggers or self.triggers[name] is not None:
             raise self.fault(f"{name} must be declared once and set once")
         lead = float(self.numbers([float(lead_time)], 1)[0])
+        self.said_at[name] = self.place
         self.triggers[name] = Switch(signal=self.signal(output), on=value == "1", lead_time=lead)
 
     def signal(self, output: str) -> Signal:
@@ -214,8 +277,18 @@ class _Reader:
         same_output(output, self.settings.laser_output, f"{self.file}, line {self.line}")
         return "laser"
 
+    def part(self, last: str) -> None:
+        if self.last_of_part or self.loaded:
+            raise self.fault("expected one module at a time")
+        self.last_of_part = int(last)
+
+    def end_part(self) -> None:
+        if self.loaded or self.last_of_part != len(self.called_in):
+            raise self.fault("the number in IF must be that of the last contour of the module")
+        self.last_of_part = 0
+
     def load(self, folder: str, file: str) -> None:
-        if self.loaded or folder != self.settings.folder:
+        if self.loaded or not self.last_of_part or folder != self.settings.folder:
             raise self.fault(f"expected one module at a time, from {self.settings.folder}")
         self.loaded = file
 
@@ -224,30 +297,38 @@ class _Reader:
             raise self.fault(f"{folder}/{file} is not loaded")
         self.loaded = ""
 
-    def late_call(self, name: str) -> None:
+    def late_call(self, number: str, name: str) -> None:
         if not self.loaded:
             raise self.fault(f"{name} is called while no module is loaded")
-        self.call(name)
+        self.call(number, name)
 
-    def call(self, name: str) -> None:
+    def call(self, number: str, name: str) -> None:
         if name in self.called_in:
             raise self.fault(f"{name} is called twice")
+        if int(number) != len(self.called_in) + 1:
+            raise self.fault(f"{name} is contour {len(self.called_in) + 1}, not {number}")
         self.called_in[name] = self.loaded or self.main
 
-    def joint_move(self, text: str, speed: str, zone: str, tool: str, work_object: str) -> None:
+    def joint_move(
+        self, text: str, speed: str, timed: str | None, zone: str, tool: str, work_object: str
+    ) -> None:
         axes_deg, external = self.values(text, 2)
         self.require_frames(tool, work_object, external)
-        axes = np.radians(self.numbers(axes_deg, 6))
+        axes, said = np.radians(self.numbers(axes_deg, 6)), self.named(speed, self.speeds)
         self.append(
             ReadMove(
                 kind="joint",
                 file=self.file,
                 line=self.line,
                 q=joints_from_axes(self.robot, axes[None])[0],
-                speed=self.named(speed, self.speeds) / FULL_AIR_SPEED,
+                speed=said / FULL_AIR_SPEED if timed is None else None,
+                cruise=None if timed is None else float(timed),
                 zone=self.named(zone, self.zones),
+                elsewhere=self.elsewhere(speed=speed, zone=zone),
             )
         )
+        data = air_speed_data(self.speeds[speed] / FULL_AIR_SPEED)
+        self.require_same(self.speed_data[speed], data, f"speeds of {speed}")
 
     def linear_move(self, text: str, speed: str, zone: str, tool: str, work_object: str) -> None:
         T_part_tip, quarters = self.target(text, tool, work_object)
@@ -260,8 +341,11 @@ class _Reader:
                 posture=quarters,
                 speed=self.named(speed, self.speeds),
                 zone=self.named(zone, self.zones),
+                elsewhere=self.elsewhere(speed=speed, zone=zone),
             )
         )
+        data = linear_speed_data(self.speeds[speed])
+        self.require_same(self.speed_data[speed], data, f"speeds of {speed}")
 
     def circular_move(
         self, via: str, text: str, speed: str, zone: str, tool: str, work_object: str
@@ -274,13 +358,13 @@ class _Reader:
         self, text: str, speed: str, triggers: str, zone: str, tool: str, work_object: str
     ) -> None:
         self.linear_move(text, speed, zone, tool, work_object)
-        self.amend(switches=self.switches(triggers))
+        self.amend_switches(triggers)
 
     def switching_arc(
         self, via: str, text: str, speed: str, triggers: str, zone: str, tool: str, work: str
     ) -> None:
         self.circular_move(via, text, speed, zone, tool, work)
-        self.amend(switches=self.switches(triggers))
+        self.amend_switches(triggers)
 
     def target(self, text: str, tool: str, work_object: str) -> tuple[Array, tuple[int, ...]]:
         point, wxyz, conf, external = self.values(text, 4)
@@ -312,12 +396,25 @@ class _Reader:
         steps = self.routines[self.routine_name]
         steps[-1] = replace(steps[-1], **changes)
 
+    def amend_switches(self, text: str) -> None:
+        assert self.routine_name is not None
+        said = self.elsewhere(switches=re.split(r"\\T\d:=", text)[0])
+        before = self.routines[self.routine_name][-1]
+        assert isinstance(before, ReadMove)
+        self.amend(switches=self.switches(text), elsewhere={**before.elsewhere, **said})
+
     def require_frames(self, tool: str, work_object: str, external: Any) -> None:
         known = [self.frames[kind][0] for kind in ("tool", "work_object") if kind in self.frames]
         if [tool, work_object] != known:
             raise self.fault(f"tool {tool} and work object {work_object} are not the module's")
         if external != [9e9] * 6:
             raise self.fault("external axes are not expected")
+
+    def require_same(self, values: Array, data: str, what: str) -> None:
+        """Require what follows the first value of data (of zones, the second) as it is written."""
+        expected = np.array(self.values(data.replace("FALSE,", ""), len(values)), dtype=np.float64)
+        if not np.array_equal(values[1:], expected[1:]):
+            raise self.fault(f"{what}: expected {data}, got {values.tolist()}")
 
     def named(self, name: str, known: dict[str, float]) -> float:
         if name not in known:
@@ -353,5 +450,13 @@ class _Reader:
             raise self.fault(f"the quaternion {value[1]} must have length 1")
         return T
 
+    def elsewhere(self, **named: str) -> dict[str, str]:
+        """Return where the data that a move names are declared or set."""
+        return {what: self.said_at[name] for what, name in named.items() if name in self.said_at}
+
+    @property
+    def place(self) -> str:
+        return f"{self.file}, line {self.line}"
+
     def fault(self, message: str) -> InputError:
-        return InputError(f"{self.file}, line {self.line}: {message}")
+        return InputError(f"{self.place}: {message}")

@@ -8,107 +8,62 @@ place, so that one line says where the tip goes, how fast and how closely. ``Tri
 
 from __future__ import annotations
 
-import re
 from collections.abc import Hashable, Iterable, Iterator
 from functools import cache, cached_property
-from typing import Annotated, TypeVar
+from itertools import count
+from typing import TypeVar
 
 import numpy as np
-from pydantic import StringConstraints
 
 from kerfpath._arrays import Array
-from kerfpath.post._divide import divided, in_files
+from kerfpath.post._divide import in_files, renamed
 from kerfpath.post._formatter import Formatter, number, plain
 from kerfpath.post._names import identifiers
 from kerfpath.post._orientations import quaternions
 from kerfpath.post._program import (
+    Await,
     CircularMove,
     JointMove,
     LinearMove,
     Move,
     Program,
+    Request,
     Section,
     Switch,
     Wait,
 )
-from kerfpath.post._settings import Rules, Settings, setting
+from kerfpath.post._settings import handshakes
+from kerfpath.post._times import SHORTEST_CRUISE, cruises
 from kerfpath.post.rapid._axes import axes_from_joints, confdata
+from kerfpath.post.rapid._settings import SWITCH_OFF, TURNING_SPEED, RapidSettings
 
-__all__ = ["Rapid", "RapidSettings", "is_reserved", "rules"]
+__all__ = [
+    "FIRST",
+    "FULL_AIR_SPEED",
+    "Rapid",
+    "air_speed_data",
+    "ending",
+    "linear_speed_data",
+    "switched_off",
+    "zone_data",
+]
 
 _Key = TypeVar("_Key", bound=Hashable)
 
 FULL_AIR_SPEED = 1.0
 """Tip speed (m/s) that a joint move at its full share is given: RAPID knows no share."""
-TURNING_SPEED = np.radians(500.0)
-"""v_ori of all speed data, rad/s: ABB's own for its predefined speeds."""
-SLOWEST = 1e-5
-"""Lowest speed (m/s) that two decimals of mm/s say to within half."""
-SPEED_STEP = 1e-5
-"""Speeds (m/s) have two decimals of mm/s."""
-LONGEST_LEAD = 0.5
-r"""Longest lead (s) that ``TriggIO \Time`` takes."""
-
 NOT_CHECKED = "not been checked for collisions"
 NO_EXTERNAL_AXES = "[9E9,9E9,9E9,9E9,9E9,9E9]"
 JOINT_TARGET = "[[" + ",".join(["%.6f"] * 6) + "]," + NO_EXTERNAL_AXES + "]"
 TARGET = "[[%.4f,%.4f,%.4f],[%.8f,%.8f,%.8f,%.8f],[%d,%d,%d,%d]," + NO_EXTERNAL_AXES + "]"
 NO_POSE = np.eye(4)
 """Stands in for that of a joint move."""
-AROUND = 60
-"""Lines of a module beside those of its routines, where it declares few speeds and zones."""
+FIRST = "nFirst"
+"""Number of the contour at which the program begins, for a restart."""
+AROUND_A_ROUTINE = 4
+"""Its first and last line, the empty one before it, and its call."""
 EXTERNAL_SPEEDS = "5000,1000"
 """mm/s and deg/s of external axes; there are none, but speed data must say something."""
-
-KEYWORDS = (
-    "alias and backward case connect const default div do else elseif endfor endfunc endif "
-    "endmodule endproc endrecord endtest endtrap endwhile error exit false for from func goto "
-    "if inout local mod module nostepin not noview or pers proc raise readonly record retry "
-    "return step sysmodule task test then to trap true trynext undo var viewonly while with xor "
-)
-"""Keywords of the language."""
-MEANINGS = (
-    "bool byte clock confdata dnum errnum extjoint intnum jointtarget loaddata num orient pos "
-    "pose robjoint robtarget signaldi signaldo speeddata string tooldata triggdata wobjdata "
-    "zonedata abs accset break calcjointt calcrobt cjointt confj confl crobt deactunit "
-    "exitcycle fine incr load moveabsj movec movej movel moveldo offs pulsedo reltool reset "
-    "round set setao setdo setgo singarea sqrt start stop stopmove tool0 tpwrite triggc triggio "
-    "triggj triggl trunc unload velset waitdi waitdo waittime wobj0 load0 "
-)
-"""Types, instructions and data that every controller defines, where a contour may be named so."""
-RESERVED = frozenset((KEYWORDS + MEANINGS).split())
-PREDEFINED = re.compile(r"[vz]\d+|vmax|vrot\d+|vlin\d+", re.IGNORECASE)
-"""Speeds and zones that every controller defines: v100, z10."""
-
-
-Name = Annotated[str, StringConstraints(min_length=1, max_length=80)]
-Folder = Annotated[str, StringConstraints(pattern=r"^[A-Za-z0-9_:/.\-]{1,60}$")]
-
-
-class RapidSettings(Settings):
-    """What the controller calls things."""
-
-    laser_output: Annotated[Name, setting("the name of a digital output", '"doLaser"')] = "doLaser"
-    gas_output: Annotated[Name | None, setting("the name of a digital output", '"doGas"')] = None
-    tool_name: Annotated[Name, setting("a name for the tool", '"tLaser"')] = "tLaser"
-    folder: Annotated[Folder, setting("a folder of the controller", '"HOME:"')] = "HOME:"
-    work_object: Annotated[Name, setting("a name for the part's frame", '"wPart"')] = "wPart"
-
-
-def rules(settings: RapidSettings) -> Rules:
-    """Return what RAPID programs must keep to."""
-    return Rules(
-        longest_name=32,
-        slowest=SLOWEST,
-        speed_step=SPEED_STEP,
-        turning_speed=float(TURNING_SPEED),
-        longest_lead=LONGEST_LEAD,
-    )
-
-
-def is_reserved(name: str) -> bool:
-    """Return whether RAPID or every ABB controller gives `name` another meaning."""
-    return name.lower() in RESERVED or PREDEFINED.fullmatch(name) is not None
 
 
 class Rapid(Formatter):
@@ -117,15 +72,16 @@ class Rapid(Formatter):
     settings: RapidSettings
 
     def __init__(self, program: Program, settings: RapidSettings) -> None:
-        super().__init__(divided(program, settings.lines_per_file - AROUND), settings)
+        super().__init__(renamed(program, (FIRST, SWITCH_OFF)), settings)
         moves = program.moves
         joint = [move for move in moves if isinstance(move, JointMove)]
-        self.air_speed = _numbered("vAir", (_air_speed(move.speed) for move in joint))
+        self._cruise = cruises(self.program)
+        self.air_speed = _numbered("vAir", (air_speed_data(move.speed) for move in joint))
         self._laser_on = dict(_with_laser(moves))
-        linear = [(on, _linear_speed(move.speed)) for move, on in self._laser_on.items()]
+        linear = [(on, linear_speed_data(move.speed)) for move, on in self._laser_on.items()]
         self.linear_speed = _numbered("vApproach", (key for key in linear if not key[0]))
         self.linear_speed |= _numbered("vCut", (key for key in linear if key[0]))
-        self.zone = _numbered("zCorner", (_zone(move.zone) for move in moves if move.zone > 0))
+        self.zone = _numbered("zCorner", (zone_data(move.zone) for move in moves if move.zone > 0))
         switches = [s for m in moves if isinstance(m, LinearMove) for s in m.switches]
         self.trigger: dict[Switch, str] = {}
         for signal, prefix in (("laser", "tr"), ("gas", "trGas")):
@@ -134,23 +90,33 @@ class Rapid(Formatter):
                 self.trigger |= _numbered(f"{prefix}{suffix}", keys)
 
     def files(self) -> dict[str, str]:
-        """Return one module, or a main one and those with its routines that it loads."""
+        """Return one module, or a main one and those with its routines that it loads.
+
+        The robot stands, beam off, wherever a module is loaded or unloaded: between contours.
+        """
         name, sections = self.program.name, self.program.sections
-        lines = [len(section.steps) + 3 for section in sections]
-        if sum(lines) + AROUND <= self.settings.lines_per_file:
-            calls = [f"{section.name};" for section in sections]
-            return {f"{name}.mod": _text(self._module(calls, sections))}
+        most, numbers = self.settings.lines_per_file, dict(zip(sections, count(1), strict=False))
+        calls = [f"IF {FIRST}<={n} {section.name};" for section, n in numbers.items()]
+        whole = list(self._module(calls, sections))
+        if len(whole) <= most:
+            return {f"{name}.mod": _text(whole)}
         files, calls = {}, []
-        for module, part in zip(
-            self._modules(), in_files(sections, lines, self.settings.lines_per_file), strict=False
-        ):
+        parts = in_files(sections, list(self.lengths().values()), most)
+        for module, part in zip(self._modules(), parts, strict=False):
             place = f'"{self.settings.folder}/{module}.mod"'
-            calls += [rf"Load \Dynamic,{place};"]
-            calls += [f'%"{section.name}"%;' for section in part]
-            calls += [f"UnLoad {place};"]
+            calls += [f"IF {FIRST}<={numbers[part[-1]]} THEN", rf"  Load \Dynamic,{place};"]
+            calls += [f'  IF {FIRST}<={numbers[section]} %"{section.name}"%;' for section in part]
+            calls += [f"  UnLoad {place};", "ENDIF"]
             body = (line for section in part for line in self._routine(section))
             files[f"{module}.mod"] = _text([f"MODULE {module}", *body, "ENDMODULE"])
         return {f"{name}.mod": _text(self._module(calls, ()))} | files
+
+    def lengths(self) -> dict[str, int]:
+        """Return how many lines each contour takes, by its name."""
+        return {
+            section.name: sum(1 for _ in self.lines(section)) + AROUND_A_ROUTINE
+            for section in self.program.sections
+        }
 
     def _modules(self) -> list[str]:
         """Return names for modules of routines, as many as there might be."""
@@ -167,7 +133,9 @@ class Rapid(Formatter):
         yield "  ! Complete the load of the tool: mass -1 stands for not known."
         yield "  ! The work object is the part in the robot's base, which is the world's, too."
         yield f"  ! Moves through the air have {checked}."
-        yield "  ! A stop does not switch the laser off: the safety circuit of the cell has to."
+        yield f"  ! {SWITCH_OFF} is for the events STOP and QSTOP: enter it there. A stop switches"
+        yield "  ! the laser off only then; the safety circuit of the cell has to, too."
+        yield f"  ! To begin at a contour, set {FIRST} to its number and move PP to Main."
         load = "[-1,[0,0,0],[1,0,0,0],0,0,0]"
         yield f"  PERS tooldata {settings.tool_name}:=[TRUE,{tool},{load}];"
         inner = "[[0,0,0],[1,0,0,0]]"
@@ -175,10 +143,16 @@ class Rapid(Formatter):
         yield from (f"  CONST speeddata {name}:={value};" for value, name in self._speed_data())
         yield from (f"  CONST zonedata {name}:={value};" for value, name in self.zone.items())
         yield from (f"  VAR triggdata {name};" for name in self.trigger.values())
+        yield f"  PERS num {FIRST}:=1;"
         yield ""
         yield "  PROC main()"
         yield from (f"    {line}" for line in self.begin())
         yield from (f"    {line}" for line in calls)
+        yield from (f"  {line}" for line in ending())
+        yield "  ENDPROC"
+        yield ""
+        yield f"  PROC {SWITCH_OFF}()"
+        yield from (f"    {line}" for line in switched_off(settings))
         yield "  ENDPROC"
         for section in sections:
             yield from self._routine(section)
@@ -193,8 +167,9 @@ class Rapid(Formatter):
     def begin(self) -> Iterator[str]:
         """Yield the lines of the main routine before it calls those of the sections."""
         yield r"ConfL\Off;"
-        for signal in dict.fromkeys(["laser", *(s.signal for s in self.trigger)]):
-            yield f"SetDO {self.output(signal)},0;"
+        for s in self.trigger:
+            self.output(s.signal)
+        yield f"{SWITCH_OFF};"
         for s, name in self.trigger.items():
             lead = number(s.lead_time, 4)
             yield rf"TriggIO {name},{lead}\Time\DOp:={self.output(s.signal)},{int(s.on)};"
@@ -202,14 +177,17 @@ class Rapid(Formatter):
     def names(self) -> list[tuple[str, str]]:
         """Return every name in the module, with what it names."""
         settings = self.settings
-        gas = settings.gas_output
+        gas, ports = settings.gas_output, handshakes(settings).items()
         return [
             (self.program.name, "the program"),
             (settings.tool_name, "the tool"),
             (settings.work_object, "the work object"),
             (settings.laser_output, "the output of the laser"),
             *([] if gas is None else [(gas, "the output of the gas")]),
+            *((name, f"the {way} of {who}") for (who, way), name in ports if name is not None),
             ("main", "the main routine"),
+            (SWITCH_OFF, "the routine that switches off"),
+            (FIRST, "the number of the first contour"),
             *((section.name, "a contour") for section in self.program.sections),
             *((name, "a speed") for _, name in self._speed_data()),
             *((name, "a zone") for name in self.zone.values()),
@@ -219,8 +197,10 @@ class Rapid(Formatter):
 
     def joint_move(self, move: JointMove) -> Iterator[str]:
         """Yield a MoveAbsJ."""
-        speed = self.air_speed[_air_speed(move.speed)]
-        yield f"MoveAbsJ {self.target[move][-1]},{speed},{self.end(move)};"
+        speed = self.air_speed[air_speed_data(move.speed)]
+        cruise = self._cruise.get(move, 0.0)
+        timed = rf"\T:={number(cruise, 4)}" if cruise >= SHORTEST_CRUISE else ""
+        yield f"MoveAbsJ {self.target[move][-1]},{speed}{timed},{self.end(move)};"
 
     def linear_move(self, move: LinearMove) -> Iterator[str]:
         """Yield a MoveL, or a TriggL where something is switched."""
@@ -237,6 +217,15 @@ class Rapid(Formatter):
     def wait(self, wait: Wait) -> Iterator[str]:
         """Yield a WaitTime."""
         yield f"WaitTime {number(wait.time, 3)};"
+
+    def request(self, request: Request) -> Iterator[str]:
+        """Yield a SetDO; the robot stands."""
+        yield f"SetDO {self.port(request.partner, 'output')},{int(request.on)};"
+
+    def wait_for(self, awaited: Await) -> Iterator[str]:
+        r"""Yield a WaitDI; after its MaxTime main's handler of errors switches off and stops."""
+        name = self.port(awaited.partner, "input")
+        yield rf"WaitDI {name},1\MaxTime:={number(awaited.timeout, 3)};"
 
     def comment(self, text: str) -> Iterator[str]:
         """Yield a comment."""
@@ -270,7 +259,7 @@ class Rapid(Formatter):
 
     def speed(self, move: LinearMove) -> str:
         """Return the name of the speed data of a move."""
-        return self.linear_speed[self._laser_on[move], _linear_speed(move.speed)]
+        return self.linear_speed[self._laser_on[move], linear_speed_data(move.speed)]
 
     def _switched(self, path: str, move: LinearMove) -> tuple[str, str]:
         names = [self.trigger[s] for s in move.switches]
@@ -279,8 +268,25 @@ class Rapid(Formatter):
 
     def end(self, move: Move) -> str:
         """Return the zone, tool and work object at the end of a move."""
-        zone = self.zone[_zone(move.zone)] if move.zone > 0 else "fine"
+        zone = self.zone[zone_data(move.zone)] if move.zone > 0 else "fine"
         return rf"{zone},{self.settings.tool_name}\WObj:={self.settings.work_object}"
+
+
+def ending() -> list[str]:
+    """Return how main ends: the next time with the first contour; and its handlers.
+
+    Those are of an error, and of leaving main before its end. What is not handled below ends here:
+    everything is off, the robot stops, the error is shown.
+    """
+    off = f"  {SWITCH_OFF};"
+    return [f"  {FIRST}:=1;", "ERROR", off, "  StopMove;", "  RAISE;", "UNDO", off]
+
+
+def switched_off(settings: RapidSettings) -> list[str]:
+    """Return the lines that switch off everything that the settings name."""
+    requests = (name for (_, way), name in handshakes(settings).items() if way == "output")
+    outputs = (settings.laser_output, settings.gas_output, *requests)
+    return [f"SetDO {name},0;" for name in outputs if name is not None]
 
 
 def _numbered(prefix: str, keys: Iterable[_Key]) -> dict[_Key, str]:
@@ -306,21 +312,26 @@ def _pose(T: Array) -> str:
 
 
 @cache
-def _linear_speed(speed: float) -> str:
+def linear_speed_data(speed: float) -> str:
+    """Return the speed data of path moves at a speed of the tip (m/s)."""
     return f"[{number(speed * 1e3, 2)},{number(np.degrees(TURNING_SPEED), 0)},{EXTERNAL_SPEEDS}]"
 
 
 @cache
-def _air_speed(share: float) -> str:
+def air_speed_data(share: float) -> str:
+    """Return the speed data of joint moves at a share of the full speed."""
     speed_mm_s = share * FULL_AIR_SPEED * 1e3
     turning_deg_s = share * np.degrees(TURNING_SPEED)
     return f"[{number(speed_mm_s, 2)},{number(turning_deg_s, 0)},{EXTERNAL_SPEEDS}]"
 
 
 @cache
-def _zone(zone: float) -> str:
-    # ABB's own zones turn the tool within 1.5 times the path zone at most; here within the same,
-    # and 0.1 deg for each mm.
+def zone_data(zone: float) -> str:
+    """Return the zone data of a radius (m).
+
+    ABB's own zones turn the tool within 1.5 times the path zone at most; here within the same, and
+    0.1 deg for each mm.
+    """
     zone_mm = number(zone * 1e3, 3)
     zone_deg = number(zone * 1e3 * 0.1, 3)
     return f"[FALSE,{zone_mm},{zone_mm},{zone_mm},{zone_deg},{zone_mm},{zone_deg}]"

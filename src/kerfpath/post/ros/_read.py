@@ -70,7 +70,7 @@ class _Points:
     """The points of the trajectory, and the lines where they stand."""
 
     def __init__(self, file: str, text: str, robot: Robot, settings: RosSettings) -> None:
-        self.file = file
+        self.file, self.step_time = file, settings.step_ms * 1e-3
         lines = _lines(text)
         n = robot.joints
         expected = head(joint_names(n, settings))
@@ -166,6 +166,8 @@ class _Events:
             self.append(ReadWait(time=took, file=self.file, line=self.line))
             self.last = end
             return
+        if points.stops[first] and points.stops[end] and end > first:
+            self.require_dense(first, end)
         if kind == "joint":
             self.require_line(between, OFF_LINE)
         else:
@@ -176,9 +178,10 @@ class _Events:
                 file=self.file,
                 line=self.line,
                 speed=self.share(between, took) if kind == "joint" and self.last >= 0 else None,
-                duration=took if kind == "linear" else None,
+                duration=took if kind == "linear" or self.last >= 0 else None,
                 zone=0.0 if points.stops[end] else None,
                 q=freeze(points.q[end]),
+                elsewhere={"target": f"{points.file}, line {points.line[end]}"},
             )
         )
         self.last = end
@@ -187,6 +190,12 @@ class _Events:
         """Return the share of the full speed of a joint motion; None where it goes nowhere."""
         least = least_time((q[-1] - q[0])[None], *self.robot.speed_limits())[0]
         return float(least / took) if took > 0 else None
+
+    def require_dense(self, first: int, end: int) -> None:
+        """Require that points from stop to stop are as near to each other as they are written."""
+        step = float(np.diff(self.points.time[first : end + 1]).max())
+        if step > self.points.step_time + 2e-9:  # times are whole ns
+            raise self.fault(f"expected a point every {self.points.step_time:g} s, got {step:g} s")
 
     def require_line(self, points: Array, most: float) -> None:
         """Require that points (m, k) lie on the line from the first to the last, one by one."""

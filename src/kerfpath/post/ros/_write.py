@@ -43,7 +43,7 @@ class RosSettings(Settings):
 
 def rules(settings: RosSettings) -> Rules:
     """Return what trajectories must keep to."""
-    return Rules(slowest=1e-6)
+    return Rules(slowest=1e-6, angle_step=0.5e-9)
 
 
 def joint_names(joints: int, settings: RosSettings) -> list[str]:

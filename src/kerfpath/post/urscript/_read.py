@@ -11,10 +11,19 @@ from scipy.spatial.transform import Rotation
 
 from kerfpath._arrays import Array, freeze
 from kerfpath.errors import InputError
-from kerfpath.post._program import SIGNALS, Switch
-from kerfpath.post._read import ReadMove, ReadProgram, ReadSection, ReadStep, ReadWait, patterns
-from kerfpath.post.urscript._switching import time_ahead, words
-from kerfpath.post.urscript._write import URScriptSettings, full_joint_speed
+from kerfpath.post._program import SIGNALS, Await, Handshake, Request, Switch
+from kerfpath.post._read import (
+    ReadHandshake,
+    ReadMove,
+    ReadProgram,
+    ReadSection,
+    ReadStep,
+    ReadWait,
+    partner_of,
+    patterns,
+)
+from kerfpath.post.urscript._switching import time_ahead, waiting, when_stopped, words
+from kerfpath.post.urscript._write import FIRST, URScriptSettings, full_joint_speed, outputs
 from kerfpath.robots import Robot
 
 __all__ = ["read"]
@@ -27,6 +36,9 @@ def read(
     return _Reader(main, files[main], robot, settings).program()
 
 
+DIGIT = 1e-6
+"""What the digits of an acceleration leave, m/s^2 or rad/s^2."""
+
 _NUMBER = r"(-?\d+\.\d+)"
 _SIX = ", ".join([_NUMBER] * 6)
 _POSE = rf"p\[{_SIX}\]"
@@ -35,16 +47,19 @@ _TARGET = rf"pose_trans\(part_frame, {_POSE}\)"
 _SIGNAL = "(laser|gas)"
 _DEFINITION = re.compile(r"def ([A-Za-z]\w*)\(\):", re.ASCII)
 _CALL = re.compile(r"([A-Za-z]\w*)\(\)", re.ASCII)
+_FIRST = re.compile(rf"global {FIRST} = (\d{{1,6}})", re.ASCII)
 _TOOL = re.compile(rf"set_tcp\({_POSE}\)", re.ASCII)
 _PART = re.compile(rf"global part_frame = {_POSE}", re.ASCII)
 _STEPS = patterns(
     {
         "linear": rf"movel\({_TARGET}, {_MOTION}\)",
         "circular": rf"movec\({_TARGET}, {_TARGET}, {_MOTION}, mode=0\)",
-        "joint": rf"movej\(\[{_SIX}\], {_MOTION}\)",
+        "joint": rf"movej\(\[{_SIX}\], a={_NUMBER}, v={_NUMBER}, (?:t={_NUMBER}, )?r={_NUMBER}\)",
         "switch_ahead": rf"{_SIGNAL}_ahead\({_POSE}, {_NUMBER}, (True|False)\)",
         "switch": rf"{_SIGNAL}_set\((True|False)\)",
         "wait": rf"sleep\({_NUMBER}\)",
+        "request": r"set_standard_digital_out\((\d), (True|False)\)",
+        "wait_for": rf"await_input\((\d), {_NUMBER}\)",
     }
 )
 
@@ -60,13 +75,20 @@ class _Reader:
         self.at = 0
         self.steps: list[ReadStep] = []
         self.signals: list[str] = []
+        self.can_wait = False
         self.ahead: dict[str, tuple[tuple[str, ...], float, str]] = {}
+        self.ahead_at: dict[str, str] = {}
         self.leads: dict[str, tuple[float, str]] = {}
 
     def program(self) -> ReadProgram:
         (name,) = self.take(_DEFINITION, "def NAME():")
         tool = _pose(self.take(_TOOL, "set_tcp(p[...])"))
         part = _pose(self.take(_PART, "global part_frame = p[...]"))
+        begin = int(self.take(_FIRST, f"global {FIRST} = 1")[0])
+        self.expect(when_stopped(outputs(self.settings)))
+        self.can_wait = self.line == waiting([])[0]
+        if self.can_wait:
+            self.expect(waiting(outputs(self.settings)))
         signals = self.signals
         for known in SIGNALS.values():
             if self.line != f"global {known}_waits = False":
@@ -84,17 +106,20 @@ class _Reader:
             sections[match[1]] = ReadSection(name=match[1], steps=self.section())
         for signal in signals:
             self.expect([f"{signal}_set(False)", f"{signal}_run = run {signal}_thread()"])
-        calls = []
-        while match := _CALL.fullmatch(self.line):
-            calls.append(match[1])
+        calls: list[str] = []
+        while self.line == f"if {FIRST} <= {len(calls) + 1}:":
             self.at += 1
+            calls += self.take(_CALL, "the call of a contour")
+            self.expect(["end"])
+        if not 1 <= begin <= len(calls):
+            raise self.fault(f"{FIRST} must be the number of a contour")
         if calls != list(sections):
             raise self.fault("the contours must be called once each, in their order")
         self.expect([*(f"kill {signal}_run" for signal in signals), "end", "the end of the file"])
         robot = self.robot
         return ReadProgram(
             name=name,
-            sections=tuple(sections.values()),
+            sections=tuple(sections.values())[begin - 1 :],
             T_flange_tip=freeze(np.linalg.inv(robot.T_end_flange) @ tool),
             T_base_part=freeze(robot.T_base_foot @ part),
         )
@@ -116,7 +141,9 @@ class _Reader:
 
     def joint(self, words: tuple[str, ...]) -> None:
         self.settled()
-        *angles, _, v, r = (float(word) for word in words)
+        *angles, a, v, _, r = (float(word or "nan") for word in words)
+        self.require_acceleration(a, np.radians(self.settings.joint_acceleration_deg_s2))
+        timed = words[-2]
         robot = self.robot
         self.steps.append(
             ReadMove(
@@ -124,10 +151,16 @@ class _Reader:
                 file=self.file,
                 line=self.number,
                 q=freeze(robot.sign * (np.array(angles) + robot.offset)),
-                speed=v / full_joint_speed(robot),
+                speed=v / full_joint_speed(robot) if timed is None else None,
+                duration=None if timed is None else float(timed),
                 zone=r,
             )
         )
+
+    def require_acceleration(self, said: float, expected: float) -> None:
+        """Refuse another acceleration than that of the settings."""
+        if abs(said - expected) > DIGIT:
+            raise self.fault(f"expected the acceleration a={expected:.6f}, got {said:g}")
 
     def linear(self, words: tuple[str, ...]) -> None:
         self.path_move(words[:6], words[6:], None)
@@ -143,6 +176,7 @@ class _Reader:
         a, v, r = (float(word) for word in motion)
         if min(a, v) <= 0:
             raise self.fault("speed and acceleration must be above 0")
+        self.require_acceleration(a, self.settings.acceleration)
         for signal, (point, near, on) in armed.items():
             if point != target:
                 raise self.fault(f"the {signal} is switched ahead of another point")
@@ -165,6 +199,7 @@ class _Reader:
         if signal in self.ahead:
             raise self.fault(f"the {signal} is switched ahead twice")
         self.ahead[signal] = tuple(target), float(near), on
+        self.ahead_at[signal] = f"{self.file}, line {self.number}"
 
     def switch(self, words: tuple[str, str]) -> None:
         signal, on = words
@@ -176,11 +211,32 @@ class _Reader:
         if before != on:
             raise self.fault(f"the {signal} is switched to {before} ahead, to {on} here")
         switch = Switch(signal=SIGNALS[signal], on=on == "True", lead_time=lead)
-        self.steps[-1] = replace(move, switches=(*move.switches, switch))
+        at = self.ahead_at.pop(signal, f"{self.file}, line {self.number}")
+        self.steps[-1] = replace(
+            move,
+            switches=(*move.switches, switch),
+            elsewhere={"switches": at, **move.elsewhere},
+        )
 
     def wait(self, words: tuple[str, ...]) -> None:
         self.settled()
         self.steps.append(ReadWait(time=float(words[0]), file=self.file, line=self.number))
+
+    def request(self, words: tuple[str, str]) -> None:
+        port, on = words
+        partner = partner_of(int(port), "output", self.settings, f"{self.file}, line {self.number}")
+        self.handshake(Request(partner=partner, on=on == "True"))
+
+    def wait_for(self, words: tuple[str, str]) -> None:
+        port, timeout = words
+        if not self.can_wait:
+            raise self.fault("the program does not say how it waits for an input")
+        partner = partner_of(int(port), "input", self.settings, f"{self.file}, line {self.number}")
+        self.handshake(Await(partner=partner, timeout=float(timeout)))
+
+    def handshake(self, what: Handshake) -> None:
+        self.settled()
+        self.steps.append(ReadHandshake(what=what, file=self.file, line=self.number))
 
     def settled(self) -> None:
         """Require that what is switched ahead of a move is switched at its end, too."""

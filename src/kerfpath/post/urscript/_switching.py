@@ -8,13 +8,14 @@ instruction after the move then says the same again, so that an output is never 
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from math import sqrt
 
 from kerfpath.post._program import Signal
 
-__all__ = ["LOCAL", "distance_ahead", "names", "time_ahead", "words"]
+__all__ = ["LOCAL", "distance_ahead", "names", "time_ahead", "waiting", "when_stopped", "words"]
 
-LOCAL = ("due", "gap", "near", "on", "target", "value")
+LOCAL = ("due", "gap", "most", "near", "on", "port", "target", "value", "waited")
 """Names inside the thread and the functions of `words`; a contour of that name would hide them."""
 
 
@@ -41,6 +42,32 @@ def names(signal: Signal) -> list[str]:
     """Return every name that the lines of `words` define."""
     parts = ("waits", "point", "distance", "value", "thread", "ahead", "set", "run")
     return [f"{signal}_{part}" for part in parts]
+
+
+def when_stopped(outputs: Sequence[int]) -> list[str]:
+    """Return the lines by which the controller sets outputs low whenever no program runs."""
+    return [f"set_runstate_standard_digital_output_to_value({output}, 1)" for output in outputs]
+
+
+def waiting(outputs: Sequence[int]) -> list[str]:
+    """Return the lines that define how an input is waited for.
+
+    Without an answer all `outputs` are switched off and the program ends.
+    """
+    return [
+        "def await_input(port, most):",
+        "  waited = 0.0",
+        "  while (get_standard_digital_in(port) == False) and (waited < most):",
+        "    sync()",
+        "    waited = waited + get_steptime()",
+        "  end",
+        "  if get_standard_digital_in(port) == False:",
+        *(f"    set_standard_digital_out({output}, False)" for output in outputs),
+        '    popup("no answer at an input", title="kerfpath", error=True)',
+        "    halt",
+        "  end",
+        "end",
+    ]
 
 
 def words(signal: Signal, output: int) -> list[str]:

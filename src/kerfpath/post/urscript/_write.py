@@ -19,18 +19,41 @@ from kerfpath.errors import InputError
 from kerfpath.post._divide import in_one_file
 from kerfpath.post._formatter import Formatter, number, plain
 from kerfpath.post._orientations import rotation_vectors
-from kerfpath.post._program import CircularMove, JointMove, LinearMove, Move, Signal, Wait
-from kerfpath.post._settings import Rules, Settings, setting
-from kerfpath.post.urscript._switching import LOCAL, distance_ahead, names, words
+from kerfpath.post._program import (
+    Await,
+    CircularMove,
+    JointMove,
+    LinearMove,
+    Move,
+    Request,
+    Signal,
+    Wait,
+)
+from kerfpath.post._settings import Rules, Settings, handshakes, setting
+from kerfpath.post.urscript._switching import (
+    LOCAL,
+    distance_ahead,
+    names,
+    waiting,
+    when_stopped,
+    words,
+)
 from kerfpath.robots import Robot
 
-__all__ = ["URScript", "URScriptSettings", "full_joint_speed", "rules"]
+__all__ = ["FIRST", "URScript", "URScriptSettings", "full_joint_speed", "outputs", "rules"]
 
 SPEED_STEP = 1e-6
 """Speeds (m/s) have six decimals."""
+FIRST = "first_contour"
+"""Number of the contour at which the program begins, for a restart."""
+POINT_STEP, ANGLE_STEP = 0.5e-7, 0.5e-9
+"""What seven decimals of m leave of positions, and nine of rad of turns."""
 NOT_CHECKED = "not been checked for collisions"
 
 Output = Annotated[int | None, setting("a standard digital output from 0 to 7", "0", ge=0, le=7)]
+
+
+Input = Annotated[int | None, setting("a standard digital input from 0 to 7", "0", ge=0, le=7)]
 
 
 class URScriptSettings(Settings):
@@ -38,6 +61,14 @@ class URScriptSettings(Settings):
 
     laser_output: Output = None
     gas_output: Output = None
+    ready_input: Input = None
+    shutter_input: Input = None
+    gas_pressure_input: Input = None
+    height_input: Input = None
+    interlock_input: Input = None
+    ready_output: Output = None
+    shutter_output: Output = None
+    height_output: Output = None
     acceleration_mm_s2: Annotated[
         float, setting("a number from 1 to 50000, in mm/s^2", "1200", ge=1, le=50_000)
     ] = 1200.0
@@ -51,9 +82,18 @@ class URScriptSettings(Settings):
         return self.acceleration_mm_s2 * 1e-3
 
 
+def outputs(settings: URScriptSettings) -> list[int]:
+    """Return all outputs that the settings name."""
+    requests = (n for (_, way), n in handshakes(settings).items() if way == "output")
+    named = (settings.laser_output, settings.gas_output, *requests)
+    return [output for output in named if output is not None]
+
+
 def rules(settings: URScriptSettings) -> Rules:
     """Return what programs in URScript must keep to."""
-    return Rules(slowest=SPEED_STEP, speed_step=SPEED_STEP)
+    return Rules(
+        slowest=SPEED_STEP, speed_step=SPEED_STEP, point_step=POINT_STEP, angle_step=ANGLE_STEP
+    )
 
 
 def full_joint_speed(robot: Robot) -> float:
@@ -86,13 +126,19 @@ class URScript(Formatter):
         yield f"# Written by kerfpath for {plain(robot.model)} ({plain(robot.id)})."
         yield f"# Moves through the air have {checked}."
         yield "# Payload and centre of gravity are those of the installation."
-        yield "# A stop does not switch the laser off: the safety circuit of the cell has to."
+        yield "# The controller sets the outputs low while no program runs; the safety circuit of"
+        yield "# the cell has to switch the laser off, too."
+        yield f"# To begin at a contour, write its number for {FIRST}."
         yield f"def {program.name}():"
         # The controller's flange and base are those of Denavit and Hartenberg's model.
         tool = robot.T_end_flange @ program.T_flange_tip
         part = np.linalg.inv(robot.T_base_foot) @ program.T_base_part
         yield f"  set_tcp({_pose(tool)})"
         yield f"  global part_frame = {_pose(part)}"
+        yield f"  global {FIRST} = 1"
+        yield from (f"  {line}" for line in when_stopped(outputs(self.settings)))
+        if any(isinstance(step, Await) for step in program.steps):
+            yield from (f"  {line}" for line in waiting(outputs(self.settings)))
         for signal in self.signals:
             yield from (f"  {line}" for line in words(signal, self.output(signal)))
         for section in program.sections:
@@ -102,7 +148,8 @@ class URScript(Formatter):
         for signal in self.signals:
             yield f"  {signal}_set(False)"
             yield f"  {signal}_run = run {signal}_thread()"
-        yield from (f"  {section.name}()" for section in program.sections)
+        for n, section in enumerate(program.sections, 1):
+            yield from (f"  if {FIRST} <= {n}:", f"    {section.name}()", "  end")
         yield from (f"  kill {signal}_run" for signal in self.signals)
         yield "end"
 
@@ -119,6 +166,8 @@ class URScript(Formatter):
         return [
             (self.program.name, "the program"),
             ("part_frame", "the part's frame"),
+            (FIRST, "the number of the first contour"),
+            ("await_input", "the handshakes"),
             *((name, "the switching") for name in LOCAL),
             *((name, "the switching") for signal in self.signals for name in names(signal)),
             *((section.name, "a contour") for section in self.program.sections),
@@ -130,7 +179,8 @@ class URScript(Formatter):
         q = ", ".join(number(angle, 8) for angle in robot.sign * move.q - robot.offset)
         a = number(np.radians(self.settings.joint_acceleration_deg_s2), 6)
         v = number(move.speed * full_joint_speed(robot), 6)
-        yield f"movej([{q}], a={a}, v={v}, r={number(move.zone, 7)})"
+        timed = "" if move.duration is None else f"t={number(move.duration, 4)}, "
+        yield f"movej([{q}], a={a}, v={v}, {timed}r={number(move.zone, 7)})"
 
     def linear_move(self, move: LinearMove) -> Iterator[str]:
         """Yield a movel, and what is switched at its end."""
@@ -144,6 +194,15 @@ class URScript(Formatter):
     def wait(self, wait: Wait) -> Iterator[str]:
         """Yield a sleep."""
         yield f"sleep({number(wait.time, 3)})"
+
+    def request(self, request: Request) -> Iterator[str]:
+        """Yield an output; the robot stands."""
+        yield f"set_standard_digital_out({self.port(request.partner, 'output')}, {request.on})"
+
+    def wait_for(self, awaited: Await) -> Iterator[str]:
+        """Yield a wait for an input; without an answer the program ends with all off."""
+        port = self.port(awaited.partner, "input")
+        yield f"await_input({port}, {number(awaited.timeout, 3)})"
 
     def comment(self, text: str) -> Iterator[str]:
         """Yield a comment."""

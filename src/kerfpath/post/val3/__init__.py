@@ -25,6 +25,7 @@ VAL3 = Language(
     posture=posture,
     check=check,
     sayable=stopping_to_switch,
+    ahead=False,
     assumed={"laser_output": r"BasicIO-1\%Q0"},
     read=read,
 )

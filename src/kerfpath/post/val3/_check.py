@@ -6,11 +6,13 @@ from collections.abc import Iterator
 
 import numpy as np
 
+from kerfpath.post._divide import long_contours
 from kerfpath.post._issue import ProgramIssue
 from kerfpath.post._program import LinearMove, Program, Section
 from kerfpath.post._standing import switched_later
 from kerfpath.post.val3._axes import configurations
 from kerfpath.post.val3._settings import Val3Settings
+from kerfpath.post.val3._write import AROUND, Val3
 
 __all__ = ["check"]
 
@@ -20,6 +22,8 @@ def check(program: Program, settings: Val3Settings) -> Iterator[ProgramIssue]:
     if settings.laser_output is not None and settings.laser_output == settings.gas_output:
         said = f"laser and gas are switched by the same output, {settings.gas_output}"
         yield ProgramIssue("error", "output", said, "program")
+    room = settings.lines_per_file - AROUND
+    yield from long_contours(Val3(program, settings).lengths(), room, "warning")
     for section in program.sections:
         yield from switched_later(section, "VAL 3")
         yield from _postures(program, section)

@@ -13,14 +13,27 @@ import numpy as np
 from kerfpath._arrays import Array, freeze
 from kerfpath.errors import InputError
 from kerfpath.post._frames import faceplate, world
-from kerfpath.post._program import Signal, Switch
-from kerfpath.post._read import ReadMove, ReadProgram, ReadSection, ReadStep, ReadWait, patterns
+from kerfpath.post._program import PARTNERS, Await, Handshake, Partner, Request, Signal, Switch
+from kerfpath.post._read import (
+    ReadHandshake,
+    ReadMove,
+    ReadProgram,
+    ReadSection,
+    ReadStep,
+    ReadWait,
+    patterns,
+)
 from kerfpath.post.val3._read_data import Data
 from kerfpath.post.val3._settings import Val3Settings
 from kerfpath.post.val3._write import (
     DATA,
+    FIRST,
+    PORTS,
     PROGRAM,
     PROJECT,
+    awaiting,
+    closing,
+    links,
     opening,
     parameters,
     stopping,
@@ -39,6 +52,8 @@ _LINES = patterns(
         "joint": r"movej\(jAir\[(\d+)\],tLaser,mAir\[(\d+)\]\)",
         "stand": r"waitEndMove\(\)",
         "switch": r"(dioLaser|dioGas)=(true|false)",
+        "request": r"(do[A-Z]\w*)=(true|false)",
+        "wait_for": r"if watch\((di\w+)==true,(\d+\.\d+)\)==false",
         "wait": r"delay\((\d+\.\d+)\)",
     }
 )
@@ -60,13 +75,19 @@ def read(main: str, files: Mapping[str, str], robot: Robot, settings: Val3Settin
             raise start.fault(f"{name} is called twice", line)
         called.add((alias, name))
         sections.append(ReadSection(name=name, steps=projects[alias].steps(name)))
+    begin = top.data.first
+    if begin is None or begin > len(sections):
+        raise start.fault(f"{FIRST} must be the number of a contour")
     there = {(alias, name) for alias, project in projects.items() for name in project.routines}
     if idle := there - called:
         raise start.fault(f"{min(idle)[1]} is never called")
-    top.require_stop()
+    for project in projects.values():
+        project.require_stop()
+        if project is not top and project.statements(idle_start := project.routine("start")):
+            raise idle_start.fault("a library must not do anything when it is started")
     return ReadProgram(
         name=top.name,
-        sections=tuple(sections),
+        sections=tuple(sections[begin - 1 :]),
         T_flange_tip=faceplate(robot) @ top.data.frames["tLaser"],
         T_base_part=world(robot) @ top.data.frames["fPart"],
     )
@@ -153,17 +174,20 @@ class _Project:
     def calls(self, start: Element) -> list[tuple[int, str, str]]:
         """Return what start() calls: line, alias of the library or nothing, routine."""
         rows = self.statements(start)
-        begin, end = opening(self.settings), ["waitEndMove()"]
+        begin, end = opening(self.settings), closing()
         count = len(rows) - len(begin) - len(end)
         for number, row in enumerate(begin):
             if [text for _, text in rows[number : number + 1]] != [row]:
                 raise start.fault(f"expected {row} before anything else is done")
-        if count < 0 or rows[-1][1] != end[0]:
-            raise start.fault("expected waitEndMove() at the end of start()")
-        found = []
-        for line, row in rows[len(begin) : -1]:
+        if count < 0 or [text for _, text in rows[-len(end) :]] != end:
+            raise start.fault(f"expected {' and '.join(end)} at the end of start()")
+        found: list[tuple[int, str, str]] = []
+        body = rows[len(begin) : -len(end)]
+        for k in range(0, len(body), 3):
+            line, row = body[k + 1] if k + 1 < len(body) else body[k]
             match = _CALL.fullmatch(row)
-            if match is None:
+            around = [text for _, text in body[k : k + 3 : 2]]
+            if match is None or around != [f"if {FIRST}<={len(found) + 1}", "endIf"]:
                 raise start.fault(f"not expected here: {row[:60]!r}", line)
             found.append((line, match[1] or "", match[2]))
         return found
@@ -180,6 +204,8 @@ class _Project:
         reader = _Routine(self, code)
         for line, row in self.statements(code):
             reader.read(line, row)
+        if reader.must_say:
+            raise code.fault(f"{reader.must_say[0]!r} is missing")
         return tuple(reader.found)
 
 
@@ -190,9 +216,15 @@ class _Routine:
         self.project, self.code, self.line = project, code, 0
         self.found: list[ReadStep] = []
         self.stands = False
+        self.must_say: list[str] = []
 
     def read(self, line: int, row: str) -> None:
         self.line = line
+        if self.must_say:
+            if row != self.must_say[0]:
+                raise self.fault(f"expected {self.must_say[0]!r}, got {row[:60]!r}")
+            del self.must_say[0]
+            return
         for kind, pattern in _LINES.items():
             if match := pattern.fullmatch(row):
                 getattr(self, kind)(*match.groups())
@@ -210,6 +242,7 @@ class _Routine:
                 q=freeze(q[self.place("jAir", target, len(q))]),
                 speed=share,
                 zone=zone,
+                elsewhere=self.elsewhere("jAir", target, "mAir", motion),
             )
         )
         self.stands = False
@@ -241,6 +274,7 @@ class _Routine:
                 posture=self.project.data.words[k],
                 speed=speed,
                 zone=zone,
+                elsewhere=self.elsewhere("pPath", target, "mPath", motion),
             )
         )
         self.stands = False
@@ -256,15 +290,42 @@ class _Routine:
         if not self.stands or not isinstance(last, ReadMove) or last.kind == "joint":
             raise self.fault("a switch must follow a move of the path and waitEndMove()")
         signal: Signal = "laser" if name == "dioLaser" else "gas"
-        if self.project.data.link(signal) is None:
+        if name not in links(self.project.settings):
             raise self.fault(f"{name} is not declared")
         switches = (*last.switches, Switch(signal=signal, on=state == "true"))
-        self.found[-1] = replace(last, switches=switches)
+        elsewhere = {**last.elsewhere, "switches": f"{self.code.file}, line {self.line}"}
+        self.found[-1] = replace(last, switches=switches, elsewhere=elsewhere)
+
+    def request(self, name: str, state: str) -> None:
+        self.handshake(Request(partner=self.partner(name, "output"), on=state == "true"))
+
+    def wait_for(self, name: str, timeout: str) -> None:
+        partner = self.partner(name, "input")
+        self.must_say = awaiting(partner, float(timeout), self.project.settings)[1:]
+        self.handshake(Await(partner=partner, timeout=float(timeout)))
+
+    def partner(self, name: str, way: str) -> Partner:
+        if name in links(self.project.settings):
+            for (partner, its_way), known in PORTS.items():
+                if (known, its_way) == (name, way):
+                    return PARTNERS[partner]
+        raise self.fault(f"{name} is not declared")
+
+    def handshake(self, what: Handshake) -> None:
+        if not self.stands:
+            raise self.fault("a handshake must follow waitEndMove()")
+        self.found.append(ReadHandshake(what=what, file=self.code.file, line=self.line))
 
     def wait(self, time: str) -> None:
         if not self.stands:
             raise self.fault("a delay must follow waitEndMove()")
         self.found.append(ReadWait(time=float(time), file=self.code.file, line=self.line))
+
+    def elsewhere(self, targets: str, target: str, motions: str, motion: str) -> dict[str, str]:
+        """Return where the data of a move stand."""
+        at = self.project.data.said_at
+        moves = at[motions][int(motion)]
+        return {"target": at[targets][int(target)], "speed": moves, "zone": moves}
 
     def motion(self, name: str, key: str) -> tuple[float, float]:
         motions = self.project.data.motions[name]

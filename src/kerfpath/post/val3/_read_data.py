@@ -11,7 +11,7 @@ from kerfpath._arrays import Array, freeze
 from kerfpath.post._read import same_output
 from kerfpath.post.val3._axes import SAME, joints_from_axes
 from kerfpath.post.val3._settings import Val3Settings
-from kerfpath.post.val3._write import OUTPUTS, TYPES
+from kerfpath.post.val3._write import FIRST, OUTPUTS, PORTS, TYPES, links
 from kerfpath.post.val3._xml import Element
 from kerfpath.robots import Robot
 
@@ -37,7 +37,9 @@ class Data:
 
     def __init__(self, root: Element, robot: Robot, settings: Val3Settings) -> None:
         self.robot, self.settings = robot, settings
+        self.said_at: dict[str, list[str]] = {}
         self.frames: dict[str, Array] = {}
+        self.first: int | None = None
         self.q, self.T = np.empty((0, 6)), np.empty((0, 4, 4))
         self.words: list[tuple[str, ...]] = []
         self.motions: dict[str, list[tuple[float, float]]] = {"mAir": [], "mPath": []}
@@ -60,25 +62,33 @@ class Data:
                 value.only()
                 if value.attributes.pop("key", "") != str(key):
                     raise value.fault(f"expected the value of key {key}")
+            self.said_at[name] = [f"{value.file}, line {value.line}" for value in values]
             reader(self, name, values)
-        expected = [OUTPUTS[s] for s in ("laser", "gas") if self.link(s) is not None]
+        expected = links(settings)
         for name in ("fPart", "tLaser", *expected):
             if name not in seen:
                 raise root.fault(f"{name} is not declared")
 
-    def link(self, signal: str) -> str | None:
-        """Return the link of an output, as the settings name it."""
-        link = getattr(self.settings, f"{signal}_output")
-        return None if link is None else str(link)
-
     def _frame(self, name: str, values: list[Element]) -> None:
+        (value,) = values
+        own = {} if name == "fPart" else {"ioLink": self.settings.tool_link}
+        for key, link in own.items():
+            if value.attributes.pop(key, "") != link:
+                raise value.fault(f"expected {key} {link!r} of a tool")
         self.frames[name] = _poses(values, "world[0]" if name == "fPart" else "flange[0]")[0]
+
+    def _first(self, name: str, values: list[Element]) -> None:
+        (value,) = values
+        text = value.attributes.get("value", "")
+        value.take(value=text)
+        if not re.fullmatch(r"[1-9]\d{0,5}", text, re.ASCII):
+            raise value.fault(f"{name} must be the number of a contour, got {text[:60]!r}")
+        self.first = int(text)
 
     def _output(self, name: str, values: list[Element]) -> None:
         (value,) = values
-        signal = "laser" if name == "dioLaser" else "gas"
         link = value.attributes.get("link", "")
-        same_output(link, self.link(signal), f"{value.file}, line {value.line}")
+        same_output(link, links(self.settings).get(name), f"{value.file}, line {value.line}")
         value.take(link=link)
 
     def _air_targets(self, name: str, values: list[Element]) -> None:
@@ -115,8 +125,8 @@ class Data:
 _DATA = {
     "fPart": ("frame", Data._frame),
     "tLaser": ("tool", Data._frame),
-    "dioLaser": ("dio", Data._output),
-    "dioGas": ("dio", Data._output),
+    **{name: ("dio", Data._output) for name in (*OUTPUTS.values(), *PORTS.values())},
+    FIRST: ("num", Data._first),
     "jAir": ("jointRx", Data._air_targets),
     "mAir": ("mdesc", Data._descriptors),
     "pPath": ("pointRx", Data._points),

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import Annotated, Literal
 
+import numpy as np
 from pydantic import StringConstraints
 
 from kerfpath.post._settings import Rules, Settings, setting
@@ -12,6 +13,8 @@ __all__ = ["LONGEST_NAME", "Val3Settings", "is_reserved", "rules"]
 
 LONGEST_NAME = 15
 """Characters of a name."""
+POINT_STEP, ANGLE_STEP = 0.5e-7, float(np.radians(0.5e-6))
+"""What four decimals of mm leave of positions (m), and six of deg of angles (rad)."""
 SPEED_STEP = 1e-6
 """Speeds (m/s) have three decimals of mm/s."""
 
@@ -46,11 +49,29 @@ Output = Annotated[
 ]
 
 
+Input = Annotated[
+    Annotated[str, StringConstraints(pattern=r"^[A-Za-z0-9_.%\\/:\-]{1,80}$")] | None,
+    setting("the link of a digital input, as the controller lists it", r'"BasicIO-1\\%I0"'),
+]
+
+
 class Val3Settings(Settings):
     """Which outputs, where the projects lie, and for which version they are."""
 
     laser_output: Output = None
     gas_output: Output = None
+    ready_input: Input = None
+    shutter_input: Input = None
+    gas_pressure_input: Input = None
+    height_input: Input = None
+    interlock_input: Input = None
+    ready_output: Output = None
+    shutter_output: Output = None
+    height_output: Output = None
+    tool_link: Annotated[
+        Annotated[str, StringConstraints(pattern=r"^[A-Za-z0-9_.%\\/:\-]{1,80}$")],
+        setting("the link of the tool's own output, as the controller lists it", '"valve1"'),
+    ] = "valve1"
     configurations: Annotated[Literal["named", "same"], setting('"named" or "same"', '"named"')] = (
         "named"
     )
@@ -66,7 +87,13 @@ class Val3Settings(Settings):
 
 def rules(settings: Val3Settings) -> Rules:
     """Return what VAL 3 programs must keep to."""
-    return Rules(longest_name=LONGEST_NAME, slowest=SPEED_STEP, speed_step=SPEED_STEP)
+    return Rules(
+        longest_name=LONGEST_NAME,
+        slowest=SPEED_STEP,
+        speed_step=SPEED_STEP,
+        point_step=POINT_STEP,
+        angle_step=ANGLE_STEP,
+    )
 
 
 def is_reserved(name: str) -> bool:

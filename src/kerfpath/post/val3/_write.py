@@ -17,18 +17,30 @@ from scipy.spatial.transform import Rotation
 
 from kerfpath._arrays import Array
 from kerfpath.errors import InputError
-from kerfpath.post._divide import divided, in_files
+from kerfpath.post._divide import in_files, renamed
 from kerfpath.post._formatter import Formatter, number, plain
 from kerfpath.post._frames import faceplate, world
 from kerfpath.post._names import identifiers
-from kerfpath.post._program import CircularMove, JointMove, LinearMove, Move, Program, Section, Wait
+from kerfpath.post._program import (
+    Await,
+    CircularMove,
+    JointMove,
+    LinearMove,
+    Move,
+    Program,
+    Request,
+    Section,
+    Wait,
+)
+from kerfpath.post._settings import handshakes
 from kerfpath.post._standing import stopping_to_switch
 from kerfpath.post.val3._axes import axes_from_joints, posture
 from kerfpath.post.val3._settings import LONGEST_NAME, Val3Settings
 from kerfpath.post.val3._xml import SCHEMA
 
 __all__ = [
-    "DATA", "OUTPUTS", "PROGRAM", "PROJECT", "Val3", "opening", "parameters", "stopping",
+    "DATA", "FIRST", "OUTPUTS", "PORTS", "PROGRAM", "PROJECT", "Val3", "awaiting", "closing",
+    "links", "opening", "parameters", "stopping",
 ]  # fmt: skip
 
 PROJECT = "http://www.staubli.com/robotics/VAL3/Project/3"
@@ -38,6 +50,19 @@ HEAD = '<?xml version="1.0" encoding="utf-8"?>'
 TYPES = {"jAir": "jointRx", "mAir": "mdesc", "pPath": "pointRx", "mPath": "mdesc"}
 """Types of the data that moves refer to."""
 OUTPUTS = {"laser": "dioLaser", "gas": "dioGas"}
+PORTS = {
+    ("ready", "input"): "diReady",
+    ("shutter", "input"): "diShutter",
+    ("gas_pressure", "input"): "diGasPressure",
+    ("height", "input"): "diHeight",
+    ("interlock", "input"): "diInterlock",
+    ("ready", "output"): "doReady",
+    ("shutter", "output"): "doShutter",
+    ("height", "output"): "doHeight",
+}
+"""Names of the data of handshakes."""
+FIRST = "nFirst"
+"""Number of the contour at which the project begins, for a restart."""
 UNBOUNDED = 'tmax="99999" rmax="99999"'
 """Speeds of tip and tool that bound nothing, the controller's own."""
 AIR_SPEED = 'accel="100" vel="%s" decel="100" ' + UNBOUNDED
@@ -47,8 +72,6 @@ POSE = 'x="%.4f" y="%.4f" z="%.4f" rx="%.6f" ry="%.6f" rz="%.6f"'
 CONFIGURATION = 'shoulder="%s" elbow="%s" wrist="%s"'
 AROUND = 40
 """Lines of a file beside those of its steps and their data."""
-LINES_OF_A_STEP = 4
-"""A move with two switches: the move, a wait for its end, and they."""
 DATA_OF_A_STEP = 3
 """A circular move: two points and a speed."""
 NOT_CHECKED = "not been checked for collisions"
@@ -59,10 +82,38 @@ def parameters(settings: Val3Settings) -> dict[str, str]:
     return {"version": settings.version, "stackSize": "5000", "millimeterUnit": "true"}
 
 
+def links(settings: Val3Settings) -> dict[str, str]:
+    """Return the links of all inputs and outputs that the settings name, by their data."""
+    named = {OUTPUTS["laser"]: settings.laser_output, OUTPUTS["gas"]: settings.gas_output}
+    named |= {PORTS[key]: link for key, link in handshakes(settings).items()}
+    return {name: link for name, link in named.items() if link is not None}
+
+
 def opening(settings: Val3Settings) -> list[str]:
-    """Return the statements of start() before it calls others."""
-    named = ((settings.laser_output, "laser"), (settings.gas_output, "gas"))
-    return [f"{OUTPUTS[signal]}=false" for output, signal in named if output is not None]
+    """Return the statements that switch everything off, as start() does before it calls others."""
+    inputs = [name for (_, way), name in PORTS.items() if way == "input"]
+    return [f"{name}=false" for name in links(settings) if name not in inputs]
+
+
+def awaiting(partner: str, timeout: float, settings: Val3Settings) -> list[str]:
+    """Return the statements that wait for an input.
+
+    After `timeout` (s) everything is off, the arm's power too, until the input comes.
+    """
+    asked = f"{PORTS[partner, 'input']}==true"
+    return [
+        f"if watch({asked},{number(timeout, 3)})==false",
+        *opening(settings),
+        "disablePower()",
+        f'logMsg("{partner}: no answer")',
+        f"wait({asked})",
+        "endIf",
+    ]
+
+
+def closing() -> list[str]:
+    """Return the last statements of start(); the next time it begins with the first contour."""
+    return ["waitEndMove()", f"{FIRST}=1"]
 
 
 def stopping(settings: Val3Settings) -> list[str]:
@@ -96,13 +147,11 @@ class Val3(Formatter):
 
     def __init__(self, program: Program, settings: Val3Settings) -> None:
         short = replace(stopping_to_switch(program), name=program.name[:LONGEST_NAME])
-        most = (settings.lines_per_file - AROUND) // LINES_OF_A_STEP
-        super().__init__(divided(short, most, longest_name=LONGEST_NAME), settings)
+        super().__init__(renamed(short, (FIRST,), longest_name=LONGEST_NAME), settings)
         self._target = self._target_texts()
         self._database = _Database()
         self._moving = True
-        counts = [DATA_OF_A_STEP * len(section.steps) for section in self.program.sections]
-        room = settings.lines_per_file - AROUND
+        counts, room = list(self.lengths().values()), settings.lines_per_file - AROUND
         self._parts: dict[str, Sequence[Section]] = {}
         if sum(counts) > room:
             groups = in_files(self.program.sections, counts, room)
@@ -112,6 +161,10 @@ class Val3(Formatter):
             )
             self._parts = dict(zip(names, groups, strict=True))
 
+    def lengths(self) -> dict[str, int]:
+        """Return how many lines of data each contour takes at most, by its name."""
+        return {s.name: DATA_OF_A_STEP * len(s.steps) for s in self.program.sections}
+
     def files(self) -> dict[str, str]:
         """Return the files of the project, and those of the libraries that it calls."""
         name, sections = self.program.name, self.program.sections
@@ -119,15 +172,14 @@ class Val3(Formatter):
             return self._project(name, sections, [section.name for section in sections])
         calls = [f"{part}:{s.name}" for part, own in self._parts.items() for s in own]
         texts = self._project(name, (), calls)
-        for part, own in self._parts.items():
-            texts |= self._project(part, own, None)
-        most = self.settings.lines_per_file
-        longest = max(text.count("\n") for text in texts.values())
+        most, longest = self.settings.lines_per_file, max(t.count("\n") for t in texts.values())
         if longest > most:
             raise InputError(
                 f"program {name!r}: {len(self._parts)} libraries need files of {longest} lines, "
                 f"lines_per_file allows {most}; raise it"
             )
+        for part, own in self._parts.items():
+            texts |= self._project(part, own, None)
         return texts
 
     def names(self) -> list[tuple[str, str]]:
@@ -139,6 +191,8 @@ class Val3(Formatter):
             ("fPart", "the part's frame"),
             ("tLaser", "the tool"),
             *((name, f"the output of the {signal}") for signal, name in OUTPUTS.items()),
+            *((name, f"the {way} of {who}") for (who, way), name in PORTS.items()),
+            (FIRST, "the number of the first contour"),
             *((name, "the data of moves") for name in TYPES),
         ]
 
@@ -167,6 +221,16 @@ class Val3(Formatter):
         yield from self.standing()
         yield f"delay({number(wait.time, 3)})"
 
+    def request(self, request: Request) -> Iterator[str]:
+        """Yield an output, once the robot stands."""
+        yield from self.standing()
+        yield f"{PORTS[request.partner, 'output']}={'true' if request.on else 'false'}"
+
+    def wait_for(self, awaited: Await) -> Iterator[str]:
+        """Yield a wait for an input, once the robot stands."""
+        yield from self.standing()
+        yield from awaiting(awaited.partner, awaited.timeout, self.settings)
+
     def comment(self, text: str) -> Iterator[str]:
         """Yield a comment that does not end the text in which it stands."""
         yield f"// {text.replace(']]>', ']] >')}"
@@ -194,14 +258,17 @@ class Val3(Formatter):
         """Return the files of one project; without calls it is a library that is not started."""
         self._database = _Database()
         routines = {section.name: list(self.lines(section)) for section in sections}
+        start = ["// A library: its routines are called."]
         if calls is not None:
-            called = (f"call {call}()" for call in calls)
-            start = [*self._remarks(), *opening(self.settings), *called, "waitEndMove()"]
-            routines = {"start": start, "stop": stopping(self.settings), **routines}
+            start = [*self._remarks(), *opening(self.settings)]
+            for n, call in enumerate(calls, 1):
+                start += [f"if {FIRST}<={n}", f"  call {call}()", "endIf"]
+            start += closing()
+        routines = {"start": start, "stop": stopping(self.settings), **routines}
         texts = {
             f"{name}.pjx": self._contents(name, routines, () if calls is None else self._parts)
         }
-        texts[f"{name}.dtx"] = self._data()
+        texts[f"{name}.dtx"] = self._data(is_main=calls is not None)
         texts |= {f"{routine}.pgx": _routine(routine, code) for routine, code in routines.items()}
         return {f"{name}/{file}": text for file, text in texts.items()}
 
@@ -216,16 +283,17 @@ class Val3(Formatter):
         rows += [f"    {_tag('Library', alias=part, path=path)}" for part, path in paths.items()]
         return _text([*rows, "  </Libraries>", "</Project>"])
 
-    def _data(self) -> str:
+    def _data(self, *, is_main: bool) -> str:
         program, settings = self.program, self.settings
         frame = np.linalg.inv(world(program.robot)) @ program.T_base_part
         tool = np.linalg.inv(faceplate(program.robot)) @ program.T_flange_tip
         rows = [f'<Database xmlns:xsi="{SCHEMA}" xmlns="{DATA}">', "  <Datas>"]
         rows += _array("fPart", "frame", [f'{POSE % _poses(frame)[0]} fatherId="world[0]"'])
-        rows += _array("tLaser", "tool", [f'{POSE % _poses(tool)[0]} fatherId="flange[0]"'])
-        for signal, name in OUTPUTS.items():
-            link = getattr(settings, f"{signal}_output")
-            rows += [] if link is None else _array(name, "dio", [f"link={quoteattr(link)}"])
+        own = f"ioLink={quoteattr(settings.tool_link)}"
+        rows += _array("tLaser", "tool", [f'{POSE % _poses(tool)[0]} fatherId="flange[0]" {own}'])
+        for name, link in links(settings).items():
+            rows += _array(name, "dio", [f"link={quoteattr(link)}"])
+        rows += _array(FIRST, "num", ['value="1"']) if is_main else []
         for name, values in self._database.values.items():
             rows += _array(name, TYPES[name], values)
         return _text([*rows, "  </Datas>", "</Database>"])
@@ -240,6 +308,7 @@ class Val3(Formatter):
         yield from self.comment(
             "stop() switches the laser off; the safety circuit of the cell has to, too."
         )
+        yield from self.comment(f"To begin at a contour, set {FIRST} to its number.")
 
     def _target_texts(self) -> dict[Move, list[str]]:
         """Return the targets of each move as they stand in the data, all at once."""

@@ -91,8 +91,8 @@ def parse(file: str, text: str, tag: str, namespace: str) -> Element:
         parser.Parse(text.encode("utf-8", "surrogatepass"), True)
     except expat.ExpatError as error:
         raise InputError(f"{file}, line {error.lineno}: no XML ({error})") from None
-    except LookupError as error:  # an encoding that nobody knows
-        raise InputError(f"{file}, line 1: no XML ({error})") from None
+    except (ValueError, LookupError) as error:  # an encoding that the parser does not have
+        raise InputError(f"{file}, line {parser.CurrentLineNumber}: no XML ({error})") from None
     root = top.children[0]
     if root.tag != tag:
         raise root.fault(f"expected <{tag}>, got {root.shown()}")

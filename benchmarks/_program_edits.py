@@ -1,0 +1,408 @@
+"""A grammar of edits over the text of robot programs, and an oracle for which do harm.
+
+An edit deletes, doubles, moves, swaps or copies a line, scales or nudges a number, flips a sign or a
+state, or takes another word of the same family. The oracle shares nothing with the audit: it
+compares, step by step, what the reader makes of the text before and after. Where that is the same,
+the edit is harmless only if it touched nothing but what the `Words` of the language list as such:
+whatever else a controller reads and our reader lets pass is counted as harm.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from kerfpath.post import ReadMove, ReadProgram, ReadStep, ReadWait
+
+__all__ = ["WORDS", "Edit", "Verdict", "Words", "edits", "verdict"]
+
+Verdict = Literal["harmful", "harmless", "either"]
+"""Of an edit: it must not pass; it must pass; or it may do either, and is only counted."""
+
+NUMBER = re.compile(r"(?<![\w.])-?\d*\.?\d+(?![\w.]|E)")
+FACTORS = (0.0, 0.5, 0.9, 1.1, 2.0, 10.0, 30.0, 100.0)
+ALONG, TURNED = 0.25e-3, np.radians(1.5)
+"""How far (m) a node and (rad) its axis move at least to do harm: the job allows 0.1 mm, 1 deg."""
+EXACT, SHARP = 2e-5, np.radians(0.02)
+"""The same of targets beside the cut (m) and of joints (rad)."""
+TIME = 2.5e-3
+"""The same of waits and lead times, s: controllers count milliseconds."""
+RATE = 0.025
+"""The same of speeds, as a share."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Words:
+    """What the grammar has to know of a language.
+
+    Parameters
+    ----------
+    remark : str
+        Matches lines that no controller acts on.
+    idle : tuple of str
+        Each matches lines with a group that no controller moves or switches by.
+    families : tuple of str
+        Each matches words that stand for one another.
+    orderless : tuple of str
+        Each matches lines whose order among themselves means nothing, twice the same as once.
+    held : tuple of str
+        Each matches lines that do nothing but what the reader makes of the moves behind them.
+    """
+
+    remark: str
+    idle: tuple[str, ...] = ()
+    families: tuple[str, ...] = ()
+    orderless: tuple[str, ...] = ()
+    held: tuple[str, ...] = ()
+
+
+STATES = (r"\b(?:ON|OFF)\b", r"\b(?:TRUE|FALSE)\b", r"\b(?:true|false)\b", r"\b(?:True|False)\b",
+          r"\b(?:on|off)\b")  # fmt: skip
+WORDS = {
+    "rapid": Words(
+        remark=r"\s*(!.*)?",
+        idle=(r".*tooldata.*,(\[-?[\d.]+,\[[^]]*\],\[[^]]*\],0,0,0\])\];",),
+        families=(r"\bv(?:Air|Approach|Cut)\d*\b", r"\b(?:zCorner\d*|fine)\b",
+                  r"\btr(?:Gas)?(?:On|Off)\d*\b", r"\bdo(?:Laser|Gas)\b", r",[01];"),
+        orderless=(r"  (?:CONST|VAR|PERS) .*", r"    SetDO .*,0;", r"    TriggIO .*",
+                   r"    ConfL.*"),
+    ),
+    "krl": Words(
+        remark=r"\s*(;.*)?",
+        families=(*STATES, r"\$OUT\[\d\]", r"\$VEL\.ORI\d", r"\b(?:LIN|PTP)\b"),
+        orderless=(r"\$OUT\[\d\]=FALSE", r"\$(?:TOOL|BASE)=.*",
+                   r"\$(?:ADV|IPO|ORI|CIRC|VEL\.ORI).*"),
+        held=(r"BAS\(#VEL_PTP,.*", r"\$VEL\.CP=.*", r"\$APO\.CDIS=.*"),
+    ),
+    "fanuc": Words(
+        remark=r"\s*\d+:  !(?!UFRAME|UTOOL).*|",
+        idle=(r"(?:OWNER|COMMENT|PROG_SIZE|FILE_NAME|VERSION|MEMORY_SIZE|PROTECT|CONTROL_CODE|"
+              r"CREATE|MODIFIED)(.*)", r"((?:TCD:)?\s+[A-Z_]+\s*= .*)", r"(DEFAULT_GROUP.*)"),
+        families=(*STATES, r"\bDO\[\d\]", r"\bP\[\d+\]", r"\b(?:FINE|CNT\d+)\b", r"'[NF] [UD] [TB]"),
+        orderless=(r"\s*\d+:  DO\[\d\]=OFF ;", r"\s*\d+:  U(?:FRAME|TOOL)_NUM.*",
+                   r"\s*\d+:  !U.*"),
+    ),
+    "inform": Words(
+        remark=r"'(?!UFRAME|TOOL).*|",
+        families=(*STATES, r"OT#\(\d\)", r"\bC\d{5}\b", r"\bPL=\d", r"\b(?:MOVL|MOVJ)\b",
+                  r"RCONF .*"),
+        orderless=(r"'(?:UFRAME|TOOL) .*", r"DOUT OT#\(\d\) OFF"),
+    ),
+    "val3": Words(
+        remark=r"\s*(//.*)?",
+        idle=(r"(<\?xml.*)", r"<\w+ (xmlns.*)"),
+        families=(*STATES, r"\bdio(?:Laser|Gas)\b", r"\bmPath\[\d+\]", r"\bpPath\[\d+\]",
+                  r"\bjAir\[\d+\]", r"blend=\"\w+\"", r"elbow=\"\w+\"", r"shoulder=\"\w+\""),
+        orderless=(r"\s*waitEndMove\(\)",),
+    ),
+    "urscript": Words(
+        remark=r"\s*(#.*)?",
+        families=(*STATES, r"\b(?:laser|gas)\b", r"\bmove[lj]\b"),
+        held=(r"\s*(?:laser|gas)_ahead.*",),
+    ),
+    "ros": Words(remark=r"\s*(#.*)?", families=(*STATES, r"\b(?:laser|gas)\b"),
+                 held=(r"- {positions.*",)),
+    "csv": Words(remark=r"", families=(*STATES, r"\b(?:laser|gas)\b", r"\b(?:linear|joint)\b")),
+}  # fmt: skip
+"""By language."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Edit:
+    """One edit of a program.
+
+    Parameters
+    ----------
+    kind : str
+    file, line : str, int
+        Where, the line counted from 1.
+    files : mapping of str to str
+        The program with it.
+    idle : bool
+        Whether nothing acts on what was changed, but by the moves, waits and switches that are read.
+    remark : bool
+        Whether it is a remark.
+    said : str
+        What was changed, for people.
+    """
+
+    kind: str
+    file: str
+    line: int
+    files: Mapping[str, str]
+    idle: bool
+    remark: bool
+    said: str
+
+
+def edits(files: Mapping[str, str], language: str, rng: np.random.Generator) -> Iterator[Edit]:
+    """Yield edits of a program for ever, by a generator of random numbers."""
+    words = WORDS[language]
+    names = [name for name in files if any(line.strip() for line in files[name].splitlines())]
+    sizes = np.array([len(files[name].splitlines()) for name in names], dtype=float)
+    makers = (_delete, _double, _move, _swap, _copy, _scale, _scale, _scale, _nudge, _flip, _other,
+              _other, _remark)  # fmt: skip
+    while True:
+        name = names[int(rng.choice(len(names), p=sizes / sizes.sum()))]
+        lines = files[name].splitlines()
+        made = makers[int(rng.integers(len(makers)))](lines, words, rng)
+        if made is None:
+            continue
+        kind, line, changed, idle, said = made
+        text = _numbered(changed, language)
+        if text.split() == files[name].split():
+            continue
+        end = "\r\n" if "\r\n" in files[name] else "\n"
+        yield Edit(kind=kind, file=name, line=line + 1, files={**files, name: text.replace("\n", end)},
+                   idle=idle, remark=_in_remarks(files[name], text, words), said=said)  # fmt: skip
+
+
+def _in_remarks(before: str, after: str, words: Words) -> bool:
+    """Return whether two texts are the same but for their remarks, line for line."""
+    one, two = (
+        [line.rstrip() for line in text.splitlines() if not re.fullmatch(words.remark, line)]
+        for text in (before, after)
+    )
+    return one == two
+
+
+Made = tuple[str, int, list[str], bool, str] | None
+"""Kind, line, all lines, whether it is idle, and words."""
+
+
+def _numbered(lines: list[str], language: str) -> str:
+    """Return a text as the editor of a controller leaves it: FANUC's numbers its lines anew."""
+    text = "\n".join([*lines, ""])
+    if language != "fanuc":
+        return text
+    count = 0
+
+    def next_number(match: re.Match[str]) -> str:
+        nonlocal count
+        count += 1
+        return f"{count:4d}:"
+
+    text = re.sub(r"^ *\d+:(?!  P\[)", next_number, text, flags=re.MULTILINE)
+    return re.sub(r"(LINE_COUNT\s*= )\d+", rf"\g<1>{count}", text)
+
+
+def _is_remark(line: str, words: Words) -> bool:
+    """Return whether nothing acts on a line, or only by what the reader makes of the moves."""
+    whole = (words.remark, *words.held, *(p for p in words.idle if not p.startswith(".*")))
+    return any(re.fullmatch(pattern, line) for pattern in whole)
+
+
+def _line(lines: list[str], rng: np.random.Generator) -> int:
+    return int(rng.integers(len(lines)))
+
+
+def _same_kind(one: str, two: str, words: Words) -> bool:
+    return any(re.fullmatch(p, one) and re.fullmatch(p, two) for p in words.orderless)
+
+
+def _delete(lines: list[str], words: Words, rng: np.random.Generator) -> Made:
+    k = _line(lines, rng)
+    idle = _is_remark(lines[k], words)
+    return "line deleted", k, [*lines[:k], *lines[k + 1 :]], idle, lines[k].strip()
+
+
+def _double(lines: list[str], words: Words, rng: np.random.Generator) -> Made:
+    k = _line(lines, rng)
+    idle = _is_remark(lines[k], words) or _same_kind(lines[k], lines[k], words)
+    return "line doubled", k, [*lines[: k + 1], *lines[k:]], idle, lines[k].strip()
+
+
+def _move(lines: list[str], words: Words, rng: np.random.Generator) -> Made:
+    k, to = _line(lines, rng), _line(lines, rng)
+    rest = [*lines[:k], *lines[k + 1 :]]
+    between = rest[min(k, to) : max(k, to)]
+    idle = _is_remark(lines[k], words) or all(
+        _same_kind(lines[k], line, words) or _is_remark(line, words) for line in between
+    )
+    return "line moved", k, [*rest[:to], lines[k], *rest[to:]], idle, lines[k].strip()
+
+
+def _swap(lines: list[str], words: Words, rng: np.random.Generator) -> Made:
+    k = _line(lines[:-1], rng)
+    one, two = lines[k : k + 2]
+    idle = one == two or _same_kind(one, two, words) or any(_is_remark(x, words) for x in (one, two))
+    return "lines swapped", k, [*lines[:k], two, one, *lines[k + 2 :]], idle, one.strip()
+
+
+def _copy(lines: list[str], words: Words, rng: np.random.Generator) -> Made:
+    """Copy a line elsewhere: one more move, wait, switch or call."""
+    k, to = _line(lines, rng), _line(lines, rng)
+    beside = lines[max(to - 1, 0) : to + 1]
+    idle = _is_remark(lines[k], words) or any(_same_kind(lines[k], x, words) for x in beside)
+    return "line inserted", to, [*lines[:to], lines[k], *lines[to:]], idle, lines[k].strip()
+
+
+def _number(lines: list[str], words: Words, rng: np.random.Generator) -> tuple[int, re.Match[str], bool] | None:
+    k = _line(lines, rng)
+    found = list(NUMBER.finditer(lines[k]))
+    if not found:
+        return None
+    match = found[int(rng.integers(len(found)))]
+    return k, match, _idle_at(lines[k], match.start(), words)
+
+
+def _idle_at(line: str, at: int, words: Words) -> bool:
+    """Return whether nothing acts on what stands at a place of a line."""
+    said = [match for pattern in words.idle if (match := re.fullmatch(pattern, line))]
+    return _is_remark(line, words) or any(m.start(1) <= at < m.end(1) for m in said)
+
+
+def _with_number(lines: list[str], k: int, match: re.Match[str], value: float) -> list[str]:
+    decimals = len(match[0].partition(".")[2])
+    text = f"{value:.{decimals}f}" if "." in match[0] else str(round(value))
+    if match[0].startswith("."):
+        text = text.removeprefix("0")
+    changed = lines[k][: match.start()] + text + lines[k][match.end() :]
+    return [*lines[:k], changed, *lines[k + 1 :]]
+
+
+def _scale(lines: list[str], words: Words, rng: np.random.Generator) -> Made:
+    found = _number(lines, words, rng)
+    if found is None:
+        return None
+    k, match, idle = found
+    value = float(match[0]) * float(rng.choice(FACTORS))
+    said = f"{match[0]} to {value:g} in {lines[k].strip()}"
+    return "number scaled", k, _with_number(lines, k, match, value), idle, said
+
+
+def _nudge(lines: list[str], words: Words, rng: np.random.Generator) -> Made:
+    """Add to a number, or turn its sign."""
+    found = _number(lines, words, rng)
+    if found is None:
+        return None
+    k, match, idle = found
+    value = float(match[0])
+    value = -value if value and rng.random() < 0.3 else value + float(rng.choice([-20, -1, 1, 0.5, 5, 20]))
+    said = f"{match[0]} to {value:g} in {lines[k].strip()}"
+    return "number nudged", k, _with_number(lines, k, match, value), idle, said
+
+
+def _flip(lines: list[str], words: Words, rng: np.random.Generator) -> Made:
+    return _taken("state flipped", lines, words, (*STATES, r"(?<=,)[01](?=;)"), rng)
+
+
+def _other(lines: list[str], words: Words, rng: np.random.Generator) -> Made:
+    return _taken("word of its family", lines, words, words.families, rng)
+
+
+def _taken(
+    kind: str, lines: list[str], words: Words, families: tuple[str, ...], rng: np.random.Generator
+) -> Made:
+    """Take another word of the same family for one."""
+    if not families:
+        return None
+    family = families[int(rng.integers(len(families)))]
+    found = [(k, m) for k, line in enumerate(lines) for m in re.finditer(family, line)]
+    others = sorted({m[0] for _, m in found})
+    pairs = {"ON": "OFF", "TRUE": "FALSE", "true": "false", "True": "False", "on": "off", "0": "1"}
+    pairs |= {b: a for a, b in pairs.items()}
+    if not found:
+        return None
+    k, match = found[int(rng.integers(len(found)))]
+    choice = [w for w in others if w != match[0]] or [pairs.get(match[0], match[0])]
+    word = choice[int(rng.integers(len(choice)))]
+    changed = lines[k][: match.start()] + word + lines[k][match.end() :]
+    said = f"{match[0]} to {word} in {lines[k].strip()}"
+    return kind, k, [*lines[:k], changed, *lines[k + 1 :]], _idle_at(lines[k], match.start(), words), said
+
+
+def _remark(lines: list[str], words: Words, rng: np.random.Generator) -> Made:
+    """Say something else in a remark."""
+    remarks = [
+        k for k, line in enumerate(lines) if line.strip() and re.fullmatch(words.remark, line)
+    ]
+    if not remarks:
+        return None
+    k = remarks[int(rng.integers(len(remarks)))]
+    at = max(lines[k].rfind(" "), len(lines[k]) // 2)
+    changed = f"{lines[k][:at]} shift two {lines[k][at:].strip()}"[:30 if ":" in lines[k] else 200]
+    return "remark", k, [*lines[:k], changed + (" ;" if lines[k].endswith(" ;") else ""),
+                         *lines[k + 1 :]], True, lines[k].strip()  # fmt: skip
+
+
+def verdict(edit: Edit, before: ReadProgram, after: ReadProgram) -> Verdict:
+    """Return what the oracle says of an edit, by what the text meant before and after it."""
+    found = _compared(before, after)
+    if found == "same" and edit.idle:
+        return "harmless" if edit.remark else "either"
+    return "harmful" if found == "same" else found
+
+
+def _compared(one: ReadProgram, two: ReadProgram) -> Literal["same", "either", "harmful"]:
+    for what in ("T_flange_tip", "T_base_part"):
+        a, b = getattr(one, what), getattr(two, what)
+        if a is not None and np.abs(a - b).max() > EXACT:
+            return "harmful"
+    if len(one.steps) != len(two.steps):
+        return "harmful"
+    moves = [step for step in one.steps if isinstance(step, ReadMove)]
+    exact = any(
+        a is not None and not np.array_equal(a, b)
+        for what in ("T_flange_tip", "T_base_part")
+        for a, b in ((getattr(one, what), getattr(two, what)),)
+    )
+    same = not exact
+    for k, (a, b) in enumerate(zip(one.steps, two.steps, strict=True)):
+        found = _step(a, b, cut=_in_cut(one.steps, k))
+        if found == "harmful":
+            return "harmful"
+        same = same and found == "same"
+    assert moves
+    return "same" if same else "either"
+
+
+def _in_cut(steps: tuple[ReadStep, ...], k: int) -> bool:
+    """Return whether a step is a node of a contour: neither its approach nor its retract."""
+    step = steps[k]
+    if not isinstance(step, ReadMove) or step.kind == "joint":
+        return False
+    rest = [s for s in steps[k + 1 :] if isinstance(s, ReadMove)]
+    return bool(rest) and rest[0].kind != "joint"
+
+
+def _step(a: ReadStep, b: ReadStep, *, cut: bool) -> Literal["same", "either", "harmful"]:
+    if isinstance(a, ReadWait) or isinstance(b, ReadWait):
+        if not isinstance(a, ReadWait) or not isinstance(b, ReadWait):
+            return "harmful"
+        return _far(a.time, b.time, TIME)
+    if a.kind != b.kind or a.posture != b.posture or (a.zone is None) != (b.zone is None):
+        return "harmful"
+    switches = [[(s.signal, s.on) for s in move.switches] for move in (a, b)]
+    if switches[0] != switches[1]:
+        return "harmful"
+    point, angle = (ALONG, TURNED) if cut else (EXACT, SHARP)
+    found = [_far(s.lead_time, t.lead_time, TIME) for s, t in zip(a.switches, b.switches, strict=True)]
+    for one, two, most in (
+        (a.speed, b.speed, RATE * (a.speed or 1)),
+        (a.duration, b.duration, RATE * (a.duration or 1)),
+        (a.zone, b.zone, EXACT),
+    ):
+        found.append(_far(one or 0.0, two or 0.0, most))
+    if a.T_part_tip is not None and not np.array_equal(a.T_part_tip, b.T_part_tip):
+        apart = float(np.linalg.norm(a.T_part_tip[:3, 3] - b.T_part_tip[:3, 3]))
+        cosine = float(np.clip(a.T_part_tip[:3, 2] @ b.T_part_tip[:3, 2], -1, 1))
+        turned = Rotation.from_matrix(a.T_part_tip[:3, :3].T @ b.T_part_tip[:3, :3]).magnitude()
+        found += [_far(0, apart, point), _far(0, np.arccos(cosine), angle)]
+        # About the beam the tool may turn as it likes, within the limits of the joints.
+        found += [_far(0, float(turned), np.inf if cut else angle)]
+    if a.q is not None and not np.array_equal(a.q, b.q):
+        off = float(np.abs(a.q - b.q).max())
+        found.append(_far(0, off, np.radians(5) if cut else angle))
+    return max(found, key=["same", "either", "harmful"].index)
+
+
+def _far(one: float, two: float, most: float) -> Literal["same", "either", "harmful"]:
+    if one == two:
+        return "same"
+    return "harmful" if abs(one - two) > most else "either"

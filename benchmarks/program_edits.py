@@ -1,0 +1,283 @@
+"""The audit of programs, tried with thousands of edits: how many that do harm it lets pass."""
+
+from __future__ import annotations
+
+import tempfile
+from collections import Counter
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field
+from itertools import islice
+from pathlib import Path
+from typing import Literal
+
+import numpy as np
+
+from benchmarks._figures import Figure, Report
+from benchmarks._program_edits import edits, verdict
+from benchmarks._program_faults import faults
+from kerfpath.errors import InputError
+from kerfpath.job import ProgramAsked, read_job, run_job
+from kerfpath.post import Language, Program, ReadProgram, Settings, build_program, languages
+from kerfpath.post import read_program
+
+__all__ = ["Outcome", "Subject", "Tally", "run", "subjects"]
+
+EDITS = 2000
+"""Of the text, in every language."""
+ARMS = {"inform": "yaskawa_gp25", "urscript": "ur_ur10e"}
+"""Robots of languages that cannot say the axes of the one below."""
+ARM = "abb_irb4600_60_205"
+ACCELERATION = [300, 300, 400, 1000, 1000, 1500]
+"""deg/s^2"""
+
+JOB = """\
+[robot]
+model = "{arm}"
+acceleration_deg_s2 = {acceleration}
+[tool]
+head = "laser-head-45"
+[part]
+file = "points.csv"
+xyz_mm = [{reach}, -100, 500]
+rpy_deg = [0, 0, 30]
+[[contour]]
+pick = "hole"
+speed_m_min = 3
+spacing_mm = 2
+[contour.micro_joints]
+width_mm = 3
+count = 1
+[[contour]]
+pick = "slit"
+speed_m_min = 4
+spacing_mm = 4
+[plan]
+gamma_step_deg = 10
+[program]
+name = "job"
+language = "{language}"
+gas_lead_s = 0.3
+pierce_time_s = 0.25
+lead_time_s = {lead}
+{more}
+[program.rapid]
+gas_output = "doGas"
+[program.krl]
+laser_output = 5
+gas_output = 6
+[program.fanuc]
+laser_output = 5
+gas_output = 6
+[program.val3]
+laser_output = 'BasicIO-1\\%Q0'
+gas_output = 'BasicIO-1\\%Q1'
+[program.inform]
+laser_output = 5
+gas_output = 6
+pulses_per_deg = [1341.4, 1341.4, 1000.0, 1000.0, 800.0, 500.0]
+[program.urscript]
+laser_output = 0
+gas_output = 1
+"""
+"""A hole with a micro joint and an open slit, gas, pierce and lead times."""
+
+HOW = """\
+A job of two contours (a hole with a micro joint, an open slit; gas, pierce and lead times), written
+in each language for {arm}, and for {others}. Its program is spoilt in two ways, and
+audited by the job. Faults: every fault of `_program_faults` (the laser on with the retract, a wait
+in the cut, an approach from afar, ...) is put into the neutral program and written out, so that it
+is an edit in each language that can say it; each does harm. Edits: {edits} edits of the text by the
+grammar of `_program_edits`, whose oracle says which do harm. Caught: the audit has a finding.
+Refused: the reader does not take the text, with file and line. Passed: neither."""
+
+Outcome = Literal["caught", "refused", "passed"]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Subject:
+    """A job, and its program in one language.
+
+    Parameters
+    ----------
+    asked : ProgramAsked
+    language : Language
+    settings : Settings
+    program : Program
+        What the language can say of it.
+    files : mapping of str to str
+    """
+
+    asked: ProgramAsked
+    language: Language
+    settings: Settings
+    program: Program
+    files: Mapping[str, str]
+
+    def written(self, program: Program) -> dict[str, str]:
+        """Return the files of a program in its language."""
+        return self.language.formatter(program, self.settings).files()
+
+    def read(self, files: Mapping[str, str]) -> ReadProgram:
+        """Return what files say."""
+        return read_program(files, self.language.name, self.program.robot, self.settings)
+
+    def outcome(self, files: Mapping[str, str]) -> tuple[Outcome, str]:
+        """Return what comes of the audit of files, and the first finding."""
+        try:
+            found = self.asked.audit(self.read(files), self.language, self.settings, "job")
+        except InputError as error:
+            return "refused", str(error)
+        if found.passed:
+            return "passed", ""
+        wrong = [(n, c) for n, table in found.tables.items() for c in table if not c.ok]
+        said = [f"{found.place(n, c)}: {c.issue().message}" for n, c in wrong]
+        return "caught", "; ".join([*said, *found.missing])
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Tally:
+    """How many edits were tried, by language, kind, what the oracle says and what came of them.
+
+    Parameters
+    ----------
+    counts : Counter of (language, kind, verdict, outcome)
+    wrong : list of str
+        What passed and does harm, and what was caught and is harmless.
+    told : Counter of "told" or "elsewhere"
+        Whether a finding names the line of the edit, or one beside it.
+    """
+
+    counts: Counter[tuple[str, str, str, str]] = field(default_factory=Counter)
+    wrong: list[str] = field(default_factory=list)
+    told: Counter[str] = field(default_factory=Counter)
+
+    def add(
+        self, subject: Subject, kind: str, said: str, judged: str, files: Mapping[str, str],
+        at: tuple[str, int] | None = None,
+    ) -> None:  # fmt: skip
+        """Audit an edited program, and count it, and whether its line is told where it is known."""
+        outcome, first = subject.outcome(files)
+        if at is not None and judged == "harmful" and outcome != "passed":
+            near = any(f"{at[0]}, line {at[1] + k}" in first for k in (-1, 0, 1))
+            self.told["told" if near else "elsewhere"] += 1
+        self.counts[subject.language.name, kind, judged, outcome] += 1
+        missed = judged == "harmful" and outcome == "passed"
+        alarm = judged == "harmless" and outcome != "passed"
+        if missed or alarm:
+            word = "passed, harmful" if missed else f"{outcome}, harmless"
+            self.wrong.append(f"{subject.language.name}: {word}: {kind}: {said} {first}")
+
+    def of(self, judged: str, outcome: str | None = None, language: str | None = None) -> int:
+        """Return how many the oracle judged so, of an outcome, in a language."""
+        return sum(
+            n
+            for (lang, _, said, came), n in self.counts.items()
+            if said == judged and outcome in (None, came) and language in (None, lang)
+        )
+
+    def try_faults(self, subject: Subject, rng: np.random.Generator) -> None:
+        """Write every fault of the program out, and audit it."""
+        for fault in faults(subject.program, rng):
+            try:
+                files = subject.written(fault.program)
+            except InputError:
+                continue  # which the language cannot say
+            if files != subject.files:
+                self.add(subject, fault.kind, "", "harmful", files)
+
+    def try_edits(self, subject: Subject, rng: np.random.Generator, count: int) -> None:
+        """Make edits of the text, and audit each."""
+        before = subject.read(subject.files)
+        for edit in islice(edits(subject.files, subject.language.name, rng), count):
+            try:
+                judged: str = verdict(edit, before, subject.read(edit.files))
+            except InputError:
+                judged = "unread"
+            said = f"{edit.file}, line {edit.line}: {edit.said}"
+            self.add(subject, edit.kind, said, judged, edit.files, (edit.file, edit.line))
+
+
+def subjects(folder: Path, only: tuple[str, ...] = (), more: str = "") -> Iterator[Subject]:
+    """Yield the job and its program in each language, planned once for each robot.
+
+    Parameters
+    ----------
+    folder : Path
+        Where job and drawing are written to.
+    only : tuple of str
+        Names of languages; default: all.
+    more : str
+        Lines of [program].
+    """
+    _draw(folder / "points.csv")
+    plans = {}
+    for name, chosen in sorted(languages().items()):
+        if only and name not in only:
+            continue
+        arm = ARMS.get(name, ARM)
+        path = folder / f"{name}.toml"
+        path.write_text(
+            JOB.format(
+                arm=arm, acceleration=ACCELERATION, reach=1200 if arm == ARM else 900,
+                language=name, lead=0.01 if chosen.ahead else 0.0, more=more,
+            )
+        )  # fmt: skip
+        asked = ProgramAsked.of(path)
+        options = asked.job.program
+        if arm not in plans:
+            outcome = run_job(asked.job)
+            assert outcome.passed, outcome
+            plans[arm] = outcome.plans, () if outcome.part is None else outcome.part.moves
+        made, moves = plans[arm]
+        program = build_program(
+            made, moves=moves, name=options.name, retract=options.retract, zone=options.zone,
+            lead_time=options.lead_time, gas_lead=options.gas_lead,
+            pierce_time=options.pierce_time, approach_speed=options.approach_speed,
+            air_speed=options.air_speed, arc_tolerance=options.arc_tolerance,
+            handshakes=options.handshakes,
+        )  # fmt: skip
+        settings = chosen.completed(options.settings)
+        files = chosen.formatter(program, settings).files()
+        yield Subject(asked=asked, language=chosen, settings=settings, program=program, files=files)
+
+
+def _draw(path: Path) -> None:
+    """Write a round hole and an arc."""
+    rows = ["contour,x_mm,y_mm,z_mm,nx,ny,nz"]
+    for a in np.linspace(0, 2 * np.pi, 121):
+        rows.append(f"hole,{30 + 6 * np.cos(a):.5f},{20 - 6 * np.sin(a):.5f},0,0,0,1")
+    for a in np.linspace(0, 0.8, 41):
+        rows.append(f"slit,{40 * np.sin(a):.5f},{25 - 40 * np.cos(a):.5f},0,0,0,1")
+    path.write_text("\n".join([*rows, ""]))
+
+
+def run(*, quick: bool = False) -> Report:
+    """Return the figures of faults and edits in every language."""
+    count = 50 if quick else EDITS
+    others = " and ".join(f"{arm} ({name})" for name, arm in ARMS.items())
+    report = Report(
+        title="Edited programs", how=HOW.format(arm=ARM, others=others, edits=count)
+    )
+    with tempfile.TemporaryDirectory() as folder:
+        for number, subject in enumerate(subjects(Path(folder))):
+            name = subject.language.name
+            for what in ("faults", "edits"):
+                rng, tally = np.random.default_rng(number), Tally()
+                if what == "faults":
+                    tally.try_faults(subject, rng)
+                else:
+                    tally.try_edits(subject, rng, count)
+                done, passed = tally.of("harmful"), tally.of("harmful", "passed")
+                fine, alarms = tally.of("harmless"), tally.of("harmless") - tally.of("harmless", "passed")
+                note = (
+                    f"{tally.of('harmful', 'caught')} caught, {tally.of('harmful', 'refused')} "
+                    f"refused; unread {tally.of('unread')}; no matter {tally.of('either')}"
+                )
+                report.figures += [
+                    Figure(what=f"{name}: {what} that do harm", values=[done], unit="", note=note),
+                    Figure(what=f"{name}: of these passed", values=[passed], unit=""),
+                    Figure(what=f"{name}: harmless {what}", values=[fine], unit=""),
+                    Figure(what=f"{name}: of these caught or refused", values=[alarms], unit=""),
+                ]
+                report.findings += tally.wrong[:20]
+    return report

@@ -1,0 +1,32 @@
+"""How what holds on a grid alone is said: as that and no more, in figures that keep what they say.
+
+A search knows the rotations of its grid. That a path is best, fastest or not there is proved for
+those; between them there may be more.
+"""
+
+from __future__ import annotations
+
+from decimal import ROUND_CEILING, ROUND_FLOOR, Decimal
+
+__all__ = ["FINER", "ON_THIS_GRID", "at_least", "at_most"]
+
+ON_THIS_GRID = "on this grid of the rotation"
+"""Where a statement holds."""
+FINER = "a finer gamma_step_deg or the refinement may do more"
+"""What is to be said with it."""
+
+
+def at_most(value: float, digits: int = 4) -> str:
+    """Return a positive value in so many digits, never more than it is."""
+    return _rounded(value, digits, ROUND_FLOOR)
+
+
+def at_least(value: float, digits: int = 4) -> str:
+    """Return a positive value in so many digits, never less than it is."""
+    return _rounded(value, digits, ROUND_CEILING)
+
+
+def _rounded(value: float, digits: int, how: str) -> str:
+    exact = Decimal(value)
+    last = Decimal(1).scaleb(exact.adjusted() - digits + 1)
+    return f"{exact.quantize(last, rounding=how).normalize():f}"

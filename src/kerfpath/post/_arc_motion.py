@@ -1,0 +1,113 @@
+"""What the joints do along an arc that is to replace straight moves, and whether they may."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from kerfpath._arrays import Array
+from kerfpath.post._program import Program
+from kerfpath.robots import Robot
+
+__all__ = ["ArcLimits", "Stretch"]
+
+MARGIN = 0.01
+"""Share of a limit that arcs leave unused, for the digits of their text and other node times."""
+NEAR = np.radians(5.0)
+"""Farther (rad) from the planned joints than this, an arc is on another branch."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Stretch:
+    """Moves of a path, with the stretches that join them to the motion before and behind.
+
+    Parameters
+    ----------
+    before, after : (q (n,) rad, dt s) or None
+        The node before the first and how long it is ago, the node after the last and how long the
+        way there takes; None where the robot stands.
+    q : (m + 1, n) rad
+        Joints planned from the first node to the last.
+    dt : (m,) s
+    """
+
+    before: tuple[Array, float] | None
+    after: tuple[Array, float] | None
+    q: Array
+    dt: Array
+
+    def joined(self, q: Array, dt: Array) -> tuple[Array, Array]:
+        """Return joints and time steps from `before` to `after`, by way of q (m + 1, n) in dt."""
+        if self.before is not None:
+            q, dt = np.vstack([self.before[0], q]), np.append(self.before[1], dt)
+        if self.after is not None:
+            q, dt = np.vstack([q, self.after[0]]), np.append(dt, self.after[1])
+        return q, dt
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class ArcLimits:
+    """What the joints may do along an arc: limits of position, velocity and acceleration.
+
+    A share of a limit that is used up to `MARGIN` below it, or no more than planned there, is kept.
+
+    Parameters
+    ----------
+    program : Program
+        Its robot and frames.
+    eta_v, eta_a : float
+        Share of the velocity and acceleration limits that may be used.
+    """
+
+    program: Program
+    eta_v: float = 1.0
+    eta_a: float = 1.0
+
+    def along(self, poses: Array, stretch: Stretch) -> Array | None:
+        """Return the joints (m + 1, n) rad along an arc, or None where they break a limit.
+
+        Parameters
+        ----------
+        poses : (m, 4, 4) m
+            Of the tip in the part, at even times after the first node.
+        stretch : Stretch
+            The moves that the arc is to replace.
+        """
+        program, planned = self.program, stretch.q
+        T = program.T_base_part @ poses @ np.linalg.inv(program.T_flange_tip)
+        found = _nearest(program.robot, T, planned[1:])
+        if found is None:
+            return None
+        q = np.vstack([planned[:1], found])
+        even = np.full(len(poses), stretch.dt.sum() / len(poses))
+        ours = self._shares(*stretch.joined(q, even))
+        theirs = self._shares(*stretch.joined(planned, stretch.dt))
+        for share, plan, eta in zip(ours, theirs, (self.eta_v, self.eta_a), strict=True):
+            if (share > np.maximum(eta * (1 - MARGIN), plan)).any():
+                return None
+        limits = program.robot.joint_limits()
+        beyond = np.maximum(limits.lower - q, q - limits.upper)[:, ~limits.endless]
+        sums = q @ limits.rows.T
+        beyond = np.hstack([beyond, np.maximum(limits.row_lower - sums, sums - limits.row_upper)])
+        return None if (beyond > 0).any() else q
+
+    def _shares(self, q: Array, dt: Array) -> tuple[Array, Array]:
+        """Return shares of the velocity (m, n) and acceleration (m - 1, n) limits."""
+        velocity, acceleration = self.program.robot.speed_limits()
+        rate = np.diff(q, axis=0) / dt[:, None]
+        change = np.diff(rate, axis=0) / ((dt[1:] + dt[:-1]) / 2)[:, None]
+        return np.abs(rate) / velocity, np.abs(change) / acceleration
+
+
+def _nearest(robot: Robot, T: Array, near: Array) -> Array | None:
+    """Return the joints (m, n) at flange poses T (m, 4, 4) next to those planned, or None."""
+    if robot.family.follow_all is not None:
+        q = robot.follow(T, near, np.zeros(len(T), dtype=np.int64))
+    else:
+        solved, reach = robot.inverse_all(T)
+        turns = 2 * np.pi * np.round((near[:, None] - solved) / (2 * np.pi))
+        apart = np.abs(solved + turns - near[:, None]).max(axis=2)
+        best = np.argmin(np.where(reach, apart, np.inf), axis=1)
+        q = (solved + turns)[np.arange(len(T)), best]
+    return q if np.abs(q - near).max() < NEAR else None  # not where it is NaN

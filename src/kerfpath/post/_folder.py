@@ -1,0 +1,196 @@
+"""Programs in folders: written whole or not at all, no file of an earlier one left beside them."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import os
+from collections.abc import Mapping, Sequence
+from contextlib import suppress
+from dataclasses import dataclass
+from pathlib import Path
+
+from kerfpath._writing import write_whole
+from kerfpath.errors import InputError
+
+__all__ = ["MANIFEST", "Replaced", "replace_program", "write_files", "write_program"]
+
+MANIFEST = ".kerfpath.json"
+"""File in a folder that says which programs in it are ours: of which each file is, and its hash."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Replaced:
+    """What was done to the files of a folder.
+
+    Parameters
+    ----------
+    written : tuple of Path
+        The new files, the one to start first.
+    removed : tuple of Path
+        Of an earlier program of ours, and not of the new one.
+    edited : tuple of Path
+        The same, but changed by someone since, and so left.
+    """
+
+    written: tuple[Path, ...]
+    removed: tuple[Path, ...] = ()
+    edited: tuple[Path, ...] = ()
+
+
+def replace_program(
+    folder: str | os.PathLike[str],
+    files: Mapping[str, str],
+    program: Sequence[str],
+    *,
+    only: str | None = None,
+) -> Replaced:
+    """Write files into a folder, and remove those of an earlier program that is replaced.
+
+    Ours are only files that this function has written and listed in `MANIFEST`; nothing else is
+    touched, nor what was edited since. Files that are there as they are to be stay.
+
+    Parameters
+    ----------
+    folder : path
+    files : mapping of str to str
+        Text by name, that of the file to start first.
+    program : sequence of str
+        Which of them are the program, the one that is started first; none: there is no program
+        now, and the earlier ones are removed before anything is written.
+    only : str, optional
+        Replace only the program that is started with this file, and write nothing where a file of
+        it was edited; default: all that the folder has.
+
+    Raises
+    ------
+    InputError
+        A file cannot be written, or was edited.
+    """
+    folder = Path(folder)
+    ours = _listed(folder)
+    old = {n: entry for n, entry in ours.items() if only is None or entry["of"] == only}
+    there = [n for n in old if n not in program and (folder / n).is_file()]
+    edited = [n for n in there if _hash((folder / n).read_bytes()) != old[n]["sha256"]]
+    if edited and only is not None:
+        raise InputError(
+            f"{folder / edited[0]} is of the earlier program {only} and was edited since; it must "
+            "not stay beside the new one: move it away"
+        )
+    stale = [n for n in there if n not in edited]
+    if not program:
+        _remove(folder, stale)
+    new = {n: text for n, text in files.items() if not _is(folder / n, text)}
+    write_files(folder, new)
+    if program:
+        _remove(folder, stale)
+    kept = {n: entry for n, entry in ours.items() if n not in old or n in edited}
+    kept |= {
+        n: {"of": program[0], "sha256": _hash(files[n].encode("utf-8"))} for n in program
+    }  # fmt: skip
+    _list(folder, kept, needed=only is None or len(program) > 1 or bool(ours))
+    return Replaced(
+        written=tuple(folder / n for n in files),
+        removed=tuple(folder / n for n in stale),
+        edited=tuple(folder / n for n in edited),
+    )
+
+
+def write_files(folder: str | os.PathLike[str], files: Mapping[str, str]) -> list[Path]:
+    """Write files into a folder, all or none, the first one last.
+
+    So the program that is started calls no file that is not there yet. All are written beside
+    their places first: a disk that is full leaves everything as it was.
+
+    Raises
+    ------
+    InputError
+        A file cannot be written.
+    """
+    paths = {name: Path(folder) / name for name in files}
+    for path in paths.values():
+        try:
+            path.parent.mkdir(parents=True, exist_ok=True)
+        except OSError as error:
+            raise InputError(f"{path.parent}: no folder can be made ({error})") from None
+    _write({paths[name]: files[name] for name in reversed(list(files))})
+    return list(paths.values())
+
+
+def write_program(path: str | os.PathLike[str], text: str) -> None:
+    """Write `text` to the file at `path`, whole or not at all.
+
+    The text goes to a file beside it first, so that no controller ever loads half a program.
+
+    Raises
+    ------
+    InputError
+        The file cannot be written.
+    """
+    target = Path(path)
+    if not target.name:
+        raise InputError(f"cannot write the program to {str(path)!r}: expected a file name")
+    _write({target: text})
+
+
+def _write(texts: Mapping[Path, str]) -> None:
+    try:
+        write_whole({path: text.encode("utf-8") for path, text in texts.items()})
+    except OSError as error:
+        raise InputError(
+            f"cannot write the program to {error.filename}: {error.strerror}"
+        ) from None
+
+
+def _listed(folder: Path) -> dict[str, dict[str, str]]:
+    """Return the files that are listed as ours; none where the list is not there, or not ours."""
+    try:
+        found = json.loads((folder / MANIFEST).read_text(encoding="utf-8"))["programs"]
+        entries = {str(n): {k: str(e[k]) for k in ("of", "sha256")} for n, e in found.items()}
+    except (OSError, ValueError, KeyError, TypeError, AttributeError):
+        return {}
+    inside = folder.resolve()
+    return {n: e for n, e in entries.items() if (folder / n).resolve().is_relative_to(inside)}
+
+
+def _list(folder: Path, entries: Mapping[str, Mapping[str, str]], *, needed: bool) -> None:
+    if entries and needed:
+        text = json.dumps({"programs": dict(entries)}, indent=1, sort_keys=True) + "\n"
+        if not _is(folder / MANIFEST, text):
+            write_program(folder / MANIFEST, text)
+    else:
+        with suppress(OSError):
+            (folder / MANIFEST).unlink(missing_ok=True)
+
+
+def _remove(folder: Path, names: Sequence[str]) -> None:
+    """Remove files, and folders that this leaves empty.
+
+    Raises
+    ------
+    InputError
+        A file cannot be removed.
+    """
+    for name in names:
+        try:
+            (folder / name).unlink(missing_ok=True)
+        except OSError as error:
+            raise InputError(
+                f"{folder / name} is of an earlier program and cannot be removed "
+                f"({error.strerror}); remove it yourself"
+            ) from None
+        if (parent := (folder / name).parent) != folder:
+            with suppress(OSError):
+                parent.rmdir()
+
+
+def _is(path: Path, text: str) -> bool:
+    """Return whether a file is there with this very text."""
+    try:
+        return path.read_bytes() == text.encode("utf-8")
+    except OSError:
+        return False
+
+
+def _hash(data: bytes) -> str:
+    return hashlib.sha256(data).hexdigest()
