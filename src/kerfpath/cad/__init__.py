@@ -9,15 +9,15 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     from kerfpath.cad._departure import Departure as Departure
     from kerfpath.cad._departure import departure_from as departure_from
+    from kerfpath.cad._left_out import LeftOut as LeftOut
     from kerfpath.cad._measured import read_measured as read_measured
-    from kerfpath.cad._part import LeftOut as LeftOut
     from kerfpath.cad._part import Loop as Loop
     from kerfpath.cad._part import Part as Part
     from kerfpath.cad._read import read as read
 
 _HOME = {
     "Departure": "_departure",
-    "LeftOut": "_part",
+    "LeftOut": "_left_out",
     "Loop": "_part",
     "Part": "_part",
     "departure_from": "_departure",

@@ -24,7 +24,8 @@ from kerfpath.cad._chains import Look, loops_in
 from kerfpath.cad._curves import Curve
 from kerfpath.cad._dxf_document import DAMAGED, document_of
 from kerfpath.cad._dxf_entities import curves_of
-from kerfpath.cad._part import LeftOut, Part
+from kerfpath.cad._left_out import LeftOut
+from kerfpath.cad._part import Part
 from kerfpath.cad._units import LARGEST, UNITS_MM
 from kerfpath.errors import InputError
 

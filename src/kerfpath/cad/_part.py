@@ -15,6 +15,7 @@ from kerfpath._arrays import Array, Ints, floats, freeze, scalar
 from kerfpath.cad._crossing import crossing
 from kerfpath.cad._departure import ON_CURVE, Departure, departure
 from kerfpath.cad._healed import HealedSurface
+from kerfpath.cad._left_out import LeftOut
 from kerfpath.cad._loops import OrientedEdge
 from kerfpath.cad._round import diameter
 from kerfpath.cad._sample import Chain, Trace, distance
@@ -23,7 +24,7 @@ from kerfpath.contour import Contour
 from kerfpath.errors import InputError
 from kerfpath.operations import Ribbon, Surface
 
-__all__ = ["Kind", "LeftOut", "Loop", "Part", "Side", "loop_of", "numbered"]
+__all__ = ["Kind", "Loop", "Part", "Side", "loop_of", "numbered"]
 
 Kind = Literal["outer", "inner", "open"]
 Side = Literal["outer", "inner", "edge", ""]
@@ -97,30 +98,6 @@ class Loop:
         chord = scalar(chord_tolerance, "chord_tolerance", unit="m", above=0.0)
         points = self._trace.sample(chord / MM, np.pi)[0] * MM
         return freeze(points if self.kind == "open" else np.vstack([points, points[:1]]))
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class LeftOut:
-    """Entities of a drawing that are in no loop.
-
-    Parameters
-    ----------
-    kind : str
-        As the format calls it: SPLINE, TEXT, INSERT (a block), ...
-    reason : str
-    count : int
-    may_cut : bool
-        Whether it may have been a line to cut; texts, dimensions and the like are none.
-    """
-
-    kind: str
-    reason: str
-    count: int
-    may_cut: bool
-
-    def __str__(self) -> str:
-        doubt = "; this may have been to cut" if self.may_cut else ""
-        return f"left out: {self.count} {self.kind} ({self.reason}){doubt}"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)

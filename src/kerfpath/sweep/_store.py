@@ -125,19 +125,19 @@ class Store:
         query = "SELECT value, kind, message, seconds FROM result WHERE key = ?"
         with self._explained():
             row = self._base.execute(query, (key,)).fetchone()
-        value, kind, message, seconds = row or (None,) * 4
-        right = (value is None) != (kind is None) and (kind is None) == (message is None)
-        texts = all(text is None or isinstance(text, str) for text in (value, kind, message))
-        if not (right and texts and isinstance(seconds, float)):
-            raise self.damaged(key)
-        failure = None if kind is None else Failure(kind=kind, message=message)
-        return Outcome(key=key, value=value, failure=failure, seconds=seconds)
+        match row:
+            case (str() as value, None, None, float() as seconds):
+                return Outcome(key=key, value=value, failure=None, seconds=seconds)
+            case (None, str() as kind, str() as message, float() as seconds):
+                failure = Failure(kind=kind, message=message)
+                return Outcome(key=key, value=None, failure=failure, seconds=seconds)
+        raise self.damaged(key)
 
     def damaged(self, key: str) -> InputError:
         """Return the error that says that what is kept under a key is no result."""
         return InputError(
-            f"{self._path}: the store is damaged, result {str(key)[:16]!r} is none; name another store, "
-            "and the sweep is done anew"
+            f"{self._path}: the store is damaged, result {str(key)[:16]!r} is none; name another "
+            "store, and the sweep is done anew"
         )
 
     def __enter__(self) -> Store:
