@@ -2,13 +2,18 @@
 
 import contextlib
 import io
+import time
+from pathlib import Path
 
 import numpy as np
 import pytest
 
 import spoilt
+from kerfpath.cad import read
 from kerfpath.cell import read_stl
 from kerfpath.errors import InputError, about
+from kerfpath.job import read_job
+from kerfpath.robots import Robot
 from readers import READERS, write_meshes
 
 MUTANTS = {
@@ -123,3 +128,27 @@ def test_a_mesh_takes_memory_as_it_is_large(tmp_path):
     corners[: len(crowd)][: len(corners)] = crowd[: len(corners)]
     write_meshes(tmp_path, corners, faces)
     assert spoilt.taken(lambda path: read_stl(path, "m"), whole) * 1e6 < 300 * size
+
+
+# --- time ------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    "text", ["a." * 200_000 + "a = 1", "[" + "a." * 200_000 + "a]", "#" * 11**7]
+)
+def test_a_job_takes_no_time_for_what_no_job_holds(tmp_path, text):
+    (tmp_path / "job.toml").write_text(f"[robot]\n{text}\n")
+    started = time.process_time()
+    with pytest.raises(InputError, match=r"job\.toml"):
+        read_job(tmp_path / "job.toml")
+    assert time.process_time() - started < 2  # s; minutes where it grows with the square
+
+
+@pytest.mark.skipif(not Path("/dev/zero").exists(), reason="no such device here")
+@pytest.mark.parametrize("suffix", [".step", ".csv", ".toml", ".urdf"])
+def test_a_device_is_no_file(tmp_path, suffix):
+    path = tmp_path / f"endless{suffix}"
+    path.symlink_to("/dev/zero")
+    reading = {".toml": read_job, ".urdf": Robot.from_urdf}.get(suffix, read)
+    with pytest.raises(InputError, match=f"endless{suffix}: is no file"):
+        reading(path)

@@ -53,7 +53,11 @@ def read(path: str | Path, unit: str | None = None, *, gap: float = GAP) -> Part
 def content_of(path: Path, expected: str) -> bytes:
     """Return the bytes of a file, or raise InputError that says what it is expected to be."""
     try:
+        if path.exists() and not (path.is_file() or path.is_dir()):
+            raise InputError(f"{path}: is no file, which would never end; expected {expected}")
         return path.read_bytes()
+    except InputError:
+        raise
     except FileNotFoundError:
         raise InputError(f"{path}: no such file; expected {expected}") from None
     except IsADirectoryError:

@@ -114,6 +114,8 @@ def read_tree(path: Path, snap: float) -> Tree:
 
 def _root(path: Path) -> ElementTree.Element:
     try:
+        if path.exists() and not (path.is_file() or path.is_dir()):
+            raise InputError("is no file; expected a robot description (URDF)")
         root = ElementTree.fromstring(
             path.read_bytes(), parser=ElementTree.XMLParser(target=_NoDoctype())
         )
