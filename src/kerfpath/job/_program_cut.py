@@ -8,7 +8,7 @@ from scipy.spatial import cKDTree
 from kerfpath._arrays import Array
 from kerfpath.auditor import Check, Rounding, Unit, checks, rounding_of
 from kerfpath.cell import Cell
-from kerfpath.contour import Contour
+from kerfpath.contour import KINDS, Contour
 from kerfpath.job._program_asked import AskedNodes, asked_nodes
 from kerfpath.job._program_read import ReadCut
 from kerfpath.job._read import Job
@@ -151,7 +151,7 @@ def _asked(
     asked, dt = asked_times(task, reference)
     when = dt * np.arange(len(asked))
     k = np.clip(np.searchsorted(reference.s, middle, side="right") - 1, 0, len(reference) - 1)
-    wanted = np.array([reference.kinds[j] != "micro joint" for j in k])
+    wanted = reference.kind[k] != KINDS.index("micro joint")
     wrong = wanted != cut.laser
     excess = np.diff(np.interp(s, asked.s, when)) / np.diff(made.time) - 1
     if job.plan_options["feed"] == "constant":
