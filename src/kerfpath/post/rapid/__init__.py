@@ -16,7 +16,6 @@ RAPID = Language(
     title="ABB RAPID",
     manufacturers=("ABB",),
     families=("opw",),
-    axis_3=("serial", "horizontal"),
     suffix=".mod",
     settings=RapidSettings,
     rules=rules,

@@ -10,7 +10,6 @@ from typing import Any, TypeVar
 import numpy as np
 
 from kerfpath._arrays import Array
-from kerfpath.errors import InputError
 from kerfpath.post._program import Await, Handshake, Request, Signal, Switch
 from kerfpath.post._read import (
     ReadHandshake,
@@ -22,7 +21,7 @@ from kerfpath.post._read import (
     partner_of,
     same_output,
 )
-from kerfpath.post.rapid._aggregates import numbers, parts_of, pose
+from kerfpath.post.rapid._aggregates import Aggregates
 from kerfpath.post.rapid._axes import joints_from_axes
 from kerfpath.post.rapid._lines import DECLARED, IN_MAIN, IN_PART, IN_ROUTINE, LINES, OUTSIDE
 from kerfpath.post.rapid._settings import SWITCH_OFF, RapidSettings
@@ -52,7 +51,7 @@ def read(main: str, files: Mapping[str, str], robot: Robot, settings: RapidSetti
     return reader.program()
 
 
-class _Reader:
+class _Reader(Aggregates):
     """Reads line by line; each kind of line has a method of its name."""
 
     def __init__(
@@ -373,22 +372,6 @@ class _Reader:
         if name in known:
             raise self.fault(f"{name} is declared twice")
 
-    def values(self, text: str, count: int) -> list[Any]:
-        return parts_of(text, count, self.place)
-
-    def numbers(self, values: Any, count: int) -> Array:
-        return numbers(values, count, self.place)
-
-    def pose(self, value: Any) -> Array:
-        return pose(value, self.place)
-
     def elsewhere(self, **named: str) -> dict[str, str]:
         """Return where the data that a move names are declared or set."""
         return {what: self.said_at[name] for what, name in named.items() if name in self.said_at}
-
-    @property
-    def place(self) -> str:
-        return f"{self.file}, line {self.line}"
-
-    def fault(self, message: str) -> InputError:
-        return InputError(f"{self.place}: {message}")
