@@ -34,7 +34,7 @@ COLUMNS = (
     "harm: caught", "refused", "passed", "harmless: passed", "not", "not of our making", "either",
 )  # fmt: skip
 """Of the tables: what does harm, what is harmless, what no reader takes, and what may do either."""
-EDITS = 1000
+EDITS = 300
 """Of the text, in every language."""
 ARMS = {"inform": "yaskawa_gp25", "urscript": "ur_ur10e"}
 """Robots of languages that cannot say the axes of the one below."""
@@ -144,7 +144,7 @@ class Subject:
         if found.passed:
             return "passed", ""
         wrong = [(n, c) for n, table in found.tables.items() for c in table if not c.ok]
-        said = [f"{found.place(n, c)}: {c.issue().message}" for n, c in wrong]
+        said = [found.said(n, c) for n, c in wrong]
         return "caught", "; ".join([*said, *found.missing])
 
 

@@ -84,11 +84,11 @@ def test_what_bounds_the_motion_beside_its_speed_is_read(subjects, language):
 def test_a_finding_names_the_line_where_a_speed_is_declared(subjects):
     subject = subjects["rapid"]
     (text,) = subject.files.values()
-    edited = re.sub(r"(vAir:=\[)250\.00,125", r"\g<1>500.00,250", text)
-    line = next(k for k, row in enumerate(edited.splitlines(), 1) if "vAir:=[500" in row)
+    edited = re.sub(r"(vApproach1:=\[)100\.00", r"\g<1>200.00", text)
+    line = next(k for k, row in enumerate(edited.splitlines(), 1) if "vApproach1:=[200" in row)
     outcome, said = subject.outcome({"job.mod": edited})
     assert outcome == "caught"
-    assert "25.0% in the job and 50.0% in the text" in said
+    assert "100 mm/s in the job and 200 mm/s in the text" in said
     assert f"job.mod, line {line})" in said
 
 
@@ -97,3 +97,15 @@ def test_remarks_and_names_of_routines_are_nobodys_business(subjects):
     renamed = re.sub(r"\bhole\b", "round_hole", text).replace("  ! Complete", "  ! Please complete")
     assert renamed != text
     assert subjects["rapid"].outcome({"job.mod": renamed}) == ("passed", "")
+
+
+def test_a_cut_that_comes_again_in_the_same_routine_hides_no_finding_of_the_first(subjects):
+    subject = subjects["rapid"]
+    (text,) = subject.files.values()
+    body = re.search(r"(?<=PROC slit\(\)\n).*?(?=  ENDPROC)", text, re.DOTALL)[0]
+    slow = body.replace("WaitTime 0.250;", "WaitTime 0.100;")
+    edited = subject.read({"job.mod": text.replace(body, slow + body)})
+    found = subject.asked.audit(edited, subject.language, subject.settings, "job.mod")
+    assert {"slit (slit)", "slit (slit), again"} <= found.tables.keys()
+    wrong = {(name, c.code) for name, table in found.tables.items() for c in table if not c.ok}
+    assert {("slit (slit)", "pierce"), ("slit (slit), again", "once")} <= wrong

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -133,10 +133,13 @@ class ProgramAsked:
             *beam_checks(read, job.robot, process),
         ]
         done: list[int] = []
+        starts: list[str] = []
         followed: list[tuple[ReadCut, AskedNodes, Plan]] = []
         for cut in cuts:
             apart, which, candidate = _closest(cut, candidates)
-            title = f"{cut.name} ({tasks[which].name})" if apart < NEAR else cut.name
+            title = _unused(
+                f"{cut.name} ({tasks[which].name})" if apart < NEAR else cut.name, tables
+            )
             places[title] = tuple(move.place for move in cut.moves)
             if apart >= NEAR:
                 said = "distance from the nearest contour of the job"
@@ -152,18 +155,27 @@ class ProgramAsked:
             times = done.count(which)
             tables[title].append(row("once", "earlier cuts of this contour", times, 0, "count"))
             done.append(which)
+            starts.append(cut.moves[0].place)
             followed += [] if along is None else [(cut, *along)]
-        tables[name] += self._order(done, cuts, places[name])
+        tables[name] += self._order(done, [places[name].index(start) for start in starts])
         tables[name] += _asked_for(job, followed, home, read, chosen, settings)
-        tables["air"] = _air(job, cuts, home, cell if job.sequence is not None else None)
+        tables[_unused("air", tables)] = _air(
+            job, cuts, home, cell if job.sequence is not None else None
+        )
         missing = tuple(task.name for i, task in enumerate(tasks) if i not in done)
         note = collision_note(cell, moves_too=job.sequence is not None)
         return Audited(tables=tables, missing=missing, note=note, places=places)
 
-    def _order(
-        self, done: Sequence[int], cuts: Sequence[ReadCut], places: Sequence[str]
-    ) -> list[Check]:
-        """Compare the order of contours with that of the job, or with the rules of [sequence]."""
+    def _order(self, done: Sequence[int], starts: Sequence[int]) -> list[Check]:
+        """Compare the order of contours with that of the job, or with the rules of [sequence].
+
+        Parameters
+        ----------
+        done : sequence of int
+            Which contour each cut is of.
+        starts : sequence of int
+            The step of the program that each begins with.
+        """
         sequence = self.job.sequence
         given = sequence is None or sequence.order == "given"
         wrong = [
@@ -173,8 +185,13 @@ class ProgramAsked:
             or any(inner == i and outer in done[:k] for inner, outer in self.inner_first)
         ]
         said = "contours cut after one that comes later in the job, or that they lie in"
-        node = places.index(cuts[wrong[0]].moves[0].place) if wrong else 0
+        node = starts[wrong[0]] if wrong else 0
         return [row("order", said, len(wrong), 0, "count", node)]
+
+
+def _unused(title: str, tables: Mapping[str, object]) -> str:
+    """Return a title that no table has yet: a cut that comes again must not hide the first."""
+    return title if title not in tables else _unused(f"{title}, again", tables)
 
 
 def _asked_for(
@@ -199,7 +216,7 @@ def _asked_for(
     rows = [
         row(
             f"asked-{each.code}",
-            f"not as asked for, {WHAT.get(each.code, each.code)}: {each.message}"
+            f"not as the job asks for, {WHAT.get(each.code, each.code)}: {each.message}"
             + (f" (said in {each.said_at})" if each.said_at else ""),
             each.count,
             0,
@@ -209,7 +226,7 @@ def _asked_for(
         for each in found
         if each.code not in FOLLOWED
     ]
-    return rows or [row("asked", "moves that are not as asked for", 0, 0, "count")]
+    return rows or [row("asked", "what is not as the job asks for", 0, 0, "count")]
 
 
 def _closest(cut: ReadCut, candidates: Sequence[Sequence[Contour]]) -> tuple[float, int, int]:

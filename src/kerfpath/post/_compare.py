@@ -152,7 +152,7 @@ def _places(
             point,
             angle,
         )
-    jointed = [(m, b) for m, b in pairs if b.q is not None and b.T_part_tip is None]
+    jointed = [(m, b) for m, b in pairs if b.q is not None and not _follows(b)]
     if jointed:
         q, q_back = np.array([m.q for m, _ in jointed]), np.array([b.q for _, b in jointed])
         forward = program.robot.forward
@@ -166,12 +166,17 @@ def _places(
             joint = int(np.abs(q[k] - q_back[k]).argmax()) + 1
             yield _issue(backs[k], f"joint {joint} is {np.degrees(off[k]):.4f} deg off")
     for move, back in pairs:
-        if back.q is not None and back.T_part_tip is not None:
+        if back.q is not None and _follows(back):
             off_by = float(np.abs(move.q - back.q).max())
             if off_by > DERIVED:
                 yield _issue(back, f"its words lead to joints {np.degrees(off_by):.1f} deg off")
         if back.q is None and back.T_part_tip is None:
             yield _issue(back, "says no target")
+
+
+def _follows(back: ReadMove) -> bool:
+    """Return whether the joints of a move follow from a pose and its words."""
+    return back.T_part_tip is not None and back.posture != ()
 
 
 def _apart(

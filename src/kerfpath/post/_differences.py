@@ -21,6 +21,8 @@ Both = Sequence[tuple[Stop, Stop]]
 """Moves that both programs have."""
 SAID = {"speeds": "speed", "zones": "zone", "switches": "switches", "postures": "target"}
 """Which of `ReadMove.elsewhere` a difference is about."""
+UNSAID = (("speed", "speeds"), ("duration", "times"), ("cruise", "times"), ("zone", "zones"))
+"""What a move may leave unsaid, and the code of a difference in it."""
 Names = tuple[str, str]
 """What programs A and B are called."""
 
@@ -294,7 +296,7 @@ def _said(both: Both, digits: _Digits, names: Names) -> Iterator[Difference]:
 
 def _unsaid(both: Both, names: Names) -> Iterator[Difference]:
     """Tell of moves that say a speed, a time or a zone in one of the programs alone."""
-    for attribute, code in (("speed", "speeds"), ("duration", "times"), ("zone", "zones")):
+    for attribute, code in UNSAID:
         said = [[getattr(stop.move, attribute) is not None for stop in pair] for pair in both]
         if alone := [k for k, (one, two) in enumerate(said) if one != two]:
             a, b = both[alone[0]]
