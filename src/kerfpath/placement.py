@@ -254,6 +254,10 @@ def placed_moves(
             )
         after = before + 1
         q0 = move.q[0] if before < 0 else backed_off(plans[before], "end", retract)
-        q1 = move.q[-1] if after == len(plans) else backed_off(plans[after], "start", retract)
+        if after < len(plans):
+            q1 = backed_off(plans[after], "start", retract)
+        else:  # home, the short way for endless joints
+            turns = np.round((q0 - move.q[-1]) / (2 * np.pi)) * plans[0].robot.endless
+            q1 = move.q[-1] + 2 * np.pi * turns
         led.append(air_move(plans[0].robot, q0, q1))
     return tuple(led)
