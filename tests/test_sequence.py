@@ -222,7 +222,8 @@ def test_the_audit_holds_moves_through_the_air_to_limits_time_and_cell(walled, a
     cell, cut = walled
     for move in cut.moves:
         table = air_checks(arm, move.q, move.time, cell=cell)
-        assert {check.code for check in table} == {"air-time", "air-limits", "collision"}
+        codes = {"air-time", "air-limits", "collision", "collision-own"}
+        assert {check.code for check in table} == codes
         assert all(check.ok for check in table)
     around = max(cut.moves, key=lambda move: len(move.q))
     fast = air_checks(arm, around.q, 0.9 * around.time, cell=cell)
