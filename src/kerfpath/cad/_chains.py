@@ -13,8 +13,8 @@ from kerfpath._arrays import Array, Ints, freeze
 from kerfpath.cad._connected import connected
 from kerfpath.cad._curves import Curve, backwards
 from kerfpath.cad._left_out import LeftOut
-from kerfpath.cad._part import Kind, Part, loop_of, numbered
-from kerfpath.cad._sample import Chain, Trace
+from kerfpath.cad._part import Kind, Part, loop_of
+from kerfpath.cad._sample import Chain, Trace, numbered
 from kerfpath.cad._units import MM
 from kerfpath.errors import InputError
 

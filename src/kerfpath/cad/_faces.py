@@ -14,8 +14,8 @@ from OCP.GeomAbs import GeomAbs_SurfaceType
 from kerfpath._arrays import freeze
 from kerfpath.cad._loops import FaceLoop, bounds_of, loops_of
 from kerfpath.cad._mesh import triangulate
-from kerfpath.cad._part import Kind, Loop, Part, Side, loop_of, numbered
-from kerfpath.cad._sample import Trace
+from kerfpath.cad._part import Kind, Loop, Part, Side, loop_of
+from kerfpath.cad._sample import Trace, numbered
 from kerfpath.cad._shape import Drawn, NamedFace, unique
 from kerfpath.cad._skins import Skin, skins_of
 from kerfpath.cad._units import MM

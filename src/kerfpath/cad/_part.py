@@ -24,7 +24,7 @@ from kerfpath.contour import Contour
 from kerfpath.errors import InputError
 from kerfpath.operations import Ribbon, Surface
 
-__all__ = ["Kind", "Loop", "Part", "Side", "loop_of", "numbered"]
+__all__ = ["Kind", "Loop", "Part", "Side", "loop_of"]
 
 Kind = Literal["outer", "inner", "open"]
 Side = Literal["outer", "inner", "edge", ""]
@@ -375,18 +375,6 @@ def loop_of(
         colour=colour,
         _trace=trace,
     )
-
-
-def numbered(traces: list[Trace], stem: str, *, alone: str | None = None) -> dict[str, Trace]:
-    """Return `traces` in the order of their middles by name: stem1, stem2, ...; a single `alone`.
-
-    Middles are rounded, so that last bits do not decide an order.
-    """
-    middles = [tuple((t.around.mean(axis=0).round(3) + 0.0).tolist()) for t in traces]
-    order = sorted(range(len(traces)), key=middles.__getitem__)
-    if alone is not None and len(traces) == 1:
-        return {alone: traces[0]}
-    return {f"{stem}{n}": traces[k] for n, k in enumerate(order, start=1)}
 
 
 def _range(value: tuple[float, float] | None, name: str) -> tuple[float, float] | None:

@@ -14,7 +14,17 @@ from kerfpath._arrays import Array
 from kerfpath.contour import Contour
 from kerfpath.errors import InputError
 
-__all__ = ["Chain", "Curve", "Edge", "Points", "Polyline", "Trace", "off_chord", "sampled"]
+__all__ = [
+    "Chain",
+    "Curve",
+    "Edge",
+    "Points",
+    "Polyline",
+    "Trace",
+    "numbered",
+    "off_chord",
+    "sampled",
+]
 
 FIRST_CELLS = 4
 """Cells per smooth stretch to begin with: one could hide an S whose middle lies on its chord."""
@@ -306,3 +316,15 @@ def distance(trace: Trace, point: Array) -> float:
     along = ((point - p) * d).sum(1) / np.maximum((d * d).sum(1), np.finfo(float).tiny)
     off = np.linalg.norm(p + np.clip(along, 0, 1)[:, None] * d - point, axis=1)
     return float((off if trace.gaps.size == len(trace.lengths) else off[:-1]).min())
+
+
+def numbered(traces: list[Trace], stem: str, *, alone: str | None = None) -> dict[str, Trace]:
+    """Return `traces` in the order of their middles by name: stem1, stem2, ...; a single `alone`.
+
+    Middles are rounded, so that last bits do not decide an order.
+    """
+    middles = [tuple((t.around.mean(axis=0).round(3) + 0.0).tolist()) for t in traces]
+    order = sorted(range(len(traces)), key=middles.__getitem__)
+    if alone is not None and len(traces) == 1:
+        return {alone: traces[0]}
+    return {f"{stem}{n}": traces[k] for n, k in enumerate(order, start=1)}
