@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike
 from scipy.spatial.transform import Rotation
 
 from kerfpath._arrays import Array, as_pose, floats, freeze, scalar
+from kerfpath._told import told
 from kerfpath.air import AirMove, air_move, backed_off
 from kerfpath.errors import InputError, NoFeasiblePath
 from kerfpath.planner import plan as plan_contour
@@ -43,6 +44,8 @@ class MeasuredFrame:
 
     T_base_part: Array
     residuals: Array
+
+    __repr__ = told
 
     @property
     def xyz_mm(self) -> list[float]:

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from kerfpath._arrays import Array, Ints, floats, freeze, scalar
+from kerfpath._told import told
 from kerfpath.cad._crossing import crossing
 from kerfpath.cad._departure import ON_CURVE, Departure, departure
 from kerfpath.cad._healed import HealedSurface
@@ -87,6 +88,8 @@ class Loop:
     colour: str = ""
     _trace: Trace = field(repr=False)
 
+    __repr__ = told
+
     def line(self, chord_tolerance: float = 1e-4) -> Array:
         """Return points (K, 3) m along the loop for pictures, whether or not it can be cut.
 
@@ -131,6 +134,13 @@ class Part:
     left_out: tuple[LeftOut, ...] = ()
     _gap: float = field(repr=False)
     _triangulate: Callable[[float], tuple[Array, Ints]] | None = field(default=None, repr=False)
+
+    def __repr__(self) -> str:
+        size = (self.bounding_box[1] - self.bounding_box[0]) * 1e3
+        return (
+            f"Part({self.path.name!r}, {self.faces} faces, {len(self.loops)} loops, "
+            f"{' x '.join(f'{v:.1f}' for v in size)} mm)"
+        )
 
     @property
     def largest_gap(self) -> float:

@@ -11,6 +11,7 @@ from typing import Generic, Protocol, TypeVar
 import numpy as np
 
 from kerfpath._arrays import Array
+from kerfpath._told import told
 from kerfpath.contour import Contour
 from kerfpath.errors import InputError
 
@@ -131,6 +132,8 @@ class Chain(Generic[E]):
     is_closed: bool = True
     next_end: str = ""
 
+    __repr__ = told
+
     @property
     def curves(self) -> Sequence[Curve]:
         """Its edges."""
@@ -201,6 +204,8 @@ class Polyline:
 
     line: Contour
 
+    __repr__ = told
+
     def breaks(self) -> Array:
         """Return the parameters of the nodes."""
         return self.line.s
@@ -218,6 +223,8 @@ class Points:
     points: Array
     normals: Array
     is_closed: bool
+
+    __repr__ = told
 
     @cached_property
     def lengths(self) -> Array:

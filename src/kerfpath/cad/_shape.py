@@ -24,6 +24,7 @@ from OCP.TopAbs import TopAbs_ShapeEnum
 from OCP.TopExp import TopExp_Explorer
 from OCP.TopoDS import TopoDS, TopoDS_Compound, TopoDS_Face, TopoDS_Iterator, TopoDS_Shape
 
+from kerfpath._told import told
 from kerfpath.cad._units import MM
 from kerfpath.errors import InputError
 
@@ -50,6 +51,8 @@ class NamedFace:
     component: str = ""
     layer: str = ""
     colour: str = ""
+
+    __repr__ = told
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

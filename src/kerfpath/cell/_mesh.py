@@ -15,6 +15,7 @@ from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
 from kerfpath._arrays import Array, Bools, Ints, as_pose, floats, freeze, integers, scalar
+from kerfpath._told import told
 from kerfpath.cell._columns import Columns
 from kerfpath.cell._sheet import edges_of
 from kerfpath.errors import InputError
@@ -58,6 +59,8 @@ class Mesh:
     deviation: float = 0.0
     name: str = "mesh"
     _columns: Columns = field(init=False, repr=False)
+
+    __repr__ = told
 
     def __post_init__(self) -> None:
         _set, name = object.__setattr__, self.name

@@ -54,8 +54,7 @@ def show_audit(file: Path, job: Path | None, *, as_json: bool) -> bool:
             )
             for c in checks if name in found.places else ():
                 if not c.ok:
-                    said = f"{found.place(name, c)}: {c.issue().message}"
-                    out.print(escape(said), soft_wrap=True)
+                    out.print(escape(found.said(name, c)), soft_wrap=True)
         for name in found.missing:
             out.print(f"{escape(name)}: {'not cut' if found.places else 'no plan'}")
         out.print(f"note: {escape(found.note)}")

@@ -12,6 +12,7 @@ import numpy as np
 from pydantic import ValidationError
 
 from kerfpath._arrays import Array, Bools
+from kerfpath._told import told
 from kerfpath.cad import Part
 from kerfpath.errors import InputError
 from kerfpath.job._refusals import error_at, refusal, refused_at
@@ -83,6 +84,8 @@ class ProgramOptions:
     gas_lead: float | None
     handshakes: tuple[Handshake, ...] = ()
 
+    __repr__ = told
+
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Job:
@@ -143,6 +146,8 @@ class Job:
     audit_options: dict[str, Any]
     program: ProgramOptions
     source: dict[str, Any]
+
+    __repr__ = told
 
     @property
     def graph_options(self) -> dict[str, Any]:

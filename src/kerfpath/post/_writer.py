@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from kerfpath._told import told
 from kerfpath.errors import InputError
 from kerfpath.plans import Plan
 from kerfpath.post._build import build_program
@@ -78,6 +79,8 @@ class Posted:
     files: dict[str, str]
     read: ReadProgram | None
     warnings: tuple[ProgramIssue, ...]
+
+    __repr__ = told
 
 
 def posted(

@@ -11,6 +11,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from kerfpath._arrays import Array, freeze
+from kerfpath._told import told
 from kerfpath.errors import InputError
 
 __all__ = ["Joint", "Tree", "child", "numbers", "pose_of", "read_tree"]
@@ -53,6 +54,8 @@ class Joint:
     velocity: float | None
     mimics: str
 
+    __repr__ = told
+
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Tree:
@@ -64,6 +67,8 @@ class Tree:
     joints: tuple[Joint, ...]
     parent: Mapping[str, Joint]
     """The joint above each link that has one."""
+
+    __repr__ = told
 
 
 class _NoDoctype(ElementTree.TreeBuilder):
