@@ -75,7 +75,7 @@ def apart(function: Callable[..., _T], *arguments: object, size: int) -> _T:
             f"it takes more than {memory / 1024**3:.0f} GB of memory to read; it is damaged, or "
             "holds far more than what is to be cut: export it again"
         )
-    assert isinstance(value, Exception)
+    assert isinstance(value, BaseException)
     raise value
 
 
@@ -192,7 +192,7 @@ def _attempt(request: bytes) -> bytes:
         if (here := _address_space()) is not None:
             _bound(resource.RLIMIT_AS, here + memory)
         return pickle.dumps(("value", function(*arguments)))
-    except Exception as error:  # sent to who asked, not hidden
+    except (Exception, SystemExit) as error:  # sent to who asked, not hidden
         return pickle.dumps(("error", error))
 
 

@@ -62,7 +62,7 @@ def _require_whole(content: bytes) -> None:
         if got != want:
             raise InputError(
                 f"the file is damaged: expected {want} in columns 73 to {WIDTH} of line "
-                f"{line}, got {got!r}; copy or export it again"
+                f"{line}, got {got or 'nothing'}; copy or export it again"
             )
 
     # Columns 65 to 72 of the parameters tell the directory entry that each line belongs to.
