@@ -98,12 +98,14 @@ def placement_from_points(
     if len(nominal) < 3:
         raise InputError(f"measured frame: expected at least 3 points, got {len(nominal)}")
     centre, middle = nominal.mean(axis=0), measured.mean(axis=0)
-    spread = np.linalg.svd(nominal - centre, compute_uv=False)
-    if spread[1] <= ON_A_LINE * spread[0]:
-        raise InputError(
-            "measured frame: the points lie on one line, or nearly, and leave the part free to "
-            "turn about it; measure one that stands away from it"
-        )
+    for spread in (
+        np.linalg.svd(p, compute_uv=False) for p in (nominal - centre, measured - middle)
+    ):
+        if spread[1] <= ON_A_LINE * spread[0]:
+            raise InputError(
+                "measured frame: the points lie on one line, or nearly, and leave the part free to "
+                "turn about it; measure one that stands away from it"
+            )
     turned, _ = Rotation.align_vectors(measured - middle, nominal - centre)
     T = np.eye(4)
     T[:3, :3] = turned.as_matrix()

@@ -16,6 +16,7 @@ from kerfpath._told import told
 from kerfpath.cad._crossing import crossing
 from kerfpath.cad._departure import ON_CURVE, Departure, departure
 from kerfpath.cad._healed import HealedSurface
+from kerfpath.cad._left_out import LeftOut
 from kerfpath.cad._loops import OrientedEdge
 from kerfpath.cad._round import diameter
 from kerfpath.cad._sample import Chain, Trace, distance
@@ -120,6 +121,8 @@ class Part:
         Those of the skins, then those of the faces in their order; outer before inner.
     notes : tuple of str
         What was assumed, repaired or left out in reading.
+    left_out : tuple of LeftOut
+        What was left out, by kind and reason; in the notes, too.
     """
 
     path: Path
@@ -128,6 +131,7 @@ class Part:
     faces: int
     loops: tuple[Loop, ...]
     notes: tuple[str, ...] = ()
+    left_out: tuple[LeftOut, ...] = ()
     _gap: float = field(repr=False)
     _triangulate: Callable[[float], tuple[Array, Ints]] | None = field(default=None, repr=False)
 

@@ -46,6 +46,8 @@ class Cut:
         How clear every pose is in the cell, where the job asks for the map.
     departure : Departure or None
         How far the nodes leave the CAD curve; measured once it is settled what is cut.
+    picked : bool
+        Whether the plan is one of a Pareto set, which aims at something else than the job does.
     """
 
     contour: str
@@ -60,6 +62,7 @@ class Cut:
     checks: tuple[Check, ...] = ()
     clearance: ClearanceMap | None = None
     departure: Departure | None = None
+    picked: bool = False
 
     __repr__ = told
 

@@ -85,12 +85,15 @@ def asked_nodes(
     """
     asked = task.sample(reference)
     dt = node_interval(asked, task.speed if asked.time is None else None)
-    time = dt * np.arange(len(asked))
+    time: Array = dt * np.arange(len(asked), dtype=np.float64)
     targets = cut.ends
     if job.refine_parts > 1 and len(targets) > len(asked):
         k = np.arange(len(asked))
         fine = np.arange((len(asked) - 1) * job.refine_parts + 1) / job.refine_parts
-        asked, time = reference.at_nodes(np.interp(fine, k, asked.s)), np.interp(fine, k, time)
+        asked, time = (
+            reference.at_nodes(np.interp(fine, k, asked.s)),
+            np.asarray(np.interp(fine, k, time)),
+        )
     if len(targets) == len(asked):
         at = np.arange(len(asked))
     else:
@@ -224,7 +227,7 @@ def _same_pose(program: Program, asked: Array, read: Array, rules: Rules) -> Arr
 
 
 def _with_arcs(steps: Sequence[Step], cut: ReadCut, asked: AskedNodes) -> list[Step]:
-    """Return the steps of a cut with arcs where it was read with arcs, as far as there may be one."""
+    """Return the steps of a cut with arcs where it was read with arcs and there may be one."""
     path = [k for k, step in enumerate(steps) if isinstance(step, LinearMove)]
     found, done = list(steps[: path[0] + 1]), path[0] + 1
     for j, move in enumerate(cut.targets[1:], 1):

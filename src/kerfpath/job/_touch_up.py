@@ -15,7 +15,7 @@ from kerfpath.cad import read as read_drawing
 from kerfpath.contour import Contour, angle_between
 from kerfpath.errors import InputError
 from kerfpath.job._again import require_same
-from kerfpath.job._planfile import PlanFile, read_plan_file
+from kerfpath.job._planread import PlanFile, read_plan_file
 from kerfpath.job._program_of import asked_of_plans, program_of
 from kerfpath.job._program_read import language_of, program_on_disk
 from kerfpath.job._read import Job, read_job

@@ -237,6 +237,8 @@ class Program:
         One for each contour, in order.
     air_checked : bool
         Whether the moves to and between the contours have been proved clear.
+    caveats : tuple of str
+        What the plans do not prove, sentences for the comment at its head.
     """
 
     name: str
@@ -245,6 +247,7 @@ class Program:
     T_base_part: Array
     sections: tuple[Section, ...]
     air_checked: bool = False
+    caveats: tuple[str, ...] = ()
 
     __repr__ = told
 

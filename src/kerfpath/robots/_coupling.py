@@ -10,7 +10,10 @@ from kerfpath._arrays import Array, floats
 from kerfpath._told import told
 from kerfpath.errors import InputError
 
-__all__ = ["Coupling"]
+__all__ = ["AXIS_3", "Coupling"]
+
+AXIS_3 = ("", "serial", "horizontal")
+"""What axis 3 of a controller may measure, "" where that is not known: see `Robot`."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)

@@ -128,9 +128,13 @@ class Sweep:
             if batch:
                 self._tell()
         outcome = self._kept.outcome(key)
+        try:
+            value = None if outcome.value is None else json.loads(outcome.value)
+        except (ValueError, RecursionError):
+            raise self._kept.damaged(key) from None
         return Result(
             parameters=json.loads(self._tasks[key].parameters),
-            value=None if outcome.value is None else json.loads(outcome.value),
+            value=value,
             failure=outcome.failure,
             seconds=outcome.seconds,
         )

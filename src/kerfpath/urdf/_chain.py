@@ -38,6 +38,12 @@ class Chain:
         object.__setattr__(self, "axes", floats(self.axes, "chain axes", (n, 3)))
         object.__setattr__(self, "end", floats(self.end, "chain end", (4, 4)))
 
+    @property
+    def length(self) -> float:
+        """The lengths (m) from joint to joint and to the end, together: how far the arm reaches."""
+        steps = np.linalg.norm(self.origins[1:, :3, 3], axis=1)
+        return float(steps.sum() + np.linalg.norm(self.end[:3, 3]))
+
     def frames(self, q: Array) -> Array:
         """Return the poses (B, n+1, 4, 4) in the base of all frames at q (B, n) rad."""
         B, n = q.shape

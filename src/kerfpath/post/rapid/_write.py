@@ -104,9 +104,11 @@ class Rapid(Formatter):
         parts = in_files(sections, list(self.lengths().values()), most)
         for module, part in zip(self._modules(), parts, strict=False):
             place = f'"{self.settings.folder}/{module}.mod"'
-            calls += [f"IF {FIRST}<={numbers[part[-1]]} THEN", rf"  Load \Dynamic,{place};"]
-            calls += [f'  IF {FIRST}<={numbers[section]} %"{section.name}"%;' for section in part]
-            calls += [f"  UnLoad {place};", "ENDIF"]
+            calls += [rf"Load \Dynamic,{place};"]
+            for section in part:
+                called = f'  %"{section.name}"%;'
+                calls += [f"IF {FIRST}<={numbers[section]} THEN", called, "ENDIF"]
+            calls += [f"UnLoad {place};"]
             body = (line for section in part for line in self._routine(section))
             files[f"{module}.mod"] = _text([f"MODULE {module}", *body, "ENDMODULE"])
         return {f"{name}.mod": _text(self._module(calls, ()))} | files
@@ -133,6 +135,7 @@ class Rapid(Formatter):
         yield "  ! Complete the load of the tool: mass -1 stands for not known."
         yield "  ! The work object is the part in the robot's base, which is the world's, too."
         yield f"  ! Moves through the air have {checked}."
+        yield from (f"  ! {said}" for said in program.caveats)
         yield f"  ! {SWITCH_OFF} is for the events STOP and QSTOP: enter it there. A stop switches"
         yield "  ! the laser off only then; the safety circuit of the cell has to, too."
         yield f"  ! To begin at a contour, set {FIRST} to its number and move PP to Main."
