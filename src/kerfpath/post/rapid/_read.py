@@ -3,13 +3,14 @@ r"""Read back the RAPID that `Rapid` writes, and nothing else: what it does not 
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import replace
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 
 from kerfpath._arrays import Array
+from kerfpath.errors import InputError
 from kerfpath.post._program import Await, Handshake, Request, Signal, Switch
 from kerfpath.post._read import (
     ReadHandshake,
@@ -21,16 +22,9 @@ from kerfpath.post._read import (
     partner_of,
     same_output,
 )
-from kerfpath.post.rapid._aggregates import Aggregates
+from kerfpath.post.rapid._aggregates import numbers, parts_of, pose
 from kerfpath.post.rapid._axes import joints_from_axes
-from kerfpath.post.rapid._lines import (
-    DECLARED,
-    IN_MAIN,
-    IN_PART,
-    IN_ROUTINE,
-    LINES,
-    OUTSIDE,
-)
+from kerfpath.post.rapid._lines import DECLARED, IN_MAIN, IN_PART, IN_ROUTINE, LINES, OUTSIDE
 from kerfpath.post.rapid._settings import SWITCH_OFF, RapidSettings
 from kerfpath.post.rapid._write import (
     FIRST,
@@ -45,6 +39,8 @@ from kerfpath.robots import Robot
 
 __all__ = ["read"]
 
+_T = TypeVar("_T")
+
 
 def read(main: str, files: Mapping[str, str], robot: Robot, settings: RapidSettings) -> ReadProgram:
     """Return the program that a RAPID module of ours says; see `kerfpath.post.Reader`."""
@@ -56,7 +52,7 @@ def read(main: str, files: Mapping[str, str], robot: Robot, settings: RapidSetti
     return reader.program()
 
 
-class _Reader(Aggregates):
+class _Reader:
     """Reads line by line; each kind of line has a method of its name."""
 
     def __init__(
@@ -70,8 +66,7 @@ class _Reader(Aggregates):
         self.routine_name: str | None = None
         self.ended = False
         self.frames: dict[str, tuple[str, Array]] = {}
-        self.speeds: dict[str, float] = {}
-        self.speed_data: dict[str, Array] = {}
+        self.speeds: dict[str, Array] = {}
         self.said_at: dict[str, str] = {}
         self.zones: dict[str, float] = {"fine": 0.0}
         self.triggers: dict[str, Switch | None] = {}
@@ -163,10 +158,8 @@ class _Reader(Aggregates):
         self.frames[kind] = (name, self.pose(pose))
 
     def speed(self, name: str, text: str) -> None:
-        values = self.numbers(self.values(text, 4), 4)
         self.unused(name, self.speeds)
-        self.speeds[name] = float(values[0]) * 1e-3
-        self.speed_data[name] = values
+        self.speeds[name] = self.numbers(self.values(text, 4), 4)
         self.said_at[name] = self.place
 
     def zone(self, name: str, text: str) -> None:
@@ -266,21 +259,19 @@ class _Reader(Aggregates):
     ) -> None:
         axes_deg, external = self.values(text, 2)
         self.require_frames(tool, work_object, external)
-        axes, said = np.radians(self.numbers(axes_deg, 6)), self.named(speed, self.speeds)
+        axes, said = np.radians(self.numbers(axes_deg, 6)), self.speed_of(speed, air_speed_data)
         self.append(
             ReadMove(
                 kind="joint",
                 file=self.file,
                 line=self.line,
                 q=joints_from_axes(self.robot, axes[None])[0],
-                speed=said / FULL_AIR_SPEED if timed is None else None,
+                speed=said if timed is None else None,
                 cruise=None if timed is None else float(timed),
                 zone=self.named(zone, self.zones),
                 elsewhere=self.elsewhere(speed=speed, zone=zone),
             )
         )
-        data = air_speed_data(self.speeds[speed] / FULL_AIR_SPEED)
-        self.require_same(self.speed_data[speed], data, f"speeds of {speed}")
 
     def linear_move(self, text: str, speed: str, zone: str, tool: str, work_object: str) -> None:
         T_part_tip, quarters = self.target(text, tool, work_object)
@@ -291,13 +282,11 @@ class _Reader(Aggregates):
                 line=self.line,
                 T_part_tip=T_part_tip,
                 posture=quarters,
-                speed=self.named(speed, self.speeds),
+                speed=self.speed_of(speed, linear_speed_data),
                 zone=self.named(zone, self.zones),
                 elsewhere=self.elsewhere(speed=speed, zone=zone),
             )
         )
-        data = linear_speed_data(self.speeds[speed])
-        self.require_same(self.speed_data[speed], data, f"speeds of {speed}")
 
     def circular_move(
         self, via: str, text: str, speed: str, zone: str, tool: str, work_object: str
@@ -368,7 +357,14 @@ class _Reader(Aggregates):
         if not np.array_equal(values[1:], expected[1:]):
             raise self.fault(f"{what}: expected {data}, got {values.tolist()}")
 
-    def named(self, name: str, known: dict[str, float]) -> float:
+    def speed_of(self, name: str, data: Callable[[float], str]) -> float:
+        """Return the speed of declared data, the rest of which is as `data` writes it."""
+        values = self.named(name, self.speeds)
+        speed = float(values[0]) * 1e-3 / (FULL_AIR_SPEED if data is air_speed_data else 1.0)
+        self.require_same(values, data(speed), f"speeds of {name}")
+        return speed
+
+    def named(self, name: str, known: dict[str, _T]) -> _T:
         if name not in known:
             raise self.fault(f"{name} is not declared")
         return known[name]
@@ -377,6 +373,22 @@ class _Reader(Aggregates):
         if name in known:
             raise self.fault(f"{name} is declared twice")
 
+    def values(self, text: str, count: int) -> list[Any]:
+        return parts_of(text, count, self.place)
+
+    def numbers(self, values: Any, count: int) -> Array:
+        return numbers(values, count, self.place)
+
+    def pose(self, value: Any) -> Array:
+        return pose(value, self.place)
+
     def elsewhere(self, **named: str) -> dict[str, str]:
         """Return where the data that a move names are declared or set."""
         return {what: self.said_at[name] for what, name in named.items() if name in self.said_at}
+
+    @property
+    def place(self) -> str:
+        return f"{self.file}, line {self.line}"
+
+    def fault(self, message: str) -> InputError:
+        return InputError(f"{self.place}: {message}")
