@@ -22,9 +22,10 @@ from kerfpath.job import (
     collision_note,
     fastest_speeds,
     read_job,
+    read_plan_file,
+    require_language,
     run_job,
 )
-from kerfpath.job._planfile import read_plan_file
 from kerfpath.planner import ClearanceMap
 from kerfpath.report._section import with_clearance
 from test_cli import refused, run
@@ -136,8 +137,9 @@ def test_the_audit_checks_the_cell_again_with_the_job_and_says_so_without(planne
     blocked = SMALL.replace("xyz_mm = [1390, -210, 600]", "xyz_mm = [1225, -130, 700]")
     assert not audit_file(file, job(folder, blocked, "blocked.toml")).passed
     moved = SMALL.replace("xyz_mm = [1200, -600, 500]", "xyz_mm = [1200, -600, 501]")
-    with pytest.raises(InputError, match="its part is not where that of"):
-        audit_file(file, job(folder, moved, "moved.toml"))
+    found = audit_file(file, job(folder, moved, "moved.toml"))
+    (said,) = (c.title for c in found.tables["plan.json"] if "T_base_part" in c.title)
+    assert "expected 0.501, found 0.5" in said
 
 
 def test_a_blocked_contour_says_that_it_is_collision(folder):
@@ -485,3 +487,39 @@ def test_a_language_that_the_robot_does_not_speak_is_refused_before_planning(fol
     path = job(folder, text, "ur.toml")
     result = run("plan", path, cwd=folder)
     refused(result, f"{path}:", "program.language", "cannot yet say the axes", 'language = "none"')
+
+
+def test_an_arm_whose_axis_3_is_not_known_is_asked_for_it_before_planning(folder, arm):
+    # The arm with a longer forearm is none of the library; by its description or by its lengths.
+    lengths = {**arm.geometry, "c3": arm.geometry["c3"] + 0.03}
+    described(folder, replace(arm, geometry=lengths, T_base_foot=np.eye(4)))
+    rest = 'manufacturer = "ABB"\nacceleration_deg_s2 = [320, 270, 420, 1300, 1400, 2000]\n'
+    geometry = ", ".join(f"{name} = {1000 * value}" for name, value in lengths.items())
+    limits = "lower_deg = [-172, -172, -172, -172, -172, -172]\n"
+    limits += "upper_deg = [172, 172, 172, 172, 172, 172]\n"
+    limits += "velocity_deg_s = [115, 115, 115, 115, 115, 115]\n"
+    for number, table in enumerate(
+        (
+            '[robot]\nurdf = "arm.urdf"\ntip = "tool0"\n' + rest,
+            f'[robot]\nkinematics = "opw"\ngeometry_mm = {{ {geometry} }}\n{rest}{limits}',
+        )
+    ):
+        text = free(table).replace('language = "none"', 'language = "rapid"')
+        with pytest.raises(InputError, match=r"program\.language: .*axis_3 = .*axis_3_deg"):
+            require_language(read_job(job(folder, text, f"{number}.toml")))
+        told = 'axis_3 = "horizontal"\naxis_3_deg = [-60, 65]\n'
+        require_language(held := read_job(job(folder, text.replace(table, table + told), "a.toml")))
+        (bound,) = held.robot.couplings
+        upright = 90 * number  # lengths alone count joint 3 from the upright arm
+        assert np.degrees([bound.lower, bound.upper]) == pytest.approx(
+            [-60 + upright, 65 + upright]
+        )
+        for wrong, where in (
+            ('axis_3 = "horizontal"\n', r"robot\.axis_3_deg: expected the two limits of axis 3"),
+            (told.replace("horizontal", "serial"), r"robot\.axis_3_deg: .*got them with 'serial'"),
+            (told.replace("horizontal", "coupled"), r"robot\.axis_3: expected 'serial' or"),
+        ):
+            with pytest.raises(InputError, match=where):
+                read_job(job(folder, text.replace(table, table + wrong), "w.toml"))
+    with pytest.raises(InputError, match="axis_3 only with urdf or kinematics"):
+        read_job(job(folder, free(ROBOT + 'axis_3 = "serial"\n')))

@@ -8,6 +8,7 @@ from typing import Literal
 import numpy as np
 
 from kerfpath._arrays import Array
+from kerfpath._told import told
 from kerfpath.cell._shapes import Shape
 
 __all__ = ["Body", "Kind"]
@@ -41,6 +42,8 @@ class Body:
     kind: Kind
     approximate: bool = False
     holds: bool = True
+
+    __repr__ = told
 
     @property
     def size(self) -> Array:

@@ -98,6 +98,12 @@ class Cell:
     _scene: Scene = field(init=False, repr=False)
     _sweep: Sweep = field(init=False, repr=False)
 
+    def __repr__(self) -> str:
+        return (
+            f"Cell({len(self.bodies)} bodies, {len(self.pairs)} pairs judged, all keep "
+            f"{self.near_miss * 1e3:g} mm)"
+        )
+
     def __post_init__(self) -> None:
         _set = object.__setattr__
         bodies = tuple(sorted(self.bodies, key=lambda body: body.frame))

@@ -162,7 +162,8 @@ def _shape(body: Described, hulls: bool) -> Shape:
     vertices, triangles = read_surface(body.path, name)
     if not hulls:
         return closed(vertices, triangles, body.size, name).moved(body.pose)
-    vertices = vertices * body.size
+    with np.errstate(over="ignore"):  # what becomes infinite is refused for its size
+        vertices = vertices * body.size
     size_of(vertices, triangles, name)
     try:
         return Hull(vertices[np.unique(triangles)]).moved(body.pose)

@@ -10,6 +10,7 @@ from scipy.spatial import ConvexHull, QhullError, cKDTree
 from scipy.spatial.transform import Rotation
 
 from kerfpath._arrays import Array, Ints, as_pose, floats, freeze, positive, scalar
+from kerfpath._told import told
 from kerfpath.cell._mesh import Mesh
 from kerfpath.errors import InputError
 
@@ -41,6 +42,8 @@ class Capsule:
     start: Array
     end: Array
     radius: float
+
+    __repr__ = told
 
     def __post_init__(self) -> None:
         for name in ("start", "end"):
@@ -74,6 +77,8 @@ class Hull:
     points: Array
     triangles: Ints
     axis: Array | None
+
+    __repr__ = told
 
     def __init__(self, points: ArrayLike, *, axis: ArrayLike | None = None) -> None:
         given = floats(points, "hull points", (None, 3))

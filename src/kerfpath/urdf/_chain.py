@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from kerfpath._arrays import Array, floats
+from kerfpath._told import told
 
 __all__ = ["Chain", "turns"]
 
@@ -28,6 +29,8 @@ class Chain:
     origins: Array
     axes: Array
     end: Array
+
+    __repr__ = told
 
     def __post_init__(self) -> None:
         n = len(self.origins)
