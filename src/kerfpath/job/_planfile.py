@@ -231,13 +231,13 @@ def _cell_entry(cell: Cell) -> dict[str, Any]:
             }
             for b in cell.bodies
         ],
-        "near_miss_m": pair_entries(cell),
+        "near_miss_m": _pair_entries(cell),
         "not_judged": [{"between": list(pair), "why": why} for pair, why in cell.unjudged.items()],
         "not_proved": list(caveats(cell)),
     }
 
 
-def pair_entries(cell: Cell) -> list[dict[str, Any]]:
+def _pair_entries(cell: Cell) -> list[dict[str, Any]]:
     """Return what every judged pair keeps, what it is asked, and the overlap that is left out."""
     rules = zip(cell.pair_names, cell.asked, cell.required, cell.depth, strict=True)
     return [
