@@ -176,7 +176,7 @@ def _require_passed(found: Audited) -> None:
         for check in table:
             own = check.code == "job-program"  # [program] is taken from the job as it is now
             if check.level == "error" and not check.ok and not own:
-                raise AuditFailed(f"no program: contour {name!r} fails its audit: {check.issue()}")
+                raise AuditFailed(f"no program: {name!r} fails its audit: {check.issue()}")
 
 
 def _led(file: PlanFile, frame: MeasuredFrame, retract: float) -> tuple[PlanFile, list[str]]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any
 
@@ -16,7 +16,7 @@ from kerfpath.job._plan_follows import SAME
 from kerfpath.job._read import Job
 from kerfpath.job._tables import JobFile
 
-__all__ = ["CLAIMS", "disagreement", "job_disagreement", "of_job"]
+__all__ = ["CLAIMS", "disagreement", "job_disagreement"]
 
 CLAIMS = {
     r"kerfpath$": "the version that wrote the file",
@@ -107,11 +107,6 @@ def job_disagreement(job: Job, source: dict[str, Any]) -> list[Check]:
         told = f"{title}: {mine[0]}{many}" if mine else title
         rows.append(_check(code, told, len(mine)))
     return rows
-
-
-def of_job(checks: Sequence[Check]) -> list[Check]:
-    """Return the checks without that of the tables which do not say what the motion is."""
-    return [check for check in checks if check.code != "job-program"]
 
 
 def _differences(one: Any, two: Any, path: tuple[str | int, ...]) -> Iterator[_Difference]:
