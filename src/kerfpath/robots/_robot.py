@@ -101,11 +101,9 @@ class Robot:
     sources: dict[str, str] = field(default_factory=dict)
 
     def __repr__(self) -> str:
-        known = "known" if self.acceleration is not None else "not known"
-        return (
-            f"Robot({self.id!r}, {self.manufacturer} {self.model}, {self.joints} joints, "
-            f"{self.kinematics}, accelerations {known})"
-        )
+        known = f"accelerations {'not ' if self.acceleration is None else ''}known"
+        words = f"{self.manufacturer} {self.model}, {self.joints} joints, {self.kinematics}"
+        return f"Robot({self.id!r}, {words}, {known})"
 
     def __post_init__(self) -> None:
         _set = object.__setattr__

@@ -16,6 +16,7 @@ RAPID = Language(
     title="ABB RAPID",
     manufacturers=("ABB",),
     families=("opw",),
+    axis_3=("serial", "horizontal"),
     suffix=".mod",
     settings=RapidSettings,
     rules=rules,

@@ -16,37 +16,42 @@ from numpy.typing import ArrayLike
 
 from kerfpath._arrays import Array, Ints, floats, freeze
 from kerfpath.post._arm_plane import wrist_in_plane
+from kerfpath.post._counting import offset_near
 from kerfpath.robots import Robot
 
-__all__ = ["axes_from_joints", "axis_matrix", "confdata", "joints_from_axes", "posture"]
+__all__ = ["axes_from_joints", "confdata", "joints_from_axes", "posture"]
 
-ROD = (0.0, 1.0, 1.0, 0.0, 0.0, 0.0)
-"""The coupling of a parallel rod: it carries the upper arm, so that its motor turns joint 2 + 3."""
+COUNTED_FROM = (0.0, 0.0, -90.0, 0.0, 0.0, 0.0)
+OFFSET = np.radians(COUNTED_FROM)
+"""ABB's axes of an ortho-parallel arm: angles of the model = axes - OFFSET, upright at 0."""
 NOISE_DECIMALS = 6
 """Angles are rounded to this many decimals (deg) before a quadrant: -1e-15 deg is zero."""
 
 
-def axis_matrix(robot: Robot) -> Array:
-    """Return the matrix (6, 6) that takes joints of the serial model to the controller's axes.
-
-    The identity, but for arms with a parallel rod (IRB 2400, IRB 4400): there the controller's
-    axis 3 is joint 2 + joint 3, the coupling that the robot's data carry.
-    """
-    matrix = np.eye(6)
-    if any(np.array_equal(coupling.row, ROD) for coupling in robot.couplings):
-        matrix[2] = ROD
-    return freeze(matrix)
-
-
 def axes_from_joints(robot: Robot, q: ArrayLike) -> Array:
-    """Return the controller's axes (K, 6) rad of joint vectors q (K, 6) rad."""
-    return freeze(floats(q, "q", (None, 6)) @ axis_matrix(robot).T)
+    """Return the controller's axes (K, 6) rad of joint vectors q (K, 6) rad.
+
+    With a parallel rod (IRB 2400, IRB 4400: `Robot.axis_3` is "horizontal") axis 3 is joint 2 +
+    joint 3. Descriptions that count joints otherwise than ABB are converted by the arm's model.
+    """
+    matrix, shift = _from_joints(robot)
+    return freeze(np.asarray(floats(q, "q", (None, 6)) @ matrix.T + shift, dtype=np.float64))
 
 
 def joints_from_axes(robot: Robot, axes: ArrayLike) -> Array:
     """Return the joint vectors (K, 6) rad of a controller's axes (K, 6) rad."""
-    rows = floats(axes, "axes", (None, 6))
-    return freeze(np.asarray(rows @ np.linalg.inv(axis_matrix(robot)).T, dtype=np.float64))
+    matrix, shift = _from_joints(robot)
+    rows = floats(axes, "axes", (None, 6)) - shift
+    return freeze(np.asarray(rows @ np.linalg.inv(matrix).T, dtype=np.float64))
+
+
+def _from_joints(robot: Robot) -> tuple[Array, Array]:
+    """Return matrix (6, 6) and shift (6,) rad with axes = matrix @ joints + shift."""
+    matrix, shift = np.diag(robot.sign), OFFSET - offset_near(robot, COUNTED_FROM)
+    if robot.axis_3 == "horizontal":
+        matrix[2] += matrix[1]
+        shift[2] += shift[1]
+    return matrix, shift
 
 
 def confdata(robot: Robot, q: ArrayLike) -> Ints:
