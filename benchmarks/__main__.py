@@ -23,6 +23,7 @@ NAMES = (
     "cad",
     "part",
     "programs",
+    "program_edits",
     "plan_edits",
     "pareto",
     "sweeps",
@@ -73,6 +74,10 @@ def _run(name: str, *, quick: bool) -> list[Report]:
         from benchmarks import programs
 
         return [programs.run(quick=quick)]
+    if name == "program_edits":
+        from benchmarks import program_edits
+
+        return [program_edits.run(quick=quick)]
     if name == "plan_edits":
         from benchmarks import plan_edits
 

@@ -1,10 +1,7 @@
-"""A grammar of edits over the text of robot programs, and an oracle for which do harm.
+"""A grammar of edits over the text of robot programs.
 
-An edit deletes, doubles, moves, swaps or copies a line, scales or nudges a number, flips a sign or a
-state, or takes another word of the same family. The oracle shares nothing with the audit: it
-compares, step by step, what the reader makes of the text before and after. Where that is the same,
-the edit is harmless only if it touched nothing but what the `Words` of the language list as such:
-whatever else a controller reads and our reader lets pass is counted as harm.
+An edit deletes, doubles, moves, swaps or copies a line, scales or nudges a number, flips a sign or
+a state, or takes another word of the same family.
 """
 
 from __future__ import annotations
@@ -12,28 +9,13 @@ from __future__ import annotations
 import re
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
-from typing import Literal
 
 import numpy as np
-from scipy.spatial.transform import Rotation
 
-from kerfpath.post import ReadMove, ReadProgram, ReadStep, ReadWait
-
-__all__ = ["WORDS", "Edit", "Verdict", "Words", "edits", "verdict"]
-
-Verdict = Literal["harmful", "harmless", "either"]
-"""Of an edit: it must not pass; it must pass; or it may do either, and is only counted."""
+__all__ = ["WORDS", "Edit", "Words", "edits"]
 
 NUMBER = re.compile(r"(?<![\w.])-?\d*\.?\d+(?![\w.]|E)")
 FACTORS = (0.0, 0.5, 0.9, 1.1, 2.0, 10.0, 30.0, 100.0)
-ALONG, TURNED = 0.25e-3, np.radians(1.5)
-"""How far (m) a node and (rad) its axis move at least to do harm: the job allows 0.1 mm, 1 deg."""
-EXACT, SHARP = 2e-5, np.radians(0.02)
-"""The same of targets beside the cut (m) and of joints (rad)."""
-TIME = 2.5e-3
-"""The same of waits and lead times, s: controllers count milliseconds."""
-RATE = 0.025
-"""The same of speeds, as a share."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -81,9 +63,11 @@ WORDS = {
     ),
     "fanuc": Words(
         remark=r"\s*\d+:  !(?!UFRAME|UTOOL).*|",
-        idle=(r"(?:OWNER|COMMENT|PROG_SIZE|FILE_NAME|VERSION|MEMORY_SIZE|PROTECT|CONTROL_CODE|"
-              r"CREATE|MODIFIED)(.*)", r"((?:TCD:)?\s+[A-Z_]+\s*= .*)", r"(DEFAULT_GROUP.*)"),
-        families=(*STATES, r"\bDO\[\d\]", r"\bP\[\d+\]", r"\b(?:FINE|CNT\d+)\b", r"'[NF] [UD] [TB]"),
+        idle=(r"(?:OWNER|COMMENT|PROG_SIZE|FILE_NAME|VERSION|LINE_COUNT|MEMORY_SIZE|PROTECT|"
+              r"CONTROL_CODE|CREATE|MODIFIED)(.*)", r"((?:TCD:)?\s+[A-Z_]+\s*= .*)",
+              r"(DEFAULT_GROUP.*)"),
+        families=(*STATES, r"\bDO\[\d\]", r"\bP\[\d+\]", r"\b(?:FINE|CNT\d+)\b",
+                  r"'[NF] [UD] [TB]"),
         orderless=(r"\s*\d+:  DO\[\d\]=OFF ;", r"\s*\d+:  U(?:FRAME|TOOL)_NUM.*",
                    r"\s*\d+:  !U.*"),
     ),
@@ -98,11 +82,12 @@ WORDS = {
         idle=(r"(<\?xml.*)", r"<\w+ (xmlns.*)"),
         families=(*STATES, r"\bdio(?:Laser|Gas)\b", r"\bmPath\[\d+\]", r"\bpPath\[\d+\]",
                   r"\bjAir\[\d+\]", r"blend=\"\w+\"", r"elbow=\"\w+\"", r"shoulder=\"\w+\""),
-        orderless=(r"\s*waitEndMove\(\)",),
+        orderless=(r"\s*waitEndMove\(\)", r"\s*<Program file=.*/>"),
     ),
     "urscript": Words(
         remark=r"\s*(#.*)?",
         families=(*STATES, r"\b(?:laser|gas)\b", r"\bmove[lj]\b"),
+        idle=(r".*movej\(.*, (v=[\d.]+), t=.*",),  # the time counts
         held=(r"\s*(?:laser|gas)_ahead.*",),
     ),
     "ros": Words(remark=r"\s*(#.*)?", families=(*STATES, r"\b(?:laser|gas)\b"),
@@ -124,7 +109,7 @@ class Edit:
     files : mapping of str to str
         The program with it.
     idle : bool
-        Whether nothing acts on what was changed, but by the moves, waits and switches that are read.
+        Whether nothing acts on what was changed but by the moves, waits and switches read of it.
     remark : bool
         Whether it is a remark.
     said : str
@@ -158,8 +143,15 @@ def edits(files: Mapping[str, str], language: str, rng: np.random.Generator) -> 
         if text.split() == files[name].split():
             continue
         end = "\r\n" if "\r\n" in files[name] else "\n"
-        yield Edit(kind=kind, file=name, line=line + 1, files={**files, name: text.replace("\n", end)},
-                   idle=idle, remark=_in_remarks(files[name], text, words), said=said)  # fmt: skip
+        yield Edit(
+            kind=kind,
+            file=name,
+            line=line + 1,
+            files={**files, name: text.replace("\n", end)},
+            idle=idle,
+            remark=_in_remarks(files[name], text, words),
+            said=said,
+        )
 
 
 def _in_remarks(before: str, after: str, words: Words) -> bool:
@@ -230,7 +222,9 @@ def _move(lines: list[str], words: Words, rng: np.random.Generator) -> Made:
 def _swap(lines: list[str], words: Words, rng: np.random.Generator) -> Made:
     k = _line(lines[:-1], rng)
     one, two = lines[k : k + 2]
-    idle = one == two or _same_kind(one, two, words) or any(_is_remark(x, words) for x in (one, two))
+    idle = (
+        one == two or _same_kind(one, two, words) or any(_is_remark(x, words) for x in (one, two))
+    )
     return "lines swapped", k, [*lines[:k], two, one, *lines[k + 2 :]], idle, one.strip()
 
 
@@ -242,7 +236,9 @@ def _copy(lines: list[str], words: Words, rng: np.random.Generator) -> Made:
     return "line inserted", to, [*lines[:to], lines[k], *lines[to:]], idle, lines[k].strip()
 
 
-def _number(lines: list[str], words: Words, rng: np.random.Generator) -> tuple[int, re.Match[str], bool] | None:
+def _number(
+    lines: list[str], words: Words, rng: np.random.Generator
+) -> tuple[int, re.Match[str], bool] | None:
     k = _line(lines, rng)
     found = list(NUMBER.finditer(lines[k]))
     if not found:
@@ -283,7 +279,11 @@ def _nudge(lines: list[str], words: Words, rng: np.random.Generator) -> Made:
         return None
     k, match, idle = found
     value = float(match[0])
-    value = -value if value and rng.random() < 0.3 else value + float(rng.choice([-20, -1, 1, 0.5, 5, 20]))
+    value = (
+        -value
+        if value and rng.random() < 0.3
+        else value + float(rng.choice([-20, -1, 1, 0.5, 5, 20]))
+    )
     said = f"{match[0]} to {value:g} in {lines[k].strip()}"
     return "number nudged", k, _with_number(lines, k, match, value), idle, said
 
@@ -314,7 +314,13 @@ def _taken(
     word = choice[int(rng.integers(len(choice)))]
     changed = lines[k][: match.start()] + word + lines[k][match.end() :]
     said = f"{match[0]} to {word} in {lines[k].strip()}"
-    return kind, k, [*lines[:k], changed, *lines[k + 1 :]], _idle_at(lines[k], match.start(), words), said
+    return (
+        kind,
+        k,
+        [*lines[:k], changed, *lines[k + 1 :]],
+        _idle_at(lines[k], match.start(), words),
+        said,
+    )
 
 
 def _remark(lines: list[str], words: Words, rng: np.random.Generator) -> Made:
@@ -326,83 +332,6 @@ def _remark(lines: list[str], words: Words, rng: np.random.Generator) -> Made:
         return None
     k = remarks[int(rng.integers(len(remarks)))]
     at = max(lines[k].rfind(" "), len(lines[k]) // 2)
-    changed = f"{lines[k][:at]} shift two {lines[k][at:].strip()}"[:30 if ":" in lines[k] else 200]
+    changed = f"{lines[k][:at]} shift two {lines[k][at:].strip()}"[: 30 if ":" in lines[k] else 200]
     return "remark", k, [*lines[:k], changed + (" ;" if lines[k].endswith(" ;") else ""),
                          *lines[k + 1 :]], True, lines[k].strip()  # fmt: skip
-
-
-def verdict(edit: Edit, before: ReadProgram, after: ReadProgram) -> Verdict:
-    """Return what the oracle says of an edit, by what the text meant before and after it."""
-    found = _compared(before, after)
-    if found == "same" and edit.idle:
-        return "harmless" if edit.remark else "either"
-    return "harmful" if found == "same" else found
-
-
-def _compared(one: ReadProgram, two: ReadProgram) -> Literal["same", "either", "harmful"]:
-    for what in ("T_flange_tip", "T_base_part"):
-        a, b = getattr(one, what), getattr(two, what)
-        if a is not None and np.abs(a - b).max() > EXACT:
-            return "harmful"
-    if len(one.steps) != len(two.steps):
-        return "harmful"
-    moves = [step for step in one.steps if isinstance(step, ReadMove)]
-    exact = any(
-        a is not None and not np.array_equal(a, b)
-        for what in ("T_flange_tip", "T_base_part")
-        for a, b in ((getattr(one, what), getattr(two, what)),)
-    )
-    same = not exact
-    for k, (a, b) in enumerate(zip(one.steps, two.steps, strict=True)):
-        found = _step(a, b, cut=_in_cut(one.steps, k))
-        if found == "harmful":
-            return "harmful"
-        same = same and found == "same"
-    assert moves
-    return "same" if same else "either"
-
-
-def _in_cut(steps: tuple[ReadStep, ...], k: int) -> bool:
-    """Return whether a step is a node of a contour: neither its approach nor its retract."""
-    step = steps[k]
-    if not isinstance(step, ReadMove) or step.kind == "joint":
-        return False
-    rest = [s for s in steps[k + 1 :] if isinstance(s, ReadMove)]
-    return bool(rest) and rest[0].kind != "joint"
-
-
-def _step(a: ReadStep, b: ReadStep, *, cut: bool) -> Literal["same", "either", "harmful"]:
-    if isinstance(a, ReadWait) or isinstance(b, ReadWait):
-        if not isinstance(a, ReadWait) or not isinstance(b, ReadWait):
-            return "harmful"
-        return _far(a.time, b.time, TIME)
-    if a.kind != b.kind or a.posture != b.posture or (a.zone is None) != (b.zone is None):
-        return "harmful"
-    switches = [[(s.signal, s.on) for s in move.switches] for move in (a, b)]
-    if switches[0] != switches[1]:
-        return "harmful"
-    point, angle = (ALONG, TURNED) if cut else (EXACT, SHARP)
-    found = [_far(s.lead_time, t.lead_time, TIME) for s, t in zip(a.switches, b.switches, strict=True)]
-    for one, two, most in (
-        (a.speed, b.speed, RATE * (a.speed or 1)),
-        (a.duration, b.duration, RATE * (a.duration or 1)),
-        (a.zone, b.zone, EXACT),
-    ):
-        found.append(_far(one or 0.0, two or 0.0, most))
-    if a.T_part_tip is not None and not np.array_equal(a.T_part_tip, b.T_part_tip):
-        apart = float(np.linalg.norm(a.T_part_tip[:3, 3] - b.T_part_tip[:3, 3]))
-        cosine = float(np.clip(a.T_part_tip[:3, 2] @ b.T_part_tip[:3, 2], -1, 1))
-        turned = Rotation.from_matrix(a.T_part_tip[:3, :3].T @ b.T_part_tip[:3, :3]).magnitude()
-        found += [_far(0, apart, point), _far(0, np.arccos(cosine), angle)]
-        # About the beam the tool may turn as it likes, within the limits of the joints.
-        found += [_far(0, float(turned), np.inf if cut else angle)]
-    if a.q is not None and not np.array_equal(a.q, b.q):
-        off = float(np.abs(a.q - b.q).max())
-        found.append(_far(0, off, np.radians(5) if cut else angle))
-    return max(found, key=["same", "either", "harmful"].index)
-
-
-def _far(one: float, two: float, most: float) -> Literal["same", "either", "harmful"]:
-    if one == two:
-        return "same"
-    return "harmful" if abs(one - two) > most else "either"

@@ -1,12 +1,15 @@
-"""Faults of a neutral program, each with its effect: written out, they are edits in any language."""
+"""Faults of a neutral program by their effect: written out, they are edits in any language."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
+from scipy.spatial.transform import Rotation
 
+from kerfpath._arrays import Array
 from kerfpath.post import JointMove, LinearMove, Program, Section, Step, Switch, Wait
 
 __all__ = ["Fault", "faults"]
@@ -41,13 +44,8 @@ def faults(program: Program, rng: np.random.Generator) -> Iterator[Fault]:
     for what, name in (("T_flange_tip", "tool"), ("T_base_part", "part")):
         T = np.array(getattr(program, what))
         T[int(rng.integers(3)), 3] += float(rng.choice([-1, 1, 20])) * 1e-3
-        yield Fault(kind=f"frame of the {name} moved", program=_renamed(program, what, T))
-
-
-def _renamed(program: Program, what: str, T: np.ndarray) -> Program:
-    return replace(program, T_flange_tip=T) if what == "T_flange_tip" else replace(
-        program, T_base_part=T
-    )  # fmt: skip
+        frame: dict[str, Any] = {what: T}
+        yield Fault(kind=f"frame of the {name} moved", program=replace(program, **frame))
 
 
 def _with(program: Program, number: int, section: Section) -> Program:
@@ -59,19 +57,23 @@ def _with(program: Program, number: int, section: Section) -> Program:
 Steps = tuple[Step, ...]
 
 
-def _section_faults(
-    steps: Sequence[Step], rng: np.random.Generator
-) -> Iterator[tuple[str, Steps]]:
+def _section_faults(steps: Sequence[Step], rng: np.random.Generator) -> Iterator[tuple[str, Steps]]:
     """Yield faults of the steps of one contour, in the layout that `build_program` has."""
     path = [k for k, step in enumerate(steps) if isinstance(step, LinearMove)]
     joint = [k for k, step in enumerate(steps) if isinstance(step, JointMove)]
     start, last, back = path[0], path[-2], path[-1]
-    inner = [k for k in path[1:-2] if steps[k].switches == ()]  # type: ignore[union-attr]
+    inner = [k for k in path[1:-2] if not getattr(steps[k], "switches", ())]
     middle = int(rng.choice(inner[1:-1]))
     pierce = next(k for k, step in enumerate(steps) if isinstance(step, Wait))
 
-    def changed(k: int, **fields: object) -> Steps:
-        return (*steps[:k], replace(steps[k], **fields), *steps[k + 1 :])  # type: ignore[arg-type]
+    def way(k: int) -> LinearMove:
+        move = steps[k]
+        assert isinstance(move, LinearMove)
+        return move
+
+    def changed(k: int, **fields: Any) -> Steps:
+        step: Any = steps[k]
+        return (*steps[:k], replace(step, **fields), *steps[k + 1 :])
 
     def inserted(k: int, *more: Step) -> Steps:
         return (*steps[:k], *more, *steps[k:])
@@ -80,17 +82,15 @@ def _section_faults(
         return (*steps[:k], *steps[k + 1 :])
 
     def switched(k: int, keep: Callable[[Switch], bool]) -> Steps:
-        move = steps[k]
-        assert isinstance(move, LinearMove)
-        return changed(k, switches=tuple(s for s in move.switches if keep(s)))
+        return changed(k, switches=tuple(s for s in way(k).switches if keep(s)))
 
-    at_start, at_end = steps[start], steps[last]
-    assert isinstance(at_start, LinearMove)
-    assert isinstance(at_end, LinearMove)
+    at_start, at_end, away_from = way(start), way(last), steps[joint[-1]]
+    assert isinstance(away_from, JointMove)
     lead = at_start.switches[-1].lead_time
     # The beam and the gas.
     yield "laser on with the retract", changed(back, switches=(replace(ON, lead_time=0.0),))
-    yield "laser on ahead of the retract's end", changed(back, switches=(replace(ON, lead_time=lead),))
+    early = (replace(ON, lead_time=lead),)
+    yield "laser on ahead of the retract's end", changed(back, switches=early)
     yield "laser on on the way down", changed(start, switches=tuple(
         replace(s, lead_time=s.lead_time + 0.2) if s.signal == "laser" else s
         for s in at_start.switches))  # fmt: skip
@@ -105,12 +105,12 @@ def _section_faults(
         for s in at_start.switches))  # fmt: skip
     yield "laser before gas off swapped", changed(last, switches=at_end.switches[::-1])
     for k in path[1:-2]:
-        if steps[k].switches:  # type: ignore[union-attr]
+        if way(k).switches:
             yield "micro joint left out or not ended", changed(k, switches=())
     # Standing where the beam is on.
     wait = Wait(time=float(rng.choice([0.1, 5.0])))
     yield "wait in the cut", (
-        *steps[:middle], replace(steps[middle], zone=0.0), wait, *steps[middle + 1 :])  # type: ignore[arg-type]  # fmt: skip
+        *steps[:middle], replace(way(middle), zone=0.0), wait, *steps[middle + 1 :])  # fmt: skip
     yield "stop in the cut", changed(middle, zone=0.0)
     yield "wait at the end of the cut", inserted(last + 1, wait)
     yield "wait in the air", inserted(start, wait)
@@ -119,26 +119,28 @@ def _section_faults(
     yield "pierce longer", changed(pierce, time=2.0)
     yield "pierce shorter", changed(pierce, time=0.1)
     yield "pierce on the fly", changed(start, zone=0.001)
-    yield "pierce point passed by", without(pierce)[:start] + (
-        replace(at_start, zone=0.0003), *without(pierce)[start + 1 :])  # fmt: skip
+    passed_by = replace(at_start, zone=0.0003)
+    yield "pierce point passed by", (*steps[:start], passed_by, *steps[pierce + 1 :])
     yield "end passed by", changed(last, zone=0.0003)
     # Speeds and zones.
     for k, what in ((joint[-1], "air"), (start, "approach"), (back, "retract"), (middle, "cut")):
         share = float(rng.choice([0.3, 0.5, 2.0, 3.0]))
-        speed = steps[k].speed * share  # type: ignore[union-attr]
-        yield f"speed of {what}", changed(k, speed=speed, **(
-            {} if what == "air" else {"duration": steps[k].duration / share}))  # type: ignore[union-attr]  # fmt: skip
+        if what == "air":
+            took = away_from.duration
+            slow = {"speed": away_from.speed * share, "duration": took and took / share}
+            yield f"speed of {what}", changed(k, **slow)
+        else:
+            slow = {"speed": way(k).speed * share, "duration": way(k).duration / share}
+            yield f"speed of {what}", changed(k, **slow)
     yield "zone larger", changed(middle, zone=0.0003 * float(rng.choice([3, 30, 100])))
     yield "zone in the air", changed(joint[-1], zone=0.01)
     yield "zone after the retract", changed(back, zone=0.01)
     # Where it goes.
     yield "approach from afar", _backed(steps, joint[-1], start, 10)
-    yield "start joint moved", changed(joint[-1], q=_nudged(steps[joint[-1]].q, rng, 2.0))  # type: ignore[union-attr]
-    move = steps[back]
-    assert isinstance(move, LinearMove)
-    for kind, way in (("retract into the part", -1), ("retract ten times as far", 10)):
-        yield kind, changed(back, T_part_tip=_shifted(at_end.T_part_tip, -0.05 * way))
-    aside = np.array(move.T_part_tip)
+    yield "start joint moved", changed(joint[-1], q=_nudged(away_from.q, rng, 2.0))
+    for kind, times in (("retract into the part", -1), ("retract ten times as far", 10)):
+        yield kind, changed(back, T_part_tip=_shifted(at_end.T_part_tip, -0.05 * times))
+    aside = np.array(way(back).T_part_tip)
     aside[:3, 3] += 0.01 * aside[:3, 0]
     yield "retract aside", changed(back, T_part_tip=aside)
     yield "no retract", without(back)
@@ -147,17 +149,17 @@ def _section_faults(
     yield "node left out", without(middle)
     yield "node twice", inserted(middle, steps[middle])
     yield "nodes swapped", (*steps[:middle], steps[middle + 1], steps[middle], *steps[middle + 2 :])
-    off = np.array(steps[middle].T_part_tip)  # type: ignore[union-attr]
+    off = np.array(way(middle).T_part_tip)
     off[int(rng.integers(3)), 3] += float(rng.choice([-0.5, 0.5])) * 1e-3
     yield "node moved", changed(middle, T_part_tip=off)
-    tilted = np.array(steps[middle].T_part_tip)  # type: ignore[union-attr]
-    tilted[:3, :3] = tilted[:3, :3] @ np.array([[1, 0, 0], [0, 0.9962, -0.0872], [0, 0.0872, 0.9962]])
-    yield "node tilted by 5 deg", changed(middle, T_part_tip=_square(tilted))
+    tilted = np.array(way(middle).T_part_tip)
+    tilted[:3, :3] = tilted[:3, :3] @ Rotation.from_euler("x", 5, degrees=True).as_matrix()
+    yield "node tilted by 5 deg", changed(middle, T_part_tip=tilted)
     yield "joint move in the cut", inserted(middle, steps[joint[-1]])
     yield "joint move behind the cut", inserted(last + 1, steps[joint[-1]])
     yield "way between in a straight line", inserted(
         back + 1, replace(at_start, switches=(), speed=at_start.speed))  # fmt: skip
-    away = replace(steps[joint[-1]], q=_nudged(steps[joint[-1]].q, rng, 20.0))  # type: ignore[arg-type, union-attr]
+    away = replace(away_from, q=_nudged(away_from.q, rng, 20.0))
     yield "another joint move", inserted(joint[-1], away)
 
 
@@ -168,13 +170,13 @@ def _order_faults(sections: Sequence[Section]) -> Iterator[tuple[str, Sequence[S
     yield "contour twice", [*sections, replace(first, name=f"{first.name}_2")]
 
 
-def _nudged(q: np.ndarray, rng: np.random.Generator, by_deg: float) -> np.ndarray:
+def _nudged(q: Array, rng: np.random.Generator, by_deg: float) -> Array:
     moved = np.array(q)
     moved[int(rng.integers(len(q)))] += np.radians(by_deg) * float(rng.choice([-1, 1]))
     return moved
 
 
-def _shifted(T: np.ndarray, along: float) -> np.ndarray:
+def _shifted(T: Array, along: float) -> Array:
     moved = np.array(T)
     moved[:3, 3] += along * moved[:3, 2]
     return moved
@@ -187,9 +189,3 @@ def _backed(steps: Sequence[Step], joint: int, start: int, times: float) -> Step
     assert isinstance(here, LinearMove)
     q = here.q + times * (there.q - here.q)
     return (*steps[:joint], replace(there, q=q), *steps[joint + 1 :])
-
-
-def _square(T: np.ndarray) -> np.ndarray:
-    u, _, v = np.linalg.svd(T[:3, :3])
-    T[:3, :3] = u @ v
-    return T

@@ -12,17 +12,29 @@ from typing import Literal
 
 import numpy as np
 
-from benchmarks._figures import Figure, Report
-from benchmarks._program_edits import edits, verdict
+from benchmarks._figures import Report, Sheet
+from benchmarks._program_edits import edits
 from benchmarks._program_faults import faults
+from benchmarks._program_oracle import verdict
 from kerfpath.errors import InputError
-from kerfpath.job import ProgramAsked, read_job, run_job
-from kerfpath.post import Language, Program, ReadProgram, Settings, build_program, languages
-from kerfpath.post import read_program
+from kerfpath.job import ProgramAsked, run_job
+from kerfpath.post import (
+    Language,
+    Program,
+    ReadProgram,
+    Settings,
+    build_program,
+    languages,
+    read_program,
+)
 
 __all__ = ["Outcome", "Subject", "Tally", "run", "subjects"]
 
-EDITS = 2000
+COLUMNS = (
+    "harm: caught", "refused", "passed", "harmless: passed", "not", "not of our making", "either",
+)  # fmt: skip
+"""Of the tables: what does harm, what is harmless, what no reader takes, and what may do either."""
+EDITS = 300
 """Of the text, in every language."""
 ARMS = {"inform": "yaskawa_gp25", "urscript": "ur_ur10e"}
 """Robots of languages that cannot say the axes of the one below."""
@@ -88,7 +100,9 @@ audited by the job. Faults: every fault of `_program_faults` (the laser on with 
 in the cut, an approach from afar, ...) is put into the neutral program and written out, so that it
 is an edit in each language that can say it; each does harm. Edits: {edits} edits of the text by the
 grammar of `_program_edits`, whose oracle says which do harm. Caught: the audit has a finding.
-Refused: the reader does not take the text, with file and line. Passed: neither."""
+Refused: no program of the job's making, with file and line. Passed: neither. Not of our making: the
+reader does not take the text, so that the oracle has nothing to judge. Either: another text of the
+same motion, or a move within what the job allows; it may pass."""
 
 Outcome = Literal["caught", "refused", "passed"]
 
@@ -130,7 +144,7 @@ class Subject:
         if found.passed:
             return "passed", ""
         wrong = [(n, c) for n, table in found.tables.items() for c in table if not c.ok]
-        said = [f"{found.place(n, c)}: {c.issue().message}" for n, c in wrong]
+        said = [found.said(n, c) for n, c in wrong]
         return "caught", "; ".join([*said, *found.missing])
 
 
@@ -167,6 +181,11 @@ class Tally:
             word = "passed, harmful" if missed else f"{outcome}, harmless"
             self.wrong.append(f"{subject.language.name}: {word}: {kind}: {said} {first}")
 
+    def only(self, kind: str) -> Tally:
+        """Return what was counted of one kind."""
+        counts = Counter({key: n for key, n in self.counts.items() if key[1] == kind})
+        return Tally(counts=counts)
+
     def of(self, judged: str, outcome: str | None = None, language: str | None = None) -> int:
         """Return how many the oracle judged so, of an outcome, in a language."""
         return sum(
@@ -175,9 +194,11 @@ class Tally:
             if said == judged and outcome in (None, came) and language in (None, lang)
         )
 
-    def try_faults(self, subject: Subject, rng: np.random.Generator) -> None:
-        """Write every fault of the program out, and audit it."""
-        for fault in faults(subject.program, rng):
+    def try_faults(
+        self, subject: Subject, rng: np.random.Generator, *, every: int = 1, first: int = 0
+    ) -> None:
+        """Write every fault of the program out, or `every` so manyth, and audit it."""
+        for fault in islice(faults(subject.program, rng), first % every, None, every):
             try:
                 files = subject.written(fault.program)
             except InputError:
@@ -252,32 +273,52 @@ def _draw(path: Path) -> None:
 
 
 def run(*, quick: bool = False) -> Report:
-    """Return the figures of faults and edits in every language."""
+    """Return what came of faults and edits, by language and by kind."""
     count = 50 if quick else EDITS
     others = " and ".join(f"{arm} ({name})" for name, arm in ARMS.items())
-    report = Report(
-        title="Edited programs", how=HOW.format(arm=ARM, others=others, edits=count)
-    )
+    all_of_them, rows = Tally(), []
     with tempfile.TemporaryDirectory() as folder:
         for number, subject in enumerate(subjects(Path(folder))):
-            name = subject.language.name
             for what in ("faults", "edits"):
                 rng, tally = np.random.default_rng(number), Tally()
                 if what == "faults":
                     tally.try_faults(subject, rng)
                 else:
                     tally.try_edits(subject, rng, count)
-                done, passed = tally.of("harmful"), tally.of("harmful", "passed")
-                fine, alarms = tally.of("harmless"), tally.of("harmless") - tally.of("harmless", "passed")
-                note = (
-                    f"{tally.of('harmful', 'caught')} caught, {tally.of('harmful', 'refused')} "
-                    f"refused; unread {tally.of('unread')}; no matter {tally.of('either')}"
-                )
-                report.figures += [
-                    Figure(what=f"{name}: {what} that do harm", values=[done], unit="", note=note),
-                    Figure(what=f"{name}: of these passed", values=[passed], unit=""),
-                    Figure(what=f"{name}: harmless {what}", values=[fine], unit=""),
-                    Figure(what=f"{name}: of these caught or refused", values=[alarms], unit=""),
-                ]
-                report.findings += tally.wrong[:20]
-    return report
+                rows.append([subject.language.name, what, *map(str, _row(tally))])
+                all_of_them.counts.update(tally.counts)
+                all_of_them.told.update(tally.told)
+                all_of_them.wrong.extend(tally.wrong)
+    kinds = sorted({kind for _, kind, _, _ in all_of_them.counts})
+    told = all_of_them.told
+    return Report(
+        title="Edited programs",
+        how=HOW.format(arm=ARM, others=others, edits=count),
+        sheets=[
+            Sheet(columns=("language", "what", *COLUMNS), rows=rows, words=2),
+            Sheet(
+                columns=("kind", *COLUMNS),
+                rows=[[kind, *map(str, _row(all_of_them.only(kind)))] for kind in kinds],
+            ),
+        ],
+        findings=[
+            f"of {all_of_them.of('harmful')} that do harm {all_of_them.of('harmful', 'passed')} "
+            f"passed; of {all_of_them.of('harmless')} that are harmless "
+            f"{all_of_them.of('harmless') - all_of_them.of('harmless', 'passed')} did not",
+            f"of {told.total()} harmful edits of the text that were found, {told['told']} are told "
+            "with their own line or one beside it",
+            *all_of_them.wrong[:20],
+        ],
+    )
+
+
+def _row(tally: Tally) -> list[int]:
+    """Return the figures of `COLUMNS`."""
+    fine = tally.of("harmless", "passed")
+    return [
+        *(tally.of("harmful", outcome) for outcome in ("caught", "refused", "passed")),
+        fine,
+        tally.of("harmless") - fine,
+        tally.of("unread"),
+        tally.of("either"),
+    ]

@@ -10,6 +10,7 @@ from pathlib import Path
 import pytest
 
 from kerfpath.errors import InputError
+from kerfpath.post import MANIFEST
 from kerfpath.study import batch
 from kerfpath.sweep import _cluster, _local
 from kerfpath.sweep._store import Store
@@ -124,7 +125,7 @@ def test_files_are_those_of_a_plan_in_a_folder_of_the_jobs_name(done):
         there = folder / rows[name]["folder"]
         assert {path.name: path.read_bytes() for path in there.iterdir()} == alone
         shutil.rmtree(folder / "alone")
-    assert {path.name for path in (folder / "out" / "good").iterdir()} == FILES
+    assert {path.name for path in (folder / "out" / "good").iterdir()} == FILES | {MANIFEST}
 
 
 def test_the_store_is_small_beside_the_files(done):
@@ -268,7 +269,7 @@ def test_workers_of_a_cluster_need_the_job_folder_alone_and_that_they_need(
     write_jobs(shared, {"good": JOB})
     (row,) = batch([shared / "good.toml"], out, scheduler=scheduler)
     assert row.passed
-    assert {path.name for path in row.folder.iterdir()} == FILES
+    assert {path.name for path in row.folder.iterdir()} == FILES | {MANIFEST}
     (other,) = write_jobs(shared, {"other": JOB})
 
     def lost(done, total, left):

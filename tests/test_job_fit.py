@@ -13,7 +13,7 @@ from kerfpath.job import program_from_file, read_job, read_plan_file, run_job
 from kerfpath.job._files import write_outcome
 from kerfpath.job._program_audit import audit_program
 from kerfpath.job._program_read import language_of
-from kerfpath.post import groups_of, read_program, write_files
+from kerfpath.post import MANIFEST, groups_of, read_program, write_files
 from kerfpath.post import language as find_language
 from kerfpath.post._languages import SHIPPED
 from test_cli import refused, run
@@ -220,12 +220,6 @@ def test_moves_planned_with_another_retract_are_refused(planned):
         program_from_file(planned["whole"] / "plan.json", "rapid", job_file=job)
 
 
-def test_stopping_at_every_node_is_refused(planned):
-    job = job_file(planned["whole"], program="zone_mm = 0")
-    with pytest.raises(AuditFailed, match="zone_mm above 0"):
-        program_from_file(planned["whole"] / "plan.json", "rapid", job_file=job)
-
-
 def programmed_time(read, robot, start):
     """Time of the joint moves of a program behind the first, by the model that docs state.
 
@@ -275,6 +269,6 @@ def test_post_follows_the_language_of_the_job(planned, tmp_path):
     job = job_file(folder, program='language = "krl"')
     result = run("post", plan, "--job", job, "-o", tmp_path / "out")
     assert result.returncode == 0, result.stderr
-    assert sorted(p.name for p in (tmp_path / "out").iterdir()) == ["cut.dat", "cut.src"]
+    assert {p.name for p in (tmp_path / "out").iterdir()} == {"cut.dat", "cut.src", MANIFEST}
     refused(run("post", plan, "--job", job, "-o", tmp_path / "cut.mod"), "krl", ".src", "rapid")
     refused(run("post", folder / "plan.json", "-o", tmp_path / "x"), "--language")

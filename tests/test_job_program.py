@@ -3,6 +3,7 @@
 import json
 import re
 import shutil
+from itertools import count
 
 import numpy as np
 import pytest
@@ -149,14 +150,22 @@ def test_what_else_people_change_is_found(folder, written):
         assert code in {which for _, which in failures(found)}, code
 
 
+def without(text, call):
+    """The text of a main routine without a call, the others numbered again."""
+    numbers = count(1)
+    kept = text.replace(call, "")
+    return re.sub(r"(?<=IF nFirst<=)\d+", lambda _: str(next(numbers)), kept)
+
+
 def test_a_cut_that_is_left_out_or_made_twice_is_found(folder, written):
-    name = re.search(r"    (joined);", written)[0]
+    name = re.search(r"    IF nFirst<=\d joined;\n", written)[0]
     body = re.search(r"\n  PROC joined\(\)\n.*?ENDPROC\n", written, re.DOTALL)[0]
-    code, found = audited(folder, written.replace(name, "").replace(body, ""))
+    code, found = audited(folder, without(written, name).replace(body, ""))
     assert (code, found["missing"]) == (1, ["joined"])
-    twice = written.replace(name, f"{name}\n    joined_2;").replace(
-        body, body + body.replace("PROC joined", "PROC joined_2")
+    twice = without(written, name).replace(
+        "    nFirst:=1;", "    IF nFirst<=3 joined;\n    IF nFirst<=4 joined_2;\n    nFirst:=1;"
     )
+    twice = twice.replace(body, body + body.replace("PROC joined", "PROC joined_2"))
     code, found = audited(folder, twice)
     assert code == 1
     assert ("joined_2 (joined)", "once") in failures(found)
@@ -311,11 +320,11 @@ def test_a_measured_part_that_is_none_or_out_of_reach_gives_no_program(folder):
     assert re.search(r"as a job says it: xyz_mm = \[.*\], rpy_deg = \[.*\]", result.stdout)
     assert "xyz_mm = [" in run(*command, "--json").stderr
     assert not out.exists()
-    for shift, reason in ((300, "excess over the joint limits"), (-900, "joint acceleration")):
-        with_points(folder, shift=shift)
-        result = run(*command)
-        assert result.returncode == 0, shift
-        assert f"was planned again there; only led there it fails: error: {reason}" in result.stdout
+    with_points(folder, shift=300)
+    result = run(*command)
+    assert result.returncode == 0
+    said = "was planned again there; only led there it fails: error: excess over the joint limits"
+    assert said in result.stdout
 
 
 def test_a_plan_on_its_limits_is_planned_again_around_a_part_that_was_measured(folder):
@@ -363,7 +372,7 @@ def test_bad_arguments_are_refused(folder, written):
     )
     assert "a program is compared with its job" in refused("audit", str(folder / "out/job.mod"))
     assert "no such file" in refused(
-        "audit", str(folder / "none.mod"), "--job", str(folder / "job.toml")
+        "audit", str(folder / "nowhere.mod"), "--job", str(folder / "job.toml")
     )
     (folder / "x.foo").write_text("")
     said = refused("audit", str(folder / "x.foo"), "--job", str(folder / "job.toml"))

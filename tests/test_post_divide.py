@@ -130,7 +130,7 @@ def test_no_border_of_a_file_or_routine_lies_inside_a_contour(name, lengths, lin
     made, options = program(*lengths, arm=ARMS[name]), settings(name, lines)
     too_long = max(lengths) + 5 > lines or (name == "inform" and 2 * max(lengths) + 30 > lines)
     if name in ("fanuc", "inform") and too_long:
-        with pytest.raises(InputError, match="not divided.*lines_per_file"):
+        with pytest.raises(InputError, match=r"not divided.*lines_per_file"):
             post(made, name, options)
         return
     whole = post(made, name, settings(name, 9999))

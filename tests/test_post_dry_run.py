@@ -69,7 +69,10 @@ def test_rapid_only_ever_switches_off(program):
     text = text_of(post(dry_run(program, SHARE), "rapid", RapidSettings(gas_output="doGas")))
     assert "Trigg" not in text
     assert "WaitTime" not in text
-    assert [line.strip() for line in text.splitlines() if "SetDO" in line] == ["SetDO doLaser,0;"]
+    assert [line.strip() for line in text.splitlines() if "SetDO" in line] == [
+        "SetDO doLaser,0;",
+        "SetDO doGas,0;",
+    ]
 
 
 @pytest.mark.parametrize("share", [0, -0.1, 1.01, float("nan")])

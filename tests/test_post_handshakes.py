@@ -1,45 +1,228 @@
-"""Handshakes: partners that are asked and awaited before the beam, in every language."""
+"""Handshakes, what an interruption switches off, and where a program begins again."""
+
+import re
 
 import pytest
 
-from kerfpath.post import Await, Request, build_program, dry_run, preflight
-from kerfpath.robots import robot
+from kerfpath import InputError, robot
+from kerfpath.post import (
+    Await,
+    ReadHandshake,
+    Request,
+    build_program,
+    deviations,
+    differences,
+    dry_run,
+    language,
+    post,
+    preflight,
+    read_program,
+)
 from programs import arc, codes, frames, hand_plan, with_steps
 
-ASKED = (Request(partner="shutter", on=True), Await(partner="ready", timeout=4.0))
+ASKED = (
+    Request(partner="shutter", on=True),
+    Request(partner="height", on=True),
+    Await(partner="ready", timeout=4.0),
+    Await(partner="interlock", timeout=0.5),
+)
+ARMS = {
+    "rapid": ("abb_irb4600_60_205", (1.05, -0.15, 0.61)),
+    "krl": ("kuka_kr16_r2010_2", (1.05, -0.15, 0.61)),
+    "fanuc": ("fanuc_m20id_25", (1.05, -0.15, 0.61)),
+    "val3": ("staubli_tx2_160l", (1.05, -0.15, 0.61)),
+    "inform": ("yaskawa_gp25", (1.0, -0.15, 0.55)),
+    "urscript": ("ur_ur10e", (0.75, 0.1, 0.2)),
+}
+PORTS = {
+    "laser_output": 1, "gas_output": 2, "shutter_output": 3, "height_output": 4,
+    "ready_input": 5, "interlock_input": 6,
+}  # fmt: skip
 
 
-def program(arm="abb_irb4600_60_205", place=None, **options):
+def program(name="rapid", contours=("one",), **options):
+    arm, place = ARMS[name]
     tool, placement = frames()
-    if place is not None:
-        placement[:3, 3] = place
-    return build_program([hand_plan(arc(), robot(arm), tool, placement)], **options)
+    placement[:3, 3] = place
+    plans = [hand_plan(arc(each), robot(arm), tool, placement) for each in contours]
+    return build_program(plans, gas_lead=0.2, pierce_time=0.1, lead_time=0.0, **options)
+
+
+def settings(name, ports=PORTS):
+    words = {"rapid": "x{}", "val3": "x{}"}
+    own = {k: words[name].format(v) if name in words else v for k, v in ports.items()}
+    return language(name).settings(**own)
 
 
 def test_partners_are_asked_before_the_way_down_and_released_after_the_way_back():
     made = program(handshakes=ASKED)
     kinds = [type(step).__name__ for step in made.steps]
     first = kinds.index("LinearMove")
-    assert made.steps[first - 2 : first] == ASKED
-    assert made.steps[-1] == Request(partner="shutter", on=False)
-    assert len(made.steps) == len(program().steps) + 3
+    assert made.steps[first - 4 : first] == ASKED
+    released = [Request(partner=partner, on=False) for partner in ("height", "shutter")]
+    assert list(made.steps[-2:]) == released
+    assert len(made.steps) == len(program().steps) + 6
 
 
-@pytest.mark.parametrize("language", ["csv", "ros"])
-def test_a_trajectory_cannot_wait(language):
-    found = preflight(program(handshakes=ASKED), language)
+@pytest.mark.parametrize("name", ARMS)
+def test_every_language_reads_its_handshakes_back(name):
+    made, options = program(name, handshakes=ASKED), settings(name)
+    files = post(made, name, options)
+    read = read_program(files, name, made.robot, options)
+    assert deviations(made, read, language(name), options) == []
+    found = [step.what for step in read.steps if isinstance(step, ReadHandshake)]
+    assert found == [step for step in made.steps if isinstance(step, Request | Await)]
+    without = post(program(name), name, options)
+    (difference,) = differences(read, read_program(without, name, made.robot, options))
+    assert difference.code == "handshakes"
+
+
+EDITS = {
+    "rapid": [(r"x5,1\\MaxTime:=4.000", r"x5,1\MaxTime:=9.000"), ("SetDO x3,1", "SetDO x3,0")],
+    "krl": [("$TIMER[20]=-4000", "$TIMER[20]=-9000"), ("$OUT[3]=TRUE", "$OUT[3]=FALSE")],
+    "fanuc": [("$WAITTMOUT=400", "$WAITTMOUT=900"), ("DO[3]=ON", "DO[3]=OFF")],
+    "val3": [("diReady==true,4.000", "diReady==true,9.000"), ("doShutter=true", "doShutter=false")],
+    "inform": [("IN#(5)=ON T=4.00", "IN#(5)=ON T=9.00"), ("OT#(3) ON", "OT#(3) OFF")],
+    "urscript": [
+        ("await_input(5, 4.000)", "await_input(5, 9.000)"),
+        ("_out(3, True)", "_out(3, False)"),
+    ],
+}
+
+
+@pytest.mark.parametrize(("name", "number"), [(name, k) for name in ARMS for k in (0, 1)])
+def test_an_edited_handshake_is_found(name, number):
+    made, options = program(name, handshakes=ASKED), settings(name)
+    old, new = EDITS[name][number]
+    old = old.replace("\\\\", "\\")
+    files = post(made, name, options)
+    (file,) = [f for f, text in files.items() if old in text]
+    read = read_program(files | {file: files[file].replace(old, new, 1)}, name, made.robot, options)
+    assert len(deviations(made, read, language(name), options)) == 1
+
+
+NO_ANSWER = {
+    "rapid": ("    switchOff;\n    StopMove;\n", "    StopMove;\n"),
+    "krl": ("$OUT[1]=FALSE\r\n$OUT[2]=FALSE\r\n$OUT[3]=FALSE\r\n$OUT[4]=FALSE\r\nHALT", "HALT"),
+    "fanuc": ("DO[1]=OFF ;\r\n", "DO[2]=OFF ;\r\n"),
+    "val3": (
+        "  dioLaser=false\n  dioGas=false\n  doShutter=false",
+        "  dioGas=false\n  doShutter=false",
+    ),
+    "inform": ("DOUT OT#(1) OFF\r\nDOUT OT#(2) OFF\r\nDOUT OT#(3)", "DOUT OT#(3)"),
+    "urscript": ("    set_standard_digital_out(1, False)\n", ""),
+}
+
+
+@pytest.mark.parametrize("name", ARMS)
+def test_without_an_answer_everything_is_switched_off_which_the_reader_requires(name):
+    made, options = program(name, handshakes=ASKED), settings(name)
+    files = post(made, name, options)
+    old, new = NO_ANSWER[name]
+    changed = [file for file, text in files.items() if old in text]
+    assert changed
+    for file in changed:
+        with pytest.raises(InputError, match=r"line \d+: (expected|the settings|.* is missing)"):
+            read_program(files | {file: files[file].replace(old, new)}, name, made.robot, options)
+
+
+@pytest.mark.parametrize("name", ARMS)
+def test_a_partner_needs_an_input_of_its_own(name):
+    made = program(name, handshakes=ASKED)
+    unnamed = settings(name, {"laser_output": 1, "gas_output": 2})
+    assert codes(made, "error", name, unnamed).count("handshake") == 4
+    assert "handshake" not in codes(made, "error", name, settings(name))
+    twice = settings(name, PORTS | {"shutter_output": 1, "interlock_input": 5})
+    assert codes(made, "error", name, twice).count("handshake") == 2
+
+
+@pytest.mark.parametrize("name", ["csv", "ros"])
+def test_a_trajectory_cannot_wait(name):
+    found = preflight(program(handshakes=ASKED), name)
     said = [issue.message for issue in found if issue.code == "handshake"]
-    assert len(said) == 2
+    assert len(said) == 4
     assert all("leave it out" in text for text in said)
 
 
 def test_handshakes_belong_where_the_robot_stands_with_the_laser_off():
-    made = program(handshakes=ASKED)
+    made = program(handshakes=ASKED[2:])
     steps = list(made.steps)
-    moving = [*steps[:6], ASKED[1], *steps[6:]]
-    assert codes(with_steps(made, moving), "error", "csv").count("handshake") == 3
+    for place in (5, 7):  # behind the start, where the laser is on, and on the way
+        moved = with_steps(made, [*steps[:place], ASKED[2], *steps[place:]])
+        assert "handshake" in codes(moved, "error", "rapid", settings("rapid"))
+    endless = with_steps(made, [*steps[:3], Await(partner="ready", timeout=0.0), *steps[3:]])
+    assert "handshake" in codes(endless, "error", "rapid", settings("rapid"))
 
 
 def test_a_dry_run_asks_nobody():
     slow = dry_run(program(handshakes=ASKED), 0.5)
     assert not any(isinstance(step, Request | Await) for step in slow.steps)
+
+
+OFF = {
+    "rapid": (r"PROC switchOff\(\)\n(.*?)\n  ENDPROC", r"SetDO (x\d),0;"),
+    "krl": (r"DEF switch_off\(\)\r\n(.*?)END", r"\$OUT\[(\d)\]=FALSE"),
+    "fanuc": (r"BG logic \(SETUP\) ;\r\n(.*?)/POS", r"IF \(!UO\[3\]\),DO\[(\d)\]=\(OFF\)"),
+    "val3": (r'"stop".*?begin\n(.*?)end', r"(do?io?\w+|do\w+)=false"),
+    "inform": (r"NAME CUT_ONE_OFF\r\n.*?NOP\r\n(.*?)END", r"DOUT OT#\((\d)\) OFF"),
+    "urscript": (r"first_contour = 1\n(.*?)\n  global", r"digital_output_to_value\((\d), 1\)"),
+}
+
+
+@pytest.mark.parametrize("name", ARMS)
+def test_what_runs_at_a_stop_switches_off_all_that_the_program_switches_on(name):
+    files = post(program(name, handshakes=ASKED), name, settings(name))
+    block, line = OFF[name]
+    (found,) = [m for text in files.values() for m in re.findall(block, text, re.DOTALL)][:1]
+    off = set(re.findall(line, found))
+    assert len(off) == 4, "laser, gas, shutter, height"
+
+
+BEGIN = {
+    "rapid": "nFirst:=1;\n\n",
+    "krl": "first_contour=1",
+    "val3": '<Value key="0" value="1" />',
+    "urscript": "global first_contour = 1",
+}
+
+
+@pytest.mark.parametrize("name", BEGIN)
+def test_a_program_begins_at_the_contour_that_it_names(name):
+    made, options = program(name, ("one", "two", "three")), settings(name)
+    files = post(made, name, options)
+    old = BEGIN[name]
+    (file, *_) = [f for f, text in reversed(files.items()) if old in text]
+    for number, names in (("2", ["two", "three"]), ("3", ["three"])):
+        new = (
+            old.replace("1", number)
+            if name != "val3"
+            else old.replace('value="1"', f'value="{number}"')
+        )
+        edited = files | {file: files[file].replace(old, new, 1)}
+        read = read_program(edited, name, made.robot, options)
+        assert [section.name for section in read.sections] == names
+    wrong = files | {file: files[file].replace(old, old.replace("1", "4"), 1)}
+    with pytest.raises(InputError):
+        read_program(wrong, name, made.robot, options)
+
+
+@pytest.mark.parametrize("name", ["fanuc", "inform"])
+def test_each_contour_is_a_program_that_can_be_started_alone(name):
+    """It selects its frames itself, and its first motion is to joints or a position with a type."""
+    files = post(program(name, ("one", "two")), name, settings(name))
+    for contour in ("ONE", "TWO"):
+        if name == "fanuc":
+            text = files[f"{contour}.ls"]
+            assert text.index("UFRAME_NUM=1") < text.index("UTOOL_NUM=1") < text.index("J P[1]")
+        else:
+            text = files[f"{contour}_AIR.JBI"]
+            assert "///USER 1" in text
+            assert "///RCONF" in text
+
+
+def test_settings_say_what_they_expect():
+    for name in ARMS:
+        for key, field in language(name).settings.model_fields.items():
+            if key.endswith(("_input", "_output")):
+                assert field.description, (name, key)
+                assert field.examples, (name, key)

@@ -564,9 +564,10 @@ def test_a_long_program_is_loaded_module_by_module(long_program):
     ("file", "old", "new", "message"),
     [
         ("long.mod", "UnLoad", "Reload", "long.mod, line .*not expected here: 'Reload"),
-        ("long.mod", 'IF nFirst<=1 %"hole_0"%;', "", "must be that of the last contour"),
-        ("long.mod", "ENDIF", "", "one module at a time"),
-        ("long.mod", "<=2 THEN", "<=1 THEN", "must be that of the last contour"),
+        ("long.mod", '%"hole_0"%;', "", "expected here: 'ENDIF'"),
+        ("long.mod", "ENDIF", "", "expected 'ENDIF'"),
+        ("long.mod", "IF nFirst<=1 THEN", "", "without a condition"),
+        ("long.mod", "IF nFirst<=1 THEN", "IF nFirst<=2 THEN", "hole_0 is contour 1, not 2"),
         ("long.mod", "HOME:/long_part.mod", "HOME:/other.mod", "the file 'other.mod' is not there"),
         ("long.mod", 'UnLoad "HOME:/long_part.mod', 'UnLoad "HOME:/x.mod', "x.mod is not loaded"),
         ("long_part.mod", "PROC hole_0()", "PROC main()", "main is declared twice"),

@@ -31,6 +31,11 @@ LIMIT_SLACK = 1e-8
 LENGTH_AGREES = 1e-6
 """Relative difference of path lengths between a plan's contour and the reference it came from."""
 
+FINER = "sample the contour more finely"
+"""What helps where the nodes lie on the path and the way between them does not."""
+OFF_THE_PATH = "the target itself is off the path there: put it back, or plan the path meant"
+"""What helps where a node was moved, as by hand."""
+
 
 def audit(
     plan: Plan,
@@ -162,7 +167,10 @@ def _between_nodes(
     part = along[row, near, None]
     there = (1 - part) * axis[row, near] + part * axis[row, near + 1]
     turned = _angle(there / np.linalg.norm(there, axis=1, keepdims=True), axes)
-    advice = "sample the contour more finely"
+    worst = cell[int(np.argmax(off[row, near]))]
+    ends, _ = path.at(s[worst : worst + 2])
+    ends = np.linalg.norm(ends @ rotation.T + origin - motion.tip[worst, [0, -1]], axis=1)
+    advice = FINER if ends.max() <= path_tolerance else OFF_THE_PATH
     return [
         _worst(
             "tip-between-nodes",
@@ -180,7 +188,7 @@ def _between_nodes(
             axis_tolerance,
             "rad",
             cell,
-            advice=advice,
+            advice=FINER,
         ),
         _worst(
             "straight-move",

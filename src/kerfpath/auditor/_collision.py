@@ -85,10 +85,11 @@ def _nearest(cell: Cell, frames: Array, wanted: Bools, code: str, whose: str, no
         beyond *= FARTHER
     (one, two), value = cell.pair_names[pair], float(short[row, pair])
     needed = float(cell.required[pair])
+    whence = "left by design" if needed < cell.asked[pair] else "asked"
     return Check(
         code=code,
         title=f"shortfall of near-miss distances{whose} (nearest: {one} and {two}, "
-        f"{(needed - value) * 1e3:.2f} mm apart, {needed * 1e3:g} mm asked)",
+        f"{(needed - value) * 1e3:.2f} mm apart, {needed * 1e3:.4g} mm {whence})",
         value=value,
         limit=TOUCHING,
         unit="m",

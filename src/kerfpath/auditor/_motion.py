@@ -9,6 +9,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from kerfpath._arrays import Array, Ints
+from kerfpath._told import told
 from kerfpath.auditor._chain import JointChain
 from kerfpath.plans import Plan
 
@@ -43,6 +44,8 @@ class Motion:
     tip: Array
     axis: Array
     residual: Array
+
+    __repr__ = told
 
 
 def joint_increments(plan: Plan) -> Array:

@@ -9,7 +9,7 @@ from rich.markup import escape
 
 from kerfpath.auditor import in_words
 from kerfpath.cli._show import busy, out, print_json, table
-from kerfpath.errors import InputError
+from kerfpath.errors import InputError, about
 from kerfpath.job import Audited, audit_file, audit_program
 
 __all__ = ["show_audit"]
@@ -54,8 +54,7 @@ def show_audit(file: Path, job: Path | None, *, as_json: bool) -> bool:
             )
             for c in checks if name in found.places else ():
                 if not c.ok:
-                    said = f"{found.place(name, c)}: {c.issue().message}"
-                    out.print(escape(said), soft_wrap=True)
+                    out.print(escape(found.said(name, c)), soft_wrap=True)
         for name in found.missing:
             out.print(f"{escape(name)}: {'not cut' if found.places else 'no plan'}")
         out.print(f"note: {escape(found.note)}")
@@ -65,8 +64,9 @@ def show_audit(file: Path, job: Path | None, *, as_json: bool) -> bool:
 
 def _audited(file: Path, job: Path | None) -> Audited:
     if file.suffix.lower() == ".json":
-        return audit_file(file, job)
+        with about(file):
+            return audit_file(file, job)
     if job is None:
         raise InputError(f"{file}: a program is compared with its job; give it with --job JOB.toml")
-    with busy("auditing the program"):
+    with about(file), busy("auditing the program"):
         return audit_program(file, job)

@@ -11,6 +11,7 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from kerfpath._arrays import Array, freeze
+from kerfpath._told import told
 from kerfpath.auditor import Check
 from kerfpath.cad import Part
 from kerfpath.cad import read as read_drawing
@@ -45,6 +46,8 @@ class Candidate:
     nodes: Contour
     dt: float
 
+    __repr__ = told
+
     @property
     def time(self) -> Array:
         """When each node is reached at the speed asked for, (K,) s."""
@@ -68,6 +71,8 @@ class Asked:
     part: Part
     cell: Cell | None
     tasks: tuple[ContourTask, ...]
+
+    __repr__ = told
 
     @cached_property
     def loops(self) -> tuple[Contour, ...]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 
+from kerfpath._told import told
 from kerfpath.auditor import Check
 from kerfpath.cad import Departure, Part, departure_from
 from kerfpath.contour import Contour
@@ -62,6 +63,8 @@ class Cut:
     clearance: ClearanceMap | None = None
     departure: Departure | None = None
     picked: bool = False
+
+    __repr__ = told
 
     @property
     def passed(self) -> bool:

@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 
+from kerfpath._told import told
 from kerfpath.air import AirMove
 from kerfpath.errors import AuditFailed, InputError
 from kerfpath.job._planfile import broken_entry, plan_entry, plan_text
@@ -64,6 +65,8 @@ class Written:
     stale: Path | None
     notes: tuple[str, ...]
 
+    __repr__ = told
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Texts:
@@ -88,6 +91,8 @@ class Texts:
     refused: str
     unsafe: bool
     notes: tuple[str, ...]
+
+    __repr__ = told
 
 
 def write_outcome(outcome: Outcome, folder: Path, *, strict: bool = False) -> Written:

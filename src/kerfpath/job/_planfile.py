@@ -13,7 +13,7 @@ import numpy as np
 from kerfpath import __version__
 from kerfpath._arrays import Array
 from kerfpath.auditor import Check
-from kerfpath.cell import Cell
+from kerfpath.cell import Cell, caveats
 from kerfpath.comfort import MEASURES, Comfort
 from kerfpath.errors import NoFeasiblePath
 from kerfpath.job._external import by_unit, external_entry
@@ -191,6 +191,7 @@ def _robot_entry(robot: Robot) -> dict[str, Any]:
         "geometry_m": dict(robot.geometry),
         "sign": robot.sign.tolist(),
         "offset_rad": robot.offset.tolist(),
+        "axis_3": robot.axis_3,
         "T_base_foot": robot.T_base_foot.tolist(),
         "T_end_flange": robot.T_end_flange.tolist(),
         "chain": None
@@ -221,11 +222,30 @@ def _cell_entry(cell: Cell) -> dict[str, Any]:
     """Return what kept apart and how far: a record, as the cell itself is that of the job."""
     return {
         "bodies": [
-            {"name": b.name, "kind": b.kind, "frame": b.frame, "approximate": b.approximate}
+            {
+                "name": b.name,
+                "kind": b.kind,
+                "frame": b.frame,
+                "approximate": b.approximate,
+                "holds_the_real_one": b.holds,
+            }
             for b in cell.bodies
         ],
-        "near_miss_m": [
-            {"between": list(pair), "at_least": float(required)}
-            for pair, required in zip(cell.pair_names, cell.required, strict=True)
-        ],
+        "near_miss_m": pair_entries(cell),
+        "not_judged": [{"between": list(pair), "why": why} for pair, why in cell.unjudged.items()],
+        "not_proved": list(caveats(cell)),
     }
+
+
+def pair_entries(cell: Cell) -> list[dict[str, Any]]:
+    """Return what every judged pair keeps, what it is asked, and the overlap that is left out."""
+    rules = zip(cell.pair_names, cell.asked, cell.required, cell.depth, strict=True)
+    return [
+        {
+            "between": list(pair),
+            "at_least": float(required),
+            "asked": float(asked),
+            "overlap_by_design": float(depth),
+        }
+        for pair, asked, required, depth in rules
+    ]

@@ -11,6 +11,7 @@ import numpy as np
 from pydantic import BaseModel, ValidationError
 
 from kerfpath._arrays import Array
+from kerfpath._told import told
 from kerfpath.air import AirMove
 from kerfpath.comfort import Band, Comfort
 from kerfpath.contour import KINDS, Contour
@@ -64,6 +65,8 @@ class PlanFile:
     contours: dict[str, str]
     moves: tuple[AirMove, ...]
     in_cell: bool
+
+    __repr__ = told
     picked: frozenset[str]
     data: dict[str, Any]
 
@@ -140,6 +143,7 @@ def _read_robot(robot: dict[str, Any], limits: dict[str, Any]) -> Robot:
         geometry=robot["geometry_m"],
         sign=robot["sign"],
         offset=robot["offset_rad"],
+        axis_3=robot["axis_3"],
         T_base_foot=robot["T_base_foot"],
         T_end_flange=robot["T_end_flange"],
         chain=Chain(**robot["chain"]) if robot["chain"] else None,

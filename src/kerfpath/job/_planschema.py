@@ -16,7 +16,7 @@ from kerfpath.search import Closure, Method, Metric, ObjectiveKind
 
 __all__ = ["SCHEMA", "read_document"]
 
-SCHEMA = 3
+SCHEMA = 4
 """Version of the layout of plan.json; it grows when a reader of the old one would go wrong."""
 LARGEST = 1e12
 """No number of a plan is larger, in SI: not even the sum of all it counts."""
@@ -50,6 +50,7 @@ class _Robot(_Entry):
     geometry_m: dict[str, Real]
     sign: Row
     offset_rad: Row
+    axis_3: str
     T_base_foot: Rows
     T_end_flange: Rows
     chain: _Chain | None

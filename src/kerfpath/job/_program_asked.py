@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from kerfpath._arrays import Array, Bools, Ints
+from kerfpath._told import told
 from kerfpath.air import AirMove, backed_off
 from kerfpath.contour import Contour
 from kerfpath.job._program_read import ReadCut, branch_of, followed, poses_on_arc
@@ -67,6 +68,8 @@ class AskedNodes:
     off: Array
     alone: Bools
 
+    __repr__ = told
+
     @property
     def complete(self) -> bool:
         """Whether every node has its target, or lies on an arc between two."""
@@ -82,12 +85,15 @@ def asked_nodes(
     """
     asked = task.sample(reference)
     dt = node_interval(asked, task.speed if asked.time is None else None)
-    time = dt * np.arange(len(asked))
+    time: Array = dt * np.arange(len(asked), dtype=np.float64)
     targets = cut.ends
     if job.refine_parts > 1 and len(targets) > len(asked):
         k = np.arange(len(asked))
         fine = np.arange((len(asked) - 1) * job.refine_parts + 1) / job.refine_parts
-        asked, time = reference.at_nodes(np.interp(fine, k, asked.s)), np.interp(fine, k, time)
+        asked, time = (
+            reference.at_nodes(np.interp(fine, k, asked.s)),
+            np.asarray(np.interp(fine, k, time)),
+        )
     if len(targets) == len(asked):
         at = np.arange(len(asked))
     else:
@@ -221,7 +227,7 @@ def _same_pose(program: Program, asked: Array, read: Array, rules: Rules) -> Arr
 
 
 def _with_arcs(steps: Sequence[Step], cut: ReadCut, asked: AskedNodes) -> list[Step]:
-    """Return the steps of a cut with arcs where it was read with arcs, as far as there may be one."""
+    """Return the steps of a cut with arcs where it was read with arcs and there may be one."""
     path = [k for k, step in enumerate(steps) if isinstance(step, LinearMove)]
     found, done = list(steps[: path[0] + 1]), path[0] + 1
     for j, move in enumerate(cut.targets[1:], 1):

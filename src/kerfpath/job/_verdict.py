@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 
-from kerfpath.auditor import Check
-from kerfpath.cell import Cell
+from kerfpath._told import told
+from kerfpath.auditor import Check, in_words
+from kerfpath.cell import Cell, caveats
 
 __all__ = ["Audited", "collision_note"]
 
@@ -34,6 +35,8 @@ class Audited:
     note: str
     places: dict[str, tuple[str, ...]] = field(default_factory=dict)
 
+    __repr__ = told
+
     @property
     def passed(self) -> bool:
         """True when every contour has a plan and no check found an error."""
@@ -48,14 +51,25 @@ class Audited:
         lines = self.places.get(name, ())
         return f"{lines[check.node]}" if check.node < len(lines) else f"node {check.node}"
 
+    def said(self, name: str, check: Check) -> str:
+        """Say in one sentence where a check of a table failed, what was found, what is allowed."""
+        if check.unit == "count" and check.limit == 0:
+            found = f"{check.title}: {check.value:g}, expected none"
+        else:
+            value, limit = (in_words(x, check.unit) for x in (check.value, check.limit))
+            found = f"{check.title}: {value}, allowed {limit}"
+        advice = f"; {check.advice}" if check.advice else ""
+        return f"{self.place(name, check)}: {found}{advice}"
+
 
 def collision_note(cell: Cell | None, *, moves_too: bool = False) -> str:
     """Say what was checked for collisions, and what was not."""
     if cell is None:
         return NOT_CHECKED
     about = f" (approximate: {', '.join(cell.approximate)})" if cell.approximate else ""
-    return (
+    checked = (
         f"Collisions are checked along the contours, among {len(cell.bodies)} bodies of the "
         f"cell{about}; the moves to and between contours are "
         f"{'checked, too' if moves_too else 'not checked'}."
     )
+    return " ".join([checked, *caveats(cell)])

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
@@ -25,7 +25,7 @@ from kerfpath.post._program import (
 )
 from kerfpath.post._read import ReadHandshake, ReadMove, ReadProgram, ReadStep, ReadWait
 from kerfpath.post._settings import Rules, Settings
-from kerfpath.post._times import cruises
+from kerfpath.post._times import air_times, cruises
 
 __all__ = ["deviations", "events", "handshake"]
 
@@ -39,6 +39,9 @@ LEAD = 6e-4
 """The same of lead times and waits (s): controllers count milliseconds."""
 DURATION = 1e-6
 """The same of durations (s), where a text says times."""
+DERIVED = np.radians(1.0)
+"""How far (rad) joints may be off that follow from a pose and its words: the digits of the pose,
+near a singular stand; another posture is farther."""
 REACH = 4.0
 """Farther (m) than a tip is from any axis: the lever of what digits leave of joints."""
 SHARE = 6e-3
@@ -85,7 +88,7 @@ def deviations(
             pairs.append((step, back))
     rules = language.rules(settings)
     issues += _places(program, pairs, rules)
-    issues += _motion(pairs, rules, cruises(program))
+    issues += _motion(pairs, rules, _Air(program, read))
     issues += _postures(program, pairs, language, settings)
     return issues
 
@@ -149,7 +152,7 @@ def _places(
             point,
             angle,
         )
-    jointed = [(m, b) for m, b in pairs if b.q is not None]
+    jointed = [(m, b) for m, b in pairs if b.q is not None and not _follows(b)]
     if jointed:
         q, q_back = np.array([m.q for m, _ in jointed]), np.array([b.q for _, b in jointed])
         forward = program.robot.forward
@@ -162,9 +165,18 @@ def _places(
         for k in np.flatnonzero(off > angle).tolist():
             joint = int(np.abs(q[k] - q_back[k]).argmax()) + 1
             yield _issue(backs[k], f"joint {joint} is {np.degrees(off[k]):.4f} deg off")
-    for _, back in pairs:
+    for move, back in pairs:
+        if back.q is not None and _follows(back):
+            off_by = float(np.abs(move.q - back.q).max())
+            if off_by > DERIVED:
+                yield _issue(back, f"its words lead to joints {np.degrees(off_by):.1f} deg off")
         if back.q is None and back.T_part_tip is None:
             yield _issue(back, "says no target")
+
+
+def _follows(back: ReadMove) -> bool:
+    """Return whether the joints of a move follow from a pose and its words."""
+    return back.T_part_tip is not None and back.posture != ()
 
 
 def _apart(
@@ -178,14 +190,12 @@ def _apart(
         yield _issue(backs[k], said)
 
 
-def _motion(
-    pairs: list[tuple[Move, ReadMove]], rules: Rules, cruise: Mapping[Move, float]
-) -> Iterator[ProgramIssue]:
+def _motion(pairs: list[tuple[Move, ReadMove]], rules: Rules, air: _Air) -> Iterator[ProgramIssue]:
     for move, back in pairs:
         joint, timed = isinstance(move, JointMove), False
         if isinstance(move, JointMove):
-            timed = move.duration is not None and back.duration is not None
-            if said := _air_time(move, back, cruise):
+            timed = back.duration is not None
+            if said := air.apart(move, back):
                 yield _issue(back, said)
         off = SHARE if joint else 0.51 * rules.speed_step + 1e-9
         if back.speed is not None and not timed and abs(move.speed - back.speed) > off:
@@ -212,12 +222,22 @@ def _motion(
             yield _issue(back, said)
 
 
-def _air_time(move: JointMove, back: ReadMove, cruise: Mapping[Move, float]) -> str:
-    """Say how the time of a joint move is another; empty where it is not, or not said."""
-    for took, planned in ((back.duration, move.duration), (back.cruise, cruise.get(move))):
-        if took is not None and planned is not None and abs(took - planned) > LEAD:
-            return f"takes {took:g} s, expected {planned:g} s"
-    return ""
+class _Air:
+    """How long the joint moves of a program take, in all and at their speed throughout (s)."""
+
+    def __init__(self, program: Program, read: ReadProgram) -> None:
+        self._took = dict(zip(read.moves, air_times(program), strict=False))
+        self._cruise = cruises(program)
+
+    def apart(self, move: JointMove, back: ReadMove) -> str:
+        """Say how the time of a move that was read back is another; empty where it is not."""
+        for took, planned in (
+            (back.duration, self._took.get(back)),
+            (back.cruise, self._cruise.get(move)),
+        ):
+            if took is not None and planned is not None and abs(took - planned) > LEAD:
+                return f"takes {took:g} s, expected {planned:g} s"
+        return ""
 
 
 def events(switches: Any) -> str:

@@ -9,6 +9,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from kerfpath._arrays import Array
+from kerfpath._told import told
 from kerfpath.post._compare import ANGLE, FRAME, LEAD, POINT, SHARE, events, handshake
 from kerfpath.post._groups import ReadGroup, groups_of
 from kerfpath.post._matching import Pair, Stop, matched, pairs_of
@@ -21,6 +22,8 @@ Both = Sequence[tuple[Stop, Stop]]
 """Moves that both programs have."""
 SAID = {"speeds": "speed", "zones": "zone", "switches": "switches", "postures": "target"}
 """Which of `ReadMove.elsewhere` a difference is about."""
+UNSAID = (("speed", "speeds"), ("duration", "times"), ("cruise", "times"), ("zone", "zones"))
+"""What a move may leave unsaid, and the code of a difference in it."""
 Names = tuple[str, str]
 """What programs A and B are called."""
 
@@ -53,6 +56,8 @@ class Difference:
     said_at: str = ""
     near: str = ""
 
+    __repr__ = told
+
     @property
     def place(self) -> str:
         """File and line in B; empty where it has none there."""
@@ -75,7 +80,12 @@ class _Digits:
 
 
 def differences(
-    a: ReadProgram, b: ReadProgram, *, rules: Sequence[Rules] = (), names: Names = ("A", "B")
+    a: ReadProgram,
+    b: ReadProgram,
+    *,
+    rules: Sequence[Rules] = (),
+    names: Names = ("A", "B"),
+    strict: bool = False,
 ) -> list[Difference]:
     """Return what differs between two programs for the same robot, at most one of each kind.
 
@@ -92,6 +102,8 @@ def differences(
         Of languages whose digits may make a difference; none where both texts are in the same one.
     names : (str, str)
         What the two are called in messages.
+    strict : bool
+        Whether a speed, time or zone that only one of them says is a difference.
 
     Raises
     ------
@@ -119,6 +131,8 @@ def differences(
     found += _targets(both, digits)
     found += _joints(both, digits)
     found += _said(both, digits, names)
+    if strict:
+        found += _unsaid(both, names)
     found += _handshakes([(one[i], two[j]) for i, j in same], names)
     return found
 
@@ -281,6 +295,18 @@ def _said(both: Both, digits: _Digits, names: Names) -> Iterator[Difference]:
             yield Difference(
                 code=code, count=len(moved), message=message, places=places, said_at=said_at
             )
+
+
+def _unsaid(both: Both, names: Names) -> Iterator[Difference]:
+    """Tell of moves that say a speed, a time or a zone in one of the programs alone."""
+    for attribute, code in UNSAID:
+        said = [[getattr(stop.move, attribute) is not None for stop in pair] for pair in both]
+        if alone := [k for k, (one, two) in enumerate(said) if one != two]:
+            a, b = both[alone[0]]
+            where = names[0] if said[alone[0]][0] else names[1]
+            message = f"{_count(len(alone), 'move')}, said in {where} alone"
+            places = (a.move.place, b.move.place)
+            yield Difference(code=code, count=len(alone), message=message, places=places)
 
 
 def _handshakes(

@@ -12,7 +12,7 @@ from kerfpath.errors import InputError
 from kerfpath.post._issue import ProgramIssue
 from kerfpath.post._program import JointMove, LinearMove, Move, Program, Wait
 
-__all__ = ["SHORTEST_CRUISE", "cruises", "refusals", "timetable"]
+__all__ = ["SHORTEST_CRUISE", "air_times", "cruises", "refusals", "timetable"]
 
 SHORTEST_CRUISE = 1e-3
 """s; a joint move that takes less goes nowhere worth a time."""
@@ -57,6 +57,22 @@ def cruises(program: Program) -> dict[Move, float]:
         for before, move in pairwise(program.moves)
         if isinstance(move, JointMove) and move.duration is not None
     }
+
+
+def air_times(program: Program) -> list[float | None]:
+    """Return how long each move takes (s), as `timetable` has it; None where that is not known.
+
+    So it is of the first move, of moves along the path, and where limits are not known.
+    """
+    if program.robot.velocity is None or program.robot.acceleration is None:
+        return [None] * len(program.moves)
+    steps, ends = zip(*timetable(program), strict=True)
+    took = np.diff(ends, prepend=ends[0]).tolist()
+    return [
+        time if isinstance(step, JointMove) and k > 0 else None
+        for k, (step, time) in enumerate(zip(steps, took, strict=True))
+        if not isinstance(step, Wait)
+    ]
 
 
 def refusals(program: Program) -> Iterator[ProgramIssue]:

@@ -2,17 +2,14 @@ r"""Read back the RAPID that `Rapid` writes, and nothing else: what it does not 
 
 from __future__ import annotations
 
-import json
 import re
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import replace
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 
 from kerfpath._arrays import Array
-from kerfpath.errors import InputError
-from kerfpath.post._orientations import pose_of
 from kerfpath.post._program import Await, Handshake, Request, Signal, Switch
 from kerfpath.post._read import (
     ReadHandshake,
@@ -22,10 +19,11 @@ from kerfpath.post._read import (
     ReadStep,
     ReadWait,
     partner_of,
-    patterns,
     same_output,
 )
+from kerfpath.post.rapid._aggregates import Aggregates
 from kerfpath.post.rapid._axes import joints_from_axes
+from kerfpath.post.rapid._lines import DECLARED, IN_MAIN, IN_PART, IN_ROUTINE, LINES, OUTSIDE
 from kerfpath.post.rapid._settings import SWITCH_OFF, RapidSettings
 from kerfpath.post.rapid._write import (
     FIRST,
@@ -40,6 +38,8 @@ from kerfpath.robots import Robot
 
 __all__ = ["read"]
 
+_T = TypeVar("_T")
+
 
 def read(main: str, files: Mapping[str, str], robot: Robot, settings: RapidSettings) -> ReadProgram:
     """Return the program that a RAPID module of ours says; see `kerfpath.post.Reader`."""
@@ -51,56 +51,7 @@ def read(main: str, files: Mapping[str, str], robot: Robot, settings: RapidSetti
     return reader.program()
 
 
-_NAME = r"([A-Za-z]\w*)"
-_POSE = r"(\[\[.*?9E9\]\])"
-_TRIGGERS = r"([A-Za-z]\w*(?:\\T\d:=[A-Za-z]\w*)*)"
-_FRAMES = rf"{_NAME}\\WObj:={_NAME}"
-_LINES = patterns(
-    {
-        "blank": r"(?:!.*)?",
-        "module": rf"MODULE {_NAME}",
-        "end_module": "ENDMODULE",
-        "tool": rf"PERS tooldata {_NAME}:=(\[.*\]);",
-        "work_object": rf"PERS wobjdata {_NAME}:=(\[.*\]);",
-        "speed": rf"CONST speeddata {_NAME}:=(\[.*\]);",
-        "zone": rf"CONST zonedata {_NAME}:=(\[.*\]);",
-        "trigger": rf"VAR triggdata {_NAME};",
-        "routine": rf"PROC {_NAME}\(\)",
-        "end_routine": "ENDPROC",
-        "first": rf"PERS num {FIRST}:=(\d+);",
-        "request": rf"SetDO {_NAME},([01]);",
-        "wait_for": rf"WaitDI {_NAME},1\\MaxTime:=([\d.]+);",
-        "set_trigger": rf"TriggIO {_NAME},([\d.]+)\\Time\\DOp:={_NAME},([01]);",
-        "wait": r"WaitTime ([\d.]+);",
-        "load": r'Load \\Dynamic,"([^"]*)/([^"/]*)";',
-        "late_call": rf'IF {FIRST}<=(\d+) %"{_NAME}"%;',
-        "part": rf"IF {FIRST}<=(\d+) THEN",
-        "end_part": "ENDIF",
-        "unload": r'UnLoad "([^"]*)/([^"/]*)";',
-        "call": rf"IF {FIRST}<=(\d+) {_NAME};",
-        "joint_move": rf"MoveAbsJ (\[.*\]),{_NAME}(?:\\T:=(\d+\.\d+))?,{_NAME},{_FRAMES};",
-        "linear_move": rf"MoveL (\[.*\]),{_NAME},{_NAME},{_FRAMES};",
-        "circular_move": rf"MoveC {_POSE},{_POSE},{_NAME},{_NAME},{_FRAMES};",
-        "switching_move": rf"TriggL (\[.*\]),{_NAME},{_TRIGGERS},{_NAME},{_FRAMES};",
-        "switching_arc": rf"TriggC {_POSE},{_POSE},{_NAME},{_TRIGGERS},{_NAME},{_FRAMES};",
-    }
-)
-_OUTSIDE = {
-    "tool", "work_object", "speed", "zone", "trigger", "first", "routine", "end_module",
-}  # fmt: skip
-_DECLARED = _OUTSIDE - {"routine", "end_module"}
-_IN_PART = {"routine", "end_module"}
-_IN_MAIN = {
-    "set_trigger", "part", "load", "late_call", "unload", "end_part", "call",
-    "end_routine",
-}  # fmt: skip
-_IN_ROUTINE = {
-    "joint_move", "linear_move", "circular_move", "switching_move", "switching_arc", "wait",
-    "request", "wait_for", "end_routine",
-}  # fmt: skip
-
-
-class _Reader:
+class _Reader(Aggregates):
     """Reads line by line; each kind of line has a method of its name."""
 
     def __init__(
@@ -114,8 +65,7 @@ class _Reader:
         self.routine_name: str | None = None
         self.ended = False
         self.frames: dict[str, tuple[str, Array]] = {}
-        self.speeds: dict[str, float] = {}
-        self.speed_data: dict[str, Array] = {}
+        self.speeds: dict[str, Array] = {}
         self.said_at: dict[str, str] = {}
         self.zones: dict[str, float] = {"fine": 0.0}
         self.triggers: dict[str, Switch | None] = {}
@@ -123,8 +73,8 @@ class _Reader:
         self.routines: dict[str, list[ReadStep]] = {}
         self.homes: dict[str, str] = {}
         self.first_number = 0
-        self.last_of_part = 0
         self.must_say: list[str] = []
+        self.number: str | None = None
 
     def read_module(self, file: str) -> None:
         self.file, self.line, self.ended, self.name = file, 0, False, ""
@@ -136,7 +86,7 @@ class _Reader:
 
     def read(self, number: int, line: str) -> None:
         self.line = number
-        if _LINES["blank"].fullmatch(line):
+        if LINES["blank"].fullmatch(line):
             return
         if self.ended:
             raise self.fault("nothing may follow ENDMODULE")
@@ -145,19 +95,19 @@ class _Reader:
                 raise self.fault(f"expected {self.must_say[0]!r}, got {line[:60]!r}")
             del self.must_say[0]
             return
-        if self.routine_name == "main" and line == ending()[0].strip():
+        if self.routine_name == "main" and self.number is None and line == ending()[0].strip():
             self.must_say = [*(row.strip() for row in ending()[1:]), "ENDPROC"]
             self.routine_name = None
             return
         if not self.name:
             expected = {"module"}
         elif self.routine_name is None:
-            expected = _OUTSIDE if self.file == self.main else _IN_PART
+            expected = OUTSIDE if self.file == self.main else IN_PART
         else:
-            expected = _IN_MAIN if self.routine_name == "main" else _IN_ROUTINE
+            expected = IN_MAIN if self.routine_name == "main" else IN_ROUTINE
         for kind in expected:
-            if match := _LINES[kind].fullmatch(line):
-                if kind in _DECLARED and self.routines:
+            if match := LINES[kind].fullmatch(line):
+                if kind in DECLARED and self.routines:
                     raise self.fault("data must be declared before the first routine")
                 getattr(self, kind)(*match.groups())
                 return
@@ -207,10 +157,8 @@ class _Reader:
         self.frames[kind] = (name, self.pose(pose))
 
     def speed(self, name: str, text: str) -> None:
-        values = self.numbers(self.values(text, 4), 4)
         self.unused(name, self.speeds)
-        self.speeds[name] = float(values[0]) * 1e-3
-        self.speed_data[name] = values
+        self.speeds[name] = self.numbers(self.values(text, 4), 4)
         self.said_at[name] = self.place
 
     def zone(self, name: str, text: str) -> None:
@@ -277,18 +225,8 @@ class _Reader:
         same_output(output, self.settings.laser_output, f"{self.file}, line {self.line}")
         return "laser"
 
-    def part(self, last: str) -> None:
-        if self.last_of_part or self.loaded:
-            raise self.fault("expected one module at a time")
-        self.last_of_part = int(last)
-
-    def end_part(self) -> None:
-        if self.loaded or self.last_of_part != len(self.called_in):
-            raise self.fault("the number in IF must be that of the last contour of the module")
-        self.last_of_part = 0
-
     def load(self, folder: str, file: str) -> None:
-        if self.loaded or not self.last_of_part or folder != self.settings.folder:
+        if self.loaded or folder != self.settings.folder:
             raise self.fault(f"expected one module at a time, from {self.settings.folder}")
         self.loaded = file
 
@@ -297,10 +235,16 @@ class _Reader:
             raise self.fault(f"{folder}/{file} is not loaded")
         self.loaded = ""
 
-    def late_call(self, number: str, name: str) -> None:
-        if not self.loaded:
-            raise self.fault(f"{name} is called while no module is loaded")
-        self.call(number, name)
+    def condition(self, number: str) -> None:
+        if self.number is not None:
+            raise self.fault("a condition must have one call")
+        self.number = number
+
+    def late_call(self, name: str) -> None:
+        if not self.loaded or self.number is None:
+            raise self.fault(f"{name} is called while no module is loaded, or without a condition")
+        self.call(self.number, name)
+        self.number, self.must_say = None, ["ENDIF"]
 
     def call(self, number: str, name: str) -> None:
         if name in self.called_in:
@@ -314,21 +258,19 @@ class _Reader:
     ) -> None:
         axes_deg, external = self.values(text, 2)
         self.require_frames(tool, work_object, external)
-        axes, said = np.radians(self.numbers(axes_deg, 6)), self.named(speed, self.speeds)
+        axes, said = np.radians(self.numbers(axes_deg, 6)), self.speed_of(speed, air_speed_data)
         self.append(
             ReadMove(
                 kind="joint",
                 file=self.file,
                 line=self.line,
                 q=joints_from_axes(self.robot, axes[None])[0],
-                speed=said / FULL_AIR_SPEED if timed is None else None,
+                speed=said if timed is None else None,
                 cruise=None if timed is None else float(timed),
                 zone=self.named(zone, self.zones),
                 elsewhere=self.elsewhere(speed=speed, zone=zone),
             )
         )
-        data = air_speed_data(self.speeds[speed] / FULL_AIR_SPEED)
-        self.require_same(self.speed_data[speed], data, f"speeds of {speed}")
 
     def linear_move(self, text: str, speed: str, zone: str, tool: str, work_object: str) -> None:
         T_part_tip, quarters = self.target(text, tool, work_object)
@@ -339,13 +281,11 @@ class _Reader:
                 line=self.line,
                 T_part_tip=T_part_tip,
                 posture=quarters,
-                speed=self.named(speed, self.speeds),
+                speed=self.speed_of(speed, linear_speed_data),
                 zone=self.named(zone, self.zones),
                 elsewhere=self.elsewhere(speed=speed, zone=zone),
             )
         )
-        data = linear_speed_data(self.speeds[speed])
-        self.require_same(self.speed_data[speed], data, f"speeds of {speed}")
 
     def circular_move(
         self, via: str, text: str, speed: str, zone: str, tool: str, work_object: str
@@ -416,7 +356,14 @@ class _Reader:
         if not np.array_equal(values[1:], expected[1:]):
             raise self.fault(f"{what}: expected {data}, got {values.tolist()}")
 
-    def named(self, name: str, known: dict[str, float]) -> float:
+    def speed_of(self, name: str, data: Callable[[float], str]) -> float:
+        """Return the speed of declared data, the rest of which is as `data` writes it."""
+        values = self.named(name, self.speeds)
+        speed = float(values[0]) * 1e-3 / (FULL_AIR_SPEED if data is air_speed_data else 1.0)
+        self.require_same(values, data(speed), f"speeds of {name}")
+        return speed
+
+    def named(self, name: str, known: dict[str, _T]) -> _T:
         if name not in known:
             raise self.fault(f"{name} is not declared")
         return known[name]
@@ -425,38 +372,6 @@ class _Reader:
         if name in known:
             raise self.fault(f"{name} is declared twice")
 
-    def values(self, text: str, count: int) -> list[Any]:
-        """Return the `count` parts of an aggregate; RAPID writes it almost as JSON does."""
-        try:
-            values = json.loads(text.replace("TRUE", "true").replace("FALSE", "false"))
-        except json.JSONDecodeError as error:
-            raise self.fault(f"not an aggregate: {error}") from None
-        if not isinstance(values, list) or len(values) != count:
-            raise self.fault(f"expected {count} values, got {text[:60]!r}")
-        return values
-
-    def numbers(self, values: Any, count: int) -> Array:
-        is_list = isinstance(values, list) and len(values) == count
-        if not is_list or any(type(value) not in (int, float) for value in values):
-            raise self.fault(f"expected {count} numbers, got {values!r}")
-        return np.array(values, dtype=np.float64)
-
-    def pose(self, value: Any) -> Array:
-        if not isinstance(value, list) or len(value) != 2:
-            raise self.fault(f"expected a position and a quaternion, got {value!r}")
-        point_mm, wxyz = self.numbers(value[0], 3), self.numbers(value[1], 4)
-        T = pose_of(point_mm * 1e-3, wxyz)
-        if T is None:
-            raise self.fault(f"the quaternion {value[1]} must have length 1")
-        return T
-
     def elsewhere(self, **named: str) -> dict[str, str]:
         """Return where the data that a move names are declared or set."""
         return {what: self.said_at[name] for what, name in named.items() if name in self.said_at}
-
-    @property
-    def place(self) -> str:
-        return f"{self.file}, line {self.line}"
-
-    def fault(self, message: str) -> InputError:
-        return InputError(f"{self.place}: {message}")

@@ -104,9 +104,11 @@ class Rapid(Formatter):
         parts = in_files(sections, list(self.lengths().values()), most)
         for module, part in zip(self._modules(), parts, strict=False):
             place = f'"{self.settings.folder}/{module}.mod"'
-            calls += [f"IF {FIRST}<={numbers[part[-1]]} THEN", rf"  Load \Dynamic,{place};"]
-            calls += [f'  IF {FIRST}<={numbers[section]} %"{section.name}"%;' for section in part]
-            calls += [f"  UnLoad {place};", "ENDIF"]
+            calls += [rf"Load \Dynamic,{place};"]
+            for section in part:
+                called = f'  %"{section.name}"%;'
+                calls += [f"IF {FIRST}<={numbers[section]} THEN", called, "ENDIF"]
+            calls += [f"UnLoad {place};"]
             body = (line for section in part for line in self._routine(section))
             files[f"{module}.mod"] = _text([f"MODULE {module}", *body, "ENDMODULE"])
         return {f"{name}.mod": _text(self._module(calls, ()))} | files

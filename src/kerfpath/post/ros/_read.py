@@ -9,7 +9,6 @@ from dataclasses import replace
 import numpy as np
 
 from kerfpath._arrays import Array, freeze
-from kerfpath.air import least_time
 from kerfpath.errors import InputError
 from kerfpath.post._orientations import pose_of
 from kerfpath.post._program import SIGNALS, Switch
@@ -177,7 +176,7 @@ class _Events:
                 kind="joint" if kind == "joint" else "linear",
                 file=self.file,
                 line=self.line,
-                speed=self.share(between, took) if kind == "joint" and self.last >= 0 else None,
+                speed=None,
                 duration=took if kind == "linear" or self.last >= 0 else None,
                 zone=0.0 if points.stops[end] else None,
                 q=freeze(points.q[end]),
@@ -185,11 +184,6 @@ class _Events:
             )
         )
         self.last = end
-
-    def share(self, q: Array, took: float) -> float | None:
-        """Return the share of the full speed of a joint motion; None where it goes nowhere."""
-        least = least_time((q[-1] - q[0])[None], *self.robot.speed_limits())[0]
-        return float(least / took) if took > 0 else None
 
     def require_dense(self, first: int, end: int) -> None:
         """Require that points from stop to stop are as near to each other as they are written."""
