@@ -68,14 +68,13 @@ WORDS = {
               r"(DEFAULT_GROUP.*)"),
         families=(*STATES, r"\bDO\[\d\]", r"\bP\[\d+\]", r"\b(?:FINE|CNT\d+)\b",
                   r"'[NF] [UD] [TB]"),
-        orderless=(r"\s*\d+:  DO\[\d\]=OFF ;", r"\s*\d+:  U(?:FRAME|TOOL)_NUM.*",
-                   r"\s*\d+:  !U.*"),
+        orderless=(r"\s*\d+:  (?:DO\[\d\]=OFF ;|U(?:FRAME|TOOL)_NUM.*|!U.*)",),
     ),
     "inform": Words(
         remark=r"'(?!UFRAME|TOOL).*|",
         families=(*STATES, r"OT#\(\d\)", r"\bC\d{5}\b", r"\bPL=\d", r"\b(?:MOVL|MOVJ)\b",
                   r"RCONF .*"),
-        orderless=(r"'(?:UFRAME|TOOL) .*", r"DOUT OT#\(\d\) OFF"),
+        orderless=(r"(?:'(?:UFRAME|TOOL) .*|DOUT OT#\(\d\) OFF)",),
     ),
     "val3": Words(
         remark=r"\s*(//.*)?",

@@ -205,9 +205,10 @@ def _moves(job: Job, cuts: Sequence[ReadCut], plans: Sequence[Plan], home: Array
     ways = [[back, *way] for back, way in zip(backs, corners[1:], strict=False)]
     if job.sequence.home_deg is not None:
         there = np.radians(job.sequence.home_deg)
-        way = there - backs[-1]
-        short = np.where(job.robot.endless, way - 2 * np.pi * np.round(way / (2 * np.pi)), way)
-        ways = [[there, *corners[0][1:]], *ways, [backs[-1], *home[:-1], backs[-1] + short]]
+        # At the end an endless joint is at home on whichever turn the motion has brought it to.
+        end = home[-1] if len(home) else backs[-1]
+        turns = np.round((end - there) / (2 * np.pi)) * job.robot.endless
+        ways = [[there, *corners[0][1:]], *ways, [backs[-1], *home[:-1], there + 2 * np.pi * turns]]
     return [
         AirMove(q=np.array(way), time=np.arange(len(way), dtype=float), clear=True) for way in ways
     ]

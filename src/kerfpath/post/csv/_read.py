@@ -81,6 +81,8 @@ class _Reader:
         if took < 0:
             raise self.fault("the time runs backwards")
         if kind == "wait":
+            if took == 0:
+                raise self.fault("the wait takes no time")
             steps.append(ReadWait(time=took, file=self.file, line=number))
             return
         if (kind == "circular") != (self.via is not None):
