@@ -154,7 +154,7 @@ def number(value: Any, rng: random.Random) -> tuple[str, Any]:
     return "number nudged", value * (1 + 1e-5) + 1e-5
 
 
-ODD = [
+ODD: list[Any] = [
     True, False, None, "1.0", "nan", [], {}, [1.0], Raw("NaN"), Raw("Infinity"), Raw("-Infinity"),
     Raw("1e400"), Raw("1e300"), Raw("-1e18"), Raw("1" + "0" * 400), Raw("1" + "0" * 5000),
 ]  # fmt: skip

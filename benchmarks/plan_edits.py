@@ -5,6 +5,7 @@ from __future__ import annotations
 import tempfile
 from collections import Counter, defaultdict
 from collections.abc import Callable, Iterable, Iterator
+from functools import partial
 from pathlib import Path
 
 from benchmarks._figures import Report, Sheet
@@ -111,6 +112,14 @@ class Tally:
 Judge = Callable[[Path], bool]
 
 
+def _passes(audit: PlanAudit, plan: Path) -> bool:
+    return audit.audited(plan).passed
+
+
+def _passes_of(job: Path, plan: Path) -> bool:
+    return PlanAudit.of(job).audited(plan).passed
+
+
 def judged(judge: Judge, plan: Path) -> str:
     """Return what an audit makes of a plan.json: passed, caught, refused or broke."""
     try:
@@ -151,11 +160,9 @@ def judged_all(made: Iterable[tuple[Path, Path]], count: int, seed: int) -> Tall
         name = job.stem
         audit = PlanAudit.of(job)
         assert audit.audited(plan).passed, f"{name}: the plan as it is does not pass"
-        edited_plans(tally, lambda path, audit=audit: audit.audited(path).passed, plan, count, seed)
+        edited_plans(tally, partial(_passes, audit), plan, count, seed)
         for what, other in edited_jobs(job):
-            verdict = judged(
-                lambda path, other=other: PlanAudit.of(other).audited(path).passed, plan
-            )
+            verdict = judged(partial(_passes_of, other), plan)
             tally.add("job edited", f"{name}: {what}", verdict, harmless=False)
     return tally
 

@@ -362,8 +362,7 @@ def loop_of(
     InputError
         A trace that is longer or reaches further than any part does.
     """
-    largest_gap = float(trace.gaps.max(initial=0.0)) * MM
-    length, box = float(trace.lengths.sum()), trace.bounds()
+    length, box, widest = float(trace.lengths.sum()), trace.bounds(), trace.gaps.max(initial=0.0)
     if not (length <= LARGEST and (np.abs(box) <= LARGEST).all()):
         raise InputError(
             f"loop {name!r} reaches further than {LARGEST / 1e6:g} km; the file is damaged, or its "
@@ -378,8 +377,8 @@ def loop_of(
         bounding_box=freeze(box * MM),
         edges=len(trace.lengths),
         shortest_edge=float(trace.lengths.min()) * MM,
-        largest_gap=largest_gap,
-        closed=kind != "open" and largest_gap <= gap,
+        largest_gap=float(widest) * MM,
+        closed=kind != "open" and float(widest) * MM <= gap,
         diameter=None if kind == "open" else diameter(trace.around * MM),
         layer=layer,
         colour=colour,

@@ -314,8 +314,7 @@ class Robot:
         if self.family.inverse_nodes is None:
             spin = np.tile(np.eye(4), (len(gamma), 1, 1))
             spin[:, 0, 0] = spin[:, 1, 1] = np.cos(gamma)
-            spin[:, 1, 0] = np.sin(gamma)
-            spin[:, 0, 1] = -spin[:, 1, 0]
+            spin[:, 1, 0], spin[:, 0, 1] = np.sin(gamma), -np.sin(gamma)
             q, reach = self.inverse_all((H[:, None] @ (spin @ T_tip_flange)).reshape(-1, 4, 4))
             size = (len(H), len(gamma), self.postures)
             return q.reshape(*size, self.joints), reach.reshape(size)
@@ -344,8 +343,7 @@ class Robot:
     @property
     def _placed(self) -> bool:
         """Whether base or flange differ from the model's own."""
-        unmoved = np.eye(4)
-        return not all(np.array_equal(T, unmoved) for T in (self.T_base_foot, self.T_end_flange))
+        return not all(np.array_equal(T, np.eye(4)) for T in (self.T_base_foot, self.T_end_flange))
 
     def joint_limits(self) -> turns.JointLimits:
         """Return the position limits as the kernels take them.
@@ -385,12 +383,10 @@ class Robot:
 
     def reasons(self) -> tuple[str, ...]:
         """Say what each reason code of a dropped pose means, by code."""
-        words = ["admitted", "unreachable"]
-        for name in [f"joint {i + 1}" for i in range(self.family.joints)] + [
-            c.name for c in self.couplings
-        ]:
-            words += [f"{name} low", f"{name} high"]
-        return (*words, "posture not wanted")
+        names = [f"joint {i + 1}" for i in range(self.family.joints)]
+        names += [c.name for c in self.couplings]
+        bounds = [f"{name} {end}" for name in names for end in ("low", "high")]
+        return ("admitted", "unreachable", *bounds, "posture not wanted")
 
     def _require_alone(self) -> None:
         if self.external is not None:
