@@ -96,9 +96,14 @@ class Cut:
         """Why there is no plan, and what would help; empty where there is one."""
         if self.broken is None:
             return ""
+        return f"{self.broken}; {self.remedy}" if self.remedy else str(self.broken)
+
+    @property
+    def remedy(self) -> str:
+        """Which speeds and which shares of the limits have a path; empty where none is known."""
         if self.fastest is None:
-            return str(self.broken)
-        return f"{self.broken}; {self._speeds(self.fastest)}{self._shares()}; {FINER}"
+            return ""
+        return f"{self._speeds(self.fastest)}{self._shares()}; {FINER}"
 
     def _speeds(self, found: FastestSpeed) -> str:
         """Say up to which speed a path exists on the grid, and which one is known off it."""

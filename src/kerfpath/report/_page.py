@@ -168,7 +168,7 @@ def _map_part(section: ContourSection, figures: Figures) -> list[str]:
 def _failure(section: ContourSection) -> str:
     where = "" if section.broken_at is None else f" The path breaks at node {section.broken_at}."
     reason = section.failure or "The search found no admissible path."
-    remedy = f"<p>{escape(section.remedy)}</p>" if section.remedy else ""
+    remedy = f"<p>What would do: {escape(section.remedy)}.</p>" if section.remedy else ""
     return (
         f'<div class="failure">{sign(FAIL, "No feasible path")}<p>{escape(reason)}</p>'
         f"<p>{escape(where.strip())}</p>{remedy}</div>"
@@ -193,7 +193,9 @@ def _first_steps(sections: Sequence[ContourSection], faults: Sequence[str]) -> s
 
 def _what_to_do(section: ContourSection) -> str:
     if section.plan is None:
-        return section.remedy or section.failure or "give way on the limits that the map shows"
+        if section.remedy:
+            return f"cut slower, or give way on a limit: {section.remedy}"
+        return section.failure or "give way on the limits that the map shows"
     worst = section.errors[0]
     return worst.advice or f"{worst.title} is beyond what is allowed; see its audit"
 
