@@ -372,7 +372,7 @@ def test_bad_arguments_are_refused(folder, written):
     )
     assert "a program is compared with its job" in refused("audit", str(folder / "out/job.mod"))
     assert "no such file" in refused(
-        "audit", str(folder / "none.mod"), "--job", str(folder / "job.toml")
+        "audit", str(folder / "missing.mod"), "--job", str(folder / "job.toml")
     )
     (folder / "x.foo").write_text("")
     said = refused("audit", str(folder / "x.foo"), "--job", str(folder / "job.toml"))
