@@ -24,6 +24,7 @@ NAMES = (
     "part",
     "programs",
     "program_edits",
+    "plan_edits",
     "pareto",
     "sweeps",
     "layout",
@@ -77,6 +78,10 @@ def _run(name: str, *, quick: bool) -> list[Report]:
         from benchmarks import program_edits
 
         return [program_edits.run(quick=quick)]
+    if name == "plan_edits":
+        from benchmarks import plan_edits
+
+        return [plan_edits.run(quick=quick)]
     if name == "pareto":
         from benchmarks import pareto
 

@@ -1,56 +1,69 @@
-"""Small drawings, spoilt as people, programs and disks spoil files.
+"""Files spoilt as people, programs, disks and wires spoil them; `fuzz.py` does so by the thousand.
 
-    python tests/spoilt.py [SECONDS] [FIRST_SEED]
-
-spoils one per seed and reads it in a child process. What crashes, hangs, ends in a traceback or
-says more than one line is printed, and the file is left in the folder spoilt.
+Bytes, tokens and structure: whatever a reader is given, it reads or refuses in one line.
 """
 
 from __future__ import annotations
 
 import contextlib
-import functools
-import importlib.util
+import copy
 import io
-import logging
+import json
 import random
 import re
-import select
-import subprocess
-import sys
-import time
+import tomllib
 import traceback
+import tracemalloc
+import warnings
+from collections.abc import Callable, Iterator
 from pathlib import Path
+from typing import Any, NamedTuple
+from xml.etree import ElementTree
 
-from ezdxf.filemanagement import new
-from OCP.BRep import BRep_Builder
-from OCP.BRepPrimAPI import BRepPrimAPI_MakeBox, BRepPrimAPI_MakeCylinder
-from OCP.gp import gp_Trsf, gp_Vec
-from OCP.TopLoc import TopLoc_Location
-from OCP.TopoDS import TopoDS_Compound, TopoDS_Shape
+import tomlkit
 
-from kerfpath.cad import read
-from kerfpath.cli._contours import list_contours
-from kerfpath.errors import InputError
+from kerfpath.errors import InputError, KerfpathError
 
-FOLDER = Path("spoilt")
-HANG = 20.0
-"""s that no small drawing needs."""
-LOOPS = 8
-"""How many contours are taken from a part."""
-LONGEST = 400
+LONGEST = 600
 """Characters of a message."""
 NUMBERS = (
-    b" 0 -1 1 2 3 17 1. -0. 1E-300 1.E+300 -1E20 1e400 nan inf 99999999999999999999 2147483648"
-    b" -2147483649 1e 0x10 1,5 1.D5"
+    b" 0 -0 -1 1 2 3 17 1. -0. 1E-300 5e-324 1.E+300 1e308 -1E20 1e400 nan NaN inf -inf Infinity"
+    b" 99999999999999999999 2147483648 -2147483649 9223372036854775808 1e 0x10 1_0 1,5 1.D5 +7 ++7"
+    b" true null 1e-7 6553700 \xd9\xa3"
 ).split(b" ")
 NUMBER = re.compile(rb"[-+]?\d+\.?\d*(?:[eEdD][-+]?\d+)?")
+WORD = re.compile(rb"#\d+|[A-Za-z_]\w*")
+WORDS = (
+    b"", b"$", b"*", b"()", b"x" * 70_000, b"\xc3\xa9\xe2\x80\xa8", b"nan", b"a\nb", b"\0", b"..",
+    b"/dev/zero", b"../" * 40, b"%s%n{0}", b"[bold]", b"'", b'"', b"\\", b"-1", b"None",
+)  # fmt: skip
+ODD: tuple[Any, ...] = (
+    0, -0.0, -1, 1, 2, 1e308, -1e308, 5e-324, 10**30, -(2**63) - 1, 2**31, 0.5, float("nan"),
+    float("inf"), "", "1.0", "x" * 5000, "é\u2028\0\x1b[31m", None, True, False, [], {}, [[]],
+    [1, [2]], [[1.0], [1.0, 2.0]], {"a": 1}, [None], ["x"],
+)  # fmt: skip
+"""Values that stand where others are expected."""
 
 
-def spoil(raw: bytes, rng: random.Random) -> bytes:
-    """Return a drawing's bytes after one to three of the accidents that befall files."""
+class Whole(NamedTuple):
+    """A sound file that is spoilt, and the file that is then read: itself, or one that needs it."""
+
+    spoilt: Path
+    main: Path
+
+
+class Reader(NamedTuple):
+    """A reader of files, and a function that writes small sound ones into a folder."""
+
+    wholes: Callable[[Path], list[Whole]]
+    read: Callable[[Path], object]
+
+
+def spoil(raw: bytes, rng: random.Random, suffix: str = "") -> bytes:
+    """Return a file's bytes after one to three of the accidents that befall files."""
+    accidents = [*ACCIDENTS, *[STRUCTURE[suffix]] * 5] if suffix in STRUCTURE else ACCIDENTS
     for _ in range(rng.choice([1, 1, 1, 2, 3])):
-        raw = rng.choice(ACCIDENTS)(raw, rng)
+        raw = rng.choice(accidents)(raw, rng)
     return raw
 
 
@@ -59,17 +72,21 @@ def _truncated(raw: bytes, rng: random.Random) -> bytes:
 
 
 def _lines(raw: bytes, rng: random.Random) -> bytes:
-    """Return it with a line deleted, doubled, swapped with another, or split."""
+    """Return it with lines deleted, doubled, moved, swapped with others, or one split."""
     lines = raw.split(b"\n")
     k, j = rng.randrange(len(lines)), rng.randrange(len(lines))
-    many = rng.choice([1, 1, 2, 5])
-    way = rng.randrange(4)
+    many = rng.choice([1, 1, 2, 5, 20])
+    way = rng.randrange(5)
     if way == 0:
         del lines[k : k + many]
     elif way == 1:
         lines[k:k] = lines[k : k + many]
     elif way == 2:
         lines[k], lines[j] = lines[j], lines[k]
+    elif way == 3:
+        taken = lines[k : k + many]
+        del lines[k : k + many]
+        lines[j:j] = taken
     else:
         lines[k] = lines[k][: len(lines[k]) // 2] + b"\n" + lines[k][len(lines[k]) // 2 :]
     return b"\n".join(lines)
@@ -78,50 +95,66 @@ def _lines(raw: bytes, rng: random.Random) -> bytes:
 def _numbers(raw: bytes, rng: random.Random) -> bytes:
     """Return it with some numbers replaced by odd ones, by their neighbours or scaled."""
     found = list(NUMBER.finditer(raw))
-    if not found:
-        return raw
-    for at in sorted(
-        rng.sample(found, min(len(found), rng.choice([1, 1, 2, 8]))), key=lambda m: -m.start()
-    ):
-        with_ = rng.choice([*NUMBERS, rng.choice(found)[0], b"-" + at[0], at[0] + b"0"])
-        raw = raw[: at.start()] + with_ + raw[at.end() :]
-    return raw
+
+    def other(at: re.Match[bytes]) -> bytes:
+        return rng.choice([*NUMBERS, rng.choice(found)[0], b"-" + at[0], at[0] + b"0"])
+
+    return _replaced(raw, found, other, rng)
 
 
-def _references(raw: bytes, rng: random.Random) -> bytes:
-    """Return it with some STEP references (or other words) swapped with others."""
-    found = list(re.finditer(rb"#\d+" if b"#" in raw else rb"[A-Za-z_]+", raw))
+def _words(raw: bytes, rng: random.Random) -> bytes:
+    """Return it with some words (references in STEP) swapped with others or with odd ones."""
+    found = list(WORD.finditer(raw))
+
+    def other(at: re.Match[bytes]) -> bytes:
+        return rng.choice([rng.choice(found)[0], rng.choice(WORDS), at[0].swapcase()])
+
+    return _replaced(raw, found, other, rng)
+
+
+def _replaced(
+    raw: bytes,
+    found: list[re.Match[bytes]],
+    other: Callable[[re.Match[bytes]], bytes],
+    rng: random.Random,
+) -> bytes:
     if not found:
         return raw
-    for at in sorted(
-        rng.sample(found, min(len(found), rng.choice([1, 1, 2, 8]))), key=lambda m: -m.start()
-    ):
-        raw = (
-            raw[: at.start()]
-            + rng.choice([rng.choice(found)[0], b"$", b"*", b"()"])
-            + raw[at.end() :]
-        )
+    chosen = rng.sample(found, min(len(found), rng.choice([1, 1, 2, 8])))
+    for at in sorted(chosen, key=lambda m: -m.start()):
+        raw = raw[: at.start()] + other(at) + raw[at.end() :]
     return raw
 
 
 def _bytes(raw: bytes, rng: random.Random) -> bytes:
+    """Return it with bytes flipped, or with junk put in, in place of a few bytes or of none."""
     k = rng.randint(0, len(raw))
+    if rng.random() < 0.3 and raw:
+        flipped = bytearray(raw)
+        for _ in range(rng.choice([1, 1, 3, 10])):
+            flipped[rng.randrange(len(raw))] ^= 1 << rng.randrange(8)
+        return bytes(flipped)
     junk = rng.choice(
+        [b"\0", b"\0" * 50, b"\xff\xfe", b"\xc3", rng.randbytes(rng.randint(0, 20)), b"\r",
+         b"\x85", b"'", b"(", b")", b";", b'"', b"/*", b"<!--", b"]]>", b"[" * 3000, b"(" * 3000,
+         b"{" * 3000, b"<a>" * 1500, b"\xe2\x80\xa8"]
+    )  # fmt: skip
+    return raw[:k] + junk + raw[k + rng.choice([0, 0, 1, 8, 60]) :]
+
+
+def _ranges(raw: bytes, rng: random.Random) -> bytes:
+    """Return it with a stretch of bytes deleted, doubled, many times over or moved."""
+    a, b = sorted((rng.randint(0, len(raw)), rng.randint(0, len(raw))))
+    b = min(b, a + rng.choice([10, 100, 1000, 10_000]))
+    stretch, k = raw[a:b], rng.randint(0, len(raw))
+    return rng.choice(
         [
-            b"\0",
-            b"\0" * 50,
-            b"\xff\xfe",
-            b"\xc3",
-            rng.randbytes(rng.randint(0, 20)),
-            b"'",
-            b"(",
-            b")",
-            b";",
-            b'"',
-            b"/*",
+            raw[:a] + raw[b:],
+            raw[:b] + raw[a:],
+            raw[:k] + stretch + raw[k:],
+            raw[:a] + stretch * rng.choice([2, 30]) + raw[b:],
         ]
     )
-    return raw[:k] + junk + raw[k + rng.choice([0, 0, 1, 8, 60]) :]
 
 
 def _whole(raw: bytes, rng: random.Random) -> bytes:
@@ -133,169 +166,163 @@ def _whole(raw: bytes, rng: random.Random) -> bytes:
             lambda: text.replace("\n", "\r").encode("latin-1"),
             lambda: text.replace("\n", "").encode("latin-1"),
             lambda: text.encode("utf-16"),
+            lambda: text.encode("utf-16-le"),
             lambda: text.encode("utf-8-sig"),
             lambda: text.replace("e", "é").encode("utf-8"),
+            lambda: text.replace("e", "é").encode("latin-1"),
             lambda: text.upper().encode("latin-1", "ignore"),
             lambda: raw + raw,
             lambda: raw[: len(raw) // rng.choice([3, 10, 30, 100])] + raw[-200:],
+            lambda: b"",
+            lambda: b"\n" * 3,
         ]
     )()
 
 
 ACCIDENTS = [
-    _truncated,
-    _lines,
-    _lines,
-    _numbers,
-    _numbers,
-    _numbers,
-    _references,
-    _references,
-    _bytes,
+    _truncated, _lines, _lines, _numbers, _numbers, _numbers, _words, _words, _bytes, _ranges,
     _whole,
-]
+]  # fmt: skip
 
 
-@functools.cache
-def drawings(folder: Path) -> dict[str, bytes]:
-    """Return small drawings of each format by file name."""
-    path = Path(__file__).parents[1] / "examples" / "model_drawings.py"
-    spec = importlib.util.spec_from_file_location("model_drawings", path)
-    assert spec is not None
-    assert spec.loader is not None
-    examples = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(examples)
-    folder.mkdir(parents=True, exist_ok=True)
-    logging.disable(logging.WARNING)
-    examples.write(folder)
-    plate = examples.drilled(
-        BRepPrimAPI_MakeBox(20.0, 10.0, 1.0).Shape(), 4.0, (6, 5, -1), (0, 0, 1), 3.0
+def _places(value: Any, into: Any = None, key: Any = None) -> Iterator[tuple[Any, Any]]:
+    """Yield every place inside a value: what holds it, and its key or index there."""
+    if into is not None:
+        yield into, key
+    keys = (
+        value if isinstance(value, dict) else range(len(value)) if isinstance(value, list) else ()
     )
-    pipe = examples.drilled(
-        BRepPrimAPI_MakeCylinder(8.0, 20.0).Shape(), 5.0, (0, 0, 10), (1, 0, 0), 20.0
-    )
-    examples.write_step(folder / "plate.step", plate)
-    examples.write_step(folder / "pipe.step", pipe)
-    examples.write_step(folder / "pair.step", _pair(plate, pipe))
-    examples.write_iges(folder / "plate.iges", plate)
-    examples.write_iges(folder / "pipe.iges", pipe)
-    _write_r12(folder / "old.dxf")
-    rows = [(0, 0, 0), (10, 0, 0), (10, 20, 0), (0, 20, 1), (0, 0, 0)]
-    table = [
-        ("contour", "x_mm", "y_mm", "z_mm", "nx", "ny", "nz"),
-        *(("trim", *row, 0, 0.1, 1) for row in rows),
-    ]
-    for name, comma in (("points.csv", ","), ("points.tsv", "\t"), ("semicolon.csv", ";")):
-        (folder / name).write_text("".join(comma.join(map(str, row)) + "\n" for row in table))
-    logging.disable(logging.NOTSET)
-    return {path.name: path.read_bytes() for path in sorted(folder.iterdir()) if path.suffix}
+    for each in keys:
+        yield from _places(value[each], value, each)
 
 
-def _pair(a: TopoDS_Shape, b: TopoDS_Shape) -> TopoDS_Shape:
-    whole, move = TopoDS_Compound(), gp_Trsf()
-    move.SetTranslation(gp_Vec(50, 0, 0))
-    BRep_Builder().MakeCompound(whole)
-    for shape in (a, b.Located(TopLoc_Location(move))):
-        BRep_Builder().Add(whole, shape)
-    return whole
+def _restructured(value: Any, rng: random.Random) -> None:
+    """Change a tree of dicts and lists: take out, rename, swap, nest, or put in what is odd."""
+    # Rows of numbers would be all that is ever chosen: each kind of place gets its share.
+    places = list(_places(value))
+    if not places:
+        return
+    named = [p for p in places if isinstance(p[0], dict)]
+    into, key = rng.choice(rng.choice([named or places, places]))
+    other, its = rng.choice(rng.choice([named or places, places]))
+    way = rng.randrange(8)
+    if way == 0:
+        del into[key]
+    elif way == 1 and isinstance(into, dict):
+        into[rng.choice(["", "x", key + "s", key.upper()])] = into.pop(key)
+    elif way == 2:
+        into[key], other[its] = copy.deepcopy(other[its]), copy.deepcopy(into[key])
+    elif way == 3:
+        for _ in range(rng.choice([1, 2, 30])):
+            into[key] = [into[key]] if rng.random() < 0.5 else {"x": into[key]}
+    elif way == 4 and isinstance(into, list):
+        into[key:key] = [copy.deepcopy(into[key])] * rng.choice([1, 2, 10])
+    elif way == 5 and isinstance(into[key], int | float):
+        into[key] = rng.choice(
+            [into[key] * f for f in (-1.0, 1e-9, 0.1, 10.0, 1000.0, 1e9)] + [str(into[key])]
+        )
+    else:
+        into[key] = rng.choice(ODD)
 
 
-def _write_r12(path: Path) -> None:
-    document = new("R12")
-    space = document.modelspace()
-    block = document.blocks.new("B")
-    block.add_arc((1, 1), 2, 0, 90)
-    for a, b in (((0, 0), (10, 0)), ((10, 0), (10, 10)), ((10, 10), (0, 0))):
-        space.add_line(a, b)
-    space.add_polyline2d([(0, 0, 1), (5, 5, 0), (9, 2, 0.3)], format="xyb", close=True)
-    space.add_blockref("B", (3, 3), dxfattribs={"xscale": -2, "row_count": 2})
-    document.saveas(path)
-
-
-def spoilt_file(seed: int, folder: Path) -> Path:
-    """Write the drawing of a seed, spoilt, and return where it is."""
-    rng = random.Random(seed)
-    originals = drawings(folder / "whole")
-    name = rng.choice(list(originals))
-    path = folder / f"{seed}-{name}"
-    path.write_bytes(spoil(originals[name], rng))
-    return path
-
-
-def complaint(path: Path) -> str:
-    """Return what is wrong with the answer to a spoilt drawing, "" if it is one as promised."""
-    unit = "mm" if path.suffix == ".dxf" else None
+def _json(raw: bytes, rng: random.Random) -> bytes:
     try:
-        with contextlib.redirect_stdout(io.StringIO()):
-            list_contours(path, unit, None, everything=True, as_json=True)
-        part = read(path, unit)
-        part.mesh()
-        for loop in part.loops[:LOOPS]:
-            part.contour(loop.name, closed=False)
+        tree = [json.loads(raw)]
+    except (ValueError, RecursionError):
+        return raw
+    _restructured(tree, rng)
+    return json.dumps(tree[0] if tree else None).encode()
+
+
+def _toml(raw: bytes, rng: random.Random) -> bytes:
+    try:
+        tree = tomllib.loads(raw.decode())
+        _restructured(tree, rng)
+        # What TOML cannot hold, such as null, is left out by going through JSON's words.
+        return tomlkit.dumps(tree).encode("utf-8", "replace")
+    except (ValueError, TypeError, AttributeError, RecursionError):
+        return raw
+
+
+def _xml(raw: bytes, rng: random.Random) -> bytes:
+    """Return it with an element taken out, doubled, moved or changed."""
+    try:
+        root = ElementTree.fromstring(raw)
+    except (ElementTree.ParseError, ValueError, LookupError):
+        return raw
+    pairs = [(parent, child) for parent in root.iter() for child in parent]
+    if not pairs:
+        return raw
+    parent, child = rng.choice(pairs)
+    way = rng.randrange(6)
+    if way == 0:
+        parent.remove(child)
+    elif way == 1:
+        parent.append(copy.deepcopy(child))
+    elif way == 2:
+        rng.choice(pairs)[1].append(copy.deepcopy(child))
+    elif way == 3:
+        child.tag = rng.choice([rng.choice(pairs)[1].tag, "x"])
+    elif child.attrib:
+        key = rng.choice(list(child.attrib))
+        value = child.attrib.pop(key)
+        if way == 4:
+            child.attrib[key] = str(rng.choice([*ODD[:14], "", "a b c", f"{value} 1", f"-{value}"]))
+    else:
+        child.text = str(rng.choice(ODD[:14]))
+    return ElementTree.tostring(root, encoding="utf-8")
+
+
+STRUCTURE = {
+    ".json": _json, ".toml": _toml, ".urdf": _xml, ".dae": _xml, ".pjx": _xml, ".pgx": _xml,
+    ".dtx": _xml,
+}  # fmt: skip
+"""Accidents to the structure of formats that have one."""
+
+
+def spoilt(wholes: list[Whole], sound: dict[Path, bytes], seed: int) -> tuple[Whole, bytes]:
+    """Return the file of a seed and the bytes that it is spoilt to.
+
+    Parameters
+    ----------
+    wholes : list of Whole
+    sound : dict
+        The bytes of each file as it was.
+    seed : int
+    """
+    rng = random.Random(seed)
+    whole = rng.choice(wholes)
+    return whole, spoil(sound[whole.spoilt], rng, whole.spoilt.suffix.lower())
+
+
+def complaint(read: Callable[[Path], object], whole: Whole) -> str:
+    """Return what is wrong with the answer to a spoilt file, "" if it is one as promised.
+
+    Promised: it is read, or refused in one short line that names the file; no warning.
+    """
+    try:
+        with contextlib.redirect_stdout(io.StringIO()), warnings.catch_warnings():
+            warnings.simplefilter("error")
+            read(whole.main)
     except InputError as error:
         line = str(error)
-        if "\n" in line or str(path) not in line or len(line) > LONGEST:
-            return f"not one short line that names the file: {line!r}"
-    except Exception:
+        names = {path.name for path in whole} | {path.name for path in whole.main.parent.iterdir()}
+        if not line.isprintable() or not any(name in line for name in names):
+            return f"not one line that names the file: {line[:2000]!r}"
+        if len(line) > LONGEST:
+            return f"a line of {len(line)} characters: {line[:600]!r}"
+    except KerfpathError:
+        return ""
+    except (Exception, RecursionError):
         return traceback.format_exc()
     return ""
 
 
-def _child() -> None:
-    answers = sys.stdout
-    for line in sys.stdin:
-        seed = int(line)
-        path = spoilt_file(seed, FOLDER)
-        started = time.monotonic()
-        wrong = complaint(path)
-        if (took := time.monotonic() - started) > HANG / 4:
-            wrong += f" took {took:.1f} s"
-        if not wrong:
-            path.unlink()
-        print(repr(wrong), file=answers, flush=True)
-
-
-def _main(seconds: float, seed: int) -> None:
-    FOLDER.mkdir(exist_ok=True)
-    until, child, first, where = time.monotonic() + seconds, None, seed, 0
-    with (FOLDER / "stderr.txt").open("w+") as said:
-        while time.monotonic() < until:
-            if child is None:
-                child = subprocess.Popen(
-                    [sys.executable, __file__, "child"],
-                    stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=said, text=True,
-                )  # fmt: skip
-                assert child.stdin is not None
-                assert child.stdout is not None
-                patience = 2 * HANG
-            child.stdin.write(f"{seed}\n")
-            child.stdin.flush()
-            if select.select([child.stdout], [], [], patience)[0]:
-                answer = child.stdout.readline().strip() or f"crashes: {child.wait()}"
-            else:
-                child.kill()
-                answer = f"hangs: {child.wait()}"
-            said.seek(where)
-            if more := said.read().strip():
-                answer += f" says {more}"
-            where = said.tell()
-            if answer != "''":
-                name = next(FOLDER.glob(f"{seed}-*"), seed)
-                print(name, answer.replace("\\n", "\n"), flush=True)
-            patience = HANG
-            if child.poll() is not None:
-                child = None
-            seed += 1
-    if child is not None:
-        child.kill()
-    print(f"{seed - first} seeds")
-
-
-if __name__ == "__main__":
-    if sys.argv[1:] == ["child"]:
-        _child()
-    else:
-        _main(
-            float(sys.argv[1]) if len(sys.argv) > 1 else 600.0,
-            int(sys.argv[2]) if len(sys.argv) > 2 else 0,
-        )
+def taken(read: Callable[[Path], object], whole: Whole) -> float:
+    """Return how much memory (MB) Python took at most in reading a file, read or not."""
+    tracemalloc.start()
+    try:
+        complaint(read, whole)
+        return tracemalloc.get_traced_memory()[1] / 1e6
+    finally:
+        tracemalloc.stop()

@@ -74,6 +74,21 @@ def test_the_chord_error_is_measured_against_the_drawing(good, drawn):
     assert "allowed 0.02 mm" in str(issue)
 
 
+def test_finer_nodes_are_no_advice_for_a_target_that_was_moved(good, drawn):
+    points = good.contour.points.copy()
+    points[40, 0] += 5e-4
+    moved = replace(good, contour=replace(good.contour, points=points))
+    q = good.robot.follow(
+        moved.T_base_part @ moved.T_part_tip @ np.linalg.inv(moved.T_flange_tip), good.q,
+        good.posture,
+    )  # fmt: skip
+    found = audit(replace(moved, q=q), reference=drawn, path_tolerance=2e-4)
+    issue = next(i for i in found if i.code == "tip-between-nodes")
+    assert issue.node in (39, 40)
+    assert "the target itself is off the path there" in str(issue)
+    assert "more finely" not in str(issue)
+
+
 def spoilt(good, **change):
     return {issue.code for issue in audit(replace(good, **change))}
 

@@ -21,6 +21,7 @@ from kerfpath.cell import (
     read_stl,
     welded,
 )
+from kerfpath.cell._scene import Scene
 from kerfpath.errors import InputError
 from kerfpath.robots import chain_of, robot, robot_ids
 from kerfpath.urdf import Chain
@@ -278,24 +279,31 @@ def test_every_pair_is_judged_or_left_out_for_a_reason():
         frozenset(pair) for pair in combinations(cell.names, 2)
     }
     assert len(both) == len(set(both))
-    assert left_out["table", "head"] == "may touch"
-    assert left_out["nozzle", "head"] == "do not move against each other"
-    assert left_out["link 1", "link 2"] == "joined by joint 2"
+    assert left_out["table", "head"] == "they may touch"
+    assert left_out["nozzle", "head"] == "they do not move against each other"
+    assert "at every pose" in left_out["link 1", "link 2"]
     assert "at every pose" in left_out["link 3", "link 5"]
     # Looked at pose by pose: what overlaps always is left out, what overlaps at times is judged.
-    arm = robot("abb_irb4600_60_205")
     q = np.random.default_rng(9).uniform(-np.pi, np.pi, (300, 6))
-    told = [pair for pair, why in left_out.items() if "at every pose" in why]
-    sole = Cell(
-        chain=cell.chain, bodies=[b for b in cell.bodies if b.kind in ("robot", "head")],
-        endless=arm.endless, near_miss_of=dict.fromkeys(told, 0.0),
-    )  # fmt: skip
-    near = sole.distances(q) <= 0
-    for pair, always, ever in zip(sole.pair_names, near.all(axis=0), near.any(axis=0), strict=True):
-        assert always == (pair in told)
-        assert ever or pair not in told
-    # A pair that stays nearer than it must keep says nothing either.
-    assert "at every pose" in a_cell(near_miss=3.0).unjudged["link 1", "link 3"]
+    arm = [i for i, body in enumerate(cell.bodies) if body.kind in ("robot", "head")]
+    pairs = [(a, b) for a, b in combinations(arm, 2) if cell.bodies[a].frame < cell.bodies[b].frame]
+    near = Scene(cell.bodies, np.array(pairs)).distances(cell.frames(q), np.inf) <= 0
+    depth = dict(zip(cell.pair_names, cell.depth, strict=True))
+    for (a, b), touch in zip(pairs, near.T, strict=True):
+        pair = cell.names[a], cell.names[b]
+        if pair in depth:
+            assert touch.all() == (depth[pair] > 0), pair
+        elif "at every pose" in left_out[pair]:
+            assert touch.all(), pair
+            assert {cell.bodies[a].kind, cell.bodies[b].kind} == {"robot"}
+        else:
+            assert left_out[pair].startswith("they keep "), pair
+            assert touch.all() if "overlap by design" in left_out[pair] else not touch.any()
+    # A pair that stays nearer than it is asked to keep is judged by what there is.
+    near = a_cell(near_miss=3.0, may_touch={("head", "table"): "the head rests on it"})
+    assert near.unjudged["table", "head"] == "the head rests on it"
+    assert near.pair_names == cell.pair_names
+    assert 0.1 < near.required[near.pair_names.index(("link 1", "link 3"))] < 3
 
 
 def dense(cell, q0, q1, parts):
@@ -469,7 +477,7 @@ def test_a_fixture_on_the_robot_base_is_said_at_once_and_may_be_meant():
         cell_of(arm, tool=np.eye(4), fixtures={"plinth": plinth})
     touch = [("plinth", "base")]
     meant = cell_of(arm, tool=np.eye(4), fixtures={"plinth": plinth}, may_touch=touch)
-    assert meant.unjudged["base", "plinth"] == "may touch"
+    assert meant.unjudged["base", "plinth"] == "they may touch"
     assert {"plinth", "link 3"} in [set(pair) for pair in meant.pair_names]
 
 
@@ -478,7 +486,7 @@ def test_a_fixture_on_the_robot_base_is_said_at_once_and_may_be_meant():
     [
         ({"may_touch": [("head", "lamp")]}, "may_touch: no body is called 'lamp'; there are base"),
         ({"near_miss_of": {("head", "lamp"): 1}}, "near_miss_of: no body is called 'lamp'"),
-        ({"near_miss_of": {("head", "nozzle"): 1}}, "not judged, they do not move against each"),
+        ({"near_miss_of": {("head", "nozzle"): 1}}, "not judged: they do not move against each"),
         ({"near_miss": -1}, "near-miss distance of .* must not be negative"),
         ({"near_miss": np.nan}, "near-miss distance of .* expected a finite number"),
         ({"head": CuttingHead(), "links": [Body(name="part", shape=ball([0, 0, 0], 0.1), frame=2,
@@ -521,3 +529,24 @@ def test_bad_numbers_are_refused_and_never_free(monkeypatch):
 def test_shapes_without_volume_are_refused(make):
     with pytest.raises(InputError):
         make()
+
+
+def cone(sides, T):
+    """A cone, its tip at the origin of T; every corner of its rim is a neighbour of the tip."""
+    turn = np.linspace(0, 2 * np.pi, sides, endpoint=False)
+    rim = np.c_[0.2 * np.cos(turn), 0.2 * np.sin(turn), np.full(sides, 0.3)]
+    return Hull(np.vstack([[[0.0, 0, 0]], rim])).moved(T)
+
+
+@pytest.mark.parametrize("sides", [60, 254, 255, 3000])
+def test_a_convex_solid_of_any_corners_is_judged(sides):
+    """Beyond 254 neighbours of a corner coal has no convex solid; the surface stands for it."""
+    tip = cone(sides, at([0.5, 0, 0]))
+    assert tip.crowded == (sides > 254)
+    for gap in (0.1, 0.02):
+        wall = box_between([-0.1, -1, -1], [0.5 - 0.2 - gap, 1, 1])
+        # Of 255 corners none faces it: the rim is 0.2 (1 - cos(pi / 255)) m farther.
+        assert distance(wall, tip) == pytest.approx(gap, abs=2e-5)
+    assert distance(box([0.01, 0.01, 0.01], at([0.5, 0, 0.2])), tip) < 0, "inside, off the surface"
+    assert distance(box([2, 2, 2]), tip) < 0, "holds it"
+    assert distance(box_between([0.45, -1, -1], [0.55, 1, 0.1]), tip) <= 0

@@ -157,7 +157,9 @@ def test_post_takes_the_settings_of_a_language_from_the_job_as_it_is_now(planned
     other = text.replace("xyz_mm = [1", "xyz_mm = [2", 1)
     assert other != text
     (folder / "other.toml").write_text(other)
-    refused(run(*post, "--job", "other.toml", cwd=folder), "other.toml")
+    moved = run(*post, "--job", "other.toml", cwd=folder)
+    assert moved.returncode == 1
+    assert "job.part.xyz_mm" in moved.stderr
 
 
 def test_the_same_job_gives_the_same_bytes(planned, folder):

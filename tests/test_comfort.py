@@ -28,7 +28,8 @@ from kerfpath.auditor import chain_of, checks
 from kerfpath.auditor._margins import margins
 from kerfpath.cell import Checker, box_between, cell_of
 from kerfpath.comfort import MEASURES, jacobian, measure, measures
-from kerfpath.job._planfile import plan_entry, plan_text, read_plan_file
+from kerfpath.job import read_plan_file
+from kerfpath.job._planfile import plan_entry, plan_text
 from kerfpath.planner import layered_graph
 from kerfpath.robots import Robot
 from kerfpath.tilt import Tilt

@@ -15,8 +15,17 @@ from kerfpath.cell import Mesh, box, edges_of, thickened
 from kerfpath.comfort import Band, Comfort
 from kerfpath.errors import InputError
 from kerfpath.graph import LayeredGraph
-from kerfpath.job import audit_file, cell_of_job, check_job, fastest_speeds, read_job, run_job
-from kerfpath.job._planfile import read_plan_file
+from kerfpath.job import (
+    audit_file,
+    cell_of_job,
+    check_job,
+    collision_note,
+    fastest_speeds,
+    read_job,
+    read_plan_file,
+    require_language,
+    run_job,
+)
 from kerfpath.planner import ClearanceMap
 from kerfpath.report._section import with_clearance
 from test_cli import refused, run
@@ -90,6 +99,17 @@ def test_a_job_in_a_cell_is_planned_audited_and_says_so(planned, folder):
     assert asked["post", "head"] == 0.02
     assert asked["part", "nozzle"] == 0.0005
     assert asked["table", "head"] == 0.01
+    # Links drawn as capsules are never told of as the real ones, wherever it says clear.
+    unproved = "need not hold the real ones"
+    assert unproved in planned["notes"][0]
+    assert unproved in plan["contours"][0]["proof"]
+    assert unproved in plan["cell"]["not_proved"][0]
+    assert unproved in (folder / "small-plan" / "report.html").read_text()
+    (program,) = (folder / "small-plan").glob("*.mod")
+    assert "clear of the real ones is not proved" in program.read_text()
+    deep = [p for p in plan["cell"]["near_miss_m"] if p["overlap_by_design"] > 0]
+    assert [p["between"] for p in deep] == [["link 3", "arm"]]
+    assert "link 3 - arm 24 mm" in planned["notes"][0]
     checks = {c["code"]: c for c in plan["contours"][0]["audit"]["checks"]}
     assert re.search(r"nearest: .* mm apart, \d+ mm asked", checks["collision"]["title"])
     assert "part and nozzle" in checks["collision-own"]["title"]
@@ -117,8 +137,9 @@ def test_the_audit_checks_the_cell_again_with_the_job_and_says_so_without(planne
     blocked = SMALL.replace("xyz_mm = [1390, -210, 600]", "xyz_mm = [1225, -130, 700]")
     assert not audit_file(file, job(folder, blocked, "blocked.toml")).passed
     moved = SMALL.replace("xyz_mm = [1200, -600, 500]", "xyz_mm = [1200, -600, 501]")
-    with pytest.raises(InputError, match="its part is not where that of"):
-        audit_file(file, job(folder, moved, "moved.toml"))
+    found = audit_file(file, job(folder, moved, "moved.toml"))
+    (said,) = (c.title for c in found.tables["plan.json"] if "T_base_part" in c.title)
+    assert "expected 0.501, found 0.5" in said
 
 
 def test_a_blocked_contour_says_that_it_is_collision(folder):
@@ -176,11 +197,19 @@ def test_check_shows_bodies_pairs_and_the_start(folder):
     assert start.clearance > checked.cell.near_miss
     shown = run("check", "small.toml", cwd=folder)
     assert shown.returncode == 0, shown.stderr
-    for words in ("nest left", "post - head: 20 mm", "not judged", "base - table", "slot"):
+    for words in (
+        "nest left", "post - head: 20 mm", "not judged", "base - table", "slot",
+        "800 x 1500 x 50", "not the real one", "beyond the 24 mm that they overlap by design",
+    ):  # fmt: skip
         assert words in shown.stdout
+    assert "is its unit right?" not in shown.stdout
     told = json.loads(run("check", "small.toml", "--json", cwd=folder).stdout)
     pairs = len(told["cell"]["judged"]) + len(told["cell"]["not_judged"])
     assert pairs == 14 * 13 // 2  # every pair is one or the other
+    assert all(entry["why"] for entry in told["cell"]["not_judged"])
+    assert {"at_least_m", "asked_m", "overlap_by_design_m"} < set(told["cell"]["judged"][0])
+    sizes = {body["name"]: body["size_m"] for body in told["cell"]["bodies"]}
+    np.testing.assert_allclose(sizes["table"], [0.8, 1.5, 0.05])
     free = SMALL[: SMALL.index("[cell]")] + NO_PROGRAM
     shown = run("check", job(folder, free, "free.toml"), cwd=folder)
     assert "Collisions are not checked" in shown.stdout
@@ -190,6 +219,10 @@ def test_pairs_and_files_of_the_job_make_its_cell(folder):
     text = with_keys(
         "[cell]", 'may_touch = [["arm", "post"]]', "share = 0.25", 'links = "capsules"'
     )
+    text = text.replace(
+        "near_miss_mm = 20", 'near_miss_mm = 20\n[[cell.pair]]\nbetween = ["head", "link 3"]\n'
+        'allowed = "the bracket is drawn too thick"', 1,
+    )  # fmt: skip
     text += '\n[[cell.fixture]]\nname = "lump"\nfile = "lump.stl"\nunit = "mm"\n'
     text += "xyz_mm = [2000, 0, 0]\n"
     text += '[[cell.fixture]]\nname = "twin"\nfile = "b_pillar.step"\nxyz_mm = [0, 3000, 0]\n'
@@ -198,6 +231,8 @@ def test_pairs_and_files_of_the_job_make_its_cell(folder):
     cell = cell_of_job(read, read_drawing(read.part_file))
     bodies = {body.name: body.shape for body in cell.bodies}
     assert ("post", "arm") not in cell.pair_names
+    assert cell.unjudged["link 3", "head"] == "the bracket is drawn too thick"
+    assert "link 3 - head (the bracket is drawn too thick)" in collision_note(cell)
     assert cell.required[cell.pair_names.index(("part", "nozzle"))] == 0.25e-3
     np.testing.assert_allclose(bodies["lump"].bounds, [[1.95, -0.05, -0.05], [2.05, 0.05, 0.05]])
     assert bodies["twin"].deviation == 0.2e-3
@@ -225,6 +260,8 @@ FAULTS = [
     ('["head", "post"]', '["head", "head"]', 'expected two bodies, got "head" twice'),
     ('["head", "post"]', '["head"]', "cell.pair.between: expected the names of two bodies"),
     ("near_miss_mm = 20", "near_miss_mm = -1", "cell.pair.near_miss_mm: .*got -1"),
+    ("near_miss_mm = 20", "", "cell.pair.near_miss_mm: expected one of .*allowed .*got none"),
+    ("near_miss_mm = 20", 'near_miss_mm = 2\nallowed = "why"', "expected one of .*got both"),
     ("stand_off_mm = 1", "share = 1.5", "cell.share: .*below 1"),
     ("stand_off_mm = 1", 'may_touch = [["arm", "wall"]]', 'cell.may_touch: .*got "wall"'),
     ("stand_off_mm = 1", 'links = "description"', "cell.links: .*only with urdf"),
@@ -450,3 +487,39 @@ def test_a_language_that_the_robot_does_not_speak_is_refused_before_planning(fol
     path = job(folder, text, "ur.toml")
     result = run("plan", path, cwd=folder)
     refused(result, f"{path}:", "program.language", "cannot yet say the axes", 'language = "none"')
+
+
+def test_an_arm_whose_axis_3_is_not_known_is_asked_for_it_before_planning(folder, arm):
+    # The arm with a longer forearm is none of the library; by its description or by its lengths.
+    lengths = {**arm.geometry, "c3": arm.geometry["c3"] + 0.03}
+    described(folder, replace(arm, geometry=lengths, T_base_foot=np.eye(4)))
+    rest = 'manufacturer = "ABB"\nacceleration_deg_s2 = [320, 270, 420, 1300, 1400, 2000]\n'
+    geometry = ", ".join(f"{name} = {1000 * value}" for name, value in lengths.items())
+    limits = "lower_deg = [-172, -172, -172, -172, -172, -172]\n"
+    limits += "upper_deg = [172, 172, 172, 172, 172, 172]\n"
+    limits += "velocity_deg_s = [115, 115, 115, 115, 115, 115]\n"
+    for number, table in enumerate(
+        (
+            '[robot]\nurdf = "arm.urdf"\ntip = "tool0"\n' + rest,
+            f'[robot]\nkinematics = "opw"\ngeometry_mm = {{ {geometry} }}\n{rest}{limits}',
+        )
+    ):
+        text = free(table).replace('language = "none"', 'language = "rapid"')
+        with pytest.raises(InputError, match=r"program\.language: .*axis_3 = .*axis_3_deg"):
+            require_language(read_job(job(folder, text, f"{number}.toml")))
+        told = 'axis_3 = "horizontal"\naxis_3_deg = [-60, 65]\n'
+        require_language(held := read_job(job(folder, text.replace(table, table + told), "a.toml")))
+        (bound,) = held.robot.couplings
+        upright = 90 * number  # lengths alone count joint 3 from the upright arm
+        assert np.degrees([bound.lower, bound.upper]) == pytest.approx(
+            [-60 + upright, 65 + upright]
+        )
+        for wrong, where in (
+            ('axis_3 = "horizontal"\n', r"robot\.axis_3_deg: expected the two limits of axis 3"),
+            (told.replace("horizontal", "serial"), r"robot\.axis_3_deg: .*got them with 'serial'"),
+            (told.replace("horizontal", "coupled"), r"robot\.axis_3: expected 'serial' or"),
+        ):
+            with pytest.raises(InputError, match=where):
+                read_job(job(folder, text.replace(table, table + wrong), "w.toml"))
+    with pytest.raises(InputError, match="axis_3 only with urdf or kinematics"):
+        read_job(job(folder, free(ROBOT + 'axis_3 = "serial"\n')))

@@ -13,6 +13,7 @@ from kerfpath import robot
 from kerfpath.cad import read
 from kerfpath.errors import InputError
 from kerfpath.job import program_from_file, read_job, read_plan_file
+from kerfpath.job._run import Given, _cut, _in_other_postures
 from programs import read_text
 from test_cli import refused, run
 
@@ -180,7 +181,11 @@ def test_the_audit_against_the_drawing_knows_what_was_made_of_it(folder, done):
     # Another kerf is another path.
     other = folder / "other.toml"
     other.write_text(WHOLE.replace("kerf_mm = 0.2", "kerf_mm = 1.2"))
-    refused(run("audit", str(out / "plan.json"), "--job", str(other)), "reference: ")
+    result = run("audit", str(out / "plan.json"), "--job", str(other), "--json")
+    assert result.returncode == 1, result.stderr
+    found = json.loads(result.stdout)["contours"]
+    assert any("kerf_mm" in c["title"] for c in found["plan.json"])
+    assert not all(c["ok"] for c in found["led in"])
 
 
 ALL = """\
@@ -285,3 +290,25 @@ def test_every_cut_of_the_shipped_part_can_be_made():
         assert len(shaped) == (1 if task.name == "trim" else 2)
         for cut in shaped:
             assert {"pierce", "lead-in", "cut"} <= set(task.sample(cut).kinds)
+
+
+def test_a_contour_that_no_way_leads_to_is_planned_in_its_other_postures(folder):
+    path = folder / "one.toml"
+    path.write_text(HEAD + CONTOURS.split('[[contour]]\npick = "skin/hole21"')[0] + PLAN + SEQUENCE)
+    job = read_job(path)
+    part = read(job.part_file)
+    (task,) = job.tasks(part)
+    way = task.candidates(part, task.drawn(part))[0]
+    given = Given(way, task.sample(way), job.plan_options["postures"], touched=False)
+    told = []
+
+    def progress(*words):
+        told.append(words)
+
+    made = _cut(job, task, given, None, None, progress)
+    others = _in_other_postures(job, task, given, made, None, progress)
+    # The job allows two postures, front/up with either wrist.
+    used = [{int(p) for p in cut.plan.posture} for cut in (*made, *others)]
+    assert sorted(used, key=min) == [{0}, {1}]
+    assert all(cut.passed for cut in others)
+    assert ("led in: other postures", 0, 1) in told

@@ -320,11 +320,11 @@ def test_a_measured_part_that_is_none_or_out_of_reach_gives_no_program(folder):
     assert re.search(r"as a job says it: xyz_mm = \[.*\], rpy_deg = \[.*\]", result.stdout)
     assert "xyz_mm = [" in run(*command, "--json").stderr
     assert not out.exists()
-    for shift, reason in ((300, "excess over the joint limits"), (-900, "joint acceleration")):
-        with_points(folder, shift=shift)
-        result = run(*command)
-        assert result.returncode == 0, shift
-        assert f"was planned again there; only led there it fails: error: {reason}" in result.stdout
+    with_points(folder, shift=300)
+    result = run(*command)
+    assert result.returncode == 0
+    said = "was planned again there; only led there it fails: error: excess over the joint limits"
+    assert said in result.stdout
 
 
 def test_a_plan_on_its_limits_is_planned_again_around_a_part_that_was_measured(folder):
@@ -372,7 +372,7 @@ def test_bad_arguments_are_refused(folder, written):
     )
     assert "a program is compared with its job" in refused("audit", str(folder / "out/job.mod"))
     assert "no such file" in refused(
-        "audit", str(folder / "missing.mod"), "--job", str(folder / "job.toml")
+        "audit", str(folder / "nowhere.mod"), "--job", str(folder / "job.toml")
     )
     (folder / "x.foo").write_text("")
     said = refused("audit", str(folder / "x.foo"), "--job", str(folder / "job.toml"))

@@ -1,5 +1,6 @@
 """Plans in a cell: clear, the best of all clear ones, audited again, and refused where they hit."""
 
+import re
 from dataclasses import replace
 
 import numpy as np
@@ -9,6 +10,7 @@ from kerfpath import InputError, NoFeasiblePath, audit, fastest_speed, plan
 from kerfpath.auditor import checks
 from kerfpath.cell import Mesh, box_between, cell_of
 from kerfpath.planner import layered_graph, plan_in_pieces
+from kerfpath.search import Known
 
 STEP = np.radians(5)
 
@@ -50,10 +52,13 @@ def posts():
 
 
 def test_where_nothing_is_in_the_way_the_plan_is_the_same(task, blind, arm, tool, placement):
-    made = plan(*task[0], **task[1], cell=cell(arm, tool, placement, {}))
+    # The thick capsules of forearm and head meet where the wrist is bent that far.
+    there = cell(arm, tool, placement, {}, may_touch=[("link 3", "arm")])
+    made = plan(*task[0], **task[1], cell=there)
     np.testing.assert_array_equal(made.q, blind.q)
     assert made.proof.optimal
-    assert "clear in the cell: 121 of " in made.proof.statement
+    assert "clear in the cell" in made.proof.statement
+    assert "need not hold the real ones): 121 of " in made.proof.statement
     assert "in 1 searches" in made.proof.statement
 
 
@@ -133,12 +138,11 @@ def test_behind_a_cage_no_speed_and_no_interruption_helps(task, arm, tool, place
     caged = cell(arm, tool, placement, lid)
     options = {name: task[1][name] for name in ("tool", "placement", "gamma_step", "graph")}
     with pytest.raises(
-        NoFeasiblePath,
-        match="contour 'circle': on this grid of the rotation no admissible way to node",
+        NoFeasiblePath, match=r"contour .circle.: on this grid .* no pose at node 0"
     ) as no:
         plan(*task[0], **task[1], cell=caged, feed="dip")
     assert no.value.counts["collision at the node"] > 0
-    with pytest.raises(NoFeasiblePath, match="no number of interruptions helps: no admissible way"):
+    with pytest.raises(NoFeasiblePath, match="no number of interruptions helps: no pose at node"):
         plan_in_pieces(*task[0], **task[1], cell=caged)
     with pytest.raises(NoFeasiblePath, match="collision at the node"):
         fastest_speed(*task[0], **options, cell=caged)
@@ -147,12 +151,16 @@ def test_behind_a_cage_no_speed_and_no_interruption_helps(task, arm, tool, place
 def test_a_cage_is_no_way_and_says_so(task, arm, tool, placement):
     lid = {"lid": box_between([0.9, -0.3, 0.5], [1.5, 0.3, 0.52])}
     with pytest.raises(
-        NoFeasiblePath,
-        match="contour 'circle': on this grid of the rotation no admissible way to node",
+        NoFeasiblePath, match=r"contour .circle.: on this grid .* no pose at node 0"
     ) as no:
         plan(*task[0], **task[1], cell=cell(arm, tool, placement, lid))
-    # The lid lies between the part and all that is above it.
-    assert "(most often of lid and head" in str(no.value)
+    # The lid lies between the part and all that is above it: at every node, and by its thickness
+    # and more, wherever the search broke.
+    said = str(no.value)
+    assert "(121 such nodes: 0 to 120)" in said
+    assert re.search(r"lid and head.* at (\d+) of \1 poses, [\d.]+ to [\d.]+ mm nearer", said)
+    assert re.search(r"the best of them lacks [\d.]+ mm \(lid and head", said)
+    assert no.value.node == -1
     assert no.value.proved
     assert no.value.counts["collision at the node"] > 0
 
@@ -171,3 +179,42 @@ def test_a_cell_of_another_task_is_refused(task, arm, tool, placement):
         plan(*task[0], **task[1], cell=cell(plain, tool, placement, {}))
     with pytest.raises(InputError, match='method: only "exact"'):
         plan(*task[0], **task[1], method="paper", cell=cell(arm, tool, placement, {}))
+
+
+def test_the_first_node_without_a_clear_pose_is_told_wherever_the_search_breaks(
+    task, arm, tool, placement
+):
+    """A lid over half of the contour: the nodes told are those that checking all poses finds."""
+    half = {"lid": box_between([0.9, 0.05, 0.5], [1.5, 0.3, 0.52])}
+    there = cell(arm, tool, placement, half)
+    with pytest.raises(NoFeasiblePath) as no:
+        plan(*task[0], **task[1], cell=there)
+    graph = task[1]["graph"]
+    clear = there.clear(graph.q)
+    none = [k for k in range(121) if not clear[graph.start[k] : graph.start[k + 1]].any()]
+    assert 0 < len(none) < 121
+    said = str(no.value)
+    assert f"no pose at node {none[0]} of 121 is clear ({len(none)} such nodes: " in said
+    assert no.value.node == none[0] - 1
+    here = slice(graph.start[none[0]], graph.start[none[0] + 1])
+    assert no.value.counts["collision at the node"] == here.stop - here.start
+
+
+def test_how_many_poses_are_looked_at_to_find_closed_nodes_is_bounded():
+    asked = []
+
+    def price(vertices):
+        asked.append(len(vertices))
+        return np.where(vertices % 50 < 40, np.inf, 0.0)
+
+    q, start = np.zeros((500, 1)), np.arange(0, 501, 40)
+    known = Known(q, [*start, 500], price=price, passable=lambda p, j: np.ones(len(p), bool))
+    closed, settled = known.closed_layers(10_000)
+    every = [k for k in range(13) if (np.arange(40 * k, min(40 * k + 40, 500)) % 50 < 40).all()]
+    assert (closed, settled) == (every, 13)
+    fresh = Known(q, [*start, 500], price=price, passable=lambda p, j: np.ones(len(p), bool))
+    asked.clear()
+    closed, settled = fresh.closed_layers(100)
+    assert sum(asked) <= 100
+    assert closed == [k for k in every if k < settled]
+    assert settled < 13

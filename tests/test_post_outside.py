@@ -10,7 +10,7 @@ import pytest
 from lxml import etree
 
 from kerfpath import robot
-from kerfpath.post import build_program, post, write_files
+from kerfpath.post import Await, Request, build_program, post, write_files
 from kerfpath.post.rapid import RapidSettings
 from kerfpath.post.urscript import URScriptSettings
 from kerfpath.post.val3 import Val3Settings
@@ -19,6 +19,9 @@ from test_post_arcs import slot
 
 RAPIDCHECKER = os.environ.get("RAPIDCHECKER")
 """A Python that has rapidchecker; .ci/run makes one."""
+
+
+ASKED = (Request(partner="shutter", on=True), Await(partner="ready", timeout=4.0))
 
 
 def programs(arm, place):
@@ -31,14 +34,18 @@ def programs(arm, place):
     yield "plain", build_program([plain])
     yield (
         "whole",
-        build_program([plain, round_], gas_lead=0.2, pierce_time=0.3, arc_tolerance=2e-5),
+        build_program(
+            [plain, round_], gas_lead=0.2, pierce_time=0.3, arc_tolerance=2e-5, handshakes=ASKED
+        ),
     )
 
 
 @pytest.mark.skipif(RAPIDCHECKER is None, reason="RAPIDCHECKER names no Python that has it")
 @pytest.mark.parametrize("lines", [100, 5000])
 def test_rapidchecker_finds_nothing_wrong(tmp_path, lines):
-    settings = RapidSettings(gas_output="doGas", lines_per_file=lines)
+    settings = RapidSettings(
+        gas_output="doGas", shutter_output="doOpen", ready_input="diReady", lines_per_file=lines
+    )
     for name, program in programs(robot("abb_irb4600_60_205"), (1.05, -0.15, 0.61)):
         paths = write_files(tmp_path / name, post(program, "rapid", settings))
         command = [RAPIDCHECKER, "-m", "rapidchecker", *map(str, paths)]
@@ -67,7 +74,7 @@ def as_python(text):
 
 
 def test_urscript_is_python_but_for_its_ends():
-    settings = URScriptSettings(laser_output=0, gas_output=1)
+    settings = URScriptSettings(laser_output=0, gas_output=1, shutter_output=2, ready_input=3)
     for _, program in programs(robot("ur_ur10e"), (0.75, 0.1, 0.2)):
         (text,) = post(program, "urscript", settings).values()
         assert text.count("\nend") + text.count("  end") >= len(program.sections) + 1
@@ -81,7 +88,11 @@ VAL3 = "{{http://www.staubli.com/robotics/VAL3/{}}}{}"
 
 def test_val3_is_xml_of_its_namespaces_in_which_every_program_is_listed():
     for _, program in programs(robot("staubli_tx2_160l"), (1.05, -0.15, 0.61)):
-        files = post(program, "val3", Val3Settings(laser_output="a", gas_output="b"))
+        files = post(
+            program,
+            "val3",
+            Val3Settings(laser_output="a", gas_output="b", shutter_output="c", ready_input="d"),
+        )
         trees = {name: etree.fromstring(text.encode()) for name, text in files.items()}
         for name, tree in trees.items():
             kind = {"pjx": ("Project/3", "Project"), "dtx": ("Data/2", "Database")}

@@ -1,17 +1,25 @@
 """Order of cutting and moves through the air."""
 
+import re
 from itertools import permutations, product
+from time import monotonic
 
 import numpy as np
 import pytest
 
-from kerfpath import Contour, InputError, NoFeasiblePath
+from kerfpath import Contour, InputError, NoFeasiblePath, plan
 from kerfpath.air import air_move, backed_off, least_time
 from kerfpath.auditor import air_checks
 from kerfpath.cell import box_between, cell_of
 from kerfpath.operations import start_at
 from kerfpath.post import JointMove, build_program, post, preflight
-from kerfpath.sequence import best_order, inner_first, plan_part
+from kerfpath.sequence import (
+    best_order,
+    inner_first,
+    longest_search,
+    order_plans,
+    plan_part,
+)
 from programs import read_text, text_of
 
 STEP = np.radians(10)
@@ -214,7 +222,8 @@ def test_the_audit_holds_moves_through_the_air_to_limits_time_and_cell(walled, a
     cell, cut = walled
     for move in cut.moves:
         table = air_checks(arm, move.q, move.time, cell=cell)
-        assert {check.code for check in table} == {"air-time", "air-limits", "collision"}
+        codes = {"air-time", "air-limits", "collision", "collision-own"}
+        assert {check.code for check in table} == codes
         assert all(check.ok for check in table)
     around = max(cut.moves, key=lambda move: len(move.q))
     fast = air_checks(arm, around.q, 0.9 * around.time, cell=cell)
@@ -250,3 +259,97 @@ def test_a_loop_around_a_tube_has_no_inside(ring):
     around = Contour(ring.points, -ring.points, closed=True, name="cut-off")
     hole = moved(ring, 0, 0, "hole")
     assert inner_first([around, hole]) == []
+
+
+@pytest.fixture(scope="module")
+def lane(arm, tool, ring):
+    """Two holes in a lane too narrow to turn in: behind itself the arm stays there, or does not."""
+    placement = np.eye(4)
+    placement[:3, 3] = 0.9, 0.0, 0.6
+    walls = {
+        "left": box_between([-1.2, 0.34, -0.2], [1.3, 0.39, 3]),
+        "right": box_between([-1.2, -0.39, -0.2], [1.3, -0.34, 3]),
+    }
+    cell = cell_of(arm, tool=tool, placement=placement, fixtures=walls)
+    asked = {"tool": tool, "placement": placement, "speed": 0.05, "gamma_step": np.radians(20)}
+    holes = [
+        moved(ring, x, y, name).resample(count=16)
+        for x, y, name in ((0, 0, "near"), (0.1, 0.05, "far"))
+    ]
+    ahead, behind = (
+        [plan(hole, arm, postures=(posture,), cell=cell, **asked) for hole in holes]
+        for posture in (0, 4)
+    )
+    home = np.radians([0, -20, 10, 0, 60, 0])
+    folded = np.array(behind[0].q[0])
+    folded[1] -= 0.3
+    return holes, cell, asked, ahead, behind, home, folded
+
+
+def test_where_no_way_is_found_the_contours_the_bodies_and_what_was_tried_are_named(lane):
+    _, cell, _, ahead, behind, home, _ = lane
+    given = [[behind[0]], [ahead[1]]]
+    begun = monotonic()
+    with pytest.raises(NoFeasiblePath) as none:
+        order_plans(given, home=home, cell=cell, retract=0.01, seconds=0.5)
+    said = str(none.value)
+    assert not none.value.proved
+    assert re.search(r"contour '(near|far)' in posture (rear|front)/up/plus", said)
+    assert re.search(
+        r"'(left|right)' and '.*' come [\d.]+ mm nearer than allowed \d+ % of the way", said
+    )
+    assert "no order is left" in said
+    # No search goes on from an end that is locked in: two of them told that.
+    assert monotonic() - begun < longest_search(0.5)
+
+
+def test_a_posture_that_cannot_be_left_is_reconsidered(lane, arm):
+    holes, cell, asked, ahead, behind, home, folded = lane
+    questions = []
+
+    def more(i):
+        questions.append(i)
+        return [ahead[0]] if i == 0 else []
+
+    given = [[behind[0]], [ahead[1]]]
+    found = order_plans(given, home=home, cell=cell, retract=0.01, seconds=0.5, more=more)
+    assert sorted(found.chosen) == [(0, 1), (1, 0)]
+    assert len(given[0]) == 1
+    assert len(questions) == len(set(questions))
+    assert all(move.clear for move in found.moves)
+    # Ahead is the shorter cut; a home from which only the folded arm gets there needs the other.
+    free = plan_part(holes, arm, home=home, cell=cell, retract=0.01, seconds=0.5, **asked)
+    assert {int(p.posture[0]) // 4 for p in free.plans} == {0}
+    from_there = plan_part(holes, arm, home=folded, cell=cell, retract=0.01, seconds=0.5, **asked)
+    assert {int(p.posture[0]) // 4 for p in from_there.plans} == {1}
+    with pytest.raises(NoFeasiblePath, match=r"from home to the start of contour '.*tried as well"):
+        order_plans(
+            [[a] for a in ahead], home=folded, cell=cell, retract=0.01, seconds=0.5,
+            more=lambda i: [ahead[i]],
+        )  # fmt: skip
+
+
+def test_what_is_in_the_way_of_backing_off_is_named(lane, arm, tool):
+    *_, asked, ahead, _, _, _ = lane
+
+    def under(height):
+        roof = box_between([0.7, -0.3, height], [1.4, 0.3, height + 0.1])
+        return cell_of(arm, tool=tool, placement=asked["placement"], fixtures={"roof": roof})
+
+    heights = np.arange(0.8, 3.0, 0.1)
+    lowest = next(cell for cell in map(under, heights) if cell.clear(ahead[0].q).all())
+    with pytest.raises(NoFeasiblePath, match=r"backs off node 0 by 300 mm: ") as none:
+        order_plans([[ahead[0]]], cell=lowest, retract=0.3, seconds=0.5)
+    said = str(none.value)
+    assert said.startswith("contour 'near': in posture front/up/plus")
+    assert re.search(r"('roof' and '.*'|'.*' and 'roof') come [\d.]+ mm nearer than allowed", said)
+
+
+def test_an_end_that_may_not_be_first_or_last_is_left_in_the_middle():
+    between = np.ones((3, 3))
+    order = best_order(
+        [0, 1, 2], np.ones(3), between, first=[np.inf, 0, 0], last=[np.inf, 0, np.inf]
+    )
+    assert order.candidates.tolist() == [2, 0, 1]
+    with pytest.raises(InputError, match="first: expected 3 times >= 0"):
+        best_order([0, 1, 2], np.ones(3), between, first=[-1, 0, 0])

@@ -1,5 +1,9 @@
 """Robot descriptions: every library robot through a URDF and back, and what must be refused."""
 
+import re
+import warnings
+from time import monotonic
+
 import numpy as np
 import pinocchio as pin
 import pytest
@@ -165,14 +169,58 @@ def test_a_continuous_joint_is_endless_and_a_fixed_one_is_merged(tmp_path):
     np.testing.assert_allclose(back.forward(q), r.forward(q), atol=1e-9)
 
 
-def test_right_angles_of_few_digits_are_taken_as_meant_only_when_asked(tmp_path):
-    path = described(tmp_path, robot("ur_ur10e"))
-    path.write_text(path.read_text().replace(repr(np.pi / 2), "1.5708"))
-    with pytest.raises(InputError, match=r"Universal Robots type.*e-05 off .*snap=1e-4"):
+def rounded(path, digits):
+    """Write the angles of a description with so many digits after the point."""
+
+    def few(found):
+        turn = Rotation.from_euler("xyz", [float(word) for word in found[1].split()])
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")  # where roll and yaw are one, all of it is roll
+            words = [f"{angle:.{digits}f}" for angle in turn.as_euler("xyz")]
+        return f'rpy="{" ".join(words)}"'
+
+    path.write_text(re.sub(r'rpy="([^"]*)"', few, path.read_text()))
+    return path
+
+
+@pytest.mark.parametrize("digits", [2, 3, 4])
+@pytest.mark.parametrize("name", ["staubli_tx60", "abb_irb2400_155", "fanuc_m10ia", "ur_ur10e"])
+def test_angles_of_few_digits_are_taken_as_meant_only_when_asked(tmp_path, name, digits):
+    # Joint frames turned by right angles, as descriptions have them.
+    r, draw = robot(name), np.random.default_rng(digits)
+    origins, axes, flange = frames_of(r)
+    links, joints = ["base", *(f"link_{i}" for i in range(1, 7)), "tool0"], []
+    back = np.eye(4)
+    for i in range(6):
+        turn = np.eye(4)
+        quarters = draw.integers(0, 4, 3) * np.pi / 2
+        turn[:3, :3] = Rotation.from_euler("xyz", quarters).as_matrix()
+        here, back = back @ origins[i] @ turn, np.linalg.inv(turn)
+        joints.append(joint(f"j{i}", links[i], links[i + 1], here, back[:3, :3] @ axes[i]))
+    end = joint("end", "link_6", "tool0", back @ flange, kind="fixed", inside="")
+    path = rounded(urdf(tmp_path, [*joints, end]), digits)
+    begun = monotonic()
+    with pytest.raises(InputError) as asked:
         Robot.from_urdf(path)
-    r = Robot.from_urdf(path, snap=1e-4)
-    q = np.random.default_rng(33).uniform(-3, 3, (20, 6))
-    np.testing.assert_allclose(r.forward(q), robot("ur_ur10e").forward(q), atol=1e-9)
+    assert monotonic() - begun < 10  # not the minutes of a solver
+    said = re.search(
+        r"snap=(\S+) takes them as meant, .* up to (\S+) mm and (\S+) deg; snap=0 keeps",
+        str(asked.value),
+    )
+    snap, off, turned = (float(word) for word in said.groups())
+    meant = Robot.from_urdf(path, snap=snap)
+    assert meant.kinematics == r.kinematics
+    q = draw.uniform(-3, 3, (200, 6))
+    np.testing.assert_allclose(meant.forward(q), r.forward(q), atol=1e-9)
+    # The model is the description within what was said.
+    kept = Robot.from_urdf(path, snap=0)
+    assert kept.kinematics == "general"
+    apart = kept.forward(q)[:, :3, 3] - meant.forward(q)[:, :3, 3]
+    assert 1e3 * np.linalg.norm(apart, axis=1).max() <= 1.1 * off + 1e-9
+    between = Rotation.from_matrix(
+        np.swapaxes(kept.forward(q)[:, :3, :3], 1, 2) @ meant.forward(q)[:, :3, :3]
+    )
+    assert np.degrees(between.magnitude().max()) <= 1.1 * turned + 1e-9
 
 
 def test_a_described_robot_is_planned_and_audited(tmp_path, circle, tool, placement):

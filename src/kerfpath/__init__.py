@@ -21,6 +21,7 @@ if TYPE_CHECKING:
     from kerfpath.errors import NoFeasiblePath as NoFeasiblePath
     from kerfpath.front import ParetoSet as ParetoSet
     from kerfpath.front import pareto as pareto
+    from kerfpath.job import read_plan_file as read_plan_file
     from kerfpath.placement import placed as placed
     from kerfpath.placement import placement_from_points as placement_from_points
     from kerfpath.planner import fastest_speed as fastest_speed
@@ -57,6 +58,7 @@ _HOME = {
     "placement_from_points": "placement",
     "plan": "planner",
     "plan_in_pieces": "planner",
+    "read_plan_file": "job",
     "refine": "refiner",
     "robot": "robots",
     "shortest_path": "search",

@@ -30,6 +30,8 @@ Ints = NDArray[np.int64]
 Bools = NDArray[np.bool_]
 _A = TypeVar("_A", bound=NDArray[Any])
 
+WHOLE = 2.0**53
+"""Whole numbers from here on are not told from their neighbours as float64."""
 _ROTATION_TOLERANCE = 1e-6
 """How far R^T R may be from the identity: seven printed decimals pass, a typo fails."""
 
@@ -78,7 +80,7 @@ def integers(value: ArrayLike, name: str, shape: tuple[int | None, ...]) -> Ints
         return freeze(np.array(value, dtype=np.int64, order="C"))
     array = _converted(value, name, np.float64)
     _require_shape(array, name, shape)
-    if not (np.isfinite(array).all() and (array == np.round(array)).all()):
+    if not ((np.abs(array) < WHOLE).all() and (array == np.round(array)).all()):
         raise InputError(f"{name}: expected whole numbers")
     return freeze(np.array(value, dtype=np.int64, order="C"))
 
@@ -105,7 +107,7 @@ def scalar(value: float, name: str, *, unit: str = "", above: float | None = Non
     """Return `value` as a finite float, above `above` if that is given."""
     try:
         number = float(value)
-    except (TypeError, ValueError):
+    except (TypeError, ValueError, OverflowError):
         raise InputError(f"{name}: expected a number, got {value!r}") from None
     unit = f" {unit}" if unit else ""
     if not np.isfinite(number) or (above is not None and not number > above):
@@ -138,7 +140,7 @@ def as_pose(value: ArrayLike, name: str) -> Array:
 def _converted(value: ArrayLike, name: str, dtype: type[np.float64]) -> Array:
     try:
         return np.asarray(value, dtype=dtype)
-    except (TypeError, ValueError) as error:
+    except (TypeError, ValueError, OverflowError) as error:
         raise InputError(f"{name}: expected an array of numbers ({error})") from None
 
 

@@ -31,6 +31,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from kerfpath._arrays import Array, Bools, as_pose, floats, freeze, scalar
+from kerfpath._told import told
 from kerfpath.errors import InputError
 from kerfpath.kernels.turns import JointLimits
 from kerfpath.robots import Robot
@@ -48,6 +49,8 @@ class Measure:
     words: str
     unit: str
     most: float = np.inf
+
+    __repr__ = told
 
 
 MEASURES: Mapping[str, Measure] = {
@@ -124,6 +127,8 @@ class Comfort:
     limits: Band | None = None
     manipulability: Band | None = None
     clearance: Band | None = None
+
+    __repr__ = told
 
     def __post_init__(self) -> None:
         for field in fields(self):

@@ -2,12 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["AuditFailed", "InputError", "KerfpathError", "NoFeasiblePath"]
+__all__ = ["AuditFailed", "InputError", "KerfpathError", "NoFeasiblePath", "about"]
+
+LONGEST, BEGINNING = 600, 420
+"""Characters of a message about bad input; of a longer one its beginning and its end are kept."""
 
 
 class KerfpathError(Exception):
@@ -15,7 +20,26 @@ class KerfpathError(Exception):
 
 
 class InputError(KerfpathError, ValueError):
-    """Bad input: one line that says what was expected, what came, where, and what to do."""
+    """Bad input: one line that says what was expected, what came, where, and what to do.
+
+    It stays one line, and one that can be read, whatever of a file is quoted in it.
+    """
+
+    def __init__(self, message: str) -> None:
+        line = "".join(c if c.isprintable() else repr(c)[1:-1] for c in message)
+        if len(line) > LONGEST:
+            line = f"{line[:BEGINNING]} ... {line[BEGINNING + 5 - LONGEST :]}"
+        super().__init__(line)
+
+
+@contextmanager
+def about(path: Path) -> Iterator[None]:
+    """Have errors about bad input name the file that they are about, where they do not."""
+    try:
+        yield
+    except InputError as error:
+        said = str(error)
+        raise (error if path.name in said else InputError(f"{path}: {said}")) from None
 
 
 class NoFeasiblePath(KerfpathError):

@@ -60,6 +60,12 @@ class LayeredGraph:
     reason: NDArray[np.uint8]
     reasons: tuple[str, ...]
 
+    def __repr__(self) -> str:
+        return (
+            f"LayeredGraph({len(self.start) - 1} layers, {len(self.q)} vertices, "
+            f"{len(self.gamma)} rotations, {self.q.shape[1]} joints)"
+        )
+
     @property
     def candidate(self) -> NDArray[np.int32]:
         """Variant and gamma of each vertex, (N,): its place along the second axis of `reason`."""

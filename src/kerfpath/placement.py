@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike
 from scipy.spatial.transform import Rotation
 
 from kerfpath._arrays import Array, as_pose, floats, freeze, scalar
+from kerfpath._told import told
 from kerfpath.air import AirMove, air_move, backed_off
 from kerfpath.errors import InputError, NoFeasiblePath
 from kerfpath.planner import plan as plan_contour
@@ -43,6 +44,8 @@ class MeasuredFrame:
 
     T_base_part: Array
     residuals: Array
+
+    __repr__ = told
 
     @property
     def xyz_mm(self) -> list[float]:
@@ -95,12 +98,14 @@ def placement_from_points(
     if len(nominal) < 3:
         raise InputError(f"measured frame: expected at least 3 points, got {len(nominal)}")
     centre, middle = nominal.mean(axis=0), measured.mean(axis=0)
-    spread = np.linalg.svd(nominal - centre, compute_uv=False)
-    if spread[1] <= ON_A_LINE * spread[0]:
-        raise InputError(
-            "measured frame: the points lie on one line, or nearly, and leave the part free to "
-            "turn about it; measure one that stands away from it"
-        )
+    for spread in (
+        np.linalg.svd(p, compute_uv=False) for p in (nominal - centre, measured - middle)
+    ):
+        if spread[1] <= ON_A_LINE * spread[0]:
+            raise InputError(
+                "measured frame: the points lie on one line, or nearly, and leave the part free to "
+                "turn about it; measure one that stands away from it"
+            )
     turned, _ = Rotation.align_vectors(measured - middle, nominal - centre)
     T = np.eye(4)
     T[:3, :3] = turned.as_matrix()
@@ -249,6 +254,10 @@ def placed_moves(
             )
         after = before + 1
         q0 = move.q[0] if before < 0 else backed_off(plans[before], "end", retract)
-        q1 = move.q[-1] if after == len(plans) else backed_off(plans[after], "start", retract)
+        if after < len(plans):
+            q1 = backed_off(plans[after], "start", retract)
+        else:  # home, the short way for endless joints
+            turns = np.round((q0 - move.q[-1]) / (2 * np.pi)) * plans[0].robot.endless
+            q1 = move.q[-1] + 2 * np.pi * turns
         led.append(air_move(plans[0].robot, q0, q1))
     return tuple(led)

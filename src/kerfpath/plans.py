@@ -10,6 +10,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from kerfpath._arrays import Array, Ints, as_pose, floats, freeze, integers, scalar
+from kerfpath._told import told
 from kerfpath.comfort import Comfort, measures
 from kerfpath.contour import Contour, FrameKind
 from kerfpath.errors import InputError
@@ -59,6 +60,8 @@ class Settings:
     comfort: Comfort | None = None
     tilt: Tilt | None = None
 
+    __repr__ = told
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Proof:
@@ -78,6 +81,8 @@ class Proof:
     optimal: bool
     statement: str
     grid_cost: float | None = None
+
+    __repr__ = told
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -140,6 +145,8 @@ class Criteria:
     peak_velocity: Array
     peak_acceleration: Array
     nearest: Mapping[str, tuple[float, int]]
+
+    __repr__ = told
 
 
 def path_cost(
@@ -206,6 +213,13 @@ class Plan:
     counts: Mapping[str, int]
     feed: Feed | None = None
     tilt: Array = None  # type: ignore[assignment]  # filled in by __post_init__
+
+    def __repr__(self) -> str:
+        best = ", best of its grid" if self.proof.optimal else ""
+        return (
+            f"Plan({self.name!r}, {len(self.q)} nodes, {self.time[-1] - self.time[0]:.2f} s, cost "
+            f"{self.cost:.6g}{best}, {self.robot.id})"
+        )
 
     def __post_init__(self) -> None:
         K, n = len(self.contour), self.robot.joints

@@ -6,3 +6,4 @@ from kerfpath.air._move import least_time as least_time
 from kerfpath.air._move import speed_share as speed_share
 from kerfpath.air._retract import End as End
 from kerfpath.air._retract import backed_off as backed_off
+from kerfpath.air._told import why_not_clear as why_not_clear

@@ -8,7 +8,9 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from kerfpath._arrays import Array, floats, freeze
+from kerfpath._told import told
 from kerfpath.air._around import way_around
+from kerfpath.air._told import why_not_clear
 from kerfpath.cell import Cell
 from kerfpath.errors import InputError, NoFeasiblePath
 from kerfpath.robots import Robot
@@ -36,6 +38,8 @@ class AirMove:
     q: Array
     time: Array
     clear: bool
+
+    __repr__ = told
 
     @property
     def duration(self) -> float:
@@ -127,7 +131,8 @@ def air_move(
             )  # fmt: skip
             if found is None:
                 raise NoFeasiblePath(
-                    f"no way through the air found in {seconds:g} s; its ends are clear",
+                    f"no way through the air found in {seconds:g} s, its ends are clear; straight, "
+                    f"{why_not_clear(cell, ends)}",
                     proved=False,
                     node=-1,
                 )

@@ -9,7 +9,7 @@ from numpy.typing import ArrayLike
 
 from kerfpath._arrays import Array, Ints, floats
 from kerfpath.auditor._chain import chain_of
-from kerfpath.auditor._collision import collision_at
+from kerfpath.auditor._collision import collision_along
 from kerfpath.auditor._table import Check, Unit
 from kerfpath.cell import Cell
 from kerfpath.errors import InputError
@@ -55,7 +55,8 @@ def air_checks(
         raise InputError(f"air move: it is not known yet how a {robot.external.kind} moves in it")
     corners = floats(q, "q", (None, robot.joints))
     duration = np.diff(floats(time, "time", (len(corners),)))
-    late = _needed(robot, np.abs(np.diff(corners, axis=0)), eta_v, eta_a) / duration
+    needed = _needed(robot, np.abs(np.diff(corners, axis=0)), eta_v, eta_a)
+    late = np.where(duration > 0, needed / np.where(duration > 0, duration, 1.0), np.inf)
     limits = robot.joint_limits()
     beyond = np.maximum(limits.lower - corners, corners - limits.upper)
     beyond[:, robot.endless] = -np.inf
@@ -65,7 +66,10 @@ def air_checks(
     ]
     if cell is not None and len(cell.pairs):
         samples, leg = _sampled(corners)
-        rows += collision_at(cell, samples, leg, chain_of(robot))
+        steps = np.flatnonzero(leg[1:] == leg[:-1])
+        rows += collision_along(
+            cell, samples[steps], samples[steps + 1], leg[steps], chain_of(robot)
+        )
     return rows
 
 

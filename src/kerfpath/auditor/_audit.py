@@ -5,13 +5,14 @@ from __future__ import annotations
 import numpy as np
 
 from kerfpath._arrays import Array, Ints, scalar
+from kerfpath.auditor._between import Between, between
 from kerfpath.auditor._chain import chain_of
 from kerfpath.auditor._collision import collisions
 from kerfpath.auditor._margins import margins
 from kerfpath.auditor._motion import Interpolation, Motion, joint_increments, motion_of
 from kerfpath.auditor._nominal import axes_asked_for, tilt_turns
 from kerfpath.auditor._rounding import MOST_ROUNDED, Rounding
-from kerfpath.auditor._table import Check, Issue, Unit
+from kerfpath.auditor._table import Check, Issue, Level, Unit
 from kerfpath.cell import Cell
 from kerfpath.contour import Contour
 from kerfpath.errors import InputError
@@ -29,6 +30,11 @@ LIMIT_SLACK = 1e-8
 """rad, or m on a rail: slack on joint positions, for the same reason."""
 LENGTH_AGREES = 1e-6
 """Relative difference of path lengths between a plan's contour and the reference it came from."""
+
+FINER = "sample the contour more finely"
+"""What helps where the nodes lie on the path and the way between them does not."""
+OFF_THE_PATH = "the target itself is off the path there: put it back, or plan the path meant"
+"""What helps where a node was moved, as by hand."""
 
 
 def audit(
@@ -108,11 +114,12 @@ def checks(
             f"reference: {path.length:.6f} m long, but the plan's contour was sampled from a path "
             f"of {plan.contour.length:.6f} m"
         )
+    reached = between(plan, chain, motion, interpolation)
     return [
         *_at_nodes(plan, chain.forward(plan.q) @ plan.T_flange_tip),
-        *_between_nodes(plan, motion, path, path_tolerance, axis_tolerance),
-        *_positions(plan, motion, rounding),
-        *_rates(plan, motion, rounding),
+        *_between_nodes(plan, motion, reached, path, path_tolerance, axis_tolerance),
+        *_positions(plan, motion, reached, rounding),
+        *_rates(plan, reached, rounding),
         *margins(plan, chain),
         *([] if cell is None else collisions(cell, motion, chain)),
     ]
@@ -135,8 +142,9 @@ def _at_nodes(plan: Plan, tool: Array) -> list[Check]:
 
 
 def _between_nodes(
-    plan: Plan, motion: Motion, path: Contour, path_tolerance: float, axis_tolerance: float
-) -> list[Check]:
+    plan: Plan, motion: Motion, reached: Between, path: Contour, path_tolerance: float,
+    axis_tolerance: float,
+) -> list[Check]:  # fmt: skip
     """Compare points of the path with the motion of the cell between nodes that they fall in."""
     s = plan.contour.s - plan.contour.s[0] + path.s[0]
     parts = motion.q.shape[1] - 1
@@ -159,7 +167,10 @@ def _between_nodes(
     part = along[row, near, None]
     there = (1 - part) * axis[row, near] + part * axis[row, near + 1]
     turned = _angle(there / np.linalg.norm(there, axis=1, keepdims=True), axes)
-    advice = "sample the contour more finely"
+    worst = cell[int(np.argmax(off[row, near]))]
+    ends, _ = path.at(s[worst : worst + 2])
+    ends = np.linalg.norm(ends @ rotation.T + origin - motion.tip[worst, [0, -1]], axis=1)
+    advice = FINER if ends.max() <= path_tolerance else OFF_THE_PATH
     return [
         _worst(
             "tip-between-nodes",
@@ -177,12 +188,12 @@ def _between_nodes(
             axis_tolerance,
             "rad",
             cell,
-            advice=advice,
+            advice=FINER,
         ),
         _worst(
             "straight-move",
             "pose that the joints miss on a straight move",
-            motion.residual.max(axis=1),
+            np.maximum(motion.residual.max(axis=1), reached.residual),
             1e-6,
             "m",
             advice="the robot cannot follow a straight move there: it passes a singularity or "
@@ -191,7 +202,9 @@ def _between_nodes(
     ]
 
 
-def _positions(plan: Plan, motion: Motion, rounding: Rounding | None) -> list[Check]:
+def _positions(
+    plan: Plan, motion: Motion, reached: Between, rounding: Rounding | None
+) -> list[Check]:
     limits = plan.robot.joint_limits()
     left = np.zeros(plan.q.shape) if rounding is None else rounding.q
     left = np.maximum(left[:-1], left[1:])
@@ -203,7 +216,8 @@ def _positions(plan: Plan, motion: Motion, rounding: Rounding | None) -> list[Ch
         title = f"excess over the limits of the {axis.kind}"
         rows.append(_worst("external-limits", title, over, LIMIT_SLACK, axis.unit))
     if bound.any():
-        beyond = np.maximum(limits.lower - motion.q, motion.q - limits.upper).max(axis=1)
+        n = len(bound)
+        beyond = np.maximum(limits.lower - reached.low[:, :n], reached.high[:, :n] - limits.upper)
         excess = (beyond - left)[:, bound]
         node, column = np.unravel_index(np.argmax(excess), excess.shape)
         joint = int(np.flatnonzero(bound)[column])
@@ -217,9 +231,8 @@ def _positions(plan: Plan, motion: Motion, rounding: Rounding | None) -> list[Ch
                 node=int(node),
             )
         )
-    for coupling in plan.robot.couplings:
-        value = motion.q @ coupling.row
-        over = np.maximum(coupling.lower - value, value - coupling.upper).max(axis=1)
+    for c, coupling in enumerate(plan.robot.couplings, len(limits.lower)):
+        over = np.maximum(coupling.lower - reached.low[:, c], reached.high[:, c] - coupling.upper)
         over = over - left @ np.abs(coupling.row)
         title = f"excess over the limits of {coupling.name}"
         rows.append(_worst("coupled-limits", title, over, LIMIT_SLACK, "rad"))
@@ -228,25 +241,34 @@ def _positions(plan: Plan, motion: Motion, rounding: Rounding | None) -> list[Ch
         over = (np.abs(turned) - plan.settings.rotation).max(axis=1)
         title = "excess over the limits of accumulated rotation"
         rows.append(_worst("rotation", title, over, LIMIT_SLACK, "rad"))
+    hidden = reached.open.astype(float)
+    rows.append(
+        _worst(
+            "unbounded",
+            "intervals between nodes in which the joints may do more than their samples show",
+            hidden * hidden.sum(),
+            0.0,
+            "count",
+            level="warning",
+            advice="the motion passes a singularity there: keep away from it with [comfort]",
+        )
+    )
     step = np.abs(joint_increments(plan)[:, own]).max(axis=1)
     rows.append(_worst("joint-step", "joint step between nodes", step, np.pi * (1 - 1e-9), "rad"))
     return rows
 
 
-def _rates(plan: Plan, motion: Motion, rounding: Rounding | None) -> list[Check]:
+def _rates(plan: Plan, reached: Between, rounding: Rounding | None) -> list[Check]:
     velocity, acceleration = plan.robot.speed_limits()
     eta_v, eta_a = plan.settings.eta_v, plan.settings.eta_a
     dt = np.diff(plan.time)
     dq = joint_increments(plan)
     speed = np.abs(dq / dt[:, None]) / velocity
-    parts = motion.q.shape[1] - 1
-    fine = np.abs(np.diff(motion.q, axis=1)) / (dt[:, None, None] / parts) / velocity
+    fine = reached.speed / dt[:, None] / velocity
     left = None if rounding is None else rounding.of_velocity(dq, dt) / velocity
     rows = [
         _per_joint("velocity", "joint velocity from node to node", speed, eta_v, left),
-        _per_joint(
-            "velocity-between", "joint velocity between the nodes", fine.max(axis=1), 1.0, left
-        ),
+        _per_joint("velocity-between", "joint velocity between the nodes", fine, 1.0, left),
     ]
     if len(dq) > 1:
         change = np.diff(dq / dt[:, None], axis=0) / ((dt[1:] + dt[:-1]) / 2)[:, None]
@@ -288,6 +310,7 @@ def _worst(
     unit: Unit,
     nodes: Ints | None = None,
     *,
+    level: Level = "error",
     advice: str = "",
 ) -> Check:
     """Return the check of the largest of `values`, NaN counting as the worst of all."""
@@ -299,6 +322,7 @@ def _worst(
         limit=limit,
         unit=unit,
         node=i if nodes is None else int(nodes[i]),
+        level=level,
         advice=advice,
     )
 

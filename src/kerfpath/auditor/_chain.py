@@ -11,6 +11,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from kerfpath._arrays import Array
+from kerfpath._told import told
 from kerfpath.robots import ExternalAxis, Robot
 
 __all__ = ["JointChain", "chain_of"]
@@ -36,6 +37,8 @@ class JointChain:
     axes: Array
     tip: Array
     external: ExternalAxis | None = None
+
+    __repr__ = told
 
     def forward(self, q: Array) -> Array:
         """Return the tip poses (B, 4, 4) of joint vectors q (B, n) rad."""

@@ -11,10 +11,11 @@ import numpy as np
 from kerfpath._arrays import Array, Bools, Ints
 from kerfpath.auditor._chain import JointChain
 from kerfpath.auditor._motion import Motion
+from kerfpath.auditor._swept import frames_of, in_between
 from kerfpath.auditor._table import Check
 from kerfpath.cell import Cell
 
-__all__ = ["collision_at", "collisions"]
+__all__ = ["collision_along", "collisions"]
 
 TOUCHING = -1e-9
 """m: to touch is not to be clear."""
@@ -26,26 +27,44 @@ FARTHEST = 1.0
 
 
 def collisions(cell: Cell, motion: Motion, chain: JointChain) -> list[Check]:
-    """Return the checks of every sample of a motion: by how much near-miss distances are missed.
+    """Return the checks of a motion: by how much near-miss distances are missed.
 
     One of the pairs that keep that of the cell, one of those with a distance of their own, as
     nozzle and part. The value is what the nearest pair falls short by, negative where all are
     farther apart.
     """
-    nodes, samples, n = motion.q.shape
-    return collision_at(cell, motion.q.reshape(-1, n), np.repeat(np.arange(nodes), samples), chain)
+    nodes, samples, _ = motion.q.shape
+    node = np.repeat(np.arange(nodes), samples - 1)
+    return collision_along(cell, _rows(motion.q[:, :-1]), _rows(motion.q[:, 1:]), node, chain)
 
 
-def collision_at(cell: Cell, q: Array, node: Ints, chain: JointChain) -> list[Check]:
-    """Return the same checks of joint vectors q (S, n) rad, each of a node (S,)."""
-    frames = np.stack([np.broadcast_to(np.eye(4), (len(q), 4, 4)), *chain.joints(q)], axis=1)
-    frames = np.ascontiguousarray(frames)
+def collision_along(cell: Cell, q0: Array, q1: Array, node: Ints, chain: JointChain) -> list[Check]:
+    """Return the same checks of motions from q0 to q1 (S, n) rad, each of a node (S,).
+
+    They are divided until nothing nearer can hide; where that cannot be said, it is counted.
+    """
+    between, nodes, open_ = in_between(cell, q0, q1, node, chain)
+    q, node = np.vstack([q0, q1, between]), np.concatenate([node, node, nodes])
+    frames = frames_of(chain, q)
+    left = Check(
+        code="collision-open",
+        title="steps between samples in which bodies may come nearer than is seen",
+        value=float(len(open_)),
+        limit=0.0,
+        unit="count",
+        node=int(open_[0]) if len(open_) else 0,
+    )
     rows = [("collision", "", ~cell.own), ("collision-own", " of their own", cell.own)]
-    return [
+    found = [
         _nearest(cell, frames, wanted, code, whose, node)
         for code, whose, wanted in rows
         if wanted.any()
     ]
+    return [*found, left]
+
+
+def _rows(q: Array) -> Array:
+    return q.reshape(-1, q.shape[-1])
 
 
 def _nearest(cell: Cell, frames: Array, wanted: Bools, code: str, whose: str, node: Ints) -> Check:
@@ -66,10 +85,11 @@ def _nearest(cell: Cell, frames: Array, wanted: Bools, code: str, whose: str, no
         beyond *= FARTHER
     (one, two), value = cell.pair_names[pair], float(short[row, pair])
     needed = float(cell.required[pair])
+    whence = "left by design" if needed < cell.asked[pair] else "asked"
     return Check(
         code=code,
         title=f"shortfall of near-miss distances{whose} (nearest: {one} and {two}, "
-        f"{(needed - value) * 1e3:.2f} mm apart, {needed * 1e3:g} mm asked)",
+        f"{(needed - value) * 1e3:.2f} mm apart, {needed * 1e3:.4g} mm {whence})",
         value=value,
         limit=TOUCHING,
         unit="m",

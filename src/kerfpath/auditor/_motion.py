@@ -8,11 +8,12 @@ from typing import Literal
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from kerfpath._arrays import Array
+from kerfpath._arrays import Array, Ints
+from kerfpath._told import told
 from kerfpath.auditor._chain import JointChain
 from kerfpath.plans import Plan
 
-__all__ = ["Interpolation", "Motion", "joint_increments", "motion_of"]
+__all__ = ["Interpolation", "Motion", "follow", "joint_increments", "motion_of", "straight"]
 
 Interpolation = Literal["linear", "joint"]
 
@@ -44,6 +45,8 @@ class Motion:
     axis: Array
     residual: Array
 
+    __repr__ = told
+
 
 def joint_increments(plan: Plan) -> Array:
     """Return joint increments (K-1, n) rad; an endless joint goes the short way round (13)."""
@@ -66,7 +69,10 @@ def motion_of(plan: Plan, chain: JointChain, interpolation: Interpolation, parts
     chain = replace(chain, tip=chain.tip @ plan.T_flange_tip)
     residual = np.zeros(len(flat))
     if interpolation == "linear":
-        flat, residual = _follow(chain, _straight(chain.forward(plan.q), f), flat)
+        poses = chain.forward(plan.q)
+        k = np.repeat(np.arange(K - 1), len(f))
+        wanted = straight(poses[:-1], poses[1:], k, np.tile(f, K - 1))
+        flat, residual = follow(chain, wanted, flat)
     tool = chain.forward(flat)
     shape = (K - 1, parts + 1)
     return Motion(
@@ -77,20 +83,21 @@ def motion_of(plan: Plan, chain: JointChain, interpolation: Interpolation, parts
     )
 
 
-def _straight(poses: Array, f: Array) -> Array:
-    """Interpolate poses (K, 4, 4) as linear moves do: (K-1)(m+1) poses, cell after cell."""
-    R0, R1 = poses[:-1, :3, :3], poses[1:, :3, :3]
-    turn = Rotation.from_matrix(R0.transpose(0, 2, 1) @ R1).as_rotvec()
-    part = Rotation.from_rotvec((f[None, :, None] * turn[:, None, :]).reshape(-1, 3)).as_matrix()
-    T = np.zeros((len(R0) * len(f), 4, 4))
-    T[:, :3, :3] = np.repeat(R0, len(f), axis=0) @ part
-    step = poses[1:, :3, 3] - poses[:-1, :3, 3]
-    T[:, :3, 3] = (poses[:-1, None, :3, 3] + f[None, :, None] * step[:, None, :]).reshape(-1, 3)
+def straight(start: Array, end: Array, k: Ints, f: Array) -> Array:
+    """Return the poses (B, 4, 4) at shares f (B,) of the linear moves k (B,) from start to end.
+
+    start, end : (M, 4, 4) m, of each move.
+    """
+    R0 = start[:, :3, :3]
+    turn = Rotation.from_matrix(R0.transpose(0, 2, 1) @ end[:, :3, :3]).as_rotvec()
+    T = np.zeros((len(f), 4, 4))
+    T[:, :3, :3] = R0[k] @ Rotation.from_rotvec(f[:, None] * turn[k]).as_matrix()
+    T[:, :3, 3] = start[k, :3, 3] + f[:, None] * (end[:, :3, 3] - start[:, :3, 3])[k]
     T[:, 3, 3] = 1.0
     return T
 
 
-def _follow(chain: JointChain, wanted: Array, q: Array) -> tuple[Array, Array]:
+def follow(chain: JointChain, wanted: Array, q: Array) -> tuple[Array, Array]:
     """Solve the tool poses `wanted` (B, 4, 4) by Newton's method from the joints q (B, n).
 
     Five joints are asked for tip and tool axis alone; an external axis stays as it is. Returns the

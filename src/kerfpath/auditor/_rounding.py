@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from kerfpath._arrays import Array
+from kerfpath._told import told
 from kerfpath.auditor._chain import chain_of
 from kerfpath.plans import Plan
 
@@ -34,6 +35,8 @@ class Rounding:
 
     q: Array
     time: Array
+
+    __repr__ = told
 
     def of_velocity(self, dq: Array, dt: Array) -> Array:
         """Return the bound (K-1, n) rad/s on joint velocities from increments dq in dt (K-1,) s."""

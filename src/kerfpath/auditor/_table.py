@@ -8,6 +8,8 @@ from typing import Literal
 
 import numpy as np
 
+from kerfpath._told import told
+
 __all__ = ["Check", "Issue", "Level", "Unit", "worst_of"]
 
 Unit = Literal["m", "rad", "m^3", "s", "share", "count"]
@@ -44,6 +46,8 @@ class Check:
     level: Level = "error"
     advice: str = ""
 
+    __repr__ = told
+
     @property
     def ok(self) -> bool:
         """True when the value keeps the limit; False for NaN."""
@@ -68,6 +72,8 @@ class Issue:
     code: str
     message: str
     node: int
+
+    __repr__ = told
 
     def __str__(self) -> str:
         return f"{self.level}: {self.message} [{self.code}]"

@@ -1,8 +1,36 @@
-"""CAD in: what a drawing holds, its loops by name, and each loop as a contour."""
+"""CAD in: what a drawing holds, its loops by name, and each loop as a contour.
 
-from kerfpath.cad._departure import Departure, departure_from
-from kerfpath.cad._measured import read_measured
-from kerfpath.cad._part import Loop, Part
-from kerfpath.cad._read import read
+Names load when they are first used: the process that translates a file needs none of them.
+"""
 
-__all__ = ["Departure", "Loop", "Part", "departure_from", "read", "read_measured"]
+from importlib import import_module
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from kerfpath.cad._departure import Departure as Departure
+    from kerfpath.cad._departure import departure_from as departure_from
+    from kerfpath.cad._left_out import LeftOut as LeftOut
+    from kerfpath.cad._measured import read_measured as read_measured
+    from kerfpath.cad._part import Loop as Loop
+    from kerfpath.cad._part import Part as Part
+    from kerfpath.cad._read import read as read
+
+_HOME = {
+    "Departure": "_departure",
+    "LeftOut": "_left_out",
+    "Loop": "_part",
+    "Part": "_part",
+    "departure_from": "_departure",
+    "read": "_read",
+    "read_measured": "_measured",
+}
+
+__all__ = sorted(_HOME)
+
+
+def __getattr__(name: str) -> object:
+    if name not in _HOME:
+        raise AttributeError(f"module 'kerfpath.cad' has no attribute {name!r}")
+    value = getattr(import_module(f"kerfpath.cad.{_HOME[name]}"), name)
+    globals()[name] = value
+    return value

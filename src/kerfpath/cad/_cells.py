@@ -10,6 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from kerfpath._told import told
 from kerfpath.errors import InputError
 
 __all__ = ["Cells", "cells_of"]
@@ -24,6 +25,8 @@ class Cells:
     lines: Sequence[int]
     rows: Sequence[Sequence[str]]
     has_decimal_comma: bool
+
+    __repr__ = told
 
     def is_numbers(self, row: int) -> bool:
         """Return whether all cells of a row are numbers: whether it is no header."""

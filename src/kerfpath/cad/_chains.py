@@ -12,8 +12,9 @@ from scipy.spatial import cKDTree
 from kerfpath._arrays import Array, Ints, freeze
 from kerfpath.cad._connected import connected
 from kerfpath.cad._curves import Curve, backwards
-from kerfpath.cad._part import Kind, Part, loop_of, numbered
-from kerfpath.cad._sample import Chain, Trace
+from kerfpath.cad._left_out import LeftOut
+from kerfpath.cad._part import Kind, Part, loop_of
+from kerfpath.cad._sample import Chain, Trace, numbered
 from kerfpath.cad._units import MM
 from kerfpath.errors import InputError
 
@@ -32,6 +33,7 @@ def loops_in(
     *,
     gap: float,
     notes: Sequence[str],
+    left_out: Sequence[LeftOut] = (),
 ) -> Part:
     """Return the part that flat curves make up, by layer and colour; `gap` in m.
 
@@ -39,13 +41,16 @@ def loops_in(
     lies within an odd number of others.
     """
     chains: list[tuple[Look, Chain[Curve]]] = []
-    told = list(notes)
+    told = [*notes, *map(str, left_out)]
     for look, curves in drawn.items():
         kept, repaired = _repaired(curves)
         told += [f"layer {look[0]}, {look[1]}: {what}" for what in repaired]
         chains += [(look, chain) for chain in _chains(kept, gap / MM)]
     if not chains:
-        raise InputError(f"{path}: holds nothing to cut: no line, arc, polyline, ellipse or spline")
+        why = f"; {left_out[0]}" if left_out else ""
+        raise InputError(
+            f"{path}: holds nothing to cut: no line, arc, polyline, ellipse or spline{why}"
+        )
     polygons = [chain.around for _, chain in chains if chain.is_closed]
     depth = iter(_depths(polygons))
     kinds: list[Kind] = []
@@ -89,6 +94,7 @@ def loops_in(
         faces=0,
         loops=tuple(loops),
         notes=tuple(told),
+        left_out=tuple(left_out),
         _gap=gap,
     )
 

@@ -10,6 +10,7 @@ import numpy as np
 from scipy.interpolate import BSpline
 
 from kerfpath._arrays import Array
+from kerfpath._told import told
 
 __all__ = ["Arc", "Curve", "Line", "Spline", "backwards"]
 
@@ -74,6 +75,8 @@ class Line(_Flat):
     start: float = 0.0
     end: float = 1.0
 
+    __repr__ = told
+
     def at(self, t: Array) -> Array:
         """Return points (K, 3) mm."""
         return np.asarray(self.p + t[:, None] * (self.q - self.p))
@@ -92,6 +95,8 @@ class Arc(_Flat):
     minor: Array
     start: float
     end: float
+
+    __repr__ = told
 
     def at(self, t: Array) -> Array:
         """Return points (K, 3) mm."""

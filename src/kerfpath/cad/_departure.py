@@ -10,6 +10,7 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from kerfpath._arrays import Array, Ints
+from kerfpath._told import told
 from kerfpath.cad._sample import Curve, Points, Polyline, Trace, off_chord, sampled
 from kerfpath.cad._units import MM
 from kerfpath.contour import Contour, angle_between, turned
@@ -71,6 +72,8 @@ class Departure:
     axis_step: float
     step_node: int
     path: Departure | None = None
+
+    __repr__ = told
 
 
 def departure(trace: Trace, contour: Contour, tolerance: float) -> Departure:

@@ -1,41 +1,36 @@
-"""Read DXF files: flat contours in millimetres, with layers and colours, chained to loops."""
+"""Read DXF files: flat contours in millimetres, with layers and colours, chained to loops.
+
+What is left out is counted by kind and reason, also what ezdxf drops in repairing a file.
+"""
 
 from __future__ import annotations
 
-import logging
 from collections import Counter
-from collections.abc import Iterable, Iterator
-from contextlib import contextmanager
+from collections.abc import Iterable
 from dataclasses import dataclass, field
-from io import BytesIO
+from itertools import product
 from pathlib import Path
 
 import numpy as np
-from ezdxf import recover
 from ezdxf.colors import BYBLOCK, BYLAYER, int2rgb
 from ezdxf.document import Drawing
-from ezdxf.entities.arc import Arc as DxfArc
-from ezdxf.entities.circle import Circle
 from ezdxf.entities.dxfgfx import DXFGraphic
-from ezdxf.entities.ellipse import Ellipse
 from ezdxf.entities.insert import Insert
-from ezdxf.entities.line import Line as DxfLine
-from ezdxf.entities.lwpolyline import LWPolyline
-from ezdxf.entities.polyline import Polyline
-from ezdxf.entities.spline import Spline as DxfSpline
-from ezdxf.lldxf.const import DXFError
-from scipy.interpolate import BSpline
+from ezdxf.math import Vec3
+from ezdxf.xclip import XClip
 
 from kerfpath._arrays import Array
 from kerfpath.cad._chains import Look, loops_in
-from kerfpath.cad._curves import Arc, Curve, Line, Spline
+from kerfpath.cad._curves import Curve
+from kerfpath.cad._dxf_document import DAMAGED, document_of
+from kerfpath.cad._dxf_entities import curves_of
+from kerfpath.cad._left_out import LeftOut
 from kerfpath.cad._part import Part
 from kerfpath.cad._units import LARGEST, UNITS_MM
 from kerfpath.errors import InputError
 
 __all__ = ["read_dxf"]
 
-logger = logging.getLogger("ezdxf")
 INSUNITS = {
     1: "in", 2: "ft", 4: "mm", 5: "cm", 6: "m", 7: "km", 9: "mil", 13: "um", 14: "dm",
 }  # fmt: skip
@@ -47,13 +42,15 @@ LOOSE = ("0", "white")
 DEEPEST = 32
 """Blocks inside blocks; more means that a block holds itself."""
 MOST = 200_000
-"""Curves in a drawing; more is a slip in the rows and columns of a block."""
+"""Curves and blocks in a drawing; more is a slip in the rows and columns of a block."""
 FLAT = 1e-6
 """How far (mm) a curve may leave the drawing plane: what writers round to."""
-DAMAGED = (
-    DXFError, ArithmeticError, AssertionError, AttributeError, LookupError, TypeError, ValueError,
-)  # fmt: skip
-"""What ezdxf and splines raise on values that are none, and on structures that are torn."""
+NEVER_CUT = frozenset([
+    "TEXT", "MTEXT", "ATTDEF", "ATTRIB", "DIMENSION", "ARC_DIMENSION", "LARGE_RADIAL_DIMENSION",
+    "LEADER", "MLEADER", "MULTILEADER", "TOLERANCE", "POINT", "VIEWPORT", "IMAGE", "WIPEOUT",
+    "PDFUNDERLAY", "DWFUNDERLAY", "DGNUNDERLAY", "RAY", "XLINE", "ACAD_TABLE", "LIGHT", "SUN",
+])  # fmt: skip
+"""Kinds of entities that say something about a part, and are no line of it; others may be."""
 
 
 def read_dxf(path: Path, content: bytes, unit: str | None, gap: float) -> Part:
@@ -66,12 +63,12 @@ def read_dxf(path: Path, content: bytes, unit: str | None, gap: float) -> Part:
         known.
     """
     try:
-        document, repairs = _document(content)
+        document, repairs, lost = document_of(content)
         insunits = int(document.header.get("$INSUNITS", 0))
     except DAMAGED as error:
-        reason = " ".join(str(error).split()) or type(error).__name__
         raise InputError(
-            f"{path}: not a DXF file, or a damaged one ({reason}); save the drawing as DXF again"
+            f"{path}: not a DXF file, or a damaged one ({_reason(error)}); save the drawing as DXF "
+            "again"
         ) from None
     declared = INSUNITS.get(insunits, "")
     if unit is None and not declared:
@@ -86,53 +83,25 @@ def read_dxf(path: Path, content: bytes, unit: str | None, gap: float) -> Part:
         notes.append(f"unit {unit} as asked; $INSUNITS says {declared}")
     if repairs:
         notes.append(f"{len(repairs)} faults of the file repaired, the first: {repairs[0]}")
-    sheet = _Sheet(document, UNITS_MM[unit or declared])
+    sheet = _Sheet(document)
+    scale = UNITS_MM[unit or declared]
     try:
         with np.errstate(all="ignore"):  # ezdxf divides by lengths that may be 0
-            sheet.add(document.modelspace())
+            sheet.add(document.modelspace(), np.diag([scale, scale, scale, 1.0]))
+            sheet.look_on_paper()
     except InputError as error:
         raise InputError(f"{path}: {error}") from None
     except DAMAGED as error:
-        reason = " ".join(str(error).split()) or type(error).__name__
-        raise InputError(f"{path}: a damaged entity ({reason}); repair it in CAD") from None
-    return loops_in(path, unit or declared, sheet.curves, gap=gap, notes=notes + sheet.notes())
+        raise InputError(f"{path}: damaged ({_reason(error)}); repair it in CAD") from None
+    sheet.left_out.update(lost)
+    return loops_in(
+        path, unit or declared, sheet.curves, gap=gap, notes=notes, left_out=sheet.summed()
+    )
 
 
-def _document(content: bytes) -> tuple[Drawing, list[str]]:
-    """Return the drawing and what was repaired in reading it."""
-    if b"AutoCAD Binary DXF" in content[:22]:
-        raise InputError("a binary DXF; save it as text")
-    if b"SECTION" not in content[:4096]:
-        raise DXFError(f"expected SECTION at its start, got {content[:32]!r}")
-    with _overheard() as said:
-        document, auditor = recover.read(BytesIO(content))
-    faults = [*said, *(fault.message for fault in (*auditor.fixes, *auditor.errors))]
-    return document, [" ".join(fault.split())[:200] for fault in faults]
-
-
-class _Listener(logging.Handler):
-    """Keeps what is logged."""
-
-    def __init__(self, level: int) -> None:
-        super().__init__(level)
-        self.said: list[str] = []
-
-    def emit(self, record: logging.LogRecord) -> None:
-        """Keep a message."""
-        self.said.append(record.getMessage())
-
-
-@contextmanager
-def _overheard() -> Iterator[list[str]]:
-    """Give what ezdxf logs about faults, which would go to the terminal otherwise."""
-    handler = _Listener(logging.WARNING)
-    propagates, logger.propagate = logger.propagate, False
-    logger.addHandler(handler)
-    try:
-        yield handler.said
-    finally:
-        logger.removeHandler(handler)
-        logger.propagate = propagates
+def _reason(error: Exception) -> str:
+    """Return what an exception says, short enough for a line."""
+    return " ".join(str(error).split())[:80] or type(error).__name__
 
 
 @dataclass
@@ -140,43 +109,91 @@ class _Sheet:
     """Curves gathered from the entities of a drawing, in mm, by (layer, colour)."""
 
     document: Drawing
-    mm: float
     curves: dict[Look, list[Curve]] = field(default_factory=dict)
-    left_out: Counter[str] = field(default_factory=Counter)
+    left_out: Counter[tuple[str, str]] = field(default_factory=Counter)
     count: int = 0
 
-    def notes(self) -> list[str]:
-        """Say what was left out."""
-        told = ", ".join(f"{count} {what}" for what, count in self.left_out.items())
-        return [f"left out: {told}"] if told else []
+    def summed(self) -> tuple[LeftOut, ...]:
+        """Return what was left out by kind and reason, first what may have been cut."""
+        found = [
+            LeftOut(kind=kind, reason=reason, count=count, may_cut=kind not in NEVER_CUT)
+            for (kind, reason), count in self.left_out.items()
+        ]
+        return tuple(sorted(found, key=lambda one: not one.may_cut))
 
-    def add(self, entities: Iterable[DXFGraphic], inside: Look = LOOSE, depth: int = 0) -> None:
-        """Add entities; those of a block stand `inside` the layer and colour of its insertion."""
+    def look_on_paper(self) -> None:
+        """Count what stands on sheets to print, beside the model."""
+        for layout in self.document.layouts:
+            if not layout.is_modelspace:
+                for entity in layout:
+                    self.left_out[entity.dxftype(), f"on the sheet {layout.name}"] += 1
+
+    def add(
+        self, entities: Iterable[DXFGraphic], T: Array, inside: Look = LOOSE, depth: int = 0
+    ) -> None:
+        """Add entities; those of a block stand `inside` the layer and colour of its insertion.
+
+        T (4, 4) leads from their coordinates to those of the drawing, mm; it may scale.
+        """
         if depth > DEEPEST:
             raise InputError(f"blocks nest deeper than {DEEPEST}: one holds itself; repair it")
         for entity in entities:
-            layer, colour = self._look(entity, inside)
             kind = entity.dxftype()
-            if self.document.layers.has_entry(layer):
-                drawn = self.document.layers.get(layer)
-                if drawn.is_off() or drawn.is_frozen():
-                    self.left_out[f"{kind} on hidden layer {layer}"] += 1
-                    continue
-            if isinstance(entity, Insert):
-                if entity.mcount > MOST:
-                    raise InputError(f"a block is inserted {entity.mcount} times (at most {MOST})")
-                for single in entity.multi_insert() if entity.mcount > 1 else (entity,):
-                    self.add(single.virtual_entities(), (layer, colour), depth + 1)
-                continue
-            curves = list(self._curves(entity))
-            if not curves:
-                self.left_out[kind] += 1
-            self.count += len(curves)
-            if self.count > MOST:
-                raise InputError(f"more than {MOST} curves; leave out what is not to be cut")
-            for curve in curves:
-                self._require_flat(curve, kind, layer)
-            self.curves.setdefault((layer, colour), []).extend(curves)
+            try:
+                self._entity(entity, kind, T, inside, depth)
+            except InputError:
+                raise
+            except DAMAGED as error:
+                self.left_out[kind, f"it cannot be read: {_reason(error)}"] += 1
+
+    def _entity(self, entity: DXFGraphic, kind: str, T: Array, inside: Look, depth: int) -> None:
+        look = self._look(entity, inside)
+        if self.document.layers.has_entry(look[0]):
+            drawn = self.document.layers.get(look[0])
+            if drawn.is_off() or drawn.is_frozen():
+                self.left_out[kind, f"on hidden layer {look[0]}"] += 1
+                return
+        if isinstance(entity, Insert):
+            self._insert(entity, T, look, depth)
+            return
+        curves = list(curves_of(entity, T))
+        if not curves:
+            self.left_out[kind, "not a line to cut"] += 1
+        self._counted(len(curves))
+        for curve in curves:
+            self._require_flat(curve, kind, look[0])
+        self.curves.setdefault(look, []).extend(curves)
+
+    def _insert(self, insert: Insert, T: Array, look: Look, depth: int) -> None:
+        """Add a block wherever it is inserted: once, or in rows and columns."""
+        block = insert.block()
+        if block is None or block.block is None:
+            self.left_out["INSERT", "its block is not in the file"] += 1
+            return
+        if block.block.is_xref:
+            self.left_out["INSERT", "its block is in another file (XREF)"] += 1
+            return
+        if not (insert.dxf.xscale and insert.dxf.yscale):
+            self.left_out["INSERT", "it is scaled to nothing, by 0"] += 1
+            return
+        if XClip(insert).has_clipping_path:
+            self.left_out["INSERT", "not itself, but its clipping: the block is read whole"] += 1
+        ocs, own = insert.ocs(), np.array([*insert.matrix44()]).reshape(4, 4).T
+        rows = max(insert.dxf.row_count, 1) if insert.dxf.row_spacing else 1
+        columns = max(insert.dxf.column_count, 1) if insert.dxf.column_spacing else 1
+        if rows * columns > MOST:
+            raise InputError(f"a block is inserted {rows * columns} times (at most {MOST})")
+        self._counted(rows * columns)
+        for row, column in product(range(rows), range(columns)):
+            place = Vec3(column * insert.dxf.column_spacing, row * insert.dxf.row_spacing)
+            step = np.eye(4)
+            step[:3, 3] = ocs.to_wcs(place.rotate_deg(insert.dxf.rotation)).xyz
+            self.add(block, T @ step @ own, look, depth + 1)
+
+    def _counted(self, more: int) -> None:
+        self.count += more
+        if self.count > MOST:
+            raise InputError(f"more than {MOST} curves and blocks; leave out what is not to be cut")
 
     def _look(self, entity: DXFGraphic, inside: Look) -> Look:
         layer = inside[0] if entity.dxf.layer == "0" else str(entity.dxf.layer)
@@ -189,48 +206,6 @@ class _Sheet:
             known = self.document.layers.has_entry(layer)
             index = abs(int(self.document.layers.get(layer).dxf.color)) if known else 7
         return layer, COLOURS.get(index, f"aci{index}")
-
-    def _curves(self, entity: DXFGraphic) -> Iterator[Curve]:
-        """Yield the curves (mm) of an entity, none if it is not one."""
-        if isinstance(entity, DxfLine):
-            yield Line(self._point(entity.dxf.start), self._point(entity.dxf.end))
-        elif isinstance(entity, Circle):  # of which ARC is a kind
-            first, last = 0.0, 360.0
-            if isinstance(entity, DxfArc):
-                first, last = float(entity.dxf.start_angle), float(entity.dxf.end_angle)
-                last = first + ((last - first) % 360.0 or 360.0)
-            ocs, radius = entity.ocs(), float(entity.dxf.radius)
-            yield Arc(
-                self._point(ocs.to_wcs(entity.dxf.center)),
-                self._point(ocs.to_wcs((radius, 0, 0))),
-                self._point(ocs.to_wcs((0, radius, 0))),
-                *np.radians([first, last]).tolist(),
-            )
-        elif isinstance(entity, Ellipse):
-            first, last = float(entity.dxf.start_param), float(entity.dxf.end_param)
-            yield Arc(
-                self._point(entity.dxf.center),
-                self._point(entity.dxf.major_axis),
-                self._point(entity.minor_axis),
-                first,
-                first + ((last - first) % (2 * np.pi) or 2 * np.pi),
-            )
-        elif isinstance(entity, LWPolyline) or (
-            isinstance(entity, Polyline) and (entity.is_2d_polyline or entity.is_3d_polyline)
-        ):
-            for piece in entity.virtual_entities():
-                yield from self._curves(piece)
-        elif isinstance(entity, DxfSpline):
-            tool = entity.construction_tool()
-            weights = np.array(tool.weights() or np.ones(tool.count))
-            points = np.array([self._point(p) for p in tool.control_points])
-            net = np.column_stack([points * weights[:, None], weights])
-            spline = BSpline(np.array(tool.knots()), net, tool.order - 1)
-            low, high = spline.t[spline.k], spline.t[-spline.k - 1]
-            yield Spline(spline, float(low), float(high))
-
-    def _point(self, point: Iterable[float]) -> Array:
-        return np.array([*point], dtype=float) * self.mm
 
     def _require_flat(self, curve: Curve, kind: str, layer: str) -> None:
         box = curve.bounds()

@@ -3,24 +3,24 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from typing import get_args
 
 from OCP.BRepAdaptor import BRepAdaptor_Surface
 from OCP.GeomAbs import GeomAbs_SurfaceType
-from OCP.TopoDS import TopoDS_Face, TopoDS_Shape
 
 from kerfpath._arrays import freeze
 from kerfpath.cad._loops import FaceLoop, bounds_of, loops_of
 from kerfpath.cad._mesh import triangulate
-from kerfpath.cad._part import Kind, Loop, Part, Side, loop_of, numbered
-from kerfpath.cad._sample import Trace
+from kerfpath.cad._part import Kind, Loop, Part, Side, loop_of
+from kerfpath.cad._sample import Trace, numbered
+from kerfpath.cad._shape import Drawn, NamedFace, unique
 from kerfpath.cad._skins import Skin, skins_of
 from kerfpath.cad._units import MM
 
-__all__ = ["NamedFace", "part_of", "unique"]
+__all__ = ["part_of"]
 
 SURFACES = {
     GeomAbs_SurfaceType.GeomAbs_Plane: "plane",
@@ -37,38 +37,9 @@ SURFACES = {
 }
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class NamedFace:
-    """A face of a file.
-
-    Parameters
-    ----------
-    face : TopoDS_Face
-    name : str
-        As the file says, "" if it does not.
-    component : str
-        The part of an assembly that it belongs to, "" if there is only one.
-    layer, colour : str
-        As the file says, "" if it does not.
-    """
-
-    face: TopoDS_Face
-    name: str = ""
-    component: str = ""
-    layer: str = ""
-    colour: str = ""
-
-
-def part_of(
-    path: Path,
-    unit: str,
-    shape: TopoDS_Shape,
-    faces: Sequence[NamedFace],
-    *,
-    gap: float,
-    notes: Sequence[str] = (),
-) -> Part:
-    """Return the part made of `faces`, every face, skin and loop given its name; `gap` in m."""
+def part_of(path: Path, drawn: Drawn, gap: float) -> Part:
+    """Return the part that is drawn, every face, skin and loop given its name; `gap` in m."""
+    faces = drawn.faces
     found = [loops_of(named.face) for named in faces]
     skins = skins_of([named.face for named in faces], found)
     names = _names(faces)
@@ -86,13 +57,13 @@ def part_of(
         loops += [replace(loop, skin=piece_of[f]) for loop in made]
     return Part(
         path=path,
-        unit=unit,
-        bounding_box=freeze(bounds_of(shape) * MM),
+        unit=drawn.unit,
+        bounding_box=freeze(bounds_of(drawn.shape) * MM),
         faces=len(faces),
         loops=tuple(loops),
-        notes=tuple(notes),
+        notes=tuple(drawn.notes),
         _gap=gap,
-        _triangulate=partial(triangulate, shape),
+        _triangulate=partial(triangulate, drawn.shape),
     )
 
 
@@ -140,19 +111,3 @@ def _skin_names(skins: Sequence[Skin], taken: set[str]) -> list[str]:
                 name = f"skin{number}"
         names.append(name)
     return names
-
-
-def unique(names: list[str]) -> list[str]:
-    """Return `names` with a number behind each repeated one."""
-    taken, unique = set(names), []
-    seen: set[str] = set()
-    for name in names:
-        number, chosen = 1, name
-        if name in seen:
-            while chosen in taken:
-                number += 1
-                chosen = f"{name}-{number}"
-        seen.add(name)
-        taken.add(chosen)
-        unique.append(chosen)
-    return unique

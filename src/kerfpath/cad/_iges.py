@@ -14,9 +14,7 @@ from OCP.IGESData import IGESData_IGESEntity
 from OCP.TopAbs import TopAbs_ShapeEnum
 from OCP.TopoDS import TopoDS, TopoDS_Shape
 
-from kerfpath.cad._faces import NamedFace
-from kerfpath.cad._part import Part
-from kerfpath.cad._shape import explored, occt, part_of_shape
+from kerfpath.cad._shape import Drawn, NamedFace, drawn_of, explored, occt
 from kerfpath.cad._units import UNITS_MM
 from kerfpath.errors import InputError
 
@@ -28,33 +26,33 @@ WIDTH = 80
 """Columns of a line; the 73rd names its section, the rest number it there."""
 
 
-def read_iges(path: Path, content: bytes, unit: str | None, gap: float) -> Part:
-    """Return the part that an IGES file holds, its loose faces sewn together.
+def read_iges(path: Path, unit: str | None, gap: float) -> Drawn:
+    """Return what an IGES file holds, its loose faces sewn together.
 
     Raises
     ------
     InputError
         Not an IGES file, a truncated or damaged one, one without faces, or one whose header
-        declares no known unit while `unit` is not given.
+        declares no known unit while `unit` is not given: what of it, without the file's name.
     """
-    _require_whole(path, content)
-    with occt(path):
+    _require_whole(path.read_bytes())
+    with occt():
         return _read(path, unit, gap)
 
 
-def _require_whole(path: Path, content: bytes) -> None:
+def _require_whole(content: bytes) -> None:
     lines = [line for line in content.splitlines() if line.strip()]
     marks = [line[72:WIDTH].decode("ascii", "replace").replace(" ", "0") for line in lines]
     if marks[0][:1] != "S":
         raise InputError(
-            f"{path}: not an IGES file: expected S in column 73 of its first line, "
+            f"not an IGES file: expected S in column 73 of its first line, "
             f"got {marks[0][:1]!r}; export the part as IGES"
         )
     last = lines[-1].decode("ascii", "replace")
     told = re.match(r"S\s*(\d+)G\s*(\d+)D\s*(\d+)P\s*(\d+)", last)
     if marks[-1][:1] != "T" or told is None:
         raise InputError(
-            f"{path}: the file is truncated: expected a line T at its end, got {last[:32]!r}; "
+            f"the file is truncated: expected a line T at its end, got {last[:32]!r}; "
             "copy or export it again"
         )
     # OCCT may crash on lines that are missing or in another order.
@@ -63,7 +61,7 @@ def _require_whole(path: Path, content: bytes) -> None:
     for line, (want, got) in enumerate(zip_longest(due, marks), start=1):
         if got != want:
             raise InputError(
-                f"{path}: the file is damaged: expected {want} in columns 73 to {WIDTH} of line "
+                f"the file is damaged: expected {want} in columns 73 to {WIDTH} of line "
                 f"{line}, got {got or 'nothing'}; copy or export it again"
             )
 
@@ -73,22 +71,22 @@ def _require_whole(path: Path, content: bytes) -> None:
     known = range(1, int(told[3]) + 1, 2)
     if len(set(entries)) < len(entries) or not all(entry in known for entry in entries):
         raise InputError(
-            f"{path}: the file is damaged: parameters of section P belong to no entity, or are "
+            "the file is damaged: parameters of section P belong to no entity, or are "
             "scattered; copy or export it again"
         )
 
 
-def _read(path: Path, unit: str | None, gap: float) -> Part:
+def _read(path: Path, unit: str | None, gap: float) -> Drawn:
     IGESControl_Controller.Init_s()
     reader = IGESControl_Reader()
     if reader.ReadFile(str(path)) != IFSelect_ReturnStatus.IFSelect_RetDone:
-        raise InputError(f"{path}: the file cannot be parsed; export the part as IGES again")
-    _require_sound(path, reader)
+        raise InputError("the file cannot be parsed; export the part as IGES again")
+    _require_sound(reader)
     flag = reader.IGESModel().GlobalSection().UnitFlag()
     header = FLAGS.get(flag, "")
     if unit is None and not header:
         raise InputError(
-            f"{path}: the header's unit flag is {flag}, expected one of "
+            f"the header's unit flag is {flag}, expected one of "
             f"{', '.join(map(str, FLAGS))}; say what the numbers mean with unit="
         )
     reader.TransferRoots()
@@ -107,10 +105,10 @@ def _read(path: Path, unit: str | None, gap: float) -> Part:
             for named in faces
         ]
         notes.append(f"unit {unit} as asked; the header says {header or 'nothing'}")
-    return part_of_shape(path, unit or header, shape, faces, gap=gap, notes=notes)
+    return drawn_of(unit or header, shape, faces, gap=gap, notes=notes)
 
 
-def _require_sound(path: Path, reader: IGESControl_Reader) -> None:
+def _require_sound(reader: IGESControl_Reader) -> None:
     """Refuse broken entities, on which OCCT's transfer may crash the process."""
     checks = reader.WS().ModelCheckList()
     checks.Start()
@@ -119,7 +117,7 @@ def _require_sound(path: Path, reader: IGESControl_Reader) -> None:
         checks.Next()
         if check.HasFailed():
             reason = " ".join(check.CFail(1).split())
-            raise InputError(f"{path}: the file is damaged ({reason}); copy or export it again")
+            raise InputError(f"the file is damaged ({reason}); copy or export it again")
 
 
 def _name(reader: IGESControl_Reader, face: TopoDS_Shape) -> str:

@@ -12,9 +12,11 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from kerfpath._arrays import Array, Ints, floats, freeze, scalar
+from kerfpath._told import told
 from kerfpath.cad._crossing import crossing
 from kerfpath.cad._departure import ON_CURVE, Departure, departure
 from kerfpath.cad._healed import HealedSurface
+from kerfpath.cad._left_out import LeftOut
 from kerfpath.cad._loops import OrientedEdge
 from kerfpath.cad._round import diameter
 from kerfpath.cad._sample import Chain, Trace, distance
@@ -23,7 +25,7 @@ from kerfpath.contour import Contour
 from kerfpath.errors import InputError
 from kerfpath.operations import Ribbon, Surface
 
-__all__ = ["Kind", "Loop", "Part", "Side", "loop_of", "numbered"]
+__all__ = ["Kind", "Loop", "Part", "Side", "loop_of"]
 
 Kind = Literal["outer", "inner", "open"]
 Side = Literal["outer", "inner", "edge", ""]
@@ -86,6 +88,8 @@ class Loop:
     colour: str = ""
     _trace: Trace = field(repr=False)
 
+    __repr__ = told
+
     def line(self, chord_tolerance: float = 1e-4) -> Array:
         """Return points (K, 3) m along the loop for pictures, whether or not it can be cut.
 
@@ -117,6 +121,8 @@ class Part:
         Those of the skins, then those of the faces in their order; outer before inner.
     notes : tuple of str
         What was assumed, repaired or left out in reading.
+    left_out : tuple of LeftOut
+        What was left out, by kind and reason; in the notes, too.
     """
 
     path: Path
@@ -125,8 +131,16 @@ class Part:
     faces: int
     loops: tuple[Loop, ...]
     notes: tuple[str, ...] = ()
+    left_out: tuple[LeftOut, ...] = ()
     _gap: float = field(repr=False)
     _triangulate: Callable[[float], tuple[Array, Ints]] | None = field(default=None, repr=False)
+
+    def __repr__(self) -> str:
+        size = (self.bounding_box[1] - self.bounding_box[0]) * 1e3
+        return (
+            f"Part({self.path.name!r}, {self.faces} faces, {len(self.loops)} loops, "
+            f"{' x '.join(f'{v:.1f}' for v in size)} mm)"
+        )
 
     @property
     def largest_gap(self) -> float:
@@ -371,18 +385,6 @@ def loop_of(
         colour=colour,
         _trace=trace,
     )
-
-
-def numbered(traces: list[Trace], stem: str, *, alone: str | None = None) -> dict[str, Trace]:
-    """Return `traces` in the order of their middles by name: stem1, stem2, ...; a single `alone`.
-
-    Middles are rounded, so that last bits do not decide an order.
-    """
-    middles = [tuple((t.around.mean(axis=0).round(3) + 0.0).tolist()) for t in traces]
-    order = sorted(range(len(traces)), key=middles.__getitem__)
-    if alone is not None and len(traces) == 1:
-        return {alone: traces[0]}
-    return {f"{stem}{n}": traces[k] for n, k in enumerate(order, start=1)}
 
 
 def _range(value: tuple[float, float] | None, name: str) -> tuple[float, float] | None:

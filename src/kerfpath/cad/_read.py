@@ -4,11 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from kerfpath._arrays import scalar
+from kerfpath.apart import apart, stand_by
 from kerfpath.cad._part import Part
 from kerfpath.cad._units import GAP, require_unit
 from kerfpath.errors import InputError
+
+if TYPE_CHECKING:
+    from kerfpath.cad._shape import Drawn
 
 __all__ = ["content_of", "read"]
 
@@ -48,7 +53,11 @@ def read(path: str | Path, unit: str | None = None, *, gap: float = GAP) -> Part
 def content_of(path: Path, expected: str) -> bytes:
     """Return the bytes of a file, or raise InputError that says what it is expected to be."""
     try:
+        if path.exists() and not (path.is_file() or path.is_dir()):
+            raise InputError(f"{path}: is no file, which would never end; expected {expected}")
         return path.read_bytes()
+    except InputError:
+        raise
     except FileNotFoundError:
         raise InputError(f"{path}: no such file; expected {expected}") from None
     except IsADirectoryError:
@@ -60,15 +69,36 @@ def content_of(path: Path, expected: str) -> bytes:
 
 # Each reader is loaded when a file asks for it: OCCT alone takes over a second.
 def _step(path: Path, content: bytes, unit: str | None, gap: float) -> Part:
+    stand_by()
     from kerfpath.cad._step import read_step
 
-    return read_step(path, content, unit, gap)
+    return _translated(read_step, path, content, unit, gap)
 
 
 def _iges(path: Path, content: bytes, unit: str | None, gap: float) -> Part:
+    stand_by()
     from kerfpath.cad._iges import read_iges
 
-    return read_iges(path, content, unit, gap)
+    return _translated(read_iges, path, content, unit, gap)
+
+
+def _translated(
+    read: Callable[[Path, str | None, float], Drawn],
+    path: Path,
+    content: bytes,
+    unit: str | None,
+    gap: float,
+) -> Part:
+    """Return the part of a file that OCCT reads, apart from this process, which it may crash."""
+    from kerfpath.cad._faces import part_of
+    from kerfpath.cad._shape import occt
+
+    try:
+        drawn = apart(read, path.absolute(), unit, gap, size=len(content))
+        with occt():
+            return part_of(path, drawn, gap)
+    except InputError as error:
+        raise InputError(f"{path}: {error}") from None
 
 
 def _dxf(path: Path, content: bytes, unit: str | None, gap: float) -> Part:

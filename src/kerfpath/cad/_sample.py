@@ -11,10 +11,21 @@ from typing import Generic, Protocol, TypeVar
 import numpy as np
 
 from kerfpath._arrays import Array
+from kerfpath._told import told
 from kerfpath.contour import Contour
 from kerfpath.errors import InputError
 
-__all__ = ["Chain", "Curve", "Edge", "Points", "Polyline", "Trace", "off_chord", "sampled"]
+__all__ = [
+    "Chain",
+    "Curve",
+    "Edge",
+    "Points",
+    "Polyline",
+    "Trace",
+    "numbered",
+    "off_chord",
+    "sampled",
+]
 
 FIRST_CELLS = 4
 """Cells per smooth stretch to begin with: one could hide an S whose middle lies on its chord."""
@@ -121,6 +132,8 @@ class Chain(Generic[E]):
     is_closed: bool = True
     next_end: str = ""
 
+    __repr__ = told
+
     @property
     def curves(self) -> Sequence[Curve]:
         """Its edges."""
@@ -191,6 +204,8 @@ class Polyline:
 
     line: Contour
 
+    __repr__ = told
+
     def breaks(self) -> Array:
         """Return the parameters of the nodes."""
         return self.line.s
@@ -208,6 +223,8 @@ class Points:
     points: Array
     normals: Array
     is_closed: bool
+
+    __repr__ = told
 
     @cached_property
     def lengths(self) -> Array:
@@ -306,3 +323,15 @@ def distance(trace: Trace, point: Array) -> float:
     along = ((point - p) * d).sum(1) / np.maximum((d * d).sum(1), np.finfo(float).tiny)
     off = np.linalg.norm(p + np.clip(along, 0, 1)[:, None] * d - point, axis=1)
     return float((off if trace.gaps.size == len(trace.lengths) else off[:-1]).min())
+
+
+def numbered(traces: list[Trace], stem: str, *, alone: str | None = None) -> dict[str, Trace]:
+    """Return `traces` in the order of their middles by name: stem1, stem2, ...; a single `alone`.
+
+    Middles are rounded, so that last bits do not decide an order.
+    """
+    middles = [tuple((t.around.mean(axis=0).round(3) + 0.0).tolist()) for t in traces]
+    order = sorted(range(len(traces)), key=middles.__getitem__)
+    if alone is not None and len(traces) == 1:
+        return {alone: traces[0]}
+    return {f"{stem}{n}": traces[k] for n, k in enumerate(order, start=1)}

@@ -1,68 +1,150 @@
-"""What STEP and IGES have in common: OCCT kept quiet, and loose faces sewn together."""
+"""What STEP and IGES hold: a shape, its named faces, sewn together where they are loose.
+
+OCCT crashes on some damaged files, so they are read in a process of its own (`kerfpath.apart`), and
+what was read comes from there as OCCT's own binary text. This module and those that translate are
+all that the process has to import.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import replace
-from pathlib import Path
+from dataclasses import dataclass, replace
+from io import BytesIO
+from typing import Any
 
 import numpy as np
-from OCP.BRep import BRep_Tool
+from OCP.BinTools import BinTools
+from OCP.BRep import BRep_Builder, BRep_Tool
 from OCP.BRepBuilderAPI import BRepBuilderAPI_MakeSolid, BRepBuilderAPI_Sewing
 from OCP.BRepLib import BRepLib
 from OCP.Message import Message
 from OCP.Standard import Standard_Failure
 from OCP.TopAbs import TopAbs_ShapeEnum
 from OCP.TopExp import TopExp_Explorer
-from OCP.TopoDS import TopoDS, TopoDS_Shape
+from OCP.TopoDS import TopoDS, TopoDS_Compound, TopoDS_Face, TopoDS_Iterator, TopoDS_Shape
 
-from kerfpath.cad._faces import NamedFace, part_of
-from kerfpath.cad._part import Part
+from kerfpath._told import told
 from kerfpath.cad._units import MM
 from kerfpath.errors import InputError
 
-__all__ = ["explored", "occt", "part_of_shape"]
+__all__ = ["Drawn", "NamedFace", "drawn_of", "explored", "occt", "unique"]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class NamedFace:
+    """A face of a file.
+
+    Parameters
+    ----------
+    face : TopoDS_Face
+    name : str
+        As the file says, "" if it does not.
+    component : str
+        The part of an assembly that it belongs to, "" if there is only one.
+    layer, colour : str
+        As the file says, "" if it does not.
+    """
+
+    face: TopoDS_Face
+    name: str = ""
+    component: str = ""
+    layer: str = ""
+    colour: str = ""
+
+    __repr__ = told
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Drawn:
+    """A shape and its faces, each named, as they lie in it.
+
+    Parameters
+    ----------
+    unit : str
+        Length unit that the file's numbers were taken for; the shape is in mm.
+    shape : TopoDS_Shape
+    faces : sequence of NamedFace
+    notes : sequence of str
+    """
+
+    unit: str
+    shape: TopoDS_Shape
+    faces: Sequence[NamedFace]
+    notes: Sequence[str]
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        """Return what to make it of again, in another process."""
+        both, faces, builder = TopoDS_Compound(), TopoDS_Compound(), BRep_Builder()
+        builder.MakeCompound(faces)
+        for named in self.faces:
+            builder.Add(faces, named.face)
+        builder.MakeCompound(both)
+        builder.Add(both, self.shape)
+        builder.Add(both, faces)
+        stream = BytesIO()
+        BinTools.Write_s(both, stream)
+        names = [(n.name, n.component, n.layer, n.colour) for n in self.faces]
+        return _again, (self.unit, stream.getvalue(), names, tuple(self.notes))
+
+
+def _again(
+    unit: str, stream: bytes, names: Sequence[tuple[str, str, str, str]], notes: Sequence[str]
+) -> Drawn:
+    both = TopoDS_Shape()
+    BinTools.Read_s(both, BytesIO(stream))
+    shape, faces = _children(both)
+    named = [
+        NamedFace(
+            face=TopoDS.Face(face), name=name, component=component, layer=layer, colour=colour
+        )
+        for face, (name, component, layer, colour) in zip(_children(faces), names, strict=True)
+    ]
+    return Drawn(unit=unit, shape=shape, faces=named, notes=notes)
+
+
+def _children(shape: TopoDS_Shape) -> list[TopoDS_Shape]:
+    found, children = [], TopoDS_Iterator(shape)
+    while children.More():
+        found.append(children.Value())
+        children.Next()
+    return found
 
 
 @contextmanager
-def occt(path: Path) -> Iterator[None]:
+def occt() -> Iterator[None]:
     """Keep OCCT's own messages off the terminal, and put its failures in one line."""
     messenger = Message.DefaultMessenger_s()
     printers = list(messenger.Printers())
     messenger.ChangePrinters().Clear()
     try:
         yield
-    except InputError as error:
-        told = str(error)
-        raise InputError(told if told.startswith(str(path)) else f"{path}: {told}") from None
+    except InputError:
+        raise
     except (Standard_Failure, RuntimeError, UnicodeDecodeError) as error:
         reason = " ".join(str(error).split()) or type(error).__name__
-        raise InputError(
-            f"{path}: the geometry cannot be read ({reason}); export the part again"
-        ) from None
+        raise InputError(f"the geometry cannot be read ({reason}); export the part again") from None
     finally:
         for printer in printers:
             messenger.AddPrinter(printer)
 
 
-def part_of_shape(
-    path: Path,
+def drawn_of(
     unit: str,
     shape: TopoDS_Shape,
     faces: Sequence[NamedFace],
     *,
     gap: float,
     notes: Sequence[str] = (),
-) -> Part:
-    """Return the part of a shape, faces that belong to no solid sewn together within `gap` (m)."""
+) -> Drawn:
+    """Return a shape and its faces, sewn within `gap` (m) where there is no solid."""
     if not faces:
         raise InputError("the file holds no face; export the part as a solid or a surface")
     solids = explored(shape, TopAbs_ShapeEnum.TopAbs_SOLID)
     if not solids and len(faces) > 1:
         shape, faces, told = _sewn(faces, gap)
         notes = [*notes, told]
-    return part_of(path, unit, shape, faces, gap=gap, notes=notes)
+    return Drawn(unit=unit, shape=shape, faces=faces, notes=notes)
 
 
 def explored(shape: TopoDS_Shape, kind: TopAbs_ShapeEnum) -> list[TopoDS_Shape]:
@@ -104,3 +186,19 @@ def _sewn(faces: Sequence[NamedFace], gap: float) -> tuple[TopoDS_Shape, list[Na
         f"joined, the widest gap {np.round(widest, 4):g} mm; {sewing.NbFreeEdges()} edges are free"
     )
     return shape, lying, told
+
+
+def unique(names: list[str]) -> list[str]:
+    """Return `names` with a number behind each repeated one."""
+    taken, unique = set(names), []
+    seen: set[str] = set()
+    for name in names:
+        number, chosen = 1, name
+        if name in seen:
+            while chosen in taken:
+                number += 1
+                chosen = f"{name}-{number}"
+        seen.add(name)
+        taken.add(chosen)
+        unique.append(chosen)
+    return unique

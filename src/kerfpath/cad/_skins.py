@@ -13,6 +13,7 @@ from OCP.TopoDS import TopoDS_Face
 from scipy.spatial import cKDTree
 
 from kerfpath._arrays import Array, Ints
+from kerfpath._told import told
 from kerfpath.cad._connected import connected
 from kerfpath.cad._loops import FaceLoop, OrientedEdge, chained
 from kerfpath.cad._part import Side
@@ -55,6 +56,8 @@ class Skin:
     faces: tuple[int, ...]
     side: Side
     inside: frozenset[tuple[int, int, int]]
+
+    __repr__ = told
 
     def loops(self, found: Sequence[list[FaceLoop]]) -> list[FaceLoop]:
         """Return the loops around the skin and its holes, over all its faces."""

@@ -16,10 +16,8 @@ from OCP.TopAbs import TopAbs_ShapeEnum
 from OCP.TopoDS import TopoDS, TopoDS_Iterator, TopoDS_Shape
 
 from kerfpath._arrays import Array
-from kerfpath.cad._faces import NamedFace, unique
-from kerfpath.cad._part import Part
 from kerfpath.cad._part21 import points_in, sound_data
-from kerfpath.cad._shape import occt, part_of_shape
+from kerfpath.cad._shape import Drawn, NamedFace, drawn_of, occt, unique
 from kerfpath.cad._styles import styles_in
 from kerfpath.cad._units import LARGEST, UNITS_MM
 from kerfpath.errors import InputError
@@ -43,42 +41,43 @@ UNNAMED = ("", "none")
 """What CAD systems write for a face without a name, in lower case."""
 
 
-def read_step(path: Path, content: bytes, unit: str | None, gap: float) -> Part:
-    """Return the part that a STEP file (AP203, AP214, AP242) holds, its placements applied.
+def read_step(path: Path, unit: str | None, gap: float) -> Drawn:
+    """Return what a STEP file (AP203, AP214, AP242) holds, its placements applied.
 
     Raises
     ------
     InputError
         Not a STEP file, a truncated or damaged one, one without faces, or one whose header declares
-        no single unit while `unit` is not given.
+        no single unit while `unit` is not given: what of it, without the name of the file.
     """
-    _require_whole(path, content)
-    with occt(path):
+    content = path.read_bytes()
+    _require_whole(content)
+    with occt():
         return _read(path, sound_data(content), unit, gap)
 
 
-def _require_whole(path: Path, text: bytes) -> None:
+def _require_whole(text: bytes) -> None:
     if b"ISO-10303-21;" not in text[:1024]:
         raise InputError(
-            f"{path}: not a STEP file: expected ISO-10303-21; in its first line, "
+            f"not a STEP file: expected ISO-10303-21; in its first line, "
             f"got {text[:32].decode('ascii', 'replace')!r}; export the part as STEP"
         )
     if b"END-ISO-10303-21;" not in text:
         raise InputError(
-            f"{path}: the file is truncated: expected END-ISO-10303-21; at its end, "
+            f"the file is truncated: expected END-ISO-10303-21; at its end, "
             f"got {text[-32:].decode('ascii', 'replace')!r}; copy or export it again"
         )
 
 
-def _read(path: Path, data: bytes, unit: str | None, gap: float) -> Part:
+def _read(path: Path, data: bytes, unit: str | None, gap: float) -> Drawn:
     reader = STEPControl_Reader()
     if reader.ReadFile(str(path)) != IFSelect_ReturnStatus.IFSelect_RetDone:
-        raise InputError(f"{path}: the file cannot be parsed; export the part as STEP again")
-    has_styles = _require_sound(path, reader)
+        raise InputError("the file cannot be parsed; export the part as STEP again")
+    has_styles = _require_sound(reader)
     header = _header_unit(reader)
     if unit is None and header not in UNITS_MM:
         raise InputError(
-            f"{path}: the header declares {header or 'no length unit'}, expected one of "
+            f"the header declares {header or 'no length unit'}, expected one of "
             f"{', '.join(UNITS_MM)}; say what the numbers mean with unit="
         )
     _require_near(points_in(data) * UNITS_MM[unit or header])
@@ -90,9 +89,9 @@ def _read(path: Path, data: bytes, unit: str | None, gap: float) -> Part:
     reader.TransferRoots()
     shape = reader.OneShape()
     if shape is None or shape.IsNull():
-        raise InputError(f"{path}: the file holds no face; export the part as a solid or a surface")
+        raise InputError("the file holds no face; export the part as a solid or a surface")
     faces = list(_faces(reader, shape, has_styles=has_styles))
-    return part_of_shape(path, unit or header, shape, faces, gap=gap, notes=notes)
+    return drawn_of(unit or header, shape, faces, gap=gap, notes=notes)
 
 
 def _faces(
@@ -139,7 +138,7 @@ def _product(used: StepRepr_NextAssemblyUsageOccurrence) -> str:
     return (name.ToCString().strip() if name is not None else "") or "component"
 
 
-def _require_sound(path: Path, reader: STEPControl_Reader) -> bool:
+def _require_sound(reader: STEPControl_Reader) -> bool:
     """Refuse broken syntax and geometry, on which OCCT may crash; say if styles are sound."""
     has_styles = True
     model, checks = reader.WS().Model(), reader.WS().ModelCheckList()
@@ -157,15 +156,14 @@ def _require_sound(path: Path, reader: STEPControl_Reader) -> bool:
                 continue
             where = f"{entity}: "
         reason = " ".join(check.CFail(1).split())
-        raise InputError(f"{path}: the file is damaged ({where}{reason}); copy or export it again")
+        raise InputError(f"the file is damaged ({where}{reason}); copy or export it again")
     for number in range(1, model.NbEntities() + 1):
         drawn = model.Value(number)
         if isinstance(drawn, StepGeom_Pcurve):
             items = drawn.ReferenceToCurve()
             if not (items and items.NbItems() and isinstance(items.ItemsValue(1), StepGeom_Curve)):
                 raise InputError(
-                    f"{path}: the file is damaged (Pcurve: expected a curve); copy or export it "
-                    "again"
+                    "the file is damaged (Pcurve: expected a curve); copy or export it again"
                 )
     return has_styles
 

@@ -12,6 +12,7 @@ from kerfpath.cell._map import Clearances as Clearances
 from kerfpath.cell._map import clearances as clearances
 from kerfpath.cell._mesh import Mesh as Mesh
 from kerfpath.cell._mesh import welded as welded
+from kerfpath.cell._pairs import MEANT as MEANT
 from kerfpath.cell._shapes import Capsule as Capsule
 from kerfpath.cell._shapes import Hull as Hull
 from kerfpath.cell._shapes import Shape as Shape
@@ -21,3 +22,6 @@ from kerfpath.cell._shapes import frustum as frustum
 from kerfpath.cell._sheet import edges_of as edges_of
 from kerfpath.cell._sheet import thickened as thickened
 from kerfpath.cell._stl import read_stl as read_stl
+from kerfpath.cell._told import UNPROVED as UNPROVED
+from kerfpath.cell._told import caveats as caveats
+from kerfpath.cell._told import odd_sizes as odd_sizes

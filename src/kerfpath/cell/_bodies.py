@@ -5,6 +5,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Literal
 
+import numpy as np
+
+from kerfpath._arrays import Array
+from kerfpath._told import told
 from kerfpath.cell._shapes import Shape
 
 __all__ = ["Body", "Kind"]
@@ -27,6 +31,9 @@ class Body:
     kind : {"robot", "head", "part", "fixture"}
     approximate : bool
         The shape stands in for one that is not known, or is the hull around it.
+    holds : bool
+        The shape holds the real body whole. Where it need not, what is clear of it is not proved
+        clear of the body.
     """
 
     name: str
@@ -34,3 +41,12 @@ class Body:
     frame: int
     kind: Kind
     approximate: bool = False
+    holds: bool = True
+
+    __repr__ = told
+
+    @property
+    def size(self) -> Array:
+        """Edges (3,) m of the box around the shape, along the axes of its frame."""
+        corners = self.shape.corners
+        return np.asarray(np.ptp(corners, axis=0) + 2 * self.shape.radius)

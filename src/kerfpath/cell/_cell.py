@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from itertools import combinations
 
 import numpy as np
@@ -15,7 +15,15 @@ from kerfpath.cell._head import CuttingHead, MeshHead
 from kerfpath.cell._links import link_bodies
 from kerfpath.cell._mesh import Mesh
 from kerfpath.cell._motion import Sweep
-from kerfpath.cell._pairs import Places, always_near, fixed_together
+from kerfpath.cell._pairs import (
+    BY_DESIGN,
+    MEANT,
+    Design,
+    Places,
+    designs,
+    kept_all_round,
+    stand_still,
+)
 from kerfpath.cell._scene import Scene
 from kerfpath.cell._shapes import Shape
 from kerfpath.errors import InputError
@@ -31,7 +39,9 @@ Pair = tuple[str, str]
 class Cell:
     """Robot, head, part and fixtures as solids, and how near any two may come.
 
-    A joint vector is clear when every judged pair is farther apart than its near-miss distance.
+    A joint vector is clear when every judged pair is farther apart than its near-miss distance. No
+    setting that asks for more lets anything pass that was refused: the pairs that are judged, and
+    what the arm's design leaves them, do not depend on the distances asked for.
 
     Parameters
     ----------
@@ -42,9 +52,9 @@ class Cell:
         How near two bodies may come.
     near_miss_of : mapping of (name, name) to float m
         The same for single pairs.
-    may_touch : sequence of (name, name)
-        Pairs that are not judged, beside those that do not move against each other, links joined
-        by a joint, and those of the arm that overlap at every pose.
+    may_touch : sequence of (name, name), or mapping of these to str
+        Pairs that are not judged, and why, beside those that do not move against each other and
+        those of the arm that touch at every pose.
     endless : (n,) bool
         Joints that go the short way round between nodes.
     T_flange_tip, T_base_part : (4, 4) m, optional
@@ -54,12 +64,15 @@ class Cell:
     ----------
     pairs : (P, 2) int
         The judged pairs, as places in `bodies`.
-    required : (P,) m
-        The near-miss distance of each.
+    asked, required : (P,) m
+        The near-miss distance of each, as asked for and as kept: less where no pose leaves what is
+        asked for, by the arm's design.
+    depth : (P,) m
+        How deep each may overlap, as it does by design; its distance is less by no more than this.
     own : (P,) bool
-        Those that have one of their own.
+        Those that have a near-miss distance of their own, asked for or by the arm's design.
     unjudged : mapping of (name, name) to str
-        Every other pair, and why it is not judged.
+        Every other pair, and why it need not, or cannot, be judged.
 
     Raises
     ------
@@ -72,16 +85,24 @@ class Cell:
     bodies: tuple[Body, ...]
     near_miss: float = 0.0
     near_miss_of: Mapping[Pair, float] = field(default_factory=dict)
-    may_touch: Sequence[Pair] = ()
+    may_touch: Sequence[Pair] | Mapping[Pair, str] = ()
     endless: Bools
     T_flange_tip: Array | None = None
     T_base_part: Array | None = None
     pairs: Ints = field(init=False)
+    asked: Array = field(init=False)
     required: Array = field(init=False)
+    depth: Array = field(init=False)
     own: Bools = field(init=False)
     unjudged: Mapping[Pair, str] = field(init=False)
     _scene: Scene = field(init=False, repr=False)
     _sweep: Sweep = field(init=False, repr=False)
+
+    def __repr__(self) -> str:
+        return (
+            f"Cell({len(self.bodies)} bodies, {len(self.pairs)} pairs judged, all keep "
+            f"{self.near_miss * 1e3:g} mm)"
+        )
 
     def __post_init__(self) -> None:
         _set = object.__setattr__
@@ -96,12 +117,17 @@ class Cell:
         if any(not 0 <= body.frame <= n for body in bodies):
             raise InputError(f"cell: expected frames 0 to {n} for every body")
         own = {self._pair(k, "near_miss_of"): v for k, v in self.near_miss_of.items()}
-        why, needed = self._sorted_out(own)
+        why, judged = self._sorted_out(own)
         _set(self, "unjudged", {(names[a], names[b]): words for (a, b), words in why.items()})
-        _set(self, "pairs", freeze(np.array([*needed], np.int64).reshape(-1, 2)))
-        _set(self, "required", freeze(np.array([*needed.values()], dtype=np.float64)))
-        _set(self, "own", freeze(np.array([pair in own for pair in needed], dtype=np.bool_)))
-        _set(self, "_scene", Scene(bodies, self.pairs))
+        _set(self, "pairs", freeze(np.array([*judged], np.int64).reshape(-1, 2)))
+        rules = [(asked, design.keeps(asked), design.depth) for asked, design in judged.values()]
+        asked, required, depth = np.array(rules, dtype=np.float64).reshape(-1, 3).T
+        _set(self, "asked", freeze(asked))
+        _set(self, "required", freeze(required))
+        _set(self, "depth", freeze(depth))
+        given = np.array([pair in own for pair in judged], dtype=np.bool_)
+        _set(self, "own", freeze(given | (required < asked) | (depth > 0)))
+        _set(self, "_scene", _scene(bodies, judged))
         _set(self, "_sweep", Sweep(self.chain, bodies, self.pairs))
         self._require_room_for_the_base()
 
@@ -119,6 +145,11 @@ class Cell:
     def approximate(self) -> tuple[str, ...]:
         """Names of the bodies whose shape only stands in for the real one."""
         return tuple(body.name for body in self.bodies if body.approximate)
+
+    @property
+    def unproved(self) -> tuple[str, ...]:
+        """Names of bodies that need not hold the real ones, so that clear of them proves little."""
+        return tuple(body.name for body in self.bodies if not body.holds)
 
     @property
     def queries(self) -> int:
@@ -211,27 +242,36 @@ class Cell:
 
     def _sorted_out(
         self, own: Mapping[Places, float]
-    ) -> tuple[dict[Places, str], dict[Places, float]]:
-        """Return why each pair that is not judged is not, and what (m) each other must keep."""
-        bodies, names = self.bodies, self.names
-        why = {self._pair(pair, "may_touch"): "may touch" for pair in self.may_touch}
-        needed: dict[Places, float] = {}
+    ) -> tuple[dict[Places, str], dict[Places, tuple[float, Design]]]:
+        """Return why pairs are not judged; of others what each is asked to keep, and its design."""
+        bodies, names, touching = self.bodies, self.names, self.may_touch
+        reasons = touching if isinstance(touching, Mapping) else dict.fromkeys(touching, MEANT)
+        why = {self._pair(pair, "may_touch"): words for pair, words in reasons.items()}
+        asked: dict[Places, float] = {}
         for a, b in combinations(range(len(bodies)), 2):
-            if words := why.get((a, b)) or fixed_together(bodies[a], bodies[b]):
+            if words := why.get((a, b)) or stand_still(bodies[a], bodies[b]):
                 why[a, b] = words
             else:
-                needed[a, b] = _distance(own.get((a, b), self.near_miss), names, (a, b))
-        open_ = {pair: distance for pair, distance in needed.items() if pair not in own}
-        for pair in always_near(self.chain, bodies, open_):
-            del needed[pair]
-            why[pair] = "overlap, or are too near each other, at every pose tried"
+                asked[a, b] = _distance(own.get((a, b), self.near_miss), names, (a, b))
+        left = designs(self.chain, bodies, asked)
+        judged: dict[Places, tuple[float, Design]] = {}
+        for pair, distance in asked.items():
+            design = left.get(pair, Design())
+            if not design.judged:
+                why[pair] = BY_DESIGN
+            else:
+                judged[pair] = distance, design
         for a, b in own:
             if (a, b) in why:
                 raise InputError(
-                    f"cell near_miss_of: {names[a]!r} and {names[b]!r} are not judged, they "
+                    f"cell near_miss_of: {names[a]!r} and {names[b]!r} are not judged: "
                     f"{why[a, b]}; leave the pair out"
                 )
-        return why, needed
+        for pair, (distance, design) in [*judged.items()]:
+            if words := kept_all_round(self.chain, bodies, pair, distance, design):
+                del judged[pair]
+                why[pair] = words
+        return why, judged
 
     def _pair(self, pair: Pair, where: str) -> tuple[int, int]:
         for name in pair:
@@ -276,7 +316,7 @@ def cell_of(
     links: Sequence[Body] | None = None,
     near_miss: float = 0.0,
     near_miss_of: Mapping[Pair, float] | None = None,
-    may_touch: Sequence[Pair] = (),
+    may_touch: Sequence[Pair] | Mapping[Pair, str] = (),
 ) -> Cell:
     """Return the cell of a robot with a cutting head, a part and what else stands around.
 
@@ -328,6 +368,19 @@ def cell_of(
         T_flange_tip=as_pose(tool, "tool"),
         T_base_part=None if placement is None else as_pose(placement, "placement"),
     )
+
+
+def _scene(bodies: Sequence[Body], judged: Mapping[Places, tuple[float, Design]]) -> Scene:
+    """Return the bodies ready for distance queries, shaved where pairs overlap by design."""
+    solids, ends = [*bodies], []
+    for pair, (_, design) in judged.items():
+        two = [*pair]
+        if design.solid is not None:
+            place, shape = design.solid
+            two[two.index(place)] = len(solids)
+            solids.append(replace(bodies[place], shape=shape))
+        ends.append(two)
+    return Scene(solids, np.array(ends, np.int64).reshape(-1, 2))
 
 
 def _distance(value: float, names: Sequence[str], pair: tuple[int, int]) -> float:

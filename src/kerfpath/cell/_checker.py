@@ -126,6 +126,8 @@ class Checker:
         cell, q = self._cell, self._q[vertices]
         frames = cell.frames(q)
         low, high = self._known(q, frames)
+        round_ = cell.scene.round
+        low[:, round_] = high[:, round_] = cell.scene.cheap(frames)[:, round_]
         open_ = ~(low > self._needed) & ~(high <= cell.required).any(axis=1, keepdims=True)
         rows = open_.any(axis=1)
         if rows.any():

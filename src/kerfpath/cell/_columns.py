@@ -18,6 +18,8 @@ CLOSE = 1e-9
 """Of the body's size squared: twice the area of a triangle that is too thin to count with."""
 MOST = 256
 """Columns along x and y."""
+SPREAD = 64
+"""Columns that a triangle may stand in on average: of wide ones there are fewer columns."""
 
 
 class Columns:
@@ -28,11 +30,15 @@ class Columns:
         self.low, self.high = corners.min(axis=(0, 1)), corners.max(axis=(0, 1))
         size = self.high - self.low
         self._close = CLOSE * float(size.max()) ** 2
-        self._n = n = int(np.clip(np.sqrt(len(corners)), 1, MOST))
-        self._step = np.maximum(size[:2] / n, 1e-300)
-        first = self._column(corners[..., :2].min(axis=1))
-        wide = self._column(corners[..., :2].max(axis=1)) - first + 1
-        count = wide.prod(axis=1)
+        n = int(np.clip(np.sqrt(len(corners)), 1, MOST))
+        while True:
+            self._n, self._step = n, np.maximum(size[:2] / n, 1e-300)
+            first = self._column(corners[..., :2].min(axis=1))
+            wide = self._column(corners[..., :2].max(axis=1)) - first + 1
+            count = wide.prod(axis=1)
+            if count.sum() <= SPREAD * len(corners):  # as it is with n = 1 at the latest
+                break
+            n //= 2
         triangle = np.repeat(np.arange(len(corners)), count)
         place = np.arange(len(triangle)) - np.repeat(np.cumsum(count) - count, count)
         x, y = first[triangle].T + np.divmod(place, wide[triangle, 1])

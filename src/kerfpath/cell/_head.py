@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from kerfpath._arrays import as_pose, scalar
+from kerfpath._told import told
 from kerfpath.cell._bodies import Body
 from kerfpath.cell._mesh import Mesh
 from kerfpath.cell._shapes import Capsule, Shape, frustum
@@ -47,6 +48,8 @@ class CuttingHead:
     body_length: float = 0.14
     body_radius: float = 0.04
     arm_radius: float = 0.05
+
+    __repr__ = told
 
     def __post_init__(self) -> None:
         for name in ("stand_off", "nozzle_length", "body_length", "body_radius", "arm_radius"):
@@ -98,6 +101,8 @@ class MeshHead:
     stand_off: float = 1e-3
     share: float = 0.5
     nozzle_length: float = 0.06
+
+    __repr__ = told
 
     def __post_init__(self) -> None:
         for name in ("stand_off", "nozzle_length"):

@@ -23,7 +23,8 @@ Line = tuple[str, int, tuple[float, ...], tuple[float, ...], float]
 
 FRACTIONS = (0.10, 0.09, 0.07, 0.055, 0.055, 0.04, 0.04)
 """Radius of each link's capsule over the length of the arm's two long links: typical of heavy arms,
-drawn rather too thick than too thin."""
+drawn rather too thick than too thin. Real links jut out of them all the same: by makers' meshes, up
+to half of the poses collide that they call clear."""
 POINT = 1e-9
 """m: joints nearer than this have no link between them to draw."""
 
@@ -63,7 +64,7 @@ def link_bodies(robot: Robot, *, hulls: bool = True) -> tuple[Body, ...]:
 
 
 def link_capsules(robot: Robot) -> tuple[Body, ...]:
-    """Return the links as capsules along the joint chain, marked approximate.
+    """Return the links as capsules along the joint chain, marked as not holding the real ones.
 
     Radii are typical ones over the arm's lengths; for judging a cell in earnest, take the meshes
     of the robot's description.
@@ -89,6 +90,7 @@ def link_capsules(robot: Robot) -> tuple[Body, ...]:
             frame=frame,
             kind="robot",
             approximate=True,
+            holds=False,
         )
         for name, frame, a, b, radius in lines
     )
@@ -160,7 +162,8 @@ def _shape(body: Described, hulls: bool) -> Shape:
     vertices, triangles = read_surface(body.path, name)
     if not hulls:
         return closed(vertices, triangles, body.size, name).moved(body.pose)
-    vertices = vertices * body.size
+    with np.errstate(over="ignore"):  # what becomes infinite is refused for its size
+        vertices = vertices * body.size
     size_of(vertices, triangles, name)
     try:
         return Hull(vertices[np.unique(triangles)]).moved(body.pose)

@@ -18,6 +18,7 @@ from typing import NamedTuple
 import numpy as np
 
 from kerfpath._arrays import Array, Ints
+from kerfpath._told import told
 from kerfpath.cell._cell import Cell
 from kerfpath.cell._motion import relative
 from kerfpath.cell._scene import ACCURACY
@@ -46,6 +47,8 @@ class Clearances:
     lower: Array
     upper: Array
     pair: Ints
+
+    __repr__ = told
 
 
 def clearances(

@@ -15,6 +15,7 @@ from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
 from kerfpath._arrays import Array, Bools, Ints, as_pose, floats, freeze, integers, scalar
+from kerfpath._told import told
 from kerfpath.cell._columns import Columns
 from kerfpath.cell._sheet import edges_of
 from kerfpath.errors import InputError
@@ -27,6 +28,8 @@ SMALLEST = 1e-4
 """m: a whole body smaller than this has the wrong unit, too."""
 SAME = 1e-6
 """Vertices closer than this share of the body's size are one: single precision tells no more."""
+CROWDED = 64
+"""Vertices within the tolerance of each that welding takes, on average: memory grows with them."""
 MOST = 2_000_000
 """Triangles: more take minutes and gigabytes, and no cell needs them."""
 
@@ -56,6 +59,8 @@ class Mesh:
     deviation: float = 0.0
     name: str = "mesh"
     _columns: Columns = field(init=False, repr=False)
+
+    __repr__ = told
 
     def __post_init__(self) -> None:
         _set, name = object.__setattr__, self.name
@@ -180,7 +185,8 @@ def size_of(vertices: Array, triangles: Ints, name: str) -> float:
         )
     if triangles.min() < 0 or triangles.max() >= len(vertices):
         raise InputError(f"{name}: a triangle names a vertex that is not there")
-    size = float(np.ptp(vertices[triangles.ravel()], axis=0).max())
+    with np.errstate(over="ignore", invalid="ignore"):
+        size = float(np.ptp(vertices[triangles.ravel()], axis=0).max())
     if not SMALLEST <= size <= LARGEST:
         raise InputError(
             f"{name}: {size:g} m across, expected {SMALLEST:g} to {LARGEST:g} m; is its unit right?"
@@ -188,13 +194,24 @@ def size_of(vertices: Array, triangles: Ints, name: str) -> float:
     return size
 
 
-def welded(vertices: ArrayLike, triangles: ArrayLike, tolerance: float) -> tuple[Array, Ints]:
+def welded(
+    vertices: ArrayLike, triangles: ArrayLike, tolerance: float, name: str = "mesh"
+) -> tuple[Array, Ints]:
     """Return the mesh with vertices closer than `tolerance` (m) made one, slivers left out."""
     points = floats(vertices, "vertices", (None, 3))
     corners = integers(triangles, "triangles", (None, 3))
     if not len(points):
         return points, corners
-    pairs = cKDTree(points).query_pairs(tolerance, output_type="ndarray")
+    # An STL file says each vertex once per triangle: the very same ones need no search.
+    points, same = np.unique(points, axis=0, return_inverse=True)
+    corners = same.reshape(-1)[corners]
+    tree = cKDTree(points)
+    if (count := int(tree.count_neighbors(tree, tolerance))) > CROWDED * len(points):
+        raise InputError(
+            f"{name}: its vertices lie too close, on average {count // len(points)} of them within "
+            f"{tolerance:.3g} m of each; simplify the mesh"
+        )
+    pairs = tree.query_pairs(tolerance, output_type="ndarray")
     links = coo_array((np.ones(len(pairs)), (pairs[:, 0], pairs[:, 1])), shape=(len(points),) * 2)
     _, one = connected_components(links, directed=False)
     _, first = np.unique(one, return_index=True)

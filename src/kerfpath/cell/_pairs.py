@@ -1,59 +1,233 @@
-"""Which pairs of bodies are judged against each other; of every other pair, why not."""
+"""What the design of an arm leaves between its bodies, hence which pairs of them can be judged.
+
+Links of a compact wrist overlap as convex hulls, a head touches the link that it is mounted before,
+capsules are drawn too thick. What is so by design is so whatever the joints do: distances are found
+at poses spread over whole turns of all joints, limits ignored, and never depend on what a cell asks
+for. A pair that is apart at any pose is judged. Where it is never as far apart as asked, it keeps
+nearly the most that a pose leaves it. Links that touch at every pose do so by their maker's design.
+A head is not the maker's: where it touches a link at every pose it is judged as well, but for the
+depth of that overlap, by which one of the two is shaved; so is any pair that touches at most poses
+by a skin's depth.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
+from scipy.stats import qmc
 
+from kerfpath._arrays import Array
 from kerfpath.cell._bodies import Body
-from kerfpath.cell._scene import Scene
+from kerfpath.cell._mesh import Mesh
+from kerfpath.cell._motion import TOLERANCE, Sweep
+from kerfpath.cell._scene import ACCURACY, Scene
+from kerfpath.cell._shapes import Shape
+from kerfpath.cell._shaved import shaved
 from kerfpath.urdf import Chain
 
-__all__ = ["Places", "always_near", "fixed_together"]
+__all__ = ["BY_DESIGN", "MEANT", "Design", "Places", "designs", "kept_all_round", "stand_still"]
 
 Places = tuple[int, int]
 """Two bodies by their places in the cell, the one in the earlier frame first."""
 
 ARM = {"robot", "head"}
 JOINTS = 3
-"""Links with more joints between them do not overlap by design, however they overlap."""
-TRIED = (1, 15, 112)
-"""Joint vectors tried, in rounds: all at zero, then random ones."""
+"""Bodies with more joints between them are not near each other by design."""
+POSES, FIRST = 128, 32
+"""Poses tried, a power of two, so that each joint stands at as many even steps of a turn; and how
+many come first, to settle most pairs."""
+TOUCH = 2 * TOLERANCE
+"""m: nearer than this, hardly any motion could be told clear, so it is as good as contact."""
+SPARED = 0.1
+"""Of the most that the design leaves a pair, what it need not keep, or no pose would be clear."""
+SKIN = (5e-4, 1e-3, 2e-3)
+"""m: depths to which bodies that touch by design may overlap."""
+DEEPER = (3e-3, 4e-3, 6e-3, 8e-3, 0.012, 0.016, 0.024, 0.032, 0.048, 0.064, 0.096, 0.128)
+"""m: depths to which a head may overlap a link at every pose and still be judged for more."""
+HALVED = 3
+"""Times that the step before a depth is halved to find the least that does."""
+OFTEN, GONE, FREE = 0.5, 0.5, 0.25
+"""Shares of the poses: at so many a pair touches that may do so by design, and of those so many are
+freed by a skin where it does; of all, so many where a head touches a link at every pose.
+"""
+ARCS = 72
+"""Pieces of a turn that a proof for a whole one begins with."""
+FAIR = 0.1
+"""m beyond what is required: farther is not told apart."""
+BY_DESIGN = "they touch at every pose tried, by design"
+"""Why links, and a head that cannot be judged otherwise, are not judged."""
+MEANT = "they may touch"
+"""Why pairs are not judged that are listed without a reason."""
 
 
-def fixed_together(one: Body, two: Body) -> str:
-    """Say why two bodies need no judging whatever their shapes; nothing where they do."""
-    if one.frame == two.frame:
-        return "do not move against each other"
-    if {one.kind, two.kind} <= ARM and abs(one.frame - two.frame) == 1:
-        return f"joined by joint {max(one.frame, two.frame)}"
-    return ""
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Design:
+    """What the design leaves between two bodies.
 
-
-def always_near(
-    chain: Chain, bodies: Sequence[Body], required: Mapping[Places, float]
-) -> set[Places]:
-    """Return the pairs of the arm that are nearer than `required` (m) at every pose tried.
-
-    Links of a compact wrist and capsules drawn too thick overlap over two or three joints: such
-    pairs say nothing about a pose. At `TRIED` poses, limits ignored.
+    Parameters
+    ----------
+    most : float m
+        The largest distance at any pose tried; infinite where that is more than is asked for, or
+        they are shaved, and so asked for no distance at all.
+    depth : float m
+        To which they overlap by design: so far they are not judged.
+    solid : (int, Shape) or None
+        Which of the two is shaved by that depth, by its place in the cell, and what is left of it.
+    judged : bool
+        Whether anything is left that can be judged.
     """
-    near = [
+
+    most: float = np.inf
+    depth: float = 0.0
+    solid: tuple[int, Shape] | None = None
+    judged: bool = True
+
+    def keeps(self, asked: float) -> float:
+        """Return what (m) of a distance asked for such a pair keeps: no more than there is."""
+        if self.solid is not None:
+            return 0.0
+        if self.most == np.inf:
+            return asked
+        return min(asked, self.most - max(SPARED * self.most, TOUCH))
+
+
+def stand_still(one: Body, two: Body) -> str:
+    """Say why two bodies need no judging whatever their shapes; nothing where they do."""
+    return "they do not move against each other" if one.frame == two.frame else ""
+
+
+def designs(
+    chain: Chain, bodies: Sequence[Body], asked: Mapping[Places, float]
+) -> dict[Places, Design]:
+    """Return what the design leaves between the bodies of the arm that few joints are between.
+
+    Parameters
+    ----------
+    chain : Chain
+    bodies : sequence of Body
+    asked : mapping of (int, int) to float m
+        What each pair is asked to keep: more is not told apart.
+    """
+    pairs = [
         (a, b)
-        for a, b in required
+        for a, b in asked
         if {bodies[a].kind, bodies[b].kind} <= ARM
-        and 1 < bodies[b].frame - bodies[a].frame <= JOINTS
+        and 0 < bodies[b].frame - bodies[a].frame <= JOINTS
     ]
-    if not near:
-        return set()
-    held = sorted({i for pair in near for i in pair})
-    scene = Scene([bodies[i] for i in held], np.searchsorted(held, near))
-    needed = np.array([required[pair] for pair in near])
-    rng = np.random.default_rng(2008)
-    left = np.ones(len(near), bool)
-    for count in TRIED:
-        q = rng.uniform(-np.pi, np.pi, (count, len(chain.axes))) * (count > 1)
-        apart = scene.distances(chain.frames(q), needed + 1e-9, np.tile(left, (count, 1)))
-        left &= (np.where(left, apart, np.inf) <= needed).all(axis=0)
-    return {pair for pair, is_near in zip(near, left, strict=True) if is_near}
+    if not pairs:
+        return {}
+    frames = chain.frames(_poses(len(chain.axes)))
+    enough = np.array([_enough(asked[pair]) for pair in pairs])
+    apart = np.full((POSES, len(pairs)), np.nan)
+    apart[:FIRST] = _apart(bodies, pairs, frames[:FIRST], enough)
+    often = (apart[:FIRST] <= TOUCH).mean(axis=0) >= OFTEN / 2
+    more = np.flatnonzero(often | (apart[:FIRST].max(axis=0) < enough))
+    if more.size:
+        some = [pairs[i] for i in more]
+        apart[FIRST:, more] = _apart(bodies, some, frames[FIRST:], enough[more])
+    found = {}
+    for i, pair in enumerate(pairs):
+        if often[i] and (apart[:, i] <= TOUCH).mean() >= OFTEN:
+            found[pair] = _touching(bodies, pair, frames, enough[i], apart[:, i])
+        else:
+            found[pair] = _design(float(np.nanmax(apart[:, i])), enough[i])
+    return found
+
+
+def kept_all_round(
+    chain: Chain, bodies: Sequence[Body], pair: Places, asked: float, design: Design
+) -> str:
+    """Say what a pair is proved to keep at every angle of the one joint between; nothing if not."""
+    a, b = (bodies[i].frame for i in pair)
+    if b - a != 1 or not {bodies[i].kind for i in pair} <= ARM:
+        return ""
+    two, needed = left_of(bodies, pair, design), np.array([design.keeps(asked)])
+    scene = Scene(two, np.array([[0, 1]]))
+    q = np.zeros((ARCS + 1, len(chain.axes)))
+    q[:, a] = np.linspace(-np.pi, np.pi, ARCS + 1)
+    # Not worth a proof where it is not so, or hardly.
+    if not (scene.distances(chain.frames(q), needed + FAIR) > needed + TOLERANCE).all():
+        return ""
+    sweep = Sweep(chain, two, np.array([[0, 1]]))
+    if not sweep.clear(q[:-1], q[1:], needed, scene.distances).all():
+        return ""
+    said = (
+        ""
+        if not design.depth
+        else f", but for {design.depth * 1e3:g} mm that they overlap by design"
+    )
+    less = "" if needed[0] >= asked or design.depth else f" of {asked * 1e3:g} mm"
+    return f"they keep {needed[0] * 1e3:.3g} mm{less} at every angle of joint {b}{said}"
+
+
+def left_of(bodies: Sequence[Body], pair: Places, design: Design) -> tuple[Body, Body]:
+    """Return two bodies, one of them shaved by its design."""
+    a, b = (
+        bodies[i] if design.solid is None or design.solid[0] != i
+        else replace(bodies[i], shape=design.solid[1])
+        for i in pair
+    )  # fmt: skip
+    return a, b
+
+
+def _poses(joints: int) -> Array:
+    """Return joint vectors (POSES, joints) rad, spread evenly over whole turns; zero is one."""
+    spread = qmc.Sobol(joints, scramble=False).random(POSES)
+    return np.asarray(2 * np.pi * spread - np.pi, dtype=np.float64)
+
+
+def _enough(asked: float) -> float:
+    """Return the distance (m) from which on the design leaves what is asked for."""
+    return max(asked / (1 - SPARED), asked + TOUCH) + ACCURACY
+
+
+def _apart(bodies: Sequence[Body], pairs: Sequence[Places], frames: Array, enough: Array) -> Array:
+    held = sorted({i for pair in pairs for i in pair})
+    scene = Scene([bodies[i] for i in held], np.searchsorted(held, pairs))
+    return scene.distances(frames, enough)
+
+
+def _design(most: float, enough: float) -> Design:
+    return Design() if most >= enough else Design(most=most)
+
+
+def _touching(
+    bodies: Sequence[Body], pair: Places, frames: Array, enough: float, apart: Array
+) -> Design:
+    """Return the design of two bodies that touch often: `apart` (POSES,) m is their distance."""
+    touching = apart <= TOUCH
+    most, always = float(apart.max()), bool(touching.all())
+    if always and {bodies[i].kind for i in pair} == {"robot"}:
+        return Design(most=most, judged=False)
+
+    def freed(depth: float) -> Design | None:
+        """Return the design where shaving by a depth frees as many poses as it must."""
+        solid = _first_shaved(bodies, pair, depth)
+        if solid is None:
+            return None
+        found = Design(depth=depth, solid=solid)
+        two = left_of(bodies, pair, found)
+        left = _apart(two, [(0, 1)], frames[touching], np.array([enough]))[:, 0]
+        return found if (left > TOUCH).mean() >= (FREE if always else GONE) else None
+
+    less = 0.0
+    for depth in (*SKIN, *(DEEPER if always else ())):
+        if (found := freed(depth)) is not None:
+            # No more than need be, unless the shapes are but typical ones.
+            for _ in range(HALVED if all(bodies[i].holds for i in pair) and less > 0 else 0):
+                middle = (less + found.depth) / 2
+                nearer = freed(middle)
+                less, found = (middle, found) if nearer is None else (less, nearer)
+            return found
+        less = depth
+    return Design(most=most, judged=False) if always else _design(most, enough)
+
+
+def _first_shaved(bodies: Sequence[Body], pair: Places, depth: float) -> tuple[int, Shape] | None:
+    """Return what is left of one of two bodies, a convex one if there is, and its place."""
+    for i in sorted(pair, key=lambda i: isinstance(bodies[i].shape, Mesh)):
+        if (shape := shaved(bodies[i].shape, depth)) is not None:
+            return i, shape
+    return None

@@ -16,6 +16,7 @@ import numpy as np
 
 from kerfpath._arrays import Array, Bools, Ints
 from kerfpath.cell._bodies import Body
+from kerfpath.cell._lines import Lines, lines_apart
 from kerfpath.cell._mesh import Mesh
 from kerfpath.cell._shapes import Capsule, Hull, Shape, box_between
 from kerfpath.errors import InputError
@@ -57,6 +58,9 @@ class Scene:
         Which of them are judged against each other; frames do not decrease along a pair.
     """
 
+    round: Bools
+    """(P,): pairs of two capsules, whose distances follow from a formula."""
+
     def __init__(self, bodies: Sequence[Body], pairs: Ints) -> None:
         self._names = [body.name for body in bodies]
         self._solids = [_solid(body) for body in bodies]
@@ -74,6 +78,13 @@ class Scene:
         self._held = ball[self._ends[1]] + np.where(self._still[:, 0], 0.0, ball[self._ends[0]])
         with_mesh = [any(self._solids[i].mesh for i in pair) for pair in self._pairs]
         self._order = np.argsort(with_mesh, kind="stable")
+        round_ = [all(isinstance(bodies[i].shape, Capsule) for i in pair) for pair in self._pairs]
+        self.round = np.array(round_, dtype=np.bool_)
+        self._lines = [
+            Lines([bodies[i].frame for i in side], [bodies[i].shape for i in side])
+            for side in self._ends[:, self.round]
+            if side.size
+        ]
         self._request, self._result = coal.DistanceRequest(), coal.DistanceResult()
         self.queries = 0
 
@@ -113,9 +124,11 @@ class Scene:
             Where a pair is this near or nearer, the others need not be found.
         """
         low = self.cheap(frames)
-        high = np.full(low.shape, np.inf)
+        high = np.where(self.round, low, np.inf)
         enough = np.broadcast_to(np.asarray(enough, dtype=np.float64), low.shape)
-        near = wanted & (low < enough)
+        near = wanted & (low < enough) & ~self.round
+        if stop is not None:
+            near &= ~(wanted & self.round & (low <= stop)).any(axis=1, keepdims=True)
         for row in np.flatnonzero(near.any(axis=1)):
             poses: dict[int, Any] = {}
             for p in self._order[near[row, self._order]]:
@@ -126,12 +139,18 @@ class Scene:
 
     def pair_bounds(self, p: int, frames: Array, enough: Array) -> tuple[Array, Array]:
         """Return what `bounds` does of one pair, (B,) m each, with `enough` (B,) m."""
+        if self.round[p]:
+            apart = self.cheap(frames)[:, p]
+            return apart, apart
         found = [self._pair(p, T, {}, e) for T, e in zip(frames, enough.tolist(), strict=True)]
         low, high = np.array(found).reshape(-1, 2).T
         return low, high
 
     def cheap(self, frames: Array) -> Array:
-        """Return lower bounds (B, P) m by balls, and by boxes around what stands still."""
+        """Return lower bounds (B, P) m by balls, and by boxes around what stands still.
+
+        Of the pairs that are `round`, two capsules each, these are the distances themselves.
+        """
         parts = range(0, max(len(frames), 1), AT_ONCE)
         return np.vstack([self._cheap(frames[i : i + AT_ONCE]) for i in parts])
 
@@ -143,7 +162,13 @@ class Scene:
             self._still, np.clip(centres[:, b], self._low[a], self._high[a]), centres[:, a]
         )
         apart = centres[:, b] - there
-        return np.asarray(np.sqrt((apart**2).sum(axis=2)) - self._held - self._slack)
+        low = np.sqrt((apart**2).sum(axis=2)) - self._held - self._slack
+        if self._lines:
+            one, two = self._lines
+            low[:, self.round] = (
+                lines_apart(*one.at(frames), *two.at(frames)) - one.thick - two.thick
+            )
+        return np.asarray(low)
 
     def _pair(
         self, p: int, frames: Array, poses: dict[int, Any], enough: float
@@ -192,7 +217,10 @@ def _inside(inner: _Solid, outer: _Solid, frames: Array) -> bool:
 
 
 def _solid(body: Body) -> _Solid:
-    shape = body.shape
+    shape: Shape = body.shape
+    if isinstance(shape, Hull) and shape.crowded:
+        # Coal has no such convex solid. Its surface bounds the same one, at more work a query.
+        shape = Mesh(vertices=shape.points, triangles=shape.triangles, name=body.name)
     low, high = (f(shape.corners, axis=0) for f in (np.min, np.max))
     centre = (low + high) / 2
     geometry, place = _geometry(shape, body.name)

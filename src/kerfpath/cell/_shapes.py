@@ -9,7 +9,8 @@ from numpy.typing import ArrayLike
 from scipy.spatial import ConvexHull, QhullError, cKDTree
 from scipy.spatial.transform import Rotation
 
-from kerfpath._arrays import Array, as_pose, floats, freeze, positive, scalar
+from kerfpath._arrays import Array, Ints, as_pose, floats, freeze, positive, scalar
+from kerfpath._told import told
 from kerfpath.cell._mesh import Mesh
 from kerfpath.errors import InputError
 
@@ -20,6 +21,8 @@ RING = 24
 SAME = 1e-7
 """m: corners that differ by this are the same, but for rounding."""
 
+MOST_NEIGHBOURS = 254
+"""Of a corner of a convex solid in coal, which counts them in a byte."""
 CORNERS = 64
 """A hull of more corners is followed along motions by those of the box around it: far fewer, and
 hardly farther out."""
@@ -39,6 +42,8 @@ class Capsule:
     start: Array
     end: Array
     radius: float
+
+    __repr__ = told
 
     def __post_init__(self) -> None:
         for name in ("start", "end"):
@@ -70,8 +75,10 @@ class Hull:
     """
 
     points: Array
-    triangles: Array
+    triangles: Ints
     axis: Array | None
+
+    __repr__ = told
 
     def __init__(self, points: ArrayLike, *, axis: ArrayLike | None = None) -> None:
         given = floats(points, "hull points", (None, 3))
@@ -107,6 +114,12 @@ class Hull:
     def seeds(self) -> Array:
         """A point (1, 3) m inside."""
         return freeze(self.points.mean(axis=0, keepdims=True))
+
+    @property
+    def crowded(self) -> bool:
+        """Whether a corner has too many neighbours for coal's convex solids, as a cone's tip."""
+        # Around a corner of a closed surface there are as many triangles as neighbours.
+        return int(np.bincount(self.triangles.ravel()).max()) > MOST_NEIGHBOURS
 
     def moved(self, T: ArrayLike) -> Hull:
         """Return the shape in coordinates b of a pose T (4, 4) that maps its own into b."""

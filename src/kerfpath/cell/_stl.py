@@ -5,10 +5,10 @@ from __future__ import annotations
 import re
 from pathlib import Path
 
-import coal
 import numpy as np
 
 from kerfpath._arrays import Array, Ints
+from kerfpath.apart import apart
 from kerfpath.cell._mesh import SAME, Mesh, size_of, welded
 from kerfpath.errors import InputError
 
@@ -41,9 +41,10 @@ def read_stl(path: str | Path, unit: str) -> Mesh:
 
 def closed(vertices: Array, triangles: Ints, scale: Array | float, name: str) -> Mesh:
     """Return the solid inside a surface: scaled, and what the file tears apart welded."""
-    points = vertices * scale
+    with np.errstate(over="ignore"):  # what becomes infinite is refused for its size
+        points = vertices * scale
     size = size_of(points, triangles, name)
-    points, triangles = welded(points, triangles, SAME * size)
+    points, triangles = welded(points, triangles, SAME * size, name)
     return Mesh(vertices=points, triangles=triangles, name=name)
 
 
@@ -83,20 +84,29 @@ def _stl(data: bytes, name: str) -> tuple[Array, Ints]:
 
 def _loaded(path: Path, name: str) -> tuple[Array, Ints]:
     """Return what the collision library's own reader finds; it ignores the unit of COLLADA."""
-    unit = _UNIT.search(_bytes(path)) if path.suffix.lower() == ".dae" else None
+    content = _bytes(path)
+    unit = _UNIT.search(content) if path.suffix.lower() == ".dae" else None
     try:
-        mesh = coal.MeshLoader().load(
-            str(path), np.full(3, 1.0 if unit is None else unit[1], float)
-        )
+        scale = 1.0 if unit is None else float(unit[1])
+        vertices, triangles = apart(loaded, str(path.absolute()), scale, size=len(content))
+    except InputError as error:
+        raise InputError(f"{name}: {error}") from None
     except ValueError:
         raise InputError(
             f"{name}: no mesh that can be read as {path.suffix}; export it again"
         ) from None
-    found = [[mesh.tri_indices(i)[k] for k in range(3)] for i in range(mesh.num_tris)]
-    vertices, triangles = np.array(mesh.vertices()), np.array(found, np.int64).reshape(-1, 3)
     if not np.isfinite(vertices).all():
         raise InputError(f"{name}: a vertex is not a finite number; export the mesh again")
     return vertices, triangles
+
+
+def loaded(path: str, scale: float) -> tuple[Array, Ints]:
+    """Return the vertices (V, 3), scaled, and triangles (F, 3) of a mesh file; may crash."""
+    import coal
+
+    mesh = coal.MeshLoader().load(path, np.full(3, scale))
+    found = [[mesh.tri_indices(i)[k] for k in range(3)] for i in range(mesh.num_tris)]
+    return np.array(mesh.vertices()), np.array(found, np.int64).reshape(-1, 3)
 
 
 def _corners(data: bytes, name: str) -> Array:

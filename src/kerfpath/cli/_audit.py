@@ -9,7 +9,7 @@ from rich.markup import escape
 
 from kerfpath.auditor import in_words
 from kerfpath.cli._show import busy, out, print_json, table
-from kerfpath.errors import InputError
+from kerfpath.errors import InputError, about
 from kerfpath.job import Audited, audit_file, audit_program
 
 __all__ = ["show_audit"]
@@ -64,8 +64,9 @@ def show_audit(file: Path, job: Path | None, *, as_json: bool) -> bool:
 
 def _audited(file: Path, job: Path | None) -> Audited:
     if file.suffix.lower() == ".json":
-        return audit_file(file, job)
+        with about(file):
+            return audit_file(file, job)
     if job is None:
         raise InputError(f"{file}: a program is compared with its job; give it with --job JOB.toml")
-    with busy("auditing the program"):
+    with about(file), busy("auditing the program"):
         return audit_program(file, job)

@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-from itertools import combinations
 from typing import Any
 
 import numpy as np
 from rich.markup import escape
 
-from kerfpath.cell import Body, Capsule, Cell, Mesh
+from kerfpath.cell import Body, Capsule, Cell, Mesh, caveats, odd_sizes
 from kerfpath.cli._drawing import drawing_entry
 from kerfpath.cli._show import out, print_json, table
 from kerfpath.job import Checked, collision_note
@@ -70,27 +69,41 @@ def _show_cell(cell: Cell) -> None:
             escape(body.name),
             body.kind,
             "base" if body.frame == 0 else f"joint {body.frame}",
-            _shape(body) + (", approximate" if body.approximate else ""),
+            " x ".join(f"{edge * 1e3:.0f}" for edge in body.size),
+            _shape(body) + ("" if body.holds else ", not the real one"),
             f"{len(_partners(cell, i))}",
         ]
         for i, body in enumerate(cell.bodies)
     ]
-    table(["body", "kind", "moves with", "shape", "pairs"], rows, numbers=["pairs"])
+    table(["body", "kind", "moves with", "box mm", "shape", "pairs"], rows, numbers=["pairs"])
+    for said in odd_sizes(cell):
+        out.print(f"warning: {escape(said)}")
     out.print(f"{len(cell.pairs)} pairs are judged; all keep {cell.near_miss * 1e3:g} mm, but for:")
-    for (a, b), required, own in zip(cell.pair_names, cell.required, cell.own, strict=True):
-        if own:
-            out.print(f"  {escape(a)} - {escape(b)}: {required * 1e3:g} mm")
-    free = ", ".join(f"{a} - {b}" for a, b in _not_judged(cell))
-    out.print(f"not judged, as they are joined, or stand still, or may touch: {escape(free)}")
+    rules = zip(cell.pair_names, cell.asked, cell.required, cell.depth, cell.own, strict=True)
+    for (a, b), asked, required, depth, own in rules:
+        if own or required < asked or depth > 0:
+            said = f"{required * 1e3:.3g} mm"
+            if depth > 0:
+                said = f"beyond the {depth * 1e3:g} mm that they overlap by design"
+            elif required < asked:
+                said += f" of {asked * 1e3:g} mm asked, nearly all that the design leaves"
+            out.print(f"  {escape(a)} - {escape(b)}: {said}")
+    out.print("not judged:")
+    for why, pairs in _not_judged(cell).items():
+        said = ", ".join(f"{a} - {b}" for a, b in pairs)
+        out.print(f"  {escape(why)}: {escape(said)}")
 
 
 def _partners(cell: Cell, body: int) -> list[int]:
     return [int(a + b - body) for a, b in cell.pairs.tolist() if body in (a, b)]
 
 
-def _not_judged(cell: Cell) -> list[tuple[str, str]]:
-    judged = set(cell.pair_names)
-    return [pair for pair in combinations(cell.names, 2) if pair not in judged]
+def _not_judged(cell: Cell) -> dict[str, list[tuple[str, str]]]:
+    """Return the pairs that are not judged, by why they are not."""
+    found: dict[str, list[tuple[str, str]]] = {}
+    for pair, why in cell.unjudged.items():
+        found.setdefault(why, []).append(pair)
+    return found
 
 
 def _shape(body: Body) -> str:
@@ -99,19 +112,37 @@ def _shape(body: Body) -> str:
         return f"capsule, radius {shape.radius * 1e3:.0f} mm"
     if isinstance(shape, Mesh):
         return f"mesh, {len(shape.triangles)} triangles, within {shape.deviation * 1e3:g} mm"
-    return f"convex, {len(shape.points)} corners"
+    hull = ", the hull of its mesh" if body.approximate else ""
+    surface = ", judged by its surface" if shape.crowded else ""
+    return f"convex, {len(shape.points)} corners{hull}{surface}"
 
 
 def _cell_entry(cell: Cell) -> dict[str, Any]:
     return {
         "near_miss_m": cell.near_miss,
         "bodies": [
-            {"name": b.name, "kind": b.kind, "joint": b.frame, "approximate": b.approximate}
+            {
+                "name": b.name,
+                "kind": b.kind,
+                "joint": b.frame,
+                "approximate": b.approximate,
+                "holds_the_real_one": b.holds,
+                "size_m": b.size.tolist(),
+            }
             for b in cell.bodies
         ],
+        "warnings": list(odd_sizes(cell)),
         "judged": [
-            {"between": list(pair), "at_least_m": float(required)}
-            for pair, required in zip(cell.pair_names, cell.required, strict=True)
+            {
+                "between": list(pair),
+                "at_least_m": float(required),
+                "asked_m": float(asked),
+                "overlap_by_design_m": float(depth),
+            }
+            for pair, asked, required, depth in zip(
+                cell.pair_names, cell.asked, cell.required, cell.depth, strict=True
+            )
         ],
-        "not_judged": [list(pair) for pair in _not_judged(cell)],
+        "not_judged": [{"between": list(pair), "why": why} for pair, why in cell.unjudged.items()],
+        "not_proved": list(caveats(cell)),
     }

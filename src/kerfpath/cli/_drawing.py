@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import asdict
 from typing import Any
 
 from rich.markup import escape
@@ -58,4 +59,5 @@ def drawing_entry(part: Part) -> dict[str, Any]:
         "largest_gap_m": part.largest_gap,
         "shortest_edge_m": part.shortest_edge,
         "notes": list(part.notes),
+        "left_out": [asdict(each) for each in part.left_out],
     }

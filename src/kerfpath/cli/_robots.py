@@ -88,6 +88,7 @@ def show_robot(name: str, *, as_json: bool) -> None:
                     k.replace(" ", "_").replace("/", "_").replace("^", ""): v
                     for k, v in limits.items()
                 },
+                "axis_3": r.axis_3,
                 "couplings": couplings,
                 "endless": (np.flatnonzero(r.endless) + 1).tolist(),
                 "limits_missing": r.limits_missing,

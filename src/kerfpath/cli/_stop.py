@@ -86,8 +86,10 @@ def _note(*_: object) -> None:
 
 def _watch(hears: socket.socket) -> None:
     """Wait for the signal, which the interpreter's own handler tells of at any time."""
+    asked = 0
     while told := hears.recv(16):
-        if signal.SIGINT in told and (_heard or not _ordered):
+        asked += told.count(signal.SIGINT)
+        if asked > (1 if _ordered else 0):
             no_more_writing(FILE_SECONDS)
             _say("kerfpath: stopped")
             os._exit(STOPPED)

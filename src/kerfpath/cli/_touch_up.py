@@ -9,7 +9,7 @@ import numpy as np
 from rich.markup import escape
 
 from kerfpath.cli._plan import leave
-from kerfpath.cli._show import compile_kernels, out, progress_bars
+from kerfpath.cli._show import compile_kernels, out, progress_bars, told_once
 from kerfpath.job import require_folder, touch_up
 
 __all__ = ["touch_up_program"]
@@ -30,6 +30,6 @@ def touch_up_program(
                 f"{escape(each.place)}: {escape(each.contour)}, node {each.node}, moved by "
                 f"{each.off * 1e3:.3f} mm, axis turned by {np.degrees(each.turned):.3f} deg"
             )
-        for note in done.notes:
+        for note in told_once(done.notes):
             out.print(f"note: {escape(note)}")
     leave(done.outcome, done.part, folder, as_json=as_json, more=more)

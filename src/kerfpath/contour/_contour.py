@@ -76,6 +76,12 @@ class Contour:
     x: Array | None = None
     name: str = "contour"
 
+    def __repr__(self) -> str:
+        return (
+            f"Contour({self.name!r}, {len(self.points)} points, {self.length * 1e3:.1f} mm, "
+            f"{'closed' if self.closed else 'open'})"
+        )
+
     def __post_init__(self) -> None:
         points = floats(self.points, "points", (None, 3))
         axes = unit(floats(self.axes, "axes", (len(points), 3)))

@@ -10,6 +10,7 @@ from typing import get_args
 import numpy as np
 
 from kerfpath._arrays import Array, freeze
+from kerfpath._told import told
 from kerfpath.front._criteria import Criterion
 from kerfpath.front._runs import Run, in_window, quicker
 from kerfpath.graph import LayeredGraph
@@ -54,6 +55,8 @@ class Made:
     run: Run
     losses: Array
     reach: Array
+
+    __repr__ = told
 
 
 def reach_of(plan: Plan) -> Array:

@@ -6,6 +6,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
+from kerfpath._told import told
 from kerfpath.auditor import audit as full_audit
 from kerfpath.cell import Cell
 from kerfpath.contour import Contour
@@ -39,6 +40,8 @@ class Attempts:
     cell: Cell | None
     options: dict[str, Any]
     audit: Callable[[Plan], Sequence[object]] | None = None
+
+    __repr__ = told
 
     def of(self, run: Run) -> Plan | str:
         """Return the plan of a run, which has passed its audit, or in a few words why not."""

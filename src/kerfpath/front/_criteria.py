@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from kerfpath._arrays import Array, floats, freeze
+from kerfpath._told import told
 from kerfpath.air import least_time
 from kerfpath.cell import Cell
 from kerfpath.comfort import MEASURES, Comfort
@@ -59,6 +60,8 @@ class Criterion:
     joint: int | None
     unit: str
 
+    __repr__ = told
+
     @property
     def sense(self) -> float:
         """1 where less is better, -1 where more is."""
@@ -83,6 +86,8 @@ class Judge:
     eta_a: float
     cell: Cell | None
     home: Array | None
+
+    __repr__ = told
 
     def losses(self, plan: Plan) -> Array:
         """Return the criteria (C,) of a plan, with signs by which less is better.

@@ -10,6 +10,7 @@ from typing import Any, get_args
 import numpy as np
 
 from kerfpath._arrays import Array, Bools, freeze
+from kerfpath._told import told
 from kerfpath.cell import Cell
 from kerfpath.front._clearance import roomier
 from kerfpath.front._criteria import Criterion
@@ -55,6 +56,8 @@ class Run:
     eta_a: float
     window: Array
     clearance: float = 0.0
+
+    __repr__ = told
 
     @property
     def options(self) -> dict[str, Any]:

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from kerfpath._arrays import Array, floats, freeze
+from kerfpath._told import told
 from kerfpath.errors import InputError
 from kerfpath.front._runs import Run
 from kerfpath.plans import Plan
@@ -59,6 +60,8 @@ class Front:
     tried: int
     feasible: int
     failures: Mapping[str, int]
+
+    __repr__ = told
 
     @property
     def scaled(self) -> Array:
@@ -134,6 +137,8 @@ class ParetoSet(Front):
     """
 
     plans: tuple[Plan, ...]
+
+    __repr__ = told
 
     def best(self, criterion: str) -> Plan:
         """Return the plan that is best in a criterion.

@@ -1,6 +1,5 @@
 """The job: one file that says what to cut and how, its run, and the files the run leaves."""
 
-from kerfpath.job._again import audit_file as audit_file
 from kerfpath.job._again import program_from_file as program_from_file
 from kerfpath.job._again import program_language as program_language
 from kerfpath.job._cell import cell_of_job as cell_of_job
@@ -11,13 +10,16 @@ from kerfpath.job._files import Texts as Texts
 from kerfpath.job._files import Written as Written
 from kerfpath.job._files import make_folder as make_folder
 from kerfpath.job._files import outcome_texts as outcome_texts
+from kerfpath.job._files import planned_text as planned_text
 from kerfpath.job._files import require_folder as require_folder
 from kerfpath.job._files import require_language as require_language
 from kerfpath.job._files import stale_program as stale_program
 from kerfpath.job._files import write_outcome as write_outcome
 from kerfpath.job._heads import pose as pose
-from kerfpath.job._planfile import PlanFile as PlanFile
-from kerfpath.job._planfile import read_plan_file as read_plan_file
+from kerfpath.job._plan_audit import PlanAudit as PlanAudit
+from kerfpath.job._plan_audit import audit_file as audit_file
+from kerfpath.job._planread import PlanFile as PlanFile
+from kerfpath.job._planread import read_plan_file as read_plan_file
 from kerfpath.job._program_audit import ProgramAsked as ProgramAsked
 from kerfpath.job._program_audit import audit_program as audit_program
 from kerfpath.job._program_compare import Compared as Compared

@@ -2,32 +2,28 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import fields, replace
 from pathlib import Path
 from typing import Any, TypeVar
 
 import numpy as np
-from pydantic import BaseModel, ValidationError
+from pydantic import BaseModel
 
 from kerfpath.auditor import Check, checks
-from kerfpath.cad import Part
-from kerfpath.cad import read as read_drawing
-from kerfpath.cell import Cell
-from kerfpath.contour import Contour
 from kerfpath.errors import AuditFailed, InputError, NoFeasiblePath
-from kerfpath.job._cell import cell_of_job
-from kerfpath.job._planfile import PlanFile, read_plan_file
+from kerfpath.job._plan_audit import audit_file
+from kerfpath.job._planread import PlanFile, read_plan_file, table_of
 from kerfpath.job._program_audit import ProgramAsked
 from kerfpath.job._program_of import asked_of_plans, program_of
 from kerfpath.job._read import Job, ProgramOptions, audit_options, program_options, read_job
 from kerfpath.job._tables import AuditTable, LayoutTable, ProgramTable, SequenceTable
-from kerfpath.job._verdict import Audited, collision_note
+from kerfpath.job._verdict import Audited
 from kerfpath.placement import MeasuredFrame, placed, placed_moves, planned_again
 from kerfpath.plans import Plan
 from kerfpath.post import language as find_language
 
-__all__ = ["audit_file", "program_from_file", "program_language", "require_same"]
+__all__ = ["program_from_file", "program_language", "require_same"]
 
 LED_NOTE = (
     "The joints are led to the measured part and audited there for path, limits, velocities and "
@@ -39,43 +35,10 @@ LED_MOVES_NOTE = (
     "clear any more."
 )
 _M = TypeVar("_M", bound=BaseModel)
-_R = TypeVar("_R")
 
 
 SAME_PLACE = 1e-6
 """m: what a plan.json and its job say of the same place differs by rounding at most."""
-
-
-def audit_file(plan_file: Path, job_file: Path | None = None) -> Audited:
-    """Return what the audit says of every contour of a plan.json.
-
-    Collisions are checked in the cell of the job, where one is given and has one.
-
-    Parameters
-    ----------
-    plan_file : Path
-    job_file : Path, optional
-        Its job; the deviation between nodes is then measured against the drawing.
-
-    Raises
-    ------
-    InputError
-        A file cannot be read, or the job is not that of the plan.
-    """
-    file = read_plan_file(plan_file)
-    drawn: dict[str, Contour] = {}
-    cell = None
-    if job_file is not None:
-        job = read_job(job_file)
-        part = read_drawing(job.part_file, unit=job.part_unit)
-        drawn, cell = _drawn(file, job, part), cell_of_job(job, part)
-    asked = _table(file, "audit", AuditTable, audit_options)
-    tables = {}
-    for p in file.plans:
-        if job_file is not None:
-            require_same(p, job, file.path)
-        tables[p.name] = checks(p, reference=drawn.get(p.name), cell=cell, **asked)
-    return Audited(tables=tables, missing=file.missing, note=_note(file, cell, job_file))
 
 
 def program_from_file(
@@ -144,7 +107,7 @@ def program_from_file(
     if frame is not None:
         file, again = _led(file, frame, options.retract)
         notes += [*again, LED_NOTE, *([LED_MOVES_NOTE] if file.moves else [])]
-    asked = _table(file, "audit", AuditTable, audit_options)
+    asked = table_of(file, "audit", AuditTable, audit_options)
     for p in file.plans:
         for check in checks(p, **asked):
             if check.level == "error" and not check.ok:
@@ -196,9 +159,9 @@ def _job_of(file: PlanFile, options: ProgramOptions) -> Job:
         interruptions="none",
         least_piece=None,
         cell=None,
-        sequence=None if sequence is None else _table(file, "sequence", SequenceTable, _same),
+        sequence=None if sequence is None else table_of(file, "sequence", SequenceTable, _same),
         layout=LayoutTable(),
-        audit_options=_table(file, "audit", AuditTable, audit_options),
+        audit_options=table_of(file, "audit", AuditTable, audit_options),
         program=options,
         source=file.job,
     )
@@ -211,8 +174,9 @@ def _same(table: _M) -> _M:
 def _require_passed(found: Audited) -> None:
     for name, table in found.tables.items():
         for check in table:
-            if check.level == "error" and not check.ok:
-                raise AuditFailed(f"no program: contour {name!r} fails its audit: {check.issue()}")
+            own = check.code == "job-program"  # [program] is taken from the job as it is now
+            if check.level == "error" and not check.ok and not own:
+                raise AuditFailed(f"no program: {name!r} fails its audit: {check.issue()}")
 
 
 def _led(file: PlanFile, frame: MeasuredFrame, retract: float) -> tuple[PlanFile, list[str]]:
@@ -220,7 +184,7 @@ def _led(file: PlanFile, frame: MeasuredFrame, retract: float) -> tuple[PlanFile
 
     A contour that would not pass its audit there is planned again around it; notes say which.
     """
-    asked, plans, notes = _table(file, "audit", AuditTable, audit_options), [], []
+    asked, plans, notes = table_of(file, "audit", AuditTable, audit_options), [], []
     for p in file.plans:
         led, why = _there(p, frame, asked)
         if why:
@@ -254,46 +218,13 @@ def first_failed(table: Sequence[Check]) -> Check | None:
 
 def _options(file: PlanFile, language: str, stem: str) -> ProgramOptions:
     find_language(language)
-    return _table(
+    return table_of(
         file,
         "program",
         ProgramTable,
         lambda table: program_options(table, stem),
         language=language,
     )
-
-
-def _table(
-    file: PlanFile, name: str, model: type[_M], read: Callable[[_M], _R], **changes: str
-) -> _R:
-    """Return a table of the job that a plan was made from, read as the job's own would be."""
-    table: Any = file.job.get(name, {})
-    try:
-        return read(model.model_validate({**table, **changes}))
-    except (ValidationError, TypeError) as error:
-        said = " ".join(str(error).split())
-        raise InputError(f"{file.path}: its [{name}] table is not valid ({said})") from None
-
-
-def _drawn(file: PlanFile, job: Job, part: Part) -> dict[str, Contour]:
-    tasks = {task.name: task for task in job.tasks(part)}
-    unknown = [name for name in file.contours.values() if name not in tasks]
-    if unknown:
-        raise InputError(
-            f"{job.path}: has no contour {unknown[0]!r} of {file.path}; give the job of that plan"
-        )
-    shaped = {name: tasks[name].candidates(part) for name in dict.fromkeys(file.contours.values())}
-    drawn: dict[str, Contour] = {}
-    for p in file.plans:
-        name, s = file.contours[p.name], p.contour.s
-        whole = min(shaped[name], key=lambda cut: _apart(p.contour, cut))
-        drawn[p.name] = whole if p.name == name else whole.between(float(s[0]), float(s[-1]))
-    return drawn
-
-
-def _apart(planned: Contour, cut: Contour) -> float:
-    """Return how far (m) the planned nodes are from a candidate at the same arc lengths."""
-    return float(np.linalg.norm(planned.points - cut.at(planned.s)[0], axis=1).max())
 
 
 def require_same(plan: Plan, job: Job, path: Path) -> None:
@@ -309,11 +240,3 @@ def require_same(plan: Plan, job: Job, path: Path) -> None:
                 f"{job.path}: its {name} is not where that of {path} is; give the job of that "
                 "plan, or plan it again"
             )
-
-
-def _note(file: PlanFile, cell: Cell | None, job_file: Path | None) -> str:
-    """Say what was checked for collisions."""
-    if cell is None and file.in_cell:
-        why = "give its job with --job" if job_file is None else f"{job_file} has no [cell]"
-        return f"Planned clear of collisions in a cell, which was not checked again: {why}."
-    return collision_note(cell)

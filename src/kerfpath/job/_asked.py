@@ -11,6 +11,7 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from kerfpath._arrays import Array, freeze
+from kerfpath._told import told
 from kerfpath.auditor import Check
 from kerfpath.cad import Part
 from kerfpath.cad import read as read_drawing
@@ -45,6 +46,8 @@ class Candidate:
     nodes: Contour
     dt: float
 
+    __repr__ = told
+
     @property
     def time(self) -> Array:
         """When each node is reached at the speed asked for, (K,) s."""
@@ -68,6 +71,8 @@ class Asked:
     part: Part
     cell: Cell | None
     tasks: tuple[ContourTask, ...]
+
+    __repr__ = told
 
     @cached_property
     def loops(self) -> tuple[Contour, ...]:
@@ -131,11 +136,23 @@ def order_checks(asked: Asked, done: Sequence[int], paths: Sequence[Contour]) ->
     given = sequence is None or sequence.order == "given"
     turned = [k + 1 for k, (a, b) in enumerate(pairwise(done)) if given and b < a]
     rows.append(_count("order", "contours cut before one that the job has first", turned))
+    rows.append(
+        _count("pieces", "pieces cut before one that lies before them", _early(done, paths))
+    )
     spacing = 0.0 if sequence is None else sequence.heat_spacing_mm / 1000
     if spacing > 0:
         warm = _too_warm(asked, done, paths, spacing)
         rows.append(_count("heat-spacing", "contours cut right after one too near to them", warm))
     return rows
+
+
+def _early(done: Sequence[int], paths: Sequence[Contour]) -> list[int]:
+    """Return the pieces that are cut after one that lies farther along the same contour."""
+    return [
+        k
+        for k, (i, path) in enumerate(zip(done, paths, strict=True))
+        if any(j == i and other.s[0] > path.s[0] for j, other in zip(done[:k], paths, strict=False))
+    ]
 
 
 def _too_warm(

@@ -13,6 +13,7 @@ from kerfpath._arrays import Array, Ints
 from kerfpath.cad import Part
 from kerfpath.cad import read as read_drawing
 from kerfpath.cell import (
+    MEANT,
     Cell,
     CuttingHead,
     Mesh,
@@ -76,8 +77,9 @@ def cell_of_job(job: Job, part: Part) -> Cell | None:
         _require_known(job, bare, pair.between, ("cell", "pair", i, "between"))
     for i, names in enumerate(table.may_touch):
         _require_known(job, bare, names, ("cell", "may_touch", i))
-    own = {(p.between[0], p.between[1]): p.near_miss_mm / 1000 for p in table.pair}
-    touching = [(names[0], names[1]) for names in table.may_touch]
+    own = {_two(p.between): p.near_miss_mm / 1000 for p in table.pair if p.near_miss_mm is not None}
+    touching = {_two(names): MEANT for names in table.may_touch}
+    touching |= {_two(p.between): p.allowed for p in table.pair if p.allowed is not None}
     with _at(job, "cell"):
         return replace(bare, near_miss_of={**bare.near_miss_of, **own}, may_touch=touching)
 
@@ -122,6 +124,11 @@ def _require_known(
             )
     if names[0] == names[1]:
         raise refused_at(job.path, where, f'expected two bodies, got "{names[0]}" twice')
+
+
+def _two(names: tuple[str, ...]) -> tuple[str, str]:
+    one, two = names
+    return one, two
 
 
 def _head(table: CellTable, folder: Path) -> CuttingHead | MeshHead:

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from kerfpath._told import told
 from kerfpath.cad import Part
 from kerfpath.cad import read as read_drawing
 from kerfpath.cell import Cell
@@ -45,6 +46,8 @@ class Start:
     clearance: float
     pair: tuple[str, str] | None
 
+    __repr__ = told
+
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Checked:
@@ -54,6 +57,8 @@ class Checked:
     part: Part
     cell: Cell | None
     starts: tuple[Start, ...]
+
+    __repr__ = told
 
 
 def check_job(job: Job, part: Part | None = None) -> Checked:

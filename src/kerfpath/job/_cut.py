@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 
+from kerfpath._told import told
 from kerfpath.auditor import Check
 from kerfpath.cad import Departure, Part, departure_from
 from kerfpath.contour import Contour
@@ -45,6 +46,8 @@ class Cut:
         How clear every pose is in the cell, where the job asks for the map.
     departure : Departure or None
         How far the nodes leave the CAD curve; measured once it is settled what is cut.
+    picked : bool
+        Whether the plan is one of a Pareto set, which aims at something else than the job does.
     """
 
     contour: str
@@ -59,6 +62,9 @@ class Cut:
     checks: tuple[Check, ...] = ()
     clearance: ClearanceMap | None = None
     departure: Departure | None = None
+    picked: bool = False
+
+    __repr__ = told
 
     @property
     def passed(self) -> bool:

@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 
+from kerfpath._told import told
 from kerfpath.air import AirMove
 from kerfpath.errors import AuditFailed, InputError
 from kerfpath.job._planfile import broken_entry, plan_entry, plan_text
@@ -29,6 +30,7 @@ __all__ = [
     "Written",
     "make_folder",
     "outcome_texts",
+    "planned_text",
     "require_folder",
     "require_language",
     "stale_program",
@@ -63,6 +65,8 @@ class Written:
     stale: Path | None
     notes: tuple[str, ...]
 
+    __repr__ = told
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Texts:
@@ -87,6 +91,8 @@ class Texts:
     refused: str
     unsafe: bool
     notes: tuple[str, ...]
+
+    __repr__ = told
 
 
 def write_outcome(outcome: Outcome, folder: Path, *, strict: bool = False) -> Written:
@@ -136,22 +142,28 @@ def outcome_texts(outcome: Outcome, *, strict: bool = False) -> Texts:
         except (InputError, AuditFailed) as error:
             refused, unsafe = str(error), isinstance(error, AuditFailed)
             faults.append(refused if unsafe else f"no program was written: {error}")
-    entries = []
-    for cut in outcome.cuts:
-        if cut.plan is not None:
-            entries.append(plan_entry(cut.plan, cut.contour, cut.checks))
-        elif cut.broken is not None:
-            entries.append(broken_entry(cut.task.name, cut.broken, cut.fastest))
     files = {
         **program,
-        "plan.json": plan_text(
-            job.robot, job.tool, job.placement, entries, job.source, outcome.cell, part
-        ),
+        "plan.json": planned_text(outcome),
         "trajectory.csv": trajectory_text(outcome.plans, moves),
         "report.html": report_text(outcome, notes, faults),
     }
     told = (*notes, *faults)
     return Texts(files=files, program=tuple(program), refused=refused, unsafe=unsafe, notes=told)
+
+
+def planned_text(outcome: Outcome) -> str:
+    """Return the text of the plan.json of a run."""
+    job = outcome.job
+    entries = []
+    for cut in outcome.cuts:
+        if cut.plan is not None:
+            entries.append(plan_entry(cut.plan, cut.contour, cut.checks, picked=cut.picked))
+        elif cut.broken is not None:
+            entries.append(broken_entry(cut.task.name, cut.broken, cut.fastest))
+    return plan_text(
+        job.robot, job.tool, job.placement, entries, job.source, outcome.cell, outcome.part
+    )
 
 
 def stale_program(options: ProgramOptions, folder: Path, program: Sequence[str]) -> Path | None:

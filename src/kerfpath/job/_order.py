@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
 
 import numpy as np
 
+from kerfpath._told import told
 from kerfpath.auditor import Check, air_checks, worst_of
 from kerfpath.cell import Cell
 from kerfpath.contour import Contour
@@ -43,9 +44,15 @@ class Ordered:
     stuck: NoFeasiblePath | None = None
     air: tuple[Check, ...] = ()
 
+    __repr__ = told
+
 
 def ordered(
-    job: Job, loops: Sequence[Contour], tries: Sequence[Tries], cell: Cell | None
+    job: Job,
+    loops: Sequence[Contour],
+    tries: Sequence[Tries],
+    cell: Cell | None,
+    more: Callable[[int, Sequence[Cut]], Sequence[Cut]],
 ) -> Ordered:
     """Return one cut (or its pieces) of each contour's candidates, in the order asked for.
 
@@ -57,6 +64,9 @@ def ordered(
     tries : sequence of sequences of tuples of Cut
         What came of the candidates of each.
     cell : Cell or None
+    more : callable
+        Given the number of a contour and its cuts, further ones in other postures; asked where
+        there is no way to those.
     """
     good = [[cuts for cuts in each if all(cut.passed for cut in cuts)] for each in tries]
     if job.sequence is None or not all(good):
@@ -75,6 +85,14 @@ def ordered(
     members = [[u for u, i in enumerate(owner) if i == k] for k in range(len(loops))]
     before = [(a, b) for i, j in inner for a in members[i] for b in members[j]]
     home = job.sequence.home_deg
+
+    def further(unit: int) -> list[Plan]:
+        if owner.count(owner[unit]) > 1:
+            return []  # one piece of an interrupted cut follows another in its posture
+        fresh = more(owner[unit], units[unit])
+        units[unit] += fresh
+        return [_plan(cut) for cut in fresh]
+
     try:
         part = order_plans(
             [[_plan(cut) for cut in unit] for unit in units],
@@ -88,6 +106,7 @@ def ordered(
             approach_speed=job.program.approach_speed,
             pierce_time=job.program.pierce_time,
             seconds=job.sequence.seconds,
+            more=further,
         )
     except NoFeasiblePath as stuck:
         return Ordered(cuts=tuple(unit[0] for unit in units), stuck=stuck)

@@ -5,68 +5,28 @@ from __future__ import annotations
 import json
 import re
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass
-from pathlib import Path
+from dataclasses import asdict
 from typing import Any
 
 import numpy as np
 
 from kerfpath import __version__
 from kerfpath._arrays import Array
-from kerfpath.air import AirMove
 from kerfpath.auditor import Check
-from kerfpath.cell import Cell
-from kerfpath.comfort import MEASURES, Band, Comfort
-from kerfpath.contour import KINDS, Contour
-from kerfpath.errors import InputError, NoFeasiblePath
-from kerfpath.job._external import by_unit, external_entry, joints, with_external
-from kerfpath.job._sequencefile import read_moves, sequence_entry
+from kerfpath.cell import Cell, caveats
+from kerfpath.comfort import MEASURES, Comfort
+from kerfpath.errors import NoFeasiblePath
+from kerfpath.job._external import by_unit, external_entry
+from kerfpath.job._planschema import SCHEMA
+from kerfpath.job._sequencefile import sequence_entry
 from kerfpath.planner import FastestSpeed
-from kerfpath.plans import Feed, Plan, Proof, Settings
-from kerfpath.robots import Coupling, Robot
+from kerfpath.plans import Plan
+from kerfpath.robots import Robot
 from kerfpath.sequence import PartPlan
-from kerfpath.tilt import Tilt
-from kerfpath.urdf import Chain
 
-__all__ = ["SCHEMA", "PlanFile", "broken_entry", "plan_entry", "plan_text", "read_plan_file"]
-
-SCHEMA = 3
-"""Version of the layout of plan.json; it grows when a reader of the old one would go wrong."""
+__all__ = ["broken_entry", "plan_data", "plan_entry", "plan_text"]
 
 _NUMBERS = re.compile(r"\[\s+([-+.\deE,\s]+?)\s+\]")
-
-
-@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class PlanFile:
-    """A plan.json, read back.
-
-    Parameters
-    ----------
-    path : Path
-    job : dict
-        The job file as it was read; empty when the plan was not made from one.
-    plans : tuple of Plan
-        One for each contour, in the order of cutting.
-    missing : tuple of str
-        Names of the contours that have no plan.
-    failed : tuple of str
-        Names of the contours whose plan failed its audit when it was made.
-    moves : tuple of AirMove
-        Through the air between them; empty when none were planned.
-    contours : dict of str to str
-        What the job calls the contour of each plan: a plan may be that of a piece.
-    in_cell : bool
-        Whether the motions were planned and audited clear of collisions.
-    """
-
-    path: Path
-    job: dict[str, Any]
-    plans: tuple[Plan, ...]
-    missing: tuple[str, ...]
-    failed: tuple[str, ...]
-    contours: dict[str, str]
-    moves: tuple[AirMove, ...]
-    in_cell: bool
 
 
 def plan_text(
@@ -78,7 +38,23 @@ def plan_text(
     cell: Cell | None = None,
     part: PartPlan | None = None,
 ) -> str:
-    """Return the text of a plan.json; the same input gives the same bytes.
+    """Return the text of a plan.json, see `plan_data`; the same input gives the same bytes."""
+    data = plan_data(robot, T_flange_tip, T_base_part, contours, job, cell, part)
+    text = json.dumps(data, indent=1, allow_nan=False)
+    # One row of numbers to a line: a person can still read it, and a diff shows a node.
+    return _NUMBERS.sub(lambda m: "[" + re.sub(r"\s+", " ", m[1]) + "]", text) + "\n"
+
+
+def plan_data(
+    robot: Robot,
+    T_flange_tip: np.ndarray[Any, Any],
+    T_base_part: np.ndarray[Any, Any],
+    contours: Sequence[dict[str, Any]],
+    job: dict[str, Any],
+    cell: Cell | None = None,
+    part: PartPlan | None = None,
+) -> dict[str, Any]:
+    """Return what a plan.json says.
 
     Parameters
     ----------
@@ -94,7 +70,7 @@ def plan_text(
     part : PartPlan, optional
         The moves between the contours, and what is proved about their order.
     """
-    data = {
+    return {
         "schema": SCHEMA,
         "kerfpath": __version__,
         "job": job,
@@ -107,18 +83,21 @@ def plan_text(
         "contours": list(contours),
         "sequence": None if part is None else sequence_entry(part),
     }
-    text = json.dumps(data, indent=1, allow_nan=False)
-    # One row of numbers to a line: a person can still read it, and a diff shows a node.
-    return _NUMBERS.sub(lambda m: "[" + re.sub(r"\s+", " ", m[1]) + "]", text) + "\n"
 
 
-def plan_entry(plan: Plan, contour: str, checks: Sequence[Check]) -> dict[str, Any]:
-    """Return what plan.json says of a planned and audited contour, or of a piece of it."""
+def plan_entry(
+    plan: Plan, contour: str, checks: Sequence[Check], *, picked: bool = False
+) -> dict[str, Any]:
+    """Return what plan.json says of a planned and audited contour, or of a piece of it.
+
+    `picked`: from a Pareto set, by which its objective, weights and eta are then told.
+    """
     criteria, settings = plan.criteria, plan.settings
     return {
         "name": plan.name,
         "contour": contour,
         "feasible": True,
+        **({"picked": True} if picked else {}),
         "closed": plan.contour.closed,
         "method": settings.method,
         "objective": settings.objective,
@@ -191,61 +170,9 @@ def broken_entry(name: str, broken: NoFeasiblePath, fastest: FastestSpeed | None
     }
 
 
-def read_plan_file(path: str | Path) -> PlanFile:
-    """Return the plans of a plan.json.
-
-    Raises
-    ------
-    InputError
-        No such file, not JSON, another schema, or something missing or of the wrong kind.
-    """
-    path = Path(path)
-    try:
-        data = json.loads(path.read_text(encoding="utf-8"))
-    except OSError as error:
-        raise InputError(f"{path}: cannot be read ({error.strerror}); give a plan.json") from None
-    except (UnicodeDecodeError, json.JSONDecodeError, RecursionError) as error:
-        raise InputError(f"{path}: not a plan.json: {' '.join(str(error).split())}") from None
-    if not isinstance(data, dict) or data.get("schema") != SCHEMA:
-        got = data.get("schema") if isinstance(data, dict) else type(data).__name__
-        raise InputError(
-            f"{path}: expected a plan.json with schema {SCHEMA}, got {got!r}; plan the job again"
-        )
-    try:
-        arm = _read_robot(data["robot"], data["limits"])
-        robot = with_external(data["external_axis"], arm)
-        tool, placement = data["T_flange_tip"], data["T_base_part"]
-        entries = data["contours"]
-        return PlanFile(
-            path=path,
-            job=dict(data["job"]),
-            plans=tuple(_read_plan(e, robot, tool, placement) for e in entries if e["feasible"]),
-            contours={str(e["name"]): str(e["contour"]) for e in entries if e["feasible"]},
-            missing=tuple(str(e["name"]) for e in entries if not e["feasible"]),
-            failed=tuple(
-                str(e["name"])
-                for e in entries
-                if e["feasible"] and e["audit"]["passed"] is not True
-            ),
-            moves=read_moves(data["sequence"]),
-            in_cell=data.get("cell") is not None,
-        )
-    except InputError as error:
-        raise InputError(f"{path}: {error}") from None
-    except KeyError as error:
-        raise InputError(f"{path}: the key {error} is missing; plan the job again") from None
-    except (TypeError, ValueError, AttributeError) as error:
-        said = " ".join(str(error).split())
-        raise InputError(f"{path}: something in it is of the wrong kind ({said})") from None
-
-
 def _finite(rotation: Array | None) -> list[float | None] | None:
     """Return limits with null, which JSON knows, for infinity, which it does not."""
     return None if rotation is None else [v if np.isfinite(v) else None for v in rotation.tolist()]
-
-
-def _infinite(rotation: list[float | None] | None) -> Array | None:
-    return None if rotation is None else np.array([np.inf if v is None else v for v in rotation])
 
 
 def _bands(comfort: Comfort | None) -> dict[str, Any] | None:
@@ -264,6 +191,7 @@ def _robot_entry(robot: Robot) -> dict[str, Any]:
         "geometry_m": dict(robot.geometry),
         "sign": robot.sign.tolist(),
         "offset_rad": robot.offset.tolist(),
+        "axis_3": robot.axis_3,
         "T_base_foot": robot.T_base_foot.tolist(),
         "T_end_flange": robot.T_end_flange.tolist(),
         "chain": None
@@ -294,93 +222,30 @@ def _cell_entry(cell: Cell) -> dict[str, Any]:
     """Return what kept apart and how far: a record, as the cell itself is that of the job."""
     return {
         "bodies": [
-            {"name": b.name, "kind": b.kind, "frame": b.frame, "approximate": b.approximate}
+            {
+                "name": b.name,
+                "kind": b.kind,
+                "frame": b.frame,
+                "approximate": b.approximate,
+                "holds_the_real_one": b.holds,
+            }
             for b in cell.bodies
         ],
-        "near_miss_m": [
-            {"between": list(pair), "at_least": float(required)}
-            for pair, required in zip(cell.pair_names, cell.required, strict=True)
-        ],
+        "near_miss_m": _pair_entries(cell),
+        "not_judged": [{"between": list(pair), "why": why} for pair, why in cell.unjudged.items()],
+        "not_proved": list(caveats(cell)),
     }
 
 
-def _read_robot(robot: dict[str, Any], limits: dict[str, Any]) -> Robot:
-    return Robot(
-        id=str(robot["id"]),
-        manufacturer=str(robot["manufacturer"]),
-        model=str(robot["model"]),
-        kinematics=str(robot.get("kinematics", "opw")),
-        geometry={k: float(v) for k, v in robot["geometry_m"].items()},
-        sign=robot["sign"],
-        offset=robot["offset_rad"],
-        T_base_foot=robot.get("T_base_foot", np.eye(4)),
-        T_end_flange=robot.get("T_end_flange", np.eye(4)),
-        chain=Chain(**robot["chain"]) if robot.get("chain") else None,
-        lower=limits["lower_rad"],
-        upper=limits["upper_rad"],
-        endless=limits["endless"],
-        velocity=limits["velocity_rad_s"],
-        acceleration=limits["acceleration_rad_s2"],
-        acceleration_source=str(limits["acceleration_source"]),
-        couplings=tuple(
-            Coupling(row=c["row"], lower=c["lower_rad"], upper=c["upper_rad"], note=c["note"])
-            for c in limits["couplings"]
-        ),
-    )
-
-
-def _read_tilt(entry: dict[str, Any] | None) -> Tilt | None:
-    if entry is None:
-        return None
-    return Tilt(cone=entry["cone_rad"], steps=entry["steps"], cost=entry["cost_per_rad"])
-
-
-def _read_plan(entry: dict[str, Any], robot: Robot, tool: Any, placement: Any) -> Plan:
-    nodes = entry["nodes"]
-    return Plan(
-        contour=Contour(
-            nodes["points_m"],
-            nodes["axes"],
-            closed=entry["closed"],
-            s=nodes["s_m"],
-            kind=np.array([KINDS.index(word) for word in nodes["kind"]]),
-            speed_share=nodes["speed_share"],
-            x=nodes["x"],
-            name=str(entry["name"]),
-        ),
-        robot=robot,
-        T_flange_tip=tool,
-        T_base_part=placement,
-        q=joints(nodes, "q", robot),
-        gamma=nodes["gamma_rad"],
-        tilt=nodes["lead_lean_rad"],
-        posture=nodes["posture"],
-        turn=nodes["turn"],
-        time=nodes["time_s"],
-        settings=Settings(
-            gamma_step=float(entry["gamma_step_rad"]),
-            frames=entry["frames"],
-            method=entry["method"],
-            objective=entry["objective"],
-            metric=entry["metric"],
-            weights=joints(entry, "weights_per", robot),
-            eta_v=float(entry["eta_v"]),
-            eta_a=float(entry["eta_a"]),
-            closure=entry["closure"],
-            rotation=_infinite(entry["rotation_rad"]),
-            comfort=_read_comfort(entry.get("comfort")),
-            tilt=_read_tilt(entry["tilt"]),
-        ),
-        cost=entry["cost"],
-        proof=Proof(
-            optimal=bool(entry["optimal"]),
-            statement=str(entry["proof"]),
-            grid_cost=entry["grid_cost"],
-        ),
-        counts=dict(entry["counts"]),
-        feed=None if entry["feed"] is None else Feed(**entry["feed"]),
-    )
-
-
-def _read_comfort(bands: dict[str, Any] | None) -> Comfort | None:
-    return None if bands is None else Comfort(**{k: Band(**band) for k, band in bands.items()})
+def _pair_entries(cell: Cell) -> list[dict[str, Any]]:
+    """Return what every judged pair keeps, what it is asked, and the overlap that is left out."""
+    rules = zip(cell.pair_names, cell.asked, cell.required, cell.depth, strict=True)
+    return [
+        {
+            "between": list(pair),
+            "at_least": float(required),
+            "asked": float(asked),
+            "overlap_by_design": float(depth),
+        }
+        for pair, asked, required, depth in rules
+    ]

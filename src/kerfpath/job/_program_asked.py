@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from kerfpath._arrays import Array, Bools, Ints
+from kerfpath._told import told
 from kerfpath.air import AirMove, backed_off
 from kerfpath.contour import Contour
 from kerfpath.job._program_read import ReadCut, branch_of, followed, poses_on_arc
@@ -66,6 +67,8 @@ class AskedNodes:
     at: Ints
     off: Array
     alone: Bools
+
+    __repr__ = told
 
     @property
     def complete(self) -> bool:

@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from kerfpath._arrays import Array
+from kerfpath._told import told
 from kerfpath.air import least_time
 from kerfpath.auditor import Check, air_checks, worst_of
 from kerfpath.cell import Cell
@@ -92,6 +93,8 @@ class ProgramAsked:
     candidates: tuple[tuple[Contour, ...], ...]
     cell: Cell | None
     inner_first: tuple[tuple[int, int], ...] = ()
+
+    __repr__ = told
 
     @classmethod
     def of(cls, job_file: Path) -> ProgramAsked:

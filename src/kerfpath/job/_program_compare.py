@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from pathlib import Path
 
+from kerfpath._told import told
 from kerfpath.job._program_read import language_of, program_on_disk
 from kerfpath.job._read import read_job
 from kerfpath.post import (
@@ -34,6 +35,8 @@ class Compared:
 
     differences: tuple[Difference, ...]
     not_compared: tuple[str, ...]
+
+    __repr__ = told
 
 
 def compare_programs(a: Path, b: Path, job_file: Path) -> Compared:

@@ -10,6 +10,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation, Slerp
 
 from kerfpath._arrays import Array, Bools, Ints
+from kerfpath._told import told
 from kerfpath.errors import InputError
 from kerfpath.job._read import Job
 from kerfpath.job._tables import ProgramTable
@@ -150,6 +151,8 @@ class ReadCut:
     moves: tuple[ReadMove, ...]
     ends: Ints
     group: ReadGroup
+
+    __repr__ = told
 
     @property
     def targets(self) -> tuple[ReadMove, ...]:

@@ -12,6 +12,7 @@ import numpy as np
 from pydantic import ValidationError
 
 from kerfpath._arrays import Array, Bools
+from kerfpath._told import told
 from kerfpath.cad import Part
 from kerfpath.errors import InputError
 from kerfpath.job._refusals import error_at, refusal, refused_at
@@ -31,6 +32,9 @@ from kerfpath.robots import Robot, postures_named
 
 __all__ = ["Job", "ProgramOptions", "audit_options", "program_options", "read_job"]
 
+MOST_TEXT = 10_000_000
+"""Characters of a job file: many thousand contours."""
+_DOTTED = re.compile(r"(?<![\w\"'-])(?:[\w\"'-]++[ \t]*+\.[ \t]*+){33}")
 _NAME_LENGTH = 32
 """Characters that a robot controller takes in a name."""
 
@@ -79,6 +83,8 @@ class ProgramOptions:
     arc_tolerance: float | None
     gas_lead: float | None
     handshakes: tuple[Handshake, ...] = ()
+
+    __repr__ = told
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -140,6 +146,8 @@ class Job:
     audit_options: dict[str, Any]
     program: ProgramOptions
     source: dict[str, Any]
+
+    __repr__ = told
 
     @property
     def graph_options(self) -> dict[str, Any]:
@@ -230,7 +238,8 @@ def read_job(path: str | Path) -> Job:
 
 def _text(path: Path) -> str:
     try:
-        raw = path.read_bytes()
+        endless = path.exists() and not (path.is_file() or path.is_dir())  # a device
+        raw = b"" if endless else path.read_bytes()
     except IsADirectoryError:
         raise error_at(path, None, "expected a job file, got a folder; name a file in it") from None
     except FileNotFoundError:
@@ -238,6 +247,8 @@ def _text(path: Path) -> str:
     except (OSError, ValueError) as error:
         why = getattr(error, "strerror", None) or str(error)
         raise error_at(path, None, f"cannot be read ({why}); give the path of a job file") from None
+    if endless:
+        raise error_at(path, None, "is no file; give the path of a job file")
     try:
         return raw.decode("utf-8-sig")  # some editors begin a UTF-8 file with a byte order mark
     except UnicodeDecodeError as error:
@@ -250,6 +261,12 @@ def _text(path: Path) -> str:
 
 
 def _tables(path: Path, text: str) -> dict[str, Any]:
+    if len(text) > MOST_TEXT:
+        raise error_at(path, None, f"expected a job file, got one of {len(text) / 1e6:.0f} MB")
+    # The time that TOML's reader takes grows with the square of these.
+    if (dotted := _DOTTED.search(text)) is not None:
+        line = text.count("\n", 0, dotted.start()) + 1
+        raise error_at(path, line, "a key of too many parts joined by dots; no job has such keys")
     try:
         tables = tomllib.loads(text)
     except RecursionError:

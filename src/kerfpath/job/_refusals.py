@@ -110,6 +110,5 @@ def _shown(value: object) -> str:
 
 
 def error_at(path: Path, line: int | None, said: str) -> InputError:
-    """Return the error with its place in front, all on one line whatever came from the file."""
-    text = f"{path}: {said}" if line is None else f"{path}:{line}: {said}"
-    return InputError("".join(c if c.isprintable() else repr(c)[1:-1] for c in text))
+    """Return the error with its place in front."""
+    return InputError(f"{path}: {said}" if line is None else f"{path}:{line}: {said}")

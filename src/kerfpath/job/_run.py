@@ -10,6 +10,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from kerfpath._arrays import Array, Ints
+from kerfpath._told import told
 from kerfpath.auditor import Check, checks
 from kerfpath.cad import Part
 from kerfpath.cad import read as read_drawing
@@ -36,7 +37,7 @@ from kerfpath.planner import (
 from kerfpath.plans import Plan
 from kerfpath.refiner import refine
 from kerfpath.robots import robot
-from kerfpath.sequence import PartPlan
+from kerfpath.sequence import PartPlan, longest_search, unused_postures
 
 __all__ = [
     "Chosen",
@@ -70,6 +71,8 @@ class Outcome:
     part: PartPlan | None = None
     stuck: NoFeasiblePath | None = None
     air: tuple[Check, ...] = ()
+
+    __repr__ = told
 
     @property
     def passed(self) -> bool:
@@ -126,7 +129,7 @@ def run_job(
         tasks = tuple(sorted(tasks, key=lambda task: list(given).index(task.name)))
     cell = cell_of_job(job, part)
     loops = [task.drawn(part) for task in tasks]
-    tries = []
+    tries, first = [], []
     for task, loop in zip(tasks, loops, strict=True):
         if given is not None:
             paths = [given[task.name]]
@@ -138,9 +141,17 @@ def run_job(
             paths = [Given(path, task.sample(path), asked, touched=False) for path in shaped]
         run = None if chosen is None else chosen.get(task.name)
         tries.append([_cut(job, task, path, cell, run, progress) for path in paths])
+        first.append(paths[0])
     if job.sequence is not None:
-        progress("order and moves", 0, 0)
-    found = ordered(job, loops, tries, cell)
+        longest = longest_search(job.sequence.seconds)
+        progress(f"order and moves, {longest:g} s at most without a way", 0, 0)
+
+    def more(i: int, cuts: Sequence[Cut]) -> list[Cut]:
+        if chosen is not None and tasks[i].name in chosen:
+            return []  # its plan is settled
+        return _in_other_postures(job, tasks[i], first[i], cuts, cell, progress)
+
+    found = ordered(job, loops, tries, cell, more)
     moved = {
         task.name: part.departure(task.pick, loop)
         for task, loop in zip(tasks, loops, strict=True)
@@ -186,7 +197,13 @@ def _cut(
         progress(f"{task.name}: map of the cell", 0, 0)
         clearance = clearance_map(graph, cell)
     whole = Cut(
-        contour=task.name, task=task, drawn=drawn, nodes=nodes, graph=graph, clearance=clearance
+        contour=task.name,
+        task=task,
+        drawn=drawn,
+        nodes=nodes,
+        graph=graph,
+        clearance=clearance,
+        picked=chosen is not None,
     )
     kept = cell
     if chosen is not None:
@@ -220,6 +237,34 @@ def _cut(
         return (replace(whole, broken=broken, fastest=fastest, relaxations=least),)
     phase("audit")
     return tuple(_audited(job, whole, made, cell) for made in plans)
+
+
+def _in_other_postures(
+    job: Job,
+    task: ContourTask,
+    asked: Given,
+    made: Sequence[Cut],
+    cell: Cell | None,
+    progress: Progress,
+) -> list[Cut]:
+    """Return the cuts of a contour, each all in one of the postures that those made do not use."""
+    found = []
+    plans = [cut.plan for cut in made if cut.plan is not None]
+    postures = unused_postures(plans, asked.postures)
+    for k, posture in enumerate(postures):
+        progress(f"{task.name}: other postures", k, len(postures))
+        here = replace(job, plan_options=job.plan_options | {"postures": (posture,)})
+        graph = layered_graph(
+            asked.nodes, job.robot, **here.graph_options, comfort=here.plan_options["comfort"]
+        )
+        whole = Cut(contour=task.name, task=task, drawn=asked.path, nodes=asked.nodes, graph=graph)
+        with suppress(NoFeasiblePath):
+            whole_cut = replace(here, interruptions="none")
+            cuts = _plans(whole_cut, task, asked.nodes, graph, cell, lambda phase: None)
+            found += [
+                cut for cut in (_audited(here, whole, one, cell) for one in cuts) if cut.passed
+            ]
+    return found
 
 
 def fastest_along(

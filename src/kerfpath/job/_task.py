@@ -6,6 +6,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from kerfpath._told import told
 from kerfpath.cad import Part
 from kerfpath.contour import Contour
 from kerfpath.errors import InputError
@@ -51,6 +52,8 @@ class ContourTask:
     tolerance: float | None = None
     axis_tolerance: float | None = None
     table: ContourTable
+
+    __repr__ = told
 
     def expanded(self, part: Part) -> list[ContourTask]:
         """Return a task for each loop of the part that this one picks.

@@ -9,12 +9,13 @@ from pathlib import Path
 import numpy as np
 
 from kerfpath._arrays import Array, Ints
+from kerfpath._told import told
 from kerfpath.cad import Part
 from kerfpath.cad import read as read_drawing
 from kerfpath.contour import Contour, angle_between
 from kerfpath.errors import InputError
 from kerfpath.job._again import require_same
-from kerfpath.job._planfile import PlanFile, read_plan_file
+from kerfpath.job._planread import PlanFile, read_plan_file
 from kerfpath.job._program_of import asked_of_plans, program_of
 from kerfpath.job._program_read import language_of, program_on_disk
 from kerfpath.job._read import Job, read_job
@@ -60,6 +61,8 @@ class Taught:
     off: float
     turned: float
 
+    __repr__ = told
+
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class TouchUp:
@@ -78,6 +81,8 @@ class TouchUp:
     outcome: Outcome
     targets: tuple[Taught, ...]
     notes: tuple[str, ...]
+
+    __repr__ = told
 
 
 def touch_up(

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 
+from kerfpath._told import told
 from kerfpath.auditor import Check, in_words
-from kerfpath.cell import Cell
+from kerfpath.cell import Cell, caveats
 
 __all__ = ["Audited", "collision_note"]
 
@@ -33,6 +34,8 @@ class Audited:
     missing: tuple[str, ...]
     note: str
     places: dict[str, tuple[str, ...]] = field(default_factory=dict)
+
+    __repr__ = told
 
     @property
     def passed(self) -> bool:
@@ -64,8 +67,9 @@ def collision_note(cell: Cell | None, *, moves_too: bool = False) -> str:
     if cell is None:
         return NOT_CHECKED
     about = f" (approximate: {', '.join(cell.approximate)})" if cell.approximate else ""
-    return (
+    checked = (
         f"Collisions are checked along the contours, among {len(cell.bodies)} bodies of the "
         f"cell{about}; the moves to and between contours are "
         f"{'checked, too' if moves_too else 'not checked'}."
     )
+    return " ".join([checked, *caveats(cell)])

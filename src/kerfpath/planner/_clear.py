@@ -8,7 +8,7 @@ from typing import Any, TypeVar
 import numpy as np
 
 from kerfpath._arrays import Array, Ints
-from kerfpath.cell import Cell, Checker
+from kerfpath.cell import UNPROVED, Cell, Checker
 from kerfpath.comfort import Band
 from kerfpath.errors import InputError, NoFeasiblePath
 from kerfpath.graph import LayeredGraph
@@ -28,9 +28,11 @@ __all__ = ["Finder"]
 _P = TypeVar("_P", LayeredPath, SlowedPath, InterruptedPath, LeastInterval)
 
 POSES_TOLD, PAIRS_TOLD = 100, 3
-"""Poses of a node that are looked at, and pairs of bodies that are named, where it is closed."""
-ACCURACY = 1e-5
-"""m beyond what is required: nothing above it need be known."""
+"""Poses of a node that are measured, and pairs of bodies that are named, where it is closed."""
+POSES_SETTLED = 20_000
+"""Poses asked about to find the nodes at which none is clear."""
+RANGES_TOLD = 6
+"""Ranges of nodes that a message lists."""
 SAME_PLACE = 1e-9
 """m: two poses of the same tool or part differ by rounding at most."""
 
@@ -39,7 +41,8 @@ class Finder:
     """How the searches of a task run: as they are or, in a cell, for what is clear in it."""
 
     def __init__(self, task: Task, cell: Cell | None) -> None:
-        self._limits, self._cell = task.limits, cell
+        self._limits, self._cell, self._graph = task.limits, cell, task.graph
+        self._but = f" ({UNPROVED})" if cell is not None and cell.unproved else ""
         if cell is None:
             return
         _require_same_cell(task, cell)
@@ -67,17 +70,62 @@ class Finder:
             raise self._named(broken) from None
 
     def _named(self, broken: NoFeasiblePath) -> NoFeasiblePath:
-        """Say of a break at a node which bodies collide there, in some of its poses, most often."""
-        if not broken.counts.get("collision at the node") or self._cell is None:
+        """Say of a break by collision where no pose is clear at all, and which bodies collide.
+
+        A search learns what it needs in any order, and may break at a node of many that are closed:
+        the first of them is what is told.
+        """
+        if self._cell is None or not any("collision" in word for word in broken.counts):
             return broken
-        first, last = self._known.start[broken.node + 1 : broken.node + 3]
+        closed, settled = self._known.closed_layers(POSES_SETTLED)
+        if not closed:
+            return self._at_break(broken)
+        first, nodes = closed[0], len(self._known.start) - 1
+        others = f" ({len(closed)} such nodes: {_ranges(closed)})" if len(closed) > 1 else ""
+        rest = "" if settled == nodes else f"; nodes from {settled} on have not been looked at"
+        counts = {
+            word: number for word, number in self._graph.counts(first).items() if word != "admitted"
+        }
+        counts["collision at the node"] = int(np.diff(self._known.start[first : first + 2])[0])
+        reasons = ", ".join(f"{word}: {number}" for word, number in counts.items())
+        return NoFeasiblePath(
+            f"no pose at node {first} of {nodes} is clear{others}{rest}; of the candidates there, "
+            f"{reasons}{self._depths(first)}",
+            proved=True,
+            node=first - 1,
+            counts=counts,
+        )
+
+    def _at_break(self, broken: NoFeasiblePath) -> NoFeasiblePath:
+        """Say of a break that is not for want of clear poses which bodies collide at its node."""
+        return broken.retold(f"{broken}{self._depths(broken.node + 1)}")
+
+    def _depths(self, node: int) -> str:
+        """Say which bodies come too near to each other at a node, at how many poses, how deep."""
+        assert self._cell is not None
+        if node >= len(self._known.start) - 1:
+            return ""
+        first, last = self._known.start[node : node + 2]
         some = np.unique(np.linspace(first, last - 1, POSES_TOLD).astype(np.int64))
-        needed = self._cell.required
-        hits = self._cell.distances(self._known.q[some], enough=needed + ACCURACY) <= needed
-        order = np.argsort(-hits.sum(axis=0), kind="stable")[:PAIRS_TOLD]
-        pairs = [self._cell.pair_names[p] for p in order if hits[:, p].any()]
-        told = ", ".join(f"{one} and {two}" for one, two in pairs)
-        return broken.retold(f"{broken} (most often of {told})") if told else broken
+        over = self._cell.distances(self._known.q[some]) - self._cell.required
+        hits = over <= 0
+        told = []
+        for p in np.argsort(-hits.sum(axis=0), kind="stable")[:PAIRS_TOLD]:
+            if hits[:, p].any():
+                one, two = self._cell.pair_names[p]
+                deep = -over[hits[:, p], p] * 1e3
+                told.append(
+                    f"{one} and {two} at {hits[:, p].sum()} of {len(some)} poses, "
+                    f"{deep.min():.3g} to {deep.max():.3g} mm nearer than allowed"
+                )
+        if not told:
+            return ""
+        best = int(np.argmax(over.min(axis=1)))
+        least = ""
+        if hits.any(axis=1).all():
+            one, two = self._cell.pair_names[int(np.argmin(over[best]))]
+            least = f"; the best of them lacks {-over[best].min() * 1e3:.3g} mm ({one} and {two})"
+        return f" (most often {'; '.join(told)}{least})"
 
     def claimed(self, claim: str) -> str:
         """Return a claim and, in a cell, that it holds for what is clear, after how many checks."""
@@ -85,7 +133,8 @@ class Finder:
             return claim
         seen = self._checker
         return (
-            f"{claim}, clear in the cell: {seen.asked} of {len(self._known.cost)} poses and "
+            f"{claim}, clear in the cell{self._but}: "
+            f"{seen.asked} of {len(self._known.cost)} poses and "
             f"{seen.motions_asked} motions looked at in {self._known.searches} searches, "
             f"distances found at {seen.measured} poses and on {seen.motions_measured} motions"
         )
@@ -134,3 +183,15 @@ def _beside(graph: LayeredGraph) -> Ints:
         place = np.minimum(np.searchsorted(key[order], wanted), len(key) - 1)
         beside[:, side] = np.where(key[order][place] == wanted, order[place], -1)
     return beside
+
+
+def _ranges(numbers: list[int]) -> str:
+    """Write ascending numbers as ranges, such as "3 to 7, 9", the first of them."""
+    runs: list[list[int]] = []
+    for number in numbers:
+        if runs and number == runs[-1][1] + 1:
+            runs[-1][1] = number
+        else:
+            runs.append([number, number])
+    words = [f"{a}" if a == b else f"{a} to {b}" for a, b in runs[:RANGES_TOLD]]
+    return ", ".join(words) + (", ..." if len(runs) > RANGES_TOLD else "")

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from kerfpath._arrays import Array, Bools, Ints, freeze, scalar
+from kerfpath._told import told
 from kerfpath.cell import Cell, clearances
 from kerfpath.errors import InputError
 from kerfpath.graph import LayeredGraph
@@ -52,6 +53,8 @@ class ClearanceMap:
     resolution: float
     poses: int
     queries: int
+
+    __repr__ = told
 
 
 def clearance_map(

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from kerfpath._arrays import Array, Ints, as_pose, floats, freeze, scalar
+from kerfpath._told import told
 from kerfpath.comfort import Comfort
 from kerfpath.contour import Contour, FrameKind
 from kerfpath.errors import InputError
@@ -76,6 +77,8 @@ class Task:
     settings: Settings
     graph: LayeredGraph
     vertex_cost: Array | None = None
+
+    __repr__ = told
 
     @property
     def limits(self) -> dict[str, Any]:

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from kerfpath._arrays import Array
+from kerfpath._told import told
 from kerfpath.post._program import Program
 from kerfpath.robots import Robot
 
@@ -36,6 +37,8 @@ class Stretch:
     after: tuple[Array, float] | None
     q: Array
     dt: Array
+
+    __repr__ = told
 
     def joined(self, q: Array, dt: Array) -> tuple[Array, Array]:
         """Return joints and time steps from `before` to `after`, by way of q (m + 1, n) in dt."""

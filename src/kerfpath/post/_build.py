@@ -10,6 +10,7 @@ import numpy as np
 
 from kerfpath._arrays import Array, scalar
 from kerfpath.air import AirMove, End, backed_off, least_time, speed_share
+from kerfpath.cell import UNPROVED
 from kerfpath.errors import InputError
 from kerfpath.plans import Plan
 from kerfpath.post._arcs import with_arcs
@@ -30,6 +31,8 @@ from kerfpath.robots import Robot, posture_name
 
 __all__ = ["build_program"]
 
+CAPSULES = "The links were drawn as capsules: clear of the real ones is not proved."
+"""Said at the head of a program whose plans say so of their proof."""
 PLANNED, UNPLANNED = 1.0, 0.25
 """Shares of the full speed of joint moves that are planned and that are not."""
 LOWEST_SHARE = 0.01
@@ -157,6 +160,7 @@ def build_program(
         T_base_part=first.T_base_part,
         sections=tuple(sections),
         air_checked=len(moves) > 0 and all(move.clear for move in moves),
+        caveats=(CAPSULES,) if any(UNPROVED in plan.proof.statement for plan in plans) else (),
     )
     if arc_tolerance is None:
         return program

@@ -9,6 +9,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from kerfpath._arrays import Array
+from kerfpath._told import told
 from kerfpath.post._compare import ANGLE, FRAME, LEAD, POINT, SHARE, events, handshake
 from kerfpath.post._groups import ReadGroup, groups_of
 from kerfpath.post._matching import Pair, Stop, matched, pairs_of
@@ -54,6 +55,8 @@ class Difference:
     places: tuple[str, ...] = ()
     said_at: str = ""
     near: str = ""
+
+    __repr__ = told
 
     @property
     def place(self) -> str:

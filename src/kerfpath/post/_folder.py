@@ -10,6 +10,7 @@ from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 
+from kerfpath._told import told
 from kerfpath._writing import write_whole
 from kerfpath.errors import InputError
 
@@ -36,6 +37,8 @@ class Replaced:
     written: tuple[Path, ...]
     removed: tuple[Path, ...] = ()
     edited: tuple[Path, ...] = ()
+
+    __repr__ = told
 
 
 def replace_program(

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 
+from kerfpath._told import told
 from kerfpath.post._read import ReadHandshake, ReadMove, ReadProgram, ReadStep, ReadWait
 
 __all__ = ["ReadGroup", "groups_of"]
@@ -29,6 +30,8 @@ class ReadGroup:
     path: list[ReadMove] = field(default_factory=list)
     waits: list[tuple[int, ReadWait]] = field(default_factory=list)
     handshakes: list[tuple[int, ReadHandshake]] = field(default_factory=list)
+
+    __repr__ = told
 
 
 def groups_of(read: ReadProgram) -> list[ReadGroup]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from kerfpath._told import told
 from kerfpath.auditor import Level
 
 __all__ = ["ProgramIssue"]
@@ -29,6 +30,8 @@ class ProgramIssue:
     code: str
     message: str
     place: str
+
+    __repr__ = told
 
     def __str__(self) -> str:
         return f"{self.place}: {self.message}"

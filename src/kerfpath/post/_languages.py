@@ -10,13 +10,14 @@ from importlib.metadata import EntryPoint, entry_points
 from typing import Any
 
 from kerfpath._arrays import Array
+from kerfpath._told import told
 from kerfpath.errors import InputError
 from kerfpath.post._formatter import Formatter
 from kerfpath.post._issue import ProgramIssue
 from kerfpath.post._program import Program
 from kerfpath.post._read import Reader
 from kerfpath.post._settings import Rules, Settings
-from kerfpath.robots import Robot
+from kerfpath.robots import AXIS_3, Robot
 
 __all__ = ["ENTRY_POINTS", "Language", "language", "languages"]
 
@@ -51,6 +52,9 @@ class Language:
         Whose robots it moves; empty: everyone's.
     families : tuple of str
         The arms that it can express, by `Robot.kinematics`; empty: all.
+    axis_3 : tuple of str
+        The arms that it can express, by `Robot.axis_3`. Without "", it must be known what the
+        axis 3 that it says measures.
     suffix : str
         Suffix of the file to start, with its dot.
     settings : type of Settings
@@ -90,6 +94,9 @@ class Language:
     ahead: bool = True
     assumed: Mapping[str, Any] = field(default_factory=dict)
     read: Reader | None = None
+    axis_3: tuple[str, ...] = AXIS_3
+
+    __repr__ = told
 
     def completed(self, settings: Settings | None) -> Settings:
         """Return settings, by default the language's defaults, with what is `assumed` of them."""
@@ -101,7 +108,25 @@ class Language:
         """Say why no program in this language can move a robot; empty where one can."""
         if self.families and robot.kinematics not in self.families:
             return f"language {self.name!r} cannot yet say the axes of an arm like {robot.id!r}"
-        return ""
+        if robot.axis_3 in self.axis_3:
+            return ""
+        if robot.axis_3:
+            return (
+                f"language {self.name!r} cannot say a {robot.axis_3} axis 3 like that of "
+                f"{robot.id!r}"
+            )
+        ways = {
+            "serial": 'axis_3 = "serial" where it is joint 3 alone',
+            "horizontal": (
+                'axis_3 = "horizontal", with axis_3_deg = [LOWER, UPPER] from its data sheet, '
+                "where it measures the upper arm from the horizontal, as with a parallel rod"
+            ),
+        }
+        return (
+            f"language {self.name!r} says axis 3 of a controller, and nothing says what that of "
+            f"{robot.id!r} measures (no arm of the library has its lengths); add to [robot] "
+            + ", or ".join(ways[way] for way in self.axis_3 if way)
+        )
 
     def doubt(self, robot: Robot) -> str:
         """Say why a robot may not understand this language; empty where it does."""

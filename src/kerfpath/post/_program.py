@@ -9,6 +9,7 @@ from typing import Literal, get_args
 import numpy as np
 
 from kerfpath._arrays import Array, as_pose, floats
+from kerfpath._told import told
 from kerfpath.errors import InputError
 from kerfpath.robots import Robot
 
@@ -81,6 +82,8 @@ class JointMove:
     duration: float | None = None
     zone: float = 0.0
 
+    __repr__ = told
+
     def __post_init__(self) -> None:
         object.__setattr__(self, "q", floats(self.q, "q", (None,)))
 
@@ -112,6 +115,8 @@ class LinearMove:
     zone: float = 0.0
     switches: tuple[Switch, ...] = ()
 
+    __repr__ = told
+
     def __post_init__(self) -> None:
         object.__setattr__(self, "T_part_tip", as_pose(self.T_part_tip, "T_part_tip"))
         object.__setattr__(self, "q", floats(self.q, "q", (None,)))
@@ -131,6 +136,8 @@ class CircularMove(LinearMove):
 
     T_part_via: Array
     q_via: Array
+
+    __repr__ = told
 
     def __post_init__(self) -> None:
         super(CircularMove, self).__post_init__()
@@ -164,6 +171,8 @@ class Request:
     partner: Partner
     on: bool
 
+    __repr__ = told
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Await:
@@ -180,12 +189,16 @@ class Await:
     partner: Partner
     timeout: float
 
+    __repr__ = told
+
 
 @dataclass(frozen=True, slots=True)
 class Comment:
     """A remark for the person who reads the program."""
 
     text: str
+
+    __repr__ = told
 
 
 PathMove = LinearMove | CircularMove
@@ -200,6 +213,8 @@ class Section:
 
     name: str
     steps: tuple[Step, ...]
+
+    __repr__ = told
 
     @property
     def moves(self) -> tuple[Move, ...]:
@@ -222,6 +237,8 @@ class Program:
         One for each contour, in order.
     air_checked : bool
         Whether the moves to and between the contours have been proved clear.
+    caveats : tuple of str
+        What the plans do not prove, sentences for the comment at its head.
     """
 
     name: str
@@ -230,6 +247,9 @@ class Program:
     T_base_part: Array
     sections: tuple[Section, ...]
     air_checked: bool = False
+    caveats: tuple[str, ...] = ()
+
+    __repr__ = told
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "T_flange_tip", as_pose(self.T_flange_tip, "T_flange_tip"))

@@ -10,6 +10,7 @@ from typing import Any, Literal, Protocol, get_args
 import numpy as np
 
 from kerfpath._arrays import Array, freeze
+from kerfpath._told import told
 from kerfpath.errors import InputError
 from kerfpath.post._program import Handshake, Partner, Switch
 from kerfpath.post._settings import Settings, handshakes
@@ -72,6 +73,8 @@ class ReadMove:
     switches: tuple[Switch, ...] = ()
     elsewhere: Mapping[str, str] = field(default_factory=dict)
 
+    __repr__ = told
+
     @property
     def place(self) -> str:
         """Where it stands."""
@@ -86,6 +89,8 @@ class ReadWait:
     file: str
     line: int
 
+    __repr__ = told
+
     @property
     def place(self) -> str:
         """Where it stands."""
@@ -99,6 +104,8 @@ class ReadHandshake:
     what: Handshake
     file: str
     line: int
+
+    __repr__ = told
 
     @property
     def place(self) -> str:
@@ -115,6 +122,8 @@ class ReadSection:
 
     name: str
     steps: tuple[ReadStep, ...]
+
+    __repr__ = told
 
     @property
     def moves(self) -> tuple[ReadMove, ...]:
@@ -139,6 +148,8 @@ class ReadProgram:
     sections: tuple[ReadSection, ...]
     T_flange_tip: Array | None = None
     T_base_part: Array | None = None
+
+    __repr__ = told
 
     @property
     def steps(self) -> tuple[ReadStep, ...]:

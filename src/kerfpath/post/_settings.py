@@ -8,6 +8,7 @@ from typing import Annotated, Any
 import numpy as np
 from pydantic import BaseModel, ConfigDict, Field
 
+from kerfpath._told import told
 from kerfpath.post._program import PARTNERS, Partner
 
 __all__ = ["Rules", "Settings", "handshakes", "setting"]
@@ -70,3 +71,5 @@ class Rules:
     longest_lead: float = np.inf
     point_step: float = 0.0
     angle_step: float = 0.0
+
+    __repr__ = told

@@ -5,6 +5,9 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
+import numpy as np
+
+from kerfpath._told import told
 from kerfpath.errors import InputError
 from kerfpath.plans import Plan
 from kerfpath.post._build import build_program
@@ -12,6 +15,7 @@ from kerfpath.post._compare import deviations
 from kerfpath.post._issue import ProgramIssue
 from kerfpath.post._languages import Language
 from kerfpath.post._languages import language as find_language
+from kerfpath.post._meant import Meant
 from kerfpath.post._preflight import preflight
 from kerfpath.post._program import Program
 from kerfpath.post._read import ReadProgram
@@ -75,6 +79,8 @@ class Posted:
     files: dict[str, str]
     read: ReadProgram | None
     warnings: tuple[ProgramIssue, ...]
+
+    __repr__ = told
 
 
 def posted(
@@ -140,9 +146,16 @@ def read_program(
         raise InputError(f"language {language!r} has no reader, so that its programs stay unread")
     main = next(iter(files)) if main is None else main
     try:
-        return chosen.read(main, files, robot, settings)
+        with np.errstate(over="raise", divide="raise", invalid="raise"):
+            return chosen.read(main, Meant(files), robot, settings)
     except KeyError as missing:
         raise InputError(f"{main}: the file {missing.args[0]!r} is not there") from None
+    except InputError:
+        raise
+    except (ArithmeticError, ValueError) as error:
+        raise InputError(
+            f"{main}: numbers in it make no pose or joints ({error}); write the program again"
+        ) from None
 
 
 def said_in(program: Program, chosen: Language, settings: Settings) -> ReadProgram:

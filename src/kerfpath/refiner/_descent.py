@@ -8,6 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from kerfpath._arrays import Array
+from kerfpath._told import told
 from kerfpath.kernels.turns import JointLimits
 from kerfpath.plans import path_cost
 from kerfpath.refiner._curves import JointCurves
@@ -55,6 +56,8 @@ class Stand:
     excess: float
     lost: float
     outside: float
+
+    __repr__ = told
 
     @property
     def admitted(self) -> bool:
@@ -110,6 +113,8 @@ class Descent:
     radius: float
     node_cost: Array | None = None
     cap: float = np.inf
+
+    __repr__ = told
 
     def stand(self, gamma: Array, near: Array) -> Stand:
         """Return where `gamma` brings the joints; infinite where it is out of reach."""

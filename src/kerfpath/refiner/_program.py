@@ -15,6 +15,7 @@ import numpy as np
 from scipy import sparse
 
 from kerfpath._arrays import Array, Ints
+from kerfpath._told import told
 from kerfpath.refiner._rates import Rates
 from kerfpath.refiner._rows import Rows, Sparse, wide
 from kerfpath.search import Metric
@@ -66,6 +67,8 @@ class Model:
     weight: Array
     metric: Metric
     cap: float
+
+    __repr__ = told
 
 
 def solve(model: Model, rates: Rates, aim: Aim) -> Array | None:

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from kerfpath._arrays import Array, Ints
+from kerfpath._told import told
 
 __all__ = ["Rates"]
 
@@ -29,6 +30,8 @@ class Rates:
     velocity: Array
     acceleration: Array
     periodic: bool
+
+    __repr__ = told
 
     @property
     def before(self) -> Ints:

@@ -9,6 +9,7 @@ import numpy as np
 from scipy.interpolate import CubicSpline
 
 from kerfpath._arrays import Array, scalar
+from kerfpath._told import told
 from kerfpath.contour import Contour
 from kerfpath.errors import InputError
 from kerfpath.plans import Plan, Proof, path_cost
@@ -61,6 +62,8 @@ class Refinement:
     cost_after: float
     programs: int
     statement: str
+
+    __repr__ = told
 
 
 def refine(

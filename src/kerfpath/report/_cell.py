@@ -90,8 +90,10 @@ def _size(figure: go.Figure) -> dict[str, float]:
     """Return the sides of the box around all that is shown, to one scale, to fill the figure."""
     sides = {}
     for axis in "xyz":
-        ends = [np.nan_to_num(t[axis]) for t in figure.data if t.visible is not False]
-        sides[axis] = float(max(e.max() for e in ends) - min(e.min() for e in ends))
+        # Lines break, and the cursor waits, at what is no number.
+        drawn = [np.array(t[axis], np.float64) for t in figure.data if t.visible is not False]
+        points = np.concatenate(drawn)
+        sides[axis] = float(np.ptp(points[np.isfinite(points)]))
     mean = float(np.prod(list(sides.values()))) ** (1 / 3)
     return {axis: FILL * side / mean for axis, side in sides.items()}
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from html import escape
 
+from kerfpath._told import told
 from kerfpath.errors import InputError
 from kerfpath.report._tables import shown_unit
 
@@ -37,6 +38,8 @@ class FrontAxis:
     words: str
     unit: str
     sense: float
+
+    __repr__ = told
 
     def __post_init__(self) -> None:
         """Check the sense."""
@@ -81,3 +84,5 @@ class FrontPlan:
     number: int
     values: tuple[float, ...]
     asked: tuple[tuple[str, str], ...]
+
+    __repr__ = told

@@ -10,6 +10,7 @@ from typing import NamedTuple
 import numpy as np
 
 from kerfpath._arrays import Array
+from kerfpath._told import told
 from kerfpath.auditor import Check
 from kerfpath.contour import Contour
 from kerfpath.errors import InputError
@@ -94,6 +95,8 @@ class ContourSection:
     broken_at: int | None = None
     clearance: ClearanceMap | None = None
     sampling: Sequence[tuple[str, str]] = ()
+
+    __repr__ = told
 
     def __post_init__(self) -> None:
         nodes = {"graph": len(self.graph.reason), "path": len(self.path)}

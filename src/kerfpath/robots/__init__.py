@@ -1,7 +1,10 @@
 """Robots: their kinematics in closed form, their limits, and the library of known models."""
 
+from kerfpath.robots._axis_three import level as level
+from kerfpath.robots._axis_three import with_axis_3 as with_axis_3
 from kerfpath.robots._chain import chain_of as chain_of
 from kerfpath.robots._chain import model_chain as model_chain
+from kerfpath.robots._coupling import AXIS_3 as AXIS_3
 from kerfpath.robots._coupling import Coupling as Coupling
 from kerfpath.robots._external import ExternalAxis as ExternalAxis
 from kerfpath.robots._external import Travel as Travel

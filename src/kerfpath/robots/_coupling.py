@@ -7,9 +7,13 @@ from dataclasses import dataclass
 import numpy as np
 
 from kerfpath._arrays import Array, floats
+from kerfpath._told import told
 from kerfpath.errors import InputError
 
-__all__ = ["Coupling"]
+__all__ = ["AXIS_3", "Coupling"]
+
+AXIS_3 = ("", "serial", "horizontal")
+"""What axis 3 of a controller may measure, "" where that is not known: see `Robot`."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -30,6 +34,8 @@ class Coupling:
     lower: float
     upper: float
     note: str = ""
+
+    __repr__ = told
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "row", floats(self.row, "coupling row", (None,)))

@@ -2,24 +2,93 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
+from scipy.spatial.transform import Rotation
 
 from kerfpath._arrays import Array
 from kerfpath.errors import InputError
-from kerfpath.robots._recognise import model_of
+from kerfpath.robots._axis_three import with_axis_3
+from kerfpath.robots._recognise import in_closed_form, model_of
 from kerfpath.robots._robot import Robot
-from kerfpath.urdf import Description
+from kerfpath.urdf import Chain, Description, read_urdf
 
-__all__ = ["robot_of"]
+__all__ = ["described", "robot_of"]
+
+SNAPS = (5e-6, 5e-5, 5e-4, 5e-3)
+"""rad: by how much angles of five, four, three and two digits after the point may be rounded."""
+POSES = 256
+
+
+def described(
+    path: str | Path,
+    snap: float | None,
+    *,
+    base: str | None,
+    tip: str | None,
+    packages: Mapping[str, str | Path] | None,
+    meshes: bool,
+) -> Description:
+    """Return the description of an arm, its angles as they are written, or within snap as meant.
+
+    Raises
+    ------
+    InputError
+        As `read_urdf`; without snap, an arm that is of no family with a closed form as it is
+        written, but is of one with its angles rounded: the message says what that moves.
+    """
+    found = read_urdf(
+        path,
+        base=base,
+        tip=tip,
+        packages=packages,
+        meshes=meshes,
+        snap=0.0 if snap is None else snap,
+    )
+    if snap is not None or len(found.joints) != 6 or in_closed_form(found.chain):
+        return found
+    meant = {
+        snap: read_urdf(path, base=base, tip=tip, meshes=False, snap=snap).chain for snap in SNAPS
+    }
+    whole = meant[SNAPS[-1]]
+    if not in_closed_form(whole):
+        return found
+    least = next(snap for snap, chain in meant.items() if _alike(chain, whole))
+    off, turned = _moved(found, whole)
+    raise InputError(
+        f"{found.path} ({found.base} to {found.tip}): as it is written the arm is of no family "
+        f"with a closed form, with its angles rounded to 15 deg it is: snap={least:g} takes them "
+        f"as meant, which moves the tip by up to {off * 1e3:.2g} mm and "
+        f"{np.degrees(turned):.2g} deg; snap=0 keeps what is written, as a general "
+        "arm, whose solver may need minutes to prepare"
+    )
+
+
+def _alike(one: Chain, two: Chain) -> bool:
+    """Say whether two chains have the same frames."""
+    return np.array_equal(one.origins, two.origins) and np.array_equal(one.end, two.end)
+
+
+def _moved(found: Description, meant: Chain) -> tuple[float, float]:
+    """Return how far rounding moves the tip, m, and turns it, rad, over random joint vectors."""
+    q = np.random.default_rng(1571).uniform(-np.pi, np.pi, (POSES, 6))
+    here, there = found.chain.forward(q), meant.forward(q)
+    off = np.linalg.norm(there[:, :3, 3] - here[:, :3, 3], axis=1)
+    between = np.swapaxes(here[:, :3, :3], 1, 2) @ there[:, :3, :3]
+    return float(off.max()), float(Rotation.from_matrix(between).magnitude().max())
 
 
 def robot_of(
     description: Description,
     *,
+    as_written: bool = False,
+    manufacturer: str = "",
+    axis_3: str = "",
+    axis_3_limits: ArrayLike | None = None,
     lower: ArrayLike | None = None,
     upper: ArrayLike | None = None,
     velocity: ArrayLike | None = None,
@@ -31,18 +100,20 @@ def robot_of(
     Raises
     ------
     InputError
-        The chain is of no family; a limit that is missing, or zero, and is not given.
+        The chain is of no family; a limit that is missing, or zero, and is not given; as
+        `with_axis_3`.
     """
     where = f"{description.path} ({description.base} to {description.tip})"
     try:
-        model = model_of(description.chain)
+        model = model_of(description.chain, as_written=as_written)
     except InputError as error:
         raise InputError(f"{where}: {error}") from None
     continuous = np.array([joint.kind == "continuous" for joint in description.joints])
     left_out = ", ".join(description.left_out)
     outside = [f"Links on joints outside the chain are left out: {left_out}."] if left_out else []
-    return Robot(
+    found = Robot(
         id=description.name,
+        manufacturer=manufacturer,
         notes=(*model.pop("notes", ()), *outside),
         **model,
         **_ranges(description, lower, upper, endless),
@@ -55,6 +126,7 @@ def robot_of(
         frames={"base": description.base, "tip": description.tip},
         sources={"geometry_limits_velocity": f"URDF {Path(description.path).name}"},
     )
+    return with_axis_3(found, axis_3, axis_3_limits)
 
 
 def _ranges(

@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike
 from scipy.spatial.transform import Rotation
 
 from kerfpath._arrays import Array, floats, freeze, scalar
+from kerfpath._told import told
 from kerfpath.errors import InputError
 
 if TYPE_CHECKING:
@@ -57,6 +58,8 @@ class ExternalAxis:
     axis: Array
     point: Array
     step: float
+
+    __repr__ = told
 
     def __post_init__(self) -> None:
         axis = floats(self.axis, f"{self.kind} axis", (3,))

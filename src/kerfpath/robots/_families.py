@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from kerfpath._arrays import Array
+from kerfpath._told import told
 from kerfpath.errors import InputError
 from kerfpath.kernels import five, kinematics, ur
 from kerfpath.robots import _general
@@ -71,6 +72,8 @@ class Family:
     follow_all: Callable[..., None] | None = None
     poses_at_once: int = 100_000
     free_rotation: bool = True
+
+    __repr__ = told
 
 
 def _without_sixth(*, sign: Array, offset: Array, **lengths: float) -> kinematics.Arm:

@@ -100,6 +100,7 @@ def _read(data: dict[str, Any]) -> Robot:
             )
             for c in data.get("coupling", ())
         ),
+        axis_3=joints["axis_3"],
         payload=data["payload_kg"],
         reach=data["reach_m"],
         acceleration_source=joints.get("acceleration_source", ""),

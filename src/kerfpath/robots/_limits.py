@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from kerfpath.errors import InputError
 from kerfpath.kernels.turns import MOST_TURNS
@@ -12,7 +13,7 @@ from kerfpath.kernels.turns import MOST_TURNS
 if TYPE_CHECKING:
     from kerfpath.robots._robot import Robot
 
-__all__ = ["require_few_turns", "require_order"]
+__all__ = ["for_each", "require_few_turns", "require_order"]
 
 
 def require_order(robot: Robot) -> None:
@@ -55,3 +56,8 @@ def require_few_turns(robot: Robot) -> None:
             f"{MOST_TURNS} are told apart; call joints that turn without end endless, or narrow "
             "their limits"
         )
+
+
+def for_each(value: ArrayLike, joints: int) -> ArrayLike:
+    """Return one number as that number for each joint; anything longer as it is."""
+    return np.full(joints, value) if np.ndim(value) == 0 else value

@@ -21,7 +21,7 @@ from kerfpath.robots._general import require_solver
 from kerfpath.robots._robot import Robot
 from kerfpath.urdf import Chain
 
-__all__ = ["EXACT", "model_of"]
+__all__ = ["EXACT", "in_closed_form", "model_of"]
 
 EXACT = 1e-9
 """m, and entries of a rotation: how far a model may be from the description it stands for."""
@@ -73,13 +73,29 @@ class _Lines:
         return ""
 
 
-def model_of(chain: Chain) -> dict[str, Any]:
+def in_closed_form(chain: Chain) -> bool:
+    """Say whether a chain of six joints is of a family with a closed form."""
+    lines = _lines(chain)
+    return any(
+        not isinstance(derived := derive(lines), str)
+        and _miss(chain, _laid(name, lines, *derived)) <= EXACT
+        for name, derive in DERIVED
+    )
+
+
+def model_of(chain: Chain, *, as_written: bool = False) -> dict[str, Any]:
     """Return family, geometry, joint convention and frames of a chain, as `Robot` takes them.
+
+    Parameters
+    ----------
+    chain : Chain
+    as_written : bool
+        Take for a general arm what misses a closed form by few digits.
 
     Raises
     ------
     InputError
-        Not six joints; a closed form that angles of few digits miss; no solver for the others.
+        Not six joints; a closed form that few digits miss; no solver for the others.
     """
     n = len(chain.axes)
     if n != 6:
@@ -87,7 +103,7 @@ def model_of(chain: Chain) -> dict[str, Any]:
         why = redundant if n > 6 else "such arms are not recognised from descriptions"
         raise InputError(f"expected 6 joints between base and tip, got {n}: {why}")
     lines, told = _lines(chain), []
-    for name, derive in (("opw", _opw), ("ur", _ur)):
+    for name, derive in DERIVED:
         derived = derive(lines)
         words = FAMILIES[name].words
         if isinstance(derived, str):
@@ -98,11 +114,11 @@ def model_of(chain: Chain) -> dict[str, Any]:
         if miss <= EXACT:
             return model
         told.append(f"not an {words}, which it misses by {miss:.1e} (m and rad)")
-        if miss > ROUNDED:
+        if miss > ROUNDED or as_written:
             continue
         raise InputError(
-            f"nearly an {words}, but {miss:.1e} off (m and rad, allowed {EXACT:g}); if the "
-            "description prints right angles with few digits, snap=1e-4 takes them as meant"
+            f"nearly an {words}, but {miss:.1e} off (m and rad, allowed {EXACT:g}); write its "
+            "axes and lengths with more digits, or take the arm as it is written with snap=0"
         )
     try:
         require_solver()
@@ -252,3 +268,7 @@ def _round(value: float) -> float:
 
 def _tidy(T: Array) -> Array:
     return np.eye(4) if np.abs(T - np.eye(4)).max() < NONE else T
+
+
+DERIVED = (("opw", _opw), ("ur", _ur))
+"""The families with a closed form, and what lays each into the lines of an arm."""

@@ -13,12 +13,12 @@ from numpy.typing import ArrayLike
 from kerfpath._arrays import Array, Bools, Ints, as_pose, bools, floats, freeze, positive
 from kerfpath.errors import InputError
 from kerfpath.kernels import turns
-from kerfpath.robots._coupling import Coupling
+from kerfpath.robots._coupling import AXIS_3, Coupling
 from kerfpath.robots._external import ExternalAxis, Travel, alone, carried, held
 from kerfpath.robots._families import FAMILIES, Family
-from kerfpath.robots._limits import require_few_turns, require_order
+from kerfpath.robots._limits import for_each, require_few_turns, require_order
 from kerfpath.robots._solutions import Solutions, admitted, every
-from kerfpath.urdf import Body, Chain, read_urdf
+from kerfpath.urdf import Body, Chain
 
 __all__ = ["Robot"]
 
@@ -56,6 +56,9 @@ class Robot:
         Joints that turn without end; their limits do not apply.
     couplings : tuple of Coupling
         Bounds on combinations of joints.
+    axis_3 : {"", "serial", "horizontal"}
+        What axis 3 of the controller measures: joint 3, or the upper arm from the horizontal; ""
+        where it is not known, and then no program that says axis 3 is written.
     chain : Chain, optional
         The joint frames of the description that the robot comes from: the audit's kinematics.
     bodies : tuple of Body
@@ -82,6 +85,7 @@ class Robot:
     acceleration: Array | None = None
     endless: Bools = field(default_factory=lambda: np.zeros((), bool))
     couplings: tuple[Coupling, ...] = ()
+    axis_3: str = ""
     chain: Chain | None = None
     bodies: tuple[Body, ...] = ()
     external: ExternalAxis | None = None
@@ -96,6 +100,13 @@ class Robot:
     frames: dict[str, object] = field(default_factory=dict)
     sources: dict[str, str] = field(default_factory=dict)
 
+    def __repr__(self) -> str:
+        known = "known" if self.acceleration is not None else "not known"
+        return (
+            f"Robot({self.id!r}, {self.manufacturer} {self.model}, {self.joints} joints, "
+            f"{self.kinematics}, accelerations {known})"
+        )
+
     def __post_init__(self) -> None:
         _set = object.__setattr__
         if self.kinematics not in FAMILIES:
@@ -104,16 +115,18 @@ class Robot:
                 f"{', '.join(FAMILIES)}"
             )
         n, arm, lengths = self.joints, self.family.joints, self.family.lengths
+        if self.axis_3 not in AXIS_3:
+            raise InputError(f"axis_3: expected one of {AXIS_3}, got {self.axis_3!r}")
         missing = [k for k in lengths if k not in self.geometry]
         if missing:
             raise InputError(f"robot {self.id!r}: geometry lacks {', '.join(missing)} (m)")
         for name in ("sign", "offset"):
-            _set(self, name, floats(_for_each(getattr(self, name), arm), name, (arm,)))
+            _set(self, name, floats(for_each(getattr(self, name), arm), name, (arm,)))
         if not (np.abs(self.sign) == 1).all():
             raise InputError(f"robot {self.id!r}: sign must be +1 or -1, got {self.sign.tolist()}")
         for name in ("T_base_foot", "T_end_flange"):
             _set(self, name, as_pose(getattr(self, name), name))
-        _set(self, "endless", bools(_for_each(self.endless, n), "endless", (n,)))
+        _set(self, "endless", bools(for_each(self.endless, n), "endless", (n,)))
         for coupling in self.couplings:
             floats(coupling.row, "coupling row", (n,))
         for name in ("lower", "upper"):
@@ -148,7 +161,10 @@ class Robot:
         tip: str | None = None,
         packages: Mapping[str, str | Path] | None = None,
         meshes: bool = True,
-        snap: float = 0.0,
+        snap: float | None = None,
+        manufacturer: str = "",
+        axis_3: str = "",
+        axis_3_limits: ArrayLike | None = None,
         **limits: ArrayLike | None,
     ) -> Robot:
         """Return the robot of a description, its family recognised from the joint axes.
@@ -159,6 +175,10 @@ class Robot:
         ----------
         path, base, tip, packages, meshes, snap
             As in `kerfpath.urdf.read_urdf`. Poses of the robot are of link `tip` in link `base`.
+            Without snap, an arm that has a family by its angles rounded is refused; 0 keeps it.
+        manufacturer, axis_3, axis_3_limits : str, str, (2,) rad
+            Whose controller moves it; what its axis 3 measures and, if "horizontal", its limits as
+            shown there; default: as a robot of the library with the same lengths has it.
         **limits : (n,) rad, rad/s, rad/s^2
             lower, upper, velocity, acceleration, endless: instead of what is written there. No
             description states accelerations. Continuous joints are endless.
@@ -168,10 +188,14 @@ class Robot:
         InputError
             A bad description; a chain of no family; limits that are missing or zero, and not given.
         """
-        from kerfpath.robots._described import robot_of
+        from kerfpath.robots._described import described, robot_of
 
         return robot_of(
-            read_urdf(path, base=base, tip=tip, packages=packages, meshes=meshes, snap=snap),
+            described(path, snap, base=base, tip=tip, packages=packages, meshes=meshes),
+            as_written=snap == 0,
+            manufacturer=manufacturer,
+            axis_3=axis_3,
+            axis_3_limits=axis_3_limits,
             **limits,
         )
 
@@ -380,8 +404,3 @@ class Robot:
             f"robot {self.id!r}: {what} are not known{why}; "
             f"give them with robot.with_limits({keys}...){hint}"
         )
-
-
-def _for_each(value: ArrayLike, joints: int) -> ArrayLike:
-    """Return one number as that number for each joint; anything longer as it is."""
-    return np.full(joints, value) if np.ndim(value) == 0 else value

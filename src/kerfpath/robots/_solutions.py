@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from kerfpath._arrays import Array, Bools, Ints, freeze
+from kerfpath._told import told
 from kerfpath.kernels import turns
 
 __all__ = ["Solutions", "admitted", "every"]
@@ -32,6 +33,8 @@ class Solutions:
     pose: Ints
     posture: Ints
     turn: Ints
+
+    __repr__ = told
 
     def __len__(self) -> int:
         return len(self.q)

@@ -33,6 +33,8 @@ _P = TypeVar("_P", LayeredPath, SlowedPath, InterruptedPath, LeastInterval)
 LIKELY, OPEN, CLOSED = 1, 2, 3
 """What is known of an edge: not seen to be closed, passable, or closed."""
 
+FIRST_ASKED = 8
+"""Vertices of a layer that are asked about at once to find an open one, to begin with."""
 WIDEST = 16
 """Rings around a closed edge that are looked at, at most."""
 
@@ -205,6 +207,30 @@ class Known:
             self._edges = np.insert(edges, at, new)
             self._state = np.insert(state, at, np.where(passed, verdict, CLOSED))
         return np.asarray(self._state[np.searchsorted(self._edges, key)] == CLOSED)
+
+    def closed_layers(self, most: int) -> tuple[list[int], int]:
+        """Return the layers that hold no open vertex, and how many layers that is settled of.
+
+        Layer by layer from the first, until `most` vertices have been asked about.
+        """
+        closed: list[int] = []
+        for k in range(len(self.start) - 1):
+            layer = np.arange(self.start[k], self.start[k + 1])
+            if (self._asked[layer] & np.isfinite(self.cost[layer])).any():
+                continue
+            unknown = np.random.default_rng(k).permutation(layer[~self._asked[layer]])
+            at, batch = 0, FIRST_ASKED
+            while at < len(unknown):
+                if most <= 0:
+                    return closed, k
+                some = unknown[at : at + min(batch, most)]
+                self._ask(some)
+                at, batch, most = at + len(some), 4 * batch, most - len(some)
+                if np.isfinite(self.cost[some]).any():
+                    break
+            else:
+                closed.append(k)
+        return closed, len(self.start) - 1
 
     def told(self, broken: NoFeasiblePath) -> NoFeasiblePath:
         """Say of a break what collision has to do with it."""

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from kerfpath._arrays import Array, Bools, Ints
+from kerfpath._told import told
 from kerfpath.kernels import exact, to_go
 from kerfpath.kernels.search import Layers, Objective
 from kerfpath.kernels.states import EVERY
@@ -59,6 +60,8 @@ class Dead:
     shut: int
     reached: Ints
 
+    __repr__ = told
+
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Best:
@@ -77,6 +80,8 @@ class Best:
     path: Ints
     cost: float
     total: float
+
+    __repr__ = told
 
 
 def best_path(layers: Layers, aim: Objective) -> Best | Dead:

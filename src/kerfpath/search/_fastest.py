@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from kerfpath._arrays import Array, Bools, Ints, bools, floats, freeze, positive, scalar
+from kerfpath._told import told
 from kerfpath.errors import InputError
 from kerfpath.kernels import search as kernel
 from kerfpath.kernels.metric import CHEBYCHEV, increments
@@ -44,6 +45,8 @@ class LeastInterval:
     joint: int
     node: int
     limit: Literal["velocity", "acceleration"]
+
+    __repr__ = told
 
 
 def least_interval(

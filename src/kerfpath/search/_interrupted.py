@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from kerfpath._arrays import Array, Bools, Ints, floats, freeze, scalar
+from kerfpath._told import told
 from kerfpath.errors import InputError, NoFeasiblePath
 from kerfpath.kernels.search import Layers, Objective
 from kerfpath.search._exact import (
@@ -47,6 +48,8 @@ class Piece:
     first: int
     index: Ints
 
+    __repr__ = told
+
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class InterruptedPath:
@@ -65,6 +68,8 @@ class InterruptedPath:
     pieces: tuple[Piece, ...]
     cost: float
     optimal: bool
+
+    __repr__ = told
 
     @property
     def interruptions(self) -> int:

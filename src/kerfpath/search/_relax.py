@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from kerfpath._arrays import bools, floats, positive, scalar
+from kerfpath._told import told
 from kerfpath.errors import NoFeasiblePath
 from kerfpath.search._fastest import LeastInterval, least_interval, quickest, timed
 from kerfpath.search._problem import offsets
@@ -36,6 +37,8 @@ class Relaxations:
     eta_v: float | None
     eta_a: float | None
     slower: LeastInterval
+
+    __repr__ = told
 
     @property
     def dt(self) -> float:

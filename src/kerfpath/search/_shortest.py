@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from kerfpath._arrays import Array, Bools, Ints, freeze, integers
+from kerfpath._told import told
 from kerfpath.errors import InputError, NoFeasiblePath
 from kerfpath.kernels import search as kernel
 from kerfpath.search._branch import best_closed_path
@@ -50,6 +51,8 @@ class LayeredPath:
     index: Ints
     cost: float
     optimal: bool
+
+    __repr__ = told
 
 
 def shortest_path(

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from kerfpath._arrays import Array, Bools, Ints, freeze, scalar
+from kerfpath._told import told
 from kerfpath.kernels import exact, to_go
 from kerfpath.kernels import search as kernel
 from kerfpath.kernels.metric import increments
@@ -43,6 +44,8 @@ class SlowedPath:
     index: Ints
     cost: float
     lost: Array
+
+    __repr__ = told
 
 
 def slowed_path(

@@ -14,12 +14,26 @@ from kerfpath.air import AirMove, air_move, backed_off, least_time
 from kerfpath.cell import Cell
 from kerfpath.errors import NoFeasiblePath
 from kerfpath.plans import Plan
+from kerfpath.robots import posture_name
 
-__all__ = ["Moves"]
+__all__ = ["HOME", "PATIENCE", "Moves"]
+
+PATIENCE = 12
+"""Searches that may end without a way; each takes all its seconds."""
+LOCKED_AFTER = 2
+"""An end that no way was found from so often, and none ever, is taken for one that has none."""
+HOME = -1
+"""In place of a candidate."""
 
 
 class Moves:
-    """Times of the moves between candidates: least ones, and those that have been planned."""
+    """Times of the moves between candidates: least ones, and those that have been planned.
+
+    Attributes
+    ----------
+    failed : dict of (int, int) to NoFeasiblePath
+        The moves, from candidate to candidate, for which no way was found, and why.
+    """
 
     def __init__(
         self,
@@ -31,7 +45,7 @@ class Moves:
         air_speed: float = 1.0,
     ) -> None:
         self._robot, self._plans, self._cell, self._seconds = plans[0].robot, plans, cell, seconds
-        self._air_speed = air_speed
+        self._retract, self._air_speed = retract, air_speed
         self._eta_v, self._eta_a = plans[0].settings.eta_v, plans[0].settings.eta_a
         self._starts = np.array([backed_off(p, "start", retract) for p in plans])
         self._ends = np.array([backed_off(p, "end", retract) for p in plans])
@@ -39,6 +53,7 @@ class Moves:
         self.between = np.array([self._least(self._ends[[i] * C], self._starts) for i in range(C)])
         self.between[group[:, None] == group] = np.inf
         self._moves: dict[tuple[int, int], AirMove] = {}
+        self.failed: dict[tuple[int, int], NoFeasiblePath] = {}
         self._home: Array | None = None
         self.first, self.last = np.zeros(C), np.zeros(C)
 
@@ -54,32 +69,107 @@ class Moves:
         self.first = self._least(everywhere, self._starts)
         self.last = self._least(self._ends, everywhere)
 
+    def extended(self, plans: Sequence[Plan], group: Ints) -> Moves:
+        """Return the moves between these candidates, which go on from those here; so does `failed`.
+
+        What is known stays known.
+        """
+        more = Moves(plans, group, self._cell, self._retract, self._seconds, self._air_speed)
+        C = len(self._plans)
+        more.between[:C, :C] = self.between
+        more._moves, more.failed = self._moves, self.failed
+        if self._home is not None:
+            more.home = self._home
+            more.first[:C], more.last[:C] = self.first, self.last
+        return more
+
     def forbid(self, pairs: Bools) -> None:
         """Let no candidate follow another where pairs (C, C) says so."""
         self.between[pairs] = np.inf
 
     def look_at(self, candidates: Ints) -> bool:
-        """Plan the moves of an order that have not been planned; True where one takes longer."""
+        """Plan the moves of an order that have not been planned; True where one takes longer.
+
+        A move that no way is found for may not be made; nor may any other from or to an end that
+        failed twice, to or from where it was tried, and was never reached.
+
+        Raises
+        ------
+        NoFeasiblePath
+            Home is not clear (proved).
+        """
         changed = False
-        for a, b in self._legs(candidates):
-            if (a, b) in self._moves:
+        for leg in self._legs(candidates):
+            if leg in self._moves:
                 continue
-            one = self._home if a < 0 else self._ends[a]
-            two = self._home if b < 0 else self._starts[b]
+            a, b = leg
+            one = self._home if a == HOME else self._ends[a]
+            two = self._home if b == HOME else self._starts[b]
             assert one is not None
             assert two is not None
             try:
-                move = self._moves[a, b] = self._planned(one, two)
+                move = self._moves[leg] = self._planned(one, two)
                 took = move.duration
             except NoFeasiblePath as broken:
-                if a < 0 or b < 0 or broken.proved:
-                    raise
-                took = np.inf
-            times = self.first if a < 0 else self.last if b < 0 else self.between[a]
-            at = a if b < 0 else b
+                if broken.proved:
+                    raise broken.retold(f"{self.between_which(leg)}: {broken}") from None
+                self.failed[leg], took = broken, np.inf
+                self._shut(leg)
+            times, at = self._place(leg)
             changed |= bool(took > times[at] + 1e-9)
             times[at] = took
+            if not np.isfinite(took):
+                return True  # another order avoids it: what else this one asks for can wait
         return changed
+
+    def told(self, none: NoFeasiblePath | None) -> NoFeasiblePath:
+        """Say which moves no way was found for, and what is in the way of the first.
+
+        `none` is why no order is left without them; None where patience has ended.
+        """
+        if not self.failed:
+            assert none is not None
+            return none
+        leg, broken = next(iter(self.failed.items()))
+        others = len(self.failed) - 1
+        also = f"; nor {others} more move{'s' * (others > 1)}" if others else ""
+        return NoFeasiblePath(
+            f"{self.between_which(leg)}: {broken}{also}, and "
+            + ("no order is left without them" if none else "the search has ended"),
+            proved=False,
+            node=-1,
+        )
+
+    def between_which(self, leg: tuple[int, int]) -> str:
+        """Say from where to where a move goes: contours, and the postures there."""
+        words = []
+        for candidate, end, node in ((leg[0], "end", -1), (leg[1], "start", 0)):
+            if candidate == HOME:
+                words.append("home")
+                continue
+            made = self._plans[candidate]
+            posture = posture_name(int(made.posture[node]))
+            words.append(f"the {end} of contour {made.name!r} in posture {posture}")
+        return f"from {words[0]} to {words[1]}"
+
+    def _shut(self, leg: tuple[int, int]) -> None:
+        """Take an end for locked that has failed often enough and never been left or reached."""
+        for side, candidate in enumerate(leg):
+            often = sum(failed[side] == candidate for failed in self.failed)
+            ever = any(made[side] == candidate for made in self._moves)
+            if candidate == HOME or ever or often < LOCKED_AFTER:
+                continue
+            if side == 0:
+                self.between[candidate] = self.last[candidate] = np.inf
+            else:
+                self.between[:, candidate] = self.first[candidate] = np.inf
+
+    def _place(self, leg: tuple[int, int]) -> tuple[Array, int]:
+        """Return the row of times that a move stands in, and where."""
+        a, b = leg
+        return (
+            (self.first, b) if a == HOME else (self.last, a) if b == HOME else (self.between[a], b)
+        )
 
     def unrolled(self, candidates: Ints) -> dict[str, tuple[Any, ...]]:
         """Return the plans and moves of an order, endless joints going on from one to the next."""
@@ -89,10 +179,10 @@ class Moves:
         for k, (a, b) in enumerate(legs):
             move = self._moves[a, b]
             moves.append(replace(move, q=freeze(move.q + (here - move.q[0]))))
-            shift = moves[-1].q[-1] - (self._starts[b] if b >= 0 else 0)
-            if k == 0 and a >= 0:
+            shift = moves[-1].q[-1] - (0 if b == HOME else self._starts[b])
+            if k == 0 and a != HOME:
                 plans.append(self._shifted(a, here - self._ends[a]))
-            if b >= 0:
+            if b != HOME:
                 plans.append(self._shifted(b, shift))
                 here = self._ends[b] + shift
         if not legs:
@@ -100,7 +190,7 @@ class Moves:
         return {"plans": tuple(plans), "moves": tuple(moves)}
 
     def _legs(self, candidates: Ints) -> list[tuple[int, int]]:
-        around = candidates.tolist() if self._home is None else [-1, *candidates.tolist(), -1]
+        around = candidates.tolist() if self._home is None else [HOME, *candidates.tolist(), HOME]
         return list(pairwise(around))
 
     def _planned(self, one: Array, two: Array) -> AirMove:

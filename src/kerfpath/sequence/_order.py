@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from kerfpath._arrays import Array, Bools, Ints, floats, integers
+from kerfpath._told import told
 from kerfpath.errors import InputError, NoFeasiblePath
 
 __all__ = ["Order", "best_order"]
@@ -39,6 +40,8 @@ class Order:
     candidates: Ints
     duration: float
     at_least: float
+
+    __repr__ = told
 
     @property
     def optimal(self) -> bool:
@@ -67,7 +70,8 @@ def best_order(
     between : (C, C) s
         Time from the end of one to the start of another; infinite where that may not follow.
     first, last : (C,) s, optional
-        Time to reach each as the first, and to come home from each as the last; default 0.
+        Time to reach each as the first, and to come home from each as the last; default 0,
+        infinite where that may not be.
     before : sequence of (g, h)
         Group g is done before group h.
     seconds : float
@@ -90,8 +94,13 @@ def best_order(
     if any(not 0 <= h < G for pair in before for h in pair):
         raise InputError(f"before: expected pairs of numbers from 0 to {G - 1}, got {list(before)}")
     cost = floats(own, "own", (C,))
-    enter = np.zeros(C) if first is None else floats(first, "first", (C,))
-    leave = np.zeros(C) if last is None else floats(last, "last", (C,))
+    ends = []
+    for name, given in (("first", first), ("last", last)):
+        time = np.zeros(C) if given is None else np.asarray(given, dtype=np.float64)
+        if time.shape != (C,) or not (time >= 0).all():
+            raise InputError(f"{name}: expected {C} times >= 0, got {time.tolist()}")
+        ends.append(time)
+    enter, leave = ends
     return _solved(g, cost, move, enter, leave, before, seconds)
 
 

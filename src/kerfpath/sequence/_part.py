@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from itertools import combinations
 from typing import Any
@@ -11,21 +12,20 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy.spatial import cKDTree
 
-from kerfpath._arrays import Bools, floats, scalar
-from kerfpath.air import AirMove, End, backed_off
+from kerfpath._arrays import Array, Bools, Ints, floats, scalar
+from kerfpath._told import told
+from kerfpath.air import AirMove
 from kerfpath.cell import Cell
 from kerfpath.contour import Contour
 from kerfpath.errors import InputError, NoFeasiblePath
 from kerfpath.planner import plan
 from kerfpath.plans import Plan
 from kerfpath.robots import Robot
-from kerfpath.sequence._moves import Moves
+from kerfpath.sequence._candidates import Asked, further, reachable, unused_postures
+from kerfpath.sequence._moves import HOME, PATIENCE, Moves
 from kerfpath.sequence._order import Order, best_order
 
-__all__ = ["PartPlan", "order_plans", "plan_part"]
-
-BACK_BY = (0.0, 0.1, 0.4, 0.7, 1.0)
-"""Shares of the retract between which the joints are taken to run straight."""
+__all__ = ["PartPlan", "longest_search", "order_plans", "plan_part"]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -56,6 +56,8 @@ class PartPlan:
     retract: float
     approach_speed: float
     pierce_time: float
+
+    __repr__ = told
 
     @property
     def cutting_time(self) -> float:
@@ -101,7 +103,8 @@ def plan_part(
 ) -> PartPlan:
     """Return plans for all contours of a part, cut in the order that takes the least time.
 
-    Every candidate is planned; then as `order_plans`.
+    Every candidate is planned; then as `order_plans`. Where that finds no way to or from a contour,
+    the first of its candidates is planned in every other of the `postures`, too.
 
     Parameters
     ----------
@@ -146,8 +149,19 @@ def plan_part(
             assert broken is not None
             raise broken
         plans.append(made)
+
+    def in_other_postures(i: int) -> list[Plan]:
+        found, contour = [], groups[i][0]
+        for posture in unused_postures(plans[i], options.get("postures")):
+            asked = options | {"postures": (posture,)}
+            laid_on = None if contour.time is not None else speeds[i]
+            with suppress(NoFeasiblePath):
+                found.append(plan(contour, robot, speed=laid_on, **asked))
+        return found
+
     return order_plans(
         plans,
+        more=in_other_postures,
         home=home,
         cell=cell,
         before=before,
@@ -174,12 +188,14 @@ def order_plans(
     air_speed: float = 1.0,
     pierce_time: float = 0.0,
     seconds: float = 10.0,
+    more: Callable[[int], Sequence[Plan]] = lambda contour: (),
 ) -> PartPlan:
     """Return one plan of each contour's candidates, in the order that takes the least time.
 
     Order, candidates and moves between them are chosen together. A move is first taken to be
     straight, which no way around beats; those that the best order uses are then planned in the
-    cell, until it uses none that has not been.
+    cell, until it uses none that has not been. A move that no way is found for is not made. Where
+    no order is left without it, the contours that it joins are asked for `more` plans, once.
 
     Parameters
     ----------
@@ -201,12 +217,17 @@ def order_plans(
         Share of the full speed of the moves between contours: they take their least time by it.
     pierce_time : float s
     seconds : float s
-        How long the solver of the order, and each search for a way around, may take.
+        How long the solver of the order, and each search for a way around, may take; searches
+        that find none end after `longest_search(seconds)` in all.
+    more : callable, optional
+        Given the number of a contour, further plans of it, in other postures: its candidates from
+        then on, numbered after the others.
 
     Raises
     ------
     NoFeasiblePath
-        No candidate of a contour that the tool can reach and leave; no order; no way between two.
+        No candidate of a contour that the tool can reach and leave; no order; no way between two,
+        which are named, with what is in the way and what was tried.
     InputError
         Lengths or times that are not positive.
     """
@@ -215,23 +236,35 @@ def order_plans(
     heat_spacing = scalar(heat_spacing, "heat_spacing", unit="m", above=-1e-300)
     pierce_time = scalar(pierce_time, "pierce_time", unit="s", above=-1e-300)
     air_speed = scalar(air_speed, "air_speed", above=0.0)
-    places = _reachable(candidates, cell, retract)
-    plans = [candidates[i][c] for i, c in places]
-    group = np.array([i for i, _ in places])
+    every = [list(made) for made in candidates]
+    asked = Asked(every, more)
+    places = reachable(every, cell, retract, asked)
     if given_order:
-        before = [*before, *((i, i + 1) for i in range(len(candidates) - 1))]
-    air = Moves(plans, group, cell, retract, seconds, air_speed)
-    air.forbid(_too_warm([c[0].contour for c in candidates], heat_spacing)[np.ix_(group, group)])
-    if home is not None:
-        air.home = floats(home, "home", (plans[0].robot.joints,))
-    own = np.array([p.time[-1] - p.time[0] for p in plans])
-    own += pierce_time + 2 * retract / approach_speed
+        before = [*before, *((i, i + 1) for i in range(len(every) - 1))]
+    warm = _too_warm([c[0].contour for c in every], heat_spacing)
+    air: Moves | None = None
     while True:
-        order = best_order(
-            group, own, air.between, first=air.first, last=air.last, before=before, seconds=seconds
+        plans = [every[i][c] for i, c in places]
+        group = np.array([i for i, _ in places])
+        air = (
+            Moves(plans, group, cell, retract, seconds, air_speed)
+            if air is None
+            else air.extended(plans, group)
         )
-        if not air.look_at(order.candidates):
+        air.forbid(warm[np.ix_(group, group)])
+        if home is not None and air.home is None:
+            air.home = floats(home, "home", (plans[0].robot.joints,))
+        own = np.array([p.time[-1] - p.time[0] for p in plans])
+        own += pierce_time + 2 * retract / approach_speed
+        found = _settled(air, group, own, before, seconds)
+        if not isinstance(found, NoFeasiblePath):
+            order = found
             break
+        contours = sorted({int(group[c]) for leg in air.failed for c in leg if c != HOME})
+        fresh = further(every, cell, retract, asked, contours) if air.failed else []
+        if not fresh:
+            raise asked.told(found)
+        places += fresh
     return PartPlan(
         **air.unrolled(order.candidates),
         order=order,
@@ -242,41 +275,30 @@ def order_plans(
     )
 
 
-def _reachable(
-    candidates: Sequence[Sequence[Plan]], cell: Cell | None, retract: float
-) -> list[tuple[int, int]]:
-    """Return contour and candidate of each plan that the tool can go down to and leave again."""
-    places: list[tuple[int, int]] = []
-    for i, made in enumerate(candidates):
-        broken, found = None, len(places)
-        for c, one in enumerate(made):
-            try:
-                _require_clear_ends(one, cell, retract)
-                places.append((i, c))
-            except NoFeasiblePath as error:
-                broken = broken or error
-        if broken is not None and len(places) == found:
-            raise broken
-    return places
+def longest_search(seconds: float) -> float:
+    """Return how long searches for ways around that find none may take in all, s.
+
+    Before other postures are asked for, and once more with them.
+    """
+    return 2 * PATIENCE * seconds
 
 
-def _require_clear_ends(made: Plan, cell: Cell | None, retract: float) -> None:
-    """Raise NoFeasiblePath where the tool cannot go down to a cut or back from it."""
-    ends: tuple[tuple[End, int], ...] = (("start", 0), ("end", len(made.q) - 1))
-    for end, node in ends:
+def _settled(
+    air: Moves, group: Ints, own: Array, before: Sequence[tuple[int, int]], seconds: float
+) -> Order | NoFeasiblePath:
+    """Return the best order whose moves all have a way, or why none is found."""
+    failed = len(air.failed)
+    while len(air.failed) - failed < PATIENCE:
         try:
-            way = np.array([backed_off(made, end, part * retract) for part in BACK_BY])
-        except InputError as broken:
-            raise NoFeasiblePath(str(broken), proved=True, node=node) from broken
-        if cell is None:
-            continue
-        if not cell.clear_through(way):
-            raise NoFeasiblePath(
-                f"contour {made.name!r}: the tool is not clear while it backs off node {node} by "
-                f"{retract * 1e3:g} mm",
-                proved=True,
-                node=node,
-            )
+            order = best_order(
+                group, own, air.between,
+                first=air.first, last=air.last, before=before, seconds=seconds,
+            )  # fmt: skip
+        except NoFeasiblePath as none:
+            return air.told(none)
+        if not air.look_at(order.candidates):
+            return order
+    return air.told(None)
 
 
 def _too_warm(contours: Sequence[Contour], spacing: float) -> Bools:

@@ -11,6 +11,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from kerfpath._told import told
 from kerfpath.errors import InputError
 from kerfpath.job import (
     Outcome,
@@ -73,6 +74,8 @@ class Planned:
     reason: str = ""
     notes: tuple[str, ...] = ()
     seconds: float = 0.0
+
+    __repr__ = told
 
 
 def batch(

@@ -9,6 +9,7 @@ from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
+from kerfpath._told import told
 from kerfpath.cad import Part
 from kerfpath.cad import read as read_drawing
 from kerfpath.errors import InputError
@@ -24,6 +25,8 @@ class Loaded:
 
     job: Job
     part: Part
+
+    __repr__ = told
 
 
 def digest(path: Path) -> str:

@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 
+from kerfpath._told import told
 from kerfpath.auditor import Check, checks
 from kerfpath.cell import Cell
 from kerfpath.contour import Contour
@@ -58,6 +59,8 @@ class Studied:
     contour: str
     others: tuple[str, ...]
     front: Front
+
+    __repr__ = told
 
 
 def pareto_of_job(

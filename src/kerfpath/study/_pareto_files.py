@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 
 from kerfpath import __version__
+from kerfpath._told import told
 from kerfpath.cad import Part
 from kerfpath.errors import InputError
 from kerfpath.front import Front, Run
@@ -169,6 +170,8 @@ class Pick:
     contour: str
     number: int
     run: Run
+
+    __repr__ = told
 
 
 def picked(folder: Path, job_file: Path, which: str) -> Pick:

@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 
+from kerfpath._told import told
 from kerfpath.cad import Part
 from kerfpath.cell import Cell, Checker
 from kerfpath.errors import InputError, NoFeasiblePath
@@ -60,6 +61,8 @@ class ContourSpeed:
     limit: str | None = None
     reason: str = ""
 
+    __repr__ = told
+
     @property
     def margin(self) -> float | None:
         """The fastest speed as a multiple of what is asked."""
@@ -86,6 +89,8 @@ class RobotSpeed:
     own: bool
     contours: tuple[ContourSpeed, ...] = ()
     reason: str = ""
+
+    __repr__ = told
 
     @property
     def binding(self) -> ContourSpeed | None:

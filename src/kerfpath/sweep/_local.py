@@ -6,10 +6,10 @@ import os
 import pickle
 import signal
 from collections import deque
-from collections.abc import Callable, Generator
+from collections.abc import Callable, Generator, Iterator
 from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
 from concurrent.futures.process import BrokenProcessPool
-from contextlib import suppress
+from contextlib import contextmanager, suppress
 from multiprocessing import get_context
 from multiprocessing.connection import Connection
 from threading import Thread
@@ -71,7 +71,8 @@ def _pooled(
         while True:
             while waiting and not broken and len(flying) < ahead:
                 try:
-                    future = pool.submit(attempt, __version__, call, waiting[0])
+                    with _unheard():
+                        future = pool.submit(attempt, __version__, call, waiting[0])
                 except BrokenProcessPool:
                     broken = True
                 else:
@@ -104,6 +105,19 @@ def _pooled(
         pool.shutdown(cancel_futures=True)
         ours.close()
         theirs.close()
+
+
+@contextmanager
+def _unheard() -> Iterator[None]:
+    """Let processes that are started here begin deaf to Ctrl-C, before they can say so."""
+    if not hasattr(signal, "pthread_sigmask"):
+        yield
+        return
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+    try:
+        yield
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)
 
 
 def _begin(link: Connection, call: bytes) -> None:

@@ -11,6 +11,7 @@ from pathlib import Path
 from time import perf_counter
 from typing import Any
 
+from kerfpath._told import told
 from kerfpath.errors import InputError
 from kerfpath.sweep._cluster import on_cluster
 from kerfpath.sweep._local import on_processes
@@ -42,6 +43,8 @@ class Result:
     value: Any
     failure: Failure | None
     seconds: float
+
+    __repr__ = told
 
 
 class Sweep:
@@ -125,9 +128,13 @@ class Sweep:
             if batch:
                 self._tell()
         outcome = self._kept.outcome(key)
+        try:
+            value = None if outcome.value is None else json.loads(outcome.value)
+        except (ValueError, RecursionError):
+            raise self._kept.damaged(key) from None
         return Result(
             parameters=json.loads(self._tasks[key].parameters),
-            value=None if outcome.value is None else json.loads(outcome.value),
+            value=value,
             failure=outcome.failure,
             seconds=outcome.seconds,
         )

@@ -79,7 +79,7 @@ class Store:
             raise InputError(
                 f"{self._path}: a store of schema {schema}, this kerfpath writes {SCHEMA}: {again}"
             )
-        (version,) = self._base.execute("SELECT version FROM package").fetchone()
+        (version,) = self._base.execute("SELECT version FROM package").fetchone() or ("unknown",)
         if version != __version__:
             raise InputError(
                 f"{self._path}: a store of kerfpath {version}, this is {__version__}: {again}"
@@ -124,9 +124,21 @@ class Store:
         """Return what is kept under a key."""
         query = "SELECT value, kind, message, seconds FROM result WHERE key = ?"
         with self._explained():
-            value, kind, message, seconds = self._base.execute(query, (key,)).fetchone()
-        failure = None if kind is None else Failure(kind=kind, message=message)
-        return Outcome(key=key, value=value, failure=failure, seconds=seconds)
+            row = self._base.execute(query, (key,)).fetchone()
+        match row:
+            case (str() as value, None, None, float() as seconds):
+                return Outcome(key=key, value=value, failure=None, seconds=seconds)
+            case (None, str() as kind, str() as message, float() as seconds):
+                failure = Failure(kind=kind, message=message)
+                return Outcome(key=key, value=None, failure=failure, seconds=seconds)
+        raise self.damaged(key)
+
+    def damaged(self, key: str) -> InputError:
+        """Return the error that says that what is kept under a key is no result."""
+        return InputError(
+            f"{self._path}: the store is damaged, result {str(key)[:16]!r} is none; name another "
+            "store, and the sweep is done anew"
+        )
 
     def __enter__(self) -> Store:
         return self

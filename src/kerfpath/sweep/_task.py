@@ -14,6 +14,7 @@ from time import perf_counter
 from typing import Any, NamedTuple
 
 from kerfpath import __version__
+from kerfpath._told import told
 from kerfpath.errors import InputError
 
 __all__ = ["SCHEMA", "Failure", "Outcome", "Task", "UnfitWorker", "attempt", "name_of", "task_of"]
@@ -48,6 +49,8 @@ class Failure:
     kind: str
     message: str
 
+    __repr__ = told
+
     @property
     def reason(self) -> str:
         """The message, after the kind where that is not one of kerfpath's own errors."""
@@ -63,6 +66,8 @@ class Outcome:
     value: str | None
     failure: Failure | None
     seconds: float
+
+    __repr__ = told
 
 
 def name_of(function: Callable[..., Any]) -> str:

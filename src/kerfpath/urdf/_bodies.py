@@ -10,6 +10,7 @@ from xml.etree import ElementTree
 import numpy as np
 
 from kerfpath._arrays import Array, freeze
+from kerfpath._told import told
 from kerfpath.errors import InputError
 from kerfpath.urdf._xml import Tree, child, numbers, pose_of
 
@@ -42,6 +43,8 @@ class Body:
     kind: str
     size: Array
     path: Path | None = None
+
+    __repr__ = told
 
 
 def bodies_of(

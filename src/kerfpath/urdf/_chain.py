@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from kerfpath._arrays import Array, floats
+from kerfpath._told import told
 
 __all__ = ["Chain", "turns"]
 
@@ -29,11 +30,19 @@ class Chain:
     axes: Array
     end: Array
 
+    __repr__ = told
+
     def __post_init__(self) -> None:
         n = len(self.origins)
         object.__setattr__(self, "origins", floats(self.origins, "chain origins", (n, 4, 4)))
         object.__setattr__(self, "axes", floats(self.axes, "chain axes", (n, 3)))
         object.__setattr__(self, "end", floats(self.end, "chain end", (4, 4)))
+
+    @property
+    def length(self) -> float:
+        """The lengths (m) from joint to joint and to the end, together: how far the arm reaches."""
+        steps = np.linalg.norm(self.origins[1:, :3, 3], axis=1)
+        return float(steps.sum() + np.linalg.norm(self.end[:3, 3]))
 
     def frames(self, q: Array) -> Array:
         """Return the poses (B, n+1, 4, 4) in the base of all frames at q (B, n) rad."""

@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from kerfpath._arrays import Array, freeze
+from kerfpath._told import told
 from kerfpath.errors import InputError
 from kerfpath.urdf._bodies import Body, bodies_of
 from kerfpath.urdf._chain import Chain
@@ -50,6 +51,8 @@ class Description:
     chain: Chain
     bodies: tuple[Body, ...]
     left_out: tuple[str, ...]
+
+    __repr__ = told
 
 
 def read_urdf(

@@ -11,6 +11,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from kerfpath._arrays import Array, freeze
+from kerfpath._told import told
 from kerfpath.errors import InputError
 
 __all__ = ["Joint", "Tree", "child", "numbers", "pose_of", "read_tree"]
@@ -18,6 +19,10 @@ __all__ = ["Joint", "Tree", "child", "numbers", "pose_of", "read_tree"]
 XACRO = ("{http://www.ros.org/wiki/xacro}", "{http://wiki.ros.org/xacro}")
 FINE = np.pi / 12
 """rad: the angles that are meant where a description rounds them are whole multiples of 15 deg."""
+LARGEST = 1e6
+"""No number of a description is larger, m, rad or a scale."""
+NO_AXIS = 1e-9
+"""An axis whose numbers are all smaller is none."""
 KINDS = ("revolute", "continuous", "fixed", "prismatic", "floating", "planar")
 
 
@@ -49,6 +54,8 @@ class Joint:
     velocity: float | None
     mimics: str
 
+    __repr__ = told
+
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Tree:
@@ -60,6 +67,8 @@ class Tree:
     joints: tuple[Joint, ...]
     parent: Mapping[str, Joint]
     """The joint above each link that has one."""
+
+    __repr__ = told
 
 
 class _NoDoctype(ElementTree.TreeBuilder):
@@ -110,6 +119,8 @@ def read_tree(path: Path, snap: float) -> Tree:
 
 def _root(path: Path) -> ElementTree.Element:
     try:
+        if path.exists() and not (path.is_file() or path.is_dir()):
+            raise InputError("is no file; expected a robot description (URDF)")
         root = ElementTree.fromstring(
             path.read_bytes(), parser=ElementTree.XMLParser(target=_NoDoctype())
         )
@@ -155,8 +166,8 @@ def _joint(element: ElementTree.Element, snap: float, path: Path) -> Joint:
     axis = np.array([1.0, 0.0, 0.0])
     if kind not in ("fixed", "floating") and (found := child(element, "axis", where)) is not None:
         axis = numbers(found, "xyz", where, (1.0, 0.0, 0.0))
-        if not np.linalg.norm(axis) > 0:
-            raise InputError(f"{where}: its axis is 0 0 0, which is no direction")
+        if not np.abs(axis).max() > NO_AXIS:
+            raise InputError(f"{where}: its axis is nearly 0 0 0, which is no direction")
     limit, mimic = child(element, "limit", where), child(element, "mimic", where)
     written: dict[str, float | None] = dict.fromkeys(("lower", "upper", "velocity"))
     if limit is not None:
@@ -209,9 +220,11 @@ def numbers(
         values = np.array([float(word) for word in text.split()])
     except ValueError:
         values = np.array([])
-    if len(values) != len(default) or not np.isfinite(values).all():
+    if len(values) != len(default) or not (np.abs(values) <= LARGEST).all():
         want = "a finite number" if len(default) == 1 else f"{len(default)} finite numbers"
-        raise InputError(f"{where}: expected {key}= as {want}, got {text!r}")
+        raise InputError(
+            f"{where}: expected {key}= as {want}, got {text!r} (allowed are {LARGEST:g})"
+        )
     return values
 
 

@@ -133,10 +133,25 @@ class FixtureTable(Table):
 
 
 class PairTable(Table):
-    """[[cell.pair]]: how near two bodies may come, where it is not near_miss_mm."""
+    """[[cell.pair]]: how near two bodies may come, or why they are not judged."""
 
     between: Annotated[Pair, key("the names of two bodies", '["nozzle", "clamp"]')]
-    near_miss_mm: Annotated[NotNegative, key("a number not below 0, in mm", "2")]
+    near_miss_mm: Annotated[NotNegative | None, key("a number not below 0, in mm", "2")] = None
+    allowed: Annotated[
+        Text | None, key("why the two may touch, in words", '"the hose rests on it"')
+    ] = None
+
+    @model_validator(mode="after")
+    def _one_rule(self) -> PairTable:
+        rules = given(self, "near_miss_mm", "allowed")
+        if len(rules) != 1:
+            raise fault(
+                "one of near_miss_mm (how near they may come) and allowed (why they may touch)",
+                "both" if rules else "none",
+                "remove one" if rules else "add, for example, near_miss_mm = 2",
+                ("near_miss_mm",),
+            )
+        return self
 
 
 class CellTable(Table):

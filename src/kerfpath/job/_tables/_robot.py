@@ -16,7 +16,8 @@ from kerfpath.job._keys import (
     Joints,
     JointsPositive,
     Lengths,
-    Positive,
+    NotNegative,
+    Number,
     Ratio,
     Signs,
     Text,
@@ -28,15 +29,16 @@ from kerfpath.job._keys import (
     told,
 )
 from kerfpath.job._tables._table import Table, given
-from kerfpath.robots import FAMILIES, Robot, acceleration_ratios, robot, robot_ids
+from kerfpath.robots import FAMILIES, Robot, acceleration_ratios, robot, robot_ids, with_axis_3
 from kerfpath.urdf import read_urdf
 
 __all__ = ["RobotTable"]
 
+CONTROLLER = ("manufacturer", "axis_3", "axis_3_deg")
 SOURCES = {
     "model": (),
-    "urdf": ("base", "tip", "packages", "snap_deg", "manufacturer"),
-    "kinematics": ("geometry_mm", "sign", "offset_deg", "manufacturer"),
+    "urdf": ("base", "tip", "packages", "snap_deg", *CONTROLLER),
+    "kinematics": ("geometry_mm", "sign", "offset_deg", *CONTROLLER),
 }
 """The three ways to say which robot, and the keys that belong to each."""
 LIMITS = ("lower_deg", "upper_deg", "velocity_deg_s", "acceleration_deg_s2")
@@ -44,11 +46,16 @@ IN_KEYS = {
     "lower= and upper=": "lower_deg and upper_deg",
     "velocity=": "velocity_deg_s",
     "(rad, rad/s)": "(deg, deg/s)",
-    "snap=1e-4": "snap_deg = 0.006",
+    "snap=5e-06": "snap_deg = 0.0003",
+    "snap=5e-05": "snap_deg = 0.003",
+    "snap=0.0005": "snap_deg = 0.03",
+    "snap=0.005": "snap_deg = 0.3",
+    "snap=0": "snap_deg = 0",
     'packages={"NAME": "FOLDER"}, or read the kinematics alone with meshes=False': (
         'packages = { NAME = "FOLDER" }'
     ),
     "choose base= or tip=": "choose base or tip",
+    "axis_3_limits=": "axis_3_deg",
 }
 """What messages about descriptions tell to do in Python, and what that is in a job."""
 
@@ -72,9 +79,9 @@ class RobotTable(Table):
         dict[str, Text] | None,
         key("folders by the name of their package", '{ arm_description = "meshes" }'),
     ] = None
-    snap_deg: Annotated[
-        Positive | None, key("a number above 0, at most 1, in deg", "0.006", le=1)
-    ] = None
+    snap_deg: Annotated[NotNegative | None, key("a number from 0 to 1, in deg", "0.006", le=1)] = (
+        None
+    )
     kinematics: Annotated[
         Literal["opw", "ur", "five"] | None, key("a family of arms", '"five"')
     ] = None
@@ -89,6 +96,18 @@ class RobotTable(Table):
         Joints | None, key("an angle for every joint, in deg", "[0, 0, -90, 0, 0]")
     ] = None
     manufacturer: Annotated[Text | None, key("whose controller moves the robot", '"ABB"')] = None
+    axis_3: Annotated[
+        Literal["serial", "horizontal"] | None,
+        key("what axis 3 of the controller measures", '"horizontal"'),
+    ] = None
+    axis_3_deg: Annotated[
+        tuple[Number, Number] | None,
+        key(
+            "the two limits of axis 3 as its controller shows them, in deg",
+            "[-60, 65]",
+            strict=False,
+        ),
+    ] = None
     endless: Annotated[
         tuple[Axis, ...] | None, key("axis numbers from 1 to 6, each once", "[4, 6]", strict=False)
     ] = None
@@ -124,8 +143,10 @@ class RobotTable(Table):
             self._require_for_each_joint(self.joints(folder))
             known = self._known(folder)
         except InputError as error:
-            where = "urdf" if self.urdf else "geometry_mm"
-            raise told(_in_keys(str(error)), (where,)) from None
+            said = _in_keys(str(error))
+            keys = "axis_3_deg", "axis_3", "urdf" if self.urdf else "geometry_mm"
+            where = next((k for k in keys[:2] if said.startswith(f"{k}: ")), keys[2])
+            raise told(said.removeprefix(f"{where}: "), (where,)) from None
         if len(given(self, "acceleration_deg_s2", "acceleration_ratio")) == 2:
             raise fault(
                 "acceleration_deg_s2 or acceleration_ratio",
@@ -235,15 +256,18 @@ class RobotTable(Table):
         """Return the robot as the library or its lengths have it, or as described and limited."""
         if self.model is not None:
             return robot(self.model)
+        limits = None if self.axis_3_deg is None else np.radians(self.axis_3_deg)
+        counted: dict[str, Any] = {"axis_3": self.axis_3 or "", "axis_3_limits": limits}
         maker = self.manufacturer or ""
         if self.urdf is not None:
-            found = Robot.from_urdf(
+            return Robot.from_urdf(
                 folder / self.urdf,
                 **self._chain(folder),
                 meshes=bodies,
+                manufacturer=maker,
+                **counted,
                 **self._limits(self.joints(folder)),
             )
-            return replace(found, manufacturer=maker)
         assert self.kinematics is not None
         assert self.geometry_mm is not None
         family = FAMILIES[self.kinematics]
@@ -252,19 +276,24 @@ class RobotTable(Table):
             raise InputError(
                 f"expected lengths {', '.join(family.lengths)}, got {unknown[0]}; remove it"
             )
-        return Robot(
-            id=f"{self.kinematics} arm by its lengths",
-            manufacturer=maker,
-            kinematics=self.kinematics,
-            geometry={name: mm / 1000 for name, mm in self.geometry_mm.items()},
-            sign=np.array(self.sign or 1.0, dtype=float),
-            offset=np.radians(self.offset_deg or 0.0),
+        return with_axis_3(
+            Robot(
+                id=f"{self.kinematics} arm by its lengths",
+                manufacturer=maker,
+                kinematics=self.kinematics,
+                geometry={name: mm / 1000 for name, mm in self.geometry_mm.items()},
+                sign=np.array(self.sign or 1.0, dtype=float),
+                offset=np.radians(self.offset_deg or 0.0),
+            ),
+            self.axis_3 or "",
+            limits,
         )
 
     def joints(self, folder: Path) -> int:
         """Return how many joints the robot has."""
         if self.urdf is not None:
-            return len(read_urdf(folder / self.urdf, **self._chain(folder), meshes=False).joints)
+            chain = self._chain(folder) | {"meshes": False, "snap": 0.0}
+            return len(read_urdf(folder / self.urdf, **chain).joints)
         return robot(self.model).joints if self.model else FAMILIES[self.kinematics or ""].joints
 
     def _chain(self, folder: Path) -> dict[str, Any]:
@@ -273,7 +302,7 @@ class RobotTable(Table):
             "base": self.base,
             "tip": self.tip,
             "packages": {name: folder / place for name, place in (self.packages or {}).items()},
-            "snap": float(np.radians(self.snap_deg or 0.0)),
+            "snap": None if self.snap_deg is None else float(np.radians(self.snap_deg)),
         }
 
     def _limits(self, n: int) -> dict[str, Any]:

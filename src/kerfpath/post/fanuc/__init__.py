@@ -16,6 +16,7 @@ FANUC = Language(
     title="FANUC TP",
     manufacturers=("FANUC",),
     families=("opw",),
+    axis_3=("horizontal",),
     suffix=".ls",
     settings=FanucSettings,
     rules=rules,

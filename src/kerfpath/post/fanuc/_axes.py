@@ -22,11 +22,14 @@ from numpy.typing import ArrayLike
 
 from kerfpath._arrays import Array, Ints, floats, freeze
 from kerfpath.post._arm_plane import wrist_in_plane
+from kerfpath.post._counting import offset_near
 from kerfpath.post.fanuc._settings import FanucSettings
 from kerfpath.robots import Robot
 
 __all__ = ["axes_from_joints", "joints_from_axes", "posture", "turns"]
 
+COUNTED_FROM = (0.0, 0.0, -90.0, 0.0, 0.0, -180.0)
+"""Offsets (deg) of the maker's own descriptions."""
 NOISE_DECIMALS = 6
 """Angles are rounded to this many decimals (deg) before their turns are counted."""
 NOISE = 1e-8
@@ -40,14 +43,16 @@ TURNING = {"J1 J4 J6": [0, 3, 5], "J4 J5 J6": [3, 4, 5]}
 
 def axes_from_joints(robot: Robot, q: ArrayLike) -> Array:
     """Return the controller's axes (K, 6) rad of joint vectors q (K, 6) rad."""
-    angles = robot.sign * floats(q, "q", (None, 6)) - robot.offset
+    angles = robot.sign * floats(q, "q", (None, 6)) - offset_near(robot, COUNTED_FROM)
     return freeze(np.asarray(angles @ MATRIX.T + SHIFT, dtype=np.float64))
 
 
 def joints_from_axes(robot: Robot, axes: ArrayLike) -> Array:
     """Return the joint vectors (K, 6) rad of a controller's axes (K, 6) rad."""
     angles = (floats(axes, "axes", (None, 6)) - SHIFT) @ np.linalg.inv(MATRIX).T
-    return freeze(np.asarray(robot.sign * (angles + robot.offset), dtype=np.float64))
+    return freeze(
+        np.asarray(robot.sign * (angles + offset_near(robot, COUNTED_FROM)), dtype=np.float64)
+    )
 
 
 def turns(robot: Robot, q: ArrayLike, settings: FanucSettings) -> Ints:

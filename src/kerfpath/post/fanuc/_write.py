@@ -151,6 +151,7 @@ class Fanuc(Formatter):
         lines = [
             *self.comment(f"kerfpath, for {plain(program.robot.model)}"),
             *self.comment(f"Moves through the air: {checked}."),
+            *(line for said in program.caveats for line in self.comment(said)),
             *self.comment(
                 f"{off_name(program.name, settings)} as BG logic switches off at a stop."
             ),

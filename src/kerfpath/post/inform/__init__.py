@@ -17,6 +17,7 @@ INFORM = Language(
     title="Yaskawa INFORM",
     manufacturers=("Yaskawa",),
     families=("opw",),
+    axis_3=("serial",),
     suffix=".JBI",
     settings=InformSettings,
     rules=rules,

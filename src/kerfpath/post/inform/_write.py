@@ -157,6 +157,8 @@ class Inform(Formatter):
         checked = clear if program.air_checked else "not checked for collisions"
         yield from self.comment(f"kerfpath, for {plain(program.robot.model)}")
         yield from self.comment(f"Moves through the air: {checked}.")
+        for said in program.caveats:
+            yield from self.comment(said)
         off = off_name(program.name, settings)
         yield from self.comment(f"{off} switches off: run it after a stop.")
         yield from self.comment("A stop does not switch the laser off: the cell's safety has to.")

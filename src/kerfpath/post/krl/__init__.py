@@ -17,6 +17,7 @@ KRL = Language(
     title="KUKA KRL",
     manufacturers=("KUKA",),
     families=("opw",),
+    axis_3=("", "serial"),
     suffix=".src",
     settings=KrlSettings,
     rules=rules,

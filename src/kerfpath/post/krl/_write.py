@@ -282,6 +282,7 @@ class Krl(Formatter):
         if settings.base_number is None:
             yield "; $BASE is the part in the robot's base, which is $WORLD, too."
         yield f"; Moves through the air have {checked}."
+        yield from (f"; {said}" for said in program.caveats)
         yield f"; {SWITCH_OFF}() runs at a stop message; the safety circuit of the cell has to"
         yield "; switch the laser off, too."
         yield f"; To begin at a contour set {FIRST} in the .dat to its number, and reset."

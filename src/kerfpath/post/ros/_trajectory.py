@@ -8,6 +8,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation, Slerp
 
 from kerfpath._arrays import Array, Bools, Ints, freeze
+from kerfpath._told import told
 from kerfpath.air import least_time
 from kerfpath.errors import InputError
 from kerfpath.post._program import JointMove, LinearMove, Program, Wait
@@ -38,6 +39,8 @@ class Trajectory:
     q: Array
     stops: Bools
     done: Ints
+
+    __repr__ = told
 
 
 def rates(time: Array, q: Array, stops: Bools) -> tuple[Array, Array]:

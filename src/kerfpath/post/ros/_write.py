@@ -84,6 +84,7 @@ class Ros(Formatter):
         yield f"# Written by kerfpath for {plain(robot.model)} ({plain(robot.id)})."
         yield "# A trajectory_msgs/JointTrajectory; rad and s. Bring the robot to its first point."
         yield f"# Moves through the air have {checked}."
+        yield from (f"# {said}" for said in program.caveats)
         yield f"# What is switched when is in {program.name}.events.yaml."
         yield from head(joint_names(robot.joints, self.settings))
         ns = _ns(motion.time)

@@ -11,6 +11,7 @@ from scipy.spatial.transform import Rotation
 
 from kerfpath._arrays import Array, freeze
 from kerfpath.errors import InputError
+from kerfpath.post._counting import offset_near
 from kerfpath.post._program import SIGNALS, Await, Handshake, Request, Switch
 from kerfpath.post._read import (
     ReadHandshake,
@@ -150,7 +151,7 @@ class _Reader:
                 kind="joint",
                 file=self.file,
                 line=self.number,
-                q=freeze(robot.sign * (np.array(angles) + robot.offset)),
+                q=freeze(robot.sign * (np.array(angles) + offset_near(robot, 0.0))),
                 speed=v / full_joint_speed(robot) if timed is None else None,
                 duration=None if timed is None else float(timed),
                 zone=r,

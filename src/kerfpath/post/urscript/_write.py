@@ -16,6 +16,7 @@ import numpy as np
 
 from kerfpath._arrays import Array
 from kerfpath.errors import InputError
+from kerfpath.post._counting import offset_near
 from kerfpath.post._divide import in_one_file
 from kerfpath.post._formatter import Formatter, number, plain
 from kerfpath.post._orientations import rotation_vectors
@@ -125,6 +126,7 @@ class URScript(Formatter):
         checked = "been proved clear in the planned cell" if program.air_checked else NOT_CHECKED
         yield f"# Written by kerfpath for {plain(robot.model)} ({plain(robot.id)})."
         yield f"# Moves through the air have {checked}."
+        yield from (f"# {said}" for said in program.caveats)
         yield "# Payload and centre of gravity are those of the installation."
         yield "# The controller sets the outputs low while no program runs; the safety circuit of"
         yield "# the cell has to switch the laser off, too."
@@ -176,7 +178,7 @@ class URScript(Formatter):
     def joint_move(self, move: JointMove) -> Iterator[str]:
         """Yield a movej; its speed is that of the joint with the longest way."""
         robot = self.program.robot
-        q = ", ".join(number(angle, 8) for angle in robot.sign * move.q - robot.offset)
+        q = ", ".join(number(angle, 8) for angle in robot.sign * move.q - offset_near(robot, 0.0))
         a = number(np.radians(self.settings.joint_acceleration_deg_s2), 6)
         v = number(move.speed * full_joint_speed(robot), 6)
         timed = "" if move.duration is None else f"t={number(move.duration, 4)}, "

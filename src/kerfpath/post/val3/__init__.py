@@ -17,6 +17,7 @@ VAL3 = Language(
     title="Staubli VAL 3",
     manufacturers=("Staubli",),
     families=("opw",),
+    axis_3=("", "serial"),
     suffix=".pjx",
     settings=Val3Settings,
     rules=rules,

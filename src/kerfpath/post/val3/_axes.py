@@ -20,6 +20,7 @@ from numpy.typing import ArrayLike
 
 from kerfpath._arrays import Array, floats, freeze
 from kerfpath.post._arm_plane import wrist_in_plane
+from kerfpath.post._counting import offset_near
 from kerfpath.post.val3._settings import Val3Settings
 from kerfpath.robots import Robot
 
@@ -34,12 +35,14 @@ NOISE = 1e-8
 
 def axes_from_joints(robot: Robot, q: ArrayLike) -> Array:
     """Return the controller's axes (K, 6) rad of joint vectors q (K, 6) rad."""
-    return freeze(np.asarray(robot.sign * floats(q, "q", (None, 6)) - robot.offset))
+    return freeze(np.asarray(robot.sign * floats(q, "q", (None, 6)) - offset_near(robot, 0.0)))
 
 
 def joints_from_axes(robot: Robot, axes: ArrayLike) -> Array:
     """Return the joint vectors (K, 6) rad of a controller's axes (K, 6) rad."""
-    return freeze(np.asarray(robot.sign * (floats(axes, "axes", (None, 6)) + robot.offset)))
+    return freeze(
+        np.asarray(robot.sign * (floats(axes, "axes", (None, 6)) + offset_near(robot, 0.0)))
+    )
 
 
 def posture(robot: Robot, q: Array, settings: Val3Settings) -> list[tuple[int | str, ...]]:

@@ -305,6 +305,8 @@ class Val3(Formatter):
         yield from self.comment(f"Written by kerfpath for {robot}.")
         yield from self.comment("fPart is the part in the world, which starts at axis 2.")
         yield from self.comment(f"Moves through the air have {checked}.")
+        for said in program.caveats:
+            yield from self.comment(said)
         yield from self.comment(
             "stop() switches the laser off; the safety circuit of the cell has to, too."
         )

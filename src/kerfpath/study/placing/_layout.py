@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 
+from kerfpath._told import told
 from kerfpath.errors import InputError
 from kerfpath.job import Goal, Job, cell_of_job
 from kerfpath.study._job import digest, loaded
@@ -74,6 +75,8 @@ class Layout:
     open_bound: float | None
     numbers: Numbers
     map: Map | None
+
+    __repr__ = told
 
     @property
     def statuses(self) -> dict[str, int]:

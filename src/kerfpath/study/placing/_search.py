@@ -10,6 +10,7 @@ from scipy.optimize import Bounds, differential_evolution
 from scipy.stats import qmc
 
 from kerfpath._arrays import Array
+from kerfpath._told import told
 from kerfpath.errors import InputError
 from kerfpath.study.placing._worth import SLACK, Answer, beats
 from kerfpath.sweep import Sweep
@@ -54,6 +55,8 @@ class Trial:
     stretches: int = 0
     searched: bool = False
 
+    __repr__ = told
+
     @property
     def feasible(self) -> bool:
         """Whether nothing forbids it, as far as is known."""
@@ -76,6 +79,8 @@ class Map:
     y: Array
     answers: tuple[Answer, ...]
 
+    __repr__ = told
+
 
 @dataclass(kw_only=True, eq=False)
 class Search:
@@ -91,6 +96,8 @@ class Search:
     best: Trial | None = None
     exact: int = 0
     known: dict[tuple[float, ...], Trial] = field(default_factory=dict)
+
+    __repr__ = told
 
     @property
     def goal(self) -> str:

@@ -9,6 +9,7 @@ from functools import lru_cache
 import numpy as np
 
 from kerfpath._arrays import Array
+from kerfpath._told import told
 from kerfpath.contour import Contour, FrameKind
 from kerfpath.job import Job
 from kerfpath.planner import node_interval
@@ -24,6 +25,8 @@ class Subject:
     name: str
     nodes: Contour
     speed: float
+
+    __repr__ = told
 
     @property
     def interval(self) -> float:

@@ -24,6 +24,7 @@ from typing import Any
 import numpy as np
 
 from kerfpath._arrays import Bools, Ints
+from kerfpath._told import told
 from kerfpath.cad import Part
 from kerfpath.cell import Cell, Checker
 from kerfpath.errors import InputError, NoFeasiblePath
@@ -85,6 +86,8 @@ class Worth:
     subjects: tuple[Subject, ...]
     seconds: dict[str, float]
     graphs: list[LayeredGraph] = field(default_factory=list)
+
+    __repr__ = told
 
     def answer(
         self,

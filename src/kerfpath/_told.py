@@ -1,0 +1,67 @@
+"""What a data object is, in a line: a notebook prints one without being asked."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Mapping
+from dataclasses import fields, is_dataclass
+from pathlib import PurePath
+from typing import Any
+
+import numpy as np
+
+__all__ = ["told"]
+
+LONGEST = 240
+"""Characters of a line; what does not fit is left out."""
+FEW = 6
+"""Numbers and things up to which all are shown."""
+SHORT = 40
+"""Characters of a text or of several things that are shown."""
+
+
+def told(thing: Any) -> str:
+    """Return the class of a dataclass and its fields in few words; arrays by their shapes."""
+    said, left = [f"{type(thing).__name__}("], LONGEST
+    for field in fields(thing):
+        value = getattr(thing, field.name)
+        if value is None or not field.repr:
+            continue
+        part = f"{field.name}={_few(value)}"
+        left -= len(part) + 2
+        if left < 0:
+            said.append("..., ")
+            break
+        said.append(f"{part}, ")
+    return "".join(said).removesuffix(", ") + ")"
+
+
+def _few(value: Any) -> str:
+    if isinstance(value, np.ndarray):
+        if value.ndim == 1 and value.size <= FEW and value.dtype != object:
+            return "[" + ", ".join(_few(each) for each in value.tolist()) + "]"
+        return f"array {' x '.join(map(str, value.shape))}"
+    if isinstance(value, float):
+        return f"{value:.6g}"
+    if isinstance(value, str):
+        return repr(value if len(value) <= SHORT else f"{value[:SHORT]}...")
+    if isinstance(value, PurePath):
+        return repr(value.name)
+    if isinstance(value, Mapping):
+        return f"{len(value)} keys"
+    if isinstance(value, Collection):
+        return _several(value)
+    if is_dataclass(value):
+        name = getattr(value, "name", getattr(value, "id", None))
+        return (
+            f"{type(value).__name__}({name!r})" if isinstance(name, str) else type(value).__name__
+        )
+    plain = repr(value)
+    return plain if len(plain) <= SHORT else type(value).__name__
+
+
+def _several(values: Collection[Any]) -> str:
+    if len(values) <= FEW:
+        all_of_them = ", ".join(_few(value) for value in values)
+        if len(all_of_them) <= SHORT:
+            return f"({all_of_them})"
+    return f"{len(values)} x {type(next(iter(values))).__name__}"

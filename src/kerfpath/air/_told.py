@@ -1,0 +1,44 @@
+"""What a motion that is not clear comes too near to, where and by how much."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from kerfpath._arrays import Array
+from kerfpath.cell import Cell
+
+__all__ = ["why_not_clear"]
+
+SAMPLES = 65
+"""Poses of a motion that are looked at."""
+PAIRS = 3
+"""Pairs of bodies that are named."""
+
+
+def why_not_clear(cell: Cell, corners: Array) -> str:
+    """Say which bodies come nearer than allowed on straight motions through corners (m, n) rad.
+
+    The pair that is too near at most of the poses comes first, each with its deepest place.
+    """
+    steps = np.linspace(0, len(corners) - 1, SAMPLES)
+    at = np.arange(len(corners))
+    q = np.array([np.interp(steps, at, joint) for joint in corners.T]).T
+    over = cell.distances(q) - cell.required
+    hits = over <= 0
+    worst = np.argsort(-hits.sum(axis=0), kind="stable")[:PAIRS]
+    told = []
+    for p in worst[hits[:, worst].any(axis=0)]:
+        one, two = cell.pair_names[int(p)]
+        k = int(np.argmin(over[:, p]))
+        told.append(
+            f"{one!r} and {two!r} come {-over[k, p] * 1e3:.3g} mm nearer than allowed "
+            f"{100 * steps[k] / steps[-1]:.0f} % of the way"
+        )
+    if told:
+        return "; ".join(told)
+    k, p = (int(i) for i in np.unravel_index(np.argmin(over), over.shape))
+    one, two = cell.pair_names[p]
+    return (
+        f"{one!r} and {two!r} keep {over[k, p] * 1e3:.3g} mm more than asked where they are "
+        "nearest, too little to prove it between the poses tried"
+    )

@@ -1,0 +1,268 @@
+"""What the joints do between the samples of a straight move: bisected until nothing can hide.
+
+On a straight move J(q) q' = V, the tool's twist per interval. If s is the least singular value of
+J at a sample and J changes by at most L for each radian that the joints turn, then within a step h
+of the interval the joints stay within r of the sample, where L r^2 - s r + |V| h = 0; the least
+singular value stays above s - L r, joint speeds below S = |V| / (s - L r), and their change per
+step below Q h with Q = (L S^2 + |V'|) / (s - L r). A step is divided until what it can hide is too
+small to matter, or cannot reach a limit. Lengths are in m, so that 1 m weighs as much as 1 rad.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from kerfpath._arrays import Array, Bools, Ints
+from kerfpath.auditor._chain import JointChain
+from kerfpath.auditor._motion import Interpolation, Motion, follow, joint_increments, straight
+from kerfpath.plans import Plan
+
+__all__ = ["HIDDEN_ANGLE", "HIDDEN_SPEED", "Between", "between"]
+
+HIDDEN_ANGLE = 1e-5
+"""rad that a joint may be beyond what its samples show."""
+HIDDEN_SPEED = 1e-2
+"""Share of its limit by which a joint may be faster than at the samples."""
+BY_FAR = 5.0
+"""Times a speed limit from which on a speed need not be known better."""
+DEEPEST = 14
+"""Times that a part of an interval is halved at most: to a hundred thousandth of it."""
+MOST = 60
+"""Samples of an interval at most, on the average of a plan, beyond the first and 5000 in all."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Between:
+    """What joints and their speeds reach between the nodes, found by bisection.
+
+    Parameters
+    ----------
+    low, high : (K-1, n + c) rad
+        Least and largest value of each joint, then of each coupling, in each interval.
+    speed : (K-1, n) rad
+        Largest speed of each joint in each interval, per interval.
+    residual : (K-1,)
+        What the joints miss of the straight move at the samples in between, m and rad.
+    open : (K-1,) bool
+        Where more may hide than is seen: at a singularity, or where the samples were used up.
+    """
+
+    low: Array
+    high: Array
+    speed: Array
+    residual: Array
+    open: Bools
+
+
+@dataclass(slots=True)
+class _Steps:
+    """Steps of intervals, by their two ends: interval, f, joints, speeds and singular values."""
+
+    k: Ints
+    f0: Array
+    h: Array
+    q0: Array
+    q1: Array
+    v0: Array
+    v1: Array
+    s0: Array
+    s1: Array
+
+    def rows(self, wanted: Bools) -> _Steps:
+        return _Steps(*(getattr(self, name)[wanted] for name in self.__slots__))
+
+
+def between(plan: Plan, chain: JointChain, motion: Motion, interpolation: Interpolation) -> Between:
+    """Return what the joints reach between the nodes of a plan; `motion` has the first samples.
+
+    Parameters
+    ----------
+    plan : Plan
+    chain : JointChain
+        Of the robot, without the tool.
+    motion : Motion
+    interpolation : {"linear", "joint"}
+        That of the motion; even joint motions reach nothing that their ends do not.
+    """
+    if interpolation == "joint":
+        rows = np.vstack([np.eye(plan.q.shape[1]), *(c.row[None] for c in plan.robot.couplings)])
+        values, none = motion.q @ rows.T, np.zeros(len(plan.q) - 1)
+        low, high = values.min(axis=1), values.max(axis=1)
+        speed = np.abs(motion.q[:, -1] - motion.q[:, 0])
+        return Between(low=low, high=high, speed=speed, residual=none, open=none > 0)
+    chain = replace(chain, tip=chain.tip @ plan.T_flange_tip)
+    task = _Task(plan, chain)
+    parts = motion.q.shape[1] - 1
+    K = len(plan.q) - 1
+    k = np.repeat(np.arange(K), parts + 1)
+    flat = motion.q.reshape(K * (parts + 1), -1)
+    v, s = task.speeds(k, flat)
+    shape = (K, parts + 1, -1)
+    ends = [each.reshape(shape) for each in (flat, v, s[:, None])]
+    (q0, q1), (v0, v1), (s0, s1) = (
+        (e[:, :-1].reshape(K * parts, -1), e[:, 1:].reshape(K * parts, -1)) for e in ends
+    )
+    steps = _Steps(
+        k=np.repeat(np.arange(K), parts),
+        f0=np.tile(np.arange(parts) / parts, K),
+        h=np.full(K * parts, 1 / parts),
+        q0=q0, q1=q1, v0=v0, v1=v1, s0=s0[:, 0], s1=s1[:, 0],
+    )  # fmt: skip
+    values = motion.q @ task.rows.T
+    low, high, residual = values.min(axis=1), values.max(axis=1), np.zeros(K)
+    speed = task.fastest(steps).reshape(K, parts, -1).max(axis=1)
+    left, count = np.zeros(K, bool), len(flat)
+    for _ in range(DEEPEST):
+        steps = steps.rows(~task.settled(steps))
+        if not len(steps.k):
+            break
+        if count + len(steps.k) > len(flat) + MOST * K + 5000:
+            break
+        steps, missed = task.halved(steps)
+        count += len(steps.k) // 2
+        np.maximum.at(residual, steps.k[::2], missed)
+        np.minimum.at(low, steps.k, steps.q0 @ task.rows.T)
+        np.maximum.at(high, steps.k, steps.q0 @ task.rows.T)
+        np.maximum.at(speed, steps.k, task.fastest(steps))
+    else:
+        steps = steps.rows(~task.settled(steps))
+    left[steps.k] = True
+    return Between(low=low, high=high, speed=speed, residual=residual, open=left)
+
+
+class _Task:
+    """The straight moves of a plan, and when a step of one is small enough."""
+
+    def __init__(self, plan: Plan, chain: JointChain) -> None:
+        self._chain, self._n = chain, len(chain.axes)
+        self._poses = chain.forward(plan.q)
+        R = self._poses[:, :3, :3]
+        local = Rotation.from_matrix(R[:-1].transpose(0, 2, 1) @ R[1:]).as_rotvec()
+        self._turn = np.einsum("kij,kj->ki", R[:-1], local)
+        self._step = np.diff(self._poses[:, :3, 3], axis=0)
+        dq = joint_increments(plan)
+        self._x = dq[:, self._n] if dq.shape[1] > self._n else np.zeros(len(dq))
+        rate, reach = np.sqrt((self._step**2).sum(1) + (self._turn**2).sum(1)), _reaches(chain)
+        turned = np.abs(self._x) * _turns(chain)
+        far = float(np.abs(self._poses[:, :3, 3]).max()) + 1.0
+        self._size = rate + np.abs(self._x) * (far if chain.external is not None else 0.0)
+        # What the twist changes by per interval: the axis that it is measured about turns with it.
+        still = self._n == 6
+        own = 0.0 if still else (self._turn**2).sum(1)
+        self._change = own + np.abs(self._x) * rate * (1.0 + reach[0]) + turned * self._size
+        self._lipschitz = _lipschitz(reach) * (1.0 if still else 2.0)
+        limits, (velocity, _) = plan.robot.joint_limits(), plan.robot.speed_limits()
+        bound, couplings = ~plan.robot.endless, plan.robot.couplings
+        bound[self._n :] = False  # an external axis runs evenly
+        self.rows = np.vstack([np.eye(dq.shape[1]), *(c.row[None] for c in couplings)])
+        self._low = np.append(np.where(bound, limits.lower, -np.inf), [c.lower for c in couplings])
+        self._high = np.append(np.where(bound, limits.upper, np.inf), [c.upper for c in couplings])
+        self._fast = (np.diff(plan.time)[:, None] * velocity)[:, : self._n]
+
+    def speeds(self, k: Ints, q: Array) -> tuple[Array, Array]:
+        """Return joint speeds (S, n) per interval at samples, and least singular values (S,)."""
+        T, J = self._chain.jacobian(q)
+        V = np.concatenate([self._step[k], self._turn[k]], axis=1)
+        axis = self._chain.external
+        if axis is not None:
+            column = np.zeros((len(q), 6))
+            if axis.kind == "rail":
+                column[:, :3] = axis.axis
+            else:
+                column[:, :3] = -np.cross(axis.axis, T[:, :3, 3] - axis.point)
+                column[:, 3:] = -axis.axis
+            V = V - column * self._x[k, None]
+        if self._n < 6:
+            z = T[:, :3, 2]
+            J = J.copy()
+            J[:, 3:] -= z[:, :, None] * np.einsum("bi,bij->bj", z, J[:, 3:])[:, None]
+            V[:, 3:] -= z * (z * V[:, 3:]).sum(axis=1, keepdims=True)
+        U, s, Vt = np.linalg.svd(J, full_matrices=False)
+        least = s[:, -1]
+        inverse = np.where(s > 1e-12, 1 / np.maximum(s, 1e-12), 0.0)
+        v = np.einsum("bji,bj,bkj,bk->bi", Vt, inverse, U, V)
+        if axis is not None:
+            v = np.concatenate([v, self._x[k, None]], axis=1)
+        return v, least
+
+    def settled(self, steps: _Steps) -> Bools:
+        """Say of which steps what they hide is known not to matter."""
+        L, own = self._lipschitz, slice(self._n)
+        s, size = np.maximum(steps.s0, steps.s1), self._size[steps.k]
+        turned = np.abs(self._x[steps.k]) * steps.h * _turns(self._chain)
+        s = s - turned
+        root = s**2 - 4 * L * size * steps.h
+        known = (s > 0) & (root >= 0)
+        r = np.where(known, (s - np.sqrt(np.maximum(root, 0.0))) / (2 * L), np.inf)
+        floor = np.where(known, s - L * np.where(known, r, 0.0), 1.0)
+        speed = size / floor
+        second = (L * speed**2 + self._change[steps.k]) / floor
+        hidden = second * steps.h**2 / 8
+        faster = (second * steps.h / 2)[:, None]
+        one, two = steps.q0 @ self.rows.T, steps.q1 @ self.rows.T
+        by = hidden[:, None] * np.linalg.norm(self.rows, axis=1)
+        inside = (
+            (np.minimum(one, two) - by >= self._low) & (np.maximum(one, two) + by <= self._high)
+        ).all(axis=1)
+        fast = self._fast[steps.k]
+        most = self.fastest(steps)[:, own]
+        slow = ((most + faster <= fast) | (faster <= HIDDEN_SPEED * fast)).all(axis=1)
+        joined = np.linalg.norm((steps.q1 - steps.q0)[:, own], axis=1) <= r + 1e-6
+        safe = known & joined & slow & (inside | (hidden <= HIDDEN_ANGLE))
+        # What breaks a limit by far is seen, and need not be known better.
+        return np.asarray(safe | (most > BY_FAR * fast).any(axis=1))
+
+    def fastest(self, steps: _Steps) -> Array:
+        """Return the speeds (S, n) per interval seen in steps; a jump to another branch is one."""
+        ends = np.maximum(np.abs(steps.v0), np.abs(steps.v1))
+        return np.asarray(np.maximum(ends, np.abs(steps.q1 - steps.q0) / steps.h[:, None]))
+
+    def halved(self, steps: _Steps) -> tuple[_Steps, Array]:
+        """Return the two halves of each step after each other, and what their middles miss."""
+        f = steps.f0 + steps.h / 2
+        wanted = straight(self._poses[:-1], self._poses[1:], steps.k, f)
+        q, missed = follow(self._chain, wanted, (steps.q0 + steps.q1) / 2)
+        v, s = self.speeds(steps.k, q)
+
+        def both(first: Array, second: Array) -> Array:
+            return np.stack([first, second], axis=1).reshape(2 * len(first), *first.shape[1:])
+
+        half = steps.h / 2
+        halves = _Steps(
+            k=np.repeat(steps.k, 2),
+            f0=both(steps.f0, f), h=both(half, half),
+            q0=both(steps.q0, q), q1=both(q, steps.q1),
+            v0=both(steps.v0, v), v1=both(v, steps.v1),
+            s0=both(steps.s0, s), s1=both(s, steps.s1),
+        )  # fmt: skip
+        return halves, missed
+
+
+def _reaches(chain: JointChain) -> Array:
+    """Return how far (m) the tip can be from each joint's axis, (n,)."""
+    links = np.linalg.norm(chain.origins[:, :3, 3], axis=1)
+    tip = float(np.linalg.norm(chain.tip[:3, 3]))
+    return np.array([links[i + 1 :].sum() + tip for i in range(len(links))])
+
+
+def _lipschitz(reach: Array) -> float:
+    """Return by how much the Jacobian changes at most per radian of the joints, both 2-norms.
+
+    Turning joint j moves column i by at most the reach of the outer of the two, and turns its axis
+    where j is the inner one.
+    """
+    n = len(reach)
+    outer = np.maximum.outer(np.arange(n), np.arange(n))
+    inner = np.tril(np.ones((n, n)), -1)
+    return float(np.sqrt((reach[outer] ** 2 + inner).sum()))
+
+
+def _turns(chain: JointChain) -> float:
+    """Return by how much a positioner changes the Jacobian at most per radian; a rail does not."""
+    axis = chain.external
+    if axis is None or axis.kind == "rail":
+        return 0.0
+    return float(np.sqrt((_reaches(chain) ** 2 + 1.0).sum()))

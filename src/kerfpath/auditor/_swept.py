@@ -1,0 +1,125 @@
+"""Joint vectors between the samples of a motion at which bodies could be nearer than at those.
+
+From one sample to the next no corner of a body comes farther than delta, seen from the other body
+of a pair, and leaves its straight way by no more than M / 8, M bounding its second derivative. So
+the distance of the pair is at least (d0 + d1 - delta) / 2 - M / 8 all along. Where that does not
+clear it, the middle is looked at, too.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from kerfpath._arrays import Array, Ints
+from kerfpath.auditor._chain import JointChain
+from kerfpath.cell import Cell
+
+__all__ = ["frames_of", "in_between"]
+
+HIDDEN = 1e-4
+"""m that bodies may come nearer to each other than at the samples."""
+FAR = 0.1
+"""m beyond the near-miss distance up to which distances are measured."""
+DEEPEST = 10
+"""Times that a step is halved at most."""
+MOST = 8
+"""Joint vectors looked at for each of the first steps, at most, on the average."""
+CURVED = 2.0
+"""Joints on a straight move do not run quite evenly: what that bends is taken as much again."""
+
+
+def frames_of(chain: JointChain, q: Array) -> Array:
+    """Return the poses (B, n+1, 4, 4) of base and links at joints q (B, n) rad."""
+    frames = np.stack([np.broadcast_to(np.eye(4), (len(q), 4, 4)), *chain.joints(q)], axis=1)
+    return np.ascontiguousarray(frames)
+
+
+def in_between(
+    cell: Cell, q0: Array, q1: Array, node: Ints, chain: JointChain
+) -> tuple[Array, Ints, Ints]:
+    """Return the joints (S, n) to be looked at between samples q0 and q1 (B, n), and their nodes.
+
+    Last the nodes of the steps in which bodies may still come nearer by more than `HIDDEN`.
+    """
+    moves = _Moves(cell, chain)
+    middle: list[Array] = []
+    nodes: list[Ints] = []
+    F0, F1 = frames_of(chain, q0), frames_of(chain, q1)
+    d0, d1 = moves.apart(F0), moves.apart(F1)
+    most = MOST * len(q0) + 1000
+    for _ in range(DEEPEST):
+        left = moves.left(q1 - q0, F0, F1, d0, d1)
+        q0, q1, node = q0[left], q1[left], node[left]
+        if not len(node) or sum(map(len, nodes)) + len(node) > most:
+            F0, F1, d0, d1 = F0[left], F1[left], d0[left], d1[left]
+            break
+        half = (q0 + q1) / 2
+        F, d = frames_of(chain, half), moves.apart(frames_of(chain, half))
+        middle.append(half)
+        nodes.append(node)
+        q0, q1, node = np.vstack([q0, half]), np.vstack([half, q1]), np.tile(node, 2)
+        F0, F1 = np.concatenate([F0[left], F]), np.concatenate([F, F1[left]])
+        d0, d1 = np.vstack([d0[left], d]), np.vstack([d, d1[left]])
+    open_ = node[moves.left(q1 - q0, F0, F1, d0, d1)] if len(node) else node
+    found = np.vstack(middle) if middle else np.zeros((0, q0.shape[1]))
+    return found, np.concatenate([np.zeros(0, np.int64), *nodes]), open_
+
+
+class _Moves:
+    """The judged pairs of a cell, and how far their bodies come as the joints turn."""
+
+    def __init__(self, cell: Cell, chain: JointChain) -> None:
+        self._cell, self._joints = cell, np.arange(len(chain.axes))
+        bodies = cell.bodies
+        pairs = [sorted((int(a), int(b)), key=lambda k: bodies[k].frame) for a, b in cell.pairs]
+        self._pairs = [
+            (bodies[a].frame, bodies[b].frame, bodies[b].shape.corners) for a, b in pairs
+        ]
+        self._turns = np.array(
+            [(self._joints >= a) & (self._joints < b) for a, b, _ in self._pairs]
+        ).reshape(len(pairs), -1)
+        self._reach = np.array(
+            [_reach(chain, b, corners) for _, b, corners in self._pairs]
+        ).reshape(len(pairs), -1)
+
+    def apart(self, frames: Array) -> Array:
+        """Return the distances (B, P) m of the pairs, exact up to `FAR` beyond what is asked."""
+        enough = self._cell.required + FAR
+        return np.minimum(self._cell.scene.distances(frames, enough), enough)
+
+    def left(self, dq: Array, F0: Array, F1: Array, d0: Array, d1: Array) -> Ints:
+        """Return the steps in which a pair may be nearer than asked without being seen."""
+        required = self._cell.required
+        turned = np.abs(dq)[:, None, :] * self._turns
+        way = (turned * self._reach).sum(axis=2)
+        # A step at whose ends the pair is too near already is seen, and not looked at again.
+        seen = (d0 <= required) | (d1 <= required)
+        rows, pairs = np.nonzero(~((d0 + d1 - way) / 2 > required) & ~seen & (way / 2 > HIDDEN))
+        left = np.zeros(len(dq), bool)
+        for p in np.unique(pairs):
+            at = rows[pairs == p]
+            a, b, corners = self._pairs[p]
+            moved = _relative(F1[at], a, b)[:, :3] - _relative(F0[at], a, b)[:, :3]
+            shift = moved[:, :, :3] @ corners.T + moved[:, :, 3:]
+            delta = np.sqrt((shift**2).sum(axis=1).max(axis=1))
+            outer = np.maximum.outer(self._joints, self._joints)
+            t = turned[at, p]
+            bend = np.einsum("bi,bj,ij->b", t, t, self._reach[p][outer])
+            hides = delta / 2 + CURVED * bend / 8
+            clear = (d0[at, p] + d1[at, p]) / 2 - hides > required[p]
+            left[at] |= ~clear & (hides > HIDDEN)
+        return np.flatnonzero(left)
+
+
+def _relative(frames: Array, a: int, b: int) -> Array:
+    """Return the poses (B, 4, 4) of frame b as seen from frame a."""
+    return np.asarray(np.linalg.solve(frames[:, a], frames[:, b]))
+
+
+def _reach(chain: JointChain, frame: int, corners: Array) -> Array:
+    """Return how far (m) a corner in a frame can be from the axis of each joint before it."""
+    origins = np.linalg.norm(chain.origins[:, :3, 3], axis=1)
+    own = float(np.linalg.norm(corners, axis=1).max())
+    return np.array(
+        [origins[j + 1 : frame].sum() + own if j < frame else 0.0 for j in range(len(origins))]
+    )

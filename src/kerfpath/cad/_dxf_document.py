@@ -1,0 +1,99 @@
+"""A DXF as ezdxf opens it, text or binary: what it repaired, and what it dropped in doing so."""
+
+from __future__ import annotations
+
+import logging
+import re
+import struct
+from collections import Counter
+from collections.abc import Iterator
+from contextlib import contextmanager
+from io import BytesIO
+
+from ezdxf import recover
+from ezdxf.audit import Auditor
+from ezdxf.document import Drawing
+from ezdxf.lldxf.const import DXFError
+from ezdxf.lldxf.tagger import binary_tags_loader
+
+__all__ = ["DAMAGED", "document_of"]
+
+logger = logging.getLogger("ezdxf")
+DAMAGED = (
+    DXFError, ArithmeticError, AssertionError, AttributeError, LookupError, RecursionError,
+    TypeError, ValueError, struct.error,
+)  # fmt: skip
+"""What ezdxf and splines raise on values that are none, and on structures that are torn."""
+BINARY = b"AutoCAD Binary DXF"
+LINES = ("LINE", "ARC", "CIRCLE", "ELLIPSE", "LWPOLYLINE", "POLYLINE", "SPLINE", "INSERT")
+"""Kinds that a cut is drawn by; none of them may get lost without a word."""
+STANDS = re.compile(
+    rf"^[ \t]*0[ \t]*\r?\n[ \t]*({'|'.join(LINES)})[ \t]*\r?$".encode(), re.MULTILINE
+)
+DROPPED = re.compile(
+    r"(?:Removed|Deleted) (?:[a-zDXF]+ )*([A-Z][A-Z0-9_]+)(?:\(#\w+\))? (?:entity )?(.*)"
+)
+"""How ezdxf says that it dropped an entity."""
+
+
+def document_of(content: bytes) -> tuple[Drawing, list[str], Counter[tuple[str, str]]]:
+    """Return the drawing, what was repaired, and how many of each kind were lost, with the reason.
+
+    Raises
+    ------
+    one of DAMAGED
+        No DXF, or one that cannot be repaired.
+    """
+    is_binary = content.startswith(BINARY)
+    if not (is_binary or b"SECTION" in content[:4096]):
+        raise DXFError(f"expected SECTION at its start, got {content[:32]!r}")
+    with _overheard() as said:
+        if is_binary:
+            document = Drawing.load(binary_tags_loader(content))
+            auditor: Auditor = document.audit()
+        else:
+            document, auditor = recover.read(BytesIO(content))
+    faults = [*said, *(fault.message for fault in (*auditor.fixes, *auditor.errors))]
+    faults = [" ".join(fault.split())[:200] for fault in faults]
+    return document, faults, _lost(document, content, faults)
+
+
+def _lost(document: Drawing, content: bytes, faults: list[str]) -> Counter[tuple[str, str]]:
+    """Return which lines of the file are not in the drawing."""
+    kept = Counter(entity.dxftype() for entity in document.entitydb.values() if entity.is_alive)
+    stand = Counter(kind.decode() for kind in STANDS.findall(content))
+    lost: Counter[tuple[str, str]] = Counter()
+    for fault in faults:
+        told = DROPPED.match(fault)
+        if told and told[1] in LINES:
+            lost[told[1], told[2].rstrip(".")] += 1
+    for kind, count in stand.items():
+        explained = sum(n for (dropped, _), n in lost.items() if dropped == kind)
+        if (missing := count - kept[kind] - explained) > 0:
+            lost[kind, "the file is damaged where it stands"] += missing
+    return lost
+
+
+class _Listener(logging.Handler):
+    """Keeps what is logged."""
+
+    def __init__(self, level: int) -> None:
+        super().__init__(level)
+        self.said: list[str] = []
+
+    def emit(self, record: logging.LogRecord) -> None:
+        """Keep a message."""
+        self.said.append(record.getMessage())
+
+
+@contextmanager
+def _overheard() -> Iterator[list[str]]:
+    """Give what ezdxf logs about faults, which would go to the terminal otherwise."""
+    handler = _Listener(logging.WARNING)
+    propagates, logger.propagate = logger.propagate, False
+    logger.addHandler(handler)
+    try:
+        yield handler.said
+    finally:
+        logger.removeHandler(handler)
+        logger.propagate = propagates

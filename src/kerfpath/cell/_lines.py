@@ -1,0 +1,69 @@
+"""Distances between straight lines with ends, as of capsules: in bulk, by a formula."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from kerfpath._arrays import Array
+from kerfpath.cell._shapes import Capsule
+
+__all__ = ["Lines", "lines_apart"]
+
+PARALLEL = 1e-12
+"""Of the squared sine of two lines: below it they are parallel, and ends tell their distance."""
+
+
+class Lines:
+    """The lines of capsules, each in a frame of an arm.
+
+    Parameters
+    ----------
+    frames : (R,) int
+    capsules : sequence of Capsule
+
+    Attributes
+    ----------
+    thick : (R,) m
+        Their radii.
+    """
+
+    def __init__(self, frames: Sequence[int], capsules: Sequence[Capsule]) -> None:
+        self._frames = np.array(frames, dtype=np.int64)
+        self._start = np.array([c.start for c in capsules])
+        self._along = np.array([c.end - c.start for c in capsules])
+        self.thick = np.array([c.radius for c in capsules])
+
+    def at(self, frames: Array) -> tuple[Array, Array]:
+        """Return starts and vectors to the ends, (B, R, 3) m, at link poses (B, n+1, 4, 4)."""
+        T = frames[:, self._frames]
+        turned = T[..., :3, :3]
+        start = (turned @ self._start[:, :, None])[..., 0] + T[..., :3, 3]
+        return start, (turned @ self._along[:, :, None])[..., 0]
+
+
+def lines_apart(p: Array, u: Array, q: Array, v: Array) -> Array:
+    """Return distances (...) m between lines from p along u and from q along v, (..., 3) m."""
+    uu, vv, uv = (u * u).sum(-1), (v * v).sum(-1), (u * v).sum(-1)
+    ends = [
+        _to_line(p - q, v, vv), _to_line(p + u - q, v, vv),
+        _to_line(q - p, u, uu), _to_line(q + v - p, u, uu),
+    ]  # fmt: skip
+    # Where the lines are nearest to each other between their ends, that is nearer.
+    w = p - q
+    uw, vw = (u * w).sum(-1), (v * w).sum(-1)
+    sine = uu * vv - uv**2
+    skew = sine > PARALLEL * uu * vv
+    whole = np.where(skew, sine, 1.0)
+    s, t = (uv * vw - vv * uw) / whole, (uu * vw - uv * uw) / whole
+    inside = skew & (s > 0) & (s < 1) & (t > 0) & (t < 1)
+    between = w + s[..., None] * u - t[..., None] * v
+    square = np.where(inside, (between**2).sum(-1), np.inf)
+    return np.asarray(np.sqrt(np.minimum(np.min(ends, axis=0), square)))
+
+
+def _to_line(w: Array, v: Array, vv: Array) -> Array:
+    """Return squared distances of points at w from lines along v from the origin."""
+    t = np.clip((w * v).sum(-1) / np.where(vv > 0, vv, 1.0), 0.0, 1.0)
+    return np.asarray(((w - t[..., None] * v) ** 2).sum(-1))

@@ -1,0 +1,40 @@
+"""Texts of programs whose numbers can be meant: checked in one place, for all languages."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator, Mapping
+
+from kerfpath.errors import InputError
+
+__all__ = ["Meant"]
+
+LARGEST = 1e10
+"""No number of a program is larger: ABB's 9E+09 for an axis that is not there is the largest."""
+NUMBER = re.compile(r"(?<![\w.])[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?", re.ASCII)
+LONG = re.compile(r"\d{10,}|[eE]\+?\d", re.ASCII)
+"""What a number needs in its text to be so large."""
+
+
+class Meant(Mapping[str, str]):
+    """The same texts by name; one with a number that nobody means is refused with its line."""
+
+    def __init__(self, files: Mapping[str, str]) -> None:
+        self.files = files
+
+    def __getitem__(self, name: str) -> str:
+        text = self.files[name]
+        for number, line in enumerate(text.splitlines(), start=1):
+            for found in NUMBER.finditer(line) if LONG.search(line) else ():
+                if abs(float(found[0])) > LARGEST:
+                    raise InputError(
+                        f"{name}, line {number}: {found[0]} is larger than any number of a "
+                        f"program ({LARGEST:g}); write the program again"
+                    )
+        return text
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self.files)
+
+    def __len__(self) -> int:
+        return len(self.files)

@@ -1,0 +1,173 @@
+"""What axis 3 of a controller measures: the elbow, or the upper arm from the horizontal.
+
+A parallel rod from the foot of an arm (IRB 2400, 4400) holds its upper arm as it was while axis 2
+moves, and every FANUC pendant shows J3 so: then axis 3 is joint 2 and joint 3 of the serial model
+together, and its limits bound both. Nothing in a description tells. An arm read from one is known
+by the lengths of a robot of the library, or it is told; otherwise it is not known, and languages
+that say axis 3 refuse it.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from kerfpath._arrays import Array, floats
+from kerfpath.errors import InputError
+from kerfpath.robots._coupling import Coupling
+from kerfpath.robots._library import robot as known_robot
+from kerfpath.robots._library import robot_ids
+from kerfpath.robots._robot import Robot
+
+__all__ = ["level", "with_axis_3"]
+
+COUNTED = {
+    "ABB": ("serial", "horizontal"),
+    "FANUC": ("horizontal",),
+    "KUKA": ("serial",),
+    "Staubli": ("serial",),
+    "Universal Robots": ("serial",),
+    "Yaskawa": ("serial",),
+}
+"""How a maker's controllers count axis 3 of arms of six axes; of other makers nothing is known."""
+UPWARDS = ("FANUC",)
+"""Makers whose axis 3 grows as the upper arm lifts; the others' as it falls."""
+ALIKE = 0.002
+"""m: lengths nearer than this are the same. Published ones are rounded by up to 0.5 mm; models
+that differ do so by 5 mm and more."""
+ARM = ("a1", "a2", "b", "c2", "c3")
+"""The lengths from axis 1 to the wrist: foot and flange may be described elsewhere."""
+
+
+def level(robot: Robot) -> tuple[Array, float]:
+    """Return row (n,) and shift rad of axis 3 from the horizontal: row @ q + shift.
+
+    As the robot's maker counts it, zero where the upper arm lies level.
+    """
+    row = np.zeros(robot.joints)
+    row[1:3] = robot.sign[1:3]
+    shift = float(_turned(-robot.offset[1]) + _turned(-robot.offset[2] - np.pi / 2))
+    way = -1.0 if robot.manufacturer in UPWARDS else 1.0
+    return way * row, way * shift
+
+
+def with_axis_3(robot: Robot, axis_3: str = "", limits: ArrayLike | None = None) -> Robot:
+    """Return the robot with axis 3 as it is told, or else as the library knows it.
+
+    Parameters
+    ----------
+    robot : Robot
+        As described, with nothing known of its axis 3.
+    axis_3 : {"", "serial", "horizontal"}
+        What it measures; "" looks for arms of the same maker and lengths in the library.
+    limits : (2,) rad, optional
+        Of an axis that is "horizontal", as the controller shows them.
+
+    Raises
+    ------
+    InputError
+        Limits missing, needless, or that leave the arm no room; what its maker's controllers do
+        not do, or the library knows otherwise of an arm with these lengths.
+    """
+    if axis_3:
+        return _told(robot, axis_3, limits)
+    if limits is not None:
+        raise InputError('axis_3_limits=: expected them with axis_3="horizontal", got no axis_3=')
+    return _looked_up(robot)
+
+
+def _looked_up(robot: Robot) -> Robot:
+    """Return the robot with what the library knows of axis 3 of an arm with its lengths.
+
+    Unchanged where no arm of its maker has them, or where those that have them do not agree.
+    """
+    twins = [
+        twin
+        for twin in (known_robot(name) for name in robot_ids())
+        if twin.kinematics == robot.kinematics == "opw"
+        and robot.manufacturer in ("", twin.manufacturer)
+        and all(abs(robot.geometry[k] - twin.geometry[k]) <= ALIKE for k in ARM)
+    ]
+    if not twins or len({twin.axis_3 for twin in twins}) > 1:
+        return robot
+    names = ", ".join(twin.id for twin in twins)
+    counted = twins[0].axis_3
+    bounds = [_carried_over(c, twin, robot) for twin in twins for c in twin.couplings]
+    notes = [f"Axis 3 of the controller is {counted}, as the arm has the lengths of {names}."]
+    turned = float(np.degrees(_turned(robot.offset[5] - twins[0].offset[5])))
+    if round(turned, 3):
+        notes.append(
+            f"Its tip is turned by {turned:.3f} deg about axis 6 against the flange of "
+            f"{twins[0].id}: programs take the tip's frame for the controller's flange."
+        )
+    return replace(robot, axis_3=counted, couplings=_tightest(bounds), notes=(*robot.notes, *notes))
+
+
+def _told(robot: Robot, axis_3: str, limits: ArrayLike | None) -> Robot:
+    """Return the robot with axis 3 as it is told, once nothing known speaks against it."""
+    counted = COUNTED.get(robot.manufacturer, ("serial", "horizontal"))
+    if axis_3 not in counted:
+        raise InputError(
+            f"axis_3: expected {' or '.join(map(repr, counted))}, as controllers by "
+            f"{robot.manufacturer or 'any maker'} count, got {axis_3!r}"
+        )
+    found = _looked_up(robot)
+    if found.axis_3 not in ("", axis_3):
+        raise InputError(
+            f"axis_3: expected {found.axis_3!r}, got {axis_3!r}. {found.notes[len(robot.notes)]}"
+        )
+    if (axis_3 == "horizontal") != (limits is not None):
+        raise InputError(
+            'axis_3_limits=: expected the two limits of axis 3 with "horizontal", and none with '
+            f'"serial", got {"none" if limits is None else "them"} with {axis_3!r}'
+        )
+    if limits is None:
+        return replace(robot, axis_3=axis_3)
+    if robot.kinematics != "opw":
+        raise InputError(
+            f'axis_3: expected "serial", as an arm of family {robot.kinematics!r} has no upper arm '
+            "between axes 3 and 4 that a rod could hold, got 'horizontal'"
+        )
+    low, high = floats(limits, "axis_3_limits", (2,))
+    row, shift = level(robot)
+    one = Coupling(
+        row=row, lower=low - shift, upper=high - shift,
+        note="axis 3 of the controller counts from the horizontal, and these are its limits",
+    )  # fmt: skip
+    if robot.lower is not None and robot.upper is not None:
+        ends = np.where(row > 0, [robot.lower, robot.upper], [robot.upper, robot.lower]) @ row
+        if ends[1] <= one.lower or ends[0] >= one.upper:
+            shown = np.degrees(ends + shift).round(2).tolist()
+            raise InputError(
+                f"axis_3_limits=: {np.degrees([low, high]).round(2).tolist()} deg lie outside the "
+                f"range of axis 3 that the limits of joints 2 and 3 leave, {shown} deg"
+            )
+    return replace(robot, axis_3=axis_3, couplings=(one,))
+
+
+def _carried_over(coupling: Coupling, twin: Robot, robot: Robot) -> Coupling:
+    """Return a bound of a twin in the joints of a robot, which may count them otherwise."""
+    row = coupling.row * twin.sign * robot.sign
+    shift = float(coupling.row @ (twin.sign * _turned(twin.offset - robot.offset)))
+    return Coupling(
+        row=row, lower=coupling.lower - shift, upper=coupling.upper - shift, note=coupling.note
+    )
+
+
+def _tightest(bounds: list[Coupling]) -> tuple[Coupling, ...]:
+    """Return one bound for each row: where several arms have the same lengths, the narrowest."""
+    rows: dict[bytes, Coupling] = {}
+    for one in bounds:
+        other = rows.get(one.row.tobytes(), one)
+        rows[one.row.tobytes()] = replace(
+            one, lower=max(one.lower, other.lower), upper=min(one.upper, other.upper)
+        )
+    return tuple(rows.values())
+
+
+def _turned(angle: ArrayLike) -> Array:
+    """Return angles within half a turn: a description has its zero there of what is meant."""
+    angle = np.asarray(angle, dtype=float)
+    return np.asarray(angle - 2 * np.pi * np.round(angle / (2 * np.pi)))
