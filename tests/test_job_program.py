@@ -81,14 +81,13 @@ def test_the_program_that_was_written_passes(folder, written):
     ("language", "main"),
     [
         ("krl", "job.src"),
-        ("fanuc", "JOB.ls"),
         ("val3", "job/job.pjx"),
         ("ros", "job.yaml"),
         ("csv", "job.csv"),
     ],
 )
 def test_every_language_that_can_say_the_plan_passes_its_audit(folder, language, main):
-    """Arms of other makers are a warning; UR's and Yaskawa's languages cannot say this one's."""
+    """Arms of other makers are a warning; UR's, Yaskawa's and FANUC's cannot say this one's."""
     out = folder / language
     out.mkdir()
     job = str(folder / "job.toml")

@@ -190,7 +190,8 @@ def test_frames_are_compared_where_both_say_them(read):
 
 
 def test_one_program_in_several_languages_is_the_same(program):
-    names = ("csv", "fanuc", "inform", "krl", "rapid", "ros", "val3")
+    # Not FANUC's: of an arm by another maker it does not know what moves axis 3.
+    names = ("csv", "inform", "krl", "rapid", "ros", "val3")
     texts = {name: read_back(program, name) for name in names}
     for one, two in combinations(names, 2):
         (a, of_a), (b, of_b) = texts[one], texts[two]

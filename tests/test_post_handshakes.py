@@ -7,6 +7,7 @@ import pytest
 from kerfpath import InputError, robot
 from kerfpath.post import (
     Await,
+    Comment,
     ReadHandshake,
     Request,
     build_program,
@@ -152,6 +153,16 @@ def test_handshakes_belong_where_the_robot_stands_with_the_laser_off():
         assert "handshake" in codes(moved, "error", "rapid", settings("rapid"))
     endless = with_steps(made, [*steps[:3], Await(partner="ready", timeout=0.0), *steps[3:]])
     assert "handshake" in codes(endless, "error", "rapid", settings("rapid"))
+
+
+def test_a_number_in_a_remark_is_no_number_of_the_program():
+    made = program("urscript")
+    told = with_steps(made, [Comment("1E100"), *made.steps])
+    post(told, "urscript", settings("urscript"))
+    text = post(made, "urscript", settings("urscript"))["cut_one.script"]
+    large = {"cut_one.script": text.replace("sleep(0.100)", "sleep(1E100)")}
+    with pytest.raises(InputError, match="larger than any number of a program"):
+        read_program(large, "urscript", made.robot, settings("urscript"))
 
 
 def test_a_dry_run_asks_nobody():

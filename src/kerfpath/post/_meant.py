@@ -15,6 +15,9 @@ NUMBER = re.compile(r"(?<![\w.])[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?", re.A
 LONG = re.compile(r"\d{10,}|[eE]\+?\d", re.ASCII)
 """What a number needs in its text to be so large."""
 
+REMARK = re.compile(r"\s*(?:\d+:\s*)?(?:!|;|//|'|#) ", re.ASCII)
+"""How a person's remark begins in any of the languages; one that tells a frame has no space."""
+
 
 class Meant(Mapping[str, str]):
     """The same texts by name; one with a number that nobody means is refused with its line."""
@@ -25,7 +28,9 @@ class Meant(Mapping[str, str]):
     def __getitem__(self, name: str) -> str:
         text = self.files[name]
         for number, line in enumerate(text.splitlines(), start=1):
-            for found in NUMBER.finditer(line) if LONG.search(line) else ():
+            if not LONG.search(line) or REMARK.match(line):
+                continue
+            for found in NUMBER.finditer(line):
                 if abs(float(found[0])) > LARGEST:
                     raise InputError(
                         f"{name}, line {number}: {found[0]} is larger than any number of a "

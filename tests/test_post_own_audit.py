@@ -1,4 +1,4 @@
-"""The jobs that are written by default carry what their audit needs: targets by their type."""
+"""What is written by default, and with gas and handshakes, passes its own audit."""
 
 import json
 import re
@@ -66,3 +66,33 @@ def test_another_wrist_in_the_start_is_found(folder):
         assert audited(folder)[0] != 0
     finally:
         air.write_bytes(text)
+
+
+FANUC = """\
+[program]
+language = "fanuc"
+gas_lead_s = 0.3
+pierce_time_s = 0.2
+request = ["shutter"]
+wait_for = ["ready", "gas_pressure"]
+[program.fanuc]
+laser_output = 5
+gas_output = 6
+shutter_output = 7
+ready_input = 1
+gas_pressure_input = 2
+"""
+
+
+def test_listings_with_gas_and_handshakes_pass_their_audit_but_not_that_of_another_job(tmp_path):
+    shutil.copy(DEMO / "b_pillar.step", tmp_path)
+    head = JOB[: JOB.index("[program]")].replace("yaskawa_gp25", "fanuc_m20id_25")
+    head = re.sub(r"(lower|upper)_deg = .*\n", "", head)
+    (tmp_path / "job.toml").write_text(head + FANUC)
+    made = run("plan", str(tmp_path / "job.toml"), "--out", str(tmp_path / "out"), "--json")
+    assert made.returncode == 0, made.stderr
+    (tmp_path / "less.toml").write_text(head + FANUC.replace(', "gas_pressure"]', "]"))
+    for job, code in (("job.toml", 0), ("less.toml", 1)):
+        main = str(tmp_path / "out" / "JOB.ls")
+        result = run("audit", main, "--job", str(tmp_path / job), "--json")
+        assert result.returncode == code, result.stdout
