@@ -133,6 +133,8 @@ class _Main(Listing):
         self.frames(self.selected["UFRAME"], self.selected["UTOOL"])
 
     def told(self, kind: str, number: str, letter: str, value: str) -> None:
+        if self.calls:
+            raise self.fault("frames must be told before the first CALL")
         if (kind, letter) in self.values:
             raise self.fault(f"{letter} of {kind} is told twice")
         self.frames(

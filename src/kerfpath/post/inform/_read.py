@@ -184,6 +184,8 @@ class _Main(_Text):
             raise self.fault(f"expected {off_name(self.name, settings)} to be called first")
 
     def told(self, frame: str, number: str, word: str, value: str) -> None:
+        if self.calls:
+            raise self.fault("frames must be told before the first job is called")
         if (f"{frame} {number}", word) in self.frames:
             raise self.fault(f"{frame} {number} {word} is told twice")
         self.frames[f"{frame} {number}", word] = float(value)
