@@ -137,7 +137,7 @@ def test_a_least_length_needs_to_know_where_the_nodes_are():
 def test_the_oracle_itself_agrees_with_enumeration():
     rng = np.random.default_rng(32)
     interrupted = 0
-    for i in range(150):
+    for i in range(240):
         q, start, o = instance(rng, layers=(1, 5), size=(1, 4))
         least = {"least_piece": 2.0} if i % 2 else {}
         want = naive.interrupted(q, start, **least, **o)

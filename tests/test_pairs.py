@@ -5,7 +5,6 @@ from itertools import combinations
 
 import numpy as np
 import pytest
-from benchmarks._boxes import with_collimator
 from scipy.spatial import ConvexHull
 
 from kerfpath import robot
@@ -24,8 +23,10 @@ from kerfpath.cell import (
 from kerfpath.cell._pairs import BY_DESIGN
 from kerfpath.cell._shaved import shaved
 from kerfpath.urdf import Chain
+from test_benchmarks import benchmark_module
 from test_cell import at, mesh_of
 
+with_collimator = benchmark_module("_boxes").with_collimator
 ARM = robot("abb_irb2600_12_165")
 LADDER = [0.0, 2e-3, 0.01, 0.02, 0.2]
 """m: near-miss distances, each asking for more than the one before."""

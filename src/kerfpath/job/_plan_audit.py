@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from kerfpath import __version__
+from kerfpath._told import told
 from kerfpath.auditor import Check, air_checks, checks, worst_of
 from kerfpath.job._asked import Asked, asked_of, order_checks
 from kerfpath.job._plan_differs import disagreement, job_disagreement
@@ -62,6 +63,8 @@ class PlanAudit:
     """
 
     asked: Asked
+
+    __repr__ = told
 
     @classmethod
     def of(cls, job_file: Path) -> PlanAudit:
