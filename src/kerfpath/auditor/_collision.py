@@ -44,7 +44,8 @@ def collision_along(cell: Cell, q0: Array, q1: Array, node: Ints, chain: JointCh
     They are divided until nothing nearer can hide; where that cannot be said, it is counted.
     """
     between, nodes, open_ = in_between(cell, q0, q1, node, chain)
-    q, node = np.vstack([q0, q1, between]), np.concatenate([node, node, nodes])
+    q, first = np.unique(np.vstack([q0, q1, between]), axis=0, return_index=True)
+    node = np.concatenate([node, node, nodes])[first]
     frames = frames_of(chain, q)
     left = Check(
         code="collision-open",

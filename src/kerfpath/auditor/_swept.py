@@ -18,8 +18,6 @@ __all__ = ["frames_of", "in_between"]
 
 HIDDEN = 1e-4
 """m that bodies may come nearer to each other than at the samples."""
-FAR = 0.1
-"""m beyond the near-miss distance up to which distances are measured."""
 DEEPEST = 10
 """Times that a step is halved at most."""
 MOST = 8
@@ -41,11 +39,14 @@ def in_between(
 
     Last the nodes of the steps in which bodies may still come nearer by more than `HIDDEN`.
     """
-    moves = _Moves(cell, chain)
+    moves = _Moves(cell, chain, q1 - q0)
     middle: list[Array] = []
     nodes: list[Ints] = []
-    F0, F1 = frames_of(chain, q0), frames_of(chain, q1)
-    d0, d1 = moves.apart(F0), moves.apart(F1)
+    # Where a step ends, the next begins: each sample is looked at once.
+    samples, place = np.unique(np.vstack([q0, q1]), axis=0, return_inverse=True)
+    frames = frames_of(chain, samples)
+    apart, (at0, at1) = moves.apart(frames), place.reshape(2, -1)
+    F0, F1, d0, d1 = frames[at0], frames[at1], apart[at0], apart[at1]
     most = MOST * len(q0) + 1000
     for _ in range(DEEPEST):
         left = moves.left(q1 - q0, F0, F1, d0, d1)
@@ -54,7 +55,8 @@ def in_between(
             F0, F1, d0, d1 = F0[left], F1[left], d0[left], d1[left]
             break
         half = (q0 + q1) / 2
-        F, d = frames_of(chain, half), moves.apart(frames_of(chain, half))
+        F = frames_of(chain, half)
+        d = moves.apart(F)
         middle.append(half)
         nodes.append(node)
         q0, q1, node = np.vstack([q0, half]), np.vstack([half, q1]), np.tile(node, 2)
@@ -66,9 +68,9 @@ def in_between(
 
 
 class _Moves:
-    """The judged pairs of a cell, and how far their bodies come as the joints turn."""
+    """The judged pairs of a cell, and how far their bodies come in steps dq (B, n) and in halves."""
 
-    def __init__(self, cell: Cell, chain: JointChain) -> None:
+    def __init__(self, cell: Cell, chain: JointChain, dq: Array) -> None:
         self._cell, self._joints = cell, np.arange(len(chain.axes))
         bodies = cell.bodies
         pairs = [sorted((int(a), int(b)), key=lambda k: bodies[k].frame) for a, b in cell.pairs]
@@ -81,17 +83,22 @@ class _Moves:
         self._reach = np.array(
             [_reach(chain, b, corners) for _, b, corners in self._pairs]
         ).reshape(len(pairs), -1)
+        # Farther apart than any step could bring them, pairs are clear whatever they are.
+        self._enough = cell.required + self._way(dq).max(axis=0, initial=0.0)
 
     def apart(self, frames: Array) -> Array:
-        """Return the distances (B, P) m of the pairs, exact up to `FAR` beyond what is asked."""
-        enough = self._cell.required + FAR
-        return np.minimum(self._cell.scene.distances(frames, enough), enough)
+        """Return the distances (B, P) m of the pairs, exact up to where no step can hide more."""
+        found = self._cell.scene.distances(frames, self._enough)
+        return np.asarray(np.minimum(found, self._enough))
+
+    def _way(self, dq: Array) -> Array:
+        """Return how far (B, P) m a corner of each pair can come in steps, seen from the other."""
+        return np.asarray(np.abs(dq) @ (self._turns * self._reach).T)
 
     def left(self, dq: Array, F0: Array, F1: Array, d0: Array, d1: Array) -> Ints:
         """Return the steps in which a pair may be nearer than asked without being seen."""
         required = self._cell.required
-        turned = np.abs(dq)[:, None, :] * self._turns
-        way = (turned * self._reach).sum(axis=2)
+        way = self._way(dq)
         # A step at whose ends the pair is too near already is seen, and not looked at again.
         seen = (d0 <= required) | (d1 <= required)
         rows, pairs = np.nonzero(~((d0 + d1 - way) / 2 > required) & ~seen & (way / 2 > HIDDEN))
@@ -103,7 +110,7 @@ class _Moves:
             shift = moved[:, :, :3] @ corners.T + moved[:, :, 3:]
             delta = np.sqrt((shift**2).sum(axis=1).max(axis=1))
             outer = np.maximum.outer(self._joints, self._joints)
-            t = turned[at, p]
+            t = np.abs(dq[at]) * self._turns[p]
             bend = np.einsum("bi,bj,ij->b", t, t, self._reach[p][outer])
             hides = delta / 2 + CURVED * bend / 8
             clear = (d0[at, p] + d1[at, p]) / 2 - hides > required[p]
