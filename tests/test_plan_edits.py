@@ -12,7 +12,7 @@ from kerfpath.job import PlanAudit, audit_file, read_plan_file
 from test_benchmarks import benchmark_module
 from test_cli import run
 
-EDITS = 45
+EDITS = 25
 """Of each of four jobs: what a few seconds allow. `python -m benchmarks plan_edits` does 3000."""
 
 
