@@ -82,30 +82,34 @@ def is_harmless(before: Any, after: Any) -> bool:
 
 
 def _harm(one: Any, two: Any, path: Path) -> Iterator[str]:
-    where = said(path)
-    free = any(re.match(pattern, where) for pattern in HARMLESS)
     if isinstance(one, dict) and isinstance(two, dict):
-        if one.keys() != two.keys() and not free:
-            yield where
+        if one.keys() != two.keys() and not _is_free(path):
+            yield said(path)
         for key in one.keys() & two.keys():
             yield from _harm(one[key], two[key], (*path, key))
     elif isinstance(one, list) and isinstance(two, list):
         if len(one) != len(two):
-            yield where
+            yield said(path)
         for i, (a, b) in enumerate(zip(one, two, strict=False)):
             yield from _harm(a, b, (*path, i))
     elif _number(one) and _number(two):
         off = abs(two - one)
-        if path[-2:-1] == ("gamma_rad",) or "gamma_rad" in path:
+        if off and "gamma_rad" in path:
             off = min(off % TURN, TURN - off % TURN)
         # A number may become a whole one of the same value, as JSON knows but one kind.
-        if off > WITHIN * max(1.0, abs(one)) and not free:
-            yield where
+        if off > WITHIN * max(1.0, abs(one)) and not _is_free(path):
+            yield said(path)
     elif type(one) is not type(two):
-        if not (free and all(each is None or _number(each) for each in (one, two))):
-            yield where
-    elif one != two and not free:
-        yield where
+        if not (all(each is None or _number(each) for each in (one, two)) and _is_free(path)):
+            yield said(path)
+    elif one != two and not _is_free(path):
+        yield said(path)
+
+
+def _is_free(path: Path) -> bool:
+    """Say whether any value does at a place."""
+    where = said(path)
+    return any(re.match(pattern, where) for pattern in HARMLESS)
 
 
 def _number(value: Any) -> bool:

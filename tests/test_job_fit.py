@@ -1,5 +1,6 @@
 """Whatever is written passes its audit: languages by settings of [program], generated."""
 
+import json
 from dataclasses import replace
 from itertools import product
 from pathlib import Path
@@ -9,8 +10,7 @@ import pytest
 
 from kerfpath.air import least_time
 from kerfpath.errors import AuditFailed, InputError
-from kerfpath.job import program_from_file, read_job, read_plan_file, run_job
-from kerfpath.job._files import write_outcome
+from kerfpath.job import planned_text, program_from_file, read_job, read_plan_file, run_job
 from kerfpath.job._program_audit import audit_program
 from kerfpath.job._program_read import language_of
 from kerfpath.post import MANIFEST, groups_of, read_program, write_files
@@ -71,24 +71,40 @@ gas_output = 1
 """
 PULSES = "pulses_per_deg = [1341.4, 1341.4, 1000.0, 1000.0, 800.0, 500.0]"
 USUAL = {"lines": 5000, "decimals": 4, "unit": "cm/min", "pulses": PULSES}
-WHOLE = (
-    HEAD.format(
-        robot="abb_irb4600_60_205",
-        limits="acceleration_deg_s2 = [320, 270, 420, 1300, 1400, 2000]",
-        tool='head = "laser-head-45"',
-        xyz="[1200, -200, 500]",
-        plan='posture = "front/up"\neta_acceleration = 0.9',
+
+
+def whole(robot, acceleration, xyz, home):
+    """A job with its moves through the air, for an arm whose accelerations bind."""
+    return (
+        HEAD.format(
+            robot=robot,
+            limits=f"acceleration_deg_s2 = {acceleration}",
+            tool='head = "laser-head-45"',
+            xyz=xyz,
+            plan='posture = "front/up"\neta_acceleration = 0.9',
+        )
+        + CONTOURS.format(slot=14, hole=10)
+        + f"[sequence]\nhome_deg = {home}\n"
     )
-    + CONTOURS.format(slot=14, hole=10)
-    + "[sequence]\nhome_deg = [0, -20, 10, 0, 60, 0]\n"
+
+
+WHOLE = whole(
+    "abb_irb4600_60_205",
+    [320, 270, 420, 1300, 1400, 2000],
+    [1200, -200, 500],
+    [0, -20, 10, 0, 60, 0],
 )
 """Acceleration sits on its limit, at 4 ms from node to node: digits and arcs matter."""
+RODS = whole(
+    "fanuc_m20id_25", [215, 175, 260, 760, 860, 1190], [1000, -150, 300], [0, -20, 10, 0, 60, 0]
+)
+"""The same for an arm that measures its axis 3 from the horizontal, as listings do."""
 SMALL = HEAD.format(
     robot="ur_ur10e",
     limits="acceleration_deg_s2 = [300, 300, 300, 600, 600, 600]",
     tool="xyz_mm = [0, 0, 150]\nrpy_deg = [0, 30, 0]",
     xyz="[700, -100, 100]",
-    plan="",
+    plan="refine = false",
 ) + CONTOURS.format(slot=3, hole=3)
 TURNS = HEAD.format(
     robot="yaskawa_gp25",
@@ -99,7 +115,8 @@ TURNS = HEAD.format(
 ) + CONTOURS.format(slot=6, hole=4)
 """Its axes do not turn beyond what the positions of INFORM say."""
 OF = {
-    "whole": ("rapid", "krl", "fanuc", "val3", "ros", "csv"),
+    "whole": ("rapid", "krl", "val3", "ros", "csv"),
+    "rods": ("fanuc",),
     "small": ("urscript",),
     "turns": ("inform", "rapid"),
 }
@@ -121,14 +138,14 @@ def drawing():
 def planned(tmp_path_factory):
     """A folder for each job, with its drawing and its plan.json: planned once."""
     folders = {}
-    for name, job in {"whole": WHOLE, "small": SMALL, "turns": TURNS}.items():
+    for name, job in {"whole": WHOLE, "rods": RODS, "small": SMALL, "turns": TURNS}.items():
         folder = folders[name] = tmp_path_factory.mktemp(name)
         (folder / "part.csv").write_text(drawing())
         path = folder / "job.toml"
         path.write_text(job + '[program]\nlanguage = "none"\n')
         outcome = run_job(read_job(path))
         assert outcome.passed
-        write_outcome(outcome, folder)
+        (folder / "plan.json").write_text(planned_text(outcome))
     return folders
 
 
@@ -220,6 +237,39 @@ def test_moves_planned_with_another_retract_are_refused(planned):
         program_from_file(planned["whole"] / "plan.json", "rapid", job_file=job)
 
 
+def another_retract(data):
+    data["job"]["program"]["retract_mm"] = 20
+
+
+def another_pierce_time(data):
+    data["job"]["program"]["pierce_time_s"] = 1
+
+
+def a_slower_way(data):
+    times = data["sequence"]["moves"][1]["time_s"]
+    times[:] = [2 * t for t in times]
+
+
+@pytest.mark.parametrize(
+    ("edit", "code"),
+    [
+        (another_retract, "air-ends|agrees"),
+        (another_pierce_time, "agrees"),
+        (a_slower_way, "agrees"),
+    ],
+)
+def test_what_a_plan_says_of_its_own_program_binds_its_times_and_moves(
+    planned, tmp_path, edit, code
+):
+    """[program] is that of the job as it is now, but a plan has to agree with its own."""
+    data = json.loads((planned["whole"] / "plan.json").read_text())
+    edit(data)
+    (tmp_path / "plan.json").write_text(json.dumps(data))
+    job = job_file(planned["whole"])
+    with pytest.raises(AuditFailed, match=rf"\[({code})\]"):
+        program_from_file(tmp_path / "plan.json", "rapid", job_file=job)
+
+
 def programmed_time(read, robot, start):
     """Time of the joint moves of a program behind the first, by the model that docs state.
 
@@ -244,10 +294,12 @@ def programmed_time(read, robot, start):
 
 
 @pytest.mark.parametrize("air_speed", [None, 0.4])
-@pytest.mark.parametrize("language", OF["whole"])
-def test_joint_moves_take_the_time_that_was_planned(planned, language, air_speed):
+@pytest.mark.parametrize(
+    ("name", "language"), [(name, each) for name in ("whole", "rods") for each in OF[name]]
+)
+def test_joint_moves_take_the_time_that_was_planned(planned, name, language, air_speed):
     """Shares are counted in per cent by some: 1.5 % of the time at a share of 40 %."""
-    folder = planned["whole"]
+    folder = planned[name]
     file = read_plan_file(folder / "plan.json")
     planned_time = sum(move.duration for move in file.moves) / (air_speed or 1.0)
     said = "" if air_speed is None else f"air_speed = {air_speed}"

@@ -222,7 +222,7 @@ def test_the_audit_holds_moves_through_the_air_to_limits_time_and_cell(walled, a
     cell, cut = walled
     for move in cut.moves:
         table = air_checks(arm, move.q, move.time, cell=cell)
-        codes = {"air-time", "air-limits", "collision", "collision-own"}
+        codes = {"air-time", "air-limits", "collision", "collision-own", "collision-open"}
         assert {check.code for check in table} == codes
         assert all(check.ok for check in table)
     around = max(cut.moves, key=lambda move: len(move.q))

@@ -12,7 +12,8 @@ from pydantic import BaseModel
 
 from kerfpath.auditor import Check, checks
 from kerfpath.errors import AuditFailed, InputError, NoFeasiblePath
-from kerfpath.job._plan_audit import audit_file
+from kerfpath.job._asked import Asked, asked_of
+from kerfpath.job._plan_audit import PlanAudit
 from kerfpath.job._planread import PlanFile, read_plan_file, table_of
 from kerfpath.job._program_audit import ProgramAsked
 from kerfpath.job._program_of import asked_of_plans, program_of
@@ -89,15 +90,18 @@ def program_from_file(
             f"no program: {', '.join(file.failed)} failed the audit against the drawing when it "
             "was planned; mend the job and plan it again"
         )
-    notes = []
+    notes, to_do = [], None
     if job_file is not None:
         if frame is not None:
             raise InputError(
                 f"{job_file}: the cell of a job says nothing of a part that was measured; give "
                 "one of the two"
             )
-        _require_passed(audit_file(plan_file, job_file))
-        file = replace(file, job=read_job(job_file).source)
+        asked = _as_planned(asked_of(read_job(job_file)), file)
+        _require_passed(PlanAudit(asked=asked).audited(plan_file))
+        if asked.job.interruptions == "none":
+            to_do = ProgramAsked.by(asked)
+        file = replace(file, job=asked.job.source)
     options = _options(
         file,
         language or program_language(file.job, job_file or plan_file),
@@ -107,20 +111,21 @@ def program_from_file(
     if frame is not None:
         file, again = _led(file, frame, options.retract)
         notes += [*again, LED_NOTE, *([LED_MOVES_NOTE] if file.moves else [])]
-    asked = table_of(file, "audit", AuditTable, audit_options)
+    limits = table_of(file, "audit", AuditTable, audit_options)
     for p in file.plans:
-        for check in checks(p, **asked):
+        for check in checks(p, **limits):
             if check.level == "error" and not check.ok:
                 there = "" if frame is None else " at the measured placement"
                 raise AuditFailed(
                     f"no program: contour {p.name!r} fails its audit{there}: {check.issue()}"
                 )
-    if job_file is not None and read_job(job_file).interruptions == "none":
-        to_do = ProgramAsked.of(job_file)
-    else:
-        to_do = asked_of_plans(_job_of(file, options), file.plans)
     files, warnings = program_of(
-        file.plans, options, file.moves, asked=to_do, strict=strict, dry_share=dry_share
+        file.plans,
+        options,
+        file.moves,
+        asked=to_do or asked_of_plans(_job_of(file, options), file.plans),
+        strict=strict,
+        dry_share=dry_share,
     )
     return files, notes + warnings
 
@@ -169,6 +174,17 @@ def _job_of(file: PlanFile, options: ProgramOptions) -> Job:
 
 def _same(table: _M) -> _M:
     return table
+
+
+def _as_planned(asked: Asked, file: PlanFile) -> Asked:
+    """Return what a job asks for, with the [program] that a plan.json was made with.
+
+    Retract, air and pierce times of the plan follow from that one. The program is built with that
+    of the job as it is now, and refused where the planned moves do not meet its retract.
+    """
+    stem = asked.job.path.stem
+    then = table_of(file, "program", ProgramTable, lambda table: program_options(table, stem))
+    return replace(asked, job=replace(asked.job, program=then))
 
 
 def _require_passed(found: Audited) -> None:

@@ -15,7 +15,7 @@ from kerfpath.auditor import Check, air_checks, worst_of
 from kerfpath.cell import Cell
 from kerfpath.contour import Contour
 from kerfpath.errors import InputError
-from kerfpath.job._asked import asked_of
+from kerfpath.job._asked import Asked, asked_of
 from kerfpath.job._program_asked import AskedNodes, asked_program
 from kerfpath.job._program_beam import Process, beam_checks
 from kerfpath.job._program_cut import asked_times, cut_checks, row
@@ -105,13 +105,17 @@ class ProgramAsked:
         InputError
             A file cannot be read, or the job is of a kind that programs cannot be compared with.
         """
-        job = read_job(job_file)
+        return cls.by(asked_of(read_job(job_file)))
+
+    @classmethod
+    def by(cls, asked: Asked) -> ProgramAsked:
+        """Return the same of a job whose drawing and cell are read already."""
+        job = asked.job
         if job.interruptions != "none":
             raise InputError(
-                f"{job_file}: programs of jobs with interruptions cannot be compared with the "
+                f"{job.path}: programs of jobs with interruptions cannot be compared with the "
                 "drawing yet; audit the plan.json"
             )
-        asked = asked_of(job)
         return cls(
             job=job,
             tasks=asked.tasks,
