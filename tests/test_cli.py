@@ -386,6 +386,7 @@ def test_robots_lists_the_library_and_shows_sources():
     assert "68 robots" in run("robots").stdout
     shown = run("robots", "abb_irb2400_155").stdout
     assert "joint 2 + joint 3: -60 to 65 deg" in shown
+    assert re.search(r"^acceleration deg/s\^2 +not known *$", shown, re.MULTILINE)
     assert "source of geometry limits velocity: ros-industrial/abb" in shown
     data = json.loads(run("robots", "kuka_kr120_r2500_pro", "--json").stdout)
     assert data["lower_deg"] is None
