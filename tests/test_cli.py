@@ -412,7 +412,7 @@ def test_help_teaches():
         (("post", "small.toml"), ["not a plan.json"]),
         (("post", "list.json"), ['expected a plan.json with schema 4, got "list"']),
         (("post", "old.json"), ["schema 4, got 0", "plan the job again"]),
-        (("post", "short.json"), ["the key 'robot' is missing"]),
+        (("post", "short.json"), ["the key kerfpath is missing", "plan the job again"]),
         (("audit", "none.json"), ["cannot be read"]),
         (("audit", "small-plan/plan.json", "--job", "none.toml"), ["no such file"]),
         (
