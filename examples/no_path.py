@@ -50,7 +50,9 @@ def main() -> None:
         )
         where = "off the grid" if refine else "on the grid"
         print(f"dipped {where}: {dipped.time[-1]:.3f} s, {dipped.feed}")
-        assert kerfpath.audit(dipped) == []
+        for issue in kerfpath.audit(dipped):
+            assert issue.level == "warning", issue
+            print(f"  {issue}")
     pieces = kerfpath.plan_in_pieces(
         contour, robot, tool=tool, placement=placement, gamma_step=step, speed=0.15
     )

@@ -89,7 +89,8 @@ def test_the_demo_leaves_all_four_files(tmp_path):
     assert result.stdout.count("passed") == 7
     assert "Collisions are not checked" in result.stdout
     names = {p.name for p in (tmp_path / "deep" / "demo").iterdir()}
-    assert names == {"plan.json", "trajectory.csv", "report.html", "b_pillar.mod"}
+    ours = {"plan.json", "trajectory.csv", "report.html", "b_pillar.mod"}
+    assert names == {*ours, ".kerfpath.json"}
 
 
 def test_a_plan_says_what_it_did(planned, folder):
@@ -125,7 +126,7 @@ def test_the_trajectory_is_the_plan_in_degrees_and_millimetres(planned, folder):
 
 def test_plan_json_carries_everything_and_round_trips(planned, folder):
     data = json.loads((folder / "small-plan" / "plan.json").read_text())
-    assert data["schema"] == 3
+    assert data["schema"] == 4
     assert data["robot"]["id"] == "abb_irb4600_60_205"
     assert data["job"]["tool"]["head"] == "laser-head-45"
     assert np.array(data["T_flange_tip"]).shape == (4, 4)
@@ -385,6 +386,7 @@ def test_robots_lists_the_library_and_shows_sources():
     assert "68 robots" in run("robots").stdout
     shown = run("robots", "abb_irb2400_155").stdout
     assert "joint 2 + joint 3: -60 to 65 deg" in shown
+    assert re.search(r"^acceleration deg/s\^2 +not known *$", shown, re.MULTILINE)
     assert "source of geometry limits velocity: ros-industrial/abb" in shown
     data = json.loads(run("robots", "kuka_kr120_r2500_pro", "--json").stdout)
     assert data["lower_deg"] is None
@@ -408,9 +410,9 @@ def test_help_teaches():
         (("plan", "."), ["got a folder"]),
         (("post", "none.json"), ["none.json", "cannot be read"]),
         (("post", "small.toml"), ["not a plan.json"]),
-        (("post", "list.json"), ["expected a plan.json with schema 3, got 'list'"]),
-        (("post", "old.json"), ["schema 3, got 0"]),
-        (("post", "short.json"), ["the key 'robot' is missing"]),
+        (("post", "list.json"), ['expected a plan.json with schema 4, got "list"']),
+        (("post", "old.json"), ["schema 4, got 0", "plan the job again"]),
+        (("post", "short.json"), ["the key kerfpath is missing", "plan the job again"]),
         (("audit", "none.json"), ["cannot be read"]),
         (("audit", "small-plan/plan.json", "--job", "none.toml"), ["no such file"]),
         (
@@ -430,7 +432,7 @@ def test_help_teaches():
 def test_bad_input_is_one_line_and_nothing_is_written(planned, folder, arguments, words):
     (folder / "list.json").write_text("[]")
     (folder / "old.json").write_text('{"schema": 0}')
-    (folder / "short.json").write_text('{"schema": 3}')
+    (folder / "short.json").write_text('{"schema": 4}')
     (folder / "wrong-loop.toml").write_text(SMALL.replace("skin/hole16", "skin/hole99"))
     (folder / "slow.toml").write_text(SMALL.replace("speed_m_min = 3", "speed_m_min = -3", 1))
     before = sorted(folder.iterdir())

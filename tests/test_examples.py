@@ -145,3 +145,7 @@ def test_no_path_shows_every_way_out(capsys):
     said = capsys.readouterr().out
     for words in ("proved: True", "dipped on the grid", "dipped off the grid", "pieces of [32"):
         assert words in said
+    # On the grid joint 5 goes through its zero; the audit has nothing to say of the other.
+    on_grid, off = said.split("dipped off the grid")
+    assert "passes a singularity" in on_grid
+    assert "warning" not in off

@@ -31,7 +31,7 @@ def test_the_shipped_drawings_are_what_the_script_models(examples, tmp_path, nam
 
 # The job, its gamma step, a coarser one that does, the contours, and those that come last.
 JOBS = [
-    ("bracket", 3, 5, 4, {"trim"}),
+    ("bracket", 3, 4, 4, {"trim"}),
     ("tube", 10, 15, 10, set()),
     ("blank", 5, 15, 7, {"trim"}),
 ]

@@ -10,6 +10,7 @@ from kerfpath import Contour, InputError, NoFeasiblePath, audit, plan, plan_in_p
 from kerfpath.planner import layered_graph, node_interval
 
 STEP = np.radians(5)
+IN_LINE = 0.05  # sine of joint 5: nearer than this to its zero the wrist is all but singular
 
 
 @pytest.fixture(scope="module")
@@ -234,13 +235,19 @@ def test_off_the_grid_the_feed_dips_less(corner, arm, tool, placement):
     assert off.time[-1] < grid.time[-1]
 
 
+def require_clean(made, **options):
+    """Assert an audit without issues, or where joints 4 and 6 are nearly in line, with that one."""
+    in_line = np.abs(np.sin(made.q[:, 4])).min() < IN_LINE
+    assert [i.code for i in audit(made, **options)] == ["unbounded"] * bool(in_line)
+
+
 def test_the_pieces_of_an_interrupted_cut(corner, arm, tool, placement):
     options = {"tool": tool, "placement": placement, "gamma_step": STEP, "speed": 0.1}
     pieces = plan_in_pieces(corner, arm, **options)
     assert len(pieces) > 1
     assert pieces[0].name == f"corner, piece 1 of {len(pieces)}"
     for p in pieces:
-        assert audit(p, reference=corner.between(p.contour.s[0], p.contour.s[-1])) == []
+        require_clean(p, reference=corner.between(p.contour.s[0], p.contour.s[-1]))
         assert p.proof.optimal
         # Gamma still counts from the frames of the whole contour.
         H = p.T_base_part @ p.contour.frames("rotation-minimising")
@@ -258,7 +265,8 @@ def test_the_pieces_of_an_interrupted_cut(corner, arm, tool, placement):
     shortest = min(float(np.ptp(p.contour.s)) for p in pieces)
     longer = plan_in_pieces(corner, arm, least_piece=shortest + 0.004, **options)
     assert min(float(np.ptp(p.contour.s)) for p in longer) >= shortest + 0.004 - 1e-9
-    assert all(audit(p) == [] for p in longer)
+    for p in longer:
+        require_clean(p)
     with pytest.raises(NoFeasiblePath, match=r"no division into pieces of 0.15 m or more"):
         plan_in_pieces(corner, arm, least_piece=0.15, **options)
     with pytest.raises(InputError, match=r"least_piece: expected a number above 0 m"):

@@ -2,6 +2,7 @@
 
 import re
 import sys
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -41,6 +42,22 @@ def example():
 @pytest.fixture(scope="module")
 def program():
     return build_program([hand_plan(arc(), robot("abb_irb4600_60_205"), *frames())])
+
+
+@pytest.mark.parametrize("name", sorted(languages()))
+def test_every_language_says_what_is_not_proved(name):
+    arms = [
+        robot(arm, acceleration_ratio="iontec_20_to_70kg")
+        for arm in ("abb_irb4600_60_205", "fanuc_m710ic_50", "ur_ur10e")
+    ]
+    arm = next(arm for arm in arms if not languages()[name].refusal(arm))
+    tool, placement = frames()
+    placement[0, 3] -= 0.35 * (arm.id == "ur_ur10e")  # which reaches less far
+    program = build_program([hand_plan(arc(), arm, tool, placement)], retract=0.01)
+    # One word: some languages fold their comments.
+    said = post(replace(program, caveats=("unproved-of-capsules",)), name)
+    count = sum(text.lower().count("unproved-of-capsules") for text in said.values())
+    assert count == (0 if name == "csv" else 1)  # a table has no comments
 
 
 def test_the_dialect_of_the_documentation_writes_its_macros(installed, example, program):

@@ -15,7 +15,13 @@ def test_the_python_example_runs_and_its_audit_is_clean(capsys):
 
 def test_every_link_leads_somewhere():
     for target in re.findall(r"\]\(([^)]+)\)", README):
-        assert (ROOT / target).exists(), target
+        page, _, heading = target.partition("#")
+        text = (ROOT / page).read_text(encoding="utf-8") if heading else ""
+        titles = re.findall(r"^#+ (.+)$", text, re.MULTILINE)
+        assert (ROOT / page).exists(), target
+        assert not heading or heading in {
+            re.sub(r"[^\w -]", "", title.lower()).replace(" ", "-") for title in titles
+        }, target
 
 
 def test_every_command_it_shows_exists():

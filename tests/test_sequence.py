@@ -164,6 +164,33 @@ def test_a_part_is_cut_in_less_time_than_in_the_order_given(part, arm, tool, pla
         np.testing.assert_allclose(move.q[-1], backed_off(after, "start", 0.05), atol=1e-9)
 
 
+@pytest.mark.parametrize("home", [None, np.radians([0, -20, 10, 0, 60, 0])])
+def test_moves_of_open_cuts_run_from_the_end_of_each_to_the_start_of_the_next(
+    arm, tool, placement, home
+):
+    x, zero = np.linspace(0, 0.06, 16), np.zeros(16)
+    lines = [
+        Contour(np.c_[x, zero + y, zero], np.tile([0, 0, -1.0], (16, 1)), closed=False, name=name)
+        for name, y in (("near", 0.0), ("middle", 0.05), ("far", 0.1))
+    ]
+    asked = {"tool": tool, "placement": placement, "speed": 0.05, "gamma_step": STEP}
+    cut = plan_part(lines, arm, home=home, retract=0.02, **asked)
+    ends = [backed_off(p, "end", 0.02) for p in cut.plans]
+    starts = [backed_off(p, "start", 0.02) for p in cut.plans]
+    if home is None:
+        starts, ends = starts[1:], ends[:-1]
+    else:
+        starts, ends = [*starts, home], [home, *ends]
+    assert len(cut.moves) == len(starts)
+    for move, end, start in zip(cut.moves, ends, starts, strict=True):
+        np.testing.assert_allclose(move.q[0], end, atol=1e-9)
+        if start is home:  # endless joints come home on any turn
+            np.testing.assert_allclose(np.exp(1j * move.q[-1]), np.exp(1j * home), atol=1e-9)
+        else:
+            np.testing.assert_allclose(move.q[-1], start, atol=1e-9)
+    build_program(cut.plans, moves=cut.moves, retract=0.02)
+
+
 def test_home_heat_and_precedence_are_kept(part, arm, tool, placement):
     asked = {"tool": tool, "placement": placement, "speed": 0.1, "gamma_step": STEP}
     home = np.radians([0, -20, 10, 0, 60, 0])

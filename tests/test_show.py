@@ -85,6 +85,23 @@ def test_a_table_leaves_columns_out_before_it_hides_what_matters(width):
     assert ("no room for: figure 8" in lines[-1]) == (kept[0].count("1234.56") < 9)
 
 
+def test_headings_are_folded_only_where_that_makes_room(monkeypatch):
+    def heads(width):
+        monkeypatch.setattr(_show.out, "_width", width)
+        out = io.StringIO()
+        with redirect_stdout(out):
+            table(columns, rows, numbers=columns[1:3])
+        return out.getvalue().split("a.toml")[0].rstrip()
+
+    columns = ["job", "cutting s", "time in all s", "program, or why there is none"]
+    rows = [["a.toml", "1.25", "3.5", "word " * 60]]
+    assert heads(200).split() == " ".join(columns).split()
+    assert "\n" not in heads(200)
+    folded = heads(60).splitlines()
+    assert len(folded) == 4
+    assert columns[3] in folded[-1]
+
+
 def test_equal_notes_are_told_once():
     notes = [f"warning: at {i} of 33 targets it is too large (hole {i})" for i in range(30)]
     told = told_once(["something else", *notes, "more 1"], [f"hole {i}" for i in range(30)])

@@ -250,7 +250,7 @@ def _positions(
             0.0,
             "count",
             level="warning",
-            advice="the motion passes a singularity there: keep away from it with [comfort]",
+            advice="the motion passes a singularity there, or near one: keep away with [comfort]",
         )
     )
     step = np.abs(joint_increments(plan)[:, own]).max(axis=1)

@@ -105,7 +105,7 @@ def show_robot(name: str, *, as_json: bool) -> None:
     lengths = ", ".join(f"{k} {v * 1000:g}" for k, v in r.geometry.items())
     out.print(f"lengths ({r.kinematics.upper()}, mm): {lengths}")
     rows = [
-        [what, *(["not known"] if values is None else [f"{v:g}" for v in values])]
+        [what, *(["not known", *[""] * 5] if values is None else [f"{v:g}" for v in values])]
         for what, values in limits.items()
     ]
     joints = [f"joint {i}" for i in range(1, 7)]

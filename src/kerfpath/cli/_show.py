@@ -40,6 +40,8 @@ _PIPED = 200
 
 _LEAST_OF_WORDS = 16
 """Columns that a cell of words has at least, or its own length."""
+_ROOM_FOR_WORDS = 40
+"""Columns for words that are enough: headings are not folded for more."""
 _BETWEEN = 2
 """Columns between those of a table."""
 LINE_SECONDS = 10.0
@@ -69,24 +71,29 @@ def table(
     """Print a table that can be read at the width there is.
 
     Columns named in `numbers` stand to the right; these and those in `whole` are never folded. In a
-    narrow terminal headings are folded, then the columns in `spare` left out, the first one first,
-    until the others fit, and last of all words are folded.
+    narrow terminal headings longer than what stands below are folded, then the columns in `spare`
+    left out, the first one first, until the others fit, and last of all words are folded.
     """
     fixed = {*numbers, *whole}
+    cells = [
+        max((cell_len(Text.from_markup(row[i]).plain) for row in rows), default=0)
+        for i in range(len(columns))
+    ]
     kept, heads, left_out = list(range(len(columns))), list(columns), list[str]()
 
     def needed(least_of_words: int) -> int:
         """Return the width of what is kept, words folded to so much if they are longer."""
         widths = []
         for i in kept:
-            cells = max((cell_len(Text.from_markup(row[i]).plain) for row in rows), default=0)
-            if columns[i] not in fixed:
-                cells = min(cells, least_of_words)
-            widths.append(max(cells, *map(len, heads[i].split("\n"))))
+            width = cells[i] if columns[i] in fixed else min(cells[i], least_of_words)
+            widths.append(max(width, *map(len, heads[i].split("\n"))))
         return sum(widths) + _BETWEEN * (len(kept) - 1)
 
-    if needed(out.width) > out.width:
-        heads = [head.replace(" ", "\n") for head in columns]
+    if needed(_ROOM_FOR_WORDS) > out.width:
+        heads = [
+            head.replace(" ", "\n") if len(head) > width else head
+            for head, width in zip(columns, cells, strict=True)
+        ]
     for name in spare:
         if needed(_LEAST_OF_WORDS) <= out.width:
             break

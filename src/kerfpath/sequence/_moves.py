@@ -174,14 +174,14 @@ class Moves:
     def unrolled(self, candidates: Ints) -> dict[str, tuple[Any, ...]]:
         """Return the plans and moves of an order, endless joints going on from one to the next."""
         legs = self._legs(candidates)
-        here = self._starts[candidates[0]] if self._home is None else self._home
+        here = self._ends[candidates[0]] if self._home is None else self._home
         plans, moves, shift = [], [], np.zeros_like(here)
         for k, (a, b) in enumerate(legs):
             move = self._moves[a, b]
             moves.append(replace(move, q=freeze(move.q + (here - move.q[0]))))
             shift = moves[-1].q[-1] - (0 if b == HOME else self._starts[b])
             if k == 0 and a != HOME:
-                plans.append(self._shifted(a, here - self._ends[a]))
+                plans.append(self._plans[a])
             if b != HOME:
                 plans.append(self._shifted(b, shift))
                 here = self._ends[b] + shift

@@ -135,6 +135,7 @@ class Rapid(Formatter):
         yield "  ! Complete the load of the tool: mass -1 stands for not known."
         yield "  ! The work object is the part in the robot's base, which is the world's, too."
         yield f"  ! Moves through the air have {checked}."
+        yield from (f"  ! {said}" for said in program.caveats)
         yield f"  ! {SWITCH_OFF} is for the events STOP and QSTOP: enter it there. A stop switches"
         yield "  ! the laser off only then; the safety circuit of the cell has to, too."
         yield f"  ! To begin at a contour, set {FIRST} to its number and move PP to Main."
