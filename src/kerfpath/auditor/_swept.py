@@ -68,7 +68,7 @@ def in_between(
 
 
 class _Moves:
-    """The judged pairs of a cell, and how far their bodies come in steps dq (B, n) and in halves."""
+    """The judged pairs of a cell, and how far their bodies come in steps dq (B, n) rad."""
 
     def __init__(self, cell: Cell, chain: JointChain, dq: Array) -> None:
         self._cell, self._joints = cell, np.arange(len(chain.axes))
