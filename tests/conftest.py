@@ -10,9 +10,14 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from hypothesis import settings
 
 from kerfpath.contour import Contour
 from kerfpath.robots import robot
+
+# The same examples in every run, without a deadline that a busy machine could miss.
+settings.register_profile("fixed", derandomize=True, deadline=None)
+settings.load_profile("fixed")
 
 
 def pose(xyz, rotation=None):

@@ -27,6 +27,6 @@ def at_least(value: float, digits: int = 4) -> str:
 
 
 def _rounded(value: float, digits: int, how: str) -> str:
-    exact = Decimal(value)
+    exact = Decimal(repr(float(value)))  # as it is written: 0.1 is no more than that
     last = Decimal(1).scaleb(exact.adjusted() - digits + 1)
     return f"{exact.quantize(last, rounding=how).normalize():f}"
