@@ -66,13 +66,14 @@ def feasibility_map(
     """
     postures = shown_postures(graph)
     gamma = np.degrees(graph.gamma)
-    step = 360.0 / len(gamma)
+    step, nodes = 360.0 / len(gamma), len(graph.reason)
+    parts = 1 if plan is None else (len(plan.q) - 1) // (nodes - 1)
     height = TOP + BOTTOM + len(postures) * ROW + (len(postures) - 1) * GAP
     figure = go.Figure(layout=base_layout(height, hovermode="closest"))
     figure.update_layout(margin={"l": 62, "r": 16, "t": TOP, "b": BOTTOM})
     used = set() if plan is None else {int(mu) for mu in plan.posture}
     for row, mu in enumerate(postures):
-        _add_axes(figure, row, len(postures), height, len(graph.reason))
+        _add_axes(figure, row, len(postures), height, nodes)
         name = posture_name(mu) + (" (in use)" if mu in used else "")
         figure.add_annotation(
             text=name,
@@ -102,13 +103,11 @@ def feasibility_map(
             hovertemplate="node %{x}<br>gamma %{y:.1f}°<extra>%{meta.posture}</extra>",
         )
         if plan is not None and mu in used:
-            _add_choice(figure, plan, mu, row, (len(plan.q) - 1) // (len(graph.reason) - 1))
+            _add_choice(figure, plan, mu, row, parts)
     _add_marks(figure, marks, len(postures))
     _add_legend(figure, graph, postures, has_plan=plan is not None)
     if s is None and plan is not None:
         s = plan.contour.s
-    nodes = len(graph.reason)
-    parts = 1 if plan is None else (len(plan.q) - 1) // (nodes - 1)
     figure.update_layout(
         meta={
             "reasons": list(graph.reasons),
