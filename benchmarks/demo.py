@@ -21,12 +21,12 @@ start, frames and sampling, plan and program files, kernels that `warm_up` leave
 
 CLOCKS = {
     "compile (cold only)": ("kerfpath.job", "warm_up"),
-    "read STEP": ("kerfpath.job._run", "read_drawing"),
-    "graph": ("kerfpath.job._run", "layered_graph"),
+    "read STEP": ("kerfpath.job.run._run", "read_drawing"),
+    "graph": ("kerfpath.job.run._run", "layered_graph"),
     "search": ("kerfpath.planner._plan", "shortest_path"),
     "refinement": ("kerfpath.planner._plan", "refined"),
-    "audit": ("kerfpath.job._run", "checks"),
-    "report": ("kerfpath.job._files", "report_text"),
+    "audit": ("kerfpath.job.run._run", "checks"),
+    "report": ("kerfpath.job.output._files", "report_text"),
 }
 PARTS = ("import", *CLOCKS, "other")
 

@@ -20,6 +20,9 @@ settings.register_profile("fixed", derandomize=True, deadline=None)
 settings.load_profile("fixed")
 
 
+ROOT = Path(__file__).parents[1]
+
+
 def pose(xyz, rotation=None):
     T = np.eye(4)
     T[:3, 3] = xyz

@@ -3,14 +3,12 @@
 import importlib.util
 import sys
 import time
-from pathlib import Path
 
 import numpy as np
 import pytest
 
 import kerfpath
-
-ROOT = Path(__file__).parent.parent
+from conftest import ROOT
 
 
 def benchmark_module(name):

@@ -3,7 +3,6 @@
 import json
 import re
 from dataclasses import replace
-from pathlib import Path
 from types import SimpleNamespace
 
 import numpy as np
@@ -11,7 +10,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 import naive
-from conftest import pose
+from conftest import ROOT, pose
 from kerfpath import (
     Band,
     Comfort,
@@ -29,7 +28,7 @@ from kerfpath.auditor._margins import margins
 from kerfpath.cell import Checker, box_between, cell_of
 from kerfpath.comfort import MEASURES, jacobian, measure, measures
 from kerfpath.job import read_plan_file
-from kerfpath.job._planfile import plan_entry, plan_text
+from kerfpath.job.plan_file._write import plan_entry, plan_text
 from kerfpath.planner import layered_graph
 from kerfpath.robots import Robot
 from kerfpath.tilt import Tilt
@@ -411,7 +410,7 @@ def test_a_plan_file_tells_the_comfort_asked_for(small, tmp_path):
 
 
 def test_the_page_s_example_runs_and_keeps_its_margins(capsys):
-    page = (Path(__file__).parent.parent / "docs" / "comfort.md").read_text()
+    page = (ROOT / "docs" / "comfort.md").read_text()
     (code,) = re.findall(r"```python\n(.*?)```", page, re.DOTALL)
     exec(compile(code, "comfort.md", "exec"), {})
     wrist, _, limits = map(float, capsys.readouterr().out.split())

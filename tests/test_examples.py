@@ -3,7 +3,6 @@
 import csv
 import re
 import xml.etree.ElementTree as ET
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -11,8 +10,9 @@ import pytest
 import known_against_proposed as example
 import no_path
 import operations
+from conftest import ROOT
 
-EXAMPLES = Path(__file__).parent.parent / "examples"
+EXAMPLES = ROOT / "examples"
 KEPT = EXAMPLES / "known_against_proposed"
 
 

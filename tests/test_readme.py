@@ -1,9 +1,9 @@
 """The README keeps its promises."""
 
 import re
-from pathlib import Path
 
-ROOT = Path(__file__).parent.parent
+from conftest import ROOT
+
 README = (ROOT / "README.md").read_text()
 
 

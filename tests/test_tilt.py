@@ -2,14 +2,14 @@
 
 import re
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
+from tests.robots.test_five_axes import ARM, TOOLS
 
 import naive
-from conftest import pose
+from conftest import ROOT, pose
 from kerfpath import (
     Contour,
     InputError,
@@ -24,12 +24,11 @@ from kerfpath import (
 from kerfpath.auditor import checks
 from kerfpath.graph import gamma_grid
 from kerfpath.job import read_plan_file
-from kerfpath.job._planfile import plan_entry, plan_text
+from kerfpath.job.plan_file._write import plan_entry, plan_text
 from kerfpath.planner import layered_graph
 from kerfpath.planner._clear import _beside
 from kerfpath.post import build_program, post
 from kerfpath.tilt import tilted
-from test_five_axes import ARM, TOOLS
 
 CONE = np.radians(6)
 
@@ -298,7 +297,7 @@ def test_what_a_tilt_does_not_go_with_is_refused(arc, arm, options):
 
 
 def test_the_example_of_the_page_runs(capsys):
-    page = (Path(__file__).parent.parent / "docs" / "tilt-and-extra-axes.md").read_text()
+    page = (ROOT / "docs" / "tilt-and-extra-axes.md").read_text()
     for code in re.findall(r"```python\n(.*?)```", page, re.DOTALL):
         exec(compile(code, "tilt-and-extra-axes.md", "exec"), {})
         assert capsys.readouterr().out.strip().endswith("[]")

@@ -8,14 +8,14 @@ from collections.abc import Mapping
 
 import numpy as np
 import pytest
+from tests.cli.test_commands import DEMO, SMALL
 
 import kerfpath
 from kerfpath._told import LONGEST, told
 from kerfpath.cad import read
 from kerfpath.cell import Cell
 from kerfpath.job import read_job, run_job
-from kerfpath.job._cell import cell_of_job
-from test_cli import DEMO, SMALL
+from kerfpath.job.format._cell import cell_of_job
 
 MOST = 300
 

@@ -6,7 +6,7 @@ by three bits: 4 = wrist centre behind axis 1, 2 = wrist centre behind the lower
 negative. Our reading of "behind": 4 where the wrist centre lies on the far side of axis 1 as the
 arm faces, 2 where it lies behind the line from axis 2 through axis 3, prolonged. That bit therefore
 turns over at the stretched arm, where the elbow is singular. So it does at 28 positions of an
-IRB 6700 that others had RobotStudio compute (tests/test_post_measured.py).
+IRB 6700 that others had RobotStudio compute (tests/post/test_measured.py).
 """
 
 from __future__ import annotations

@@ -1,0 +1,210 @@
+"""From a job's [cell] table and its part to the cell that plans and audits are held against."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import replace
+from functools import lru_cache
+from pathlib import Path
+from typing import Any
+
+from kerfpath._arrays import Array, Ints
+from kerfpath.cad import Part
+from kerfpath.cad import read as read_drawing
+from kerfpath.cell import (
+    MEANT,
+    Cell,
+    CuttingHead,
+    Mesh,
+    MeshHead,
+    Shape,
+    box,
+    cell_of,
+    edges_of,
+    link_capsules,
+    read_stl,
+    thickened,
+    welded,
+)
+from kerfpath.errors import InputError
+from kerfpath.job.format._poses import pose
+from kerfpath.job.format._read import Job
+from kerfpath.job.format._refusals import refused_at
+from kerfpath.job.format.tables import CellTable, FixtureTable, given
+
+__all__ = ["cell_of_job", "with_map"]
+
+SIZES = (
+    "nozzle_length_mm", "nozzle_radii_mm", "body_length_mm", "body_radius_mm", "arm_radius_mm",
+)  # fmt: skip
+"""Keys of [cell.head] that are arguments of the head, but for their unit."""
+SAME = 1e-6
+"""m: corners of neighbouring faces that are one; CAD systems keep to less."""
+
+
+def cell_of_job(job: Job, part: Part) -> Cell | None:
+    """Return the cell that a job describes; None where it has no [cell]: nothing is checked then.
+
+    Raises
+    ------
+    InputError
+        At its line in the job: a file that holds no closed solid, a pair of unknown bodies, a part
+        drawn as a surface whose thickness is not given, a robot whose links are not known.
+    """
+    table = job.cell
+    if table is None:
+        return None
+    fixtures: dict[str, Shape] = {}
+    for i, fixture in enumerate(table.fixture):
+        with _at(job, "cell", "fixture", i):
+            fixtures[fixture.name] = _shape(fixture, job.path.parent, table.deviation_mm / 1000)
+    solid = _solid(job, table, part) if table.part else None
+    with _at(job, "cell", "head"):
+        head = _head(table, job.path.parent)
+    with _at(job, "cell"):
+        bare = cell_of(
+            job.robot,
+            tool=job.tool,
+            head=head,
+            part=solid,
+            placement=job.placement,
+            fixtures=fixtures,
+            links=link_capsules(job.robot) if table.links == "capsules" else None,
+            near_miss=table.near_miss_mm / 1000,
+        )
+    for i, pair in enumerate(table.pair):
+        _require_known(job, bare, pair.between, ("cell", "pair", i, "between"))
+    for i, names in enumerate(table.may_touch):
+        _require_known(job, bare, names, ("cell", "may_touch", i))
+    own = {_two(p.between): p.near_miss_mm / 1000 for p in table.pair if p.near_miss_mm is not None}
+    touching = {_two(names): MEANT for names in table.may_touch}
+    touching |= {_two(p.between): p.allowed for p in table.pair if p.allowed is not None}
+    with _at(job, "cell"):
+        return replace(bare, near_miss_of={**bare.near_miss_of, **own}, may_touch=touching)
+
+
+def with_map(job: Job) -> Job:
+    """Return the job with the collision map asked for.
+
+    Raises
+    ------
+    InputError
+        It has no [cell].
+    """
+    if job.cell is None:
+        raise refused_at(
+            job.path, ("cell",), "expected a [cell] for the collision map, got none; add one"
+        )
+    return replace(job, cell=job.cell.model_copy(update={"map": True}))
+
+
+@contextmanager
+def _at(job: Job, *where: str | int) -> Iterator[None]:
+    """Give the errors of a piece of the cell their place in the job."""
+    try:
+        yield
+    except InputError as error:
+        said = str(error)
+        raise (
+            error if said.startswith(f"{job.path}:") else refused_at(job.path, where, said)
+        ) from None
+
+
+def _require_known(
+    job: Job, cell: Cell, names: tuple[str, ...], where: tuple[str | int, ...]
+) -> None:
+    for name in names:
+        if name not in cell.names:
+            raise refused_at(
+                job.path,
+                where,
+                f'expected names of bodies of the cell, got "{name}"; there are '
+                f"{', '.join(cell.names)}",
+            )
+    if names[0] == names[1]:
+        raise refused_at(job.path, where, f'expected two bodies, got "{names[0]}" twice')
+
+
+def _two(names: tuple[str, ...]) -> tuple[str, str]:
+    one, two = names
+    return one, two
+
+
+def _head(table: CellTable, folder: Path) -> CuttingHead | MeshHead:
+    """Return the head of its file, or the generic one with the sizes that are given."""
+    head = table.head
+    sizes: dict[str, Any] = {"stand_off": table.stand_off_mm / 1000, "share": table.share}
+    for name in given(head, *SIZES):
+        mm = getattr(head, name)
+        many = isinstance(mm, tuple)
+        sizes[name.removesuffix("_mm")] = tuple(v / 1000 for v in mm) if many else mm / 1000
+    if head.file is None:
+        return CuttingHead(**sizes)
+    solid = _read_solid(folder / head.file, head.unit, table.deviation_mm / 1000)
+    place = pose(head.xyz_mm or (0.0, 0.0, 0.0), head.rpy_deg or (0.0, 0.0, 0.0))
+    return MeshHead(mesh=solid.moved(place), **sizes)
+
+
+def _solid(job: Job, table: CellTable, part: Part) -> Mesh:
+    """Return the part as a solid, a part drawn as a surface by its thickness."""
+    if not part.faces:
+        raise refused_at(
+            job.path,
+            ("cell", "part"),
+            f"{job.part_file.name} holds curves and no solid to keep away from; write part = false "
+            "to leave it out of the cell, or give it as a solid",
+        )
+    vertices, triangles = _triangles(part, table.deviation_mm / 1000)
+    is_open = bool(edges_of(triangles)[1].any())
+    if is_open and table.sheet_mm is None:
+        raise refused_at(
+            job.path,
+            ("cell", "sheet_mm"),
+            f"{job.part_file.name} is drawn as a surface, not as a closed solid: what is inside "
+            "cannot be told; add sheet_mm = its thickness in mm, behind the surface as the beam "
+            "sees it, or part = false to leave it out of the cell",
+        )
+    if not is_open and table.sheet_mm is not None:
+        raise refused_at(
+            job.path,
+            ("cell", "sheet_mm"),
+            f"{job.part_file.name} is a closed solid, which has its thickness; remove sheet_mm",
+        )
+    if table.sheet_mm is not None:
+        vertices, triangles = thickened(vertices, triangles, table.sheet_mm / 1000)
+    return Mesh(
+        vertices=vertices,
+        triangles=triangles,
+        deviation=table.deviation_mm / 1000,
+        name=job.part_file.name,
+    )
+
+
+def _shape(fixture: FixtureTable, folder: Path, deviation: float) -> Shape:
+    place = pose(fixture.xyz_mm, fixture.rpy_deg)
+    if fixture.size_mm is not None:
+        return box([mm / 1000 for mm in fixture.size_mm], place)
+    assert fixture.file is not None
+    return _read_solid(folder / fixture.file, fixture.unit, deviation).moved(place)
+
+
+def _read_solid(path: Path, unit: str | None, deviation: float) -> Mesh:
+    """Return the solid in an STL file of a unit, or in a STEP file, which says its own."""
+    stamp = path.stat()
+    return _solid_in(path, unit, deviation, (stamp.st_mtime_ns, stamp.st_size))
+
+
+@lru_cache(maxsize=16)
+def _solid_in(path: Path, unit: str | None, deviation: float, _stamp: tuple[int, int]) -> Mesh:
+    """Read a solid; a study that moves the cell asks for the same again and again."""
+    if path.suffix.lower() == ".stl":
+        assert unit is not None
+        return read_stl(path, unit)
+    vertices, triangles = _triangles(read_drawing(path, unit=unit), deviation)
+    return Mesh(vertices=vertices, triangles=triangles, deviation=deviation, name=path.name)
+
+
+@lru_cache(maxsize=2)
+def _triangles(part: Part, deviation: float) -> tuple[Array, Ints]:
+    return welded(*part.mesh(deviation), SAME)

@@ -1,0 +1,148 @@
+"""One contour of a job: which loop, how fast, what is made of it and how it is sampled."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from kerfpath._told import told
+from kerfpath.cad import Part
+from kerfpath.contour import Contour
+from kerfpath.errors import InputError
+from kerfpath.job.format._operations import shaped
+from kerfpath.job.format._values import MOST_NODES
+from kerfpath.job.format.tables import ContourTable
+
+__all__ = ["ContourTask", "task_of"]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ContourTask:
+    """One contour to cut: which, how fast, and how it is sampled.
+
+    Parameters
+    ----------
+    pick : str
+        Name of the loop in the part; "" where the table picks several, see `expanded`.
+    name : str
+        What the contour is called in messages, reports and programs.
+    speed : float m/s
+        Speed along the path.
+    spacing : float m, optional
+        Largest distance between nodes; or
+    time_step : float s, optional
+        largest time between nodes; or
+    count : int, optional
+        number of nodes; or
+    tolerance : float m, optional
+        largest distance of the chords from the contour; exactly one of the four is given.
+    axis_tolerance : float rad, optional
+        Largest angle between the axis along a chord and the contour's, with `tolerance`.
+    table : ContourTable
+        What is made of the loop before it is sampled, as the file says it.
+    """
+
+    pick: str
+    name: str
+    speed: float
+    spacing: float | None = None
+    time_step: float | None = None
+    count: int | None = None
+    tolerance: float | None = None
+    axis_tolerance: float | None = None
+    table: ContourTable
+
+    __repr__ = told
+
+    def expanded(self, part: Part) -> list[ContourTask]:
+        """Return a task for each loop of the part that this one picks.
+
+        Raises
+        ------
+        InputError
+            No such loop.
+        """
+        if self.table.pick_all is None:
+            return [replace(self, pick=part.loop(self.pick).name)]
+        loops = part.pick(**self.table.pick_all.resolve())
+        return [replace(self, pick=loop.name, name=loop.name) for loop in loops]
+
+    def drawn(self, part: Part) -> Contour:
+        """Return its loop as the part has it.
+
+        Raises
+        ------
+        InputError
+            A loop with a gap; a line drawn open that is not asked for by name or as such, as a
+            trim that was meant to be closed may end up as one.
+        """
+        everything = self.table.pick_all
+        return part.contour(self.pick, closed=everything is not None and everything.kind != "open")
+
+    def candidates(self, part: Part, drawn: Contour | None = None) -> list[Contour]:
+        """Return the contours that may be cut for its loop, see `shaped`.
+
+        `drawn` is the loop as the part has it, where that is at hand.
+        """
+        laid = self.table.lead_in or self.table.lead_out or self.table.corners
+        surface = part.surface(self.pick) if laid else None
+        drawn = self.drawn(part) if drawn is None else drawn
+        return shaped(self.table, drawn, surface)
+
+    def evenly_fast(self, part: Part) -> Contour:
+        """Return the first of its paths, sampled, without shares of the speed."""
+        path = self.candidates(part)[0]
+        return self.sample(replace(path, speed_share=np.ones(len(path))))
+
+    def sample(self, contour: Contour) -> Contour:
+        """Return the contour sampled as this task says, under the task's name.
+
+        Raises
+        ------
+        InputError
+            A spacing that would make too many nodes, a tolerance that cannot be kept.
+        """
+        named, slowed = replace(contour, name=self.name), bool((contour.speed_share < 1).any())
+        spacing, time_step = self.spacing, self.time_step
+        if time_step is not None:
+            self._require_few(contour, time_step * self.speed, "time_step_ms")
+        elif spacing is not None:
+            self._require_few(contour, spacing, "spacing_mm")
+            time_step = spacing / self.speed if slowed else None
+        if time_step is not None:
+            timed = named.resample(dt=time_step, speed=self.speed)
+            return timed if slowed else replace(timed, time=None)  # one speed: the plan's to say
+        return named.resample(
+            spacing=spacing,
+            count=self.count,
+            tolerance=self.tolerance,
+            axis_tolerance=self.axis_tolerance,
+        )
+
+    def _require_few(self, contour: Contour, spacing: float, key: str) -> None:
+        if contour.length / spacing > MOST_NODES:
+            raise InputError(
+                f"contour {self.name!r}: {spacing * 1e3:g} mm between nodes would make more "
+                f"than {MOST_NODES} of them over {contour.length * 1e3:g} mm; raise {key}"
+            )
+
+
+def task_of(table: ContourTable) -> ContourTask:
+    """Return what a [[contour]] table asks for, in SI."""
+    angle, step = table.axis_tolerance_deg, table.time_step_ms
+    return ContourTask(
+        pick=table.pick or "",
+        name=table.name or table.pick or "",
+        speed=table.speed_m_min / 60,
+        spacing=_metres(table.spacing_mm),
+        time_step=None if step is None else step / 1000,
+        count=table.count,
+        tolerance=_metres(table.tolerance_mm),
+        axis_tolerance=None if angle is None else float(np.radians(angle)),
+        table=table,
+    )
+
+
+def _metres(mm: float | None) -> float | None:
+    return None if mm is None else mm / 1000

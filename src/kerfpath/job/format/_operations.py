@@ -1,0 +1,130 @@
+"""From a loop as drawn to what is cut: the operations that a [[contour]] table asks for."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from kerfpath.contour import Contour
+from kerfpath.job.format.tables import ContourTable
+from kerfpath.job.format.tables._cut import LeadTable
+from kerfpath.operations import (
+    Side,
+    Surface,
+    bevel,
+    lead_in,
+    lead_out,
+    loop_corners,
+    micro_joints,
+    offset,
+    overlap,
+    reverse,
+    round_corners,
+    slow_corners,
+    smooth_axes,
+    smoothest_start,
+    start_at,
+)
+
+__all__ = ["closed_only", "shaped"]
+
+MM = 1e-3
+OTHER: dict[Side, Side] = {"left": "right", "right": "left"}
+
+
+def closed_only(table: ContourTable) -> dict[str, str]:
+    """Return the keys in use that only a closed loop can have, and what an open line lacks."""
+    ends = 'begins at one of its ends: the other with direction = "reversed"'
+    asked = {
+        "start": (table.start != "drawn", ends),
+        "start_mm": (table.start_mm is not None, ends),
+        "overlap_mm": (table.overlap_mm is not None, "does not come back to its start"),
+    }
+    return {key: lacks for key, (used, lacks) in asked.items() if used}
+
+
+def shaped(table: ContourTable, drawn: Contour, surface: Surface | None) -> list[Contour]:
+    """Return the contours that may be cut for a loop: one, or several starts and directions.
+
+    Corners and leads are laid on `surface`.
+
+    In this order: direction, smoothed axes, kerf, corners, start, bevel, micro joints, overlap,
+    leads, slowing down (also where a lead meets the cut at an angle).
+
+    Raises
+    ------
+    InputError
+        What the operations refuse.
+    """
+    ways = {"drawn": (False,), "reversed": (True,), "best": (False, True)}[table.direction]
+    return [cut for way in ways for cut in _run(table, drawn, surface, backwards=way)]
+
+
+def _run(
+    table: ContourTable, contour: Contour, surface: Surface | None, *, backwards: bool
+) -> list[Contour]:
+    scrap: Side = OTHER[table.scrap] if backwards else table.scrap
+    contour = reverse(contour) if backwards else contour
+    if table.smooth_axes is not None:
+        contour = smooth_axes(
+            contour,
+            table.smooth_axes.distance_mm * MM,
+            limit=float(np.radians(table.smooth_axes.limit_deg)),
+        )
+    if table.kerf_mm is not None:
+        sharp = table.corners is not None
+        contour = offset(contour, table.kerf_mm * MM / 2, side=scrap, sharp=sharp)
+    if table.corners is not None and table.corners.round_mm is not None:
+        contour = round_corners(contour, table.corners.round_mm * MM, surface=surface)
+    if table.corners is not None and table.corners.loop_mm is not None:
+        contour = loop_corners(contour, table.corners.loop_mm * MM, side=scrap, surface=surface)
+    return [_featured(table, begun, surface, scrap) for begun in _started(table, contour)]
+
+
+def _started(table: ContourTable, contour: Contour) -> list[Contour]:
+    """Return the contour begun where the table says."""
+    if table.start_mm is not None:
+        return [start_at(contour, contour.s[0] + table.start_mm * MM)]
+    if table.start == "smoothest":
+        return [start_at(contour, smoothest_start(contour))]
+    if table.start == "best":
+        places = np.linspace(contour.s[0], contour.s[-1], table.candidates, endpoint=False)
+        return [start_at(contour, s) for s in places]
+    return [contour]
+
+
+def _featured(
+    table: ContourTable, contour: Contour, surface: Surface | None, scrap: Side
+) -> Contour:
+    """Return the contour with its bevel, joints, slow corners, overlap and leads."""
+    if table.bevel_deg:
+        contour = bevel(contour, float(np.radians(table.bevel_deg)), side=scrap)
+    if table.micro_joints is not None:
+        joints = table.micro_joints
+        contour = micro_joints(contour, joints.width_mm * MM, count=joints.count)
+    if table.overlap_mm is not None:
+        contour = overlap(contour, table.overlap_mm * MM)
+    if table.lead_out is not None:
+        contour = lead_out(contour, side=scrap, surface=surface, **_lead(table.lead_out))
+    if table.lead_in is not None:
+        contour = lead_in(contour, side=scrap, surface=surface, **_lead(table.lead_in))
+    corners = table.corners
+    if corners is not None and corners.slow_share is not None:
+        contour = slow_corners(
+            contour,
+            corners.slow_share,
+            distance=corners.slow_mm * MM,
+            ramp=corners.ramp_mm * MM,
+        )
+    return contour
+
+
+def _lead(table: LeadTable) -> dict[str, Any]:
+    return {
+        "length": table.length_mm * MM,
+        "shape": table.shape,
+        "angle": float(np.radians(table.angle_deg)),
+        "fan": None if table.fan_mm is None else table.fan_mm * MM,
+        "speed_share": table.speed_share,
+    }

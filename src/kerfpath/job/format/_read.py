@@ -1,0 +1,337 @@
+"""read_job(): from a TOML file to a job in SI with everything in it resolved."""
+
+from __future__ import annotations
+
+import re
+import tomllib
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Literal
+
+import numpy as np
+from pydantic import ValidationError
+
+from kerfpath._arrays import Array, Bools
+from kerfpath._told import told
+from kerfpath.cad import Part
+from kerfpath.errors import InputError
+from kerfpath.job.format._contour import ContourTask, task_of
+from kerfpath.job.format._operations import closed_only
+from kerfpath.job.format._refusals import error_at, refusal, refused_at
+from kerfpath.job.format.tables import (
+    AuditTable,
+    CellTable,
+    JobFile,
+    LayoutTable,
+    PlanTable,
+    ProgramTable,
+    SequenceTable,
+)
+from kerfpath.post import Handshake, Settings
+from kerfpath.robots import Robot, postures_named
+
+__all__ = ["Job", "ProgramOptions", "audit_options", "program_options", "read_job"]
+
+MOST_TEXT = 10_000_000
+"""Characters of a job file: many thousand contours."""
+_DOTTED = re.compile(r"(?<![\w\"'-])(?:[\w\"'-]++[ \t]*+\.[ \t]*+){33}")
+_NAME_LENGTH = 32
+"""Characters that a robot controller takes in a name."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ProgramOptions:
+    """What the robot program needs beyond the plan.
+
+    Parameters
+    ----------
+    language : str
+        Robot language, or "none".
+    name : str
+        Name of the module: letters, digits and _, a letter first.
+    retract : float m
+        How far the head backs off along the tool axis between contours.
+    zone : float m
+        How far from a node the robot may begin to turn towards the next.
+    settings : Settings or None
+        Those of the language.
+    lead_time : float s
+        How long before the robot reaches a point the laser is switched for it.
+    pierce_time : float s
+        How long the laser stays on at the start before the cut goes on.
+    approach_speed : float m/s
+        Along the tool axis before and after a contour.
+    air_speed : float or None
+        Share of the full speed of joint moves; None: what is usual for planned moves and others.
+    arc_tolerance : float m or None
+        How near to the path circular moves stay; None: there are none.
+    gas_lead : float s or None
+        How long before the start the gas is switched on; None: not by the program.
+    handshakes : tuple of Request or Await
+        Before each contour.
+    """
+
+    language: str
+    name: str
+    retract: float
+    zone: float
+    settings: Settings | None
+    lead_time: float
+    pierce_time: float
+    approach_speed: float
+    air_speed: float | None
+    arc_tolerance: float | None
+    gas_lead: float | None
+    handshakes: tuple[Handshake, ...] = ()
+
+    __repr__ = told
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Job:
+    """A job file, read and resolved: all in SI, nothing left to look up but the part itself.
+
+    Parameters
+    ----------
+    path : Path
+        The job file.
+    robot : Robot
+        With limits, velocities and accelerations as the job says.
+    tool : (4, 4) m
+        T_flange_tip.
+    placement : (4, 4) m
+        T_base_part.
+    part_file : Path
+        The CAD file, there when the job was read.
+    part_unit : {"mm", "cm", "m", "in"} or None
+        Length unit that overrides the CAD file's own.
+    contours : tuple of ContourTask
+        In the order of cutting.
+    plan_options : dict
+        Keyword arguments of `kerfpath.planner.plan`, in SI.
+    refine_parts : int
+        Parts into which the refinement divides every interval between nodes.
+    interruptions : {"none", "fewest"}
+        Whether a contour that cannot be cut in one go is cut in pieces.
+    least_piece : float m or None
+        Length that every such piece has at least.
+    cell : CellTable or None
+        What stands around, as the file says it; without one, collisions are not checked.
+    sequence : SequenceTable or None
+        How the order and the moves between contours are chosen; without one, neither is.
+    layout : LayoutTable
+        What `kerfpath layout` may move, and how far, as the file says it.
+    audit_options : dict
+        Keyword arguments of `kerfpath.auditor.checks`, in SI.
+    program : ProgramOptions
+        For the robot program.
+    source : dict
+        The whole file as read: tables, keys and values that JSON can hold.
+    """
+
+    path: Path
+    robot: Robot
+    tool: Array
+    placement: Array
+    part_file: Path
+    part_unit: str | None
+    contours: tuple[ContourTask, ...]
+    plan_options: dict[str, Any]
+    refine_parts: int
+    interruptions: Literal["none", "fewest"]
+    least_piece: float | None
+    cell: CellTable | None
+    sequence: SequenceTable | None
+    layout: LayoutTable
+    audit_options: dict[str, Any]
+    program: ProgramOptions
+    source: dict[str, Any]
+
+    __repr__ = told
+
+    @property
+    def graph_options(self) -> dict[str, Any]:
+        """What the layered graph of a contour is built by; its comfort is `plan_options`'."""
+        keys = ("gamma_step", "frames", "tilt", "postures")
+        placed = {"tool": self.tool, "placement": self.placement}
+        return placed | {key: self.plan_options[key] for key in keys}
+
+    def tasks(self, part: Part) -> tuple[ContourTask, ...]:
+        """Return the contours to cut of the part that was read.
+
+        Raises
+        ------
+        InputError
+            A loop that does not exist, or that is picked twice; an open line with what only a
+            closed loop can have.
+        """
+        tasks = []
+        for number, table in enumerate(self.contours):
+            for task in table.expanded(part):
+                if part.loop(task.pick).kind == "open":
+                    self._require_open(task, number)
+                tasks.append(task)
+        names = [task.name for task in tasks]
+        for name in names:
+            if names.count(name) > 1:
+                raise InputError(
+                    f"{self.path}: contour {name!r} is picked twice; give one of the two another "
+                    "name, or narrow [contour.pick_all]"
+                )
+        return tuple(tasks)
+
+    def _require_open(self, task: ContourTask, number: int) -> None:
+        """Raise InputError where a task of table `number` asks of an open line what it has not."""
+        line = f"loop {task.pick!r} is an open line, which"
+        for key, why in closed_only(task.table).items():
+            raise refused_at(self.path, ("contour", number, key), f"{line} {why}; remove {key}")
+        if self.plan_options["closure"] == "periodic":
+            said = f'{line} does not come back to its start; write closure = "free"'
+            raise refused_at(self.path, ("plan", "closure"), said)
+
+
+def read_job(path: str | Path) -> Job:
+    """Return the job of a TOML file.
+
+    Raises
+    ------
+    InputError
+        Anything wrong with the file, in one line: file, line, key, what was expected, what came
+        and what to do; the first problem, and how many more there are.
+    """
+    path = Path(path)
+    text = _text(path)
+    source = _tables(path, text)
+    try:
+        file = JobFile.model_validate(source, context={"folder": path.parent})
+    except ValidationError as error:
+        raise refusal(path, text, error) from None
+    described = file.cell is not None and file.cell.links != "capsules"
+    robot = file.robot.resolve(path.parent, bodies=described)
+    if file.plan.rotation_deg is not None and not robot.endless.any():
+        raise refused_at(
+            path,
+            ("plan", "rotation_deg"),
+            "expected an endless axis to limit, got none; remove it, or say which with endless "
+            "in [robot]",
+        )
+    return Job(
+        path=path,
+        robot=robot,
+        tool=file.tool.resolve(),
+        placement=file.part.resolve(),
+        part_file=path.parent / file.part.file,
+        part_unit=file.part.unit,
+        contours=tuple(task_of(table) for table in file.contour),
+        plan_options=_plan_options(file.plan, robot) | {"comfort": file.comfort.resolve()},
+        refine_parts=file.plan.refine_parts,
+        interruptions=file.plan.interruptions,
+        least_piece=None if file.plan.least_piece_mm is None else file.plan.least_piece_mm / 1000,
+        cell=file.cell,
+        sequence=file.sequence,
+        layout=file.layout,
+        audit_options=audit_options(file.audit),
+        program=program_options(file.program, path.stem),
+        source=source,
+    )
+
+
+def _text(path: Path) -> str:
+    try:
+        endless = path.exists() and not (path.is_file() or path.is_dir())  # a device
+        raw = b"" if endless else path.read_bytes()
+    except IsADirectoryError:
+        raise error_at(path, None, "expected a job file, got a folder; name a file in it") from None
+    except FileNotFoundError:
+        raise error_at(path, None, "no such file; give the path of a job file") from None
+    except (OSError, ValueError) as error:
+        why = getattr(error, "strerror", None) or str(error)
+        raise error_at(path, None, f"cannot be read ({why}); give the path of a job file") from None
+    if endless:
+        raise error_at(path, None, "is no file; give the path of a job file")
+    try:
+        return raw.decode("utf-8-sig")  # some editors begin a UTF-8 file with a byte order mark
+    except UnicodeDecodeError as error:
+        line = raw.count(b"\n", 0, error.start) + 1
+        raise error_at(
+            path,
+            line,
+            f"expected UTF-8 text, got the byte 0x{raw[error.start]:02x}; save the file as UTF-8",
+        ) from None
+
+
+def _tables(path: Path, text: str) -> dict[str, Any]:
+    if len(text) > MOST_TEXT:
+        raise error_at(path, None, f"expected a job file, got one of {len(text) / 1e6:.0f} MB")
+    # The time that TOML's reader takes grows with the square of these.
+    if (dotted := _DOTTED.search(text)) is not None:
+        line = text.count("\n", 0, dotted.start()) + 1
+        raise error_at(path, line, "a key of too many parts joined by dots; no job has such keys")
+    try:
+        tables = tomllib.loads(text)
+    except RecursionError:
+        raise error_at(path, None, "arrays or tables are nested too deeply; flatten them") from None
+    except tomllib.TOMLDecodeError as error:
+        told = str(error)
+        at = re.search(r" \(at line (\d+), column \d+\)$", told)
+        line = int(at[1]) if at else text.rstrip("\n").count("\n") + 1
+        raise error_at(path, line, f"not valid TOML: {told}; correct it there") from None
+    except ValueError:  # what Python's int() refuses
+        raise error_at(path, None, "not valid TOML: an integer is too long; shorten it") from None
+    if not tables:
+        raise error_at(
+            path, 1, "expected [robot], [tool], [part] and [[contour]], got an empty file; add them"
+        )
+    return tables
+
+
+def _rotation(degrees: float | None, endless: Bools) -> Array | None:
+    return None if degrees is None else np.where(endless, np.radians(degrees), np.inf)
+
+
+def _plan_options(table: PlanTable, robot: Robot) -> dict[str, Any]:
+    words = table.posture
+    return {
+        "gamma_step": float(np.radians(table.gamma_step_deg)),
+        "frames": table.frames,
+        "tilt": table.tilt(),
+        "postures": None if words is None else postures_named(words, robot.kinematics),
+        "method": table.method,
+        "objective": table.objective,
+        "metric": table.metric,
+        "weights": table.weights,
+        "eta_v": table.eta_velocity,
+        "eta_a": table.eta_acceleration,
+        "closure": table.closure,
+        "rotation": _rotation(table.rotation_deg, robot.endless),
+        "feed": table.feed,
+        "refine": table.method == "exact" if table.refine is None else table.refine,
+    }
+
+
+def audit_options(table: AuditTable) -> dict[str, Any]:
+    """Return what an [audit] table asks for, as `kerfpath.auditor.checks` takes it."""
+    return {
+        "path_tolerance": table.path_tolerance_mm / 1000,
+        "axis_tolerance": float(np.radians(table.axis_tolerance_deg)),
+    }
+
+
+def program_options(table: ProgramTable, stem: str) -> ProgramOptions:
+    """Return the options of a [program] table; `stem` names the program where it does not."""
+    stem = re.sub(r"[^A-Za-z0-9_]", "_", stem)
+    stem = stem if stem[:1].isascii() and stem[:1].isalpha() else f"job_{stem}"
+    return ProgramOptions(
+        language=table.language,
+        name=table.name or stem[:_NAME_LENGTH],
+        retract=table.retract_mm / 1000,
+        zone=table.zone_mm / 1000,
+        settings=table.settings(),
+        lead_time=table.lead_time_s,
+        pierce_time=table.pierce_time_s,
+        approach_speed=table.approach_mm_s / 1000,
+        air_speed=table.air_speed,
+        arc_tolerance=None if table.arcs_mm is None else table.arcs_mm / 1000,
+        gas_lead=table.gas_lead_s,
+        handshakes=table.handshakes(),
+    )

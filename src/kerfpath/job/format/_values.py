@@ -1,0 +1,117 @@
+"""What the values of a job file may be, and how a message says what was expected instead."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Collection
+from difflib import get_close_matches
+from pathlib import Path
+from typing import Annotated, Any, Literal
+
+from pydantic import AfterValidator, Field, ValidationInfo
+from pydantic_core import PydanticCustomError
+
+from kerfpath.job.format._poses import heads
+from kerfpath.robots import acceleration_ratios
+
+__all__ = [
+    "FAULT", "LARGEST", "MOST_NODES", "SMALLEST", "Axis", "Head", "Identifier", "Joints",
+    "JointsNotNegative", "JointsPositive", "Lengths", "NotNegative", "Number", "Positive",
+    "Ratio", "Signs", "Text", "Three", "existing", "fault", "folder_of", "key",
+    "nearest", "one_of", "told",
+]  # fmt: skip
+
+LARGEST = 1e6
+"""No number of a job is larger, in the unit of its key: a kilometre in mm is a slip of the pen."""
+SMALLEST = 1e-9
+"""What must be positive is at least this: smaller numbers vanish when units are converted."""
+MOST_NODES = 1_000_000
+"""More nodes than any contour needs, few enough to fit into memory."""
+FAULT = "kerfpath"
+"""Error type of the rules below that pydantic cannot state itself."""
+_LISTED = 12
+"""Known names are listed in a message up to this many."""
+
+
+def nearest(name: str, known: Collection[str]) -> str:
+    """Say which of the `known` names are most like `name`, or which there are."""
+    within = [k for k in known if name and name.lower() in k.lower()]
+    if near := within[:3] or get_close_matches(name, known, n=3, cutoff=0.5):
+        return f"nearest: {', '.join(near)}"
+    return f"known: {', '.join(known)}" if len(known) <= _LISTED else "none is called like it"
+
+
+def key(expected: str, example: str, **bounds: Any) -> Any:
+    """Return a field's bounds, with what a message says was expected and how to write it."""
+    return Field(description=expected, examples=[example], **bounds)
+
+
+def fault(
+    expected: str, got: str | None, remedy: str, where: tuple[str | int, ...] = ()
+) -> PydanticCustomError:
+    """Return an error at the key that `where` leads to from here; `got` None: the value itself."""
+    said = {"expected": expected, "got": got, "remedy": remedy, "where": where}
+    return PydanticCustomError(FAULT, "expected {expected}, got {got}; {remedy}", said)
+
+
+def told(said: str, where: tuple[str | int, ...] = ()) -> PydanticCustomError:
+    """Return an error that says `said`, a whole line but for its place, at `where` from here."""
+    return PydanticCustomError(FAULT, "{said}", {"said": said, "where": where})
+
+
+def folder_of(info: ValidationInfo) -> Path:
+    """Return the folder of the job file."""
+    return info.context["folder"] if info.context else Path()
+
+
+def existing(what: str) -> Callable[[str, ValidationInfo], str]:
+    """Return a validator that requires a file, its path relative to the job's folder."""
+
+    def check(value: str, info: ValidationInfo) -> str:
+        folder = folder_of(info)
+        try:
+            is_file, is_there = (folder / value).is_file(), (folder / value).exists()
+        except (OSError, ValueError):  # a name that the file system cannot hold
+            is_file = is_there = False
+        if not is_file:
+            why = "it is not a file" if is_there else f"it is not in {folder}"
+            raise fault(what, None, f"{why}; give its path relative to the job file")
+        return value
+
+    return check
+
+
+def one_of(what: str, names: Callable[[], Collection[str]], hint: str = "") -> AfterValidator:
+    """Return a validator that admits only one of `names`."""
+
+    def check(value: str) -> str:
+        if value not in names():
+            raise fault(what, None, f"{nearest(value, names())}{hint}")
+        return value
+
+    return AfterValidator(check)
+
+
+Number = Annotated[float, Field(allow_inf_nan=False, ge=-LARGEST, le=LARGEST)]
+Positive = Annotated[float, Field(allow_inf_nan=False, ge=SMALLEST, le=LARGEST)]
+NotNegative = Annotated[float, Field(allow_inf_nan=False, ge=0, le=LARGEST)]
+Axis = Annotated[int, Field(ge=1, le=6)]
+# TOML arrays arrive as lists: not strict about that, while their elements stay strict.
+Three = Annotated[tuple[Number, ...], Field(strict=False, min_length=3, max_length=3)]
+# One number for every joint: how many that are is known once the robot is.
+Joints = Annotated[tuple[Number, ...], Field(strict=False, min_length=1)]
+JointsPositive = Annotated[tuple[Positive, ...], Field(strict=False, min_length=1)]
+JointsNotNegative = Annotated[tuple[NotNegative, ...], Field(strict=False, min_length=1)]
+Signs = Annotated[tuple[Literal[-1, 1], ...], Field(strict=False, min_length=1)]
+Lengths = dict[str, Number]
+# One printable line that is not blank.
+Text = Annotated[str, Field(pattern=r"^[^\p{C}\p{Zl}\p{Zp}]*\S[^\p{C}\p{Zl}\p{Zp}]*$")]
+Identifier = Annotated[
+    str | None,
+    key(
+        "a name of letters, digits and _, a letter first, at most 32 characters",
+        '"trim_1"',
+        pattern=r"^[A-Za-z][A-Za-z0-9_]{0,31}$",
+    ),
+]
+Head = Annotated[str, one_of("a cutting head", heads)]
+Ratio = Annotated[str, one_of("a known ratio", acceleration_ratios)]

@@ -1,0 +1,105 @@
+"""The [[contour]] tables: which loops are cut, how fast, and how finely."""
+
+from __future__ import annotations
+
+from typing import Annotated, Literal
+
+from pydantic import model_validator
+
+from kerfpath.job.format._values import MOST_NODES, NotNegative, Number, Positive, Text, fault, key
+from kerfpath.job.format.tables._cut import (
+    CornersTable,
+    LeadTable,
+    MicroJointsTable,
+    PickTable,
+    SmoothAxesTable,
+)
+from kerfpath.job.format.tables._table import Table, given
+from kerfpath.operations import Side
+
+__all__ = ["ContourTable"]
+
+
+SHAPES = ("overlap_mm", "lead_in", "lead_out", "micro_joints", "corners")
+"""Keys that give a contour features, whose ends sampling by spacing_mm or time_step_ms keeps."""
+SAMPLINGS = ("spacing_mm", "time_step_ms", "count", "tolerance_mm")
+
+
+class ContourTable(Table):
+    """[[contour]]: which loop of the part to cut, how fast, how sampled, and what is made of it."""
+
+    pick: Annotated[Text | None, key("the name of a loop in the part", '"trim"')] = None
+    pick_all: PickTable | None = None
+    name: Annotated[Text | None, key("a name that no other contour has", '"trim 2"')] = None
+    speed_m_min: Annotated[Positive, key("a number above 0, in m/min", "9")]
+    spacing_mm: Annotated[Positive | None, key("a number above 0, in mm", "2")] = None
+    time_step_ms: Annotated[Positive | None, key("a number above 0, in ms", "20")] = None
+    count: Annotated[
+        int | None, key(f"a whole number of nodes, 2 to {MOST_NODES}", "200", ge=2, le=MOST_NODES)
+    ] = None
+    tolerance_mm: Annotated[Positive | None, key("a number above 0, in mm", "0.05")] = None
+    axis_tolerance_deg: Annotated[Positive | None, key("a number above 0, in deg", "1")] = None
+    start: Literal["drawn", "smoothest", "best"] = "drawn"
+    start_mm: Annotated[
+        NotNegative | None, key("a number not below 0, in mm along the loop", "120")
+    ] = None
+    direction: Literal["drawn", "reversed", "best"] = "drawn"
+    candidates: Annotated[
+        int, key('a whole number of starts from 2 to 100, for start = "best"', "4", ge=2, le=100)
+    ] = 4
+    scrap: Side = "right"
+    kerf_mm: Annotated[Positive | None, key("a number above 0, in mm", "0.2")] = None
+    bevel_deg: Annotated[Number, key("a number from -60 to 60, in deg", "20", ge=-60, le=60)] = 0.0
+    overlap_mm: Annotated[Positive | None, key("a number above 0, in mm", "2")] = None
+    lead_in: LeadTable | None = None
+    lead_out: LeadTable | None = None
+    micro_joints: MicroJointsTable | None = None
+    corners: CornersTable | None = None
+    smooth_axes: SmoothAxesTable | None = None
+
+    @property
+    def moves_the_path(self) -> bool:
+        """Whether points or tool axes of the cut are other than those of the loop as drawn."""
+        rounded = self.corners is not None and self.corners.round_mm is not None
+        return bool(self.kerf_mm or self.bevel_deg or self.smooth_axes or rounded)
+
+    @model_validator(mode="after")
+    def _one_pick(self) -> ContourTable:
+        found = given(self, "pick", "pick_all")
+        if len(found) != 1:
+            raise fault(
+                "pick (a loop's name) or [contour.pick_all]",
+                "both" if found else "none",
+                "remove one" if found else 'add, for example, pick = "trim"',
+                ("pick",),
+            )
+        if self.pick_all is not None and self.name is not None:
+            raise fault("name only with pick", "pick_all", "remove it", ("name",))
+        return self
+
+    @model_validator(mode="after")
+    def _one_sampling(self) -> ContourTable:
+        ways = f"one of {', '.join(SAMPLINGS[:-1])} and {SAMPLINGS[-1]}"
+        found = given(self, *SAMPLINGS)
+        if not found:
+            raise fault(ways, "none", "add, for example, spacing_mm = 2", SAMPLINGS[:1])
+        if len(found) > 1:
+            raise fault(ways, " and ".join(found), "keep one", (found[-1],))
+        if self.axis_tolerance_deg is not None and self.tolerance_mm is None:
+            raise fault(
+                "axis_tolerance_deg only with tolerance_mm",
+                f"it with {found[0]}",
+                "remove one",
+                ("axis_tolerance_deg",),
+            )
+        features = given(self, *SHAPES)
+        if features and found[0] not in SAMPLINGS[:2]:
+            raise fault(
+                f"spacing_mm or time_step_ms with {features[0]}, whose ends they keep",
+                found[0],
+                "write, for example, spacing_mm = 1",
+                (found[0],),
+            )
+        if self.start != "drawn" and self.start_mm is not None:
+            raise fault("start or start_mm", "both", "remove one", ("start_mm",))
+        return self

@@ -1,0 +1,179 @@
+"""The whole job file: every table, and the rules between tables."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+from pydantic import BaseModel, Field, ValidationInfo, model_validator
+
+from kerfpath.errors import InputError
+from kerfpath.job.format._values import fault, folder_of, told
+from kerfpath.job.format.tables._cell import CellTable, FixtureTable, HeadTable, PairTable
+from kerfpath.job.format.tables._comfort import ComfortTable
+from kerfpath.job.format.tables._contour import ContourTable
+from kerfpath.job.format.tables._cut import (
+    CornersTable,
+    LeadTable,
+    MicroJointsTable,
+    PickTable,
+    SmoothAxesTable,
+)
+from kerfpath.job.format.tables._layout import LayoutTable
+from kerfpath.job.format.tables._part import PartTable
+from kerfpath.job.format.tables._plan import PlanTable
+from kerfpath.job.format.tables._program import AuditTable, ProgramTable
+from kerfpath.job.format.tables._robot import RobotTable
+from kerfpath.job.format.tables._sequence import SequenceTable
+from kerfpath.job.format.tables._table import Table
+from kerfpath.job.format.tables._tool import ToolTable
+from kerfpath.robots import postures_named
+
+__all__ = ["REPEATED", "TABLES", "JobFile"]
+
+
+class JobFile(Table):
+    """The whole job file: robot, part, contours, process, objective, and what stands around."""
+
+    robot: RobotTable
+    tool: ToolTable
+    part: PartTable
+    contour: Annotated[tuple[ContourTable, ...], Field(strict=False, min_length=1)]
+    plan: PlanTable = PlanTable()
+    cell: CellTable | None = None
+    sequence: SequenceTable | None = None
+    comfort: ComfortTable = ComfortTable()
+    layout: LayoutTable = LayoutTable()
+    audit: AuditTable = AuditTable()
+    program: ProgramTable = ProgramTable()
+
+    @model_validator(mode="after")
+    def _names_differ(self) -> JobFile:
+        seen: set[str] = set()
+        for i, table in enumerate(self.contour):
+            name = table.name or table.pick
+            if name is None:
+                continue
+            if name in seen:
+                raise fault(
+                    "a name that no other contour has",
+                    f'"{name}" again',
+                    "give one of them another name",
+                    ("contour", i, "name" if table.name else "pick"),
+                )
+            seen.add(name)
+        return self
+
+    @model_validator(mode="after")
+    def _one_for_every_joint(self, info: ValidationInfo) -> JobFile:
+        home = None if self.sequence is None else self.sequence.home_deg
+        given = {("plan", "weights"): self.plan.weights, ("sequence", "home_deg"): home}
+        joints = self.robot.joints(folder_of(info))
+        for where, numbers in given.items():
+            if numbers is not None and len(numbers) != joints:
+                expected = f"{joints} numbers, one for every joint"
+                raise fault(expected, f"{len(numbers)}", "give as many", where)
+        return self
+
+    @model_validator(mode="after")
+    def _posture_fits(self, info: ValidationInfo) -> JobFile:
+        if self.plan.posture is not None:
+            try:
+                postures_named(self.plan.posture, self.robot.resolve(folder_of(info)).kinematics)
+            except InputError as error:
+                raise told(f"{error}", ("plan", "posture")) from None
+        return self
+
+    @model_validator(mode="after")
+    def _best_is_chosen(self) -> JobFile:
+        """Require [sequence] of what it alone can choose."""
+        if self.sequence is not None:
+            return self
+        for i, table in enumerate(self.contour):
+            for name in ("start", "direction"):
+                if getattr(table, name) == "best":
+                    raise fault(
+                        "[sequence], which chooses what is best",
+                        "none",
+                        f"add it, or write another {name}",
+                        ("contour", i, name),
+                    )
+        return self
+
+    @model_validator(mode="after")
+    def _cell_fits(self) -> JobFile:
+        """Refuse what cannot be planned or known in a cell, at its key."""
+        if self.cell is None:
+            return self
+        if (method := self.plan.method) != "exact":
+            expected = 'method = "exact" with [cell]'
+            raise fault(expected, f'"{method}"', "change one", ("plan", "method"))
+        if self.cell.links == "description" and self.robot.urdf is None:
+            raise fault(
+                'links = "description" only with urdf in [robot]',
+                "none there",
+                'write links = "capsules"',
+                ("cell", "links"),
+            )
+        return self
+
+    @model_validator(mode="after")
+    def _standing_are_fixtures(self) -> JobFile:
+        fixtures = [] if self.cell is None else [fixture.name for fixture in self.cell.fixture]
+        for i, name in enumerate(self.layout.standing):
+            if name not in fixtures:
+                raise fault(
+                    "the name of a fixture",
+                    f'"{name}"',
+                    f"there are {', '.join(fixtures) or 'none'}",
+                    ("layout", "standing", i),
+                )
+        return self
+
+    @model_validator(mode="after")
+    def _clearance_is_measured(self) -> JobFile:
+        """Refuse a cost of clearance where the planner would not measure it."""
+        here, why = ("comfort", "clearance_band_mm"), "with clearance_band_mm"
+        if self.comfort.clearance_band_mm is None:
+            return self
+        if self.cell is None:
+            raise fault(f"[cell] {why}, as it is measured there", "none", "change one", here)
+        for name, plain in (("feed", "constant"), ("interruptions", "none")):
+            if (got := getattr(self.plan, name)) != plain:
+                raise fault(f'{name} = "{plain}" {why}', f'"{got}"', "change one", here)
+        return self
+
+    @model_validator(mode="after")
+    def _costs_are_known(self) -> JobFile:
+        """Refuse costs where the planner would not know them."""
+        asked = self.comfort.resolve()
+        if asked and asked.costs and self.plan.feed == "dip" and self.plan.refine is not False:
+            expected = 'refine = false with feed = "dip" and costs in [comfort]'
+            raise fault(expected, "none", "add it, or remove the costs", ("plan", "feed"))
+        return self
+
+
+TABLES: dict[str, type[BaseModel]] = {
+    "robot": RobotTable,
+    "tool": ToolTable,
+    "part": PartTable,
+    "contour": ContourTable,
+    "contour.pick_all": PickTable,
+    "contour.lead_in": LeadTable,
+    "contour.lead_out": LeadTable,
+    "contour.micro_joints": MicroJointsTable,
+    "contour.corners": CornersTable,
+    "contour.smooth_axes": SmoothAxesTable,
+    "plan": PlanTable,
+    "cell": CellTable,
+    "cell.head": HeadTable,
+    "cell.fixture": FixtureTable,
+    "cell.pair": PairTable,
+    "sequence": SequenceTable,
+    "comfort": ComfortTable,
+    "layout": LayoutTable,
+    "audit": AuditTable,
+    "program": ProgramTable,
+}
+"""The model of each table of the file."""
+REPEATED = ("contour", "cell.fixture", "cell.pair")
+"""Those that a file may have several of."""

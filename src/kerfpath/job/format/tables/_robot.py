@@ -1,0 +1,327 @@
+"""The [robot] table: which robot, and limits that replace the known ones."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+from typing import Annotated, Any, Literal
+
+import numpy as np
+from pydantic import AfterValidator, ValidationInfo, model_validator
+
+from kerfpath._arrays import Array
+from kerfpath.errors import InputError
+from kerfpath.job.format._values import (
+    Axis,
+    Joints,
+    JointsPositive,
+    Lengths,
+    NotNegative,
+    Number,
+    Ratio,
+    Signs,
+    Text,
+    existing,
+    fault,
+    folder_of,
+    key,
+    one_of,
+    told,
+)
+from kerfpath.job.format.tables._table import Table, given
+from kerfpath.robots import FAMILIES, Robot, acceleration_ratios, robot, robot_ids, with_axis_3
+from kerfpath.urdf import read_urdf
+
+__all__ = ["RobotTable"]
+
+CONTROLLER = ("manufacturer", "axis_3", "axis_3_deg")
+SOURCES = {
+    "model": (),
+    "urdf": ("base", "tip", "packages", "snap_deg", *CONTROLLER),
+    "kinematics": ("geometry_mm", "sign", "offset_deg", *CONTROLLER),
+}
+"""The three ways to say which robot, and the keys that belong to each."""
+LIMITS = ("lower_deg", "upper_deg", "velocity_deg_s", "acceleration_deg_s2")
+IN_KEYS = {
+    "lower= and upper=": "lower_deg and upper_deg",
+    "velocity=": "velocity_deg_s",
+    "(rad, rad/s)": "(deg, deg/s)",
+    "snap=5e-06": "snap_deg = 0.0003",
+    "snap=5e-05": "snap_deg = 0.003",
+    "snap=0.0005": "snap_deg = 0.03",
+    "snap=0.005": "snap_deg = 0.3",
+    "snap=0": "snap_deg = 0",
+    'packages={"NAME": "FOLDER"}, or read the kinematics alone with meshes=False': (
+        'packages = { NAME = "FOLDER" }'
+    ),
+    "choose base= or tip=": "choose base or tip",
+    "axis_3_limits=": "axis_3_deg",
+}
+"""What messages about descriptions tell to do in Python, and what that is in a job."""
+
+
+class RobotTable(Table):
+    """[robot]: which robot, and limits that replace or complete those known of it."""
+
+    model: Annotated[
+        str | None,
+        one_of("a robot of the library", robot_ids, "; 'kerfpath robots' lists all"),
+        key("a robot of the library", '"abb_irb4600_60_205"'),
+    ] = None
+    urdf: Annotated[
+        Text | None,
+        AfterValidator(existing("the robot's description")),
+        key("the path of the robot's description", '"arm.urdf"'),
+    ] = None
+    base: Annotated[Text | None, key("a link of the description", '"base_link"')] = None
+    tip: Annotated[Text | None, key("a link of the description", '"tool0"')] = None
+    packages: Annotated[
+        dict[str, Text] | None,
+        key("folders by the name of their package", '{ arm_description = "meshes" }'),
+    ] = None
+    snap_deg: Annotated[NotNegative | None, key("a number from 0 to 1, in deg", "0.006", le=1)] = (
+        None
+    )
+    kinematics: Annotated[
+        Literal["opw", "ur", "five"] | None, key("a family of arms", '"five"')
+    ] = None
+    geometry_mm: Annotated[
+        Lengths | None,
+        key("the lengths of the arm by name, in mm", "{ a1 = 300, a2 = -100, b = 0, c1 = 700 }"),
+    ] = None
+    sign: Annotated[
+        Signs | None, key("1 or -1 for every joint", "[1, 1, 1, 1, 1]", strict=False)
+    ] = None
+    offset_deg: Annotated[
+        Joints | None, key("an angle for every joint, in deg", "[0, 0, -90, 0, 0]")
+    ] = None
+    manufacturer: Annotated[Text | None, key("whose controller moves the robot", '"ABB"')] = None
+    axis_3: Annotated[
+        Literal["serial", "horizontal"] | None,
+        key("what axis 3 of the controller measures", '"horizontal"'),
+    ] = None
+    axis_3_deg: Annotated[
+        tuple[Number, Number] | None,
+        key(
+            "the two limits of axis 3 as its controller shows them, in deg",
+            "[-60, 65]",
+            strict=False,
+        ),
+    ] = None
+    endless: Annotated[
+        tuple[Axis, ...] | None, key("axis numbers from 1 to 6, each once", "[4, 6]", strict=False)
+    ] = None
+    lower_deg: Annotated[
+        Joints | None,
+        key("a lower limit for every joint, in deg", "[-180, -90, -180, -400, -125, -400]"),
+    ] = None
+    upper_deg: Annotated[
+        Joints | None,
+        key("an upper limit for every joint, in deg", "[180, 150, 75, 400, 120, 400]"),
+    ] = None
+    velocity_deg_s: Annotated[
+        JointsPositive | None,
+        key("numbers above 0, the largest joint speeds in deg/s", "[175, 175, 175, 250, 250, 360]"),
+    ] = None
+    acceleration_deg_s2: Annotated[
+        JointsPositive | None,
+        key(
+            "numbers above 0, the largest joint accelerations in deg/s^2",
+            "[320, 270, 420, 1300, 1400, 2000]",
+        ),
+    ] = None
+    acceleration_ratio: Annotated[
+        Ratio | None, key("a ratio of acceleration to speed, by its name", '"iontec_20_to_70kg"')
+    ] = None
+
+    @model_validator(mode="after")
+    def _plannable(self, info: ValidationInfo) -> RobotTable:
+        """Require every limit that planning needs, known or given: nothing is assumed silently."""
+        self._require_one_source()
+        folder = folder_of(info)
+        try:
+            self._require_for_each_joint(self.joints(folder))
+            known = self._known(folder)
+        except InputError as error:
+            said = _in_keys(str(error))
+            keys = "axis_3_deg", "axis_3", "urdf" if self.urdf else "geometry_mm"
+            where = next((k for k in keys[:2] if said.startswith(f"{k}: ")), keys[2])
+            raise told(said.removeprefix(f"{where}: "), (where,)) from None
+        if len(given(self, "acceleration_deg_s2", "acceleration_ratio")) == 2:
+            raise fault(
+                "acceleration_deg_s2 or acceleration_ratio",
+                "both",
+                "remove one",
+                ("acceleration_ratio",),
+            )
+        holder = (
+            f"the library does not know those of {self.model}"
+            if self.model
+            else f"{self.urdf} does not state them"
+            if self.urdf
+            else "lengths do not tell them"
+        )
+        for name, value in zip(LIMITS, (known.lower, known.upper, known.velocity), strict=False):
+            if value is None and getattr(self, name) is None:
+                raise fault(
+                    f"{known.joints} numbers, as {holder}",
+                    "none",
+                    "add them from its data sheet",
+                    (name,),
+                )
+        if known.acceleration is None and not given(
+            self, "acceleration_deg_s2", "acceleration_ratio"
+        ):
+            ratio = known.acceleration_ratio or next(iter(acceleration_ratios()))
+            raise fault(
+                f"joint accelerations, as {holder}",
+                "none",
+                f"add acceleration_deg_s2 = [{known.joints} numbers], or, to assume a typical "
+                f'ratio to the speeds, acceleration_ratio = "{ratio}"',
+                ("acceleration_deg_s2",),
+            )
+        try:
+            self.resolve(folder)  # limits given may contradict those known
+        except InputError as error:
+            raise fault(
+                "lower_deg below upper_deg",
+                f"reversed limits ({error})",
+                "correct one of them",
+                ("upper_deg" if self.upper_deg else "lower_deg",),
+            ) from None
+        return self
+
+    def _require_one_source(self) -> None:
+        """Require one of the ways to say which robot, and no key of another."""
+        sources = given(self, *SOURCES)
+        if len(sources) != 1:
+            raise fault(
+                "one of model (a robot of the library), urdf (its description) and kinematics "
+                "(with the lengths of its arm)",
+                " and ".join(sources) or "nothing",
+                "remove all but one"
+                if sources
+                else 'add, for example, model = "abb_irb4600_60_205"',
+                (sources[-1] if sources else "model",),
+            )
+        (source,) = sources
+        foreign = {name for names in SOURCES.values() for name in names} - set(SOURCES[source])
+        for name in given(self, *sorted(foreign)):
+            owners = " or ".join(s for s, names in SOURCES.items() if name in names)
+            raise fault(f"{name} only with {owners}", f"it with {source}", "remove one", (name,))
+        if self.kinematics and not self.geometry_mm:
+            lengths = ", ".join(f"{name} = 0" for name in FAMILIES[self.kinematics].lengths)
+            raise fault(
+                f'the lengths of an arm of kinematics "{self.kinematics}"',
+                "none",
+                f"add geometry_mm = {{ {lengths} }} with the true ones",
+                ("geometry_mm",),
+            )
+
+    def _require_for_each_joint(self, n: int) -> None:
+        """Require as many numbers as the robot has joints, and no axis beyond them."""
+        for name in given(self, *LIMITS, "sign", "offset_deg"):
+            if (got := len(getattr(self, name))) != n:
+                raise fault(f"{n} numbers, one for every joint", f"{got}", "give as many", (name,))
+        axes = self.endless or ()
+        if len(set(axes)) < len(axes):
+            raise fault("each axis once", "one twice", "remove it", ("endless",))
+        if max(axes, default=1) > n:
+            raise fault(f"axis numbers from 1 to {n}", f"{max(axes)}", "remove it", ("endless",))
+        ratio = self.acceleration_ratio
+        if ratio is not None and (count := len(acceleration_ratios()[ratio])) != n:
+            raise fault(
+                f"accelerations of {n} joints",
+                f"a ratio for {count}",
+                "give acceleration_deg_s2 instead",
+                ("acceleration_ratio",),
+            )
+
+    def resolve(self, folder: Path, *, bodies: bool = False) -> Robot:
+        """Return the robot with this table's limits; `bodies`: those of its description, too."""
+        changed = self._known(folder, bodies=bodies)
+        changed = changed.with_limits(**self._limits(changed.joints))
+        if self.acceleration_ratio is None:
+            return changed
+        assert changed.velocity is not None
+        return replace(
+            changed,
+            acceleration=np.multiply(
+                acceleration_ratios()[self.acceleration_ratio], changed.velocity
+            ),
+            acceleration_source=f"assumed: ratio {self.acceleration_ratio} times the speeds",
+        )
+
+    def _known(self, folder: Path, *, bodies: bool = False) -> Robot:
+        """Return the robot as the library or its lengths have it, or as described and limited."""
+        if self.model is not None:
+            return robot(self.model)
+        limits = None if self.axis_3_deg is None else np.radians(self.axis_3_deg)
+        counted: dict[str, Any] = {"axis_3": self.axis_3 or "", "axis_3_limits": limits}
+        maker = self.manufacturer or ""
+        if self.urdf is not None:
+            return Robot.from_urdf(
+                folder / self.urdf,
+                **self._chain(folder),
+                meshes=bodies,
+                manufacturer=maker,
+                **counted,
+                **self._limits(self.joints(folder)),
+            )
+        assert self.kinematics is not None
+        assert self.geometry_mm is not None
+        family = FAMILIES[self.kinematics]
+        unknown = sorted(set(self.geometry_mm) - set(family.lengths))
+        if unknown:
+            raise InputError(
+                f"expected lengths {', '.join(family.lengths)}, got {unknown[0]}; remove it"
+            )
+        return with_axis_3(
+            Robot(
+                id=f"{self.kinematics} arm by its lengths",
+                manufacturer=maker,
+                kinematics=self.kinematics,
+                geometry={name: mm / 1000 for name, mm in self.geometry_mm.items()},
+                sign=np.array(self.sign or 1.0, dtype=float),
+                offset=np.radians(self.offset_deg or 0.0),
+            ),
+            self.axis_3 or "",
+            limits,
+        )
+
+    def joints(self, folder: Path) -> int:
+        """Return how many joints the robot has."""
+        if self.urdf is not None:
+            chain = self._chain(folder) | {"meshes": False, "snap": 0.0}
+            return len(read_urdf(folder / self.urdf, **chain).joints)
+        return robot(self.model).joints if self.model else FAMILIES[self.kinematics or ""].joints
+
+    def _chain(self, folder: Path) -> dict[str, Any]:
+        """Return which chain of the description it is, as its reader takes it."""
+        return {
+            "base": self.base,
+            "tip": self.tip,
+            "packages": {name: folder / place for name, place in (self.packages or {}).items()},
+            "snap": None if self.snap_deg is None else float(np.radians(self.snap_deg)),
+        }
+
+    def _limits(self, n: int) -> dict[str, Any]:
+        axes = self.endless
+        return {
+            "lower": _radians(self.lower_deg),
+            "upper": _radians(self.upper_deg),
+            "velocity": _radians(self.velocity_deg_s),
+            "acceleration": _radians(self.acceleration_deg_s2),
+            "endless": None if axes is None else np.isin(np.arange(1, n + 1), axes),
+        }
+
+
+def _radians(degrees: tuple[float, ...] | None) -> Array | None:
+    return None if degrees is None else np.radians(degrees)
+
+
+def _in_keys(said: str) -> str:
+    """Return a message about a description in the words of a job file."""
+    for python, ours in IN_KEYS.items():
+        said = said.replace(python, ours)
+    return said

@@ -1,0 +1,302 @@
+"""What a run leaves on disk: plan.json, trajectory.csv, report.html and the program."""
+
+from __future__ import annotations
+
+import csv
+import io
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from kerfpath._told import told
+from kerfpath.air import AirMove
+from kerfpath.errors import AuditFailed, InputError
+from kerfpath.job.format import Job, ProgramOptions, refused_at
+from kerfpath.job.output._report import report_text
+from kerfpath.job.plan_file import broken_entry, collision_note, plan_entry, plan_text
+from kerfpath.job.programs import asked_of_cuts, program_of
+from kerfpath.job.run import Outcome
+from kerfpath.plans import Plan
+from kerfpath.post import language, replace_program
+from kerfpath.sequence import PartPlan
+
+__all__ = [
+    "Texts",
+    "Written",
+    "make_folder",
+    "outcome_texts",
+    "planned_text",
+    "require_folder",
+    "require_language",
+    "stale_program",
+    "trajectory_text",
+    "write_outcome",
+]
+
+SHORT_PIECE = 0.02
+"""m: a shorter piece has hardly room for its leads, and is warned of."""
+SHORTEST_CUT = 8
+"""No language cuts names to fewer characters."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Written:
+    """The files of a run, and what their reader must know.
+
+    Parameters
+    ----------
+    files : tuple of Path
+        Written, in this order.
+    removed : tuple of Path
+        Of the program of an earlier run, and removed: they do not belong to this one.
+    stale : Path or None
+        The same, but edited since or of unknown origin, and so left.
+    notes : tuple of str
+        Warnings of the program's preflight, and what nobody has checked.
+    """
+
+    files: tuple[Path, ...]
+    removed: tuple[Path, ...]
+    stale: Path | None
+    notes: tuple[str, ...]
+
+    __repr__ = told
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Texts:
+    """The files of a run as text, not written yet.
+
+    Parameters
+    ----------
+    files : dict of str to str
+        By their names in the folder, those of the program first.
+    program : tuple of str
+        Which of them are the program, the one that is started first; none without one.
+    refused : str
+        Why there is no program though every plan has passed; empty where there is none to tell.
+    unsafe : bool
+        Whether that is because the program, as its language says it, fails its audit.
+    notes : tuple of str
+        Warnings of the program's preflight, and what nobody has checked.
+    """
+
+    files: dict[str, str]
+    program: tuple[str, ...]
+    refused: str
+    unsafe: bool
+    notes: tuple[str, ...]
+
+    __repr__ = told
+
+
+def write_outcome(outcome: Outcome, folder: Path, *, strict: bool = False) -> Written:
+    """Write the files of a run into `folder`; the program only if every audit has passed.
+
+    Raises
+    ------
+    InputError
+        The folder cannot be made or written to; or the program is refused, and the other files
+        are written.
+    AuditFailed
+        The program fails its audit; the other files are written.
+    """
+    texts = outcome_texts(outcome, strict=strict)
+    make_folder(folder)
+    replaced = replace_program(folder, texts.files, texts.program)
+    if texts.refused:
+        said = f"{texts.refused} ({folder / 'plan.json'} and the report are written)"
+        raise AuditFailed(said) if texts.unsafe else InputError(said)
+    stale = stale_program(outcome.job.program, folder, texts.program)
+    return Written(
+        files=replaced.written,
+        removed=replaced.removed,
+        stale=next(iter(replaced.edited), stale),
+        notes=texts.notes,
+    )
+
+
+def outcome_texts(outcome: Outcome, *, strict: bool = False) -> Texts:
+    """Return the files of a run as text; the program only if every audit has passed."""
+    job = outcome.job
+    part, moves = outcome.part, () if outcome.part is None else outcome.part.moves
+    program: dict[str, str] = {}
+    refused, unsafe = "", False
+    notes = [collision_note(outcome.cell, moves_too=bool(moves))]
+    notes += [] if part is None else [order_note(part)]
+    notes += short_pieces(outcome)
+    faults = [] if outcome.stuck is None else [f"The moves between contours: {outcome.stuck}"]
+    faults += [f"The moves between contours: {c.issue()}" for c in outcome.air if not c.ok]
+    if outcome.passed and job.program.language != "none":
+        try:
+            asked = asked_of_cuts(job, outcome.cuts, outcome.cell)
+            program, warnings = program_of(
+                outcome.plans, job.program, moves, asked=asked, strict=strict
+            )
+            notes += warnings
+        except (InputError, AuditFailed) as error:
+            refused, unsafe = str(error), isinstance(error, AuditFailed)
+            faults.append(refused if unsafe else f"no program was written: {error}")
+    files = {
+        **program,
+        "plan.json": planned_text(outcome),
+        "trajectory.csv": trajectory_text(outcome.plans, moves),
+        "report.html": report_text(outcome, notes, faults),
+    }
+    told = (*notes, *faults)
+    return Texts(files=files, program=tuple(program), refused=refused, unsafe=unsafe, notes=told)
+
+
+def planned_text(outcome: Outcome) -> str:
+    """Return the text of the plan.json of a run."""
+    job = outcome.job
+    entries = []
+    for cut in outcome.cuts:
+        if cut.plan is not None:
+            entries.append(plan_entry(cut.plan, cut.contour, cut.checks, picked=cut.picked))
+        elif cut.broken is not None:
+            entries.append(broken_entry(cut.task.name, cut.broken, cut.fastest))
+    return plan_text(
+        job.robot, job.tool, job.placement, entries, job.source, outcome.cell, outcome.part
+    )
+
+
+def stale_program(options: ProgramOptions, folder: Path, program: Sequence[str]) -> Path | None:
+    """Return a program of the job's name in its folder that is none of the files of `program`."""
+    written = [folder / name for name in program]
+    return next((path for path in _programs(options, folder) if path not in written), None)
+
+
+def _programs(options: ProgramOptions, folder: Path) -> list[Path]:
+    """Return the programs of a job's name in a folder, or in one of their own in it.
+
+    Languages cut names, or say them in capitals.
+    """
+    if options.language == "none":
+        return []
+    name, suffix = options.name.lower(), language(options.language).suffix
+    there = sorted([*folder.glob(f"*{suffix}"), *folder.glob(f"*/*{suffix}")])
+    shortest = min(len(name), SHORTEST_CUT)
+    return [p for p in there if name.startswith(p.stem.lower()) and len(p.stem) >= shortest]
+
+
+def order_note(part: PartPlan) -> str:
+    """Say how long the part takes, of what, and what is proved about the order."""
+    order = part.order
+    proved = (
+        "no order takes less"
+        if order.optimal
+        else f"an order of {order.at_least:.1f} s is not ruled out"
+    )
+    return (
+        f"Cycle time {part.cycle_time:.1f} s: cutting {part.cutting_time:.1f} s, air "
+        f"{part.air_time:.1f} s, piercing {part.piercing_time:.1f} s; by these candidates and "
+        f"moves {proved}."
+    )
+
+
+def short_pieces(outcome: Outcome) -> list[str]:
+    """Say of interrupted contours which piece is shortest, if it is short and nobody asked."""
+    if outcome.job.least_piece is not None:
+        return []
+    lengths: dict[str, list[float]] = {}
+    for cut in outcome.cuts:
+        if cut.plan is not None:
+            lengths.setdefault(cut.contour, []).append(float(np.ptp(cut.plan.contour.s)))
+    return [
+        f"{name}: the shortest of its {len(pieces)} pieces is {min(pieces) * 1e3:.1f} mm; with "
+        "least_piece_mm in [plan] none is shorter than that"
+        for name, pieces in lengths.items()
+        if len(pieces) > 1 and min(pieces) < SHORT_PIECE
+    ]
+
+
+def require_folder(folder: Path) -> None:
+    """Refuse a place for the files that cannot be a folder, before any work is done for it.
+
+    Raises
+    ------
+    InputError
+        Something else than a folder is there, or on the way there.
+    """
+    for place in (folder, *folder.parents):
+        if place.is_dir():
+            return
+        if place.exists():
+            raise InputError(f"{folder}: expected a folder, but {place} is a file; name another")
+
+
+def make_folder(folder: Path) -> None:
+    """Make a folder for the files, unless it is there.
+
+    Raises
+    ------
+    InputError
+        As `require_folder`; it cannot be made.
+    """
+    require_folder(folder)
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise InputError(f"{folder}: cannot be made a folder ({error.strerror})") from None
+
+
+def require_language(job: Job) -> None:
+    """Refuse a program that the job's robot cannot run, before any work is done for it.
+
+    Raises
+    ------
+    InputError
+        At the language in the job.
+    """
+    if job.program.language == "none":
+        return
+    if refusal := language(job.program.language).refusal(job.robot):
+        raise refused_at(
+            job.path,
+            ("program", "language"),
+            f'{refusal}; write language = "none" in [program] to plan without a program',
+        )
+
+
+def trajectory_text(plans: Sequence[Plan], moves: Sequence[AirMove] = ()) -> str:
+    """Return the text of trajectory.csv: one row per node, in mm and degrees, base frame.
+
+    Moves through the air stand where they are made, a row per corner; each has a time of its own.
+    """
+    joints = range(1, (plans[0].robot.joints if plans else 6) + 1)
+    header = ["contour", "node", "kind", "t_s", *(f"q{i}_deg" for i in joints)]
+    header += ["x_mm", "y_mm", "z_mm", "axis_x", "axis_y", "axis_z", "gamma_deg", "posture"]
+    out = io.StringIO()
+    writer = csv.writer(out, lineterminator="\n")
+    writer.writerow(header)
+    homeless = len(moves) < len(plans)
+    for i, plan in enumerate(plans):
+        if moves and not (homeless and i == 0):
+            _write_air(writer, moves[i - 1 if homeless else i], plan)
+        numbers = np.column_stack(
+            [
+                plan.time,
+                np.degrees(plan.q),
+                plan.points * 1000,
+                plan.axes,
+                np.degrees(plan.gamma),
+            ]
+        )
+        rows = zip(numbers.tolist(), plan.contour.kinds, plan.posture, strict=True)
+        for k, (row, kind, posture) in enumerate(rows):
+            writer.writerow([plan.name, k, kind, *row, int(posture)])
+    if len(moves) > len(plans):
+        _write_air(writer, moves[-1], plans[-1])
+    return out.getvalue()
+
+
+def _write_air(writer: Any, move: AirMove, plan: Plan) -> None:
+    """Write the corners of a move; gamma and posture are those of contours alone."""
+    T = plan.robot.forward(move.q) @ plan.T_flange_tip
+    for k, (time, q, tip) in enumerate(zip(move.time, move.q, T, strict=True)):
+        row = [time, *np.degrees(q), *tip[:3, 3] * 1000, *tip[:3, 2]]
+        writer.writerow(["air", k, "air", *(float(v) for v in row), "", ""])

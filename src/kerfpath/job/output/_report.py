@@ -1,0 +1,108 @@
+"""report.html: what the report shows of a run."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from kerfpath._arrays import Array
+from kerfpath.air import AirMove
+from kerfpath.cad import Departure
+from kerfpath.job.format import Job
+from kerfpath.job.run import Outcome
+from kerfpath.report import ContourSection, render
+
+__all__ = ["report_text"]
+
+PER_LEG = 17
+"""Points that a straight joint motion is drawn by."""
+
+
+def report_text(outcome: Outcome, notes: Sequence[str], faults: Sequence[str] = ()) -> str:
+    """Return the HTML report of a run; `faults` say why it is not to be cut though planned."""
+    job = outcome.job
+    sections = [
+        ContourSection(
+            name=cut.task.name,
+            graph=cut.graph,
+            path=cut.nodes,
+            plan=cut.plan,
+            checks=cut.checks,
+            failure="" if cut.broken is None else str(cut.broken),
+            remedy=cut.remedy,
+            broken_at=None if cut.broken is None else cut.broken.node + 1,
+            clearance=cut.clearance,
+            sampling=() if cut.departure is None else _sampling(cut.departure),
+        )
+        for cut in outcome.cuts
+    ]
+    speeds = sorted({task.speed * 60 for task in job.contours})
+    robot, options = job.robot, job.plan_options
+    velocity, acceleration = (np.degrees(v).round(1) for v in robot.speed_limits())
+    facts = [
+        ("Job", job.path.name),
+        ("Part", job.part_file.name),
+        ("Robot", f"{robot.manufacturer} {robot.model}".strip() or robot.id),
+        ("Cutting speed", f"{' / '.join(f'{v:g}' for v in speeds)} m/min"),
+        ("Gamma step", f"{np.degrees(options['gamma_step']):g} deg"),
+        ("Objective", f"{options['objective']}, {options['metric']} metric"),
+        ("Method", f"{options['method']}, {options['frames']} frames"),
+        ("Limits used", f"{options['eta_v']:.0%} velocity, {options['eta_a']:.0%} acceleration"),
+        ("Joint velocity limits", f"{_row(velocity)} deg/s"),
+        (
+            "Joint acceleration limits",
+            f"{_row(acceleration)} deg/s^2 ({robot.acceleration_source})",
+        ),
+        ("Endless axes", _row(np.flatnonzero(robot.endless) + 1) or "none"),
+    ]
+    moves = () if outcome.part is None else outcome.part.moves
+    # From home and back to it the way is long, and would make the part small.
+    between = moves[1:-1] if len(moves) > len(outcome.plans) else moves
+    return render(
+        f"{job.part_file.stem.replace('_', ' ')}",
+        sections,
+        mesh=outcome.mesh,
+        cell=outcome.cell,
+        moves=[_tips(job, move) for move in between],
+        facts=facts,
+        faults=faults,
+        notes=notes,
+        job_text=job.path.read_text(encoding="utf-8-sig"),
+    )
+
+
+def _sampling(found: Departure) -> list[tuple[str, str]]:
+    """Return how far the nodes leave what they sample, in words."""
+    against = {
+        "CAD curve": "the CAD curve",
+        "points of the drawing": "the lines through the points of the drawing, which tell no more",
+        "path as cut": "the path as cut, which is not the drawn one",
+    }
+    rows = [
+        ("Measured against", against[found.against]),
+        ("Largest chord error", f"{found.chord_error * 1e3:.4f} mm, after node {found.chord_node}"),
+        (
+            "Largest axis error between nodes",
+            f"{np.degrees(found.axis_error):.3f} deg, after node {found.axis_node}",
+        ),
+        (
+            "Largest axis step from node to node",
+            f"{np.degrees(found.axis_step):.3f} deg, after node {found.step_node}",
+        ),
+    ]
+    if (loop := found.path) is not None:
+        told = f"{loop.chord_error * 1e3:.4f} mm and {np.degrees(loop.axis_error):.3f} deg"
+        rows.append(("Drawn loop", f"within {told} of {against[loop.against]}"))
+    return rows
+
+
+def _tips(job: Job, move: AirMove) -> Array:
+    """Return where the tool tip is along a move, (m, 3) m, part frame."""
+    legs = np.linspace(move.q[:-1], move.q[1:], PER_LEG, axis=1).reshape(-1, move.q.shape[1])
+    T = np.linalg.inv(job.placement) @ job.robot.forward(legs) @ job.tool
+    return np.asarray(T[:, :3, 3])
+
+
+def _row(values: object) -> str:
+    return " ".join(f"{v:g}" for v in np.asarray(values).tolist())

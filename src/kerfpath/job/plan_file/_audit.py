@@ -1,0 +1,216 @@
+"""The audit of a plan.json: by its job where that is given, by itself where it is not."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from kerfpath import __version__
+from kerfpath._told import told
+from kerfpath.auditor import Check, air_checks, checks, worst_of
+from kerfpath.job.format import AuditTable, audit_options, read_job
+from kerfpath.job.plan_file._asked import Asked, asked_of, order_checks
+from kerfpath.job.plan_file._differs import disagreement, job_disagreement
+from kerfpath.job.plan_file._expected import Expected, expected_plans
+from kerfpath.job.plan_file._follows import SAME, following
+from kerfpath.job.plan_file._moves import expected_sequence, move_checks
+from kerfpath.job.plan_file._read import PlanFile, read_plan_file, table_of
+from kerfpath.job.plan_file._result import Audited, collision_note
+from kerfpath.job.plan_file._write import plan_data, plan_entry
+from kerfpath.plans import Plan
+
+__all__ = ["PlanAudit", "audit_file"]
+
+JOB, FILE = "what follows from the job and the joints", "what follows from the joints"
+OWN_NODES = ("gamma_rad", "lead_lean_rad", "posture", "turn")
+"""Columns of nodes that follow from the joints."""
+AIR = "air"
+"""Name of the table of the moves."""
+
+
+def audit_file(plan_file: Path, job_file: Path | None = None) -> Audited:
+    """Return what the audit says of every contour of a plan.json.
+
+    With a job, the job alone says what is asked for and allowed; what the plan repeats of it, or
+    says of its own joints, has to agree. Without one, limits, tool, placement and speed are those
+    that the plan says, and only what follows from its joints is compared.
+
+    Parameters
+    ----------
+    plan_file : Path
+    job_file : Path, optional
+
+    Raises
+    ------
+    InputError
+        A file cannot be read.
+    """
+    if job_file is not None:
+        return PlanAudit.of(job_file).audited(plan_file)
+    return _by_itself(read_plan_file(plan_file))
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class PlanAudit:
+    """The audit of plan.json files of one job, whose drawing and cell are read once.
+
+    Parameters
+    ----------
+    asked : Asked
+    """
+
+    asked: Asked
+
+    __repr__ = told
+
+    @classmethod
+    def of(cls, job_file: Path) -> PlanAudit:
+        """Return the audit of a job's plans.
+
+        Raises
+        ------
+        InputError
+            The job, its drawing or its cell cannot be read.
+        """
+        return cls(asked=asked_of(read_job(job_file)))
+
+    def audited(self, plan_file: Path) -> Audited:
+        """Return what the audit says of every contour of a plan.json, by the job.
+
+        Raises
+        ------
+        InputError
+            The file cannot be read.
+        """
+        asked, file = self.asked, read_plan_file(plan_file)
+        expected, rows = expected_plans(asked, file)
+        entries = {entry["name"]: entry for entry in file.data["contours"] if entry["feasible"]}
+        tables: dict[str, list[Check]] = {file.path.name: rows}
+        told: list[dict[str, Any]] = []
+        for each in expected:
+            table = tables.setdefault(each.name, [])
+            table += each.checks
+            if each.plan is None:
+                continue
+            made = checks(
+                each.plan, reference=each.path, cell=asked.cell, **asked.job.audit_options
+            )
+            entry = _entry(each.plan, entries[each.name], made, file)
+            told.append(entry)
+            table += made
+            table += _claims(each.plan)
+            table += disagreement(entry, entries[each.name], JOB)
+        rows += job_disagreement(asked.job, file.job)
+        paths = [p.contour for p in file.plans]
+        rows += order_checks(asked, [each.number for each in expected], paths)
+        rows += self._whole(file, told, expected)
+        plans = [each.plan for each in expected if each.plan is not None]
+        if len(plans) == len(expected) and plans:
+            tables.setdefault(AIR, []).extend(move_checks(asked, plans, file.moves))
+        note = collision_note(asked.cell, moves_too=asked.job.sequence is not None)
+        return Audited(
+            tables={name: table for name, table in tables.items() if table},
+            missing=file.missing,
+            note=f"{note} {_unverified(file)}".strip(),
+        )
+
+    def _whole(
+        self, file: PlanFile, told: list[dict[str, Any]], expected: Sequence[Expected]
+    ) -> list[Check]:
+        """Compare what stands in the file beside its contours: robot, limits, cell, sequence."""
+        asked, data = self.asked, file.data
+        plans = [each.plan for each in expected if each.plan is not None]
+        part = None
+        if asked.job.sequence is not None and data["sequence"] is not None and plans:
+            least = data["sequence"]["at_least_s"]
+            part = expected_sequence(asked, plans, file.moves, least)
+        whole = plan_data(
+            asked.job.robot, asked.job.tool, asked.job.placement, told, {}, asked.cell, part
+        )
+        rows = []
+        for key in whole.keys() - {"job", "contours", "kerfpath", "schema"}:
+            if key == "sequence" and len(plans) < len(expected):
+                continue  # a contour is refused already, and its times are not known
+            rows += [row for row in disagreement(whole[key], data[key], JOB, (key,)) if not row.ok]
+        if asked.job.sequence is not None and data["sequence"] is None:
+            rows.append(_count("moves", "moves between contours that the job asks for", 1))
+        return rows or disagreement({}, {}, JOB)
+
+
+def _entry(
+    plan: Plan, said: dict[str, Any], made: Sequence[Check], file: PlanFile
+) -> dict[str, Any]:
+    """Return what plan.json should say of a contour, the record of the audit included.
+
+    The record of another version is its own.
+    """
+    name = said["contour"]
+    entry = plan_entry(plan, name, made, picked=plan.name in file.picked)
+    if file.data["kerfpath"] != __version__:
+        entry["audit"]["checks"] = said["audit"]["checks"]
+    return entry
+
+
+def _claims(plan: Plan) -> list[Check]:
+    """Check of what is claimed of other motions the part that can be checked."""
+    before = plan.proof.grid_cost
+    rows = []
+    if before is not None:
+        over = plan.cost - before * (1 + SAME)
+        rows.append(
+            Check(code="grid-cost", title="cost above that of the path it was refined from",
+                  value=float(over), limit=SAME, unit="count", node=0)
+        )  # fmt: skip
+    if plan.settings.method != "exact":
+        claimed = plan.proof.optimal
+        rows.append(_count("optimal", "claims to be best that its method cannot prove", claimed))
+    return rows
+
+
+def _unverified(file: PlanFile) -> str:
+    """Say what the file claims and nobody has verified."""
+    best = [p.name for p in file.plans if p.proof.optimal]
+    claims = [f"that {', '.join(best)} is best of its grid"] if best else []
+    if file.data["sequence"] is not None and file.data["sequence"]["optimal"]:
+        claims.append("that no order takes less")
+    return f"Claimed, not verified: {' and '.join(claims)}." if claims else ""
+
+
+def _by_itself(file: PlanFile) -> Audited:
+    """Return the audit of a plan.json by what it says itself."""
+    table: Any = table_of(file, "audit", AuditTable, audit_options)
+    entries = {entry["name"]: entry for entry in file.data["contours"] if entry["feasible"]}
+    tables = {}
+    for p in file.plans:
+        own = following(p)
+        made = checks(own, **table)
+        entry = plan_entry(own, entries[p.name]["contour"], made, picked=p.name in file.picked)
+        entry["audit"], entry["nodes"] = (
+            entries[p.name]["audit"],
+            entries[p.name]["nodes"]
+            | {key: value for key, value in entry["nodes"].items() if key in OWN_NODES},
+        )
+        tables[p.name] = [*made, *_claims(own), *disagreement(entry, entries[p.name], FILE)]
+    if not file.plans and not file.missing:
+        tables[file.path.name] = [_count("contours", "plans lacking: the file has none", 1)]
+    if file.moves and file.plans:
+        robot = file.plans[0].robot
+        tables[AIR] = worst_of(air_checks(robot, m.q, m.time) for m in file.moves)
+    note = (
+        "Limits, tool, placement and speed were taken from the plan itself; give its job with "
+        "--job to judge by that."
+    )
+    if file.in_cell:
+        note = (
+            f"{note} Planned clear of collisions in a cell, which was not checked again: give its "
+            "job with --job."
+        )
+    else:
+        note = f"{note} {collision_note(None)}"
+    return Audited(tables=tables, missing=file.missing, note=f"{note} {_unverified(file)}".strip())
+
+
+def _count(code: str, title: str, count: float) -> Check:
+    return Check(code=code, title=title, value=float(count), limit=0.0, unit="count", node=0)

@@ -1,0 +1,197 @@
+"""Where a plan.json says something else than what follows from its job and its joints."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import ValidationError
+
+from kerfpath.auditor import Check
+from kerfpath.job.format import Job, JobFile
+from kerfpath.job.plan_file._follows import SAME
+
+__all__ = ["CLAIMS", "disagreement", "job_disagreement"]
+
+CLAIMS = {
+    r"kerfpath$": "the version that wrote the file",
+    r"(proof|optimal|grid_cost)$": "what is claimed of motions that are not in the file",
+    r"counts(/|$)": "poses that were dropped in planning",
+    r"audit/checks/\d+/(title|advice|node)$": "words and places of the audit made in planning",
+    r"sequence/(optimal|at_least_s)$": "what is claimed of orders that are not in the file",
+}
+"""Places that are not compared, and why: none says anything of the motion."""
+DISTANCE = 1e-6
+"""m: distances between convex solids are exact to this; those of a record may differ."""
+SHOWN = 60
+"""Characters of a value that a message shows."""
+PROGRAM = ("program", "audit", "layout")
+"""Tables of a job that do not say what the motion is."""
+
+
+@dataclass(frozen=True, slots=True)
+class _Difference:
+    """One value that differs: where, and what both sides have."""
+
+    path: tuple[str | int, ...]
+    expected: Any
+    found: Any
+
+    @property
+    def node(self) -> int:
+        """The node that it belongs to; 0 where it belongs to all."""
+        node = self.path[1 + (self.path[0] == "nodes")] if len(self.path) > 2 else 0
+        return node if isinstance(node, int) and self.path[0] == "nodes" else 0
+
+    def __str__(self) -> str:
+        where = ".".join(str(step) for step in self.path)
+        return f"{where}: expected {_shown(self.expected)}, found {_shown(self.found)}"
+
+
+def disagreement(
+    expected: Any, found: Any, whose: str, under: tuple[str | int, ...] = ()
+) -> list[Check]:
+    """Return a check for each kind of place at which `found` is not what is expected.
+
+    The first of each kind is told; a single check that passes where there is none.
+
+    Parameters
+    ----------
+    expected, found : JSON values
+    whose : str
+        Whose values are expected, in words.
+    under : tuple
+        Where in the document the two stand.
+    """
+    groups: dict[tuple[str, ...], list[_Difference]] = {}
+    for each in _differences(expected, found, under):
+        kind = tuple(step for step in each.path if isinstance(step, str))
+        groups.setdefault(kind, []).append(each)
+    checks = []
+    for alike in groups.values():
+        first = alike[0]
+        many = "" if len(alike) == 1 else f" (and {len(alike) - 1} more such)"
+        checks.append(
+            _check("agrees", f"values that are not {whose}: {first}{many}", len(alike), first.node)
+        )
+    return checks or [_check("agrees", f"values that are not {whose}", 0)]
+
+
+def job_disagreement(job: Job, source: dict[str, Any]) -> list[Check]:
+    """Return the checks of the job that a plan.json repeats, by what its text means.
+
+    Tables that do not say what the motion is have a check of their own.
+    """
+    title = "values of the job that the plan was made from that are not the job's"
+    if _same(job.source, source):
+        return [_check("job", title, 0)]
+    context = {"folder": job.path.parent}
+    try:
+        then = JobFile.model_validate(source, context=context).model_dump(mode="json")
+    except (ValidationError, ValueError, TypeError, OverflowError) as error:
+        said = " ".join(str(error).split())[:SHOWN]
+        return [_check("job", f"{title}: it is no job ({said}...)", 1)]
+    now = JobFile.model_validate(job.source, context=context).model_dump(mode="json")
+    found = list(_differences(now, then, ("job",)))
+    rows = []
+    for code, mine in (
+        ("job", [each for each in found if each.path[1] not in PROGRAM]),
+        ("job-program", [each for each in found if each.path[1] in PROGRAM]),
+    ):
+        many = f" (and {len(mine) - 1} more)" if len(mine) > 1 else ""
+        told = f"{title}: {mine[0]}{many}" if mine else title
+        rows.append(_check(code, told, len(mine)))
+    return rows
+
+
+def _differences(one: Any, two: Any, path: tuple[str | int, ...]) -> Iterator[_Difference]:
+    where = "/".join(str(step) for step in path)
+    if any(re.match(pattern, where) for pattern in CLAIMS):
+        return
+    if isinstance(one, dict) and isinstance(two, dict):
+        for key in sorted(one.keys() | two.keys()):
+            if key not in one or key not in two:
+                a, b = (side.get(key, _Absent) for side in (one, two))
+                yield _Difference((*path, key), a, b)
+            else:
+                yield from _differences(one[key], two[key], (*path, key))
+    elif isinstance(one, list | tuple) and isinstance(two, list | tuple):
+        if len(one) != len(two):
+            yield _Difference((*path,), f"{len(one)} of them", f"{len(two)} of them")
+            return
+        numbers = _numbers(one), _numbers(two)
+        if numbers[0] is not None and numbers[1] is not None:
+            yield from _far(*numbers, path)
+            return
+        for i, (a, b) in enumerate(zip(one, two, strict=True)):
+            yield from _differences(a, b, (*path, i))
+    elif _is_number(one) and _is_number(two):
+        if not abs(one - two) <= _allowed(path, one):
+            yield _Difference(path, one, two)
+    elif type(one) is not type(two) or one != two:
+        yield _Difference(path, one, two)
+
+
+def _far(
+    one: NDArray[np.float64] | None, two: NDArray[np.float64] | None, path: tuple[str | int, ...]
+) -> Iterator[_Difference]:
+    """Yield the numbers of two arrays that are apart, the farthest first."""
+    assert one is not None
+    assert two is not None
+    if one.shape != two.shape:
+        yield _Difference(path, f"{one.shape} numbers", f"{two.shape} numbers")
+        return
+    off = np.abs(one - two) / np.maximum(1.0, np.abs(one))
+    far = np.argwhere(~(off <= SAME))
+    for index in far[np.argsort([-off[tuple(i)] for i in far], kind="stable")]:
+        at = tuple(int(i) for i in index)
+        yield _Difference((*path, *at), float(one[at]), float(two[at]))
+
+
+def _allowed(path: tuple[str | int, ...], value: float) -> float:
+    """Return how far a number may be from `value`."""
+    if path[:2] == ("audit", "checks") and path[-1] == "value":
+        return DISTANCE
+    return SAME * max(1.0, abs(value))
+
+
+def _numbers(values: Any) -> NDArray[np.float64] | None:
+    """Return an array of numbers, of any depth; None where it holds anything else."""
+    try:
+        found = np.array(values)
+    except ValueError:  # rows of unlike lengths
+        return None
+    return found.astype(np.float64) if found.dtype.kind in "iuf" and found.size else None
+
+
+def _is_number(value: Any) -> bool:
+    return isinstance(value, int | float) and not isinstance(value, bool)
+
+
+def _same(one: Any, two: Any) -> bool:
+    """Say whether two documents are the same, types included."""
+    if type(one) is not type(two):
+        return False
+    if isinstance(one, dict):
+        return one.keys() == two.keys() and all(_same(one[key], two[key]) for key in one)
+    if isinstance(one, list):
+        return len(one) == len(two) and all(map(_same, one, two))
+    return bool(one == two)
+
+
+class _Absent:
+    """Stands for what one of the two has not."""
+
+
+def _shown(value: Any) -> str:
+    text = "nothing" if value is _Absent else str(value)
+    text = "".join(c if c.isprintable() else "?" for c in text)
+    return text if len(text) <= SHOWN else f"{text[:SHOWN]}..."
+
+
+def _check(code: str, title: str, count: float, node: int = 0) -> Check:
+    return Check(code=code, title=title, value=float(count), limit=0.0, unit="count", node=node)

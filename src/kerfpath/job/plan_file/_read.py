@@ -1,0 +1,217 @@
+"""plan.json, read back: its plans and moves, with everything in it checked for its type."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, TypeVar
+
+import numpy as np
+from pydantic import BaseModel, ValidationError
+
+from kerfpath._arrays import Array
+from kerfpath._told import told
+from kerfpath.air import AirMove
+from kerfpath.comfort import Band, Comfort
+from kerfpath.contour import KINDS, Contour
+from kerfpath.errors import InputError
+from kerfpath.job.plan_file._external import joints, with_external
+from kerfpath.job.plan_file._schema import read_document
+from kerfpath.job.plan_file._sequence import read_moves
+from kerfpath.plans import Feed, Plan, Proof, Settings
+from kerfpath.robots import Coupling, Robot
+from kerfpath.tilt import Tilt
+from kerfpath.urdf import Chain
+
+__all__ = ["PlanFile", "read_plan_file", "table_of"]
+
+_M = TypeVar("_M", bound=BaseModel)
+_R = TypeVar("_R")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class PlanFile:
+    """A plan.json, read back.
+
+    Parameters
+    ----------
+    path : Path
+    job : dict
+        The job file as it was read; empty when the plan was not made from one.
+    plans : tuple of Plan
+        One for each contour, in the order of cutting.
+    missing : tuple of str
+        Names of the contours that have no plan.
+    failed : tuple of str
+        Names of the contours whose plan failed its audit when it was made.
+    moves : tuple of AirMove
+        Through the air between them; empty when none were planned.
+    contours : dict of str to str
+        What the job calls the contour of each plan: a plan may be that of a piece.
+    in_cell : bool
+        Whether the motions were planned and audited clear of collisions.
+    picked : frozenset of str
+        Names of the contours whose plan was picked from a Pareto set.
+    data : dict
+        The whole document.
+    """
+
+    path: Path
+    job: dict[str, Any]
+    plans: tuple[Plan, ...]
+    missing: tuple[str, ...]
+    failed: tuple[str, ...]
+    contours: dict[str, str]
+    moves: tuple[AirMove, ...]
+    in_cell: bool
+
+    __repr__ = told
+    picked: frozenset[str]
+    data: dict[str, Any]
+
+
+def read_plan_file(path: str | Path) -> PlanFile:
+    """Return the plans of a plan.json.
+
+    Parameters
+    ----------
+    path : str or Path
+
+    Returns
+    -------
+    file : PlanFile
+        Its `plans` in the order of cutting, and what else stands in it.
+
+    Raises
+    ------
+    InputError
+        No such file, not JSON, another schema; a key that is missing, unknown or there twice; a
+        value of the wrong type. In one line.
+    """
+    path = Path(path)
+    data = read_document(path)
+    try:
+        arm = _read_robot(data["robot"], data["limits"])
+        robot = with_external(data["external_axis"], arm)
+        entries = [entry for entry in data["contours"] if entry["feasible"]]
+        return PlanFile(
+            path=path,
+            job=data["job"],
+            plans=tuple(
+                _read_plan(e, robot, data["T_flange_tip"], data["T_base_part"]) for e in entries
+            ),
+            contours={e["name"]: e["contour"] for e in entries},
+            missing=tuple(e["name"] for e in data["contours"] if not e["feasible"]),
+            failed=tuple(e["name"] for e in entries if not e["audit"]["passed"]),
+            moves=read_moves(data["sequence"]),
+            in_cell=data["cell"] is not None,
+            picked=frozenset(e["name"] for e in entries if e.get("picked", False)),
+            data=data,
+        )
+    except InputError as error:
+        raise InputError(f"{path}: {error}") from None
+    except KeyError as error:
+        raise InputError(f"{path}: the key {error} is missing; plan the job again") from None
+    except (TypeError, ValueError) as error:  # what the schema cannot say: rows of unlike lengths
+        said = " ".join(str(error).split())
+        raise InputError(f"{path}: something in it is of the wrong kind ({said})") from None
+
+
+def table_of(
+    file: PlanFile, name: str, model: type[_M], read: Callable[[_M], _R], **changes: str
+) -> _R:
+    """Return a table of the job that a plan was made from, read as the job's own would be."""
+    table: Any = file.job.get(name, {})
+    try:
+        return read(model.model_validate({**table, **changes}))
+    except (ValidationError, TypeError) as error:
+        said = " ".join(str(error).split())
+        raise InputError(f"{file.path}: its [{name}] table is not valid ({said})") from None
+
+
+def _infinite(rotation: list[float | None] | None) -> Array | None:
+    return None if rotation is None else np.array([np.inf if v is None else v for v in rotation])
+
+
+def _read_robot(robot: dict[str, Any], limits: dict[str, Any]) -> Robot:
+    return Robot(
+        id=robot["id"],
+        manufacturer=robot["manufacturer"],
+        model=robot["model"],
+        kinematics=robot["kinematics"],
+        geometry=robot["geometry_m"],
+        sign=robot["sign"],
+        offset=robot["offset_rad"],
+        axis_3=robot["axis_3"],
+        T_base_foot=robot["T_base_foot"],
+        T_end_flange=robot["T_end_flange"],
+        chain=Chain(**robot["chain"]) if robot["chain"] else None,
+        lower=limits["lower_rad"],
+        upper=limits["upper_rad"],
+        endless=limits["endless"],
+        velocity=limits["velocity_rad_s"],
+        acceleration=limits["acceleration_rad_s2"],
+        acceleration_source=limits["acceleration_source"],
+        couplings=tuple(
+            Coupling(row=c["row"], lower=c["lower_rad"], upper=c["upper_rad"], note=c["note"])
+            for c in limits["couplings"]
+        ),
+    )
+
+
+def _read_tilt(entry: dict[str, Any] | None) -> Tilt | None:
+    if entry is None:
+        return None
+    return Tilt(cone=entry["cone_rad"], steps=entry["steps"], cost=entry["cost_per_rad"])
+
+
+def _read_plan(entry: dict[str, Any], robot: Robot, tool: Any, placement: Any) -> Plan:
+    nodes = entry["nodes"]
+    return Plan(
+        contour=Contour(
+            nodes["points_m"],
+            nodes["axes"],
+            closed=entry["closed"],
+            s=nodes["s_m"],
+            kind=np.array([KINDS.index(word) for word in nodes["kind"]]),
+            speed_share=nodes["speed_share"],
+            x=nodes["x"],
+            name=entry["name"],
+        ),
+        robot=robot,
+        T_flange_tip=tool,
+        T_base_part=placement,
+        q=joints(nodes, "q", robot),
+        gamma=nodes["gamma_rad"],
+        tilt=nodes["lead_lean_rad"],
+        posture=nodes["posture"],
+        turn=nodes["turn"],
+        time=nodes["time_s"],
+        settings=Settings(
+            gamma_step=entry["gamma_step_rad"],
+            frames=entry["frames"],
+            method=entry["method"],
+            objective=entry["objective"],
+            metric=entry["metric"],
+            weights=joints(entry, "weights_per", robot),
+            eta_v=entry["eta_v"],
+            eta_a=entry["eta_a"],
+            closure=entry["closure"],
+            rotation=_infinite(entry["rotation_rad"]),
+            comfort=_read_comfort(entry["comfort"]),
+            tilt=_read_tilt(entry["tilt"]),
+        ),
+        cost=entry["cost"],
+        proof=Proof(
+            optimal=entry["optimal"],
+            statement=entry["proof"],
+            grid_cost=entry["grid_cost"],
+        ),
+        counts=entry["counts"],
+        feed=None if entry["feed"] is None else Feed(**entry["feed"]),
+    )
+
+
+def _read_comfort(bands: dict[str, Any] | None) -> Comfort | None:
+    return None if bands is None else Comfort(**{k: Band(**band) for k, band in bands.items()})

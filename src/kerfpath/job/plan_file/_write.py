@@ -1,0 +1,251 @@
+"""plan.json: everything about the plans of a job, so that other programs can rely on it."""
+
+from __future__ import annotations
+
+import json
+import re
+from collections.abc import Sequence
+from dataclasses import asdict
+from typing import Any
+
+import numpy as np
+
+from kerfpath import __version__
+from kerfpath._arrays import Array
+from kerfpath.auditor import Check
+from kerfpath.cell import Cell, caveats
+from kerfpath.comfort import MEASURES, Comfort
+from kerfpath.errors import NoFeasiblePath
+from kerfpath.job.plan_file._external import by_unit, external_entry
+from kerfpath.job.plan_file._schema import SCHEMA
+from kerfpath.job.plan_file._sequence import sequence_entry
+from kerfpath.planner import FastestSpeed
+from kerfpath.plans import Plan
+from kerfpath.robots import Robot
+from kerfpath.sequence import PartPlan
+
+__all__ = ["broken_entry", "plan_data", "plan_entry", "plan_text"]
+
+_NUMBERS = re.compile(r"\[\s+([-+.\deE,\s]+?)\s+\]")
+
+
+def plan_text(
+    robot: Robot,
+    T_flange_tip: np.ndarray[Any, Any],
+    T_base_part: np.ndarray[Any, Any],
+    contours: Sequence[dict[str, Any]],
+    job: dict[str, Any],
+    cell: Cell | None = None,
+    part: PartPlan | None = None,
+) -> str:
+    """Return the text of a plan.json, see `plan_data`; the same input gives the same bytes."""
+    data = plan_data(robot, T_flange_tip, T_base_part, contours, job, cell, part)
+    text = json.dumps(data, indent=1, allow_nan=False)
+    # One row of numbers to a line: a person can still read it, and a diff shows a node.
+    return _NUMBERS.sub(lambda m: "[" + re.sub(r"\s+", " ", m[1]) + "]", text) + "\n"
+
+
+def plan_data(
+    robot: Robot,
+    T_flange_tip: np.ndarray[Any, Any],
+    T_base_part: np.ndarray[Any, Any],
+    contours: Sequence[dict[str, Any]],
+    job: dict[str, Any],
+    cell: Cell | None = None,
+    part: PartPlan | None = None,
+) -> dict[str, Any]:
+    """Return what a plan.json says.
+
+    Parameters
+    ----------
+    robot : Robot
+        With the limits used.
+    T_flange_tip, T_base_part : (4, 4) m
+    contours : sequence of dict
+        From `plan_entry` and `broken_entry`.
+    job : dict
+        The job file as read.
+    cell : Cell, optional
+        What the motions were planned and audited clear of.
+    part : PartPlan, optional
+        The moves between the contours, and what is proved about their order.
+    """
+    return {
+        "schema": SCHEMA,
+        "kerfpath": __version__,
+        "job": job,
+        "robot": _robot_entry(robot),
+        "external_axis": external_entry(robot),
+        "T_flange_tip": T_flange_tip.tolist(),
+        "T_base_part": T_base_part.tolist(),
+        "limits": _limits_entry(robot),
+        "cell": None if cell is None else _cell_entry(cell),
+        "contours": list(contours),
+        "sequence": None if part is None else sequence_entry(part),
+    }
+
+
+def plan_entry(
+    plan: Plan, contour: str, checks: Sequence[Check], *, picked: bool = False
+) -> dict[str, Any]:
+    """Return what plan.json says of a planned and audited contour, or of a piece of it.
+
+    `picked`: from a Pareto set, by which its objective, weights and eta are then told.
+    """
+    criteria, settings = plan.criteria, plan.settings
+    return {
+        "name": plan.name,
+        "contour": contour,
+        "feasible": True,
+        **({"picked": True} if picked else {}),
+        "closed": plan.contour.closed,
+        "method": settings.method,
+        "objective": settings.objective,
+        "metric": settings.metric,
+        **by_unit("weights_per", settings.weights, plan.robot),
+        "eta_v": settings.eta_v,
+        "eta_a": settings.eta_a,
+        "closure": settings.closure,
+        "rotation_rad": _finite(settings.rotation),
+        "comfort": _bands(settings.comfort),
+        "gamma_step_rad": settings.gamma_step,
+        "tilt": None
+        if settings.tilt is None
+        else {
+            "cone_rad": settings.tilt.cone,
+            "steps": settings.tilt.steps,
+            "cost_per_rad": settings.tilt.cost,
+        },
+        "frames": settings.frames,
+        "dt": plan.dt,
+        "cost": plan.cost,
+        "optimal": plan.proof.optimal,
+        "proof": plan.proof.statement,
+        "grid_cost": plan.proof.grid_cost,
+        "criteria": {
+            **by_unit("displacement", criteria.displacement, plan.robot),
+            **by_unit("largest_increment", criteria.largest_increment, plan.robot),
+            **by_unit("range", criteria.range, plan.robot),
+            "peak_velocity_share": criteria.peak_velocity.tolist(),
+            "peak_acceleration_share": criteria.peak_acceleration.tolist(),
+            "nearest": {
+                name: {"least": least if np.isfinite(least) else None, "unit": MEASURES[name].unit}
+                | {"node": node}
+                for name, (least, node) in criteria.nearest.items()
+            },
+        },
+        "feed": None if plan.feed is None else asdict(plan.feed),
+        "counts": dict(plan.counts),
+        "audit": {
+            "passed": all(c.ok or c.level == "warning" for c in checks),
+            "checks": [asdict(c) | {"ok": c.ok} for c in checks],
+        },
+        "nodes": {
+            "s_m": plan.contour.s.tolist(),
+            "time_s": plan.time.tolist(),
+            "points_m": plan.contour.points.tolist(),
+            "axes": plan.contour.axes.tolist(),
+            "kind": list(plan.contour.kinds),
+            "speed_share": plan.contour.speed_share.tolist(),
+            "x": None if plan.contour.x is None else plan.contour.x.tolist(),
+            **by_unit("q", plan.q, plan.robot),
+            "gamma_rad": plan.gamma.tolist(),
+            "lead_lean_rad": plan.tilt.tolist() if plan.tilt.any() else None,
+            "posture": plan.posture.tolist(),
+            "turn": plan.turn.tolist(),
+        },
+    }
+
+
+def broken_entry(name: str, broken: NoFeasiblePath, fastest: FastestSpeed | None) -> dict[str, Any]:
+    """Return what plan.json says of a contour without a feasible path."""
+    return {
+        "name": name,
+        "feasible": False,
+        "reason": str(broken),
+        "proved": broken.proved,
+        "last_node_reached": broken.node,
+        "counts": broken.counts,
+        "fastest_speed_m_s": None if fastest is None else fastest.speed,
+    }
+
+
+def _finite(rotation: Array | None) -> list[float | None] | None:
+    """Return limits with null, which JSON knows, for infinity, which it does not."""
+    return None if rotation is None else [v if np.isfinite(v) else None for v in rotation.tolist()]
+
+
+def _bands(comfort: Comfort | None) -> dict[str, Any] | None:
+    """Return the bands that are asked for, margins and widths in rad, m and m^3."""
+    if comfort is None:
+        return None
+    return {name: band for name, band in asdict(comfort).items() if band is not None}
+
+
+def _robot_entry(robot: Robot) -> dict[str, Any]:
+    return {
+        "id": robot.id,
+        "manufacturer": robot.manufacturer,
+        "model": robot.model,
+        "kinematics": robot.kinematics,
+        "geometry_m": dict(robot.geometry),
+        "sign": robot.sign.tolist(),
+        "offset_rad": robot.offset.tolist(),
+        "axis_3": robot.axis_3,
+        "T_base_foot": robot.T_base_foot.tolist(),
+        "T_end_flange": robot.T_end_flange.tolist(),
+        "chain": None
+        if robot.chain is None
+        else {name: getattr(robot.chain, name).tolist() for name in ("origins", "axes", "end")},
+    }
+
+
+def _limits_entry(robot: Robot) -> dict[str, Any]:
+    robot = robot.alone()
+    limits = robot.joint_limits()
+    velocity, acceleration = robot.speed_limits()
+    return {
+        "lower_rad": limits.lower.tolist(),
+        "upper_rad": limits.upper.tolist(),
+        "endless": robot.endless.tolist(),
+        "velocity_rad_s": velocity.tolist(),
+        "acceleration_rad_s2": acceleration.tolist(),
+        "acceleration_source": robot.acceleration_source,
+        "couplings": [
+            {"row": c.row.tolist(), "lower_rad": c.lower, "upper_rad": c.upper, "note": c.note}
+            for c in robot.couplings
+        ],
+    }
+
+
+def _cell_entry(cell: Cell) -> dict[str, Any]:
+    """Return what kept apart and how far: a record, as the cell itself is that of the job."""
+    return {
+        "bodies": [
+            {
+                "name": b.name,
+                "kind": b.kind,
+                "frame": b.frame,
+                "approximate": b.approximate,
+                "holds_the_real_one": b.holds,
+            }
+            for b in cell.bodies
+        ],
+        "near_miss_m": _pair_entries(cell),
+        "not_judged": [{"between": list(pair), "why": why} for pair, why in cell.unjudged.items()],
+        "not_proved": list(caveats(cell)),
+    }
+
+
+def _pair_entries(cell: Cell) -> list[dict[str, Any]]:
+    """Return what every judged pair keeps, what it is asked, and the overlap that is left out."""
+    rules = zip(cell.pair_names, cell.asked, cell.required, cell.depth, strict=True)
+    return [
+        {
+            "between": list(pair),
+            "at_least": float(required),
+            "asked": float(asked),
+            "overlap_by_design": float(depth),
+        }
+        for pair, asked, required, depth in rules
+    ]

@@ -1,0 +1,262 @@
+"""What a job asks of the program that cuts along the paths that were read, in its own language."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from kerfpath._arrays import Array, Bools, Ints
+from kerfpath._told import told
+from kerfpath.air import AirMove, backed_off
+from kerfpath.contour import Contour
+from kerfpath.job.format import ContourTask, Job
+from kerfpath.job.programs._read import ReadCut, branch_of, followed, poses_on_arc
+from kerfpath.planner import node_interval
+from kerfpath.plans import Plan
+from kerfpath.post import (
+    CircularMove,
+    JointMove,
+    Language,
+    LinearMove,
+    Program,
+    ReadProgram,
+    Rules,
+    Settings,
+    Step,
+    build_program,
+    said_in,
+)
+
+__all__ = ["AskedNodes", "asked_nodes", "asked_program"]
+
+REACH = 4.0
+"""Farther (m) than a tip is from any axis: the lever of what digits leave of joints."""
+POINT = 1e-5
+"""How far (m) a target beside the cut may be from where the job has it, beyond its digits."""
+ANGLE = np.radians(0.02)
+"""The same of the tool's orientation, rad."""
+SAME_BRANCH = 0.2
+"""How far (rad) joints may be apart that lead to the same pose: digits near a singularity."""
+SAME_SPEED = 1e-3
+"""Relative difference of speeds that one arc may have."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class AskedNodes:
+    """The nodes that a job asks for along a cut, and which of them its targets stand at.
+
+    Parameters
+    ----------
+    nodes : Contour
+        Of K nodes, with what they are.
+    time : (K,) s
+        When each is reached at the speed that is asked for.
+    at : (m,) int
+        The node of each target of the cut.
+    off : (m,) m
+        How far each is from it.
+    alone : (m,) bool
+        Targets that do not follow the node before, and are no arc either.
+    """
+
+    nodes: Contour
+    time: Array
+    at: Ints
+    off: Array
+    alone: Bools
+
+    __repr__ = told
+
+    @property
+    def complete(self) -> bool:
+        """Whether every node has its target, or lies on an arc between two."""
+        return not self.alone.any() and self.at[-1] == len(self.nodes) - 1
+
+
+def asked_nodes(
+    job: Job, task: ContourTask, cut: ReadCut, reference: Contour, s: Array
+) -> AskedNodes:
+    """Return the nodes that the job asks for along a cut, by the arc lengths s (m,) of its targets.
+
+    Where the job asks for finer intervals, those are taken if there are as many targets.
+    """
+    asked = task.sample(reference)
+    dt = node_interval(asked, task.speed if asked.time is None else None)
+    time: Array = dt * np.arange(len(asked), dtype=np.float64)
+    targets = cut.ends
+    if job.refine_parts > 1 and len(targets) > len(asked):
+        k = np.arange(len(asked))
+        fine = np.arange((len(asked) - 1) * job.refine_parts + 1) / job.refine_parts
+        asked, time = (
+            reference.at_nodes(np.interp(fine, k, asked.s)),
+            np.asarray(np.interp(fine, k, time)),
+        )
+    if len(targets) == len(asked):
+        at = np.arange(len(asked))
+    else:
+        at = np.abs(asked.s[None] - s[targets][:, None]).argmin(axis=1)
+    arc = np.array([move.kind == "circular" for move in cut.targets])
+    step = np.diff(at, prepend=-1)
+    return AskedNodes(
+        nodes=asked,
+        time=time,
+        at=at,
+        off=np.linalg.norm(cut.T_part_tip[targets, :3, 3] - asked.points[at], axis=1),
+        alone=np.where(arc, step < 1, step != 1),
+    )
+
+
+def asked_program(
+    job: Job, cuts: Sequence[tuple[ReadCut, AskedNodes, Plan]], home: Array,
+    language: Language, settings: Settings,
+) -> ReadProgram:  # fmt: skip
+    """Return what the job's program along the paths of these cuts would say, read back.
+
+    The paths, and with [sequence] the corners of the moves between them, are those that were read;
+    they are audited for themselves. All else is by the job: speeds, zones, waits, switches, how far
+    and which way the tool backs off.
+
+    Raises
+    ------
+    InputError
+        There is no such program: joints that leave the path, no way to back off.
+    """
+    rules, options = language.rules(settings), job.program
+    plans = [_whole(job, cut, asked, plan) for cut, asked, plan in cuts]
+    program = build_program(
+        plans,
+        moves=_moves(job, [cut for cut, _, _ in cuts], plans, home),
+        name=options.name,
+        retract=options.retract,
+        zone=options.zone,
+        lead_time=options.lead_time,
+        gas_lead=options.gas_lead,
+        pierce_time=options.pierce_time,
+        approach_speed=options.approach_speed,
+        air_speed=options.air_speed,
+        handshakes=options.handshakes,
+    )
+    sections = []
+    for section, (cut, asked, _) in zip(program.sections, cuts, strict=True):
+        steps = [
+            replace(step, q=_same_pose(program, step.q, cut.approach[-1], rules))
+            if isinstance(step, JointMove)
+            else step
+            for step in section.steps
+        ]
+        if options.arc_tolerance is not None:
+            steps = _with_arcs(steps, cut, asked)
+        sections.append(replace(section, steps=tuple(steps)))
+    return said_in(replace(program, sections=tuple(sections)), language, settings)
+
+
+def _whole(job: Job, cut: ReadCut, asked: AskedNodes, plan: Plan) -> Plan:
+    """Return the plan of a cut with a node wherever the job asks for one, along arcs, too."""
+    targets, at = cut.ends, asked.at
+    K = len(asked.nodes)
+    T, q = np.empty((K, 4, 4)), np.empty((K, cut.q.shape[1]))
+    T[at], q[at] = cut.T_part_tip[targets], cut.q[targets]
+    flange = np.linalg.inv(plan.T_flange_tip)
+    for j, move in enumerate(cut.targets):
+        first, last = at[max(j - 1, 0)], at[j]
+        if move.T_part_via is not None and last - first > 1:
+            inner = slice(first + 1, last)
+            s = asked.nodes.s[first : last + 1]
+            parts = ((s - s[0]) / (s[-1] - s[0]))[1:-1]
+            T[inner] = poses_on_arc(T[first], move.T_part_via, T[last], parts)
+            q[inner] = followed(plan.robot, plan.T_base_part @ T[inner] @ flange, q[first])
+    time = asked.time
+    if job.plan_options["feed"] != "constant":  # it may be slower, which is judged by itself
+        time = np.interp(np.arange(K), at, _as_fast(cut, asked.nodes.s[at]))
+    return replace(
+        plan,
+        contour=Contour(
+            T[:, :3, 3], T[:, :3, 2], s=asked.nodes.s, kind=asked.nodes.kind, name=plan.name
+        ),
+        q=q,
+        gamma=np.zeros(K),
+        time=time,
+        posture=np.full(K, branch_of(plan.robot, q[0])),
+        turn=np.zeros(q.shape, dtype=np.int64),
+    )
+
+
+def _as_fast(cut: ReadCut, s: Array) -> Array:
+    """Return when (s) the targets of a cut are reached at the speeds of the text, from 0 on."""
+    took = [
+        float(cut.took[a:b].sum()) if np.isnan(cut.speed[a]) else float(way / cut.speed[a])
+        for a, b, way in zip(cut.ends[:-1], cut.ends[1:], np.diff(s), strict=True)
+    ]
+    return np.append(0.0, np.cumsum(took))
+
+
+def _moves(job: Job, cuts: Sequence[ReadCut], plans: Sequence[Plan], home: Array) -> list[AirMove]:
+    """Return the moves between cuts with the corners that were read, and the job's home."""
+    if job.sequence is None:
+        return []
+    corners = [
+        [*cut.approach[:-1], backed_off(plan, "start", job.program.retract)]
+        for cut, plan in zip(cuts, plans, strict=True)
+    ]
+    backs = [backed_off(plan, "end", job.program.retract) for plan in plans]
+    ways = [[back, *way] for back, way in zip(backs, corners[1:], strict=False)]
+    if job.sequence.home_deg is not None:
+        there = np.radians(job.sequence.home_deg)
+        # At the end an endless joint is at home on whichever turn the motion has brought it to.
+        end = home[-1] if len(home) else backs[-1]
+        turns = np.round((end - there) / (2 * np.pi)) * job.robot.endless
+        ways = [[there, *corners[0][1:]], *ways, [backs[-1], *home[:-1], there + 2 * np.pi * turns]]
+    return [
+        AirMove(q=np.array(way), time=np.arange(len(way), dtype=float), clear=True) for way in ways
+    ]
+
+
+def _same_pose(program: Program, asked: Array, read: Array, rules: Rules) -> Array:
+    """Return the joints that were read, where they bring the tool to the pose that is asked for.
+
+    Near a singularity the digits of a pose leave more of joints than of the pose.
+    """
+    T = program.robot.forward(np.array([asked, read])) @ program.T_flange_tip
+    left = len(asked) * rules.angle_step
+    off = np.linalg.norm(T[0, :3, 3] - T[1, :3, 3])
+    turned = np.linalg.norm(T[0, :3, :3] - T[1, :3, :3]) / np.sqrt(2)
+    near = off <= POINT + rules.point_step + REACH * left and turned <= ANGLE + left
+    return read if near and np.abs(asked - read).max() <= SAME_BRANCH else asked
+
+
+def _with_arcs(steps: Sequence[Step], cut: ReadCut, asked: AskedNodes) -> list[Step]:
+    """Return the steps of a cut with arcs where it was read with arcs and there may be one."""
+    path = [k for k, step in enumerate(steps) if isinstance(step, LinearMove)]
+    found, done = list(steps[: path[0] + 1]), path[0] + 1
+    for j, move in enumerate(cut.targets[1:], 1):
+        first, last = path[asked.at[j - 1] + 1], path[asked.at[j]]
+        run = [step for step in steps[first : last + 1] if isinstance(step, LinearMove)]
+        found += steps[done:first]
+        done = last + 1
+        arc = move.T_part_via is not None and _is_one(run)
+        found += [_arc(run, move.T_part_via)] if arc else run
+    return [*found, *steps[done:]]
+
+
+def _is_one(run: Sequence[LinearMove]) -> bool:
+    """Return whether linear moves may be one: passed through, nothing switched, of one speed."""
+    speeds = [move.speed for move in run]
+    through = all(move.zone > 0 and not move.switches for move in run[:-1])
+    return through and max(speeds) - min(speeds) <= SAME_SPEED * speeds[0]
+
+
+def _arc(run: Sequence[LinearMove], T_part_via: Array | None) -> CircularMove:
+    end, via = run[-1], run[(len(run) - 1) // 2]
+    assert T_part_via is not None
+    return CircularMove(
+        T_part_via=T_part_via,
+        q_via=via.q,
+        T_part_tip=end.T_part_tip,
+        q=end.q,
+        speed=run[0].speed,
+        duration=sum(move.duration for move in run),
+        zone=end.zone,
+        switches=end.switches,
+    )

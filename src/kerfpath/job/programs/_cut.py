@@ -1,0 +1,207 @@
+"""The checks of one cut of a program: its path, motion, speeds, nodes and posture."""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy.spatial import cKDTree
+
+from kerfpath._arrays import Array
+from kerfpath.auditor import Check, Rounding, Unit, checks, rounding_of
+from kerfpath.cell import Cell
+from kerfpath.contour import KINDS, Contour
+from kerfpath.job.format import ContourTask, Job
+from kerfpath.job.programs._asked import AskedNodes, asked_nodes
+from kerfpath.job.programs._read import ReadCut
+from kerfpath.planner import node_interval
+from kerfpath.plans import Plan, Proof
+from kerfpath.plans import Settings as PlanSettings
+from kerfpath.post import Language, Rules, Settings
+
+__all__ = ["asked_times", "cut_checks", "row"]
+
+SAME_SPEED = 0.02
+"""Share by which a speed may differ from the one asked for, beyond its digits."""
+SAME_TIME = 2e-3
+"""How far (s) lead times and waits may differ from those asked for: controllers round them."""
+CLIMB = 0.05
+"""What a step along the path counts beside one away from it, where a place on it is looked for."""
+
+
+def row(code: str, title: str, value: float, limit: float, unit: Unit, node: int = 0) -> Check:
+    """Return a check, its numbers as Python's own."""
+    return Check(
+        code=code, title=title, value=float(value), limit=float(limit), unit=unit, node=node
+    )
+
+
+def cut_checks(
+    job: Job, task: ContourTask, cut: ReadCut, reference: Contour, cell: Cell | None,
+    chosen: Language, settings: Settings,
+) -> tuple[list[Check], tuple[AskedNodes, Plan] | None]:  # fmt: skip
+    """Return the checks of a cut, and its nodes and plan where it can be compared with the job."""
+    unreached = np.flatnonzero(np.isnan(cut.q).any(axis=1))
+    if unreached.size:
+        said = "targets out of the robot's reach in the posture of the start"
+        return [row("reach", said, unreached.size, 0, "count", int(unreached[0]))], None
+    s, ends = _along(cut, reference)
+    rows = [row("ends", "ends of the cut, off those of the contour", ends.max(), 1e-4, "m")]
+    if (np.diff(s) <= 0).any():
+        node = int(np.flatnonzero(np.diff(s) <= 0)[0])
+        said = "stretches that go back along the contour"
+        return [*rows, row("order", said, (np.diff(s) <= 0).sum(), 0, "count", node)], None
+    took = np.where(np.isnan(cut.speed), cut.took, np.diff(s) / cut.speed)
+    made = _plan(job, task, cut, s, np.append(0.0, np.cumsum(took)))
+    options = dict(job.audit_options)
+    if job.plan_options["tilt"] is not None:
+        options["axis_tolerance"] += job.plan_options["tilt"].cone
+    rules = chosen.rules(settings)
+    digits = _rounding(cut, made, rules)
+    rows += checks(made, reference=reference, cell=cell, rounding=digits, **options)
+    rows += _asked(job, task, cut, reference, made, digits.time, ahead=chosen.ahead)
+    rows += _postures(job, cut, chosen, settings, digits.q)
+    asked = asked_nodes(job, task, cut, reference, s)
+    off, alone = int(np.argmax(asked.off)), int(np.argmax(asked.alone))
+    said = "targets that leave a node of the job out, or are none"
+    rows += [
+        row("nodes", "targets, off the nodes that the job asks for", asked.off[off],
+               options["path_tolerance"], "m", int(cut.ends[off])),
+        row("every-node", said, asked.alone.sum(), 0, "count", int(cut.ends[alone])),
+    ]  # fmt: skip
+    return rows, (asked, made) if asked.complete else None
+
+
+def _along(cut: ReadCut, reference: Contour) -> tuple[Array, Array]:
+    """Return arc lengths (K,) of the nodes on the contour, and how far (2,) m its ends are off.
+
+    Where the contour comes by the same place twice, the share of the way decides.
+    """
+    points = cut.T_part_tip[:, :3, 3]
+    way = np.append(0.0, np.cumsum(np.linalg.norm(np.diff(points, axis=0), axis=1)))
+    guess = reference.s[0] + way / way[-1] * reference.length
+    fine = np.linspace(reference.s[0], reference.s[-1], 8 * len(reference))
+    at = np.unique(np.concatenate([reference.s, fine]))
+    tree = cKDTree(np.c_[reference.at(at)[0], CLIMB * at])
+    near = np.asarray(tree.query(np.c_[points, CLIMB * guess])[1])
+    s = at[near]
+    for _ in range(3):  # on the chords beside the nearest sample
+        before, after = (
+            reference.at(np.maximum(s - 1e-5, at[0]))[0],
+            reference.at(np.minimum(s + 1e-5, at[-1]))[0],
+        )
+        chord = after - before
+        step = ((points - reference.at(s)[0]) * chord).sum(axis=1) / np.maximum(
+            np.linalg.norm(chord, axis=1), 1e-12
+        )
+        s = np.clip(s + step, at[0], at[-1])
+    ends = np.linalg.norm(points[[0, -1]] - reference.points[[0, -1]], axis=1)
+    s[0], s[-1] = reference.s[0], reference.s[-1]
+    return s, ends
+
+
+def _plan(job: Job, task: ContourTask, cut: ReadCut, s: Array, time: Array) -> Plan:
+    """Return what the text says of a cut as a plan, so that it is audited as one."""
+    options, K = job.plan_options, len(cut.q)
+    weights = options["weights"]
+    return Plan(
+        contour=Contour(cut.T_part_tip[:, :3, 3], cut.T_part_tip[:, :3, 2], s=s, name=task.name),
+        robot=job.robot,
+        T_flange_tip=job.tool,
+        T_base_part=job.placement,
+        q=cut.q,
+        gamma=np.zeros(K),
+        posture=np.zeros(K, dtype=np.int64),
+        turn=np.zeros(cut.q.shape, dtype=np.int64),
+        time=time,
+        settings=PlanSettings(
+            gamma_step=options["gamma_step"],
+            frames=options["frames"],
+            method=options["method"],
+            objective=options["objective"],
+            metric=options["metric"],
+            weights=np.ones(job.robot.joints) if weights is None else np.asarray(weights),
+            eta_v=options["eta_v"],
+            eta_a=options["eta_a"],
+            rotation=options["rotation"],
+            comfort=options["comfort"],
+        ),
+        cost=0.0,
+        proof=Proof(optimal=False, statement="read from a program"),
+        counts={},
+    )
+
+
+def _rounding(cut: ReadCut, made: Plan, rules: Rules) -> Rounding:
+    """Return what the digits of a language leave of the joints and times of a cut."""
+    jointed = all(move.T_part_tip is None for move in cut.moves)
+    time = np.where(np.isnan(cut.speed), 0.0, rules.speed_step / 2 / cut.speed)
+    return rounding_of(made, rules.point_step, rules.angle_step, time, jointed=jointed)
+
+
+def _asked(
+    job: Job, task: ContourTask, cut: ReadCut, reference: Contour, made: Plan, digits: Array,
+    *, ahead: bool,
+) -> list[Check]:  # fmt: skip
+    """Compare speeds, switches and waits with what the job asks for.
+
+    Where the language cannot switch `ahead` of a target, it has to do so at the target.
+    """
+    s = made.contour.s
+    middle = (s[1:] + s[:-1]) / 2
+    asked, dt = asked_times(task, reference)
+    when = dt * np.arange(len(asked))
+    k = np.clip(np.searchsorted(reference.s, middle, side="right") - 1, 0, len(reference) - 1)
+    wanted = reference.kind[k] != KINDS.index("micro joint")
+    wrong = wanted != cut.laser
+    excess = np.diff(np.interp(s, asked.s, when)) / np.diff(made.time) - 1
+    if job.plan_options["feed"] == "constant":
+        excess = np.abs(excess)
+    fast = int(np.argmax(excess - digits))
+    node = int(np.argmax(wrong)) if wrong.any() else 0
+    lead = np.abs(cut.lead_times - (job.program.lead_time if ahead else 0.0))
+    wait = abs(float(cut.waits.sum()) - job.program.pierce_time)
+    lengths = np.diff(s)[wrong].sum()
+    return [
+        row(
+            "speed",
+            "speed, off the one asked for",
+            excess[fast],
+            SAME_SPEED + digits[fast],
+            "share",
+            fast,
+        ),
+        row("laser", "length with the laser wrongly on or off", lengths, 1e-6, "m", node),
+        row("laser-off", "laser left on at the end", cut.left_on, 0, "count", len(s) - 1),
+        row("lead-time", "lead time of the laser, off", lead.max(initial=0), SAME_TIME, "s"),
+        row("pierce", "wait at the start, off the one asked for", wait, SAME_TIME, "s"),
+    ]
+
+
+def asked_times(task: ContourTask, reference: Contour) -> tuple[Contour, float]:
+    """Return the nodes that are asked for and the time (s) between them."""
+    asked = task.sample(reference)
+    return asked, node_interval(asked, task.speed if asked.time is None else None)
+
+
+def _postures(
+    job: Job, cut: ReadCut, chosen: Language, settings: Settings, left: Array
+) -> list[Check]:
+    """Count targets whose words of posture and turns are not those of the joints there.
+
+    Joints are `left` (K, n) rad to digits: where they are that near to where a word changes, both
+    words are right.
+    """
+    moves, q = (*cut.moves, cut.group.path[-1]), np.vstack([cut.q, cut.q_out])
+    left = np.vstack([left, left[-1:]])
+    told = [k for k in (*cut.ends.tolist(), len(cut.moves)) if moves[k].posture]
+    if not told or chosen.posture is None:
+        return []
+    ways = [q[told] + sign * left[told] for sign in (0, -1, 1)]
+    expected = zip(*(chosen.posture(job.robot, way, settings) for way in ways), strict=True)
+    wrong = [
+        k
+        for k, words in zip(told, expected, strict=True)
+        if len(moves[k].posture) != len(words[0])
+        or any(said not in right for said, *right in zip(moves[k].posture, *words, strict=True))
+    ]
+    said = "targets whose posture or turn is not the motion's"
+    return [row("posture", said, len(wrong), 0, "count", wrong[0] if wrong else 0)]

@@ -1,0 +1,272 @@
+"""Work with a plan.json again: audit it, and write its program."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import fields, replace
+from pathlib import Path
+from typing import Any, TypeVar
+
+import numpy as np
+from pydantic import BaseModel
+
+from kerfpath.auditor import Check, checks
+from kerfpath.errors import AuditFailed, InputError, NoFeasiblePath
+from kerfpath.job.format import (
+    AuditTable,
+    Job,
+    LayoutTable,
+    ProgramOptions,
+    ProgramTable,
+    SequenceTable,
+    audit_options,
+    program_options,
+    read_job,
+)
+from kerfpath.job.plan_file import (
+    Asked,
+    Audited,
+    PlanAudit,
+    PlanFile,
+    asked_of,
+    read_plan_file,
+    table_of,
+)
+from kerfpath.job.programs._audit import ProgramAsked
+from kerfpath.job.programs._build import asked_of_plans, program_of
+from kerfpath.placement import MeasuredFrame, placed, placed_moves, planned_again
+from kerfpath.plans import Plan
+from kerfpath.post import language as find_language
+
+__all__ = ["program_from_file", "program_language", "require_same"]
+
+LED_NOTE = (
+    "The joints are led to the measured part and audited there for path, limits, velocities and "
+    "accelerations; collisions are not checked there, as its cell is not known: simulate the "
+    "program in the cell before running it."
+)
+LED_MOVES_NOTE = (
+    "The moves between contours are straight joint motions between their new ends, and not proved "
+    "clear any more."
+)
+_M = TypeVar("_M", bound=BaseModel)
+
+
+SAME_PLACE = 1e-6
+"""m: what a plan.json and its job say of the same place differs by rounding at most."""
+
+
+def program_from_file(
+    plan_file: Path,
+    language: str | None = None,
+    *,
+    name: str | None = None,
+    strict: bool = False,
+    job_file: Path | None = None,
+    dry_share: float | None = None,
+    frame: MeasuredFrame | None = None,
+) -> tuple[dict[str, str], list[str]]:
+    """Return the files of a plan.json's program in a language, and its preflight's warnings.
+
+    Parameters
+    ----------
+    plan_file : Path
+    language : str, optional
+        Default: that of the job.
+    name : str, optional
+        Of the program, where it is not to be that of the job.
+    strict : bool
+        Refuse what is only warned of otherwise.
+    job_file : Path, optional
+        The job as it is now: its [program] is taken, and the plans are audited against its drawing
+        and in its cell. Default: [program] as it was when the plan was made, and no cell.
+    dry_share : float, optional
+        Make it a dry run at this share of the speed, see `kerfpath.post.dry_run`.
+    frame : MeasuredFrame, optional
+        Where the part really stands; the plans are led there and audited, but for collisions.
+
+    Raises
+    ------
+    AuditFailed
+        A contour has no plan, its plan fails the audit, which is run again here, or the program
+        does, as its language says it.
+    NoFeasiblePath
+        The robot does not reach the measured part as planned.
+    InputError
+        The file cannot be read, an unknown language, a program that its preflight refuses, or moves
+        around obstacles that cannot be led to a measured part.
+    """
+    file = read_plan_file(plan_file)
+    if file.missing:
+        raise AuditFailed(f"no program: {', '.join(file.missing)} has no plan")
+    if file.failed:
+        raise AuditFailed(
+            f"no program: {', '.join(file.failed)} failed the audit against the drawing when it "
+            "was planned; mend the job and plan it again"
+        )
+    notes, to_do = [], None
+    if job_file is not None:
+        if frame is not None:
+            raise InputError(
+                f"{job_file}: the cell of a job says nothing of a part that was measured; give "
+                "one of the two"
+            )
+        asked = _as_planned(asked_of(read_job(job_file)), file)
+        _require_passed(PlanAudit(asked=asked).audited(plan_file))
+        if asked.job.interruptions == "none":
+            to_do = ProgramAsked.by(asked)
+        file = replace(file, job=asked.job.source)
+    options = _options(
+        file,
+        language or program_language(file.job, job_file or plan_file),
+        (job_file or plan_file).stem,
+    )
+    options = options if name is None else replace(options, name=name)
+    if frame is not None:
+        file, again = _led(file, frame, options.retract)
+        notes += [*again, LED_NOTE, *([LED_MOVES_NOTE] if file.moves else [])]
+    limits = table_of(file, "audit", AuditTable, audit_options)
+    for p in file.plans:
+        for check in checks(p, **limits):
+            if check.level == "error" and not check.ok:
+                there = "" if frame is None else " at the measured placement"
+                raise AuditFailed(
+                    f"no program: contour {p.name!r} fails its audit{there}: {check.issue()}"
+                )
+    files, warnings = program_of(
+        file.plans,
+        options,
+        file.moves,
+        asked=to_do or asked_of_plans(_job_of(file, options), file.plans),
+        strict=strict,
+        dry_share=dry_share,
+    )
+    return files, notes + warnings
+
+
+def program_language(source: Mapping[str, Any], path: Path) -> str:
+    """Return the language that a job, as it was read, asks for; `path` is where it stands.
+
+    Raises
+    ------
+    InputError
+        It asks for none.
+    """
+    name = str(source.get("program", {}).get("language", ProgramTable().language))
+    if name == "none":
+        raise InputError(
+            f"{path}: its job asks for no program; say with --language in which one is to be"
+        )
+    return name
+
+
+def _job_of(file: PlanFile, options: ProgramOptions) -> Job:
+    """Return what a plan.json keeps of its job: all but the drawing and the cell."""
+    first = file.plans[0]
+    asked, sequence = first.settings, file.job.get("sequence")
+    return Job(
+        path=file.path,
+        robot=first.robot,
+        tool=first.T_flange_tip,
+        placement=first.T_base_part,
+        part_file=file.path,
+        part_unit=None,
+        contours=(),
+        plan_options={field.name: getattr(asked, field.name) for field in fields(asked)}
+        | {"feed": "constant" if all(p.feed is None for p in file.plans) else "dip"},
+        refine_parts=1,
+        interruptions="none",
+        least_piece=None,
+        cell=None,
+        sequence=None if sequence is None else table_of(file, "sequence", SequenceTable, _same),
+        layout=LayoutTable(),
+        audit_options=table_of(file, "audit", AuditTable, audit_options),
+        program=options,
+        source=file.job,
+    )
+
+
+def _same(table: _M) -> _M:
+    return table
+
+
+def _as_planned(asked: Asked, file: PlanFile) -> Asked:
+    """Return what a job asks for, with the [program] that a plan.json was made with.
+
+    Retract, air and pierce times of the plan follow from that one. The program is built with that
+    of the job as it is now, and refused where the planned moves do not meet its retract.
+    """
+    stem = asked.job.path.stem
+    then = table_of(file, "program", ProgramTable, lambda table: program_options(table, stem))
+    return replace(asked, job=replace(asked.job, program=then))
+
+
+def _require_passed(found: Audited) -> None:
+    for name, table in found.tables.items():
+        for check in table:
+            own = check.code == "job-program"  # [program] is taken from the job as it is now
+            if check.level == "error" and not check.ok and not own:
+                raise AuditFailed(f"no program: {name!r} fails its audit: {check.issue()}")
+
+
+def _led(file: PlanFile, frame: MeasuredFrame, retract: float) -> tuple[PlanFile, list[str]]:
+    """Return a plan.json with its plans and the moves between them led to a measured part.
+
+    A contour that would not pass its audit there is planned again around it; notes say which.
+    """
+    asked, plans, notes = table_of(file, "audit", AuditTable, audit_options), [], []
+    for p in file.plans:
+        led, why = _there(p, frame, asked)
+        if why:
+            try:
+                led = planned_again(p, frame.T_base_part)
+            except NoFeasiblePath as broken:
+                raise broken.retold(
+                    f"contour {p.name!r}: led to the measured placement {why}, and planned again "
+                    f"there: {broken}"
+                ) from None
+            notes.append(f"Contour {p.name!r} was planned again there; only led there {why}.")
+        plans.append(led)
+    moves = placed_moves(file.moves, plans, retract)
+    return replace(file, plans=tuple(plans), moves=moves, in_cell=False), notes
+
+
+def _there(p: Plan, frame: MeasuredFrame, asked: dict[str, Any]) -> tuple[Plan, str]:
+    """Return a plan led to a measured part, and what then fails; empty where nothing does."""
+    try:
+        led = placed(p, frame.T_base_part)
+    except NoFeasiblePath as away:
+        return p, f"it fails: {away}"
+    failed = first_failed(checks(led, **asked))
+    return led, "" if failed is None else f"it fails: {failed.issue()}"
+
+
+def first_failed(table: Sequence[Check]) -> Check | None:
+    """Return the first check that is an error; None where the plan passes."""
+    return next((check for check in table if check.level == "error" and not check.ok), None)
+
+
+def _options(file: PlanFile, language: str, stem: str) -> ProgramOptions:
+    find_language(language)
+    return table_of(
+        file,
+        "program",
+        ProgramTable,
+        lambda table: program_options(table, stem),
+        language=language,
+    )
+
+
+def require_same(plan: Plan, job: Job, path: Path) -> None:
+    """Raise InputError where a plan's tool, part or arm is not where the job has it."""
+    pairs = {
+        "tool": (plan.T_flange_tip, job.tool),
+        "part": (plan.T_base_part, job.placement),
+        "robot": (plan.robot.forward(plan.q[:1]), job.robot.forward(plan.q[:1])),
+    }
+    for name, (here, there) in pairs.items():
+        if np.abs(here - there).max() > SAME_PLACE:
+            raise InputError(
+                f"{job.path}: its {name} is not where that of {path} is; give the job of that "
+                "plan, or plan it again"
+            )

@@ -1,0 +1,339 @@
+"""A program on disk, and the motions that its text means."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from scipy.spatial.transform import Rotation, Slerp
+
+from kerfpath._arrays import Array, Bools, Ints
+from kerfpath._told import told
+from kerfpath.errors import InputError
+from kerfpath.job.format import Job, ProgramTable
+from kerfpath.post import (
+    Language,
+    ReadGroup,
+    ReadMove,
+    ReadProgram,
+    Settings,
+    circle_through,
+    groups_of,
+    languages,
+    read_program,
+    with_tips,
+)
+from kerfpath.robots import Robot
+
+__all__ = [
+    "ReadCut",
+    "at_interval",
+    "branch_of",
+    "cuts_of",
+    "followed",
+    "language_of",
+    "poses_on_arc",
+    "program_on_disk",
+]
+
+ARC_STEP = np.radians(2.0)
+"""Sweep between the nodes that an arc has, where it is not known which contour it is of."""
+COARSEST = np.radians(45.0)
+"""The same at most, where it is."""
+
+
+class _Folder(Mapping[str, str]):
+    """The text files of a folder by name, read when they are asked for."""
+
+    def __init__(self, folder: Path) -> None:
+        self.folder = folder
+
+    def __getitem__(self, name: str) -> str:
+        path = self.folder / name
+        if not path.is_file():
+            raise KeyError(name)
+        try:
+            return path.read_bytes().decode("utf-8-sig")
+        except (OSError, UnicodeDecodeError) as error:
+            why = " ".join(str(error).split())
+            raise InputError(f"{path}: cannot be read as a text ({why})") from None
+
+    def __iter__(self) -> Iterator[str]:
+        return (path.name for path in self.folder.iterdir())
+
+    def __len__(self) -> int:
+        return sum(1 for _ in self.folder.iterdir())
+
+
+def language_of(path: Path, job: Job) -> tuple[Language, Settings]:
+    """Return the language of a program by the suffix of its file, and the job's settings for it.
+
+    Raises
+    ------
+    InputError
+        No language, or none with a reader, writes such files.
+    """
+    known = languages()
+    fitting = [each for each in known.values() if each.suffix.lower() == path.suffix.lower()]
+    own = [each for each in fitting if each.name == job.program.language]
+    if not fitting:
+        suffixes = ", ".join(sorted(each.suffix for each in known.values()))
+        raise InputError(f"{path}: expected a program ({suffixes}) or a plan.json")
+    chosen = (own or fitting)[0]
+    table = {**job.source.get("program", {}), "language": chosen.name}
+    settings = ProgramTable.model_validate(table).settings()
+    assert settings is not None
+    return chosen, settings
+
+
+def program_on_disk(path: Path, chosen: Language, settings: Settings, robot: Robot) -> ReadProgram:
+    """Return what the program that starts with the file at `path` says.
+
+    Raises
+    ------
+    InputError
+        The file cannot be read, or is not of our making: where, in one line.
+    """
+    if not path.is_file():
+        raise InputError(f"{path}: no such file; give the path of a program or a plan.json")
+    return read_program(_Folder(path.parent), chosen.name, robot, settings, main=path.name)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class ReadCut:
+    """One cut of a program: what lies between going down to the part and backing off it.
+
+    Parameters
+    ----------
+    name : str
+        Of the routine that it begins in.
+    approach : (m, n) rad
+        Corners of the joint moves on the way to it.
+    q : (K, n) rad
+        Joints at its nodes, on the branch that the joint moves lead to; NaN out of reach.
+    T_part_tip : (K, 4, 4) m
+    took : (K-1,) s
+        How long each stretch takes along its chord, or as long as the text says.
+    speed : (K-1,) m/s
+        Along each stretch; NaN where the text says times.
+    laser : (K-1,) bool
+        Whether the laser is on along each stretch.
+    left_on : bool
+        Whether it is on while the tool backs off.
+    lead_times : (s,) s
+        Of the switches of the laser.
+    waits : (w,) s
+        At its first node.
+    q_out : (n,) rad
+        Where the tool has backed off to.
+    moves : tuple of ReadMove
+        The move to each node.
+    ends : (m,) int
+        The node that each target of the text stands at; an arc has nodes between.
+    group : ReadGroup
+        What it was made of.
+    """
+
+    name: str
+    approach: Array
+    q: Array
+    T_part_tip: Array
+    took: Array
+    speed: Array
+    laser: Bools
+    left_on: bool
+    lead_times: Array
+    waits: Array
+    q_out: Array
+    moves: tuple[ReadMove, ...]
+    ends: Ints
+    group: ReadGroup
+
+    __repr__ = told
+
+    @property
+    def targets(self) -> tuple[ReadMove, ...]:
+        """The moves to its first node and on, each once."""
+        return tuple(self.moves[k] for k in self.ends)
+
+
+def cuts_of(
+    read: ReadProgram, robot: Robot, T_flange_tip: Array, T_base_part: Array
+) -> tuple[list[ReadCut], Array]:
+    """Return the cuts of a program in order, and the corners (m, n) rad of the way home.
+
+    Raises
+    ------
+    InputError
+        Moves in an order that makes no cut: where.
+    """
+    groups = groups_of(with_tips(read, robot, T_flange_tip, T_base_part))
+    home = np.zeros((0, robot.joints))
+    if groups and not groups[-1].path:
+        home = np.array([move.q for move in groups.pop().joint])
+    cuts = []
+    for group in groups:
+        if not group.joint:
+            raise InputError(f"{group.path[0].place}: expected a joint move before the path")
+        if len(group.path) < 4:
+            raise InputError(
+                f"{group.path[-1].place}: expected a way down, a cut and a way back, got "
+                f"{len(group.path)} moves"
+            )
+        cuts.append(_cut(group, robot, T_flange_tip, T_base_part))
+    return cuts, home
+
+
+def at_interval(
+    cut: ReadCut, interval: float, robot: Robot, T_flange_tip: Array, T_base_part: Array
+) -> ReadCut:
+    """Return a cut whose arcs have a node at each interval (s), as straight moves would have.
+
+    So rates along arcs, and where arcs end, are judged over the same times as all others.
+    """
+    if all(move.kind != "circular" for move in cut.moves):
+        return cut
+    return _cut(cut.group, robot, T_flange_tip, T_base_part, interval)
+
+
+def _cut(
+    group: ReadGroup,
+    robot: Robot,
+    T_flange_tip: Array,
+    T_base_part: Array,
+    interval: float | None = None,
+) -> ReadCut:
+    """Return the cut of a group; an arc gets nodes of its own along it."""
+    T: list[Array] = []
+    took: list[float] = []
+    moves: list[ReadMove] = []
+    ends: list[int] = []
+    on: list[bool] = []
+    laser = False
+    for move in group.path:
+        end = move.T_part_tip
+        assert end is not None
+        stops = [end]
+        if T and move.kind == "circular" and move.T_part_via is not None:
+            stops = _arc(T[-1], move.T_part_via, end, move, interval)
+        for stop in stops:
+            if T:
+                took.append(_duration(move, T[-1], stop, len(stops)))
+                on.append(laser)
+            T.append(np.asarray(stop))
+            moves.append(move)
+        ends.append(len(T) - 1)
+        for switch in move.switches:
+            laser = switch.on if switch.signal == "laser" else laser
+    poses = np.array(T)
+    q = followed(robot, T_base_part @ poses @ np.linalg.inv(T_flange_tip), _q(group.joint[-1]))
+    last = len(poses) - 1
+    switches = [s for move in group.path for s in move.switches if s.signal == "laser"]
+    return ReadCut(
+        name=group.name,
+        approach=np.array([_q(move) for move in group.joint]),
+        q=q[:last],
+        T_part_tip=poses[:last],
+        took=np.array(took[: last - 1]),
+        speed=np.array([_speed(move) for move in moves[1:last]]),
+        laser=np.array(on[: last - 1], dtype=bool),
+        left_on=on[last - 1],
+        lead_times=np.array([switch.lead_time for switch in switches]),
+        waits=np.array([wait.time for at, wait in group.waits if at == 1]),
+        q_out=q[last],
+        moves=tuple(moves[:last]),
+        ends=np.array(ends[:-1]),
+        group=group,
+    )
+
+
+def _duration(move: ReadMove, start: Array, end: Array, parts: int) -> float:
+    """Return how long (s) a move, or one of so many parts of it, takes."""
+    if move.duration is not None:
+        return move.duration / parts
+    if not move.speed:
+        raise InputError(f"{move.place}: neither a speed nor a time is said for the move")
+    return float(np.linalg.norm(end[:3, 3] - start[:3, 3])) / move.speed
+
+
+def _speed(move: ReadMove) -> float:
+    return np.nan if move.speed is None or move.duration is not None else move.speed
+
+
+def _q(move: ReadMove) -> Array:
+    if move.q is None:
+        raise InputError(f"{move.place}: a joint move says no joints")
+    return move.q
+
+
+def _arc(
+    start: Array, via: Array, end: Array, move: ReadMove, interval: float | None
+) -> list[Array]:
+    """Return poses along the arc after `start`, its end included, the tool turning evenly.
+
+    They are `ARC_STEP` apart, or as far as the robot comes in an interval (s), but no farther than
+    `COARSEST`.
+    """
+    circle = circle_through(start[:3, 3], via[:3, 3], end[:3, 3])
+    if circle is None:
+        return [via, end]  # on one line
+    sweep = _sweep(circle, start, end)
+    count = int(np.ceil(sweep / ARC_STEP))
+    if interval is not None:
+        took = move.duration
+        if took is None and move.speed:
+            took = sweep * circle[2] / move.speed
+        if took is not None:
+            count = max(round(took / interval), int(np.ceil(sweep / COARSEST)))
+    return list(poses_on_arc(start, via, end, np.linspace(0, 1, max(count, 1) + 1)[1:]))
+
+
+def poses_on_arc(start: Array, via: Array, end: Array, parts: Array) -> Array:
+    """Return the poses (m, 4, 4) at shares (m,) of the arc from `start` by `via` to `end`.
+
+    On a straight line where the three points are.
+    """
+    circle = circle_through(start[:3, 3], via[:3, 3], end[:3, 3])
+    poses = np.tile(np.eye(4), (len(parts), 1, 1))
+    turned = Slerp([0.0, 1.0], Rotation.from_matrix(np.array([start[:3, :3], end[:3, :3]])))
+    poses[:, :3, :3] = turned(parts).as_matrix()
+    if circle is None:
+        poses[:, :3, 3] = start[:3, 3] + parts[:, None] * (end[:3, 3] - start[:3, 3])
+        return poses
+    centre, normal, _ = circle
+    x = start[:3, 3] - centre
+    at = (parts * _sweep(circle, start, end))[:, None]
+    poses[:, :3, 3] = centre + np.cos(at) * x + np.sin(at) * np.cross(normal, x)
+    return poses
+
+
+def _sweep(circle: tuple[Array, Array, float], start: Array, end: Array) -> float:
+    """Return how far (rad) an arc turns from its start to its end."""
+    centre, normal, _ = circle
+    x, last = start[:3, 3] - centre, end[:3, 3] - centre
+    return float(np.arctan2(last @ np.cross(normal, x), last @ x) % (2 * np.pi))
+
+
+def branch_of(robot: Robot, q: Array) -> int:
+    """Return which posture joints (n,) are in."""
+    solved, reach = robot.inverse_all(robot.forward(q)[None])
+    apart = np.abs((solved[0] - q + np.pi) % (2 * np.pi) - np.pi).max(axis=1)
+    return int(np.argmin(np.where(reach[0], apart, np.inf)))
+
+
+def followed(robot: Robot, T: Array, q0: Array) -> Array:
+    """Return joints (K, n) at flange poses T (K, 4, 4), on the branch of q0; NaN out of reach."""
+    posture = branch_of(robot, q0)
+    if robot.family.follow_all is None:
+        q = robot.follow(T, np.tile(q0, (len(T), 1)), np.full(len(T), posture))
+        good = ~np.isnan(q).any(axis=1)
+        q[good] = np.unwrap(np.vstack([q0, q[good]]), axis=0)[1:]
+        return q
+    q, branch = np.empty((len(T), robot.joints)), np.array([posture])
+    before = q0
+    for k, pose in enumerate(T):
+        q[k] = robot.follow(pose[None], before[None], branch)[0]
+        before = before if np.isnan(q[k]).any() else q[k]
+    return q

@@ -1,0 +1,254 @@
+"""Targets of a program that a person has moved by hand, and the job planned again around them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+
+from kerfpath._arrays import Array, Ints
+from kerfpath._told import told
+from kerfpath.cad import Part
+from kerfpath.cad import read as read_drawing
+from kerfpath.contour import Contour, angle_between
+from kerfpath.errors import InputError
+from kerfpath.job.format import Job, read_job
+from kerfpath.job.plan_file import PlanFile, read_plan_file
+from kerfpath.job.programs._build import asked_of_plans, program_of
+from kerfpath.job.programs._from_plan import require_same
+from kerfpath.job.programs._read import language_of, program_on_disk
+from kerfpath.job.run import Given, Outcome, Progress, run_job
+from kerfpath.operations import touched_up
+from kerfpath.plans import Plan
+from kerfpath.post import ReadGroup, ReadMove, differences, groups_of, read_program, with_tips
+
+__all__ = ["Taught", "TouchUp", "touch_up"]
+
+MOVED = 1e-6
+"""A target that is nearer (m) to where it was planned was not moved."""
+TURNED = np.radians(1e-3)
+"""The same of its axis, rad."""
+MOST_MOVED = 0.1
+"""Share of the targets; where more were moved it is the part that stands elsewhere."""
+SAME_PATH = 1e-5
+"""A plan whose nodes leave the drawing's path by more (m) was touched up before."""
+ALONG = ("added", "removed", "order", "kinds")
+"""Differences that are none of moved targets."""
+MEASURE = "a part that stands elsewhere is measured: kerfpath post PLAN.json --measured POINTS.csv"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Taught:
+    """A target that a person has moved.
+
+    Parameters
+    ----------
+    contour : str
+    node : int
+    place : str
+        File and line.
+    off : float m
+        From where it was planned.
+    turned : float rad
+        Of its tool axis.
+    """
+
+    contour: str
+    node: int
+    place: str
+    off: float
+    turned: float
+
+    __repr__ = told
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class TouchUp:
+    """A job planned again around moved targets.
+
+    Parameters
+    ----------
+    part : Part
+    outcome : Outcome
+    targets : tuple of Taught
+    notes : tuple of str
+        What else was changed in the program, and is not kept.
+    """
+
+    part: Part
+    outcome: Outcome
+    targets: tuple[Taught, ...]
+    notes: tuple[str, ...]
+
+    __repr__ = told
+
+
+def touch_up(
+    program: Path,
+    plan_file: Path,
+    job_file: Path,
+    *,
+    ease: float = 0.01,
+    progress: Progress = lambda what, done, total: None,
+) -> TouchUp:
+    """Return what comes of planning a job again around the targets moved in its program.
+
+    Moved nodes keep tip and axis as taught, and the path eases back to the planned one; the
+    rotation about the beam is planned again. Starts, directions, order and postures stay.
+
+    Parameters
+    ----------
+    program : Path
+        The edited program, the file that is started.
+    plan_file : Path
+        The plan.json that it was written from.
+    job_file : Path
+        The job of that plan.
+    ease : float m
+        Distance along the path over which a shift fades out.
+
+    Raises
+    ------
+    InputError
+        A file cannot be read, does not belong to the others, or is of a kind that cannot be
+        touched up; no target was moved, the start of a contour, a frame, or more than a tenth.
+    """
+    job, file = read_job(job_file), read_plan_file(plan_file)
+    _require_kind(job, file)
+    part = read_drawing(job.part_file, unit=job.part_unit)
+    groups, notes = _edited(program, job, file)
+    targets = [
+        _taught(p, group.path[: len(p.contour)])
+        for p, group in zip(file.plans, groups, strict=True)
+    ]
+    _require_few(program, targets, file.plans)
+    given = {}
+    tasks = {task.name: task for task in job.tasks(part)}
+    if set(tasks) != set(file.contours.values()):
+        raise InputError(
+            f"{job.path}: has other contours than {file.path}; give the job of that plan"
+        )
+    for p, moved, group in zip(file.plans, targets, groups, strict=True):
+        path, nodes = _planned_from(p, tasks[p.name].candidates(part), tasks[p.name].sample)
+        if moved:
+            k = np.array([target.node for target in moved])
+            T = np.array([group.path[node].T_part_tip for node in k])
+            path, keep = touched_up(path, nodes, k, T[:, :3, 3], T[:, :3, 2], ease=ease)
+            nodes = _sampled(path, nodes, keep, tasks[p.name].speed)
+        postures = np.unique(p.posture).tolist()
+        given[p.name] = Given(path=path, nodes=nodes, postures=postures, touched=bool(moved))
+    if job.sequence is not None:
+        job = replace(job, sequence=job.sequence.model_copy(update={"order": "given"}))
+    outcome = run_job(job, part, given=given, progress=progress)
+    found = tuple(target for moved in targets for target in moved)
+    return TouchUp(part=part, outcome=outcome, targets=found, notes=tuple(notes))
+
+
+def _require_kind(job: Job, file: PlanFile) -> None:
+    """Raise InputError where job and plan do not belong together, or are not for touching up."""
+    options = job.plan_options
+    kinds = (
+        (job.interruptions != "none", "interruptions"),
+        (options["tilt"] is not None, "a tilt of the tool axis"),
+        (job.refine_parts > 1, "refine_parts"),
+        (job.program.arc_tolerance is not None, "arcs_mm"),
+    )
+    for found, words in kinds:
+        if found:
+            raise InputError(
+                f"{job.path}: programs of jobs with {words} cannot be touched up; remove it and "
+                "plan the job again"
+            )
+    if file.missing or file.failed:
+        names = ", ".join(file.missing + file.failed)
+        raise InputError(f"{file.path}: {names} has no plan that passed; plan the job again")
+    for p in file.plans:
+        require_same(p, job, file.path)
+
+
+def _edited(program: Path, job: Job, file: PlanFile) -> tuple[list[ReadGroup], list[str]]:
+    """Return what an edited program does, a group for each plan, and what else was changed."""
+    chosen, settings = language_of(program, job)
+    options = replace(job.program, language=chosen.name, settings=settings)
+    texts, _ = program_of(file.plans, options, file.moves, asked=asked_of_plans(job, file.plans))
+    planned, edited = (
+        with_tips(read, job.robot, job.tool, job.placement)
+        for read in (
+            read_program(texts, chosen.name, job.robot, settings),
+            program_on_disk(program, chosen, settings, job.robot),
+        )
+    )
+    found = {each.code: each for each in differences(planned, edited)}
+    if "frames" in found:
+        raise InputError(f"{program}: {found['frames'].message}; {MEASURE}")
+    for code in ALONG:
+        if code in found:
+            raise InputError(
+                f"{program}: {found[code]}; only moved targets are taken over: change the job and "
+                "plan it again"
+            )
+    notes = [f"not kept: {each}" for code, each in found.items() if code != "targets"]
+    return [group for group in groups_of(edited) if group.path], notes
+
+
+def _taught(p: Plan, moves: Sequence[ReadMove]) -> list[Taught]:
+    """Return the targets of a contour that are not where they were planned."""
+    T = np.array([move.T_part_tip for move in moves])
+    off = np.linalg.norm(T[:, :3, 3] - p.contour.points, axis=1)
+    turned = angle_between(p.contour.axes, T[:, :3, 2])
+    return [
+        Taught(
+            contour=p.name, node=k, place=moves[k].place, off=float(off[k]), turned=float(turned[k])
+        )
+        for k in np.flatnonzero((off > MOVED) | (turned > TURNED)).tolist()
+    ]
+
+
+def _require_few(program: Path, targets: Sequence[Sequence[Taught]], plans: Sequence[Plan]) -> None:
+    moved = [target for each in targets for target in each]
+    total = sum(len(p.contour) for p in plans)
+    if not moved:
+        raise InputError(f"{program}: no target on a contour was moved; there is nothing to do")
+    if len(moved) > MOST_MOVED * total:
+        raise InputError(f"{program}: {len(moved)} of {total} targets were moved; {MEASURE}")
+    for p, each in zip(plans, targets, strict=True):
+        ends = (0, len(p.contour) - 1) if p.contour.returns else (0,)
+        for target in each:
+            if target.node in ends:
+                raise InputError(
+                    f"{target.place}: the {'end' if target.node else 'start'} of contour "
+                    f"{target.contour!r} was moved; say another start in the job and plan it again;"
+                    f" {MEASURE}"
+                )
+
+
+def _planned_from(
+    p: Plan, candidates: Sequence[Contour], sample: Callable[[Contour], Contour]
+) -> tuple[Contour, Contour]:
+    """Return the path that a plan's nodes were sampled from, and the nodes.
+
+    Those of a plan that was touched up before are its own, with straight lines between.
+    """
+    for path in candidates:
+        if _apart(p.contour, path) < SAME_PATH:
+            nodes = sample(path)
+            if len(nodes) == len(p.contour):
+                return path, nodes
+    slowed = bool((p.contour.speed_share < 1).any())
+    return p.contour, replace(p.contour, time=p.time if slowed else None)
+
+
+def _sampled(path: Contour, nodes: Contour, keep: Ints, speed: float) -> Contour:
+    """Return a touched-up path sampled as finely as the nodes that it replaces."""
+    if nodes.time is not None:
+        return path.resample(dt=float(np.diff(nodes.time).max()), speed=speed, keep=keep)
+    return path.resample(spacing=float(np.diff(nodes.s).max()), keep=keep)
+
+
+def _apart(planned: Contour, path: Contour) -> float:
+    """Return how far (m) nodes and axes are from a path at the same arc lengths."""
+    points, axes = path.at(planned.s)
+    off: Array = np.linalg.norm(planned.points - points, axis=1)
+    return float(np.maximum(off, angle_between(planned.axes, axes)).max())

@@ -1,0 +1,137 @@
+"""What came of one contour of a job."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+from kerfpath._told import told
+from kerfpath.auditor import Check
+from kerfpath.cad import Departure, Part, departure_from
+from kerfpath.contour import Contour
+from kerfpath.errors import NoFeasiblePath
+from kerfpath.graph import LayeredGraph
+from kerfpath.job.format import ContourTask
+from kerfpath.planner import FINER, ON_THIS_GRID, ClearanceMap, FastestSpeed, at_least, at_most
+from kerfpath.plans import Plan
+from kerfpath.search import Relaxations
+
+__all__ = ["Cut"]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Cut:
+    """What came of one contour of a job, or of one piece of it.
+
+    Parameters
+    ----------
+    contour : str
+        What the job calls the contour.
+    task : ContourTask
+    drawn : Contour
+        The loop as drawn, densely sampled, part frame.
+    nodes : Contour
+        Its nodes, part frame.
+    graph : LayeredGraph
+    plan : Plan or None
+        None when no feasible path was found.
+    broken : NoFeasiblePath or None
+        Why there is no plan.
+    fastest : FastestSpeed or None
+        Where there is no plan but a slower one exists: up to which speed.
+    relaxations : Relaxations or None
+        With it: the least change of each limit that would do at the speed asked.
+    checks : tuple of Check
+        The audit's table; empty without a plan.
+    clearance : ClearanceMap or None
+        How clear every pose is in the cell, where the job asks for the map.
+    departure : Departure or None
+        How far the nodes leave the CAD curve; measured once it is settled what is cut.
+    picked : bool
+        Whether the plan is one of a Pareto set, which aims at something else than the job does.
+    """
+
+    contour: str
+    task: ContourTask
+    drawn: Contour
+    nodes: Contour
+    graph: LayeredGraph
+    plan: Plan | None = None
+    broken: NoFeasiblePath | None = None
+    fastest: FastestSpeed | None = None
+    relaxations: Relaxations | None = None
+    checks: tuple[Check, ...] = ()
+    clearance: ClearanceMap | None = None
+    departure: Departure | None = None
+    picked: bool = False
+
+    __repr__ = told
+
+    @property
+    def passed(self) -> bool:
+        """True when there is a plan and its audit finds no error."""
+        return self.plan is not None and not any(
+            c.level == "error" and not c.ok for c in self.checks
+        )
+
+    def measured(self, part: Part, loop: Departure | None) -> Cut:
+        """Return the cut with the departure of its nodes.
+
+        Parameters
+        ----------
+        part : Part
+        loop : Departure or None
+            That of the loop as drawn, where operations moved it: the nodes are then measured from
+            the path as cut.
+        """
+        nodes = self.nodes if self.plan is None else self.plan.contour
+        found = (
+            part.departure(self.task.pick, nodes)
+            if loop is None
+            else departure_from(self.drawn, nodes, loop)
+        )
+        return replace(self, departure=found)
+
+    @property
+    def failure(self) -> str:
+        """Why there is no plan, and what would help; empty where there is one."""
+        if self.broken is None:
+            return ""
+        return f"{self.broken}; {self.remedy}" if self.remedy else str(self.broken)
+
+    @property
+    def remedy(self) -> str:
+        """Which speeds and which shares of the limits have a path; empty where none is known."""
+        if self.fastest is None:
+            return ""
+        return f"{self._speeds(self.fastest)}{self._shares()}; {FINER}"
+
+    def _speeds(self, found: FastestSpeed) -> str:
+        """Say up to which speed a path exists on the grid, and which one is known off it."""
+        point = self.nodes.points[found.node] * 1000
+        binds = (
+            f", where the {found.limit} of joint {found.joint + 1} binds at node {found.node}, "
+            f"{' '.join(f'{v:.1f}' for v in point)} mm"
+        )
+        if found.on_grid is None:
+            return f"{ON_THIS_GRID} a path exists up to {at_most(found.speed * 60)} m/min{binds}"
+        on_grid = f"{ON_THIS_GRID} a path exists up to {at_most(found.on_grid * 60)} m/min"
+        if found.speed < self.task.speed:
+            return f"{on_grid}, refined up to {at_most(found.speed * 60)} m/min{binds}"
+        return (
+            f"{on_grid}; a refined one was found at {at_most(found.speed * 60)} m/min, but none at "
+            "the speed asked for"
+        )
+
+    def _shares(self) -> str:
+        """Say which larger share of one limit would open the way on the grid, or that none does."""
+        if self.relaxations is None:
+            return ""
+        shares = {
+            "eta_velocity": self.relaxations.eta_v,
+            "eta_acceleration": self.relaxations.eta_a,
+        }
+        told = {k: "none" if v is None or v > 1 else at_least(v) for k, v in shares.items()}
+        ways = [f"{name} = {share}" for name, share in told.items() if share != "none"]
+        closed = [name for name, share in told.items() if share == "none"]
+        said = f"; at the speed asked for with {' or '.join(ways)}" if ways else ""
+        return said + (f"; no {' and no '.join(closed)} up to 1 is enough there" if closed else "")

@@ -1,0 +1,94 @@
+"""What a job asks for, looked at without planning: its cell, and how its contours begin in it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from kerfpath._told import told
+from kerfpath.cad import Part
+from kerfpath.cad import read as read_drawing
+from kerfpath.cell import Cell
+from kerfpath.job.format import Job, cell_of_job
+from kerfpath.planner import layered_graph
+
+__all__ = ["Checked", "Start", "check_job"]
+
+FAR = 0.05
+"""m beyond the near-miss distance: farther is not told apart."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Start:
+    """How a contour begins.
+
+    Parameters
+    ----------
+    name : str
+    nodes : int
+    poses : int
+        Admissible poses at its first node.
+    clear : int
+        Those of them that keep every near-miss distance.
+    clearance : float m
+        Of the pose that keeps most distance: its least distance among the pairs that must keep the
+        near-miss distance of the cell, at most 50 mm more than that is told; NaN without poses.
+    pair : (str, str) or None
+        The two bodies that have it.
+    """
+
+    name: str
+    nodes: int
+    poses: int
+    clear: int
+    clearance: float
+    pair: tuple[str, str] | None
+
+    __repr__ = told
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Checked:
+    """A job that can be read, its part, its cell if it has one, and how every contour begins."""
+
+    job: Job
+    part: Part
+    cell: Cell | None
+    starts: tuple[Start, ...]
+
+    __repr__ = told
+
+
+def check_job(job: Job, part: Part | None = None) -> Checked:
+    """Return the cell of a job and how its contours begin in it; `part` if it is read already.
+
+    Raises
+    ------
+    InputError
+        As `run_job`.
+    """
+    part = part or read_drawing(job.part_file, unit=job.part_unit)
+    cell = cell_of_job(job, part)
+    starts = []
+    for task in job.tasks(part):
+        nodes = task.sample(task.candidates(part)[0])
+        first = nodes.part(0, 1, job.plan_options["frames"])
+        graph = layered_graph(first, job.robot, **job.graph_options)
+        q = graph.q[: graph.start[1]]
+        starts.append(_start(task.name, len(nodes), q, cell))
+    return Checked(job=job, part=part, cell=cell, starts=tuple(starts))
+
+
+def _start(name: str, nodes: int, q: np.ndarray, cell: Cell | None) -> Start:
+    clear, clearance, pair = len(q), np.nan, None
+    if cell is not None and len(q) and len(cell.pairs):
+        apart = cell.distances(q, enough=cell.required + FAR)
+        clear = int((apart > cell.required).all(axis=1).sum())
+        common = np.flatnonzero(~cell.own)
+        if common.size:
+            apart = np.minimum(apart[:, common], cell.near_miss + FAR)
+            best = int(np.argmax(apart.min(axis=1)))
+            nearest = int(np.argmin(apart[best]))
+            clearance, pair = float(apart[best, nearest]), cell.pair_names[common[nearest]]
+    return Start(name=name, nodes=nodes, poses=len(q), clear=clear, clearance=clearance, pair=pair)

@@ -1,0 +1,614 @@
+"""The neutral program, its preflight, the RAPID formatter, and the reader that checks it."""
+
+import re
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from scipy.spatial.transform import Rotation
+
+from conftest import ROOT
+from kerfpath import InputError, plan, robot
+from kerfpath.contour import KINDS
+from kerfpath.post import (
+    Comment,
+    LinearMove,
+    ReadWait,
+    Switch,
+    Wait,
+    build_program,
+    deviations,
+    language,
+    post,
+    preflight,
+    read_program,
+    write_program,
+)
+from kerfpath.post.rapid import RapidSettings, axes_from_joints, confdata, joints_from_axes
+from programs import arc, changed, codes, edited, frames, hand_plan, read_text, text_of, with_steps
+
+GOLDEN = ROOT / "tests" / "data" / "golden_rapid.mod"
+RAPID = language("rapid")
+
+
+@pytest.fixture(scope="module")
+def cell():
+    return robot("abb_irb4600_60_205"), *frames()
+
+
+@pytest.fixture(scope="module")
+def small(cell):
+    return hand_plan(arc(), *cell, speed=0.12)
+
+
+@pytest.fixture(scope="module")
+def program(small):
+    return build_program([small])
+
+
+def moves_of(section, kind):
+    return [step for step in section.steps if isinstance(step, kind)]
+
+
+# The text.
+
+
+def test_the_golden_program_is_written_byte_for_byte(small):
+    assert text_of(post([small])) == GOLDEN.read_bytes().decode("ascii")
+
+
+def test_the_golden_program_is_plain_text_in_short_names():
+    lines = GOLDEN.read_text().splitlines()
+    assert max(len(line) for line in lines) < 200
+    assert all(re.fullmatch(r"[ -~]*", line) for line in lines)
+    assert not any(line.endswith(" ") for line in lines)
+
+
+def test_the_same_plans_give_the_same_bytes(cell):
+    assert post([hand_plan(arc(), *cell)]) == post([hand_plan(arc(), *cell)])
+
+
+# The law: what is read back is what was planned.
+
+
+def reads_back(plans, program):
+    """Check that the text says tool, placement, path, configuration, speeds and switches."""
+    read = read_text(text_of(post(program)), program.robot)
+    assert read.name == program.name
+    assert deviations(program, read, RAPID, RapidSettings()) == []
+    first = plans[0]
+    # Four decimals of mm and eight of a unit quaternion.
+    np.testing.assert_allclose(read.T_flange_tip, first.T_flange_tip, atol=1e-7)
+    np.testing.assert_allclose(read.T_base_part, first.T_base_part, atol=1e-7)
+    assert [section.name for section in read.sections] == [s.name for s in program.sections]
+    for made, section in zip(plans, read.sections, strict=True):
+        (joint,) = [move for move in section.moves if move.kind == "joint"]
+        linear = [move for move in section.moves if move.kind == "linear"]
+        assert len(linear) == len(made.q) + 1
+        T_base_tip = read.T_base_part @ np.array([move.T_part_tip for move in linear[:-1]])
+        planned = made.robot.forward(made.q) @ made.T_flange_tip
+        off = np.linalg.norm(T_base_tip[:, :3, 3] - planned[:, :3, 3], axis=1)
+        turned = np.swapaxes(T_base_tip[:, :3, :3], 1, 2) @ planned[:, :3, :3]
+        assert off.max() < 1e-6  # 1e-3 mm
+        assert np.degrees(Rotation.from_matrix(turned).magnitude()).max() < 1e-3
+        # The joint move leads, through the robot's kinematics, to the backed-off start.
+        T_in = made.robot.forward(joint.q) @ made.T_flange_tip
+        back = T_in[:3, 3] - planned[0, :3, 3]
+        np.testing.assert_allclose(back, -0.05 * planned[0, :3, 2], atol=2e-6)
+        T_out = read.T_base_part @ linear[-1].T_part_tip
+        back = T_out[:3, 3] - planned[-1, :3, 3]
+        np.testing.assert_allclose(back, -0.05 * planned[-1, :3, 2], atol=2e-6)
+        check_configurations(made, linear[:-1])
+        check_motion(made, linear)
+    return read
+
+
+def check_configurations(made, linear):
+    """cf1, cf4, cf6 by quarter turns; cfx from the posture that the kernels solved for."""
+    q = made.q[0] + np.vstack([np.zeros(6), np.cumsum(made.increments, axis=0)])
+    conf = np.array([move.posture for move in linear])
+    quarters = np.floor(np.degrees(q[:, [0, 3, 5]]) / 90)
+    np.testing.assert_array_equal(conf[:, :3], quarters)
+    # For ABB arms every sign is +, so that axis 5 negative is the kernels' wrist "minus"; behind
+    # axis 1 the elbow of the kernels changes its sense, the lower arm's bit does not.
+    rear, down, minus = made.posture // 4, made.posture // 2 % 2, made.posture % 2
+    np.testing.assert_array_equal(conf[:, 3], 4 * rear + 2 * (rear ^ down) + minus)
+
+
+def check_motion(made, linear):
+    speed = made.contour.length / made.time[-1]
+    start, cut, out = linear[0], linear[1:-1], linear[-1]
+    assert start.speed == out.speed == pytest.approx(0.1)
+    assert all(move.speed == pytest.approx(speed, abs=1e-5) for move in cut)
+    assert [move.zone for move in (start, cut[-1], out)] == [0, 0, 0]
+    assert all(move.zone == pytest.approx(0.0003) for move in cut[:-1])
+    assert start.switches == (Switch(signal="laser", on=True, lead_time=0.02),)
+    assert cut[-1].switches == (Switch(signal="laser", on=False, lead_time=0.02),)
+    assert not any(move.switches for move in (*cut[:-1], out))
+
+
+def test_the_golden_program_reads_back_as_planned(small, program):
+    read = reads_back([small], program)
+    speeds = {move.kind + str(k): move.speed for k, move in enumerate(read.moves[:3])}
+    assert speeds == {"joint0": 0.25, "linear1": 0.1, "linear2": 0.12}
+    assert read.moves[2].zone == pytest.approx(0.0003)
+
+
+def test_a_planned_circle_with_endless_joints_reads_back(circle, arm, tool, placement):
+    step = np.radians(10)
+    made = plan(circle, arm, tool=tool, placement=placement, speed=0.1, gamma_step=step)
+    program = build_program([made])
+    reads_back([made], program)
+    assert codes(program) == ["air-moves"]
+    q = np.array([move.q for move in moves_of(program.sections[0], LinearMove)])
+    assert np.abs(np.diff(q, axis=0)).max() < np.pi  # unrolled: no jump of a turn
+
+
+def test_several_contours_become_routines_called_in_order(cell):
+    plans = [
+        hand_plan(arc(name), *cell)
+        for name in ("skin/outer", "skin outer", "7. Bohrung ø12", "hole" * 12)
+    ]
+    program = build_program(plans, name="B-pillar 4711")
+    names = ["skin_outer", "skin_outer_2", "c_7_Bohrung_12", ("hole" * 12)[:32]]
+    assert program.name == "B_pillar_4711"
+    assert [section.name for section in program.sections] == names
+    reads_back(plans, program)
+    text = text_of(post(program))
+    assert text.index("IF nFirst<=1 skin_outer;") < text.index("IF nFirst<=2 skin_outer_2;")
+    assert "! 7. Bohrung ?12: 8 nodes" in text
+
+
+@pytest.mark.parametrize("posture", range(8))
+def test_configurations_follow_the_posture_in_all_eight_postures(cell, posture):
+    """The kernels' postures are an independent account of front/rear, elbow and wrist."""
+    arm, tool, _ = cell
+    arm = arm.with_limits(lower=np.full(6, -7.0), upper=np.full(6, 7.0))
+    placement = np.eye(4)
+    placement[:3, 3] = 0.55, 0.1, 0.9
+    made = hand_plan(arc(count=20, radius=0.03), arm, tool, placement, posture=posture)
+    reads_back([made], build_program([made]))
+
+
+def test_quaternions_do_not_jump_in_sign_along_the_path(cell):
+    arm, tool, placement = cell
+    made = hand_plan(arc(count=40), arm, tool, placement)
+    text = text_of(post([made]))
+    rows = re.findall(r"(?:MoveL|TriggL) \[\[[^]]*\],\[([^]]*)\]", text)
+    wxyz = np.array([[float(x) for x in row.split(",")] for row in rows])
+    assert ((wxyz[1:] * wxyz[:-1]).sum(axis=1) > 0).all()
+    np.testing.assert_allclose(np.linalg.norm(wxyz, axis=1), 1, atol=2e-8)
+
+
+@settings(max_examples=60, deadline=None)
+@given(st.lists(st.floats(-6, 6), min_size=6, max_size=6))
+def test_configuration_bits_agree_with_a_construction_from_points(q):
+    """The lower arm's line and axis 1 drawn as points, on an arm without lateral offset."""
+    arm = robot("abb_irb6700_200_260")
+    a1, c1, c2 = (arm.geometry[k] for k in ("a1", "c1", "c2"))
+    flange = arm.forward(np.array(q))
+    wrist = flange[:3, 3] - arm.geometry["c4"] * flange[:3, 2]
+    ahead = np.array([np.cos(q[0]), np.sin(q[0]), 0.0])
+    shoulder = a1 * ahead + [0, 0, c1]
+    lower = c2 * (np.sin(q[1]) * ahead + [0, 0, np.cos(q[1])])
+    left = np.array([-np.sin(q[0]), np.cos(q[0]), 0.0])
+    side = np.cross(lower, wrist - shoulder) @ left  # positive: in front, turning nose down
+    reach, axis_5 = wrist @ ahead, np.degrees(q[4])
+    if min(abs(side), abs(reach), abs(axis_5)) < 1e-5:
+        return
+    expected = 4 * (reach < 0) + 2 * (side < 0) + (axis_5 < 0)
+    assert confdata(arm, [q])[0, 3] == expected
+
+
+def test_the_elbow_bit_turns_over_at_the_stretched_arm():
+    """IRB 6700 with 1392.5 mm and 200 mm: the elbow is singular at axis 3 = -81.83 deg."""
+    arm = robot("abb_irb6700_200_260")
+    arm = replace(arm, geometry={**arm.geometry, "c3": 1.3925, "a2": -0.2})
+    axis_3 = np.array([60, 0, -60, -81.5, -82.2, -90, -150])
+    q = np.zeros((len(axis_3), 6))
+    q[:, 2], q[:, 4] = np.radians(axis_3), np.radians(90)
+    np.testing.assert_array_equal(confdata(arm, q)[:, 3] & 2, [0, 0, 0, 0, 2, 2, 2])
+
+
+def test_quarter_turns_count_in_both_directions_and_ignore_rounding():
+    arm = robot("abb_irb4600_60_205")
+    q = np.zeros((5, 6))
+    q[:, 5] = np.radians([0, 89.9, 90, -0.1, 750])
+    np.testing.assert_array_equal(confdata(arm, q)[:, 2], [0, 0, 1, -1, 8])
+    q[:, 5] = -1e-15
+    assert (confdata(arm, q)[:, 2] == 0).all()
+
+
+# The parallel rod.
+
+
+def test_a_parallel_rod_converts_axis_3_both_ways():
+    arm = robot("abb_irb2400_155")
+    q = np.radians([[10.0, 40, -30, 5, 6, 7]])
+    axes = axes_from_joints(arm, q)
+    np.testing.assert_allclose(np.degrees(axes), [[10, 40, 10, 5, 6, 7]])
+    np.testing.assert_allclose(joints_from_axes(arm, axes), q, atol=1e-15)
+    plain = robot("abb_irb4600_60_205")
+    np.testing.assert_array_equal(axes_from_joints(plain, q), q)
+
+
+def test_a_program_for_a_parallel_rod_arm_reads_back(cell):
+    arm, (_, tool, placement) = robot("abb_irb2400_155"), cell
+    made = hand_plan(arc(), arm, tool, placement)
+    program = build_program([made])
+    reads_back([made], program)
+    axis_3 = float(re.search(r"MoveAbsJ \[\[[^,]*,[^,]*,([^,]*),", text_of(post(program)))[1])
+    q_in = program.sections[0].moves[0].q
+    assert axis_3 == pytest.approx(np.degrees(q_in[1] + q_in[2]), abs=1e-6)
+
+
+# Preflight.
+
+
+def test_a_good_program_has_only_the_warning_about_air_moves(program):
+    assert [(i.level, i.code) for i in preflight(program)] == [("warning", "air-moves")]
+
+
+@pytest.mark.parametrize(
+    ("change", "code"),
+    [
+        ({"name": "a" * 33}, "name-length"),
+        ({"name": "main"}, "name-collision"),
+        ({"sections": ()}, "empty"),
+    ],
+)
+def test_preflight_refuses_what_concerns_the_whole_program(program, change, code):
+    assert codes(replace(program, **change), "error") == [code]
+
+
+@pytest.mark.parametrize(
+    ("settings", "code"),
+    [
+        ({"tool_name": "t-laser"}, "name-identifier"),
+        ({"laser_output": "Reset"}, "name-reserved"),
+        ({"work_object": "v100"}, "name-reserved"),
+        ({"work_object": "TLASER"}, "name-collision"),
+    ],
+)
+def test_preflight_refuses_names_of_the_settings(program, settings, code):
+    assert codes(program, "error", settings=RapidSettings(**settings)) == [code]
+
+
+def test_preflight_warns_of_a_robot_of_another_maker_and_strict_refuses_it(program):
+    other = replace(program, robot=replace(program.robot, manufacturer="KUKA"))
+    assert codes(other) == ["wrong-robot", "air-moves"]
+    post(other)
+    with pytest.raises(InputError, match="for robots by ABB, but 'abb_irb4600_60_205' is by KUKA"):
+        post(other, strict=True)
+
+
+def test_preflight_refuses_an_arm_whose_axes_the_language_cannot_say(program):
+    assert "wrong-arm" in codes(replace(program, robot=robot("ur_ur10e")), "error")
+
+
+def test_gas_flows_from_before_the_start_to_the_end_and_needs_an_output(small):
+    program = build_program([small], gas_lead=0.3)
+    assert codes(program, "error") == ["output"]
+    settings = RapidSettings(gas_output="doGas")
+    text = text_of(post(program, settings=settings))
+    assert r"TriggIO trGasOn,0.3000\Time\DOp:=doGas,1;" in text
+    assert r",trGasOn\T2:=trOn,fine" in text
+    read = read_text(text, program.robot, settings=settings)
+    assert [s.signal for s in read.moves[1].switches] == ["gas", "laser"]
+
+
+@pytest.mark.parametrize(
+    ("number", "change", "code"),
+    [
+        (2, {"speed": 0.0}, "speed"),
+        (2, {"speed": -0.1}, "speed"),
+        (2, {"speed": float("nan")}, "speed"),
+        (1, {"speed": 1.5}, "speed"),
+        (2, {"zone": -1e-3}, "zone"),
+        (2, {"switches": (Switch(signal="laser", on=True, lead_time=0.6),)}, "lead-time"),
+    ],
+)
+def test_preflight_refuses_numbers_out_of_range(program, number, change, code):
+    assert codes(changed(program, number, **change), "error") == [code]
+
+
+def test_preflight_refuses_a_joint_step_of_half_a_turn(program):
+    q = program.sections[0].steps[4].q + 3.5 * np.eye(6)[3]
+    bad = changed(program, 4, q=q)
+    issues = [i for i in preflight(bad) if i.code == "joint-step"]
+    assert [i.place for i in issues] == ["skin_outer, move 3", "skin_outer, move 4"]
+    assert "joint 4 turns 2" in issues[0].message
+
+
+def test_preflight_refuses_a_turn_of_the_tool_by_a_right_angle(program):
+    T = program.sections[0].steps[-1].T_part_tip.copy()
+    T[:3, :3] = T[:3, :3] @ Rotation.from_euler("z", 91, degrees=True).as_matrix()
+    assert codes(changed(program, -1, T_part_tip=T), "error") == ["orientation-step"]
+
+
+def test_preflight_refuses_axes_beyond_their_limits(program):
+    upper = program.robot.upper.copy()
+    upper[1] = program.sections[0].steps[2].q[1] - 0.01
+    tight = replace(program, robot=program.robot.with_limits(upper=upper))
+    issues = [i for i in preflight(tight) if i.code == "axis-limit"]
+    assert issues[0].place.startswith("skin_outer, move")
+    assert all("joint 2 high" in i.message for i in issues)
+
+
+def test_preflight_checks_the_sum_that_a_parallel_rod_bounds(cell):
+    _, tool, placement = cell
+    program = build_program([hand_plan(arc(), robot("abb_irb2400_155"), tool, placement)])
+    q = program.sections[0].steps[1].q.copy()
+    q[1:3] = np.radians([50, 40])
+    issues = [i for i in preflight(changed(program, 1, q=q)) if i.code == "axis-limit"]
+    assert "joint 2 + joint 3 high: 25.000 deg" in issues[0].message
+
+
+def test_preflight_refuses_a_laser_that_is_not_switched_in_turn(program):
+    steps = list(program.sections[0].steps)
+    start, end = steps[2], steps[-2]
+    orders = {
+        "still on": [*steps[:-2], replace(end, switches=()), steps[-1]],
+        "twice on": [*steps[:5], replace(steps[5], switches=start.switches), *steps[6:]],
+        "joint move": [*steps[:5], steps[1], *steps[5:]],
+    }
+    for order in orders.values():
+        assert "laser-order" in codes(with_steps(program, order), "error")
+    assert codes(with_steps(program, [*steps[:3], Comment("x"), *steps[3:]]), "error") == []
+
+
+def test_preflight_warns_of_zones_that_overlap(program):
+    wide = program
+    for number in range(3, 9):
+        wide = changed(wide, number, zone=0.02)
+    found = [i for i in preflight(wide) if i.code == "zone-overlap"]
+    assert len(found) == 1
+    assert found[0].level == "warning"
+    assert "at 6 of 10 targets" in found[0].message  # all inner nodes, none of the stops
+
+
+def test_zones_are_halved_until_they_do_not_overlap(small):
+    program = build_program([small], zone=0.1)
+    gaps = np.linalg.norm(np.diff(small.contour.points, axis=0), axis=1)
+    zones = [move.zone for move in program.sections[0].moves[2:-1]]
+    assert zones[-1] == 0
+    for k, zone in enumerate(zones[:-1]):
+        room = min(gaps[k], gaps[k + 1]) / 2
+        assert room / 2 < zone <= room
+        assert np.log2(0.1 / zone) == round(np.log2(0.1 / zone))
+    assert codes(program) == ["air-moves"]
+
+
+def test_preflight_warns_of_a_lead_longer_than_its_move(small):
+    found = [i for i in preflight(build_program([small], lead_time=0.4)) if i.code == "short-lead"]
+    assert [i.place for i in found] == ["skin_outer, move 8"]
+    assert "400 ms ahead" in found[0].message
+
+
+def test_preflight_warns_where_turning_the_tool_would_slow_it_down(cell):
+    quick = hand_plan(arc(), *cell, speed=2.0)
+    assert "turning-speed" in codes(build_program([quick], lead_time=0.0), "warning")
+
+
+def test_what_preflight_refuses_is_not_written(program):
+    with pytest.raises(InputError, match="tool: 't-laser' is no name in ABB RAPID"):
+        post(program, settings=RapidSettings(tool_name="t-laser"))
+
+
+# Bad input.
+
+
+def test_plans_that_do_not_belong_together_are_refused(cell, small):
+    arm, tool, placement = cell
+    moved = placement.copy()
+    moved[0, 3] += 0.01
+    other = hand_plan(arc("hole"), arm, tool, moved)
+    with pytest.raises(InputError, match=r"'skin/outer' and 'hole' differ in placement"):
+        build_program([small, other])
+    with pytest.raises(InputError, match="differ in robot"):
+        build_program([small, replace(small, robot=replace(arm, id="another"))])
+    with pytest.raises(InputError, match="at least one plan"):
+        build_program([])
+
+
+def test_joints_that_miss_the_contour_are_refused(small):
+    with pytest.raises(InputError, match=r"node 3: the planned joints put the tool tip \d"):
+        build_program([replace(small, q=small.q + np.where(np.arange(8) == 3, 1e-3, 0)[:, None])])
+
+
+def test_a_retract_out_of_reach_says_to_lower_it(small):
+    with pytest.raises(InputError, match=r"back off by 5000 mm .* lower the retract"):
+        build_program([small], retract=5.0)
+    with pytest.raises(InputError, match="retract: expected a number above 0 m"):
+        build_program([small], retract=0.0)
+
+
+def test_an_unknown_language_lists_those_known(small):
+    with pytest.raises(InputError, match=r"'basic' is not known; expected .*rapid"):
+        post([small], "basic")
+
+
+def test_writing_replaces_the_file_at_one_stroke(tmp_path):
+    target = tmp_path / "cut.mod"
+    write_program(target, "first\n")
+    write_program(target, "second\n")
+    assert target.read_bytes() == b"second\n"
+    assert list(tmp_path.iterdir()) == [target]
+    for bad in (tmp_path / "missing" / "cut.mod", tmp_path, target / "x.mod", ""):
+        with pytest.raises(InputError, match="cannot write the program"):
+            write_program(bad, "text")
+    assert list(tmp_path.iterdir()) == [target]
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "message"),
+    [
+        ("MODULE cut_skin_outer", "SYSMODULE x", "line 1: not expected here"),
+        ("ENDMODULE", "", "ENDMODULE is missing"),
+        ("ENDMODULE", "ENDMODULE\nx;", "nothing may follow"),
+        (r"ConfL\Off;", r"ConfJ\On;", "line 20: expected"),
+        ("IF nFirst<=1 skin_outer;", "", "do not match: skin_outer"),
+        (
+            "IF nFirst<=1 skin_outer;",
+            "IF nFirst<=1 skin_outer;\nIF nFirst<=2 skin_outer;",
+            "called twice",
+        ),
+        ("IF nFirst<=1 skin_outer;", "IF nFirst<=2 skin_outer;", "is contour 1, not 2"),
+        ("IF nFirst<=1 skin_outer;", "skin_outer;", "not expected here"),
+        ("PERS num nFirst:=1;", "PERS num nFirst:=2;", "must be the number of a contour"),
+        ("PERS num nFirst:=1;", "", "must be the number of a contour"),
+        ("    nFirst:=1;\n", "", "not expected here: 'ERROR'"),
+        ("    RAISE;\n", "", "expected 'RAISE;'"),
+        ("  UNDO\n    switchOff;\n", "", "expected 'UNDO'"),
+        ("    SetDO doLaser,0;\n", "", "expected 'SetDO doLaser,0;'"),
+        (",trOff,fine", ",trX,fine", "trX has not been set"),
+        (",fine,tLaser", ",z10,tLaser", "z10 is not declared"),
+        (r"fine,tLaser\WObj", r"fine,tool0\WObj", "are not the module's"),
+        ("[FALSE,TRUE,", "[TRUE,TRUE,", "line 10: expected a fixed work object"),
+        ("tLaser:=[TRUE,", "tLaser:=[FALSE,", "expected a tool held by the robot"),
+        ("zCorner:=[FALSE,", "zCorner:=[TRUE,", "expected a zone"),
+        ("vAir:=[250.00,", "vAir:=[", "expected 4 values"),
+        ("vAir:=[250.00,", "vAir:=[TRUE,", "expected 4 numbers"),
+        ("vAir:=[250.00,", "vAir:=[25O,", "not an aggregate"),
+        ("speeddata vCut", "speeddata vAir", "vAir is declared twice"),
+        ("SetDO doLaser", "SetDO doOther", "expected 'SetDO doLaser,0;'"),
+        ("TriggIO trOff", "TriggIO trOn", "set once"),
+        ("9E9]],vAir", "0]],vAir", "external axes"),
+        ("[0,-1,0,0]", "[0.5,-1,0,0]", "must be whole numbers"),
+    ],
+)
+def test_the_reader_refuses_what_it_does_not_know(old, new, message):
+    text = GOLDEN.read_text()
+    assert old in text
+    with pytest.raises(InputError, match=re.escape(message)):
+        read_text(text.replace(old, new, 1), robot("abb_irb4600_60_205"))
+
+
+def test_the_reader_refuses_a_quaternion_that_is_none():
+    text = re.sub(r"(TriggL \[\[[^]]*\],\[)[\d.-]+", r"\g<1>0.9", GOLDEN.read_text(), count=1)
+    with pytest.raises(InputError, match=r"line \d+: the quaternion .* must have length 1"):
+        read_text(text, robot("abb_irb4600_60_205"))
+
+
+def test_the_reader_refuses_a_module_without_a_tool():
+    lines = [line for line in GOLDEN.read_text().splitlines() if "tooldata" not in line]
+    with pytest.raises(InputError, match="tool tLaser and work object wPart are not the module's"):
+        read_text("\n".join(lines), robot("abb_irb4600_60_205"))
+
+
+def kinds_of(text):
+    """The kind of each stretch, from single letters."""
+    words = {"p": "pierce", "i": "lead-in", "c": "cut", "m": "micro joint", "o": "lead-out"}
+    return np.array([KINDS.index(words[letter]) for letter in text])
+
+
+def test_the_laser_is_off_along_micro_joints_and_waits_at_the_pierce(cell):
+    contour = replace(arc(), kind=kinds_of("picmmcoo"))
+    made = hand_plan(contour, *cell, speed=0.12)
+    program = build_program([made], pierce_time=0.4, lead_time=0.005)
+    assert codes(program, "error") == []
+    steps = read_text(text_of(post(program)), program.robot).sections[0].steps
+    moves, on, waits, switched = 0, False, [], []
+    for step in steps:
+        if isinstance(step, ReadWait):
+            waits.append((moves, on, step.time))
+            continue
+        switched.append(on)
+        moves += 1
+        for switch in step.switches:
+            on = switch.on
+    # Approach twice, then seven stretches of which two are micro joints, then the retract.
+    assert switched == [False, False, True, True, True, False, False, True, True, False]
+    assert waits == [(2, True, 0.4)]
+
+
+def test_preflight_refuses_waits_on_the_fly_or_without_an_end(program):
+    steps = list(program.sections[0].steps)
+    assert "wait" in codes(with_steps(program, [*steps[:6], Wait(time=1.0), *steps[6:]]), "error")
+    for time in (0.0, np.inf, 400.0):
+        odd = with_steps(program, [*steps[:3], Wait(time=time), *steps[3:]])
+        assert "wait" in codes(odd, "error")
+
+
+def test_a_contour_with_times_of_its_own_is_cut_in_them(cell):
+    contour = replace(arc(count=40), speed_share=np.linspace(1, 0.5, 40))
+    timed = contour.resample(dt=0.02, speed=0.12)
+    made = hand_plan(timed, *cell, speed=0.12)
+    made = replace(made, time=timed.time)
+    moves = moves_of(build_program([made]).sections[0], LinearMove)[1:-1]
+    np.testing.assert_allclose([m.speed for m in moves], np.diff(timed.s) / np.diff(timed.time))
+    assert moves[-1].speed < 0.6 * moves[0].speed
+
+
+@pytest.fixture(scope="module")
+def long_program(cell):
+    plans = [hand_plan(arc(f"hole {k}", count=70), *cell) for k in range(3)]
+    return build_program(plans, name="long")
+
+
+def test_a_long_program_is_loaded_module_by_module(long_program):
+    settings = RapidSettings(lines_per_file=100)
+    files = post(long_program, settings=settings)
+    assert list(files)[:3] == ["long.mod", "long_part.mod", "long_part_2.mod"]
+    assert max(text.count("\n") for text in files.values()) <= 100
+    main = files["long.mod"]
+    assert main.count("Load \\Dynamic") == main.count("UnLoad ") == len(files) - 1
+    read = read_program(files, "rapid", long_program.robot, settings)
+    assert deviations(long_program, read, RAPID, settings) == []
+    assert post(long_program).keys() == {"long.mod"}
+
+
+@pytest.mark.parametrize(
+    ("file", "old", "new", "message"),
+    [
+        ("long.mod", "UnLoad", "Reload", "long.mod, line .*not expected here: 'Reload"),
+        ("long.mod", '%"hole_0"%;', "", "expected here: 'ENDIF'"),
+        ("long.mod", "ENDIF", "", "expected 'ENDIF'"),
+        ("long.mod", "IF nFirst<=1 THEN", "", "without a condition"),
+        ("long.mod", "IF nFirst<=1 THEN", "IF nFirst<=2 THEN", "hole_0 is contour 1, not 2"),
+        ("long.mod", "HOME:/long_part.mod", "HOME:/other.mod", "the file 'other.mod' is not there"),
+        ("long.mod", 'UnLoad "HOME:/long_part.mod', 'UnLoad "HOME:/x.mod', "x.mod is not loaded"),
+        ("long_part.mod", "PROC hole_0()", "PROC main()", "main is declared twice"),
+        ("long_part.mod", "ENDMODULE", "", "long_part.mod, line .*ENDMODULE is missing"),
+    ],
+)
+def test_modules_that_do_not_fit_each_other_are_refused(long_program, file, old, new, message):
+    settings = RapidSettings(lines_per_file=100)
+    files = edited(post(long_program, settings=settings), file, old, new, count=-1)
+    with pytest.raises(InputError, match=message):
+        read_program(files, "rapid", long_program.robot, settings)
+
+
+def test_a_folder_of_the_controller_cannot_carry_anything_else():
+    with pytest.raises(ValueError, match="folder"):
+        RapidSettings(folder='HOME:"; StopMove; !')
+
+
+NASTY = st.text(max_size=40) | st.sampled_from(
+    ['a";StopMove;!', "x\nENDPROC\nPROC y()", "\u2028ENDMODULE", "\r\nSetDO doLaser,1;", "%main%"]
+)
+
+
+@settings(max_examples=40, deadline=None, derandomize=True)
+@given(name=NASTY, model=NASTY)
+def test_no_name_gets_a_line_of_its_own_into_the_program(cell, small, name, model):
+    """Names of contours and robots are identifiers and comments, whatever they hold."""
+    contour = replace(small.contour, name=name)
+    plain = post([small])
+    made = replace(small, contour=contour, robot=replace(small.robot, model=model, id=model))
+    refused = [str(i) for i in preflight(build_program([made])) if i.level == "error"]
+    if refused:
+        assert re.search(r"is reserved in ABB RAPID; rename it|is also the name of", refused[0])
+        assert "\n" not in refused[0]
+        return
+    files = post([made])
+    text = text_of(files)
+    assert len(text.splitlines()) == len(text_of(plain).splitlines())
+    words = [line.split()[0] for line in text.splitlines() if line.strip()]
+    expected = [line.split()[0] for line in text_of(plain).splitlines() if line.strip()]
+    differing = [w for w, e in zip(words, expected, strict=True) if w != e]
+    assert all(re.fullmatch(r"[A-Za-z]\w*;", word) for word in differing)  # the call of the routine
+    read = read_program(files, "rapid", made.robot)
+    assert len(read.moves) == 10

@@ -1,0 +1,59 @@
+"""`kerfpath contours` for every source, and the page that it draws."""
+
+import base64
+import json
+import re
+import zlib
+
+import numpy as np
+import pytest
+from tests.cli.test_commands import run
+
+from kerfpath.report import DrawnLoop, render_drawing
+
+
+@pytest.fixture(scope="module")
+def drawings(tmp_path_factory, examples):
+    folder = tmp_path_factory.mktemp("drawings")
+    examples.write(folder)
+    examples.write_iges(folder / "bracket.iges", examples.bracket())
+    (folder / "line.csv").write_text("x_mm;y_mm;z_mm;nx;ny;nz\n0;0;0;0;0;1\n10,5;0;0;0;0;1\n")
+    return folder
+
+
+def figures(page):
+    packed = re.findall(r'<script type="application/octet-stream"[^>]*>([^<]*)<', page)
+    return [json.loads(zlib.decompress(base64.b64decode(data))) for data in packed]
+
+
+@pytest.mark.parametrize("name", ["bracket.step", "bracket.iges", "blank.dxf", "line.csv"])
+def test_every_source_is_listed_and_drawn(drawings, name):
+    html = drawings / f"{name}.html"
+    result = run("contours", drawings / name, "--html", html)
+    assert result.returncode == 0, result.stderr
+    assert "largest gap" in result.stdout
+    assert "shortest edge" in result.stdout
+    data = json.loads(run("contours", drawings / name, "--json").stdout)
+    shown = [loop for loop in data["loops"] if not loop["skin"] and loop["side"] != "edge"]
+    (figure,) = figures(html.read_text())
+    labels = [label["text"] for label in figure["layout"]["scene"]["annotations"]]
+    assert labels == [loop["name"] for loop in shown]
+    assert all(loop["name"] in result.stdout for loop in shown)
+    everything = run("contours", drawings / name, "--all").stdout
+    assert all(loop["name"] in everything for loop in data["loops"])
+
+
+def test_faults_are_drawn_apart_and_names_are_escaped():
+    loop = DrawnLoop(name="<b>", kind="outer", points=np.eye(3)[:2], fault=True)
+    page = render_drawing("a & b", [loop], mesh=([[0, 0, 0]], [[0, 0, 0]]))
+    assert "<h1>a &amp; b</h1>" in page
+    (figure,) = figures(page)
+    assert "1 trim lines with faults" in [trace["name"] for trace in figure["data"]]
+    assert figure["layout"]["scene"]["annotations"][0]["text"] == "&lt;b&gt;"
+
+
+def test_bad_drawings_end_with_exit_code_2(drawings):
+    (drawings / "bad.csv").write_text("1,2\n")
+    result = run("contours", drawings / "bad.csv", "--unit", "mm")
+    assert result.returncode == 2
+    assert "line 1: without a header expected 6 columns" in result.stderr
