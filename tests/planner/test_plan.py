@@ -300,5 +300,5 @@ def test_a_feed_that_need_not_dip_is_constant(circle, arm, tool, placement, made
     np.testing.assert_array_equal(same.q, made.q)
     assert same.feed is None
     for wrong in ({"feed": "dips"}, {"feed": "dip", "objective": "max"}):
-        with pytest.raises(InputError, match="feed: "):
+        with pytest.raises(InputError, match="feed"):
             plan(circle, arm, tool=tool, placement=placement, speed=0.1, **wrong)
