@@ -15,7 +15,7 @@ from pymoo.optimize import minimize
 
 from kerfpath import Plan
 from kerfpath._arrays import Array, freeze
-from kerfpath.front import Attempts, Judge, Run
+from kerfpath.front import ParetoProblem, Subproblem
 from kerfpath.search import Metric, ObjectiveKind
 
 __all__ = ["by_nsga"]
@@ -29,17 +29,17 @@ OBJECTIVES, METRICS = get_args(ObjectiveKind), get_args(Metric)
 class _Runs(Problem):  # type: ignore[misc]
     """Losses of runs over 6 weights, 2 shares of the limits, objective and metric."""
 
-    def __init__(self, attempts: Attempts, judge: Judge, first: Run) -> None:
-        self.attempts, self.judge, self.first = attempts, judge, first
+    def __init__(self, problem: ParetoProblem, first: Subproblem) -> None:
+        self.problem, self.first = problem, first
         self.losses: list[Array] = []
-        n, shares = len(first.weights), np.log([judge.eta_v, judge.eta_a])
+        n, shares = len(first.weights), np.log([problem.options.eta_v, problem.options.eta_a])
         low = np.r_[np.full(n, -SPREAD), shares - np.log(10), 0, 0]
         high = np.r_[np.full(n, SPREAD), shares, 2, 3]
         super().__init__(
-            n_var=n + 4, n_obj=len(judge.criteria), n_ieq_constr=1, xl=low, xu=high - 1e-9
+            n_var=n + 4, n_obj=len(problem.criteria), n_ieq_constr=1, xl=low, xu=high - 1e-9
         )
 
-    def run(self, x: Array) -> Run:
+    def run(self, x: Array) -> Subproblem:
         """Return the run of genes x (n + 4,)."""
         n = len(self.first.weights)
         return replace(
@@ -51,7 +51,7 @@ class _Runs(Problem):  # type: ignore[misc]
             metric=METRICS[int(x[n + 3])],
         )
 
-    def genes(self, run: Run) -> Array:
+    def genes(self, run: Subproblem) -> Array:
         """Return the genes (n + 4,) of a run, those of `run` but for what is out of bounds."""
         which = [OBJECTIVES.index(run.objective) + 0.5, METRICS.index(run.metric) + 0.5]
         weights = np.log(run.weights / self.first.weights)
@@ -60,8 +60,10 @@ class _Runs(Problem):  # type: ignore[misc]
 
     def _evaluate(self, x: Array, out: dict[str, Array], *_: Any, **__: Any) -> None:
         with ThreadPoolExecutor() as pool:
-            found = list(pool.map(lambda genes: self.attempts.of(self.run(genes)), x))
-        made = [self.judge.losses(each) if isinstance(each, Plan) else None for each in found]
+            found = list(pool.map(lambda genes: self.problem.solve(self.run(genes)), x))
+        made = [
+            self.problem.evaluate(each).losses if isinstance(each, Plan) else None for each in found
+        ]
         self.losses += [losses for losses in made if losses is not None]
         worst = np.full(self.n_obj, 1e9)
         out["F"] = np.array([worst if losses is None else losses for losses in made])
@@ -69,22 +71,22 @@ class _Runs(Problem):  # type: ignore[misc]
 
 
 def by_nsga(
-    attempts: Attempts, judge: Judge, runs: Sequence[Run], *, budget: int, seed: int
+    problem: ParetoProblem, runs: Sequence[Subproblem], *, budget: int, seed: int
 ) -> tuple[Array, int]:
     """Return the losses (P, C) of the front that `budget` runs find, and how many were feasible.
 
     It begins with `runs`, the first of which has all that is allowed, and random others.
     """
-    problem = _Runs(attempts, judge, runs[0])
+    search = _Runs(problem, runs[0])
     population = min(POPULATION, budget)
-    first = np.random.default_rng(seed).uniform(problem.xl, problem.xu, (population, problem.n_var))
-    given = np.array([problem.genes(run) for run in runs])[:population]
+    first = np.random.default_rng(seed).uniform(search.xl, search.xu, (population, search.n_var))
+    given = np.array([search.genes(run) for run in runs])[:population]
     first[: len(given)] = given
     minimize(
-        problem,
+        search,
         NSGA2(pop_size=population, sampling=first),
         ("n_eval", budget),
         seed=seed,
     )
-    found = np.array(problem.losses)
+    found = np.array(search.losses)
     return np.asarray(found[moocore.is_nondominated(found)]), len(found)

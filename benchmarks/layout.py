@@ -15,9 +15,10 @@ from benchmarks._figures import Figure, Report
 from kerfpath.job import Job, warm_up
 from kerfpath.search import least_interval
 from kerfpath.study import Layout, digest, layout
+from kerfpath.study._evaluator import SampledContour
+from kerfpath.study.placing._evaluate import contours_of, middle_of
 from kerfpath.study.placing._place import moved, numbers_of
 from kerfpath.study.placing._search import HALF
-from kerfpath.study.placing._subject import Subject, middle_of, subjects_of
 
 __all__ = ["run"]
 
@@ -42,10 +43,12 @@ def run(*, quick: bool = False) -> Report:
             evaluations=16 if quick else None,
         )  # fmt: skip
         seconds = perf_counter() - begun
-        subjects = subjects_of(str(job), digest(job), found.goal)
-        bounds = _bounds(found, subjects, 1 if quick else 4)
+        contours = contours_of(str(job), digest(job), found.goal)
+        bounds = _bounds(found, contours, 1 if quick else 4)
     assert found.best is not None
-    before, after = found.before["value"], found.best.answer["value"]
+    before, after = found.before.value, found.best.result.value
+    assert before is not None
+    assert after is not None
     solved = sum(trial.searched for trial in found.tried)
     told = ", ".join(f"{name} = {value:g}" for name, value in found.best.offsets.items())
     return Report(
@@ -82,22 +85,23 @@ def _job(folder: Path, *, quick: bool) -> Path:
     return path
 
 
-def _bounds(found: Layout, subjects: Sequence[Subject], placements: int) -> list[Figure]:
+def _bounds(found: Layout, contours: Sequence[SampledContour], placements: int) -> list[Figure]:
     """Return how far bounds are above exact speeds, and the share of time that they take."""
-    middle, rng = middle_of(found.job, subjects), np.random.default_rng(5)
+    middle, rng = middle_of(found.job, contours), np.random.default_rng(5)
     over: dict[str, list[float]] = {}
     share: dict[str, list[float]] = {}
-    _timed(found.job, subjects[0], np.arange(len(subjects[0].nodes)))  # what is loaded once
+    _timed(found.job, contours[0], np.arange(len(contours[0].nodes)))  # what is loaded once
     for _ in range(placements):
         at = {name: float(rng.uniform(*span)) for name, span in found.ranges.items()}
         job = moved(found.job, numbers_of(found.job, at, middle))
-        for subject, known in zip(subjects, found.before["contours"], strict=True):
-            last, node = len(subject.nodes) - 1, known["node"]
-            exact, whole = _timed(job, subject, np.arange(last + 1))
+        for contour, known in zip(contours, found.before.contours, strict=True):
+            last, node = len(contour.nodes) - 1, known.node
+            assert node is not None
+            exact, whole = _timed(job, contour, np.arange(last + 1))
             ways = {f"1 of {s} nodes": np.arange(0, last + 1, s) for s in STRIDES}
             ways["stretch"] = np.arange(max(0, node - HALF), min(last, node + HALF) + 1)
             for name, nodes in ways.items():
-                interval, seconds = _timed(job, subject, nodes)
+                interval, seconds = _timed(job, contour, nodes)
                 over.setdefault(name, []).append(exact / (interval / (nodes[1] - nodes[0])))
                 share.setdefault(name, []).append(seconds / whole)
     return [
@@ -107,10 +111,10 @@ def _bounds(found: Layout, subjects: Sequence[Subject], placements: int) -> list
     ]
 
 
-def _timed(job: Job, subject: Subject, nodes: Any) -> tuple[float, float]:
+def _timed(job: Job, contour: SampledContour, nodes: Any) -> tuple[float, float]:
     """Return the least interval over some nodes, s, and how long it took to find."""
     begun = perf_counter()
-    graph = job.graph(subject.nodes, replace(job.options, comfort=None), only=nodes)
+    graph = job.graph(contour.nodes, replace(job.options, comfort=None), only=nodes)
     velocity, acceleration = job.robot.speed_limits()
     least = least_interval(
         graph.q, graph.start, velocity=velocity, acceleration=acceleration,

@@ -17,17 +17,16 @@ from benchmarks._figures import Figure, Report, Sheet, in_turn
 from benchmarks._nsga import by_nsga
 from kerfpath import Contour, ParetoSet, pareto
 from kerfpath.cad import read as read_drawing
-from kerfpath.front import Attempts, Search, hypervolume, judge_of
-from kerfpath.front._runs import anchors, whole
+from kerfpath.front import ParetoProblem, SearchKind, criteria_named, hypervolume
 from kerfpath.job import read_job
 from kerfpath.options import PlanOptions
-from kerfpath.planner import layered_graph, node_interval, relaxations
+from kerfpath.planner import layered_graph
 from kerfpath.study import pareto_of_job
 
 __all__ = ["run"]
 
 JOB = Path(str(files("kerfpath.demo") / "b_pillar.toml"))
-SEARCHES: tuple[Search, ...] = ("adaptive", "grid")
+SEARCHES: tuple[SearchKind, ...] = ("adaptive", "grid")
 SEED = 0
 CASES = (("displacement", "velocity", "range"), ("displacement", "acceleration", "range_6"))
 COLUMNS = (
@@ -126,7 +125,7 @@ def _task() -> tuple[Contour, dict[str, Any]]:
 
 
 def _cells(
-    criteria: Sequence[str], search: Search, found: ParetoSet, other: ParetoSet
+    criteria: Sequence[str], search: SearchKind, found: ParetoSet, other: ParetoSet
 ) -> tuple[str, ...]:
     return (
         ", ".join(criteria),
@@ -148,19 +147,15 @@ def _nsga(
     figures: list[Figure],
 ) -> tuple[str, ...]:
     """Take the time of NSGA-II, and return its row: the same first runs, box and budget as ours."""
-    robot, graph, speed = options["robot"], options["graph"], options["speed"]
-    judge = judge_of(criteria, robot, eta_v=1.0, eta_a=1.0, cell=None, comfort=None, home=None)
-    attempts = Attempts(
+    robot = options["robot"]
+    asked = PlanOptions(gamma_step=options["gamma_step"], frames=options["frames"])
+    problem = ParetoProblem(
         contour=nodes, robot=robot, tool=options["tool"], placement=options["placement"],
-        speed=speed, graph=graph, cell=None,
-        options=PlanOptions(gamma_step=options["gamma_step"], frames=options["frames"]),
+        speed=options["speed"], options=asked, graph=options["graph"],
+        criteria=criteria_named(criteria, robot, options=asked, cell=None, home=None),
     )  # fmt: skip
-    dt = node_interval(nodes, speed)
-    first = whole(1 / (robot.speed_limits()[0] * dt), judge.eta_v, judge.eta_a)
     start = perf_counter()
-    least = relaxations(nodes, robot, graph, speed)
-    runs = [first, *anchors(first, judge.criteria, least, dt)]
-    losses, feasible = by_nsga(attempts, judge, runs, budget=budget, seed=SEED)
+    losses, feasible = by_nsga(problem, problem.first_runs(), budget=budget, seed=SEED)
     what = f"{budget} runs, NSGA-II: {', '.join(criteria)}"
     figures.append(Figure(what=what, values=[perf_counter() - start]))
     here, there = losses, ours.values * ours.sense

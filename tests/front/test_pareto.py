@@ -12,8 +12,8 @@ from kerfpath import Contour, InputError, NoFeasiblePath, audit, fastest_speed, 
 from kerfpath.air import least_time
 from kerfpath.cell import Mesh, box_between, cell_of
 from kerfpath.comfort import Band, Comfort
-from kerfpath.front import Run, hypervolume
-from kerfpath.front._runs import grid, whole, within
+from kerfpath.front import Subproblem, hypervolume
+from kerfpath.front._subproblem import grid
 from kerfpath.planner import layered_graph
 
 STEP = np.radians(8)
@@ -232,9 +232,10 @@ def test_the_hypervolume_of_boxes_is_their_union():
 
 def test_a_window_of_an_endless_joint_goes_round(task):
     graph, endless = task["graph"], task["robot"].endless
-    window = np.tile([-np.inf, np.inf], (6, 1))
+    free = Subproblem.unbounded(np.ones(6), 1.0, 1.0)
+    window = free.window.copy()
     window[5] = np.pi - 0.2, np.pi + 0.3
-    left = within(graph, window, endless).q[:, 5] % (2 * np.pi)
+    left = replace(free, window=window).graph(graph, endless).q[:, 5] % (2 * np.pi)
     assert len(left)
     assert (np.abs(left - np.pi - 0.05) <= 0.25).all()
     kept = np.abs(graph.q[:, 5] % (2 * np.pi) - np.pi - 0.05) <= 0.25
@@ -242,10 +243,10 @@ def test_a_window_of_an_endless_joint_goes_round(task):
 
 
 def test_the_grid_never_ends_and_never_repeats_itself():
-    first = whole(np.ones(6), 1.0, 1.0)
+    first = Subproblem.unbounded(np.ones(6), 1.0, 1.0)
     runs = list(itertools.islice(grid(first, np.random.default_rng(0)), 1500))
     kinds = {(r.objective, r.metric, r.eta_v, r.eta_a, *r.weights) for r in runs}
-    assert isinstance(runs[0], Run)
+    assert isinstance(runs[0], Subproblem)
     assert len(kinds) == len(runs)
 
 
@@ -334,8 +335,8 @@ def test_the_time_is_that_from_home_and_back(task):
 
 def test_the_same_run_comes_back_from_its_data(found):
     for run in found.runs:
-        again = Run.of_data(json.loads(json.dumps(run.data())))
-        assert again.data() == run.data()
+        again = Subproblem.from_data(json.loads(json.dumps(run.to_data())))
+        assert again.to_data() == run.to_data()
         np.testing.assert_array_equal(again.window, run.window)
 
 

@@ -18,10 +18,10 @@ from kerfpath.cad import read as read_drawing
 from kerfpath.errors import InputError
 from kerfpath.job import cell_of_job, fastest_speeds, pose, read_job
 from kerfpath.study import digest, layout, ranges_of
-from kerfpath.study.placing._look import look
+from kerfpath.study._evaluator import EVERY
+from kerfpath.study.placing._evaluate import contours_of, evaluate_placements, middle_of
 from kerfpath.study.placing._place import moved, numbers_of, placed_text
-from kerfpath.study.placing._subject import middle_of, subjects_of
-from kerfpath.study.placing._worth import EVERY
+from kerfpath.study.placing._value import PlacementValue
 
 DEMO = ROOT / "src" / "kerfpath" / "demo"
 HEAD = f"""
@@ -148,7 +148,7 @@ def in_cell(tmp_path_factory):
 
 
 def worth(job, *places, goal="speed", stretches=(), **options):
-    return look(
+    data = evaluate_placements(
         job=str(job),
         digest=digest(job),
         goal=goal,
@@ -156,10 +156,11 @@ def worth(job, *places, goal="speed", stretches=(), **options):
         stretches=[list(s) for s in stretches],
         **options,
     )
+    return PlacementValue.from_data(json.loads(json.dumps(data)))
 
 
 def middle(path, goal="speed"):
-    return middle_of(read_job(path), subjects_of(str(path), digest(path), goal))
+    return middle_of(read_job(path), contours_of(str(path), digest(path), goal))
 
 
 @pytest.mark.parametrize("goal", ["speed", "margin", "motion"])
@@ -167,7 +168,7 @@ def middle(path, goal="speed"):
 def test_no_bound_is_below_what_the_exact_search_finds(which, goal, request):
     job = request.getfixturevalue(which)
     rng = np.random.default_rng(3)
-    sizes = [len(s.nodes) for s in subjects_of(str(job), digest(job), goal)]
+    sizes = [len(s.nodes) for s in contours_of(str(job), digest(job), goal)]
     decided = 0
     for offsets in SOME:
         stretches = []
@@ -176,58 +177,58 @@ def test_no_bound_is_below_what_the_exact_search_finds(which, goal, request):
             stretches.append((c, first, first + int(rng.integers(4, 12))))
         bound = worth(job, offsets, goal=goal, stretches=stretches)
         exact = worth(job, offsets, goal=goal, exact=True, whole=True)
-        if bound["status"] != "feasible":
-            assert exact["status"] != "feasible"
-        elif exact["status"] == "feasible":
+        if bound.status != "feasible":
+            assert exact.status != "feasible"
+        elif exact.status == "feasible":
             decided += 1
             sign = -1 if goal == "motion" else 1
             # 1e-9 relative: what rounding of sums of a few dozen steps comes to.
-            assert sign * bound["bound"] >= sign * exact["value"] * (1 - sign * 1e-9)
+            assert sign * bound.bound >= sign * exact.value * (1 - sign * 1e-9)
     assert decided
 
 
 def test_the_bounds_are_near_the_value_where_the_stretch_is_the_one_that_binds(plain):
     whole = worth(plain, exact=True, whole=True)
-    slowest = min(whole["contours"], key=lambda c: c["value"])
+    slowest = min(whole.contours, key=lambda c: c.value)
     about = (
-        slowest["index"],
-        max(0, slowest["node"] - 24),
-        min(slowest["nodes"], slowest["node"] + 25) - 1,
+        slowest.index,
+        max(0, slowest.node - 24),
+        min(slowest.nodes, slowest.node + 25) - 1,
     )
-    bound = worth(plain, stretches=[about])["bound"]
-    assert whole["value"] <= bound * (1 + 1e-9)
-    assert bound <= whole["value"] * 1.1
+    bound = worth(plain, stretches=[about]).bound
+    assert whole.value <= bound * (1 + 1e-9)
+    assert bound <= whole.value * 1.1
 
 
 def test_what_is_called_unreachable_has_a_node_without_a_pose(plain):
     job, lost = read_job(plain), 0
-    subjects = {s.name: s for s in subjects_of(str(plain), digest(plain), "speed")}
+    subjects = {s.name: s for s in contours_of(str(plain), digest(plain), "speed")}
     for x in (300.0, 600.0, 800.0, 1000.0):
         answer = worth(plain, {"x_mm": x})
-        if answer["status"] != "unreachable":
+        if answer.status != "unreachable":
             continue
         lost += 1
         there = moved(job, numbers_of(job, {"x_mm": x}, middle(plain)))
-        graph = there.graph(subjects[answer["contour"]].nodes)
-        assert answer["node"] % EVERY == 0
-        assert np.diff(graph.start)[answer["node"]] == 0
+        graph = there.graph(subjects[answer.infeasibility.contour].nodes)
+        assert answer.infeasibility.node % EVERY == 0
+        assert np.diff(graph.start)[answer.infeasibility.node] == 0
     assert lost
 
 
 def test_infeasible_placements_rank_by_how_much_is_reached_and_then_by_how_far_it_is(plain):
     answers = [worth(plain, {"x_mm": x}) for x in (1000.0, 1400.0, 3000.0, 4000.0)]
-    assert all(a["status"] == "unreachable" for a in answers)
-    progress = [a["progress"] for a in answers]
+    assert all(a.status == "unreachable" for a in answers)
+    progress = [a.infeasibility.progress for a in answers]
     assert all(near > far for near, far in pairwise(progress))
 
 
 def test_a_floor_ends_early_and_a_better_placement_is_still_found(plain):
     whole = worth(plain, SOME[0], exact=True, whole=True)
-    beaten = worth(plain, SOME[0], exact=True, floor=whole["value"] * 1.01)
-    assert beaten["value"] is None
-    assert beaten["bound"] <= whole["value"] * 1.01
-    found = worth(plain, SOME[0], exact=True, floor=whole["value"] * 0.99)
-    assert found["value"] == pytest.approx(whole["value"], rel=1e-12)  # the same search
+    beaten = worth(plain, SOME[0], exact=True, floor=whole.value * 1.01)
+    assert beaten.value is None
+    assert beaten.bound <= whole.value * 1.01
+    found = worth(plain, SOME[0], exact=True, floor=whole.value * 0.99)
+    assert found.value == pytest.approx(whole.value, rel=1e-12)  # the same search
 
 
 @pytest.mark.parametrize("offsets", SOME)
@@ -249,9 +250,9 @@ def test_the_file_that_is_written_has_the_very_placement_that_was_looked_at(
     assert np.array_equal(*distances)
     found = worth(in_cell, offsets, exact=True, whole=True)
     speeds = [s for _, _, s in fastest_speeds(again)]
-    if found["status"] == "feasible":
+    if found.status == "feasible":
         # The same graph and search twice.
-        assert min(s.speed for s in speeds) * 60 == pytest.approx(found["value"], rel=1e-12)
+        assert min(s.speed for s in speeds) * 60 == pytest.approx(found.value, rel=1e-12)
     else:
         assert any(isinstance(s, Exception) for s in speeds)
 
@@ -310,33 +311,31 @@ def stl_cone(path):
 
 def test_a_base_that_moves_is_a_part_that_moves_the_other_way(plain):
     # Rounding of the file's numbers, 0.1 um in a metre, may tip a pose over a limit: 1e-4.
-    base = worth(plain, {"base_x_mm": 50.0, "base_y_mm": -20.0}, exact=True)["value"]
+    base = worth(plain, {"base_x_mm": 50.0, "base_y_mm": -20.0}, exact=True).value
     assert base == pytest.approx(
-        worth(plain, {"x_mm": -50.0, "y_mm": 20.0}, exact=True)["value"], rel=1e-4
+        worth(plain, {"x_mm": -50.0, "y_mm": 20.0}, exact=True).value, rel=1e-4
     )
 
 
 def test_turning_the_head_on_an_endless_axis_changes_nothing(plain):
     # Axis 6 turns about the flange's z: it takes the turn back. 1e-6: rounding in the file.
-    shipped = worth(plain, exact=True)["value"]
-    assert worth(plain, {"mount_deg": 40.0}, exact=True)["value"] == pytest.approx(
-        shipped, rel=1e-6
-    )
-    motion = worth(plain, goal="motion", exact=True)["value"]
-    turned = worth(plain, {"mount_deg": 40.0}, goal="motion", exact=True)["value"]
+    shipped = worth(plain, exact=True).value
+    assert worth(plain, {"mount_deg": 40.0}, exact=True).value == pytest.approx(shipped, rel=1e-6)
+    motion = worth(plain, goal="motion", exact=True).value
+    turned = worth(plain, {"mount_deg": 40.0}, goal="motion", exact=True).value
     assert turned == pytest.approx(motion, rel=1e-6)
 
 
 @pytest.mark.parametrize("goal", ["speed", "motion"])
 def test_a_tolerance_never_makes_it_better(plain, goal):
-    alone = worth(plain, {"x_mm": 30.0}, goal=goal, exact=True)["value"]
+    alone = worth(plain, {"x_mm": 30.0}, goal=goal, exact=True).value
     star = [{"x_mm": 30.0}, {"x_mm": 25.0}, {"x_mm": 35.0}]
     robust = worth(plain, *star, goal=goal, exact=True)
-    values = [worth(plain, at, goal=goal, exact=True)["value"] for at in star]
+    values = [worth(plain, at, goal=goal, exact=True).value for at in star]
     worst = max(values) if goal == "motion" else min(values)
-    assert robust["value"] == pytest.approx(worst, rel=1e-12)  # the same searches
-    assert (robust["value"] >= alone) if goal == "motion" else (robust["value"] <= alone)
-    assert values[robust["place"]] == pytest.approx(worst, rel=1e-12)
+    assert robust.value == pytest.approx(worst, rel=1e-12)  # the same searches
+    assert (robust.value >= alone) if goal == "motion" else (robust.value <= alone)
+    assert values[robust.place] == pytest.approx(worst, rel=1e-12)
 
 
 class Stopped(Exception):
@@ -345,9 +344,7 @@ class Stopped(Exception):
 
 def found(job, store, processes=1, **options):
     result = layout(job, store=store, ranges=RANGES, map_points=0, processes=processes, **options)
-    story = [
-        (dict(t.offsets), t.answer["bound"], t.answer["value"], t.searched) for t in result.tried
-    ]
+    story = [(dict(t.offsets), t.result.bound, t.result.value, t.searched) for t in result.tried]
     return result, json.dumps(story)
 
 
@@ -370,9 +367,9 @@ def test_the_search_is_repeatable_goes_on_and_proves_what_it_says(coarse, tmp_pa
     # Oracle: every placement tried, each contour solved exactly.
     assert result.proved
     assert result.best is not None
-    values = [worth(coarse, dict(t.offsets), exact=True).get("value") for t in result.tried]
-    assert result.best.answer["value"] == pytest.approx(max(v for v in values if v), rel=1e-12)
-    assert result.best.answer["value"] >= result.before["value"]
+    values = [worth(coarse, dict(t.offsets), exact=True).value for t in result.tried]
+    assert result.best.result.value == pytest.approx(max(v for v in values if v), rel=1e-12)
+    assert result.best.result.value >= result.before.value
     assert dict(result.tried[0].offsets) == dict.fromkeys(RANGES, 0.0)
     assert sum(result.stages.values()) == len(result.tried)
     assert sum(t.searched for t in result.tried) < len(result.tried)
@@ -386,19 +383,19 @@ def kept(store):
 @pytest.mark.slow
 def test_a_job_that_cannot_be_cut_where_it_lies_is_led_to_where_it_can(tmp_path):
     job = rings(tmp_path, 2600)
-    assert worth(job)["status"] == "unreachable"
+    assert worth(job).status == "unreachable"
     result = layout(
         job, store=tmp_path / "s.sqlite", ranges={"x_mm": (-1200.0, 0.0)}, evaluations=24,
         map_points=5, processes=1, tolerance_mm=20,
     )  # fmt: skip
-    assert result.before["status"] == "unreachable"
+    assert result.before.status == "unreachable"
     assert result.best is not None
     # Worth what the worst is of itself and the ends of its tolerance: the same searches again.
     x = result.best.offsets["x_mm"]
-    star = [worth(job, {"x_mm": x + off}, exact=True)["value"] for off in (-20.0, 0.0, 20.0)]
-    assert result.best.answer["value"] == pytest.approx(min(star), rel=1e-12)
+    star = [worth(job, {"x_mm": x + off}, exact=True).value for off in (-20.0, 0.0, 20.0)]
+    assert result.best.result.value == pytest.approx(min(star), rel=1e-12)
     assert result.map is not None
-    assert [a["status"] for a in result.map.answers][-1] == "unreachable"
+    assert [a.status for a in result.map.answers][-1] == "unreachable"
 
 
 def test_ranges_on_the_command_line():

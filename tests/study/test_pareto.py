@@ -19,7 +19,7 @@ from tests.job.run.test_part import HEAD
 from kerfpath import InputError, NoFeasiblePath, pareto
 from kerfpath.cad import read as read_drawing
 from kerfpath.job import read_job, read_plan_file
-from kerfpath.study import pareto_of_job, picked, plan_picked, write_pareto
+from kerfpath.study import pareto_of_job, plan_picked, read_pick, write_pareto
 
 CRITERIA = ("displacement", "velocity", "range_6")
 TABLES = (
@@ -157,7 +157,7 @@ def test_a_plan_that_is_picked_has_the_criteria_of_the_front(job, studied, tmp_p
     ]
     assert windowed, "the case that only the graph can hold a plan to"
     for which in ("balanced", "range_6", str(windowed[0])):
-        pick = picked(tmp_path, job, which)
+        pick = read_pick(tmp_path, job, which)
         row = studied.front.numbers.index(pick.number)
         _, outcome = plan_picked(job, pick, refine=False)
         assert outcome.passed
@@ -176,7 +176,7 @@ def test_a_plan_that_is_picked_has_the_criteria_of_the_front(job, studied, tmp_p
 
 def test_refined_from_there_it_is_no_worse_by_what_it_minimised(job, studied, tmp_path):
     write_pareto(studied, tmp_path)
-    pick = picked(tmp_path, job, "displacement")
+    pick = read_pick(tmp_path, job, "displacement")
     _, outcome = plan_picked(job, pick, refine=True)
     (cut,) = [cut for cut in outcome.cuts if cut.task.name == "large"]
     assert outcome.passed
@@ -236,7 +236,7 @@ def test_a_front_that_is_not_of_this_job_is_refused(job, studied, tmp_path, spoi
     path = tmp_path / "pareto.json"
     spoil(path, json.loads(path.read_text()))
     with pytest.raises(InputError, match=said) as caught:
-        picked(tmp_path, job, "balanced")
+        read_pick(tmp_path, job, "balanced")
     assert "\n" not in str(caught.value)
 
 
@@ -245,7 +245,7 @@ def test_a_plan_that_is_not_on_the_front_is_refused(job, studied, tmp_path):
     beaten = next(n for n in range(24) if n not in studied.front.numbers)
     for which in (str(beaten), "best", "²"):
         with pytest.raises(InputError, match="or a plan of the front: "):
-            picked(tmp_path, job, which)
+            read_pick(tmp_path, job, which)
 
 
 def test_the_command_finds_a_front_and_writes_a_plan_of_it(job, tmp_path):

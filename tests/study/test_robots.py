@@ -26,7 +26,7 @@ from kerfpath.study import (
     with_robot,
     write_robots,
 )
-from kerfpath.study._robots import judged
+from kerfpath.study._robots import evaluate_robot
 from kerfpath.sweep import _local
 
 # The job gives accelerations of its own robot, and none that could be assumed of others.
@@ -116,7 +116,7 @@ def test_accelerations_are_assumed_only_as_asked(folder, tmp_path):
     by_id = {e.robot.id: e for e in which_robots(path, acceleration_ratio=NEAREST, **given)}
     assumed = by_id[SILENT]
     assert assumed.robot.acceleration_source.startswith("assumed: ratio cybertech_8_to_20kg")
-    told = judged(
+    told = evaluate_robot(
         path=str(path), digest_then=digest(path), name=SILENT, ratio="cybertech_8_to_20kg"
     )
     assert [contour["fastest"] for contour in told] == [c.fastest for c in assumed.contours]

@@ -6,7 +6,7 @@ import pytest
 
 from conftest import ROOT
 from kerfpath.errors import InputError
-from kerfpath.study import digest, loaded
+from kerfpath.study import digest, load_job
 from kerfpath.sweep import UnfitWorker
 
 PARTS = ROOT / "examples" / "parts"
@@ -29,12 +29,12 @@ def test_the_digest_is_that_of_the_contents_wherever_they_lie(bracket):
 
 def test_a_worker_refuses_a_job_that_has_changed(bracket):
     then = digest(bracket)
-    assert loaded(str(bracket), then).job.path == bracket
-    assert loaded(str(bracket), then) is loaded(str(bracket), then)
+    assert load_job(str(bracket), then).job.path == bracket
+    assert load_job(str(bracket), then) is load_job(str(bracket), then)
     bracket.write_text(bracket.read_text() + "\n# a remark\n")
-    loaded.cache_clear()
+    load_job.cache_clear()
     with pytest.raises(UnfitWorker, match="changed, or is another one on this worker"):
-        loaded(str(bracket), then)
+        load_job(str(bracket), then)
 
 
 def test_a_job_that_is_not_there_is_refused(tmp_path):
@@ -46,4 +46,4 @@ def test_a_worker_without_the_job_is_unfit_and_does_not_fail_the_task(bracket):
     then = digest(bracket)
     (bracket.parent / "bracket.step").unlink()
     with pytest.raises(UnfitWorker, match=r"bracket\.step.*every worker needs job and files"):
-        loaded(str(bracket), then)
+        load_job(str(bracket), then)

@@ -19,9 +19,9 @@ from kerfpath.cli._show import (
     sweep_bar,
     table,
 )
-from kerfpath.front import Front, Search
+from kerfpath.front import Front, SearchKind
 from kerfpath.job import make_folder, read_job, require_folder, require_language
-from kerfpath.study import Studied, axes_of, pareto_of_job, picked, plan_picked, write_pareto
+from kerfpath.study import JobFront, axes_of, pareto_of_job, plan_picked, read_pick, write_pareto
 
 __all__ = ["pick_plan", "show_front"]
 
@@ -36,7 +36,7 @@ def show_front(
     contour: str | None,
     criteria: Sequence[str],
     runs: int,
-    search: Search,
+    search: SearchKind,
     seed: int,
     ahead: int,
     scheduler: str | None,
@@ -47,7 +47,7 @@ def show_front(
     make_folder(folder)
     compile_kernels()
     with sweep_bar("runs") as progress:
-        studied = pareto_of_job(
+        found = pareto_of_job(
             job_file,
             store=folder / "pareto.sqlite",
             contour=contour,
@@ -61,14 +61,14 @@ def show_front(
             progress=progress,
         )
     with busy("writing"):
-        written = write_pareto(studied, folder)
+        written = write_pareto(found, folder)
     if as_json:
-        print_json(_entry(studied, written))
+        print_json(_entry(found, written))
         return
-    front = studied.front
-    chosen = "" if contour or not studied.others else f", the longest of {len(studied.others) + 1}"
+    front = found.front
+    chosen = "" if contour or not found.others else f", the longest of {len(found.others) + 1}"
     out.print(
-        f"[bold]{escape(studied.contour)}[/]{chosen}: {len(front.runs)} plans that no other beats, "
+        f"[bold]{escape(found.contour)}[/]{chosen}: {len(front.runs)} plans that no other beats, "
         f"of {front.feasible} feasible runs of {front.tried}; hypervolume {front.hypervolume:.4f}, "
         f"largest gap {front.gap:.3f}"
     )
@@ -97,10 +97,10 @@ def _show_plans(front: Front) -> None:
     out.print(f"arrows: where better is{more}")
 
 
-def _entry(studied: Studied, written: Sequence[Path]) -> dict[str, Any]:
-    front = studied.front
+def _entry(found: JobFront, written: Sequence[Path]) -> dict[str, Any]:
+    front = found.front
     return {
-        "contour": studied.contour,
+        "contour": found.contour,
         "criteria": list(front.criteria),
         "units": list(front.units),
         "plans": [
@@ -127,7 +127,7 @@ def pick_plan(
     typer.Exit
         Code 1: some contour has no plan that passes its audit.
     """
-    pick = picked(folder, job_file, which)
+    pick = read_pick(folder, job_file, which)
     to = folder / f"plan-{pick.number}"
     require_folder(to)
     require_language(read_job(job_file))

@@ -1,16 +1,17 @@
 """The Pareto set: plans of one contour of which none is better than another in every criterion."""
 
-from kerfpath.front._adaptive import reach_of as reach_of
-from kerfpath.front._attempt import Attempts as Attempts
-from kerfpath.front._collection import AHEAD as AHEAD
-from kerfpath.front._collection import Collection as Collection
-from kerfpath.front._collection import Reached as Reached
-from kerfpath.front._collection import Search as Search
-from kerfpath.front._criteria import Judge as Judge
-from kerfpath.front._criteria import judge_of as judge_of
+from kerfpath.front._criteria import CRITERIA as CRITERIA
+from kerfpath.front._criteria import JOINT_CRITERIA as JOINT_CRITERIA
+from kerfpath.front._criteria import criteria_named as criteria_named
+from kerfpath.front._front import Front as Front
+from kerfpath.front._front import ParetoSet as ParetoSet
+from kerfpath.front._front import hypervolume as hypervolume
 from kerfpath.front._pareto import pareto as pareto
-from kerfpath.front._runs import Run as Run
-from kerfpath.front._runs import RunData as RunData
-from kerfpath.front._set import Front as Front
-from kerfpath.front._set import ParetoSet as ParetoSet
-from kerfpath.front._set import hypervolume as hypervolume
+from kerfpath.front._problem import Criterion as Criterion
+from kerfpath.front._problem import Evaluation as Evaluation
+from kerfpath.front._problem import ParetoProblem as ParetoProblem
+from kerfpath.front._search import AHEAD as AHEAD
+from kerfpath.front._search import FrontSearch as FrontSearch
+from kerfpath.front._search import SearchKind as SearchKind
+from kerfpath.front._subproblem import Subproblem as Subproblem
+from kerfpath.front._subproblem import SubproblemData as SubproblemData

@@ -1,188 +1,309 @@
-"""The criteria that plans are compared by, by name."""
+"""The criteria, each an object; `CRITERIA` and `JOINT_CRITERIA` register them by name."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
-from typing import Any
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from kerfpath._arrays import Array, floats, freeze
-from kerfpath._told import told
+from kerfpath._arrays import Array, freeze
 from kerfpath.air import least_time
 from kerfpath.cell import Cell
-from kerfpath.comfort import MEASURES, Comfort
+from kerfpath.comfort import MEASURES
 from kerfpath.errors import InputError
 from kerfpath.front._clearance import clearance, counted
+from kerfpath.front._problem import Criterion, Gap, ParetoProblem
+from kerfpath.front._subproblem import Subproblem, in_window
 from kerfpath.kernels.metric import increments
-from kerfpath.plans import Criteria, Plan
+from kerfpath.options import PlanOptions
+from kerfpath.plans import Plan
 from kerfpath.robots import Robot
 
-__all__ = ["Criterion", "Judge", "judge_of"]
+__all__ = ["CRITERIA", "JOINT_CRITERIA", "criteria_named"]
 
-PER_JOINT = {"displacement": "displacement", "increment": "largest_increment", "range": "range"}
-"""Criteria (7) to (9) of one joint, and what `kerfpath.plans.Criteria` calls them."""
-TOGETHER = {
-    "displacement": "s",
-    "range": "s",
-    "velocity": "share",
-    "acceleration": "share",
-    "speed": "m/s",
-    "time": "s",
-    "clearance": "m",
-}
-"""Criteria of all joints together, and their units."""
-DIGITS = 12
-"""Of a criterion that count."""
-MORE = ("speed", "clearance", *MEASURES)
-"""Criteria that are better the more they are."""
+FAINT = 1e-6
+"""Weight of the other joints where one joint counts: they decide between equals, or as good as."""
+ROUNDING = 1e-9
+"""Share by which limits are wider than what was found to need them."""
+TRIES = 8
+"""Windows that are looked at for a pose of every node before a run is spent on one."""
+ROOM = 1e-9
+"""rad, by which windows are wider than the motion that they are to hold: rounding."""
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Criterion:
-    """One criterion.
+class PerJoint(Criterion):
+    """A criterion of one joint, or of all: added up over their velocity limits."""
 
-    Parameters
-    ----------
-    name : str
-        As `pareto` takes it.
-    kind : str
-        The name, without its joint.
-    joint : int, optional
-        The joint it is of, 0-based; None: of all joints together.
-    unit : str
-    """
+    def of_joints(self, plan: Plan) -> Array:
+        """Return it joint by joint, (n,) rad, of a rail m."""
+        raise NotImplementedError
 
-    name: str
-    kind: str
-    joint: int | None
-    unit: str
-
-    __repr__ = told
-
-    @property
-    def sense(self) -> float:
-        """1 where less is better, -1 where more is."""
-        return -1.0 if self.kind in MORE else 1.0
-
-
-@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class Judge:
-    """What plans are judged by: the criteria, and what some of them need beyond the plan.
-
-    Parameters
-    ----------
-    criteria : tuple of Criterion
-    eta_v, eta_a : float
-        Shares of the limits within which a plan could be sped up.
-    cell : Cell, optional
-    home : (n,) rad, optional
-    """
-
-    criteria: tuple[Criterion, ...]
-    eta_v: float
-    eta_a: float
-    cell: Cell | None
-    home: Array | None
-
-    __repr__ = told
-
-    def losses(self, plan: Plan) -> Array:
-        """Return the criteria (C,) of a plan, with signs by which less is better.
-
-        To so many digits that the same motion found twice, its sums rounded otherwise, is one.
-        """
-        found = plan.criteria
-        values = [c.sense * self._value(c, plan, found) for c in self.criteria]
-        return freeze(np.array([float(f"{value:.{DIGITS}g}") for value in values]))
-
-    def _value(self, criterion: Criterion, plan: Plan, found: Criteria) -> float:
-        kind = criterion.kind
-        if kind in MEASURES:
-            return found.nearest[kind][0]
-        if kind in ("velocity", "acceleration"):
-            return float(getattr(found, f"peak_{kind}").max())
-        if kind == "speed":
-            faster = [self.eta_v / found.peak_velocity.max()]
-            if (sharpest := found.peak_acceleration.max()) > 0:
-                faster.append(np.sqrt(self.eta_a / sharpest))
-            return plan.contour.length / float(plan.time[-1]) * float(min(faster))
-        if kind == "time":
-            assert self.home is not None
-            return _cycle(plan, self.home)
-        if kind == "clearance":
-            assert self.cell is not None
-            return clearance(plan, self.cell)
-        values: Array = getattr(found, PER_JOINT[kind])
-        if criterion.joint is not None:
-            return float(values[criterion.joint])
+    def value(self, plan: Plan, problem: ParetoProblem) -> float:
+        values = self.of_joints(plan)
+        if self.joint is not None:
+            return float(values[self.joint])
         return float((values / plan.robot.speed_limits()[0]).sum())
 
+    def anchor(self, problem: ParetoProblem) -> Subproblem | None:
+        if self.joint is None:
+            return None
+        weights = FAINT * problem.unbounded.weights
+        weights[self.joint] = problem.unbounded.weights[self.joint]
+        return replace(problem.unbounded, weights=freeze(weights))
 
-def _cycle(plan: Plan, home: Array) -> float:
-    """Return the time from home along a plan and back, s: straight joint motions, full limits."""
-    ends = np.stack([home, plan.q[0]]), np.stack([plan.q[-1], home])
-    ways = np.vstack([increments(pair, plan.robot.endless) for pair in ends])
-    return float(plan.time[-1] + least_time(ways, *plan.robot.speed_limits()).sum())
+
+class Displacement(PerJoint):
+    """Total displacement (7); the unbounded run is best in that of all joints."""
+
+    exact_anchor = True
+
+    def of_joints(self, plan: Plan) -> Array:
+        return plan.criteria.displacement
 
 
-def judge_of(
+class Increment(PerJoint):
+    """Largest increment (8)."""
+
+    exact_anchor = True
+
+    def of_joints(self, plan: Plan) -> Array:
+        return plan.criteria.largest_increment
+
+    def anchor(self, problem: ParetoProblem) -> Subproblem | None:
+        alone = PerJoint.anchor(self, problem)
+        return alone and replace(alone, objective="max", metric="chebychev")
+
+
+class Range(PerJoint):
+    """Coordinate range (9), bounded by windows on the joints."""
+
+    bounded = True
+
+    def of_joints(self, plan: Plan) -> Array:
+        return plan.criteria.range
+
+    def anchor(self, problem: ParetoProblem) -> Subproblem | None:
+        if self.joint is None:
+            return replace(problem.unbounded, metric="euclid")
+        return PerJoint.anchor(self, problem)
+
+    def bound(
+        self, run: Subproblem, value: float, gap: Gap, problem: ParetoProblem,
+        rng: np.random.Generator,
+    ) -> Subproblem:  # fmt: skip
+        """Return a subproblem with windows that hold the range to a value.
+
+        Around the joints' spans in the better plan, inside those of the worse one or, for one
+        joint, anywhere that leaves every node a pose.
+        """
+        a, b = gap.better, gap.worse
+        widths = [np.ptp(solution.spans, axis=1) for solution in (a or b, b)]
+        around = a is not None and bool(rng.integers(2))
+        window = run.window.copy()
+        if self.joint is None:
+            joints = np.arange(len(window))
+            velocity, _ = problem.robot.speed_limits()
+            if around and a is not None:
+                low = np.minimum(a.spans[:, 0], b.spans[:, 0])
+                more = np.maximum(a.spans[:, 1], b.spans[:, 1]) - low - widths[0]
+                had, all_more = (float((w / velocity).sum()) for w in (widths[0], more))
+                width = widths[0] + min(1.0, (value - had) / max(all_more, ROOM)) * more
+            else:
+                width = widths[1] * value / float((widths[1] / velocity).sum())
+        else:
+            joints = np.array([self.joint])
+            width = np.full(len(window), value)
+        place = rng.uniform(size=len(window))
+        held = a.spans if around and a is not None else b.spans
+        low = held[:, 0] + place * (np.ptp(held, axis=1) - width)
+        if self.joint is not None and rng.integers(2):
+            low[self.joint] = self._elsewhere(problem, value, low[self.joint], rng)
+        window[joints] = np.stack([low - ROOM, low + width + ROOM], axis=1)[joints]
+        return replace(run, window=freeze(window))
+
+    def _elsewhere(
+        self, problem: ParetoProblem, width: float, otherwise: float, rng: np.random.Generator
+    ) -> float:
+        """Return where a window of the joint begins that holds a pose of every node, if found.
+
+        At a vertex: so does the span of every path.
+        """
+        graph, endless = problem.graph, bool(problem.robot.endless[self.joint])
+        q = graph.q[:, self.joint]
+        for _ in range(TRIES):
+            low = q[rng.integers(len(q))]
+            inside = in_window(q, low, width, endless=endless)
+            if np.logical_or.reduceat(inside, graph.start[:-1]).all():
+                return float(low)
+        return otherwise
+
+
+class Velocity(Criterion):
+    """Largest increment (8) of any joint, as a share of its velocity limit."""
+
+    exact_anchor = bounded = True
+
+    def value(self, plan: Plan, problem: ParetoProblem) -> float:
+        return float(plan.criteria.peak_velocity.max())
+
+    def anchor(self, problem: ParetoProblem) -> Subproblem:
+        return replace(problem.unbounded, objective="max", metric="chebychev")
+
+    def bound(self, run: Subproblem, value: float, *_: object) -> Subproblem:
+        return replace(run, eta_v=value)
+
+
+class Acceleration(Criterion):
+    """Largest second difference (6) of any joint, as a share of its acceleration limit."""
+
+    exact_anchor = bounded = True
+
+    def value(self, plan: Plan, problem: ParetoProblem) -> float:
+        return float(plan.criteria.peak_acceleration.max())
+
+    def anchor(self, problem: ParetoProblem) -> Subproblem | None:
+        eta_a = problem.least.eta_a
+        return None if eta_a is None else replace(problem.unbounded, eta_a=eta_a * (1 + ROUNDING))
+
+    def bound(self, run: Subproblem, value: float, *_: object) -> Subproblem:
+        return replace(run, eta_a=value)
+
+
+class Speed(Criterion):
+    """Fastest constant speed of the plan's path, within eta_v and eta_a."""
+
+    more_is_better = exact_anchor = bounded = True
+
+    def value(self, plan: Plan, problem: ParetoProblem) -> float:
+        found, asked = plan.criteria, problem.options
+        faster = [asked.eta_v / found.peak_velocity.max()]
+        if (sharpest := found.peak_acceleration.max()) > 0:
+            faster.append(np.sqrt(asked.eta_a / sharpest))
+        return plan.contour.length / float(plan.time[-1]) * float(min(faster))
+
+    def anchor(self, problem: ParetoProblem) -> Subproblem:
+        return problem.unbounded.quicker(problem.dt / problem.least.slower.dt * (1 - ROUNDING))
+
+    def bound(
+        self, run: Subproblem, value: float, gap: Gap, problem: ParetoProblem, *_: object
+    ) -> Subproblem:
+        contour, whole = problem.contour, problem.unbounded
+        mean = contour.length / (problem.dt * (len(contour) - 1))
+        return replace(run, eta_v=whole.eta_v, eta_a=whole.eta_a).quicker(value / mean)
+
+
+class Time(Criterion):
+    """Time from home along the plan and back: straight joint motions, full limits."""
+
+    def require(self, options: PlanOptions, cell: Cell | None, home: ArrayLike | None) -> None:
+        if home is None:
+            raise InputError("criteria: 'time' needs home; give it, or leave 'time' out")
+
+    def value(self, plan: Plan, problem: ParetoProblem) -> float:
+        home = problem.home
+        assert home is not None
+        ends = np.stack([home, plan.q[0]]), np.stack([plan.q[-1], home])
+        ways = np.vstack([increments(pair, plan.robot.endless) for pair in ends])
+        return float(plan.time[-1] + least_time(ways, *plan.robot.speed_limits()).sum())
+
+
+class Clearance(Criterion):
+    """What robot and head keep in the cell beyond the near-miss distance, at the nodes."""
+
+    more_is_better = bounded = True
+
+    def require(self, options: PlanOptions, cell: Cell | None, home: ArrayLike | None) -> None:
+        if cell is None:
+            raise InputError(
+                "criteria: 'clearance' needs a cell; give it, or leave 'clearance' out"
+            )
+        if not counted(cell).any():
+            raise InputError(
+                "criteria: 'clearance' needs a part or fixtures in the cell without near-miss "
+                "distances of their own, and it has none"
+            )
+        if options.comfort is not None and options.comfort.clearance is not None:
+            raise InputError(
+                "criteria: 'clearance' is a cost of comfort already; leave one of the two out"
+            )
+
+    def value(self, plan: Plan, problem: ParetoProblem) -> float:
+        assert problem.cell is not None
+        return clearance(plan, problem.cell)
+
+    def bound(self, run: Subproblem, value: float, *_: object) -> Subproblem:
+        return replace(run, clearance=value)
+
+
+class LeastMeasure(Criterion):
+    """The least of a measure of `kerfpath.comfort`, which has the same name, at the nodes."""
+
+    more_is_better = True
+
+    def value(self, plan: Plan, problem: ParetoProblem) -> float:
+        return plan.criteria.nearest[self.name][0]
+
+
+JOINT_CRITERIA: dict[str, Criterion] = {
+    "displacement": Displacement(name="displacement", words="total displacement", unit="s"),
+    "increment": Increment(name="increment", words="largest increment", unit="s"),
+    "range": Range(name="range", words="coordinate range", unit="s"),
+}
+"""Those of one joint J, which `pareto` takes as "displacement_J" and so on."""
+CRITERIA: dict[str, Criterion] = {
+    each.name: each
+    for each in (
+        JOINT_CRITERIA["displacement"],
+        JOINT_CRITERIA["range"],
+        Velocity(name="velocity", words="peak velocity", unit="share"),
+        Acceleration(name="acceleration", words="peak acceleration", unit="share"),
+        Speed(name="speed", words="fastest speed of the path", unit="m/s"),
+        Time(name="time", words="time from home and back", unit="s"),
+        Clearance(name="clearance", words="clearance in the cell", unit="m"),
+        *(LeastMeasure(name=name, words=name, unit=m.unit) for name, m in MEASURES.items()),
+    )
+}
+"""Those of all joints together."""
+
+
+def criteria_named(
     names: Sequence[str],
     robot: Robot,
     *,
-    eta_v: float,
-    eta_a: float,
+    options: PlanOptions,
     cell: Cell | None,
-    comfort: Comfort | None,
     home: ArrayLike | None,
-) -> Judge:
-    """Return who judges by the criteria of these names.
+) -> tuple[Criterion, ...]:
+    """Return the criteria of these names.
 
     Raises
     ------
     InputError
         An unknown name, a joint that the robot does not have, a name given twice, or none; a
-        clearance without a cell or beside one in `comfort`, a time without home.
+        clearance without a cell or beside one in `options.comfort`, a time without home.
     """
     if isinstance(names, str) or not names or len(set(names)) != len(names):
         raise InputError(f"criteria: expected different names, at least one, got {names!r}")
-    needs: dict[str, Any] = {"clearance": ("a cell", cell), "time": ("home", home)}
-    for name, (what, given) in needs.items():
-        if name in names and given is None:
-            raise InputError(f"criteria: {name!r} needs {what}; give it, or leave {name!r} out")
-    if "clearance" in names:
-        if cell is not None and not counted(cell).any():
-            raise InputError(
-                "criteria: 'clearance' needs a part or fixtures in the cell without near-miss "
-                "distances of their own, and it has none"
-            )
-        if comfort is not None and comfort.clearance is not None:
-            raise InputError(
-                "criteria: 'clearance' is a cost of comfort already; leave one of the two out"
-            )
-    return Judge(
-        criteria=tuple(_criterion(name, robot) for name in names),
-        eta_v=eta_v,
-        eta_a=eta_a,
-        cell=cell,
-        home=None if home is None else floats(home, "home", (robot.joints,)),
-    )
+    found = tuple(_named(name, robot) for name in names)
+    for criterion in found:
+        criterion.require(options, cell, home)
+    return found
 
 
-def _criterion(name: str, robot: Robot) -> Criterion:
+def _named(name: str, robot: Robot) -> Criterion:
     kind, _, number = str(name).rpartition("_")
-    if kind in PER_JOINT and number in map(str, range(1, robot.joints + 1)):
-        joint = int(number) - 1
+    if kind in JOINT_CRITERIA and number in map(str, range(1, robot.joints + 1)):
+        joint, each = int(number) - 1, JOINT_CRITERIA[kind]
         unit = robot.external.unit if robot.external and joint == robot.joints - 1 else "rad"
-        return Criterion(name=name, kind=kind, joint=joint, unit=unit)
-    if name in MEASURES:
-        return Criterion(name=name, kind=name, joint=None, unit=MEASURES[name].unit)
-    if name in TOGETHER:
-        return Criterion(name=name, kind=name, joint=None, unit=TOGETHER[name])
+        return replace(
+            each, name=name, words=f"{each.words}, joint {number}", unit=unit, joint=joint
+        )
+    if name in CRITERIA:
+        return CRITERIA[name]
     raise InputError(
-        f"criteria: expected some of {', '.join((*TOGETHER, *MEASURES))}, or "
-        f"{', '.join(f'{kind}_J' for kind in PER_JOINT)} of a joint J from 1 to {robot.joints}, "
-        f"got {name!r}"
+        f"criteria: expected some of {', '.join(CRITERIA)}, or "
+        f"{', '.join(f'{kind}_J' for kind in JOINT_CRITERIA)} of a joint J from 1 to "
+        f"{robot.joints}, got {name!r}"
     )

@@ -10,15 +10,14 @@ from typing import Unpack
 
 from numpy.typing import ArrayLike
 
-from kerfpath._arrays import as_pose
+from kerfpath._arrays import as_pose, floats
 from kerfpath.cell import Cell
 from kerfpath.contour import Contour
-from kerfpath.front._adaptive import reach_of
-from kerfpath.front._attempt import Attempts
-from kerfpath.front._collection import AHEAD, Collection, Reached, Search, whole_number
-from kerfpath.front._criteria import judge_of
-from kerfpath.front._runs import Run
-from kerfpath.front._set import Front, ParetoSet
+from kerfpath.front._criteria import criteria_named
+from kerfpath.front._front import Front, ParetoSet
+from kerfpath.front._problem import Evaluation, ParetoProblem
+from kerfpath.front._search import AHEAD, FrontSearch, SearchKind, whole_number
+from kerfpath.front._subproblem import Subproblem
 from kerfpath.graph import LayeredGraph
 from kerfpath.options import GraphKeywords, PlanOptions, chosen
 from kerfpath.planner import layered_graph
@@ -47,7 +46,7 @@ def pareto(
     speed: float | None = None,
     criteria: Sequence[str] = ("displacement", "velocity", "range"),
     runs: int = 100,
-    search: Search = "adaptive",
+    search: SearchKind = "adaptive",
     seed: int = 0,
     home: ArrayLike | None = None,
     options: PlanOptions | None = None,
@@ -109,22 +108,14 @@ def pareto(
         Unknown criteria or search, fewer than one run, and what `kerfpath.plan` refuses.
     """
     asked = chosen(options, keywords, ParetoKeywords, feed="constant", refine=False)
-    judge = judge_of(
-        criteria,
-        robot,
-        eta_v=asked.eta_v,
-        eta_a=asked.eta_a,
-        cell=cell,
-        comfort=asked.comfort,
-        home=home,
-    )
+    found = criteria_named(criteria, robot, options=asked, cell=cell, home=home)
     workers = whole_number((os.cpu_count() or 1) if workers is None else workers, "workers")
     T_flange_tip, T_base_part = as_pose(tool, "tool"), as_pose(placement, "placement")
     if graph is None:
         graph = layered_graph(
             contour, robot, tool=T_flange_tip, placement=T_base_part, options=asked
         )
-    attempts = Attempts(
+    problem = ParetoProblem(
         contour=contour,
         robot=robot,
         tool=T_flange_tip,
@@ -132,33 +123,31 @@ def pareto(
         speed=speed,
         options=asked,
         graph=graph,
+        criteria=found,
         cell=cell,
+        home=None if home is None else floats(home, "home", (robot.joints,)),
         audit=audit,
     )
-    collection = Collection(attempts, judge=judge, runs=runs, search=search, seed=seed, ahead=ahead)
+    front_search = FrontSearch(problem, runs=runs, search=search, seed=seed, ahead=ahead)
     plans: dict[int, Plan] = {}
-    begun = 0
 
     with ThreadPoolExecutor(1 if cell else workers) as pool:
 
-        def submit(run: Run) -> Callable[[], Reached | str]:
-            nonlocal begun
-            number, begun = begun, begun + 1
-            future = pool.submit(attempts.of if number else attempts.first, run)
+        def submit(number: int, run: Subproblem) -> Callable[[], Evaluation | str]:
+            future = pool.submit(problem.solve, run, first=number == 0)
 
-            def settled() -> Reached | str:
-                found = future.result()
+            def wait() -> Evaluation | str:
+                made = future.result()
                 if progress is not None:
                     progress(1)
-                if isinstance(found, str):
-                    return found
-                plans[number] = found
-                return judge.losses(found), reach_of(found)
+                if isinstance(made, str):
+                    return made
+                plans[number] = made
+                return problem.evaluate(made)
 
-            return settled
+            return wait
 
-        collection.gather(submit)
-    front = collection.result()
+        front = front_search.run(submit)
     return ParetoSet(
         **{each.name: getattr(front, each.name) for each in fields(Front)},
         plans=tuple(plans[number] for number in front.numbers),

@@ -2,15 +2,15 @@
 
 from kerfpath.study._batch import Planned as Planned
 from kerfpath.study._batch import batch as batch
-from kerfpath.study._job import Loaded as Loaded
+from kerfpath.study._job import LoadedJob as LoadedJob
 from kerfpath.study._job import digest as digest
-from kerfpath.study._job import loaded as loaded
-from kerfpath.study._pareto import Studied as Studied
+from kerfpath.study._job import load_job as load_job
+from kerfpath.study._pareto import JobFront as JobFront
 from kerfpath.study._pareto import pareto_of_job as pareto_of_job
 from kerfpath.study._pareto_files import Pick as Pick
 from kerfpath.study._pareto_files import axes_of as axes_of
-from kerfpath.study._pareto_files import picked as picked
 from kerfpath.study._pareto_files import plan_picked as plan_picked
+from kerfpath.study._pareto_files import read_pick as read_pick
 from kerfpath.study._pareto_files import write_pareto as write_pareto
 from kerfpath.study._robots import NEAREST as NEAREST
 from kerfpath.study._robots import ContourSpeed as ContourSpeed

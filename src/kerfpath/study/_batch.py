@@ -27,7 +27,7 @@ from kerfpath.job import (
 )
 from kerfpath.post import replace_program
 from kerfpath.report import with_library, without_library
-from kerfpath.study._job import digest, loaded
+from kerfpath.study._job import digest, load_job
 from kerfpath.sweep import Progress, Result, Sweep
 
 __all__ = ["STORE", "Planned", "batch"]
@@ -171,7 +171,7 @@ def planned(*, path: str, digest_then: str) -> dict[str, Any]:
     InputError
         As `run_job`, and a language that the robot does not speak.
     """
-    found = loaded(path, digest_then)
+    found = load_job(path, digest_then)
     require_language(found.job)
     outcome = run_job(found.job, found.part)
     texts = outcome_texts(outcome)

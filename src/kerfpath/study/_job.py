@@ -7,7 +7,6 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
-from typing import Any
 
 from kerfpath._told import told
 from kerfpath.cad import Part
@@ -16,11 +15,11 @@ from kerfpath.errors import InputError
 from kerfpath.job import Job, read_job
 from kerfpath.sweep import UnfitWorker
 
-__all__ = ["Loaded", "digest", "loaded"]
+__all__ = ["LoadedJob", "digest", "load_job"]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class Loaded:
+class LoadedJob:
     """A job, and its part as read."""
 
     job: Job
@@ -56,7 +55,7 @@ def _files(job: Job) -> Iterator[Path]:
     yield from sorted(meshes)
 
 
-def _texts(value: Any) -> Iterator[str]:
+def _texts(value: object) -> Iterator[str]:
     """Yield the text in a tree of plain data, in order."""
     if isinstance(value, str):
         yield value
@@ -66,7 +65,7 @@ def _texts(value: Any) -> Iterator[str]:
 
 
 @lru_cache(maxsize=2)
-def loaded(path: str, digest_then: str) -> Loaded:
+def load_job(path: str, digest_then: str) -> LoadedJob:
     """Return a job and its part, kept for the next task of a worker.
 
     Parameters
@@ -91,4 +90,4 @@ def loaded(path: str, digest_then: str) -> Loaded:
             "worker; start the study again"
         )
     job = read_job(path)
-    return Loaded(job=job, part=read_drawing(job.part_file, unit=job.part_unit))
+    return LoadedJob(job=job, part=read_drawing(job.part_file, unit=job.part_unit))

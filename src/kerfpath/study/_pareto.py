@@ -6,7 +6,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
 from pathlib import Path
-from typing import Any
+from typing import TypedDict
 
 import numpy as np
 
@@ -17,27 +17,25 @@ from kerfpath.contour import Contour
 from kerfpath.errors import InputError, NoFeasiblePath
 from kerfpath.front import (
     AHEAD,
-    Attempts,
-    Collection,
+    Evaluation,
     Front,
-    Judge,
-    Reached,
-    Run,
-    RunData,
-    Search,
-    judge_of,
-    reach_of,
+    FrontSearch,
+    ParetoProblem,
+    SearchKind,
+    Subproblem,
+    SubproblemData,
+    criteria_named,
 )
 from kerfpath.job import Job, cell_of_job
 from kerfpath.plans import Plan
-from kerfpath.study._job import Loaded, digest, loaded
+from kerfpath.study._job import LoadedJob, digest, load_job
 from kerfpath.sweep import Progress, Result, Sweep
 
-__all__ = ["Studied", "pareto_of_job"]
+__all__ = ["JobFront", "pareto_of_job"]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class Studied:
+class JobFront:
     """The front of a contour of a job.
 
     Parameters
@@ -67,13 +65,13 @@ def pareto_of_job(
     contour: str | None = None,
     criteria: Sequence[str] = ("displacement", "velocity", "range"),
     runs: int = 100,
-    search: Search = "adaptive",
+    search: SearchKind = "adaptive",
     seed: int = 0,
     ahead: int = AHEAD,
     scheduler: str | None = None,
     processes: int | None = None,
     progress: Progress | None = None,
-) -> Studied:
+) -> JobFront:
     """Return the front of a contour; what is in the store already is not done again.
 
     Parameters
@@ -97,76 +95,73 @@ def pareto_of_job(
     """
     whole = digest(job_file)
     here = str(job_file.resolve())
-    known = loaded(here, whole)
-    name, others = _picked(known, contour)
-    stage = _stage(here, whole, name, tuple(criteria))
-    collection = Collection(
-        stage.attempts,
-        judge=stage.judge,
-        runs=runs,
-        search=search,
-        seed=seed,
-        ahead=ahead,
-    )
+    known = load_job(here, whole)
+    name, others = _named_contour(known, contour)
+    problem = _problem(here, whole, name, tuple(criteria))
+    front_search = FrontSearch(problem, runs=runs, search=search, seed=seed, ahead=ahead)
     with Sweep(
-        attempt,
+        solve,
         store=store,
         scheduler=scheduler,
         processes=processes,
         progress=progress,
-        total=collection.runs,
+        total=front_search.runs,
     ) as sweep:
-        first = True
 
-        def submit(run: Run) -> Callable[[], Reached | str]:
-            nonlocal first
+        def submit(number: int, run: Subproblem) -> Callable[[], Evaluation | str]:
             key = sweep.submit(
                 job=here,
                 digest=whole,
                 contour=name,
                 criteria=list(criteria),
-                run=run.data(),
-                first=first,
+                run=run.to_data(),
+                first=number == 0,
             )
-            first = False
-            return lambda: _settled(sweep.result(key))
+            return lambda: _evaluation(sweep.result(key))
 
-        collection.gather(submit)
-    return Studied(
-        job=known.job, digest=whole, contour=name, others=others, front=collection.result()
-    )
+        front = front_search.run(submit)
+    return JobFront(job=known.job, digest=whole, contour=name, others=others, front=front)
 
 
-def attempt(
+class SolvedData(TypedDict, total=False):
+    """What a run came to, as JSON holds it: `why` it has no plan, or the evaluation of its plan."""
+
+    why: str
+    losses: list[float]
+    spans: list[list[float]]
+
+
+def solve(
     *,
     job: str,
     digest: str,
     contour: str,
     criteria: Sequence[str],
-    run: RunData,
+    run: SubproblemData,
     first: bool,
-) -> dict[str, Any]:
-    """Do one run: return the losses of its plan and the reach of its joints, or why there is none.
+) -> SolvedData:
+    """Do one run: a task of a sweep.
 
     Raises
     ------
     NoFeasiblePath
         The `first` run, which has all that is allowed, has no path.
     """
-    stage = _stage(job, digest, contour, tuple(criteria))
-    made = (stage.attempts.first if first else stage.attempts.of)(Run.of_data(run))
+    problem = _problem(job, digest, contour, tuple(criteria))
+    made = problem.solve(Subproblem.from_data(run), first=first)
     if isinstance(made, str):
         return {"why": made}
-    return {"losses": stage.judge.losses(made).tolist(), "reach": reach_of(made).tolist()}
+    found = problem.evaluate(made)
+    return {"losses": found.losses.tolist(), "spans": found.spans.tolist()}
 
 
-def _settled(result: Result) -> Reached | str:
+def _evaluation(result: Result) -> Evaluation | str:
     failure = result.failure
     if failure is None:
-        found: dict[str, Any] = result.value
+        found: SolvedData = result.value
         if "why" in found:
-            return str(found["why"])
-        return np.array(found["losses"]), np.array(found["reach"])
+            return found["why"]
+        return Evaluation(losses=np.array(found["losses"]), spans=np.array(found["spans"]))
     if failure.kind == "NoFeasiblePath":
         raise NoFeasiblePath(failure.message, proved=False, node=-1)
     if failure.kind == "InputError":
@@ -174,17 +169,10 @@ def _settled(result: Result) -> Reached | str:
     return failure.reason
 
 
-@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class _Stage:
-    """What the runs of a contour have in common."""
-
-    attempts: Attempts
-    judge: Judge
-
-
 @lru_cache(maxsize=2)
-def _stage(path: str, digest_then: str, contour: str, criteria: tuple[str, ...]) -> _Stage:
-    known = loaded(path, digest_then)
+def _problem(path: str, digest_then: str, contour: str, criteria: tuple[str, ...]) -> ParetoProblem:
+    """Return what the runs of a contour have in common, kept for the next task of a worker."""
+    known = load_job(path, digest_then)
     job, part = known.job, known.part
     task = next(task for task in job.tasks(part) if task.name == contour)
     drawn = task.candidates(part)[0]
@@ -192,27 +180,20 @@ def _stage(path: str, digest_then: str, contour: str, criteria: tuple[str, ...])
     cell = cell_of_job(job, part)
     options = replace(job.options, feed="constant", refine=False)
     home = None if job.sequence is None else job.sequence.home_deg
-    judge = judge_of(
-        criteria,
-        job.robot,
-        eta_v=options.eta_v,
-        eta_a=options.eta_a,
-        cell=cell,
-        comfort=options.comfort,
-        home=None if home is None else np.radians(home),
-    )
-    attempts = Attempts(
+    home_rad = None if home is None else np.radians(home)
+    return ParetoProblem(
         contour=nodes,
         robot=job.robot,
         tool=job.tool,
         placement=job.placement,
         speed=task.speed if nodes.time is None else None,
         options=options,
+        criteria=criteria_named(criteria, job.robot, options=options, cell=cell, home=home_rad),
         graph=job.graph(nodes),
         cell=cell,
+        home=home_rad,
         audit=lambda made: _faults(job, drawn, made, cell),
     )
-    return _Stage(attempts=attempts, judge=judge)
 
 
 def _faults(job: Job, drawn: Contour, made: Plan, cell: Cell | None) -> list[Check]:
@@ -220,7 +201,7 @@ def _faults(job: Job, drawn: Contour, made: Plan, cell: Cell | None) -> list[Che
     return [check for check in table if check.level == "error" and not check.ok]
 
 
-def _picked(known: Loaded, contour: str | None) -> tuple[str, tuple[str, ...]]:
+def _named_contour(known: LoadedJob, contour: str | None) -> tuple[str, tuple[str, ...]]:
     """Return the name of the contour, the longest if none is named, and those of the others."""
     tasks = {task.name: task for task in known.job.tasks(known.part)}
     if contour is None:

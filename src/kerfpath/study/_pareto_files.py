@@ -6,7 +6,6 @@ import json
 from dataclasses import dataclass
 from pathlib import Path
 from shlex import quote
-from typing import Any
 
 import numpy as np
 
@@ -14,31 +13,21 @@ from kerfpath import __version__
 from kerfpath._told import told
 from kerfpath.cad import Part
 from kerfpath.errors import InputError
-from kerfpath.front import Front, Run
+from kerfpath.front import Front, Subproblem
 from kerfpath.job import Chosen, Outcome, Progress, make_folder, run_job
 from kerfpath.post import write_files
 from kerfpath.report import FrontAxis, FrontPlan, render_front
 from kerfpath.robots import Robot
-from kerfpath.study._job import digest, loaded
-from kerfpath.study._pareto import Studied
+from kerfpath.study._job import digest, load_job
+from kerfpath.study._pareto import JobFront
 
-__all__ = ["Pick", "axes_of", "picked", "plan_picked", "write_pareto"]
+__all__ = ["Pick", "axes_of", "plan_picked", "read_pick", "write_pareto"]
 
 SCHEMA = 1
 """Counts the ways in which pareto.json was written."""
-WORDS = {
-    "displacement": "total displacement",
-    "increment": "largest increment",
-    "range": "coordinate range",
-    "velocity": "peak velocity",
-    "acceleration": "peak acceleration",
-    "speed": "fastest speed of the path",
-    "time": "time from home and back",
-    "clearance": "clearance in the cell",
-}
 
 
-def write_pareto(studied: Studied, folder: Path) -> list[Path]:
+def write_pareto(found: JobFront, folder: Path) -> list[Path]:
     """Write pareto.json and pareto.html of a study into a folder.
 
     Raises
@@ -47,25 +36,24 @@ def write_pareto(studied: Studied, folder: Path) -> list[Path]:
         The folder cannot be made or written to.
     """
     make_folder(folder)
-    data = json.dumps(_entries(studied), indent=1, allow_nan=False) + "\n"
-    return write_files(folder, {"pareto.json": data, "pareto.html": _page(studied, folder)})
+    data = json.dumps(_entries(found), indent=1, allow_nan=False) + "\n"
+    return write_files(folder, {"pareto.json": data, "pareto.html": _page(found, folder)})
 
 
-def _entries(studied: Studied) -> dict[str, Any]:
-    front = studied.front
-    named = zip(front.criteria, front.units, front.sense, strict=True)
+def _entries(found: JobFront) -> dict[str, object]:
+    front = found.front
     return {
         "schema": SCHEMA,
         "kerfpath": __version__,
-        "job": studied.job.source,
-        "digest": studied.digest,
-        "contour": studied.contour,
+        "job": found.job.source,
+        "digest": found.digest,
+        "contour": found.contour,
         "criteria": [
-            {"name": name, "unit": unit, "better": "less" if sense > 0 else "more"}
-            for name, unit, sense in named
+            {"name": c.name, "unit": c.unit, "better": "more" if c.more_is_better else "less"}
+            for c in front.axes
         ],
         "plans": [
-            {"number": number, "values": values, "run": run.data()}
+            {"number": number, "values": values, "run": run.to_data()}
             for number, values, run in zip(
                 front.numbers, front.values.tolist(), front.runs, strict=True
             )
@@ -88,26 +76,24 @@ def marks(front: Front) -> dict[str, int]:
 
 
 def axes_of(front: Front) -> list[FrontAxis]:
-    """Return the criteria of a front in words, and how they are shown to people."""
-    axes = []
-    for name, unit, sense in zip(front.criteria, front.units, front.sense, strict=True):
-        kind, _, joint = name.rpartition("_")
-        words = f"{WORDS[kind]}, joint {joint}" if joint.isdigit() else WORDS.get(name, name)
-        axes.append(FrontAxis(name=name, words=words, unit=unit, sense=float(sense)))
-    return axes
+    """Return the criteria of a front as they are shown to people."""
+    return [
+        FrontAxis(name=axis.name, words=axis.words, unit=axis.unit, sense=axis.sense)
+        for axis in front.axes
+    ]
 
 
-def _page(studied: Studied, folder: Path) -> str:
-    front, job, axes = studied.front, studied.job, axes_of(studied.front)
+def _page(found: JobFront, folder: Path) -> str:
+    front, job, axes = found.front, found.job, axes_of(found.front)
     plans = [
-        FrontPlan(number=number, values=tuple(values), asked=tuple(asked_for(run, job.robot)))
+        FrontPlan(number=number, values=tuple(values), asked=tuple(rows_of_run(run, job.robot)))
         for number, values, run in zip(
             front.numbers, front.values.tolist(), front.runs, strict=True
         )
     ]
     facts = [
         ("Job", job.path.name),
-        ("Contour", studied.contour),
+        ("Contour", found.contour),
         ("Robot", f"{job.robot.manufacturer} {job.robot.model}".strip() or job.robot.id),
         ("Runs", f"{front.tried}, {front.feasible} of them with a plan that passed its audit"),
         ("Front", f"{len(front.runs)} plans that no other beats"),
@@ -118,30 +104,30 @@ def _page(studied: Studied, folder: Path) -> str:
     titles = {"balanced": "balanced"} | {axis.name: f"best {axis.words}" for axis in axes}
     where = quote(str(folder))
     return render_front(
-        f"{job.part_file.stem.replace('_', ' ')}: {studied.contour}",
+        f"{job.part_file.stem.replace('_', ' ')}: {found.contour}",
         axes=axes,
         plans=plans,
         dominated=front.beaten.tolist(),
         marks={titles[name]: number for name, number in marks(front).items()},
         facts=facts,
-        notes=_notes(studied),
+        notes=_notes(found),
         command=f"kerfpath pareto {quote(str(job.path))} --out {where} --pick {{number}}",
         job_text=job.path.read_text(encoding="utf-8-sig"),
     )
 
 
-def _notes(studied: Studied) -> list[str]:
+def _notes(found: JobFront) -> list[str]:
     notes = [
         "Every plan is the proved optimum of its run on the grid of the rotation, and is not "
         "refined: off the grid others may be better or faster; "
         "the set is a sample of the front."
     ]
-    if studied.others:
-        notes.append(f"The front is of one contour; the job has {len(studied.others)} more.")
+    if found.others:
+        notes.append(f"The front is of one contour; the job has {len(found.others)} more.")
     return notes
 
 
-def asked_for(run: Run, robot: Robot) -> list[tuple[str, str]]:
+def rows_of_run(run: Subproblem, robot: Robot) -> list[tuple[str, str]]:
     """Return what a run asks for, in words."""
     each = run.weights * robot.speed_limits()[0]
     relative = each / np.exp(np.log(each).mean())
@@ -169,12 +155,12 @@ class Pick:
 
     contour: str
     number: int
-    run: Run
+    run: Subproblem
 
     __repr__ = told
 
 
-def picked(folder: Path, job_file: Path, which: str) -> Pick:
+def read_pick(folder: Path, job_file: Path, which: str) -> Pick:
     """Return a plan of the front in a folder: by number, "balanced", or a criterion it is best in.
 
     Raises
@@ -206,7 +192,7 @@ def picked(folder: Path, job_file: Path, which: str) -> Pick:
         raise InputError(
             f"--pick {which}: expected one of {', '.join(named)}, or a plan of the front: {known}"
         )
-    return Pick(contour=contour, number=number, run=Run.of_data(plans[number]["run"]))
+    return Pick(contour=contour, number=number, run=Subproblem.from_data(plans[number]["run"]))
 
 
 def plan_picked(
@@ -216,6 +202,6 @@ def plan_picked(
 
     With `refine`, the plan is moved off the grid of gamma from there; its criteria then differ.
     """
-    known = loaded(str(job_file.resolve()), digest(job_file))
+    known = load_job(str(job_file.resolve()), digest(job_file))
     chosen = {pick.contour: Chosen(run=pick.run, refine=refine)}
     return known.part, run_job(known.job, known.part, chosen=chosen, progress=progress)

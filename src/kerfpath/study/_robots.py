@@ -6,29 +6,29 @@ import os
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
 from kerfpath._told import told
 from kerfpath.cad import Part
-from kerfpath.cell import Cell, Checker
 from kerfpath.errors import InputError, NoFeasiblePath
 from kerfpath.graph import LayeredGraph
-from kerfpath.job import Job, cell_of_job, fastest_along, read_job
+from kerfpath.job import Job, read_job
 from kerfpath.robots import Robot, acceleration_ratios, postures_named, robot, robot_ids
-from kerfpath.study._clear import has_clear_pose
-from kerfpath.study._job import digest, loaded
+from kerfpath.study._evaluator import (
+    EVERY,
+    Evaluator,
+    SampledContour,
+    commonest_loss,
+    sample_contours,
+)
+from kerfpath.study._job import digest, load_job
 from kerfpath.sweep import Progress, Sweep
 
 __all__ = ["NEAREST", "ContourSpeed", "RobotSpeed", "contour_speeds", "which_robots", "with_robot"]
 
 NEAREST = "nearest"
 """In place of a ratio: of each robot the one that the library calls its nearest."""
-EVERY = 8
-"""Nodes from one that is looked at for a clear pose to the next."""
-NOT_ASKED = "posture not wanted"
-"""What drops a candidate without telling anything about the robot."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -116,7 +116,7 @@ def which_robots(
 ) -> list[RobotSpeed]:
     """Return what each robot can do of a job, the fastest first; each is a task of its own.
 
-    Robot base, head and part stay where the job has them. The job's own robot is judged with its
+    Robot base, head and part stay where the job has them. The job's own robot is evaluated with its
     limits as the job gives them, all others with those of the library and the endless axes that
     are so there.
 
@@ -150,18 +150,18 @@ def which_robots(
     same = {"path": str(path.resolve()), "digest_then": digest(path)}
     found = []
     with Sweep(
-        judged, store=store, scheduler=scheduler, processes=processes, progress=progress
+        evaluate_robot, store=store, scheduler=scheduler, processes=processes, progress=progress
     ) as tasks:
         keys = [tasks.submit(**same, name=name, ratio=used) for name, used in asked]
         for key, (name, used) in zip(keys, asked, strict=True):
             result = tasks.result(key)
-            judge = job.robot if name is None else robot(name, acceleration_ratio=used)
+            arm = job.robot if name is None else robot(name, acceleration_ratio=used)
             if result.failure is None:
-                contours = tuple(ContourSpeed(**told) for told in result.value)
+                contours = tuple(ContourSpeed(**data) for data in result.value)
                 why = _reason(contours)
             else:
                 contours, why = (), result.failure.message
-            found.append(RobotSpeed(robot=judge, own=name is None, contours=contours, reason=why))
+            found.append(RobotSpeed(robot=arm, own=name is None, contours=contours, reason=why))
     return sorted(found, key=_order)
 
 
@@ -189,11 +189,11 @@ def _order(found: RobotSpeed) -> tuple[float, float, str]:
     return -margin, -found.reached, found.robot.id
 
 
-def judged(
+def evaluate_robot(
     *, path: str, digest_then: str, name: str | None, ratio: str | None
-) -> list[dict[str, Any]]:
+) -> list[dict[str, object]]:
     """Return what a robot of the library, or the job's own, can do of a job: a task of a sweep."""
-    found = loaded(path, digest_then)
+    found = load_job(path, digest_then)
     job = found.job
     if name is not None:
         candidate = robot(name, acceleration_ratio=ratio)
@@ -233,53 +233,42 @@ def contour_speeds(job: Job, part: Part) -> list[ContourSpeed]:
     InputError
         Limits that are not known, a cell that cannot be.
     """
-    cell = cell_of_job(job, part)
-    looks = []
-    for task in job.tasks(part):
-        nodes = task.evenly_fast(part)
-        graph = job.graph(nodes, job.options.without_penalties)
-        looks.append((_reached(task.name, task.speed, graph), nodes, graph))
-    if all(not contour.reason for contour, _, _ in looks) and cell is not None:
-        looks = [(_clear(contour, graph, cell), nodes, graph) for contour, nodes, graph in looks]
-    if any(contour.reason for contour, _, _ in looks):
-        return [contour for contour, _, _ in looks]
+    evaluator = Evaluator(job=job, part=part)
+    _ = evaluator.cell  # what is wrong with it is said first
+    contours = sample_contours(job, part)
+    graphs = [evaluator.graph(contour.nodes) for contour in contours]
+    found = [_reached(contour, graph) for contour, graph in zip(contours, graphs, strict=True)]
+    if not any(each.reason for each in found):
+        for i, graph in enumerate(graphs):
+            if (node := next(evaluator.blocked(graph, EVERY), None)) is not None:
+                found[i] = replace(found[i], reason=f"collision: no clear pose at node {node}")
+    if any(each.reason for each in found):
+        return found
     if job.robot.acceleration is None:
         raise InputError(
             "in reach of every node, but its accelerations are not known: give "
             "--acceleration-ratio, or acceleration_ratio in [robot], to assume a typical ratio "
             "to the speeds"
         )
-    found = []
-    for contour, nodes, graph in looks:
+    for i, graph in enumerate(graphs):
         try:
-            best = fastest_along(job, nodes, cell, refine=False, graph=graph)
+            best = evaluator.fastest(contours[i].nodes, graph)
         except NoFeasiblePath as broken:
-            found.append(replace(contour, reason=str(broken)))
+            found[i] = replace(found[i], reason=str(broken))
         else:
-            found.append(
-                replace(contour, fastest=best.speed, joint=best.joint + 1, limit=best.limit)
-            )
+            found[i] = replace(found[i], fastest=best.speed, joint=best.joint + 1, limit=best.limit)
     return found
 
 
-def _reached(name: str, asked: float, graph: LayeredGraph) -> ContourSpeed:
+def _reached(contour: SampledContour, graph: LayeredGraph) -> ContourSpeed:
     """Return which share of the nodes has a pose, and what forbids the first that has none."""
-    empty, nodes = np.flatnonzero(np.diff(graph.start) == 0), len(graph.start) - 1
+    empty, nodes = np.flatnonzero(np.diff(graph.start) == 0), len(contour.nodes)
     reason = ""
     if empty.size:
-        counts = graph.counts(int(empty[0]))
-        counts.pop(NOT_ASKED, None)
         reason = (
             f"no pose at {empty.size} of {nodes} nodes, at node {empty[0]} mostly: "
-            f"{max(counts, key=lambda word: counts[word])}"
+            f"{commonest_loss(graph, int(empty[0]))}"
         )
-    return ContourSpeed(name=name, asked=asked, reached=1 - empty.size / nodes, reason=reason)
-
-
-def _clear(contour: ContourSpeed, graph: LayeredGraph, cell: Cell) -> ContourSpeed:
-    """Return a contour with the reason where, of every `EVERY`-th node, one has no clear pose."""
-    checker = Checker(cell, graph.q)
-    for k in range(0, len(graph.start) - 1, EVERY):
-        if not has_clear_pose(graph, checker, k):
-            return replace(contour, reason=f"collision: no clear pose at node {k}")
-    return contour
+    return ContourSpeed(
+        name=contour.name, asked=contour.speed, reached=1 - empty.size / nodes, reason=reason
+    )

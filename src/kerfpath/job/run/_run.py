@@ -17,7 +17,7 @@ from kerfpath.cad import read as read_drawing
 from kerfpath.cell import Cell
 from kerfpath.contour import FRAME_KINDS, Contour
 from kerfpath.errors import NoFeasiblePath
-from kerfpath.front import Run
+from kerfpath.front import Subproblem
 from kerfpath.graph import LayeredGraph
 from kerfpath.job.format import ContourTask, Job, cell_of_job
 from kerfpath.job.run._cut import Cut
@@ -95,7 +95,7 @@ class Given(NamedTuple):
 class Chosen(NamedTuple):
     """The run of a Pareto set that a contour is planned by, and whether its plan is refined."""
 
-    run: Run
+    run: Subproblem
     refine: bool
 
 

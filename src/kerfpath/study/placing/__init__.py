@@ -1,4 +1,4 @@
-"""Where the part, the robot's base and the head are best: bounds lead, exact searches end it."""
+"""Where the part, the robot's base and the head are best."""
 
 from kerfpath.study.placing._files import layout_entry as layout_entry
 from kerfpath.study.placing._files import write_layout as write_layout

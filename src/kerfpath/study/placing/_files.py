@@ -6,7 +6,6 @@ import json
 from collections import Counter
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any
 
 from kerfpath import __version__
 from kerfpath.job import make_folder
@@ -15,7 +14,7 @@ from kerfpath.report import render_layout
 from kerfpath.study.placing._layout import Layout
 from kerfpath.study.placing._place import placed_text
 from kerfpath.study.placing._search import Trial
-from kerfpath.study.placing._worth import Answer
+from kerfpath.study.placing._value import PlacementValue
 
 __all__ = ["layout_entry", "write_layout"]
 
@@ -26,7 +25,7 @@ OF_CONTOUR = ("value", "at_least", "fastest_m_min", "joint", "limit", "node")
 WHY = ("reason", "contour", "node", "nodes", "progress")
 
 
-def layout_entry(found: Layout) -> dict[str, Any]:
+def layout_entry(found: Layout) -> dict[str, object]:
     """Return what layout.json holds: plain data, the same for the same seed."""
     best, before = found.best, found.before
     return {
@@ -42,7 +41,7 @@ def layout_entry(found: Layout) -> dict[str, Any]:
         "seed": found.seed,
         "evaluations": found.evaluations,
         "feasible": best is not None,
-        "shipped": {key: before[key] for key in ("status", "value", *WHY) if key in before},
+        "shipped": before.entry("status", "value", *WHY),
         "best": None if best is None else _best(found, best),
         "contours": _contours(before, found.after),
         "proved": found.proved,
@@ -58,10 +57,10 @@ def layout_entry(found: Layout) -> dict[str, Any]:
     }
 
 
-def _best(found: Layout, best: Trial) -> dict[str, Any]:
-    value, shipped = best.answer["value"], found.before["value"]
+def _best(found: Layout, best: Trial) -> dict[str, object]:
+    value, shipped = best.result.value, found.before.value
     gain = None
-    if shipped is not None:
+    if shipped is not None and value is not None:
         gain = shipped / value - 1 if found.goal == "motion" else value / shipped - 1
     cell = found.job.cell
     fixtures = () if cell is None else cell.fixture
@@ -72,51 +71,53 @@ def _best(found: Layout, best: Trial) -> dict[str, Any]:
     return {"offsets": dict(best.offsets), "value": value, "gain": gain, "numbers": numbers}
 
 
-def _contours(before: Answer, after: Answer) -> list[dict[str, Any]]:
+def _contours(before: PlacementValue, after: PlacementValue | None) -> list[dict[str, object]]:
     """Return each contour's value in the job's placement and in the best one."""
     sides = [
-        {entry["name"]: {key: entry[key] for key in OF_CONTOUR if key in entry} for entry in side}
-        for side in (before.get("contours", []), after.get("contours", []))
+        {
+            contour.name: {k: v for k in OF_CONTOUR if (v := getattr(contour, k)) is not None}
+            for contour in (() if side is None else side.contours)
+        }
+        for side in (before, after)
     ]
     names = dict.fromkeys([*sides[0], *sides[1]])
     return [{"name": n, "before": sides[0].get(n), "after": sides[1].get(n)} for n in names]
 
 
-def _trial(trial: Trial) -> dict[str, Any]:
-    told = {key: trial.answer[key] for key in WHY if key in trial.answer}
-    kept = {key: trial.answer[key] for key in ("status", "stage", "bound", "value")}
-    return {"offsets": dict(trial.offsets), **kept, **told}
+def _trial(trial: Trial) -> dict[str, object]:
+    known = trial.result.entry("status", "stage", "bound", "value", *WHY)
+    return {"offsets": dict(trial.offsets), **known}
 
 
-def _reasons(found: Layout) -> list[dict[str, Any]]:
+def _reasons(found: Layout) -> list[dict[str, object]]:
     """Return why placements are infeasible, by contour, the most common first."""
-    lost = [trial.answer for trial in found.tried if not trial.feasible]
-    count = Counter((answer["status"], answer.get("contour", "")) for answer in lost)
-    told = []
-    for (status, contour), number in count.most_common():
-        same = [a for a in lost if (a["status"], a.get("contour", "")) == (status, contour)]
-        nodes = Counter(a["node"] for a in same if "node" in a).most_common(1)
-        told.append(
+    every = [why for trial in found.tried if (why := trial.result.infeasibility)]
+    reasons: list[dict[str, object]] = []
+    for (status, contour), number in Counter((w.status, w.contour) for w in every).most_common():
+        same = [why for why in every if (why.status, why.contour) == (status, contour)]
+        nodes = Counter(why.node for why in same).most_common(1)
+        reasons.append(
             {
                 "status": status,
-                "contour": contour or None,
+                "contour": contour,
                 "count": number,
-                "node": nodes[0][0] if nodes else None,
-                "reason": Counter(a["reason"] for a in same).most_common(1)[0][0],
+                "node": nodes[0][0],
+                "reason": Counter(why.reason for why in same).most_common(1)[0][0],
             }
         )
-    return told
+    return reasons
 
 
-def _map(found: Layout) -> dict[str, Any] | None:
+def _map(found: Layout) -> dict[str, object] | None:
     if found.map is None:
         return None
-    keys = ("status", "bound", "reason", "contour", "node")
     return {
         "variables": list(found.ranges)[:2],
         "x": found.map.x.tolist(),
         "y": found.map.y.tolist(),
-        "cells": [{key: a[key] for key in keys if key in a} for a in found.map.answers],
+        "cells": [
+            each.entry("status", "bound", "reason", "contour", "node") for each in found.map.results
+        ],
     }
 
 
@@ -142,5 +143,5 @@ def write_layout(found: Layout, folder: Path) -> list[Path]:
 
 
 def _remark(job: Path, offsets: Mapping[str, float]) -> str:
-    told = ", ".join(f"{name} = {value:g}" for name, value in offsets.items())
-    return f"{job.name} as placed by kerfpath layout: {told}. Ranges count from here now."
+    moves = ", ".join(f"{name} = {value:g}" for name, value in offsets.items())
+    return f"{job.name} as placed by kerfpath layout: {moves}. Ranges count from here now."

@@ -7,19 +7,17 @@ from collections import Counter
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
 from kerfpath._told import told
 from kerfpath.errors import InputError
-from kerfpath.job import Goal, Job, cell_of_job
-from kerfpath.study._job import digest, loaded
-from kerfpath.study.placing._look import look
+from kerfpath.job import Goal, Job, Progress, cell_of_job
+from kerfpath.study._job import digest, load_job
+from kerfpath.study.placing._evaluate import contours_of, evaluate_placements, middle_of
 from kerfpath.study.placing._place import DEFAULT_RANGES, Numbers, numbers_of
-from kerfpath.study.placing._search import LEAST_EXACT, MOST_EXACT, Map, Progress, Search, Trial
-from kerfpath.study.placing._subject import middle_of, subjects_of
-from kerfpath.study.placing._worth import Answer
+from kerfpath.study.placing._search import LEAST_EXACT, MOST_EXACT, Map, PlacementSearch, Trial
+from kerfpath.study.placing._value import PlacementValue
 from kerfpath.sweep import Sweep
 
 __all__ = ["STATUSES", "Layout", "layout"]
@@ -48,7 +46,7 @@ class Layout:
         How many there were before those of the map.
     best : Trial or None
         The best one, unless none is feasible.
-    before, after : mapping
+    before, after : PlacementValue
         What the job's placement and the best one are worth, contour by contour.
     proved : bool
         Whether no other of those tried is better.
@@ -69,8 +67,8 @@ class Layout:
     tried: tuple[Trial, ...]
     evolved: int
     best: Trial | None
-    before: Answer
-    after: Answer
+    before: PlacementValue
+    after: PlacementValue | None
     proved: bool
     open_bound: float | None
     numbers: Numbers
@@ -81,19 +79,22 @@ class Layout:
     @property
     def statuses(self) -> dict[str, int]:
         """How many placements are feasible, and how many not for which reason."""
-        found = Counter(trial.answer["status"] for trial in self.tried)
+        found = Counter(trial.result.status for trial in self.tried)
         return {status: found[status] for status in STATUSES if found[status]}
 
     @property
     def stages(self) -> dict[str, int]:
         """How many placements each test decided."""
-        found = Counter(trial.answer["stage"] for trial in self.tried)
+        found = Counter(trial.result.stage for trial in self.tried)
         return {stage: found[stage] for stage in ("reach", "stretch", "exact")}
 
     @property
     def nearest(self) -> Trial:
         """The placement that came nearest to being feasible."""
-        return max(self.tried, key=lambda trial: float(trial.answer.get("progress", np.inf)))
+        return max(
+            self.tried,
+            key=lambda trial: why.progress if (why := trial.result.infeasibility) else np.inf,
+        )
 
 
 def layout(
@@ -113,12 +114,12 @@ def layout(
 ) -> Layout:
     """Return the best placement that is found in the ranges, never worse than the job's own.
 
-    Differential evolution (Storn and Price, J. Global Optim. 11, 1997) goes by the bounds of
-    `look`; then the exact search takes the placements tried by their bounds, the best first, until
-    the best value is at least the next bound: no other of those tried is better then. Where an
-    exact search shows a stretch that binds and was not in the bound, the bounds are found again
-    with it. The points of the map about the best are tried in the same way. The same seed gives the
-    same answer, whatever the number of processes.
+    Differential evolution (Storn and Price, J. Global Optim. 11, 1997) goes by bounds of what
+    placements are worth; then the exact search takes the placements tried by their bounds, the best
+    first, until the best value is at least the next bound: no other of those tried is better then.
+    Where an exact search shows a stretch that binds and was not in the bound, the bounds are found
+    again with it. The points of the map about the best are tried in the same way. The same seed
+    gives the same answer, whatever the number of processes.
 
     Parameters
     ----------
@@ -149,29 +150,23 @@ def layout(
         As `read_job`, `cell_of_job` and `kerfpath.sweep.run`; numbers out of range.
     """
     path, then = str(Path(job).resolve()), digest(Path(job).resolve())
-    at = loaded(path, then)
-    cell_of_job(at.job, at.part)  # what is wrong with it is told once, not by every placement
-    table = at.job.layout.model_copy(
-        update={
-            name: value
-            for name, value in {
-                "goal": goal,
-                "evaluations": evaluations,
-                "seed": seed,
-                "tolerance_mm": tolerance_mm,
-                "tolerance_deg": tolerance_deg,
-                "map_points": map_points,
-            }.items()
-            if value is not None
-        }
+    at = load_job(path, then)
+    cell_of_job(at.job, at.part)  # what is wrong with it is said once, not by every placement
+    given = _checked(
+        goal=goal,
+        evaluations=evaluations,
+        seed=seed,
+        tolerance_mm=tolerance_mm,
+        tolerance_deg=tolerance_deg,
+        map_points=map_points,
     )
-    _require(table)
+    table = at.job.layout.model_copy(update=given)
     spans = dict(ranges or table.ranges or DEFAULT_RANGES)
     allowed = {"mm": table.tolerance_mm, "deg": table.tolerance_deg}
     tolerance = {name: allowed[name.rpartition("_")[2]] for name in spans}
     tolerance = {name: size for name, size in tolerance.items() if size}
-    with Sweep(look, store=store, scheduler=scheduler, processes=processes) as sweep:
-        search = Search(
+    with Sweep(evaluate_placements, store=store, scheduler=scheduler, processes=processes) as sweep:
+        search = PlacementSearch(
             sweep=sweep,
             task={"job": path, "digest": then, "goal": table.goal},
             ranges=spans,
@@ -187,12 +182,12 @@ def layout(
             axes, cells = search.mapped(search.best or search.trials[0], table.map_points)
             proved, open_bound = search.climb()
             y = axes[1] if len(axes) > 1 else np.zeros(0)
-            drawn = Map(x=axes[0], y=y, answers=tuple(cell.answer for cell in cells))
+            drawn = Map(x=axes[0], y=y, results=tuple(cell.result for cell in cells))
         best = search.best
-        after = search.whole(best) if best is not None else {}
+        after = None if best is None else search.whole(best)
     numbers: Numbers = {}
     if best is not None:
-        middle = middle_of(at.job, subjects_of(path, then, table.goal))
+        middle = middle_of(at.job, contours_of(path, then, table.goal))
         numbers = numbers_of(at.job, best.offsets, middle)
     return Layout(
         job=at.job,
@@ -214,10 +209,10 @@ def layout(
     )
 
 
-def _require(table: Any) -> None:
-    """Raise InputError where what was given in place of [layout] is out of range."""
-    for name, low in {
-        "evaluations": 8, "seed": 0, "tolerance_mm": 0, "tolerance_deg": 0, "map_points": 0,
-    }.items():  # fmt: skip
-        if not (value := getattr(table, name)) >= low:
+def _checked(**given: float | str | None) -> dict[str, float | str]:
+    """Return what is given in place of [layout]; raise InputError where it is out of range."""
+    for name, value in given.items():
+        low = 8 if name == "evaluations" else 0
+        if isinstance(value, int | float) and not value >= low:
             raise InputError(f"{name}: expected at least {low}, got {value:g}")
+    return {name: value for name, value in given.items() if value is not None}

@@ -1,4 +1,4 @@
-"""The search for the best placement: bounds lead it, exact searches end it."""
+"""The search for the best placement: bounds guide it, exact searches end it."""
 
 from __future__ import annotations
 
@@ -12,13 +12,11 @@ from scipy.stats import qmc
 from kerfpath._arrays import Array
 from kerfpath._told import told
 from kerfpath.errors import InputError
-from kerfpath.study.placing._worth import SLACK, Answer, beats
+from kerfpath.job import Progress
+from kerfpath.study.placing._value import SLACK, PlacementValue, beats
 from kerfpath.sweep import Sweep
 
-__all__ = ["LEAST_EXACT", "MOST_EXACT", "Map", "Progress", "Search", "Trial"]
-
-Progress = Callable[[str, int, int], None]
-"""Called with what is being done, how much of it is done, and how much there is."""
+__all__ = ["LEAST_EXACT", "MOST_EXACT", "Map", "PlacementSearch", "Trial"]
 
 PER_VARIABLE = 4
 """Placements of a generation for each variable."""
@@ -42,25 +40,20 @@ class Trial:
     ----------
     offsets : mapping of variable to float
         In the units of the variables' names.
-    answer : mapping
-        What is known of it, see `look`.
+    result : PlacementValue
+        What is known of it.
     stretches : int
-        How many stretches its bound was found with.
+        How many stretches its bound was found with; -1 before there is one.
     searched : bool
         Whether it was asked for its exact value.
     """
 
     offsets: Mapping[str, float]
-    answer: Answer = field(default_factory=dict)
-    stretches: int = 0
+    result: PlacementValue = field(default_factory=lambda: PlacementValue(stage="reach"))
+    stretches: int = -1
     searched: bool = False
 
     __repr__ = told
-
-    @property
-    def feasible(self) -> bool:
-        """Whether nothing forbids it, as far as is known."""
-        return bool(self.answer["status"] == "feasible")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -71,19 +64,19 @@ class Map:
     ----------
     x, y : (m,)
         Values of the first variable and of the second; `y` is empty where there is only one.
-    answers : tuple of mapping
+    results : tuple of PlacementValue
         Row by row of y.
     """
 
     x: Array
     y: Array
-    answers: tuple[Answer, ...]
+    results: tuple[PlacementValue, ...]
 
     __repr__ = told
 
 
 @dataclass(kw_only=True, eq=False)
-class Search:
+class PlacementSearch:
     """The placements tried, and what is asked of them next."""
 
     sweep: Sweep
@@ -109,23 +102,23 @@ class Search:
 
     @property
     def floor(self) -> float | None:
-        return None if self.best is None else self.best.answer["value"]
+        return None if self.best is None else self.best.result.value
 
-    def first(self) -> Answer:
-        """Look at the job's own placement, whole."""
+    def first(self) -> PlacementValue:
+        """Evaluate the job's own placement, whole."""
         self.progress("the job's own placement", 0, 1)
         trial = self._trial(np.zeros(len(self.ranges)))
-        trial.searched, trial.answer = True, self.whole(trial)
+        trial.searched, trial.stretches, trial.result = True, 0, self.whole(trial)
         self.progress("the job's own placement", 1, 1)
         self._take(trial)
-        return trial.answer
+        return trial.result
 
-    def whole(self, trial: Trial) -> Answer:
+    def whole(self, trial: Trial) -> PlacementValue:
         """Return what a placement is worth, every contour solved to its own optimum."""
-        return self._asked([trial.offsets], exact=True, whole=True)[0]
+        return self._evaluated([trial.offsets], exact=True, whole=True)[0]
 
     def evolve(self, evaluations: int, seed: int) -> None:
-        """Let the bounds lead differential evolution through the ranges."""
+        """Search the ranges by differential evolution on the bounds."""
         low, high = np.array(list(self.ranges.values())).T
         size = 2 ** int(np.ceil(np.log2(PER_VARIABLE * len(low))))
         size = max(5, min(max(size, 8), evaluations // 2))
@@ -139,9 +132,9 @@ class Search:
         def energies(points: Array, /) -> Array:
             nonlocal begun
             trials = [self._trial(point) for point in points.T]
-            self.look_at(
-                [trial for trial in trials if not trial.answer],
-                told=lambda done: self.progress("placements", min(begun + done, total), total),
+            self.find_bounds(
+                [trial for trial in trials if trial.stretches < 0],
+                lambda done: self.progress("placements", min(begun + done, total), total),
             )
             begun += len(trials)
             self.progress("placements", min(begun, total), total)
@@ -176,20 +169,20 @@ class Search:
                 return not open_, None
             open_.sort(key=self._energy)
             if self.exact >= self.most:
-                return False, open_[0].answer["bound"]
+                return False, open_[0].result.bound
             batch = open_[:AT_ONCE]
             if self._refresh(batch):
                 continue
             self.progress("exact searches", self.exact, self.exact + len(open_))
-            answers = self._asked([t.offsets for t in batch], exact=True, floor=self.floor)
+            results = self._evaluated([t.offsets for t in batch], exact=True, floor=self.floor)
             self.exact += len(batch)
-            for trial, answer in zip(batch, answers, strict=True):
-                trial.searched, trial.answer = True, answer
+            for trial, result in zip(batch, results, strict=True):
+                trial.searched, trial.result = True, result
                 self._take(trial)
             self.progress("exact searches", self.exact, self.exact + len(open_) - len(batch))
 
     def mapped(self, about: Trial, points: int) -> tuple[list[Array], list[Trial]]:
-        """Look at a grid over the first two variables about a placement: its axes, its placements.
+        """Try a grid over the first two variables about a placement; return its axes and trials.
 
         They are tried as all others are: what the grid shows to be better is not left lying.
         """
@@ -199,42 +192,42 @@ class Search:
         at = np.tile([*about.offsets.values()], (len(grid), 1))
         at[:, : len(names)] = grid
         trials = [self._trial(point) for point in at]
-        self.look_at(
-            [trial for trial in trials if not trial.answer],
-            told=lambda done: self.progress("map", done, len(grid)),
+        self.find_bounds(
+            [trial for trial in trials if trial.stretches < 0],
+            lambda done: self.progress("map", done, len(grid)),
         )
         self._refresh(trials)
         return axes, trials
 
-    def look_at(self, trials: Sequence[Trial], told: Callable[[int], None]) -> None:
+    def find_bounds(self, trials: Sequence[Trial], progress: Callable[[int], None]) -> None:
         """Find the bounds of placements."""
-        answers = self._asked([trial.offsets for trial in trials], told=told)
-        for trial, answer in zip(trials, answers, strict=True):
-            trial.answer, trial.stretches = answer, len(self.stretches)
+        results = self._evaluated([trial.offsets for trial in trials], progress=progress)
+        for trial, result in zip(trials, results, strict=True):
+            trial.result, trial.stretches = result, len(self.stretches)
 
     def _refresh(self, trials: Sequence[Trial]) -> bool:
         """Find bounds again that were found with fewer stretches; return whether there were any."""
         stale = [
             t for t in trials
-            if not t.searched and t.feasible and t.stretches < len(self.stretches)
+            if not t.searched and t.result.feasible and t.stretches < len(self.stretches)
         ]  # fmt: skip
-        self.look_at(stale, told=lambda done: None)
+        self.find_bounds(stale, lambda done: None)
         return bool(stale)
 
     def _take(self, trial: Trial) -> None:
         """Learn from an exact search: the best placement, and the stretches that bind."""
-        answer = trial.answer
-        value = answer["value"]
-        if trial.feasible and value is not None and beats(self.goal, value, self.floor):
+        result, why = trial.result, trial.result.infeasibility
+        value = result.value if result.feasible else None
+        if value is not None and beats(self.goal, value, self.floor):
             self.best = trial
-        bound = [entry for entry in answer["contours"] if "node" in entry]
-        if bound:
-            limit = CLOSE * min(entry["value"] for entry in bound)
-            bound = [entry for entry in bound if entry["value"] <= limit]
-        if answer.get("index") is not None and answer["status"] != "unreachable":
-            bound.append(answer)
-        for entry in bound:
-            self._add_stretch(entry["index"], entry["node"], entry["nodes"])
+        limit = CLOSE * min((c.value for c in result.contours if c.value is not None), default=0.0)
+        for c in result.contours:
+            if c.node is not None and c.value is not None and c.value <= limit:
+                self._add_stretch(c.index, c.node, c.nodes)
+        if why is not None and why.status != "unreachable" and why.index is not None:
+            assert why.node is not None
+            assert why.nodes is not None
+            self._add_stretch(why.index, why.node, why.nodes)
 
     def _add_stretch(self, contour: int, node: int, nodes: int) -> None:
         """Add the stretch about a node, unless one holds it well inside."""
@@ -247,15 +240,15 @@ class Search:
         if last - first > 1:
             self.stretches.append([contour, first, last])
 
-    def _asked(
+    def _evaluated(
         self,
         offsets: Sequence[Mapping[str, float]],
         *,
         exact: bool = False,
         whole: bool = False,
         floor: float | None = None,
-        told: Callable[[int], None] = lambda done: None,
-    ) -> list[Answer]:
+        progress: Callable[[int], None] = lambda done: None,
+    ) -> list[PlacementValue]:
         """Return what placements are worth."""
         keys = [
             self.sweep.submit(
@@ -268,14 +261,14 @@ class Search:
             )
             for at in offsets
         ]
-        answers = []
+        found: list[PlacementValue] = []
         for key in keys:
             result = self.sweep.result(key)
             if result.failure is not None:
                 raise InputError(f"a placement could not be looked at: {result.failure.reason}")
-            answers.append(result.value)
-            told(len(answers))
-        return answers
+            found.append(PlacementValue.from_data(result.value))
+            progress(len(found))
+        return found
 
     def _places(self, offsets: Mapping[str, float]) -> list[dict[str, float]]:
         """Return a placement, and those at the ends of what each variable may be off."""
@@ -295,9 +288,9 @@ class Search:
         return self.known.setdefault(tuple(offsets.values()), Trial(offsets=offsets))
 
     def _may_win(self, trial: Trial) -> bool:
-        if not trial.feasible:
+        if not trial.result.feasible:
             return False
-        bound = trial.answer["bound"]
+        bound = trial.result.bound
         if bound is None or self.floor is None:
             return True
         eased = bound * (1 - SLACK) if self.goal == "motion" else bound * (1 + SLACK)
@@ -305,9 +298,9 @@ class Search:
 
     def _energy(self, trial: Trial) -> float:
         """Return what evolution makes small: any feasible placement below every other."""
-        answer = trial.answer
-        if not trial.feasible:
-            return 10.0 - float(answer["progress"])
-        if answer["bound"] is None:
+        why, bound = trial.result.infeasibility, trial.result.bound
+        if why is not None:
+            return 10.0 - why.progress
+        if bound is None:
             return 0.0
-        return -1 / float(answer["bound"]) if self.goal == "motion" else -float(answer["bound"])
+        return -1 / bound if self.goal == "motion" else -bound

@@ -1,8 +1,8 @@
-"""What a run of the planner is asked for: the first runs, and the plain grid of weights."""
+"""Subproblems: what one run of the planner is asked for, and the plain grid of them."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from itertools import product
 from typing import TypedDict, get_args
@@ -13,27 +13,22 @@ from kerfpath._arrays import Array, Bools, freeze
 from kerfpath._told import told
 from kerfpath.cell import Cell
 from kerfpath.front._clearance import roomier
-from kerfpath.front._criteria import Criterion
 from kerfpath.graph import LayeredGraph
 from kerfpath.options import PlanOptions
-from kerfpath.search import Metric, ObjectiveKind, Relaxations
+from kerfpath.search import Metric, ObjectiveKind
 
-__all__ = ["WINDOW", "Run", "RunData", "anchors", "grid", "in_window", "quicker", "whole", "within"]
+__all__ = ["WINDOW", "Subproblem", "SubproblemData", "grid", "in_window"]
 
 WINDOW = "window of joint"
 """What vertices outside a window are counted under, before the joint's number."""
-FAINT = 1e-6
-"""Weight of the other joints where one joint counts: they decide between equals, or as good as."""
 LEVELS = (0.25, 4.0)
 """Multiples of the weight of one joint at a time, in the grid."""
-ROUNDING = 1e-9
-"""Share by which limits are wider than what was found to need them."""
 SHARES = (1.0, 0.9, 0.8)
 """Multiples of eta in the grid."""
 
 
-class RunData(TypedDict):
-    """A run as JSON holds it; null where a joint has no window."""
+class SubproblemData(TypedDict):
+    """A subproblem as JSON holds it; null where a joint has no window."""
 
     objective: ObjectiveKind
     metric: Metric
@@ -45,8 +40,8 @@ class RunData(TypedDict):
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class Run:
-    """What one run of the planner is asked for.
+class Subproblem:
+    """What one run of the planner minimises, and what it has to keep (the epsilon constraints).
 
     Parameters
     ----------
@@ -71,8 +66,20 @@ class Run:
 
     __repr__ = told
 
+    @classmethod
+    def unbounded(cls, weights: Array, eta_v: float, eta_a: float) -> Subproblem:
+        """Return that of the least displacement, with the whole limits and no window."""
+        return cls(
+            objective="sum",
+            metric="manhattan",
+            weights=weights,
+            eta_v=eta_v,
+            eta_a=eta_a,
+            window=freeze(np.tile([-np.inf, np.inf], (len(weights), 1))),
+        )
+
     def applied_to(self, options: PlanOptions) -> PlanOptions:
-        """Return the options with what this run asks for in their place."""
+        """Return the options with what this subproblem says in their place."""
         return replace(
             options,
             objective=self.objective,
@@ -83,8 +90,13 @@ class Run:
         )
 
     def graph(self, graph: LayeredGraph, endless: Bools) -> LayeredGraph:
-        """Return the layered graph of a task without what is outside the window."""
-        return within(graph, self.window, endless)
+        """Return the layered graph without the vertices outside the window, counted by joint."""
+        outside = {}
+        for joint, (low, high) in enumerate(self.window):
+            if np.isfinite(high - low) and not (endless[joint] and high - low >= 2 * np.pi):
+                inside = in_window(graph.q[:, joint], low, high - low, endless=bool(endless[joint]))
+                outside[f"{WINDOW} {joint + 1}"] = ~inside
+        return graph.without(outside) if outside else graph
 
     def cell(self, cell: Cell | None) -> Cell | None:
         """Return the cell in which the clearance is kept."""
@@ -92,8 +104,12 @@ class Run:
             return cell
         return roomier(cell, self.clearance)
 
-    def data(self) -> RunData:
-        """Return it as plain JSON data; `of_data` gives the very same run back."""
+    def quicker(self, factor: float) -> Subproblem:
+        """Return the subproblem whose plans keep the limits at `factor` times the speed, too."""
+        return replace(self, eta_v=self.eta_v / factor, eta_a=self.eta_a / factor**2)
+
+    def to_data(self) -> SubproblemData:
+        """Return it as JSON holds it; `from_data` reads the very same back."""
         return {
             "objective": self.objective,
             "metric": self.metric,
@@ -105,8 +121,8 @@ class Run:
         }
 
     @classmethod
-    def of_data(cls, data: RunData) -> Run:
-        """Return the run that `data` was made of."""
+    def from_data(cls, data: SubproblemData) -> Subproblem:
+        """Return the subproblem that `to_data` wrote."""
         free = [-np.inf, np.inf]
         window = [free if pair is None else pair for pair in data["window"]]
         weights = freeze(np.array(data["weights"], dtype=np.float64))
@@ -121,55 +137,8 @@ class Run:
         )
 
 
-def whole(weights: Array, eta_v: float, eta_a: float) -> Run:
-    """Return the run with all that the limits allow and no window, for the least displacement."""
-    return Run(
-        objective="sum",
-        metric="manhattan",
-        weights=weights,
-        eta_v=eta_v,
-        eta_a=eta_a,
-        window=freeze(np.tile([-np.inf, np.inf], (len(weights), 1))),
-    )
-
-
-def anchors(
-    first: Run, criteria: Sequence[Criterion], least: Relaxations | None, dt: float
-) -> list[Run]:
-    """Return a run for the best of each criterion but the displacement of all joints.
-
-    For the displacement and the increment of a joint, peak velocity, peak acceleration and speed it
-    is the best on the graph; for a range it is only where to begin, and for the others there is
-    none. `least` is what acceleration and speed need, at the node interval `dt` s.
-    """
-    found = []
-    for criterion in criteria:
-        kind, weights = criterion.kind, first.weights
-        if criterion.joint is not None:
-            weights = FAINT * weights
-            weights[criterion.joint] = first.weights[criterion.joint]
-        if kind in ("velocity", "increment"):
-            found.append(
-                replace(first, objective="max", metric="chebychev", weights=freeze(weights))
-            )
-        elif criterion.joint is not None:
-            found.append(replace(first, weights=freeze(weights)))
-        elif kind == "range":
-            found.append(replace(first, metric="euclid"))
-        elif kind == "acceleration" and least is not None and least.eta_a is not None:
-            found.append(replace(first, eta_a=least.eta_a * (1 + ROUNDING)))
-        elif kind == "speed" and least is not None:
-            found.append(quicker(first, dt / least.slower.dt * (1 - ROUNDING)))
-    return found
-
-
-def quicker(run: Run, factor: float) -> Run:
-    """Return the run whose plans keep the limits at `factor` times the speed, too."""
-    return replace(run, eta_v=run.eta_v / factor, eta_a=run.eta_a / factor**2)
-
-
-def grid(first: Run, rng: np.random.Generator) -> Iterator[Run]:
-    """Yield the runs of a plain grid over objective, metric, weights and eta, in random order.
+def grid(first: Subproblem, rng: np.random.Generator) -> Iterator[Subproblem]:
+    """Yield a plain grid over objective, metric, weights and eta, in random order.
 
     Then the same again with other levels, between those before.
     """
@@ -190,17 +159,6 @@ def grid(first: Run, rng: np.random.Generator) -> Iterator[Run]:
                 eta_a=first.eta_a * share_a ** (1 / depth),
             )
         depth += 1
-
-
-def within(graph: LayeredGraph, window: Array, endless: Bools) -> LayeredGraph:
-    """Return the graph without the vertices outside a window (n, 2), counted by joint."""
-    outside = {}
-    for joint, (low, high) in enumerate(window):
-        if not np.isfinite(high - low) or (endless[joint] and high - low >= 2 * np.pi):
-            continue
-        inside = in_window(graph.q[:, joint], low, high - low, endless=bool(endless[joint]))
-        outside[f"{WINDOW} {joint + 1}"] = ~inside
-    return graph.without(outside) if outside else graph
 
 
 def in_window(q: Array, low: float, width: float, *, endless: bool) -> Bools:

@@ -12,7 +12,8 @@ from numpy.typing import ArrayLike
 from kerfpath._arrays import Array, floats, freeze
 from kerfpath._told import told
 from kerfpath.errors import InputError
-from kerfpath.front._runs import Run
+from kerfpath.front._problem import Criterion
+from kerfpath.front._subproblem import Subproblem
 from kerfpath.plans import Plan
 
 __all__ = ["Front", "ParetoSet", "hypervolume"]
@@ -24,14 +25,11 @@ class Front:
 
     Parameters
     ----------
-    criteria : tuple of str
-        Names, as `pareto` takes them.
-    units : tuple of str
-    sense : (C,)
-        1 where less is better, -1 where more is.
+    axes : tuple of Criterion
+        The criteria; `criteria` are their names.
     numbers : tuple of int
         Place of each run among all that were tried; by the first criterion, the best first.
-    runs : tuple of Run
+    runs : tuple of Subproblem
         What each plan was asked for.
     values : (P, C)
         Criteria of each plan, in their units; each plan has passed its audit.
@@ -48,11 +46,9 @@ class Front:
         Why the other runs had none, by count.
     """
 
-    criteria: tuple[str, ...]
-    units: tuple[str, ...]
-    sense: Array
+    axes: tuple[Criterion, ...]
     numbers: tuple[int, ...]
-    runs: tuple[Run, ...]
+    runs: tuple[Subproblem, ...]
     values: Array
     beaten: Array
     ideal: Array
@@ -62,6 +58,21 @@ class Front:
     failures: Mapping[str, int]
 
     __repr__ = told
+
+    @property
+    def criteria(self) -> tuple[str, ...]:
+        """Names of the criteria, as `pareto` takes them."""
+        return tuple(axis.name for axis in self.axes)
+
+    @property
+    def units(self) -> tuple[str, ...]:
+        """Units of the criteria."""
+        return tuple(axis.unit for axis in self.axes)
+
+    @property
+    def sense(self) -> Array:
+        """1 where less is better, -1 where more is, (C,)."""
+        return np.array([axis.sense for axis in self.axes])
 
     @property
     def scaled(self) -> Array:
@@ -119,9 +130,8 @@ class Front:
             f"{len(self.runs)} plans of {self.feasible} feasible runs of {self.tried}; "
             f"hypervolume {self.hypervolume:.4f}, largest gap {self.gap:.3f}"
         ]
-        for i, (name, unit) in enumerate(zip(self.criteria, self.units, strict=True)):
-            low, high = self.values[:, i].min(), self.values[:, i].max()
-            lines.append(f"  {name}: {low:.4g} to {high:.4g} {unit}")
+        for axis, values in zip(self.axes, self.values.T, strict=True):
+            lines.append(f"  {axis.name}: {values.min():.4g} to {values.max():.4g} {axis.unit}")
         lines += [f"  no plan in {number} runs: {why}" for why, number in self.failures.items()]
         return "\n".join(lines)
 

@@ -1,0 +1,241 @@
+"""The multi-objective problem: a contour on its graph, the criteria, and the runs that solve it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import ClassVar
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from kerfpath._arrays import Array, freeze
+from kerfpath._told import told
+from kerfpath.auditor import audit as full_audit
+from kerfpath.cell import Cell
+from kerfpath.contour import Contour
+from kerfpath.errors import NoFeasiblePath
+from kerfpath.front._subproblem import WINDOW, Subproblem
+from kerfpath.graph import LayeredGraph
+from kerfpath.options import PlanOptions
+from kerfpath.planner import node_interval, plan, relaxations
+from kerfpath.plans import Plan
+from kerfpath.robots import Robot
+from kerfpath.search import Relaxations
+
+__all__ = ["Criterion", "Evaluation", "Gap", "ParetoProblem", "Solution"]
+
+DIGITS = 12
+"""Of a criterion that count."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Criterion:
+    """A criterion that plans are compared by; every one is a class of `kerfpath.front._criteria`.
+
+    Parameters
+    ----------
+    name : str
+        As `pareto` takes it.
+    words : str
+        As a reader calls it.
+    unit : str
+    joint : int, optional
+        The joint that it measures, 0-based; None: all joints together.
+    """
+
+    name: str
+    words: str
+    unit: str
+    joint: int | None = None
+
+    more_is_better: ClassVar[bool] = False
+    exact_anchor: ClassVar[bool] = False
+    """Whether the plan of the first runs that is best in it is the best on the graph."""
+    bounded: ClassVar[bool] = False
+    """Whether `bound` can hold a run to a value of it."""
+
+    __repr__ = told
+
+    @property
+    def sense(self) -> float:
+        """1 where less is better, -1 where more is."""
+        return -1.0 if self.more_is_better else 1.0
+
+    def require(self, options: PlanOptions, cell: Cell | None, home: ArrayLike | None) -> None:
+        """Raise InputError where something is missing that it is measured with."""
+
+    def value(self, plan: Plan, problem: ParetoProblem) -> float:
+        """Return its value of a plan, in its unit."""
+        raise NotImplementedError
+
+    def anchor(self, problem: ParetoProblem) -> Subproblem | None:
+        """Return the subproblem that is to find its best value, or to come near; None for none."""
+        return None
+
+    def bound(
+        self, run: Subproblem, value: float, gap: Gap, problem: ParetoProblem,
+        rng: np.random.Generator,
+    ) -> Subproblem:  # fmt: skip
+        """Return a subproblem with the epsilon constraint that it be as good as a value."""
+        raise NotImplementedError
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Evaluation:
+    """What the search knows of a plan.
+
+    Parameters
+    ----------
+    losses : (C,)
+        Its criteria, with signs by which less is better.
+    spans : (n, 2) rad
+        Lowest and highest value of each joint, endless ones unrolled.
+    """
+
+    losses: Array
+    spans: Array
+
+    __repr__ = told
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Solution(Evaluation):
+    """A run that has a plan: its place among all runs, and its subproblem."""
+
+    number: int
+    run: Subproblem
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Gap:
+    """Two solutions that are neighbours on the front in one criterion.
+
+    Parameters
+    ----------
+    criterion : int
+        Its place among the criteria.
+    better : Solution or None
+        None: the gap is beyond the best.
+    worse : Solution
+    """
+
+    criterion: int
+    better: Solution | None
+    worse: Solution
+
+    __repr__ = told
+
+    @property
+    def key(self) -> tuple[int, int, int]:
+        """What tells gaps apart, whatever the front is by then."""
+        better, worse = self.better, self.worse
+        return (self.criterion, *((-1, -1) if better is None else (better.number, worse.number)))
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class ParetoProblem:
+    """A contour to plan on one layered graph, and what its plans are compared by.
+
+    Parameters
+    ----------
+    contour, robot, tool, placement, speed, options, graph, cell
+        As in `kerfpath.plan`; the runs change some of the options.
+    criteria : tuple of Criterion
+    home : (n,) rad, optional
+        Where the arm comes from and goes back to.
+    audit : callable, optional
+        Returns what is wrong with a plan; default: `kerfpath.audit`, with the cell.
+    """
+
+    contour: Contour
+    robot: Robot
+    tool: Array
+    placement: Array
+    speed: float | None
+    options: PlanOptions
+    graph: LayeredGraph
+    criteria: tuple[Criterion, ...]
+    cell: Cell | None = None
+    home: Array | None = None
+    audit: Callable[[Plan], Sequence[object]] | None = None
+
+    __repr__ = told
+
+    @cached_property
+    def dt(self) -> float:
+        """Time from node to node, s."""
+        return node_interval(self.contour, self.speed)
+
+    @cached_property
+    def unbounded(self) -> Subproblem:
+        """The first run: all that the limits allow and no window."""
+        velocity, _ = self.robot.speed_limits()
+        weights = freeze(1 / (velocity * self.dt))
+        return Subproblem.unbounded(weights, self.options.eta_v, self.options.eta_a)
+
+    @cached_property
+    def least(self) -> Relaxations:
+        """The least shares of the limits and the least node interval that have a path."""
+        asked = self.options
+        return relaxations(
+            self.contour,
+            self.robot,
+            self.graph,
+            self.speed,
+            eta_v=asked.eta_v,
+            eta_a=asked.eta_a,
+        )
+
+    def first_runs(self) -> list[Subproblem]:
+        """Return the unbounded run, and one for the best of each criterion that has an anchor."""
+        anchors = [criterion.anchor(self) for criterion in self.criteria]
+        return [self.unbounded, *(run for run in anchors if run is not None)]
+
+    def solve(self, run: Subproblem, *, first: bool = False) -> Plan | str:
+        """Return the plan of a run, which has passed its audit, or in a few words why not.
+
+        Raises
+        ------
+        NoFeasiblePath
+            The `first` run, which has all that is allowed, has no path, so that none can have one.
+        """
+        try:
+            made = plan(
+                self.contour,
+                self.robot,
+                tool=self.tool,
+                placement=self.placement,
+                speed=self.speed,
+                options=run.applied_to(self.options),
+                graph=run.graph(self.graph, self.robot.endless),
+                cell=run.cell(self.cell),
+            )
+        except NoFeasiblePath as broken:
+            if first:
+                said = (
+                    f"{broken}; no run can have a plan: this one had all that is allowed. Runs "
+                    "stand on the grid of the rotation: where kerfpath plan finds a motion by "
+                    "refining it, choose a finer gamma_step_deg or a lower speed here"
+                )
+                raise broken.retold(said) from None
+            counts = broken.counts
+            if windows := [why for why in counts if why.startswith(WINDOW)]:
+                return f"no pose in the {windows[0]}"
+            return f"no edge within {max(counts, key=counts.__getitem__, default='the seam')}"
+        wrong = full_audit(made, cell=self.cell) if self.audit is None else self.audit(made)
+        return f"audit: {getattr(wrong[0], 'code', wrong[0])}" if wrong else made
+
+    def evaluate(self, made: Plan) -> Evaluation:
+        """Return what the search knows of a plan.
+
+        Criteria to so many digits that the same motion found twice, its sums rounded otherwise, is
+        one.
+        """
+        values = [each.sense * each.value(made, self) for each in self.criteria]
+        q = made.q[0] + np.vstack([np.zeros(made.q.shape[1]), np.cumsum(made.increments, axis=0)])
+        return Evaluation(
+            losses=freeze(np.array([float(f"{value:.{DIGITS}g}") for value in values])),
+            spans=freeze(np.stack([q.min(axis=0), q.max(axis=0)], axis=1)),
+        )

@@ -1,0 +1,158 @@
+"""The search for the front: which run comes next, what came of the others, and the front of it."""
+
+from __future__ import annotations
+
+from collections import Counter, deque
+from collections.abc import Callable, Iterator
+from typing import Literal, get_args
+
+import moocore
+import numpy as np
+
+from kerfpath._arrays import Array, freeze
+from kerfpath.errors import InputError, NoFeasiblePath
+from kerfpath.front._adaptive import Adaptive
+from kerfpath.front._front import Front
+from kerfpath.front._problem import Evaluation, ParetoProblem, Solution
+from kerfpath.front._subproblem import Subproblem, grid
+
+__all__ = ["AHEAD", "FrontSearch", "SearchKind", "whole_number"]
+
+SearchKind = Literal["adaptive", "grid"]
+
+AHEAD = 8
+"""Runs that may be under way: a run depends on what came of those so far before it, on no clock."""
+LEAST_ROOM = 0.1
+"""Share of an ideal value by which the reference is beyond the worst, at least."""
+TINY = 1e-9
+"""Of whatever unit: where an ideal value is zero."""
+
+
+class FrontSearch:
+    """Proposes one run after the other, and collects what comes of them in the same order.
+
+    Parameters
+    ----------
+    problem : ParetoProblem
+    runs : int
+        How many there are to be.
+    search : {"adaptive", "grid"}
+    seed : int
+    ahead : int
+        How many may be under way.
+
+    Raises
+    ------
+    InputError
+        An unknown search, fewer than one run, or none under way.
+    """
+
+    def __init__(
+        self, problem: ParetoProblem, *, runs: int, search: SearchKind, seed: int, ahead: int
+    ) -> None:
+        if search not in get_args(SearchKind):
+            raise InputError(
+                f"search: expected one of {', '.join(get_args(SearchKind))}, got {search!r}"
+            )
+        self.runs, self._ahead = whole_number(runs, "runs"), whole_number(ahead, "ahead")
+        self._problem, self._search, self._seed = problem, search, seed
+        self._beginning = 1
+        self._found: list[Solution] = []
+        self._failures: Counter[str] = Counter()
+
+    def _proposed(self) -> Iterator[Subproblem]:
+        """Yield the runs: the first, those for the best of each criterion, and then the search."""
+        yield self._problem.unbounded
+        first = self._problem.first_runs()
+        self._beginning = len(first)
+        yield from first[1:]
+        rng = np.random.default_rng(self._seed)
+        plain = grid(first[0], rng)
+        adaptive = Adaptive(self._problem, first, rng)
+        while True:
+            if self._search == "adaptive" and self._found:
+                ideal, reference = self._box()
+                yield adaptive.propose(self._front(), reference - ideal)
+            else:
+                yield next(plain)
+
+    def run(self, submit: Callable[[int, Subproblem], Callable[[], Evaluation | str]]) -> Front:
+        """Do all runs, up to `ahead` of them under way, and return the front.
+
+        `submit` begins a run, by its number, and returns how to wait for what comes of it: the
+        evaluation of its plan, or why there is none. The first is waited for alone, as all else
+        hangs on it.
+
+        Raises
+        ------
+        NoFeasiblePath
+            No run has a plan.
+        """
+        proposed, begun = self._proposed(), 0
+        flying: deque[tuple[int, Subproblem, Callable[[], Evaluation | str]]] = deque()
+        for done in range(self.runs):
+            while len(flying) < (self._ahead if done else 1) and begun < self.runs:
+                run = next(proposed)
+                flying.append((begun, run, submit(begun, run)))
+                begun += 1
+            number, run, wait = flying.popleft()
+            found = wait()
+            if isinstance(found, str):
+                self._failures[found] += 1
+            else:
+                self._found.append(
+                    Solution(losses=found.losses, spans=found.spans, number=number, run=run)
+                )
+        return self._result()
+
+    def _front(self) -> list[Solution]:
+        """Return those that none dominates, of equal ones the first."""
+        kept = moocore.is_nondominated(np.array([each.losses for each in self._found]))
+        return [each for each, keep in zip(self._found, kept, strict=True) if keep]
+
+    def _box(self) -> tuple[Array, Array]:
+        """Return the ideal and the reference (C,) that the first runs leave, less being better.
+
+        The reference is beyond their worst by as much as that is from the ideal, and by a share
+        of it at least. Later runs do not move them, so that hypervolumes are comparable.
+        """
+        some = [each for each in self._found if each.number < self._beginning] or self._found[:1]
+        values = np.array([each.losses for each in some])
+        ideal, worst = values.min(axis=0), values.max(axis=0)
+        return ideal, worst + np.maximum(worst - ideal, LEAST_ROOM * np.abs(ideal) + TINY)
+
+    def _result(self) -> Front:
+        failures = dict(self._failures.most_common())
+        if not self._found:
+            why = ", ".join(f"{why}: {number}" for why, number in failures.items())
+            raise NoFeasiblePath(
+                f"contour {self._problem.contour.name!r}: none of {self.runs} runs has a plan; "
+                f"{why}",
+                proved=False,
+                node=-1,
+                counts=failures,
+            )
+        front = sorted(self._front(), key=lambda each: (*each.losses,))
+        numbers = {each.number for each in front}
+        beaten = [each.losses for each in self._found if each.number not in numbers]
+        sense = np.array([criterion.sense for criterion in self._problem.criteria])
+        ideal, reference = self._box()
+        return Front(
+            axes=self._problem.criteria,
+            numbers=tuple(each.number for each in front),
+            runs=tuple(each.run for each in front),
+            values=freeze(sense * np.array([each.losses for each in front])),
+            beaten=freeze(sense * np.array(beaten).reshape(-1, len(sense))),
+            ideal=freeze(sense * ideal),
+            reference=freeze(sense * reference),
+            tried=self.runs,
+            feasible=len(self._found),
+            failures=failures,
+        )
+
+
+def whole_number(value: int, name: str) -> int:
+    """Return a number that counts; raise InputError where it is none, or less than one."""
+    if not isinstance(value, int) or value < 1:
+        raise InputError(f"{name}: expected a whole number, at least 1, got {value!r}")
+    return value

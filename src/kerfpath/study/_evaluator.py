@@ -1,0 +1,125 @@
+"""What the robot of a job can do of contours where they lie: poses, clear poses, fastest speeds.
+
+Both studies that change a job ask this, one with another robot, one with other placements.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+
+from kerfpath._arrays import Ints
+from kerfpath._told import told
+from kerfpath.cad import Part
+from kerfpath.cell import Cell, Checker
+from kerfpath.contour import Contour, FrameKind
+from kerfpath.graph import LayeredGraph
+from kerfpath.job import Job, cell_of_job, fastest_along
+from kerfpath.planner import FastestSpeed, node_interval
+
+__all__ = ["EVERY", "Evaluator", "SampledContour", "commonest_loss", "sample_contours"]
+
+EVERY = 8
+"""Nodes from one that is looked at for a clear pose to the next."""
+TRIED = 8
+"""Poses of a node asked at once for a clear one."""
+NO_LOSS = ("admitted", "posture not wanted")
+"""Counts of candidates that say nothing of why a robot has no pose."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class SampledContour:
+    """A contour of a job as its nodes, and its asked speed in m/s."""
+
+    name: str
+    nodes: Contour
+    speed: float
+
+    __repr__ = told
+
+    @property
+    def interval(self) -> float:
+        """Time from node to node at the speed asked for, s."""
+        return node_interval(self.nodes, self.speed if self.nodes.time is None else None)
+
+    def stretch(self, first: int, last: int, frames: FrameKind, *, timed: bool) -> SampledContour:
+        """Return some of its nodes, each step to take as long as a step of the contour does.
+
+        With `timed` as long as one takes at the speed asked for; else its steps count as long as
+        they are on the average, so that its speeds are those of the contour.
+        """
+        run = self.nodes.part(first, last, frames)
+        run = replace(run, time=None, speed_share=np.ones(len(run)))
+        if timed:
+            return replace(self, nodes=run, speed=float(np.diff(run.s).max()) / self.interval)
+        step = self.nodes.length / (len(self.nodes) - 1)
+        return replace(self, nodes=replace(run, s=np.arange(len(run), dtype=float) * step))
+
+
+def sample_contours(job: Job, part: Part, *, as_asked: bool = False) -> tuple[SampledContour, ...]:
+    """Return the contours of a job, sampled at one speed each, or as their speeds are asked for."""
+    return tuple(
+        SampledContour(
+            name=task.name,
+            nodes=task.sample(task.candidates(part)[0]) if as_asked else task.evenly_fast(part),
+            speed=task.speed,
+        )
+        for task in job.tasks(part)
+    )
+
+
+@dataclass(kw_only=True, eq=False)
+class Evaluator:
+    """Finds what the robot of a job can do, by searches on the job's grid without penalties."""
+
+    job: Job
+    part: Part
+
+    __repr__ = told
+
+    @cached_property
+    def cell(self) -> Cell | None:
+        """The cell of the job.
+
+        Raises
+        ------
+        InputError
+            A cell that cannot be.
+        """
+        return cell_of_job(self.job, self.part)
+
+    def graph(self, nodes: Contour, only: Ints | None = None) -> LayeredGraph:
+        """Return the layered graph of nodes: margins are kept, penalties play no part."""
+        return self.job.graph(nodes, self.job.options.without_penalties, only=only)
+
+    def blocked(self, graph: LayeredGraph, step: int = 1) -> Iterator[int]:
+        """Yield, of every `step`-th layer, those without a clear pose."""
+        if self.cell is None:
+            return
+        checker = Checker(self.cell, graph.q)
+        for layer in range(0, len(graph.start) - 1, step):
+            poses = np.arange(graph.start[layer], graph.start[layer + 1])
+            rounds = max(1, len(poses) // TRIED)
+            # Spread over the layer, as neighbours collide together.
+            parts = (poses[r::rounds] for r in range(rounds))
+            if not any(np.isfinite(checker.price(part)).any() for part in parts):
+                yield layer
+
+    def fastest(self, nodes: Contour, graph: LayeredGraph) -> FastestSpeed:
+        """Return the fastest constant speed on the grid, clear in the cell.
+
+        Raises
+        ------
+        NoFeasiblePath
+            No speed has a path.
+        """
+        return fastest_along(self.job, nodes, self.cell, refine=False, graph=graph)
+
+
+def commonest_loss(graph: LayeredGraph, layer: int) -> str:
+    """Return what most candidates of a layer without a pose were lost to."""
+    counts = {word: n for word, n in graph.counts(layer).items() if word not in NO_LOSS}
+    return max(counts, key=counts.__getitem__, default="")

@@ -1,0 +1,113 @@
+"""The task of the study of a layout: what the worst of some placements is worth."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import asdict, replace
+from functools import lru_cache
+
+import numpy as np
+
+from kerfpath._arrays import Array
+from kerfpath.job import Job
+from kerfpath.study._evaluator import SampledContour, sample_contours
+from kerfpath.study._job import load_job
+from kerfpath.study.placing._evaluator import PlacementEvaluator
+from kerfpath.study.placing._place import moved, numbers_of
+from kerfpath.study.placing._value import ContourValue, PlacementValue, Test, beats, worst_of
+
+__all__ = ["contours_of", "evaluate_placements", "middle_of"]
+
+
+def evaluate_placements(
+    *,
+    job: str,
+    digest: str,
+    goal: str,
+    places: list[dict[str, float]],
+    stretches: list[list[int]],
+    exact: bool = False,
+    whole: bool = False,
+    floor: float | None = None,
+) -> dict[str, object]:
+    """Return what the worst of some placements is worth: a task of a sweep.
+
+    Parameters
+    ----------
+    job, digest
+        As in `load_job`.
+    goal : {"speed", "margin", "motion"}
+    places : list of mapping
+        Offsets by variable; the first is the nominal placement, others are its errors.
+    stretches : list of (contour, first node, last node)
+        Solved for the bound.
+    exact : bool
+        Also solve the contours, unless they are infeasible before.
+    whole : bool
+        Solve every contour of the nominal placement to its own optimum.
+    floor : float, optional
+        Nobody asks for values that do not beat it.
+
+    Returns
+    -------
+    dict
+        A `PlacementValue` as JSON holds it.
+    """
+    known = load_job(job, digest)
+    contours = contours_of(job, digest, goal)
+    middle = middle_of(known.job, contours)
+    seconds: dict[Test, float] = {"reach": 0.0, "stretch": 0.0, "exact": 0.0}
+    of_contours: tuple[ContourValue, ...] = ()
+    worst: PlacementValue | None = None
+    for i, offsets in enumerate(places):
+        evaluator = PlacementEvaluator(
+            job=moved(known.job, numbers_of(known.job, offsets, middle)),
+            part=known.part,
+            goal=goal,
+            contours=contours,
+            seconds=seconds,
+        )
+        here = evaluator.evaluate(
+            stretches,
+            exact=exact,
+            whole=whole and i == 0,
+            floor=floor,
+            least=None if worst is None else worst.value,
+        )
+        of_contours, here = of_contours or here.contours, replace(here, place=i)
+        worst = here if worst is None else _worse(goal, worst, here)
+        if not worst.feasible:
+            break
+        if floor is not None and worst.bound is not None and not beats(goal, worst.bound, floor):
+            break
+    assert worst is not None
+    return asdict(replace(worst, contours=of_contours, seconds=seconds))
+
+
+def _worse(goal: str, one: PlacementValue, two: PlacementValue) -> PlacementValue:
+    """Return what two placements are worth together."""
+    if not two.feasible:
+        return two
+    bounds = [bound for bound in (one.bound, two.bound) if bound is not None]
+    bound = worst_of(goal, bounds) if bounds else None
+    exact = None if one.value is None or two.value is None else [one.value, two.value]
+    return replace(
+        two,
+        bound=bound,
+        value=None if exact is None else worst_of(goal, exact),
+        place=one.place if bound == one.bound else two.place,
+    )
+
+
+@lru_cache(maxsize=2)
+def contours_of(job: str, digest: str, goal: str) -> tuple[SampledContour, ...]:
+    """Return the contours of a job, sampled: at one speed each, or for "motion" as asked."""
+    known = load_job(job, digest)
+    return sample_contours(known.job, known.part, as_asked=goal == "motion")
+
+
+def middle_of(job: Job, contours: Sequence[SampledContour]) -> Array:
+    """Return the middle (3,) m, in the base, of the box about all nodes in the part frame."""
+    points = np.concatenate([contour.nodes.points for contour in contours])
+    middle = (points.min(axis=0) + points.max(axis=0)) / 2
+    return np.asarray(job.placement[:3, :3] @ middle + job.placement[:3, 3])

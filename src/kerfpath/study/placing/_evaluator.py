@@ -1,0 +1,320 @@
+"""Tests of a placement that grow dearer: each but the last gives a bound, all proved.
+
+- Reach: the layers of every `EVERY`-th node alone, with all their poses. A node without a pose, or
+  in a cell without a clear one, ends it: every path visits every node.
+- Stretch: a run of nodes on the whole grid, solved exactly. The part of a path on them keeps what
+  the path keeps, so no path is faster than the stretch lets it be, and none is clear where no path
+  along the stretch is. The displacement is bounded by paths over every `EVERY`-th node whose steps
+  keep that many times the velocity limit: by the triangle inequality of the metric they are no
+  longer than the steps between them, on endless axes too, as the short way round is the shortest.
+- Exact: the contours on the job's own grid. Where only the worst contour counts, others are left at
+  a path on every `THIN`-th gamma that is good enough: what a part of the graph allows, all of it
+  does.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+from time import perf_counter
+from typing import Literal
+
+import numpy as np
+
+from kerfpath._arrays import Bools
+from kerfpath._told import told
+from kerfpath.cell import Cell
+from kerfpath.errors import InputError, NoFeasiblePath
+from kerfpath.graph import LayeredGraph
+from kerfpath.job import cell_of_job
+from kerfpath.planner import plan
+from kerfpath.search import shortest_path
+from kerfpath.study._evaluator import EVERY, Evaluator, SampledContour, commonest_loss
+from kerfpath.study.placing._value import (
+    ContourValue,
+    Infeasibility,
+    PlacementValue,
+    Test,
+    beats,
+    worst_of,
+)
+
+__all__ = ["PlacementEvaluator"]
+
+THIN = 4
+"""Steps of gamma between the samples of a path that is good enough."""
+PER_METRE = 1e-3
+"""What a metre from the base counts between placements that are out of reach alike."""
+TOLERATED = 1e-6
+"""Share by which steps over several nodes may exceed the limit: each step has a tolerance."""
+UNLIMITED = 1e12
+"""rad/s^2."""
+
+
+class InfeasiblePlacement(Exception):
+    """A test shows that the placement is infeasible."""
+
+    def __init__(self, why: Infeasibility) -> None:
+        super().__init__(why.reason)
+        self.why = why
+
+
+@dataclass(kw_only=True, eq=False)
+class PlacementEvaluator(Evaluator):
+    """One placement, a job moved there, and the tests of it.
+
+    Parameters
+    ----------
+    goal : {"speed", "margin", "motion"}
+    contours : tuple of SampledContour
+    seconds : mapping of test to float
+        What each test has taken is added to it.
+    """
+
+    goal: str
+    contours: tuple[SampledContour, ...]
+    seconds: dict[Test, float]
+    graphs: list[LayeredGraph] = field(default_factory=list)
+
+    __repr__ = told
+
+    def evaluate(
+        self,
+        stretches: Sequence[Sequence[int]],
+        *,
+        exact: bool,
+        whole: bool,
+        floor: float | None,
+        least: float | None,
+    ) -> PlacementValue:
+        """Return what this placement is worth; `least` is what another has come down to."""
+        stage: Test = "reach"
+        try:
+            with self._timed("reach"):
+                self._require_poses()
+            with self._timed("stretch"):
+                bound = self._bound(stretches)
+            stage = "stretch"
+            beaten = bound is not None and floor is not None and not beats(self.goal, bound, floor)
+            if not exact or (beaten and not whole):
+                return PlacementValue(stage=stage, bound=bound)
+            stage = "exact"
+            with self._timed("exact"):
+                order = dict.fromkeys([*(s[0] for s in stretches), *range(len(self.contours))])
+                if self.goal == "motion":
+                    return self._displacement(list(order), floor)
+                return self._speeds(list(order), floor, least, whole=whole)
+        except InfeasiblePlacement as found:
+            return PlacementValue(stage=stage, infeasibility=found.why)
+
+    @contextmanager
+    def _timed(self, stage: Test) -> Iterator[None]:
+        begun = perf_counter()
+        try:
+            yield
+        finally:
+            self.seconds[stage] += perf_counter() - begun
+
+    @cached_property
+    def cell(self) -> Cell | None:
+        """The cell; a part or fixture that would stand in the robot's base is a collision."""
+        try:
+            return cell_of_job(self.job, self.part)
+        except InputError as overlap:
+            why = Infeasibility(status="collision", progress=1.0, reason=str(overlap))
+            raise InfeasiblePlacement(why) from None
+
+    def _require_poses(self) -> None:
+        """Require a pose, and in a cell a clear one, of every `EVERY`-th node."""
+        self.graphs = [
+            self.graph(contour.nodes, np.arange(0, len(contour.nodes), EVERY))
+            for contour in self.contours
+        ]
+        empty = [np.diff(graph.start) == 0 for graph in self.graphs]
+        self._require_none("unreachable", empty, 0.0)
+        if self.cell is not None:
+            blocked = [np.zeros(len(graph.start) - 1, dtype=np.bool_) for graph in self.graphs]
+            for graph, here in zip(self.graphs, blocked, strict=True):
+                here[list(self.blocked(graph))] = True
+            self._require_none("collision", blocked, 1.0)
+
+    def _require_none(
+        self, status: Literal["unreachable", "collision"], bad: list[Bools], so_far: float
+    ) -> None:
+        """Refuse the placement where any node is bad, and say which is the first."""
+        share = 1.0 - float(np.concatenate(bad).mean())
+        middle = np.mean([contour.nodes.points.mean(axis=0) for contour in self.contours], axis=0)
+        placement = self.job.placement
+        away = float(np.linalg.norm(placement[:3, :3] @ middle + placement[:3, 3]))
+        for contour, graph, here in zip(self.contours, self.graphs, bad, strict=True):
+            if here.any():
+                k = int(np.argmax(here))
+                lost = f"no pose, most often {commonest_loss(graph, k)}"
+                raise InfeasiblePlacement(
+                    Infeasibility(
+                        status=status,
+                        progress=so_far + share - PER_METRE * away,
+                        reason="no clear pose" if status == "collision" else lost,
+                        contour=contour.name,
+                        node=EVERY * k,
+                        nodes=len(contour.nodes),
+                    )
+                )
+
+    def _bound(self, stretches: Sequence[Sequence[int]]) -> float | None:
+        """Return what no path of this placement can beat, None where nothing is known."""
+        values = []
+        for c, first, last in stretches:
+            contour, frames = self.contours[c], self.job.options.frames
+            graph = self.graph(contour.nodes, np.arange(first, last + 1))
+            run = contour.stretch(first, last, frames, timed=self.goal == "motion")
+            try:
+                values.append(self._value(c, run, graph)[0])
+            except NoFeasiblePath as broken:
+                raise self._infeasible(c, graph, broken, 2.0, first) from None
+        if self.goal == "motion":
+            return sum(map(self._least_displacement, range(len(self.contours))))
+        return worst_of(self.goal, values) if values else None
+
+    def _value(
+        self, index: int, contour: SampledContour, graph: LayeredGraph
+    ) -> tuple[float, ContourValue]:
+        """Return the value of a contour on a graph, alone and with what binds."""
+        known = ContourValue(index=index, name=contour.name, nodes=len(contour.nodes))
+        if self.goal == "motion":
+            cost = self._plan_cost(contour, graph)
+            return cost, replace(known, value=cost)
+        found = self.fastest(contour.nodes, graph)
+        value = found.speed / contour.speed if self.goal == "margin" else found.speed * 60
+        return value, replace(
+            known,
+            value=value,
+            fastest_m_min=found.speed * 60,
+            joint=found.joint + 1,
+            limit=found.limit,
+            node=found.node,
+        )
+
+    def _plan_cost(self, contour: SampledContour, graph: LayeredGraph) -> float:
+        options = replace(
+            self.job.options.without_penalties,
+            method="exact", objective="sum", feed="constant", refine=False,
+        )  # fmt: skip
+        if not contour.nodes.closed:
+            options = replace(options, closure="free")  # a stretch of a loop that closes need not
+        speed = contour.speed if contour.nodes.time is None else None
+        return plan(
+            contour.nodes, self.job.robot, tool=self.job.tool, placement=self.job.placement,
+            speed=speed, options=options, cell=self.cell, graph=graph,
+        ).cost  # fmt: skip
+
+    def _least_displacement(self, index: int) -> float:
+        """Return a displacement that none along a contour is below, by every `EVERY`-th node."""
+        contour, graph, robot = self.contours[index], self.graphs[index], self.job.robot
+        if len(graph.start) < 3:
+            return 0.0
+        options = self.job.options.of(robot, contour.interval)
+        velocity, _ = robot.speed_limits()
+        try:
+            return shortest_path(
+                graph.q,
+                graph.start,
+                dt=EVERY * contour.interval,
+                velocity=velocity * (1 + TOLERATED),
+                acceleration=np.full(len(velocity), UNLIMITED),
+                endless=robot.endless,
+                weights=options.weights,
+                metric=options.metric,
+                eta_v=options.eta_v,
+            ).cost
+        except NoFeasiblePath as broken:
+            raise self._infeasible(index, graph, broken, 2.0, step=EVERY) from None
+
+    def _speeds(
+        self, order: list[int], floor: float | None, least: float | None, *, whole: bool
+    ) -> PlacementValue:
+        """Solve the contours until none can be slower than the slowest, or all are beaten."""
+        solved: dict[int, ContourValue] = {}
+        for c in order:
+            contour = self.contours[c]
+            graph = self.graph(contour.nodes)
+            enough = None if whole or least is None else self._enough(c, graph, least)
+            if enough is not None:
+                solved[c] = enough
+                continue
+            try:
+                value, solved[c] = self._value(c, contour, graph)
+            except NoFeasiblePath as broken:
+                raise self._infeasible(c, graph, broken, 2 + len(solved) / len(order)) from None
+            least = value if least is None else worst_of(self.goal, [least, value])
+            if floor is not None and not whole and not beats(self.goal, least, floor):
+                return _exact(least, None, solved)
+        return _exact(least, least, solved)
+
+    def _enough(self, index: int, graph: LayeredGraph, least: float) -> ContourValue | None:
+        """Return a value that is reached on a part of the graph, if it is `least` or more."""
+        contour = self.contours[index]
+        thin = graph.without({"left out": graph.sample % THIN != 0})
+        try:
+            value, _ = self._value(index, contour, thin)
+        except NoFeasiblePath:
+            return None
+        if value < least:
+            return None
+        return ContourValue(
+            index=index, name=contour.name, nodes=len(contour.nodes), at_least=value
+        )
+
+    def _displacement(self, order: list[int], floor: float | None) -> PlacementValue:
+        """Solve the contours until their displacement, with what the others need, is beaten."""
+        solved: dict[int, ContourValue] = {}
+        left = {c: self._least_displacement(c) for c in order}
+        for c in order:
+            graph = self.graph(self.contours[c].nodes)
+            try:
+                left[c], solved[c] = self._value(c, self.contours[c], graph)
+            except NoFeasiblePath as broken:
+                raise self._infeasible(c, graph, broken, 2 + len(solved) / len(order)) from None
+            total = sum(left.values())
+            if floor is not None and not beats(self.goal, total, floor):
+                return _exact(total, None, solved)
+        total = sum(left.values())
+        return _exact(total, total, solved)
+
+    def _infeasible(
+        self,
+        index: int,
+        graph: LayeredGraph,
+        broken: NoFeasiblePath,
+        progress: float,
+        first: int = 0,
+        step: int = 1,
+    ) -> InfeasiblePlacement:
+        """Say of a contour without a path why that is, and where it breaks."""
+        status: Literal["unreachable", "collision", "speed"] = "speed"
+        if not np.diff(graph.start).all():
+            status = "unreachable"
+        elif self.goal != "motion" or any("collision" in word for word in broken.counts):
+            status = "collision"
+        contour = self.contours[index]
+        return InfeasiblePlacement(
+            Infeasibility(
+                status=status,
+                progress=progress,
+                reason=str(broken),
+                index=index,
+                contour=contour.name,
+                node=first + step * (broken.node + 1),
+                nodes=len(contour.nodes),
+            )
+        )
+
+
+def _exact(
+    bound: float | None, value: float | None, solved: Mapping[int, ContourValue]
+) -> PlacementValue:
+    """Return what came of the exact test, the contours as the job has them."""
+    contours = tuple(solved[c] for c in sorted(solved))
+    return PlacementValue(stage="exact", bound=bound, value=value, contours=contours)

@@ -1,0 +1,150 @@
+"""What a placement is worth, contour by contour, and what is better."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass, field
+from typing import Literal
+
+from pydantic import TypeAdapter
+
+from kerfpath._told import told
+
+__all__ = ["SLACK", "ContourValue", "Infeasibility", "PlacementValue", "Test", "beats", "worst_of"]
+
+SLACK = 1e-9
+"""Relative: by how much rounding may lift a value over its bound."""
+
+Test = Literal["reach", "stretch", "exact"]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ContourValue:
+    """What a placement is worth for one contour.
+
+    Parameters
+    ----------
+    index : int
+        Place of the contour in the job.
+    name : str
+    nodes : int
+        How many it has.
+    value : float, optional
+        In the unit of the goal; None where only a part of the graph was searched.
+    at_least : float, optional
+        What was found on that part.
+    fastest_m_min : float, optional
+        Where the goal is a speed: the fastest.
+    joint, limit, node : optional
+        What binds there, the joint from 1.
+    """
+
+    index: int
+    name: str
+    nodes: int
+    value: float | None = None
+    at_least: float | None = None
+    fastest_m_min: float | None = None
+    joint: int | None = None
+    limit: Literal["velocity", "acceleration"] | None = None
+    node: int | None = None
+
+    __repr__ = told
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Infeasibility:
+    """Why a placement is infeasible.
+
+    Parameters
+    ----------
+    status : {"unreachable", "collision", "speed"}
+    progress : float
+        How far it got: more is nearer to being feasible.
+    reason : str
+    contour, node, nodes : optional
+        Where it breaks: name, node, number of nodes.
+    index : int, optional
+        Place of the contour in the job, where a search found no path.
+    """
+
+    status: Literal["unreachable", "collision", "speed"]
+    progress: float
+    reason: str
+    contour: str | None = None
+    node: int | None = None
+    nodes: int | None = None
+    index: int | None = None
+
+    __repr__ = told
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class PlacementValue:
+    """What is known of a placement, or of the worst of several.
+
+    Parameters
+    ----------
+    stage : {"reach", "stretch", "exact"}
+        The test that decided.
+    bound : float, optional
+        What the value cannot beat; None where that is not known.
+    value : float, optional
+        Exact: m/min of the slowest contour, least share of the asked speeds, or displacement (14).
+    infeasibility : Infeasibility, optional
+    contours : tuple of ContourValue
+        Of the first placement.
+    place : int
+        Which placement was worst.
+    seconds : mapping of test to float
+        What each test took.
+    """
+
+    stage: Test
+    bound: float | None = None
+    value: float | None = None
+    infeasibility: Infeasibility | None = None
+    contours: tuple[ContourValue, ...] = ()
+    place: int = 0
+    seconds: dict[Test, float] = field(default_factory=dict)
+
+    __repr__ = told
+
+    @property
+    def feasible(self) -> bool:
+        """Whether nothing forbids it, as far as is known."""
+        return self.infeasibility is None
+
+    @property
+    def status(self) -> str:
+        """Whether it is "feasible", or why not."""
+        return "feasible" if self.infeasibility is None else self.infeasibility.status
+
+    @classmethod
+    def from_data(cls, data: object) -> PlacementValue:
+        """Return the value that `dataclasses.asdict` made `data` of."""
+        return _DATA.validate_python(data)
+
+    def entry(self, *names: str) -> dict[str, object]:
+        """Return some of what is known, with why it is infeasible, as JSON holds it."""
+        known = {name: getattr(self, name) for name in ("status", "stage", "bound", "value")}
+        if self.infeasibility is not None:
+            known |= {k: v for k, v in asdict(self.infeasibility).items() if v is not None}
+        return {name: known[name] for name in names if name in known}
+
+
+def beats(goal: str, value: float, other: float | None) -> bool:
+    """Return whether a value is better than another, by more than rounding."""
+    if other is None:
+        return True
+    if goal == "motion":
+        return value < other * (1 - SLACK)
+    return value > other * (1 + SLACK)
+
+
+def worst_of(goal: str, values: Sequence[float]) -> float:
+    """Return the worst of some values."""
+    return max(values) if goal == "motion" else min(values)
+
+
+_DATA = TypeAdapter(PlacementValue)
