@@ -1,4 +1,4 @@
-"""Measured frames: the fit of points, and plans and moves led to another placement."""
+"""Measured frames: the fit of points, and plans and moves at another placement."""
 
 from dataclasses import replace
 
@@ -107,7 +107,7 @@ def test_the_tool_keeps_its_pose_in_the_part_and_the_audit_its_limits(made):
     np.testing.assert_allclose(about[:, 2], made.gamma, atol=1e-6)  # gamma is 0 by hand
     assert audit(led) == audit(made) == []
     assert led.cost == pytest.approx(np.abs(np.diff(led.q, axis=0)).sum())
-    assert "led to another placement" in led.proof.statement
+    assert "moved to another placement" in led.proof.statement
     assert not led.proof.optimal
 
 

@@ -25,7 +25,8 @@ tool; its manipulability knows the tool.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, field, fields
+from functools import partial
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -44,23 +45,23 @@ AT_ONCE = 100_000
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Measure:
-    """One of the measures: what it says in words, its unit, and the most that it can be."""
+    """A measure of joint vectors: its words, its unit, and the most that it can be.
+
+    `of` returns its values (B,) of an arm without an external axis, of joint vectors (B, n) rad and
+    T_flange_tip or None. Without `families`, every arm has it.
+    """
 
     words: str
     unit: str
+    of: Callable[[Robot, Array, ArrayLike | None], Array] = field(repr=False)
     most: float = np.inf
+    families: tuple[str, ...] | None = None
 
     __repr__ = told
 
-
-MEASURES: Mapping[str, Measure] = {
-    "wrist": Measure(words="wrist singularity", unit="rad", most=np.pi / 2),
-    "elbow": Measure(words="elbow singularity", unit="rad", most=np.pi / 2),
-    "shoulder": Measure(words="shoulder singularity", unit="m"),
-    "limits": Measure(words="joint limit", unit="rad"),
-    "manipulability": Measure(words="manipulability", unit="m^3"),
-}
-"""What can be measured of a joint vector, by name."""
+    def has(self, robot: Robot) -> bool:
+        """Return whether the arm has it."""
+        return self.families is None or robot.kinematics in self.families
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -131,10 +132,10 @@ class Comfort:
     __repr__ = told
 
     def __post_init__(self) -> None:
-        for field in fields(self):
-            band = getattr(self, field.name)
+        for name in (each.name for each in fields(self)):
+            band = getattr(self, name)
             if not (band is None or isinstance(band, Band)):
-                raise InputError(f"comfort {field.name}: expected a Band, got {band!r}")
+                raise InputError(f"comfort {name}: expected a Band, got {band!r}")
         for name, band in self.bands.items():
             if band.margin >= MEASURES[name].most:
                 raise InputError(
@@ -253,16 +254,12 @@ def measure(name: str, robot: Robot, q: ArrayLike, *, tool: ArrayLike | None = N
     robot = robot.alone()
     if name not in MEASURES:
         raise InputError(f"comfort: expected one of {', '.join(MEASURES)}, got {name!r}")
-    if name == "limits":
-        return _to_limits(robot, q)
-    if name == "manipulability":
-        return _manipulability(robot, q, tool)
-    if name not in _measures_of(robot):
+    if not MEASURES[name].has(robot):
         raise InputError(
             f"comfort {name}: no {MEASURES[name].words} is defined for this kind of arm "
             f"({robot.family.words}); use {' or '.join(_measures_of(robot))}"
         )
-    return freeze(_shoulder(robot, q) if name == "shoulder" else _from_line(_bend(name, robot, q)))
+    return freeze(MEASURES[name].of(robot, q, tool))
 
 
 def jacobian(robot: Robot, q: ArrayLike, *, tool: ArrayLike | None = None) -> Array:
@@ -291,8 +288,7 @@ def jacobian(robot: Robot, q: ArrayLike, *, tool: ArrayLike | None = None) -> Ar
 
 def _measures_of(robot: Robot) -> list[str]:
     """Return the names of the measures that the arm has."""
-    bends = _BENDS.get(robot.kinematics, {})
-    return [*bends, *(["shoulder"] if bends else []), "limits", "manipulability"]
+    return [name for name, each in MEASURES.items() if each.has(robot)]
 
 
 def _manipulability(robot: Robot, q: Array, tool: ArrayLike | None) -> Array:
@@ -312,10 +308,10 @@ def _manipulability(robot: Robot, q: Array, tool: ArrayLike | None) -> Array:
             found[part] = np.abs(np.linalg.det(J))
         else:
             found[part] = np.sqrt(np.maximum(np.linalg.det(J @ J.transpose(0, 2, 1)), 0.0))
-    return freeze(found)
+    return found
 
 
-def _to_limits(robot: Robot, q: Array) -> Array:
+def _to_limits(robot: Robot, q: Array, tool: ArrayLike | None) -> Array:
     """Return how far the nearest limit is, (B,) rad, negative beyond it; infinite without any."""
     limits = robot.joint_limits()
     bound = ~limits.endless
@@ -326,12 +322,13 @@ def _to_limits(robot: Robot, q: Array) -> Array:
         combined - limits.row_lower,
         limits.row_upper - combined,
     ]
-    return freeze(np.concatenate(room, axis=1).min(axis=1, initial=np.inf))
+    return np.asarray(np.concatenate(room, axis=1).min(axis=1, initial=np.inf))
 
 
-def _from_line(angle: Array) -> Array:
-    """Return how far angles are from the nearest multiple of pi, from 0 to pi / 2."""
-    return np.asarray(np.abs(angle - np.pi * np.round(angle / np.pi)))
+def _from_line(name: str, robot: Robot, q: Array, tool: ArrayLike | None) -> Array:
+    """Return how far a bend (B,) is from the nearest multiple of pi, from 0 to pi / 2."""
+    bend = _bend(name, robot, q)
+    return np.asarray(np.abs(bend - np.pi * np.round(bend / np.pi)))
 
 
 def _bend(name: str, robot: Robot, q: Array) -> Array:
@@ -341,7 +338,7 @@ def _bend(name: str, robot: Robot, q: Array) -> Array:
     return np.asarray(angle + offset(robot.geometry))
 
 
-def _shoulder(robot: Robot, q: Array) -> Array:
+def _shoulder(robot: Robot, q: Array, tool: ArrayLike | None) -> Array:
     """Return the distance (B,) m of the wrist from the plane of axis 1 along axis 2."""
     g, angle = robot.geometry, robot.sign * q - robot.offset
     q2, q23 = angle[:, 1], angle[:, 1] + angle[:, 2]
@@ -367,3 +364,22 @@ _BENDS: Mapping[str, Mapping[str, tuple[int, Callable[[Mapping[str, float]], flo
     "five": {"elbow": (2, _forearm)},
 }
 """By family and measure: the joint that bends, and what its angle is off by, from the lengths."""
+
+MEASURES: Mapping[str, Measure] = {
+    **{
+        name: Measure(
+            words=f"{name} singularity",
+            unit="rad",
+            of=partial(_from_line, name),
+            most=np.pi / 2,
+            families=tuple(family for family, bends in _BENDS.items() if name in bends),
+        )
+        for name in ("wrist", "elbow")
+    },
+    "shoulder": Measure(
+        words="shoulder singularity", unit="m", of=_shoulder, families=tuple(_BENDS)
+    ),
+    "limits": Measure(words="joint limit", unit="rad", of=_to_limits),
+    "manipulability": Measure(words="manipulability", unit="m^3", of=_manipulability),
+}
+"""What can be measured of a joint vector, by name."""

@@ -1,4 +1,4 @@
-"""The part where it really stands: the frame of measured points, and plans led to it."""
+"""The part where it really stands: the frame of measured points, and plans moved to it."""
 
 from __future__ import annotations
 
@@ -155,16 +155,16 @@ def placed(plan: Plan, T_base_part: ArrayLike) -> Plan:
         )
     # Nearest turn at the first node, and no jump of a turn from the old joints after it.
     q = plan.q + np.unwrap(q - plan.q, axis=0)
-    led = replace(
+    there = replace(
         plan,
         T_base_part=T_base_part,
         q=q,
         turn=np.ceil((q - np.pi) / (2 * np.pi)).astype(np.int64),
-        proof=Proof(optimal=False, statement=f"{plan.proof.statement}; led to another placement"),
+        proof=Proof(optimal=False, statement=f"{plan.proof.statement}; moved to another placement"),
     )
     s = plan.settings
-    cost = path_cost(led.increments, s.weights, s.metric, s.objective, led.node_cost)
-    return replace(led, cost=cost)
+    cost = path_cost(there.increments, s.weights, s.metric, s.objective, there.node_cost)
+    return replace(there, cost=cost)
 
 
 def planned_again(plan: Plan, T_base_part: ArrayLike) -> Plan:
@@ -218,7 +218,7 @@ def planned_again(plan: Plan, T_base_part: ArrayLike) -> Plan:
 def placed_moves(
     moves: Sequence[AirMove], plans: Sequence[Plan], retract: float
 ) -> tuple[AirMove, ...]:
-    """Return the straight moves between plans that were led to another placement, not `clear`.
+    """Return the straight moves between plans that were moved to another placement, not `clear`.
 
     Where a move begins or ends at a home position it stays there.
 
@@ -237,7 +237,7 @@ def placed_moves(
         A move that goes around obstacles, or an end beyond the limits.
     """
     first = 0 if len(moves) < len(plans) else -1
-    led = []
+    moved = []
     for before, move in enumerate(moves, first):
         if len(move.q) > 2:
             raise InputError(
@@ -251,5 +251,5 @@ def placed_moves(
         else:  # home, the short way for endless joints
             turns = np.round((q0 - move.q[-1]) / (2 * np.pi)) * plans[0].robot.endless
             q1 = move.q[-1] + 2 * np.pi * turns
-        led.append(air_move(plans[0].robot, q0, q1))
-    return tuple(led)
+        moved.append(air_move(plans[0].robot, q0, q1))
+    return tuple(moved)

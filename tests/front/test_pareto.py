@@ -2,6 +2,7 @@
 
 import itertools
 import json
+import re
 from dataclasses import replace
 
 import numpy as np
@@ -12,12 +13,12 @@ from kerfpath import Contour, InputError, NoFeasiblePath, audit, fastest_speed, 
 from kerfpath.air import least_time
 from kerfpath.cell import Mesh, box_between, cell_of
 from kerfpath.comfort import Band, Comfort
-from kerfpath.front import Subproblem, hypervolume
+from kerfpath.front import CRITERIA, JOINT_CRITERIA, Subproblem, hypervolume
 from kerfpath.front._subproblem import grid
 from kerfpath.planner import layered_graph
 
 STEP = np.radians(8)
-CRITERIA = ("displacement", "velocity", "range_6", "acceleration")
+NAMES = ("displacement", "velocity", "range_6", "acceleration")
 
 
 @pytest.fixture(scope="module")
@@ -34,7 +35,7 @@ def task(arm, tool, placement):
 
 @pytest.fixture(scope="module")
 def found(task):
-    return pareto(**task, criteria=CRITERIA, runs=80)
+    return pareto(**task, criteria=NAMES, runs=80)
 
 
 def dominated(values):
@@ -92,7 +93,7 @@ def test_plans_keep_what_their_runs_were_asked_for(found):
 def test_more_runs_never_lower_the_hypervolume_and_keep_what_is_good(task, found):
     before = 0.0
     for runs in (8, 20, 41):
-        fewer = pareto(**task, criteria=CRITERIA, runs=runs)
+        fewer = pareto(**task, criteria=NAMES, runs=runs)
         np.testing.assert_array_equal(fewer.reference, found.reference)
         assert fewer.hypervolume >= before
         before = fewer.hypervolume
@@ -104,7 +105,7 @@ def test_more_runs_never_lower_the_hypervolume_and_keep_what_is_good(task, found
     "criterion", ["displacement", "displacement_4", "increment_6", "velocity", "acceleration"]
 )
 def test_the_plan_of_one_criterion_alone_is_as_good_in_it_as_any_other(task, criterion):
-    names = (*(c for c in CRITERIA if c != criterion), criterion)
+    names = (*(c for c in NAMES if c != criterion), criterion)
     alone = pareto(**task, criteria=[criterion], runs=3)
     many = pareto(**task, criteria=names, runs=30)
     assert len(alone.plans) == 1
@@ -341,12 +342,19 @@ def test_the_same_run_comes_back_from_its_data(found):
 
 
 def test_the_page_on_pareto_sets_runs(capsys):
-    import re
-
     page = (ROOT / "docs" / "pareto.md").read_text()
     for code in re.findall(r"```python\n(.*?)```", page, re.DOTALL):
         exec(compile(code, "pareto.md", "exec"), {})
     assert "hypervolume" in capsys.readouterr().out
+
+
+def test_the_page_on_pareto_sets_has_a_row_for_every_criterion_and_its_unit():
+    page = (ROOT / "docs" / "pareto.md").read_text()
+    rows = [line.strip("|").split(" | ") for line in page.splitlines() if line.startswith("| `")]
+    units = {name: row[1].strip() for row in rows for name in re.findall(r"`(\w+)`", row[0])}
+    every = CRITERIA | {f"{name}_J": each for name, each in JOINT_CRITERIA.items()}
+    assert set(units) == set(every)
+    assert all(units[name] == each.unit for name, each in CRITERIA.items() if units[name])
 
 
 def test_in_a_cell_every_plan_is_clear(task, tool, placement):

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
+from typing import ClassVar
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -36,12 +37,11 @@ ROOM = 1e-9
 class PerJoint(Criterion):
     """A criterion of one joint, or of all: added up over their velocity limits."""
 
-    def of_joints(self, plan: Plan) -> Array:
-        """Return it joint by joint, (n,) rad, of a rail m."""
-        raise NotImplementedError
+    field: ClassVar[str]
+    """What `kerfpath.plans.Criteria` calls it."""
 
     def value(self, plan: Plan, problem: ParetoProblem) -> float:
-        values = self.of_joints(plan)
+        values: Array = getattr(plan.criteria, self.field)
         if self.joint is not None:
             return float(values[self.joint])
         return float((values / plan.robot.speed_limits()[0]).sum())
@@ -57,19 +57,15 @@ class PerJoint(Criterion):
 class Displacement(PerJoint):
     """Total displacement (7); the unbounded run is best in that of all joints."""
 
+    field = "displacement"
     exact_anchor = True
-
-    def of_joints(self, plan: Plan) -> Array:
-        return plan.criteria.displacement
 
 
 class Increment(PerJoint):
     """Largest increment (8)."""
 
+    field = "largest_increment"
     exact_anchor = True
-
-    def of_joints(self, plan: Plan) -> Array:
-        return plan.criteria.largest_increment
 
     def anchor(self, problem: ParetoProblem) -> Subproblem | None:
         alone = PerJoint.anchor(self, problem)
@@ -79,10 +75,8 @@ class Increment(PerJoint):
 class Range(PerJoint):
     """Coordinate range (9), bounded by windows on the joints."""
 
+    field = "range"
     bounded = True
-
-    def of_joints(self, plan: Plan) -> Array:
-        return plan.criteria.range
 
     def anchor(self, problem: ParetoProblem) -> Subproblem | None:
         if self.joint is None:

@@ -74,12 +74,8 @@ def pareto(
         comfort, eta_v and eta_a: the largest share of the velocity and acceleration limits that any
         run may use. Runs say objective, metric and weights; the speed is constant.
     criteria : sequence of str
-        Less is better of: "displacement" (7) and "range" (9), over the joints' velocity limits and
-        added up (s); "velocity", the largest increment (8) of any joint, and "acceleration", as
-        shares of the limits; "displacement_J", "increment_J" and "range_J" of joint J, from 1
-        (rad, of a rail m); "time" from home along the contour and back (s). More is better of
-        "speed", the fastest constant one of the plan's path (m/s), of "clearance" in the cell (m),
-        and of the measures of `kerfpath.comfort`, at their least.
+        Names in `kerfpath.front.CRITERIA`, or in `JOINT_CRITERIA` with a joint from 1, as
+        "range_6"; docs/pareto.md says what each measures. "clearance" needs a cell.
     runs : int
         How often the planner is run.
     search : {"adaptive", "grid"}

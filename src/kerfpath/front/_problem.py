@@ -84,14 +84,10 @@ class Criterion:
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Evaluation:
-    """What the search knows of a plan.
+    """What the search knows of a plan: its losses (C,), and the spans (n, 2) of its joints.
 
-    Parameters
-    ----------
-    losses : (C,)
-        Its criteria, with signs by which less is better.
-    spans : (n, 2) rad
-        Lowest and highest value of each joint, endless ones unrolled.
+    Losses are criteria with signs by which less is better; spans the lowest and highest values in
+    rad, endless joints unrolled.
     """
 
     losses: Array
@@ -102,7 +98,7 @@ class Evaluation:
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Solution(Evaluation):
-    """A run that has a plan: its place among all runs, and its subproblem."""
+    """The evaluation of a run that has a plan, its number among all runs, and its subproblem."""
 
     number: int
     run: Subproblem
@@ -110,16 +106,7 @@ class Solution(Evaluation):
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Gap:
-    """Two solutions that are neighbours on the front in one criterion.
-
-    Parameters
-    ----------
-    criterion : int
-        Its place among the criteria.
-    better : Solution or None
-        None: the gap is beyond the best.
-    worse : Solution
-    """
+    """Two solutions that are neighbours on the front in a criterion; `better` None: beyond all."""
 
     criterion: int
     better: Solution | None
@@ -178,14 +165,9 @@ class ParetoProblem:
     @cached_property
     def least(self) -> Relaxations:
         """The least shares of the limits and the least node interval that have a path."""
-        asked = self.options
+        eta_v, eta_a = self.options.eta_v, self.options.eta_a
         return relaxations(
-            self.contour,
-            self.robot,
-            self.graph,
-            self.speed,
-            eta_v=asked.eta_v,
-            eta_a=asked.eta_a,
+            self.contour, self.robot, self.graph, self.speed, eta_v=eta_v, eta_a=eta_a
         )
 
     def first_runs(self) -> list[Subproblem]:

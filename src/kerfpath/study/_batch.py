@@ -9,7 +9,7 @@ import zlib
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import TypedDict
 
 from kerfpath._told import told
 from kerfpath.errors import InputError
@@ -118,7 +118,7 @@ def batch(
     make_folder(out)
     found: list[Planned] = []
     with Sweep(
-        planned, store=out / STORE, scheduler=scheduler, processes=processes, progress=progress
+        plan_job, store=out / STORE, scheduler=scheduler, processes=processes, progress=progress
     ) as tasks:
         asked = [_asked(tasks, path) for path in paths]
         for path, folder, given in zip(paths, folders, asked, strict=True):
@@ -163,8 +163,21 @@ def _asked(tasks: Sweep, path: Path) -> tuple[ProgramOptions, str] | InputError:
         return error
 
 
-def planned(*, path: str, digest_then: str) -> dict[str, Any]:
-    """Plan and audit a job: what came of it, and its files, packed; the task of a batch.
+class PlannedData(TypedDict):
+    """What came of a job, as JSON holds it: most of a `Planned`, and its files, packed."""
+
+    passed: bool
+    contours: int
+    kept: int
+    cutting_time: float | None
+    program: list[str]
+    reason: str
+    notes: list[str]
+    files: str
+
+
+def plan_job(*, path: str, digest_then: str) -> PlannedData:
+    """Plan and audit a job: the task of a batch.
 
     Raises
     ------
@@ -223,18 +236,22 @@ def _written(job: Path, folder: Path, options: ProgramOptions, result: Result) -
     if result.failure is not None:
         reason = result.failure.reason
         return Planned(job=job, folder=folder, passed=False, reason=reason, seconds=result.seconds)
-    told = dict(result.value)
-    files, program = _unpacked(told.pop("files")), told.pop("program")
-    replaced = replace_program(folder, files, program)
-    notes = list(told.pop("notes"))
+    found: PlannedData = result.value
+    program = found["program"]
+    replaced = replace_program(folder, _unpacked(found["files"]), program)
+    notes = found["notes"]
     notes += [f"{path.name} is from an earlier run and was removed" for path in replaced.removed]
     if stale := next(iter(replaced.edited), stale_program(options, folder, program)):
         notes.append(f"{stale.name} is from an earlier run and does not belong to this plan")
     return Planned(
         job=job,
         folder=folder,
+        passed=found["passed"],
+        contours=found["contours"],
+        kept=found["kept"],
+        cutting_time=found["cutting_time"],
         program=program[0] if program else "",
+        reason=found["reason"],
         notes=tuple(notes),
         seconds=result.seconds,
-        **told,
     )

@@ -101,6 +101,8 @@ def _page(found: JobFront, folder: Path) -> str:
         ("Largest gap", f"{front.gap:.3f} of that box, between neighbours in one criterion"),
     ]
     facts += [(f"{number} runs without a plan", why) for why, number in front.failures.items()]
+    many = len(found.others)
+    others = [f"The front is of one contour; the job has {many} more."] if many else []
     titles = {"balanced": "balanced"} | {axis.name: f"best {axis.words}" for axis in axes}
     where = quote(str(folder))
     return render_front(
@@ -110,21 +112,15 @@ def _page(found: JobFront, folder: Path) -> str:
         dominated=front.beaten.tolist(),
         marks={titles[name]: number for name, number in marks(front).items()},
         facts=facts,
-        notes=_notes(found),
+        notes=[
+            "Every plan is the proved optimum of its run on the grid of the rotation, and is not "
+            "refined: off the grid others may be better or faster; "
+            "the set is a sample of the front.",
+            *others,
+        ],
         command=f"kerfpath pareto {quote(str(job.path))} --out {where} --pick {{number}}",
         job_text=job.path.read_text(encoding="utf-8-sig"),
     )
-
-
-def _notes(found: JobFront) -> list[str]:
-    notes = [
-        "Every plan is the proved optimum of its run on the grid of the rotation, and is not "
-        "refined: off the grid others may be better or faster; "
-        "the set is a sample of the front."
-    ]
-    if found.others:
-        notes.append(f"The front is of one contour; the job has {len(found.others)} more.")
-    return notes
 
 
 def rows_of_run(run: Subproblem, robot: Robot) -> list[tuple[str, str]]:

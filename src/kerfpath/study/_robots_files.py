@@ -6,7 +6,6 @@ import json
 import os
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
 
 from kerfpath import __version__
 from kerfpath.errors import InputError
@@ -44,12 +43,12 @@ ROBOT_NOTES = (
 """What a reader of the table must know."""
 
 
-def robots_entry(found: Sequence[RobotSpeed]) -> list[dict[str, Any]]:
+def robots_entry(found: Sequence[RobotSpeed]) -> list[dict[str, object]]:
     """Return what was found as plain data, units in the names."""
     return [_entry(each) for each in found]
 
 
-def _entry(each: RobotSpeed) -> dict[str, Any]:
+def _entry(each: RobotSpeed) -> dict[str, object]:
     binding, arm = each.binding, each.robot
     return {
         "robot": arm.id,
@@ -67,7 +66,7 @@ def _entry(each: RobotSpeed) -> dict[str, Any]:
     }
 
 
-def _contour_entry(contour: ContourSpeed) -> dict[str, Any]:
+def _contour_entry(contour: ContourSpeed) -> dict[str, object]:
     return {
         "name": contour.name,
         "asked_m_min": contour.asked * 60,

@@ -30,7 +30,7 @@ def evaluate_placements(
     whole: bool = False,
     floor: float | None = None,
 ) -> dict[str, object]:
-    """Return what the worst of some placements is worth: a task of a sweep.
+    """Return the `PlacementValue` of the worst of some placements: a task of a sweep.
 
     Parameters
     ----------
@@ -46,12 +46,7 @@ def evaluate_placements(
     whole : bool
         Solve every contour of the nominal placement to its own optimum.
     floor : float, optional
-        Nobody asks for values that do not beat it.
-
-    Returns
-    -------
-    dict
-        A `PlacementValue` as JSON holds it.
+        Values that do not beat it are of no interest.
     """
     known = load_job(job, digest)
     contours = contours_of(job, digest, goal)

@@ -19,7 +19,6 @@ from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from time import perf_counter
-from typing import Literal
 
 import numpy as np
 
@@ -36,6 +35,7 @@ from kerfpath.study.placing._value import (
     ContourValue,
     Infeasibility,
     PlacementValue,
+    Status,
     Test,
     beats,
     worst_of,
@@ -103,9 +103,7 @@ class PlacementEvaluator(Evaluator):
             stage = "exact"
             with self._timed("exact"):
                 order = dict.fromkeys([*(s[0] for s in stretches), *range(len(self.contours))])
-                if self.goal == "motion":
-                    return self._displacement(list(order), floor)
-                return self._speeds(list(order), floor, least, whole=whole)
+                return self._solve(list(order), floor, least, whole=whole)
         except InfeasiblePlacement as found:
             return PlacementValue(stage=stage, infeasibility=found.why)
 
@@ -140,28 +138,19 @@ class PlacementEvaluator(Evaluator):
                 here[list(self.blocked(graph))] = True
             self._require_none("collision", blocked, 1.0)
 
-    def _require_none(
-        self, status: Literal["unreachable", "collision"], bad: list[Bools], so_far: float
-    ) -> None:
+    def _require_none(self, status: Status, bad: list[Bools], so_far: float) -> None:
         """Refuse the placement where any node is bad, and say which is the first."""
         share = 1.0 - float(np.concatenate(bad).mean())
         middle = np.mean([contour.nodes.points.mean(axis=0) for contour in self.contours], axis=0)
         placement = self.job.placement
         away = float(np.linalg.norm(placement[:3, :3] @ middle + placement[:3, 3]))
-        for contour, graph, here in zip(self.contours, self.graphs, bad, strict=True):
+        progress = so_far + share - PER_METRE * away
+        for c, here in enumerate(bad):
             if here.any():
-                k = int(np.argmax(here))
-                lost = f"no pose, most often {commonest_loss(graph, k)}"
-                raise InfeasiblePlacement(
-                    Infeasibility(
-                        status=status,
-                        progress=so_far + share - PER_METRE * away,
-                        reason="no clear pose" if status == "collision" else lost,
-                        contour=contour.name,
-                        node=EVERY * k,
-                        nodes=len(contour.nodes),
-                    )
-                )
+                k, reason = int(np.argmax(here)), "no clear pose"
+                if status == "unreachable":
+                    reason = f"no pose, most often {commonest_loss(self.graphs[c], k)}"
+                raise self._why(status, progress, reason, c, EVERY * k, searched=False)
 
     def _bound(self, stretches: Sequence[Sequence[int]]) -> float | None:
         """Return what no path of this placement can beat, None where nothing is known."""
@@ -232,56 +221,45 @@ class PlacementEvaluator(Evaluator):
         except NoFeasiblePath as broken:
             raise self._infeasible(index, graph, broken, 2.0, step=EVERY) from None
 
-    def _speeds(
+    def _solve(
         self, order: list[int], floor: float | None, least: float | None, *, whole: bool
     ) -> PlacementValue:
-        """Solve the contours until none can be slower than the slowest, or all are beaten."""
-        solved: dict[int, ContourValue] = {}
+        """Solve the contours until the placement is known, or can no longer beat the floor.
+
+        A speed is that of the slowest contour; displacements add up, and those that are not solved
+        yet count by their bounds.
+        """
+        motion, solved = self.goal == "motion", dict[int, ContourValue]()
+        left = {c: self._least_displacement(c) for c in order} if motion else {}
         for c in order:
-            contour = self.contours[c]
-            graph = self.graph(contour.nodes)
-            enough = None if whole or least is None else self._enough(c, graph, least)
+            graph = self.graph(self.contours[c].nodes)
+            enough = None if motion or whole or least is None else self._enough(c, graph, least)
             if enough is not None:
                 solved[c] = enough
                 continue
             try:
-                value, solved[c] = self._value(c, contour, graph)
+                value, solved[c] = self._value(c, self.contours[c], graph)
             except NoFeasiblePath as broken:
                 raise self._infeasible(c, graph, broken, 2 + len(solved) / len(order)) from None
-            least = value if least is None else worst_of(self.goal, [least, value])
+            if motion:
+                left[c] = value
+                least = sum(left.values())
+            else:
+                least = value if least is None else worst_of(self.goal, [least, value])
             if floor is not None and not whole and not beats(self.goal, least, floor):
                 return _exact(least, None, solved)
         return _exact(least, least, solved)
 
     def _enough(self, index: int, graph: LayeredGraph, least: float) -> ContourValue | None:
         """Return a value that is reached on a part of the graph, if it is `least` or more."""
-        contour = self.contours[index]
         thin = graph.without({"left out": graph.sample % THIN != 0})
         try:
-            value, _ = self._value(index, contour, thin)
+            value, known = self._value(index, self.contours[index], thin)
         except NoFeasiblePath:
             return None
         if value < least:
             return None
-        return ContourValue(
-            index=index, name=contour.name, nodes=len(contour.nodes), at_least=value
-        )
-
-    def _displacement(self, order: list[int], floor: float | None) -> PlacementValue:
-        """Solve the contours until their displacement, with what the others need, is beaten."""
-        solved: dict[int, ContourValue] = {}
-        left = {c: self._least_displacement(c) for c in order}
-        for c in order:
-            graph = self.graph(self.contours[c].nodes)
-            try:
-                left[c], solved[c] = self._value(c, self.contours[c], graph)
-            except NoFeasiblePath as broken:
-                raise self._infeasible(c, graph, broken, 2 + len(solved) / len(order)) from None
-            total = sum(left.values())
-            if floor is not None and not beats(self.goal, total, floor):
-                return _exact(total, None, solved)
-        total = sum(left.values())
-        return _exact(total, total, solved)
+        return ContourValue(index=index, name=known.name, nodes=known.nodes, at_least=value)
 
     def _infeasible(
         self,
@@ -293,21 +271,27 @@ class PlacementEvaluator(Evaluator):
         step: int = 1,
     ) -> InfeasiblePlacement:
         """Say of a contour without a path why that is, and where it breaks."""
-        status: Literal["unreachable", "collision", "speed"] = "speed"
+        status: Status = "speed"
         if not np.diff(graph.start).all():
             status = "unreachable"
         elif self.goal != "motion" or any("collision" in word for word in broken.counts):
             status = "collision"
+        node = first + step * (broken.node + 1)
+        return self._why(status, progress, str(broken), index, node, searched=True)
+
+    def _why(
+        self, status: Status, progress: float, reason: str, index: int, node: int, *, searched: bool
+    ) -> InfeasiblePlacement:
         contour = self.contours[index]
         return InfeasiblePlacement(
             Infeasibility(
                 status=status,
                 progress=progress,
-                reason=str(broken),
-                index=index,
+                reason=reason,
                 contour=contour.name,
-                node=first + step * (broken.node + 1),
+                node=node,
                 nodes=len(contour.nodes),
+                index=index if searched else None,
             )
         )
 

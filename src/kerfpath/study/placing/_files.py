@@ -116,7 +116,8 @@ def _map(found: Layout) -> dict[str, object] | None:
         "x": found.map.x.tolist(),
         "y": found.map.y.tolist(),
         "cells": [
-            each.entry("status", "bound", "reason", "contour", "node") for each in found.map.results
+            each.result.entry("status", "bound", "reason", "contour", "node")
+            for each in found.map.trials
         ],
     }
 

@@ -28,7 +28,7 @@ STATUSES = ("feasible", "speed", "collision", "unreachable")
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Layout:
-    """What came of looking for the best placement of a job.
+    """The best placement of a job, and all that were tried.
 
     Parameters
     ----------
@@ -133,7 +133,7 @@ def layout(
     ranges : mapping of variable to (low, high), optional
         What varies; default: the ranges of [layout], or else `DEFAULT_RANGES`.
     evaluations : int, optional
-        Placements that are looked at.
+        Placements that are tried.
     seed : int, optional
     tolerance_mm, tolerance_deg : float, optional
         By how much each variable may be off: the worst of its two ends counts, one at a time.
@@ -179,10 +179,8 @@ def layout(
         proved, open_bound = search.climb()
         evolved, drawn = len(search.trials), None
         if table.map_points:
-            axes, cells = search.mapped(search.best or search.trials[0], table.map_points)
-            proved, open_bound = search.climb()
-            y = axes[1] if len(axes) > 1 else np.zeros(0)
-            drawn = Map(x=axes[0], y=y, results=tuple(cell.result for cell in cells))
+            drawn = search.mapped(search.best or search.trials[0], table.map_points)
+            proved, open_bound = search.climb()  # what the map shows to be better is taken
         best = search.best
         after = None if best is None else search.whole(best)
     numbers: Numbers = {}

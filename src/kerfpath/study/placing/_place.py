@@ -61,7 +61,7 @@ def numbers_of(job: Job, offsets: Mapping[str, float], middle: Array) -> Numbers
     The part is tilted about the base's x, then y, turned about its z, all through `middle`, and
     then shifted; fixtures go with it but for the standing ones. A robot whose base moves by B sees
     all else moved by inv(B). The head turns about the flange's z. Numbers are rounded as a file has
-    them, so that the job of the file is the very one that was looked at. Offsets of zero change
+    them, so that the job of the file is the very one that was evaluated. Offsets of zero change
     nothing.
 
     Parameters
@@ -123,7 +123,9 @@ def moved(job: Job, numbers: Numbers) -> Job:
 
     part, tool, cell = at("part"), at("tool"), job.cell
     if cell is not None:
-        tables: dict[str, Any] = {"head": cell.head.model_copy(update=_of(numbers, "cell", "head"))}
+        tables: dict[str, object] = {
+            "head": cell.head.model_copy(update=_of(numbers, "cell", "head"))
+        }
         tables["fixture"] = tuple(
             fixture.model_copy(update=_of(numbers, "cell", "fixture", i))
             for i, fixture in enumerate(cell.fixture)

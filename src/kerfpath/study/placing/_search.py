@@ -34,7 +34,7 @@ CLOSE = 1.3
 
 @dataclass(slots=True, kw_only=True, eq=False)
 class Trial:
-    """A placement that was looked at.
+    """A placement that is tried.
 
     Parameters
     ----------
@@ -45,7 +45,7 @@ class Trial:
     stretches : int
         How many stretches its bound was found with; -1 before there is one.
     searched : bool
-        Whether it was asked for its exact value.
+        Whether its exact value was searched for.
     """
 
     offsets: Mapping[str, float]
@@ -64,13 +64,13 @@ class Map:
     ----------
     x, y : (m,)
         Values of the first variable and of the second; `y` is empty where there is only one.
-    results : tuple of PlacementValue
+    trials : tuple of Trial
         Row by row of y.
     """
 
     x: Array
     y: Array
-    results: tuple[PlacementValue, ...]
+    trials: tuple[Trial, ...]
 
     __repr__ = told
 
@@ -181,11 +181,8 @@ class PlacementSearch:
                 self._take(trial)
             self.progress("exact searches", self.exact, self.exact + len(open_) - len(batch))
 
-    def mapped(self, about: Trial, points: int) -> tuple[list[Array], list[Trial]]:
-        """Try a grid over the first two variables about a placement; return its axes and trials.
-
-        They are tried as all others are: what the grid shows to be better is not left lying.
-        """
+    def mapped(self, about: Trial, points: int) -> Map:
+        """Try a grid over the first two variables about a placement, as all others are tried."""
         names = list(self.ranges)[:2]
         axes = [np.linspace(*self.ranges[name], points) for name in names]
         grid = np.array(np.meshgrid(*axes)).reshape(len(names), -1).T
@@ -197,7 +194,8 @@ class PlacementSearch:
             lambda done: self.progress("map", done, len(grid)),
         )
         self._refresh(trials)
-        return axes, trials
+        y = axes[1] if len(axes) > 1 else np.zeros(0)
+        return Map(x=axes[0], y=y, trials=tuple(trials))
 
     def find_bounds(self, trials: Sequence[Trial], progress: Callable[[int], None]) -> None:
         """Find the bounds of placements."""

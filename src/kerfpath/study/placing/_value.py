@@ -10,33 +10,31 @@ from pydantic import TypeAdapter
 
 from kerfpath._told import told
 
-__all__ = ["SLACK", "ContourValue", "Infeasibility", "PlacementValue", "Test", "beats", "worst_of"]
+__all__ = [
+    "SLACK",
+    "ContourValue",
+    "Infeasibility",
+    "PlacementValue",
+    "Status",
+    "Test",
+    "beats",
+    "worst_of",
+]
 
 SLACK = 1e-9
 """Relative: by how much rounding may lift a value over its bound."""
 
 Test = Literal["reach", "stretch", "exact"]
+Status = Literal["unreachable", "collision", "speed"]
+"""Why a placement is infeasible."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ContourValue:
-    """What a placement is worth for one contour.
+    """What a placement is worth for one contour, by its place in the job, its name and nodes.
 
-    Parameters
-    ----------
-    index : int
-        Place of the contour in the job.
-    name : str
-    nodes : int
-        How many it has.
-    value : float, optional
-        In the unit of the goal; None where only a part of the graph was searched.
-    at_least : float, optional
-        What was found on that part.
-    fastest_m_min : float, optional
-        Where the goal is a speed: the fastest.
-    joint, limit, node : optional
-        What binds there, the joint from 1.
+    The value is in the unit of the goal; where only a part of the graph was searched, `at_least`
+    was found on it. A speed has what binds it: the joint, from 1, the limit and the node.
     """
 
     index: int
@@ -54,21 +52,13 @@ class ContourValue:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Infeasibility:
-    """Why a placement is infeasible.
+    """Why a placement is infeasible, and in which contour, at which of its nodes.
 
-    Parameters
-    ----------
-    status : {"unreachable", "collision", "speed"}
-    progress : float
-        How far it got: more is nearer to being feasible.
-    reason : str
-    contour, node, nodes : optional
-        Where it breaks: name, node, number of nodes.
-    index : int, optional
-        Place of the contour in the job, where a search found no path.
+    More `progress` is nearer to being feasible. The contour's place in the job, `index`, is known
+    where a search found no path.
     """
 
-    status: Literal["unreachable", "collision", "speed"]
+    status: Status
     progress: float
     reason: str
     contour: str | None = None
@@ -81,21 +71,18 @@ class Infeasibility:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class PlacementValue:
-    """What is known of a placement, or of the worst of several.
+    """What is known of a placement, or of the worst of several (`place`).
 
     Parameters
     ----------
     stage : {"reach", "stretch", "exact"}
         The test that decided.
-    bound : float, optional
-        What the value cannot beat; None where that is not known.
-    value : float, optional
-        Exact: m/min of the slowest contour, least share of the asked speeds, or displacement (14).
+    bound, value : float, optional
+        What the value cannot beat, and the exact value: m/min of the slowest contour, least share
+        of the asked speeds, or displacement (14); None where that is not known.
     infeasibility : Infeasibility, optional
     contours : tuple of ContourValue
         Of the first placement.
-    place : int
-        Which placement was worst.
     seconds : mapping of test to float
         What each test took.
     """
