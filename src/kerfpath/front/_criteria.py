@@ -14,9 +14,8 @@ from kerfpath.air import least_time
 from kerfpath.cell import Cell
 from kerfpath.comfort import MEASURES
 from kerfpath.errors import InputError
-from kerfpath.front._clearance import clearance, counted
 from kerfpath.front._problem import Criterion, Gap, ParetoProblem
-from kerfpath.front._subproblem import Subproblem, in_window
+from kerfpath.front._subproblem import Subproblem, counts_as_clearance, in_window
 from kerfpath.kernels.metric import increments
 from kerfpath.options import PlanOptions
 from kerfpath.plans import Plan
@@ -213,7 +212,7 @@ class Clearance(Criterion):
             raise InputError(
                 "criteria: 'clearance' needs a cell; give it, or leave 'clearance' out"
             )
-        if not counted(cell).any():
+        if not counts_as_clearance(cell).any():
             raise InputError(
                 "criteria: 'clearance' needs a part or fixtures in the cell without near-miss "
                 "distances of their own, and it has none"
@@ -224,8 +223,11 @@ class Clearance(Criterion):
             )
 
     def value(self, plan: Plan, problem: ParetoProblem) -> float:
-        assert problem.cell is not None
-        return clearance(plan, problem.cell)
+        cell = problem.cell
+        assert cell is not None
+        wanted = counts_as_clearance(cell)
+        apart = cell.distances(plan.q, wanted=np.broadcast_to(wanted, (len(plan.q), len(wanted))))
+        return float((apart - cell.required)[:, wanted].min())
 
     def bound(self, run: Subproblem, value: float, *_: object) -> Subproblem:
         return replace(run, clearance=value)

@@ -12,12 +12,11 @@ import numpy as np
 from kerfpath._arrays import Array, Bools, freeze
 from kerfpath._told import told
 from kerfpath.cell import Cell
-from kerfpath.front._clearance import roomier
 from kerfpath.graph import LayeredGraph
 from kerfpath.options import PlanOptions
 from kerfpath.search import Metric, ObjectiveKind
 
-__all__ = ["WINDOW", "Subproblem", "SubproblemData", "grid", "in_window"]
+__all__ = ["WINDOW", "Subproblem", "SubproblemData", "counts_as_clearance", "grid", "in_window"]
 
 WINDOW = "window of joint"
 """What vertices outside a window are counted under, before the joint's number."""
@@ -99,10 +98,12 @@ class Subproblem:
         return graph.without(outside) if outside else graph
 
     def cell(self, cell: Cell | None) -> Cell | None:
-        """Return the cell in which the clearance is kept."""
+        """Return the cell in which the clearance is kept beyond its near-miss distance."""
         if cell is None or not self.clearance:
             return cell
-        return roomier(cell, self.clearance)
+        names = [cell.pair_names[p] for p in np.flatnonzero(counts_as_clearance(cell))]
+        asked = dict.fromkeys(names, cell.near_miss + self.clearance)
+        return replace(cell, near_miss_of={**cell.near_miss_of, **asked})
 
     def quicker(self, factor: float) -> Subproblem:
         """Return the subproblem whose plans keep the limits at `factor` times the speed, too."""
@@ -165,3 +166,14 @@ def in_window(q: Array, low: float, width: float, *, endless: bool) -> Bools:
     """Return which values (N,) of a joint are in a window, modulo 2 pi where it is endless."""
     above = (q - low) % (2 * np.pi) if endless else q - low
     return np.asarray((above >= 0) & (above <= width))
+
+
+def counts_as_clearance(cell: Cell) -> Bools:
+    """Return which judged pairs (P,) count: robot or head with what stands around.
+
+    Pairs with a near-miss distance of their own, as nozzle and part, work near each other by
+    design, and links may be near each other whatever the arm does.
+    """
+    moving = np.array([cell.bodies[b].kind in ("robot", "head") for b in cell.pairs.ravel()])
+    one, two = moving.reshape(-1, 2).T
+    return np.asarray((one != two) & ~cell.own, dtype=np.bool_)

@@ -14,7 +14,7 @@ from kerfpath.study._evaluator import SampledContour, sample_contours
 from kerfpath.study._job import load_job
 from kerfpath.study.placing._evaluator import PlacementEvaluator
 from kerfpath.study.placing._place import moved, numbers_of
-from kerfpath.study.placing._value import ContourValue, PlacementValue, Test, beats, worst_of
+from kerfpath.study.placing._value import ContourValue, PlacementValue, beats, worst_of
 
 __all__ = ["contours_of", "evaluate_placements", "middle_of"]
 
@@ -51,7 +51,6 @@ def evaluate_placements(
     known = load_job(job, digest)
     contours = contours_of(job, digest, goal)
     middle = middle_of(known.job, contours)
-    seconds: dict[Test, float] = {"reach": 0.0, "stretch": 0.0, "exact": 0.0}
     of_contours: tuple[ContourValue, ...] = ()
     worst: PlacementValue | None = None
     for i, offsets in enumerate(places):
@@ -60,7 +59,6 @@ def evaluate_placements(
             part=known.part,
             goal=goal,
             contours=contours,
-            seconds=seconds,
         )
         here = evaluator.evaluate(
             stretches,
@@ -76,7 +74,7 @@ def evaluate_placements(
         if floor is not None and worst.bound is not None and not beats(goal, worst.bound, floor):
             break
     assert worst is not None
-    return asdict(replace(worst, contours=of_contours, seconds=seconds))
+    return asdict(replace(worst, contours=of_contours))
 
 
 def _worse(goal: str, one: PlacementValue, two: PlacementValue) -> PlacementValue:

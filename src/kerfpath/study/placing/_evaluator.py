@@ -14,11 +14,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from time import perf_counter
 
 import numpy as np
 
@@ -35,8 +33,8 @@ from kerfpath.study.placing._value import (
     ContourValue,
     Infeasibility,
     PlacementValue,
+    Stage,
     Status,
-    Test,
     beats,
     worst_of,
 )
@@ -69,13 +67,10 @@ class PlacementEvaluator(Evaluator):
     ----------
     goal : {"speed", "margin", "motion"}
     contours : tuple of SampledContour
-    seconds : mapping of test to float
-        What each test has taken is added to it.
     """
 
     goal: str
     contours: tuple[SampledContour, ...]
-    seconds: dict[Test, float]
     graphs: list[LayeredGraph] = field(default_factory=list)
 
     __repr__ = told
@@ -90,30 +85,19 @@ class PlacementEvaluator(Evaluator):
         least: float | None,
     ) -> PlacementValue:
         """Return what this placement is worth; `least` is what another has come down to."""
-        stage: Test = "reach"
+        stage: Stage = "reach"
         try:
-            with self._timed("reach"):
-                self._require_poses()
-            with self._timed("stretch"):
-                bound = self._bound(stretches)
+            self._require_poses()
+            bound = self._bound(stretches)
             stage = "stretch"
             beaten = bound is not None and floor is not None and not beats(self.goal, bound, floor)
             if not exact or (beaten and not whole):
                 return PlacementValue(stage=stage, bound=bound)
             stage = "exact"
-            with self._timed("exact"):
-                order = dict.fromkeys([*(s[0] for s in stretches), *range(len(self.contours))])
-                return self._solve(list(order), floor, least, whole=whole)
+            order = dict.fromkeys([*(s[0] for s in stretches), *range(len(self.contours))])
+            return self._solve(list(order), floor, least, whole=whole)
         except InfeasiblePlacement as found:
             return PlacementValue(stage=stage, infeasibility=found.why)
-
-    @contextmanager
-    def _timed(self, stage: Test) -> Iterator[None]:
-        begun = perf_counter()
-        try:
-            yield
-        finally:
-            self.seconds[stage] += perf_counter() - begun
 
     @cached_property
     def cell(self) -> Cell | None:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict, dataclass
 from typing import Literal
 
 from pydantic import TypeAdapter
@@ -15,8 +15,8 @@ __all__ = [
     "ContourValue",
     "Infeasibility",
     "PlacementValue",
+    "Stage",
     "Status",
-    "Test",
     "beats",
     "worst_of",
 ]
@@ -24,7 +24,7 @@ __all__ = [
 SLACK = 1e-9
 """Relative: by how much rounding may lift a value over its bound."""
 
-Test = Literal["reach", "stretch", "exact"]
+Stage = Literal["reach", "stretch", "exact"]
 Status = Literal["unreachable", "collision", "speed"]
 """Why a placement is infeasible."""
 
@@ -83,17 +83,14 @@ class PlacementValue:
     infeasibility : Infeasibility, optional
     contours : tuple of ContourValue
         Of the first placement.
-    seconds : mapping of test to float
-        What each test took.
     """
 
-    stage: Test
+    stage: Stage
     bound: float | None = None
     value: float | None = None
     infeasibility: Infeasibility | None = None
     contours: tuple[ContourValue, ...] = ()
     place: int = 0
-    seconds: dict[Test, float] = field(default_factory=dict)
 
     __repr__ = told
 
