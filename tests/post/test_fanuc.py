@@ -26,7 +26,7 @@ from kerfpath.post import (
     preflight,
     read_program,
 )
-from kerfpath.post._frames import world, xyzwpr
+from kerfpath.post._frames import euler, world
 from kerfpath.post.fanuc import FanucSettings, axes_from_joints, joints_from_axes, posture
 from kerfpath.robots import robot_ids
 from programs import arc, changed, codes, edited, frames, hand_plan, with_steps
@@ -205,9 +205,9 @@ def test_x_y_z_w_p_r_turn_about_fixed_axes_one_after_the_other():
     about = {axis: Rotation.from_rotvec(angle * np.eye(3)["xyz".index(axis)]).as_matrix()
              for axis, angle in (("x", w), ("y", p), ("z", r))}  # fmt: skip
     T[0, :3, :3] = about["z"] @ about["y"] @ about["x"]
-    np.testing.assert_allclose(xyzwpr(T)[0, 3:], [20, -35, 110], atol=1e-12)
+    np.testing.assert_allclose(euler(T, "xyz")[0, 3:], [20, -35, 110], atol=1e-12)
     T[0, :3, :3] = Rotation.from_euler("xyz", [30, 90, 0], degrees=True).as_matrix()
-    back = Rotation.from_euler("xyz", xyzwpr(T)[0, 3:], degrees=True).as_matrix()
+    back = Rotation.from_euler("xyz", euler(T, "xyz")[0, 3:], degrees=True).as_matrix()
     np.testing.assert_allclose(back, T[0, :3, :3], atol=1e-9)  # at the lock, the same rotation
 
 
@@ -420,8 +420,8 @@ def test_robots_of_another_kind_or_maker(program):
         (MAIN, "  11:", "  12:", "expected line number 11"),
         (MAIN, "/END\r\n", "", "/END is missing"),
         (MAIN, "/END", "/END\r\nx", "nothing after it"),
-        (MAIN, "!UFRAME 1 X", "! UFRAME 1 X", "no remark tells X of UFRAME"),
-        (MAIN, "!UFRAME 1 X", "!UFRAME 1 Y", "Y of UFRAME is told twice"),
+        (MAIN, "!UFRAME 1 X", "! UFRAME 1 X", "no remark gives X of UFRAME"),
+        (MAIN, "!UFRAME 1 X", "!UFRAME 1 Y", "Y of UFRAME is given twice"),
         (MAIN, "!UTOOL 1 X", "!UTOOL 2 X", "tool frame 2, expected 1 and 1"),
         (MAIN, "UFRAME_NUM=1", "UFRAME_NUM=0", "user frame 0"),
         (MAIN, "UFRAME_NUM=1", "UTOOL_NUM=1", "UTOOL_NUM must be set once"),

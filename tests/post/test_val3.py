@@ -536,7 +536,7 @@ START, STOP = f"{NAME}/start.pgx", f"{NAME}/stop.pgx"
         (CODE, "waitEndMove()\n", "\n", "line 9: a switch must follow a move of the path and"),
         (CODE, "mPath[0])\n  waitEndMove()", "mPath[1])\n  waitEndMove()", "the robot is to stand"),
         (CODE, "  delay(0.400)\n  movel(pPath[1]", "  movel(pPath[1],tLaser,mPath[1])\n  delay(0.4)"
-         "\n  movel(pPath[1]", "a delay must follow waitEndMove()"),
+         "\n  movel(pPath[1]", "a wait must follow waitEndMove()"),
         (CODE, "delay(0.400)", "delay(0.400)\n  dioLaser=true", "a switch must follow a move"),
         (CODE, "delay(0.400)", "put(1)", "line 11: not expected here: 'put(1)'"),
         (CODE, "movel(pPath[3]", "//\n  dioLaser=false ; movel(pPath[3]", "not expected here"),

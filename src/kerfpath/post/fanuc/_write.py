@@ -15,12 +15,13 @@ import textwrap
 from collections.abc import Iterator
 from dataclasses import replace
 from itertools import count
+from typing import Final
 
 import numpy as np
 
 from kerfpath._arrays import Array
 from kerfpath.post._formatter import Formatter, number, plain
-from kerfpath.post._frames import faceplate, world, xyzwpr
+from kerfpath.post._frames import euler, faceplate, world
 from kerfpath.post._names import identifiers
 from kerfpath.post._program import (
     Await,
@@ -38,8 +39,12 @@ from kerfpath.post.fanuc._axes import axes_from_joints, posture
 from kerfpath.post.fanuc._settings import FanucSettings, unit
 from kerfpath.post.fanuc._switching import switching
 
-__all__ = ["Fanuc", "aborting", "off_name", "selection", "switched_off", "watching"]
+__all__ = [
+    "ANGLES", "Fanuc", "aborting", "off_name", "selection", "switched_off", "watching",
+]  # fmt: skip
 
+ANGLES: Final = "xyz"
+"""W turns about x, then P about y, then R about z, all axes fixed."""
 NEW_LINE = "\r\n"
 PADDING = "    "
 REMARK = 32
@@ -253,7 +258,7 @@ class Fanuc(Formatter):
         robot, settings = self.program.robot, self.settings
         q = np.array([q for q, _ in targets])
         axes_deg = np.degrees(axes_from_joints(robot, q)).tolist()
-        poses = xyzwpr(np.array([np.eye(4) if T is None else T for _, T in targets])).tolist()
+        poses = euler([np.eye(4) if T is None else T for _, T in targets], ANGLES).tolist()
         configurations = posture(robot, q, settings)
         frames = f"\tUF : {settings.user_frame}, UT : {settings.tool_frame},\t"
         texts = []
@@ -285,7 +290,7 @@ def _remarks(text: str) -> list[str]:
 
 def _frame(name: str, T: Array) -> Iterator[str]:
     """Yield a frame as remarks, to be entered by a person and read back."""
-    for k, (letter, value) in enumerate(zip("XYZWPR", xyzwpr(T[None])[0], strict=True)):
+    for k, (letter, value) in enumerate(zip("XYZWPR", euler(T, ANGLES)[0], strict=True)):
         yield f"  !{name} {letter} {number(value, FRAME_DECIMALS[k // 3])} ;"
 
 

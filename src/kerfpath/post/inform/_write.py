@@ -12,13 +12,14 @@ import textwrap
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from itertools import count
+from typing import Final
 
 import numpy as np
 
 from kerfpath._arrays import Array
 from kerfpath.errors import InputError
 from kerfpath.post._formatter import Formatter, number, plain
-from kerfpath.post._frames import faceplate, world, xyzwpr
+from kerfpath.post._frames import euler, faceplate, world
 from kerfpath.post._names import identifiers
 from kerfpath.post._program import (
     Await,
@@ -38,9 +39,12 @@ from kerfpath.post.inform._axes import axes_from_joints, manipulator_type
 from kerfpath.post.inform._settings import InformSettings
 
 __all__ = [
-    "FRAME_WORDS", "SUFFIX", "Inform", "awaiting", "head", "middle", "off_name", "switched_off",
+    "ANGLES", "FRAME_WORDS", "SUFFIX", "Inform", "awaiting", "head", "middle", "off_name",
+    "switched_off",
 ]  # fmt: skip
 
+ANGLES: Final = "xyz"
+"""RX, RY, RZ turn about x, y, z, one after the other, all fixed."""
 SUFFIX = ".JBI"
 NEW_LINE = "\r\n"
 REMARK = 30
@@ -255,7 +259,7 @@ class Inform(Formatter):
         types = manipulator_type(
             self.program.robot, [q for q, _ in self._targets], self.settings.flip
         ).tolist()
-        poses = xyzwpr(np.array([T for _, T in self._targets]))
+        poses = euler(np.array([T for _, T in self._targets]), ANGLES)
         poses = np.hstack([poses[:, :3].round(3), poses[:, 3:].round(4)]) + 0.0
         unused = [0] * (self.settings.rconf_values - 6)
         lines, said = [], None
@@ -302,7 +306,7 @@ def _speed(move: LinearMove) -> str:
 
 def _frame(name: str, T: Array) -> Iterator[str]:
     """Yield a frame as remarks, to be entered by a person and read back."""
-    values = xyzwpr(T[None])[0]
+    values = euler(T, ANGLES)[0]
     for word, value, decimals in zip(FRAME_WORDS, values, FRAME_DECIMALS, strict=True):
         yield f"'{name} {word} {number(value, decimals)}"
 

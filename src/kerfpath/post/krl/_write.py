@@ -10,17 +10,17 @@ output would stop the advance run and with it the blending.
 
 from __future__ import annotations
 
-import warnings
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from typing import Final
 
 import numpy as np
-from scipy.spatial.transform import Rotation
 
 from kerfpath._arrays import Array
 from kerfpath.errors import InputError
 from kerfpath.post._divide import in_files, renamed
 from kerfpath.post._formatter import Formatter, number, plain
+from kerfpath.post._frames import euler
 from kerfpath.post._names import identifiers
 from kerfpath.post._program import (
     Await,
@@ -38,8 +38,8 @@ from kerfpath.post.krl._axes import axes_from_joints, status_and_turn
 from kerfpath.post.krl._settings import LONGEST_NAME, KrlSettings
 
 __all__ = [
-    "FIRST", "HEAD", "SWITCH_OFF", "Krl", "awaiting", "called_from", "data_list", "opening",
-    "switched_off",
+    "ANGLES", "FIRST", "HEAD", "SWITCH_OFF", "Krl", "awaiting", "called_from", "data_list",
+    "opening", "switched_off",
 ]  # fmt: skip
 
 HEAD = ("&ACCESS RVP", "&REL 1")
@@ -62,6 +62,8 @@ INTERRUPT = 20
 TIMER = 20
 """The interrupt and the timer that are used; KUKA's own programs take others."""
 AXES = ("A1", "A2", "A3", "A4", "A5", "A6")
+ANGLES: Final = "ZYX"
+"""A, B, C turn about Z, the new Y, the new X."""
 NOT_CHECKED = "not been checked for collisions"
 
 
@@ -314,15 +316,9 @@ class Krl(Formatter):
 
 def _frames(T: Array | Sequence[Array]) -> list[str]:
     """Return the fields of poses (K, 4, 4) m: mm, and deg about Z, the new Y, the new X."""
-    poses = np.asarray(T).reshape(-1, 4, 4)
-    points = (poses[:, :3, 3] * 1e3).tolist()
-    rotations = Rotation.from_matrix(poses[:, :3, :3])
-    with warnings.catch_warnings():
-        warnings.filterwarnings("ignore", "Gimbal lock", UserWarning)  # C is 0 there
-        turns = rotations.as_euler("ZYX", degrees=True).tolist()
     return [
-        f"{_fields('XYZ', point, 4)},{_fields('ABC', turn, 6)}"
-        for point, turn in zip(points, turns, strict=True)
+        f"{_fields('XYZ', values[:3], 4)},{_fields('ABC', values[3:], 6)}"
+        for values in euler(T, ANGLES).tolist()
     ]
 
 

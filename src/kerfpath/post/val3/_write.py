@@ -10,16 +10,16 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
+from typing import Final
 from xml.sax.saxutils import quoteattr
 
 import numpy as np
-from scipy.spatial.transform import Rotation
 
 from kerfpath._arrays import Array
 from kerfpath.errors import InputError
 from kerfpath.post._divide import in_files, renamed
 from kerfpath.post._formatter import Formatter, number, plain
-from kerfpath.post._frames import faceplate, world
+from kerfpath.post._frames import euler, faceplate, world
 from kerfpath.post._names import identifiers
 from kerfpath.post._program import (
     Await,
@@ -39,10 +39,12 @@ from kerfpath.post.val3._settings import LONGEST_NAME, Val3Settings
 from kerfpath.post.val3._xml import SCHEMA
 
 __all__ = [
-    "DATA", "FIRST", "OUTPUTS", "PORTS", "PROGRAM", "PROJECT", "Val3", "awaiting", "closing",
-    "links", "opening", "parameters", "stopping",
+    "ANGLES", "DATA", "FIRST", "OUTPUTS", "PORTS", "PROGRAM", "PROJECT", "Val3", "awaiting",
+    "closing", "links", "opening", "parameters", "stopping",
 ]  # fmt: skip
 
+ANGLES: Final = "XYZ"
+"""rx, ry, rz turn about x, the new y, the new z."""
 PROJECT = "http://www.staubli.com/robotics/VAL3/Project/3"
 PROGRAM = "http://www.staubli.com/robotics/VAL3/Program/2"
 DATA = "http://www.staubli.com/robotics/VAL3/Data/2"
@@ -337,11 +339,9 @@ class Val3(Formatter):
 
 def _poses(T: Array | Sequence[Array]) -> list[tuple[float, ...]]:
     """Return poses (K, 4, 4) m as x, y, z in mm and rx, ry, rz in deg."""
-    poses = np.asarray(T).reshape(-1, 4, 4)
-    turned = Rotation.from_matrix(poses[:, :3, :3])
-    angles = turned.as_euler("XYZ", degrees=True, suppress_warnings=True).round(6) + 0.0
-    points = (poses[:, :3, 3] * 1e3).round(4) + 0.0
-    return [tuple(row) for row in np.hstack([points, angles]).tolist()]
+    values = euler(T, ANGLES)
+    rows = np.hstack([values[:, :3].round(4), values[:, 3:].round(6)]) + 0.0
+    return [tuple(row) for row in rows.tolist()]
 
 
 def _blend(kind: str, move: Move) -> str:
