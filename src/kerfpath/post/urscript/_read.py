@@ -9,7 +9,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from kerfpath._arrays import Array, freeze
-from kerfpath.post._counting import offset_near
+from kerfpath.post._axes import offset_near
 from kerfpath.post._program import SIGNALS, Switch
 from kerfpath.post._read import MoveKind, ReadProgram, ReadSection, ReadStep
 from kerfpath.post._reading import END_OF_FILE, LineReader, patterns, statements

@@ -16,7 +16,7 @@ import numpy as np
 
 from kerfpath._arrays import Array
 from kerfpath.errors import InputError
-from kerfpath.post._counting import offset_near
+from kerfpath.post._axes import offset_near
 from kerfpath.post._divide import in_one_file
 from kerfpath.post._formatter import Formatter, number, plain
 from kerfpath.post._orientations import rotation_vectors
