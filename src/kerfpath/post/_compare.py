@@ -6,11 +6,11 @@ from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
-from scipy.spatial.transform import Rotation
 
 from kerfpath._arrays import Array
 from kerfpath.post._issue import ProgramIssue
 from kerfpath.post._languages import Language
+from kerfpath.post._orientations import distances
 from kerfpath.post._program import (
     Await,
     CircularMove,
@@ -182,9 +182,7 @@ def _follows(back: ReadMove) -> bool:
 def _apart(
     backs: list[ReadMove], ours: Array, theirs: Array, point: float, angle: float
 ) -> Iterator[ProgramIssue]:
-    off = np.linalg.norm(ours[:, :3, 3] - theirs[:, :3, 3], axis=1)
-    between = np.swapaxes(ours[:, :3, :3], 1, 2) @ theirs[:, :3, :3]
-    turned = np.asarray(Rotation.from_matrix(between).magnitude())
+    off, turned = distances(ours, theirs)
     for k in np.flatnonzero((off > point) | (turned > angle)).tolist():
         said = f"the tip is {off[k] * 1e3:.4f} mm and {np.degrees(turned[k]):.4f} deg off"
         yield _issue(backs[k], said)

@@ -6,13 +6,12 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.spatial.transform import Rotation
 
-from kerfpath._arrays import Array
 from kerfpath._told import told
 from kerfpath.post._compare import ANGLE, FRAME, LEAD, POINT, SHARE, events, handshake
 from kerfpath.post._groups import ReadGroup, groups_of
 from kerfpath.post._matching import Pair, Stop, matched, pairs_of
+from kerfpath.post._orientations import distances
 from kerfpath.post._read import ReadMove, ReadProgram
 from kerfpath.post._settings import Rules
 
@@ -156,7 +155,7 @@ def _frames(a: ReadProgram, b: ReadProgram, digits: _Digits) -> Iterator[Differe
         one, two = getattr(a, attribute), getattr(b, attribute)
         if one is None or two is None or np.abs(one - two).max() <= digits.frame:
             continue
-        off, turned = _apart(one[None], two[None])
+        off, turned = distances(one[None], two[None])
         message = f"the {words} is {off[0] * 1e3:.4f} mm and {np.degrees(turned[0]):.4f} deg off"
         yield Difference(code="frames", count=1, message=message)
 
@@ -183,13 +182,6 @@ def _order(groups: Sequence[ReadGroup], numbers: list[int], both: Names) -> Iter
 
 def _count(number: int, word: str) -> str:
     return f"{number} {word}{'' if number == 1 else 's'}"
-
-
-def _apart(one: Array, two: Array) -> tuple[Array, Array]:
-    """Return distances (m) and angles (rad) between poses (K, 4, 4)."""
-    off = np.linalg.norm(one[:, :3, 3] - two[:, :3, 3], axis=1)
-    between = np.swapaxes(one[:, :3, :3], 1, 2) @ two[:, :3, :3]
-    return off, np.asarray(Rotation.from_matrix(between).magnitude())
 
 
 def _alone(pairs: Sequence[Pair], names: Names) -> Iterator[Difference]:
@@ -221,7 +213,9 @@ def _targets(both: Both, digits: _Digits) -> Iterator[Difference]:
     ]
     if not posed:
         return
-    off, turned = _apart(np.array([one[2] for one in posed]), np.array([one[3] for one in posed]))
+    off, turned = distances(
+        np.array([one[2] for one in posed]), np.array([one[3] for one in posed])
+    )
     moved = np.flatnonzero((off > digits.point) | (turned > digits.angle))
     if moved.size:
         a, b, _, _ = posed[moved[np.lexsort((turned[moved], off[moved]))[-1]]]

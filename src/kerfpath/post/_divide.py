@@ -2,16 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import replace
-from typing import Literal
 
 from kerfpath.errors import InputError
+from kerfpath.post._formatter import Formatter
 from kerfpath.post._issue import ProgramIssue
 from kerfpath.post._names import LONGEST_NAME, identifiers
 from kerfpath.post._program import Program, Section
 
-__all__ = ["in_files", "in_one_file", "long_contours", "renamed"]
+__all__ = ["in_files", "in_one_file", "long_contours", "parts_of", "renamed"]
 
 
 def renamed(
@@ -43,27 +43,33 @@ def in_files(
     return files
 
 
-def long_contours(
-    lines: Mapping[str, int], most_lines: int, level: Literal["error", "warning"]
-) -> Iterator[ProgramIssue]:
-    """Yield the contours of more lines, by name, than a file is to have: none is divided.
+def long_contours(written: Formatter) -> Iterator[ProgramIssue]:
+    """Yield the contours of more lines than a file is to have: none is divided.
 
-    Parameters
-    ----------
-    lines : mapping of str to int
-    most_lines : int
-    level : {"error", "warning"}
-        A warning where a file may be longer than that.
+    A warning where the language gives each of them a file of its own.
     """
+    if written.too_long is None:
+        return
     remedy = "allow more with lines_per_file, or take fewer nodes (spacing_mm) or arcs (arcs_mm)"
-    kept = "" if level == "error" else ", and has a file of its own"
-    for name, count in lines.items():
-        if count > most_lines:
+    kept = "" if written.too_long == "error" else ", and has a file of its own"
+    most = written.room()
+    for name, count in written.lengths().items():
+        if count > most:
             said = (
-                f"the contour has {count} lines, lines_per_file allows {most_lines}; it is not "
+                f"the contour has {count} lines, lines_per_file allows {most}; it is not "
                 f"divided, as the robot could stop there with the beam on{kept}: {remedy}"
             )
-            yield ProgramIssue(level, "file-length", said, name)
+            yield ProgramIssue(written.too_long, "file-length", said, name)
+
+
+def parts_of(
+    program: Program, lines: Sequence[int], room: int, longest_name: int
+) -> dict[str, list[Section]]:
+    """Return sections of so many lines each as `in_files` divides them, by names of files."""
+    groups = in_files(program.sections, lines, room)
+    taken = [program.name, *(section.name for section in program.sections)]
+    names = identifiers([program.name] * len(groups), taken=taken, longest=longest_name)
+    return dict(zip(names, groups, strict=True))
 
 
 def in_one_file(name: str, lines: Sequence[str], most_lines: int) -> dict[str, str]:

@@ -9,9 +9,10 @@ from numpy.typing import ArrayLike
 from scipy.spatial.transform import Rotation
 
 from kerfpath._arrays import Array, freeze
+from kerfpath.post._program import Program
 from kerfpath.robots import Robot
 
-__all__ = ["euler", "faceplate", "from_euler", "world"]
+__all__ = ["Order", "controller_frames", "euler", "faceplate", "from_euler", "world"]
 
 Order = Literal["xyz", "XYZ", "ZYX"]
 
@@ -26,6 +27,14 @@ def world(robot: Robot) -> Array:
 def faceplate(robot: Robot) -> Array:
     """Return the pose (4, 4) m of the model's own flange in the robot's flange."""
     return freeze(np.asarray(np.linalg.inv(robot.T_end_flange), dtype=np.float64))
+
+
+def controller_frames(program: Program) -> tuple[Array, Array]:
+    """Return the poses (4, 4) m of part and tool in the controller's world and flange."""
+    robot = program.robot
+    part = np.linalg.inv(world(robot)) @ program.T_base_part
+    tool = np.linalg.inv(faceplate(robot)) @ program.T_flange_tip
+    return np.asarray(part), np.asarray(tool)
 
 
 def euler(T: ArrayLike, order: Order) -> Array:

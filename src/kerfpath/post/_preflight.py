@@ -6,13 +6,25 @@ import re
 from collections.abc import Iterator
 
 import numpy as np
-from scipy.spatial.transform import Rotation
 
 from kerfpath.errors import InputError
+from kerfpath.post._divide import long_contours
 from kerfpath.post._issue import ProgramIssue
 from kerfpath.post._languages import Language
 from kerfpath.post._languages import language as find_language
-from kerfpath.post._program import Await, JointMove, LinearMove, Program, Request, Section, Wait
+from kerfpath.post._orientations import distances
+from kerfpath.post._program import (
+    SIGNALS,
+    Await,
+    JointMove,
+    LinearMove,
+    Program,
+    Request,
+    Section,
+    Step,
+    Wait,
+    switches_of,
+)
 from kerfpath.post._settings import Rules, Settings, handshakes
 
 __all__ = ["preflight"]
@@ -71,12 +83,12 @@ def preflight(
         issues += _names(program, chosen, rules, settings)
     for section in program.sections:
         issues += _laser(section)
-        issues += _waits(section)
-        issues += _handshakes(section)
+        issues += _stays(section)
         issues += _motion(program, section, rules)
         issues += _limits(program, section)
-    if chosen.check is not None and not any(issue.level == "error" for issue in issues):
-        issues += chosen.check(program, settings)
+    if not any(issue.level == "error" for issue in issues):
+        issues += long_contours(chosen.formatter(program, settings))
+        issues += [] if chosen.check is None else chosen.check(program, settings)
     if not program.air_checked and any(isinstance(move, JointMove) for move in program.moves):
         issues.append(
             ProgramIssue(
@@ -119,14 +131,17 @@ def _ports(program: Program, language: Language, settings: Settings) -> Iterator
                 f"[program.{language.name}]"
             )
             yield ProgramIssue("error", "handshake", said, "program")
-    taken = {
-        ("output", getattr(settings, key, None)): key for key in ("laser_output", "gas_output")
-    }
-    for (name, way), port in known.items():
+    ports: list[tuple[str, str, object]] = [
+        (signal, "output", getattr(settings, f"{signal}_output", None)) for signal in SIGNALS
+    ]
+    ports += [(partner, way, port) for (partner, way), port in known.items()]
+    taken: dict[tuple[str, object], str] = {}
+    for name, way, port in ports:
         key = f"{name}_{way}"
         if port is not None and (other := taken.setdefault((way, port), key)) != key:
             said = f"{other} and {key} are both {port}; name one for each"
-            yield ProgramIssue("error", "handshake", said, "program")
+            code = "output" if name in SIGNALS else "handshake"
+            yield ProgramIssue("error", code, said, "program")
 
 
 def _robot(program: Program, language: Language) -> Iterator[ProgramIssue]:
@@ -168,99 +183,64 @@ def _names(
 
 
 def _numbers(section: Section, rules: Rules) -> Iterator[ProgramIssue]:
-    for number, step in enumerate(section.steps):
-        place = f"{section.name}, step {number}"
-        in_reach = np.isfinite(getattr(step, "speed", 0.0))
+    """Check that speeds, zones and lead times are numbers that the language can write."""
+    lead = f"the lead time must lie between 0 and {rules.longest_lead:g} s"
+    share = f"the share of the full speed must lie between {LOWEST_SHARE:g} and 1"
+    most = "" if np.isinf(rules.fastest) else f" and at most {rules.fastest * 1e3:g} mm/s"
+    speed = f"the speed must be at least {rules.slowest * 1e3:g} mm/s{most}"
+    for place, step, _, _ in _walk(section):
+        wrong: list[tuple[str, str]] = []
         if isinstance(step, LinearMove) and not (
-            in_reach and rules.slowest <= step.speed <= rules.fastest
+            np.isfinite(step.speed) and rules.slowest <= step.speed <= rules.fastest
         ):
-            most = "" if np.isinf(rules.fastest) else f" and at most {rules.fastest * 1e3:g} mm/s"
-            yield ProgramIssue(
-                "error",
-                "speed",
-                f"the speed must be at least {rules.slowest * 1e3:g} mm/s{most}, "
-                f"got {step.speed * 1e3:g} mm/s",
-                place,
-            )
+            wrong.append(("speed", f"{speed}, got {step.speed * 1e3:g} mm/s"))
         if isinstance(step, JointMove) and not LOWEST_SHARE <= step.speed <= 1:
-            yield ProgramIssue(
-                "error",
-                "speed",
-                f"the share of the full speed must lie between {LOWEST_SHARE:g} and 1, "
-                f"got {step.speed:g}",
-                place,
-            )
+            wrong.append(("speed", f"{share}, got {step.speed:g}"))
         if isinstance(step, LinearMove | JointMove) and not 0 <= step.zone < np.inf:
-            yield ProgramIssue(
-                "error",
-                "zone",
-                f"the zone must be 0 mm (stop) or more, got {step.zone * 1e3:g} mm",
-                place,
-            )
-        for switch in step.switches if isinstance(step, LinearMove) else ():
-            if not (0 <= switch.lead_time <= rules.longest_lead and np.isfinite(switch.lead_time)):
-                yield ProgramIssue(
-                    "error",
-                    "lead-time",
-                    f"the lead time must lie between 0 and {rules.longest_lead:g} s, "
-                    f"got {switch.lead_time:g} s",
-                    place,
-                )
+            said = f"the zone must be 0 mm (stop) or more, got {step.zone * 1e3:g} mm"
+            wrong.append(("zone", said))
+        for switch in switches_of(step):
+            if not (0 <= switch.lead_time < np.inf and switch.lead_time <= rules.longest_lead):
+                wrong.append(("lead-time", f"{lead}, got {switch.lead_time:g} s"))
+        for code, said in wrong:
+            yield ProgramIssue("error", code, said, place)
 
 
-def _waits(section: Section) -> Iterator[ProgramIssue]:
-    """Check that waits are of a sensible length, and where the robot stands."""
-    stopped = False
+def _walk(section: Section) -> Iterator[tuple[str, Step, bool, bool]]:
+    """Yield place and step, and whether the robot stands before it and the laser is on."""
+    stands, on = False, False
     for number, step in enumerate(section.steps):
+        yield f"{section.name}, step {number}", step, stands, on
         if isinstance(step, JointMove | LinearMove):
-            stopped = step.zone == 0
-        if not isinstance(step, Wait):
-            continue
-        place = f"{section.name}, step {number}"
-        if not 0 < step.time <= LONGEST_WAIT:
-            yield ProgramIssue(
-                "error",
-                "wait",
-                f"a wait must last more than 0 s and at most {LONGEST_WAIT:g} s, got "
-                f"{step.time:g} s",
-                place,
-            )
-        if not stopped:
-            yield ProgramIssue("error", "wait", "a wait must follow a move that stops", place)
-
-
-def _handshakes(section: Section) -> Iterator[ProgramIssue]:
-    """Check that partners are asked and awaited where the robot stands with the laser off."""
-    stopped, on = False, False
-    for number, step in enumerate(section.steps):
-        if isinstance(step, JointMove | LinearMove):
-            stopped = step.zone == 0
-        for switch in step.switches if isinstance(step, LinearMove) else ():
+            stands = step.zone == 0
+        for switch in switches_of(step):
             on = switch.on if switch.signal == "laser" else on
-        if not isinstance(step, Request | Await):
-            continue
-        place = f"{section.name}, step {number}"
-        if not stopped or on:
+
+
+def _stays(section: Section) -> Iterator[ProgramIssue]:
+    """Check that waits and handshakes take a sensible time, where the robot stands."""
+    for place, step, stands, on in _walk(section):
+        if isinstance(step, Wait):
+            if not 0 < step.time <= LONGEST_WAIT:
+                said = f"more than 0 s and at most {LONGEST_WAIT:g} s, got {step.time:g} s"
+                yield ProgramIssue("error", "wait", f"a wait must last {said}", place)
+            if not stands:
+                yield ProgramIssue("error", "wait", "a wait must follow a move that stops", place)
+        if isinstance(step, Request | Await) and (on or not stands):
             said = "a handshake must follow a move that stops, with the laser off"
             yield ProgramIssue("error", "handshake", said, place)
         if isinstance(step, Await) and not 0 < step.timeout <= LONGEST_TIMEOUT:
-            yield ProgramIssue(
-                "error",
-                "handshake",
-                f"a timeout must be more than 0 s and at most {LONGEST_TIMEOUT:g} s, got "
-                f"{step.timeout:g} s",
-                place,
-            )
+            said = f"more than 0 s and at most {LONGEST_TIMEOUT:g} s, got {step.timeout:g} s"
+            yield ProgramIssue("error", "handshake", f"a timeout must be {said}", place)
 
 
 def _laser(section: Section) -> Iterator[ProgramIssue]:
     """Check that the laser is only on between its switches, along the path, and off after."""
     on = False
-    for number, step in enumerate(section.steps):
-        place = f"{section.name}, step {number}"
+    for place, step, _, on in _walk(section):
         if isinstance(step, JointMove) and on:
             yield ProgramIssue("error", "laser-order", "a joint move with the laser on", place)
-        for switch in step.switches if isinstance(step, LinearMove) else ():
+        for switch in switches_of(step):
             if switch.signal == "laser" and on == switch.on:
                 said = f"the laser is switched {'on' if on else 'off'}, but is so already"
                 yield ProgramIssue("error", "laser-order", said, place)
@@ -276,9 +256,7 @@ def _motion(program: Program, section: Section, rules: Rules) -> Iterator[Progra
         return
     T = program.tips(moves)
     q = np.array([move.q for move in moves])
-    lengths = np.linalg.norm(np.diff(T[:, :3, 3], axis=0), axis=1)
-    between = np.swapaxes(T[:-1, :3, :3], 1, 2) @ T[1:, :3, :3]
-    turn = np.asarray(Rotation.from_matrix(between).magnitude())
+    lengths, turn = distances(T[:-1], T[1:])
     on_path = np.array([isinstance(move, LinearMove) for move in moves[1:]])
     step = np.abs(np.diff(q, axis=0))
     for k in np.flatnonzero(on_path & (step.max(axis=1) >= LARGEST_JOINT_STEP)).tolist():

@@ -11,7 +11,9 @@ from pydantic import BaseModel, ConfigDict, Field
 from kerfpath._told import told
 from kerfpath.post._program import PARTNERS, Partner
 
-__all__ = ["Rules", "Settings", "handshakes", "setting"]
+__all__ = [
+    "LinesPerFile", "Rules", "Settings", "handshakes", "numbered", "outputs", "setting",
+]  # fmt: skip
 
 
 def setting(expected: str, example: str, **bounds: Any) -> Any:
@@ -19,15 +21,22 @@ def setting(expected: str, example: str, **bounds: Any) -> Any:
     return Field(description=expected, examples=[example], **bounds)
 
 
+def numbered(port: str, most: int, least: int = 1) -> Any:
+    """Return the bounds of a setting that is the number of a port."""
+    return setting(f"the number of {port}, {least} to {most}", "5", ge=least, le=most)
+
+
+LinesPerFile = Annotated[
+    int, setting("a whole number of lines from 100 to 1000000", "5000", ge=100, le=1_000_000)
+]
+
+
 class Settings(BaseModel):
     """The settings of one language; in jobs the table [program.LANGUAGE]."""
 
     model_config = ConfigDict(extra="forbid", strict=True, frozen=True)
 
-    lines_per_file: Annotated[
-        int,
-        setting("a whole number of lines from 100 to 1000000", "5000", ge=100, le=1_000_000),
-    ] = 5000
+    lines_per_file: LinesPerFile = 5000
 
 
 def handshakes(settings: Settings) -> dict[tuple[Partner, str], Any]:
@@ -38,6 +47,13 @@ def handshakes(settings: Settings) -> dict[tuple[Partner, str], Any]:
         for partner, _, way in fields
         if partner in PARTNERS and way in ("input", "output")
     }
+
+
+def outputs(settings: Any) -> list[Any]:
+    """Return all outputs that settings name: laser, gas, and those of requests."""
+    requests = (port for (_, way), port in handshakes(settings).items() if way == "output")
+    named = (settings.laser_output, settings.gas_output, *requests)
+    return [output for output in named if output is not None]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

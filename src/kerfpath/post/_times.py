@@ -12,10 +12,16 @@ from kerfpath.errors import InputError
 from kerfpath.post._issue import ProgramIssue
 from kerfpath.post._program import JointMove, LinearMove, Move, Program, Wait
 
-__all__ = ["SHORTEST_CRUISE", "air_times", "cruises", "refusals", "timetable"]
+__all__ = [
+    "SHORTEST_CRUISE", "TICK", "air_times", "cruises", "not_whole", "refusals", "timetable",
+]  # fmt: skip
 
 SHORTEST_CRUISE = 1e-3
 """s; a joint move that takes less goes nowhere worth a time."""
+TICK = 0.01
+"""s; some controllers count times in whole numbers of it."""
+TICK_NOISE = 1e-4
+"""How far (s) a time may be from them."""
 SHORTEST = 1e-6
 """s; a move that takes less has no duration worth writing."""
 
@@ -73,6 +79,11 @@ def air_times(program: Program) -> list[float | None]:
         for k, (step, time) in enumerate(zip(steps, took, strict=True))
         if not isinstance(step, Wait)
     ]
+
+
+def not_whole(time: float) -> bool:
+    """Return whether a time (s) is no whole number of `TICK`."""
+    return abs(time - TICK * round(time / TICK)) > TICK_NOISE
 
 
 def refusals(program: Program) -> Iterator[ProgramIssue]:

@@ -10,6 +10,7 @@ import numpy as np
 
 from kerfpath._arrays import Array, freeze
 from kerfpath.errors import InputError
+from kerfpath.post._called import off_name
 from kerfpath.post._frames import faceplate, from_euler, world
 from kerfpath.post._program import Await, Switch
 from kerfpath.post._read import (
@@ -28,7 +29,6 @@ from kerfpath.post.fanuc._switching import time_before
 from kerfpath.post.fanuc._write import (
     ANGLES,
     aborting,
-    off_name,
     selection,
     switched_off,
     watching,

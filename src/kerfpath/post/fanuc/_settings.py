@@ -8,7 +8,7 @@ from typing import Annotated, Literal
 import numpy as np
 from pydantic import StringConstraints
 
-from kerfpath.post._settings import Rules, Settings, setting
+from kerfpath.post._settings import Rules, Settings, numbered, setting
 
 __all__ = ["FanucSettings", "is_reserved", "rules", "unit"]
 
@@ -25,14 +25,8 @@ WORDS = (
 )
 """Words of the language, where a contour may be named so."""
 
-Output = Annotated[
-    int | None, setting("the number of a digital output, 1 to 4096", "5", ge=1, le=4096)
-]
-
-
-Input = Annotated[
-    int | None, setting("the number of a digital input, 1 to 4096", "5", ge=1, le=4096)
-]
+Output = Annotated[int | None, numbered("a digital output", 4096)]
+Input = Annotated[int | None, numbered("a digital input", 4096)]
 
 
 class FanucSettings(Settings):

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from kerfpath._arrays import Array, freeze
+from kerfpath.post._called import off_name
 from kerfpath.post._frames import faceplate, from_euler, world
 from kerfpath.post._program import Switch
 from kerfpath.post._read import MoveKind, ReadProgram, ReadSection
@@ -22,7 +23,6 @@ from kerfpath.post.inform._write import (
     awaiting,
     head,
     middle,
-    off_name,
     switched_off,
 )
 from kerfpath.robots import Robot

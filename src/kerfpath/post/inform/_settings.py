@@ -7,7 +7,7 @@ from typing import Annotated, Literal
 import numpy as np
 from pydantic import AfterValidator, StringConstraints
 
-from kerfpath.post._settings import Rules, Settings, setting
+from kerfpath.post._settings import Rules, Settings, numbered, setting
 
 __all__ = ["InformSettings", "is_reserved", "rules"]
 
@@ -25,10 +25,8 @@ def _not_zero(values: list[float]) -> list[float]:
     return values
 
 
-Output = Annotated[int | None, setting("the number of an output, 1 to 4096", "5", ge=1, le=4096)]
-
-
-Input = Annotated[int | None, setting("the number of an input, 1 to 4096", "5", ge=1, le=4096)]
+Output = Annotated[int | None, numbered("an output", 4096)]
+Input = Annotated[int | None, numbered("an input", 4096)]
 
 
 class InformSettings(Settings):

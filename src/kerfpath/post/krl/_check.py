@@ -7,12 +7,10 @@ from collections.abc import Iterator
 import numpy as np
 
 from kerfpath._arrays import Array
-from kerfpath.post._divide import long_contours
 from kerfpath.post._issue import ProgramIssue
 from kerfpath.post._program import JointMove, Program
 from kerfpath.post.krl._axes import axes_from_joints, joints_from_axes
 from kerfpath.post.krl._settings import KrlSettings
-from kerfpath.post.krl._write import Krl
 from kerfpath.robots import Robot
 
 __all__ = ["check"]
@@ -31,10 +29,6 @@ HALF_TURN_DEG = 180.0 - 1e-3
 
 def check(program: Program, settings: KrlSettings) -> Iterator[ProgramIssue]:
     """Yield what KRL or a KUKA controller cannot say or do of a program."""
-    if settings.laser_output is not None and settings.laser_output == settings.gas_output:
-        said = f"laser and gas are switched by the same output, {settings.gas_output}"
-        yield ProgramIssue("error", "output", said, "program")
-    yield from long_contours(Krl(program, settings).lengths(), settings.lines_per_file, "warning")
     yield from _frames(program.robot)
     moves = program.moves
     places = [

@@ -18,10 +18,9 @@ import numpy as np
 
 from kerfpath._arrays import Array
 from kerfpath.errors import InputError
-from kerfpath.post._divide import in_files, renamed
-from kerfpath.post._formatter import Formatter, number, plain
+from kerfpath.post._divide import parts_of, renamed
+from kerfpath.post._formatter import Formatter, number
 from kerfpath.post._frames import euler
-from kerfpath.post._names import identifiers
 from kerfpath.post._program import (
     Await,
     CircularMove,
@@ -32,8 +31,9 @@ from kerfpath.post._program import (
     Request,
     Section,
     Wait,
+    targets_of,
 )
-from kerfpath.post._settings import handshakes
+from kerfpath.post._settings import outputs
 from kerfpath.post.krl._axes import axes_from_joints, status_and_turn
 from kerfpath.post.krl._settings import LONGEST_NAME, KrlSettings
 
@@ -50,8 +50,6 @@ MOST_ROUTINES = 254
 """Local routines that a file may have, but for the one that switches off."""
 LINES_OF_A_FILE = 5
 """HEAD, DEF and END of its first routine, and the empty line at its end."""
-LINES_OF_A_ROUTINE = 6
-"""DEF, END, the empty line before them, and the call with its condition."""
 FIRST = "first_contour"
 """Number of the contour at which the program begins, for a restart; in the .dat."""
 PASSED = "first"
@@ -64,7 +62,6 @@ TIMER = 20
 AXES = ("A1", "A2", "A3", "A4", "A5", "A6")
 ANGLES: Final = "ZYX"
 """A, B, C turn about Z, the new Y, the new X."""
-NOT_CHECKED = "not been checked for collisions"
 
 
 def opening(settings: KrlSettings) -> list[str]:
@@ -88,9 +85,7 @@ def opening(settings: KrlSettings) -> list[str]:
 
 def switched_off(settings: KrlSettings) -> list[str]:
     """Return the lines that switch off everything that the settings name."""
-    requests = (n for (_, way), n in handshakes(settings).items() if way == "output")
-    outputs = (settings.laser_output, settings.gas_output, *requests)
-    return [f"$OUT[{output}]=FALSE" for output in outputs if output is not None]
+    return [f"$OUT[{output}]=FALSE" for output in outputs(settings)]
 
 
 def awaiting(number: int, timeout: float, settings: KrlSettings) -> list[str]:
@@ -143,6 +138,8 @@ class Krl(Formatter):
     """Writes a main .src with a routine for each section, and more files where it is too long."""
 
     settings: KrlSettings
+    around = 6  # DEF, END, the empty line before them, the call with its condition
+    too_long = "warning"
 
     def __init__(self, program: Program, settings: KrlSettings) -> None:
         named = replace(program, name=program.name[:LONGEST_NAME])
@@ -227,13 +224,6 @@ class Krl(Formatter):
             self._held[what] = line
             yield line
 
-    def lengths(self) -> dict[str, int]:
-        """Return how many lines each contour takes, by its name."""
-        return {
-            section.name: sum(1 for _ in self.lines(section)) + LINES_OF_A_ROUTINE
-            for section in self.program.sections
-        }
-
     def _in_one_file(self) -> list[_File]:
         """Return the program as one file; nothing where that is too long."""
         sections = self.program.sections
@@ -245,15 +235,11 @@ class Krl(Formatter):
 
     def _in_more_files(self) -> list[_File]:
         """Return a main program and the files it calls between contours, the beam off."""
-        sections = self.program.sections
         room = self.settings.lines_per_file - LINES_OF_A_FILE
         share = -(-room // MOST_ROUTINES)
         counts = [max(count, share) for count in self.lengths().values()]
-        groups = in_files(sections, counts, room)
-        taken = [self.program.name, *(section.name for section in sections)]
-        names = identifiers([self.program.name] * len(groups), taken=taken, longest=LONGEST_NAME)
         others, calls, number = [], [], 0
-        for name, group in zip(names, groups, strict=True):
+        for name, group in parts_of(self.program, counts, room, LONGEST_NAME).items():
             first = [f"INT {PASSED}"]
             for section in group:
                 number += 1
@@ -277,14 +263,10 @@ class Krl(Formatter):
 
     def _start(self) -> Iterator[str]:
         program, settings = self.program, self.settings
-        checked = "been proved clear in the planned cell" if program.air_checked else NOT_CHECKED
-        yield f"; Written by kerfpath for {plain(program.robot.model)} ({plain(program.robot.id)})."
-        if settings.tool_number is None:
-            yield "; Complete the load of the tool: $LOAD."
-        if settings.base_number is None:
-            yield "; $BASE is the part in the robot's base, which is $WORLD, too."
-        yield f"; Moves through the air have {checked}."
-        yield from (f"; {said}" for said in program.caveats)
+        load = ["Complete the load of the tool: $LOAD."] * (settings.tool_number is None)
+        base = ["$BASE is the part in the robot's base, which is $WORLD, too."]
+        base *= settings.base_number is None
+        yield from (f"; {remark}" for remark in self.head(*load, *base))
         yield f"; {SWITCH_OFF}() runs at a stop message; the safety circuit of the cell has to"
         yield "; switch the laser off, too."
         yield f"; To begin at a contour set {FIRST} in the .dat to its number, and reset."
@@ -296,21 +278,20 @@ class Krl(Formatter):
 
     def _target_texts(self) -> dict[Move, str]:
         """Return the targets of each move, all at once."""
-        robot, moves = self.program.robot, self.program.moves
-        q = np.array([move.q for move in moves]).reshape(-1, robot.joints)
+        robot, points = self.program.robot, targets_of(self.program.moves)
+        q = np.array([point.q for point in points]).reshape(-1, robot.joints)
         axes_deg = np.degrees(axes_from_joints(robot, q)).tolist()
         words = status_and_turn(robot, q).tolist()
-        path = [move for move in moves if isinstance(move, LinearMove)]
-        frames = dict(zip(path, _frames([move.T_part_tip for move in path]), strict=True))
-        arcs = [move for move in path if isinstance(move, CircularMove)]
-        vias = dict(zip(arcs, _frames([arc.T_part_via for arc in arcs]), strict=True))
+        frames = iter(_frames([T for _, _, T in points if T is not None]))
         texts: dict[Move, str] = {}
-        for move, axes, (status, turn) in zip(moves, axes_deg, words, strict=True):
-            if isinstance(move, JointMove):
+        for (move, _, T), axes, (status, turn) in zip(points, axes_deg, words, strict=True):
+            if T is None:
                 texts[move] = f"{{{_fields(AXES, axes, 6)}}}"
-                continue
-            via = f"{{{vias[move]}}}," if isinstance(move, CircularMove) else ""
-            texts[move] = f"{via}{{{frames[move]},S {status},T {turn}}}"
+            elif isinstance(move, CircularMove) and T is move.T_part_via:
+                texts[move] = f"{{{next(frames)}}},"
+            else:
+                via = texts[move] if isinstance(move, CircularMove) else ""
+                texts[move] = f"{via}{{{next(frames)},S {status},T {turn}}}"
         return texts
 
 

@@ -13,8 +13,9 @@ from kerfpath.post._axes import offset_near
 from kerfpath.post._program import SIGNALS, Switch
 from kerfpath.post._read import MoveKind, ReadProgram, ReadSection, ReadStep
 from kerfpath.post._reading import END_OF_FILE, LineReader, patterns, statements
+from kerfpath.post._settings import outputs
 from kerfpath.post.urscript._switching import time_ahead, waiting, when_stopped, words
-from kerfpath.post.urscript._write import FIRST, URScriptSettings, full_joint_speed, outputs
+from kerfpath.post.urscript._write import FIRST, URScriptSettings, full_joint_speed
 from kerfpath.robots import Robot
 
 __all__ = ["read"]

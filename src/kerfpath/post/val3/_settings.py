@@ -43,14 +43,13 @@ MEANINGS = (
 """Types, data, words and instructions of a controller, where a contour may be named so."""
 RESERVED = frozenset((KEYWORDS + " " + MEANINGS).split())
 
+Link = Annotated[str, StringConstraints(pattern=r"^[A-Za-z0-9_.%\\/:\-]{1,80}$")]
 Output = Annotated[
-    Annotated[str, StringConstraints(pattern=r"^[A-Za-z0-9_.%\\/:\-]{1,80}$")] | None,
+    Link | None,
     setting("the link of a digital output, as the controller lists it", r'"BasicIO-1\\%Q0"'),
 ]
-
-
 Input = Annotated[
-    Annotated[str, StringConstraints(pattern=r"^[A-Za-z0-9_.%\\/:\-]{1,80}$")] | None,
+    Link | None,
     setting("the link of a digital input, as the controller lists it", r'"BasicIO-1\\%I0"'),
 ]
 
@@ -69,7 +68,7 @@ class Val3Settings(Settings):
     shutter_output: Output = None
     height_output: Output = None
     tool_link: Annotated[
-        Annotated[str, StringConstraints(pattern=r"^[A-Za-z0-9_.%\\/:\-]{1,80}$")],
+        Link,
         setting("the link of the tool's own output, as the controller lists it", '"valve1"'),
     ] = "valve1"
     configurations: Annotated[Literal["named", "same"], setting('"named" or "same"', '"named"')] = (

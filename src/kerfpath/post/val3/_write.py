@@ -17,10 +17,9 @@ import numpy as np
 
 from kerfpath._arrays import Array
 from kerfpath.errors import InputError
-from kerfpath.post._divide import in_files, renamed
-from kerfpath.post._formatter import Formatter, number, plain
-from kerfpath.post._frames import euler, faceplate, world
-from kerfpath.post._names import identifiers
+from kerfpath.post._divide import parts_of, renamed
+from kerfpath.post._formatter import Formatter, number
+from kerfpath.post._frames import controller_frames, euler
 from kerfpath.post._program import (
     Await,
     CircularMove,
@@ -31,6 +30,7 @@ from kerfpath.post._program import (
     Request,
     Section,
     Wait,
+    targets_of,
 )
 from kerfpath.post._settings import handshakes
 from kerfpath.post._standing import stopping_to_switch
@@ -76,7 +76,6 @@ AROUND = 40
 """Lines of a file beside those of its steps and their data."""
 DATA_OF_A_STEP = 3
 """A circular move: two points and a speed."""
-NOT_CHECKED = "not been checked for collisions"
 
 
 def parameters(settings: Val3Settings) -> dict[str, str]:
@@ -146,6 +145,7 @@ class Val3(Formatter):
     """Writes a project with a routine for each section, and libraries where it is too long."""
 
     settings: Val3Settings
+    too_long = "warning"
 
     def __init__(self, program: Program, settings: Val3Settings) -> None:
         short = replace(stopping_to_switch(program), name=program.name[:LONGEST_NAME])
@@ -153,19 +153,18 @@ class Val3(Formatter):
         self._target = self._target_texts()
         self._database = _Database()
         self._moving = True
-        counts, room = list(self.lengths().values()), settings.lines_per_file - AROUND
-        self._parts: dict[str, Sequence[Section]] = {}
-        if sum(counts) > room:
-            groups = in_files(self.program.sections, counts, room)
-            taken = [self.program.name, *(section.name for section in self.program.sections)]
-            names = identifiers(
-                [self.program.name] * len(groups), taken=taken, longest=LONGEST_NAME
-            )
-            self._parts = dict(zip(names, groups, strict=True))
+        counts = list(self.lengths().values())
+        self._parts: dict[str, list[Section]] = {}
+        if sum(counts) > self.room():
+            self._parts = parts_of(self.program, counts, self.room(), LONGEST_NAME)
 
     def lengths(self) -> dict[str, int]:
         """Return how many lines of data each contour takes at most, by its name."""
         return {s.name: DATA_OF_A_STEP * len(s.steps) for s in self.program.sections}
+
+    def room(self) -> int:
+        """Return how many lines of contours a file has room for."""
+        return super().room() - AROUND
 
     def files(self) -> dict[str, str]:
         """Return the files of the project, and those of the libraries that it calls."""
@@ -286,9 +285,8 @@ class Val3(Formatter):
         return _text([*rows, "  </Libraries>", "</Project>"])
 
     def _data(self, *, is_main: bool) -> str:
-        program, settings = self.program, self.settings
-        frame = np.linalg.inv(world(program.robot)) @ program.T_base_part
-        tool = np.linalg.inv(faceplate(program.robot)) @ program.T_flange_tip
+        settings = self.settings
+        frame, tool = controller_frames(self.program)
         rows = [f'<Database xmlns:xsi="{SCHEMA}" xmlns="{DATA}">', "  <Datas>"]
         rows += _array("fPart", "frame", [f'{POSE % _poses(frame)[0]} fatherId="world[0]"'])
         own = f"ioLink={quoteattr(settings.tool_link)}"
@@ -301,18 +299,10 @@ class Val3(Formatter):
         return _text([*rows, "  </Datas>", "</Database>"])
 
     def _remarks(self) -> Iterator[str]:
-        program = self.program
-        checked = "been proved clear in the planned cell" if program.air_checked else NOT_CHECKED
-        robot = f"{plain(program.robot.model)} ({plain(program.robot.id)})"
-        yield from self.comment(f"Written by kerfpath for {robot}.")
-        yield from self.comment("fPart is the part in the world, which starts at axis 2.")
-        yield from self.comment(f"Moves through the air have {checked}.")
-        for said in program.caveats:
-            yield from self.comment(said)
-        yield from self.comment(
-            "stop() switches the laser off; the safety circuit of the cell has to, too."
-        )
-        yield from self.comment(f"To begin at a contour, set {FIRST} to its number.")
+        head = self.head("fPart is the part in the world, which starts at axis 2.")
+        stop = "stop() switches the laser off; the safety circuit of the cell has to, too."
+        for remark in (*head, stop, f"To begin at a contour, set {FIRST} to its number."):
+            yield from self.comment(remark)
 
     def _target_texts(self) -> dict[Move, list[str]]:
         """Return the targets of each move as they stand in the data, all at once."""
@@ -323,15 +313,9 @@ class Val3(Formatter):
             axes_deg = np.degrees(axes_from_joints(robot, [m.q for m in joint])).round(6) + 0.0
             for target, row in zip(joint, axes_deg.tolist(), strict=True):
                 texts[target].append(JOINTS % tuple(row))
-        points: list[tuple[Move, Array, Array]] = []
-        for move in moves:
-            if isinstance(move, CircularMove):
-                points.append((move, move.q_via, move.T_part_via))
-            if isinstance(move, LinearMove):
-                points.append((move, move.q, move.T_part_tip))
-        if points:
+        if points := targets_of(move for move in moves if isinstance(move, LinearMove)):
             words = posture(robot, np.array([q for _, q, _ in points]), self.settings)
-            poses = _poses([T for _, _, T in points])
+            poses = _poses(np.array([T for _, _, T in points]))
             for (end, _, _), pose, three in zip(points, poses, words, strict=True):
                 texts[end].append(f'{POSE % pose} {CONFIGURATION % three} fatherId="fPart[0]"')
         return texts
