@@ -4,6 +4,7 @@ import re
 
 import numpy as np
 import pytest
+from tests.post.cases import ARMS
 
 from kerfpath import InputError, robot
 from kerfpath.post import (
@@ -70,14 +71,6 @@ def branch(arm, q):
     return np.array([int(np.nanargmin(apart))])
 
 
-ARMS = {
-    "rapid": "abb_irb4600_60_205",
-    "krl": "kuka_kr16_r2010_2",
-    "fanuc": "fanuc_m20id_25",
-    "val3": "staubli_tx2_160l",
-    "inform": "yaskawa_gp25",
-    "urscript": "ur_ur10e",
-}
 BEAM = {
     "rapid": (r"Trigg[LC].*trOn", r"Trigg[LC].*trOff"),
     "krl": (r"TRIGGER.*OUT\[1\]=TRUE", r"TRIGGER.*OUT\[1\]=FALSE"),
@@ -127,7 +120,7 @@ def cuts_with_borders(name, files):
 @pytest.mark.parametrize("lines", [100, 137, 250, 9999])
 def test_no_border_of_a_file_or_routine_lies_inside_a_contour(name, lengths, lines):
     """The beam is off wherever a routine or file begins or ends; or the program is refused."""
-    made, options = program(*lengths, arm=ARMS[name]), settings(name, lines)
+    made, options = program(*lengths, arm=ARMS[name][0]), settings(name, lines)
     too_long = max(lengths) + 5 > lines or (name == "inform" and 2 * max(lengths) + 30 > lines)
     if name in ("fanuc", "inform") and too_long:
         with pytest.raises(InputError, match=r"not divided.*lines_per_file"):
@@ -147,7 +140,7 @@ def test_no_border_of_a_file_or_routine_lies_inside_a_contour(name, lengths, lin
 @pytest.mark.parametrize("name", ARMS)
 def test_the_law_finds_a_border_that_is_put_into_a_contour(name):
     """What it looks for is there to be found: each kind of call, in the middle of a cut."""
-    files = post(program(20, arm=ARMS[name]), name, settings(name, 9999))
+    files = post(program(20, arm=ARMS[name][0]), name, settings(name, 9999))
     (file,) = [f for f, text in files.items() if re.search(BEAM[name][0], text)]
     lines = files[file].splitlines()
     first = next(k for k, line in enumerate(lines) if re.search(BEAM[name][0], line))
@@ -159,7 +152,7 @@ def test_the_law_finds_a_border_that_is_put_into_a_contour(name):
 
 @pytest.mark.parametrize("name", ["rapid", "krl", "val3"])
 def test_a_contour_longer_than_a_file_has_its_own_and_is_warned_of(name):
-    made, options = program(10, 300, 10, arm=ARMS[name]), settings(name, 100)
+    made, options = program(10, 300, 10, arm=ARMS[name][0]), settings(name, 100)
     found = [issue for issue in preflight(made, name, options) if issue.code == "file-length"]
     assert [issue.level for issue in found] == ["warning"]
     assert "lines_per_file" in found[0].message
