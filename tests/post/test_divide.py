@@ -14,11 +14,11 @@ from kerfpath.post import (
     Section,
     Switch,
     Wait,
-    in_files,
+    divide_sections,
     language,
     post,
     preflight,
-    renamed,
+    rename_sections,
 )
 
 
@@ -160,15 +160,15 @@ def test_a_contour_longer_than_a_file_has_its_own_and_is_warned_of(name):
 
 def test_names_are_cut_and_stay_different():
     whole = program(5, 5)
-    names = [section.name for section in renamed(whole, longest_name=8).sections]
+    names = [section.name for section in rename_sections(whole, longest_name=8).sections]
     assert names == ["a_long_n", "a_long_2"]
-    taken = renamed(whole, ("A_Long_N",), longest_name=8)
+    taken = rename_sections(whole, ("A_Long_N",), longest_name=8)
     assert taken.sections[0].name == "a_long_2"
     assert taken.steps == whole.steps
 
 
 def test_files_hold_as_many_sections_as_fit():
     sections = program(1, 1, 1, 1, 1).sections
-    files = in_files(sections, [40, 50, 20, 200, 10], 100)
+    files = divide_sections(sections, [40, 50, 20, 200, 10], 100)
     assert [[s.name[-1] for s in file] for file in files] == [["0", "1"], ["2"], ["3"], ["4"]]
-    assert in_files((), [], 10) == []
+    assert divide_sections((), [], 10) == []

@@ -173,7 +173,7 @@ class _Air:
     """Joint moves that take the times that are planned.
 
     A controller runs all joints from stop to stop together, the slowest at the share of its full
-    speed that it is told, and gains speed as fast as it may; the share is that which takes the
+    speed that it is given, and gains speed as fast as it may; the share is that which takes the
     time.
     """
 

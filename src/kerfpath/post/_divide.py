@@ -11,10 +11,16 @@ from kerfpath.post._issue import ProgramIssue
 from kerfpath.post._names import LONGEST_NAME, identifiers
 from kerfpath.post._program import Program, Section
 
-__all__ = ["in_files", "in_one_file", "long_contours", "parts_of", "renamed"]
+__all__ = [
+    "divide_program",
+    "divide_sections",
+    "find_long_contours",
+    "rename_sections",
+    "require_one_file",
+]
 
 
-def renamed(
+def rename_sections(
     program: Program, taken: Iterable[str] = (), *, longest_name: int = LONGEST_NAME
 ) -> Program:
     """Return the program with names of sections cut to `longest_name`, and none twice or taken."""
@@ -24,7 +30,7 @@ def renamed(
     return replace(program, sections=tuple(sections))
 
 
-def in_files(
+def divide_sections(
     sections: Sequence[Section], lines: Sequence[int], most_lines: int
 ) -> list[list[Section]]:
     """Return sections, of so many lines each, in order, in files of at most `most_lines` lines.
@@ -43,7 +49,7 @@ def in_files(
     return files
 
 
-def long_contours(written: Formatter) -> Iterator[ProgramIssue]:
+def find_long_contours(written: Formatter) -> Iterator[ProgramIssue]:
     """Yield the contours of more lines than a file is to have: none is divided.
 
     A warning where the language gives each of them a file of its own.
@@ -55,24 +61,24 @@ def long_contours(written: Formatter) -> Iterator[ProgramIssue]:
     most = written.room()
     for name, count in written.lengths().items():
         if count > most:
-            said = (
+            message = (
                 f"the contour has {count} lines, lines_per_file allows {most}; it is not "
                 f"divided, as the robot could stop there with the beam on{kept}: {remedy}"
             )
-            yield ProgramIssue(written.too_long, "file-length", said, name)
+            yield ProgramIssue(written.too_long, "file-length", message, name)
 
 
-def parts_of(
+def divide_program(
     program: Program, lines: Sequence[int], room: int, longest_name: int
 ) -> dict[str, list[Section]]:
-    """Return sections of so many lines each as `in_files` divides them, by names of files."""
-    groups = in_files(program.sections, lines, room)
+    """Return the files, by their names, that sections of so many lines each are divided in."""
+    groups = divide_sections(program.sections, lines, room)
     taken = [program.name, *(section.name for section in program.sections)]
     names = identifiers([program.name] * len(groups), taken=taken, longest=longest_name)
     return dict(zip(names, groups, strict=True))
 
 
-def in_one_file(name: str, lines: Sequence[str], most_lines: int) -> dict[str, str]:
+def require_one_file(name: str, lines: Sequence[str], most_lines: int) -> dict[str, str]:
     """Return the text of a program that cannot be divided, by the name of its file.
 
     Raises

@@ -8,7 +8,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from kerfpath.errors import InputError
-from kerfpath.post._divide import long_contours
+from kerfpath.post._divide import find_long_contours
 from kerfpath.post._issue import ProgramIssue
 from kerfpath.post._languages import Language
 from kerfpath.post._languages import language as find_language
@@ -71,23 +71,23 @@ def preflight(
             f"{type(settings).__name__}"
         )
     rules = chosen.rules(settings)
-    issues = list(_robot(program, chosen))
-    numbers = [issue for section in program.sections for issue in _numbers(section, rules)]
-    outputs = list(_outputs(program, chosen, settings))
-    outputs += _ports(program, chosen, settings)
+    issues = list(_check_robot(program, chosen))
+    numbers = [issue for section in program.sections for issue in _check_numbers(section, rules)]
+    outputs = list(_check_outputs(program, chosen, settings))
+    outputs += _check_ports(program, chosen, settings)
     settings = chosen.completed(settings)
     issues += numbers + outputs
     # Speeds and zones are named by their formatted values: only finite ones can be.
     unnamed = any(issue.level == "error" for issue in outputs)
     if not numbers and not unnamed and not chosen.refusal(program.robot):
-        issues += _names(program, chosen, rules, settings)
+        issues += _check_names(program, chosen, rules, settings)
     for section in program.sections:
-        issues += _laser(section)
-        issues += _stays(section)
-        issues += _motion(program, section, rules)
-        issues += _limits(program, section)
+        issues += _check_laser(section)
+        issues += _check_stays(section)
+        issues += _check_motion(program, section, rules)
+        issues += _check_limits(program, section)
     if not any(issue.level == "error" for issue in issues):
-        issues += long_contours(chosen.formatter(program, settings))
+        issues += find_long_contours(chosen.formatter(program, settings))
         issues += [] if chosen.check is None else chosen.check(program, settings)
     if not program.air_checked and any(isinstance(move, JointMove) for move in program.moves):
         issues.append(
@@ -102,7 +102,9 @@ def preflight(
     return issues
 
 
-def _outputs(program: Program, language: Language, settings: Settings) -> Iterator[ProgramIssue]:
+def _check_outputs(
+    program: Program, language: Language, settings: Settings
+) -> Iterator[ProgramIssue]:
     """Check that there is an output for everything that is switched, and warn of one assumed."""
     assumed = [key.removesuffix("_output") for key in language.assumed]
     for signal in sorted({*program.signals, *assumed}):
@@ -110,27 +112,29 @@ def _outputs(program: Program, language: Language, settings: Settings) -> Iterat
         if key not in type(settings).model_fields or getattr(settings, key) is not None:
             continue
         remedy = f"say which with {key} in [program.{language.name}]"
-        said = f"the {signal} is switched, but no output is named for it; {remedy}"
+        message = f"the {signal} is switched, but no output is named for it; {remedy}"
         if (taken := language.assumed.get(key)) is not None:
-            said = f"no output is named for the {signal}, {taken} is taken; {remedy}"
-        yield ProgramIssue("error" if taken is None else "warning", "output", said, "program")
+            message = f"no output is named for the {signal}, {taken} is taken; {remedy}"
+        yield ProgramIssue("error" if taken is None else "warning", "output", message, "program")
 
 
-def _ports(program: Program, language: Language, settings: Settings) -> Iterator[ProgramIssue]:
+def _check_ports(
+    program: Program, language: Language, settings: Settings
+) -> Iterator[ProgramIssue]:
     """Check that every handshake has an input or output of its own."""
     known = handshakes(settings)
     steps = dict.fromkeys(s for s in program.steps if isinstance(s, Request | Await))
     wanted = {(s.partner, "input" if isinstance(s, Await) else "output") for s in steps}
     for partner, way in sorted(wanted):
         if (partner, way) not in known:
-            said = f"{language.title} has no {way} for the handshake {partner}; leave it out"
-            yield ProgramIssue("error", "handshake", said, "program")
+            message = f"{language.title} has no {way} for the handshake {partner}; leave it out"
+            yield ProgramIssue("error", "handshake", message, "program")
         elif known[partner, way] is None:
-            said = (
+            message = (
                 f"no {way} is named for the handshake {partner}; say which with {partner}_{way} in "
                 f"[program.{language.name}]"
             )
-            yield ProgramIssue("error", "handshake", said, "program")
+            yield ProgramIssue("error", "handshake", message, "program")
     ports: list[tuple[str, str, object]] = [
         (signal, "output", getattr(settings, f"{signal}_output", None)) for signal in SIGNALS
     ]
@@ -139,12 +143,12 @@ def _ports(program: Program, language: Language, settings: Settings) -> Iterator
     for name, way, port in ports:
         key = f"{name}_{way}"
         if port is not None and (other := taken.setdefault((way, port), key)) != key:
-            said = f"{other} and {key} are both {port}; name one for each"
+            message = f"{other} and {key} are both {port}; name one for each"
             code = "output" if name in SIGNALS else "handshake"
-            yield ProgramIssue("error", code, said, "program")
+            yield ProgramIssue("error", code, message, "program")
 
 
-def _robot(program: Program, language: Language) -> Iterator[ProgramIssue]:
+def _check_robot(program: Program, language: Language) -> Iterator[ProgramIssue]:
     if refusal := language.refusal(program.robot):
         yield ProgramIssue("error", "wrong-arm", refusal, "program")
     if doubt := language.doubt(program.robot):
@@ -153,7 +157,7 @@ def _robot(program: Program, language: Language) -> Iterator[ProgramIssue]:
         yield ProgramIssue("error", "empty", "there is no contour to cut", "program")
 
 
-def _names(
+def _check_names(
     program: Program, language: Language, rules: Rules, settings: Settings
 ) -> Iterator[ProgramIssue]:
     seen: dict[str, str] = {}
@@ -173,8 +177,8 @@ def _names(
                 what,
             )
         elif language.is_reserved(name):
-            said = f"{name!r} is reserved in {language.title}; rename it"
-            yield ProgramIssue("error", "name-reserved", said, what)
+            message = f"{name!r} is reserved in {language.title}; rename it"
+            yield ProgramIssue("error", "name-reserved", message, what)
         elif (other := seen.get(name.lower())) is not None:
             yield ProgramIssue(
                 "error", "name-collision", f"{name!r} is also the name of {other}; rename it", what
@@ -182,7 +186,7 @@ def _names(
         seen[name.lower()] = what
 
 
-def _numbers(section: Section, rules: Rules) -> Iterator[ProgramIssue]:
+def _check_numbers(section: Section, rules: Rules) -> Iterator[ProgramIssue]:
     """Check that speeds, zones and lead times are numbers that the language can write."""
     lead = f"the lead time must lie between 0 and {rules.longest_lead:g} s"
     share = f"the share of the full speed must lie between {LOWEST_SHARE:g} and 1"
@@ -197,13 +201,13 @@ def _numbers(section: Section, rules: Rules) -> Iterator[ProgramIssue]:
         if isinstance(step, JointMove) and not LOWEST_SHARE <= step.speed <= 1:
             wrong.append(("speed", f"{share}, got {step.speed:g}"))
         if isinstance(step, LinearMove | JointMove) and not 0 <= step.zone < np.inf:
-            said = f"the zone must be 0 mm (stop) or more, got {step.zone * 1e3:g} mm"
-            wrong.append(("zone", said))
+            message = f"the zone must be 0 mm (stop) or more, got {step.zone * 1e3:g} mm"
+            wrong.append(("zone", message))
         for switch in switches_of(step):
             if not (0 <= switch.lead_time < np.inf and switch.lead_time <= rules.longest_lead):
                 wrong.append(("lead-time", f"{lead}, got {switch.lead_time:g} s"))
-        for code, said in wrong:
-            yield ProgramIssue("error", code, said, place)
+        for code, message in wrong:
+            yield ProgramIssue("error", code, message, place)
 
 
 def _walk(section: Section) -> Iterator[tuple[str, Step, bool, bool]]:
@@ -217,24 +221,24 @@ def _walk(section: Section) -> Iterator[tuple[str, Step, bool, bool]]:
             on = switch.on if switch.signal == "laser" else on
 
 
-def _stays(section: Section) -> Iterator[ProgramIssue]:
+def _check_stays(section: Section) -> Iterator[ProgramIssue]:
     """Check that waits and handshakes take a sensible time, where the robot stands."""
     for place, step, stands, on in _walk(section):
         if isinstance(step, Wait):
             if not 0 < step.time <= LONGEST_WAIT:
-                said = f"more than 0 s and at most {LONGEST_WAIT:g} s, got {step.time:g} s"
-                yield ProgramIssue("error", "wait", f"a wait must last {said}", place)
+                message = f"more than 0 s and at most {LONGEST_WAIT:g} s, got {step.time:g} s"
+                yield ProgramIssue("error", "wait", f"a wait must last {message}", place)
             if not stands:
                 yield ProgramIssue("error", "wait", "a wait must follow a move that stops", place)
         if isinstance(step, Request | Await) and (on or not stands):
-            said = "a handshake must follow a move that stops, with the laser off"
-            yield ProgramIssue("error", "handshake", said, place)
+            message = "a handshake must follow a move that stops, with the laser off"
+            yield ProgramIssue("error", "handshake", message, place)
         if isinstance(step, Await) and not 0 < step.timeout <= LONGEST_TIMEOUT:
-            said = f"more than 0 s and at most {LONGEST_TIMEOUT:g} s, got {step.timeout:g} s"
-            yield ProgramIssue("error", "handshake", f"a timeout must be {said}", place)
+            message = f"more than 0 s and at most {LONGEST_TIMEOUT:g} s, got {step.timeout:g} s"
+            yield ProgramIssue("error", "handshake", f"a timeout must be {message}", place)
 
 
-def _laser(section: Section) -> Iterator[ProgramIssue]:
+def _check_laser(section: Section) -> Iterator[ProgramIssue]:
     """Check that the laser is only on between its switches, along the path, and off after."""
     on = False
     for place, step, _, on in _walk(section):
@@ -242,14 +246,14 @@ def _laser(section: Section) -> Iterator[ProgramIssue]:
             yield ProgramIssue("error", "laser-order", "a joint move with the laser on", place)
         for switch in switches_of(step):
             if switch.signal == "laser" and on == switch.on:
-                said = f"the laser is switched {'on' if on else 'off'}, but is so already"
-                yield ProgramIssue("error", "laser-order", said, place)
+                message = f"the laser is switched {'on' if on else 'off'}, but is so already"
+                yield ProgramIssue("error", "laser-order", message, place)
             on = switch.on if switch.signal == "laser" else on
     if on:
         yield ProgramIssue("error", "laser-order", "the laser is still on at the end", section.name)
 
 
-def _motion(program: Program, section: Section, rules: Rules) -> Iterator[ProgramIssue]:
+def _check_motion(program: Program, section: Section, rules: Rules) -> Iterator[ProgramIssue]:
     """Check the path of a section: steps, zones, turning speed, lead times."""
     moves = section.moves
     if len(moves) < 2:
@@ -295,10 +299,10 @@ def _motion(program: Program, section: Section, rules: Rules) -> Iterator[Progra
             "neighbour; the controller will reduce it",
             section.name,
         )
-    yield from _late_switches(section, lengths.tolist())
+    yield from _check_lead_times(section, lengths.tolist())
 
 
-def _late_switches(section: Section, lengths: list[float]) -> Iterator[ProgramIssue]:
+def _check_lead_times(section: Section, lengths: list[float]) -> Iterator[ProgramIssue]:
     for k, (move, length) in enumerate(zip(section.moves[1:], lengths, strict=True), 1):
         for switch in move.switches if isinstance(move, LinearMove) and move.speed > 0 else ():
             if switch.lead_time > length / move.speed:
@@ -312,7 +316,7 @@ def _late_switches(section: Section, lengths: list[float]) -> Iterator[ProgramIs
                 )
 
 
-def _limits(program: Program, section: Section) -> Iterator[ProgramIssue]:
+def _check_limits(program: Program, section: Section) -> Iterator[ProgramIssue]:
     if not section.moves:
         return
     limits = program.robot.joint_limits()

@@ -12,7 +12,8 @@ from kerfpath._told import told
 from kerfpath.post._program import PARTNERS, Partner
 
 __all__ = [
-    "LinesPerFile", "Rules", "Settings", "handshakes", "numbered", "outputs", "setting",
+    "LinesPerFile", "PortSettings", "Rules", "Settings", "handshakes", "numbered", "outputs",
+    "setting",
 ]  # fmt: skip
 
 
@@ -37,6 +38,37 @@ class Settings(BaseModel):
     model_config = ConfigDict(extra="forbid", strict=True, frozen=True)
 
     lines_per_file: LinesPerFile = 5000
+
+
+class PortSettings(Settings):
+    """Settings that name inputs and outputs: of laser and gas, and of handshakes.
+
+    A subclass gives, as keywords, the annotations of what its language calls an output and an
+    input, with their bounds and what messages say of them; they become those of all fields here
+    that it does not annotate itself.
+    """
+
+    laser_output: Any = None
+    gas_output: Any = None
+    ready_input: Any = None
+    shutter_input: Any = None
+    gas_pressure_input: Any = None
+    height_input: Any = None
+    interlock_input: Any = None
+    ready_output: Any = None
+    shutter_output: Any = None
+    height_output: Any = None
+
+    def __init_subclass__(cls, *, output: Any = None, input: Any = None, **others: Any) -> None:
+        super().__init_subclass__(**others)
+        if output is None:
+            return
+        own = cls.__annotations__
+        ports = [name for name in PortSettings.__annotations__ if name not in own]
+        for name in ports:
+            setattr(cls, name, None)
+        ways = {name: output if name.endswith("_output") else input for name in ports}
+        cls.__annotations__ = ways | own
 
 
 def handshakes(settings: Settings) -> dict[tuple[Partner, str], Any]:

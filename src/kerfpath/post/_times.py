@@ -93,11 +93,11 @@ def refusals(program: Program) -> Iterator[ProgramIssue]:
     except InputError as error:
         yield ProgramIssue("error", "joint-speed", str(error), "program")
     if not isinstance(next(iter(program.moves), None), JointMove):
-        said = "times are counted from a first joint move, but there is none"
-        yield ProgramIssue("error", "start", said, "program")
+        message = "times are counted from a first joint move, but there is none"
+        yield ProgramIssue("error", "start", message, "program")
     for section in program.sections:
         for number, move in enumerate(section.moves):
             took = move.duration if isinstance(move, LinearMove) else 1.0
             if not SHORTEST <= took < np.inf:
-                said = f"the move takes {took:g} s, expected at least {SHORTEST:g} s"
-                yield ProgramIssue("error", "duration", said, f"{section.name}, move {number}")
+                message = f"the move takes {took:g} s, expected at least {SHORTEST:g} s"
+                yield ProgramIssue("error", "duration", message, f"{section.name}, move {number}")

@@ -11,7 +11,7 @@ from functools import cached_property
 
 import numpy as np
 
-from kerfpath.post._divide import in_one_file
+from kerfpath.post._divide import require_one_file
 from kerfpath.post._formatter import Formatter, number
 from kerfpath.post._issue import ProgramIssue
 from kerfpath.post._orientations import quaternions
@@ -79,7 +79,7 @@ class Csv(Formatter):
         lines = [",".join(columns(program.robot.joints))]
         for section in program.sections:
             lines += (f"{section.name},{row}" for row in self.lines(section))
-        return in_one_file(f"{program.name}.csv", lines, self.settings.lines_per_file)
+        return require_one_file(f"{program.name}.csv", lines, self.settings.lines_per_file)
 
     def names(self) -> list[tuple[str, str]]:
         """Return the name of the file; sections are only words in a column."""

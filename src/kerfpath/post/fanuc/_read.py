@@ -28,10 +28,10 @@ from kerfpath.post.fanuc._settings import UNITS, FanucSettings
 from kerfpath.post.fanuc._switching import time_before
 from kerfpath.post.fanuc._write import (
     ANGLES,
-    aborting,
-    selection,
-    switched_off,
-    watching,
+    abort_lines,
+    selection_lines,
+    switch_off_lines,
+    watch_lines,
 )
 from kerfpath.robots import Robot
 
@@ -129,7 +129,7 @@ class _Main(Listing):
         self.resets: list[str] = []
         self.body(_MAIN)
         self.end()
-        if self.resets != [line.strip(" ;") for line in switched_off(settings)]:
+        if self.resets != [line.strip(" ;") for line in switch_off_lines(settings)]:
             raise self.fault("expected every output that is named to be reset once")
         for kind in ("UFRAME", "UTOOL"):
             if kind not in self.selected:
@@ -176,7 +176,7 @@ class _Watching(Listing):
 
     def __init__(self, file: str, text: str, robot: Robot, settings: FanucSettings) -> None:
         super().__init__(file, text, robot, settings)
-        self.require(watching(settings))
+        self.require(watch_lines(settings))
         self.body({})
         self.end()
 
@@ -194,7 +194,7 @@ class _Section(Listing):
         self.pending: tuple[Switch, ...] = ()
         self.timeout_s: float | None = None
         self.says_abort = False
-        self.require(selection(settings))
+        self.require(selection_lines(settings))
         self.body(_SECTION)
         if self.pending or self.timeout_s is not None:
             raise self.fault("expected a motion, or the wait of a timeout, before the end")
@@ -274,7 +274,7 @@ class _Section(Listing):
 
     def aborting(self) -> None:
         self.says_abort = True
-        self.require(aborting(self.settings)[1:])
+        self.require(abort_lines(self.settings)[1:])
 
     def positions(self) -> None:
         """Read the positions, each a block of rows."""

@@ -8,7 +8,7 @@ from typing import Annotated, Literal
 import numpy as np
 from pydantic import StringConstraints
 
-from kerfpath.post._settings import Rules, Settings, numbered, setting
+from kerfpath.post._settings import PortSettings, Rules, numbered, setting
 
 __all__ = ["FanucSettings", "is_reserved", "rules", "unit"]
 
@@ -29,22 +29,12 @@ Output = Annotated[int | None, numbered("a digital output", 4096)]
 Input = Annotated[int | None, numbered("a digital input", 4096)]
 
 
-class FanucSettings(Settings):
+class FanucSettings(PortSettings, output=Output, input=Input):
     """Frames, outputs and options of the controller."""
 
     lines_per_file: Annotated[
         int, setting("a whole number of lines from 100 to 9999", "9999", ge=100, le=9999)
     ] = 9999
-    laser_output: Output = None
-    gas_output: Output = None
-    ready_input: Input = None
-    shutter_input: Input = None
-    gas_pressure_input: Input = None
-    height_input: Input = None
-    interlock_input: Input = None
-    ready_output: Output = None
-    shutter_output: Output = None
-    height_output: Output = None
     date: Annotated[
         Annotated[str, StringConstraints(pattern=r"^\d\d-\d\d-\d\d \d\d:\d\d:\d\d$")],
         setting("a date as YY-MM-DD hh:mm:ss", '"26-11-21 10:00:00"'),

@@ -37,7 +37,7 @@ from kerfpath.post.fanuc._settings import FanucSettings, unit
 from kerfpath.post.fanuc._switching import switching
 
 __all__ = [
-    "ANGLES", "Fanuc", "aborting", "selection", "switched_off", "watching",
+    "ANGLES", "Fanuc", "abort_lines", "selection_lines", "switch_off_lines", "watch_lines",
 ]  # fmt: skip
 
 ANGLES: Final = "xyz"
@@ -73,22 +73,22 @@ CONTROL_CODE\t= 00000000 00000000;
 """Controllers count sizes themselves; the date is that of the settings, so that bytes repeat."""
 
 
-def selection(settings: FanucSettings) -> list[str]:
+def selection_lines(settings: FanucSettings) -> list[str]:
     """Return the lines that select the frames; each program has them, to be started alone."""
     return [f"  UFRAME_NUM={settings.user_frame} ;", f"  UTOOL_NUM={settings.tool_frame} ;"]
 
 
-def switched_off(settings: FanucSettings) -> list[str]:
+def switch_off_lines(settings: FanucSettings) -> list[str]:
     """Return the lines that switch everything off."""
     return [f"  DO[{output}]=OFF ;" for output in outputs(settings)]
 
 
-def aborting(settings: FanucSettings) -> list[str]:
+def abort_lines(settings: FanucSettings) -> list[str]:
     """Return the last lines of a program that waits for inputs: what is done without an answer."""
-    return ["  END ;", f"  LBL[{NO_ANSWER}] ;", *switched_off(settings), "  ABORT ;"]
+    return ["  END ;", f"  LBL[{NO_ANSWER}] ;", *switch_off_lines(settings), "  ABORT ;"]
 
 
-def watching(settings: FanucSettings) -> list[str]:
+def watch_lines(settings: FanucSettings) -> list[str]:
     """Return the lines that background logic runs: all is off wherever no program runs (UO[3])."""
     off = (f"  IF (!UO[3]),DO[{output}]=(OFF) ;" for output in outputs(settings))
     return ["  ! Run this as BG logic (SETUP) ;", *off]
@@ -114,7 +114,7 @@ class Fanuc(CalledFormatter):
             positions = self._positions(section)
             files[f"{section.name}.ls"] = _listing(section.name, lines, positions, settings)
         off = self.off_name
-        files[f"{off}.ls"] = _listing(off, watching(settings), [], settings, group="*")
+        files[f"{off}.ls"] = _listing(off, watch_lines(settings), [], settings, group="*")
         return files
 
     def main(self) -> list[str]:
@@ -128,15 +128,15 @@ class Fanuc(CalledFormatter):
             tool=f"UTOOL {settings.tool_frame}",
         )
         calls = [f"  CALL {section.name}{PADDING};" for section in program.sections]
-        return [*lines, *selection(settings), *switched_off(settings), *calls]
+        return [*lines, *selection_lines(settings), *switch_off_lines(settings), *calls]
 
     def lines(self, section: Section) -> Iterator[str]:
         """Yield the lines of all steps of a section, its targets numbered from 1."""
         self._target = count(1)
-        yield from selection(self.settings)
+        yield from selection_lines(self.settings)
         yield from super().lines(section)
         if any(isinstance(step, Await) for step in section.steps):
-            yield from aborting(self.settings)
+            yield from abort_lines(self.settings)
 
     def joint_move(self, move: JointMove) -> Iterator[str]:
         """Yield a J motion; it knows no corner region."""

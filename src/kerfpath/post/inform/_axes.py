@@ -71,9 +71,9 @@ def posture(robot: Robot, q: Array, settings: InformSettings) -> list[tuple[int 
 def joints_at(
     robot: Robot, T_base_flange: Array, bits: tuple[int, ...], flip: Literal["B", "R"]
 ) -> Array | None:
-    """Return the joints (6,) rad at a flange pose (4, 4) m that a type of six bits tells.
+    """Return the joints (6,) rad at a flange pose (4, 4) m by a type of six bits.
 
-    S, R and T within 360 deg either way, as the type tells them; of the other axes the turn within
+    S, R and T within 360 deg either way, as the type gives them; of the other axes the turn within
     their limits. None where the type fits no way to reach the pose, or several.
     """
     solved = robot.inverse(T_base_flange, within_limits=False).q

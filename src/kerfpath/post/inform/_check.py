@@ -8,7 +8,7 @@ import numpy as np
 
 from kerfpath.post._issue import ProgramIssue
 from kerfpath.post._program import Await, JointMove, Program, Section, Wait
-from kerfpath.post._standing import switched_later
+from kerfpath.post._standing import warn_of_late_switches
 from kerfpath.post._times import TICK, not_whole
 from kerfpath.post.inform._axes import axes_from_joints
 from kerfpath.post.inform._settings import InformSettings
@@ -16,7 +16,7 @@ from kerfpath.post.inform._settings import InformSettings
 __all__ = ["check"]
 
 TURNING = {3: "R", 5: "T", 0: "S"}
-"""The axes whose turns a type tells, within 360 deg."""
+"""The axes whose turns a type gives, within 360 deg."""
 WHOLE_TURN_DEG = 360.0
 
 
@@ -31,12 +31,12 @@ def check(program: Program, settings: InformSettings) -> Iterator[ProgramIssue]:
             "program",
         )
     for section in program.sections:
-        yield from switched_later(section, "INFORM")
-        yield from _times(section)
-        yield from _turns(program, section, settings)
+        yield from warn_of_late_switches(section, "INFORM")
+        yield from _check_times(section)
+        yield from _check_turns(program, section, settings)
 
 
-def _times(section: Section) -> Iterator[ProgramIssue]:
+def _check_times(section: Section) -> Iterator[ProgramIssue]:
     for number, step in enumerate(section.steps):
         times = [step.time] if isinstance(step, Wait) else []
         times += [step.timeout] if isinstance(step, Await) else []
@@ -49,7 +49,9 @@ def _times(section: Section) -> Iterator[ProgramIssue]:
             )
 
 
-def _turns(program: Program, section: Section, settings: InformSettings) -> Iterator[ProgramIssue]:
+def _check_turns(
+    program: Program, section: Section, settings: InformSettings
+) -> Iterator[ProgramIssue]:
     """Check that the turns of R, T and S can be said where a position is no pulses."""
     if not section.moves:
         return

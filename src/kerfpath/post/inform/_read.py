@@ -20,10 +20,10 @@ from kerfpath.post.inform._write import (
     ANGLES,
     FRAME_WORDS,
     SUFFIX,
-    awaiting,
     head,
     middle,
-    switched_off,
+    switch_off_lines,
+    wait_lines,
 )
 from kerfpath.robots import Robot
 
@@ -120,7 +120,7 @@ class _Off(_Text):
         if self.begin():
             raise self.fault("this job must have no positions")
         self.require_rows(middle("main", settings)[1])
-        self.required = switched_off(settings)
+        self.required = switch_off_lines(settings)
         self.instructions({})
 
 
@@ -288,7 +288,7 @@ class _Job(_Text):
         if said is None:
             raise self.fault("expected the wait for an input behind the label")
         port, timeout = int(said[1]), float(said[2])
-        self.required = awaiting(int(label), port, timeout, self.settings)[1:]
+        self.required = wait_lines(int(label), port, timeout, self.settings)[1:]
         self.expect_answer(port, timeout)
 
     def require_standing(self, what: str) -> None:

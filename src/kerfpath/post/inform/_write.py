@@ -33,13 +33,19 @@ from kerfpath.post._program import (
     Wait,
 )
 from kerfpath.post._settings import outputs
-from kerfpath.post._standing import stopping_to_switch
+from kerfpath.post._standing import stop_to_switch
 from kerfpath.post.inform._axes import axes_from_joints, manipulator_type
 from kerfpath.post.inform._settings import InformSettings
 
 __all__ = [
-    "ANGLES", "FRAME_WORDS", "SUFFIX", "Inform", "awaiting", "head", "middle",
-    "switched_off",
+    "ANGLES",
+    "FRAME_WORDS",
+    "SUFFIX",
+    "Inform",
+    "head",
+    "middle",
+    "switch_off_lines",
+    "wait_lines",
 ]  # fmt: skip
 
 ANGLES: Final = "xyz"
@@ -74,12 +80,12 @@ def middle(kind: str, settings: InformSettings) -> tuple[list[str], list[str]]:
     return before, [*after, "///GROUP1 RB1", "NOP"]
 
 
-def switched_off(settings: InformSettings) -> list[str]:
+def switch_off_lines(settings: InformSettings) -> list[str]:
     """Return the instructions that switch off everything that the settings name."""
     return [f"DOUT OT#({output}) OFF" for output in outputs(settings)]
 
 
-def awaiting(label: int, number: int, timeout: float, settings: InformSettings) -> list[str]:
+def wait_lines(label: int, number: int, timeout: float, settings: InformSettings) -> list[str]:
     """Return the instructions that wait for an input.
 
     After `timeout` (s) everything is off and the job pauses; started again it waits again.
@@ -88,7 +94,7 @@ def awaiting(label: int, number: int, timeout: float, settings: InformSettings) 
         f"*WAIT{label}",
         f"WAIT IN#({number})=ON T={timeout:.2f}",
         f"JUMP *GO{label} IF IN#({number})=ON",
-        *switched_off(settings),
+        *switch_off_lines(settings),
         "PAUSE",
         f"JUMP *WAIT{label}",
         f"*GO{label}",
@@ -106,7 +112,7 @@ class Inform(CalledFormatter):
     frame_line = "'%s %s %s"
 
     def __init__(self, program: Program, settings: InformSettings) -> None:
-        super().__init__(by_kind(stopping_to_switch(program)), settings)
+        super().__init__(by_kind(stop_to_switch(program)), settings)
         self._targets: list[tuple[Array, Array | None]] = []
         self._labels = count(1)
         moves = self.program.moves
@@ -124,7 +130,7 @@ class Inform(CalledFormatter):
         texts = {f"{program.name}{SUFFIX}": self._job(program.name, "main", [], main)}
         texts |= {f"{s.name}{SUFFIX}": self._section(s) for s in program.sections}
         off = self.off_name
-        texts[f"{off}{SUFFIX}"] = self._job(off, "main", [], switched_off(settings))
+        texts[f"{off}{SUFFIX}"] = self._job(off, "main", [], switch_off_lines(settings))
         return texts
 
     def lengths(self) -> dict[str, int]:
@@ -193,7 +199,7 @@ class Inform(CalledFormatter):
     def wait_for(self, awaited: Await) -> Iterator[str]:
         """Yield a WAIT with a time, and what is done without an answer."""
         port = self.port(awaited.partner, "input")
-        yield from awaiting(next(self._labels), port, awaited.timeout, self.settings)
+        yield from wait_lines(next(self._labels), port, awaited.timeout, self.settings)
 
     def comment(self, text: str) -> Iterator[str]:
         """Yield remarks; those of frames have no space."""

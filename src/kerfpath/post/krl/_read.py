@@ -22,10 +22,10 @@ from kerfpath.post.krl._write import (
     HEAD,
     PASSED,
     SWITCH_OFF,
-    awaiting,
     data_list,
-    opening,
-    switched_off,
+    opening_lines,
+    switch_off_lines,
+    wait_lines,
 )
 from kerfpath.robots import Robot
 
@@ -74,7 +74,7 @@ _FIRST = re.compile(rf"INT {FIRST}=(\d+)", re.ASCII)
 
 def read(main: str, files: Mapping[str, str], robot: Robot, settings: KrlSettings) -> ReadProgram:
     """Return the program that .src and .dat files of ours say; see `kerfpath.post.Reader`."""
-    first = _File(main, files, robot, settings, opening(settings))
+    first = _File(main, files, robot, settings, opening_lines(settings))
     begin = first.require_data([name for name in first.calls if name not in first.contours])
     sections: list[ReadSection] = []
     for name, number in first.calls.items():
@@ -182,7 +182,7 @@ class _File(LineReader):
             raise self.fault("only the first routine of a file that is called takes a number")
         self.routines.append(name)
         if name == SWITCH_OFF:
-            self.required = [*switched_off(self.settings), "END"]
+            self.required = [*switch_off_lines(self.settings), "END"]
             return
         if len(self.routines) > 1:
             self.steps = self.contours[name] = []
@@ -237,7 +237,7 @@ class _File(LineReader):
         if said is None:
             raise self.fault("expected the wait for an input two lines below")
         port, timeout = int(said[1]), float(timeout_ms) * 1e-3
-        first, *self.required = awaiting(port, timeout, self.settings)
+        first, *self.required = wait_lines(port, timeout, self.settings)
         if here != first:
             raise self.fault(f"expected {first!r}")
         self.expect_answer(port, timeout)

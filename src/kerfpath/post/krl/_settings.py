@@ -6,7 +6,7 @@ from typing import Annotated
 
 import numpy as np
 
-from kerfpath.post._settings import LinesPerFile, Rules, Settings, numbered, setting
+from kerfpath.post._settings import LinesPerFile, PortSettings, Rules, numbered, setting
 
 __all__ = ["LONGEST_NAME", "KrlSettings", "rules"]
 
@@ -25,20 +25,10 @@ Output = Annotated[int | None, numbered("a digital output", 8192)]
 Input = Annotated[int | None, numbered("a digital input", 8192)]
 
 
-class KrlSettings(Settings):
+class KrlSettings(PortSettings, output=Output, input=Input):
     """Which outputs, tool and base, and what the machine data allow."""
 
     lines_per_file: LinesPerFile = 1400
-    laser_output: Output = None
-    gas_output: Output = None
-    ready_input: Input = None
-    shutter_input: Input = None
-    gas_pressure_input: Input = None
-    height_input: Input = None
-    interlock_input: Input = None
-    ready_output: Output = None
-    shutter_output: Output = None
-    height_output: Output = None
     tool_number: Annotated[
         int | None, setting("the number of a TOOL_DATA, 1 to 128", "1", ge=1, le=128)
     ] = None

@@ -18,7 +18,7 @@ import numpy as np
 
 from kerfpath._arrays import Array
 from kerfpath.errors import InputError
-from kerfpath.post._divide import parts_of, renamed
+from kerfpath.post._divide import divide_program, rename_sections
 from kerfpath.post._formatter import Formatter, number
 from kerfpath.post._frames import euler
 from kerfpath.post._program import (
@@ -38,8 +38,16 @@ from kerfpath.post.krl._axes import axes_from_joints, status_and_turn
 from kerfpath.post.krl._settings import LONGEST_NAME, KrlSettings
 
 __all__ = [
-    "ANGLES", "FIRST", "HEAD", "SWITCH_OFF", "Krl", "awaiting", "called_from", "data_list",
-    "opening", "switched_off",
+    "ANGLES",
+    "FIRST",
+    "HEAD",
+    "SWITCH_OFF",
+    "Krl",
+    "call_lines",
+    "data_list",
+    "opening_lines",
+    "switch_off_lines",
+    "wait_lines",
 ]  # fmt: skip
 
 HEAD = ("&ACCESS RVP", "&REL 1")
@@ -64,7 +72,7 @@ ANGLES: Final = "ZYX"
 """A, B, C turn about Z, the new Y, the new X."""
 
 
-def opening(settings: KrlSettings) -> list[str]:
+def opening_lines(settings: KrlSettings) -> list[str]:
     """Return the statements that a main routine makes before it calls others, but for frames."""
     turning_deg_s = number(settings.turning_speed_deg_s, 1)
     numbered = (("TOOL", settings.tool_number), ("BASE", settings.base_number))
@@ -83,12 +91,12 @@ def opening(settings: KrlSettings) -> list[str]:
     ]
 
 
-def switched_off(settings: KrlSettings) -> list[str]:
+def switch_off_lines(settings: KrlSettings) -> list[str]:
     """Return the lines that switch off everything that the settings name."""
     return [f"$OUT[{output}]=FALSE" for output in outputs(settings)]
 
 
-def awaiting(number: int, timeout: float, settings: KrlSettings) -> list[str]:
+def wait_lines(number: int, timeout: float, settings: KrlSettings) -> list[str]:
     """Return the lines that wait for an input; after `timeout` (s) all is off until it comes."""
     return [
         f"$TIMER[{TIMER}]={-round(timeout * 1e3)}",
@@ -96,13 +104,13 @@ def awaiting(number: int, timeout: float, settings: KrlSettings) -> list[str]:
         f"WAIT FOR $IN[{number}] OR $TIMER_FLAG[{TIMER}]",
         f"$TIMER_STOP[{TIMER}]=TRUE",
         f"WHILE NOT $IN[{number}]",
-        *switched_off(settings),
+        *switch_off_lines(settings),
         "HALT",
         "ENDWHILE",
     ]
 
 
-def called_from(first: str, number: int, call: str) -> list[str]:
+def call_lines(first: str, number: int, call: str) -> list[str]:
     """Return the lines that call a contour, or a file up to it, unless the program begins later."""
     return [f"IF {first}<={number} THEN", call, "ENDIF"]
 
@@ -144,7 +152,7 @@ class Krl(Formatter):
     def __init__(self, program: Program, settings: KrlSettings) -> None:
         named = replace(program, name=program.name[:LONGEST_NAME])
         super().__init__(
-            renamed(named, (FIRST, PASSED, SWITCH_OFF), longest_name=LONGEST_NAME), settings
+            rename_sections(named, (FIRST, PASSED, SWITCH_OFF), longest_name=LONGEST_NAME), settings
         )
         self._held: dict[str, str] = {}
         self._target = self._target_texts()
@@ -202,7 +210,7 @@ class Krl(Formatter):
 
     def wait_for(self, awaited: Await) -> Iterator[str]:
         """Yield a wait for an input with its timer."""
-        yield from awaiting(self.port(awaited.partner, "input"), awaited.timeout, self.settings)
+        yield from wait_lines(self.port(awaited.partner, "input"), awaited.timeout, self.settings)
 
     def comment(self, text: str) -> Iterator[str]:
         """Yield a comment; a bar keeps one that says FOLD from folding the program."""
@@ -228,7 +236,7 @@ class Krl(Formatter):
         """Return the program as one file; nothing where that is too long."""
         sections = self.program.sections
         routines = {section.name: list(self.lines(section)) for section in sections}
-        calls = (called_from(FIRST, n, f"{name}()") for n, name in enumerate(routines, 1))
+        calls = (call_lines(FIRST, n, f"{name}()") for n, name in enumerate(routines, 1))
         file = self._main([line for call in calls for line in call], routines)
         fits = len(file.lines()) <= self.settings.lines_per_file
         return [file] if fits and len(sections) <= MOST_ROUTINES else []
@@ -239,14 +247,14 @@ class Krl(Formatter):
         share = -(-room // MOST_ROUTINES)
         counts = [max(count, share) for count in self.lengths().values()]
         others, calls, number = [], [], 0
-        for name, group in parts_of(self.program, counts, room, LONGEST_NAME).items():
+        for name, group in divide_program(self.program, counts, room, LONGEST_NAME).items():
             first = [f"INT {PASSED}"]
             for section in group:
                 number += 1
-                first += called_from(PASSED, number, f"{section.name}()")
+                first += call_lines(PASSED, number, f"{section.name}()")
             own = {section.name: list(self.lines(section)) for section in group}
             others.append(_File(name=name, first=first, routines=own, passed=f"{PASSED} :IN"))
-            calls += called_from(FIRST, number, f"{name}({FIRST})")
+            calls += call_lines(FIRST, number, f"{name}({FIRST})")
         main = self._main(calls, {})
         if len(main.lines()) > self.settings.lines_per_file:
             raise InputError(
@@ -257,7 +265,7 @@ class Krl(Formatter):
         return [main, *others]
 
     def _main(self, calls: Sequence[str], routines: Mapping[str, Sequence[str]]) -> _File:
-        every = {SWITCH_OFF: switched_off(self.settings), **routines}
+        every = {SWITCH_OFF: switch_off_lines(self.settings), **routines}
         first = [*self._start(), *calls, f"{FIRST}=1"]
         return _File(name=self.program.name, first=first, routines=every)
 
@@ -270,7 +278,7 @@ class Krl(Formatter):
         yield f"; {SWITCH_OFF}() runs at a stop message; the safety circuit of the cell has to"
         yield "; switch the laser off, too."
         yield f"; To begin at a contour set {FIRST} in the .dat to its number, and reset."
-        yield from opening(settings)
+        yield from opening_lines(settings)
         if settings.tool_number is None:
             yield f"$TOOL={{{_frames(program.T_flange_tip[None])[0]}}}"
         if settings.base_number is None:

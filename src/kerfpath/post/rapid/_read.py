@@ -21,9 +21,9 @@ from kerfpath.post.rapid._write import (
     FIRST,
     FULL_AIR_SPEED,
     air_speed_data,
-    ending,
+    ending_lines,
     linear_speed_data,
-    switched_off,
+    switch_off_lines,
     zone_data,
 )
 from kerfpath.robots import Robot
@@ -82,8 +82,8 @@ class _Reader(Aggregates):
         if self.ended:
             raise self.fault("nothing may follow ENDMODULE")
         in_main = self.routine_name == "main"
-        if in_main and not self.required and not self.number and line == ending()[0].strip():
-            self.required = [*(row.strip() for row in ending()[1:]), "ENDPROC"]
+        if in_main and not self.required and not self.number and line == ending_lines()[0].strip():
+            self.required = [*(row.strip() for row in ending_lines()[1:]), "ENDPROC"]
             self.routine_name = None
         elif not self.name:
             self.read(line, MODULE)
@@ -161,7 +161,7 @@ class _Reader(Aggregates):
     def routine(self, name: str) -> None:
         self.unused(name, self.routines)
         if name == SWITCH_OFF and self.file == self.main:
-            self.required = [*switched_off(self.settings), "ENDPROC"]
+            self.required = [*switch_off_lines(self.settings), "ENDPROC"]
             self.homes[name] = self.main
             return
         self.routine_name = name
@@ -175,7 +175,7 @@ class _Reader(Aggregates):
 
     def end_routine(self) -> None:
         if self.routine_name == "main":
-            raise self.fault(f"expected {ending()[0].strip()}, ERROR and UNDO before its end")
+            raise self.fault(f"expected {ending_lines()[0].strip()}, ERROR and UNDO before its end")
         self.routine_name = None
 
     def first(self, number: str) -> None:

@@ -16,7 +16,7 @@ from typing import TypeVar
 import numpy as np
 
 from kerfpath._arrays import Array
-from kerfpath.post._divide import in_files, renamed
+from kerfpath.post._divide import divide_sections, rename_sections
 from kerfpath.post._formatter import Formatter, number
 from kerfpath.post._names import identifiers
 from kerfpath.post._orientations import quaternions
@@ -43,9 +43,9 @@ __all__ = [
     "FULL_AIR_SPEED",
     "Rapid",
     "air_speed_data",
-    "ending",
+    "ending_lines",
     "linear_speed_data",
-    "switched_off",
+    "switch_off_lines",
     "zone_data",
 ]
 
@@ -72,7 +72,7 @@ class Rapid(Formatter):
     too_long = "warning"
 
     def __init__(self, program: Program, settings: RapidSettings) -> None:
-        super().__init__(renamed(program, (FIRST, SWITCH_OFF)), settings)
+        super().__init__(rename_sections(program, (FIRST, SWITCH_OFF)), settings)
         moves = program.moves
         joint = [move for move in moves if isinstance(move, JointMove)]
         self._cruise = cruises(self.program)
@@ -101,7 +101,7 @@ class Rapid(Formatter):
         if len(whole) <= most:
             return {f"{name}.mod": _text(whole)}
         files, calls = {}, []
-        parts = in_files(sections, list(self.lengths().values()), most)
+        parts = divide_sections(sections, list(self.lengths().values()), most)
         for module, part in zip(self._modules(), parts, strict=False):
             place = f'"{self.settings.folder}/{module}.mod"'
             calls += [rf"Load \Dynamic,{place};"]
@@ -142,11 +142,11 @@ class Rapid(Formatter):
         yield "  PROC main()"
         yield from (f"    {line}" for line in self.begin())
         yield from (f"    {line}" for line in calls)
-        yield from (f"  {line}" for line in ending())
+        yield from (f"  {line}" for line in ending_lines())
         yield "  ENDPROC"
         yield ""
         yield f"  PROC {SWITCH_OFF}()"
-        yield from (f"    {line}" for line in switched_off(settings))
+        yield from (f"    {line}" for line in switch_off_lines(settings))
         yield "  ENDPROC"
         for section in sections:
             yield from self._routine(section)
@@ -261,7 +261,7 @@ class Rapid(Formatter):
         return rf"{zone},{self.settings.tool_name}\WObj:={self.settings.work_object}"
 
 
-def ending() -> list[str]:
+def ending_lines() -> list[str]:
     """Return how main ends: the next time with the first contour; and its handlers.
 
     Those are of an error, and of leaving main before its end. What is not handled below ends here:
@@ -271,7 +271,7 @@ def ending() -> list[str]:
     return [f"  {FIRST}:=1;", "ERROR", off, "  StopMove;", "  RAISE;", "UNDO", off]
 
 
-def switched_off(settings: RapidSettings) -> list[str]:
+def switch_off_lines(settings: RapidSettings) -> list[str]:
     """Return the lines that switch off everything that the settings name."""
     return [f"SetDO {name},0;" for name in outputs(settings)]
 

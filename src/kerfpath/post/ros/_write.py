@@ -13,7 +13,7 @@ from typing import Annotated
 import numpy as np
 
 from kerfpath._arrays import Array, Ints
-from kerfpath.post._divide import in_one_file
+from kerfpath.post._divide import require_one_file
 from kerfpath.post._formatter import Formatter, number
 from kerfpath.post._orientations import quaternions
 from kerfpath.post._program import JointMove, LinearMove, Wait
@@ -28,7 +28,7 @@ SECOND = 1_000_000_000
 
 
 class RosSettings(Settings):
-    """What the robot's driver calls things, and how densely it is told the way."""
+    """What the robot's driver calls things, and how densely the way is written."""
 
     lines_per_file: LinesPerFile = 1_000_000
     joint_names: Annotated[
@@ -69,7 +69,7 @@ class Ros(Formatter):
         motion = trajectory(program, self.settings.step_ms * 1e-3)
         self._ends = iter((_ns(motion.time[motion.done]) / SECOND).tolist())
         name = program.name
-        return in_one_file(f"{name}.yaml", [*self._message(motion)], most) | in_one_file(
+        return require_one_file(f"{name}.yaml", [*self._message(motion)], most) | require_one_file(
             f"{name}.events.yaml", [*self._events()], most
         )
 

@@ -14,7 +14,7 @@ from kerfpath.post._program import SIGNALS, Switch
 from kerfpath.post._read import MoveKind, ReadProgram, ReadSection, ReadStep
 from kerfpath.post._reading import END_OF_FILE, LineReader, patterns, statements
 from kerfpath.post._settings import outputs
-from kerfpath.post.urscript._switching import time_ahead, waiting, when_stopped, words
+from kerfpath.post.urscript._switching import stop_lines, switch_lines, time_ahead, wait_lines
 from kerfpath.post.urscript._write import FIRST, URScriptSettings, full_joint_speed
 from kerfpath.robots import Robot
 
@@ -75,10 +75,10 @@ class _Reader(LineReader):
         tool = _pose(self.take(_TOOL, "set_tcp(p[...])"))
         part = _pose(self.take(_PART, "global part_frame = p[...]"))
         begin = int(self.take(_FIRST, f"global {FIRST} = 1")[0])
-        self.expect(when_stopped(outputs(self.settings)))
-        self.can_wait = self.text == waiting([])[0]
+        self.expect(stop_lines(outputs(self.settings)))
+        self.can_wait = self.text == wait_lines([])[0]
         if self.can_wait:
-            self.expect(waiting(outputs(self.settings)))
+            self.expect(wait_lines(outputs(self.settings)))
         signals = self.signals
         for known in SIGNALS.values():
             if self.text != f"global {known}_waits = False":
@@ -87,7 +87,7 @@ class _Reader(LineReader):
             if output is None:
                 raise self.fault(f"switches the {known}; say by which output with {known}_output")
             signals.append(known)
-            self.expect(words(known, output))
+            self.expect(switch_lines(known, output))
         sections: dict[str, ReadSection] = {}
         while match := _DEFINITION.fullmatch(self.text):
             if match[1] in sections:

@@ -17,7 +17,7 @@ import numpy as np
 from kerfpath._arrays import Array
 from kerfpath.errors import InputError
 from kerfpath.post._axes import offset_near
-from kerfpath.post._divide import in_one_file
+from kerfpath.post._divide import require_one_file
 from kerfpath.post._formatter import Formatter, number
 from kerfpath.post._orientations import rotation_vectors
 from kerfpath.post._program import (
@@ -31,14 +31,14 @@ from kerfpath.post._program import (
     Wait,
     targets_of,
 )
-from kerfpath.post._settings import Rules, Settings, outputs, setting
+from kerfpath.post._settings import PortSettings, Rules, outputs, setting
 from kerfpath.post.urscript._switching import (
     LOCAL,
     distance_ahead,
     names,
-    waiting,
-    when_stopped,
-    words,
+    stop_lines,
+    switch_lines,
+    wait_lines,
 )
 from kerfpath.robots import Robot
 
@@ -55,19 +55,9 @@ Output = Annotated[int | None, setting("a standard digital output from 0 to 7", 
 Input = Annotated[int | None, setting("a standard digital input from 0 to 7", "0", ge=0, le=7)]
 
 
-class URScriptSettings(Settings):
+class URScriptSettings(PortSettings, output=Output, input=Input):
     """What is wired to the controller, and how fast it may speed up."""
 
-    laser_output: Output = None
-    gas_output: Output = None
-    ready_input: Input = None
-    shutter_input: Input = None
-    gas_pressure_input: Input = None
-    height_input: Input = None
-    interlock_input: Input = None
-    ready_output: Output = None
-    shutter_output: Output = None
-    height_output: Output = None
     acceleration_mm_s2: Annotated[
         float, setting("a number from 1 to 50000, in mm/s^2", "1200", ge=1, le=50_000)
     ] = 1200.0
@@ -110,7 +100,7 @@ class URScript(Formatter):
         """Return the one file."""
         self.target = self._target_texts()
         lines = [*self._program()]
-        return in_one_file(f"{self.program.name}.script", lines, self.settings.lines_per_file)
+        return require_one_file(f"{self.program.name}.script", lines, self.settings.lines_per_file)
 
     def _program(self) -> Iterator[str]:
         program, robot = self.program, self.program.robot
@@ -126,11 +116,11 @@ class URScript(Formatter):
         yield f"  set_tcp({_pose(tool)})"
         yield f"  global part_frame = {_pose(part)}"
         yield f"  global {FIRST} = 1"
-        yield from (f"  {line}" for line in when_stopped(outputs(self.settings)))
+        yield from (f"  {line}" for line in stop_lines(outputs(self.settings)))
         if any(isinstance(step, Await) for step in program.steps):
-            yield from (f"  {line}" for line in waiting(outputs(self.settings)))
+            yield from (f"  {line}" for line in wait_lines(outputs(self.settings)))
         for signal in self.signals:
-            yield from (f"  {line}" for line in words(signal, self.output(signal)))
+            yield from (f"  {line}" for line in switch_lines(signal, self.output(signal)))
         for section in program.sections:
             yield f"  def {section.name}():"
             yield from (f"    {line}" for line in self.lines(section))

@@ -23,12 +23,12 @@ from kerfpath.post.val3._write import (
     PORTS,
     PROGRAM,
     PROJECT,
-    awaiting,
-    closing,
+    closing_lines,
     links,
-    opening,
+    opening_lines,
     parameters,
-    stopping,
+    stop_lines,
+    wait_lines,
 )
 from kerfpath.post.val3._xml import Element, parse
 from kerfpath.robots import Robot
@@ -164,7 +164,7 @@ class _Project:
     def calls(self, start: Element) -> list[tuple[int, str, str]]:
         """Return what start() calls: line, alias of the library or nothing, routine."""
         rows = self.statements(start)
-        begin, end = opening(self.settings), closing()
+        begin, end = opening_lines(self.settings), closing_lines()
         count = len(rows) - len(begin) - len(end)
         for number, row in enumerate(begin):
             if [text for _, text in rows[number : number + 1]] != [row]:
@@ -185,8 +185,8 @@ class _Project:
     def require_stop(self) -> None:
         """Check that stop() switches everything off."""
         stop = self.routine("stop")
-        if [row for _, row in self.statements(stop)] != stopping(self.settings):
-            raise stop.fault(f"expected {' and '.join(stopping(self.settings))} in stop()")
+        if [row for _, row in self.statements(stop)] != stop_lines(self.settings):
+            raise stop.fault(f"expected {' and '.join(stop_lines(self.settings))} in stop()")
 
     def steps(self, name: str) -> tuple[ReadStep, ...]:
         """Return what a routine does."""
@@ -256,7 +256,7 @@ class _Routine(LineReader):
 
     def wait_for(self, name: str, timeout: str) -> None:
         partner = self.partner(name, "input")
-        self.required = awaiting(partner, float(timeout), self.settings)[1:]
+        self.required = wait_lines(partner, float(timeout), self.settings)[1:]
         self.expect_answer(name, float(timeout))
 
     def partner(self, port: object, way: str) -> Partner:

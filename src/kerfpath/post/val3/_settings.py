@@ -7,7 +7,7 @@ from typing import Annotated, Literal
 import numpy as np
 from pydantic import StringConstraints
 
-from kerfpath.post._settings import Rules, Settings, setting
+from kerfpath.post._settings import PortSettings, Rules, setting
 
 __all__ = ["LONGEST_NAME", "Val3Settings", "is_reserved", "rules"]
 
@@ -54,19 +54,9 @@ Input = Annotated[
 ]
 
 
-class Val3Settings(Settings):
+class Val3Settings(PortSettings, output=Output, input=Input):
     """Which outputs, where the projects lie, and for which version they are."""
 
-    laser_output: Output = None
-    gas_output: Output = None
-    ready_input: Input = None
-    shutter_input: Input = None
-    gas_pressure_input: Input = None
-    height_input: Input = None
-    interlock_input: Input = None
-    ready_output: Output = None
-    shutter_output: Output = None
-    height_output: Output = None
     tool_link: Annotated[
         Link,
         setting("the link of the tool's own output, as the controller lists it", '"valve1"'),

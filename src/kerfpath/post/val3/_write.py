@@ -3,7 +3,7 @@
 Units of VAL 3: mm, deg, mm/s, seconds; rx, ry, rz turn about x, the new y, the new z. A program is
 a project, a folder of XML files: what belongs to it, its data, and one file for each routine.
 Targets, speeds and frames are data. Motions are queued while the routine runs on: to switch an
-output where the tip stands, the routine waits for the end of the motion; see `stopping_to_switch`.
+output where the tip stands, the routine waits for the end of the motion; see `stop_to_switch`.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ import numpy as np
 
 from kerfpath._arrays import Array
 from kerfpath.errors import InputError
-from kerfpath.post._divide import parts_of, renamed
+from kerfpath.post._divide import divide_program, rename_sections
 from kerfpath.post._formatter import Formatter, number
 from kerfpath.post._frames import controller_frames, euler
 from kerfpath.post._program import (
@@ -33,14 +33,26 @@ from kerfpath.post._program import (
     targets_of,
 )
 from kerfpath.post._settings import handshakes
-from kerfpath.post._standing import stopping_to_switch
+from kerfpath.post._standing import stop_to_switch
 from kerfpath.post.val3._axes import axes_from_joints, posture
 from kerfpath.post.val3._settings import LONGEST_NAME, Val3Settings
 from kerfpath.post.val3._xml import SCHEMA
 
 __all__ = [
-    "ANGLES", "DATA", "FIRST", "OUTPUTS", "PORTS", "PROGRAM", "PROJECT", "Val3", "awaiting",
-    "closing", "links", "opening", "parameters", "stopping",
+    "ANGLES",
+    "DATA",
+    "FIRST",
+    "OUTPUTS",
+    "PORTS",
+    "PROGRAM",
+    "PROJECT",
+    "Val3",
+    "closing_lines",
+    "links",
+    "opening_lines",
+    "parameters",
+    "stop_lines",
+    "wait_lines",
 ]  # fmt: skip
 
 ANGLES: Final = "XYZ"
@@ -90,13 +102,13 @@ def links(settings: Val3Settings) -> dict[str, str]:
     return {name: link for name, link in named.items() if link is not None}
 
 
-def opening(settings: Val3Settings) -> list[str]:
+def opening_lines(settings: Val3Settings) -> list[str]:
     """Return the statements that switch everything off, as start() does before it calls others."""
     inputs = [name for (_, way), name in PORTS.items() if way == "input"]
     return [f"{name}=false" for name in links(settings) if name not in inputs]
 
 
-def awaiting(partner: str, timeout: float, settings: Val3Settings) -> list[str]:
+def wait_lines(partner: str, timeout: float, settings: Val3Settings) -> list[str]:
     """Return the statements that wait for an input.
 
     After `timeout` (s) everything is off, the arm's power too, until the input comes.
@@ -104,7 +116,7 @@ def awaiting(partner: str, timeout: float, settings: Val3Settings) -> list[str]:
     asked = f"{PORTS[partner, 'input']}==true"
     return [
         f"if watch({asked},{number(timeout, 3)})==false",
-        *opening(settings),
+        *opening_lines(settings),
         "disablePower()",
         f'logMsg("{partner}: no answer")',
         f"wait({asked})",
@@ -112,14 +124,14 @@ def awaiting(partner: str, timeout: float, settings: Val3Settings) -> list[str]:
     ]
 
 
-def closing() -> list[str]:
+def closing_lines() -> list[str]:
     """Return the last statements of start(); the next time it begins with the first contour."""
     return ["waitEndMove()", f"{FIRST}=1"]
 
 
-def stopping(settings: Val3Settings) -> list[str]:
+def stop_lines(settings: Val3Settings) -> list[str]:
     """Return the statements of stop(), which the controller calls when the project is stopped."""
-    return [*opening(settings), "resetMotion()"]
+    return [*opening_lines(settings), "resetMotion()"]
 
 
 @dataclass(slots=True)
@@ -148,15 +160,15 @@ class Val3(Formatter):
     too_long = "warning"
 
     def __init__(self, program: Program, settings: Val3Settings) -> None:
-        short = replace(stopping_to_switch(program), name=program.name[:LONGEST_NAME])
-        super().__init__(renamed(short, (FIRST,), longest_name=LONGEST_NAME), settings)
+        short = replace(stop_to_switch(program), name=program.name[:LONGEST_NAME])
+        super().__init__(rename_sections(short, (FIRST,), longest_name=LONGEST_NAME), settings)
         self._target = self._target_texts()
         self._database = _Database()
         self._moving = True
         counts = list(self.lengths().values())
         self._parts: dict[str, list[Section]] = {}
         if sum(counts) > self.room():
-            self._parts = parts_of(self.program, counts, self.room(), LONGEST_NAME)
+            self._parts = divide_program(self.program, counts, self.room(), LONGEST_NAME)
 
     def lengths(self) -> dict[str, int]:
         """Return how many lines of data each contour takes at most, by its name."""
@@ -230,7 +242,7 @@ class Val3(Formatter):
     def wait_for(self, awaited: Await) -> Iterator[str]:
         """Yield a wait for an input, once the robot stands."""
         yield from self.standing()
-        yield from awaiting(awaited.partner, awaited.timeout, self.settings)
+        yield from wait_lines(awaited.partner, awaited.timeout, self.settings)
 
     def comment(self, text: str) -> Iterator[str]:
         """Yield a comment that does not end the text in which it stands."""
@@ -261,11 +273,11 @@ class Val3(Formatter):
         routines = {section.name: list(self.lines(section)) for section in sections}
         start = ["// A library: its routines are called."]
         if calls is not None:
-            start = [*self._remarks(), *opening(self.settings)]
+            start = [*self._remarks(), *opening_lines(self.settings)]
             for n, call in enumerate(calls, 1):
                 start += [f"if {FIRST}<={n}", f"  call {call}()", "endIf"]
-            start += closing()
-        routines = {"start": start, "stop": stopping(self.settings), **routines}
+            start += closing_lines()
+        routines = {"start": start, "stop": stop_lines(self.settings), **routines}
         texts = {
             f"{name}.pjx": self._contents(name, routines, () if calls is None else self._parts)
         }
