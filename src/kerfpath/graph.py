@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from kerfpath._arrays import Array, Bools, Ints, freeze, scalar
 from kerfpath.errors import InputError
 from kerfpath.kernels import turns
-from kerfpath.robots import Robot, require_few_turns
+from kerfpath.robots import Robot
 
 __all__ = ["LayeredGraph", "build", "gamma_grid"]
 
@@ -188,7 +188,7 @@ def build(
     """
     wanted = _wanted(postures, robot.postures)
     arm = robot.alone()
-    require_few_turns(arm)
+    arm.require_few_turns()
     limits = arm.joint_limits()
     if not robot.family.free_rotation:
         gamma = freeze(np.zeros(1))

@@ -10,18 +10,20 @@ that say axis 3 refuse it.
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from kerfpath._arrays import Array, floats
 from kerfpath.errors import InputError
+from kerfpath.robots._arm import Arm
 from kerfpath.robots._coupling import Coupling
-from kerfpath.robots._library import robot as known_robot
-from kerfpath.robots._library import robot_ids
-from kerfpath.robots._robot import Robot
+from kerfpath.robots._library import known, robot_ids
 
 __all__ = ["level", "with_axis_3"]
+
+A = TypeVar("A", bound=Arm)
 
 COUNTED = {
     "ABB": ("serial", "horizontal"),
@@ -41,7 +43,7 @@ ARM = ("a1", "a2", "b", "c2", "c3")
 """The lengths from axis 1 to the wrist: foot and flange may be described elsewhere."""
 
 
-def level(robot: Robot) -> tuple[Array, float]:
+def level(robot: Arm) -> tuple[Array, float]:
     """Return row (n,) and shift rad of axis 3 from the horizontal: row @ q + shift.
 
     As the robot's maker counts it, zero where the upper arm lies level.
@@ -53,7 +55,7 @@ def level(robot: Robot) -> tuple[Array, float]:
     return way * row, way * shift
 
 
-def with_axis_3(robot: Robot, axis_3: str = "", limits: ArrayLike | None = None) -> Robot:
+def with_axis_3(robot: A, axis_3: str = "", limits: ArrayLike | None = None) -> A:
     """Return the robot with axis 3 as it is told, or else as the library knows it.
 
     Parameters
@@ -78,14 +80,14 @@ def with_axis_3(robot: Robot, axis_3: str = "", limits: ArrayLike | None = None)
     return _looked_up(robot)
 
 
-def _looked_up(robot: Robot) -> Robot:
+def _looked_up(robot: A) -> A:
     """Return the robot with what the library knows of axis 3 of an arm with its lengths.
 
     Unchanged where no arm of its maker has them, or where those that have them do not agree.
     """
     twins = [
         twin
-        for twin in (known_robot(name) for name in robot_ids())
+        for twin in (known(Arm, name) for name in robot_ids())
         if twin.kinematics == robot.kinematics == "opw"
         and robot.manufacturer in ("", twin.manufacturer)
         and all(abs(robot.geometry[k] - twin.geometry[k]) <= ALIKE for k in ARM)
@@ -105,7 +107,7 @@ def _looked_up(robot: Robot) -> Robot:
     return replace(robot, axis_3=counted, couplings=_tightest(bounds), notes=(*robot.notes, *notes))
 
 
-def _told(robot: Robot, axis_3: str, limits: ArrayLike | None) -> Robot:
+def _told(robot: A, axis_3: str, limits: ArrayLike | None) -> A:
     """Return the robot with axis 3 as it is told, once nothing known speaks against it."""
     counted = COUNTED.get(robot.manufacturer, ("serial", "horizontal"))
     if axis_3 not in counted:
@@ -147,7 +149,7 @@ def _told(robot: Robot, axis_3: str, limits: ArrayLike | None) -> Robot:
     return replace(robot, axis_3=axis_3, couplings=(one,))
 
 
-def _carried_over(coupling: Coupling, twin: Robot, robot: Robot) -> Coupling:
+def _carried_over(coupling: Coupling, twin: Arm, robot: Arm) -> Coupling:
     """Return a bound of a twin in the joints of a robot, which may count them otherwise."""
     row = coupling.row * twin.sign * robot.sign
     shift = float(coupling.row @ (twin.sign * _turned(twin.offset - robot.offset)))

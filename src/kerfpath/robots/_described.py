@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any
+from typing import TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -12,12 +12,14 @@ from scipy.spatial.transform import Rotation
 
 from kerfpath._arrays import Array
 from kerfpath.errors import InputError
+from kerfpath.robots._arm import Arm
 from kerfpath.robots._axis_three import with_axis_3
 from kerfpath.robots._recognise import in_closed_form, model_of
-from kerfpath.robots._robot import Robot
 from kerfpath.urdf import Chain, Description, read_urdf
 
 __all__ = ["described", "robot_of"]
+
+A = TypeVar("A", bound=Arm)
 
 SNAPS = (5e-6, 5e-5, 5e-4, 5e-3)
 """rad: by how much angles of five, four, three and two digits after the point may be rounded."""
@@ -83,6 +85,7 @@ def _moved(found: Description, meant: Chain) -> tuple[float, float]:
 
 
 def robot_of(
+    kind: type[A],
     description: Description,
     *,
     as_written: bool = False,
@@ -94,7 +97,7 @@ def robot_of(
     velocity: ArrayLike | None = None,
     acceleration: ArrayLike | None = None,
     endless: ArrayLike | None = None,
-) -> Robot:
+) -> A:
     """Return the robot of a description; limits given (rad, s) come before those written.
 
     Raises
@@ -111,12 +114,19 @@ def robot_of(
     continuous = np.array([joint.kind == "continuous" for joint in description.joints])
     left_out = ", ".join(description.left_out)
     outside = [f"Links on joints outside the chain are left out: {left_out}."] if left_out else []
-    found = Robot(
+    low, high = _ranges(description, lower, upper, endless)
+    found = kind(
         id=description.name,
         manufacturer=manufacturer,
-        notes=(*model.pop("notes", ()), *outside),
-        **model,
-        **_ranges(description, lower, upper, endless),
+        notes=(*model.notes, *outside),
+        kinematics=model.kinematics,
+        geometry=model.geometry,
+        sign=model.sign,
+        offset=model.offset,
+        T_base_foot=model.T_base_foot,
+        T_end_flange=model.T_end_flange,
+        lower=low,
+        upper=high,
         velocity=_velocity(description) if velocity is None else np.asarray(velocity),
         acceleration=None if acceleration is None else np.asarray(acceleration),
         acceleration_source="" if acceleration is None else "given by the user",
@@ -134,11 +144,11 @@ def _ranges(
     lower: ArrayLike | None,
     upper: ArrayLike | None,
     endless: ArrayLike | None,
-) -> dict[str, Any]:
+) -> tuple[Array, Array]:
     """Return lower and upper limits; an endless joint, which has none, gets one turn."""
     n = len(description.joints)
     free = np.zeros(n, bool) if endless is None else np.asarray(endless, bool)
-    ranges = {"lower": -np.pi * np.ones(n), "upper": np.pi * np.ones(n)}
+    low, high = -np.pi * np.ones(n), np.pi * np.ones(n)
     for i, joint in enumerate(description.joints):
         if joint.kind == "continuous" or free[i]:
             continue
@@ -151,9 +161,11 @@ def _ranges(
                 f"may only be at {joint.lower:g} rad, so that it cannot move",
                 "lower= and upper=",
             )
-        ranges["lower"][i], ranges["upper"][i] = joint.lower or 0.0, joint.upper or 0.0
-    given = {"lower": lower, "upper": upper}
-    return {**ranges, **{key: np.asarray(v) for key, v in given.items() if v is not None}}
+        low[i], high[i] = joint.lower or 0.0, joint.upper or 0.0
+    return (
+        low if lower is None else np.asarray(lower),
+        high if upper is None else np.asarray(upper),
+    )
 
 
 def _velocity(description: Description) -> Array:

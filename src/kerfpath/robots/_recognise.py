@@ -8,17 +8,16 @@ that is of no family with a closed form is "general", and its chain is its model
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
-from typing import Any
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from kerfpath._arrays import Array
 from kerfpath.errors import InputError
+from kerfpath.robots._arm import Arm
 from kerfpath.robots._families import FAMILIES
 from kerfpath.robots._general import require_solver
-from kerfpath.robots._robot import Robot
 from kerfpath.urdf import Chain
 
 __all__ = ["EXACT", "in_closed_form", "model_of"]
@@ -83,8 +82,8 @@ def in_closed_form(chain: Chain) -> bool:
     )
 
 
-def model_of(chain: Chain, *, as_written: bool = False) -> dict[str, Any]:
-    """Return family, geometry, joint convention and frames of a chain, as `Robot` takes them.
+def model_of(chain: Chain, *, as_written: bool = False) -> Arm:
+    """Return family, geometry, joint convention and frames of a chain.
 
     Parameters
     ----------
@@ -124,7 +123,8 @@ def model_of(chain: Chain, *, as_written: bool = False) -> dict[str, Any]:
         require_solver()
     except InputError as error:
         raise InputError(f"{'; '.join(told)}: {error}") from None
-    return {"kinematics": "general", "geometry": {}, "notes": (f"General arm: {'; '.join(told)}.",)}
+    notes = (f"General arm: {'; '.join(told)}.",)
+    return Arm(id="", kinematics="general", geometry={}, notes=notes, chain=chain)
 
 
 def _lines(chain: Chain) -> _Lines:
@@ -223,42 +223,41 @@ def _ur(at: _Lines) -> tuple[dict[str, float], list[float], list[float]] | str:
     return lengths, signs, [np.arctan2(x[1], x[0]), q2, q23 - q2, theta - q23, q5, 0.0]
 
 
-def _turned(direction: Array, *wanted: Any) -> tuple[Array, float]:
+def _turned(direction: Array, *wanted: Callable[[Array], float]) -> tuple[Array, float]:
     """Return a direction or its opposite, and which: whatever makes `wanted` of it positive.
 
     The first of the functions that is not zero decides; after them, the larger x and then y.
     """
-    for want in (*wanted, lambda d: d[1], lambda d: d[0], lambda d: d[2]):
-        value = want(direction)
-        if abs(value) > NEARLY:
-            sign = 1.0 if value > 0 else -1.0
-            break
+    values = [*(want(direction) for want in wanted), *direction[[1, 0, 2]]]
+    sign = 1.0 if next(value for value in values if abs(value) > NEARLY) > 0 else -1.0
     return sign * direction, sign
 
 
 def _laid(
     family: str, at: _Lines, lengths: dict[str, float], signs: list[float], zero: list[float]
-) -> dict[str, Any]:
+) -> Arm:
     """Return the model with joint 6 and the end turned onto the tip."""
-    model: dict[str, Any] = {
-        "kinematics": family,
-        "geometry": {k: _round(float(v)) for k, v in lengths.items()},
-        "sign": np.array(signs),
-        "offset": np.array([_round(-float(q)) for q in zero]),
-        "T_base_foot": at.foot,
-    }
+    model = Arm(
+        id="",
+        kinematics=family,
+        geometry={k: _round(float(v)) for k, v in lengths.items()},
+        sign=np.array(signs),
+        offset=np.array([_round(-float(q)) for q in zero]),
+        T_base_foot=at.foot,
+    )
     want = at.foot @ at.tip
-    left = np.linalg.inv(Robot(id="", **model).forward(np.zeros(6))) @ want
+    left = np.linalg.inv(model.forward(np.zeros(6))) @ want
     if np.hypot(left[0, 2], left[1, 2]) < NEARLY and left[2, 2] > 0:
-        model["offset"][5] = _round(-float(np.arctan2(left[1, 0], left[0, 0])))
-        left = np.linalg.inv(Robot(id="", **model).forward(np.zeros(6))) @ want
-    return {**model, "T_end_flange": _tidy(left)}
+        sixth = _round(-float(np.arctan2(left[1, 0], left[0, 0])))
+        model = replace(model, offset=np.append(model.offset[:5], sixth))
+        left = np.linalg.inv(model.forward(np.zeros(6))) @ want
+    return replace(model, T_end_flange=_tidy(left))
 
 
-def _miss(chain: Chain, model: dict[str, Any]) -> float:
+def _miss(chain: Chain, model: Arm) -> float:
     """Return the largest entry by which the model's poses differ from the chain's."""
     q = np.random.default_rng(2008).uniform(-np.pi, np.pi, (POSES, 6))
-    return float(np.abs(Robot(id="", **model).forward(q) - chain.forward(q)).max())
+    return float(np.abs(model.forward(q) - chain.forward(q)).max())
 
 
 def _round(value: float) -> float:

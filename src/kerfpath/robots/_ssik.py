@@ -32,7 +32,7 @@ class Prepared(NamedTuple):
     """(7, 4, 4): each joint frame in the one before it, and the end in the last."""
     axes: Array
     """(6, 3)"""
-    elimination: dict[str, Any] | None
+    elimination: Any
     """Of an arm without intersecting or parallel axes that would spare it."""
 
 
