@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike
 from kerfpath._arrays import Array, Bools, Ints, as_pose, bools, floats, freeze, positive
 from kerfpath.errors import InputError
 from kerfpath.kernels import turns
+from kerfpath.losses import Loss, Reason
 from kerfpath.robots._coupling import AXIS_3, Coupling
 from kerfpath.robots._external import ExternalAxis
 from kerfpath.robots._families import FAMILIES, Family
@@ -248,12 +249,16 @@ class Arm:
             raise self._lacks("joint accelerations", "acceleration=", hint)
         return self.velocity, self.acceleration
 
-    def reasons(self) -> tuple[str, ...]:
-        """Say what each reason code of a dropped pose means, by code."""
+    def bounds(self) -> tuple[Reason, ...]:
+        """Return the reasons for poses beyond a limit: low and high of each joint and coupling."""
         names = [f"joint {i + 1}" for i in range(self.family.joints)]
         names += [c.name for c in self.couplings]
-        bounds = [f"{name} {end}" for name in names for end in ("low", "high")]
-        return ("admitted", "unreachable", *bounds, "posture not wanted")
+        return tuple(Reason(end, name) for name in names for end in (Loss.LOW, Loss.HIGH))
+
+    def reasons(self) -> tuple[Reason, ...]:
+        """Return what each reason code of a dropped pose means, by code."""
+        first = Reason(Loss.ADMITTED), Reason(Loss.UNREACHABLE)
+        return (*first, *self.bounds(), Reason(Loss.UNWANTED))
 
     def require_few_turns(self) -> None:
         """Require of position limits that the kernels have room for every combination of turns.

@@ -2,9 +2,9 @@
 
 A parallel rod from the foot of an arm (IRB 2400, 4400) holds its upper arm as it was while axis 2
 moves, and every FANUC pendant shows J3 so: then axis 3 is joint 2 and joint 3 of the serial model
-together, and its limits bound both. Nothing in a description tells. An arm read from one is known
-by the lengths of a robot of the library, or it is told; otherwise it is not known, and languages
-that say axis 3 refuse it.
+together, and its limits bound both. No description says which. For an arm read from one it is that
+of a robot of the library with the same lengths, or it is given; otherwise it is not known, and
+languages that say axis 3 refuse the arm.
 """
 
 from __future__ import annotations
@@ -56,7 +56,7 @@ def level(robot: Arm) -> tuple[Array, float]:
 
 
 def with_axis_3(robot: A, axis_3: str = "", limits: ArrayLike | None = None) -> A:
-    """Return the robot with axis 3 as it is told, or else as the library knows it.
+    """Return the robot with axis 3 as given, or else as the library knows it.
 
     Parameters
     ----------
@@ -74,7 +74,7 @@ def with_axis_3(robot: A, axis_3: str = "", limits: ArrayLike | None = None) -> 
         not do, or the library knows otherwise of an arm with these lengths.
     """
     if axis_3:
-        return _told(robot, axis_3, limits)
+        return _given(robot, axis_3, limits)
     if limits is not None:
         raise InputError('axis_3_limits=: expected them with axis_3="horizontal", got no axis_3=')
     return _looked_up(robot)
@@ -107,8 +107,8 @@ def _looked_up(robot: A) -> A:
     return replace(robot, axis_3=counted, couplings=_tightest(bounds), notes=(*robot.notes, *notes))
 
 
-def _told(robot: A, axis_3: str, limits: ArrayLike | None) -> A:
-    """Return the robot with axis 3 as it is told, once nothing known speaks against it."""
+def _given(robot: A, axis_3: str, limits: ArrayLike | None) -> A:
+    """Return the robot with axis 3 as given, unless something known contradicts it."""
     counted = COUNTED.get(robot.manufacturer, ("serial", "horizontal"))
     if axis_3 not in counted:
         raise InputError(

@@ -29,6 +29,8 @@ class Travel(TypedDict):
 class ExternalAxis:
     """A joint that moves the whole robot against the part; its value is the last column of q.
 
+    Known to the search, the refinement and the audit; jobs, cells, reports and programs have none.
+
     Where it stands at x: a rail has taken the robot's base x metres along `axis`; a positioner has
     turned the part by x about `axis` through `point`. All frames and poses stay those of base and
     part at x = 0: what matters is how the one moves against the other. Its limits are the last of

@@ -1,9 +1,9 @@
-"""Which family an arm belongs to, told from the lines that its joints turn about.
+"""Recognise the family of an arm by the lines that its joints turn about.
 
-The joint axes at angle zero say everything: the model is laid into them, its lengths are measured
-between them, and its angles at that pose become the joint offsets. Whether it then is the robot is
-not argued but measured, against the chain of the description at joint angles of all kinds. An arm
-that is of no family with a closed form is "general", and its chain is its model.
+The joint axes at angle zero suffice: the model is laid into them, its lengths are measured between
+them, and its angles at that pose become the joint offsets. The model is then compared with the
+chain of the description at random joint angles. An arm that is of no family with a closed form is
+"general", and its chain is its model.
 """
 
 from __future__ import annotations
@@ -101,18 +101,18 @@ def model_of(chain: Chain, *, as_written: bool = False) -> Arm:
         redundant = "the arm is redundant, and planning with a free elbow is not offered"
         why = redundant if n > 6 else "such arms are not recognised from descriptions"
         raise InputError(f"expected 6 joints between base and tip, got {n}: {why}")
-    lines, told = _lines(chain), []
+    lines, why = _lines(chain), []
     for name, derive in DERIVED:
         derived = derive(lines)
         words = FAMILIES[name].words
         if isinstance(derived, str):
-            told.append(f"not an {words}, as {derived}")
+            why.append(f"not an {words}, as {derived}")
             continue
         model = _laid(name, lines, *derived)
         miss = _miss(chain, model)
         if miss <= EXACT:
             return model
-        told.append(f"not an {words}, which it misses by {miss:.1e} (m and rad)")
+        why.append(f"not an {words}, which it misses by {miss:.1e} (m and rad)")
         if miss > ROUNDED or as_written:
             continue
         raise InputError(
@@ -122,8 +122,8 @@ def model_of(chain: Chain, *, as_written: bool = False) -> Arm:
     try:
         require_solver()
     except InputError as error:
-        raise InputError(f"{'; '.join(told)}: {error}") from None
-    notes = (f"General arm: {'; '.join(told)}.",)
+        raise InputError(f"{'; '.join(why)}: {error}") from None
+    notes = (f"General arm: {'; '.join(why)}.",)
     return Arm(id="", kinematics="general", geometry={}, notes=notes, chain=chain)
 
 
