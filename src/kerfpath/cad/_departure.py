@@ -27,7 +27,7 @@ ON_CURVE = 1e-5
 """How far (m) a node that lies on a curve may be off it; samples of samples are some micrometres
 off."""
 CHORD, ANGLE = 0.02, 0.05
-"""Within a cell the curve bends by no more than this (mm, rad), so that few points tell it all."""
+"""Within a cell the curve bends by no more than this (mm, rad), so that few points suffice."""
 CELLS = 200
 """Least number of cells along a loop; a node looks for its place in those around it."""
 POLISH = 6
@@ -44,7 +44,7 @@ class Departure:
     """How far the nodes of a contour, joined by chords, leave what they sample.
 
     Tool axes turn evenly along each chord. Nodes are counted from 0; an error between two nodes is
-    told by the first of them.
+    counted at the first of them.
 
     Parameters
     ----------
@@ -271,7 +271,7 @@ def _unrolled(at: Array, around: float, length: float, tolerance: float, name: s
     around : float mm
         Length of the loop, infinite for an open one.
     length : float mm
-        Of the contour, which tells in what direction it runs.
+        Of the contour, by which its direction is found.
     tolerance : float mm
         Steps back that are only inaccurate are none.
     name : str

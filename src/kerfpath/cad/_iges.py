@@ -49,14 +49,14 @@ def _require_whole(content: bytes) -> None:
             f"got {marks[0][:1]!r}; export the part as IGES"
         )
     last = lines[-1].decode("ascii", "replace")
-    told = re.match(r"S\s*(\d+)G\s*(\d+)D\s*(\d+)P\s*(\d+)", last)
-    if marks[-1][:1] != "T" or told is None:
+    sizes = re.match(r"S\s*(\d+)G\s*(\d+)D\s*(\d+)P\s*(\d+)", last)
+    if marks[-1][:1] != "T" or sizes is None:
         raise InputError(
             f"the file is truncated: expected a line T at its end, got {last[:32]!r}; "
             "copy or export it again"
         )
     # OCCT may crash on lines that are missing or in another order.
-    counts = zip("SGDPT", (*map(int, told.groups()), 1), strict=True)
+    counts = zip("SGDPT", (*map(int, sizes.groups()), 1), strict=True)
     due = (f"{section}{k:07}" for section, count in counts for k in range(1, count + 1))
     for line, (want, got) in enumerate(zip_longest(due, marks), start=1):
         if got != want:
@@ -68,7 +68,7 @@ def _require_whole(content: bytes) -> None:
     # Columns 65 to 72 of the parameters tell the directory entry that each line belongs to.
     owners = [line[64:72].strip() for line in lines if line[72:73] == b"P"]
     entries = [int(owner) if owner.isdigit() else 0 for owner, _ in groupby(owners)]
-    known = range(1, int(told[3]) + 1, 2)
+    known = range(1, int(sizes[3]) + 1, 2)
     if len(set(entries)) < len(entries) or not all(entry in known for entry in entries):
         raise InputError(
             "the file is damaged: parameters of section P belong to no entity, or are "

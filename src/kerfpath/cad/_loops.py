@@ -16,11 +16,11 @@ from OCP.GCPnts import GCPnts_AbscissaPoint
 from OCP.GeomAbs import GeomAbs_Shape
 from OCP.gp import gp_Pnt, gp_Vec
 from OCP.TopAbs import TopAbs_Orientation, TopAbs_ShapeEnum
-from OCP.TopExp import TopExp_Explorer
-from OCP.TopoDS import TopoDS, TopoDS_Edge, TopoDS_Face, TopoDS_Iterator, TopoDS_Shape, TopoDS_Wire
+from OCP.TopoDS import TopoDS, TopoDS_Edge, TopoDS_Face, TopoDS_Shape, TopoDS_Wire
 
 from kerfpath._arrays import Array
 from kerfpath.cad._sample import Chain
+from kerfpath.cad._shape import children, explored
 from kerfpath.cad._units import LARGEST
 from kerfpath.errors import InputError
 
@@ -138,14 +138,12 @@ def loops_of(face: TopoDS_Face) -> list[FaceLoop]:
     outer_wire = BRepTools.OuterWire_s(forward)
     surface = BRepAdaptor_Surface(face)
     loops: list[FaceLoop] = []
-    wires = TopExp_Explorer(forward, TopAbs_ShapeEnum.TopAbs_WIRE)
-    while wires.More():
-        wire = TopoDS.Wire(wires.Current())
+    for found in explored(forward, TopAbs_ShapeEnum.TopAbs_WIRE):
+        wire = TopoDS.Wire(found)
         runs, has_seam = _runs(wire, forward, face, surface)
         for edges in chained(runs):
             outer = _winds(edges) or (wire.IsSame(outer_wire) and not has_seam)
             loops.append(("outer" if outer else "inner", Chain(edges=edges)))
-        wires.Next()
     return loops
 
 
@@ -153,7 +151,8 @@ def _runs(
     wire: TopoDS_Wire, forward: TopoDS_Face, face: TopoDS_Face, surface: BRepAdaptor_Surface
 ) -> tuple[list[list[OrientedEdge]], bool]:
     """Return the edges of `wire` as travelled, broken at each seam, and whether it has a seam."""
-    everything = list(_edges(wire))
+    turned = (FORWARD, REVERSED)
+    everything = [TopoDS.Edge(e) for e in children(wire) if e.Orientation() in turned]
     ordered = everything if len(everything) == 1 else list(_in_order(wire, forward))
     connected = len(ordered) == len(everything)
     runs: list[list[OrientedEdge]] = [[]]
@@ -176,14 +175,6 @@ def _in_order(wire: TopoDS_Wire, face: TopoDS_Face) -> Iterator[TopoDS_Edge]:
     while explorer.More():
         yield explorer.Current()
         explorer.Next()
-
-
-def _edges(wire: TopoDS_Wire) -> Iterator[TopoDS_Edge]:
-    iterator = TopoDS_Iterator(wire)
-    while iterator.More():
-        if iterator.Value().Orientation() in (FORWARD, REVERSED):
-            yield TopoDS.Edge(iterator.Value())
-        iterator.Next()
 
 
 def chained(runs: list[list[OrientedEdge]]) -> Iterator[list[OrientedEdge]]:

@@ -22,9 +22,10 @@ __all__ = [
     "Points",
     "Polyline",
     "Trace",
-    "numbered",
+    "distance",
     "off_chord",
     "sampled",
+    "vector_area",
 ]
 
 FIRST_CELLS = 4
@@ -305,7 +306,7 @@ def sampled(
 
 
 def off_chord(p0: Array, p1: Array, p: Array) -> Array:
-    """Return the distances of `p` from the segments p0 p1, row by row."""
+    """Return the distances of `p`, one or as many, from the segments p0 p1."""
     d = p1 - p0
     along = ((p - p0) * d).sum(1) / np.maximum((d * d).sum(1), np.finfo(float).tiny)
     return np.asarray(np.linalg.norm(p0 + np.clip(along, 0, 1)[:, None] * d - p, axis=1))
@@ -318,20 +319,10 @@ def _angle(n0: Array, n1: Array) -> Array:
 
 def distance(trace: Trace, point: Array) -> float:
     """Return the distance (mm) of `point` from the chords through the points around a trace."""
-    p = trace.around
-    d = np.roll(p, -1, axis=0) - p
-    along = ((point - p) * d).sum(1) / np.maximum((d * d).sum(1), np.finfo(float).tiny)
-    off = np.linalg.norm(p + np.clip(along, 0, 1)[:, None] * d - point, axis=1)
+    off = off_chord(trace.around, np.roll(trace.around, -1, axis=0), point)
     return float((off if trace.gaps.size == len(trace.lengths) else off[:-1]).min())
 
 
-def numbered(traces: list[Trace], stem: str, *, alone: str | None = None) -> dict[str, Trace]:
-    """Return `traces` in the order of their middles by name: stem1, stem2, ...; a single `alone`.
-
-    Middles are rounded, so that last bits do not decide an order.
-    """
-    middles = [tuple((t.around.mean(axis=0).round(3) + 0.0).tolist()) for t in traces]
-    order = sorted(range(len(traces)), key=middles.__getitem__)
-    if alone is not None and len(traces) == 1:
-        return {alone: traces[0]}
-    return {f"{stem}{n}": traces[k] for n, k in enumerate(order, start=1)}
+def vector_area(points: Array) -> Array:
+    """Return the vector area (3,) that a closed polygon (K, 3) encloses."""
+    return np.asarray(np.cross(points, np.roll(points, -1, axis=0)).sum(axis=0) / 2)

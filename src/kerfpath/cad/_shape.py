@@ -28,7 +28,7 @@ from kerfpath._told import told
 from kerfpath.cad._units import MM
 from kerfpath.errors import InputError
 
-__all__ = ["Drawn", "NamedFace", "drawn_of", "explored", "occt", "unique"]
+__all__ = ["Drawn", "NamedFace", "children", "drawn_of", "explored", "occt", "unique"]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -93,22 +93,19 @@ def _again(
 ) -> Drawn:
     both = TopoDS_Shape()
     BinTools.Read_s(both, BytesIO(stream))
-    shape, faces = _children(both)
+    shape, faces = children(both)
     named = [
         NamedFace(
             face=TopoDS.Face(face), name=name, component=component, layer=layer, colour=colour
         )
-        for face, (name, component, layer, colour) in zip(_children(faces), names, strict=True)
+        for face, (name, component, layer, colour) in zip(children(faces), names, strict=True)
     ]
     return Drawn(unit=unit, shape=shape, faces=named, notes=notes)
 
 
-def _children(shape: TopoDS_Shape) -> list[TopoDS_Shape]:
-    found, children = [], TopoDS_Iterator(shape)
-    while children.More():
-        found.append(children.Value())
-        children.Next()
-    return found
+def children(shape: TopoDS_Shape) -> list[TopoDS_Shape]:
+    """Return what a shape is directly made of."""
+    return list(_each(TopoDS_Iterator(shape)))
 
 
 @contextmanager
@@ -142,18 +139,20 @@ def drawn_of(
         raise InputError("the file holds no face; export the part as a solid or a surface")
     solids = explored(shape, TopAbs_ShapeEnum.TopAbs_SOLID)
     if not solids and len(faces) > 1:
-        shape, faces, told = _sewn(faces, gap)
-        notes = [*notes, told]
+        shape, faces, note = _sewn(faces, gap)
+        notes = [*notes, note]
     return Drawn(unit=unit, shape=shape, faces=faces, notes=notes)
 
 
 def explored(shape: TopoDS_Shape, kind: TopAbs_ShapeEnum) -> list[TopoDS_Shape]:
     """Return the faces, edges, ... of a shape."""
-    found, explorer = [], TopExp_Explorer(shape, kind)
-    while explorer.More():
-        found.append(explorer.Current())
-        explorer.Next()
-    return found
+    return list(_each(TopExp_Explorer(shape, kind)))
+
+
+def _each(shapes: TopExp_Explorer | TopoDS_Iterator) -> Iterator[TopoDS_Shape]:
+    while shapes.More():
+        yield shapes.Value()
+        shapes.Next()
 
 
 def _sewn(faces: Sequence[NamedFace], gap: float) -> tuple[TopoDS_Shape, list[NamedFace], str]:
@@ -181,11 +180,11 @@ def _sewn(faces: Sequence[NamedFace], gap: float) -> tuple[TopoDS_Shape, list[Na
         )
     edges = explored(shape, TopAbs_ShapeEnum.TopAbs_EDGE)
     widest = max((BRep_Tool.Tolerance_s(TopoDS.Edge(edge)) for edge in edges), default=0.0)
-    told = (
+    note = (
         f"{len(faces)} loose faces sewn within {gap / MM:g} mm: {sewing.NbContigousEdges()} edges "
         f"joined, the widest gap {np.round(widest, 4):g} mm; {sewing.NbFreeEdges()} edges are free"
     )
-    return shape, lying, told
+    return shape, lying, note
 
 
 def unique(names: list[str]) -> list[str]:

@@ -17,7 +17,7 @@ from kerfpath._told import told
 from kerfpath.cad._connected import connected
 from kerfpath.cad._loops import FaceLoop, OrientedEdge, chained
 from kerfpath.cad._part import Side
-from kerfpath.cad._sample import Chain
+from kerfpath.cad._sample import Chain, vector_area
 
 __all__ = ["SMOOTH", "Skin", "skins_of"]
 
@@ -150,16 +150,11 @@ def _outside(edges: Sequence[OrientedEdge], inside: list[bool]) -> list[list[Ori
 
 def _is_hole(loop: Chain[OrientedEdge]) -> bool:
     """Return whether a closed chain runs about a hole of its skin, by its normals."""
-    area = _vector_area(loop.around)
+    area = vector_area(loop.around)
     middles = [(edge.start + edge.end) / 2 for edge in loop.edges]
     normals = [e.evaluate(np.array([t]))[1][0] for e, t in zip(loop.edges, middles, strict=True)]
     facing = loop.lengths @ np.array(normals) / loop.lengths.sum()
     return bool(area @ facing < HOLE * np.linalg.norm(area))
-
-
-def _vector_area(points: Array) -> Array:
-    """Return the vector area (3,) that a closed polygon (K, 3) encloses."""
-    return np.asarray(np.cross(points, np.roll(points, -1, axis=0)).sum(axis=0) / 2)
 
 
 def _sides(
@@ -181,7 +176,7 @@ def _sides(
             BRepGProp.SurfaceProperties_s(faces[f], props, ACCURACY)
             areas[g] += abs(props.Mass())  # a damaged face may count as less than nothing
             for k, (_, loop) in enumerate(found[f]):
-                vector[g] += _vector_area(loop.around)
+                vector[g] += vector_area(loop.around)
                 around.append(loop.around)
                 outside = [(f, k, e) not in inside[g] for e in _numbers(loop)]
                 rims[g] += loop.lengths[outside].sum()

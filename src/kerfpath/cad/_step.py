@@ -13,11 +13,11 @@ from OCP.STEPControl import STEPControl_Reader
 from OCP.StepGeom import StepGeom_Curve, StepGeom_Pcurve
 from OCP.StepRepr import StepRepr_NextAssemblyUsageOccurrence, StepRepr_RepresentationItem
 from OCP.TopAbs import TopAbs_ShapeEnum
-from OCP.TopoDS import TopoDS, TopoDS_Iterator, TopoDS_Shape
+from OCP.TopoDS import TopoDS, TopoDS_Shape
 
 from kerfpath._arrays import Array
 from kerfpath.cad._part21 import points_in, sound_data
-from kerfpath.cad._shape import Drawn, NamedFace, drawn_of, occt, unique
+from kerfpath.cad._shape import Drawn, NamedFace, children, drawn_of, occt, unique
 from kerfpath.cad._styles import styles_in
 from kerfpath.cad._units import LARGEST, UNITS_MM
 from kerfpath.errors import InputError
@@ -116,10 +116,8 @@ def _faces(
         if isinstance(entity, StepRepr_NextAssemblyUsageOccurrence):
             into = []
             components.append((_product(entity), into))
-        children = TopoDS_Iterator(shape)
-        while children.More():
-            walk(children.Value(), into, layer, colour)
-            children.Next()
+        for child in children(shape):
+            walk(child, into, layer, colour)
 
     walk(shape, components[0][1], "", "")
     components = [(name, faces) for name, faces in components if faces]

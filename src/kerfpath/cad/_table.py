@@ -10,11 +10,13 @@ from pathlib import Path
 
 import numpy as np
 
-from kerfpath._arrays import Array, freeze
+from kerfpath._arrays import Array
+from kerfpath.cad._build import loop_of, part_without_faces
 from kerfpath.cad._cells import Cells, cells_of
-from kerfpath.cad._part import Kind, Part, loop_of
-from kerfpath.cad._sample import Points
+from kerfpath.cad._part import Kind, Part
+from kerfpath.cad._sample import Points, vector_area
 from kerfpath.cad._units import LARGEST, MM, UNITS_MM
+from kerfpath.contour import angle_between
 from kerfpath.errors import InputError
 
 __all__ = ["read_table"]
@@ -79,24 +81,15 @@ def read_table(path: Path, content: bytes, unit: str | None, gap: float) -> Part
         loops = []
         for name, chosen in _contours(rows):
             lines = np.array(rows.lines)[chosen]
-            trace, told = _trace(points[chosen], normals[chosen], lines, gap / MM)
-            notes += [f"contour {name!r}: {what}" for what in told]
+            trace, repaired = _trace(points[chosen], normals[chosen], lines, gap / MM)
+            notes += [f"contour {name!r}: {what}" for what in repaired]
             kind = _kind(trace)
             loops.append(
                 loop_of(name=name, face=name, kind=kind, trace=trace, surface="points", gap=gap)
             )
     except InputError as error:
         raise InputError(f"{path}: {error}") from None
-    boxes = np.array([loop.bounding_box for loop in loops])
-    return Part(
-        path=path,
-        unit=unit or rows.unit,
-        bounding_box=freeze(np.stack([boxes[:, 0].min(axis=0), boxes[:, 1].max(axis=0)])),
-        faces=0,
-        loops=tuple(loops),
-        notes=tuple(notes),
-        _gap=gap,
-    )
+    return part_without_faces(path, unit or rows.unit, loops, gap=gap, notes=notes)
 
 
 def _rows(table: Cells) -> _Rows:
@@ -195,8 +188,8 @@ def _contours(rows: _Rows) -> Iterator[tuple[str, slice]]:
 def _trace(points: Array, normals: Array, lines: Array, gap: float) -> tuple[Points, list[str]]:
     """Return the points without repeated ones, closed if they end where they began."""
     steps = np.linalg.norm(np.diff(points, axis=0), axis=1)
-    turns = _angle(normals[:-1], normals[1:])
-    told = []
+    turns = angle_between(normals[:-1], normals[1:])
+    repaired = []
     again = steps <= REPEATED
     if (bad := np.flatnonzero(again & (turns > TURNED))).size:
         raise InputError(
@@ -205,12 +198,12 @@ def _trace(points: Array, normals: Array, lines: Array, gap: float) -> tuple[Poi
         )
     if again.any():
         first = int(np.argmax(again)) + 1
-        told.append(f"{again.sum()} repeated points left out, the first in line {lines[first]}")
+        repaired.append(f"{again.sum()} repeated points left out, the first in line {lines[first]}")
         keep = np.concatenate([[True], ~again])
         points, normals, lines = points[keep], normals[keep], lines[keep]
     if len(points) < 2:
         raise InputError(f"line {lines[0]}: a contour needs at least 2 points, got {len(points)}")
-    for k, angle in enumerate(_angle(normals[:-1], normals[1:])):
+    for k, angle in enumerate(angle_between(normals[:-1], normals[1:])):
         if angle > FLIP:
             raise InputError(
                 f"line {lines[k + 1]}: the axis turns by {np.degrees(angle):.0f} deg from line "
@@ -218,22 +211,17 @@ def _trace(points: Array, normals: Array, lines: Array, gap: float) -> tuple[Poi
             )
     is_closed = len(points) > 3 and float(np.linalg.norm(points[-1] - points[0])) <= gap
     if is_closed:
-        if _angle(normals[-1:], normals[:1])[0] > TURNED:
+        if angle_between(normals[-1:], normals[:1])[0] > TURNED:
             raise InputError(
                 f"line {lines[-1]}: ends where it began, line {lines[0]}, but with another axis"
             )
         points, normals = points[:-1], normals[:-1]
-    return Points(points=points, normals=normals, is_closed=is_closed), told
+    return Points(points=points, normals=normals, is_closed=is_closed), repaired
 
 
 def _kind(trace: Points) -> Kind:
     """Return how a closed line runs about its mean normal: an outer one counter-clockwise."""
     if not trace.is_closed:
         return "open"
-    area = np.cross(trace.points, np.roll(trace.points, -1, axis=0)).sum(axis=0)
+    area = vector_area(trace.points)
     return "outer" if area @ trace.normals.mean(axis=0) >= 0 else "inner"
-
-
-def _angle(a: Array, b: Array) -> Array:
-    sine = np.linalg.norm(np.cross(a, b), axis=1)
-    return np.asarray(np.arctan2(sine, (a * b).sum(axis=1)))

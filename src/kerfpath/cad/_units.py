@@ -9,7 +9,7 @@ __all__ = ["GAP", "LARGEST", "MM", "UNITS_MM", "require_unit"]
 MM = 1e-3
 """OCCT works in mm, and so does this package; every length that leaves it is in m."""
 GAP = 5e-5
-"""Distance (m) between the ends of two curves that a loop bridges unless told: half a kerf."""
+"""Distance (m) between the ends of two curves that a loop bridges by default: half a kerf."""
 LARGEST = 1e7
 """No drawing reaches further than this, mm; a damaged number or a wrong unit soon makes it so."""
 
