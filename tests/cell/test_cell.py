@@ -447,7 +447,7 @@ def test_a_mesh_that_is_no_solid_is_refused():
         Mesh(vertices=whole.points, triangles=whole.triangles + 1)
     with pytest.raises(InputError, match="must be finite"):
         Mesh(vertices=whole.points * np.nan, triangles=whole.triangles)
-    with pytest.raises(InputError, match="deviation must not be negative"):
+    with pytest.raises(InputError, match="deviation: must not be negative"):
         mesh_of(whole, deviation=-1.0)
 
 

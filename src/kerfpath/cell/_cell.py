@@ -9,7 +9,7 @@ from itertools import combinations
 import numpy as np
 from numpy.typing import ArrayLike
 
-from kerfpath._arrays import Array, Bools, Ints, as_pose, bools, floats, freeze, scalar
+from kerfpath._arrays import Array, Bools, Ints, as_pose, bools, floats, freeze, not_negative
 from kerfpath.cell._bodies import Body
 from kerfpath.cell._head import CuttingHead, MeshHead
 from kerfpath.cell._links import link_bodies
@@ -385,7 +385,4 @@ def _scene(bodies: Sequence[Body], judged: Mapping[Places, tuple[float, Design]]
 
 def _distance(value: float, names: Sequence[str], pair: tuple[int, int]) -> float:
     what = f"near-miss distance of {names[pair[0]]!r} and {names[pair[1]]!r}"
-    number = scalar(value, what, unit="m")
-    if number < 0:
-        raise InputError(f"{what}: must not be negative, got {number:g} m")
-    return number
+    return not_negative(value, what, unit="m")

@@ -14,7 +14,7 @@ from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
-from kerfpath._arrays import Array, Bools, Ints, as_pose, floats, freeze, integers, scalar
+from kerfpath._arrays import Array, Bools, Ints, as_pose, floats, freeze, integers, not_negative
 from kerfpath._told import told
 from kerfpath.cell._columns import Columns
 from kerfpath.cell._sheet import edges_of
@@ -27,7 +27,7 @@ LARGEST = 100.0
 SMALLEST = 1e-4
 """m: a whole body smaller than this has the wrong unit, too."""
 SAME = 1e-6
-"""Vertices closer than this share of the body's size are one: single precision tells no more."""
+"""Vertices closer than this share of the body's size are one, as single precision has it."""
 CROWDED = 64
 """Vertices within the tolerance of each that welding takes, on average: memory grows with them."""
 MOST = 2_000_000
@@ -66,9 +66,7 @@ class Mesh:
         _set, name = object.__setattr__, self.name
         _set(self, "vertices", floats(self.vertices, f"{name} vertices", (None, 3)))
         _set(self, "triangles", integers(self.triangles, f"{name} triangles", (None, 3)))
-        _set(self, "deviation", scalar(self.deviation, f"{name} deviation", unit="m"))
-        if self.deviation < 0:
-            raise InputError(f"{name}: deviation must not be negative, got {self.deviation:g} m")
+        _set(self, "deviation", not_negative(self.deviation, f"{name} deviation", unit="m"))
         size_of(self.vertices, self.triangles, name)
         _require_closed(self.triangles, name)
         _set(self, "_columns", Columns(self.vertices[self.triangles]))

@@ -27,7 +27,7 @@ from kerfpath.urdf import Chain
 __all__ = ["TOLERANCE", "Sweep", "relative"]
 
 TOLERANCE = 1e-4
-"""m: a motion too close to tell by this much is refused."""
+"""m: a motion that is not proved clear at this resolution is refused."""
 HALVINGS = 24
 """Never reached by motions of a robot; a motion not proved clear by then is refused."""
 

@@ -39,7 +39,7 @@ POSES, FIRST = 128, 32
 """Poses tried, a power of two, so that each joint stands at as many even steps of a turn; and how
 many come first, to settle most pairs."""
 TOUCH = 2 * TOLERANCE
-"""m: nearer than this, hardly any motion could be told clear, so it is as good as contact."""
+"""m: nearer than this, hardly any motion could be proved clear, so it is as good as contact."""
 SPARED = 0.1
 """Of the most that the design leaves a pair, what it need not keep, or no pose would be clear."""
 SKIN = (5e-4, 1e-3, 2e-3)

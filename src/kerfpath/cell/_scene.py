@@ -1,4 +1,4 @@
-"""Distances between the bodies of a cell, by coal, where cheap bounds do not already tell enough.
+"""Distances between the bodies of a cell, by coal, where cheap bounds do not suffice.
 
 A distance here is a lower bound on the true one: exact to coal's tolerance where it is below
 `enough`, lessened by what meshes may deviate from what they stand for, negative where solids

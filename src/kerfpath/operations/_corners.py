@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from kerfpath._arrays import Array, scalar
+from kerfpath._arrays import Array, not_negative, scalar
 from kerfpath.contour import KINDS, Contour, angle_between, join, turned, unit
 from kerfpath.errors import InputError
 from kerfpath.operations._start import smoothest_start, start_at, with_nodes
@@ -115,7 +115,7 @@ def slow_corners(
     share = scalar(share, "corner speed share", above=0.0)
     if share >= 1:
         raise InputError(f"corner speed share: expected less than 1, got {share:g}")
-    distance = scalar(distance, "distance", unit="m", above=-1e-300)
+    distance = not_negative(distance, "distance", unit="m")
     ramp = scalar(ramp, "ramp", unit="m", above=0.0)
     at = contour.s[contour.corners]
     if not at.size:

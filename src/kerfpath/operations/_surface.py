@@ -48,7 +48,7 @@ class Surface(Protocol):
 
 
 class Ribbon:
-    """The surface as a contour tells it: the plane across the tool axis at the nearest node."""
+    """The surface as a contour has it: the plane across the tool axis at the nearest node."""
 
     def __init__(self, contour: Contour) -> None:
         self._contour = contour
@@ -132,7 +132,7 @@ def require_in_scrap(contour: Contour, points: Array, side: Side, what: str) -> 
     ring = np.linalg.norm(nodes[0] - nodes[-1]) <= SAME_PLACE
     before = np.where(k > 0, k - 1, last if ring else 0)
     after = np.where(k < last, k + 1, 0 if ring else last)
-    # Beside a corner the segment on either side of it alone may tell the wrong side.
+    # Beside a corner, either of its segments alone may give the wrong side.
     at_start, at_end = (np.linalg.norm(where - nodes[i], axis=1) <= SAME_PLACE for i in (k, k + 1))
     other = np.where(at_start, before, np.where(at_end, after, k))
     depth = ((points - where) * (across[k] + across[other]) / 2).sum(1)
