@@ -101,18 +101,18 @@ def model_of(chain: Chain, *, as_written: bool = False) -> Arm:
         redundant = "the arm is redundant, and planning with a free elbow is not offered"
         why = redundant if n > 6 else "such arms are not recognised from descriptions"
         raise InputError(f"expected 6 joints between base and tip, got {n}: {why}")
-    lines, why = _lines(chain), []
+    lines, misfits = _lines(chain), []
     for name, derive in DERIVED:
         derived = derive(lines)
         words = FAMILIES[name].words
         if isinstance(derived, str):
-            why.append(f"not an {words}, as {derived}")
+            misfits.append(f"not an {words}, as {derived}")
             continue
         model = _laid(name, lines, *derived)
         miss = _miss(chain, model)
         if miss <= EXACT:
             return model
-        why.append(f"not an {words}, which it misses by {miss:.1e} (m and rad)")
+        misfits.append(f"not an {words}, which it misses by {miss:.1e} (m and rad)")
         if miss > ROUNDED or as_written:
             continue
         raise InputError(
@@ -122,8 +122,8 @@ def model_of(chain: Chain, *, as_written: bool = False) -> Arm:
     try:
         require_solver()
     except InputError as error:
-        raise InputError(f"{'; '.join(why)}: {error}") from None
-    notes = (f"General arm: {'; '.join(why)}.",)
+        raise InputError(f"{'; '.join(misfits)}: {error}") from None
+    notes = (f"General arm: {'; '.join(misfits)}.",)
     return Arm(id="", kinematics="general", geometry={}, notes=notes, chain=chain)
 
 
