@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from kerfpath._arrays import Array, scalar
+from kerfpath._arrays import Array, not_negative, scalar
 from kerfpath.air import AirMove, End, backed_off, least_time, speed_share
 from kerfpath.cell import UNPROVED
 from kerfpath.errors import InputError
@@ -113,8 +113,8 @@ def build_program(
     for plan in plans[1:]:
         _require_same_cell(first, plan)
     retract = scalar(retract, "retract", unit="m", above=0.0)
-    zone = scalar(zone, "zone", unit="m", above=-1e-300)
-    pierce_time = scalar(pierce_time, "pierce_time", unit="s", above=-1e-300)
+    zone = not_negative(zone, "zone", unit="m")
+    pierce_time = not_negative(pierce_time, "pierce_time", unit="s")
     approach_speed = scalar(approach_speed, "approach_speed", unit="m/s", above=0.0)
     title = identifier(f"cut {first.name}" if name is None else name)
     names = identifiers((plan.name for plan in plans), taken=(title,))
