@@ -14,7 +14,7 @@ from OCP.IGESData import IGESData_IGESEntity
 from OCP.TopAbs import TopAbs_ShapeEnum
 from OCP.TopoDS import TopoDS, TopoDS_Shape
 
-from kerfpath.cad._shape import Drawn, NamedFace, drawn_of, explored, occt
+from kerfpath.cad._shape import Drawn, NamedFace, drawn_of, explored, failures, occt
 from kerfpath.cad._units import UNITS_MM
 from kerfpath.errors import InputError
 
@@ -110,14 +110,8 @@ def _read(path: Path, unit: str | None, gap: float) -> Drawn:
 
 def _require_sound(reader: IGESControl_Reader) -> None:
     """Refuse broken entities, on which OCCT's transfer may crash the process."""
-    checks = reader.WS().ModelCheckList()
-    checks.Start()
-    while checks.More():
-        check = checks.Value()
-        checks.Next()
-        if check.HasFailed():
-            reason = " ".join(check.CFail(1).split())
-            raise InputError(f"the file is damaged ({reason}); copy or export it again")
+    for _, reason in failures(reader.WS().ModelCheckList()):
+        raise InputError(f"the file is damaged ({reason}); copy or export it again")
 
 
 def _name(reader: IGESControl_Reader, face: TopoDS_Shape) -> str:

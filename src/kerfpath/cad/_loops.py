@@ -82,15 +82,12 @@ class OrientedEdge:
 
     @property
     def length(self) -> float:
-        """Arc length, mm."""
         return GCPnts_AbscissaPoint.Length_s(BRepAdaptor_Curve(self.edge))
 
     def bounds(self) -> Array:
-        """Return the least and greatest coordinates (2, 3) mm."""
         return bounds_of(self.edge)
 
     def breaks(self) -> Array:
-        """Return the parameters, in the direction of travel, between which the edge is smooth."""
         curve = BRepAdaptor_Curve(self.edge, self.face)
         count = curve.NbIntervals(GeomAbs_Shape.GeomAbs_C2)
         ends = Array1_double(1, count + 1)

@@ -142,12 +142,10 @@ class Chain(Generic[E]):
 
     @cached_property
     def lengths(self) -> Array:
-        """Length (E,) of each edge, mm."""
         return np.array([edge.length for edge in self.edges])
 
     @cached_property
     def gaps(self) -> Array:
-        """Distance (mm) from the end of each edge to the start of the next."""
         ends = np.array([edge.ends for edge in self.edges])
         gaps = np.linalg.norm(np.roll(ends[:, 0], -1, axis=0) - ends[:, 1], axis=1)
         return np.asarray(gaps if self.is_closed else gaps[:-1])
@@ -163,12 +161,10 @@ class Chain(Generic[E]):
         )
 
     def bounds(self) -> Array:
-        """Return the least and greatest coordinates (2, 3) mm."""
         boxes = np.array([edge.bounds() for edge in self.edges])
         return np.stack([boxes[:, 0].min(axis=0), boxes[:, 1].max(axis=0)])
 
     def break_at(self) -> str:
-        """Say where the largest gap is."""
         if not self.is_closed:
             return self.next_end
         k = int(np.argmax(self.gaps))
@@ -212,7 +208,6 @@ class Polyline:
         return self.line.s
 
     def evaluate(self, t: Array) -> tuple[Array, Array]:
-        """Return points (K, 3) mm and outward unit normals (K, 3) at parameters `t` (K,)."""
         points, axes = self.line.at(t)
         return points, -axes
 
@@ -229,7 +224,6 @@ class Points:
 
     @cached_property
     def lengths(self) -> Array:
-        """Length of each segment, mm."""
         points = np.vstack([self.points, self.points[:1]]) if self.is_closed else self.points
         return np.asarray(np.linalg.norm(np.diff(points, axis=0), axis=1))
 
@@ -251,7 +245,6 @@ class Points:
         return both if self.is_closed else both[:-1]
 
     def bounds(self) -> Array:
-        """Return the least and greatest coordinates (2, 3) mm."""
         return np.stack([self.points.min(axis=0), self.points.max(axis=0)])
 
     def break_at(self) -> str:

@@ -18,6 +18,7 @@ from OCP.BinTools import BinTools
 from OCP.BRep import BRep_Builder, BRep_Tool
 from OCP.BRepBuilderAPI import BRepBuilderAPI_MakeSolid, BRepBuilderAPI_Sewing
 from OCP.BRepLib import BRepLib
+from OCP.Interface import Interface_CheckIterator
 from OCP.Message import Message
 from OCP.Standard import Standard_Failure
 from OCP.TopAbs import TopAbs_ShapeEnum
@@ -28,7 +29,7 @@ from kerfpath._told import told
 from kerfpath.cad._units import MM
 from kerfpath.errors import InputError
 
-__all__ = ["Drawn", "NamedFace", "children", "drawn_of", "explored", "occt", "unique"]
+__all__ = ["Drawn", "NamedFace", "children", "drawn_of", "explored", "failures", "occt", "unique"]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -147,6 +148,16 @@ def drawn_of(
 def explored(shape: TopoDS_Shape, kind: TopAbs_ShapeEnum) -> list[TopoDS_Shape]:
     """Return the faces, edges, ... of a shape."""
     return list(_each(TopExp_Explorer(shape, kind)))
+
+
+def failures(checks: Interface_CheckIterator) -> Iterator[tuple[int, str]]:
+    """Yield the number of each entity that fails a check, 0 for the file as a whole, and why."""
+    checks.Start()
+    while checks.More():
+        number, check = checks.Number(), checks.Value()
+        checks.Next()
+        if check.HasFailed():
+            yield number, " ".join(check.CFail(1).split())
 
 
 def _each(shapes: TopExp_Explorer | TopoDS_Iterator) -> Iterator[TopoDS_Shape]:

@@ -17,7 +17,7 @@ from OCP.TopoDS import TopoDS, TopoDS_Shape
 
 from kerfpath._arrays import Array
 from kerfpath.cad._part21 import points_in, sound_data
-from kerfpath.cad._shape import Drawn, NamedFace, children, drawn_of, occt, unique
+from kerfpath.cad._shape import Drawn, NamedFace, children, drawn_of, failures, occt, unique
 from kerfpath.cad._styles import styles_in
 from kerfpath.cad._units import LARGEST, UNITS_MM
 from kerfpath.errors import InputError
@@ -139,13 +139,8 @@ def _product(used: StepRepr_NextAssemblyUsageOccurrence) -> str:
 def _require_sound(reader: STEPControl_Reader) -> bool:
     """Refuse broken syntax and geometry, on which OCCT may crash; say if styles are sound."""
     has_styles = True
-    model, checks = reader.WS().Model(), reader.WS().ModelCheckList()
-    checks.Start()
-    while checks.More():
-        check, number = checks.Value(), checks.Number()
-        checks.Next()
-        if not check.HasFailed():
-            continue
+    model = reader.WS().Model()
+    for number, reason in failures(reader.WS().ModelCheckList()):
         where = ""
         if number:
             package, _, entity = type(model.Value(number)).__name__.partition("_")
@@ -153,7 +148,6 @@ def _require_sound(reader: STEPControl_Reader) -> bool:
             if package not in ("StepGeom", "StepShape") and entity != "DefinitionalRepresentation":
                 continue
             where = f"{entity}: "
-        reason = " ".join(check.CFail(1).split())
         raise InputError(f"the file is damaged ({where}{reason}); copy or export it again")
     for number in range(1, model.NbEntities() + 1):
         drawn = model.Value(number)

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
 from itertools import groupby
 from pathlib import Path
 
@@ -42,20 +41,6 @@ UNIT_QUATERNION = 1e-2
 """How far a quaternion's length may be from one: rounded digits pass, other columns fail."""
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class _Rows:
-    """The cells of a table, and what the columns are."""
-
-    columns: tuple[str, ...]
-    unit: str
-    table: Cells
-
-    @property
-    def lines(self) -> Sequence[int]:
-        """The line that each row stands in."""
-        return self.table.lines
-
-
 def read_table(path: Path, content: bytes, unit: str | None, gap: float) -> Part:
     """Return the contours of a table of points, one per name in its column `contour`.
 
@@ -65,22 +50,22 @@ def read_table(path: Path, content: bytes, unit: str | None, gap: float) -> Part
         Anything wrong with a row (its line is named), columns that are not known, no unit known.
     """
     try:
-        rows = _rows(cells_of(content, EXPECTED))
-        if not (unit or rows.unit):
+        columns, declared, table = _rows(cells_of(content, EXPECTED))
+        if not (unit or declared):
             raise InputError(
                 f"states no length unit; say it with unit= one of {', '.join(UNITS_MM)}, "
                 "or in the header, as x_mm"
             )
         notes = []
-        if unit and rows.unit and unit != rows.unit:
-            notes.append(f"unit {unit} as asked; the header says {rows.unit}")
+        if unit and declared and unit != declared:
+            notes.append(f"unit {unit} as asked; the header says {declared}")
         known = (*POSITION, *NORMAL, *AXIS, *QUATERNION, NAME)
-        if unknown := [name for name in rows.columns if name not in known]:
+        if unknown := [name for name in columns if name not in known]:
             notes.append(f"columns not used: {', '.join(unknown)}")
-        points, normals = _numbers(rows, UNITS_MM[unit or rows.unit])
+        points, normals = _numbers(columns, table, UNITS_MM[unit or declared])
         loops = []
-        for name, chosen in _contours(rows):
-            lines = np.array(rows.lines)[chosen]
+        for name, chosen in _contours(columns, table):
+            lines = np.array(table.lines)[chosen]
             trace, repaired = _trace(points[chosen], normals[chosen], lines, gap / MM)
             notes += [f"contour {name!r}: {what}" for what in repaired]
             kind = _kind(trace)
@@ -89,11 +74,11 @@ def read_table(path: Path, content: bytes, unit: str | None, gap: float) -> Part
             )
     except InputError as error:
         raise InputError(f"{path}: {error}") from None
-    return part_without_faces(path, unit or rows.unit, loops, gap=gap, notes=notes)
+    return part_without_faces(path, unit or declared, loops, gap=gap, notes=notes)
 
 
-def _rows(table: Cells) -> _Rows:
-    """Return the rows under their columns."""
+def _rows(table: Cells) -> tuple[tuple[str, ...], str, Cells]:
+    """Return the names of the columns, the unit that they state, and the rows under them."""
     columns, unit = _header(table)
     if columns:
         table = table.without_header()
@@ -107,7 +92,7 @@ def _rows(table: Cells) -> _Rows:
     if not table.rows:
         raise InputError("holds a header but no rows of points")
     table.require_width(len(columns))
-    return _Rows(columns=columns, unit=unit, table=table)
+    return columns, unit, table
 
 
 def _header(table: Cells) -> tuple[tuple[str, ...], str]:
@@ -134,33 +119,33 @@ def _header(table: Cells) -> tuple[tuple[str, ...], str]:
     return tuple(columns), units[0] if units else ""
 
 
-def _numbers(rows: _Rows, mm: float) -> tuple[Array, Array]:
+def _numbers(columns: Sequence[str], table: Cells, mm: float) -> tuple[Array, Array]:
     """Return points (K, 3) mm and outward unit normals (K, 3)."""
-    at = {name: k for k, name in enumerate(rows.columns)}
+    at = {name: k for k, name in enumerate(columns)}
     axes = next(a for a in (AXIS, NORMAL, QUATERNION) if set(a) <= set(at))
     wanted = [at[name] for name in (*POSITION, *axes)]
     values = np.array(
         [
-            [rows.table.number(k, column, rows.columns[column]) for column in wanted]
-            for k in range(len(rows.table.rows))
+            [table.number(k, column, columns[column]) for column in wanted]
+            for k in range(len(table.rows))
         ]
     )
     points, directions = values[:, :3] * mm, values[:, 3:]
     if (far := np.flatnonzero((np.abs(points) > LARGEST).any(axis=1))).size:
         raise InputError(
-            f"line {rows.lines[far[0]]}: a point further than {LARGEST / 1e6:g} km from the "
+            f"line {table.lines[far[0]]}: a point further than {LARGEST / 1e6:g} km from the "
             "origin; check the unit"
         )
     size = np.abs(directions).max(axis=1)
     if (zero := np.flatnonzero(size == 0)).size:
-        raise InputError(f"line {rows.lines[zero[0]]}: {' '.join(axes)} are all 0; no direction")
+        raise InputError(f"line {table.lines[zero[0]]}: {' '.join(axes)} are all 0; no direction")
     directions = directions / size[:, None]  # no square overflows
     length = np.linalg.norm(directions, axis=1)
     if axes == QUATERNION:
         if (off := np.flatnonzero(np.abs(length * size - 1) > UNIT_QUATERNION)).size:
             raise InputError(
-                f"line {rows.lines[off[0]]}: a quaternion of length {(length * size)[off[0]]:.3g}, "
-                "expected 1; check the columns"
+                f"line {table.lines[off[0]]}: a quaternion of length "
+                f"{(length * size)[off[0]]:.3g}, expected 1; check the columns"
             )
         x, y, z, w = (directions / length[:, None]).T
         z_axis = np.stack([2 * (x * z + w * y), 2 * (y * z - w * x), 1 - 2 * (x * x + y * y)], 1)
@@ -168,18 +153,18 @@ def _numbers(rows: _Rows, mm: float) -> tuple[Array, Array]:
     return points, directions / (length if axes == NORMAL else -length)[:, None]
 
 
-def _contours(rows: _Rows) -> Iterator[tuple[str, slice]]:
+def _contours(columns: Sequence[str], table: Cells) -> Iterator[tuple[str, slice]]:
     """Yield each contour's name and rows."""
-    if NAME not in rows.columns:
-        yield NAME, slice(len(rows.table.rows))
+    if NAME not in columns:
+        yield NAME, slice(len(table.rows))
         return
-    column = rows.columns.index(NAME)
+    column = columns.index(NAME)
     first, seen = 0, set()
-    for name, group in groupby(row[column] for row in rows.table.rows):
+    for name, group in groupby(row[column] for row in table.rows):
         last = first + len(list(group))
         if not name or name in seen:
             what = f"rows of contour {name!r} stand apart" if name else "no name of a contour"
-            raise InputError(f"line {rows.lines[first]}: {what}; put its rows together")
+            raise InputError(f"line {table.lines[first]}: {what}; put its rows together")
         seen.add(name)
         yield name, slice(first, last)
         first = last
