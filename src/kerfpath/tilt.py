@@ -10,7 +10,7 @@ from scipy.spatial.transform import Rotation
 from kerfpath._arrays import Array, freeze, not_negative
 from kerfpath.errors import InputError
 
-__all__ = ["Tilt", "tilted"]
+__all__ = ["Tilt", "tilt_frames"]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -67,7 +67,7 @@ class Tilt:
         return self.cost * np.hypot(samples[:, 0], samples[:, 1])
 
 
-def tilted(frames: Array, along: Array, tilt: Array) -> Array:
+def tilt_frames(frames: Array, along: Array, tilt: Array) -> Array:
     """Return task frames (..., 4, 4) turned by lead and lean (..., 2) rad; z is the tool axis.
 
     along (..., 3) are the directions of travel, see `Contour.along`.

@@ -19,7 +19,7 @@ from kerfpath.cell import (
     cell_of,
     frustum,
     read_stl,
-    welded,
+    weld,
 )
 from kerfpath.cell._scene import Scene
 from kerfpath.errors import InputError
@@ -458,7 +458,7 @@ def test_welding_closes_what_shares_corners():
     corners = np.arange(36).reshape(-1, 3)
     with pytest.raises(InputError, match="not closed"):
         Mesh(vertices=soup, triangles=corners)
-    vertices, triangles = welded(soup, corners, 1e-6)
+    vertices, triangles = weld(soup, corners, 1e-6)
     assert len(Mesh(vertices=vertices, triangles=triangles).vertices) == 8
 
 

@@ -10,7 +10,7 @@ from scipy.spatial import cKDTree
 
 from kerfpath._arrays import Array, Ints
 from kerfpath.cad._build import named_loops, part_without_faces
-from kerfpath.cad._connected import connected
+from kerfpath.cad._connected import label_connected
 from kerfpath.cad._curves import Curve, backwards
 from kerfpath.cad._left_out import LeftOut
 from kerfpath.cad._part import Kind, Loop, Part
@@ -141,7 +141,7 @@ def _places(ends: Array, gap: float) -> Ints:
     if alone.size:
         bridged = alone[cKDTree(ends[alone]).query_pairs(gap, output_type="ndarray")]
         touching = np.vstack([touching, bridged])
-    return connected(touching, len(ends))
+    return label_connected(touching, len(ends))
 
 
 def _next_end(chain: Sequence[Curve], ends: Array, crowd: Ints) -> str:

@@ -11,9 +11,9 @@ from scipy.spatial import cKDTree
 
 from kerfpath._arrays import Array, Ints
 from kerfpath._told import told
-from kerfpath.cad._sample import Curve, Points, Polyline, Trace, off_chord, sampled
+from kerfpath.cad._sample import Curve, Points, Polyline, Trace, off_chord, sample_curve
 from kerfpath.cad._units import MM
-from kerfpath.contour import Contour, angle_between, turned
+from kerfpath.contour import Contour, angle_between, slerp
 from kerfpath.errors import InputError
 from kerfpath.operations import IN_SCRAP
 
@@ -191,7 +191,7 @@ def _measured(
         d = points[k + 1] - points[k]
         along = np.clip(((p - points[k]) * d).sum(-1) / (d * d).sum(-1), 0.0, 1.0)[..., None]
         off = np.linalg.norm(points[k] + along * d - p, axis=-1)
-        return np.stack([off, angle_between(turned(axes[k], axes[k + 1], along), n)])
+        return np.stack([off, angle_between(slerp(axes[k], axes[k + 1], along), n)])
 
     rough = errors(np.arange(len(chord)), LOOKS).max(axis=-1)
     worst = []
@@ -213,7 +213,7 @@ def _measured(
 
 def _cells(curves: Sequence[Curve]) -> _Cells:
     """Return the curves in cells that bend little, none longer than its share of the whole."""
-    fine = [sampled(curve, CHORD, ANGLE)[:2] for curve in curves]
+    fine = [sample_curve(curve, CHORD, ANGLE)[:2] for curve in curves]
     lengths = [np.linalg.norm(np.diff(points, axis=0), axis=1) for _, points in fine]
     longest = sum(float(each.sum()) for each in lengths) / CELLS
     of, t, ends = [], [], []

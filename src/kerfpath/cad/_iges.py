@@ -14,7 +14,7 @@ from OCP.IGESData import IGESData_IGESEntity
 from OCP.TopAbs import TopAbs_ShapeEnum
 from OCP.TopoDS import TopoDS, TopoDS_Shape
 
-from kerfpath.cad._shape import Drawn, NamedFace, drawn_of, explored, failures, occt
+from kerfpath.cad._shape import Drawn, NamedFace, drawn_of, failures, list_shapes, occt
 from kerfpath.cad._units import UNITS_MM
 from kerfpath.errors import InputError
 
@@ -91,7 +91,7 @@ def _read(path: Path, unit: str | None, gap: float) -> Drawn:
         )
     reader.TransferRoots()
     shape = reader.OneShape()
-    loose = [] if shape is None else explored(shape, TopAbs_ShapeEnum.TopAbs_FACE)
+    loose = [] if shape is None else list_shapes(shape, TopAbs_ShapeEnum.TopAbs_FACE)
     faces = [NamedFace(face=TopoDS.Face(face), name=_name(reader, face)) for face in loose]
     notes = []
     if unit is not None and unit != header:

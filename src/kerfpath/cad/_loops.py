@@ -20,11 +20,11 @@ from OCP.TopoDS import TopoDS, TopoDS_Edge, TopoDS_Face, TopoDS_Shape, TopoDS_Wi
 
 from kerfpath._arrays import Array
 from kerfpath.cad._sample import Chain
-from kerfpath.cad._shape import children, explored
+from kerfpath.cad._shape import children, list_shapes
 from kerfpath.cad._units import LARGEST
 from kerfpath.errors import InputError
 
-__all__ = ["FaceLoop", "OrientedEdge", "bounds_of", "chained", "loops_of"]
+__all__ = ["FaceLoop", "OrientedEdge", "bounds_of", "join_runs", "loops_of"]
 
 FORWARD, REVERSED = TopAbs_Orientation.TopAbs_FORWARD, TopAbs_Orientation.TopAbs_REVERSED
 
@@ -135,10 +135,10 @@ def loops_of(face: TopoDS_Face) -> list[FaceLoop]:
     outer_wire = BRepTools.OuterWire_s(forward)
     surface = BRepAdaptor_Surface(face)
     loops: list[FaceLoop] = []
-    for found in explored(forward, TopAbs_ShapeEnum.TopAbs_WIRE):
+    for found in list_shapes(forward, TopAbs_ShapeEnum.TopAbs_WIRE):
         wire = TopoDS.Wire(found)
         runs, has_seam = _runs(wire, forward, face, surface)
-        for edges in chained(runs):
+        for edges in join_runs(runs):
             outer = _winds(edges) or (wire.IsSame(outer_wire) and not has_seam)
             loops.append(("outer" if outer else "inner", Chain(edges=edges)))
     return loops
@@ -174,7 +174,7 @@ def _in_order(wire: TopoDS_Wire, face: TopoDS_Face) -> Iterator[TopoDS_Edge]:
         explorer.Next()
 
 
-def chained(runs: list[list[OrientedEdge]]) -> Iterator[list[OrientedEdge]]:
+def join_runs(runs: list[list[OrientedEdge]]) -> Iterator[list[OrientedEdge]]:
     """Join runs into closed chains: each end goes on at the nearest start, its own included."""
     starts = np.array([run[0].ends[0] for run in runs]).reshape(-1, 3)
     left = np.ones(len(runs), dtype=bool)

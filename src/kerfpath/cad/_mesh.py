@@ -11,7 +11,7 @@ from OCP.TopLoc import TopLoc_Location
 from OCP.TopoDS import TopoDS, TopoDS_Shape
 
 from kerfpath._arrays import Array, Ints
-from kerfpath.cad._shape import explored
+from kerfpath.cad._shape import list_shapes
 
 __all__ = ["triangulate"]
 
@@ -25,7 +25,7 @@ def triangulate(shape: TopoDS_Shape, deflection: float) -> tuple[Array, Ints]:
     BRepTools.Clean_s(shape)
     BRepMesh_IncrementalMesh(shape, deflection, False, ANGLE, False)
     vertices, triangles, count = [np.empty((0, 3))], [np.empty((0, 3), dtype=np.int64)], 0
-    for found in explored(shape, TopAbs_ShapeEnum.TopAbs_FACE):
+    for found in list_shapes(shape, TopAbs_ShapeEnum.TopAbs_FACE):
         face, location = TopoDS.Face(found), TopLoc_Location()
         mesh = BRep_Tool.Triangulation_s(face, location)
         if mesh is None:

@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike
 
 from kerfpath._arrays import Array, Ints, floats, freeze, scalar
 from kerfpath._told import told
-from kerfpath.cad._crossing import crossing
+from kerfpath.cad._crossing import find_crossing
 from kerfpath.cad._departure import ON_CURVE, Departure, departure
 from kerfpath.cad._healed import HealedSurface
 from kerfpath.cad._left_out import LeftOut
@@ -275,7 +275,7 @@ class Part:
         except InputError as error:
             raise InputError(f"{self.path}: loop {name!r}: {error}") from None
         contour = Contour(points * MM, -normals, closed=loop.closed, name=name)
-        if (place := crossing(contour.points, min(2 * chord, TOUCH))) is not None:
+        if (place := find_crossing(contour.points, min(2 * chord, TOUCH))) is not None:
             raise InputError(
                 f"{self.path}: loop {name!r} crosses or touches itself at "
                 f"{(place / MM).round(3).tolist()} mm; repair it in CAD"

@@ -24,7 +24,7 @@ __all__ = [
     "Trace",
     "distance",
     "off_chord",
-    "sampled",
+    "sample_curve",
     "vector_area",
 ]
 
@@ -176,7 +176,7 @@ class Chain(Generic[E]):
 
         The end of an edge and the start of the next become one node, halfway.
         """
-        each = [sampled(edge, chord_tolerance, axis_tolerance)[1:] for edge in self.edges]
+        each = [sample_curve(edge, chord_tolerance, axis_tolerance)[1:] for edge in self.edges]
         points, normals = [], []
         for (before_p, before_n), (p, n) in zip(each[-1:] + each[:-1], each, strict=True):
             joint = before_n[-1] + n[0]
@@ -260,7 +260,7 @@ class Points:
         return self.points, self.normals
 
 
-def sampled(
+def sample_curve(
     edge: Curve, chord_tolerance: float, axis_tolerance: float
 ) -> tuple[Array, Array, Array]:
     """Return parameters, points and normals along one edge, both ends included, by halving cells.

@@ -29,7 +29,16 @@ from kerfpath._told import told
 from kerfpath.cad._units import MM
 from kerfpath.errors import InputError
 
-__all__ = ["Drawn", "NamedFace", "children", "drawn_of", "explored", "failures", "occt", "unique"]
+__all__ = [
+    "Drawn",
+    "NamedFace",
+    "children",
+    "drawn_of",
+    "failures",
+    "list_shapes",
+    "occt",
+    "unique",
+]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -138,14 +147,14 @@ def drawn_of(
     """Return a shape and its faces, sewn within `gap` (m) where there is no solid."""
     if not faces:
         raise InputError("the file holds no face; export the part as a solid or a surface")
-    solids = explored(shape, TopAbs_ShapeEnum.TopAbs_SOLID)
+    solids = list_shapes(shape, TopAbs_ShapeEnum.TopAbs_SOLID)
     if not solids and len(faces) > 1:
         shape, faces, note = _sewn(faces, gap)
         notes = [*notes, note]
     return Drawn(unit=unit, shape=shape, faces=faces, notes=notes)
 
 
-def explored(shape: TopoDS_Shape, kind: TopAbs_ShapeEnum) -> list[TopoDS_Shape]:
+def list_shapes(shape: TopoDS_Shape, kind: TopAbs_ShapeEnum) -> list[TopoDS_Shape]:
     """Return the faces, edges, ... of a shape."""
     return list(_each(TopExp_Explorer(shape, kind)))
 
@@ -178,7 +187,7 @@ def _sewn(faces: Sequence[NamedFace], gap: float) -> tuple[TopoDS_Shape, list[Na
         BRepLib.OrientClosedSolid_s(solid)
         shape = solid
     # Sewing turns faces round so that neighbours agree: each is taken as it lies in the result.
-    sewn = explored(shape, TopAbs_ShapeEnum.TopAbs_FACE)
+    sewn = list_shapes(shape, TopAbs_ShapeEnum.TopAbs_FACE)
     lying = []
     for named in faces:
         made = sewing.ModifiedSubShape(named.face)
@@ -189,7 +198,7 @@ def _sewn(faces: Sequence[NamedFace], gap: float) -> tuple[TopoDS_Shape, list[Na
             f"{len(faces) - len(lying)} of {len(faces)} loose faces vanish when sewn over "
             f"{gap / MM:g} mm; give a smaller gap"
         )
-    edges = explored(shape, TopAbs_ShapeEnum.TopAbs_EDGE)
+    edges = list_shapes(shape, TopAbs_ShapeEnum.TopAbs_EDGE)
     widest = max((BRep_Tool.Tolerance_s(TopoDS.Edge(edge)) for edge in edges), default=0.0)
     note = (
         f"{len(faces)} loose faces sewn within {gap / MM:g} mm: {sewing.NbContigousEdges()} edges "

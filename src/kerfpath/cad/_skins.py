@@ -14,8 +14,8 @@ from scipy.spatial import cKDTree
 
 from kerfpath._arrays import Array, Ints
 from kerfpath._told import told
-from kerfpath.cad._connected import connected
-from kerfpath.cad._loops import FaceLoop, OrientedEdge, chained
+from kerfpath.cad._connected import label_connected
+from kerfpath.cad._loops import FaceLoop, OrientedEdge, join_runs
 from kerfpath.cad._part import Side
 from kerfpath.cad._sample import Chain, vector_area
 
@@ -69,7 +69,7 @@ class Skin:
             for k, (_, loop) in enumerate(found[f])
             for run in _outside(loop.edges, [(f, k, e) in self.inside for e in _numbers(loop)])
         ]
-        chains = [Chain(edges=edges) for edges in chained(runs)]
+        chains = [Chain(edges=edges) for edges in join_runs(runs)]
         loops = [(_is_hole(chain), chain) for chain in chains]
         if loops and all(hole for hole, _ in loops):
             # A trim line may face away from its sheet, as that of a C-shaped channel does.
@@ -91,7 +91,7 @@ def skins_of(faces: Sequence[TopoDS_Face], found: Sequence[list[FaceLoop]]) -> l
     pairs = [(a, b) for at in uses if len(at) == 2 for a, b in [at] if a[0] != b[0]]
     smooth = [pair for pair in pairs if _is_smooth(*(found[f][k][1].edges[e] for f, k, e in pair))]
     group, whole = (
-        connected(np.array([[a[0], b[0]] for a, b in of], dtype=np.int64), len(faces))
+        label_connected(np.array([[a[0], b[0]] for a, b in of], dtype=np.int64), len(faces))
         for of in (smooth, pairs)
     )
     inside: dict[int, set[tuple[int, int, int]]] = {}

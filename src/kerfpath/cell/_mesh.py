@@ -20,7 +20,7 @@ from kerfpath.cell._columns import Columns
 from kerfpath.cell._sheet import edges_of
 from kerfpath.errors import InputError
 
-__all__ = ["SAME", "Mesh", "size_of", "welded"]
+__all__ = ["SAME", "Mesh", "size_of", "weld"]
 
 LARGEST = 100.0
 """m: nothing in a cell is larger; a mesh that is has the wrong unit."""
@@ -158,7 +158,7 @@ class Mesh:
         ]
         points = np.vstack([self.vertices, rim, rim.mean(axis=0)])
         size = float(np.ptp(self.bounds, axis=0).max())
-        vertices, corners = welded(points, np.vstack(triangles), SAME * size)
+        vertices, corners = weld(points, np.vstack(triangles), SAME * size)
         used, corners = np.unique(corners, return_inverse=True)
         return Mesh(
             vertices=vertices[used],
@@ -192,7 +192,7 @@ def size_of(vertices: Array, triangles: Ints, name: str) -> float:
     return size
 
 
-def welded(
+def weld(
     vertices: ArrayLike, triangles: ArrayLike, tolerance: float, name: str = "mesh"
 ) -> tuple[Array, Ints]:
     """Return the mesh with vertices closer than `tolerance` (m) made one, slivers left out."""

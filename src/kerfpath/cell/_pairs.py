@@ -24,7 +24,7 @@ from kerfpath.cell._mesh import Mesh
 from kerfpath.cell._motion import TOLERANCE, Sweep
 from kerfpath.cell._scene import ACCURACY, Scene
 from kerfpath.cell._shapes import Shape
-from kerfpath.cell._shaved import shaved
+from kerfpath.cell._shaved import shave
 from kerfpath.urdf import Chain
 
 __all__ = ["BY_DESIGN", "MEANT", "Design", "Places", "designs", "kept_all_round", "stand_still"]
@@ -228,6 +228,6 @@ def _touching(
 def _first_shaved(bodies: Sequence[Body], pair: Places, depth: float) -> tuple[int, Shape] | None:
     """Return what is left of one of two bodies, a convex one if there is, and its place."""
     for i in sorted(pair, key=lambda i: isinstance(bodies[i].shape, Mesh)):
-        if (shape := shaved(bodies[i].shape, depth)) is not None:
+        if (shape := shave(bodies[i].shape, depth)) is not None:
             return i, shape
     return None

@@ -8,10 +8,10 @@ from typing import NamedTuple
 import numpy as np
 
 from kerfpath._arrays import Array, Ints
-from kerfpath.contour._vectors import angle_between, turned, unit
+from kerfpath.contour._vectors import angle_between, slerp, unit
 from kerfpath.errors import InputError
 
-__all__ = ["Polyline", "corners", "evenly", "fewest", "in_time"]
+__all__ = ["Polyline", "corners", "divide_evenly", "sample_fewest", "sample_in_time"]
 
 CORNER = np.radians(20)
 """Turn of the path at one node from which on it is a corner, which sampling keeps."""
@@ -41,7 +41,7 @@ class Polyline(NamedTuple):
         k = np.clip(np.searchsorted(self.s, where, side="right") - 1, 0, len(self.s) - 2)
         part = ((where - self.s[k]) / (self.s[k + 1] - self.s[k]))[..., None]
         points = self.points[k] + part * (self.points[k + 1] - self.points[k])
-        return points, turned(self.axes[k], self.axes[k + 1], part)
+        return points, slerp(self.axes[k], self.axes[k + 1], part)
 
 
 def corners(points: Array, closed: bool) -> Ints:
@@ -55,7 +55,7 @@ def corners(points: Array, closed: bool) -> Ints:
     return np.flatnonzero(turn > CORNER)
 
 
-def evenly(at: Array, ends: Ints, step: float, unit_name: str, name: str) -> Array:
+def divide_evenly(at: Array, ends: Ints, step: float, unit_name: str, name: str) -> Array:
     """Return values that divide the stretches between at[ends] evenly, none longer than `step`.
 
     Parameters
@@ -95,7 +95,7 @@ def evenly(at: Array, ends: Ints, step: float, unit_name: str, name: str) -> Arr
     return np.concatenate([*pieces, at[-1:]])
 
 
-def in_time(s: Array, speed: Array, dt: float, ends: Ints, name: str) -> tuple[Array, Array]:
+def sample_in_time(s: Array, speed: Array, dt: float, ends: Ints, name: str) -> tuple[Array, Array]:
     """Return arc lengths (M,) m and times (M,) s of nodes evenly spaced in time, at most `dt`.
 
     Parameters
@@ -115,7 +115,7 @@ def in_time(s: Array, speed: Array, dt: float, ends: Ints, name: str) -> tuple[A
     even = np.abs(log_ratio) < 1e-6
     slowness = np.where(even, 2.0 / (speed[1:] + speed[:-1]), log_ratio / np.where(even, 1, change))
     t = np.concatenate([[0.0], np.cumsum(np.diff(s) * slowness)])
-    at = evenly(t, ends, dt, "ms", name)
+    at = divide_evenly(t, ends, dt, "ms", name)
     k = np.clip(np.searchsorted(t, at, side="right") - 1, 0, len(t) - 2)
     # Within a segment s(t) solves ds/dt = v: exponential where the speed changes.
     rate = np.append(change, 0.0)[k] / np.diff(s)[k]
@@ -128,7 +128,7 @@ def in_time(s: Array, speed: Array, dt: float, ends: Ints, name: str) -> tuple[A
     return made, np.diff(at).max(initial=0.0) * np.arange(len(at))
 
 
-def fewest(line: Polyline, tolerance: float, axis_tolerance: float) -> Array:
+def sample_fewest(line: Polyline, tolerance: float, axis_tolerance: float) -> Array:
     """Return the arc lengths of the fewest evenly spaced nodes that keep both tolerances."""
     # Cells this short keep both: in one, path and axis move less than is allowed.
     rate = float((angle_between(line.axes[:-1], line.axes[1:]) / np.diff(line.s)).max())
@@ -157,7 +157,7 @@ def _spoilt(line: Polyline, s: Array, nodes: Ints, tolerance: float, axis_tolera
     chord, there = p1 - p0, line.points[nodes]
     along = ((there - p0) * chord).sum(1) / np.maximum((chord * chord).sum(1), REPEATED_POINT**2)
     off = np.linalg.norm(p0 + np.clip(along, 0, 1)[:, None] * chord - there, axis=1)
-    angle = angle_between(turned(n0, n1, part), line.axes[nodes])
+    angle = angle_between(slerp(n0, n1, part), line.axes[nodes])
     excess = np.maximum(off / tolerance, angle / axis_tolerance)
     worst = int(np.argmax(excess))
     return -1 if excess[worst] <= 1.0 else int(nodes[worst])

@@ -18,11 +18,11 @@ __all__ = [
     "Side",
     "Surface",
     "edge",
-    "laid",
     "lateral",
+    "lay_on",
+    "lean_axes",
     "nearest",
     "require_in_scrap",
-    "tilted",
 ]
 
 TOUCH = 1e-5
@@ -60,7 +60,7 @@ class Ribbon:
         return points - ((points - where) * axis).sum(1, keepdims=True) * axis, -axis
 
 
-def laid(surface: Surface, flat: Array, contour: Contour, what: str) -> tuple[Array, Array]:
+def lay_on(surface: Surface, flat: Array, contour: Contour, what: str) -> tuple[Array, Array]:
     """Return points (B, 3) m laid on a surface, and its outward normals (B, 3).
 
     Raises
@@ -77,7 +77,7 @@ def laid(surface: Surface, flat: Array, contour: Contour, what: str) -> tuple[Ar
     return points, normals
 
 
-def tilted(normals: Array, normal: Array, axis: Array) -> Array:
+def lean_axes(normals: Array, normal: Array, axis: Array) -> Array:
     """Return tool axes (B, 3) that lean from the normals as `axis` (3,) does from `normal` (3,)."""
     tilt, _ = Rotation.align_vectors(axis[None], -normal[None])
     return np.asarray(tilt.apply(-normals))

@@ -15,7 +15,7 @@ from kerfpath.losses import Loss, Reason
 from kerfpath.robots._coupling import AXIS_3, Coupling
 from kerfpath.robots._external import ExternalAxis
 from kerfpath.robots._families import FAMILIES, Family
-from kerfpath.robots._solutions import Solutions, admitted, every
+from kerfpath.robots._solutions import Solutions, all_solutions, solutions_within
 from kerfpath.urdf import Body, Chain
 
 __all__ = ["Arm"]
@@ -139,9 +139,9 @@ class Arm:
         poses = floats(poses[None] if poses.ndim == 2 else poses, "T", (None, 4, 4))
         q, reach = self.inverse_all(poses)
         if not within_limits:
-            return every(q, reach)
+            return all_solutions(q, reach)
         self.require_few_turns()
-        return admitted(q, reach, self.joint_limits())
+        return solutions_within(q, reach, self.joint_limits())
 
     def inverse_all(self, T: Array) -> tuple[Array, Bools]:
         """Return every posture of flange poses T (B, 4, 4), limits ignored, as bare arrays.

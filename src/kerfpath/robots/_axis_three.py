@@ -19,7 +19,7 @@ from kerfpath._arrays import Array, floats
 from kerfpath.errors import InputError
 from kerfpath.robots._arm import Arm
 from kerfpath.robots._coupling import Coupling
-from kerfpath.robots._library import known, robot_ids
+from kerfpath.robots._library import read_robot, robot_ids
 
 __all__ = ["level", "with_axis_3"]
 
@@ -87,7 +87,7 @@ def _looked_up(robot: A) -> A:
     """
     twins = [
         twin
-        for twin in (known(Arm, name) for name in robot_ids())
+        for twin in (read_robot(Arm, name) for name in robot_ids())
         if twin.kinematics == robot.kinematics == "opw"
         and robot.manufacturer in ("", twin.manufacturer)
         and all(abs(robot.geometry[k] - twin.geometry[k]) <= ALIKE for k in ARM)

@@ -14,10 +14,10 @@ from kerfpath._arrays import Array
 from kerfpath.errors import InputError
 from kerfpath.robots._arm import Arm
 from kerfpath.robots._axis_three import with_axis_3
-from kerfpath.robots._recognise import in_closed_form, model_of
+from kerfpath.robots._recognise import in_closed_form, recognise
 from kerfpath.urdf import Chain, Description, read_urdf
 
-__all__ = ["described", "robot_of"]
+__all__ = ["build_robot", "read_description"]
 
 A = TypeVar("A", bound=Arm)
 
@@ -26,7 +26,7 @@ SNAPS = (5e-6, 5e-5, 5e-4, 5e-3)
 POSES = 256
 
 
-def described(
+def read_description(
     path: str | Path,
     snap: float | None,
     *,
@@ -84,7 +84,7 @@ def _moved(found: Description, meant: Chain) -> tuple[float, float]:
     return float(off.max()), float(Rotation.from_matrix(between).magnitude().max())
 
 
-def robot_of(
+def build_robot(
     kind: type[A],
     description: Description,
     *,
@@ -108,7 +108,7 @@ def robot_of(
     """
     where = f"{description.path} ({description.base} to {description.tip})"
     try:
-        model = model_of(description.chain, as_written=as_written)
+        model = recognise(description.chain, as_written=as_written)
     except InputError as error:
         raise InputError(f"{where}: {error}") from None
     continuous = np.array([joint.kind == "continuous" for joint in description.joints])

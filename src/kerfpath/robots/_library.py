@@ -16,7 +16,7 @@ from kerfpath.errors import InputError
 from kerfpath.robots._arm import Arm
 from kerfpath.robots._coupling import Coupling
 
-__all__ = ["acceleration_ratios", "known", "robot_ids"]
+__all__ = ["acceleration_ratios", "read_robot", "robot_ids"]
 
 A = TypeVar("A", bound=Arm)
 
@@ -40,7 +40,7 @@ def acceleration_ratios() -> dict[str, tuple[float, ...]]:
     return {name: tuple(values) for name, values in tomllib.loads(text).items()}
 
 
-def known(kind: type[A], name: str, acceleration_ratio: str | None = None) -> A:
+def read_robot(kind: type[A], name: str, acceleration_ratio: str | None = None) -> A:
     """Return a robot of the library by its id, see `kerfpath.robots.robot`."""
     if name not in robot_ids():
         raise InputError(

@@ -20,7 +20,7 @@ from kerfpath.robots._families import FAMILIES
 from kerfpath.robots._general import require_solver
 from kerfpath.urdf import Chain
 
-__all__ = ["EXACT", "in_closed_form", "model_of"]
+__all__ = ["EXACT", "in_closed_form", "recognise"]
 
 EXACT = 1e-9
 """m, and entries of a rotation: how far a model may be from the description it stands for."""
@@ -82,7 +82,7 @@ def in_closed_form(chain: Chain) -> bool:
     )
 
 
-def model_of(chain: Chain, *, as_written: bool = False) -> Arm:
+def recognise(chain: Chain, *, as_written: bool = False) -> Arm:
     """Return family, geometry, joint convention and frames of a chain.
 
     Parameters

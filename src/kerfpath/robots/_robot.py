@@ -13,9 +13,9 @@ from numpy.typing import ArrayLike
 from kerfpath._arrays import Array
 from kerfpath.errors import InputError
 from kerfpath.robots._arm import Arm
-from kerfpath.robots._described import described, robot_of
+from kerfpath.robots._described import build_robot, read_description
 from kerfpath.robots._external import ExternalAxis, Travel
-from kerfpath.robots._library import known
+from kerfpath.robots._library import read_robot
 
 __all__ = ["Robot", "robot"]
 
@@ -105,9 +105,9 @@ class Robot(Arm):
         InputError
             A bad description; a chain of no family; limits that are missing or zero, and not given.
         """
-        return robot_of(
+        return build_robot(
             cls,
-            described(path, snap, base=base, tip=tip, packages=packages, meshes=meshes),
+            read_description(path, snap, base=base, tip=tip, packages=packages, meshes=meshes),
             as_written=snap == 0,
             manufacturer=manufacturer,
             axis_3=axis_3,
@@ -225,7 +225,7 @@ def robot(name: str, *, acceleration_ratio: str | None = None) -> Robot:
     InputError
         An unknown robot or ratio; the message names the nearest ones.
     """
-    return known(Robot, name, acceleration_ratio)
+    return read_robot(Robot, name, acceleration_ratio)
 
 
 def _first(values: Array | None, n: int) -> Array | None:
