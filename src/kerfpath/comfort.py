@@ -1,4 +1,4 @@
-"""How far a joint vector is from where arms do badly, and what coming near is to cost.
+"""Distances of joint vectors from singularities and limits, and the cost of coming near.
 
 The measures, of an arm whose model angles are sign * q - offset:
 
@@ -103,7 +103,7 @@ class Band:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Comfort:
-    """What a plan is to keep away from, by measure; None: it does not matter.
+    """Bands that a plan is to keep away from, by measure; None: it does not matter.
 
     Parameters
     ----------

@@ -8,7 +8,7 @@ __all__ = ["Loss", "Reason"]
 
 
 class Loss(IntEnum):
-    """What takes a candidate pose out of its layer, or an edge out of the graph.
+    """The tests that take a candidate pose out of its layer, or an edge out of the graph.
 
     Kernels code the bounds of joint (or coupling) i as LOW + 2 i and HIGH + 2 i.
     """

@@ -15,7 +15,7 @@ __all__ = ["Tilt", "tilt_frames"]
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Tilt:
-    """How far the tool may be tilted away from the nominal axis, in which steps, at what cost.
+    """The tilt allowed away from the nominal tool axis: how far, in which steps, at what cost.
 
     Lead and lean are in the frame of travel: x along the path, z along the nominal tool axis
     into the part, y = z x x across the path. They are the parts of one turn about an axis between

@@ -145,7 +145,7 @@ def _places(ends: Array, gap: float) -> Ints:
 
 
 def _next_end(chain: Sequence[Curve], ends: Array, crowd: Ints) -> str:
-    """Say why an open chain does not go on, at that of its two ends that comes closer to it."""
+    """Return why an open chain does not go on, at that of its two ends that comes closer to it."""
     mine = [chain[0].ends[0], chain[-1].ends[1]]
     breaks = []
     for end in mine:

@@ -1,4 +1,4 @@
-"""Where a closed or open polyline comes back to itself."""
+"""Places at which a closed or open polyline meets itself."""
 
 from __future__ import annotations
 

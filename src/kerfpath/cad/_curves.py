@@ -22,7 +22,7 @@ LOOK = 64
 
 
 class _Flat(ABC):
-    """What all flat curves have in common, see `Edge`; each gives start, end, `at` and `speed`."""
+    """The base of flat curves, see `Edge`; each gives start, end, `at` and `speed`."""
 
     start: float
     end: float

@@ -1,4 +1,4 @@
-"""How far the chords of a contour leave the curve that it samples."""
+"""The distance of a contour's chords from the curve that it samples."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ CLOSER, PEAKS = 128, 16
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Departure:
-    """How far the nodes of a contour, joined by chords, leave what they sample.
+    """The largest errors of a contour's nodes, joined by chords, against what they sample.
 
     Tool axes turn evenly along each chord. Nodes are counted from 0; an error between two nodes is
     counted at the first of them.

@@ -88,7 +88,7 @@ class _Listener(logging.Handler):
 
 @contextmanager
 def _overheard() -> Iterator[list[str]]:
-    """Give what ezdxf logs about faults, which would go to the terminal otherwise."""
+    """Collect what ezdxf logs about faults, which would go to the terminal otherwise."""
     handler = _Listener(logging.WARNING)
     propagates, logger.propagate = logger.propagate, False
     logger.addHandler(handler)

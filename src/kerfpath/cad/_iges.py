@@ -109,7 +109,7 @@ def _read(path: Path, unit: str | None, gap: float) -> Drawn:
 
 
 def _require_sound(reader: IGESControl_Reader) -> None:
-    """Refuse broken entities, on which OCCT's transfer may crash the process."""
+    """Raise InputError for broken entities, on which OCCT's transfer may crash the process."""
     for _, reason in failures(reader.WS().ModelCheckList()):
         raise InputError(f"the file is damaged ({reason}); copy or export it again")
 

@@ -104,7 +104,7 @@ class Loop:
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Part:
-    """What a drawing holds: its loops by name, in the part's own frame.
+    """A drawing as read: its loops by name, in the part's own frame.
 
     Parameters
     ----------

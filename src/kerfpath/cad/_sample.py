@@ -1,4 +1,4 @@
-"""What a loop runs along: a chain of curves, or points as they came; facts and dense samples."""
+"""Traces of loops: a chain of curves, or points as they came; facts and dense samples."""
 
 from __future__ import annotations
 
@@ -77,7 +77,7 @@ E = TypeVar("E", bound=Edge)
 
 
 class Trace(Protocol):
-    """What a loop runs along."""
+    """The line that a loop runs along."""
 
     @property
     def curves(self) -> Sequence[Curve]:
@@ -103,7 +103,7 @@ class Trace(Protocol):
         """Return the least and greatest coordinates (2, 3) mm."""
 
     def break_at(self) -> str:
-        """Say where its largest gap is."""
+        """Return in words where its largest gap is."""
 
     def sample(self, chord_tolerance: float, axis_tolerance: float) -> tuple[Array, Array]:
         """Return points (K, 3) mm and outward normals (K, 3); a closed trace's first ends it not.
@@ -248,7 +248,7 @@ class Points:
         return np.stack([self.points.min(axis=0), self.points.max(axis=0)])
 
     def break_at(self) -> str:
-        """Say how far its ends lie apart."""
+        """Return in words how far its ends lie apart."""
         first, last = self.points[[0, -1]]
         return (
             f"ends {np.linalg.norm(last - first):.3f} mm from its start, "

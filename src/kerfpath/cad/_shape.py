@@ -1,4 +1,4 @@
-"""What STEP and IGES hold: a shape, its named faces, sewn together where they are loose.
+"""The content of STEP and IGES files: a shape and its named faces, sewn where they are loose.
 
 OCCT crashes on some damaged files, so they are read in a process of its own (`kerfpath.apart`), and
 what was read comes from there as OCCT's own binary text. This module and those that translate are

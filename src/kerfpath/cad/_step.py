@@ -137,7 +137,7 @@ def _product(used: StepRepr_NextAssemblyUsageOccurrence) -> str:
 
 
 def _require_sound(reader: STEPControl_Reader) -> bool:
-    """Refuse broken syntax and geometry, on which OCCT may crash; say if styles are sound."""
+    """Return whether styles are sound; raise InputError for what OCCT may crash on."""
     has_styles = True
     model = reader.WS().Model()
     for number, reason in failures(reader.WS().ModelCheckList()):
@@ -161,7 +161,7 @@ def _require_sound(reader: STEPControl_Reader) -> bool:
 
 
 def _require_near(points: Array) -> None:
-    """Refuse points (K, 3) mm that no part has: OCCT would spend minutes on curves through them."""
+    """Raise InputError for points (K, 3) mm so far off that OCCT would spend minutes on them."""
     far = points[~(np.abs(points) <= LARGEST).all(axis=1)]
     if len(far):
         raise InputError(

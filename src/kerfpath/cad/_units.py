@@ -28,6 +28,6 @@ UNITS_MM = {
 
 
 def require_unit(unit: str | None) -> None:
-    """Refuse a unit that is not known; None passes."""
+    """Raise InputError for a unit that is not known; None passes."""
     if unit is not None and unit not in UNITS_MM:
         raise InputError(f"unit: expected one of {', '.join(UNITS_MM)}, got {unit!r}")

@@ -77,7 +77,7 @@ class Checker:
         return np.array([self._price[v] for v in vertices.tolist()])
 
     def passable(self, p: Ints, j: Ints) -> Bools:
-        """Say which of the motions from vertices p to vertices j, (B,) each, are clear.
+        """Return which of the motions from vertices p to vertices j, (B,) each, are clear.
 
         Pairs that closed a motion before are looked at half way first: there most motions hit.
         """
@@ -105,7 +105,7 @@ class Checker:
         return passable
 
     def blocked(self, p: Ints, j: Ints) -> Bools:
-        """Say of which motions, (B,) each, it is seen at little cost that they are not clear.
+        """Return which motions, (B,) each, are seen at little cost not to be clear.
 
         Half way, pairs that closed a motion before are too near.
         """

@@ -24,7 +24,7 @@ PAST = 1e-5
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class _Head:
-    """What every cutting head has: a nozzle, at a stand-off above the part."""
+    """The base of cutting heads: a nozzle, at a stand-off above the part."""
 
     stand_off: float = 1e-3
     share: float = 0.5

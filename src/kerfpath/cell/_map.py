@@ -1,4 +1,4 @@
-"""How clear very many joint vectors are, at as few distances as proofs allow.
+"""Clearances of very many joint vectors, at as few distances as proofs allow.
 
 One pair of bodies at a time: seen from its first body, the second takes a cloud of poses, one for
 each joint vector. A block of that cloud is measured at its middle, d. No point of the second body
@@ -184,7 +184,7 @@ class _Cloud:
 
 
 class _Outline(NamedTuple):
-    """What bounds how far a body moves: points that hold it, or a cylinder if it is a round one.
+    """The outline by which motions are bounded: points that hold a body, or a round one's cylinder.
 
     Parameters
     ----------

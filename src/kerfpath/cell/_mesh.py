@@ -108,7 +108,7 @@ class Mesh:
         )
 
     def contains(self, points: Array) -> Bools:
-        """Say which of the points (m, 3) m, none of them on the surface, lie inside."""
+        """Return which of the points (m, 3) m, none of them on the surface, lie inside."""
         return freeze(np.array([self._columns.contains(p) for p in points], dtype=np.bool_))
 
     def cut(self, point: Array, normal: Array) -> tuple[Mesh | None, Mesh | None]:

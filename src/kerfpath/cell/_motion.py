@@ -97,7 +97,7 @@ class Sweep:
         distances: Distances,
         wanted: Bools | None = None,
     ) -> Bools:
-        """Say which of the motions q0 to q1 (B, n) rad are proved to keep more than `required`.
+        """Return which of the motions q0 to q1 (B, n) rad are proved to keep more than `required`.
 
         Of pairs that are not `wanted` (B, P) it is known already.
         """

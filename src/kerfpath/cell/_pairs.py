@@ -1,4 +1,4 @@
-"""What the design of an arm leaves between its bodies, hence which pairs of them can be judged.
+"""The distances that an arm's design leaves between its bodies, hence which pairs can be judged.
 
 Links of a compact wrist overlap as convex hulls, a head touches the link that it is mounted before,
 capsules are drawn too thick. What is so by design is so whatever the joints do: distances are found
@@ -64,7 +64,7 @@ MEANT = "they may touch"
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Design:
-    """What the design leaves between two bodies.
+    """The distance that the design leaves between two bodies, and what of them is judged.
 
     Parameters
     ----------
@@ -94,7 +94,7 @@ class Design:
 
 
 def stand_still(one: Body, two: Body) -> str:
-    """Say why two bodies need no judging whatever their shapes; nothing where they do."""
+    """Return why two bodies need no judging whatever their shapes; "" where they do."""
     return "they do not move against each other" if one.frame == two.frame else ""
 
 
@@ -139,7 +139,7 @@ def designs(
 def kept_all_round(
     chain: Chain, bodies: Sequence[Body], pair: Places, asked: float, design: Design
 ) -> str:
-    """Say what a pair is proved to keep at every angle of the one joint between; nothing if not."""
+    """Return what a pair is proved to keep at every angle of the one joint between; "" if not."""
     a, b = (bodies[i].frame for i in pair)
     if b - a != 1 or not {bodies[i].kind for i in pair} <= ARM:
         return ""

@@ -208,7 +208,7 @@ class Scene:
 
 
 def _inside(inner: _Solid, outer: _Solid, frames: Array) -> bool:
-    """Say whether a body that does not touch the surface of a mesh lies inside it."""
+    """Return whether a body that does not touch the surface of a mesh lies inside it."""
     if outer.mesh is None:
         return False
     T, into = frames[inner.frame], frames[outer.frame]

@@ -1,4 +1,4 @@
-"""Where the nodes of a sampling lie: evenly between features, evenly in time, or fewest."""
+"""Samplings of a path: evenly between features, evenly in time, or by the fewest nodes."""
 
 from __future__ import annotations
 

@@ -23,7 +23,7 @@ __all__ = ["Arm"]
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Arm:
-    """What a `Robot` is, without the ways to read or change one; see there."""
+    """An arm as `Robot` describes it, without the ways to read or change one."""
 
     id: str
     geometry: dict[str, float]
@@ -261,7 +261,7 @@ class Arm:
         return (*first, *self.bounds(), Reason(Loss.UNWANTED))
 
     def require_few_turns(self) -> None:
-        """Require of position limits that the kernels have room for every combination of turns.
+        """Raise InputError where the limits leave more turns than the kernels have room for.
 
         Raises
         ------

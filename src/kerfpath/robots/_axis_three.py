@@ -1,4 +1,4 @@
-"""What axis 3 of a controller measures: the elbow, or the upper arm from the horizontal.
+"""The meaning of a controller's axis 3: the elbow, or the upper arm from the horizontal.
 
 A parallel rod from the foot of an arm (IRB 2400, 4400) holds its upper arm as it was while axis 2
 moves, and every FANUC pendant shows J3 so: then axis 3 is joint 2 and joint 3 of the serial model

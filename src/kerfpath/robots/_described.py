@@ -71,7 +71,7 @@ def read_description(
 
 
 def _alike(one: Chain, two: Chain) -> bool:
-    """Say whether two chains have the same frames."""
+    """Return whether two chains have the same frames."""
     return np.array_equal(one.origins, two.origins) and np.array_equal(one.end, two.end)
 
 

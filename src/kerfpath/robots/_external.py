@@ -88,7 +88,7 @@ class ExternalAxis:
             )
 
     def no_inverse(self) -> InputError:
-        """Say why one pose is not solved, and what to ask instead."""
+        """Return the error for a pose to be solved: why it is not, and what to ask instead."""
         return InputError(
             f"inverse: with a {self.kind} a pose has solutions without end; ask "
             f"robot.held(x).inverse(T), x in {self.unit}"

@@ -134,7 +134,7 @@ FAMILIES = {
 
 
 def posture_name(posture: int) -> str:
-    """Say a posture in words: shoulder, elbow, wrist, as in "front/up/plus" (every family's)."""
+    """Return a posture in words: shoulder, elbow, wrist, as in "front/up/plus" (every family's)."""
     return (*EIGHT, *MORE)[posture]
 
 

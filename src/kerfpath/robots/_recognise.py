@@ -62,7 +62,7 @@ class _Lines:
         return float(np.linalg.norm(np.cross(point - self.place[i], self.along[i])))
 
     def misfit(self, parallel: Sequence[int], square: Sequence[int]) -> str:
-        """Name the first of the joints i that is not parallel, or square, to joint i + 1."""
+        """Return in words the first joint i that is not parallel, or square, to joint i + 1."""
         for i in parallel:
             if float(np.linalg.norm(np.cross(*self.along[i : i + 2]))) > NEARLY:
                 return f"axes {i + 1} and {i + 2} are not parallel"
@@ -73,7 +73,7 @@ class _Lines:
 
 
 def in_closed_form(chain: Chain) -> bool:
-    """Say whether a chain of six joints is of a family with a closed form."""
+    """Return whether a chain of six joints is of a family with a closed form."""
     lines = _lines(chain)
     return any(
         not isinstance(derived := derive(lines), str)
