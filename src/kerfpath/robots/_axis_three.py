@@ -17,13 +17,13 @@ from numpy.typing import ArrayLike
 
 from kerfpath._arrays import Array, floats
 from kerfpath.errors import InputError
-from kerfpath.robots._arm import Arm
 from kerfpath.robots._coupling import Coupling
 from kerfpath.robots._library import read_robot, robot_ids
+from kerfpath.robots._manipulator import Manipulator
 
 __all__ = ["level", "with_axis_3"]
 
-A = TypeVar("A", bound=Arm)
+A = TypeVar("A", bound=Manipulator)
 
 COUNTED = {
     "ABB": ("serial", "horizontal"),
@@ -43,7 +43,7 @@ ARM = ("a1", "a2", "b", "c2", "c3")
 """The lengths from axis 1 to the wrist: foot and flange may be described elsewhere."""
 
 
-def level(robot: Arm) -> tuple[Array, float]:
+def level(robot: Manipulator) -> tuple[Array, float]:
     """Return row (n,) and shift rad of axis 3 from the horizontal: row @ q + shift.
 
     As the robot's maker counts it, zero where the upper arm lies level.
@@ -87,7 +87,7 @@ def _looked_up(robot: A) -> A:
     """
     twins = [
         twin
-        for twin in (read_robot(Arm, name) for name in robot_ids())
+        for twin in (read_robot(Manipulator, name) for name in robot_ids())
         if twin.kinematics == robot.kinematics == "opw"
         and robot.manufacturer in ("", twin.manufacturer)
         and all(abs(robot.geometry[k] - twin.geometry[k]) <= ALIKE for k in ARM)
@@ -149,7 +149,7 @@ def _given(robot: A, axis_3: str, limits: ArrayLike | None) -> A:
     return replace(robot, axis_3=axis_3, couplings=(one,))
 
 
-def _carried_over(coupling: Coupling, twin: Arm, robot: Arm) -> Coupling:
+def _carried_over(coupling: Coupling, twin: Manipulator, robot: Manipulator) -> Coupling:
     """Return a bound of a twin in the joints of a robot, which may count them otherwise."""
     row = coupling.row * twin.sign * robot.sign
     shift = float(coupling.row @ (twin.sign * _turned(twin.offset - robot.offset)))

@@ -12,14 +12,14 @@ from scipy.spatial.transform import Rotation
 
 from kerfpath._arrays import Array
 from kerfpath.errors import InputError
-from kerfpath.robots._arm import Arm
 from kerfpath.robots._axis_three import with_axis_3
+from kerfpath.robots._manipulator import Manipulator
 from kerfpath.robots._recognise import in_closed_form, recognise
 from kerfpath.urdf import Chain, Description, read_urdf
 
 __all__ = ["build_robot", "read_description"]
 
-A = TypeVar("A", bound=Arm)
+A = TypeVar("A", bound=Manipulator)
 
 SNAPS = (5e-6, 5e-5, 5e-4, 5e-3)
 """rad: by how much angles of five, four, three and two digits after the point may be rounded."""

@@ -13,12 +13,12 @@ import numpy as np
 
 from kerfpath._arrays import Array
 from kerfpath.errors import InputError
-from kerfpath.robots._arm import Arm
 from kerfpath.robots._coupling import Coupling
+from kerfpath.robots._manipulator import Manipulator
 
 __all__ = ["acceleration_ratios", "read_robot", "robot_ids"]
 
-A = TypeVar("A", bound=Arm)
+A = TypeVar("A", bound=Manipulator)
 
 _HERE = files("kerfpath.robots")
 

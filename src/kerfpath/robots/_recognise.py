@@ -15,9 +15,9 @@ import numpy as np
 
 from kerfpath._arrays import Array
 from kerfpath.errors import InputError
-from kerfpath.robots._arm import Arm
 from kerfpath.robots._families import FAMILIES
 from kerfpath.robots._general import require_solver
+from kerfpath.robots._manipulator import Manipulator
 from kerfpath.urdf import Chain
 
 __all__ = ["EXACT", "in_closed_form", "recognise"]
@@ -82,7 +82,7 @@ def in_closed_form(chain: Chain) -> bool:
     )
 
 
-def recognise(chain: Chain, *, as_written: bool = False) -> Arm:
+def recognise(chain: Chain, *, as_written: bool = False) -> Manipulator:
     """Return family, geometry, joint convention and frames of a chain.
 
     Parameters
@@ -124,7 +124,7 @@ def recognise(chain: Chain, *, as_written: bool = False) -> Arm:
     except InputError as error:
         raise InputError(f"{'; '.join(misfits)}: {error}") from None
     notes = (f"General arm: {'; '.join(misfits)}.",)
-    return Arm(id="", kinematics="general", geometry={}, notes=notes, chain=chain)
+    return Manipulator(id="", kinematics="general", geometry={}, notes=notes, chain=chain)
 
 
 def _lines(chain: Chain) -> _Lines:
@@ -235,9 +235,9 @@ def _turned(direction: Array, *wanted: Callable[[Array], float]) -> tuple[Array,
 
 def _laid(
     family: str, at: _Lines, lengths: dict[str, float], signs: list[float], zero: list[float]
-) -> Arm:
+) -> Manipulator:
     """Return the model with joint 6 and the end turned onto the tip."""
-    model = Arm(
+    model = Manipulator(
         id="",
         kinematics=family,
         geometry={k: _round(float(v)) for k, v in lengths.items()},
@@ -254,7 +254,7 @@ def _laid(
     return replace(model, T_end_flange=_tidy(left))
 
 
-def _miss(chain: Chain, model: Arm) -> float:
+def _miss(chain: Chain, model: Manipulator) -> float:
     """Return the largest entry by which the model's poses differ from the chain's."""
     q = np.random.default_rng(2008).uniform(-np.pi, np.pi, (POSES, 6))
     return float(np.abs(model.forward(q) - chain.forward(q)).max())

@@ -12,16 +12,16 @@ from numpy.typing import ArrayLike
 
 from kerfpath._arrays import Array
 from kerfpath.errors import InputError
-from kerfpath.robots._arm import Arm
 from kerfpath.robots._described import build_robot, read_description
 from kerfpath.robots._external import ExternalAxis, Travel
 from kerfpath.robots._library import read_robot
+from kerfpath.robots._manipulator import Manipulator
 
 __all__ = ["Robot", "robot"]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False, repr=False)
-class Robot(Arm):
+class Robot(Manipulator):
     """An arm of one of the families, its limits and where they come from.
 
     Joint vectors follow the robot's own description (its URDF where `frames` says so); poses are

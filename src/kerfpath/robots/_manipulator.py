@@ -1,4 +1,4 @@
-"""An arm: geometry, joint convention, limits, and closed-form kinematics in bulk."""
+"""A manipulator: geometry, joint convention, limits, and closed-form kinematics in bulk."""
 
 from __future__ import annotations
 
@@ -18,12 +18,12 @@ from kerfpath.robots._families import FAMILIES, Family
 from kerfpath.robots._solutions import Solutions, all_solutions, solutions_within
 from kerfpath.urdf import Body, Chain
 
-__all__ = ["Arm"]
+__all__ = ["Manipulator"]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class Arm:
-    """An arm as `Robot` describes it, without the ways to read or change one."""
+class Manipulator:
+    """A manipulator as `Robot` describes it, without the ways to read or change one."""
 
     id: str
     geometry: dict[str, float]
