@@ -12,6 +12,7 @@ from kerfpath.cell import UNPROVED, Cell, Checker
 from kerfpath.comfort import Band
 from kerfpath.errors import InputError, NoFeasiblePath
 from kerfpath.graph import LayeredGraph
+from kerfpath.losses import Loss, Reason
 from kerfpath.planner._task import Task
 from kerfpath.plans import Plan
 from kerfpath.search import (
@@ -75,7 +76,7 @@ class Finder:
         A search learns what it needs in any order, and may break at a node of many that are closed:
         the first of them is what is told.
         """
-        if self._cell is None or not any("collision" in word for word in broken.counts):
+        if self._cell is None or not broken.lost_by(Loss.COLLISION):
             return broken
         closed, settled = self._known.closed_layers(POSES_SETTLED)
         if not closed:
@@ -83,10 +84,11 @@ class Finder:
         first, nodes = closed[0], len(self._known.start) - 1
         others = f" ({len(closed)} such nodes: {_ranges(closed)})" if len(closed) > 1 else ""
         rest = "" if settled == nodes else f"; nodes from {settled} on have not been looked at"
-        counts = {
-            word: number for word, number in self._graph.counts(first).items() if word != "admitted"
-        }
-        counts["collision at the node"] = int(np.diff(self._known.start[first : first + 2])[0])
+        counts = self._graph.counts(first)
+        counts.pop(Reason(Loss.ADMITTED), None)
+        counts[Reason(Loss.COLLISION, "at the node")] = int(
+            np.diff(self._known.start[first : first + 2])[0]
+        )
         reasons = ", ".join(f"{word}: {number}" for word, number in counts.items())
         return NoFeasiblePath(
             f"no pose at node {first} of {nodes} is clear{others}{rest}; of the candidates there, "

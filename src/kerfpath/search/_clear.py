@@ -16,6 +16,7 @@ from numpy.typing import ArrayLike
 
 from kerfpath._arrays import Array, Bools, Ints, integers
 from kerfpath.errors import InputError, NoFeasiblePath
+from kerfpath.losses import Loss, Reason
 from kerfpath.search._fastest import LeastInterval
 from kerfpath.search._interrupted import InterruptedPath
 from kerfpath.search._layers import reduced
@@ -235,21 +236,22 @@ class Known:
     def told(self, broken: NoFeasiblePath) -> NoFeasiblePath:
         """Say of a break what collision has to do with it."""
         counts = dict(broken.counts)
-        counts.pop("closed vertices", None)
+        counts.pop(Reason(Loss.CLOSED), None)
         there, closed = broken.node + 1, np.isinf(self.cost)
         ways = {
-            "collision at the node": int(closed[self._layer == there].sum()),
-            "collision on the way": counts.pop("shut edges", 0),
+            Reason(Loss.COLLISION, "at the node"): int(closed[self._layer == there].sum()),
+            Reason(Loss.COLLISION, "on the way"): counts.pop(Reason(Loss.SHUT), 0),
         }
+        elsewhere = Reason(Loss.COLLISION, "elsewhere")
         if not broken.counts or not any(ways.values()):
-            ways = {"collision elsewhere": self.vertices_closed + self.edges_closed}
+            ways = {elsewhere: self.vertices_closed + self.edges_closed}
         if not any(ways.values()):
             return broken
         counts |= {name: number for name, number in ways.items() if number}
         told = ", ".join(f"{name}: {number}" for name, number in counts.items())
         message = f"no admissible way to node {there} that is clear; forbidden by {told}"
-        if "collision elsewhere" in ways:
-            message = f"{broken}, collision elsewhere: {ways['collision elsewhere']}"
+        if elsewhere in ways:
+            message = f"{broken}, {elsewhere}: {ways[elsewhere]}"
         return broken.retold(message, counts)
 
 

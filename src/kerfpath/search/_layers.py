@@ -11,6 +11,7 @@ from kerfpath.errors import NoFeasiblePath
 from kerfpath.kernels import search as kernel
 from kerfpath.kernels.limits import LIMIT_TOLERANCE
 from kerfpath.kernels.search import Layers, Objective
+from kerfpath.losses import Loss, Reason
 from kerfpath.search._problem import Problem
 
 __all__ = [
@@ -106,20 +107,20 @@ def empty_layer(problem: Problem, k: int) -> NoFeasiblePath:
         f"layer {k} is empty: {why}" + (f"; closed vertices: {closed}" if closed else ""),
         proved=True,
         node=k - 1,
-        counts={"closed vertices": closed} if closed else {},
+        counts={Reason(Loss.CLOSED): closed} if closed else {},
     )
 
 
 def broken_edge(k: int, forbidden: Ints, shut: int, *, proved: bool) -> NoFeasiblePath:
     """Say that no admissible edge leads into layer k, and what forbids how many."""
-    counts = {
-        f"{test}, joint {i + 1}": int(number)
-        for test, row in zip(("velocity", "acceleration"), forbidden, strict=True)
+    counts: dict[str, int] = {
+        Reason(test, i + 1): int(number)
+        for test, row in zip((Loss.VELOCITY, Loss.ACCELERATION), forbidden, strict=True)
         for i, number in enumerate(row)
         if number
     }
     if shut:
-        counts["shut edges"] = shut
+        counts[Reason(Loss.SHUT)] = shut
     told = ", ".join(f"{name}: {number}" for name, number in counts.items())
     total = int(sum(counts.values()))
     return NoFeasiblePath(
