@@ -28,7 +28,7 @@ NEAREST = 4
 
 
 class Checker:
-    """The checks that `kerfpath.search.clear_path` asks for.
+    """The checks that `kerfpath.search.find_clear` asks for.
 
     Parameters
     ----------

@@ -13,7 +13,7 @@ from tests.job.run.test_part import DEMO, WHOLE
 from kerfpath import Contour, InputError
 from kerfpath.contour import angle_between
 from kerfpath.job import read_plan_file
-from kerfpath.operations import touched_up, micro_joints
+from kerfpath.operations import micro_joints, touched_up
 from programs import read_text
 
 EASE = 0.01
