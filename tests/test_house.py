@@ -4,6 +4,7 @@ import importlib
 import re
 import subprocess
 import sys
+import tomllib
 
 import pytest
 
@@ -11,6 +12,13 @@ from conftest import ROOT
 from kerfpath.kernels import EQUATIONS
 
 SOURCES = sorted((ROOT / "src").rglob("*.py"))
+PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text())
+HOUSES = {
+    container: contract["layers"]
+    for contract in PROJECT["tool"]["importlinter"]["contracts"]
+    if contract["type"] == "layers"
+    for container in contract["containers"]
+}
 
 
 def test_every_numbered_equation_of_the_paper_is_in_the_index():
@@ -31,7 +39,7 @@ def test_an_equation_is_where_the_index_says_and_only_there(number):
 
 @pytest.mark.parametrize("number", sorted(EQUATIONS))
 def test_every_equation_has_a_test_that_names_it(number):
-    tests = "".join(f.read_text() for f in (ROOT / "tests").glob("test_*.py"))
+    tests = "".join(f.read_text() for f in (ROOT / "tests").rglob("test_*.py"))
     assert f"@pytest.mark.equation({number})" in tests
 
 
@@ -44,6 +52,21 @@ def test_a_module_stays_under_400_lines_and_keeps_the_house_rules(source):
         assert not re.search(r"(?<![\w.])print\(", text)
     if "kernels" not in source.parts:
         assert not re.search(r"^\s*(import|from) numba", text, re.MULTILINE)
+
+
+def drawn_layers(container):
+    """The layers of one drawing in CONTRIBUTING.md; deeper lines are words about the one above."""
+    text = (ROOT / "CONTRIBUTING.md").read_text()
+    (drawing,) = re.findall(rf"^Inside `{container}`.*\n\n((?: {{4}}.*\n)+)", text, re.MULTILINE)
+    return [
+        re.split(" {2,}", line)[0] for line in re.findall(r"^ {4}(\S.*)$", drawing, re.MULTILINE)
+    ]
+
+
+@pytest.mark.parametrize("container", HOUSES)
+def test_the_drawing_of_the_house_has_the_layers_of_its_contract(container):
+    drawn = [set(layer.split(" | ")) for layer in drawn_layers(container)]
+    assert drawn == [set(layer.split(" | ")) for layer in HOUSES[container]]
 
 
 def test_asking_for_help_does_not_load_the_kernels():
