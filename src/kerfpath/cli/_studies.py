@@ -186,25 +186,27 @@ def layout(
 
     Example: kerfpath layout door.toml --robots --acceleration-ratio nearest
     """
-    options = {
-        "goal": goal, "evaluations": evaluations, "seed": seed, "tolerance_mm": tolerance_mm,
-        "tolerance_deg": tolerance_deg, "map_points": map_points,
-    }  # fmt: skip
-    workers = {"scheduler": scheduler, "processes": processes}
+    from kerfpath.cli._layout import LayoutOptions, show_layout
+    from kerfpath.cli._robots_for import show_robots_for
+
+    options = LayoutOptions(
+        goal=goal, evaluations=evaluations, seed=seed, tolerance_mm=tolerance_mm,
+        tolerance_deg=tolerance_deg, map_points=map_points,
+    )  # fmt: skip
     folder = to or Path(f"{job.stem}-layout")
     if robots:
-        from kerfpath.cli._robots_for import show_robots_for
-
-        given = [name for name, value in {"vary": vary, **options}.items() if value is not None]
-        if given:
-            said = ", ".join(f"--{name.replace('_', '-')}" for name in given)
-            raise InputError(f"--robots: nothing is moved with it; leave out {said}")
-        found = show_robots_for(job, folder, workers, acceleration_ratio, as_json=as_json)
+        if given := [*(["--vary"] if vary is not None else []), *options.given()]:
+            raise InputError(f"--robots: nothing is moved with it; leave out {', '.join(given)}")
+        found = show_robots_for(
+            job, folder, scheduler=scheduler, processes=processes, ratio=acceleration_ratio,
+            as_json=as_json,
+        )  # fmt: skip
     elif acceleration_ratio is not None:
         raise InputError("--acceleration-ratio: only with --robots; else the job says it")
     else:
-        from kerfpath.cli._layout import show_layout
-
-        found = show_layout(job, folder, vary or [], options | workers, as_json=as_json)
+        found = show_layout(
+            job, folder, vary=vary or [], options=options, scheduler=scheduler,
+            processes=processes, as_json=as_json,
+        )  # fmt: skip
     if not found:
         raise typer.Exit(1)
