@@ -161,12 +161,12 @@ def _add(
     """Add loops as one line with breaks."""
     lines = [floats(loop.points, f"loop {loop.name}", (None, 3)) * 1e3 for loop in loops]
     broken = [np.vstack([line, np.full((1, 3), np.nan)]) for line in lines]
-    told = [f"<b>{escape(loop.name)}</b><br>{escape(loop.facts)}" for loop in loops]
+    texts = [f"<b>{escape(loop.name)}</b><br>{escape(loop.facts)}" for loop in loops]
     figure.add_scatter3d(
         **xyz(np.vstack(broken)),
         mode="lines",
         line={"color": colour, "width": 6},
-        text=np.repeat(told, [len(line) for line in broken]).tolist(),
+        text=np.repeat(texts, [len(line) for line in broken]).tolist(),
         hovertemplate="%{text}<extra></extra>",
         name=f"{len(loops)} {caption}",
         visible="legendonly" if aside else True,

@@ -104,8 +104,8 @@ def _facts(entry: LayoutEntry) -> list[tuple[str, str]]:
         still = f"others may come to {_value(entry, entry['open_bound'])}"
         facts.append(("Claim", proved if entry["proved"] else still))
     if entry["tolerance"]:
-        told = ", ".join(f"{name} ±{size:g}" for name, size in entry["tolerance"].items())
-        facts.append(("The worst within", f"{told}, one at a time"))
+        spans = ", ".join(f"{name} ±{size:g}" for name, size in entry["tolerance"].items())
+        facts.append(("The worst within", f"{spans}, one at a time"))
     if entry["standing"]:
         facts.append(("Standing", ", ".join(entry["standing"])))
     return facts
@@ -119,9 +119,9 @@ def _notes(entry: LayoutEntry) -> list[str]:
     if entry["goal"] == "margin" and best is not None and best["value"] < 1:
         notes.append("Some contour cannot be cut at the speed asked for, even there.")
     if best is None and entry["reasons"]:
-        told = entry["reasons"][0]
-        where = f" {told['contour']}, node {told['node']}:" if told["contour"] else ""
-        notes.append(f"Most common:{where} {told['reason']} ({told['count']} placements).")
+        why = entry["reasons"][0]
+        where = f" {why['contour']}, node {why['node']}:" if why["contour"] else ""
+        notes.append(f"Most common:{where} {why['reason']} ({why['count']} placements).")
     return notes
 
 
@@ -227,14 +227,14 @@ def _tallies(entry: LayoutEntry) -> str:
         heads = [("", ""), ("Placements", ""), ("", "%")]
         parts += [f"<h4>{title}</h4>", table(heads, rows)]
     reasons = [
-        f'<tr><th scope="row">{STATUSES[told["status"]]}</th>'
-        f"<td>{escape(told['contour'] or '')}</td>"
-        f"{td('' if told['node'] is None else str(told['node']))}{td(str(told['count']))}"
-        f"<td>{escape(told['reason'][:LONGEST])}</td></tr>"
-        for told in entry["reasons"]
+        f'<tr><th scope="row">{STATUSES[why["status"]]}</th>'
+        f"<td>{escape(why['contour'] or '')}</td>"
+        f"{td('' if why['node'] is None else str(why['node']))}{td(str(why['count']))}"
+        f"<td>{escape(why['reason'][:LONGEST])}</td></tr>"
+        for why in entry["reasons"]
     ]
     if reasons:
         heads = [("", ""), ("Contour", ""), ("Node, most often", ""), ("Placements", "")]
-        told = table([*heads, ("Such as", "")], reasons, text_columns=(0, 1, 4))
-        parts += ["<h4>Why not</h4>", told]
+        why_not = table([*heads, ("Such as", "")], reasons, text_columns=(0, 1, 4))
+        parts += ["<h4>Why not</h4>", why_not]
     return "\n".join(parts)

@@ -169,9 +169,9 @@ def _labels(sections: Sequence[ContourSection]) -> list[dict[str, object]]:
     Alternate heights keep neighbouring names apart.
     """
     named = sections if len(sections) <= LABELS else ()
-    told = [(section.path.points[0], section.name, INK) for section in named]
+    labels = [(section.path.points[0], section.name, INK) for section in named]
     failed = [section for section in sections if section.marks][:LABELS]
-    told += [(s.marks[0].point, f"{s.name}: {s.marks[0].words}", ALERT) for s in failed]
+    labels += [(s.marks[0].point, f"{s.name}: {s.marks[0].words}", ALERT) for s in failed]
     return [
         {
             **dict(zip("xyz", (point * 1e3).tolist(), strict=True)),
@@ -186,7 +186,7 @@ def _labels(sections: Sequence[ContourSection]) -> list[dict[str, object]]:
             "ay": (-34, 34, -66, 66)[i % 4],
             "xanchor": "left",
         }
-        for i, (point, text, colour) in enumerate(told)
+        for i, (point, text, colour) in enumerate(labels)
     ]
 
 
