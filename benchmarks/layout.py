@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import tempfile
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 from time import perf_counter
 from typing import Any
@@ -12,7 +13,6 @@ import numpy as np
 
 from benchmarks._figures import Figure, Report
 from kerfpath.job import Job, warm_up
-from kerfpath.planner import layered_graph
 from kerfpath.search import least_interval
 from kerfpath.study import Layout, digest, layout
 from kerfpath.study.placing._place import moved, numbers_of
@@ -110,11 +110,10 @@ def _bounds(found: Layout, subjects: Sequence[Subject], placements: int) -> list
 def _timed(job: Job, subject: Subject, nodes: Any) -> tuple[float, float]:
     """Return the least interval over some nodes, s, and how long it took to find."""
     begun = perf_counter()
-    graph = layered_graph(subject.nodes, job.robot, **job.graph_options, nodes=nodes)
+    graph = job.graph(subject.nodes, replace(job.options, comfort=None), only=nodes)
     velocity, acceleration = job.robot.speed_limits()
-    options = {key: job.plan_options[key] for key in ("eta_v", "eta_a")}
     least = least_interval(
         graph.q, graph.start, velocity=velocity, acceleration=acceleration,
-        endless=job.robot.endless, **options,
+        endless=job.robot.endless, eta_v=job.options.eta_v, eta_a=job.options.eta_a,
     )  # fmt: skip
     return least.dt, perf_counter() - begun

@@ -20,6 +20,7 @@ from kerfpath.cad import read as read_drawing
 from kerfpath.front import Attempts, Search, hypervolume, judge_of
 from kerfpath.front._runs import anchors, whole
 from kerfpath.job import read_job
+from kerfpath.options import PlanOptions
 from kerfpath.planner import layered_graph, node_interval, relaxations
 from kerfpath.study import pareto_of_job
 
@@ -119,7 +120,7 @@ def _task() -> tuple[Contour, dict[str, Any]]:
     task = next(task for task in job.contours if task.name == "trim")
     nodes = task.sample(part.contour(task.pick))
     options: dict[str, Any] = {"tool": job.tool, "placement": job.placement, "robot": job.robot}
-    options |= {key: job.plan_options[key] for key in ("gamma_step", "frames", "postures")}
+    options |= {key: getattr(job.options, key) for key in ("gamma_step", "frames", "postures")}
     graph = layered_graph(nodes, **options)
     return nodes, options | {"speed": task.speed, "graph": graph}
 
@@ -149,8 +150,11 @@ def _nsga(
     """Take the time of NSGA-II, and return its row: the same first runs, box and budget as ours."""
     robot, graph, speed = options["robot"], options["graph"], options["speed"]
     judge = judge_of(criteria, robot, eta_v=1.0, eta_a=1.0, cell=None, comfort=None, home=None)
-    shared = {k: options[k] for k in ("tool", "placement", "speed", "gamma_step", "frames")}
-    attempts = Attempts(contour=nodes, robot=robot, graph=graph, cell=None, options=shared)
+    attempts = Attempts(
+        contour=nodes, robot=robot, tool=options["tool"], placement=options["placement"],
+        speed=speed, graph=graph, cell=None,
+        options=PlanOptions(gamma_step=options["gamma_step"], frames=options["frames"]),
+    )  # fmt: skip
     dt = node_interval(nodes, speed)
     first = whole(1 / (robot.speed_limits()[0] * dt), judge.eta_v, judge.eta_a)
     start = perf_counter()

@@ -178,7 +178,7 @@ def _planned(job: Job, task: ContourTask, drawn: Contour) -> Plan:
     nodes = task.sample(drawn)
     laid_on = task.speed if nodes.time is None else None
     return plan(
-        nodes, job.robot, tool=job.tool, placement=job.placement, speed=laid_on, **job.plan_options
+        nodes, job.robot, tool=job.tool, placement=job.placement, speed=laid_on, options=job.options
     )  # fmt: skip
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from contextlib import suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from importlib.resources import files
 from pathlib import Path
 from time import perf_counter
@@ -127,17 +127,17 @@ def _words(value: float | None, pattern: str) -> str:
 
 def _step_row(job: Job, nodes: Contour, speed: float, step: float) -> _Row:
     """Plan a contour of the job on a grid of this step, deg, and refine the plan."""
-    options = job.plan_options | {"gamma_step": np.radians(step), "refine": False}
+    options = replace(job.options, gamma_step=np.radians(step), refine=False)
     space: dict[str, Any] = {"tool": job.tool, "placement": job.placement}
-    grid: dict[str, Any] = {key: options[key] for key in ("gamma_step", "frames", "postures")}
     start = perf_counter()
-    graph = layered_graph(nodes, job.robot, **space, **grid)
+    graph = job.graph(nodes, options)
     built = perf_counter()
     free = job.robot.with_limits(acceleration=FREE * job.robot.speed_limits()[1])
 
-    def made(robot: Robot, **changes: bool) -> float | None:
+    def made(robot: Robot, *, refine: bool = False) -> float | None:
         with suppress(NoFeasiblePath):
-            return plan(nodes, robot, speed=speed, graph=graph, **space, **options | changes).cost
+            asked = replace(options, refine=refine)
+            return plan(nodes, robot, speed=speed, graph=graph, options=asked, **space).cost
         return None
 
     grid_cost = made(job.robot)

@@ -40,16 +40,20 @@ def main() -> None:
         part = read_drawing(job.part_file)
     task = next(t for t in job.contours if t.name == "trim")
     nodes = task.sample(part.contour(task.pick))
-    options = job.plan_options
     graph = layered_graph(
         nodes,
         job.robot,
         tool=job.tool,
         placement=job.placement,
-        gamma_step=options["gamma_step"],
+        gamma_step=job.options.gamma_step,
     )
     made = plan(
-        nodes, job.robot, tool=job.tool, placement=job.placement, speed=task.speed, **options
+        nodes,
+        job.robot,
+        tool=job.tool,
+        placement=job.placement,
+        speed=task.speed,
+        options=job.options,
     )
     figure = feasibility_map(graph, made, s=nodes.s)
     figure.update_layout(width=SIZE[0], height=SIZE[1])

@@ -99,7 +99,8 @@ def of_job(file: Path, name: str) -> Made:
     task = next(task for task in job.tasks(part) if task.name == name)
     shaped = task.candidates(part)[0]
     nodes = task.sample(replace(shaped, speed_share=np.ones(len(shaped))))
-    return nodes, {"robot": job.robot, **job.graph_options}
+    grid = {key: getattr(job.options, key) for key in ("gamma_step", "frames", "tilt", "postures")}
+    return nodes, {"robot": job.robot, "tool": job.tool, "placement": job.placement, **grid}
 
 
 TASKS: dict[str, Callable[[], Made]] = {

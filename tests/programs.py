@@ -6,7 +6,8 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from kerfpath import Contour
-from kerfpath.plans import Plan, Proof, Settings
+from kerfpath.options import PlanOptions
+from kerfpath.plans import Plan, Proof
 from kerfpath.post import (
     JointMove,
     LinearMove,
@@ -43,16 +44,7 @@ def hand_plan(contour, arm, tool, placement, speed=0.1, posture=0):
         posture=np.full(K, posture),
         turn=np.zeros((K, 6), int),
         time=np.arange(K) * contour.length / (K - 1) / speed,
-        settings=Settings(
-            gamma_step=0.1,
-            frames="tangent",
-            method="paper",
-            objective="sum",
-            metric="manhattan",
-            weights=np.ones(6),
-            eta_v=1.0,
-            eta_a=1.0,
-        ),
+        settings=PlanOptions(gamma_step=0.1, frames="tangent", method="paper", weights=np.ones(6)),
         cost=0.0,
         proof=Proof(optimal=False, statement="made by hand"),
         counts={},

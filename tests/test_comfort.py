@@ -383,7 +383,7 @@ def test_pieces_and_dips_keep_comfort(fine):
     assert dipped.criteria.nearest["wrist"][0] >= 0.1
     hard = Comfort(wrist=Band(margin=0.1))
     assert audit(plan(nodes, arm, feed="dip", comfort=hard, refine=True, **fast)) == []
-    with pytest.raises(InputError, match='with feed "dip" costs'):
+    with pytest.raises(InputError, match='expected False with feed "dip" and comfort costs'):
         plan(nodes, arm, feed="dip", comfort=comfort, refine=True, **fast)
     pieces = plan_in_pieces(nodes, arm, comfort=comfort, **fast)
     assert len(pieces) > 1
@@ -391,7 +391,7 @@ def test_pieces_and_dips_keep_comfort(fine):
         nodes_cost = by_hand(arm, piece.q, comfort)
         path = np.abs(piece.increments * piece.settings.weights).sum()
         assert piece.cost == pytest.approx(path + nodes_cost.sum(), rel=1e-12)
-    with pytest.raises(InputError, match="clearance: is measured in a cell"):
+    with pytest.raises(InputError, match='interruptions: expected "none" with comfort clearance'):
         plan_in_pieces(nodes, arm, comfort=Comfort(clearance=Band()), **fast)
 
 

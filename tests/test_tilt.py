@@ -292,7 +292,7 @@ def test_a_bad_tilt_is_refused(wrong, message):
 
 
 def test_what_a_tilt_does_not_go_with_is_refused(arc, arm, options):
-    with pytest.raises(InputError, match="plan_in_pieces: the tool axis cannot be tilted"):
+    with pytest.raises(InputError, match='tilt: expected none with interruptions "fewest"'):
         plan_in_pieces(arc, arm, tilt=Tilt(cone=CONE), **options)
 
 

@@ -22,6 +22,8 @@ if TYPE_CHECKING:
     from kerfpath.front import ParetoSet as ParetoSet
     from kerfpath.front import pareto as pareto
     from kerfpath.job import read_plan_file as read_plan_file
+    from kerfpath.options import OptionConflict as OptionConflict
+    from kerfpath.options import PlanOptions as PlanOptions
     from kerfpath.placement import placed as placed
     from kerfpath.placement import placement_from_points as placement_from_points
     from kerfpath.planner import fastest_speed as fastest_speed
@@ -45,8 +47,10 @@ _HOME = {
     "KerfpathError": "errors",
     "LayeredPath": "search",
     "NoFeasiblePath": "errors",
+    "OptionConflict": "options",
     "ParetoSet": "front",
     "Plan": "plans",
+    "PlanOptions": "options",
     "Refinement": "refiner",
     "Robot": "robots",
     "Tilt": "tilt",

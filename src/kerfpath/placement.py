@@ -193,32 +193,24 @@ def planned_again(plan: Plan, T_base_part: ArrayLike) -> Plan:
         found = None
     if found is not None and found.done:
         return found.plan
-    s, slowest = plan.settings, plan.feed
+    slowest, comfort = plan.feed, plan.settings.comfort
     dt = plan.dt  # from node to node at the speed asked for
     if slowest is not None and slowest.node >= 0:
         dt = float(np.diff(plan.time)[slowest.node]) * slowest.slowest
-    refined = "refined off the grid" in plan.proof.statement
-    comfort = s.comfort and replace(s.comfort, clearance=None)
+    if comfort is not None:
+        comfort = replace(comfort, clearance=None)
     made = plan_contour(
         replace(plan.contour, time=dt * np.arange(len(plan.time), dtype=np.float64)),
         plan.robot,
         tool=plan.T_flange_tip,
         placement=T_base_part,
-        gamma_step=s.gamma_step,
-        frames=s.frames,
-        tilt=s.tilt,
-        postures=sorted(set(plan.posture.tolist())),
-        method=s.method,
-        objective=s.objective,
-        metric=s.metric,
-        weights=s.weights,
-        eta_v=s.eta_v,
-        eta_a=s.eta_a,
-        closure=s.closure,
-        rotation=s.rotation,
-        feed="constant" if plan.feed is None else "dip",
-        refine=refined,
-        comfort=comfort,
+        options=replace(
+            plan.settings,
+            postures=tuple(sorted(set(plan.posture.tolist()))),
+            feed="constant" if plan.feed is None else "dip",
+            refine=plan.settings.refine or plan.proof.grid_cost is not None,
+            comfort=comfort,
+        ),
     )
     return replace(made, contour=plan.contour)
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any, Literal
@@ -11,56 +12,16 @@ from scipy.spatial.transform import Rotation
 
 from kerfpath._arrays import Array, Ints, as_pose, floats, freeze, integers, scalar
 from kerfpath._told import told
-from kerfpath.comfort import Comfort, measures
-from kerfpath.contour import Contour, FrameKind
+from kerfpath.comfort import measures
+from kerfpath.contour import Contour
 from kerfpath.errors import InputError
 from kerfpath.kernels import metric
+from kerfpath.options import PlanOptions
 from kerfpath.robots import Robot
-from kerfpath.search import METRIC_CODES, Closure, Method, Metric, ObjectiveKind
-from kerfpath.tilt import Tilt, tilted
+from kerfpath.search import METRIC_CODES, Metric, ObjectiveKind
+from kerfpath.tilt import tilted
 
-__all__ = ["Criteria", "Feed", "Plan", "Proof", "Settings", "path_cost"]
-
-
-@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class Settings:
-    """How a plan was asked for.
-
-    Parameters
-    ----------
-    gamma_step : float rad
-        Step of the free rotation.
-    frames : {"tangent", "rotation-minimising"}
-        Task frames that gamma is measured in.
-    method, objective, metric : str
-        As in `kerfpath.shortest_path`.
-    weights : (n,) 1/rad
-        Weights of the joint-space distance; of a rail 1/m.
-    eta_v, eta_a : float
-        Share of the velocity and acceleration limits that may be used.
-    closure : {"free", "periodic"}
-    rotation : (6,) rad, optional
-        How far each joint may turn away from where it begins, infinite where that is not limited.
-    comfort : Comfort, optional
-        What the nodes are to keep away from, and what coming near costs.
-    tilt : Tilt, optional
-        Tolerance of the tool axis; None: the nominal axis.
-    """
-
-    gamma_step: float
-    frames: FrameKind
-    method: Method
-    objective: ObjectiveKind
-    metric: Metric
-    weights: Array
-    eta_v: float
-    eta_a: float
-    closure: Closure = "free"
-    rotation: Array | None = None
-    comfort: Comfort | None = None
-    tilt: Tilt | None = None
-
-    __repr__ = told
+__all__ = ["Criteria", "Feed", "Plan", "Proof", "path_cost"]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -123,7 +84,7 @@ class Feed:
 class Criteria:
     """Smoothness of a plan, joint by joint, each (n,), and what it comes near to.
 
-    Of a rail m stands where others have rad.
+    In rad and rad/s; for a rail in m and m/s.
 
     Parameters
     ----------
@@ -188,7 +149,8 @@ class Plan:
         Turns of 2 pi of each joint away from (-pi, pi].
     time : (K,) s
         Time of each node, from 0.
-    settings : Settings
+    settings : PlanOptions
+        How it was asked for, with the weights that were used.
     cost : float
         Objective (14) or (15), with what tilt and comfort cost.
     proof : Proof
@@ -207,7 +169,7 @@ class Plan:
     posture: Ints
     turn: Ints
     time: Array
-    settings: Settings
+    settings: PlanOptions
     cost: float
     proof: Proof
     counts: Mapping[str, int]
@@ -236,6 +198,8 @@ class Plan:
         }
         if (np.diff(cast["time"]) <= 0).any():
             raise InputError("time: must increase from node to node")
+        if self.settings.weights is None:
+            cast["settings"] = self.settings.of(self.robot, _mean_step(cast["time"]))
         for name, value in cast.items():
             object.__setattr__(self, name, value)
 
@@ -247,7 +211,7 @@ class Plan:
     @property
     def dt(self) -> float:
         """Mean time from node to node, s."""
-        return float(self.time[-1] - self.time[0]) / (len(self.time) - 1)
+        return _mean_step(self.time)
 
     @property
     def points(self) -> Array:
@@ -325,3 +289,16 @@ class Plan:
             peak_acceleration=np.abs(self.acceleration_share).max(axis=0, initial=0.0),
             nearest={name: (float(of.min()), int(of.argmin())) for name, of in measured.items()},
         )
+
+
+def _mean_step(time: Array) -> float:
+    return float(time[-1] - time[0]) / (len(time) - 1)
+
+
+def __getattr__(name: str) -> object:
+    if name != "Settings":
+        raise AttributeError(f"module 'kerfpath.plans' has no attribute {name!r}")
+    warnings.warn(
+        "kerfpath.plans.Settings is kerfpath.PlanOptions now", DeprecationWarning, stacklevel=2
+    )
+    return PlanOptions

@@ -13,7 +13,8 @@ from kerfpath.auditor._collision import collision_along
 from kerfpath.auditor._motion import follow, motion_of, straight
 from kerfpath.auditor._swept import HIDDEN
 from kerfpath.cell import CuttingHead, box, cell_of
-from kerfpath.plans import Proof, Settings
+from kerfpath.options import PlanOptions
+from kerfpath.plans import Proof
 
 DENSE = 2000
 """Samples of an interval that stand for all of it: 16 times as dense as the audit's own begin."""
@@ -33,10 +34,7 @@ def plan_of(arm, tool, q, seconds):
         posture=np.zeros(len(q), int),
         turn=np.zeros((len(q), n), int),
         time=seconds * np.arange(len(q)),
-        settings=Settings(
-            gamma_step=0.1, frames="tangent", method="exact", objective="sum",
-            metric="manhattan", weights=np.ones(n), eta_v=1.0, eta_a=1.0,
-        ),
+        settings=PlanOptions(gamma_step=0.1, frames="tangent", weights=np.ones(n)),
         cost=0.0,
         proof=Proof(optimal=False, statement=""),
         counts={},

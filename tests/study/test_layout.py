@@ -17,7 +17,6 @@ from conftest import ROOT
 from kerfpath.cad import read as read_drawing
 from kerfpath.errors import InputError
 from kerfpath.job import cell_of_job, fastest_speeds, pose, read_job
-from kerfpath.planner import layered_graph
 from kerfpath.study import digest, layout, ranges_of
 from kerfpath.study.placing._look import look
 from kerfpath.study.placing._place import moved, numbers_of, placed_text
@@ -209,7 +208,7 @@ def test_what_is_called_unreachable_has_a_node_without_a_pose(plain):
             continue
         lost += 1
         there = moved(job, numbers_of(job, {"x_mm": x}, middle(plain)))
-        graph = layered_graph(subjects[answer["contour"]].nodes, there.robot, **there.graph_options)
+        graph = there.graph(subjects[answer["contour"]].nodes)
         assert answer["node"] % EVERY == 0
         assert np.diff(graph.start)[answer["node"]] == 0
     assert lost

@@ -69,14 +69,13 @@ def test_the_front_is_that_of_the_planner_itself(job, studied):
     read = read_job(job)
     part = read_drawing(read.part_file)
     (task,) = [task for task in read.tasks(part) if task.name == "large"]
-    options = read.plan_options
     own = pareto(
         task.sample(task.candidates(part)[0]),
         read.robot,
-        **read.graph_options,
+        tool=read.tool,
+        placement=read.placement,
         speed=task.speed,
-        eta_v=options["eta_v"],
-        eta_a=options["eta_a"],
+        options=read.options,
         criteria=CRITERIA,
         runs=24,
     )

@@ -97,9 +97,9 @@ def test_reach_is_the_share_of_nodes_with_a_pose(tmp_path):
     a, b = contour_speeds(job, part)
     assert (b.reached, b.reason) == (1.0, "")
     assert a.fastest is b.fastest is None, "speeds are looked for where all is in reach"
-    H = job.placement @ job.tasks(part)[0].evenly_fast(part).frames(job.plan_options["frames"])
+    H = job.placement @ job.tasks(part)[0].evenly_fast(part).frames(job.options.frames)
     there = np.zeros(len(H), bool)
-    for gamma in gamma_grid(job.plan_options["gamma_step"]):
+    for gamma in gamma_grid(job.options.gamma_step):
         spin = np.eye(4)
         spin[:2, :2] = [[np.cos(gamma), -np.sin(gamma)], [np.sin(gamma), np.cos(gamma)]]
         poses = H @ spin @ np.linalg.inv(job.tool)
@@ -142,7 +142,7 @@ def test_a_second_call_computes_nothing(found, folder, monkeypatch):
 def test_postures_are_those_of_the_other_family(folder):
     job = read_job(folder / "job.toml")
     job.source["plan"]["posture"] = "rear"
-    assert with_robot(job, robot("ur_ur10e")).plan_options["postures"] == (4, 5, 6, 7)
+    assert with_robot(job, robot("ur_ur10e")).options.postures == (4, 5, 6, 7)
     job.source["plan"]["posture"] = "third"
     with pytest.raises(InputError, match="expected a posture in words"):
         with_robot(job, robot("ur_ur10e"))

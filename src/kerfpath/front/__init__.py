@@ -10,6 +10,7 @@ from kerfpath.front._criteria import Judge as Judge
 from kerfpath.front._criteria import judge_of as judge_of
 from kerfpath.front._pareto import pareto as pareto
 from kerfpath.front._runs import Run as Run
+from kerfpath.front._runs import RunData as RunData
 from kerfpath.front._set import Front as Front
 from kerfpath.front._set import ParetoSet as ParetoSet
 from kerfpath.front._set import hypervolume as hypervolume

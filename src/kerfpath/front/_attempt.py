@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Any
 
+from kerfpath._arrays import Array
 from kerfpath._told import told
 from kerfpath.auditor import audit as full_audit
 from kerfpath.cell import Cell
@@ -13,6 +13,7 @@ from kerfpath.contour import Contour
 from kerfpath.errors import NoFeasiblePath
 from kerfpath.front._runs import WINDOW, Run
 from kerfpath.graph import LayeredGraph
+from kerfpath.options import PlanOptions
 from kerfpath.planner import plan
 from kerfpath.plans import Plan
 from kerfpath.robots import Robot
@@ -26,19 +27,20 @@ class Attempts:
 
     Parameters
     ----------
-    contour, robot, graph, cell
-        As in `kerfpath.plan`.
-    options : dict
-        What else `kerfpath.plan` is called with, the same for all runs: the speed at least.
+    contour, robot, tool, placement, speed, options, graph, cell
+        As in `kerfpath.plan`; the runs change some of the options.
     audit : callable, optional
         Returns what is wrong with a plan; default: `kerfpath.audit`, with the cell.
     """
 
     contour: Contour
     robot: Robot
+    tool: Array
+    placement: Array
+    speed: float | None
+    options: PlanOptions
     graph: LayeredGraph
     cell: Cell | None
-    options: dict[str, Any]
     audit: Callable[[Plan], Sequence[object]] | None = None
 
     __repr__ = told
@@ -88,8 +90,10 @@ class Attempts:
         return plan(
             self.contour,
             self.robot,
+            tool=self.tool,
+            placement=self.placement,
+            speed=self.speed,
+            options=run.applied_to(self.options),
             graph=run.graph(self.graph, self.robot.endless),
             cell=run.cell(self.cell),
-            **run.options,
-            **self.options,
         )

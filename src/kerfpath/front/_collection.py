@@ -80,7 +80,7 @@ class Collection:
     ) -> Iterator[Run]:
         """Yield the runs: the first, those for the best of each criterion, and then the search."""
         contour, robot, graph = attempts.contour, attempts.robot, attempts.graph
-        speed = attempts.options["speed"]
+        speed = attempts.speed
         dt = node_interval(contour, speed)
         velocity, _ = robot.speed_limits()
         first = whole(freeze(1 / (velocity * dt)), judge.eta_v, judge.eta_a)

@@ -6,14 +6,13 @@ import os
 from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import fields
-from typing import Any
+from typing import Unpack
 
-import numpy as np
 from numpy.typing import ArrayLike
 
+from kerfpath._arrays import as_pose
 from kerfpath.cell import Cell
-from kerfpath.comfort import Comfort
-from kerfpath.contour import Contour, FrameKind
+from kerfpath.contour import Contour
 from kerfpath.front._adaptive import reach_of
 from kerfpath.front._attempt import Attempts
 from kerfpath.front._collection import AHEAD, Collection, Reached, Search, whole_number
@@ -21,13 +20,22 @@ from kerfpath.front._criteria import judge_of
 from kerfpath.front._runs import Run
 from kerfpath.front._set import Front, ParetoSet
 from kerfpath.graph import LayeredGraph
+from kerfpath.options import GraphKeywords, PlanOptions, chosen
 from kerfpath.planner import layered_graph
 from kerfpath.plans import Plan
 from kerfpath.robots import Robot
 from kerfpath.search import Closure
-from kerfpath.tilt import Tilt
 
 __all__ = ["pareto"]
+
+
+class ParetoKeywords(GraphKeywords, total=False):
+    """The options that `pareto` takes as keywords."""
+
+    eta_v: float
+    eta_a: float
+    closure: Closure
+    rotation: ArrayLike | None
 
 
 def pareto(
@@ -41,22 +49,15 @@ def pareto(
     runs: int = 100,
     search: Search = "adaptive",
     seed: int = 0,
-    gamma_step: float = np.pi / 180,
-    frames: FrameKind = "rotation-minimising",
-    tilt: Tilt | None = None,
-    postures: Sequence[int] | None = None,
-    eta_v: float = 1.0,
-    eta_a: float = 1.0,
-    closure: Closure = "free",
-    rotation: ArrayLike | None = None,
     home: ArrayLike | None = None,
+    options: PlanOptions | None = None,
     cell: Cell | None = None,
-    comfort: Comfort | None = None,
     graph: LayeredGraph | None = None,
     audit: Callable[[Plan], Sequence[object]] | None = None,
     workers: int | None = None,
     ahead: int = AHEAD,
     progress: Callable[[int], None] | None = None,
+    **keywords: Unpack[ParetoKeywords],
 ) -> ParetoSet:
     """Return plans of which none is as good as another in all criteria and better in one.
 
@@ -67,8 +68,12 @@ def pareto(
 
     Parameters
     ----------
-    contour, robot, tool, placement, speed, gamma_step, frames, tilt, postures, closure, rotation
-        As in `kerfpath.plan`.
+    contour, robot, tool, placement, speed, cell
+        As in `kerfpath.plan`; in a cell runs go one after another.
+    options
+        As in `kerfpath.plan`, or as keywords gamma_step, frames, tilt, postures, closure, rotation,
+        comfort, eta_v and eta_a: the largest share of the velocity and acceleration limits that any
+        run may use. Runs say objective, metric and weights; the speed is constant.
     criteria : sequence of str
         Less is better of: "displacement" (7) and "range" (9), over the joints' velocity limits and
         added up (s); "velocity", the largest increment (8) of any joint, and "acceleration", as
@@ -82,12 +87,8 @@ def pareto(
         Where the front is sparse, or over a plain grid of weights and eta.
     seed : int
         Of all that is random; the same seed and `ahead` give the same set, whatever `workers`.
-    eta_v, eta_a : float
-        Largest share of the velocity and acceleration limits that any run may use.
     home : (n,) rad, optional
         Where the arm comes from and goes back to; only "time" needs it.
-    cell, comfort : optional
-        As in `kerfpath.plan`; in a cell runs go one after another.
     graph : LayeredGraph, optional
         The layered graph of this very task, kept from `kerfpath.planner.layered_graph`.
     audit : callable, optional
@@ -107,35 +108,32 @@ def pareto(
     InputError
         Unknown criteria or search, fewer than one run, and what `kerfpath.plan` refuses.
     """
+    asked = chosen(options, keywords, ParetoKeywords, feed="constant", refine=False)
     judge = judge_of(
-        criteria, robot, eta_v=eta_v, eta_a=eta_a, cell=cell, comfort=comfort, home=home
+        criteria,
+        robot,
+        eta_v=asked.eta_v,
+        eta_a=asked.eta_a,
+        cell=cell,
+        comfort=asked.comfort,
+        home=home,
     )
     workers = whole_number((os.cpu_count() or 1) if workers is None else workers, "workers")
+    T_flange_tip, T_base_part = as_pose(tool, "tool"), as_pose(placement, "placement")
     if graph is None:
         graph = layered_graph(
-            contour,
-            robot,
-            tool=tool,
-            placement=placement,
-            gamma_step=gamma_step,
-            frames=frames,
-            tilt=tilt,
-            postures=postures,
-            comfort=comfort,
+            contour, robot, tool=T_flange_tip, placement=T_base_part, options=asked
         )
-    options: dict[str, Any] = {
-        "tool": tool,
-        "placement": placement,
-        "speed": speed,
-        "gamma_step": gamma_step,
-        "frames": frames,
-        "tilt": tilt,
-        "closure": closure,
-        "rotation": rotation,
-        "comfort": comfort,
-    }
     attempts = Attempts(
-        contour=contour, robot=robot, graph=graph, cell=cell, options=options, audit=audit
+        contour=contour,
+        robot=robot,
+        tool=T_flange_tip,
+        placement=T_base_part,
+        speed=speed,
+        options=asked,
+        graph=graph,
+        cell=cell,
+        audit=audit,
     )
     collection = Collection(attempts, judge=judge, runs=runs, search=search, seed=seed, ahead=ahead)
     plans: dict[int, Plan] = {}

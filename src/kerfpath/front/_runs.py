@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from itertools import product
-from typing import Any, get_args
+from typing import TypedDict, get_args
 
 import numpy as np
 
@@ -15,13 +15,13 @@ from kerfpath.cell import Cell
 from kerfpath.front._clearance import roomier
 from kerfpath.front._criteria import Criterion
 from kerfpath.graph import LayeredGraph
+from kerfpath.options import PlanOptions
 from kerfpath.search import Metric, ObjectiveKind, Relaxations
 
-__all__ = ["WINDOW", "Run", "anchors", "grid", "in_window", "quicker", "whole", "within"]
+__all__ = ["WINDOW", "Run", "RunData", "anchors", "grid", "in_window", "quicker", "whole", "within"]
 
 WINDOW = "window of joint"
 """What vertices outside a window are counted under, before the joint's number."""
-OPTIONS = ("objective", "metric", "weights", "eta_v", "eta_a")
 FAINT = 1e-6
 """Weight of the other joints where one joint counts: they decide between equals, or as good as."""
 LEVELS = (0.25, 4.0)
@@ -30,6 +30,18 @@ ROUNDING = 1e-9
 """Share by which limits are wider than what was found to need them."""
 SHARES = (1.0, 0.9, 0.8)
 """Multiples of eta in the grid."""
+
+
+class RunData(TypedDict):
+    """A run as JSON holds it; null where a joint has no window."""
+
+    objective: ObjectiveKind
+    metric: Metric
+    weights: list[float]
+    eta_v: float
+    eta_a: float
+    window: list[list[float] | None]
+    clearance: float
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -59,10 +71,16 @@ class Run:
 
     __repr__ = told
 
-    @property
-    def options(self) -> dict[str, Any]:
-        """What `kerfpath.plan` is to be called with."""
-        return {name: getattr(self, name) for name in OPTIONS}
+    def applied_to(self, options: PlanOptions) -> PlanOptions:
+        """Return the options with what this run asks for in their place."""
+        return replace(
+            options,
+            objective=self.objective,
+            metric=self.metric,
+            weights=self.weights,
+            eta_v=self.eta_v,
+            eta_a=self.eta_a,
+        )
 
     def graph(self, graph: LayeredGraph, endless: Bools) -> LayeredGraph:
         """Return the layered graph of a task without what is outside the window."""
@@ -74,19 +92,33 @@ class Run:
             return cell
         return roomier(cell, self.clearance)
 
-    def data(self) -> dict[str, Any]:
+    def data(self) -> RunData:
         """Return it as plain JSON data; `of_data` gives the very same run back."""
-        window = [pair if np.isfinite(pair).all() else None for pair in self.window.tolist()]
-        weights = self.weights.tolist()
-        return self.options | {"weights": weights, "window": window, "clearance": self.clearance}
+        return {
+            "objective": self.objective,
+            "metric": self.metric,
+            "weights": self.weights.tolist(),
+            "eta_v": self.eta_v,
+            "eta_a": self.eta_a,
+            "window": [p if np.isfinite(p).all() else None for p in self.window.tolist()],
+            "clearance": self.clearance,
+        }
 
     @classmethod
-    def of_data(cls, data: dict[str, Any]) -> Run:
+    def of_data(cls, data: RunData) -> Run:
         """Return the run that `data` was made of."""
         free = [-np.inf, np.inf]
         window = [free if pair is None else pair for pair in data["window"]]
         weights = freeze(np.array(data["weights"], dtype=np.float64))
-        return cls(**data | {"weights": weights, "window": freeze(np.array(window))})
+        return cls(
+            objective=data["objective"],
+            metric=data["metric"],
+            weights=weights,
+            eta_v=data["eta_v"],
+            eta_a=data["eta_a"],
+            window=freeze(np.array(window)),
+            clearance=data["clearance"],
+        )
 
 
 def whole(weights: Array, eta_v: float, eta_a: float) -> Run:

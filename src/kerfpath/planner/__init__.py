@@ -8,7 +8,6 @@ from kerfpath.planner._graph import node_interval as node_interval
 from kerfpath.planner._map import ClearanceMap as ClearanceMap
 from kerfpath.planner._map import clearance_map as clearance_map
 from kerfpath.planner._pieces import plan_in_pieces as plan_in_pieces
-from kerfpath.planner._plan import FeedKind as FeedKind
 from kerfpath.planner._plan import plan as plan
 from kerfpath.planner._words import FINER as FINER
 from kerfpath.planner._words import ON_THIS_GRID as ON_THIS_GRID

@@ -2,18 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass, replace
-from typing import Literal
+from typing import Literal, Unpack
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from kerfpath.cell import Cell
-from kerfpath.comfort import Comfort
-from kerfpath.contour import Contour, FrameKind
+from kerfpath.contour import Contour
 from kerfpath.errors import InputError
 from kerfpath.graph import LayeredGraph
+from kerfpath.options import GraphKeywords, PlanOptions, chosen
 from kerfpath.planner._clear import Finder
 from kerfpath.planner._graph import node_interval, require_even
 from kerfpath.planner._task import task_of
@@ -21,9 +21,16 @@ from kerfpath.plans import Proof
 from kerfpath.refiner import quicken
 from kerfpath.robots import Robot
 from kerfpath.search import LeastInterval, Relaxations, least_interval, least_relaxations
-from kerfpath.tilt import Tilt
 
 __all__ = ["FastestSpeed", "fastest_speed", "relaxations"]
+
+
+class SpeedKeywords(GraphKeywords, total=False):
+    """The options that `fastest_speed` takes as keywords."""
+
+    eta_v: float
+    eta_a: float
+    refine: bool
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -62,21 +69,16 @@ def fastest_speed(
     *,
     tool: ArrayLike,
     placement: ArrayLike,
-    gamma_step: float = np.pi / 180,
-    frames: FrameKind = "rotation-minimising",
-    tilt: Tilt | None = None,
-    postures: Sequence[int] | None = None,
-    eta_v: float = 1.0,
-    eta_a: float = 1.0,
-    refine: bool = False,
+    options: PlanOptions | None = None,
     cell: Cell | None = None,
-    comfort: Comfort | None = None,
     graph: LayeredGraph | None = None,
     progress: Callable[[int], None] | None = None,
+    **keywords: Unpack[SpeedKeywords],
 ) -> FastestSpeed:
     """Return the largest constant speed at which a path exists on the graph, exactly.
 
-    A second-order minimax problem on the layered graph; arguments as in `plan`. The grid quantises
+    A second-order minimax problem on the layered graph; arguments as in `plan`, of whose options
+    gamma_step, frames, tilt, postures, comfort, eta_v, eta_a and refine matter. The grid quantises
     the acceleration: `refine` moves gamma off it, from the fastest path, to what is then faster
     still (the nearest optimum, which is not proved to be the best one), unless it would not be
     clear or would break a margin of `comfort`, which may have no costs here.
@@ -89,28 +91,24 @@ def fastest_speed(
         Limits that are not known, nodes unevenly spaced, values out of range, costs of comfort.
     """
     require_even(contour, np.diff(contour.s), "m")
+    asked = chosen(options, keywords, SpeedKeywords)
+    comfort = asked.comfort
     if comfort is not None and comfort.costs:
         raise InputError("comfort: what is fastest knows no costs; give margins alone")
     task = task_of(
         replace(contour, time=None),
         robot,
+        PlanOptions(**{name: getattr(asked, name) for name in SpeedKeywords.__annotations__}),
         tool=tool,
         placement=placement,
         speed=1.0,
-        gamma_step=gamma_step,
-        frames=frames,
-        tilt=tilt,
-        postures=postures,
-        eta_v=eta_v,
-        eta_a=eta_a,
-        comfort=comfort,
         graph=graph,
         progress=progress,
     )
     finder = Finder(task, cell)
     least = finder.best(least_interval)
     found = FastestSpeed.of(contour, least)
-    if not (refine and robot.family.free_rotation):
+    if not (asked.refine and robot.family.free_rotation):
         return found
     claim = Proof(optimal=False, statement="the fastest path on this graph")
     quick, at = quicken(replace(task, dt=least.dt).plan(least.index, 0.0, claim))

@@ -2,18 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
+from typing import Unpack
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from kerfpath._arrays import Array, as_pose, scalar
 from kerfpath.comfort import Comfort
-from kerfpath.contour import Contour, FrameKind
+from kerfpath.contour import Contour
 from kerfpath.errors import InputError, NoFeasiblePath
 from kerfpath.graph import LayeredGraph, build, gamma_grid
+from kerfpath.options import GraphKeywords, PlanOptions, chosen
 from kerfpath.robots import Robot
-from kerfpath.tilt import Tilt, tilted
+from kerfpath.tilt import tilted
 
 __all__ = [
     "layered_graph",
@@ -34,20 +36,18 @@ def layered_graph(
     *,
     tool: ArrayLike,
     placement: ArrayLike,
-    gamma_step: float = np.pi / 180,
-    frames: FrameKind = "rotation-minimising",
-    tilt: Tilt | None = None,
-    postures: Sequence[int] | None = None,
-    comfort: Comfort | None = None,
+    options: PlanOptions | None = None,
     nodes: ArrayLike | None = None,
     progress: Callable[[int], None] | None = None,
+    **keywords: Unpack[GraphKeywords],
 ) -> LayeredGraph:
     """Return the layered graph that `plan` searches; arguments as there.
 
     With `nodes` (M,) int it has their layers alone, the very ones of the whole graph.
     """
-    H = contour.frames(frames)
-    samples = None if tilt is None else tilt.samples()
+    asked = chosen(options, keywords, GraphKeywords)
+    H = contour.frames(asked.frames)
+    samples = None if asked.tilt is None else asked.tilt.samples()
     if samples is not None and samples.any():
         H = tilted(H[:, None], contour.along[:, None], samples)
     if nodes is not None:
@@ -58,12 +58,14 @@ def layered_graph(
         H,
         robot,
         T_flange_tip=T_flange_tip,
-        gamma=gamma_grid(gamma_step),
+        gamma=gamma_grid(asked.gamma_step),
         tilt=samples,
-        postures=postures,
+        postures=asked.postures,
         progress=progress,
     )
-    return graph if comfort is None else within_margins(graph, robot, comfort, T_flange_tip)
+    if asked.comfort is None:
+        return graph
+    return within_margins(graph, robot, asked.comfort, T_flange_tip)
 
 
 def within_margins(

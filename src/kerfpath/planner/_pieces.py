@@ -5,12 +5,16 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Unpack
 
+from numpy.typing import ArrayLike
+
 from kerfpath.cell import Cell
 from kerfpath.contour import Contour
-from kerfpath.errors import InputError, NoFeasiblePath
+from kerfpath.errors import NoFeasiblePath
+from kerfpath.graph import LayeredGraph
+from kerfpath.options import PlanKeywords, PlanOptions, chosen
 from kerfpath.planner._clear import Finder
 from kerfpath.planner._refined import refined
-from kerfpath.planner._task import Options, Task, task_of
+from kerfpath.planner._task import Task, task_of
 from kerfpath.plans import Plan, Proof
 from kerfpath.robots import Robot
 from kerfpath.search import Piece, interrupted_path
@@ -18,15 +22,25 @@ from kerfpath.search import Piece, interrupted_path
 __all__ = ["plan_in_pieces"]
 
 
+class PieceKeywords(PlanKeywords, total=False):
+    """The options that `plan_in_pieces` takes as keywords."""
+
+    least_piece: float | None
+
+
 def plan_in_pieces(
     contour: Contour,
     robot: Robot,
     *,
-    refine: bool = False,
+    tool: ArrayLike,
+    placement: ArrayLike,
+    speed: float | None = None,
+    options: PlanOptions | None = None,
     cell: Cell | None = None,
-    least_piece: float | None = None,
+    graph: LayeredGraph | None = None,
+    progress: Callable[[int], None] | None = None,
     phase: Callable[[str], None] | None = None,
-    **options: Unpack[Options],
+    **keywords: Unpack[PieceKeywords],
 ) -> tuple[Plan, ...]:
     """Return the plans of the pieces that the contour is cut in, with the fewest interruptions.
 
@@ -37,7 +51,7 @@ def plan_in_pieces(
 
     Parameters
     ----------
-    contour, robot, refine, cell, phase, options
+    contour, robot, tool, placement, speed, options, cell, graph, progress, phase
         As in `plan`, with method "exact", closure "free" (a closed contour need not return to its
         first pose), no rotation limit and no tilt. Comfort: a node in two pieces costs in both.
     least_piece : float m, optional
@@ -58,24 +72,24 @@ def plan_in_pieces(
     InputError
         As `plan`; another method or closure, a rotation limit, a tilt.
     """
-    comfort = options.get("comfort")
-    if comfort is not None and comfort.clearance is not None:
-        raise InputError("comfort clearance: is measured in a cell, and has no price in pieces")
-    task = task_of(contour, robot, **options)
-    settings = task.settings
-    plain = settings.method == "exact" and settings.closure == "free"
-    if not plain or settings.rotation is not None:
-        raise InputError(
-            'plan_in_pieces: needs method "exact", closure "free" and no rotation limit, got '
-            f"{settings.method!r}, {settings.closure!r} and {settings.rotation}"
-        )
-    if settings.tilt is not None:
-        raise InputError("plan_in_pieces: the tool axis cannot be tilted in pieces; leave out tilt")
+    asked = chosen(options, keywords, PieceKeywords, interruptions="fewest")
+    task = task_of(
+        contour,
+        robot,
+        asked,
+        tool=tool,
+        placement=placement,
+        speed=speed,
+        graph=graph,
+        progress=progress,
+    )
     finder = Finder(task, cell)
     begin = phase or (lambda what: None)
     begin("search for pieces")
     try:
-        found = finder.best(interrupted_path, **task.aim, s=contour.s, least_piece=least_piece)
+        found = finder.best(
+            interrupted_path, **task.aim, s=contour.s, least_piece=asked.least_piece
+        )
     except NoFeasiblePath as broken:
         raise broken.retold(
             f"contour {contour.name!r}: no number of interruptions helps: {broken}"
@@ -83,9 +97,9 @@ def plan_in_pieces(
     plans = []
     for number, piece in enumerate(found.pieces, 1):
         part, made = _planned(task, finder, piece, number, len(found.pieces))
-        if refine:
+        if asked.refine:
             begin(f"refinement of piece {number} of {len(found.pieces)}")
-        plans.append(refined(part, Finder(part, cell), made) if refine else made)
+        plans.append(refined(part, Finder(part, cell), made) if asked.refine else made)
     return tuple(plans)
 
 

@@ -2,17 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from typing import Literal, get_args
+from collections.abc import Callable
+from typing import Unpack
 
-import numpy as np
 from numpy.typing import ArrayLike
 
 from kerfpath.cell import Cell
-from kerfpath.comfort import Comfort
-from kerfpath.contour import Contour, FrameKind
+from kerfpath.contour import Contour
 from kerfpath.errors import InputError, NoFeasiblePath
 from kerfpath.graph import LayeredGraph
+from kerfpath.options import PlanKeywords, PlanOptions, chosen
 from kerfpath.planner._clear import Finder
 from kerfpath.planner._dip import slowed
 from kerfpath.planner._refined import off_grid, refined
@@ -20,12 +19,9 @@ from kerfpath.planner._task import Task, task_of
 from kerfpath.planner._words import ON_THIS_GRID
 from kerfpath.plans import Plan, Proof
 from kerfpath.robots import Robot, posture_name
-from kerfpath.search import Closure, Method, Metric, ObjectiveKind, shortest_path
-from kerfpath.tilt import Tilt
+from kerfpath.search import Method, shortest_path
 
-__all__ = ["FeedKind", "plan"]
-
-FeedKind = Literal["constant", "dip"]
+__all__ = ["plan"]
 
 
 def plan(
@@ -35,25 +31,12 @@ def plan(
     tool: ArrayLike,
     placement: ArrayLike,
     speed: float | None = None,
-    gamma_step: float = np.pi / 180,
-    frames: FrameKind = "rotation-minimising",
-    tilt: Tilt | None = None,
-    postures: Sequence[int] | None = None,
-    method: Method = "exact",
-    objective: ObjectiveKind = "sum",
-    metric: Metric = "manhattan",
-    weights: ArrayLike | None = None,
-    eta_v: float = 1.0,
-    eta_a: float = 1.0,
-    closure: Closure = "free",
-    rotation: ArrayLike | None = None,
-    feed: FeedKind = "constant",
-    refine: bool = False,
+    options: PlanOptions | None = None,
     cell: Cell | None = None,
-    comfort: Comfort | None = None,
     graph: LayeredGraph | None = None,
     progress: Callable[[int], None] | None = None,
     phase: Callable[[str], None] | None = None,
+    **keywords: Unpack[PlanKeywords],
 ) -> Plan:
     """Return the best joint motion along the contour.
 
@@ -69,30 +52,34 @@ def plan(
         T_base_part, m: part frame in the robot base.
     speed : float m/s
         Speed along the path; left out where the contour carries its own times.
-    gamma_step : float rad
-        Step of the free rotation about the beam.
-    frames : {"rotation-minimising", "tangent"}
-        Task frames that gamma is measured in.
-    tilt : Tilt, optional
-        Tolerance of the tool axis, searched too; default: the nominal axis alone.
-    postures : sequence of int, optional
-        The postures that may be used; default all. See `kerfpath.robots.postures_named`.
-    method, objective, metric, weights, eta_v, eta_a, closure, rotation
-        As in `shortest_path`; "periodic" closure needs a closed contour.
-    feed : {"constant", "dip"}
-        Where the limits do not let the speed be held: "constant" refuses, "dip" holds it wherever
-        they do and slows down elsewhere, in the least time; `Plan.feed` says where. Needs
-        objective "sum", closure "free" and no rotation limit.
-    refine : bool
-        Move gamma off its grid afterwards, see `kerfpath.refine`. Where the grid has no path (it
-        quantises acceleration), one is looked for off it.
+    options : PlanOptions, optional
+        How the plan is asked for; default: `PlanOptions()`. Every option may also be given as a
+        keyword of its own, which goes before:
+
+        gamma_step : float rad
+            Step of the free rotation about the beam.
+        frames : {"rotation-minimising", "tangent"}
+            Task frames that gamma is measured in.
+        tilt : Tilt, optional
+            Tolerance of the tool axis, searched too; default: the nominal axis alone.
+        postures : sequence of int, optional
+            The postures that may be used; default all. See `kerfpath.robots.postures_named`.
+        method, objective, metric, weights, eta_v, eta_a, closure, rotation
+            As in `shortest_path`; "periodic" closure needs a closed contour.
+        feed : {"constant", "dip"}
+            Where the limits do not let the speed be held: "constant" refuses, "dip" holds it
+            wherever they do and slows down elsewhere, in the least time; `Plan.feed` says where.
+            Needs objective "sum", closure "free" and no rotation limit.
+        refine : bool
+            Move gamma off its grid afterwards, see `kerfpath.refine`. Where the grid has no path
+            (it quantises acceleration), one is looked for off it.
+        comfort : Comfort, optional
+            Margins that the nodes keep from singularities and limits, and what coming near costs;
+            see `kerfpath.comfort`. Costs are added at every node visited (objective "max":
+            maximised); with closure "periodic" the first node is visited twice.
     cell : Cell, optional
         The plan is clear in it, at the nodes and on straight joint motions between them: the best
         of all clear ones, though only what the search wants to use is checked. Exact method only.
-    comfort : Comfort, optional
-        Margins that the nodes keep from singularities and limits, and what coming near costs; see
-        `kerfpath.comfort`. Costs are added at every node visited (objective "max": maximised);
-        with closure "periodic" the first node is visited twice.
     graph : LayeredGraph, optional
         The layered graph of this very task, kept from `layered_graph`.
     progress : callable, optional
@@ -107,40 +94,16 @@ def plan(
     InputError
         Limits that are not known, nodes unevenly spaced, values out of range.
     """
-    if feed not in get_args(FeedKind):
-        raise InputError(f"feed: expected one of {', '.join(get_args(FeedKind))}, got {feed!r}")
-    if feed == "dip" and (objective != "sum" or closure != "free" or rotation is not None):
-        raise InputError(
-            'feed: "dip" needs objective "sum", closure "free" and no rotation limit, got '
-            f'objective "{objective}", closure "{closure}" and rotation {rotation!r}'
-        )
-    clearance = comfort is not None and comfort.clearance is not None
-    if clearance and (cell is None or feed == "dip"):
-        raise InputError(
-            "comfort clearance: is measured in a cell, at constant speed; give cell= and feed "
-            '"constant"'
-        )
-    if comfort is not None and comfort.costs and feed == "dip" and refine:
-        raise InputError('comfort: with feed "dip" costs are known on the grid only; refine=False')
+    asked = chosen(options, keywords, PlanKeywords)
+    if cell is None and asked.comfort is not None and asked.comfort.clearance is not None:
+        raise InputError("comfort clearance: is measured in a cell; give cell=")
     task = task_of(
         contour,
         robot,
+        asked,
         tool=tool,
         placement=placement,
         speed=speed,
-        gamma_step=gamma_step,
-        frames=frames,
-        tilt=tilt,
-        postures=postures,
-        method=method,
-        objective=objective,
-        metric=metric,
-        weights=weights,
-        eta_v=eta_v,
-        eta_a=eta_a,
-        closure=closure,
-        rotation=rotation,
-        comfort=comfort,
         graph=graph,
         progress=progress,
     )
@@ -152,33 +115,45 @@ def plan(
             shortest_path,
             **task.aim,
             posture=task.graph.posture,
-            method=method,
-            closure=closure,
+            method=asked.method,
+            closure=asked.closure,
             rotation=task.settings.rotation,
         )
     except NoFeasiblePath as at_speed:
-        broken = at_speed
-        if feed == "dip":
-            try:
-                return slowed(task, finder, refine=refine)
-            except NoFeasiblePath as at_any:
-                broken = at_any
-        found = None
-        if refine and closure == "free" and feed == "constant":
-            begin("refinement")
-            found = off_grid(task, finder)
-        if found is not None and found.done:
-            return found.plan
-        tried = "" if found is None else f"; off the grid {found.statement}"
-        where = f"{ON_THIS_GRID} " if task.robot.family.free_rotation else ""
-        raise broken.retold(
-            f"contour {contour.name!r}: {where}{broken}{_bracket(broken, task)}{tried}"
-        ) from None
-    made = task.plan(path.index, path.cost, _proof(method, path.optimal, finder))
-    if not refine:
+        return _otherwise(task, finder, at_speed, begin)
+    made = task.plan(path.index, path.cost, _proof(asked.method, path.optimal, finder))
+    if not asked.refine:
         return made
     begin("refinement")
     return refined(task, finder, made)
+
+
+def _otherwise(
+    task: Task, finder: Finder, broken: NoFeasiblePath, begin: Callable[[str], None]
+) -> Plan:
+    """Return a plan where the graph has none at the speed asked for: slower, or off the grid.
+
+    Raises
+    ------
+    NoFeasiblePath
+        There is none, or it was not asked for.
+    """
+    asked, found = task.settings, None
+    if asked.feed == "dip":
+        try:
+            return slowed(task, finder, refine=asked.refine)
+        except NoFeasiblePath as at_any_speed:
+            broken = at_any_speed
+    elif asked.refine and asked.closure == "free":
+        begin("refinement")
+        found = off_grid(task, finder)
+    if found is not None and found.done:
+        return found.plan
+    tried = "" if found is None else f"; off the grid {found.statement}"
+    where = f"{ON_THIS_GRID} " if task.robot.family.free_rotation else ""
+    raise broken.retold(
+        f"contour {task.contour.name!r}: {where}{broken}{_bracket(broken, task)}{tried}"
+    ) from None
 
 
 def _bracket(broken: NoFeasiblePath, task: Task) -> str:

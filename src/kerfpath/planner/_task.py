@@ -2,53 +2,31 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass, replace
-from typing import Any, Required, TypedDict
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from kerfpath._arrays import Array, Ints, as_pose, floats, freeze, scalar
+from kerfpath._arrays import Array, Ints, as_pose, freeze
 from kerfpath._told import told
-from kerfpath.comfort import Comfort
-from kerfpath.contour import Contour, FrameKind
+from kerfpath.contour import Contour
 from kerfpath.errors import InputError
 from kerfpath.graph import LayeredGraph
 from kerfpath.kernels.metric import increments
+from kerfpath.options import PlanOptions
 from kerfpath.planner._graph import (
     layered_graph,
     node_interval,
     require_no_empty_layer,
     within_margins,
 )
-from kerfpath.plans import Plan, Proof, Settings, path_cost
+from kerfpath.plans import Plan, Proof, path_cost
 from kerfpath.robots import Robot
-from kerfpath.search import Closure, Method, Metric, ObjectiveKind, rotation_limits
 from kerfpath.tilt import Tilt
 
-__all__ = ["Options", "Task", "task_of"]
-
-
-class Options(TypedDict, total=False):
-    """The keywords that every way of planning takes; see `kerfpath.plan`."""
-
-    tool: Required[ArrayLike]
-    placement: Required[ArrayLike]
-    speed: float | None
-    gamma_step: float
-    frames: FrameKind
-    tilt: Tilt | None
-    postures: Sequence[int] | None
-    method: Method
-    objective: ObjectiveKind
-    metric: Metric
-    weights: ArrayLike | None
-    eta_v: float
-    eta_a: float
-    comfort: Comfort | None
-    graph: LayeredGraph | None
-    progress: Callable[[int], None] | None
+__all__ = ["Task", "task_of"]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -62,7 +40,8 @@ class Task:
     T_flange_tip, T_base_part : (4, 4) m
     dt : float s
         Time from node to node at the speed asked for.
-    settings : Settings
+    settings : PlanOptions
+        With the weights that are used.
     graph : LayeredGraph
         No layer of it is empty.
     vertex_cost : (N,), optional
@@ -74,7 +53,7 @@ class Task:
     T_flange_tip: Array
     T_base_part: Array
     dt: float
-    settings: Settings
+    settings: PlanOptions
     graph: LayeredGraph
     vertex_cost: Array | None = None
 
@@ -149,60 +128,50 @@ class Task:
 def task_of(
     contour: Contour,
     robot: Robot,
+    options: PlanOptions,
     *,
     tool: ArrayLike,
     placement: ArrayLike,
     speed: float | None = None,
-    gamma_step: float = np.pi / 180,
-    frames: FrameKind = "rotation-minimising",
-    tilt: Tilt | None = None,
-    postures: Sequence[int] | None = None,
-    method: Method = "exact",
-    objective: ObjectiveKind = "sum",
-    metric: Metric = "manhattan",
-    weights: ArrayLike | None = None,
-    eta_v: float = 1.0,
-    eta_a: float = 1.0,
-    closure: Closure = "free",
-    rotation: ArrayLike | None = None,
-    comfort: Comfort | None = None,
     graph: LayeredGraph | None = None,
     progress: Callable[[int], None] | None = None,
 ) -> Task:
     """Return the task that the arguments of `kerfpath.plan` pose; errors as there."""
-    velocity, _ = robot.speed_limits()
     T_flange_tip, T_base_part = as_pose(tool, "tool"), as_pose(placement, "placement")
     dt = node_interval(contour, speed)
-    if closure == "periodic" and not contour.closed:
+    if options.closure == "periodic" and not contour.closed:
         raise InputError(f"closure: contour {contour.name!r} is open and cannot be periodic")
-    weight: Array = (
-        1 / (velocity * dt) if weights is None else floats(weights, "weights", velocity.shape)
+    options = options.of(robot, dt)
+    if graph is None:
+        graph = layered_graph(
+            contour,
+            robot,
+            tool=T_flange_tip,
+            placement=T_base_part,
+            options=replace(options, comfort=None),
+            progress=progress,
+        )
+    _require_fitting(graph, contour, robot, options.tilt)
+    if options.comfort is not None:
+        periodic = options.closure == "periodic"
+        graph = within_margins(graph, robot, options.comfort, T_flange_tip, periodic=periodic)
+    require_no_empty_layer(contour, graph)
+    return Task(
+        contour=contour,
+        robot=robot,
+        T_flange_tip=T_flange_tip,
+        T_base_part=T_base_part,
+        dt=dt,
+        settings=options,
+        graph=graph,
+        vertex_cost=_vertex_cost(graph, options, robot, T_flange_tip),
     )
-    settings = Settings(
-        gamma_step=scalar(gamma_step, "gamma_step", unit="rad", above=0.0),
-        frames=frames,
-        method=method,
-        objective=objective,
-        metric=metric,
-        weights=freeze(weight),
-        eta_v=scalar(eta_v, "eta_v", above=0.0),
-        eta_a=scalar(eta_a, "eta_a", above=0.0),
-        closure=closure,
-        rotation=None if rotation is None else rotation_limits(rotation, robot.endless),
-        tilt=tilt,
-        comfort=comfort,
-    )
-    graph = graph or layered_graph(
-        contour,
-        robot,
-        tool=T_flange_tip,
-        placement=T_base_part,
-        gamma_step=gamma_step,
-        frames=frames,
-        tilt=tilt,
-        postures=postures,
-        progress=progress,
-    )
+
+
+def _require_fitting(
+    graph: LayeredGraph, contour: Contour, robot: Robot, tilt: Tilt | None
+) -> None:
+    """Raise InputError where a graph is not one of this contour, robot and tilt."""
     if len(graph.start) != len(contour) + 1:
         raise InputError(
             f"graph: has {len(graph.start) - 1} layers, but the contour has {len(contour)} nodes"
@@ -214,26 +183,13 @@ def task_of(
         raise InputError(
             f"graph: its vertices have {graph.q.shape[1]} joints, but the robot has {robot.joints}"
         )
-    if comfort is not None:
-        graph = within_margins(graph, robot, comfort, T_flange_tip, periodic=closure == "periodic")
-    require_no_empty_layer(contour, graph)
-    return Task(
-        contour=contour,
-        robot=robot,
-        T_flange_tip=T_flange_tip,
-        T_base_part=T_base_part,
-        dt=dt,
-        settings=settings,
-        graph=graph,
-        vertex_cost=_vertex_cost(graph, tilt, comfort, robot, T_flange_tip),
-    )
 
 
 def _vertex_cost(
-    graph: LayeredGraph, tilt: Tilt | None, comfort: Comfort | None, robot: Robot, tool: Array
+    graph: LayeredGraph, options: PlanOptions, robot: Robot, tool: Array
 ) -> Array | None:
     """Return what the vertices cost (N,); None where they cost nothing."""
-    costs = []
+    tilt, comfort, costs = options.tilt, options.comfort, []
     if tilt is not None and tilt.cost:
         costs.append(tilt.price(graph.tilt)[graph.variant])
     if comfort is not None and any(band.cost for band in comfort.bands.values()):

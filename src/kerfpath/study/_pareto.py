@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache
 from pathlib import Path
 from typing import Any
@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from kerfpath._told import told
-from kerfpath.auditor import Check, checks
+from kerfpath.auditor import Check
 from kerfpath.cell import Cell
 from kerfpath.contour import Contour
 from kerfpath.errors import InputError, NoFeasiblePath
@@ -23,20 +23,17 @@ from kerfpath.front import (
     Judge,
     Reached,
     Run,
+    RunData,
     Search,
     judge_of,
     reach_of,
 )
 from kerfpath.job import Job, cell_of_job
-from kerfpath.planner import layered_graph
 from kerfpath.plans import Plan
 from kerfpath.study._job import Loaded, digest, loaded
 from kerfpath.sweep import Progress, Result, Sweep
 
 __all__ = ["Studied", "pareto_of_job"]
-
-OPTIONS = ("gamma_step", "frames", "tilt", "closure", "rotation", "comfort")
-"""What runs take from the job's [plan] and [comfort]."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -146,7 +143,7 @@ def attempt(
     digest: str,
     contour: str,
     criteria: Sequence[str],
-    run: dict[str, Any],
+    run: RunData,
     first: bool,
 ) -> dict[str, Any]:
     """Do one run: return the losses of its plan and the reach of its joints, or why there is none.
@@ -192,33 +189,34 @@ def _stage(path: str, digest_then: str, contour: str, criteria: tuple[str, ...])
     task = next(task for task in job.tasks(part) if task.name == contour)
     drawn = task.candidates(part)[0]
     nodes = task.sample(drawn)
-    cell, options = cell_of_job(job, part), job.plan_options
+    cell = cell_of_job(job, part)
+    options = replace(job.options, feed="constant", refine=False)
     home = None if job.sequence is None else job.sequence.home_deg
     judge = judge_of(
         criteria,
         job.robot,
-        eta_v=options["eta_v"],
-        eta_a=options["eta_a"],
+        eta_v=options.eta_v,
+        eta_a=options.eta_a,
         cell=cell,
-        comfort=options["comfort"],
+        comfort=options.comfort,
         home=None if home is None else np.radians(home),
     )
-    shared: dict[str, Any] = {key: options[key] for key in OPTIONS}
-    shared |= {"tool": job.tool, "placement": job.placement}
-    shared["speed"] = task.speed if nodes.time is None else None
     attempts = Attempts(
         contour=nodes,
         robot=job.robot,
-        graph=layered_graph(nodes, job.robot, **job.graph_options, comfort=options["comfort"]),
+        tool=job.tool,
+        placement=job.placement,
+        speed=task.speed if nodes.time is None else None,
+        options=options,
+        graph=job.graph(nodes),
         cell=cell,
-        options=shared,
         audit=lambda made: _faults(job, drawn, made, cell),
     )
     return _Stage(attempts=attempts, judge=judge)
 
 
 def _faults(job: Job, drawn: Contour, made: Plan, cell: Cell | None) -> list[Check]:
-    table = checks(made, reference=drawn, cell=cell, **job.audit_options)
+    table = job.tolerances.checks(made, reference=drawn, cell=cell)
     return [check for check in table if check.level == "error" and not check.ok]
 
 

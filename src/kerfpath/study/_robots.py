@@ -16,7 +16,6 @@ from kerfpath.cell import Cell, Checker
 from kerfpath.errors import InputError, NoFeasiblePath
 from kerfpath.graph import LayeredGraph
 from kerfpath.job import Job, cell_of_job, fastest_along, read_job
-from kerfpath.planner import layered_graph
 from kerfpath.robots import Robot, acceleration_ratios, postures_named, robot, robot_ids
 from kerfpath.study._clear import has_clear_pose
 from kerfpath.study._job import digest, loaded
@@ -219,7 +218,7 @@ def with_robot(job: Job, candidate: Robot) -> Job:
             'its links are not known, as links = "description" in [cell] describes the job\'s own '
             'robot alone; write links = "capsules", which stand for those of any'
         )
-    return replace(job, robot=candidate, plan_options=job.plan_options | {"postures": postures})
+    return replace(job, robot=candidate, options=replace(job.options, postures=postures))
 
 
 def contour_speeds(job: Job, part: Part) -> list[ContourSpeed]:
@@ -234,12 +233,11 @@ def contour_speeds(job: Job, part: Part) -> list[ContourSpeed]:
     InputError
         Limits that are not known, a cell that cannot be.
     """
-    cell, comfort = cell_of_job(job, part), job.plan_options["comfort"]
-    margins = comfort and comfort.hard
+    cell = cell_of_job(job, part)
     looks = []
     for task in job.tasks(part):
         nodes = task.evenly_fast(part)
-        graph = layered_graph(nodes, job.robot, **job.graph_options, comfort=margins)
+        graph = job.graph(nodes, job.options.without_penalties)
         looks.append((_reached(task.name, task.speed, graph), nodes, graph))
     if all(not contour.reason for contour, _, _ in looks) and cell is not None:
         looks = [(_clear(contour, graph, cell), nodes, graph) for contour, nodes, graph in looks]

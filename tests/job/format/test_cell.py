@@ -395,7 +395,7 @@ def test_an_arm_by_its_lengths_plans_without_a_program(folder):
 
 def test_a_posture_in_words_is_one_of_the_robot_s_family(folder):
     text = free(FIVE).replace("[plan]", '[plan]\nposture = "rear/third"')
-    assert read_job(job(folder, text)).plan_options["postures"] == (12, 14)
+    assert read_job(job(folder, text)).options.postures == (12, 14)
     with pytest.raises(InputError, match=r"plan\.posture: .*minus\|third\|fourth, such"):
         read_job(job(folder, text.replace("third", "fifth")))
 

@@ -15,6 +15,7 @@ from kerfpath.job import read_job
 from kerfpath.job.format._lines import Places
 from kerfpath.job.format._poses import heads, pose
 from kerfpath.operations import micro_joints, slow_corners
+from kerfpath.options import PlanOptions
 from kerfpath.post.rapid import RapidSettings
 from kerfpath.robots import acceleration_ratios, robot
 from kerfpath.tilt import Tilt
@@ -86,43 +87,18 @@ def test_the_example_is_read_into_si(read, folder):
     (task,) = job.contours
     assert (task.pick, task.name, task.speed, task.spacing) == ("trim", "trim", 0.15, 0.002)
     assert (task.count, task.tolerance, task.axis_tolerance) == (None, None, None)
-    assert job.plan_options == {
-        "gamma_step": np.pi / 180,
-        "frames": "rotation-minimising",
-        "tilt": None,
-        "postures": None,
-        "method": "exact",
-        "objective": "sum",
-        "metric": "manhattan",
-        "weights": None,
-        "eta_v": 0.95,
-        "eta_a": 0.9,
-        "closure": "free",
-        "rotation": None,
-        "feed": "constant",
-        "refine": True,
-        "comfort": None,
-    }
+    assert job.options == PlanOptions(eta_v=0.95, eta_a=0.9, refine=True)
     assert json.loads(json.dumps(job.source)) == job.source
     assert job.source["contour"][0] == {"pick": "trim", "speed_m_min": 9, "spacing_mm": 2}
 
 
 def test_plan_and_program_may_be_left_out(read):
     job = read(JOB[: JOB.index("[plan]")], "9 side-panel.toml")
-    assert job.plan_options["gamma_step"] == np.pi / 180
-    assert (job.plan_options["eta_v"], job.plan_options["eta_a"]) == (1, 1)
+    assert job.options == PlanOptions(refine=True)
     program = job.program
     assert (program.language, program.name) == ("rapid", "job_9_side_panel")
     assert (program.retract, program.zone, program.lead_time) == (0.05, 0.0003, 0.02)
     assert program.settings == RapidSettings()
-
-
-def test_the_plan_options_are_what_the_planner_takes(read):
-    import inspect
-
-    from kerfpath.planner import plan
-
-    assert set(read(JOB).plan_options) <= set(inspect.signature(plan).parameters)
 
 
 def test_limits_of_the_job_replace_those_of_the_library(read):
@@ -555,7 +531,7 @@ def test_random_bytes_are_survived(folder, at, inserted, cut):
 
 def test_a_posture_in_words_becomes_those_it_fits(read):
     job = read(JOB.replace("gamma_step_deg = 1", 'posture = "front/up"\ngamma_step_deg = 1'))
-    assert job.plan_options["postures"] == (0, 1)
+    assert job.options.postures == (0, 1)
 
 
 @pytest.mark.parametrize("words", ["front/rear", "sideways", "front up"])
@@ -571,7 +547,7 @@ def test_a_posture_that_does_not_exist_is_refused_at_its_line(read, words):
         ('feed = "dip"\nrefine_parts = 3', 'expected refine_parts = 1 with feed = "dip", got 3'),
         ('feed = "dip"\nrotation_deg = 90', 'expected no rotation_deg with feed = "dip", got 90'),
         ('interruptions = "fewest"\nmethod = "paper"', 'plan.method: expected method = "exact"'),
-        ("least_piece_mm = 5", 'expected interruptions = "fewest" with least_piece_mm, got none'),
+        ("least_piece_mm = 5", 'expected interruptions = "fewest" with least_piece_mm, got "none"'),
         ("least_piece_mm = 0", "plan.least_piece_mm: expected a number above 0, in mm, got 0"),
         ('rotation_deg = 90\nmethod = "known"', 'method = "exact" with rotation_deg, got "known"'),
         (
@@ -595,11 +571,9 @@ def test_keys_of_plan_that_do_not_go_together_are_refused_at_their_line(read, ke
 
 
 def test_a_tolerance_of_the_tool_axis_is_read_into_si(read):
-    assert read(changed("[plan]", "[plan]\ntilt_deg = 18")).plan_options["tilt"] == Tilt(
-        cone=np.pi / 10
-    )
+    assert read(changed("[plan]", "[plan]\ntilt_deg = 18")).options.tilt == Tilt(cone=np.pi / 10)
     keys = "tilt_deg = 9\ntilt_steps = 3\ntilt_cost_per_deg = 0.01"
-    tilt = read(changed("[plan]", f"[plan]\n{keys}")).plan_options["tilt"]
+    tilt = read(changed("[plan]", f"[plan]\n{keys}")).options.tilt
     assert (tilt.cone, tilt.steps) == (np.pi / 20, 3)
     # What the rim costs is the angle times the cost, in whichever unit.
     assert tilt.cone * tilt.cost == pytest.approx(9 * 0.01, rel=1e-12)
@@ -608,7 +582,7 @@ def test_a_tolerance_of_the_tool_axis_is_read_into_si(read):
 def test_a_rotation_limit_is_one_for_every_endless_axis(read):
     job = read(changed("[plan]", "[plan]\nrotation_deg = 180"))
     inf = np.inf
-    assert job.plan_options["rotation"].tolist() == [inf, inf, inf, np.pi, inf, np.pi]
+    assert job.options.rotation.tolist() == [inf, inf, inf, np.pi, inf, np.pi]
     none = changed("[plan]", "[plan]\nrotation_deg = 180").replace(
         "endless = [4, 6]", "endless = []"
     )
@@ -626,14 +600,14 @@ limits_band_deg = 3
 limits_cost = 0.5
 manipulability_margin_m3 = 0.02
 [program]"""
-    comfort = read(changed("[program]", text)).plan_options["comfort"]
+    comfort = read(changed("[program]", text)).options.comfort
     assert comfort == Comfort(
         wrist=Band(margin=9 * np.radians(1), width=18 * np.radians(1), cost=2),
         shoulder=Band(margin=50 * 1e-3),
         limits=Band(width=3 * np.radians(1), cost=0.5),
         manipulability=Band(margin=0.02),
     )
-    assert read(changed("[program]", "[comfort]\n[program]")).plan_options["comfort"] is None
+    assert read(changed("[program]", "[comfort]\n[program]")).options.comfort is None
 
 
 def test_every_key_says_what_it_expects():

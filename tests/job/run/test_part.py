@@ -231,7 +231,7 @@ def test_a_contour_that_no_way_leads_to_is_planned_in_its_other_postures(folder)
     part = read(job.part_file)
     (task,) = job.tasks(part)
     way = task.candidates(part, task.drawn(part))[0]
-    given = Given(way, task.sample(way), job.plan_options["postures"], touched=False)
+    given = Given(way, task.sample(way), job.options.postures, touched=False)
     told = []
 
     def progress(*words):

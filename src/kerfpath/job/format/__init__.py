@@ -6,9 +6,10 @@ from kerfpath.job.format._contour import ContourTask as ContourTask
 from kerfpath.job.format._poses import pose as pose
 from kerfpath.job.format._read import Job as Job
 from kerfpath.job.format._read import ProgramOptions as ProgramOptions
-from kerfpath.job.format._read import audit_options as audit_options
+from kerfpath.job.format._read import Tolerances as Tolerances
 from kerfpath.job.format._read import program_options as program_options
 from kerfpath.job.format._read import read_job as read_job
+from kerfpath.job.format._read import tolerances_of as tolerances_of
 from kerfpath.job.format._refusals import refused_at as refused_at
 from kerfpath.job.format.tables import VARIABLES as VARIABLES
 from kerfpath.job.format.tables import AuditTable as AuditTable

@@ -4,17 +4,22 @@ from __future__ import annotations
 
 import re
 import tomllib
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any
 
 import numpy as np
 from pydantic import ValidationError
 
-from kerfpath._arrays import Array, Bools
+from kerfpath._arrays import Array, Ints
 from kerfpath._told import told
+from kerfpath.auditor import Check, Rounding, checks
 from kerfpath.cad import Part
+from kerfpath.cell import Cell
+from kerfpath.contour import Contour
 from kerfpath.errors import InputError
+from kerfpath.graph import LayeredGraph
 from kerfpath.job.format._contour import ContourTask, task_of
 from kerfpath.job.format._operations import closed_only
 from kerfpath.job.format._refusals import error_at, refusal, refused_at
@@ -23,14 +28,17 @@ from kerfpath.job.format.tables import (
     CellTable,
     JobFile,
     LayoutTable,
-    PlanTable,
     ProgramTable,
     SequenceTable,
 )
+from kerfpath.job.format.tables._plan import said_in_keys
+from kerfpath.options import OptionConflict, PlanOptions
+from kerfpath.planner import layered_graph
+from kerfpath.plans import Plan
 from kerfpath.post import Handshake, Settings
-from kerfpath.robots import Robot, postures_named
+from kerfpath.robots import Robot
 
-__all__ = ["Job", "ProgramOptions", "audit_options", "program_options", "read_job"]
+__all__ = ["Job", "ProgramOptions", "Tolerances", "program_options", "read_job", "tolerances_of"]
 
 MOST_TEXT = 10_000_000
 """Characters of a job file: many thousand contours."""
@@ -87,6 +95,42 @@ class ProgramOptions:
     __repr__ = told
 
 
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Tolerances:
+    """What the audit allows between the nodes.
+
+    Parameters
+    ----------
+    path : float m
+        Largest distance of the tool tip from the path.
+    axis : float rad
+        Largest angle of the tool axis from the one asked for.
+    """
+
+    path: float
+    axis: float
+
+    __repr__ = told
+
+    def checks(
+        self,
+        plan: Plan,
+        *,
+        reference: Contour | None = None,
+        cell: Cell | None = None,
+        rounding: Rounding | None = None,
+    ) -> list[Check]:
+        """Return the audit's table of a plan within these tolerances, see `auditor.checks`."""
+        return checks(
+            plan,
+            reference=reference,
+            path_tolerance=self.path,
+            axis_tolerance=self.axis,
+            cell=cell,
+            rounding=rounding,
+        )
+
+
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Job:
     """A job file, read and resolved: all in SI, nothing left to look up but the part itself.
@@ -107,22 +151,16 @@ class Job:
         Length unit that overrides the CAD file's own.
     contours : tuple of ContourTask
         In the order of cutting.
-    plan_options : dict
-        Keyword arguments of `kerfpath.planner.plan`, in SI.
-    refine_parts : int
-        Parts into which the refinement divides every interval between nodes.
-    interruptions : {"none", "fewest"}
-        Whether a contour that cannot be cut in one go is cut in pieces.
-    least_piece : float m or None
-        Length that every such piece has at least.
+    options : PlanOptions
+        How every contour is to be planned.
     cell : CellTable or None
         What stands around, as the file says it; without one, collisions are not checked.
     sequence : SequenceTable or None
         How the order and the moves between contours are chosen; without one, neither is.
     layout : LayoutTable
         What `kerfpath layout` may move, and how far, as the file says it.
-    audit_options : dict
-        Keyword arguments of `kerfpath.auditor.checks`, in SI.
+    tolerances : Tolerances
+        What the audit allows between the nodes.
     program : ProgramOptions
         For the robot program.
     source : dict
@@ -136,25 +174,37 @@ class Job:
     part_file: Path
     part_unit: str | None
     contours: tuple[ContourTask, ...]
-    plan_options: dict[str, Any]
-    refine_parts: int
-    interruptions: Literal["none", "fewest"]
-    least_piece: float | None
+    options: PlanOptions
     cell: CellTable | None
     sequence: SequenceTable | None
     layout: LayoutTable
-    audit_options: dict[str, Any]
+    tolerances: Tolerances
     program: ProgramOptions
     source: dict[str, Any]
 
     __repr__ = told
 
-    @property
-    def graph_options(self) -> dict[str, Any]:
-        """What the layered graph of a contour is built by; its comfort is `plan_options`'."""
-        keys = ("gamma_step", "frames", "tilt", "postures")
-        placed = {"tool": self.tool, "placement": self.placement}
-        return placed | {key: self.plan_options[key] for key in keys}
+    def graph(
+        self,
+        nodes: Contour,
+        options: PlanOptions | None = None,
+        *,
+        only: Ints | None = None,
+        progress: Callable[[int], None] | None = None,
+    ) -> LayeredGraph:
+        """Return the layered graph of a contour's nodes, by these options or the job's own.
+
+        With `only` (M,) it has the layers of these nodes alone.
+        """
+        return layered_graph(
+            nodes,
+            self.robot,
+            tool=self.tool,
+            placement=self.placement,
+            options=options or self.options,
+            nodes=only,
+            progress=progress,
+        )
 
     def tasks(self, part: Part) -> tuple[ContourTask, ...]:
         """Return the contours to cut of the part that was read.
@@ -185,7 +235,7 @@ class Job:
         line = f"loop {task.pick!r} is an open line, which"
         for key, why in closed_only(task.table).items():
             raise refused_at(self.path, ("contour", number, key), f"{line} {why}; remove {key}")
-        if self.plan_options["closure"] == "periodic":
+        if self.options.closure == "periodic":
             said = f'{line} does not come back to its start; write closure = "free"'
             raise refused_at(self.path, ("plan", "closure"), said)
 
@@ -215,6 +265,10 @@ def read_job(path: str | Path) -> Job:
             "expected an endless axis to limit, got none; remove it, or say which with endless "
             "in [robot]",
         )
+    try:
+        options = file.plan.resolve(robot, file.comfort.resolve())
+    except OptionConflict as conflict:
+        raise refused_at(path, *said_in_keys(conflict, file.plan)) from None
     return Job(
         path=path,
         robot=robot,
@@ -223,14 +277,11 @@ def read_job(path: str | Path) -> Job:
         part_file=path.parent / file.part.file,
         part_unit=file.part.unit,
         contours=tuple(task_of(table) for table in file.contour),
-        plan_options=_plan_options(file.plan, robot) | {"comfort": file.comfort.resolve()},
-        refine_parts=file.plan.refine_parts,
-        interruptions=file.plan.interruptions,
-        least_piece=None if file.plan.least_piece_mm is None else file.plan.least_piece_mm / 1000,
+        options=options,
         cell=file.cell,
         sequence=file.sequence,
         layout=file.layout,
-        audit_options=audit_options(file.audit),
+        tolerances=tolerances_of(file.audit),
         program=program_options(file.program, path.stem),
         source=source,
     )
@@ -285,36 +336,11 @@ def _tables(path: Path, text: str) -> dict[str, Any]:
     return tables
 
 
-def _rotation(degrees: float | None, endless: Bools) -> Array | None:
-    return None if degrees is None else np.where(endless, np.radians(degrees), np.inf)
-
-
-def _plan_options(table: PlanTable, robot: Robot) -> dict[str, Any]:
-    words = table.posture
-    return {
-        "gamma_step": float(np.radians(table.gamma_step_deg)),
-        "frames": table.frames,
-        "tilt": table.tilt(),
-        "postures": None if words is None else postures_named(words, robot.kinematics),
-        "method": table.method,
-        "objective": table.objective,
-        "metric": table.metric,
-        "weights": table.weights,
-        "eta_v": table.eta_velocity,
-        "eta_a": table.eta_acceleration,
-        "closure": table.closure,
-        "rotation": _rotation(table.rotation_deg, robot.endless),
-        "feed": table.feed,
-        "refine": table.method == "exact" if table.refine is None else table.refine,
-    }
-
-
-def audit_options(table: AuditTable) -> dict[str, Any]:
-    """Return what an [audit] table asks for, as `kerfpath.auditor.checks` takes it."""
-    return {
-        "path_tolerance": table.path_tolerance_mm / 1000,
-        "axis_tolerance": float(np.radians(table.axis_tolerance_deg)),
-    }
+def tolerances_of(table: AuditTable) -> Tolerances:
+    """Return what an [audit] table allows."""
+    return Tolerances(
+        path=table.path_tolerance_mm / 1000, axis=float(np.radians(table.axis_tolerance_deg))
+    )
 
 
 def program_options(table: ProgramTable, stem: str) -> ProgramOptions:

@@ -200,7 +200,7 @@ def order_note(part: PartPlan) -> str:
 
 def short_pieces(outcome: Outcome) -> list[str]:
     """Say of interrupted contours which piece is shortest, if it is short and nobody asked."""
-    if outcome.job.least_piece is not None:
+    if outcome.job.options.least_piece is not None:
         return []
     lengths: dict[str, list[float]] = {}
     for cut in outcome.cuts:

@@ -38,17 +38,17 @@ def report_text(outcome: Outcome, notes: Sequence[str], faults: Sequence[str] = 
         for cut in outcome.cuts
     ]
     speeds = sorted({task.speed * 60 for task in job.contours})
-    robot, options = job.robot, job.plan_options
+    robot, options = job.robot, job.options
     velocity, acceleration = (np.degrees(v).round(1) for v in robot.speed_limits())
     facts = [
         ("Job", job.path.name),
         ("Part", job.part_file.name),
         ("Robot", f"{robot.manufacturer} {robot.model}".strip() or robot.id),
         ("Cutting speed", f"{' / '.join(f'{v:g}' for v in speeds)} m/min"),
-        ("Gamma step", f"{np.degrees(options['gamma_step']):g} deg"),
-        ("Objective", f"{options['objective']}, {options['metric']} metric"),
-        ("Method", f"{options['method']}, {options['frames']} frames"),
-        ("Limits used", f"{options['eta_v']:.0%} velocity, {options['eta_a']:.0%} acceleration"),
+        ("Gamma step", f"{np.degrees(options.gamma_step):g} deg"),
+        ("Objective", f"{options.objective}, {options.metric} metric"),
+        ("Method", f"{options.method}, {options.frames} frames"),
+        ("Limits used", f"{options.eta_v:.0%} velocity, {options.eta_a:.0%} acceleration"),
         ("Joint velocity limits", f"{_row(velocity)} deg/s"),
         (
             "Joint acceleration limits",

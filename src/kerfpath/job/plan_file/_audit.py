@@ -9,8 +9,8 @@ from typing import Any
 
 from kerfpath import __version__
 from kerfpath._told import told
-from kerfpath.auditor import Check, air_checks, checks, worst_of
-from kerfpath.job.format import AuditTable, audit_options, read_job
+from kerfpath.auditor import Check, air_checks, worst_of
+from kerfpath.job.format import AuditTable, read_job, tolerances_of
 from kerfpath.job.plan_file._asked import Asked, asked_of, order_checks
 from kerfpath.job.plan_file._differs import disagreement, job_disagreement
 from kerfpath.job.plan_file._expected import Expected, expected_plans
@@ -94,9 +94,7 @@ class PlanAudit:
             table += each.checks
             if each.plan is None:
                 continue
-            made = checks(
-                each.plan, reference=each.path, cell=asked.cell, **asked.job.audit_options
-            )
+            made = asked.job.tolerances.checks(each.plan, reference=each.path, cell=asked.cell)
             entry = _entry(each.plan, entries[each.name], made, file)
             told.append(entry)
             table += made
@@ -180,12 +178,12 @@ def _unverified(file: PlanFile) -> str:
 
 def _by_itself(file: PlanFile) -> Audited:
     """Return the audit of a plan.json by what it says itself."""
-    table: Any = table_of(file, "audit", AuditTable, audit_options)
+    tolerances = table_of(file, "audit", AuditTable, tolerances_of)
     entries = {entry["name"]: entry for entry in file.data["contours"] if entry["feasible"]}
     tables = {}
     for p in file.plans:
         own = following(p)
-        made = checks(own, **table)
+        made = tolerances.checks(own)
         entry = plan_entry(own, entries[p.name]["contour"], made, picked=p.name in file.picked)
         entry["audit"], entry["nodes"] = (
             entries[p.name]["audit"],

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
 
@@ -14,9 +13,9 @@ from kerfpath.contour import Contour
 from kerfpath.job.plan_file._asked import Asked, Candidate
 from kerfpath.job.plan_file._follows import following
 from kerfpath.job.plan_file._read import PlanFile
-from kerfpath.plans import Plan, Settings
+from kerfpath.options import PlanOptions
+from kerfpath.plans import Plan
 from kerfpath.retime import feed, retime
-from kerfpath.search import rotation_limits
 
 __all__ = ["Expected", "expected_plans"]
 
@@ -85,16 +84,16 @@ def _of_contour(
     name, job = asked.tasks[number].name, asked.job
     if len(plans) == 1 and plans[0].name == name:
         (made,) = plans
-        candidate = _nearest(asked.candidates[number], made, job.refine_parts)
+        candidate = _nearest(asked.candidates[number], made, job.options.refine_parts)
         if candidate is None:
             counts = sorted({len(c.nodes) for c in asked.candidates[number]})
             row = _node_count(made, " or ".join(map(str, counts)))
             return [Expected(name=name, number=number, checks=(row,))]
-        nodes, path = _fine(candidate.nodes, candidate.path, made, job.refine_parts)
+        nodes, path = _fine(candidate.nodes, candidate.path, made, job.options.refine_parts)
         return [_expected(asked, number, made, candidate, nodes, path, made.name in picked)]
     words = [f"{name}, piece {k + 1} of {len(plans)}" for k in range(len(plans))]
     by_name = {p.name: p for p in plans}
-    if len(plans) == 1 or job.interruptions == "none" or set(by_name) != set(words):
+    if len(plans) == 1 or job.options.interruptions == "none" or set(by_name) != set(words):
         row = _count("once", "plans of a contour that is cut once", len(plans))
         return [Expected(name=p.name, number=number, checks=(row,)) for p in plans]
     return _pieces(asked, number, [by_name[word] for word in words])
@@ -120,9 +119,9 @@ def _pieces(asked: Asked, number: int, plans: Sequence[Plan]) -> list[Expected]:
             row = _count("pieces", "pieces that do not go on where the one before them ends", 1)
             found.append(Expected(name=p.name, number=number, checks=(row,)))
             continue
-        part = replace(whole.part(at, last, job.plan_options["frames"]), name=p.name)
+        part = replace(whole.part(at, last, job.options.frames), name=p.name)
         path = candidate.path.between(float(whole.s[at]), float(whole.s[last]))
-        nodes, path = _fine(part, path, p, job.refine_parts)
+        nodes, path = _fine(part, path, p, job.options.refine_parts)
         found.append(_expected(asked, number, p, candidate, nodes, path, picked=False))
         at = last
     return found
@@ -164,7 +163,7 @@ def _expected(
     far = np.linalg.norm(made.contour.points - nodes.points, axis=1)
     worst = int(np.argmax(far))
     place = _check("place", "nodes, off those of the job", far[worst], SAME_PLACE, "m", worst)
-    parts = _parts(candidate, nodes, asked.job.refine_parts)
+    parts = _parts(candidate, nodes, asked.job.options.refine_parts)
     plan = replace(
         made,
         contour=replace(nodes, time=None),
@@ -172,10 +171,10 @@ def _expected(
         T_flange_tip=asked.job.tool,
         T_base_part=asked.job.placement,
         time=candidate.dt / parts * np.arange(len(nodes), dtype=float),
-        settings=_settings(asked, candidate.dt, made.settings, picked=picked),
+        settings=_options(asked, candidate.dt, made.settings, picked=picked),
         feed=None,
     )
-    if asked.job.plan_options["feed"] == "dip" and made.feed is not None and not picked:
+    if asked.job.options.feed == "dip" and made.feed is not None and not picked:
         plan = _dipping(plan, candidate.dt, made.time)
     plan = following(plan)
     rows = (place, *_postures(asked, plan))
@@ -188,32 +187,20 @@ def _parts(candidate: Candidate, nodes: Contour, parts: int) -> int:
     return parts if parts > 1 and step > (1 + parts) / 2 else 1
 
 
-def _settings(asked: Asked, dt: float, said: Settings, *, picked: bool) -> Settings:
+def _options(asked: Asked, dt: float, said: PlanOptions, *, picked: bool) -> PlanOptions:
     """Return how the job asks for a plan; one that was picked may aim at less than the limits."""
-    job = asked.job
-    options = job.plan_options
-    weights, rotation = options["weights"], options["rotation"]
-    if weights is None:
-        weights = 1 / (job.robot.speed_limits()[0] * dt)
-    settings = Settings(
-        **{
-            key: options[key]
-            for key in (
-                "gamma_step", "frames", "method", "objective", "metric", "eta_v", "eta_a",
-                "closure", "comfort", "tilt",
-            )
-        },
-        weights=np.asarray(weights, dtype=np.float64),
-        rotation=None if rotation is None else rotation_limits(rotation, job.robot.endless),
-    )  # fmt: skip
+    options = asked.job.options.of(asked.job.robot, dt)
     if not picked:
-        return settings
-    chosen: dict[str, Any] = {key: getattr(said, key) for key in ("objective", "metric", "weights")}
+        return options
     return replace(
-        settings,
-        eta_v=min(settings.eta_v, said.eta_v),
-        eta_a=min(settings.eta_a, said.eta_a),
-        **chosen,
+        options,
+        objective=said.objective,
+        metric=said.metric,
+        weights=said.weights,
+        eta_v=min(options.eta_v, said.eta_v),
+        eta_a=min(options.eta_a, said.eta_a),
+        feed="constant",
+        refine=said.refine,
     )
 
 
@@ -231,7 +218,7 @@ def _dipping(plan: Plan, dt: float, said: Array) -> Plan:
 
 
 def _postures(asked: Asked, made: Plan) -> list[Check]:
-    allowed = asked.job.plan_options["postures"]
+    allowed = asked.job.options.postures
     if allowed is None:
         return []
     other = np.flatnonzero(~np.isin(made.posture, list(allowed)))

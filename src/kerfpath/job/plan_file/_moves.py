@@ -46,8 +46,10 @@ def move_checks(asked: Asked, plans: Sequence[Plan], moves: Sequence[AirMove]) -
         ways = [(_way(asked, p, "start"), _way(asked, p, "end")) for p in plans]
     except InputError as error:
         return [*rows, _count("retract", f"ends of cuts that cannot be backed off: {error}", 1)]
-    etas = {key: asked.job.plan_options[key] for key in ("eta_v", "eta_a")}
-    tables = [air_checks(robot, m.q, m.time, cell=asked.cell, **etas) for m in moves]
+    o = asked.job.options
+    tables = [
+        air_checks(robot, m.q, m.time, cell=asked.cell, eta_v=o.eta_v, eta_a=o.eta_a) for m in moves
+    ]
     for table, move, ends in zip(tables, moves, _ends(asked, ways), strict=True):
         table += _fits(asked, move, ends)
     rows += worst_of(tables)

@@ -10,18 +10,16 @@ from typing import Any, TypeVar
 import numpy as np
 from pydantic import BaseModel, ValidationError
 
-from kerfpath._arrays import Array
 from kerfpath._told import told
 from kerfpath.air import AirMove
-from kerfpath.comfort import Band, Comfort
 from kerfpath.contour import KINDS, Contour
 from kerfpath.errors import InputError
 from kerfpath.job.plan_file._external import joints, with_external
 from kerfpath.job.plan_file._schema import read_document
 from kerfpath.job.plan_file._sequence import read_moves
-from kerfpath.plans import Feed, Plan, Proof, Settings
+from kerfpath.options import PlanOptions
+from kerfpath.plans import Feed, Plan, Proof
 from kerfpath.robots import Coupling, Robot
-from kerfpath.tilt import Tilt
 from kerfpath.urdf import Chain
 
 __all__ = ["PlanFile", "read_plan_file", "table_of"]
@@ -130,10 +128,6 @@ def table_of(
         raise InputError(f"{file.path}: its [{name}] table is not valid ({said})") from None
 
 
-def _infinite(rotation: list[float | None] | None) -> Array | None:
-    return None if rotation is None else np.array([np.inf if v is None else v for v in rotation])
-
-
 def _read_robot(robot: dict[str, Any], limits: dict[str, Any]) -> Robot:
     return Robot(
         id=robot["id"],
@@ -160,12 +154,6 @@ def _read_robot(robot: dict[str, Any], limits: dict[str, Any]) -> Robot:
     )
 
 
-def _read_tilt(entry: dict[str, Any] | None) -> Tilt | None:
-    if entry is None:
-        return None
-    return Tilt(cone=entry["cone_rad"], steps=entry["steps"], cost=entry["cost_per_rad"])
-
-
 def _read_plan(entry: dict[str, Any], robot: Robot, tool: Any, placement: Any) -> Plan:
     nodes = entry["nodes"]
     return Plan(
@@ -188,19 +176,8 @@ def _read_plan(entry: dict[str, Any], robot: Robot, tool: Any, placement: Any) -
         posture=nodes["posture"],
         turn=nodes["turn"],
         time=nodes["time_s"],
-        settings=Settings(
-            gamma_step=entry["gamma_step_rad"],
-            frames=entry["frames"],
-            method=entry["method"],
-            objective=entry["objective"],
-            metric=entry["metric"],
-            weights=joints(entry, "weights_per", robot),
-            eta_v=entry["eta_v"],
-            eta_a=entry["eta_a"],
-            closure=entry["closure"],
-            rotation=_infinite(entry["rotation_rad"]),
-            comfort=_read_comfort(entry["comfort"]),
-            tilt=_read_tilt(entry["tilt"]),
+        settings=PlanOptions.from_data(
+            {**entry, "weights_per_rad": joints(entry, "weights_per", robot).tolist()}  # type: ignore[typeddict-item]
         ),
         cost=entry["cost"],
         proof=Proof(
@@ -211,7 +188,3 @@ def _read_plan(entry: dict[str, Any], robot: Robot, tool: Any, placement: Any) -
         counts=entry["counts"],
         feed=None if entry["feed"] is None else Feed(**entry["feed"]),
     )
-
-
-def _read_comfort(bands: dict[str, Any] | None) -> Comfort | None:
-    return None if bands is None else Comfort(**{k: Band(**band) for k, band in bands.items()})

@@ -5,18 +5,27 @@ from __future__ import annotations
 import json
 from collections import Counter
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from types import UnionType
+from typing import (
+    Annotated,
+    Any,
+    Literal,
+    Union,
+    get_args,
+    get_origin,
+    get_type_hints,
+    is_typeddict,
+)
 
-from pydantic import BaseModel, ConfigDict, Discriminator, Field, Tag, ValidationError
+from pydantic import BaseModel, ConfigDict, Discriminator, Field, Tag, ValidationError, create_model
 
 from kerfpath.auditor import Level, Unit
-from kerfpath.contour import FrameKind
 from kerfpath.errors import InputError
-from kerfpath.search import Closure, Method, Metric, ObjectiveKind
+from kerfpath.options import OptionData
 
 __all__ = ["SCHEMA", "read_document"]
 
-SCHEMA = 4
+SCHEMA = 5
 """Version of the layout of plan.json; it grows when a reader of the old one would go wrong."""
 LARGEST = 1e12
 """No number of a plan is larger, in SI: not even the sum of all it counts."""
@@ -89,16 +98,22 @@ class _Limits(_Entry):
     couplings: list[_Coupling]
 
 
-class _Band(_Entry):
-    margin: Real
-    width: Real
-    cost: Real
+def _strict(kind: Any) -> Any:
+    """Return a type as this file takes it: numbers within bounds, objects without other keys."""
+    if kind in (float, int):
+        return Real if kind is float else Whole
+    if is_typeddict(kind):
+        hints = get_type_hints(kind).items()
+        keys: dict[str, Any] = {name: (_strict(each), ...) for name, each in hints}
+        return create_model(kind.__name__, __base__=_Entry, **keys)
+    inner = tuple(_strict(each) for each in get_args(kind))
+    if get_origin(kind) in (Union, UnionType):
+        return Union[inner]  # noqa: UP007  # of as many as there are
+    return get_origin(kind)[inner] if get_origin(kind) in (list, dict) else kind
 
 
-class _Tilt(_Entry):
-    cone_rad: Real
-    steps: Whole
-    cost_per_rad: Real
+_Options = _strict(OptionData)
+"""Every option of a plan, as `PlanOptions.to_data` writes it."""
 
 
 class _Nearest(_Entry):
@@ -164,26 +179,15 @@ class _Nodes(_Entry):
     turn: list[list[Whole]]
 
 
-class _Planned(_Entry):
+class _Planned(_Options):  # type: ignore[misc,valid-type]
     name: str
     contour: str
     feasible: bool
     picked: bool = False
     closed: bool
-    method: Method
-    objective: ObjectiveKind
-    metric: Metric
     weights_per_rad: Row
     external_weights_per_m: Real | None = None
     external_weights_per_rad: Real | None = None
-    eta_v: Real
-    eta_a: Real
-    closure: Closure
-    rotation_rad: list[Real | None] | None
-    comfort: dict[str, _Band] | None
-    gamma_step_rad: Real
-    tilt: _Tilt | None
-    frames: FrameKind
     dt: Real
     cost: Real
     optimal: bool

@@ -11,10 +11,9 @@ from typing import Any
 import numpy as np
 
 from kerfpath import __version__
-from kerfpath._arrays import Array
 from kerfpath.auditor import Check
 from kerfpath.cell import Cell, caveats
-from kerfpath.comfort import MEASURES, Comfort
+from kerfpath.comfort import MEASURES
 from kerfpath.errors import NoFeasiblePath
 from kerfpath.job.plan_file._external import by_unit, external_entry
 from kerfpath.job.plan_file._schema import SCHEMA
@@ -99,24 +98,8 @@ def plan_entry(
         "feasible": True,
         **({"picked": True} if picked else {}),
         "closed": plan.contour.closed,
-        "method": settings.method,
-        "objective": settings.objective,
-        "metric": settings.metric,
+        **settings.to_data(),
         **by_unit("weights_per", settings.weights, plan.robot),
-        "eta_v": settings.eta_v,
-        "eta_a": settings.eta_a,
-        "closure": settings.closure,
-        "rotation_rad": _finite(settings.rotation),
-        "comfort": _bands(settings.comfort),
-        "gamma_step_rad": settings.gamma_step,
-        "tilt": None
-        if settings.tilt is None
-        else {
-            "cone_rad": settings.tilt.cone,
-            "steps": settings.tilt.steps,
-            "cost_per_rad": settings.tilt.cost,
-        },
-        "frames": settings.frames,
         "dt": plan.dt,
         "cost": plan.cost,
         "optimal": plan.proof.optimal,
@@ -168,18 +151,6 @@ def broken_entry(name: str, broken: NoFeasiblePath, fastest: FastestSpeed | None
         "counts": broken.counts,
         "fastest_speed_m_s": None if fastest is None else fastest.speed,
     }
-
-
-def _finite(rotation: Array | None) -> list[float | None] | None:
-    """Return limits with null, which JSON knows, for infinity, which it does not."""
-    return None if rotation is None else [v if np.isfinite(v) else None for v in rotation.tolist()]
-
-
-def _bands(comfort: Comfort | None) -> dict[str, Any] | None:
-    """Return the bands that are asked for, margins and widths in rad, m and m^3."""
-    if comfort is None:
-        return None
-    return {name: band for name, band in asdict(comfort).items() if band is not None}
 
 
 def _robot_entry(robot: Robot) -> dict[str, Any]:

@@ -86,9 +86,9 @@ def asked_nodes(
     dt = node_interval(asked, task.speed if asked.time is None else None)
     time: Array = dt * np.arange(len(asked), dtype=np.float64)
     targets = cut.ends
-    if job.refine_parts > 1 and len(targets) > len(asked):
+    if job.options.refine_parts > 1 and len(targets) > len(asked):
         k = np.arange(len(asked))
-        fine = np.arange((len(asked) - 1) * job.refine_parts + 1) / job.refine_parts
+        fine = np.arange((len(asked) - 1) * job.options.refine_parts + 1) / job.options.refine_parts
         asked, time = (
             reference.at_nodes(np.interp(fine, k, asked.s)),
             np.asarray(np.interp(fine, k, time)),
@@ -168,7 +168,7 @@ def _whole(job: Job, cut: ReadCut, asked: AskedNodes, plan: Plan) -> Plan:
             T[inner] = poses_on_arc(T[first], move.T_part_via, T[last], parts)
             q[inner] = followed(plan.robot, plan.T_base_part @ T[inner] @ flange, q[first])
     time = asked.time
-    if job.plan_options["feed"] != "constant":  # it may be slower, which is judged by itself
+    if job.options.feed != "constant":  # it may be slower, which is judged by itself
         time = np.interp(np.arange(K), at, _as_fast(cut, asked.nodes.s[at]))
     return replace(
         plan,

@@ -109,7 +109,7 @@ class ProgramAsked:
     def by(cls, asked: Asked) -> ProgramAsked:
         """Return the same of a job whose drawing and cell are read already."""
         job = asked.job
-        if job.interruptions != "none":
+        if job.options.interruptions != "none":
             raise InputError(
                 f"{job.path}: programs of jobs with interruptions cannot be compared with the "
                 "drawing yet; audit the plan.json"

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 from scipy.spatial import cKDTree
 
 from kerfpath._arrays import Array
-from kerfpath.auditor import Check, Rounding, Unit, checks, rounding_of
+from kerfpath.auditor import Check, Rounding, Unit, rounding_of
 from kerfpath.cell import Cell
 from kerfpath.contour import KINDS, Contour
 from kerfpath.job.format import ContourTask, Job
@@ -14,7 +16,6 @@ from kerfpath.job.programs._asked import AskedNodes, asked_nodes
 from kerfpath.job.programs._read import ReadCut
 from kerfpath.planner import node_interval
 from kerfpath.plans import Plan, Proof
-from kerfpath.plans import Settings as PlanSettings
 from kerfpath.post import Language, Rules, Settings
 
 __all__ = ["asked_times", "cut_checks", "row"]
@@ -51,12 +52,12 @@ def cut_checks(
         return [*rows, row("order", said, (np.diff(s) <= 0).sum(), 0, "count", node)], None
     took = np.where(np.isnan(cut.speed), cut.took, np.diff(s) / cut.speed)
     made = _plan(job, task, cut, s, np.append(0.0, np.cumsum(took)))
-    options = dict(job.audit_options)
-    if job.plan_options["tilt"] is not None:
-        options["axis_tolerance"] += job.plan_options["tilt"].cone
+    allowed, tilt = job.tolerances, job.options.tilt
+    if tilt is not None:
+        allowed = replace(allowed, axis=allowed.axis + tilt.cone)
     rules = chosen.rules(settings)
     digits = _rounding(cut, made, rules)
-    rows += checks(made, reference=reference, cell=cell, rounding=digits, **options)
+    rows += allowed.checks(made, reference=reference, cell=cell, rounding=digits)
     rows += _asked(job, task, cut, reference, made, digits.time, ahead=chosen.ahead)
     rows += _postures(job, cut, chosen, settings, digits.q)
     asked = asked_nodes(job, task, cut, reference, s)
@@ -64,7 +65,7 @@ def cut_checks(
     said = "targets that leave a node of the job out, or are none"
     rows += [
         row("nodes", "targets, off the nodes that the job asks for", asked.off[off],
-               options["path_tolerance"], "m", int(cut.ends[off])),
+               allowed.path, "m", int(cut.ends[off])),
         row("every-node", said, asked.alone.sum(), 0, "count", int(cut.ends[alone])),
     ]  # fmt: skip
     return rows, (asked, made) if asked.complete else None
@@ -100,8 +101,7 @@ def _along(cut: ReadCut, reference: Contour) -> tuple[Array, Array]:
 
 def _plan(job: Job, task: ContourTask, cut: ReadCut, s: Array, time: Array) -> Plan:
     """Return what the text says of a cut as a plan, so that it is audited as one."""
-    options, K = job.plan_options, len(cut.q)
-    weights = options["weights"]
+    K = len(cut.q)
     return Plan(
         contour=Contour(cut.T_part_tip[:, :3, 3], cut.T_part_tip[:, :3, 2], s=s, name=task.name),
         robot=job.robot,
@@ -112,18 +112,7 @@ def _plan(job: Job, task: ContourTask, cut: ReadCut, s: Array, time: Array) -> P
         posture=np.zeros(K, dtype=np.int64),
         turn=np.zeros(cut.q.shape, dtype=np.int64),
         time=time,
-        settings=PlanSettings(
-            gamma_step=options["gamma_step"],
-            frames=options["frames"],
-            method=options["method"],
-            objective=options["objective"],
-            metric=options["metric"],
-            weights=np.ones(job.robot.joints) if weights is None else np.asarray(weights),
-            eta_v=options["eta_v"],
-            eta_a=options["eta_a"],
-            rotation=options["rotation"],
-            comfort=options["comfort"],
-        ),
+        settings=replace(job.options, tilt=None, closure="free"),
         cost=0.0,
         proof=Proof(optimal=False, statement="read from a program"),
         counts={},
@@ -153,7 +142,7 @@ def _asked(
     wanted = reference.kind[k] != KINDS.index("micro joint")
     wrong = wanted != cut.laser
     excess = np.diff(np.interp(s, asked.s, when)) / np.diff(made.time) - 1
-    if job.plan_options["feed"] == "constant":
+    if job.options.feed == "constant":
         excess = np.abs(excess)
     fast = int(np.argmax(excess - digits))
     node = int(np.argmax(wrong)) if wrong.any() else 0

@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import fields, replace
+from dataclasses import replace
 from pathlib import Path
 from typing import Any, TypeVar
 
 import numpy as np
 from pydantic import BaseModel
 
-from kerfpath.auditor import Check, checks
+from kerfpath.auditor import Check
 from kerfpath.errors import AuditFailed, InputError, NoFeasiblePath
 from kerfpath.job.format import (
     AuditTable,
@@ -19,9 +19,10 @@ from kerfpath.job.format import (
     ProgramOptions,
     ProgramTable,
     SequenceTable,
-    audit_options,
+    Tolerances,
     program_options,
     read_job,
+    tolerances_of,
 )
 from kerfpath.job.plan_file import (
     Asked,
@@ -113,7 +114,7 @@ def program_from_file(
             )
         asked = _as_planned(asked_of(read_job(job_file)), file)
         _require_passed(PlanAudit(asked=asked).audited(plan_file))
-        if asked.job.interruptions == "none":
+        if asked.job.options.interruptions == "none":
             to_do = ProgramAsked.by(asked)
         file = replace(file, job=asked.job.source)
     options = _options(
@@ -125,9 +126,9 @@ def program_from_file(
     if frame is not None:
         file, again = _led(file, frame, options.retract)
         notes += [*again, LED_NOTE, *([LED_MOVES_NOTE] if file.moves else [])]
-    limits = table_of(file, "audit", AuditTable, audit_options)
+    tolerances = table_of(file, "audit", AuditTable, tolerances_of)
     for p in file.plans:
-        for check in checks(p, **limits):
+        for check in tolerances.checks(p):
             if check.level == "error" and not check.ok:
                 there = "" if frame is None else " at the measured placement"
                 raise AuditFailed(
@@ -163,7 +164,7 @@ def program_language(source: Mapping[str, Any], path: Path) -> str:
 def _job_of(file: PlanFile, options: ProgramOptions) -> Job:
     """Return what a plan.json keeps of its job: all but the drawing and the cell."""
     first = file.plans[0]
-    asked, sequence = first.settings, file.job.get("sequence")
+    sequence = file.job.get("sequence")
     return Job(
         path=file.path,
         robot=first.robot,
@@ -172,15 +173,11 @@ def _job_of(file: PlanFile, options: ProgramOptions) -> Job:
         part_file=file.path,
         part_unit=None,
         contours=(),
-        plan_options={field.name: getattr(asked, field.name) for field in fields(asked)}
-        | {"feed": "constant" if all(p.feed is None for p in file.plans) else "dip"},
-        refine_parts=1,
-        interruptions="none",
-        least_piece=None,
+        options=replace(first.settings, refine_parts=1, interruptions="none", least_piece=None),
         cell=None,
         sequence=None if sequence is None else table_of(file, "sequence", SequenceTable, _same),
         layout=LayoutTable(),
-        audit_options=table_of(file, "audit", AuditTable, audit_options),
+        tolerances=table_of(file, "audit", AuditTable, tolerances_of),
         program=options,
         source=file.job,
     )
@@ -214,9 +211,9 @@ def _led(file: PlanFile, frame: MeasuredFrame, retract: float) -> tuple[PlanFile
 
     A contour that would not pass its audit there is planned again around it; notes say which.
     """
-    asked, plans, notes = table_of(file, "audit", AuditTable, audit_options), [], []
+    tolerances, plans, notes = table_of(file, "audit", AuditTable, tolerances_of), [], []
     for p in file.plans:
-        led, why = _there(p, frame, asked)
+        led, why = _there(p, frame, tolerances)
         if why:
             try:
                 led = planned_again(p, frame.T_base_part)
@@ -231,13 +228,13 @@ def _led(file: PlanFile, frame: MeasuredFrame, retract: float) -> tuple[PlanFile
     return replace(file, plans=tuple(plans), moves=moves, in_cell=False), notes
 
 
-def _there(p: Plan, frame: MeasuredFrame, asked: dict[str, Any]) -> tuple[Plan, str]:
+def _there(p: Plan, frame: MeasuredFrame, tolerances: Tolerances) -> tuple[Plan, str]:
     """Return a plan led to a measured part, and what then fails; empty where nothing does."""
     try:
         led = placed(p, frame.T_base_part)
     except NoFeasiblePath as away:
         return p, f"it fails: {away}"
-    failed = first_failed(checks(led, **asked))
+    failed = first_failed(tolerances.checks(led))
     return led, "" if failed is None else f"it fails: {failed.issue()}"
 
 

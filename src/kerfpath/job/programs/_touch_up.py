@@ -137,7 +137,7 @@ def touch_up(
             T = np.array([group.path[node].T_part_tip for node in k])
             path, keep = touched_up(path, nodes, k, T[:, :3, 3], T[:, :3, 2], ease=ease)
             nodes = _sampled(path, nodes, keep, tasks[p.name].speed)
-        postures = np.unique(p.posture).tolist()
+        postures = tuple(np.unique(p.posture).tolist())
         given[p.name] = Given(path=path, nodes=nodes, postures=postures, touched=bool(moved))
     if job.sequence is not None:
         job = replace(job, sequence=job.sequence.model_copy(update={"order": "given"}))
@@ -148,11 +148,11 @@ def touch_up(
 
 def _require_kind(job: Job, file: PlanFile) -> None:
     """Raise InputError where job and plan do not belong together, or are not for touching up."""
-    options = job.plan_options
+    options = job.options
     kinds = (
-        (job.interruptions != "none", "interruptions"),
-        (options["tilt"] is not None, "a tilt of the tool axis"),
-        (job.refine_parts > 1, "refine_parts"),
+        (options.interruptions != "none", "interruptions"),
+        (options.tilt is not None, "a tilt of the tool axis"),
+        (options.refine_parts > 1, "refine_parts"),
         (job.program.arc_tolerance is not None, "arcs_mm"),
     )
     for found, words in kinds:

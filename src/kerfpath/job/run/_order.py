@@ -119,8 +119,11 @@ def ordered(
 
 def _audited(job: Job, part: PartPlan, cell: Cell | None) -> tuple[Check, ...]:
     """Return the worst of each check over all moves; its node is the number of the move."""
-    etas = {key: job.plan_options[key] for key in ("eta_v", "eta_a")}
-    tables = (air_checks(job.robot, m.q, m.time, cell=cell, **etas) for m in part.moves)
+    o = job.options
+    tables = (
+        air_checks(job.robot, m.q, m.time, cell=cell, eta_v=o.eta_v, eta_a=o.eta_a)
+        for m in part.moves
+    )
     return tuple(worst_of(tables))
 
 

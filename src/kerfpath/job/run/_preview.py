@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -11,7 +11,6 @@ from kerfpath.cad import Part
 from kerfpath.cad import read as read_drawing
 from kerfpath.cell import Cell
 from kerfpath.job.format import Job, cell_of_job
-from kerfpath.planner import layered_graph
 
 __all__ = ["Checked", "Start", "check_job"]
 
@@ -73,8 +72,8 @@ def check_job(job: Job, part: Part | None = None) -> Checked:
     starts = []
     for task in job.tasks(part):
         nodes = task.sample(task.candidates(part)[0])
-        first = nodes.part(0, 1, job.plan_options["frames"])
-        graph = layered_graph(first, job.robot, **job.graph_options)
+        first = nodes.part(0, 1, job.options.frames)
+        graph = job.graph(first, replace(job.options, comfort=None))
         q = graph.q[: graph.start[1]]
         starts.append(_start(task.name, len(nodes), q, cell))
     return Checked(job=job, part=part, cell=cell, starts=tuple(starts))

@@ -5,13 +5,13 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
 from kerfpath._arrays import Array, Ints
 from kerfpath._told import told
-from kerfpath.auditor import Check, checks
+from kerfpath.auditor import Check
 from kerfpath.cad import Part
 from kerfpath.cad import read as read_drawing
 from kerfpath.cell import Cell
@@ -27,7 +27,6 @@ from kerfpath.planner import (
     FastestSpeed,
     clearance_map,
     fastest_speed,
-    layered_graph,
     plan,
     plan_in_pieces,
     relaxations,
@@ -89,7 +88,7 @@ class Given(NamedTuple):
 
     path: Contour
     nodes: Contour
-    postures: Sequence[int] | None
+    postures: tuple[int, ...] | None
     touched: bool
 
 
@@ -135,8 +134,10 @@ def run_job(
             shaped = task.candidates(part, loop)
             if chosen is not None and task.name in chosen:
                 shaped = shaped[:1]
-            asked = job.plan_options["postures"]
-            paths = [Given(path, task.sample(path), asked, touched=False) for path in shaped]
+            paths = [
+                Given(path, task.sample(path), job.options.postures, touched=False)
+                for path in shaped
+            ]
         run = None if chosen is None else chosen.get(task.name)
         tries.append([_cut(job, task, path, cell, run, progress) for path in paths])
         first.append(paths[0])
@@ -176,10 +177,10 @@ def _cut(
 ) -> tuple[Cut, ...]:
     """Return what came of a contour: one cut, or several where it is interrupted."""
     drawn, nodes = asked.path, asked.nodes
-    options = job.plan_options | {"postures": asked.postures}
+    options, done = replace(job.options, postures=asked.postures), 0
     if chosen is not None:
-        options |= chosen.run.options | {"feed": "constant", "refine": chosen.refine}
-    job, done = replace(job, plan_options=options), 0
+        options = replace(chosen.run.applied_to(options), feed="constant", refine=chosen.refine)
+    whole_job, job = job, replace(job, options=options)
 
     def solved(count: int) -> None:
         nonlocal done
@@ -187,9 +188,7 @@ def _cut(
         progress(task.name, done, len(nodes))
 
     progress(task.name, 0, len(nodes))
-    graph = layered_graph(
-        nodes, job.robot, **job.graph_options, comfort=options["comfort"], progress=solved
-    )
+    graph = job.graph(nodes, progress=solved)
     clearance = None
     if cell is not None and job.cell is not None and job.cell.map:
         progress(f"{task.name}: map of the cell", 0, 0)
@@ -215,26 +214,31 @@ def _cut(
     except NoFeasiblePath as broken:
         # With poses everywhere slower would do; for a loop that cannot close, or an axis that may
         # not turn as far, it need not, and a feed that dips has tried.
-        plain = options["closure"] == "free" and options["rotation"] is None
-        constant = options["feed"] == "constant" and nodes.time is None
+        plain = options.closure == "free" and options.rotation is None
+        constant = options.feed == "constant" and nodes.time is None
         if not (np.diff(graph.start).all() and plain and constant):
             return (replace(whole, broken=broken),)
         phase("fastest speed")
         if cell is not None:
             # Shares of the limits at which a clear path exists are not looked for.
             with suppress(NoFeasiblePath):
-                slower = fastest_along(job, nodes, cell, refine=options["refine"], graph=graph)
+                slower = fastest_along(job, nodes, cell, refine=options.refine, graph=graph)
                 return (replace(whole, broken=broken, fastest=slower),)
             return (replace(whole, broken=broken),)
         least = relaxations(
-            nodes, job.robot, graph, task.speed, eta_v=options["eta_v"], eta_a=options["eta_a"]
+            nodes, job.robot, graph, task.speed, eta_v=options.eta_v, eta_a=options.eta_a
         )
         fastest = FastestSpeed.of(nodes, least.slower)
-        if options["refine"]:
+        if options.refine:
             fastest = fastest_along(job, nodes, None, refine=True, graph=graph)
         return (replace(whole, broken=broken, fastest=fastest, relaxations=least),)
     phase("audit")
-    return tuple(_audited(job, whole, made, cell) for made in plans)
+    return tuple(_audited(job, whole, _asked_by(whole_job, made), cell) for made in plans)
+
+
+def _asked_by(job: Job, made: Plan) -> Plan:
+    """Return a plan with the postures that the job allows, of which the search had only some."""
+    return replace(made, settings=replace(made.settings, postures=job.options.postures))
 
 
 def _in_other_postures(
@@ -251,17 +255,13 @@ def _in_other_postures(
     postures = unused_postures(plans, asked.postures)
     for k, posture in enumerate(postures):
         progress(f"{task.name}: other postures", k, len(postures))
-        here = replace(job, plan_options=job.plan_options | {"postures": (posture,)})
-        graph = layered_graph(
-            asked.nodes, job.robot, **here.graph_options, comfort=here.plan_options["comfort"]
-        )
+        here = replace(job, options=replace(job.options, postures=(posture,)))
+        graph = here.graph(asked.nodes)
         whole = Cut(contour=task.name, task=task, drawn=asked.path, nodes=asked.nodes, graph=graph)
         with suppress(NoFeasiblePath):
-            whole_cut = replace(here, interruptions="none")
-            cuts = _plans(whole_cut, task, asked.nodes, graph, cell, lambda phase: None)
-            found += [
-                cut for cut in (_audited(here, whole, one, cell) for one in cuts) if cut.passed
-            ]
+            one = _whole(here, task, asked.nodes, graph, cell, lambda phase: None)
+            cut = _audited(here, whole, _asked_by(job, one), cell)
+            found += [cut] if cut.passed else []
     return found
 
 
@@ -274,17 +274,14 @@ def fastest_along(
     graph: LayeredGraph | None = None,
 ) -> FastestSpeed:
     """Return the fastest constant speed of a contour, clear in the cell where there is one."""
-    comfort, eta_v, eta_a = (job.plan_options[key] for key in ("comfort", "eta_v", "eta_a"))
     return fastest_speed(
         nodes,
         job.robot,
-        **job.graph_options,
-        eta_v=eta_v,
-        eta_a=eta_a,
+        tool=job.tool,
+        placement=job.placement,
+        options=replace(job.options.without_penalties, refine=refine),
         cell=cell,
         graph=graph,
-        refine=refine,
-        comfort=comfort and comfort.hard,
     )
 
 
@@ -297,18 +294,49 @@ def _plans(
     phase: Callable[[str], None],
 ) -> tuple[Plan, ...]:
     """Return the plan of a contour, or those of its pieces where the job lets it be interrupted."""
-    options = job.plan_options
-    setting: dict[str, Any] = {"tool": job.tool, "placement": job.placement, "graph": graph}
-    setting["phase"] = phase
-    setting["speed"] = task.speed if nodes.time is None else None
     try:
-        return (plan(nodes, job.robot, cell=cell, **setting, **options),)
+        return (_whole(job, task, nodes, graph, cell, phase),)
     except NoFeasiblePath:
-        if job.interruptions == "none" or not np.diff(graph.start).all():
+        if job.options.interruptions == "none" or not np.diff(graph.start).all():
             raise
-    plain = {key: value for key, value in options.items() if key not in ("feed", "rotation")}
-    plain["least_piece"] = job.least_piece
-    return plan_in_pieces(nodes, job.robot, cell=cell, **setting, **plain)
+    return plan_in_pieces(
+        nodes,
+        job.robot,
+        tool=job.tool,
+        placement=job.placement,
+        speed=_speed(task, nodes),
+        options=job.options,
+        cell=cell,
+        graph=graph,
+        phase=phase,
+    )
+
+
+def _whole(
+    job: Job,
+    task: ContourTask,
+    nodes: Contour,
+    graph: LayeredGraph,
+    cell: Cell | None,
+    phase: Callable[[str], None],
+) -> Plan:
+    """Return the plan of a contour that is cut in one go."""
+    return plan(
+        nodes,
+        job.robot,
+        tool=job.tool,
+        placement=job.placement,
+        speed=_speed(task, nodes),
+        options=job.options,
+        cell=cell,
+        graph=graph,
+        phase=phase,
+    )
+
+
+def _speed(task: ContourTask, nodes: Contour) -> float | None:
+    """Return the speed (m/s) to plan at; None where the nodes carry their own times."""
+    return task.speed if nodes.time is None else None
 
 
 def _audited(job: Job, whole: Cut, made: Plan, cell: Cell | None) -> Cut:
@@ -318,8 +346,8 @@ def _audited(job: Job, whole: Cut, made: Plan, cell: Cell | None) -> Cut:
         first = int(np.searchsorted(nodes.s, s[0]))
         drawn, nodes = drawn.between(float(s[0]), float(s[-1])), made.contour
         graph = graph.part(first, first + len(s) - 1)
-    if job.refine_parts > 1:
-        made = _divided(made, drawn, job.refine_parts)
+    if job.options.refine_parts > 1:
+        made = _divided(made, drawn, job.options.refine_parts)
     return replace(
         whole,
         task=replace(whole.task, name=made.name),
@@ -327,7 +355,7 @@ def _audited(job: Job, whole: Cut, made: Plan, cell: Cell | None) -> Cut:
         nodes=nodes,
         graph=graph,
         plan=made,
-        checks=tuple(checks(made, reference=drawn, cell=cell, **job.audit_options)),
+        checks=tuple(job.tolerances.checks(made, reference=drawn, cell=cell)),
     )
 
 
@@ -358,7 +386,7 @@ def fastest_speeds(
     """
     part = read_drawing(job.part_file, unit=job.part_unit)
     cell = cell_of_job(job, part)
-    refine = job.plan_options["refine"]
+    refine = job.options.refine
     answers: list[tuple[ContourTask, Contour, FastestSpeed | NoFeasiblePath]] = []
     tasks = job.tasks(part)
     for i, task in enumerate(tasks):

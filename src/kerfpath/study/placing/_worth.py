@@ -30,7 +30,8 @@ from kerfpath.cell import Cell, Checker
 from kerfpath.errors import InputError, NoFeasiblePath
 from kerfpath.graph import LayeredGraph
 from kerfpath.job import Job, cell_of_job
-from kerfpath.planner import fastest_speed, layered_graph, plan
+from kerfpath.options import PlanOptions
+from kerfpath.planner import fastest_speed, plan
 from kerfpath.search import shortest_path
 from kerfpath.study._clear import has_clear_pose
 from kerfpath.study.placing._subject import Subject
@@ -136,21 +137,12 @@ class Worth:
             raise Lost("collision", 1.0, reason=str(overlap)) from None
 
     @property
-    def _setting(self) -> dict[str, Any]:
+    def _options(self) -> PlanOptions:
         """What every search takes: margins are kept, what comfort and tilt cost plays no part."""
-        options = self.job.plan_options
-        comfort, tilt = options["comfort"], options["tilt"]
-        return self.job.graph_options | {
-            "tilt": tilt and replace(tilt, cost=0.0),
-            "comfort": comfort and comfort.hard,
-        }
-
-    @property
-    def _shares(self) -> dict[str, Any]:
-        return {key: self.job.plan_options[key] for key in ("eta_v", "eta_a")}
+        return self.job.options.without_penalties
 
     def _graph(self, subject: Subject, nodes: Ints | None = None) -> LayeredGraph:
-        return layered_graph(subject.nodes, self.job.robot, **self._setting, nodes=nodes)
+        return self.job.graph(subject.nodes, self._options, only=nodes)
 
     def _reach(self) -> None:
         """Require a pose, and in a cell a clear one, of every `EVERY`-th node."""
@@ -183,7 +175,7 @@ class Worth:
         values = []
         for c, first, last in stretches:
             graph = self._graph(self.subjects[c], np.arange(first, last + 1))
-            frames, motion = self.job.plan_options["frames"], self.goal == "motion"
+            frames, motion = self.job.options.frames, self.goal == "motion"
             run = self.subjects[c].stretch(first, last, frames, timed=motion)
             try:
                 values.append(self._value(run, graph)["value"])
@@ -198,8 +190,8 @@ class Worth:
         if self.goal == "motion":
             return {"value": self._plan_cost(subject, graph)}
         found = fastest_speed(
-            subject.nodes, self.job.robot, **self._setting, **self._shares, cell=self.cell,
-            graph=graph,
+            subject.nodes, self.job.robot, tool=self.job.tool, placement=self.job.placement,
+            options=replace(self._options, refine=False), cell=self.cell, graph=graph,
         )  # fmt: skip
         fastest = found.speed * 60
         return {
@@ -211,21 +203,22 @@ class Worth:
         }
 
     def _plan_cost(self, subject: Subject, graph: LayeredGraph) -> float:
-        keys = ("metric", "weights", "eta_v", "eta_a", "closure", "rotation")
-        options = {key: self.job.plan_options[key] for key in keys}
+        options = replace(
+            self._options, method="exact", objective="sum", feed="constant", refine=False
+        )
         if not subject.nodes.closed:
-            options["closure"] = "free"  # a stretch of a loop that closes need not
+            options = replace(options, closure="free")  # a stretch of a loop that closes need not
         speed = subject.speed if subject.nodes.time is None else None
         return plan(
-            subject.nodes, self.job.robot, **self._setting, **options, objective="sum",
-            speed=speed, cell=self.cell, graph=graph,
+            subject.nodes, self.job.robot, tool=self.job.tool, placement=self.job.placement,
+            speed=speed, options=options, cell=self.cell, graph=graph,
         ).cost  # fmt: skip
 
     def _least_displacement(self, subject: Subject, graph: LayeredGraph) -> float:
         """Return a displacement that none along a contour is below, by every `EVERY`-th node."""
         if len(graph.start) < 3:
             return 0.0
-        options, robot = self.job.plan_options, self.job.robot
+        options, robot = self.job.options.of(self.job.robot, subject.interval), self.job.robot
         velocity, _ = robot.speed_limits()
         try:
             return shortest_path(
@@ -235,9 +228,9 @@ class Worth:
                 velocity=velocity * (1 + TOLERATED),
                 acceleration=np.full(len(velocity), UNLIMITED),
                 endless=robot.endless,
-                weights=options["weights"] or 1 / (velocity * subject.interval),
-                metric=options["metric"],
-                eta_v=options["eta_v"],
+                weights=options.weights,
+                metric=options.metric,
+                eta_v=options.eta_v,
             ).cost
         except NoFeasiblePath as broken:
             raise self._lost(subject, graph, broken, 2.0, step=EVERY) from None

@@ -137,18 +137,6 @@ class JobFile(Table):
             return self
         if self.cell is None:
             raise fault(f"[cell] {why}, as it is measured there", "none", "change one", here)
-        for name, plain in (("feed", "constant"), ("interruptions", "none")):
-            if (got := getattr(self.plan, name)) != plain:
-                raise fault(f'{name} = "{plain}" {why}', f'"{got}"', "change one", here)
-        return self
-
-    @model_validator(mode="after")
-    def _costs_are_known(self) -> JobFile:
-        """Refuse costs where the planner would not know them."""
-        asked = self.comfort.resolve()
-        if asked and asked.costs and self.plan.feed == "dip" and self.plan.refine is not False:
-            expected = 'refine = false with feed = "dip" and costs in [comfort]'
-            raise fault(expected, "none", "add it, or remove the costs", ("plan", "feed"))
         return self
 
 

@@ -2,44 +2,59 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Literal
+from typing import Annotated
 
 import numpy as np
 from pydantic import Field, model_validator
 
+from kerfpath.comfort import Comfort
 from kerfpath.contour import FrameKind
 from kerfpath.job.format._values import JointsNotNegative, NotNegative, Positive, fault, key
 from kerfpath.job.format.tables._table import Table, given
-from kerfpath.planner import FeedKind
+from kerfpath.options import FeedKind, Interruptions, OptionConflict, PlanOptions
+from kerfpath.robots import Robot, postures_named
 from kerfpath.search import Closure, Method, Metric, ObjectiveKind
 from kerfpath.tilt import Tilt
 
 __all__ = ["PlanTable"]
 
 
-PLAIN = {
-    "method": "exact",
-    "closure": "free",
-    "rotation_deg": None,
-    "objective": "sum",
-    "interruptions": "none",
-    "refine_parts": 1,
-    "tilt_deg": None,
+KEYS = {
+    "eta_v": "eta_velocity",
+    "eta_a": "eta_acceleration",
+    "gamma_step": "gamma_step_deg",
+    "least_piece": "least_piece_mm",
+    "postures": "posture",
+    "rotation": "rotation_deg",
+    "tilt": "tilt_deg",
+    "comfort clearance": "clearance_band_mm",
+    "comfort costs": "costs in [comfort]",
 }
-"""What keys of [plan] must be where another key cannot do with anything else."""
-NEEDS = {
-    'feed = "dip"': (
-        "method", "closure", "rotation_deg", "objective", "interruptions", "refine_parts",
-    ),
-    'interruptions = "fewest"': ("method", "closure", "rotation_deg", "tilt_deg"),
-    'closure = "periodic"': ("method",),
-    "rotation_deg": ("method",),
-    "tilt_deg": ("refine_parts",),
-}  # fmt: skip
-"""Of a key, or a value of it: which others must then be plain."""
+"""What the file calls an option whose key has another name, or a unit."""
+
+
+def said_in_keys(conflict: OptionConflict, table: PlanTable) -> tuple[tuple[str, str], str]:
+    """Return the key of two options that do not go together, and what is wrong in its words."""
+    key = KEYS.get(conflict.option, conflict.option)
+    expected = f"no {key}" if conflict.expected is None else f"{key} = {_toml(conflict.expected)}"
+    beside = [
+        KEYS[name] if name in KEYS else f"{name} = {_toml(value)}"
+        for name, value in conflict.beside.items()
+    ]
+    got = getattr(table, key)
+    standing = [
+        each for each in (key, *conflict.beside) if KEYS.get(each, each) in table.model_fields_set
+    ]
+    at = KEYS.get(standing[0], standing[0]) if standing else key
+    said = f"expected {expected} with {' and '.join(beside)}, got {_toml(got)}; change one"
+    return ("plan", at), said
 
 
 def _toml(value: object) -> str:
+    if value is None:
+        return "none"
+    if isinstance(value, bool):
+        return str(value).lower()
     return f'"{value}"' if isinstance(value, str) else f"{value}"
 
 
@@ -54,7 +69,7 @@ class PlanTable(Table):
     method: Method = "exact"
     closure: Closure = "free"
     rotation_deg: Annotated[NotNegative | None, key("a number not below 0, in deg", "360")] = None
-    interruptions: Literal["none", "fewest"] = "none"
+    interruptions: Interruptions = "none"
     least_piece_mm: Annotated[Positive | None, key("a number above 0, in mm", "20")] = None
     frames: FrameKind = "rotation-minimising"
     tilt_deg: Annotated[
@@ -76,24 +91,41 @@ class PlanTable(Table):
     ] = None
 
     @model_validator(mode="after")
-    def _goes_together(self) -> PlanTable:
-        """Refuse what the planner cannot do together, at its key."""
-        for why, others in NEEDS.items():
-            one, _, value = why.partition(" = ")
-            asked = getattr(self, one)
-            if asked is None or (value and _toml(asked) != value):
-                continue
-            for name in others:
-                if (got := getattr(self, name)) != (plain := PLAIN[name]):
-                    expected = f"{name} = {_toml(plain)}" if plain else f"no {name}"
-                    raise fault(f"{expected} with {why}", _toml(got), "change one", (name,))
-        if self.least_piece_mm is not None and self.interruptions == "none":
-            expected = 'interruptions = "fewest" with least_piece_mm'
-            raise fault(expected, "none", "add it, or remove the length", ("least_piece_mm",))
+    def _tilt_is_asked_for(self) -> PlanTable:
         for name in given(self, "tilt_steps", "tilt_cost_per_deg"):
             if self.tilt_deg is None:
                 raise fault(f"tilt_deg with {name}", "none", "add tilt_deg", (name,))
         return self
+
+    def resolve(self, robot: Robot, comfort: Comfort | None) -> PlanOptions:
+        """Return how the table and [comfort] ask for a plan, in SI.
+
+        Raises
+        ------
+        OptionConflict
+            Two options that do not go together.
+        """
+        words, angle, piece = self.posture, self.rotation_deg, self.least_piece_mm
+        return PlanOptions(
+            gamma_step=float(np.radians(self.gamma_step_deg)),
+            frames=self.frames,
+            tilt=self.tilt(),
+            postures=None if words is None else tuple(postures_named(words, robot.kinematics)),
+            method=self.method,
+            objective=self.objective,
+            metric=self.metric,
+            weights=self.weights,  # type: ignore[arg-type]  # cast there
+            eta_v=self.eta_velocity,
+            eta_a=self.eta_acceleration,
+            closure=self.closure,
+            rotation=None if angle is None else np.where(robot.endless, np.radians(angle), np.inf),
+            feed=self.feed,
+            refine=self.method == "exact" if self.refine is None else self.refine,
+            refine_parts=self.refine_parts,
+            interruptions=self.interruptions,
+            least_piece=None if piece is None else piece / 1000,
+            comfort=comfort,
+        )
 
     def tilt(self) -> Tilt | None:
         """Return the tolerance of the tool axis; None where the table asks for none."""

@@ -1,0 +1,411 @@
+"""How a plan is asked for: one object with every option, and the rules of what goes with what."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, dataclass, fields, replace
+from typing import Any, Literal, TypedDict, get_args
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from kerfpath._arrays import Array, floats, scalar
+from kerfpath._told import told
+from kerfpath.comfort import Band, Comfort
+from kerfpath.contour import FrameKind
+from kerfpath.errors import InputError
+from kerfpath.robots import Robot
+from kerfpath.search import Closure, Method, Metric, ObjectiveKind, rotation_limits
+from kerfpath.tilt import Tilt
+
+__all__ = [
+    "FeedKind",
+    "GraphKeywords",
+    "Interruptions",
+    "OptionConflict",
+    "OptionData",
+    "PlanKeywords",
+    "PlanOptions",
+    "chosen",
+]
+
+FeedKind = Literal["constant", "dip"]
+Interruptions = Literal["none", "fewest"]
+
+
+class GraphKeywords(TypedDict, total=False):
+    """The options that the layered graph depends on."""
+
+    gamma_step: float
+    frames: FrameKind
+    tilt: Tilt | None
+    postures: Sequence[int] | None
+    comfort: Comfort | None
+
+
+class PlanKeywords(GraphKeywords, total=False):
+    """The options that `kerfpath.plan` takes as keywords."""
+
+    method: Method
+    objective: ObjectiveKind
+    metric: Metric
+    weights: ArrayLike | None
+    eta_v: float
+    eta_a: float
+    closure: Closure
+    rotation: ArrayLike | None
+    feed: FeedKind
+    refine: bool
+
+
+class BandData(TypedDict):
+    """A `kerfpath.Band` as JSON holds it, in rad, m and m^3."""
+
+    margin: float
+    width: float
+    cost: float
+
+
+class TiltData(TypedDict):
+    """A `kerfpath.Tilt` as JSON holds it."""
+
+    cone_rad: float
+    steps: int
+    cost_per_rad: float
+
+
+class OptionData(TypedDict):
+    """The options as JSON holds them: SI, the unit in the name, null for infinity."""
+
+    method: Method
+    objective: ObjectiveKind
+    metric: Metric
+    weights_per_rad: list[float] | None
+    eta_v: float
+    eta_a: float
+    closure: Closure
+    rotation_rad: list[float | None] | None
+    comfort: dict[str, BandData] | None
+    gamma_step_rad: float
+    tilt: TiltData | None
+    frames: FrameKind
+    postures: list[int] | None
+    feed_kind: FeedKind
+    refine: bool
+    refine_parts: int
+    interruptions: Interruptions
+    least_piece_m: float | None
+
+
+class OptionConflict(InputError):
+    """Two options that do not go together.
+
+    Parameters
+    ----------
+    option : str
+        The one that another forbids.
+    expected, got : object
+        Its only value beside the other, None for none; and its value.
+    beside : mapping of str to object
+        The options that forbid it, with their values.
+    """
+
+    def __init__(
+        self, option: str, expected: object, got: object, beside: Mapping[str, object]
+    ) -> None:
+        self.option, self.expected, self.got, self.beside = option, expected, got, beside
+        said = " and ".join(f"{name} {_value(value)}".strip() for name, value in beside.items())
+        super().__init__(
+            f"{option}: expected {_value(expected) or 'none'} with {said}, got "
+            f"{_value(got) or type(got).__name__}; change one"
+        )
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class PlanOptions:
+    """How a plan is asked for: the search space, what is best, and what is kept.
+
+    Parameters
+    ----------
+    gamma_step : float rad
+        Step of the free rotation about the beam.
+    frames : {"rotation-minimising", "tangent"}
+        Task frames that gamma is measured in.
+    tilt : Tilt, optional
+        Tolerance of the tool axis, searched too; None: the nominal axis alone.
+    postures : tuple of int, optional
+        The postures that may be used; None: all. See `kerfpath.robots.postures_named`.
+    method, objective, metric, closure
+        As in `kerfpath.shortest_path`.
+    weights : (n,) 1/rad, optional
+        Weights of the joint-space distance (1/m for a rail); None: 1 / (velocity limit * dt).
+    eta_v, eta_a : float
+        Share of the velocity and acceleration limits that may be used.
+    rotation : (n,) rad, optional
+        Largest angle that an endless joint may turn away, either way, from where it begins;
+        infinite where that is not limited.
+    feed : {"constant", "dip"}
+        Where the limits do not let the speed be held: "constant" refuses, "dip" reduces the feed
+        there and holds the speed elsewhere, in the least time.
+    refine : bool
+        Whether gamma moves off its grid after the search, see `kerfpath.refine`.
+    refine_parts : int
+        Parts into which the refinement divides every interval between nodes. A job does so; `plan`
+        keeps the nodes of its contour.
+    interruptions : {"none", "fewest"}
+        Whether a contour that cannot be cut in one go is cut in pieces, see `plan_in_pieces`.
+    least_piece : float m, optional
+        Length that every such piece has at least.
+    comfort : Comfort, optional
+        Margins that the nodes keep from singularities and limits, and penalties beside them.
+
+    Raises
+    ------
+    InputError
+        A value out of its range or not of its kind; `OptionConflict` where two do not go together.
+    """
+
+    gamma_step: float = np.pi / 180
+    frames: FrameKind = "rotation-minimising"
+    tilt: Tilt | None = None
+    postures: tuple[int, ...] | None = None
+    method: Method = "exact"
+    objective: ObjectiveKind = "sum"
+    metric: Metric = "manhattan"
+    weights: Array = None  # type: ignore[assignment]  # `of` fills in the default
+    eta_v: float = 1.0
+    eta_a: float = 1.0
+    closure: Closure = "free"
+    rotation: Array | None = None
+    feed: FeedKind = "constant"
+    refine: bool = False
+    refine_parts: int = 1
+    interruptions: Interruptions = "none"
+    least_piece: float | None = None
+    comfort: Comfort | None = None
+
+    __repr__ = told
+
+    def __post_init__(self) -> None:
+        for name, known in _KNOWN.items():
+            if (value := getattr(self, name)) not in known:
+                raise InputError(f"{name}: expected one of {', '.join(known)}, got {value!r}")
+        cast: dict[str, object] = {
+            "gamma_step": scalar(self.gamma_step, "gamma_step", unit="rad", above=0.0),
+            "eta_v": scalar(self.eta_v, "eta_v", above=0.0),
+            "eta_a": scalar(self.eta_a, "eta_a", above=0.0),
+        }
+        if self.postures is not None:
+            cast["postures"] = tuple(int(posture) for posture in self.postures)
+        if self.weights is not None:
+            cast["weights"] = floats(self.weights, "weights", (None,))
+        if self.rotation is not None:
+            cast["rotation"] = floats(self.rotation, "rotation", (None,), infinite=True)
+        if self.least_piece is not None:
+            cast["least_piece"] = scalar(self.least_piece, "least_piece", unit="m", above=0.0)
+        if not (isinstance(self.refine_parts, int) and self.refine_parts >= 1):
+            raise InputError(
+                f"refine_parts: expected a whole number >= 1, got {self.refine_parts!r}"
+            )
+        for name, value in cast.items():
+            object.__setattr__(self, name, value)
+        _require_no_conflict(self)
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, PlanOptions) and self.to_data() == other.to_data()
+
+    __hash__ = None  # type: ignore[assignment]  # arrays have none
+
+    def of(self, robot: Robot, dt: float) -> PlanOptions:
+        """Return the options with the default weights of a robot at `dt` s from node to node.
+
+        Raises
+        ------
+        InputError
+            Weights or a rotation limit that do not fit the robot's joints.
+        """
+        velocity, _ = robot.speed_limits()
+        weights = 1 / (velocity * dt) if self.weights is None else self.weights
+        rotation = self.rotation
+        return replace(
+            self,
+            weights=floats(weights, "weights", velocity.shape),
+            rotation=None if rotation is None else rotation_limits(rotation, robot.endless),
+        )
+
+    @property
+    def without_penalties(self) -> PlanOptions:
+        """The options with the margins of comfort and the cone of tilt, at no cost."""
+        return replace(
+            self,
+            tilt=None if self.tilt is None else replace(self.tilt, cost=0.0),
+            comfort=None if self.comfort is None else self.comfort.hard,
+        )
+
+    def to_data(self) -> OptionData:
+        """Return the options as JSON holds them; `from_data` reads the same options back."""
+        tilt = self.tilt
+        return {
+            "method": self.method,
+            "objective": self.objective,
+            "metric": self.metric,
+            "weights_per_rad": None if self.weights is None else self.weights.tolist(),
+            "eta_v": self.eta_v,
+            "eta_a": self.eta_a,
+            "closure": self.closure,
+            "rotation_rad": None
+            if self.rotation is None
+            else [angle if np.isfinite(angle) else None for angle in self.rotation.tolist()],
+            "comfort": None
+            if self.comfort is None
+            else {name: band for name, band in asdict(self.comfort).items() if band is not None},
+            "gamma_step_rad": self.gamma_step,
+            "tilt": None
+            if tilt is None
+            else {"cone_rad": tilt.cone, "steps": tilt.steps, "cost_per_rad": tilt.cost},
+            "frames": self.frames,
+            "postures": None if self.postures is None else list(self.postures),
+            "feed_kind": self.feed,
+            "refine": self.refine,
+            "refine_parts": self.refine_parts,
+            "interruptions": self.interruptions,
+            "least_piece_m": self.least_piece,
+        }
+
+    @classmethod
+    def from_data(cls, data: OptionData) -> PlanOptions:
+        """Return the options that `to_data` wrote; other keys of `data` are left alone.
+
+        Raises
+        ------
+        InputError
+            As the class itself.
+        KeyError
+            A key is missing.
+        """
+        tilt, rotation, comfort = data["tilt"], data["rotation_rad"], data["comfort"]
+        weights, postures = data["weights_per_rad"], data["postures"]
+        return cls(
+            gamma_step=data["gamma_step_rad"],
+            frames=data["frames"],
+            tilt=None
+            if tilt is None
+            else Tilt(cone=tilt["cone_rad"], steps=tilt["steps"], cost=tilt["cost_per_rad"]),
+            postures=None if postures is None else tuple(postures),
+            method=data["method"],
+            objective=data["objective"],
+            metric=data["metric"],
+            weights=None if weights is None else np.array(weights, dtype=np.float64),  # type: ignore[arg-type]
+            eta_v=data["eta_v"],
+            eta_a=data["eta_a"],
+            closure=data["closure"],
+            rotation=None
+            if rotation is None
+            else np.array([np.inf if angle is None else angle for angle in rotation]),
+            feed=data["feed_kind"],
+            refine=data["refine"],
+            refine_parts=data["refine_parts"],
+            interruptions=data["interruptions"],
+            least_piece=data["least_piece_m"],
+            comfort=None
+            if comfort is None
+            else Comfort(**{name: Band(**band) for name, band in comfort.items()}),
+        )
+
+
+def chosen(
+    options: PlanOptions | None, keywords: Mapping[str, Any], allowed: type, **more: Any
+) -> PlanOptions:
+    """Return `options`, or the defaults, with the keywords that a caller gave in their place.
+
+    Parameters
+    ----------
+    options : PlanOptions or None
+    keywords : mapping of str to value
+    allowed : type of TypedDict
+        The keywords that the caller takes.
+    more : value
+        Options that the caller sets itself.
+
+    Raises
+    ------
+    TypeError
+        A keyword that the caller does not take.
+    InputError
+        As `PlanOptions`.
+    """
+    known = allowed.__annotations__
+    for name in keywords:
+        if name not in known:
+            raise TypeError(
+                f"unexpected keyword argument {name!r}; the options are {', '.join(sorted(known))}"
+            )
+    return replace(options or PlanOptions(), **keywords, **more)
+
+
+_KNOWN: dict[str, tuple[str, ...]] = {
+    "frames": get_args(FrameKind),
+    "method": get_args(Method),
+    "objective": get_args(ObjectiveKind),
+    "metric": get_args(Metric),
+    "closure": get_args(Closure),
+    "feed": get_args(FeedKind),
+    "interruptions": get_args(Interruptions),
+}
+
+GIVEN = object()
+"""Any value but None."""
+CLEARANCE, PENALTIES = "comfort clearance", "comfort costs"
+"""What the rules ask of comfort, beside the options themselves."""
+_RULES: tuple[tuple[dict[str, object], dict[str, object]], ...] = (
+    (
+        {"feed": "dip"},
+        {
+            "method": "exact",
+            "closure": "free",
+            "rotation": None,
+            "objective": "sum",
+            "interruptions": "none",
+            "refine_parts": 1,
+        },
+    ),
+    (
+        {"interruptions": "fewest"},
+        {"method": "exact", "closure": "free", "rotation": None, "tilt": None},
+    ),
+    ({"closure": "periodic"}, {"method": "exact"}),
+    ({"rotation": GIVEN}, {"method": "exact"}),
+    ({"tilt": GIVEN}, {"refine_parts": 1}),
+    ({"least_piece": GIVEN}, {"interruptions": "fewest"}),
+    ({CLEARANCE: GIVEN}, {"feed": "constant", "interruptions": "none"}),
+    ({"feed": "dip", PENALTIES: True}, {"refine": False}),
+)
+"""Where all options of the first are so, those of the second must be so."""
+
+
+def _require_no_conflict(options: PlanOptions) -> None:
+    comfort = options.comfort
+    facts = {field.name: getattr(options, field.name) for field in fields(options)}
+    facts[CLEARANCE] = None if comfort is None else comfort.clearance
+    facts[PENALTIES] = comfort is not None and comfort.costs
+    if options.rotation is not None and not np.isfinite(options.rotation).any():
+        facts["rotation"] = None
+    for beside, needed in _RULES:
+        if not all(_is(facts[name], value) for name, value in beside.items()):
+            continue
+        for name, value in needed.items():
+            if not _is(facts[name], value):
+                raise OptionConflict(name, value, facts[name], {one: facts[one] for one in beside})
+
+
+def _is(fact: object, value: object) -> bool:
+    if value is GIVEN or value is None:
+        return (fact is None) != (value is GIVEN)
+    return fact == value
+
+
+def _value(value: object) -> str:
+    """Return a value in a message: text in quotes, numbers; nothing for an object."""
+    if isinstance(value, str):
+        return f'"{value}"'
+    return f"{value}" if isinstance(value, int | float) and value is not True else ""

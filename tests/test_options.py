@@ -1,0 +1,147 @@
+"""The options of a plan: ranges, what goes with what, and back from data."""
+
+import json
+import re
+from dataclasses import fields
+from itertools import product
+
+import numpy as np
+import pytest
+
+import kerfpath
+from conftest import ROOT
+from kerfpath import Band, Comfort, InputError, OptionConflict, PlanOptions, Tilt
+from kerfpath.job.format.tables._plan import PlanTable
+from kerfpath.options import OptionData, PlanKeywords
+
+EVERY = PlanOptions(
+    gamma_step=0.02,
+    frames="tangent",
+    tilt=Tilt(cone=0.1, steps=2, cost=0.3),
+    postures=(1, 4),
+    objective="max",
+    metric="euclid",
+    weights=np.arange(1.0, 7.0),
+    eta_v=0.9,
+    eta_a=0.8,
+    closure="periodic",
+    rotation=[np.inf, np.inf, np.inf, 7.0, np.inf, 6.5],
+    refine=True,
+    comfort=Comfort(wrist=Band(margin=0.1, width=0.2, cost=3.0), limits=Band(margin=0.05)),
+)
+
+
+def test_options_come_back_from_their_data():
+    for options in (PlanOptions(), EVERY, PlanOptions(interruptions="fewest", least_piece=0.02)):
+        data = json.loads(json.dumps(options.to_data()))
+        assert PlanOptions.from_data(data) == options
+    assert PlanOptions() != EVERY
+
+
+def test_every_option_is_in_the_data_and_in_the_keywords():
+    names = {field.name for field in fields(PlanOptions)}
+    assert len(OptionData.__annotations__) == len(names)
+    only_whole = {"refine_parts", "interruptions", "least_piece"}
+    assert set(PlanKeywords.__annotations__) == names - only_whole
+
+
+CONFLICTS = {
+    "method": {"method": "paper", "feed": "dip"},
+    "closure": {"closure": "periodic", "feed": "dip"},
+    "rotation": {"rotation": np.full(6, 1.0), "feed": "dip"},
+    "objective": {"objective": "max", "feed": "dip"},
+    "interruptions": {"interruptions": "fewest", "feed": "dip"},
+    "refine_parts": {"refine_parts": 2, "tilt": Tilt(cone=0.1)},
+    "tilt": {"tilt": Tilt(cone=0.1), "interruptions": "fewest"},
+    "feed": {"feed": "dip", "comfort": Comfort(clearance=Band(width=0.01, cost=1))},
+    "refine": {
+        "feed": "dip",
+        "refine": True,
+        "comfort": Comfort(wrist=Band(width=0.1, cost=1)),
+    },
+}
+
+
+@pytest.mark.parametrize("option", CONFLICTS)
+def test_what_does_not_go_together_names_the_option(option):
+    with pytest.raises(
+        OptionConflict, match=f"^{option}: expected .* with .*, got .*; change one$"
+    ):
+        PlanOptions(**CONFLICTS[option])
+
+
+def test_a_length_of_pieces_needs_pieces():
+    with pytest.raises(OptionConflict) as caught:
+        PlanOptions(least_piece=0.02)
+    assert (caught.value.option, caught.value.expected) == ("interruptions", "fewest")
+
+
+@pytest.mark.parametrize(
+    ("name", "value"),
+    [
+        ("gamma_step", 0.0),
+        ("gamma_step", "fine"),
+        ("eta_v", -1.0),
+        ("eta_a", np.nan),
+        ("frames", "frenet"),
+        ("method", "fast"),
+        ("objective", "mean"),
+        ("metric", "taxi"),
+        ("closure", "open"),
+        ("feed", "slow"),
+        ("interruptions", "some"),
+        ("least_piece", 0.0),
+        ("refine_parts", 0),
+        ("weights", [[1.0]]),
+        ("rotation", [np.nan]),
+    ],
+)
+def test_a_value_out_of_range_is_refused_by_its_name(name, value):
+    with pytest.raises(InputError, match=f"^{name}: "):
+        PlanOptions(**{name: value})
+
+
+def test_two_plain_options_never_conflict():
+    plain = PlanOptions()
+    for one, two in product(fields(PlanOptions), repeat=2):
+        PlanOptions(**{f.name: getattr(plain, f.name) for f in (one, two)})
+
+
+def test_keywords_go_before_the_options(arm, tool, placement, circle):
+    options = PlanOptions(gamma_step=0.5, metric="euclid")
+    made = kerfpath.plan(
+        circle, arm, tool=tool, placement=placement, speed=0.02, options=options, metric="chebychev"
+    )
+    assert made.settings.metric == "chebychev"
+    assert made.settings.gamma_step == 0.5
+    velocity, _ = arm.speed_limits()
+    np.testing.assert_allclose(made.settings.weights, 1 / (velocity * made.dt))
+
+
+def test_a_keyword_that_is_none_is_refused(arm, tool, placement, circle):
+    with pytest.raises(TypeError, match="metrik"):
+        kerfpath.plan(circle, arm, tool=tool, placement=placement, speed=0.02, metrik="euclid")
+
+
+def test_the_old_name_of_the_settings_warns():
+    from kerfpath import plans
+
+    with pytest.warns(DeprecationWarning, match="PlanOptions"):
+        assert plans.Settings is PlanOptions
+
+
+def test_the_page_lists_every_option_its_key_and_its_name_in_the_data():
+    page = (ROOT / "docs" / "options.md").read_text()
+    table = page[page.index("| option |") : page.index("## What goes with what")]
+    rows = [line.split("|") for line in table.splitlines()[2:] if line]
+    words = [set(re.findall(r"`(\w+)`", " ".join(column))) for column in zip(*rows, strict=True)]
+    assert words[1] == {field.name for field in fields(PlanOptions)}
+    assert words[2] == set(PlanTable.model_fields)
+    assert words[3] == set(OptionData.__annotations__)
+
+
+def test_the_example_of_the_page_runs(capsys):
+    page = (ROOT / "docs" / "options.md").read_text()
+    for code in re.findall(r"```python\n(.*?)```", page, re.DOTALL):
+        exec(compile(code, "options.md", "exec"), {})
+    assert capsys.readouterr().out.endswith("True\n")
