@@ -13,7 +13,7 @@ import numpy as np
 
 from benchmarks._figures import Figure, Report
 from kerfpath.job import Job, warm_up
-from kerfpath.search import least_interval
+from kerfpath.search import SearchProblem, find_least_interval
 from kerfpath.study import Layout, digest, layout
 from kerfpath.study._evaluator import SampledContour
 from kerfpath.study.placing._evaluate import contours_of, middle_of
@@ -115,9 +115,8 @@ def _timed(job: Job, contour: SampledContour, nodes: Any) -> tuple[float, float]
     """Return the least interval over some nodes, s, and how long it took to find."""
     begun = perf_counter()
     graph = job.graph(contour.nodes, replace(job.options, comfort=None), only=nodes)
-    velocity, acceleration = job.robot.speed_limits()
-    least = least_interval(
-        graph.q, graph.start, velocity=velocity, acceleration=acceleration,
-        endless=job.robot.endless, eta_v=job.options.eta_v, eta_a=job.options.eta_a,
+    problem = SearchProblem(
+        q=graph.q, start=graph.start, dt=1.0, limits=job.options.limits(job.robot),
+        endless=job.robot.endless,
     )  # fmt: skip
-    return least.dt, perf_counter() - begun
+    return find_least_interval(problem).dt, perf_counter() - begun

@@ -383,7 +383,7 @@ def test_pieces_and_dips_keep_comfort(fine):
     assert dipped.criteria.nearest["wrist"][0] >= 0.1
     hard = Comfort(wrist=Band(margin=0.1))
     assert audit(plan(nodes, arm, feed="dip", comfort=hard, refine=True, **fast)) == []
-    with pytest.raises(InputError, match='refine: expected False with feed "dip" and comfort costs'):
+    with pytest.raises(InputError, match='expected False with feed "dip" and comfort costs'):
         plan(nodes, arm, feed="dip", comfort=comfort, refine=True, **fast)
     pieces = plan_in_pieces(nodes, arm, comfort=comfort, **fast)
     assert len(pieces) > 1

@@ -1,6 +1,7 @@
 """The options of a plan: ranges, what goes with what, and back from data."""
 
 import json
+import re
 from dataclasses import fields
 from itertools import product
 
@@ -8,7 +9,9 @@ import numpy as np
 import pytest
 
 import kerfpath
+from conftest import ROOT
 from kerfpath import Band, Comfort, InputError, OptionConflict, PlanOptions, Tilt
+from kerfpath.job.format.tables._plan import PlanTable
 from kerfpath.options import OptionData, PlanKeywords
 
 EVERY = PlanOptions(
@@ -125,3 +128,20 @@ def test_the_old_name_of_the_settings_warns():
 
     with pytest.warns(DeprecationWarning, match="PlanOptions"):
         assert plans.Settings is PlanOptions
+
+
+def test_the_page_lists_every_option_its_key_and_its_name_in_the_data():
+    page = (ROOT / "docs" / "options.md").read_text()
+    table = page[page.index("| option |") : page.index("## What goes with what")]
+    rows = [line.split("|") for line in table.splitlines()[2:] if line]
+    words = [set(re.findall(r"`(\w+)`", " ".join(column))) for column in zip(*rows, strict=True)]
+    assert words[1] == {field.name for field in fields(PlanOptions)}
+    assert words[2] == set(PlanTable.model_fields)
+    assert words[3] == set(OptionData.__annotations__)
+
+
+def test_the_example_of_the_page_runs(capsys):
+    page = (ROOT / "docs" / "options.md").read_text()
+    for code in re.findall(r"```python\n(.*?)```", page, re.DOTALL):
+        exec(compile(code, "options.md", "exec"), {})
+    assert capsys.readouterr().out.endswith("True\n")

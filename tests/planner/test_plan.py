@@ -275,7 +275,7 @@ def test_the_pieces_of_an_interrupted_cut(corner, arm, tool, placement):
         plan_in_pieces(corner, arm, method="paper", **options)
     turned = np.where(arm.endless, 1.0, np.inf)
     for wrong in ({"closure": "periodic"}, {"rotation": turned}):
-        with pytest.raises(InputError, match="^(closure|rotation): expected"):
+        with pytest.raises(InputError, match=r"^(closure|rotation): expected"):
             plan_in_pieces(corner, arm, **options, **wrong)
     with pytest.raises(NoFeasiblePath, match="no number of interruptions helps"):
         plan_in_pieces(corner, arm, **options | {"speed": 20})

@@ -16,8 +16,9 @@ from kerfpath.auditor import audit as full_audit
 from kerfpath.cell import Cell
 from kerfpath.contour import Contour
 from kerfpath.errors import NoFeasiblePath
-from kerfpath.front._subproblem import WINDOW, Subproblem
+from kerfpath.front._subproblem import Subproblem
 from kerfpath.graph import LayeredGraph
+from kerfpath.losses import Loss
 from kerfpath.options import PlanOptions
 from kerfpath.planner import node_interval, plan, relaxations
 from kerfpath.plans import Plan
@@ -203,7 +204,7 @@ class ParetoProblem:
                 )
                 raise broken.retold(said) from None
             counts = broken.counts
-            if windows := [why for why in counts if why.startswith(WINDOW)]:
+            if windows := broken.lost_by(Loss.WINDOW):
                 return f"no pose in the {windows[0]}"
             return f"no edge within {max(counts, key=counts.__getitem__, default='the seam')}"
         wrong = full_audit(made, cell=self.cell) if self.audit is None else self.audit(made)

@@ -13,13 +13,12 @@ from kerfpath._arrays import Array, Bools, freeze
 from kerfpath._told import told
 from kerfpath.cell import Cell
 from kerfpath.graph import LayeredGraph
+from kerfpath.losses import Loss, Reason
 from kerfpath.options import PlanOptions
 from kerfpath.search import Metric, ObjectiveKind
 
-__all__ = ["WINDOW", "Subproblem", "SubproblemData", "counts_as_clearance", "grid", "in_window"]
+__all__ = ["Subproblem", "SubproblemData", "counts_as_clearance", "grid", "in_window"]
 
-WINDOW = "window of joint"
-"""What vertices outside a window are counted under, before the joint's number."""
 LEVELS = (0.25, 4.0)
 """Multiples of the weight of one joint at a time, in the grid."""
 SHARES = (1.0, 0.9, 0.8)
@@ -94,7 +93,7 @@ class Subproblem:
         for joint, (low, high) in enumerate(self.window):
             if np.isfinite(high - low) and not (endless[joint] and high - low >= 2 * np.pi):
                 inside = in_window(graph.q[:, joint], low, high - low, endless=bool(endless[joint]))
-                outside[f"{WINDOW} {joint + 1}"] = ~inside
+                outside[Reason(Loss.WINDOW, joint + 1)] = ~inside
         return graph.without(outside) if outside else graph
 
     def cell(self, cell: Cell | None) -> Cell | None:

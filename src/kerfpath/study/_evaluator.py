@@ -20,14 +20,12 @@ from kerfpath.graph import LayeredGraph
 from kerfpath.job import Job, cell_of_job, fastest_along
 from kerfpath.planner import FastestSpeed, node_interval
 
-__all__ = ["EVERY", "Evaluator", "SampledContour", "commonest_loss", "sample_contours"]
+__all__ = ["EVERY", "Evaluator", "SampledContour", "sample_contours"]
 
 EVERY = 8
 """Nodes from one that is looked at for a clear pose to the next."""
 TRIED = 8
 """Poses of a node asked at once for a clear one."""
-NO_LOSS = ("admitted", "posture not wanted")
-"""Counts of candidates that say nothing of why a robot has no pose."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -117,9 +115,3 @@ class Evaluator:
             No speed has a path.
         """
         return fastest_along(self.job, nodes, self.cell, refine=False, graph=graph)
-
-
-def commonest_loss(graph: LayeredGraph, layer: int) -> str:
-    """Return what most candidates of a layer without a pose were lost to."""
-    counts = {word: n for word, n in graph.counts(layer).items() if word not in NO_LOSS}
-    return max(counts, key=counts.__getitem__, default="")

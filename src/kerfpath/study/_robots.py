@@ -14,16 +14,16 @@ from kerfpath.cad import Part
 from kerfpath.errors import InputError, NoFeasiblePath
 from kerfpath.graph import LayeredGraph
 from kerfpath.job import Job, read_job
+from kerfpath.progress import Progress, no_progress
 from kerfpath.robots import Robot, acceleration_ratios, postures_named, robot, robot_ids
 from kerfpath.study._evaluator import (
     EVERY,
     Evaluator,
     SampledContour,
-    commonest_loss,
     sample_contours,
 )
 from kerfpath.study._job import digest, load_job
-from kerfpath.sweep import Progress, Sweep
+from kerfpath.sweep import Sweep
 
 __all__ = ["NEAREST", "ContourSpeed", "RobotSpeed", "contour_speeds", "which_robots", "with_robot"]
 
@@ -112,7 +112,7 @@ def which_robots(
     processes: int | None = None,
     robots: Sequence[str] | None = None,
     acceleration_ratio: str | None = None,
-    progress: Progress | None = None,
+    progress: Progress = no_progress,
 ) -> list[RobotSpeed]:
     """Return what each robot can do of a job, the fastest first; each is a task of its own.
 
@@ -267,7 +267,7 @@ def _reached(contour: SampledContour, graph: LayeredGraph) -> ContourSpeed:
     if empty.size:
         reason = (
             f"no pose at {empty.size} of {nodes} nodes, at node {empty[0]} mostly: "
-            f"{commonest_loss(graph, int(empty[0]))}"
+            f"{graph.main_loss(int(empty[0]))}"
         )
     return ContourSpeed(
         name=contour.name, asked=contour.speed, reached=1 - empty.size / nodes, reason=reason

@@ -26,9 +26,10 @@ from kerfpath.cell import Cell
 from kerfpath.errors import InputError, NoFeasiblePath
 from kerfpath.graph import LayeredGraph
 from kerfpath.job import cell_of_job
+from kerfpath.losses import Loss, Reason
 from kerfpath.planner import plan
 from kerfpath.search import shortest_path
-from kerfpath.study._evaluator import EVERY, Evaluator, SampledContour, commonest_loss
+from kerfpath.study._evaluator import EVERY, Evaluator, SampledContour
 from kerfpath.study.placing._value import (
     ContourValue,
     Infeasibility,
@@ -133,7 +134,7 @@ class PlacementEvaluator(Evaluator):
             if here.any():
                 k, reason = int(np.argmax(here)), "no clear pose"
                 if status == "unreachable":
-                    reason = f"no pose, most often {commonest_loss(self.graphs[c], k)}"
+                    reason = f"no pose, most often {self.graphs[c].main_loss(k)}"
                 raise self._why(status, progress, reason, c, EVERY * k, searched=False)
 
     def _bound(self, stretches: Sequence[Sequence[int]]) -> float | None:
@@ -236,7 +237,7 @@ class PlacementEvaluator(Evaluator):
 
     def _enough(self, index: int, graph: LayeredGraph, least: float) -> ContourValue | None:
         """Return a value that is reached on a part of the graph, if it is `least` or more."""
-        thin = graph.without({"left out": graph.sample % THIN != 0})
+        thin = graph.without({Reason(Loss.LEFT_OUT): graph.sample % THIN != 0})
         try:
             value, known = self._value(index, self.contours[index], thin)
         except NoFeasiblePath:
@@ -258,7 +259,7 @@ class PlacementEvaluator(Evaluator):
         status: Status = "speed"
         if not np.diff(graph.start).all():
             status = "unreachable"
-        elif self.goal != "motion" or any("collision" in word for word in broken.counts):
+        elif self.goal != "motion" or broken.lost_by(Loss.COLLISION):
             status = "collision"
         node = first + step * (broken.node + 1)
         return self._why(status, progress, str(broken), index, node, searched=True)

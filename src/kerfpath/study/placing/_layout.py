@@ -12,7 +12,8 @@ import numpy as np
 
 from kerfpath._told import told
 from kerfpath.errors import InputError
-from kerfpath.job import Goal, Job, Progress, cell_of_job
+from kerfpath.job import Goal, Job, cell_of_job
+from kerfpath.progress import Progress, no_progress
 from kerfpath.study._job import digest, load_job
 from kerfpath.study.placing._evaluate import contours_of, evaluate_placements, middle_of
 from kerfpath.study.placing._place import DEFAULT_RANGES, Numbers, numbers_of
@@ -110,7 +111,7 @@ def layout(
     map_points: int | None = None,
     scheduler: str | None = None,
     processes: int | None = None,
-    progress: Progress = lambda what, done, total: None,
+    progress: Progress = no_progress,
 ) -> Layout:
     """Return the best placement that is found in the ranges, never worse than the job's own.
 

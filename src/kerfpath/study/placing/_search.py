@@ -12,7 +12,7 @@ from scipy.stats import qmc
 from kerfpath._arrays import Array
 from kerfpath._told import told
 from kerfpath.errors import InputError
-from kerfpath.job import Progress
+from kerfpath.progress import Progress
 from kerfpath.study.placing._value import SLACK, PlacementValue, beats
 from kerfpath.sweep import Sweep
 
