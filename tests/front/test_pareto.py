@@ -13,7 +13,7 @@ from kerfpath import Contour, InputError, NoFeasiblePath, audit, fastest_speed, 
 from kerfpath.air import least_time
 from kerfpath.cell import Mesh, box_between, cell_of
 from kerfpath.comfort import MEASURES, Band, Comfort
-from kerfpath.front import CRITERIA, JOINT_CRITERIA, Subproblem, hypervolume
+from kerfpath.front import CRITERIA, JOINT_CRITERIA, Criterion, Subproblem, hypervolume
 from kerfpath.front._subproblem import grid
 from kerfpath.planner import layered_graph
 
@@ -355,6 +355,21 @@ def test_the_page_on_pareto_sets_has_a_row_for_every_criterion_and_its_unit():
     every = CRITERIA | {f"{name}_J": each for name, each in JOINT_CRITERIA.items()}
     assert set(units) == set(every)
     assert all(units[name] == CRITERIA[name].unit for name in set(CRITERIA) - set(MEASURES))
+
+
+def test_a_new_criterion_is_one_object(task, monkeypatch):
+    class Turning(Criterion):
+        more_is_better = True
+
+        def value(self, plan, problem):
+            return float(np.ptp(plan.gamma))
+
+    turning = Turning(name="turning", words="span of gamma", unit="rad")
+    monkeypatch.setitem(CRITERIA, "turning", turning)
+    made = pareto(**task, criteria=["displacement", "turning"], runs=8)
+    assert made.units == ("s", "rad")
+    assert made.values[:, 1] == pytest.approx([np.ptp(plan.gamma) for plan in made.plans])
+    assert (np.diff(made.values[:, 1]) > 0).all()
 
 
 def test_in_a_cell_every_plan_is_clear(task, tool, placement):
