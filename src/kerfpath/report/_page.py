@@ -45,7 +45,7 @@ def render(
     cell : Cell, optional
         What stands around it, and robot and head, drawn at a few poses.
     moves : sequence of (m, 3) m
-        Ways of the tool tip through the air, in the part frame.
+        Paths of the tool tip on the transfer moves, in the part frame.
     facts : sequence of (what, value)
         Rows such as ("Robot", "ABB IRB 4600-60/2.05").
     faults : sequence of str
@@ -194,8 +194,8 @@ def _first_steps(sections: Sequence[ContourSection], faults: Sequence[str]) -> s
 def _what_to_do(section: ContourSection) -> str:
     if section.plan is None:
         if section.remedy:
-            return f"cut slower, or give way on a limit: {section.remedy}"
-        return section.failure or "give way on the limits that the map shows"
+            return f"cut slower, or relax a limit: {section.remedy}"
+        return section.failure or "relax the limits that the map shows"
     worst = section.errors[0]
     return worst.advice or f"{worst.title} is beyond what is allowed; see its audit"
 

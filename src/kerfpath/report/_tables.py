@@ -45,7 +45,7 @@ _UNITS = {
 
 
 def summary_table(sections: Sequence[ContourSection]) -> str:
-    """Return one row per contour: its size, its cost and how close it comes to the limits."""
+    """Return one row per contour: size, cost, and largest shares of the limits."""
     heads = (
         ("Contour", ""),
         ("Length", "mm"),
@@ -115,7 +115,7 @@ def criteria_table(plan: Plan) -> str:
 
 
 def nearest_table(plan: Plan) -> str:
-    """Return how near the nodes come to singularities and limits, and the margins asked for."""
+    """Return the least distances of nodes from singularities and limits, and their margins."""
     heads = (("Nearest to", ""), ("Least", ""), ("At node", ""), ("Margin", ""))
     bands = {} if plan.settings.comfort is None else plan.settings.comfort.bands
     rows = []
@@ -133,7 +133,7 @@ def nearest_table(plan: Plan) -> str:
 
 
 def audit_table(checks: Sequence[Check]) -> str:
-    """Return the audit: what was checked, the worst value, what is allowed, where, the verdict."""
+    """Return the audit: each check, its worst value, the allowed value, the node, the verdict."""
     if not checks:
         return '<p class="quiet">The audit was not run.</p>'
     heads = (("Check", ""), ("Worst", ""), ("Allowed", ""), ("At node", ""), ("Result", ""))
@@ -155,7 +155,7 @@ def audit_table(checks: Sequence[Check]) -> str:
 
 
 def counts_table(graph: LayeredGraph) -> str:
-    """Return what became of the candidates, in numbers, per cent and as bars."""
+    """Return the counts of candidates, kept and dropped by reason, in per cent and as bars."""
     counts, colours = graph.counts(), reason_colours(graph.reasons)
     whole, rows = sum(counts.values()), []
     for word, count in counts.items():
@@ -183,7 +183,7 @@ def reason_legend(graph: LayeredGraph, postures: Sequence[int], *, has_plan: boo
 
 
 def audit_sign(section: ContourSection) -> str:
-    """Return what the audit says of a section, with a sign."""
+    """Return the verdict of the audit on a section, with its sign."""
     if not section.checks:
         return sign(WARN, "not audited")
     if section.errors:
@@ -199,7 +199,7 @@ def sign(state: str, words: str) -> str:
 
 
 def number(value: float, digits: int) -> str:
-    """Return `value` with `digits` decimals, in words where it is not finite."""
+    """Return `value` with `digits` decimals, or a word where it is not finite."""
     if math.isnan(value):
         return "not a number"
     if math.isinf(value):
@@ -208,7 +208,7 @@ def number(value: float, digits: int) -> str:
 
 
 def shown_unit(unit: str) -> tuple[float, str]:
-    """Return what a value in `unit` is multiplied by to be shown, and the unit that follows it."""
+    """Return the factor from `unit` to the unit that is shown, and that unit."""
     return _UNITS.get(unit, (1.0, f" {unit}" if unit else ""))
 
 
