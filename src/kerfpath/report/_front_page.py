@@ -65,7 +65,7 @@ def render_front(
         No axis or plan, values that do not fit the axes or are not finite, names or numbers given
         twice, a mark of no plan, a command without the number.
     """
-    values, beaten = _checked(axes, plans, dominated, marks, command)
+    values, beaten = _shown_values(axes, plans, dominated, marks, command)
     figures = Figures()
     views = [
         f"<section><h2>{'Criteria in pairs' if len(axes) > 1 else 'The criterion'}</h2>",
@@ -95,7 +95,7 @@ def render_front(
     return page(title, body, figures, also="front")
 
 
-def _checked(
+def _shown_values(
     axes: Sequence[FrontAxis],
     plans: Sequence[FrontPlan],
     dominated: Sequence[Sequence[float]],

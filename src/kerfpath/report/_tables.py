@@ -124,9 +124,9 @@ def nearest_table(plan: Plan) -> str:
         margin = bands[name].margin if name in bands else 0.0
         rows.append(
             f'<tr><th scope="row">{escape(MEASURES[name].words)}</th>'
-            + td(_measured(least, unit))
+            + td(_with_unit(least, unit))
             + td(str(node))
-            + td(_measured(margin, unit) if margin else "&ndash;")
+            + td(_with_unit(margin, unit) if margin else "&ndash;")
             + "</tr>"
         )
     return table(heads, rows)
@@ -146,8 +146,8 @@ def audit_table(checks: Sequence[Check]) -> str:
         words = {PASS: "passed", FAIL: "failed", WARN: "warning"}
         rows.append(
             f'<tr class="{state}"><th scope="row">{escape(check.title)}{advice}</th>'
-            + td(_measured(check.value, check.unit))
-            + td("≤ " + _measured(check.limit, check.unit))
+            + td(_with_unit(check.value, check.unit))
+            + td("≤ " + _with_unit(check.limit, check.unit))
             + td(str(check.node) if check.node >= 0 else "&ndash;")
             + f"<td>{sign(state, words[state])}</td></tr>"
         )
@@ -212,7 +212,7 @@ def shown_unit(unit: str) -> tuple[float, str]:
     return _UNITS.get(unit, (1.0, f" {unit}" if unit else ""))
 
 
-def _measured(value: float, unit: str) -> str:
+def _with_unit(value: float, unit: str) -> str:
     factor, suffix = _UNITS[unit]
     scaled = value * factor
     if not math.isfinite(scaled) or unit == "count":
