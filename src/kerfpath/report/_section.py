@@ -15,12 +15,12 @@ from kerfpath.auditor import Check
 from kerfpath.contour import Contour
 from kerfpath.errors import InputError
 from kerfpath.graph import LayeredGraph
+from kerfpath.losses import Loss, Reason
 from kerfpath.planner import ClearanceMap
 from kerfpath.plans import Plan
 
-__all__ = ["COLLISION", "SPARE", "ContourSection", "Mark", "with_clearance"]
+__all__ = ["SPARE", "ContourSection", "Mark", "with_clearance"]
 
-COLLISION = "collision"
 SPARE = (0.25, 0.5, 1.0)
 """Shares of the band of a clearance map up to which clearances have colours of their own."""
 
@@ -33,8 +33,8 @@ def with_clearance(graph: LayeredGraph, found: ClearanceMap) -> LayeredGraph:
     one of them is enough.
     """
     steps = [1e3 * share * found.band for share in (0.0, *SPARE)]
-    spare = [f"{a:g} to {b:g} mm to spare" for a, b in pairwise(steps)][::-1]
-    reasons = (graph.reasons[0], *spare, COLLISION, *graph.reasons[1:])
+    spare = [Reason(Loss.SPARE, f"{a:g} to {b:g} mm") for a, b in pairwise(steps)][::-1]
+    reasons = (graph.reasons[0], *spare, Reason(Loss.COLLISION), *graph.reasons[1:])
     added = len(spare) + 1
     above = np.searchsorted(np.array(SPARE) * found.band, found.lower, side="right")
     layer = np.repeat(np.arange(len(graph.reason)), np.diff(graph.start))

@@ -28,8 +28,6 @@ NEAREST = "nearest"
 """In place of a ratio: of each robot the one that the library calls its nearest."""
 EVERY = 8
 """Nodes from one that is looked at for a clear pose to the next."""
-NOT_ASKED = "posture not wanted"
-"""What drops a candidate without telling anything about the robot."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -268,11 +266,9 @@ def _reached(name: str, asked: float, graph: LayeredGraph) -> ContourSpeed:
     empty, nodes = np.flatnonzero(np.diff(graph.start) == 0), len(graph.start) - 1
     reason = ""
     if empty.size:
-        counts = graph.counts(int(empty[0]))
-        counts.pop(NOT_ASKED, None)
         reason = (
             f"no pose at {empty.size} of {nodes} nodes, at node {empty[0]} mostly: "
-            f"{max(counts, key=lambda word: counts[word])}"
+            f"{graph.main_loss(int(empty[0]))}"
         )
     return ContourSpeed(name=name, asked=asked, reached=1 - empty.size / nodes, reason=reason)
 
