@@ -60,7 +60,7 @@ class Finder:
             around=_beside(task.graph),
         )
 
-    def best(self, search: Callable[[SearchProblem], _P], problem: SearchProblem) -> _P:
+    def find(self, search: Callable[[SearchProblem], _P], problem: SearchProblem) -> _P:
         """Return what a search finds for a problem on the graph of the task."""
         if self._cell is None:
             return search(problem)
