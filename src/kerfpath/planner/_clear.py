@@ -15,19 +15,11 @@ from kerfpath.graph import LayeredGraph
 from kerfpath.losses import Loss, Reason
 from kerfpath.planner._task import Task
 from kerfpath.plans import Plan
-from kerfpath.search import (
-    InterruptedPath,
-    Known,
-    LayeredPath,
-    LeastInterval,
-    SearchProblem,
-    SlowedPath,
-    find_clear,
-)
+from kerfpath.search import FoundPath, Known, SearchProblem, find_clear
 
 __all__ = ["Finder"]
 
-_P = TypeVar("_P", LayeredPath, SlowedPath, InterruptedPath, LeastInterval)
+_P = TypeVar("_P", bound=FoundPath)
 
 POSES_MEASURED, PAIRS_NAMED = 100, 3
 """Poses of a node that are measured, and pairs of bodies that are named, where it is closed."""
