@@ -57,8 +57,10 @@ def plan_off_grid(task: Task, finder: Finder) -> Refinement | None:
     """
     first = plan_first_order(task, finder)
     found = None if first is None else _cleared(refiner.refine(first), finder)
-    if found is not None and found.done:
-        return found
+    comfort = task.settings.comfort
+    priced = comfort is not None and comfort.clearance is not None and comfort.clearance.cost
+    if priced or (found is not None and found.done):
+        return found  # what clearance costs is known on the grid only
     try:
         least = finder.find(find_least_interval, task.problem.free())
     except NoFeasiblePath:
