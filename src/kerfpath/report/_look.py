@@ -64,7 +64,7 @@ def reason_colours(reasons: Sequence[Reason]) -> tuple[str, ...]:
 
 def base_layout(height: int, **more: Any) -> go.Layout:
     """Return a calm white layout of `height` px, without plotly's default template."""
-    look: dict[str, Any] = {
+    look: dict[str, object] = {
         "template": go.layout.Template(),
         "height": height,
         "font": {"family": FONT, "size": 12, "color": INK},
@@ -80,7 +80,7 @@ def base_layout(height: int, **more: Any) -> go.Layout:
     return go.Layout(**(look | more))
 
 
-def axis(**more: Any) -> dict[str, Any]:
+def axis(**more: Any) -> dict[str, object]:
     """Return the look of a plot axis."""
     return {
         "showgrid": True,
@@ -96,12 +96,12 @@ def axis(**more: Any) -> dict[str, Any]:
     } | more
 
 
-def axis_title(text: str) -> dict[str, Any]:
+def axis_title(text: str) -> dict[str, object]:
     """Return an axis title."""
     return {"text": text, "font": {"size": 12, "color": QUIET}, "standoff": 8}
 
 
-def band(x0: float, x1: float, **where: Any) -> dict[str, Any]:
+def band(x0: float, x1: float, **where: Any) -> dict[str, object]:
     """Return a pale vertical band from x0 to x1, below the lines."""
     return {
         "type": "rect",

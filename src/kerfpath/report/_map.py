@@ -131,7 +131,7 @@ def shown_postures(graph: LayeredGraph) -> list[int]:
 
 def hidden_postures(graph: LayeredGraph) -> list[str]:
     """Say of each posture without a panel why its candidates were dropped."""
-    shown, told = shown_postures(graph), []
+    shown, left_out = shown_postures(graph), list[str]()
     for mu in range(graph.reason.shape[-1]):
         if mu in shown:
             continue
@@ -143,8 +143,8 @@ def hidden_postures(graph: LayeredGraph) -> list[str]:
         else:
             shares = [f"{graph.reasons[c]} {_share(number[c] / codes.size)}" for c in order]
             why = "no admitted candidate (" + ", ".join(shares) + ")"
-        told.append(f"{posture_name(mu)}: {why}")
-    return told
+        left_out.append(f"{posture_name(mu)}: {why}")
+    return left_out
 
 
 def chosen_line(plan: Plan, posture: int, parts: int = 1) -> list[tuple[Array, Array]]:

@@ -16,10 +16,11 @@ from kerfpath.cell import Cell, Checker
 from kerfpath.errors import InputError, NoFeasiblePath
 from kerfpath.graph import LayeredGraph
 from kerfpath.job import Job, cell_of_job, fastest_along, read_job
+from kerfpath.progress import Progress, no_progress
 from kerfpath.robots import Robot, acceleration_ratios, postures_named, robot, robot_ids
 from kerfpath.study._clear import has_clear_pose
 from kerfpath.study._job import digest, loaded
-from kerfpath.sweep import Progress, Sweep
+from kerfpath.sweep import Sweep
 
 __all__ = ["NEAREST", "ContourSpeed", "RobotSpeed", "contour_speeds", "which_robots", "with_robot"]
 
@@ -110,7 +111,7 @@ def which_robots(
     processes: int | None = None,
     robots: Sequence[str] | None = None,
     acceleration_ratio: str | None = None,
-    progress: Progress | None = None,
+    progress: Progress = no_progress,
 ) -> list[RobotSpeed]:
     """Return what each robot can do of a job, the fastest first; each is a task of its own.
 
