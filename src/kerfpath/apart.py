@@ -41,7 +41,9 @@ IDLE = 10.0
 
 _T = TypeVar("_T")
 _LEAVES = "leaves"
-_START = "import sys; sys.path[:] = {path!r}; from kerfpath.apart import _serve; _serve({fd}, {idle})"
+_START = (
+    "import sys; sys.path[:] = {path!r}; from kerfpath.apart import _serve; _serve({fd}, {idle})"
+)
 
 
 def apart(function: Callable[..., _T], *arguments: object, size: int) -> _T:

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
+from hashlib import sha256
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -16,6 +18,9 @@ if TYPE_CHECKING:
     from kerfpath.cad._shape import Drawn
 
 __all__ = ["content_of", "read"]
+
+KEPT = 4
+"""Parts that are kept for when a file of the same content is read again, those read last."""
 
 
 def read(path: str | Path, unit: str | None = None, *, gap: float = GAP) -> Part:
@@ -93,12 +98,22 @@ def _translated(
     from kerfpath.cad._faces import part_of
     from kerfpath.cad._shape import occt
 
-    try:
-        drawn = apart(read, path.absolute(), unit, gap, size=len(content))
-        with occt():
-            return part_of(path, drawn, gap)
-    except InputError as error:
-        raise InputError(f"{path}: {error}") from None
+    key = (read, sha256(content).digest(), unit, gap)
+    part = _kept.pop(key, None)
+    if part is None:
+        try:
+            drawn = apart(read, path.absolute(), unit, gap, size=len(content))
+            with occt():
+                part = part_of(path, drawn, gap)
+        except InputError as error:
+            raise InputError(f"{path}: {error}") from None
+    _kept[key] = part
+    while len(_kept) > KEPT:
+        _kept.pop(next(iter(_kept)), None)
+    return replace(part, path=path)
+
+
+_kept: dict[tuple[object, ...], Part] = {}
 
 
 def _dxf(path: Path, content: bytes, unit: str | None, gap: float) -> Part:
