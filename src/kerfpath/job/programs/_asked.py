@@ -26,7 +26,7 @@ from kerfpath.post import (
     Settings,
     Step,
     build_program,
-    said_in,
+    read_as_written,
 )
 
 __all__ = ["AskedNodes", "asked_nodes", "asked_program"]
@@ -149,7 +149,7 @@ def asked_program(
         if options.arc_tolerance is not None:
             steps = _with_arcs(steps, cut, asked)
         sections.append(replace(section, steps=tuple(steps)))
-    return said_in(replace(program, sections=tuple(sections)), language, settings)
+    return read_as_written(replace(program, sections=tuple(sections)), language, settings)
 
 
 def _whole(job: Job, cut: ReadCut, asked: AskedNodes, plan: Plan) -> Plan:

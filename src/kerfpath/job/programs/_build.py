@@ -16,7 +16,7 @@ from kerfpath.job.plan_file import Audited
 from kerfpath.job.programs._audit import ProgramAsked
 from kerfpath.job.run import Cut
 from kerfpath.plans import Plan
-from kerfpath.post import build_program, dry_run, language, posted
+from kerfpath.post import build_program, dry_run, language, post_and_read
 
 __all__ = ["asked_of_cuts", "asked_of_plans", "program_of"]
 
@@ -115,7 +115,7 @@ def program_of(
         arc_tolerance=options.arc_tolerance,
         handshakes=options.handshakes,
     )
-    written = posted(program, options.language, options.settings, strict=strict)
+    written = post_and_read(program, options.language, options.settings, strict=strict)
     if written.read is not None:
         asked = replace(asked, job=replace(asked.job, program=options))
         settings = chosen.completed(options.settings)
@@ -123,7 +123,7 @@ def program_of(
         _require_passed(found, chosen.title)
     if dry_share is not None:
         dry = dry_run(program, dry_share)
-        written = posted(dry, options.language, options.settings, strict=strict)
+        written = post_and_read(dry, options.language, options.settings, strict=strict)
     return written.files, [str(issue) for issue in written.warnings]
 
 
