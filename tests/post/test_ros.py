@@ -26,13 +26,8 @@ GOLDEN = CASE.golden
 
 
 @pytest.fixture(scope="module")
-def arm():
-    return CASE.cell[0]
-
-
-@pytest.fixture(scope="module")
-def program():
-    return CASE.program
+def arm(cell):
+    return cell[0]
 
 
 @pytest.fixture(scope="module")
