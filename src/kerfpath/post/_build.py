@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from kerfpath._arrays import Array, scalar
+from kerfpath._arrays import Array, not_negative, scalar
 from kerfpath._told import told
 from kerfpath.air import AirMove, End, backed_off, least_time, speed_share
 from kerfpath.cell import UNPROVED
@@ -114,10 +114,10 @@ def build_program(
         _require_same_cell(first, plan)
     process = _Process(
         retract=scalar(retract, "retract", unit="m", above=0.0),
-        zone=scalar(zone, "zone", unit="m", above=-1e-300),
+        zone=not_negative(zone, "zone", unit="m"),
         lead_time=lead_time,
         gas_lead=gas_lead,
-        pierce_time=scalar(pierce_time, "pierce_time", unit="s", above=-1e-300),
+        pierce_time=not_negative(pierce_time, "pierce_time", unit="s"),
         approach_speed=scalar(approach_speed, "approach_speed", unit="m/s", above=0.0),
         handshakes=tuple(handshakes),
     )

@@ -320,7 +320,7 @@ def _check_limits(program: Program, section: Section) -> Iterator[ProgramIssue]:
     if not section.moves:
         return
     limits = program.robot.joint_limits()
-    words = program.robot.reasons()[2:]
+    words = program.robot.bounds()
     q = np.array([move.q for move in section.moves])
     sums = q @ limits.rows.T
     below = np.hstack([limits.lower - q, limits.row_lower - sums])

@@ -206,13 +206,12 @@ def _options(asked: Asked, dt: float, said: PlanOptions, *, picked: bool) -> Pla
 
 def _dipping(plan: Plan, dt: float, said: Array) -> Plan:
     """Return the plan in the least time that its limits allow; what is said where that is it."""
-    velocity, acceleration = plan.robot.speed_limits()
-    limits = plan.settings.eta_v * velocity, plan.settings.eta_a * acceleration
-    tau = retime(plan.increments, dt, *limits)
+    limits = plan.settings.limits(plan.robot)
+    tau = retime(plan.increments, dt, limits)
     told = np.diff(said)
     if said[0] == 0 and (np.abs(told - tau) <= RETIMED * tau).all():
         tau = told
-    dips = feed(tau, dt, plan.increments, *limits, np.diff(plan.contour.s))
+    dips = feed(tau, dt, plan.increments, limits, np.diff(plan.contour.s))
     time = np.concatenate([[0.0], np.cumsum(tau)])
     return replace(plan, time=said if tau is told else time, feed=dips)
 
