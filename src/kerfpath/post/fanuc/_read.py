@@ -12,6 +12,7 @@ from kerfpath._arrays import Array, freeze
 from kerfpath.errors import InputError
 from kerfpath.post._called import off_name
 from kerfpath.post._frames import faceplate, from_euler, world
+from kerfpath.post._line_reader import patterns
 from kerfpath.post._program import Await, Switch
 from kerfpath.post._read import (
     MoveKind,
@@ -21,7 +22,6 @@ from kerfpath.post._read import (
     ReadSection,
     ReadStep,
 )
-from kerfpath.post._reading import patterns
 from kerfpath.post.fanuc._axes import joints_from_axes
 from kerfpath.post.fanuc._listing import Listing
 from kerfpath.post.fanuc._settings import UNITS, FanucSettings

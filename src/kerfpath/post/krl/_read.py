@@ -10,9 +10,9 @@ import numpy as np
 from kerfpath._arrays import Array, freeze
 from kerfpath.errors import InputError
 from kerfpath.post._frames import from_euler
+from kerfpath.post._line_reader import LineReader, only, patterns, statements
 from kerfpath.post._program import Switch
 from kerfpath.post._read import MoveKind, ReadProgram, ReadSection, ReadStep
-from kerfpath.post._reading import LineReader, only, patterns, statements
 from kerfpath.post.krl._axes import joints_from_axes
 from kerfpath.post.krl._settings import KrlSettings
 from kerfpath.post.krl._write import (

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from kerfpath.post._reading import only, patterns
+from kerfpath.post._line_reader import only, patterns
 from kerfpath.post.rapid._write import FIRST
 
 __all__ = ["DECLARED", "IN_MAIN", "IN_PART", "IN_ROUTINE", "MODULE", "OUTSIDE"]
