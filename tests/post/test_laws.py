@@ -202,6 +202,14 @@ def test_every_setting_says_what_it_expects(case):
 
 
 @cases(*OUTPUTS)
+def test_settings_of_a_dialect_inherit_the_ports(case):
+    kind = case.language.settings
+    own = type("Own", (kind,), {"__annotations__": {"macro": str}, "macro": "x"})
+    assert list(own.model_fields) == [*kind.model_fields, "macro"]
+    assert own(**case.options).model_dump() == {**case.settings.model_dump(), "macro": "x"}
+
+
+@cases(*OUTPUTS)
 def test_what_is_switched_has_an_output_of_its_own(case):
     program = build_program([case.small], gas_lead=0.3, lead_time=0.0)
     laser = case.settings.laser_output

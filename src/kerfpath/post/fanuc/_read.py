@@ -48,12 +48,12 @@ def read(main: str, files: Mapping[str, str], robot: Robot, settings: FanucSetti
     sections = []
     for name in top.calls:
         listing = _Section(f"{name}.ls", files[f"{name}.ls"], robot, settings)
-        steps = _timed(listing.completed(), listing.early, robot, part, tool)
+        steps = _time_early(listing.completed(), listing.early, robot, part, tool)
         sections.append(ReadSection(name=listing.name, steps=steps))
     return ReadProgram(name=top.name, sections=tuple(sections), T_flange_tip=tool, T_base_part=part)
 
 
-def _timed(
+def _time_early(
     steps: Sequence[ReadStep], early: Mapping[int, tuple[Switch, ...]], robot: Robot,
     part: Array, tool: Array,
 ) -> tuple[ReadStep, ...]:  # fmt: skip
