@@ -216,6 +216,10 @@ def test_what_is_switched_has_an_output_of_its_own(case):
     for gas in (None, laser):
         wired = case.settings.model_copy(update={"gas_output": gas})
         assert case.codes(program, "error", wired) == ["output"]
+    assumed = case.language.assumed.get("laser_output", laser)
+    unnamed = {"laser_output": None} if case.language.assumed else {}
+    wired = case.settings.model_copy(update={"gas_output": assumed, **unnamed})
+    assert case.codes(program, "error", wired) == ["output"], "nor is it the one assumed"
 
 
 @cases(*OUTPUTS)
