@@ -24,8 +24,8 @@ from kerfpath.cli._show import (
     told_once,
 )
 from kerfpath.job import (
-    Cut,
-    Outcome,
+    CutResult,
+    JobResult,
     read_job,
     require_folder,
     require_language,
@@ -68,7 +68,7 @@ def plan_job(
 
 
 def leave(
-    outcome: Outcome,
+    outcome: JobResult,
     part: Part,
     folder: Path,
     *,
@@ -127,14 +127,14 @@ def leave(
         raise typer.Exit(1)
 
 
-def _largest_tilt(cut: Cut) -> float | None:
+def _largest_tilt(cut: CutResult) -> float | None:
     """Return the largest tilt of the tool axis at the nodes, deg; None where none is allowed."""
     if cut.plan is None or cut.plan.settings.tilt is None:
         return None
     return float(np.degrees(np.hypot(*cut.plan.tilt.T).max()))
 
 
-def _cut_entry(cut: Cut) -> dict[str, Any]:
+def _cut_entry(cut: CutResult) -> dict[str, Any]:
     entry: dict[str, Any] = {"name": cut.task.name, "passed": cut.passed}
     entry |= {"length_m": cut.drawn.length, "nodes": len(cut.nodes), "speed_m_s": cut.task.speed}
     entry["departure"] = None if cut.departure is None else asdict(cut.departure)
@@ -161,7 +161,7 @@ def _cut_entry(cut: Cut) -> dict[str, Any]:
     }
 
 
-def _show_cuts(cuts: Sequence[Cut]) -> None:
+def _show_cuts(cuts: Sequence[CutResult]) -> None:
     rows = []
     for cut in cuts:
         row = [
@@ -208,7 +208,7 @@ def _show_cuts(cuts: Sequence[Cut]) -> None:
         out.print("where the drawing has points, the lines through them stand for the CAD curve")
 
 
-def _sampling(cut: Cut) -> list[str]:
+def _sampling(cut: CutResult) -> list[str]:
     """Return the chord error and the axis step of a cut's nodes."""
     found = cut.departure
     if found is None:

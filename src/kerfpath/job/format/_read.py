@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 import tomllib
-from collections.abc import Callable
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -14,6 +14,7 @@ from pydantic import ValidationError
 
 from kerfpath._arrays import Array, Ints
 from kerfpath._told import told
+from kerfpath.air import AirMove
 from kerfpath.auditor import Check, Rounding, checks
 from kerfpath.cad import Part
 from kerfpath.cell import Cell
@@ -35,7 +36,7 @@ from kerfpath.job.format.tables._plan import said_in_keys
 from kerfpath.options import OptionConflict, PlanOptions
 from kerfpath.planner import layered_graph
 from kerfpath.plans import Plan
-from kerfpath.post import Handshake, Settings
+from kerfpath.post import Handshake, Program, Settings, build_program
 from kerfpath.robots import Robot
 
 __all__ = ["Job", "ProgramOptions", "Tolerances", "program_options", "read_job", "tolerances_of"]
@@ -93,6 +94,29 @@ class ProgramOptions:
     handshakes: tuple[Handshake, ...] = ()
 
     __repr__ = told
+
+    def program(self, plans: Sequence[Plan], moves: Sequence[AirMove] = ()) -> Program:
+        """Return the neutral program that cuts the plans, see `kerfpath.post.build_program`.
+
+        Raises
+        ------
+        InputError
+            As there.
+        """
+        return build_program(
+            plans,
+            moves=moves,
+            name=self.name,
+            retract=self.retract,
+            zone=self.zone,
+            lead_time=self.lead_time,
+            gas_lead=self.gas_lead,
+            pierce_time=self.pierce_time,
+            approach_speed=self.approach_speed,
+            air_speed=self.air_speed,
+            arc_tolerance=self.arc_tolerance,
+            handshakes=self.handshakes,
+        )
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -163,7 +187,7 @@ class Job:
         What the audit allows between the nodes.
     program : ProgramOptions
         For the robot program.
-    source : dict
+    source : mapping
         The whole file as read: tables, keys and values that JSON can hold.
     """
 
@@ -180,7 +204,7 @@ class Job:
     layout: LayoutTable
     tolerances: Tolerances
     program: ProgramOptions
-    source: dict[str, Any]
+    source: Mapping[str, Any]
 
     __repr__ = told
 

@@ -1,25 +1,28 @@
-"""What came of one contour of a job."""
+"""What came of a job, and of each of its contours."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
 
+from kerfpath._arrays import Array, Ints
 from kerfpath._told import told
 from kerfpath.auditor import Check
 from kerfpath.cad import Departure, Part, departure_from
+from kerfpath.cell import Cell
 from kerfpath.contour import Contour
 from kerfpath.errors import NoFeasiblePath
 from kerfpath.graph import LayeredGraph
-from kerfpath.job.format import ContourTask
+from kerfpath.job.format import Candidate, ContourTask, CutRequest, Job
 from kerfpath.planner import FINER, ON_THIS_GRID, ClearanceMap, FastestSpeed, at_least, at_most
 from kerfpath.plans import Plan
 from kerfpath.search import Relaxations
+from kerfpath.sequence import PartPlan
 
-__all__ = ["Cut"]
+__all__ = ["CutResult", "JobResult"]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class Cut:
+class CutResult:
     """What came of one contour of a job, or of one piece of it.
 
     Parameters
@@ -28,7 +31,7 @@ class Cut:
         What the job calls the contour.
     task : ContourTask
     drawn : Contour
-        The loop as drawn, densely sampled, part frame.
+        The path to cut, densely sampled, part frame.
     nodes : Contour
         Its nodes, part frame.
     graph : LayeredGraph
@@ -66,6 +69,26 @@ class Cut:
 
     __repr__ = told
 
+    @classmethod
+    def of(
+        cls,
+        request: CutRequest,
+        candidate: Candidate,
+        graph: LayeredGraph,
+        *,
+        clearance: ClearanceMap | None = None,
+    ) -> CutResult:
+        """Return the result of a candidate before its plan is known."""
+        return cls(
+            contour=request.task.name,
+            task=request.task,
+            drawn=candidate.path,
+            nodes=candidate.nodes,
+            graph=graph,
+            clearance=clearance,
+            picked=request.run is not None,
+        )
+
     @property
     def passed(self) -> bool:
         """True when there is a plan and its audit finds no error."""
@@ -73,7 +96,7 @@ class Cut:
             c.level == "error" and not c.ok for c in self.checks
         )
 
-    def measured(self, part: Part, loop: Departure | None) -> Cut:
+    def measured(self, part: Part, loop: Departure | None) -> CutResult:
         """Return the cut with the departure of its nodes.
 
         Parameters
@@ -130,8 +153,36 @@ class Cut:
             "eta_velocity": self.relaxations.eta_v,
             "eta_acceleration": self.relaxations.eta_a,
         }
-        told = {k: "none" if v is None or v > 1 else at_least(v) for k, v in shares.items()}
-        ways = [f"{name} = {share}" for name, share in told.items() if share != "none"]
-        closed = [name for name, share in told.items() if share == "none"]
+        ways = [f"{k} = {at_least(v)}" for k, v in shares.items() if v is not None and v <= 1]
+        closed = [k for k, v in shares.items() if v is None or v > 1]
         said = f"; at the speed asked for with {' or '.join(ways)}" if ways else ""
         return said + (f"; no {' and no '.join(closed)} up to 1 is enough there" if closed else "")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class JobResult:
+    """What came of a job: every cut, in order, its cell, and the part's mesh for pictures.
+
+    With [sequence]: the moves between the cuts and their audit, or why there is no way.
+    """
+
+    job: Job
+    cuts: tuple[CutResult, ...]
+    mesh: tuple[Array, Ints]
+    cell: Cell | None = None
+    part: PartPlan | None = None
+    stuck: NoFeasiblePath | None = None
+    air: tuple[Check, ...] = ()
+
+    __repr__ = told
+
+    @property
+    def passed(self) -> bool:
+        """True when every contour has a plan that passes its audit, and every move too."""
+        moves = self.stuck is None and all(check.ok for check in self.air)
+        return moves and all(cut.passed for cut in self.cuts)
+
+    @property
+    def plans(self) -> tuple[Plan, ...]:
+        """The plans there are, in the order of cutting."""
+        return tuple(cut.plan for cut in self.cuts if cut.plan is not None)
