@@ -24,7 +24,7 @@ from kerfpath.cell import (
     box_between,
     cell_of,
     link_capsules,
-    welded,
+    weld,
 )
 from kerfpath.graph import LayeredGraph
 from kerfpath.job import read_job
@@ -87,7 +87,7 @@ def demo(spacing: float, step: float) -> Case:
         acceleration=np.radians([320, 270, 420, 1300, 1400, 2000]), endless=[0, 0, 0, 1, 0, 1]
     )
     drawn = read_drawing(Path(str(files("kerfpath.demo") / "b_pillar.step")))
-    vertices, triangles = welded(*drawn.mesh(2e-4), 1e-6)
+    vertices, triangles = weld(*drawn.mesh(2e-4), 1e-6)
     part = Mesh(vertices=vertices, triangles=triangles, deviation=2e-4, name="b_pillar.step")
     contour = drawn.contour("skin/outer").resample(spacing=spacing)
     fixtures = {

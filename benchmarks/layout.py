@@ -13,7 +13,7 @@ import numpy as np
 
 from benchmarks._figures import Figure, Report
 from kerfpath.job import Job, warm_up
-from kerfpath.search import least_interval
+from kerfpath.search import SearchProblem, find_least_interval
 from kerfpath.study import Layout, digest, layout
 from kerfpath.study.placing._place import moved, numbers_of
 from kerfpath.study.placing._search import HALF
@@ -111,9 +111,8 @@ def _timed(job: Job, subject: Subject, nodes: Any) -> tuple[float, float]:
     """Return the least interval over some nodes, s, and how long it took to find."""
     begun = perf_counter()
     graph = job.graph(subject.nodes, replace(job.options, comfort=None), only=nodes)
-    velocity, acceleration = job.robot.speed_limits()
-    least = least_interval(
-        graph.q, graph.start, velocity=velocity, acceleration=acceleration,
-        endless=job.robot.endless, eta_v=job.options.eta_v, eta_a=job.options.eta_a,
+    problem = SearchProblem(
+        q=graph.q, start=graph.start, dt=1.0, limits=job.options.limits(job.robot),
+        endless=job.robot.endless,
     )  # fmt: skip
-    return least.dt, perf_counter() - begun
+    return find_least_interval(problem).dt, perf_counter() - begun

@@ -8,6 +8,7 @@ import numpy as np
 
 from benchmarks._figures import Figure, Report, in_turn
 from kerfpath._arrays import Array
+from kerfpath.limits import Limits
 from kerfpath.retime import retime
 
 __all__ = ["run"]
@@ -55,7 +56,7 @@ def _measured(count: int, *, quick: bool) -> Report:
     found: dict[str, Array] = {}
 
     def ours() -> None:
-        found["kerfpath"] = retime(dq, dt, VELOCITY, ACCELERATION)
+        found["kerfpath"] = retime(dq, dt, Limits.of(VELOCITY, ACCELERATION))
 
     calls: dict[str, Callable[[], None]] = {"kerfpath": ours}
     missing = ""

@@ -95,7 +95,7 @@ def sweep_aloud(store: str, count: int) -> None:
         [{"x": x} for x in range(count)],
         store=store,
         processes=2,
-        progress=lambda done, _total, _left: print(done, flush=True),
+        progress=lambda _what, done, _total: print(done, flush=True),
     )
 
 
@@ -143,7 +143,7 @@ def _timed(store: Path, count: int, scheduler: str | None) -> tuple[float, float
         store=store,
         scheduler=scheduler,
         processes=None if scheduler else 2,
-        progress=lambda done, _total, _left: clock.append((done, perf_counter())),
+        progress=lambda _what, done, _total: clock.append((done, perf_counter())),
     )
     (_, begun), (first, came), (last, ended) = clock[0], clock[1], clock[-1]
     return came - begun, (ended - came) / (last - first)
@@ -158,7 +158,7 @@ def _planned(what: str, store: Path, count: int, scheduler: str | None) -> list[
         store=store,
         scheduler=scheduler,
         processes=None if scheduler else WORKERS,
-        progress=lambda done, _total, _left: clock.append((done, perf_counter())),
+        progress=lambda _what, done, _total: clock.append((done, perf_counter())),
     )
     assert all(result.failure is None for result in results)
     (early, begun), (_, ended) = next(c for c in clock if c[0] >= count), clock[-1]
@@ -189,7 +189,7 @@ def _slept(store: Path, seconds: float, count: int, scheduler: str) -> Figure:
         [{"x": x, "seconds": seconds} for x in range(count)],
         store=store,
         scheduler=scheduler,
-        progress=lambda done, _total, _left: clock.append((done, perf_counter())),
+        progress=lambda _what, done, _total: clock.append((done, perf_counter())),
     )
     (first, begun), (last, ended) = next(c for c in clock if c[0] >= count / 4), clock[-1]
     ideal = SLEEPERS["workers"] * SLEEPERS["threads"] / seconds

@@ -9,6 +9,7 @@ from kerfpath import Contour
 from kerfpath.options import PlanOptions
 from kerfpath.plans import Plan, Proof
 from kerfpath.post import (
+    CircularMove,
     JointMove,
     LinearMove,
     Program,
@@ -78,6 +79,20 @@ def changed(program, number, **changes):
 def with_steps(program, steps):
     """The program with other steps in its one section."""
     return replace(program, sections=(Section(name=program.sections[0].name, steps=tuple(steps)),))
+
+
+def arced(program, numbers):
+    """The program with some moves of the path made the way to an arc's end, the next move's."""
+    steps = list(program.sections[0].steps)
+    for n in numbers:
+        via, end = program.moves[n], program.moves[n + 1]
+        made = {f: getattr(end, f) for f in ("T_part_tip", "q", "speed", "duration", "zone")}
+        switches = (*via.switches, *end.switches)
+        steps.remove(via)
+        steps[steps.index(end)] = CircularMove(
+            T_part_via=via.T_part_tip, q_via=via.q, switches=switches, **made
+        )
+    return with_steps(program, steps)
 
 
 def codes(program, level=None, language="rapid", settings=None):

@@ -19,7 +19,7 @@ from OCP.TopoDS import TopoDS_Compound, TopoDS_Shape
 
 from kerfpath.cad import read, read_measured
 from kerfpath.cell import Hull, link_bodies
-from kerfpath.cell._stl import closed, read_surface
+from kerfpath.cell._stl import close_surface, read_surface
 from kerfpath.cli._audit import show_audit
 from kerfpath.cli._contours import list_contours
 from kerfpath.errors import InputError, about
@@ -274,7 +274,7 @@ def read_mesh(path: Path) -> None:
     vertices, triangles = read_surface(path, path.name)
     with about(path):
         Hull(vertices[np.unique(triangles)])
-    closed(vertices, triangles, 1.0, path.name)
+    close_surface(vertices, triangles, 1.0, path.name)
 
 
 # ------------------------------------------------------------------------------------------ robots

@@ -43,9 +43,7 @@ def test_every_candidate_is_admitted_or_counted_under_one_reason(frames, arm, to
     graph = build(frames, arm, T_flange_tip=tool, gamma=gamma)
     assert sum(graph.counts().values()) == len(frames) * 36 * 8
     assert sum(graph.counts(3).values()) == 36 * 8
-    by_node = graph.counts_by_node()
-    np.testing.assert_array_equal(by_node.sum(axis=1), 36 * 8)
-    assert by_node[3, 0] == graph.counts(3)["admitted"]
+    assert {sum(graph.counts(k).values()) for k in range(len(frames))} == {36 * 8}
     # Axes 4 and 6 are endless: one vertex for each admitted posture.
     assert len(graph.q) == graph.counts()["admitted"]
     assert "unreachable" not in graph.counts() or graph.counts()["unreachable"] > 0

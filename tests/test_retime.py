@@ -7,9 +7,10 @@ import pytest
 from scipy.optimize import minimize
 
 from kerfpath import InputError
+from kerfpath.limits import Limits
 from kerfpath.retime import feed, retime
 
-ONE = {"velocity": [1.0], "acceleration": [1.0]}
+ONE = Limits.of([1.0], [1.0])
 
 
 def shares(tau, dq, velocity, acceleration, periodic):
@@ -93,7 +94,7 @@ def test_the_limits_hold_and_nothing_is_faster_than_commanded():
     slowed = 0
     for _ in range(300):
         dq, dt, v, a, periodic = instance(rng, (1, 40))
-        tau = retime(dq, dt, v, a, periodic=periodic)
+        tau = retime(dq, dt, Limits.of(v, a), periodic=periodic)
         require_lawful(tau, dq, dt, v, a, periodic)
         at_speed = np.broadcast_to(dt, len(dq))
         feasible = max(shares(at_speed, dq, v, a, periodic)) <= 1
@@ -111,7 +112,7 @@ def test_a_general_solver_from_many_starts_finds_nothing_quicker():
         best = best_of_many(rng, dq, dt, v, a, periodic)
         if best < np.inf:
             # 1e-4 is what the procedure stops at; local optima of two could differ by more.
-            assert retime(dq, dt, v, a, periodic=periodic).sum() <= best * (1 + 1e-4)
+            assert retime(dq, dt, Limits.of(v, a), periodic=periodic).sum() <= best * (1 + 1e-4)
             compared += 1
     assert compared > 100
 
@@ -119,7 +120,7 @@ def test_a_general_solver_from_many_starts_finds_nothing_quicker():
 @pytest.mark.parametrize("seed", range(6))
 def test_a_long_path_is_slow_at_its_corners_only(seed):
     dq, dt, v, a = long_path(np.random.default_rng(seed))
-    tau = retime(dq, dt, v, a)
+    tau = retime(dq, dt, Limits.of(v, a))
     require_lawful(tau, dq, dt, v, a, False)
     assert (tau == dt).mean() > 0.7
     assert tau.max() > 1.2 * dt
@@ -131,11 +132,11 @@ def test_times_scale_with_the_unit_of_time_and_of_angle():
     rng = np.random.default_rng(43)
     for _ in range(40):
         dq, dt, v, a, periodic = instance(rng, (2, 30))
-        tau = retime(dq, dt, v, a, periodic=periodic).sum()
-        slower = retime(dq, 7 * dt, v / 7, a / 49, periodic=periodic).sum()
-        wider = retime(3 * dq, dt, 3 * v, 3 * a, periodic=periodic).sum()
-        back = retime(-dq[::-1], np.flip(np.atleast_1d(dt)) if np.ndim(dt) else dt, v, a,
-                      periodic=periodic).sum()  # fmt: skip
+        tau = retime(dq, dt, Limits.of(v, a), periodic=periodic).sum()
+        slower = retime(dq, 7 * dt, Limits.of(v / 7, a / 49), periodic=periodic).sum()
+        wider = retime(3 * dq, dt, Limits.of(3 * v, 3 * a), periodic=periodic).sum()
+        reverse = np.flip(np.atleast_1d(dt)) if np.ndim(dt) else dt
+        back = retime(-dq[::-1], reverse, Limits.of(v, a), periodic=periodic).sum()
         # Where the procedure stops depends on rounding: 1e-4.
         assert [slower / 7, wider, back] == pytest.approx([tau] * 3, rel=1e-4)
 
@@ -144,47 +145,50 @@ def test_more_room_never_takes_longer():
     rng = np.random.default_rng(44)
     for _ in range(60):
         dq, dt, v, a, periodic = instance(rng, (2, 30))
-        tau = retime(dq, dt, v, a, periodic=periodic).sum()
+        tau = retime(dq, dt, Limits.of(v, a), periodic=periodic).sum()
         more = 1 + rng.random(len(v))
-        for wider in ((dt, more * v, a), (dt, v, more * a), (0.8 * dt, v, a)):
-            assert retime(dq, *wider, periodic=periodic).sum() <= tau * (1 + 1e-4)
+        for wider, *limits in ((dt, more * v, a), (dt, v, more * a), (0.8 * dt, v, a)):
+            assert retime(dq, wider, Limits.of(*limits), periodic=periodic).sum() <= tau * (
+                1 + 1e-4
+            )
 
 
 def test_the_velocity_alone_has_its_closed_form():
     dq = [[0.1], [0.4], [-0.1]]
     np.testing.assert_array_equal(
-        retime(dq, 0.2, [1.0], [1e9]),
+        retime(dq, 0.2, Limits.of([1.0], [1e9])),
         [0.2, 0.4, 0.2],
     )
 
 
 def test_a_reversal_has_its_closed_form():
     # By symmetry both intervals take t: 2 dq / t = a t.
-    tau = retime([[0.5], [-0.5]], 0.1, [100.0], [4.0])
+    tau = retime([[0.5], [-0.5]], 0.1, Limits.of([100.0], [4.0]))
     np.testing.assert_allclose(tau, np.sqrt(2 * 0.5 / 4.0), rtol=1e-6)
 
 
 def test_a_seam_counts_only_where_the_path_is_periodic():
     dq = np.concatenate([np.linspace(0.1, 0.5, 20), np.full(10, 0.5)])[:, None]
     limits = ([1.0], [0.03])
-    np.testing.assert_array_equal(retime(dq, 1.0, *limits), 1.0)
-    tau = retime(dq, 1.0, *limits, periodic=True)
+    np.testing.assert_array_equal(retime(dq, 1.0, Limits.of(*limits)), 1.0)
+    tau = retime(dq, 1.0, Limits.of(*limits), periodic=True)
     require_lawful(tau, dq, 1.0, *map(np.array, limits), True)
     assert tau[-1] > 1.01
 
 
 def test_one_interval_and_no_motion_take_the_commanded_time():
-    np.testing.assert_array_equal(retime([[0.5]], 1.0, **ONE), [1.0])
-    np.testing.assert_array_equal(retime([[0.5]], 1.0, **ONE, periodic=True), [1.0])
-    np.testing.assert_array_equal(retime([[3.0]], 1.0, **ONE), [3.0])
-    np.testing.assert_array_equal(retime(np.zeros((5, 2)), 0.1, [1, 1], [1, 1]), np.full(5, 0.1))
+    np.testing.assert_array_equal(retime([[0.5]], 1.0, ONE), [1.0])
+    np.testing.assert_array_equal(retime([[0.5]], 1.0, ONE, periodic=True), [1.0])
+    np.testing.assert_array_equal(retime([[3.0]], 1.0, ONE), [3.0])
+    still = retime(np.zeros((5, 2)), 0.1, Limits.of([1, 1], [1, 1]))
+    np.testing.assert_array_equal(still, np.full(5, 0.1))
 
 
 def test_a_corner_that_needs_nearly_a_stop():
     dq = np.zeros((400, 2))
     dq[:200, 0] = dq[200:, 1] = 1e-3
     v, a = np.array([2.0, 2.0]), np.array([0.5, 0.5])
-    tau = retime(dq, 1e-3, v, a)
+    tau = retime(dq, 1e-3, Limits.of(v, a))
     require_lawful(tau, dq, 1e-3, v, a, False)
     assert tau.max() > 30e-3
     # 1 rad/s takes 1 rad to brake, the legs have 0.2: both are ramps to and from a stop, less what
@@ -196,22 +200,22 @@ def test_a_corner_that_needs_nearly_a_stop():
 def test_the_feed_names_the_slowest_interval_and_what_binds_there():
     dq = np.zeros((21, 2))
     dq[:, 0], dq[10:, 1] = 0.1, 0.3
-    limits = (0.5, [1.0, 1.0], [9.0, 0.5])
-    tau = retime(dq, *limits)
+    limits = Limits.of([1.0, 1.0], [9.0, 0.5])
+    tau = retime(dq, 0.5, limits)
     length = np.full(21, 0.01)
-    found = feed(tau, limits[0], dq, *limits[1:], length)
+    found = feed(tau, 0.5, dq, limits, length)
     assert (found.joint, found.limit) == (1, "acceleration")
     assert found.node in (9, 10)
     assert found.slowest == pytest.approx(0.5 / tau.max())
     assert found.full == pytest.approx((tau == 0.5).mean())
     dq[3, 0] = 2.0
-    tau = retime(dq, 0.5, [1.0, 1.0], [9.0, 9.0])
-    found = feed(tau, 0.5, dq, [1.0, 1.0], [9.0, 9.0], length)
+    limits = Limits.of([1.0, 1.0], [9.0, 9.0])
+    found = feed(retime(dq, 0.5, limits), 0.5, dq, limits, length)
     assert (found.node, found.joint, found.limit) == (3, 0, "velocity")
 
 
 def test_the_feed_of_a_path_at_full_speed():
-    found = feed([1.0, 1.0], 1.0, [[0.1], [0.1]], [1.0], [1.0], [0.01, 0.02])
+    found = feed([1.0, 1.0], 1.0, [[0.1], [0.1]], ONE, [0.01, 0.02])
     assert (found.full, found.slowest, found.node, found.joint, found.limit) == (1, 1, -1, -1, None)
 
 
@@ -228,4 +232,4 @@ def test_the_feed_of_a_path_at_full_speed():
 )
 def test_bad_input_is_one_line(arguments, message):
     with pytest.raises(InputError, match=message):
-        retime(*arguments)
+        retime(*arguments[:2], Limits.of(*arguments[2:]))

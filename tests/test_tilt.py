@@ -28,7 +28,7 @@ from kerfpath.job.plan_file._write import plan_document, plan_entry, plan_text
 from kerfpath.planner import layered_graph
 from kerfpath.planner._clear import _beside
 from kerfpath.post import build_program, post
-from kerfpath.tilt import tilted
+from kerfpath.tilt import tilt_frames
 
 CONE = np.radians(6)
 
@@ -62,11 +62,11 @@ def test_the_samples_are_the_grid_points_inside_the_cone(steps, count):
 
 def test_lead_turns_the_beam_ahead_and_lean_aside():
     H = np.diag([1.0, -1, -1, 1])  # the beam down, x ahead, y to the right
-    lead, lean = (tilted(H, H[:3, 0], np.array(t)) for t in ([0.2, 0], [0, 0.2]))
+    lead, lean = (tilt_frames(H, H[:3, 0], np.array(t)) for t in ([0.2, 0], [0, 0.2]))
     s, c = np.sin(0.2), np.cos(0.2)
     np.testing.assert_allclose(lead[:3, 2], [s, 0, -c], atol=1e-15)
     np.testing.assert_allclose(lean[:3, 2], -s * H[:3, 1] + [0, 0, -c], atol=1e-15)
-    both = tilted(H, H[:3, 0], np.array([0.3, -0.4]))
+    both = tilt_frames(H, H[:3, 0], np.array([0.3, -0.4]))
     assert np.arccos(both[:3, 2] @ H[:3, 2]) == pytest.approx(0.5)
 
 

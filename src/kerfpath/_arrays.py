@@ -21,6 +21,7 @@ __all__ = [
     "floats",
     "freeze",
     "integers",
+    "not_negative",
     "positive",
     "scalar",
 ]
@@ -113,6 +114,15 @@ def scalar(value: float, name: str, *, unit: str = "", above: float | None = Non
     if not np.isfinite(number) or (above is not None and not number > above):
         bound = "a finite number" if above is None else f"a number above {above:g}{unit}"
         raise InputError(f"{name}: expected {bound}, got {number:g}{unit}")
+    return number
+
+
+def not_negative(value: float, name: str, *, unit: str = "") -> float:
+    """Return `value` as a finite float, 0 or more."""
+    number = scalar(value, name, unit=unit)
+    if number < 0:
+        unit = f" {unit}" if unit else ""
+        raise InputError(f"{name}: must not be negative, got {number:g}{unit}")
     return number
 
 

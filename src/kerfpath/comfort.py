@@ -1,4 +1,4 @@
-"""How far a joint vector is from where arms do badly, and what coming near is to cost.
+"""Distances of joint vectors from singularities and limits, and the cost of coming near.
 
 The measures, of an arm whose model angles are sign * q - offset:
 
@@ -30,10 +30,11 @@ from dataclasses import dataclass, fields
 import numpy as np
 from numpy.typing import ArrayLike
 
-from kerfpath._arrays import Array, Bools, as_pose, floats, freeze, scalar
+from kerfpath._arrays import Array, Bools, as_pose, floats, freeze, not_negative
 from kerfpath._told import told
 from kerfpath.errors import InputError
 from kerfpath.kernels.turns import JointLimits
+from kerfpath.losses import Loss, Reason
 from kerfpath.robots import Robot
 
 __all__ = ["MEASURES", "Band", "Comfort", "Measure", "jacobian", "measure", "measures"]
@@ -89,10 +90,7 @@ class Band:
 
     def __post_init__(self) -> None:
         for name in ("margin", "width", "cost"):
-            value = scalar(getattr(self, name), f"comfort {name}")
-            if value < 0:
-                raise InputError(f"comfort {name}: must not be negative, got {value:g}")
-            object.__setattr__(self, name, value)
+            object.__setattr__(self, name, not_negative(getattr(self, name), f"comfort {name}"))
         if self.cost and not self.width:
             raise InputError("comfort cost: needs a width over which it falls to zero, got none")
 
@@ -105,7 +103,7 @@ class Band:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Comfort:
-    """What a plan is to keep away from, by measure; None: it does not matter.
+    """Bands that a plan is to keep away from, by measure; None: it does not matter.
 
     Parameters
     ----------
@@ -162,8 +160,8 @@ class Comfort:
         """The margins alone, without costs."""
         return Comfort(**{name: Band(margin=band.margin) for name, band in self.bands.items()})
 
-    def too_near(self, robot: Robot, q: Array, tool: Array) -> dict[str, Bools]:
-        """Say which of joint vectors q (B, n) rad break which hard margin, (B,) by its words.
+    def too_near(self, robot: Robot, q: Array, tool: Array) -> dict[Reason, Bools]:
+        """Return which of joint vectors q (B, n) rad break which hard margin, (B,) by the reason.
 
         Raises
         ------
@@ -171,14 +169,15 @@ class Comfort:
             A measure that the arm does not have.
         """
         return {
-            f"{MEASURES[name].words} margin": measure(name, robot, q, tool=tool) < band.margin
+            Reason(Loss.MARGIN, MEASURES[name].words): measure(name, robot, q, tool=tool)
+            < band.margin
             for name, band in self.bands.items()
             if band.margin
         }
 
-    def broken(self, robot: Robot, q: Array, tool: Array) -> tuple[str, ...]:
-        """Return the words of the hard margins that any of joint vectors q (B, n) rad break."""
-        return tuple(w for w, near in self.too_near(robot, q, tool).items() if near.any())
+    def broken(self, robot: Robot, q: Array, tool: Array) -> tuple[Reason, ...]:
+        """Return the hard margins that any of joint vectors q (B, n) rad break."""
+        return tuple(why for why, near in self.too_near(robot, q, tool).items() if near.any())
 
     def narrowed(self, robot: Robot, q: Array) -> JointLimits:
         """Return the joint limits inside which the margins of limits, wrist and elbow are kept.
@@ -269,9 +268,8 @@ def jacobian(robot: Robot, q: ArrayLike, *, tool: ArrayLike | None = None) -> Ar
     """Return the geometric Jacobians (B, 6, n) of the tool tip at joint vectors q (B, n) rad.
 
     Linear (m/rad) over angular velocity, in the robot base, of a robot without an external axis.
-    Every entry of a pose is a sinusoid of
-    each joint's angle, so that half the difference between a quarter turn ahead and one behind is
-    its derivative, exactly and for every family.
+    Every entry of a pose is a sinusoid of each joint's angle, so that half the difference between a
+    quarter turn ahead and one behind is its derivative, exactly and for every family.
     """
     q = floats(q, "q", (None, robot.joints), copy=False)
     if robot.external is not None:

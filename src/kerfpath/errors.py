@@ -9,6 +9,8 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from kerfpath.losses import Loss, Reason
+
 __all__ = ["AuditFailed", "InputError", "KerfpathError", "NoFeasiblePath", "about"]
 
 LONGEST, BEGINNING = 600, 420
@@ -61,8 +63,9 @@ class NoFeasiblePath(KerfpathError):
         Vertices, 0-based inside their layers, in which the paths from the front end at `node`, and
         from which those to the end begin at `back`.
     counts : mapping of str to int
-        What each test removed where the path breaks: candidates of the empty layer by reason, or
-        edges into the unreached layer by the test that forbids them.
+        What each test removed where the path breaks: candidates of the empty layer or edges into
+        the unreached one, by `kerfpath.losses.Reason`, which is its words; of a Pareto set without
+        plans the runs by what became of them.
     """
 
     def __init__(
@@ -83,6 +86,10 @@ class NoFeasiblePath(KerfpathError):
         self.reached = reached
         self.leaving = leaving
         self.counts = dict(counts or {})
+
+    def lost_by(self, loss: Loss) -> list[Reason]:
+        """Return the reasons of one kind among the counts."""
+        return [why for why in self.counts if isinstance(why, Reason) and why.loss is loss]
 
     def retold(self, message: str, counts: Mapping[str, int] | None = None) -> NoFeasiblePath:
         """Return the same answer in other words, and with other counts if they are given."""

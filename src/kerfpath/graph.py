@@ -6,15 +6,16 @@ import os
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from kerfpath._arrays import Array, Bools, Ints, freeze, scalar
 from kerfpath.errors import InputError
-from kerfpath.kernels import turns
-from kerfpath.robots import Robot, require_few_turns
+from kerfpath.kernels.turns import JointLimits, count_admissible, fill_admissible
+from kerfpath.losses import Loss, Reason
+from kerfpath.robots import Robot
 
 __all__ = ["LayeredGraph", "build", "gamma_grid"]
 
@@ -44,8 +45,8 @@ class LayeredGraph:
         Turns of 2 pi of each joint of each vertex.
     reason : (K, V m, P) uint8
         What became of each candidate: an index into `reasons`; all gamma of a variant in a row.
-    reasons : tuple of str
-        Words for the reason codes; code 0 is "admitted".
+    reasons : tuple of Reason
+        What the codes mean; code 0 is admitted.
     """
 
     q: Array
@@ -58,7 +59,7 @@ class LayeredGraph:
     posture: NDArray[np.int8]
     turn: NDArray[np.int8]
     reason: NDArray[np.uint8]
-    reasons: tuple[str, ...]
+    reasons: tuple[Reason, ...]
 
     def __repr__(self) -> str:
         return (
@@ -78,21 +79,22 @@ class LayeredGraph:
         return np.asarray(self.reason.reshape(K, -1, len(self.gamma), P).min(axis=1))
 
     def counts(self, node: int | None = None) -> dict[str, int]:
-        """Count the candidates by reason, over all nodes or at one."""
+        """Count the candidates by `Reason`, over all nodes or at one."""
         codes = self.reason if node is None else self.reason[node]
         number = np.bincount(codes.ravel(), minlength=len(self.reasons))
-        return {word: int(c) for word, c in zip(self.reasons, number, strict=True) if c}
+        return {why: int(c) for why, c in zip(self.reasons, number, strict=True) if c}
 
-    def counts_by_node(self) -> Ints:
-        """Return the candidates of each node by reason code, (K, len(reasons))."""
-        K, codes = len(self.reason), len(self.reasons)
-        flat = self.reason.reshape(K, -1) + (np.arange(K) * codes)[:, None]
-        return np.bincount(flat.ravel(), minlength=K * codes).reshape(K, codes)
+    def main_loss(self, node: int) -> str:
+        """Return what most candidates of a node are lost by, "" if none is by robot or part."""
+        counts = self.counts(node)
+        for loss in (Loss.ADMITTED, Loss.UNWANTED):
+            counts.pop(Reason(loss), None)
+        return max(counts, key=counts.__getitem__, default="")
 
-    def without(self, unwanted: Mapping[str, Bools]) -> LayeredGraph:
-        """Return the graph without the vertices unwanted, (N,) bool by the word for the reason.
+    def without(self, unwanted: Mapping[Reason, Bools]) -> LayeredGraph:
+        """Return the graph without the vertices unwanted, (N,) bool by the reason.
 
-        A candidate counts as dropped where none of its turns is left, by the first word for any.
+        A candidate counts as dropped where none of its turns is left, by the first reason for any.
         """
         gone = np.any([*unwanted.values()], axis=0)
         if not gone.any():
@@ -104,35 +106,37 @@ class LayeredGraph:
         left = np.zeros(self.reason.size, np.bool_)
         left[candidate[keep]] = True
         reason, reasons = self.reason.copy(), self.reasons
-        for word, here in reversed(list(unwanted.items())):
-            reasons = reasons if word in reasons else (*reasons, word)
-            reason.flat[candidate[here & ~left[candidate]]] = reasons.index(word)
-        return replace(
-            self,
-            q=freeze(self.q[keep]),
-            start=freeze(
-                np.concatenate([[0], np.cumsum(np.bincount(layer[keep], minlength=len(sizes)))])
-            ),
-            sample=freeze(self.sample[keep]),
-            variant=freeze(self.variant[keep]),
-            posture=freeze(self.posture[keep]),
-            turn=freeze(self.turn[keep]),
-            reason=freeze(reason),
-            reasons=reasons,
-        )
+        for why, here in reversed(list(unwanted.items())):
+            reasons = reasons if why in reasons else (*reasons, why)
+            reason.flat[candidate[here & ~left[candidate]]] = reasons.index(why)
+        left_of_layer = np.bincount(layer[keep], minlength=len(sizes))
+        start = np.concatenate([[0], np.cumsum(left_of_layer)])
+        return self._of(keep, start, reason, reasons)
 
     def part(self, first: int, last: int) -> LayeredGraph:
         """Return the layers of nodes first to last."""
         vertices = slice(self.start[first], self.start[last + 1])
+        start = self.start[first : last + 2] - self.start[first]
+        return self._of(vertices, start, self.reason[first : last + 1], self.reasons)
+
+    def _of(
+        self,
+        vertices: Bools | slice,
+        start: Ints,
+        reason: NDArray[np.uint8],
+        reasons: tuple[Reason, ...],
+    ) -> LayeredGraph:
+        """Return the graph of some of the vertices."""
         return replace(
             self,
-            q=self.q[vertices],
-            start=freeze(self.start[first : last + 2] - self.start[first]),
-            sample=self.sample[vertices],
-            variant=self.variant[vertices],
-            posture=self.posture[vertices],
-            turn=self.turn[vertices],
-            reason=self.reason[first : last + 1],
+            q=freeze(self.q[vertices]),
+            start=freeze(start),
+            sample=freeze(self.sample[vertices]),
+            variant=freeze(self.variant[vertices]),
+            posture=freeze(self.posture[vertices]),
+            turn=freeze(self.turn[vertices]),
+            reason=freeze(reason),
+            reasons=reasons,
         )
 
 
@@ -188,7 +192,7 @@ def build(
     """
     wanted = _wanted(postures, robot.postures)
     arm = robot.alone()
-    require_few_turns(arm)
+    arm.require_few_turns()
     limits = arm.joint_limits()
     if not robot.family.free_rotation:
         gamma = freeze(np.zeros(1))
@@ -205,26 +209,12 @@ def build(
         H = np.ascontiguousarray(part_in_base @ H if robot.external else H).reshape(-1, 4, 4)
         q, reach = arm.inverse_nodes(H, gamma, T_flange_tip)
         q = q.reshape(last - first, samples, *q.shape[2:])
-        reach = reach.reshape(q.shape[:3])
-        count = np.empty(last - first, np.int64)
-        turns.count_admissible(q, reach, wanted, limits, count, reason[first:last])
-        n = int(count.sum())
-        piece = _Piece(
-            count=count,
-            q=np.empty((n, arm.joints)),
-            sample=np.empty(n, np.int32),
-            posture=np.empty(n, np.int8),
-            turn=np.empty((n, arm.joints), np.int8),
-        )
-        turns.fill_admissible(
-            q, reason[first:last], limits, piece.q, piece.sample, piece.posture, piece.turn
-        )
+        piece = _admitted(q, reach.reshape(q.shape[:3]), wanted, limits, reason[first:last])
         if robot.external:
             at = np.tile(external, len(tilt) // len(external))[piece.sample // len(gamma)]
-            piece = replace(
-                piece,
-                q=np.column_stack([piece.q, at]),
-                turn=np.column_stack([piece.turn, np.zeros(n, np.int8)]),
+            still = np.zeros(len(at), np.int8)
+            piece = piece._replace(
+                q=np.column_stack([piece.q, at]), turn=np.column_stack([piece.turn, still])
             )
         if progress is not None:
             progress(last - first)
@@ -235,14 +225,12 @@ def build(
     threads = int(os.environ.get("NUMBA_NUM_THREADS") or os.cpu_count() or 1)
     with ThreadPoolExecutor(threads) as pool:
         pieces = list(pool.map(lambda f: layers_of(f, min(f + nodes, len(frames))), firsts))
-    count = np.concatenate([p.count for p in pieces])
-    q, sample = [p.q for p in pieces], [p.sample for p in pieces]
-    posture, turn = [p.posture for p in pieces], [p.turn for p in pieces]
+    sizes, q, sample, posture, turn = (list(parts) for parts in zip(*pieces, strict=True))
     pieces.clear()
     origin = _end_to_end(sample)
     return LayeredGraph(
         q=freeze(_end_to_end(q)),
-        start=freeze(np.concatenate([[0], np.cumsum(count)])),
+        start=freeze(np.concatenate([[0], np.cumsum(np.concatenate(sizes))])),
         gamma=gamma,
         tilt=tilt,
         external=freeze(np.tile(external, len(tilt) // max(1, len(external)))),
@@ -278,15 +266,27 @@ def _end_to_end(parts: list[NDArray[Any]]) -> NDArray[Any]:
     return whole
 
 
-@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class _Piece:
-    """The vertices of a run of nodes."""
+class _Piece(NamedTuple):
+    """The vertices of a run of nodes, and how many each node has."""
 
-    count: Ints
+    sizes: Ints
     q: Array
     sample: NDArray[np.int32]
     posture: NDArray[np.int8]
     turn: NDArray[np.int8]
+
+
+def _admitted(
+    q: Array, reach: Bools, wanted: Bools, limits: JointLimits, out_reason: NDArray[np.uint8]
+) -> _Piece:
+    """Return the turns that the limits admit of q (K, V m, P, n); fills the reasons (K, V m, P)."""
+    sizes = np.empty(len(q), np.int64)
+    count_admissible(q, reach, wanted, limits, sizes, out_reason)
+    N, n = int(sizes.sum()), q.shape[3]
+    sample, posture = np.empty(N, np.int32), np.empty(N, np.int8)
+    found = _Piece(sizes, np.empty((N, n)), sample, posture, np.empty((N, n), np.int8))
+    fill_admissible(q, out_reason, limits, *found[1:])
+    return found
 
 
 def _wanted(postures: Sequence[int] | None, number: int) -> Bools:

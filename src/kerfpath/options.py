@@ -14,6 +14,7 @@ from kerfpath._told import told
 from kerfpath.comfort import Band, Comfort
 from kerfpath.contour import FrameKind
 from kerfpath.errors import InputError
+from kerfpath.limits import Limits
 from kerfpath.robots import Robot
 from kerfpath.search import Closure, Method, Metric, ObjectiveKind, rotation_limits
 from kerfpath.tilt import Tilt
@@ -232,6 +233,10 @@ class PlanOptions:
             weights=floats(weights, "weights", velocity.shape),
             rotation=None if rotation is None else rotation_limits(rotation, robot.endless),
         )
+
+    def limits(self, robot: Robot) -> Limits:
+        """Return the limits of a robot in time, and the shares of them that may be used."""
+        return Limits.of(*robot.speed_limits(), eta_v=self.eta_v, eta_a=self.eta_a)
 
     @property
     def without_penalties(self) -> PlanOptions:

@@ -13,6 +13,7 @@ from kerfpath._arrays import Array, as_pose, floats, freeze, scalar
 from kerfpath._told import told
 from kerfpath.air import AirMove, air_move, backed_off
 from kerfpath.errors import InputError, NoFeasiblePath
+from kerfpath.kernels.metric import turns_of
 from kerfpath.planner import plan as plan_contour
 from kerfpath.plans import Plan, Proof, path_cost
 from kerfpath.refiner import refine
@@ -159,7 +160,7 @@ def placed(plan: Plan, T_base_part: ArrayLike) -> Plan:
         plan,
         T_base_part=T_base_part,
         q=q,
-        turn=np.ceil((q - np.pi) / (2 * np.pi)).astype(np.int64),
+        turn=turns_of(q).astype(np.int64),
         proof=Proof(optimal=False, statement=f"{plan.proof.statement}; led to another placement"),
     )
     s = plan.settings

@@ -19,7 +19,7 @@ from kerfpath.kernels import metric
 from kerfpath.options import PlanOptions
 from kerfpath.robots import Robot
 from kerfpath.search import METRIC_CODES, Metric, ObjectiveKind
-from kerfpath.tilt import tilted
+from kerfpath.tilt import tilt_frames
 
 __all__ = ["Criteria", "Feed", "Plan", "Proof", "path_cost"]
 
@@ -231,7 +231,7 @@ class Plan:
         """Task frames that gamma counts from, tilt included, robot base frame, (K, 4, 4) m."""
         H = self.contour.frames(self.settings.frames)
         if self.tilt.any():
-            H = tilted(H, self.contour.along, self.tilt)
+            H = tilt_frames(H, self.contour.along, self.tilt)
         return freeze(self.T_base_part @ H)
 
     @property

@@ -22,6 +22,7 @@ from scipy import sparse
 
 from kerfpath._arrays import Array, Ints, floats, freeze, positive
 from kerfpath.errors import InputError
+from kerfpath.limits import Limits
 from kerfpath.plans import Feed
 
 __all__ = ["feed", "retime"]
@@ -55,8 +56,7 @@ class _Rows(NamedTuple):
 def retime(
     dq: ArrayLike,
     dt: ArrayLike,
-    velocity: ArrayLike,
-    acceleration: ArrayLike,
+    limits: Limits,
     *,
     periodic: bool = False,
 ) -> Array:
@@ -71,8 +71,7 @@ def retime(
         Joint increments along the path, endless joints the short way.
     dt : float or (K-1,) s
         Commanded time of each interval.
-    velocity, acceleration : (n,) rad/s, rad/s^2
-        Limits that may be used: eta is in them.
+    limits : Limits
     periodic : bool
         The last interval is followed by the first; else the ends are reached and left at speed.
 
@@ -83,9 +82,9 @@ def retime(
     Raises
     ------
     InputError
-        Arrays that do not fit each other, NaN, limits or times that are not positive.
+        Arrays that do not fit each other, NaN, times that are not positive.
     """
-    dq, dt, velocity, acceleration = _inputs(dq, dt, velocity, acceleration)
+    dq, dt, velocity, acceleration = _inputs(dq, dt, limits)
     least = np.maximum(dt, (np.abs(dq) / velocity).max(axis=1, initial=0.0))
     rows = _rows(dq / acceleration, least, periodic)
     tau = _stretched(rows, least)
@@ -106,8 +105,7 @@ def feed(
     tau: ArrayLike,
     dt: ArrayLike,
     dq: ArrayLike,
-    velocity: ArrayLike,
-    acceleration: ArrayLike,
+    limits: Limits,
     length: ArrayLike,
     *,
     periodic: bool = False,
@@ -118,7 +116,7 @@ def feed(
     ----------
     tau : (K-1,) s
         As `retime` returns it.
-    dt, dq, velocity, acceleration, periodic
+    dt, dq, limits, periodic
         As given to `retime`.
     length : (K-1,) m
         Length of the path in each interval.
@@ -128,7 +126,7 @@ def feed(
     InputError
         As `retime`.
     """
-    dq, dt, velocity, acceleration = _inputs(dq, dt, velocity, acceleration)
+    dq, dt, velocity, acceleration = _inputs(dq, dt, limits)
     tau = positive(tau, "tau", dt.shape)
     length = floats(length, "length", dt.shape)
     at_speed = tau <= dt * (1 + SLACK)
@@ -152,21 +150,16 @@ def feed(
     )
 
 
-def _inputs(
-    dq: ArrayLike, dt: ArrayLike, velocity: ArrayLike, acceleration: ArrayLike
-) -> tuple[Array, Array, Array, Array]:
+def _inputs(dq: ArrayLike, dt: ArrayLike, limits: Limits) -> tuple[Array, Array, Array, Array]:
     dq = floats(dq, "dq", (None, None))
     intervals, n = dq.shape
     if intervals == 0 or n == 0:
         raise InputError(f"dq: expected at least one interval and one joint, got shape {dq.shape}")
     if np.ndim(dt) == 0:
         dt = np.full(intervals, dt)
-    return (
-        dq,
-        positive(dt, "dt", (intervals,)),
-        positive(velocity, "velocity", (n,)),
-        positive(acceleration, "acceleration", (n,)),
-    )
+    limits.require_joints(n)
+    dt = positive(dt, "dt", (intervals,))
+    return dq, dt, limits.velocity.usable, limits.acceleration.usable
 
 
 def _meetings(intervals: int, periodic: bool) -> tuple[Ints, Ints]:

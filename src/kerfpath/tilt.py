@@ -7,17 +7,17 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from kerfpath._arrays import Array, freeze, scalar
+from kerfpath._arrays import Array, freeze, not_negative
 from kerfpath.errors import InputError
 
-__all__ = ["Tilt", "tilted"]
+__all__ = ["Tilt", "tilt_frames"]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Tilt:
-    """How far the tool may be tilted away from the nominal axis, in which steps, at what cost.
+    """The tilt allowed away from the nominal tool axis: how far, in which steps, at what cost.
 
-    Lead and lean are told in the frame of travel: x along the path, z along the nominal tool axis
+    Lead and lean are in the frame of travel: x along the path, z along the nominal tool axis
     into the part, y = z x x across the path. They are the parts of one turn about an axis between
     the two: by hypot(lead, lean), about lean x + lead y. Lead alone turns about y, and where it is
     positive the beam points ahead; lean alone turns about x, and where it is positive the beam
@@ -44,9 +44,7 @@ class Tilt:
 
     def __post_init__(self) -> None:
         for name, unit in (("cone", "rad"), ("cost", "1/rad")):
-            value = scalar(getattr(self, name), f"tilt {name}", unit=unit)
-            if value < 0:
-                raise InputError(f"tilt {name}: must not be negative, got {value:g} {unit}")
+            value = not_negative(getattr(self, name), f"tilt {name}", unit=unit)
             object.__setattr__(self, name, value)
         if self.cone >= np.pi / 2:
             raise InputError(f"tilt cone: expected less than pi/2 rad, got {self.cone:g} rad")
@@ -69,7 +67,7 @@ class Tilt:
         return self.cost * np.hypot(samples[:, 0], samples[:, 1])
 
 
-def tilted(frames: Array, along: Array, tilt: Array) -> Array:
+def tilt_frames(frames: Array, along: Array, tilt: Array) -> Array:
     """Return task frames (..., 4, 4) turned by lead and lean (..., 2) rad; z is the tool axis.
 
     along (..., 3) are the directions of travel, see `Contour.along`.

@@ -42,7 +42,7 @@ from OCP.TopoDS import TopoDS_Compound, TopoDS_Shape
 
 from conftest import ROOT
 from kerfpath.cad import Loop, Part, read
-from kerfpath.cad._part import loop_of
+from kerfpath.cad._build import loop_of
 from kerfpath.cad._sample import Chain
 from kerfpath.errors import InputError
 

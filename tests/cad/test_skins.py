@@ -17,7 +17,7 @@ from OCP.TopLoc import TopLoc_Location
 from tests.cad.test_part import box, compound, cut, cylinder, placed, tube, write_step
 
 from kerfpath.cad import Part, read
-from kerfpath.cad._shape import explored
+from kerfpath.cad._shape import list_shapes
 from kerfpath.errors import InputError
 
 EXACT = 1e-9
@@ -174,7 +174,7 @@ def test_iges_units_are_converted_and_overridden(
 
 
 def test_loose_faces_of_a_step_are_sewn_and_gaps_over_the_tolerance_stay(tmp_path: Path) -> None:
-    faces = explored(box(10, 20, 30), TopAbs_ShapeEnum.TopAbs_FACE)
+    faces = list_shapes(box(10, 20, 30), TopAbs_ShapeEnum.TopAbs_FACE)
     for shift, free in ((0.03, 0), (0.2, 8)):
         loose = compound(faces[0].Moved(_shift(-shift, 0, 0)), *faces[1:])
         part = read(write_step(tmp_path / "loose.step", loose))
@@ -213,7 +213,7 @@ def test_bad_iges_files_are_refused_in_one_line(
     spoil, expected = BAD_IGES[case]
     shape = box(1, 2, 3)
     if case == "no face":
-        shape = explored(shape, TopAbs_ShapeEnum.TopAbs_EDGE)[0]
+        shape = list_shapes(shape, TopAbs_ShapeEnum.TopAbs_EDGE)[0]
     examples.write_iges(tmp_path / "bad.iges", shape)
     (tmp_path / "bad.iges").write_bytes(spoil((tmp_path / "bad.iges").read_bytes()))
     capfd.readouterr()

@@ -22,7 +22,7 @@ from OCP.TopLoc import TopLoc_Location
 from OCP.XCAFDoc import XCAFDoc_ColorType, XCAFDoc_DocumentTool
 
 from kerfpath.cad import Part, read
-from kerfpath.cad._shape import explored
+from kerfpath.cad._shape import list_shapes
 from kerfpath.errors import InputError
 
 SCHEMAS = {"AP203": "CONFIG_CONTROL_DESIGN", "AP214IS": "AUTOMOTIVE", "AP242DIS": "AP242"}
@@ -78,7 +78,7 @@ def painted() -> Model:
     """A blue box, its first face orange, its second on layer CUT."""
     model, box = Model(), BRepPrimAPI_MakeBox(10.0, 20.0, 30.0).Shape()
     label = model.shapes.AddShape(box, False)
-    first, second = explored(box, TopAbs_ShapeEnum.TopAbs_FACE)[:2]
+    first, second = list_shapes(box, TopAbs_ShapeEnum.TopAbs_FACE)[:2]
     model.coloured(label, 0, 0, 1)
     model.coloured(model.shapes.AddSubShape(label, first), 1, 0.5, 0)
     model.layers.SetLayer(

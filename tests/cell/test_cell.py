@@ -19,7 +19,7 @@ from kerfpath.cell import (
     cell_of,
     frustum,
     read_stl,
-    welded,
+    weld,
 )
 from kerfpath.cell._scene import Scene
 from kerfpath.errors import InputError
@@ -447,7 +447,7 @@ def test_a_mesh_that_is_no_solid_is_refused():
         Mesh(vertices=whole.points, triangles=whole.triangles + 1)
     with pytest.raises(InputError, match="must be finite"):
         Mesh(vertices=whole.points * np.nan, triangles=whole.triangles)
-    with pytest.raises(InputError, match="deviation must not be negative"):
+    with pytest.raises(InputError, match="deviation: must not be negative"):
         mesh_of(whole, deviation=-1.0)
 
 
@@ -458,7 +458,7 @@ def test_welding_closes_what_shares_corners():
     corners = np.arange(36).reshape(-1, 3)
     with pytest.raises(InputError, match="not closed"):
         Mesh(vertices=soup, triangles=corners)
-    vertices, triangles = welded(soup, corners, 1e-6)
+    vertices, triangles = weld(soup, corners, 1e-6)
     assert len(Mesh(vertices=vertices, triangles=triangles).vertices) == 8
 
 

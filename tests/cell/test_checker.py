@@ -2,12 +2,13 @@
 
 import numpy as np
 import pytest
+from tests.search.posed import clear_path
 
 import naive
 from kerfpath.cell import Checker, Mesh, box, box_between, cell_of
 from kerfpath.errors import InputError
 from kerfpath.planner import layered_graph
-from kerfpath.search import Known, clear_path, shortest_path
+from kerfpath.search import Known, shortest_path
 
 
 @pytest.fixture(scope="module")

@@ -23,7 +23,7 @@ from kerfpath.cell import (
     odd_sizes,
 )
 from kerfpath.cell._pairs import BY_DESIGN
-from kerfpath.cell._shaved import shaved
+from kerfpath.cell._shaved import shave
 from kerfpath.urdf import Chain
 
 with_collimator = benchmark_module("_boxes").with_collimator
@@ -256,7 +256,7 @@ def test_what_is_shaved_lies_inside_and_no_deeper_than_asked():
         box([0.2, 0.1, 0.3]),
     ):
         for depth in (5e-4, 4e-3, 0.02):
-            left = shaved(shape, depth)
+            left = shave(shape, depth)
             if isinstance(shape, Capsule):
                 assert left.radius == shape.radius - depth
                 continue
@@ -265,13 +265,13 @@ def test_what_is_shaved_lies_inside_and_no_deeper_than_asked():
             # Every corner lies on three faces that have gone in by the depth, behind all others.
             assert behind.min() == pytest.approx(depth, abs=1e-9)
             assert (np.sort(behind, axis=1)[:, 2] < depth + 1e-9).all()
-        assert shaved(shape, 0.5) is None
+        assert shave(shape, 0.5) is None
     solid = union([([0, 0, 0], [0.1, 0.2, 0.3]), ([0.5, 0, 0], [0.6, 0.1, 0.1])])
-    left = shaved(solid, 2e-3)
+    left = shave(solid, 2e-3)
     np.testing.assert_allclose(left.bounds, solid.bounds + 2e-3 * np.array([[1], [-1]]), atol=2e-5)
     moved = np.linalg.norm(left.vertices - solid.vertices, axis=1)
     assert (moved <= 2 * 2e-3).all()
-    assert shaved(solid, 0.05) is None
+    assert shave(solid, 0.05) is None
 
 
 def test_links_that_touch_at_most_poses_by_a_skin_are_judged_but_for_it():

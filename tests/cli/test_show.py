@@ -12,7 +12,7 @@ from tests.cli.test_commands import DEMO, SMALL, run
 
 from kerfpath import plan
 from kerfpath.cli import _show
-from kerfpath.cli._show import progress_bars, table, told_once
+from kerfpath.cli._show import merge_notes, progress_bars, sweep_bar, table
 
 LONG = ["a hole whose name is quite long", "outer trim line, upper half", "slot/7"]
 
@@ -102,9 +102,9 @@ def test_headings_are_folded_only_where_that_makes_room(monkeypatch):
     assert columns[3] in folded[-1]
 
 
-def test_equal_notes_are_told_once():
+def test_equal_notes_are_merged():
     notes = [f"warning: at {i} of 33 targets it is too large (hole {i})" for i in range(30)]
-    told = told_once(["something else", *notes, "more 1"], [f"hole {i}" for i in range(30)])
+    told = merge_notes(["something else", *notes, "more 1"], [f"hole {i}" for i in range(30)])
     assert told == ["something else", notes[0] + " (and 29 more like it; the report has all)",
                     "more 1"]  # fmt: skip
 
@@ -146,6 +146,12 @@ def test_bars_have_their_phases(monkeypatch):
         progress("trim: refinement", 0, 0)
         time.sleep(0.3)
     for words in ("9/9 nodes", "trim: search", "trim: refinement"):
+        assert words in terminal.getvalue()
+    with redirect_stderr(terminal), sweep_bar("runs") as progress:
+        progress("tasks", 2, 9)
+        progress("tasks", 3, 9)
+        time.sleep(0.3)
+    for words in ("runs done", "3/9 runs", " left"):
         assert words in terminal.getvalue()
 
 

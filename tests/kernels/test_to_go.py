@@ -8,13 +8,14 @@ from multiprocessing import get_context
 import numba
 import numpy as np
 import pytest
+from tests.search.posed import problem_of
 
 import naive
 from kerfpath import NoFeasiblePath, shortest_path
 from kerfpath.kernels import exact, to_go
 from kerfpath.kernels.limits import velocity_time
 from kerfpath.kernels.search import (
-    Objective,
+    LostTime,
     distance,
     fill_increment,
     is_shut,
@@ -22,27 +23,18 @@ from kerfpath.kernels.search import (
     shut_edges,
 )
 from kerfpath.search._exact import NO_SEAM, best_allowed
-from kerfpath.search._layers import sorted_layers
-from kerfpath.search._problem import Problem
+from kerfpath.search._layers import sort_layers
 
 
 def graph(rng, **sizes):
     """A sorted graph, in every other one with some edges shut."""
     q, start, o = naive.random_instance(rng, **sizes)
-    bound = o["eta_v"] * o["velocity"] * o["dt"]
     _, shut, _ = naive.random_closures(rng, start, rng.choice([0.0, 0.6]))
-    aim = Objective(
-        weight=o["weights"],
-        metric=0,
-        minimax=False,
-        vertex_cost=o["vertex_cost"],
-        velocity=bound,
-        acceleration=bound,
-        cap=np.inf,
-        timed=False,
-    )
-    problem = Problem(q=q, start=start, endless=o["endless"], aim=aim, shut=shut)
-    return sorted_layers(problem)[:2]
+    asked = ("dt", "velocity", "acceleration", "eta_v", "eta_a")
+    asked += ("endless", "vertex_cost", "weights")
+    problem = problem_of(q, start, shut=shut, **{name: o[name] for name in asked})
+    aim = problem.aim._replace(metric=0, acceleration=problem.aim.velocity)
+    return sort_layers(problem.layers, aim.velocity), aim
 
 
 def scalar(layers, aim, allowed):
@@ -53,16 +45,16 @@ def scalar(layers, aim, allowed):
         for p in range(start[k], start[k + 1]):
             best = np.inf
             for j in range(start[k + 1], start[k + 2]):
-                rho, tail = distance(layers, aim, p, j), aim.vertex_cost[j]
+                rho, tail = distance(layers, aim, p, j), layers.cost[j]
                 rho = np.inf if is_shut(layers.shut, *shut_edges(layers, p), j) else rho
-                if aim.penalty > 0 and rho < np.inf:
+                if aim.lost.penalty > 0 and rho < np.inf:
                     dq = np.empty(len(aim.velocity))
                     fill_increment(layers, p, j, dq)
-                    rho += late(aim, aim.stretch * velocity_time(dq, aim.velocity))
+                    rho += late(aim.lost, aim.lost.stretch * velocity_time(dq, aim.velocity))
                 if aim.minimax:
                     best = min(best, max(rho, max(tail, h[j])))
                 else:
-                    best = min(best, rho + (tail + h[j]), aim.leap + (tail + h[j]))
+                    best = min(best, rho + (tail + h[j]), aim.lost.leap + (tail + h[j]))
             h[p] = best if allowed[p] else np.inf
     return h
 
@@ -92,7 +84,7 @@ def test_lost_time_and_leaps_count_with_the_distance(metric, leap):
     finite = 0
     for _ in range(20):
         layers, aim = graph(rng, layers=(1, 7), size=(1, 40))
-        aim = aim._replace(metric=metric, timed=True, penalty=2.0, stretch=2.5, leap=leap)
+        aim = aim._replace(metric=metric, timed=True, lost=LostTime(2.0, 2.5, leap))
         allowed = rng.random(len(layers.low)) < 0.9
         h = np.empty(len(layers.low))
         to_go.cost_to_go(layers, aim, allowed, h)

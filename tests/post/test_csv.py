@@ -6,66 +6,40 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
+from tests.post.cases import CASES
 
-from conftest import ROOT
-from kerfpath import InputError, robot
+from kerfpath import InputError
 from kerfpath.air import least_time
 from kerfpath.post import (
-    CircularMove,
     Comment,
-    build_program,
-    deviations,
-    language,
     post,
 )
-from kerfpath.post.csv import CsvSettings
 from programs import (
-    arc,
+    arced,
     changed,
     codes,
     five_axis_program,
-    frames,
-    hand_plan,
-    read_text,
     text_of,
     with_steps,
 )
 
-GOLDEN = ROOT / "tests" / "data" / "golden_csv.csv"
-CSV = language("csv")
+CASE = CASES["csv"]
+TABLE = "cut_skin_outer.csv"
+GOLDEN = CASE.golden[TABLE]
 
 
 @pytest.fixture(scope="module")
-def arm():
-    return robot("abb_irb4600_60_205").with_limits(acceleration=np.radians([500] * 6))
-
-
-@pytest.fixture(scope="module")
-def program(arm):
-    made = hand_plan(arc(), arm, *frames(), speed=0.12)
-    return build_program([made], pierce_time=0.3, gas_lead=0.2)
+def program():
+    return CASE.program
 
 
 def table(source):
     return text_of(post(source, "csv"))
 
 
-def reread(text, arm):
-    return read_text(text, arm, "csv")
-
-
 def same(program):
-    read = reread(table(program), program.robot)
-    assert deviations(program, read, CSV, CsvSettings()) == []
-    return read
-
-
-def test_the_golden_table_is_written_byte_for_byte(program):
-    assert table(program) == GOLDEN.read_bytes().decode("ascii")
-    assert codes(program, language="csv") == ["air-moves"]
+    CASE.reads_back(program)
 
 
 def test_another_reader_of_csv_finds_the_planned_targets(program):
@@ -106,19 +80,6 @@ def test_times_are_those_planned(program):
     same(twice)
 
 
-@pytest.mark.parametrize("posture", range(8))
-def test_all_postures_and_turns_read_back(arm, posture):
-    tool, _ = frames()
-    reach = np.array([4.0] * 5 + [20.0])
-    wide = arm.with_limits(lower=-reach, upper=reach)
-    placement = np.eye(4)
-    placement[:3, 3] = 0.55, 0.1, 0.9
-    made = hand_plan(arc(count=20, radius=0.03), wide, tool, placement, posture=posture)
-    for turns in (-2, 0, 1):
-        wound = replace(made, q=made.q + 2 * np.pi * turns * np.eye(6)[5])
-        same(build_program([wound]))
-
-
 def test_an_arm_of_five_axes_has_five_columns():
     five = five_axis_program()
     same(five)
@@ -126,25 +87,12 @@ def test_an_arm_of_five_axes_has_five_columns():
 
 
 def test_arcs_have_a_row_for_the_point_on_the_way(program):
-    moves = program.moves
-    bent = CircularMove(
-        T_part_tip=moves[4].T_part_tip,
-        q=moves[4].q,
-        T_part_via=moves[3].T_part_tip,
-        q_via=moves[3].q,
-        speed=0.1,
-        duration=0.2,
-        zone=0.0003,
-    )
-    steps = [step for step in program.sections[0].steps if step is not moves[3]]
-    steps[steps.index(moves[4])] = bent
-    arced = with_steps(program, steps)
-    same(arced)
-    text = table(arced)
+    made = arced(program, [3])
+    text = table(made)
     kinds = [row.split(",")[1] for row in text.splitlines()]
     assert kinds.index("via") + 1 == kinds.index("circular")
     wrong = re.sub(r"(,via,,(?:[-\d.]+,){6})-?\d", r"\g<1>7", text)
-    assert deviations(arced, reread(wrong, program.robot), CSV, CsvSettings())
+    assert CASE.deviations(made, {TABLE: wrong})
 
 
 @pytest.mark.parametrize(
@@ -181,23 +129,20 @@ def test_a_table_without_times_is_refused(program):
         ("ahead and", "ahead,and", "fields, got"),
     ],
 )
-def test_the_reader_refuses_what_it_does_not_know(old, new, message, arm):
-    text = GOLDEN.read_text()
-    assert old in text
-    with pytest.raises(InputError, match=re.escape(message)):
-        reread(text.replace(old, new, 1), arm)
+def test_the_reader_refuses_what_it_does_not_know(old, new, message):
+    CASE.refuses(TABLE, old, new, message)
 
 
-def test_the_reader_refuses_a_quaternion_that_is_none_and_sections_apart(arm, program):
+def test_the_reader_refuses_a_quaternion_that_is_none_and_sections_apart(program):
     text = re.sub(r"0\.\d{11},((?:-?\d\.\d{11},){3},)", r"0.900000000,\1", table(program))
     with pytest.raises(InputError, match="must have length 1"):
-        reread(text, arm)
-    lines = GOLDEN.read_text().splitlines()
+        CASE.read({TABLE: text})
+    lines = GOLDEN.splitlines()
     lines[4] = lines[4].replace("skin_outer", "other", 1)
     with pytest.raises(InputError, match="'skin_outer' do not stand together"):
-        reread("\n".join(lines), arm)
+        CASE.read({TABLE: "\n".join(lines)})
     with pytest.raises(InputError, match="line 1: expected the columns"):
-        reread("", arm)
+        CASE.read({TABLE: ""})
 
 
 @pytest.mark.parametrize(
@@ -205,22 +150,14 @@ def test_the_reader_refuses_a_quaternion_that_is_none_and_sections_apart(arm, pr
     [("t_s", 0.01), ("q3_deg", 0.01), ("x_mm", 0.01), ("speed_mm_s", 0.01), ("zone_mm", 0.01)],
 )
 def test_an_edited_table_is_read_as_edited(program, column, off):
-    lines = GOLDEN.read_text().splitlines()
+    lines = GOLDEN.splitlines()
     fields, at = lines[6].split(","), lines[0].split(",").index(column)
     fields[at] = f"{float(fields[at]) + off:.9f}"
     text = "\n".join([*lines[:6], ",".join(fields), *lines[7:]])
-    assert deviations(program, reread(text, program.robot), CSV, CsvSettings())
+    assert CASE.deviations(program, {TABLE: text})
 
 
-@settings(max_examples=40, deadline=None)
-@given(st.text(max_size=60), st.text(max_size=60))
-def test_no_text_of_a_person_becomes_a_row(name, comment):
-    arm = robot("abb_irb4600_60_205").with_limits(acceleration=np.radians([500] * 6))
-    odd = build_program([hand_plan(arc(name, count=4), arm, *frames())], name=f"cut {name}")
-    first, *rest = odd.sections[0].steps
-    assert isinstance(first, Comment)
-    odd = with_steps(odd, [Comment(comment), *rest])
-    same(odd)
-    lines = table(odd).splitlines()
-    assert len(lines) == 1 + len(odd.moves)
+def test_every_move_has_a_row_of_its_own(program):
+    lines = table(with_steps(program, [Comment("a,b"), *program.sections[0].steps])).splitlines()
+    assert len(lines) == 2 + len(program.moves)
     assert all(line.count(",") == lines[0].count(",") for line in lines)

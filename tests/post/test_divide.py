@@ -4,6 +4,7 @@ import re
 
 import numpy as np
 import pytest
+from tests.post.cases import ARMS
 
 from kerfpath import InputError, robot
 from kerfpath.post import (
@@ -13,11 +14,11 @@ from kerfpath.post import (
     Section,
     Switch,
     Wait,
-    in_files,
+    divide_sections,
     language,
     post,
     preflight,
-    renamed,
+    rename_sections,
 )
 
 
@@ -70,14 +71,6 @@ def branch(arm, q):
     return np.array([int(np.nanargmin(apart))])
 
 
-ARMS = {
-    "rapid": "abb_irb4600_60_205",
-    "krl": "kuka_kr16_r2010_2",
-    "fanuc": "fanuc_m20id_25",
-    "val3": "staubli_tx2_160l",
-    "inform": "yaskawa_gp25",
-    "urscript": "ur_ur10e",
-}
 BEAM = {
     "rapid": (r"Trigg[LC].*trOn", r"Trigg[LC].*trOff"),
     "krl": (r"TRIGGER.*OUT\[1\]=TRUE", r"TRIGGER.*OUT\[1\]=FALSE"),
@@ -127,7 +120,7 @@ def cuts_with_borders(name, files):
 @pytest.mark.parametrize("lines", [100, 137, 250, 9999])
 def test_no_border_of_a_file_or_routine_lies_inside_a_contour(name, lengths, lines):
     """The beam is off wherever a routine or file begins or ends; or the program is refused."""
-    made, options = program(*lengths, arm=ARMS[name]), settings(name, lines)
+    made, options = program(*lengths, arm=ARMS[name][0]), settings(name, lines)
     too_long = max(lengths) + 5 > lines or (name == "inform" and 2 * max(lengths) + 30 > lines)
     if name in ("fanuc", "inform") and too_long:
         with pytest.raises(InputError, match=r"not divided.*lines_per_file"):
@@ -147,7 +140,7 @@ def test_no_border_of_a_file_or_routine_lies_inside_a_contour(name, lengths, lin
 @pytest.mark.parametrize("name", ARMS)
 def test_the_law_finds_a_border_that_is_put_into_a_contour(name):
     """What it looks for is there to be found: each kind of call, in the middle of a cut."""
-    files = post(program(20, arm=ARMS[name]), name, settings(name, 9999))
+    files = post(program(20, arm=ARMS[name][0]), name, settings(name, 9999))
     (file,) = [f for f, text in files.items() if re.search(BEAM[name][0], text)]
     lines = files[file].splitlines()
     first = next(k for k, line in enumerate(lines) if re.search(BEAM[name][0], line))
@@ -159,7 +152,7 @@ def test_the_law_finds_a_border_that_is_put_into_a_contour(name):
 
 @pytest.mark.parametrize("name", ["rapid", "krl", "val3"])
 def test_a_contour_longer_than_a_file_has_its_own_and_is_warned_of(name):
-    made, options = program(10, 300, 10, arm=ARMS[name]), settings(name, 100)
+    made, options = program(10, 300, 10, arm=ARMS[name][0]), settings(name, 100)
     found = [issue for issue in preflight(made, name, options) if issue.code == "file-length"]
     assert [issue.level for issue in found] == ["warning"]
     assert "lines_per_file" in found[0].message
@@ -167,15 +160,15 @@ def test_a_contour_longer_than_a_file_has_its_own_and_is_warned_of(name):
 
 def test_names_are_cut_and_stay_different():
     whole = program(5, 5)
-    names = [section.name for section in renamed(whole, longest_name=8).sections]
+    names = [section.name for section in rename_sections(whole, longest_name=8).sections]
     assert names == ["a_long_n", "a_long_2"]
-    taken = renamed(whole, ("A_Long_N",), longest_name=8)
+    taken = rename_sections(whole, ("A_Long_N",), longest_name=8)
     assert taken.sections[0].name == "a_long_2"
     assert taken.steps == whole.steps
 
 
 def test_files_hold_as_many_sections_as_fit():
     sections = program(1, 1, 1, 1, 1).sections
-    files = in_files(sections, [40, 50, 20, 200, 10], 100)
+    files = divide_sections(sections, [40, 50, 20, 200, 10], 100)
     assert [[s.name[-1] for s in file] for file in files] == [["0", "1"], ["2"], ["3"], ["4"]]
-    assert in_files((), [], 10) == []
+    assert divide_sections((), [], 10) == []

@@ -8,33 +8,26 @@ import pytest
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
+from tests.post.cases import CASES
 
-from conftest import ROOT
 from kerfpath import InputError, robot
 from kerfpath.contour import KINDS
 from kerfpath.post import (
-    CircularMove,
-    Comment,
     JointMove,
     LinearMove,
     ReadWait,
     Switch,
     build_program,
-    deviations,
-    language,
     post,
-    preflight,
-    read_program,
 )
-from kerfpath.post._frames import world, xyzwpr
+from kerfpath.post._frames import euler, world
 from kerfpath.post.fanuc import FanucSettings, axes_from_joints, joints_from_axes, posture
 from kerfpath.robots import robot_ids
-from programs import arc, changed, codes, edited, frames, hand_plan, with_steps
+from programs import arc, arced, changed, codes, hand_plan, with_steps
 
-GOLDEN = ROOT / "tests" / "data" / "golden_fanuc"
-MAIN, CONTOUR, OFF = "CUT_SKIN_OUTER.ls", "SKIN_OUTER.ls", "CUT_SKIN_OUTER_OFF.ls"
-FANUC = language("fanuc")
-OPTIONS = FanucSettings(laser_output=1)
+CASE = CASES["fanuc"]
+OPTIONS, golden = CASE.settings, CASE.golden
+MAIN, CONTOUR, OFF = golden
 ARMS = [name for name in robot_ids() if name.startswith("fanuc")]
 REACH = np.array([6.0, 6.0, 6.0, 6.0, 6.0, 99.0])
 WIDE = {"lower": -REACH, "upper": REACH}
@@ -63,26 +56,17 @@ controller, measured by others: source in kerfpath.post.fanuc._axes."""
 
 @pytest.fixture(scope="module")
 def cell():
-    return robot("fanuc_m20id_25"), *frames()
+    return CASE.cell
 
 
 @pytest.fixture(scope="module")
-def small(cell):
-    return hand_plan(arc(), *cell, speed=0.12)
-
-
-@pytest.fixture(scope="module")
-def program(small):
-    return build_program([small])
-
-
-def golden():
-    return {name: (GOLDEN / name).read_bytes().decode("ascii") for name in (MAIN, CONTOUR, OFF)}
+def program():
+    return CASE.program
 
 
 def read(program, options=OPTIONS):
     """What the listings of a program say; post() has compared them with it."""
-    return read_program(post(program, "fanuc", options), "fanuc", program.robot, options)
+    return CASE.read(CASE.post(program, options), program.robot, options)
 
 
 # The controller's conventions.
@@ -119,35 +103,6 @@ def test_every_arm_of_the_library_measures_joint_3_from_the_horizontal(name):
     upper = arm.with_limits(**WIDE)
     raised = upper.forward(joints_from_axes(arm, np.radians([[0, 20, 30, 0, 0, 0]])))[0]
     np.testing.assert_allclose(raised[:3, 2], [np.cos(np.pi / 6), 0, 0.5], atol=1e-12)
-
-
-def test_an_arm_described_otherwise_has_the_same_axes():
-    """Signs, zeros, foot and flange of a description change; what the controller shows does not."""
-    arm = robot("fanuc_m20ia")
-    turned = np.eye(4)
-    turned[:3, :3] = Rotation.from_euler("z", 40, degrees=True).as_matrix()
-    other = replace(arm, sign=-arm.sign, offset=arm.offset + 0.3, T_end_flange=turned)
-    q = np.random.default_rng(5).uniform(-1, 1, (5, 6))
-    same = joints_from_axes(other, axes_from_joints(arm, q))
-    np.testing.assert_allclose(other.forward(same), arm.forward(q) @ turned, atol=1e-12)
-    assert posture(other, same, OPTIONS) == posture(arm, q, OPTIONS)
-
-
-@pytest.mark.parametrize("number", range(8))
-def test_configurations_follow_the_posture_in_all_eight_postures(cell, number):
-    """The kernels' postures are an independent account of front/rear, elbow and wrist."""
-    arm, tool, _ = cell
-    placement = np.eye(4)
-    placement[:3, 3] = 0.55, 0.1, 0.9
-    free = arm.with_limits(lower=np.full(6, -4.0), upper=np.full(6, 4.0))
-    arm = replace(free, couplings=())
-    made = hand_plan(arc(count=20, radius=0.03), arm, tool, placement, posture=number)
-    moves = read(build_program([made])).moves[1:-1]
-    rear, down, minus = number // 4, number // 2 % 2, number % 2
-    # Behind axis 1 the elbow of the kernels changes its sense, the lower arm's side does not; J5
-    # grows against the model's wrist.
-    expected = ("NF"[minus], "UD"[rear ^ down], "TB"[rear])
-    assert {move.posture[:3] for move in moves} == {expected}
 
 
 @settings(max_examples=60, deadline=None)
@@ -205,21 +160,17 @@ def test_x_y_z_w_p_r_turn_about_fixed_axes_one_after_the_other():
     about = {axis: Rotation.from_rotvec(angle * np.eye(3)["xyz".index(axis)]).as_matrix()
              for axis, angle in (("x", w), ("y", p), ("z", r))}  # fmt: skip
     T[0, :3, :3] = about["z"] @ about["y"] @ about["x"]
-    np.testing.assert_allclose(xyzwpr(T)[0, 3:], [20, -35, 110], atol=1e-12)
+    np.testing.assert_allclose(euler(T, "xyz")[0, 3:], [20, -35, 110], atol=1e-12)
     T[0, :3, :3] = Rotation.from_euler("xyz", [30, 90, 0], degrees=True).as_matrix()
-    back = Rotation.from_euler("xyz", xyzwpr(T)[0, 3:], degrees=True).as_matrix()
+    back = Rotation.from_euler("xyz", euler(T, "xyz")[0, 3:], degrees=True).as_matrix()
     np.testing.assert_allclose(back, T[0, :3, :3], atol=1e-9)  # at the lock, the same rotation
 
 
 # The text.
 
 
-def test_the_golden_listings_are_written_byte_for_byte(small):
-    assert post([small], "fanuc", OPTIONS) == golden()
-
-
 def test_listings_are_numbered_counted_and_short():
-    for name, text in golden().items():
+    for name, text in golden.items():
         rows = text.split("\r\n")
         assert rows[0] == f"/PROG  {name.removesuffix('.ls')}"
         assert rows[-2:] == ["/END", ""]
@@ -236,16 +187,12 @@ def test_listings_are_numbered_counted_and_short():
 # The law: what is read back is what was planned.
 
 
-def test_the_golden_listings_read_back_as_planned(small, program):
-    back = read_program(golden(), "fanuc", program.robot, OPTIONS)
-    assert deviations(program, back, FANUC, OPTIONS) == []
-    np.testing.assert_allclose(back.T_flange_tip, small.T_flange_tip, atol=1e-7)
-    np.testing.assert_allclose(back.T_base_part, small.T_base_part, atol=1e-7)
+def test_the_golden_listings_read_back_as_planned(program):
+    back, small = CASE.read(golden), CASE.small
     T = back.T_base_part @ np.array([move.T_part_tip for move in back.moves[1:-1]])
     planned = small.robot.forward(small.q) @ small.T_flange_tip
     np.testing.assert_allclose(T, planned, atol=2e-6)  # 1e-3 mm, 1e-4 deg
     assert [move.zone for move in back.moves] == [0.0, 0.0, *[None] * 6, 0.0, 0.0]
-    assert [round(move.speed, 9) for move in back.moves] == [0.25, 0.1, *[0.12] * 7, 0.1]
     switched = [(k, move.switches) for k, move in enumerate(back.moves) if move.switches]
     assert switched == [
         (1, (Switch(signal="laser", on=True, lead_time=0.02),)),
@@ -253,7 +200,7 @@ def test_the_golden_listings_read_back_as_planned(small, program):
     ]
 
 
-def test_frames_are_told_in_the_controllers_world(program):
+def test_frames_are_given_in_the_controllers_world(program):
     """A flange of its own and a foot turned and raised change what is to be entered."""
     foot, flange = np.eye(4), np.eye(4)
     foot[:3, :3] = Rotation.from_euler("z", 90, degrees=True).as_matrix()
@@ -263,7 +210,6 @@ def test_frames_are_told_in_the_controllers_world(program):
     tool = np.linalg.inv(flange) @ program.T_flange_tip
     moved = replace(moved, T_flange_tip=tool)
     assert post(moved, "fanuc", OPTIONS) == post(program, "fanuc", OPTIONS)
-    assert deviations(moved, read(moved), FANUC, OPTIONS) == []
 
 
 def test_several_contours_gas_waits_and_micro_joints(cell):
@@ -311,15 +257,9 @@ def test_what_cannot_be_switched_with_one_tb_is_refused(program):
 
 
 def test_arcs_are_one_line_in_two_rows(program):
-    steps = list(program.sections[0].steps)
-    via, end = steps[4], steps[5]
-    fields = {k: getattr(end, k) for k in ("T_part_tip", "q", "speed", "duration", "zone")}
-    circle = CircularMove(T_part_via=via.T_part_tip, q_via=via.q, **fields)
-    made = with_steps(program, [*steps[:4], circle, *steps[6:]])
-    text = post(made, "fanuc", OPTIONS)[CONTOUR]
-    assert "   8:C P[4]    \r\n    :  P[5] 720cm/min CNT100    ;\r\n   9:L P[6]" in text
-    (back,) = [move for move in read(made).moves if move.kind == "circular"]
-    np.testing.assert_allclose(back.T_part_via, via.T_part_tip, atol=2e-6)
+    files, _ = CASE.reads_back(arced(program, [3]))
+    rows = "   8:C P[4]    \r\n    :  P[5] 720cm/min CNT100    ;\r\n   9:L P[6]"
+    assert rows in files[CONTOUR]
 
 
 def test_a_contour_longer_than_a_program_is_refused_not_divided(cell):
@@ -338,26 +278,26 @@ def test_names_are_cut_for_older_controllers_and_stay_different(cell):
     assert list(files) == ["CUT_SKIN.ls", "SKIN_OUT.ls", "SKIN_O_2.ls", "CUT__OFF.ls"]
 
 
-def test_speeds_are_whole_numbers_of_the_finer_unit(cell, small):
+def test_speeds_are_whole_numbers_of_the_finer_unit(cell):
     odd = build_program([hand_plan(arc(), *cell, speed=0.0504)])
     assert "302cm/min" in post(odd, "fanuc", OPTIONS)[CONTOUR]
     assert codes(odd, language="fanuc", settings=OPTIONS) == ["air-moves"]
     coarse = FanucSettings(laser_output=1, speed_unit="mm/sec")
     assert "50mm/sec" in post(odd, "fanuc", coarse)[CONTOUR]
     assert "speed-step" in codes(odd, "warning", "fanuc", coarse)
-    slow = build_program([small], approach_speed=0.0001)
+    slow = build_program([CASE.small], approach_speed=0.0001)
     assert codes(slow, "error", "fanuc", OPTIONS) == ["speed", "speed"]
     fast = FanucSettings(laser_output=1, fastest_mm_s=100.0)
     assert set(codes(odd, "error", "fanuc", fast)) == set()
-    assert "speed" in codes(build_program([small]), "error", "fanuc", fast)
+    assert "speed" in codes(build_program([CASE.small]), "error", "fanuc", fast)
 
 
-def test_corner_regions_say_the_zone_in_whole_mm(small):
+def test_corner_regions_say_the_zone_in_whole_mm():
     options = FanucSettings(laser_output=1, corner="CR")
-    program = build_program([small], zone=0.002)
+    program = build_program([CASE.small], zone=0.002)
     assert " CR2    ;" in post(program, "fanuc", options)[CONTOUR]
     assert read(program, options).moves[3].zone == pytest.approx(0.002)
-    assert codes(build_program([small]), "error", "fanuc", options) == ["corner-region"]
+    assert codes(build_program([CASE.small]), "error", "fanuc", options) == ["corner-region"]
 
 
 @pytest.mark.parametrize("decimals", [3, 6])
@@ -393,22 +333,6 @@ def test_preflight_finds_what_only_this_language_cannot_say(program, cell):
     )
 
 
-@pytest.mark.parametrize("name", ["PNS0001", "rsr12", "con", "End"])
-def test_names_that_a_controller_treats_specially_are_refused(program, name):
-    section = replace(program.sections[0], name=name)
-    assert codes(replace(program, sections=(section,)), "error", "fanuc", OPTIONS) == [
-        "name-reserved"
-    ]
-
-
-def test_robots_of_another_kind_or_maker(program):
-    assert "wrong-arm" in codes(
-        replace(program, robot=robot("ur_ur10e")), "error", "fanuc", OPTIONS
-    )
-    other = replace(program, robot=replace(program.robot, manufacturer="KUKA"))
-    assert [i.code for i in preflight(other, "fanuc", OPTIONS)] == ["wrong-robot", "air-moves"]
-
-
 @pytest.mark.parametrize(
     ("file", "old", "new", "message"),
     [
@@ -420,8 +344,8 @@ def test_robots_of_another_kind_or_maker(program):
         (MAIN, "  11:", "  12:", "expected line number 11"),
         (MAIN, "/END\r\n", "", "/END is missing"),
         (MAIN, "/END", "/END\r\nx", "nothing after it"),
-        (MAIN, "!UFRAME 1 X", "! UFRAME 1 X", "no remark tells X of UFRAME"),
-        (MAIN, "!UFRAME 1 X", "!UFRAME 1 Y", "Y of UFRAME is told twice"),
+        (MAIN, "!UFRAME 1 X", "! UFRAME 1 X", "no remark gives X of UFRAME"),
+        (MAIN, "!UFRAME 1 X", "!UFRAME 1 Y", "Y of UFRAME is given twice"),
         (MAIN, "!UTOOL 1 X", "!UTOOL 2 X", "tool frame 2, expected 1 and 1"),
         (MAIN, "UFRAME_NUM=1", "UFRAME_NUM=0", "user frame 0"),
         (MAIN, "UFRAME_NUM=1", "UTOOL_NUM=1", "UTOOL_NUM must be set once"),
@@ -448,10 +372,7 @@ def test_robots_of_another_kind_or_maker(program):
     ],
 )  # fmt: skip
 def test_the_reader_refuses_what_it_does_not_know(file, old, new, message):
-    files = edited(golden(), file, old, new)
-    with pytest.raises(InputError, match=re.escape(message)) as caught:
-        read_program(files, "fanuc", robot("fanuc_m20id_25"), OPTIONS)
-    assert "\n" not in str(caught.value)
+    CASE.refuses(file, old, new, message)
 
 
 @pytest.mark.parametrize(
@@ -465,11 +386,8 @@ def test_the_reader_refuses_what_it_does_not_know(file, old, new, message):
         ("X =   78.7485", "X =   78.7585", "the tip is 0.0100 mm"),
     ],
 )
-def test_an_edited_listing_is_read_as_edited(program, old, new, message):
-    files = edited(golden(), CONTOUR, old, new)
-    back = read_program(files, "fanuc", program.robot, OPTIONS)
-    issues = deviations(program, back, FANUC, OPTIONS)
-    assert message in " ".join(map(str, issues))
+def test_an_edited_listing_is_read_as_edited(old, new, message):
+    CASE.finds(CONTOUR, old, new, message)
 
 
 def test_a_listing_that_a_controller_lists_again_is_read(program):
@@ -477,36 +395,7 @@ def test_a_listing_that_a_controller_lists_again_is_read(program):
     files = {
         name: text.replace("PROG_SIZE\t= 0;", "PROG_SIZE\t= 1446;\r\nCREATE\t\t= DATE 26-09-18  "
                            "TIME 13:33:06;").replace("/MN", "LOCAL_REGISTERS\t= 0,0,0;\r\n/MN")
-        for name, text in golden().items()
+        for name, text in golden.items()
     }  # fmt: skip
     files[CONTOUR] = files[CONTOUR].replace(" -0.0687 deg", "  -.0687 deg")
-    back = read_program(files, "fanuc", program.robot, OPTIONS)
-    assert deviations(program, back, FANUC, OPTIONS) == []
-
-
-TEXT = st.text(max_size=60) | st.sampled_from(
-    ["a;b", "!UFRAME 1 X 5.0000", "x" * 31 + " UTOOL 1 X 5.0000 ;", '"', "'", "\r\n/END\r\n", "]"]
-)
-
-
-@settings(max_examples=60, deadline=None)
-@given(name=TEXT, model=TEXT, remark=TEXT)
-def test_no_text_of_a_plan_becomes_an_instruction(small, name, model, remark):
-    arm = replace(small.robot, model=model)
-    made = replace(small, contour=replace(small.contour, name=name), robot=arm)
-    program = build_program([made], name="whole")
-    program = with_steps(program, [Comment(remark), *program.sections[0].steps])
-    assume("name-reserved" not in codes(program, "error", "fanuc", OPTIONS))
-    files = post(program, "fanuc", OPTIONS)
-    main, section, off = (file.removesuffix(".ls") for file in files)
-    assert (main, off) == ("WHOLE", "WHOLE_OFF")
-    assert re.fullmatch(r"[A-Z][A-Z0-9_]{0,35}", section)
-    for text, expected in zip(files.values(), golden().values(), strict=True):
-        assert instructions(text, section) == instructions(expected, "SKIN_OUTER")
-
-
-def instructions(text, called):
-    """Every row but remarks, without what depends on their number and on names."""
-    rows = [row for row in text.split("\r\n")[1:] if not re.match(r" *\d+:  ! [ -:<-~]* ;$", row)]
-    rows = [re.sub(r"^ *\d+:|(?<=LINE_COUNT\t= )\d+", "", row) for row in rows]
-    return [row.replace(f"CALL {called} ", "CALL * ") for row in rows]
+    assert CASE.deviations(program, files) == []

@@ -3,6 +3,7 @@
 import re
 
 import pytest
+from tests.post.cases import ARMS
 
 from kerfpath import InputError, robot
 from kerfpath.post import (
@@ -27,14 +28,6 @@ ASKED = (
     Await(partner="ready", timeout=4.0),
     Await(partner="interlock", timeout=0.5),
 )
-ARMS = {
-    "rapid": ("abb_irb4600_60_205", (1.05, -0.15, 0.61)),
-    "krl": ("kuka_kr16_r2010_2", (1.05, -0.15, 0.61)),
-    "fanuc": ("fanuc_m20id_25", (1.05, -0.15, 0.61)),
-    "val3": ("staubli_tx2_160l", (1.05, -0.15, 0.61)),
-    "inform": ("yaskawa_gp25", (1.0, -0.15, 0.55)),
-    "urscript": ("ur_ur10e", (0.75, 0.1, 0.2)),
-}
 PORTS = {
     "laser_output": 1, "gas_output": 2, "shutter_output": 3, "height_output": 4,
     "ready_input": 5, "interlock_input": 6,
@@ -229,11 +222,3 @@ def test_each_contour_is_a_program_that_can_be_started_alone(name):
             text = files[f"{contour}_AIR.JBI"]
             assert "///USER 1" in text
             assert "///RCONF" in text
-
-
-def test_settings_say_what_they_expect():
-    for name in ARMS:
-        for key, field in language(name).settings.model_fields.items():
-            if key.endswith(("_input", "_output")):
-                assert field.description, (name, key)
-                assert field.examples, (name, key)

@@ -9,23 +9,12 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from pydantic import ValidationError
 from scipy.spatial.transform import Rotation
+from tests.post.cases import CASES
 
-from conftest import ROOT
 from kerfpath import InputError, robot
-from kerfpath.contour import KINDS
 from kerfpath.post import (
-    CircularMove,
-    Comment,
-    JointMove,
-    LinearMove,
-    ReadMove,
-    ReadWait,
-    Switch,
     build_program,
-    deviations,
-    language,
     post,
-    read_program,
 )
 from kerfpath.post._frames import world
 from kerfpath.post.inform import (
@@ -36,60 +25,32 @@ from kerfpath.post.inform import (
     manipulator_type,
 )
 from kerfpath.robots import robot_ids
-from programs import arc, assert_at, changed, codes, edited, frames, hand_plan, with_steps
+from programs import arc, arced, changed, hand_plan, with_steps
 
-GOLDEN = ROOT / "tests" / "data" / "golden_inform"
-JOBS = ("CUT_SKIN_OUTER.JBI", "SKIN_OUTER_AIR.JBI", "SKIN_OUTER.JBI", "CUT_SKIN_OUTER_OFF.JBI")
-MAIN, AIR, PATH, OFF = JOBS
-INFORM = language("inform")
-PULSES = [1341.4, 1341.4, -1203.7, 1000.0, 980.1, 622.2]
-IN_PULSES = InformSettings(laser_output=1, gas_output=2, pulses_per_deg=PULSES)
-BY_TYPE = InformSettings(laser_output=1, gas_output=2)
+CASE = CASES["inform"]
+IN_PULSES, golden, found_codes = CASE.settings, CASE.golden, CASE.codes
+BY_TYPE = IN_PULSES.model_copy(update={"pulses_per_deg": None})
+MAIN, AIR, PATH, OFF = golden
+
+
+def reads_back(program, options=IN_PULSES):
+    """Write and read back, and look at the text alone."""
+    files, read = CASE.reads_back(program, options)
+    counts_what_it_holds(files)
+    return files, read
+
+
 ARMS = [name for name in robot_ids() if name.startswith("yaskawa")]
 
 
 @pytest.fixture(scope="module")
 def cell():
-    tool, placement = frames()
-    placement[:3, 3] = 1.0, -0.15, 0.55
-    return robot("yaskawa_gp25"), tool, placement
+    return CASE.cell
 
 
 @pytest.fixture(scope="module")
-def small(cell):
-    return hand_plan(arc(), *cell, speed=0.12)
-
-
-@pytest.fixture(scope="module")
-def program(small):
-    return build_program([small], pierce_time=0.4, gas_lead=0.3)
-
-
-def found_codes(program, level=None, settings=IN_PULSES):
-    return codes(program, level, "inform", settings)
-
-
-def golden():
-    return {name: (GOLDEN / name).read_bytes().decode("ascii") for name in JOBS}
-
-
-def reads_back(program, options=IN_PULSES):
-    """Write and read back; check every target by the robot's forward kinematics."""
-    files = post(program, "inform", options)
-    read = read_program(files, "inform", program.robot, options)
-    assert deviations(program, read, INFORM, options) == []
-    counts_what_it_holds(files)
-    q = np.array([move.q for move in program.moves])
-    T_base_tip = program.robot.forward(q) @ program.T_flange_tip
-    for expected, ours, move in zip(T_base_tip, program.moves, read.moves, strict=True):
-        if move.q is not None:
-            # Half a pulse of the coarsest axis.
-            np.testing.assert_allclose(move.q, ours.q, atol=np.radians(0.51 / 622.2))
-            continue
-        T = program.T_base_part @ move.T_part_tip
-        # Three decimals of mm, four of deg, the plan's own error.
-        assert_at(T, expected, point=2e-6)
-    return files, read
+def program():
+    return CASE.program
 
 
 def counts_what_it_holds(files):
@@ -114,37 +75,19 @@ def counts_what_it_holds(files):
 # The text.
 
 
-def test_the_golden_jobs_are_written_byte_for_byte(program):
-    files = post(program, "inform", IN_PULSES)
-    assert list(files) == list(JOBS)
-    assert files == golden()
-
-
-def test_the_golden_jobs_are_plain_text_in_windows_lines():
-    for text in golden().values():
-        assert text.count("\n") == text.count("\r\n")
-        assert all(re.fullmatch(r"[ -~]{0,80}", line) for line in text.split("\r\n"))
-
-
 @pytest.mark.parametrize("options", [IN_PULSES, BY_TYPE])
-def test_the_golden_jobs_read_back_as_planned(program, options):
+def test_a_contour_is_a_job_for_the_way_to_it_and_one_for_its_path(program, options):
     _, read = reads_back(program, options)
-    np.testing.assert_allclose(read.T_flange_tip, program.T_flange_tip, atol=1e-7)
-    np.testing.assert_allclose(read.T_base_part, program.T_base_part, atol=1e-7)
     joint, start, first, *_, last, out = read.moves
-    assert (joint.speed, start.speed, first.speed, out.speed) == (0.25, 0.1, 0.12, 0.1)
     assert [m.zone for m in (joint, start, first, last, out)] == [0, 0, None, 0, 0]
-    assert start.switches == (Switch(signal="gas", on=True), Switch(signal="laser", on=True))
-    waits = [step for step in read.steps if isinstance(step, ReadWait)]
-    assert [wait.time for wait in waits] == [0.4]
     assert [section.name for section in read.sections] == ["SKIN_OUTER_AIR", "SKIN_OUTER"]
 
 
 def test_pulses_are_degrees_times_those_of_the_robot(program):
-    row = re.search(r"C00000=(.*)", golden()[AIR])[1]
+    row = re.search(r"C00000=(.*)", golden[AIR])[1]
     axes_deg = np.degrees(axes_from_joints(program.robot, [program.moves[0].q]))[0]
     said = [int(value) for value in row.split(",")]
-    np.testing.assert_allclose(said, axes_deg * PULSES, atol=0.5)
+    np.testing.assert_allclose(said, axes_deg * IN_PULSES.pulses_per_deg, atol=0.5)
 
 
 def test_without_pulses_the_start_is_a_position_with_its_type_which_is_said(program):
@@ -157,7 +100,7 @@ def test_without_pulses_the_start_is_a_position_with_its_type_which_is_said(prog
 
 def test_positions_are_rx_then_ry_then_rz_about_fixed_axes(program):
     """The orientation of a position, turned together by hand from its text."""
-    row = re.search(r"C00000=(.*)", golden()[PATH])[1]
+    row = re.search(r"C00000=(.*)", golden[PATH])[1]
     x, y, z = np.radians([float(value) for value in row.split(",")[3:]])
     Rx = [[1, 0, 0], [0, np.cos(x), -np.sin(x)], [0, np.sin(x), np.cos(x)]]
     Ry = [[np.cos(y), 0, np.sin(y)], [0, 1, 0], [-np.sin(y), 0, np.cos(y)]]
@@ -168,39 +111,21 @@ def test_positions_are_rx_then_ry_then_rz_about_fixed_axes(program):
 
 def test_outputs_are_switched_and_waits_begin_only_where_the_robot_stands():
     stands = False
-    for row in golden()[PATH].split("\r\n"):
+    for row in golden[PATH].split("\r\n"):
         stands = row.endswith("PL=0") or (stands and not row.startswith("MOV"))
         assert stands or not row.startswith(("DOUT", "TIMER"))
 
 
-def with_arcs(program, numbers):
-    """The program with some moves of the path made the way to an arc's end."""
-    steps = list(program.sections[0].steps)
-    for n in numbers:
-        via, end = program.moves[n], program.moves[n + 1]
-        fields = ("T_part_tip", "q", "speed", "duration", "zone")
-        made = {name: getattr(end, name) for name in fields}
-        made["switches"] = (*via.switches, *end.switches)
-        steps.remove(via)
-        steps[steps.index(end)] = CircularMove(T_part_via=via.T_part_tip, q_via=via.q, **made)
-    return with_steps(program, steps)
-
-
 def test_arcs_are_three_movc_and_parted_from_each_other(program):
-    files, read = reads_back(with_arcs(program, [3, 5]))
+    files, _ = reads_back(arced(program, [3, 5]))
     words = re.findall(r"^(MOV.) (C\d+)", files[PATH], re.MULTILINE)
     assert [word for word, _ in words[2:9]] == ["MOVC"] * 3 + ["MOVL"] + ["MOVC"] * 3
     assert words[5][1] == words[6][1]
-    circles = [move for move in read.moves if move.kind == "circular"]
-    np.testing.assert_allclose(circles[0].T_part_via, program.moves[3].T_part_tip, atol=2e-6)
+    first, _ = reads_back(arced(program, [1]))
+    assert "MOVC C00000" in first[PATH], "an arc may begin a job"
 
 
-def test_an_arc_may_begin_a_job(program):
-    files, _ = reads_back(with_arcs(program, [1]))
-    assert "MOVC C00000" in files[PATH]
-
-
-def test_several_contours_become_jobs_called_in_order(cell):
+def test_jobs_are_called_in_order_by_names_as_short_as_asked_for(cell):
     names = ("skin/outer", "skin outer", "7. Bohrung ø12", "hole" * 12)
     program = build_program([hand_plan(arc(name), *cell) for name in names], name="B-pillar 4711")
     files, _ = reads_back(program)
@@ -208,8 +133,7 @@ def test_several_contours_become_jobs_called_in_order(cell):
     assert calls[:3] == ["B_PILLAR_4711_OFF", "SKIN_OUTER_AIR", "SKIN_OUTER"]
     assert calls[3:5] == ["SKIN_OUTER_2_AIR", "SKIN_OUTER_2"]
     assert max(map(len, calls)) == 32
-    short = IN_PULSES.model_copy(update={"longest_name": 8})
-    files, _ = reads_back(program, short)
+    files, _ = reads_back(program, IN_PULSES.model_copy(update={"longest_name": 8}))
     assert {len(name) for name in files} == {12}
 
 
@@ -221,23 +145,9 @@ def test_older_controllers_have_fewer_values_of_rconf(program):
 # What INFORM cannot say.
 
 
-def test_a_lead_time_is_left_out_and_said(program, small):
+def test_a_lead_time_is_left_out_and_said(program):
     assert found_codes(program, "warning") == ["lead-time", "air-moves"]
-    assert found_codes(build_program([small], lead_time=0.0)) == ["air-moves"]
-
-
-def test_the_robot_stops_at_micro_joints_which_is_said(cell):
-    words = {"i": "lead-in", "c": "cut", "m": "micro joint", "o": "lead-out"}
-    kinds = np.array([KINDS.index(words[letter]) for letter in "iccmmcoo"])
-    program = build_program([hand_plan(replace(arc(), kind=kinds), *cell)], lead_time=0.0)
-    assert found_codes(program) == ["stop-to-switch", "air-moves"]
-    _, read = reads_back(program)
-    on, switched = False, []
-    for move in read.moves:
-        switched.append(on)
-        on = move.switches[-1].on if move.switches else on
-        assert move.zone == 0 or not move.switches
-    assert switched == [False, False, True, True, True, False, False, True, True, False]
+    assert found_codes(build_program([CASE.small], lead_time=0.0)) == ["air-moves"]
 
 
 @pytest.mark.parametrize("turns", [-2, -1, 1, 2])
@@ -280,17 +190,6 @@ def test_every_arm_of_the_library_counts_joints_as_the_controller_does(name):
     assert lifted[2, 3] > arm.forward(np.zeros(6))[2, 3]
 
 
-def test_an_arm_described_otherwise_has_the_same_axes(cell):
-    arm = cell[0]
-    turned = np.eye(4)
-    turned[:3, :3] = Rotation.from_euler("z", 40, degrees=True).as_matrix()
-    other = replace(arm, sign=-arm.sign, offset=arm.offset + 0.3, T_end_flange=turned)
-    q = np.random.default_rng(5).uniform(-1, 1, (5, 6))
-    same = joints_from_axes(other, axes_from_joints(arm, q))
-    np.testing.assert_allclose(other.forward(same), arm.forward(q) @ turned, atol=1e-12)
-    np.testing.assert_array_equal(manipulator_type(other, same), manipulator_type(arm, q))
-
-
 @pytest.mark.parametrize(
     ("r_deg", "no_flip", "beyond"),
     [
@@ -307,21 +206,15 @@ def test_flip_and_the_angle_of_r_are_those_of_the_manuals_table(r_deg, no_flip, 
 
 
 @pytest.mark.parametrize("number", range(8))
-def test_types_follow_the_posture_in_all_eight_postures(cell, number):
-    """The kernels' postures are an independent account of front/rear and elbow."""
-    arm, tool, _ = cell
-    placement = np.eye(4)
-    placement[:3, 3] = 0.45, 0.1, 0.7
-    free = arm.with_limits(lower=np.full(6, -6.28), upper=np.full(6, 6.28))
-    made = hand_plan(arc(count=20, radius=0.03), free, tool, placement, posture=number)
+def test_types_follow_the_posture_in_all_eight_postures(number):
+    """By both rules of flip, and by the turns of R, T and S."""
+    made = CASE.in_posture(number)
     program = build_program([made], lead_time=0.0)
-    rear, down = number // 4, number // 2 % 2
     for options in (IN_PULSES, BY_TYPE, BY_TYPE.model_copy(update={"flip": "R"})):
         _, read = reads_back(program, options)
         cut = [move.posture for move in read.moves if move.kind == "linear"]
-        assert {bits[1:3] for bits in cut[:-1]} == {(rear ^ down, rear)}
         q = np.array([move.q for move in program.moves[1:]])
-        r, b, t, s = (np.degrees(axes_from_joints(free, q))[:, k] for k in (3, 4, 5, 0))
+        r, b, t, s = (np.degrees(axes_from_joints(made.robot, q))[:, k] for k in (3, 4, 5, 0))
         no_flip = np.cos(np.radians(r)) < 0 if options.flip == "R" else b < 0
         assert [bits[0] for bits in cut] == no_flip.astype(int).tolist()
         for place, angle in ((3, r), (4, t), (5, s)):
@@ -381,37 +274,15 @@ def test_more_jobs_than_a_main_job_can_call_are_refused(program):
 # Settings and preflight.
 
 
-def test_every_setting_says_what_it_expects():
-    for name, field in InformSettings.model_fields.items():
-        assert field.description, name
-        assert field.examples, name
-        with pytest.raises(ValidationError):
-            InformSettings(**{name: -1})
-
-
 @pytest.mark.parametrize("pulses", [[1.0] * 5, [0.0, 1, 1, 1, 1, 1], [float("nan")] * 6, "1"])
 def test_pulses_are_six_numbers_that_are_not_zero(pulses):
     with pytest.raises(ValidationError):
         InformSettings(pulses_per_deg=pulses)
 
 
-@pytest.mark.parametrize(
-    ("update", "code"),
-    [
-        ({"gas_output": None}, "output"),
-        ({"gas_output": 1}, "output"),
-        ({"fastest_mm_s": 110.0}, "speed"),
-    ],
-)
-def test_preflight_refuses_by_the_settings(program, update, code):
-    assert set(found_codes(program, "error", IN_PULSES.model_copy(update=update))) == {code}
-
-
-def test_preflight_refuses_a_reserved_name_and_warns_of_other_makers(program):
-    named = replace(program, sections=(replace(program.sections[0], name="master"),))
-    assert found_codes(named, "error") == ["name-reserved"]
-    other = replace(program, robot=replace(program.robot, manufacturer="KUKA"))
-    assert "wrong-robot" in found_codes(other, "warning")
+def test_preflight_refuses_a_speed_beyond_that_of_the_settings(program):
+    slow = IN_PULSES.model_copy(update={"fastest_mm_s": 110.0})
+    assert set(found_codes(program, "error", slow)) == {"speed"}
 
 
 # The reader.
@@ -423,9 +294,9 @@ def test_preflight_refuses_a_reserved_name_and_warns_of_other_makers(program):
         (MAIN, "//NAME CUT_SKIN_OUTER", "//NAME OTHER", "line 2: expected '//NAME CUT_SKIN_OUTER'"),
         (MAIN, "///NPOS 0,", "///NPOS 1,", "line 4: the main job must have no positions"),
         (MAIN, "NOP", "NOP\r\nPAUSE", "line 10: not expected here: 'PAUSE'"),
-        (MAIN, "'UFRAME 1 X", "'UFRAME 2 X", "UFRAME 1 is not told whole"),
-        (MAIN, "'UFRAME 1 Y", "'UFRAME 1 X", "UFRAME 1 X is told twice"),
-        (MAIN, "'TOOL 0 RZ", "' TOOL 0 RZ", "TOOL 0 is not told whole"),
+        (MAIN, "'UFRAME 1 X", "'UFRAME 2 X", "UFRAME 1 is not given whole"),
+        (MAIN, "'UFRAME 1 Y", "'UFRAME 1 X", "UFRAME 1 X is given twice"),
+        (MAIN, "'TOOL 0 RZ", "' TOOL 0 RZ", "TOOL 0 is not given whole"),
         (OFF, "DOUT OT#(1) OFF", "DOUT OT#(1) ON", "expected 'DOUT OT#(1) OFF'"),
         (OFF, "DOUT OT#(1) OFF", "DOUT OT#(3) OFF", "expected 'DOUT OT#(1) OFF'"),
         (OFF, "DOUT OT#(2) OFF\r\n", "", "'DOUT OT#(2) OFF' is missing"),
@@ -460,16 +331,13 @@ def test_preflight_refuses_a_reserved_name_and_warns_of_other_makers(program):
         (PATH, "END", "JUMP *A\r\nEND", "not expected here: 'JUMP *A'"),
     ],
 )  # fmt: skip
-def test_the_reader_refuses_what_it_does_not_know(cell, file, old, new, message):
-    files = edited(golden(), file, old, new)
-    with pytest.raises(InputError, match=re.escape(message)) as caught:
-        read_program(files, "inform", cell[0], IN_PULSES)
-    assert "\n" not in str(caught.value)
+def test_the_reader_refuses_what_it_does_not_know(file, old, new, message):
+    CASE.refuses(file, old, new, message)
 
 
-def test_pulses_cannot_be_read_without_those_of_the_robot(cell):
+def test_pulses_cannot_be_read_without_those_of_the_robot():
     with pytest.raises(InputError, match=r"SKIN_OUTER_AIR.JBI, line \d+: .*give pulses_per_deg"):
-        read_program(golden(), "inform", cell[0], BY_TYPE)
+        CASE.read(golden, settings=BY_TYPE)
 
 
 @pytest.mark.parametrize(
@@ -487,45 +355,5 @@ def test_pulses_cannot_be_read_without_those_of_the_robot(cell):
         (MAIN, "'TOOL 0 X 51.3000", "'TOOL 0 X 51.4000"),
     ],
 )
-def test_an_edited_program_is_read_as_edited(program, file, old, new):
-    files = edited(golden(), file, old, new)
-    read = read_program(files, "inform", program.robot, IN_PULSES)
-    assert deviations(program, read, INFORM, IN_PULSES)
-
-
-NASTY = st.text(max_size=60) | st.sampled_from(
-    ["x\nEND", "'UFRAME 1 X 0.0000", "a 'UFRAME 1 X 0.0000 b" * 3, "\r\nDOUT OT#(1) ON", "/JOB"]
-)
-
-
-@settings(max_examples=60, deadline=None)
-@given(name=NASTY, robot_id=NASTY, remark=NASTY)
-def test_no_text_of_a_person_becomes_a_line_of_a_job(small, name, robot_id, remark):
-    try:
-        odd = build_program([replace(small, contour=replace(small.contour, name=name))])
-    except InputError:
-        return
-    first, *rest = odd.sections[0].steps
-    odd = replace(
-        with_steps(odd, [first, Comment(remark), *rest]),
-        robot=replace(odd.robot, id=robot_id, model=robot_id),
-    )
-    if {"name-reserved", "name-collision"} & set(found_codes(odd)):
-        return
-    files = post(odd, "inform", IN_PULSES)
-    plain = post(build_program([small]), "inform", IN_PULSES)
-    assert len(files) == len(plain)
-    for text, expected in zip(files.values(), plain.values(), strict=True):
-        rows = [row for row in text.splitlines() if not row.startswith("' ")]
-        theirs = [row for row in expected.splitlines() if not row.startswith("' ")]
-        assert len(rows) == len(theirs)
-        differing = [a for a, b in zip(rows, theirs, strict=True) if a != b]
-        assert all(row.startswith(("//NAME ", "CALL JOB:")) for row in differing)
-        assert max(map(len, text.splitlines())) <= 100
-    kinds = [type(step) for step in read_program(files, "inform", odd.robot, IN_PULSES).steps]
-    assert kinds == [ReadMove] * len(odd.moves)
-
-
-def test_moves_are_joint_moves_and_moves_of_the_path(program):
-    """What the law above compares is there: one joint move, then the path."""
-    assert [type(move) for move in program.moves] == [JointMove] + [LinearMove] * 9
+def test_an_edited_program_is_read_as_edited(file, old, new):
+    CASE.finds(file, old, new)

@@ -8,23 +8,13 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from pydantic import ValidationError
 from scipy.spatial.transform import Rotation
+from tests.post.cases import CASES
 
-from conftest import ROOT
 from kerfpath import Contour, InputError, plan, robot
-from kerfpath.contour import KINDS
 from kerfpath.post import (
-    CircularMove,
-    Comment,
-    ReadMove,
-    ReadWait,
-    Switch,
     build_program,
-    deviations,
-    language,
     post,
-    read_program,
 )
 from kerfpath.post.krl import (
     Krl,
@@ -33,88 +23,28 @@ from kerfpath.post.krl import (
     joints_from_axes,
     status_and_turn,
 )
-from programs import arc, assert_at, changed, codes, edited, frames, hand_plan, with_steps
+from programs import arc, arced, changed, edited, frames, hand_plan, with_steps
 
-DATA = ROOT / "tests" / "data"
-KRL = language("krl")
-OUTPUTS = KrlSettings(laser_output=5, gas_output=6)
+CASE = CASES["krl"]
+OUTPUTS, golden, reads_back, found_codes = CASE.settings, CASE.golden, CASE.reads_back, CASE.codes
 
 
 @pytest.fixture(scope="module")
 def kuka():
-    return robot("kuka_kr16_r2010_2")
+    return CASE.cell[0]
 
 
 @pytest.fixture(scope="module")
-def small(kuka):
-    return hand_plan(arc(), kuka, *frames(), speed=0.12)
-
-
-@pytest.fixture(scope="module")
-def program(small):
-    return build_program([small], pierce_time=0.4, gas_lead=0.3)
-
-
-def found_codes(program, level=None, settings=OUTPUTS):
-    return codes(program, level, "krl", settings)
-
-
-def golden():
-    names = ("golden_krl.src", "golden_krl.dat")
-    texts = [(DATA / name).read_bytes().decode("ascii") for name in names]
-    return dict(zip(("cut_skin_outer.src", "cut_skin_outer.dat"), texts, strict=True))
-
-
-def reads_back(program, settings=OUTPUTS):
-    """Write and read back; check tool, part and every target by the robot's forward kinematics."""
-    files = post(program, "krl", settings)
-    read = read_program(files, "krl", program.robot, settings)
-    assert deviations(program, read, KRL, settings) == []
-    q = np.array([move.q for move in program.moves])
-    T_base_tip = program.robot.forward(q) @ program.T_flange_tip
-    for expected, ours, move in zip(T_base_tip, program.moves, read.moves, strict=True):
-        if move.kind == "joint":
-            T = program.robot.forward(move.q) @ program.T_flange_tip
-        else:
-            T = program.T_base_part @ move.T_part_tip
-        # 1e-3 mm and 1e-3 deg: four decimals of mm, six of deg, the plan's own error.
-        assert_at(T, expected)
-        assert [s.signal for s in move.switches] == [
-            s.signal for s in getattr(ours, "switches", ())
-        ]
-    return files, read
+def program():
+    return CASE.program
 
 
 # The text.
 
 
-def test_the_golden_program_is_written_byte_for_byte(program):
-    assert post(program, "krl", OUTPUTS) == golden()
-
-
-def test_the_golden_program_is_plain_text_in_windows_lines():
-    for text in golden().values():
-        assert text.count("\n") == text.count("\r\n")
-        assert all(re.fullmatch(r"[ -~]{0,120}", line) for line in text.split("\r\n"))
-        assert not any(line.endswith(" ") for line in text.split("\r\n"))
-
-
-def test_the_golden_program_reads_back_as_planned(program):
-    _, read = reads_back(program)
-    np.testing.assert_allclose(read.T_flange_tip, program.T_flange_tip, atol=1e-7)
-    np.testing.assert_allclose(read.T_base_part, program.T_base_part, atol=1e-7)
-    joint, start, first, *_, last, out = read.moves
-    assert (joint.speed, start.speed, first.speed, out.speed) == (0.25, 0.1, 0.12, 0.1)
-    assert [m.zone for m in (start, last, out)] == [0, 0, 0]
-    assert first.zone == pytest.approx(0.0003)
-    assert start.switches[1] == Switch(signal="laser", on=True, lead_time=0.02)
-    waits = [step for step in read.steps if isinstance(step, ReadWait)]
-    assert [wait.time for wait in waits] == [0.4]
-
-
 def test_positions_are_a_about_z_then_b_about_y_then_c_about_x(program):
     """The orientation of a LIN, turned together by hand from its text."""
-    text = golden()["cut_skin_outer.src"]
+    text = golden["cut_skin_outer.src"]
     fields = re.search(r"LIN \{X .*?A (.*?),B (.*?),C (.*?),", text).groups()
     a, b, c = (np.radians(float(field)) for field in fields)
     Rz = [[np.cos(a), -np.sin(a), 0], [np.sin(a), np.cos(a), 0], [0, 0, 1]]
@@ -155,29 +85,8 @@ def test_a_cut_straight_down_with_the_beam_ahead_reads_back(kuka):
 
 
 def test_arcs_are_written_as_circ(program):
-    move, end = program.moves[3], program.moves[4]
-    fields = {name: getattr(end, name) for name in ("T_part_tip", "q", "speed", "duration", "zone")}
-    via = CircularMove(T_part_via=move.T_part_tip, q_via=move.q, **fields)
-    steps = [step for step in program.sections[0].steps if step is not move]
-    steps = [via if step is end else step for step in steps]
-    files, read = reads_back(with_steps(program, steps))
+    files, _ = reads_back(arced(program, [3]))
     assert re.search(r"CIRC \{X [^}ST]*\},\{X [^}]*,S 2,T \d+\} C_DIS", files["cut_skin_outer.src"])
-    (circle,) = [move for move in read.moves if move.kind == "circular"]
-    np.testing.assert_allclose(circle.T_part_via, move.T_part_tip, atol=1e-7)
-
-
-def test_the_laser_is_off_along_micro_joints_and_switched_on_the_fly(kuka):
-    words = {"i": "lead-in", "c": "cut", "m": "micro joint", "o": "lead-out"}
-    kinds = np.array([KINDS.index(words[letter]) for letter in "iccmmcoo"])
-    made = hand_plan(replace(arc(), kind=kinds), kuka, *frames(), speed=0.12)
-    _, read = reads_back(build_program([made], lead_time=0.005))
-    on, switched, moving = False, [], []
-    for move in read.moves:
-        switched.append(on)
-        moving += [move.zone > 0] * len(move.switches)
-        on = move.switches[-1].on if move.switches else on
-    assert switched == [False, False, True, True, True, False, False, True, True, False]
-    assert moving == [False, True, True, False]
 
 
 # Axes, Status and Turn.
@@ -197,31 +106,11 @@ def test_positive_a1_and_a6_turn_clockwise_seen_against_their_axes(kuka):
     np.testing.assert_allclose(T[1, :3, 0], [0, -1, 0], atol=1e-12)  # it pointed down before
 
 
-def test_a_description_with_another_zero_and_sense_has_the_same_axes(kuka):
-    """The same arm, its joints counted otherwise."""
-    other = replace(
-        kuka, sign=-kuka.sign, offset=kuka.offset + np.radians([10, 20, 30, 40, 50, 60])
-    )
-    q = np.random.default_rng(0).uniform(-1, 1, (20, 6))
-    axes = axes_from_joints(other, q)
-    np.testing.assert_allclose(joints_from_axes(other, axes), q, atol=1e-14)
-    np.testing.assert_allclose(
-        kuka.forward(joints_from_axes(kuka, axes)), other.forward(q), atol=1e-12
-    )
-    np.testing.assert_allclose(axes_from_joints(kuka, q), q, atol=1e-14)
-
-
 @pytest.mark.parametrize("posture", range(8))
-def test_status_follows_the_posture_in_all_eight_postures(kuka, posture):
-    """The kernels' postures are an independent account of front/rear, elbow and wrist."""
-    tool, placement = frames()[0], np.eye(4)
-    placement[:3, 3] = 0.55, 0.1, 0.9
-    free = kuka.with_limits(lower=np.full(6, -6.2), upper=np.full(6, 6.2))
-    made = hand_plan(arc(count=20, radius=0.03), free, tool, placement, posture=posture)
+def test_turn_has_a_bit_for_each_negative_axis_in_all_eight_postures(posture):
+    made = CASE.in_posture(posture)
     _, read = reads_back(build_program([made]))
     cut = [move for move in read.moves if move.kind == "linear"][:-1]
-    rear, down, minus = posture // 4, posture // 2 % 2, posture % 2
-    assert {move.posture[0] for move in cut} == {rear + 2 * (1 - (rear ^ down)) + 4 * minus}
     assert [move.posture[1] for move in cut] == [
         sum(1 << i for i, joint in enumerate(q) if joint < 0)
         for q in made.q[0] + np.vstack([np.zeros(6), np.cumsum(made.increments, axis=0)])
@@ -320,37 +209,16 @@ def test_more_files_than_a_main_program_can_call_are_refused(program):
 # Settings and preflight.
 
 
-def test_every_setting_says_what_it_expects():
-    for name, field in KrlSettings.model_fields.items():
-        assert field.description, name
-        assert field.examples, name
-        with pytest.raises(ValidationError):
-            KrlSettings(**{name: -1})
-
-
-@pytest.mark.parametrize(
-    ("update", "code"),
-    [
-        ({"gas_output": None}, "output"),
-        ({"gas_output": 5}, "output"),
-        ({"largest_speed_m_s": 0.11}, "speed"),
-    ],
-)
-def test_preflight_refuses_by_the_settings(program, update, code):
-    found = found_codes(program, "error", OUTPUTS.model_copy(update=update))
-    assert set(found) == {code}
-
-
-def test_preflight_refuses_names_of_the_controller(program):
-    named = replace(program, sections=(replace(program.sections[0], name="Loop"),))
-    assert found_codes(named, "error") == ["name-reserved"]
+def test_preflight_refuses_a_speed_beyond_that_of_the_machine_data(program):
+    slow = OUTPUTS.model_copy(update={"largest_speed_m_s": 0.11})
+    assert set(found_codes(program, "error", slow)) == {"speed"}
 
 
 def test_preflight_refuses_frames_that_are_not_the_controllers(program, kuka):
     turned = np.eye(4)
     turned[:3, :3] = Rotation.from_euler("z", 90, degrees=True).as_matrix()
     for arm in (replace(kuka, T_end_flange=turned), replace(kuka, T_base_foot=turned)):
-        issues = list(KRL.check(replace(program, robot=arm), OUTPUTS))
+        issues = list(CASE.language.check(replace(program, robot=arm), OUTPUTS))
         assert [(i.level, i.code) for i in issues] == [("error", "frames")]
         assert "[1173.0, 0.0, 1650.0] mm" in issues[0].message
 
@@ -428,21 +296,14 @@ def test_preflight_refuses_a_joint_move_that_rounds_its_corner(program):
         ("\r\nEND\r\n\r\nDEF skin", "\r\n\r\nDEF skin", "expected 'END'"),
     ],
 )
-def test_the_reader_refuses_what_it_does_not_know(kuka, old, new, message):
-    files = golden()
-    text = files["cut_skin_outer.src"]
-    assert old in text
-    files["cut_skin_outer.src"] = text.replace(old, new, 1)
-    with pytest.raises(InputError, match=re.escape(message)) as caught:
-        read_program(files, "krl", kuka, OUTPUTS)
-    assert "\n" not in str(caught.value)
+def test_the_reader_refuses_what_it_does_not_know(old, new, message):
+    CASE.refuses("cut_skin_outer.src", old, new, message)
 
 
-def test_the_reader_refuses_what_ends_too_early(kuka):
-    files = golden()
-    files["cut_skin_outer.src"] = files["cut_skin_outer.src"].rpartition("END")[0]
+def test_the_reader_refuses_what_ends_too_early():
+    short = golden["cut_skin_outer.src"].rpartition("END")[0]
     with pytest.raises(InputError, match="END is missing"):
-        read_program(files, "krl", kuka, OUTPUTS)
+        CASE.read(golden | {"cut_skin_outer.src": short})
 
 
 @pytest.mark.parametrize(
@@ -455,75 +316,33 @@ def test_the_reader_refuses_what_ends_too_early(kuka):
         ("ENDDAT", "", "line 6: expected 'ENDDAT'"),
     ],
 )
-def test_the_reader_refuses_another_dat(kuka, old, new, message):
-    files = golden()
-    files["cut_skin_outer.dat"] = files["cut_skin_outer.dat"].replace(old, new, 1)
-    with pytest.raises(InputError, match=f"cut_skin_outer.dat, {re.escape(message)}"):
-        read_program(files, "krl", kuka, OUTPUTS)
+def test_the_reader_refuses_another_dat(old, new, message):
+    CASE.refuses("cut_skin_outer.dat", old, new, f"cut_skin_outer.dat, {message}")
 
 
-def test_a_program_begins_at_the_contour_that_its_dat_names(kuka, long):
+def test_a_program_begins_at_the_contour_that_its_dat_names(long):
     files = post(long, "krl", OUTPUTS)
     data = "a_program_with_a_very_lo.dat"
     begun = edited(files, data, "first_contour=1", "first_contour=2")
-    names = [s.name for s in read_program(files, "krl", kuka, OUTPUTS).sections]
-    assert [s.name for s in read_program(begun, "krl", kuka, OUTPUTS).sections] == names[1:]
+    names = [s.name for s in CASE.read(files).sections]
+    assert [s.name for s in CASE.read(begun).sections] == names[1:]
     for wrong in ("0", "4"):
         with pytest.raises(InputError, match=f"must be the number of a contour, got {wrong}"):
-            read_program(
-                edited(files, data, "first_contour=1", f"first_contour={wrong}"),
-                "krl", kuka, OUTPUTS,
-            )  # fmt: skip
+            CASE.read(edited(files, data, "first_contour=1", f"first_contour={wrong}"))
 
 
-def test_a_missing_dat_is_said(kuka):
-    files = golden()
-    del files["cut_skin_outer.dat"]
-    with pytest.raises(InputError, match=r"the file 'cut_skin_outer\.dat' is not there"):
-        read_program(files, "krl", kuka, OUTPUTS)
-
-
-def test_an_edited_program_is_read_as_edited(program, kuka):
-    files = golden()
-    text = files["cut_skin_outer.src"]
-    for old, new in (
+@pytest.mark.parametrize(
+    ("old", "new"),
+    [
         ("S 2,T 35", "S 6,T 35"),
         ("$VEL.CP=0.12", "$VEL.CP=0.13"),
         ("A6 -81.5", "A6 -82.5"),
         ("Y 17.3041", "Y 17.4041"),
         ("DELAY=-300", "DELAY=-200"),
-    ):
-        files["cut_skin_outer.src"] = text.replace(old, new, 1)
-        read = read_program(files, "krl", kuka, OUTPUTS)
-        assert deviations(program, read, KRL, OUTPUTS), (old, new)
-
-
-@settings(max_examples=60, deadline=None)
-@given(name=st.text(max_size=60), robot_id=st.text(max_size=20), remark=st.text(max_size=60))
-def test_no_text_of_a_person_becomes_a_line_of_the_program(small, name, robot_id, remark):
-    try:
-        odd = build_program([replace(small, contour=replace(small.contour, name=name))])
-    except InputError:
-        return
-    first, *rest = odd.sections[0].steps
-    odd = replace(
-        with_steps(odd, [first, Comment(remark), *rest]),
-        robot=replace(odd.robot, id=robot_id, model=robot_id),
-    )
-    if "name-reserved" in found_codes(odd):
-        return
-    files = post(odd, "krl", OUTPUTS)
-    plain = post(build_program([small]), "krl", OUTPUTS)["cut_skin_outer.src"]
-    text = next(iter(files.values()))
-    statements = [line for line in text.splitlines() if not line.startswith(";")]
-    expected = [line for line in plain.splitlines() if not line.startswith(";")]
-    # Only names differ: of the program, and of its one routine where it is called and defined.
-    assert len(statements) == len(expected)
-    assert sum(a != b for a, b in zip(statements, expected, strict=True)) <= 3
-    assert len(text.splitlines()) == len(plain.splitlines()) + 1
-    assert not re.search(r"^;\s*(END)?FOLD", text, re.IGNORECASE | re.MULTILINE)
-    kinds = [type(step) for step in read_program(files, "krl", odd.robot, OUTPUTS).steps]
-    assert kinds == [ReadMove] * len(odd.moves)
+    ],
+)
+def test_an_edited_program_is_read_as_edited(old, new):
+    CASE.finds("cut_skin_outer.src", old, new)
 
 
 def test_all_shipped_kuka_arms_count_joints_as_the_controller_does():

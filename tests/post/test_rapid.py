@@ -8,10 +8,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
+from tests.post.cases import CASES, kinds_of
 
-from conftest import ROOT
 from kerfpath import InputError, plan, robot
-from kerfpath.contour import KINDS
 from kerfpath.post import (
     Comment,
     LinearMove,
@@ -20,32 +19,32 @@ from kerfpath.post import (
     Wait,
     build_program,
     deviations,
-    language,
     post,
     preflight,
     read_program,
     write_program,
 )
 from kerfpath.post.rapid import RapidSettings, axes_from_joints, confdata, joints_from_axes
-from programs import arc, changed, codes, edited, frames, hand_plan, read_text, text_of, with_steps
+from programs import arc, changed, codes, edited, hand_plan, read_text, text_of, with_steps
 
-GOLDEN = ROOT / "tests" / "data" / "golden_rapid.mod"
-RAPID = language("rapid")
+CASE = CASES["rapid"]
+MODULE = "cut_skin_outer.mod"
+GOLDEN = CASE.golden[MODULE]
 
 
 @pytest.fixture(scope="module")
 def cell():
-    return robot("abb_irb4600_60_205"), *frames()
+    return CASE.cell
 
 
 @pytest.fixture(scope="module")
-def small(cell):
-    return hand_plan(arc(), *cell, speed=0.12)
+def small():
+    return CASE.small
 
 
 @pytest.fixture(scope="module")
-def program(small):
-    return build_program([small])
+def program():
+    return CASE.program
 
 
 def moves_of(section, kind):
@@ -55,21 +54,6 @@ def moves_of(section, kind):
 # The text.
 
 
-def test_the_golden_program_is_written_byte_for_byte(small):
-    assert text_of(post([small])) == GOLDEN.read_bytes().decode("ascii")
-
-
-def test_the_golden_program_is_plain_text_in_short_names():
-    lines = GOLDEN.read_text().splitlines()
-    assert max(len(line) for line in lines) < 200
-    assert all(re.fullmatch(r"[ -~]*", line) for line in lines)
-    assert not any(line.endswith(" ") for line in lines)
-
-
-def test_the_same_plans_give_the_same_bytes(cell):
-    assert post([hand_plan(arc(), *cell)]) == post([hand_plan(arc(), *cell)])
-
-
 # The law: what is read back is what was planned.
 
 
@@ -77,7 +61,7 @@ def reads_back(plans, program):
     """Check that the text says tool, placement, path, configuration, speeds and switches."""
     read = read_text(text_of(post(program)), program.robot)
     assert read.name == program.name
-    assert deviations(program, read, RAPID, RapidSettings()) == []
+    assert deviations(program, read, CASE.language, CASE.settings) == []
     first = plans[0]
     # Four decimals of mm and eight of a unit quaternion.
     np.testing.assert_allclose(read.T_flange_tip, first.T_flange_tip, atol=1e-7)
@@ -162,13 +146,9 @@ def test_several_contours_become_routines_called_in_order(cell):
 
 
 @pytest.mark.parametrize("posture", range(8))
-def test_configurations_follow_the_posture_in_all_eight_postures(cell, posture):
+def test_configurations_follow_the_posture_in_all_eight_postures(posture):
     """The kernels' postures are an independent account of front/rear, elbow and wrist."""
-    arm, tool, _ = cell
-    arm = arm.with_limits(lower=np.full(6, -7.0), upper=np.full(6, 7.0))
-    placement = np.eye(4)
-    placement[:3, 3] = 0.55, 0.1, 0.9
-    made = hand_plan(arc(count=20, radius=0.03), arm, tool, placement, posture=posture)
+    made = CASE.in_posture(posture)
     reads_back([made], build_program([made]))
 
 
@@ -274,18 +254,6 @@ def test_preflight_refuses_what_concerns_the_whole_program(program, change, code
 )
 def test_preflight_refuses_names_of_the_settings(program, settings, code):
     assert codes(program, "error", settings=RapidSettings(**settings)) == [code]
-
-
-def test_preflight_warns_of_a_robot_of_another_maker_and_strict_refuses_it(program):
-    other = replace(program, robot=replace(program.robot, manufacturer="KUKA"))
-    assert codes(other) == ["wrong-robot", "air-moves"]
-    post(other)
-    with pytest.raises(InputError, match="for robots by ABB, but 'abb_irb4600_60_205' is by KUKA"):
-        post(other, strict=True)
-
-
-def test_preflight_refuses_an_arm_whose_axes_the_language_cannot_say(program):
-    assert "wrong-arm" in codes(replace(program, robot=robot("ur_ur10e")), "error")
 
 
 def test_gas_flows_from_before_the_start_to_the_end_and_needs_an_output(small):
@@ -480,28 +448,19 @@ def test_writing_replaces_the_file_at_one_stroke(tmp_path):
     ],
 )
 def test_the_reader_refuses_what_it_does_not_know(old, new, message):
-    text = GOLDEN.read_text()
-    assert old in text
-    with pytest.raises(InputError, match=re.escape(message)):
-        read_text(text.replace(old, new, 1), robot("abb_irb4600_60_205"))
+    CASE.refuses(MODULE, old, new, message)
 
 
 def test_the_reader_refuses_a_quaternion_that_is_none():
-    text = re.sub(r"(TriggL \[\[[^]]*\],\[)[\d.-]+", r"\g<1>0.9", GOLDEN.read_text(), count=1)
+    text = re.sub(r"(TriggL \[\[[^]]*\],\[)[\d.-]+", r"\g<1>0.9", GOLDEN, count=1)
     with pytest.raises(InputError, match=r"line \d+: the quaternion .* must have length 1"):
         read_text(text, robot("abb_irb4600_60_205"))
 
 
 def test_the_reader_refuses_a_module_without_a_tool():
-    lines = [line for line in GOLDEN.read_text().splitlines() if "tooldata" not in line]
+    lines = [line for line in GOLDEN.splitlines() if "tooldata" not in line]
     with pytest.raises(InputError, match="tool tLaser and work object wPart are not the module's"):
         read_text("\n".join(lines), robot("abb_irb4600_60_205"))
-
-
-def kinds_of(text):
-    """The kind of each stretch, from single letters."""
-    words = {"p": "pierce", "i": "lead-in", "c": "cut", "m": "micro joint", "o": "lead-out"}
-    return np.array([KINDS.index(words[letter]) for letter in text])
 
 
 def test_the_laser_is_off_along_micro_joints_and_waits_at_the_pierce(cell):
@@ -556,7 +515,7 @@ def test_a_long_program_is_loaded_module_by_module(long_program):
     main = files["long.mod"]
     assert main.count("Load \\Dynamic") == main.count("UnLoad ") == len(files) - 1
     read = read_program(files, "rapid", long_program.robot, settings)
-    assert deviations(long_program, read, RAPID, settings) == []
+    assert deviations(long_program, read, CASE.language, settings) == []
     assert post(long_program).keys() == {"long.mod"}
 
 
@@ -584,31 +543,3 @@ def test_modules_that_do_not_fit_each_other_are_refused(long_program, file, old,
 def test_a_folder_of_the_controller_cannot_carry_anything_else():
     with pytest.raises(ValueError, match="folder"):
         RapidSettings(folder='HOME:"; StopMove; !')
-
-
-NASTY = st.text(max_size=40) | st.sampled_from(
-    ['a";StopMove;!', "x\nENDPROC\nPROC y()", "\u2028ENDMODULE", "\r\nSetDO doLaser,1;", "%main%"]
-)
-
-
-@settings(max_examples=40, deadline=None, derandomize=True)
-@given(name=NASTY, model=NASTY)
-def test_no_name_gets_a_line_of_its_own_into_the_program(cell, small, name, model):
-    """Names of contours and robots are identifiers and comments, whatever they hold."""
-    contour = replace(small.contour, name=name)
-    plain = post([small])
-    made = replace(small, contour=contour, robot=replace(small.robot, model=model, id=model))
-    refused = [str(i) for i in preflight(build_program([made])) if i.level == "error"]
-    if refused:
-        assert re.search(r"is reserved in ABB RAPID; rename it|is also the name of", refused[0])
-        assert "\n" not in refused[0]
-        return
-    files = post([made])
-    text = text_of(files)
-    assert len(text.splitlines()) == len(text_of(plain).splitlines())
-    words = [line.split()[0] for line in text.splitlines() if line.strip()]
-    expected = [line.split()[0] for line in text_of(plain).splitlines() if line.strip()]
-    differing = [w for w, e in zip(words, expected, strict=True) if w != e]
-    assert all(re.fullmatch(r"[A-Za-z]\w*;", word) for word in differing)  # the call of the routine
-    read = read_program(files, "rapid", made.robot)
-    assert len(read.moves) == 10

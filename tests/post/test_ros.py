@@ -6,11 +6,9 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
+from tests.post.cases import CASES
 
-from conftest import ROOT
 from kerfpath import InputError, robot
 from kerfpath.air import least_time
 from kerfpath.post import (
@@ -18,31 +16,23 @@ from kerfpath.post import (
     Comment,
     JointMove,
     build_program,
-    deviations,
-    language,
     post,
-    read_program,
 )
 from kerfpath.post.ros import RosSettings, trajectory
 from programs import arc, changed, codes, five_axis_program, frames, hand_plan, with_steps
 
-DATA = ROOT / "tests" / "data"
-GOLDEN = {
-    f"cut_skin_outer{suffix}": (DATA / f"golden_ros{suffix}").read_text()
-    for suffix in (".yaml", ".events.yaml")
-}
-ROS = language("ros")
+CASE = CASES["ros"]
+GOLDEN = CASE.golden
 
 
 @pytest.fixture(scope="module")
 def arm():
-    return robot("abb_irb4600_60_205").with_limits(acceleration=np.radians([500] * 6))
+    return CASE.cell[0]
 
 
 @pytest.fixture(scope="module")
-def program(arm):
-    made = hand_plan(arc(), arm, *frames(), speed=0.12)
-    return build_program([made], pierce_time=0.3, gas_lead=0.2)
+def program():
+    return CASE.program
 
 
 @pytest.fixture(scope="module")
@@ -53,10 +43,7 @@ def two(arm):
 
 
 def same(program, settings=None):
-    settings = RosSettings() if settings is None else settings
-    read = read_program(post(program, "ros", settings), "ros", program.robot, settings)
-    assert deviations(program, read, ROS, settings) == []
-    return read
+    CASE.reads_back(program, settings)
 
 
 def points_of(text):
@@ -69,11 +56,6 @@ def points_of(text):
 
 
 # The text.
-
-
-def test_the_golden_trajectory_is_written_byte_for_byte(program):
-    assert post(program, "ros") == GOLDEN
-    assert codes(program, "error", "ros") == []
 
 
 def test_a_ros_2_type_store_takes_the_message_and_gives_it_back():
@@ -205,21 +187,6 @@ def test_waits_keep_the_position(program):
     assert (velocity[[before, after]] == 0).all()
 
 
-@pytest.mark.parametrize("posture", range(8))
-def test_all_postures_and_turns_read_back(arm, posture):
-    tool, _ = frames()
-    reach = np.array([4.0] * 5 + [20.0])
-    wide = arm.with_limits(lower=-reach, upper=reach, velocity=np.full(6, 50.0))
-    placement = np.eye(4)
-    placement[:3, 3] = 0.55, 0.1, 0.9
-    made = hand_plan(arc(count=20, radius=0.03), wide, tool, placement, posture=posture)
-    for turns in (-2, 0, 1):
-        wound = replace(made, q=made.q + 2 * np.pi * turns * np.eye(6)[5])
-        read = same(build_program([wound]))
-        at = np.array([move.q for move in read.moves[1:-1]])
-        np.testing.assert_allclose(at, wound.q, atol=1e-9)
-
-
 @pytest.mark.parametrize("id", ["ur_ur10e", "staubli_tx2_160l"])
 def test_arms_of_other_makers_read_back(id):
     tool, placement = frames()
@@ -256,7 +223,7 @@ def test_what_a_trajectory_cannot_say_is_refused(program):
     assert codes(unknown, "error", "ros") == ["joint-speed"]
 
 
-def test_limits_that_the_trajectory_passes_are_told(program):
+def test_limits_that_the_trajectory_passes_are_named(program):
     quick = changed(program, 6, duration=0.001)
     assert codes(quick, "error", "ros") == ["joint-velocity"]
     weak = replace(program, robot=program.robot.with_limits(acceleration=np.full(6, 0.05)))
@@ -300,56 +267,37 @@ def test_more_points_than_a_file_may_have_are_refused(program):
          "a switch must follow a linear move"),
     ],
 )  # fmt: skip
-def test_the_reader_refuses_what_it_does_not_know(file, old, new, message, arm):
+def test_the_reader_refuses_what_it_does_not_know(file, old, new, message):
+    CASE.refuses(f"cut_skin_outer{file}", old, new, message)
+
+
+@pytest.mark.parametrize(
+    ("file", "message"),
+    [
+        (".events.yaml", "the trajectory goes on after the last event"),
+        (".yaml", "must stand at the first and last point"),
+    ],
+)
+def test_the_reader_refuses_a_lost_end(file, message):
     name = f"cut_skin_outer{file}"
-    assert old in GOLDEN[name]
-    with pytest.raises(InputError, match=re.escape(message)):
-        read_program({**GOLDEN, name: GOLDEN[name].replace(old, new, 1)}, "ros", arm)
+    short = "\n".join(GOLDEN[name].splitlines()[:-1])
+    with pytest.raises(InputError, match=message):
+        CASE.read({**GOLDEN, name: short})
 
 
-def test_the_reader_refuses_a_lost_file_and_a_lost_end(arm):
-    main, events = GOLDEN
-    with pytest.raises(InputError, match=r"the file 'cut_skin_outer.events.yaml' is not there"):
-        read_program({main: GOLDEN[main]}, "ros", arm)
-    short = "\n".join(GOLDEN[events].splitlines()[:-1])
-    with pytest.raises(InputError, match="the trajectory goes on after the last event"):
-        read_program({**GOLDEN, events: short}, "ros", arm)
-    short = "\n".join(GOLDEN[main].splitlines()[:-1])
-    with pytest.raises(InputError, match="must stand at the first and last point"):
-        read_program({**GOLDEN, main: short}, "ros", arm)
+@pytest.mark.parametrize(
+    ("old", "new"),
+    [
+        ("time: 0.480000000", "time: 0.470000000"),
+        ("set: laser, to: false", "set: gas, to: true"),
+        ("tip_in_flange: [0.05", "tip_in_flange: [0.06"),
+        ("part_in_base: [1.05", "part_in_base: [1.06"),
+    ],
+)
+def test_an_edited_trajectory_is_read_as_edited(old, new):
+    CASE.finds("cut_skin_outer.events.yaml", old, new)
 
 
-def test_an_edited_trajectory_is_read_as_edited(program, arm):
-    _, events = GOLDEN
-    for name, old, new in (
-        (events, "time: 0.480000000", "time: 0.470000000"),
-        (events, "set: laser, to: false", "set: gas, to: true"),
-        (events, "tip_in_flange: [0.05", "tip_in_flange: [0.06"),
-        (events, "part_in_base: [1.05", "part_in_base: [1.06"),
-    ):
-        assert old in GOLDEN[name]
-        read = read_program({**GOLDEN, name: GOLDEN[name].replace(old, new, 1)}, "ros", arm)
-        assert deviations(program, read, ROS, RosSettings()), old
-    later = with_steps(program, program.sections[0].steps)
-    other = changed(later, 6, q=program.moves[5].q + 1e-4)
-    read = read_program(post(other, "ros"), "ros", arm)
-    assert [issue.place for issue in deviations(program, read, ROS, RosSettings())] != []
-
-
-@settings(max_examples=30, deadline=None)
-@given(st.text(max_size=60), st.text(max_size=60), st.text(max_size=60))
-def test_no_text_of_a_person_becomes_a_line(name, comment, model):
-    arm = robot("abb_irb4600_60_205").with_limits(acceleration=np.radians([500] * 6))
-    made = hand_plan(arc(count=4), replace(arm, model=model), *frames())
-    odd = build_program([made], name=f"cut {name}")
-    first, *rest = odd.sections[0].steps
-    assert isinstance(first, Comment)
-    odd = with_steps(odd, [Comment(comment), *rest])
-    same(odd)
-    plain = post(build_program([hand_plan(arc(count=4), arm, *frames())]), "ros")
-    for text, expected in zip(post(odd, "ros").values(), plain.values(), strict=True):
-        lines, others = text.splitlines(), expected.splitlines()
-        assert len(lines) == len(others)
-        told = [line for line in lines if not line.startswith(("#", "trajectory:"))]
-        assert told == [line for line in others if not line.startswith(("#", "trajectory:"))]
-        assert all(re.fullmatch(r"[ -~]*", line) for line in lines)
+def test_another_target_is_found_with_its_place(program):
+    other = changed(program, 6, q=program.moves[5].q + 1e-4)
+    assert [issue.place for issue in CASE.deviations(program, CASE.post(other))] != []

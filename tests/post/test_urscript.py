@@ -8,29 +8,23 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
+from tests.post.cases import CASES
 
-from conftest import ROOT
-from kerfpath import InputError, robot
-from kerfpath.contour import KINDS
+from kerfpath import InputError
 from kerfpath.post import (
-    CircularMove,
     Comment,
-    LinearMove,
-    ReadMove,
     Switch,
     build_program,
-    deviations,
-    language,
     post,
 )
 from kerfpath.post.urscript import URScriptSettings
 from kerfpath.post.urscript._switching import distance_ahead, time_ahead
-from programs import arc, changed, codes, frames, hand_plan, read_text, text_of, with_steps
+from programs import arc, arced, changed, codes, hand_plan, read_text, text_of, with_steps
 
-GOLDEN = ROOT / "tests" / "data" / "golden_urscript.script"
-URSCRIPT = language("urscript")
+CASE = CASES["urscript"]
+URSCRIPT, GAS = CASE.language, CASE.settings
 WIRED = URScriptSettings(laser_output=0)
-GAS = URScriptSettings(laser_output=0, gas_output=1)
+SCRIPT = "cut_skin_outer.script"
 
 
 def of(text):
@@ -40,25 +34,12 @@ def of(text):
 
 @pytest.fixture(scope="module")
 def cell():
-    tool, placement = frames()
-    placement = placement.copy()
-    placement[:3, 3] = 0.75, 0.1, 0.2
-    return robot("ur_ur10e"), tool, placement
+    return CASE.cell
 
 
 @pytest.fixture(scope="module")
-def small(cell):
-    return hand_plan(replace(arc(), kind=kinds_of("picmmcoo")), *cell, speed=0.12)
-
-
-@pytest.fixture(scope="module")
-def program(small):
-    return build_program([small], pierce_time=0.3, gas_lead=0.2)
-
-
-def kinds_of(text):
-    words = {"p": "pierce", "i": "lead-in", "c": "cut", "m": "micro joint", "o": "lead-out"}
-    return np.array([KINDS.index(words[letter]) for letter in text])
+def program():
+    return CASE.program
 
 
 def script(source, settings=GAS):
@@ -70,20 +51,13 @@ def reread(text, arm, settings=GAS):
 
 
 def same(program, settings=GAS):
-    read = reread(script(program, settings), program.robot, settings)
-    assert deviations(program, read, URSCRIPT, settings) == []
-    return read
+    return CASE.reads_back(program, settings)[1]
 
 
 # The text.
 
 
-def test_the_golden_program_is_written_byte_for_byte(program):
-    assert script(program) == GOLDEN.read_bytes().decode("ascii")
-    assert codes(program, language="urscript", settings=GAS) == ["air-moves"]
-
-
-def test_targets_are_the_planned_tips_in_the_controllers_base(program, small):
+def test_targets_are_the_planned_tips_in_the_controllers_base(program):
     """Numbers cut out of the text, multiplied as pose_trans does; digits: 0.1 um and 1e-9 rad."""
     text = script(program)
 
@@ -96,7 +70,7 @@ def test_targets_are_the_planned_tips_in_the_controllers_base(program, small):
     part = pose(of(re.search(r"part_frame = (.*)", text)[1]))
     tool = pose(of(re.search(r"set_tcp(.*)", text)[1]))
     rows = [pose(of(row)) for row in re.findall(r"movel\(.*?p(\[[^]]*\])", text)[:-1]]
-    planned = small.robot.forward(small.q) @ tool
+    planned = program.robot.forward(CASE.small.q) @ tool
     np.testing.assert_allclose(part @ np.array(rows), planned, atol=2e-6)
     q = of(re.search(r"movej\((\[[^]]*\])", text)[1])
     np.testing.assert_allclose(q, program.moves[0].q, atol=1e-8)
@@ -134,22 +108,6 @@ def test_a_description_with_another_base_and_flange_gives_the_same_joints_and_po
 # The law: what is read back is what was planned.
 
 
-@pytest.mark.parametrize("posture", range(8))
-def test_all_postures_read_back(cell, posture):
-    arm, tool, _ = cell
-    placement = np.eye(4)
-    placement[:3, 3] = 0.5, 0.2, 0.3
-    made = hand_plan(arc(count=20, radius=0.03), arm, tool, placement, posture=posture)
-    read = same(build_program([made]), WIRED)
-    start = read.moves[0].q
-    assert (
-        arm.inverse(arm.forward(start)).posture[
-            np.abs(arm.inverse(arm.forward(start)).q - start).max(axis=1).argmin()
-        ]
-        == posture
-    )
-
-
 def test_turns_of_the_wrist_stay_as_planned(cell):
     arm, tool, placement = cell
     arm = arm.with_limits(endless=[False] * 5 + [True])
@@ -163,33 +121,13 @@ def test_turns_of_the_wrist_stay_as_planned(cell):
         assert ("turns" in codes(wound, "warning", "urscript", WIRED)) == beyond
 
 
-def test_several_contours_are_called_in_order(cell):
-    plans = [hand_plan(arc(name), *cell) for name in ("skin", "hole 1", "hole 2")]
-    read = same(build_program(plans), WIRED)
-    assert [section.name for section in read.sections] == ["skin", "hole_1", "hole_2"]
-
-
 def test_arcs_are_written_as_movec(program):
-    moves = program.moves
-    bent = CircularMove(
-        T_part_tip=moves[4].T_part_tip,
-        q=moves[4].q,
-        T_part_via=moves[3].T_part_tip,
-        q_via=moves[3].q,
-        speed=0.1,
-        duration=0.2,
-        zone=0.0003,
-        switches=moves[4].switches,
-    )
-    steps = [step for step in program.sections[0].steps if step is not moves[3]]
-    steps[steps.index(moves[4])] = bent
-    arced = with_steps(program, steps)
-    same(arced)
-    text = script(arced)
+    made = arced(program, [3])
+    text = script(made)
     assert text.count("movec(") == 1
     assert ", mode=0)" in text
     wrong = re.sub(r"(movec\(pose_trans\(part_frame, p\[)-?\d", r"\g<1>7", text)
-    assert deviations(arced, reread(wrong, program.robot), URSCRIPT, GAS)
+    assert CASE.deviations(made, {SCRIPT: wrong})
 
 
 # Switching.
@@ -210,8 +148,8 @@ def test_every_switch_is_written_ahead_of_its_move_and_at_its_end(program):
     lines = [line.strip() for line in script(program).splitlines()]
     start = lines.index("def skin_outer():")
     words = [re.match(r"\w+", line)[0] for line in lines[start:] if not line.startswith("#")]
-    told = [word for word in words if re.match(r"(laser|gas)_|mov|sleep", word)]
-    ends = told[: told.index("laser_run")][:-1]
+    said = [word for word in words if re.match(r"(laser|gas)_|mov|sleep", word)]
+    ends = said[: said.index("laser_run")][:-1]
     assert ends == [
         *("movej", "gas_ahead", "laser_ahead", "movel", "gas_set", "laser_set", "sleep"),
         *("movel", "movel", "laser_ahead", "movel", "laser_set"),  # into the micro joint
@@ -238,34 +176,22 @@ def test_a_signal_is_switched_once_at_the_end_of_a_move(program):
 # What the preflight refuses.
 
 
-def test_blends_that_meet_are_refused(small):
+def test_blends_that_meet_are_refused():
     """The controller would leave the move out, so that a warning is not enough."""
-    wide = build_program([small])
+    wide = build_program([CASE.small])
     for number in range(3, 9):
         wide = changed(wide, number, zone=0.02)
     assert codes(wide, "error", "urscript", WIRED) == ["blend-overlap"]
     with pytest.raises(InputError, match=r"lower zone_mm or use fewer nodes"):
         post(wide, "urscript", WIRED)
     assert (
-        codes(build_program([small], zone=0.1), "error", "urscript", WIRED) == []
+        codes(build_program([CASE.small], zone=0.1), "error", "urscript", WIRED) == []
     )  # halved to fit
-
-
-@pytest.mark.parametrize("name", ["movel", "Thread", "get_inverse_kin", "sin", "laser_set", "p"])
-def test_names_of_the_language_are_refused(program, name):
-    named = replace(program, name=name)
-    assert set(codes(named, "error", "urscript", GAS)) <= {"name-reserved", "name-collision"}
-    assert codes(named, "error", "urscript", GAS)
 
 
 @pytest.mark.parametrize("name", ["path_1", "hole_3", "skin", "part", "list_of_holes", "tool_slot"])
 def test_common_names_of_contours_are_not(name):
     assert not URSCRIPT.is_reserved(name)
-
-
-def test_other_arms_are_refused(program):
-    other = replace(program, robot=robot("abb_irb4600_60_205"))
-    assert "wrong-arm" in codes(other, "error", "urscript", GAS)
 
 
 def test_joint_speeds_must_be_known(program):
@@ -310,10 +236,7 @@ def test_a_program_longer_than_a_file_may_be_is_refused(program):
     ],
 )
 def test_the_reader_refuses_what_it_does_not_know(old, new, message):
-    text = GOLDEN.read_text()
-    assert old in text
-    with pytest.raises(InputError, match=re.escape(message)):
-        reread(text.replace(old, new, 1), robot("ur_ur10e"))
+    CASE.refuses(SCRIPT, old, new, message)
 
 
 def test_the_reader_refuses_a_signal_that_is_not_defined(cell):
@@ -321,14 +244,16 @@ def test_the_reader_refuses_a_signal_that_is_not_defined(cell):
     bad = text.replace("    laser_set(True)", "    gas_set(True)\n    laser_set(True)", 1)
     with pytest.raises(InputError, match="does not say how it switches the gas"):
         reread(bad, cell[0], WIRED)
-    more = GOLDEN.read_text().replace("  set_runstate_standard_digital_output_to_value(1, 1)\n", "")
+    more = CASE.golden[SCRIPT].replace(
+        "  set_runstate_standard_digital_output_to_value(1, 1)\n", ""
+    )
     with pytest.raises(InputError, match="say by which output with gas_output"):
         reread(more, cell[0], WIRED)
 
 
-def test_an_edited_program_is_read_as_edited(program):
-    text = GOLDEN.read_text()
-    for old, new in (
+@pytest.mark.parametrize(
+    ("old", "new"),
+    [
         ("p[0.0787485", "p[0.0797485"),
         ("v=0.120000", "v=0.130000"),
         ("r=0.0003000", "r=0.0004000"),
@@ -336,38 +261,7 @@ def test_an_edited_program_is_read_as_edited(program):
         ("0.000240000, True", "0.000940000, True"),
         ("movej([-2.9", "movej([-2.8"),
         ("set_tcp(p[0.0513", "set_tcp(p[0.0523"),
-    ):
-        assert old in text
-        read = reread(text.replace(old, new, 1), program.robot)
-        assert deviations(program, read, URSCRIPT, GAS), old
-
-
-@settings(max_examples=40, deadline=None)
-@given(st.text(max_size=60), st.text(max_size=60), st.text(max_size=60))
-def test_no_text_of_a_person_becomes_a_line_of_the_program(name, comment, model):
-    arm, tool, placement = robot("ur_ur10e"), *frames()
-    placement = placement.copy()
-    placement[:3, 3] = 0.75, 0.1, 0.2
-    made = hand_plan(arc(count=4), arm, tool, placement)
-    plain = script([made]).splitlines()
-    odd = build_program([replace(made, robot=replace(arm, model=model))], name=f"cut {name}")
-    first, *rest = odd.sections[0].steps
-    assert isinstance(first, Comment)
-    odd = with_steps(odd, [Comment(comment), *rest])
-    if codes(odd, "error", "urscript", WIRED):
-        return
-    same(odd, WIRED)
-    lines = script(odd).splitlines()
-    assert len(lines) == len(plain)
-    assert [line for line in lines if not line.strip().startswith(("#", "def"))] == [
-        line for line in plain if not line.strip().startswith(("#", "def"))
-    ]
-    assert all(re.fullmatch(r"[ -~]*", line) for line in lines)
-
-
-def test_moves_are_of_the_kinds_that_are_read(program):
-    read = same(program)
-    kinds = [move.kind for move in read.moves if isinstance(move, ReadMove)]
-    assert kinds == [
-        "linear" if isinstance(move, LinearMove) else "joint" for move in program.moves
-    ]
+    ],
+)
+def test_an_edited_program_is_read_as_edited(old, new):
+    CASE.finds(SCRIPT, old, new)

@@ -11,21 +11,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from pydantic import ValidationError
 from scipy.spatial.transform import Rotation
+from tests.post.cases import CASES
 
-from conftest import ROOT
 from kerfpath import InputError, robot
-from kerfpath.contour import KINDS
 from kerfpath.post import (
-    CircularMove,
-    Comment,
-    JointMove,
-    LinearMove,
-    ReadMove,
-    ReadWait,
-    Switch,
     build_program,
-    deviations,
-    language,
     post,
     preflight,
     read_program,
@@ -41,13 +31,21 @@ from kerfpath.post.val3 import (
     posture,
 )
 from kerfpath.robots import robot_ids
-from programs import arc, assert_at, changed, codes, edited, frames, hand_plan, with_steps
+from programs import arc, arced, changed, hand_plan
 
-GOLDEN = ROOT / "tests" / "data" / "golden_val3"
 NAME = "cut_skin_outer"
 PARTS = (f"{NAME}.pjx", f"{NAME}.dtx", "start.pgx", "stop.pgx", "skin_outer.pgx")
-VAL3 = language("val3")
-OUTPUTS = Val3Settings(laser_output=r"BasicIO-1\%Q0", gas_output=r"BasicIO-1\%Q1")
+CASE = CASES["val3"]
+OUTPUTS, golden, found_codes = CASE.settings, CASE.golden, CASE.codes
+
+
+def reads_back(program, options=OUTPUTS):
+    """Write and read back, and look at the files alone."""
+    files, read = CASE.reads_back(program, options)
+    declares_what_it_uses(files)
+    return files, read
+
+
 ARMS = [name for name in robot_ids() if name.startswith("staubli")]
 NAMESPACES = {suffix: f"http://www.staubli.com/robotics/VAL3/{space}" for suffix, space in (
     (".pjx", "Project/3"), (".dtx", "Data/2"), (".pgx", "Program/2"))}  # fmt: skip
@@ -55,48 +53,12 @@ NAMESPACES = {suffix: f"http://www.staubli.com/robotics/VAL3/{space}" for suffix
 
 @pytest.fixture(scope="module")
 def cell():
-    tool, placement = frames()
-    placement[:3, 3] = 0.75, -0.15, 0.35
-    return robot("staubli_tx2_90xl"), tool, placement
+    return CASE.cell
 
 
 @pytest.fixture(scope="module")
-def small(cell):
-    return hand_plan(arc(), *cell, speed=0.12)
-
-
-@pytest.fixture(scope="module")
-def program(small):
-    return build_program([small], pierce_time=0.4, gas_lead=0.3)
-
-
-def found_codes(program, level=None, settings=OUTPUTS):
-    return codes(program, level, "val3", settings)
-
-
-def golden():
-    return {f"{NAME}/{part}": (GOLDEN / NAME / part).read_bytes().decode("ascii") for part in PARTS}
-
-
-def reads_back(program, options=OUTPUTS):
-    """Write and read back; check every target by the robot's forward kinematics."""
-    files = post(program, "val3", options)
-    read = read_program(files, "val3", program.robot, options)
-    assert deviations(program, read, VAL3, options) == []
-    declares_what_it_uses(files)
-    q = np.array([move.q for move in program.moves])
-    T_base_tip = program.robot.forward(q) @ program.T_flange_tip
-    for expected, ours, move in zip(T_base_tip, program.moves, read.moves, strict=True):
-        if move.kind == "joint":
-            np.testing.assert_allclose(move.q, ours.q, atol=2e-8)  # six decimals of deg
-            T = program.robot.forward(move.q) @ read.T_flange_tip
-        else:
-            T = read.T_base_part @ move.T_part_tip
-        # 1e-3 mm and 1e-3 deg: four decimals of mm, six of deg, the plan's own error.
-        assert_at(T, expected)
-        said = [(s.signal, s.on) for s in move.switches]
-        assert said == [(s.signal, s.on) for s in getattr(ours, "switches", ())]
-    return files, read
+def program():
+    return CASE.program
 
 
 def declares_what_it_uses(files):
@@ -131,18 +93,6 @@ def declares_what_it_uses(files):
 # The files.
 
 
-def test_the_golden_project_is_written_byte_for_byte(program):
-    files = post(program, "val3", OUTPUTS)
-    assert files == golden()
-    assert list(files) == [f"{NAME}/{part}" for part in PARTS]
-
-
-def test_the_golden_project_is_plain_text_in_short_names():
-    for text in golden().values():
-        assert all(re.fullmatch(r"[ -~]{0,200}", line) for line in text.split("\n"))
-        assert not any(line.endswith(" ") for line in text.split("\n"))
-
-
 def test_a_project_becomes_a_folder(program, tmp_path):
     files = post(program, "val3", OUTPUTS)
     write_files(tmp_path, files)
@@ -150,24 +100,11 @@ def test_a_project_becomes_a_folder(program, tmp_path):
     there = {f"x/y/{k}": (tmp_path / k).read_text() for k in files}
     read = read_program(there, "val3", program.robot, OUTPUTS)  # wherever it lies
     assert read.name == NAME
-
-
-def test_the_golden_project_reads_back_as_planned(program):
-    _, read = reads_back(program)
-    np.testing.assert_allclose(read.T_flange_tip, program.T_flange_tip, atol=1e-7)
-    np.testing.assert_allclose(read.T_base_part, program.T_base_part, atol=1e-7)
-    joint, start, first, *_, last, out = read.moves
-    assert (joint.speed, start.speed, first.speed, out.speed) == (0.25, 0.1, 0.12, 0.1)
-    assert [m.zone for m in (start, last, out)] == [0, 0, 0]
-    assert first.zone == pytest.approx(0.0003)
-    assert start.switches == (Switch(signal="gas", on=True), Switch(signal="laser", on=True))
-    waits = [step for step in read.steps if isinstance(step, ReadWait)]
-    assert [wait.time for wait in waits] == [0.4]
-    assert start.place == f"{NAME}/skin_outer.pgx, line 7"
+    assert read.moves[1].place == f"x/y/{NAME}/skin_outer.pgx, line 7"
 
 
 def test_outputs_are_switched_and_waits_begin_only_where_the_robot_stands(program):
-    code = golden()[f"{NAME}/skin_outer.pgx"].splitlines()
+    code = golden[f"{NAME}/skin_outer.pgx"].splitlines()
     stands = False
     for line in (line.strip() for line in code):
         stands = line == "waitEndMove()" or (stands and not line.startswith("move"))
@@ -176,13 +113,13 @@ def test_outputs_are_switched_and_waits_begin_only_where_the_robot_stands(progra
 
 
 def test_stop_switches_everything_off():
-    stop = golden()[f"{NAME}/stop.pgx"]
+    stop = golden[f"{NAME}/stop.pgx"]
     assert stop.index("dioLaser=false") < stop.index("dioGas=false") < stop.index("resetMotion()")
 
 
 def test_positions_are_rx_about_x_then_ry_about_y_then_rz_about_z(program):
     """The orientation of a point, turned together by hand from its text."""
-    text = golden()[f"{NAME}/{NAME}.dtx"]
+    text = golden[f"{NAME}/{NAME}.dtx"]
     found = re.search(r'type="pointRx".*?rx="(.*?)" ry="(.*?)" rz="(.*?)"', text, re.DOTALL)
     x, y, z = np.radians([float(field) for field in found.groups()])
     Rx = [[1, 0, 0], [0, np.cos(x), -np.sin(x)], [0, np.sin(x), np.cos(x)]]
@@ -201,15 +138,8 @@ def test_motions_that_are_alike_share_a_descriptor(cell):
 
 
 def test_arcs_are_written_as_movec(program):
-    move, end = program.moves[3], program.moves[4]
-    fields = {name: getattr(end, name) for name in ("T_part_tip", "q", "speed", "duration", "zone")}
-    via = CircularMove(T_part_via=move.T_part_tip, q_via=move.q, **fields)
-    steps = [step for step in program.sections[0].steps if step is not move]
-    steps = [via if step is end else step for step in steps]
-    files, read = reads_back(with_steps(program, steps))
+    files, _ = reads_back(arced(program, [3]))
     assert "movec(pPath[2],pPath[3],tLaser,mPath[1])" in files[f"{NAME}/skin_outer.pgx"]
-    (circle,) = [move for move in read.moves if move.kind == "circular"]
-    np.testing.assert_allclose(circle.T_part_via, move.T_part_tip, atol=1e-7)
 
 
 def test_joint_moves_may_round_their_corners(program):
@@ -228,10 +158,8 @@ def test_several_contours_become_routines_called_in_order(cell):
     names = ("skin/outer", "skin outer", "7. Bohrung ø12", "hole" * 5)
     program = build_program([hand_plan(arc(name), *cell) for name in names], name="B-pillar 4711")
     files, read = reads_back(program)
-    expected = ["skin_outer", "skin_outer_2", "c_7_Bohrung_12", "holeholeholehol"]
-    assert [section.name for section in read.sections] == expected
     calls = re.findall(r"call (\w+)\(\)", files["B_pillar_4711/start.pgx"])
-    assert calls == expected
+    assert calls == [section.name for section in read.sections]
 
 
 # What VAL 3 cannot say.
@@ -245,25 +173,10 @@ def test_a_lead_time_is_left_out_and_said(program):
         post(program, "val3", OUTPUTS, strict=True)
 
 
-def test_without_leads_nothing_is_left_out(small):
-    program = build_program([small], lead_time=0.0)
+def test_without_leads_nothing_is_left_out():
+    program = build_program([CASE.small], lead_time=0.0)
     assert found_codes(program) == ["air-moves"]
-    assert VAL3.sayable(program, OUTPUTS).moves[1].switches == program.moves[1].switches
-
-
-def test_the_robot_stops_at_micro_joints_which_is_said(cell):
-    words = {"i": "lead-in", "c": "cut", "m": "micro joint", "o": "lead-out"}
-    kinds = np.array([KINDS.index(words[letter]) for letter in "iccmmcoo"])
-    made = hand_plan(replace(arc(), kind=kinds), *cell, speed=0.12)
-    program = build_program([made], lead_time=0.0)
-    assert found_codes(program) == ["stop-to-switch", "air-moves"]
-    _, read = reads_back(program)
-    on, switched = False, []
-    for move in read.moves:
-        switched.append(on)
-        on = move.switches[-1].on if move.switches else on
-        assert move.zone == 0 or not move.switches
-    assert switched == [False, False, True, True, True, False, False, True, True, False]
+    assert CASE.language.sayable(program, OUTPUTS).moves[1].switches == program.moves[1].switches
 
 
 # Axes and configurations.
@@ -299,37 +212,13 @@ def test_every_arm_of_the_library_counts_joints_as_the_controller_does(name):
         np.testing.assert_allclose(world(arm)[:3, 3], origin, atol=1e-12)
 
 
-def test_an_arm_described_otherwise_has_the_same_axes(cell):
+def test_an_arm_described_otherwise_reads_back(cell):
     arm = cell[0]
     turned = np.eye(4)
     turned[:3, :3] = Rotation.from_euler("z", 40, degrees=True).as_matrix()
     other = replace(arm, sign=-arm.sign, offset=arm.offset + 0.3, T_end_flange=turned)
-    q = np.random.default_rng(5).uniform(-1, 1, (5, 6))
-    same = joints_from_axes(other, axes_from_joints(arm, q))
-    np.testing.assert_allclose(other.forward(same), arm.forward(q) @ turned, atol=1e-12)
-    assert configurations(other, same) == configurations(arm, q)
     free = other.with_limits(lower=np.full(6, -7.0), upper=np.full(6, 7.0))
-    made = build_program([hand_plan(arc(), free, *cell[1:])], lead_time=0.0)
-    reads_back(made)
-
-
-@pytest.mark.parametrize("number", range(8))
-def test_configurations_follow_the_posture_in_all_eight_postures(cell, number):
-    """The kernels' postures are an independent account of shoulder, elbow and wrist."""
-    arm, tool, _ = cell
-    placement = np.eye(4)
-    placement[:3, 3] = 0.45, 0.1, 0.6
-    free = arm.with_limits(lower=np.full(6, -7.0), upper=np.full(6, 7.0))
-    made = hand_plan(arc(count=20, radius=0.03), free, tool, placement, posture=number)
-    _, read = reads_back(build_program([made], lead_time=0.0))
-    rear, down, minus = number // 4, number // 2 % 2, number % 2
-    expected = (
-        ("lefty", "righty")[rear],
-        ("epositive", "enegative")[rear ^ down],
-        ("wpositive", "wnegative")[minus],
-    )
-    cut = [move.posture for move in read.moves if move.kind == "linear"]
-    assert set(cut[:-1]) == {expected}
+    reads_back(build_program([hand_plan(arc(), free, *cell[1:])], lead_time=0.0))
 
 
 @settings(max_examples=60, deadline=None)
@@ -351,16 +240,6 @@ def test_angles_that_are_zero_but_for_rounding_are_positive():
     q[1, [2, 4]] = -1e-6
     expected = [("lefty", "epositive", "wpositive"), ("lefty", "enegative", "wnegative")]
     assert posture(arm, q, OUTPUTS) == expected
-
-
-@pytest.mark.parametrize("turns", [-2, -1, 1, 2])
-def test_joint_targets_say_every_turn(program, turns):
-    far = np.array([6.0, 6.0, 6.0, 6.0, 6.0, 20.0])
-    arm = program.robot.with_limits(lower=-far, upper=far)
-    shift = 2 * np.pi * turns * np.eye(6)[5]
-    steps = [replace(s, q=s.q + shift) if hasattr(s, "q") else s for s in program.sections[0].steps]
-    _, read = reads_back(with_steps(replace(program, robot=arm), steps))
-    assert abs(np.degrees(read.moves[0].q[5])) > 180
 
 
 # Long programs.
@@ -439,37 +318,13 @@ def test_libraries_that_do_not_fit_are_refused(cell, file, old, new, message):
 # Settings and preflight.
 
 
-def test_every_setting_says_what_it_expects():
-    for name, field in Val3Settings.model_fields.items():
-        assert field.description, name
-        assert field.examples, name
-        with pytest.raises(ValidationError):
-            Val3Settings(**{name: -1})
-
-
 @pytest.mark.parametrize("link", ['a"b', "a<b", "a b", "", "a\nb", "&amp;", "x" * 81])
 def test_the_link_of_an_output_cannot_carry_anything_else(link):
     with pytest.raises(ValidationError):
         Val3Settings(laser_output=link)
 
 
-@pytest.mark.parametrize("update", [{"gas_output": None}, {"gas_output": r"BasicIO-1\%Q0"}])
-def test_preflight_refuses_outputs_that_are_missing_or_the_same(program, update):
-    assert set(found_codes(program, "error", OUTPUTS.model_copy(update=update))) == {"output"}
-
-
-@pytest.mark.parametrize(
-    ("name", "code"),
-    [("start", "name-reserved"), ("stop", "name-reserved"), ("pPath", "name-collision")],
-)
-def test_preflight_refuses_names_of_the_controller(program, name, code):
-    named = replace(program, sections=(replace(program.sections[0], name=name),))
-    assert found_codes(named, "error") == [code]
-
-
-def test_preflight_warns_of_robots_of_other_makers_and_of_changing_configurations(program):
-    other = replace(program, robot=replace(program.robot, manufacturer="KUKA"))
-    assert "wrong-robot" in found_codes(other, "warning")
+def test_preflight_warns_of_changing_configurations(program):
     q = program.moves[4].q * [1, 1, 1, 1, -1, 1]
     flipped = changed(program, 5, q=q)
     assert found_codes(flipped, "warning").count("posture-change") == 2
@@ -536,26 +391,15 @@ START, STOP = f"{NAME}/start.pgx", f"{NAME}/stop.pgx"
         (CODE, "waitEndMove()\n", "\n", "line 9: a switch must follow a move of the path and"),
         (CODE, "mPath[0])\n  waitEndMove()", "mPath[1])\n  waitEndMove()", "the robot is to stand"),
         (CODE, "  delay(0.400)\n  movel(pPath[1]", "  movel(pPath[1],tLaser,mPath[1])\n  delay(0.4)"
-         "\n  movel(pPath[1]", "a delay must follow waitEndMove()"),
+         "\n  movel(pPath[1]", "a wait must follow waitEndMove()"),
         (CODE, "delay(0.400)", "delay(0.400)\n  dioLaser=true", "a switch must follow a move"),
         (CODE, "delay(0.400)", "put(1)", "line 11: not expected here: 'put(1)'"),
         (CODE, "movel(pPath[3]", "//\n  dioLaser=false ; movel(pPath[3]", "not expected here"),
         (CODE, "<Code>", "<Locals /><Code>", "expected Code in <Program"),
     ],
 )  # fmt: skip
-def test_the_reader_refuses_what_it_does_not_know(cell, file, old, new, message):
-    files = edited(golden(), file, old, new)
-    with pytest.raises(InputError, match=re.escape(message)) as caught:
-        read_program(files, "val3", cell[0], OUTPUTS)
-    assert "\n" not in str(caught.value)
-
-
-@pytest.mark.parametrize("file", [DTX, START, STOP, CODE])
-def test_a_missing_file_is_said(cell, file):
-    files = golden()
-    del files[file]
-    with pytest.raises(InputError, match=re.escape(f"the file '{file}' is not there")):
-        read_program(files, "val3", cell[0], OUTPUTS)
+def test_the_reader_refuses_what_it_does_not_know(file, old, new, message):
+    CASE.refuses(file, old, new, message)
 
 
 @pytest.mark.parametrize(
@@ -573,52 +417,5 @@ def test_a_missing_file_is_said(cell, file):
         (CODE, "movel(pPath[1]", "movel(pPath[2]"),
     ],
 )
-def test_an_edited_project_is_read_as_edited(program, file, old, new):
-    files = edited(golden(), file, old, new)
-    read = read_program(files, "val3", program.robot, OUTPUTS)
-    assert deviations(program, read, VAL3, OUTPUTS)
-
-
-NASTY = st.text(max_size=40) | st.sampled_from(
-    ["]]></Code>", "x\nend\nbegin", "<!-- -->", "&lt;", '"/><Data', "\r\n dioLaser=true"]
-)
-
-
-@settings(max_examples=60, deadline=None)
-@given(name=NASTY, robot_id=NASTY, remark=NASTY)
-def test_no_text_of_a_person_becomes_a_line_or_an_element(small, name, robot_id, remark):
-    try:
-        odd = build_program([replace(small, contour=replace(small.contour, name=name))])
-    except InputError:
-        return
-    first, *rest = odd.sections[0].steps
-    odd = replace(
-        with_steps(odd, [first, Comment(remark), *rest]),
-        robot=replace(odd.robot, id=robot_id, model=robot_id),
-    )
-    if {"name-reserved", "name-collision"} & set(found_codes(odd)):
-        return
-    files = post(odd, "val3", OUTPUTS)
-    plain = post(build_program([small]), "val3", OUTPUTS)
-    assert len(files) == len(plain)
-    for text, expected in zip(files.values(), plain.values(), strict=True):
-        ours, theirs = ET.fromstring(text), ET.fromstring(expected)
-        assert [e.tag for e in ours.iter()] == [e.tag for e in theirs.iter()]
-    (code,) = (text for name, text in files.items() if name.endswith(plain_name(odd)))
-    statements = [line for line in code.splitlines() if not line.strip().startswith("//")]
-    expected = plain[CODE].splitlines()
-    expected = [line for line in expected if not line.strip().startswith("//")]
-    assert len(statements) == len(expected)
-    assert sum(a != b for a, b in zip(statements, expected, strict=True)) <= 1  # its name
-    kinds = [type(step) for step in read_program(files, "val3", odd.robot, OUTPUTS).steps]
-    assert kinds == [ReadMove] * len(odd.moves)
-
-
-def plain_name(program):
-    return f"/{Val3(program, OUTPUTS).program.sections[0].name}.pgx"
-
-
-def test_moves_are_joint_moves_and_moves_of_the_path(program):
-    """What the law above compares is there: one joint move, then the path."""
-    kinds = [type(move) for move in program.moves]
-    assert kinds == [JointMove] + [LinearMove] * 9
+def test_an_edited_project_is_read_as_edited(file, old, new):
+    CASE.finds(file, old, new)

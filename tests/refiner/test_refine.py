@@ -7,6 +7,7 @@ import pytest
 from scipy.optimize import linprog, minimize
 
 from kerfpath import InputError, audit, plan, refine
+from kerfpath.limits import Limits
 from kerfpath.refiner._program import Model, solve
 from kerfpath.refiner._rates import Rates
 
@@ -166,13 +167,14 @@ def _random_model(rng, metric, *, cap=np.inf):
     )
     dq = np.diff(q, axis=0)
     tau = rng.uniform(0.5, 1.5, K - 1)
+    velocity = np.abs(dq / tau[:, None]).max(0) * 1.1
     rates = Rates(
         tau=tau,
-        velocity=np.abs(dq / tau[:, None]).max(0) * 1.1,
-        acceleration=np.full(n, 9.0),
+        limits=Limits.of(velocity, np.full(n, 9.0)),
         periodic=bool(rng.random() < 0.5),
     )
-    return model, replace(rates, acceleration=np.abs(rates.accelerations(dq)).max(0) * 1.05)
+    acceleration = np.abs(rates.accelerations(dq)).max(0) * 1.05
+    return model, replace(rates, limits=Limits.of(velocity, acceleration))
 
 
 def _distances(model, delta):
@@ -193,8 +195,8 @@ def _margins(model, rates, delta):
         a.append((v[0] - v[-1]) / ((rates.tau[0] + rates.tau[-1]) / 2))
     coupled = q @ model.rows[0]
     return np.concatenate([
-        (rates.velocity - np.abs(v)).ravel(),
-        (rates.acceleration - np.abs(a)).ravel(),
+        (rates.limits.velocity.bound - np.abs(v)).ravel(),
+        (rates.limits.acceleration.bound - np.abs(a)).ravel(),
         (q - model.lower).ravel(),
         (model.upper - q).ravel(),
         model.rotation[1] - np.abs(q - q[0])[:, 1],
@@ -255,9 +257,11 @@ def test_the_manhattan_program_is_a_linear_program():
         c = model.q @ model.rows[0]
         R = np.diag(model.slope[:, 1]) - model.slope[0, 1] * np.eye(K)[[0] * K]
         r = model.q[:, 1] - model.q[0, 1]
+        velocity = rates.limits.velocity.bound
+        acceleration = rates.limits.acceleration.bound
         sides = [
-            (V, v, np.tile(rates.velocity, K - 1), -np.tile(rates.velocity, K - 1)),
-            (A, a, np.tile(rates.acceleration, K - 2), -np.tile(rates.acceleration, K - 2)),
+            (V, v, np.tile(velocity, K - 1), -np.tile(velocity, K - 1)),
+            (A, a, np.tile(acceleration, K - 2), -np.tile(acceleration, K - 2)),
             (Q, model.q.ravel(), np.tile(model.upper, K), np.tile(model.lower, K)),
             (C, c, np.full(K, model.row_upper[0]), np.full(K, model.row_lower[0])),
             (R, r, np.full(K, model.rotation[1]), np.full(K, -model.rotation[1])),
@@ -295,7 +299,9 @@ def test_a_cap_holds_every_distance():
 def test_the_largest_share_is_brought_down_where_limits_are_broken():
     rng = np.random.default_rng(8)
     model, rates = _random_model(rng, "manhattan")
-    tight = replace(rates, velocity=rates.velocity / 2, acceleration=rates.acceleration / 2)
+    limits = rates.limits
+    halved = Limits.of(limits.velocity.bound / 2, limits.acceleration.bound / 2)
+    tight = replace(rates, limits=halved)
     dq = np.diff(model.q, axis=0)
     found = solve(model, tight, "excess")
     after = np.diff(model.q + model.slope * found[:, None], axis=0)

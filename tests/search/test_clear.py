@@ -4,10 +4,11 @@ import itertools
 
 import numpy as np
 import pytest
+from tests.search.posed import clear_path, interrupted_path, least_interval, slowed_path
 
 import naive
 from kerfpath import InputError, NoFeasiblePath, shortest_path
-from kerfpath.search import Known, clear_path, interrupted_path, least_interval, slowed_path
+from kerfpath.search import Known
 
 
 class Checks:

@@ -4,10 +4,10 @@ import itertools
 
 import numpy as np
 import pytest
+from tests.search.posed import least_interval
 
 import naive
 from kerfpath import InputError, NoFeasiblePath, audit, fastest_speed, plan, shortest_path
-from kerfpath.search import least_interval
 
 
 def interval_of(q, v, a, endless):

@@ -4,11 +4,11 @@ import itertools
 
 import numpy as np
 import pytest
+from tests.search.posed import interrupted_path
 
 import naive
 from kerfpath import InputError, NoFeasiblePath, shortest_path
 from kerfpath.search import _long_enough as long_enough
-from kerfpath.search import interrupted_path
 
 ONE = {"dt": 1.0, "velocity": [1.0], "acceleration": [0.1]}
 

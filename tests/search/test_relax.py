@@ -2,10 +2,10 @@
 
 import numpy as np
 import pytest
+from tests.search.posed import least_relaxations
 
 import naive
 from kerfpath import NoFeasiblePath, shortest_path
-from kerfpath.search import least_relaxations
 
 
 def is_feasible(q, start, **options):

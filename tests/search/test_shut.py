@@ -2,11 +2,11 @@
 
 import numpy as np
 import pytest
+from tests.search.posed import interrupted_path, least_interval, slowed_path
 from tests.search.test_rotation import instance as turning
 
 import naive
 from kerfpath import InputError, NoFeasiblePath, shortest_path
-from kerfpath.search import interrupted_path, least_interval, slowed_path
 
 ONE = {"dt": 1.0, "velocity": [1.0], "acceleration": [1.0]}
 

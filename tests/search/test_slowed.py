@@ -4,10 +4,11 @@ import itertools
 
 import numpy as np
 import pytest
+from tests.search.posed import slowed_path
 
 import naive
 from kerfpath import InputError, NoFeasiblePath, shortest_path
-from kerfpath.search import _slowed, slowed_path
+from kerfpath.search import _slowed
 
 ONE = {"dt": 1.0, "velocity": [1.0], "acceleration": [1.0]}
 

@@ -252,7 +252,7 @@ def test_a_job_that_changes_meanwhile_ends_the_batch(tmp_path):
     write_jobs(tmp_path, {"good": JOB})
     job, out = tmp_path / "good.toml", tmp_path / "out"
 
-    def edit(done, total, left):
+    def edit(what, done, total):
         job.write_text(JOB + "\n# a remark\n")
 
     with pytest.raises(InputError, match=r"good\.toml: .*has changed.*start the study again"):
@@ -272,7 +272,7 @@ def test_workers_of_a_cluster_need_the_job_folder_alone_and_that_they_need(
     assert {path.name for path in row.folder.iterdir()} == FILES | {MANIFEST}
     (other,) = write_jobs(shared, {"other": JOB})
 
-    def lost(done, total, left):
+    def lost(what, done, total):
         (shared / other).unlink()
 
     with pytest.raises(InputError, match="every worker needs job and files at the same path"):

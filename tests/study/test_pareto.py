@@ -111,7 +111,7 @@ def test_a_study_that_is_killed_goes_on_and_comes_to_the_same(job, studied, tmp_
         criteria=CRITERIA,
         runs=24,
         processes=1,
-        progress=lambda done, total, left: told.append((done, total)),
+        progress=lambda what, done, total: told.append((done, total)),
     )
     assert told[-1] == (24, 24)
     assert before <= rows(store)[0] == 24, "nothing was done twice"
@@ -129,7 +129,7 @@ def test_a_cluster_comes_to_the_same_though_a_worker_is_killed(
 ):
     first, _ = workers(2)
 
-    def kill(done, total, left):
+    def kill(what, done, total):
         if done >= 4:
             first.kill()
 

@@ -126,12 +126,10 @@ def test_tasks_may_be_handed_in_as_results_come(tmp_path):
         return [result.value["square"] for result in found]
 
     assert squared() == [9, 4, 16, 256]
-    assert [state[:2] for state in told][:: len(told) - 1] == [(0, 4), (4, 4)]
-    assert told[0][2] is None
-    assert told[-1][2] == 0.0
+    assert told[:: len(told) - 1] == [("tasks", 0, 4), ("tasks", 4, 4)]
     told.clear()
     assert squared() == [9, 4, 16, 256]
-    assert told == [(2, 4, None)], "nothing was done again, so that no result was waited for"
+    assert told == [("tasks", 2, 4)], "nothing was done again, so that no result was waited for"
 
 
 def test_a_second_call_does_only_what_is_new(tmp_path):
@@ -147,9 +145,9 @@ def test_a_second_call_does_only_what_is_new(tmp_path):
     )
     assert both[:7] == first
     assert all((tmp_path / str(t["x"])).read_text() == "x" for t in tasks)
-    assert told[0] == (7, 12, None)
-    assert told[-1] == (12, 12, 0.0)
-    assert [done for done, _, _ in told] == sorted({done for done, _, _ in told})
+    assert told[0] == ("tasks", 7, 12)
+    assert told[-1] == ("tasks", 12, 12)
+    assert [done for _, done, _ in told] == sorted({done for _, done, _ in told})
     assert sweep.run(sweep_tasks.marked, tasks, store=tmp_path / "s") == both
 
 
@@ -236,7 +234,7 @@ def test_a_second_sweep_on_a_store_is_refused(tmp_path):
     store, other = tmp_path / "store.sqlite", script(tmp_path, numbers(1), REFUSED)
     lines = []
 
-    def again(done, total, left):
+    def again(what, done, total):
         with pytest.raises(InputError, match=said) as refused:
             sweep.run(sweep_tasks.square, numbers(1), store=store)
         lines.append(str(refused.value))
@@ -354,7 +352,7 @@ def test_a_cluster_that_loses_a_worker_in_the_middle_loses_nothing(workers, sche
     first, second = workers(2)
     tasks = [{"x": x, "folder": str(tmp_path), "seconds": 0.01} for x in range(300)]
 
-    def kill(done, total, left):
+    def kill(what, done, total):
         if done >= 60:
             first.kill()
 

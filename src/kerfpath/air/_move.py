@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike
 from kerfpath._arrays import Array, floats, freeze
 from kerfpath._told import told
 from kerfpath.air._around import way_around
-from kerfpath.air._told import why_not_clear
+from kerfpath.air._near_miss import why_not_clear
 from kerfpath.cell import Cell
 from kerfpath.errors import InputError, NoFeasiblePath
 from kerfpath.robots import Robot

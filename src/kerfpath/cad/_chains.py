@@ -4,17 +4,17 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
-from typing import get_args
 
 import numpy as np
 from scipy.spatial import cKDTree
 
-from kerfpath._arrays import Array, Ints, freeze
-from kerfpath.cad._connected import connected
+from kerfpath._arrays import Array, Ints
+from kerfpath.cad._build import named_loops, part_without_faces
+from kerfpath.cad._connected import label_connected
 from kerfpath.cad._curves import Curve, backwards
 from kerfpath.cad._left_out import LeftOut
-from kerfpath.cad._part import Kind, Part, loop_of
-from kerfpath.cad._sample import Chain, Trace, numbered
+from kerfpath.cad._part import Kind, Loop, Part
+from kerfpath.cad._sample import Chain, vector_area
 from kerfpath.cad._units import MM
 from kerfpath.errors import InputError
 
@@ -41,10 +41,10 @@ def loops_in(
     lies within an odd number of others.
     """
     chains: list[tuple[Look, Chain[Curve]]] = []
-    told = [*notes, *map(str, left_out)]
+    notes = [*notes, *map(str, left_out)]
     for look, curves in drawn.items():
         kept, repaired = _repaired(curves)
-        told += [f"layer {look[0]}, {look[1]}: {what}" for what in repaired]
+        notes += [f"layer {look[0]}, {look[1]}: {what}" for what in repaired]
         chains += [(look, chain) for chain in _chains(kept, gap / MM)]
     if not chains:
         why = f"; {left_out[0]}" if left_out else ""
@@ -58,45 +58,19 @@ def loops_in(
         kind: Kind = "open"
         if chain.is_closed:
             kind = "inner" if next(depth) % 2 else "outer"
-            if (_area(chain.around) > 0) != (kind == "outer"):
+            if (vector_area(chain.around)[2] > 0) != (kind == "outer"):
                 turned = tuple(backwards(curve) for curve in chain.edges[::-1])
                 chains[k] = look, Chain(edges=turned)
         kinds.append(kind)
-    loops = []
-    colours = {id(chain): look[1] for look, chain in chains}
+    loops: list[Loop] = []
     for layer in dict.fromkeys(look[0] for look, _ in chains):
-        for kind in get_args(Kind):
-            alike: list[Trace] = [
-                chain
-                for (look, chain), of in zip(chains, kinds, strict=True)
-                if look[0] == layer and of == kind
-            ]
-            stem = {"outer": "outer", "inner": "hole", "open": "line"}[kind]
-            names = numbered(alike, stem, alone="outer" if kind == "outer" else None)
-            loops += [
-                loop_of(
-                    name=f"{layer}/{last}",
-                    face=layer,
-                    kind=kind,
-                    trace=trace,
-                    surface="plane",
-                    gap=gap,
-                    layer=layer,
-                    colour=colours[id(trace)],
-                )
-                for last, trace in names.items()
-            ]
-    boxes = np.array([loop.bounding_box for loop in loops])
-    return Part(
-        path=path,
-        unit=unit,
-        bounding_box=freeze(np.stack([boxes[:, 0].min(axis=0), boxes[:, 1].max(axis=0)])),
-        faces=0,
-        loops=tuple(loops),
-        notes=tuple(told),
-        left_out=tuple(left_out),
-        _gap=gap,
-    )
+        drawn_here = [
+            (kind, chain, look[1])
+            for (look, chain), kind in zip(chains, kinds, strict=True)
+            if look[0] == layer
+        ]
+        loops += named_loops(drawn_here, face=layer, surface="plane", gap=gap, layer=layer)
+    return part_without_faces(path, unit, loops, gap=gap, notes=notes, left_out=left_out)
 
 
 def _repaired(curves: Sequence[Curve]) -> tuple[list[Curve], list[str]]:
@@ -105,12 +79,12 @@ def _repaired(curves: Sequence[Curve]) -> tuple[list[Curve], list[str]]:
     marks = [_mark(curve) for curve in long]
     first = {mark: k for k, mark in reversed(list(enumerate(marks)))}
     kept = [curve for k, curve in enumerate(long) if first[marks[k]] == k]
-    told = []
+    repaired = []
     if count := len(curves) - len(long):
-        told.append(f"{count} curves without length left out")
+        repaired.append(f"{count} curves without length left out")
     if count := len(long) - len(kept):
-        told.append(f"{count} curves drawn twice left out")
-    return kept, told
+        repaired.append(f"{count} curves drawn twice left out")
+    return kept, repaired
 
 
 def _mark(curve: Curve) -> tuple[float, ...]:
@@ -167,24 +141,24 @@ def _places(ends: Array, gap: float) -> Ints:
     if alone.size:
         bridged = alone[cKDTree(ends[alone]).query_pairs(gap, output_type="ndarray")]
         touching = np.vstack([touching, bridged])
-    return connected(touching, len(ends))
+    return label_connected(touching, len(ends))
 
 
 def _next_end(chain: Sequence[Curve], ends: Array, crowd: Ints) -> str:
-    """Say why an open chain does not go on, at that of its two ends that comes closer to it."""
+    """Return why an open chain does not go on, at that of its two ends that comes closer to it."""
     mine = [chain[0].ends[0], chain[-1].ends[1]]
-    told = []
+    breaks = []
     for end in mine:
         off = np.linalg.norm(ends - end, axis=1)
         here = int(np.argmin(off))
         place = f"at {end.round(3).tolist()} mm"
         if crowd[here] > 2:
-            told.append((0.0, f"ends {place}, where {crowd[here]} curves meet"))
+            breaks.append((0.0, f"ends {place}, where {crowd[here]} curves meet"))
             continue
         others = off[np.arange(len(off)) != here]
         nearest = float(others.min(initial=np.inf))
-        told.append((nearest, f"is open {place}: the next end is {nearest:.3f} mm away"))
-    return min(told)[1]
+        breaks.append((nearest, f"is open {place}: the next end is {nearest:.3f} mm away"))
+    return min(breaks)[1]
 
 
 def _depths(polygons: Sequence[Array]) -> list[int]:
@@ -206,9 +180,3 @@ def _encloses(polygon: Array, point: Array) -> bool:
     crosses = (y > 0) != (y1 > 0)
     at = x[crosses] - y[crosses] * (x1[crosses] - x[crosses]) / (y1[crosses] - y[crosses])
     return bool(np.count_nonzero(at > 0) % 2)
-
-
-def _area(polygon: Array) -> float:
-    """Return the signed area of a polygon in the drawing plane."""
-    x, y = polygon[:, 0], polygon[:, 1]
-    return float(x @ np.roll(y, -1) - y @ np.roll(x, -1)) / 2

@@ -1,4 +1,4 @@
-"""Where a closed or open polyline comes back to itself."""
+"""Places at which a closed or open polyline meets itself."""
 
 from __future__ import annotations
 
@@ -7,13 +7,13 @@ from scipy.spatial import cKDTree
 
 from kerfpath._arrays import Array, Ints
 
-__all__ = ["crossing"]
+__all__ = ["find_crossing"]
 
 APART = 20.0
 """Stretches closer than this along the line, in tolerances, are neighbours and may be near."""
 
 
-def crossing(points: Array, tolerance: float) -> Array | None:
+def find_crossing(points: Array, tolerance: float) -> Array | None:
     """Return a point (3,) where two distant stretches of a polyline meet, None if they never do.
 
     Parameters

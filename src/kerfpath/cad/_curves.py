@@ -22,31 +22,27 @@ LOOK = 64
 
 
 class _Flat(ABC):
-    """What all flat curves have in common; each gives `start`, `end`, `at` and `speed`."""
+    """The base of flat curves, see `Edge`; each gives start, end, `at` and `speed`."""
 
     start: float
     end: float
 
     @cached_property
     def ends(self) -> Array:
-        """First and last point (2, 3) mm."""
         return self.at(np.array([self.start, self.end]))
 
     @cached_property
     def length(self) -> float:
-        """Arc length, mm."""
         breaks = self.breaks()
         half, middle = np.diff(breaks)[:, None] / 2, (breaks[1:] + breaks[:-1])[:, None] / 2
         speed = self.speed((middle + half * GAUSS[0]).ravel()).reshape(len(half), -1)
         return float(np.abs(half[:, 0]) @ (speed @ GAUSS[1]))
 
     def bounds(self) -> Array:
-        """Return the least and greatest coordinates (2, 3) mm."""
         points = self.at(self.extremes())
         return np.stack([points.min(axis=0), points.max(axis=0)])
 
     def breaks(self) -> Array:
-        """Return the parameters, in the direction of travel, between which it is smooth."""
         return np.array([self.start, self.end])
 
     def extremes(self) -> Array:
@@ -78,11 +74,9 @@ class Line(_Flat):
     __repr__ = told
 
     def at(self, t: Array) -> Array:
-        """Return points (K, 3) mm."""
         return np.asarray(self.p + t[:, None] * (self.q - self.p))
 
     def speed(self, t: Array) -> Array:
-        """Return the length (K,) mm of the derivative."""
         return np.full(len(t), np.linalg.norm(self.q - self.p))
 
 
@@ -99,13 +93,11 @@ class Arc(_Flat):
     __repr__ = told
 
     def at(self, t: Array) -> Array:
-        """Return points (K, 3) mm."""
         return np.asarray(
             self.centre + np.cos(t)[:, None] * self.major + np.sin(t)[:, None] * self.minor
         )
 
     def speed(self, t: Array) -> Array:
-        """Return the length (K,) mm of the derivative."""
         d = np.cos(t)[:, None] * self.minor - np.sin(t)[:, None] * self.major
         return np.asarray(np.linalg.norm(d, axis=1))
 
@@ -132,12 +124,10 @@ class Spline(_Flat):
     end: float
 
     def at(self, t: Array) -> Array:
-        """Return points (K, 3) mm."""
         p = self.homogeneous(t)
         return np.asarray(p[:, :3] / p[:, 3:])
 
     def speed(self, t: Array) -> Array:
-        """Return the length (K,) mm of the derivative."""
         p, d = self.homogeneous(t), self.homogeneous(t, 1)
         return np.asarray(
             np.linalg.norm((d[:, :3] - d[:, 3:] * p[:, :3] / p[:, 3:]) / p[:, 3:], axis=1)

@@ -1,4 +1,4 @@
-"""How far the chords of a contour leave the curve that it samples."""
+"""The distance of a contour's chords from the curve that it samples."""
 
 from __future__ import annotations
 
@@ -11,9 +11,9 @@ from scipy.spatial import cKDTree
 
 from kerfpath._arrays import Array, Ints
 from kerfpath._told import told
-from kerfpath.cad._sample import Curve, Points, Polyline, Trace, off_chord, sampled
+from kerfpath.cad._sample import Curve, Points, Polyline, Trace, off_chord, sample_curve
 from kerfpath.cad._units import MM
-from kerfpath.contour import Contour, angle_between, turned
+from kerfpath.contour import Contour, angle_between, slerp
 from kerfpath.errors import InputError
 from kerfpath.operations import IN_SCRAP
 
@@ -27,7 +27,7 @@ ON_CURVE = 1e-5
 """How far (m) a node that lies on a curve may be off it; samples of samples are some micrometres
 off."""
 CHORD, ANGLE = 0.02, 0.05
-"""Within a cell the curve bends by no more than this (mm, rad), so that few points tell it all."""
+"""Within a cell the curve bends by no more than this (mm, rad), so that few points suffice."""
 CELLS = 200
 """Least number of cells along a loop; a node looks for its place in those around it."""
 POLISH = 6
@@ -41,10 +41,10 @@ CLOSER, PEAKS = 128, 16
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Departure:
-    """How far the nodes of a contour, joined by chords, leave what they sample.
+    """The largest errors of a contour's nodes, joined by chords, against what they sample.
 
     Tool axes turn evenly along each chord. Nodes are counted from 0; an error between two nodes is
-    told by the first of them.
+    counted at the first of them.
 
     Parameters
     ----------
@@ -191,7 +191,7 @@ def _measured(
         d = points[k + 1] - points[k]
         along = np.clip(((p - points[k]) * d).sum(-1) / (d * d).sum(-1), 0.0, 1.0)[..., None]
         off = np.linalg.norm(points[k] + along * d - p, axis=-1)
-        return np.stack([off, angle_between(turned(axes[k], axes[k + 1], along), n)])
+        return np.stack([off, angle_between(slerp(axes[k], axes[k + 1], along), n)])
 
     rough = errors(np.arange(len(chord)), LOOKS).max(axis=-1)
     worst = []
@@ -213,7 +213,7 @@ def _measured(
 
 def _cells(curves: Sequence[Curve]) -> _Cells:
     """Return the curves in cells that bend little, none longer than its share of the whole."""
-    fine = [sampled(curve, CHORD, ANGLE)[:2] for curve in curves]
+    fine = [sample_curve(curve, CHORD, ANGLE)[:2] for curve in curves]
     lengths = [np.linalg.norm(np.diff(points, axis=0), axis=1) for _, points in fine]
     longest = sum(float(each.sum()) for each in lengths) / CELLS
     of, t, ends = [], [], []
@@ -271,7 +271,7 @@ def _unrolled(at: Array, around: float, length: float, tolerance: float, name: s
     around : float mm
         Length of the loop, infinite for an open one.
     length : float mm
-        Of the contour, which tells in what direction it runs.
+        Of the contour, by which its direction is found.
     tolerance : float mm
         Steps back that are only inaccurate are none.
     name : str

@@ -133,7 +133,7 @@ class _Sheet:
     ) -> None:
         """Add entities; those of a block stand `inside` the layer and colour of its insertion.
 
-        T (4, 4) leads from their coordinates to those of the drawing, mm; it may scale.
+        T (4, 4) maps their coordinates to those of the drawing, mm; it may scale.
         """
         if depth > DEEPEST:
             raise InputError(f"blocks nest deeper than {DEEPEST}: one holds itself; repair it")

@@ -64,11 +64,11 @@ def _lost(document: Drawing, content: bytes, faults: list[str]) -> Counter[tuple
     stand = Counter(kind.decode() for kind in STANDS.findall(content))
     lost: Counter[tuple[str, str]] = Counter()
     for fault in faults:
-        told = DROPPED.match(fault)
-        if told and told[1] in LINES:
-            lost[told[1], told[2].rstrip(".")] += 1
+        dropped = DROPPED.match(fault)
+        if dropped and dropped[1] in LINES:
+            lost[dropped[1], dropped[2].rstrip(".")] += 1
     for kind, count in stand.items():
-        explained = sum(n for (dropped, _), n in lost.items() if dropped == kind)
+        explained = sum(n for (lost_kind, _), n in lost.items() if lost_kind == kind)
         if (missing := count - kept[kind] - explained) > 0:
             lost[kind, "the file is damaged where it stands"] += missing
     return lost
@@ -88,7 +88,7 @@ class _Listener(logging.Handler):
 
 @contextmanager
 def _overheard() -> Iterator[list[str]]:
-    """Give what ezdxf logs about faults, which would go to the terminal otherwise."""
+    """Collect what ezdxf logs about faults, which would go to the terminal otherwise."""
     handler = _Listener(logging.WARNING)
     propagates, logger.propagate = logger.propagate, False
     logger.addHandler(handler)

@@ -24,8 +24,8 @@ __all__ = ["curves_of"]
 def curves_of(entity: DXFGraphic, T: Array) -> Iterator[Curve]:
     """Yield the curves (mm) of an entity, none if it is not one.
 
-    T (4, 4) leads from its coordinates to mm. Blocks may be scaled by factors of their own in x and
-    y: arcs, ellipses and splines stay exact under any such map, which needs no division.
+    T (4, 4) maps its coordinates to mm. Blocks may be scaled by factors of their own in x and y:
+    arcs, ellipses and splines stay exact under any such map, which needs no division.
     """
 
     def point(at: Iterable[float]) -> Array:

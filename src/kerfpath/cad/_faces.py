@@ -6,16 +6,15 @@ from collections.abc import Sequence
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
-from typing import get_args
 
 from OCP.BRepAdaptor import BRepAdaptor_Surface
 from OCP.GeomAbs import GeomAbs_SurfaceType
 
 from kerfpath._arrays import freeze
+from kerfpath.cad._build import named_loops
 from kerfpath.cad._loops import FaceLoop, bounds_of, loops_of
 from kerfpath.cad._mesh import triangulate
-from kerfpath.cad._part import Kind, Loop, Part, Side, loop_of
-from kerfpath.cad._sample import Trace, numbered
+from kerfpath.cad._part import Loop, Part
 from kerfpath.cad._shape import Drawn, NamedFace, unique
 from kerfpath.cad._skins import Skin, skins_of
 from kerfpath.cad._units import MM
@@ -48,13 +47,13 @@ def part_of(path: Path, drawn: Drawn, gap: float) -> Part:
     loops: list[Loop] = []
     for skin, name in zip(skins, skin_names, strict=True):
         if name:
-            look = _look([faces[f] for f in skin.faces])
-            loops += _named(name, "skin", skin.side, skin.loops(found), gap, look)
+            around = _named(name, "skin", skin.loops(found), gap, [faces[f] for f in skin.faces])
+            loops += [replace(loop, side=skin.side) for loop in around]
     side_of = {f: skin.side for skin in skins for f in skin.faces}
     for f, (name, named) in enumerate(zip(names, faces, strict=True)):
         surface = SURFACES[BRepAdaptor_Surface(named.face).GetType()]
-        made = _named(name, surface, side_of[f], found[f], gap, _look([named]))
-        loops += [replace(loop, skin=piece_of[f]) for loop in made]
+        around = _named(name, surface, found[f], gap, [named])
+        loops += [replace(loop, side=side_of[f], skin=piece_of[f]) for loop in around]
     return Part(
         path=path,
         unit=drawn.unit,
@@ -67,27 +66,15 @@ def part_of(path: Path, drawn: Drawn, gap: float) -> Part:
     )
 
 
-def _look(faces: Sequence[NamedFace]) -> tuple[str, str]:
-    """Return the layer and the colour that all of the faces have, "" where they differ."""
-    layers, colours = {named.layer for named in faces}, {named.colour for named in faces}
-    return layers.pop() if len(layers) == 1 else "", colours.pop() if len(colours) == 1 else ""
-
-
 def _named(
-    name: str, surface: str, side: Side, found: list[FaceLoop], gap: float, look: tuple[str, str]
+    name: str, surface: str, found: list[FaceLoop], gap: float, faces: Sequence[NamedFace]
 ) -> list[Loop]:
-    """Return the loops of one face or skin, outer before inner, numbered by their places."""
-    loops = []
-    for kind in get_args(Kind):
-        traces: list[Trace] = [chain for k, chain in found if k == kind]
-        alone, stem = ("outer", "outer") if kind == "outer" else (None, "hole")
-        for last, trace in numbered(traces, stem, alone=alone).items():
-            made = loop_of(
-                name=f"{name}/{last}", face=name, kind=kind, trace=trace, surface=surface, gap=gap,
-                layer=look[0], colour=look[1],
-            )  # fmt: skip
-            loops.append(replace(made, side=side))
-    return loops
+    """Return the loops of a face or skin, with the layer and colour that all its faces have."""
+    layers, colours = {named.layer for named in faces}, {named.colour for named in faces}
+    layer = layers.pop() if len(layers) == 1 else ""
+    colour = colours.pop() if len(colours) == 1 else ""
+    around = [(kind, chain, colour) for kind, chain in found]
+    return named_loops(around, face=name, surface=surface, gap=gap, layer=layer)
 
 
 def _names(faces: Sequence[NamedFace]) -> list[str]:

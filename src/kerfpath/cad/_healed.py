@@ -51,7 +51,6 @@ class HealedSurface:
         self._tree = cKDTree(self._points)
 
     def project(self, points: Array) -> tuple[Array, Array]:
-        """Return the nearest points (B, 3) m of the surface, and its outward normals (B, 3)."""
         asked = np.asarray(points, dtype=np.float64) / MM
         away, nearest = (np.asarray(found) for found in self._tree.query(asked))
         found, normals = np.empty_like(asked), np.empty_like(asked)

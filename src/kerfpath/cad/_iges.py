@@ -14,7 +14,7 @@ from OCP.IGESData import IGESData_IGESEntity
 from OCP.TopAbs import TopAbs_ShapeEnum
 from OCP.TopoDS import TopoDS, TopoDS_Shape
 
-from kerfpath.cad._shape import Drawn, NamedFace, drawn_of, explored, occt
+from kerfpath.cad._shape import Drawn, NamedFace, drawn_of, failures, list_shapes, occt
 from kerfpath.cad._units import UNITS_MM
 from kerfpath.errors import InputError
 
@@ -49,14 +49,14 @@ def _require_whole(content: bytes) -> None:
             f"got {marks[0][:1]!r}; export the part as IGES"
         )
     last = lines[-1].decode("ascii", "replace")
-    told = re.match(r"S\s*(\d+)G\s*(\d+)D\s*(\d+)P\s*(\d+)", last)
-    if marks[-1][:1] != "T" or told is None:
+    sizes = re.match(r"S\s*(\d+)G\s*(\d+)D\s*(\d+)P\s*(\d+)", last)
+    if marks[-1][:1] != "T" or sizes is None:
         raise InputError(
             f"the file is truncated: expected a line T at its end, got {last[:32]!r}; "
             "copy or export it again"
         )
     # OCCT may crash on lines that are missing or in another order.
-    counts = zip("SGDPT", (*map(int, told.groups()), 1), strict=True)
+    counts = zip("SGDPT", (*map(int, sizes.groups()), 1), strict=True)
     due = (f"{section}{k:07}" for section, count in counts for k in range(1, count + 1))
     for line, (want, got) in enumerate(zip_longest(due, marks), start=1):
         if got != want:
@@ -68,7 +68,7 @@ def _require_whole(content: bytes) -> None:
     # Columns 65 to 72 of the parameters tell the directory entry that each line belongs to.
     owners = [line[64:72].strip() for line in lines if line[72:73] == b"P"]
     entries = [int(owner) if owner.isdigit() else 0 for owner, _ in groupby(owners)]
-    known = range(1, int(told[3]) + 1, 2)
+    known = range(1, int(sizes[3]) + 1, 2)
     if len(set(entries)) < len(entries) or not all(entry in known for entry in entries):
         raise InputError(
             "the file is damaged: parameters of section P belong to no entity, or are "
@@ -91,7 +91,7 @@ def _read(path: Path, unit: str | None, gap: float) -> Drawn:
         )
     reader.TransferRoots()
     shape = reader.OneShape()
-    loose = [] if shape is None else explored(shape, TopAbs_ShapeEnum.TopAbs_FACE)
+    loose = [] if shape is None else list_shapes(shape, TopAbs_ShapeEnum.TopAbs_FACE)
     faces = [NamedFace(face=TopoDS.Face(face), name=_name(reader, face)) for face in loose]
     notes = []
     if unit is not None and unit != header:
@@ -109,15 +109,9 @@ def _read(path: Path, unit: str | None, gap: float) -> Drawn:
 
 
 def _require_sound(reader: IGESControl_Reader) -> None:
-    """Refuse broken entities, on which OCCT's transfer may crash the process."""
-    checks = reader.WS().ModelCheckList()
-    checks.Start()
-    while checks.More():
-        check = checks.Value()
-        checks.Next()
-        if check.HasFailed():
-            reason = " ".join(check.CFail(1).split())
-            raise InputError(f"the file is damaged ({reason}); copy or export it again")
+    """Raise InputError for broken entities, on which OCCT's transfer may crash the process."""
+    for _, reason in failures(reader.WS().ModelCheckList()):
+        raise InputError(f"the file is damaged ({reason}); copy or export it again")
 
 
 def _name(reader: IGESControl_Reader, face: TopoDS_Shape) -> str:

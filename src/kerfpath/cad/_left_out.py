@@ -1,4 +1,4 @@
-"""What a drawing holds that is in no loop."""
+"""Entities of a drawing that are in no loop."""
 
 from __future__ import annotations
 

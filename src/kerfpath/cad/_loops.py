@@ -16,15 +16,15 @@ from OCP.GCPnts import GCPnts_AbscissaPoint
 from OCP.GeomAbs import GeomAbs_Shape
 from OCP.gp import gp_Pnt, gp_Vec
 from OCP.TopAbs import TopAbs_Orientation, TopAbs_ShapeEnum
-from OCP.TopExp import TopExp_Explorer
-from OCP.TopoDS import TopoDS, TopoDS_Edge, TopoDS_Face, TopoDS_Iterator, TopoDS_Shape, TopoDS_Wire
+from OCP.TopoDS import TopoDS, TopoDS_Edge, TopoDS_Face, TopoDS_Shape, TopoDS_Wire
 
 from kerfpath._arrays import Array
 from kerfpath.cad._sample import Chain
+from kerfpath.cad._shape import children, list_shapes
 from kerfpath.cad._units import LARGEST
 from kerfpath.errors import InputError
 
-__all__ = ["FaceLoop", "OrientedEdge", "bounds_of", "chained", "loops_of"]
+__all__ = ["FaceLoop", "OrientedEdge", "bounds_of", "join_runs", "loops_of"]
 
 FORWARD, REVERSED = TopAbs_Orientation.TopAbs_FORWARD, TopAbs_Orientation.TopAbs_REVERSED
 
@@ -82,15 +82,12 @@ class OrientedEdge:
 
     @property
     def length(self) -> float:
-        """Arc length, mm."""
         return GCPnts_AbscissaPoint.Length_s(BRepAdaptor_Curve(self.edge))
 
     def bounds(self) -> Array:
-        """Return the least and greatest coordinates (2, 3) mm."""
         return bounds_of(self.edge)
 
     def breaks(self) -> Array:
-        """Return the parameters, in the direction of travel, between which the edge is smooth."""
         curve = BRepAdaptor_Curve(self.edge, self.face)
         count = curve.NbIntervals(GeomAbs_Shape.GeomAbs_C2)
         ends = Array1_double(1, count + 1)
@@ -138,14 +135,12 @@ def loops_of(face: TopoDS_Face) -> list[FaceLoop]:
     outer_wire = BRepTools.OuterWire_s(forward)
     surface = BRepAdaptor_Surface(face)
     loops: list[FaceLoop] = []
-    wires = TopExp_Explorer(forward, TopAbs_ShapeEnum.TopAbs_WIRE)
-    while wires.More():
-        wire = TopoDS.Wire(wires.Current())
+    for found in list_shapes(forward, TopAbs_ShapeEnum.TopAbs_WIRE):
+        wire = TopoDS.Wire(found)
         runs, has_seam = _runs(wire, forward, face, surface)
-        for edges in chained(runs):
+        for edges in join_runs(runs):
             outer = _winds(edges) or (wire.IsSame(outer_wire) and not has_seam)
             loops.append(("outer" if outer else "inner", Chain(edges=edges)))
-        wires.Next()
     return loops
 
 
@@ -153,7 +148,8 @@ def _runs(
     wire: TopoDS_Wire, forward: TopoDS_Face, face: TopoDS_Face, surface: BRepAdaptor_Surface
 ) -> tuple[list[list[OrientedEdge]], bool]:
     """Return the edges of `wire` as travelled, broken at each seam, and whether it has a seam."""
-    everything = list(_edges(wire))
+    turned = (FORWARD, REVERSED)
+    everything = [TopoDS.Edge(e) for e in children(wire) if e.Orientation() in turned]
     ordered = everything if len(everything) == 1 else list(_in_order(wire, forward))
     connected = len(ordered) == len(everything)
     runs: list[list[OrientedEdge]] = [[]]
@@ -178,15 +174,7 @@ def _in_order(wire: TopoDS_Wire, face: TopoDS_Face) -> Iterator[TopoDS_Edge]:
         explorer.Next()
 
 
-def _edges(wire: TopoDS_Wire) -> Iterator[TopoDS_Edge]:
-    iterator = TopoDS_Iterator(wire)
-    while iterator.More():
-        if iterator.Value().Orientation() in (FORWARD, REVERSED):
-            yield TopoDS.Edge(iterator.Value())
-        iterator.Next()
-
-
-def chained(runs: list[list[OrientedEdge]]) -> Iterator[list[OrientedEdge]]:
+def join_runs(runs: list[list[OrientedEdge]]) -> Iterator[list[OrientedEdge]]:
     """Join runs into closed chains: each end goes on at the nearest start, its own included."""
     starts = np.array([run[0].ends[0] for run in runs]).reshape(-1, 3)
     left = np.ones(len(runs), dtype=bool)

@@ -7,11 +7,11 @@ from OCP.BRep import BRep_Tool
 from OCP.BRepMesh import BRepMesh_IncrementalMesh
 from OCP.BRepTools import BRepTools
 from OCP.TopAbs import TopAbs_Orientation, TopAbs_ShapeEnum
-from OCP.TopExp import TopExp_Explorer
 from OCP.TopLoc import TopLoc_Location
 from OCP.TopoDS import TopoDS, TopoDS_Shape
 
 from kerfpath._arrays import Array, Ints
+from kerfpath.cad._shape import list_shapes
 
 __all__ = ["triangulate"]
 
@@ -25,11 +25,9 @@ def triangulate(shape: TopoDS_Shape, deflection: float) -> tuple[Array, Ints]:
     BRepTools.Clean_s(shape)
     BRepMesh_IncrementalMesh(shape, deflection, False, ANGLE, False)
     vertices, triangles, count = [np.empty((0, 3))], [np.empty((0, 3), dtype=np.int64)], 0
-    faces = TopExp_Explorer(shape, TopAbs_ShapeEnum.TopAbs_FACE)
-    while faces.More():
-        face, location = TopoDS.Face(faces.Current()), TopLoc_Location()
+    for found in list_shapes(shape, TopAbs_ShapeEnum.TopAbs_FACE):
+        face, location = TopoDS.Face(found), TopLoc_Location()
         mesh = BRep_Tool.Triangulation_s(face, location)
-        faces.Next()
         if mesh is None:
             continue
         placed = location.Transformation()

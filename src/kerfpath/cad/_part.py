@@ -13,19 +13,18 @@ from numpy.typing import ArrayLike
 
 from kerfpath._arrays import Array, Ints, floats, freeze, scalar
 from kerfpath._told import told
-from kerfpath.cad._crossing import crossing
+from kerfpath.cad._crossing import find_crossing
 from kerfpath.cad._departure import ON_CURVE, Departure, departure
 from kerfpath.cad._healed import HealedSurface
 from kerfpath.cad._left_out import LeftOut
 from kerfpath.cad._loops import OrientedEdge
-from kerfpath.cad._round import diameter
 from kerfpath.cad._sample import Chain, Trace, distance
-from kerfpath.cad._units import LARGEST, MM
+from kerfpath.cad._units import MM
 from kerfpath.contour import Contour
 from kerfpath.errors import InputError
 from kerfpath.operations import Ribbon, Surface
 
-__all__ = ["Kind", "Loop", "Part", "Side", "loop_of"]
+__all__ = ["Kind", "Loop", "Part", "Side"]
 
 Kind = Literal["outer", "inner", "open"]
 Side = Literal["outer", "inner", "edge", ""]
@@ -105,7 +104,7 @@ class Loop:
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Part:
-    """What a drawing holds: its loops by name, in the part's own frame.
+    """A drawing as read: its loops by name, in the part's own frame.
 
     Parameters
     ----------
@@ -222,9 +221,9 @@ class Part:
         ]
         if not found:
             wanted = {**asked, "diameter": diameter, "length": length}
-            told = ", ".join(f"{key}={want!r}" for key, want in wanted.items() if want is not None)
+            words = ", ".join(f"{key}={want!r}" for key, want in wanted.items() if want is not None)
             raise InputError(
-                f"{self.path}: no loop among {len(self.loops)} fits {told or 'a pick'}; "
+                f"{self.path}: no loop among {len(self.loops)} fits {words or 'a pick'}; "
                 "list them with: kerfpath contours"
             )
         if near is not None:
@@ -276,7 +275,7 @@ class Part:
         except InputError as error:
             raise InputError(f"{self.path}: loop {name!r}: {error}") from None
         contour = Contour(points * MM, -normals, closed=loop.closed, name=name)
-        if (place := crossing(contour.points, min(2 * chord, TOUCH))) is not None:
+        if (place := find_crossing(contour.points, min(2 * chord, TOUCH))) is not None:
             raise InputError(
                 f"{self.path}: loop {name!r} crosses or touches itself at "
                 f"{(place / MM).round(3).tolist()} mm; repair it in CAD"
@@ -342,48 +341,6 @@ class Part:
             return freeze(np.empty((0, 3))), freeze(np.empty((0, 3), dtype=np.int64))
         vertices, triangles = self._triangulate(size / MM)
         return freeze(vertices * MM), freeze(triangles)
-
-
-def loop_of(
-    *,
-    name: str,
-    face: str,
-    kind: Kind,
-    trace: Trace,
-    surface: str,
-    gap: float,
-    layer: str = "",
-    colour: str = "",
-) -> Loop:
-    """Return the loop along `trace`, measured; it is closed where no gap (m) is larger.
-
-    Raises
-    ------
-    InputError
-        A trace that is longer or reaches further than any part does.
-    """
-    length, box, widest = float(trace.lengths.sum()), trace.bounds(), trace.gaps.max(initial=0.0)
-    if not (length <= LARGEST and (np.abs(box) <= LARGEST).all()):
-        raise InputError(
-            f"loop {name!r} reaches further than {LARGEST / 1e6:g} km; the file is damaged, or its "
-            "unit is wrong"
-        )
-    return Loop(
-        name=name,
-        face=face,
-        kind=kind,
-        surface=surface,
-        length=length * MM,
-        bounding_box=freeze(box * MM),
-        edges=len(trace.lengths),
-        shortest_edge=float(trace.lengths.min()) * MM,
-        largest_gap=float(widest) * MM,
-        closed=kind != "open" and float(widest) * MM <= gap,
-        diameter=None if kind == "open" else diameter(trace.around * MM),
-        layer=layer,
-        colour=colour,
-        _trace=trace,
-    )
 
 
 def _range(value: tuple[float, float] | None, name: str) -> tuple[float, float] | None:

@@ -65,7 +65,7 @@ def points_in(data: bytes) -> Array:
 
 
 def _line(content: bytes, statement: bytes) -> str:
-    """Say where the entity stands that a statement begins with, as far as that can be told."""
+    """Return where the entity stands that a statement begins with, as far as that is known."""
     number = re.match(rb"#\d+", statement)
     place = number and re.search(number[0] + rb"\s*=", content)
     if not place:

@@ -2,18 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from kerfpath._arrays import scalar
 from kerfpath.apart import apart, stand_by
 from kerfpath.cad._part import Part
 from kerfpath.cad._units import GAP, require_unit
 from kerfpath.errors import InputError
-
-if TYPE_CHECKING:
-    from kerfpath.cad._shape import Drawn
 
 __all__ = ["content_of", "read"]
 
@@ -42,12 +37,12 @@ def read(path: str | Path, unit: str | None = None, *, gap: float = GAP) -> Part
     require_unit(unit)
     scalar(gap, "gap", unit="m", above=0.0)
     content = content_of(path, _EXPECTED)
-    reader = _READERS.get(path.suffix.lower())
-    if reader is None:
+    kind = _KINDS.get(path.suffix.lower())
+    if kind is None:
         raise InputError(f"{path}: expected {_EXPECTED} by its suffix, got {path.suffix!r}")
     if not content.strip():
         raise InputError(f"{path}: the file is empty; expected {_EXPECTED}")
-    return reader(path, content, unit, gap)
+    return _drawn(kind, path, content, unit, gap)
 
 
 def content_of(path: Path, expected: str) -> bytes:
@@ -67,60 +62,42 @@ def content_of(path: Path, expected: str) -> bytes:
         raise InputError(f"{path}: cannot be read ({why}); expected {expected}") from None
 
 
-# Each reader is loaded when a file asks for it: OCCT alone takes over a second.
-def _step(path: Path, content: bytes, unit: str | None, gap: float) -> Part:
+def _drawn(kind: str, path: Path, content: bytes, unit: str | None, gap: float) -> Part:
+    """Return the part; each reader is loaded when a file asks for it, as OCCT takes over a second.
+
+    OCCT may crash, so STEP and IGES are translated apart from this process.
+    """
+    if kind == "table":
+        from kerfpath.cad._table import read_table
+
+        return read_table(path, content, unit, gap)
+    if kind == "DXF":
+        from kerfpath.cad._dxf import read_dxf
+
+        return read_dxf(path, content, unit, gap)
     stand_by()
+    from kerfpath.cad._faces import part_of
+    from kerfpath.cad._iges import read_iges
+    from kerfpath.cad._shape import occt
     from kerfpath.cad._step import read_step
 
-    return _translated(read_step, path, content, unit, gap)
-
-
-def _iges(path: Path, content: bytes, unit: str | None, gap: float) -> Part:
-    stand_by()
-    from kerfpath.cad._iges import read_iges
-
-    return _translated(read_iges, path, content, unit, gap)
-
-
-def _translated(
-    read: Callable[[Path, str | None, float], Drawn],
-    path: Path,
-    content: bytes,
-    unit: str | None,
-    gap: float,
-) -> Part:
-    """Return the part of a file that OCCT reads, apart from this process, which it may crash."""
-    from kerfpath.cad._faces import part_of
-    from kerfpath.cad._shape import occt
-
+    translate = read_step if kind == "STEP" else read_iges
     try:
-        drawn = apart(read, path.absolute(), unit, gap, size=len(content))
+        drawn = apart(translate, path.absolute(), unit, gap, size=len(content))
         with occt():
             return part_of(path, drawn, gap)
     except InputError as error:
         raise InputError(f"{path}: {error}") from None
 
 
-def _dxf(path: Path, content: bytes, unit: str | None, gap: float) -> Part:
-    from kerfpath.cad._dxf import read_dxf
-
-    return read_dxf(path, content, unit, gap)
-
-
-def _table(path: Path, content: bytes, unit: str | None, gap: float) -> Part:
-    from kerfpath.cad._table import read_table
-
-    return read_table(path, content, unit, gap)
-
-
-_READERS: dict[str, Callable[[Path, bytes, str | None, float], Part]] = {
-    ".step": _step,
-    ".stp": _step,
-    ".iges": _iges,
-    ".igs": _iges,
-    ".dxf": _dxf,
-    ".csv": _table,
-    ".tsv": _table,
-    ".txt": _table,
+_KINDS = {
+    ".step": "STEP",
+    ".stp": "STEP",
+    ".iges": "IGES",
+    ".igs": "IGES",
+    ".dxf": "DXF",
+    ".csv": "table",
+    ".tsv": "table",
+    ".txt": "table",
 }
-_EXPECTED = f"a drawing ({', '.join(_READERS)})"
+_EXPECTED = f"a drawing ({', '.join(_KINDS)})"

@@ -1,4 +1,4 @@
-"""Whether a loop is a round hole."""
+"""Round holes among loops."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What a loop runs along: a chain of curves, or points as they came; facts and dense samples."""
+"""Traces of loops: a chain of curves, or points as they came; facts and dense samples."""
 
 from __future__ import annotations
 
@@ -22,9 +22,10 @@ __all__ = [
     "Points",
     "Polyline",
     "Trace",
-    "numbered",
+    "distance",
     "off_chord",
-    "sampled",
+    "sample_curve",
+    "vector_area",
 ]
 
 FIRST_CELLS = 4
@@ -76,7 +77,7 @@ E = TypeVar("E", bound=Edge)
 
 
 class Trace(Protocol):
-    """What a loop runs along."""
+    """The line that a loop runs along."""
 
     @property
     def curves(self) -> Sequence[Curve]:
@@ -102,7 +103,7 @@ class Trace(Protocol):
         """Return the least and greatest coordinates (2, 3) mm."""
 
     def break_at(self) -> str:
-        """Say where its largest gap is."""
+        """Return in words where its largest gap is."""
 
     def sample(self, chord_tolerance: float, axis_tolerance: float) -> tuple[Array, Array]:
         """Return points (K, 3) mm and outward normals (K, 3); a closed trace's first ends it not.
@@ -141,12 +142,10 @@ class Chain(Generic[E]):
 
     @cached_property
     def lengths(self) -> Array:
-        """Length (E,) of each edge, mm."""
         return np.array([edge.length for edge in self.edges])
 
     @cached_property
     def gaps(self) -> Array:
-        """Distance (mm) from the end of each edge to the start of the next."""
         ends = np.array([edge.ends for edge in self.edges])
         gaps = np.linalg.norm(np.roll(ends[:, 0], -1, axis=0) - ends[:, 1], axis=1)
         return np.asarray(gaps if self.is_closed else gaps[:-1])
@@ -162,12 +161,10 @@ class Chain(Generic[E]):
         )
 
     def bounds(self) -> Array:
-        """Return the least and greatest coordinates (2, 3) mm."""
         boxes = np.array([edge.bounds() for edge in self.edges])
         return np.stack([boxes[:, 0].min(axis=0), boxes[:, 1].max(axis=0)])
 
     def break_at(self) -> str:
-        """Say where the largest gap is."""
         if not self.is_closed:
             return self.next_end
         k = int(np.argmax(self.gaps))
@@ -179,7 +176,7 @@ class Chain(Generic[E]):
 
         The end of an edge and the start of the next become one node, halfway.
         """
-        each = [sampled(edge, chord_tolerance, axis_tolerance)[1:] for edge in self.edges]
+        each = [sample_curve(edge, chord_tolerance, axis_tolerance)[1:] for edge in self.edges]
         points, normals = [], []
         for (before_p, before_n), (p, n) in zip(each[-1:] + each[:-1], each, strict=True):
             joint = before_n[-1] + n[0]
@@ -211,7 +208,6 @@ class Polyline:
         return self.line.s
 
     def evaluate(self, t: Array) -> tuple[Array, Array]:
-        """Return points (K, 3) mm and outward unit normals (K, 3) at parameters `t` (K,)."""
         points, axes = self.line.at(t)
         return points, -axes
 
@@ -228,7 +224,6 @@ class Points:
 
     @cached_property
     def lengths(self) -> Array:
-        """Length of each segment, mm."""
         points = np.vstack([self.points, self.points[:1]]) if self.is_closed else self.points
         return np.asarray(np.linalg.norm(np.diff(points, axis=0), axis=1))
 
@@ -250,11 +245,10 @@ class Points:
         return both if self.is_closed else both[:-1]
 
     def bounds(self) -> Array:
-        """Return the least and greatest coordinates (2, 3) mm."""
         return np.stack([self.points.min(axis=0), self.points.max(axis=0)])
 
     def break_at(self) -> str:
-        """Say how far its ends lie apart."""
+        """Return in words how far its ends lie apart."""
         first, last = self.points[[0, -1]]
         return (
             f"ends {np.linalg.norm(last - first):.3f} mm from its start, "
@@ -266,7 +260,7 @@ class Points:
         return self.points, self.normals
 
 
-def sampled(
+def sample_curve(
     edge: Curve, chord_tolerance: float, axis_tolerance: float
 ) -> tuple[Array, Array, Array]:
     """Return parameters, points and normals along one edge, both ends included, by halving cells.
@@ -305,7 +299,7 @@ def sampled(
 
 
 def off_chord(p0: Array, p1: Array, p: Array) -> Array:
-    """Return the distances of `p` from the segments p0 p1, row by row."""
+    """Return the distances of `p`, one or as many, from the segments p0 p1."""
     d = p1 - p0
     along = ((p - p0) * d).sum(1) / np.maximum((d * d).sum(1), np.finfo(float).tiny)
     return np.asarray(np.linalg.norm(p0 + np.clip(along, 0, 1)[:, None] * d - p, axis=1))
@@ -318,20 +312,10 @@ def _angle(n0: Array, n1: Array) -> Array:
 
 def distance(trace: Trace, point: Array) -> float:
     """Return the distance (mm) of `point` from the chords through the points around a trace."""
-    p = trace.around
-    d = np.roll(p, -1, axis=0) - p
-    along = ((point - p) * d).sum(1) / np.maximum((d * d).sum(1), np.finfo(float).tiny)
-    off = np.linalg.norm(p + np.clip(along, 0, 1)[:, None] * d - point, axis=1)
+    off = off_chord(trace.around, np.roll(trace.around, -1, axis=0), point)
     return float((off if trace.gaps.size == len(trace.lengths) else off[:-1]).min())
 
 
-def numbered(traces: list[Trace], stem: str, *, alone: str | None = None) -> dict[str, Trace]:
-    """Return `traces` in the order of their middles by name: stem1, stem2, ...; a single `alone`.
-
-    Middles are rounded, so that last bits do not decide an order.
-    """
-    middles = [tuple((t.around.mean(axis=0).round(3) + 0.0).tolist()) for t in traces]
-    order = sorted(range(len(traces)), key=middles.__getitem__)
-    if alone is not None and len(traces) == 1:
-        return {alone: traces[0]}
-    return {f"{stem}{n}": traces[k] for n, k in enumerate(order, start=1)}
+def vector_area(points: Array) -> Array:
+    """Return the vector area (3,) that a closed polygon (K, 3) encloses."""
+    return np.asarray(np.cross(points, np.roll(points, -1, axis=0)).sum(axis=0) / 2)

@@ -1,4 +1,4 @@
-"""What STEP and IGES hold: a shape, its named faces, sewn together where they are loose.
+"""The content of STEP and IGES files: a shape and its named faces, sewn where they are loose.
 
 OCCT crashes on some damaged files, so they are read in a process of its own (`kerfpath.apart`), and
 what was read comes from there as OCCT's own binary text. This module and those that translate are
@@ -18,6 +18,7 @@ from OCP.BinTools import BinTools
 from OCP.BRep import BRep_Builder, BRep_Tool
 from OCP.BRepBuilderAPI import BRepBuilderAPI_MakeSolid, BRepBuilderAPI_Sewing
 from OCP.BRepLib import BRepLib
+from OCP.Interface import Interface_CheckIterator
 from OCP.Message import Message
 from OCP.Standard import Standard_Failure
 from OCP.TopAbs import TopAbs_ShapeEnum
@@ -28,7 +29,16 @@ from kerfpath._told import told
 from kerfpath.cad._units import MM
 from kerfpath.errors import InputError
 
-__all__ = ["Drawn", "NamedFace", "drawn_of", "explored", "occt", "unique"]
+__all__ = [
+    "Drawn",
+    "NamedFace",
+    "children",
+    "drawn_of",
+    "failures",
+    "list_shapes",
+    "occt",
+    "unique",
+]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -93,22 +103,19 @@ def _again(
 ) -> Drawn:
     both = TopoDS_Shape()
     BinTools.Read_s(both, BytesIO(stream))
-    shape, faces = _children(both)
+    shape, faces = children(both)
     named = [
         NamedFace(
             face=TopoDS.Face(face), name=name, component=component, layer=layer, colour=colour
         )
-        for face, (name, component, layer, colour) in zip(_children(faces), names, strict=True)
+        for face, (name, component, layer, colour) in zip(children(faces), names, strict=True)
     ]
     return Drawn(unit=unit, shape=shape, faces=named, notes=notes)
 
 
-def _children(shape: TopoDS_Shape) -> list[TopoDS_Shape]:
-    found, children = [], TopoDS_Iterator(shape)
-    while children.More():
-        found.append(children.Value())
-        children.Next()
-    return found
+def children(shape: TopoDS_Shape) -> list[TopoDS_Shape]:
+    """Return what a shape is directly made of."""
+    return list(_each(TopoDS_Iterator(shape)))
 
 
 @contextmanager
@@ -140,20 +147,32 @@ def drawn_of(
     """Return a shape and its faces, sewn within `gap` (m) where there is no solid."""
     if not faces:
         raise InputError("the file holds no face; export the part as a solid or a surface")
-    solids = explored(shape, TopAbs_ShapeEnum.TopAbs_SOLID)
+    solids = list_shapes(shape, TopAbs_ShapeEnum.TopAbs_SOLID)
     if not solids and len(faces) > 1:
-        shape, faces, told = _sewn(faces, gap)
-        notes = [*notes, told]
+        shape, faces, note = _sewn(faces, gap)
+        notes = [*notes, note]
     return Drawn(unit=unit, shape=shape, faces=faces, notes=notes)
 
 
-def explored(shape: TopoDS_Shape, kind: TopAbs_ShapeEnum) -> list[TopoDS_Shape]:
+def list_shapes(shape: TopoDS_Shape, kind: TopAbs_ShapeEnum) -> list[TopoDS_Shape]:
     """Return the faces, edges, ... of a shape."""
-    found, explorer = [], TopExp_Explorer(shape, kind)
-    while explorer.More():
-        found.append(explorer.Current())
-        explorer.Next()
-    return found
+    return list(_each(TopExp_Explorer(shape, kind)))
+
+
+def failures(checks: Interface_CheckIterator) -> Iterator[tuple[int, str]]:
+    """Yield the number of each entity that fails a check, 0 for the file as a whole, and why."""
+    checks.Start()
+    while checks.More():
+        number, check = checks.Number(), checks.Value()
+        checks.Next()
+        if check.HasFailed():
+            yield number, " ".join(check.CFail(1).split())
+
+
+def _each(shapes: TopExp_Explorer | TopoDS_Iterator) -> Iterator[TopoDS_Shape]:
+    while shapes.More():
+        yield shapes.Value()
+        shapes.Next()
 
 
 def _sewn(faces: Sequence[NamedFace], gap: float) -> tuple[TopoDS_Shape, list[NamedFace], str]:
@@ -168,7 +187,7 @@ def _sewn(faces: Sequence[NamedFace], gap: float) -> tuple[TopoDS_Shape, list[Na
         BRepLib.OrientClosedSolid_s(solid)
         shape = solid
     # Sewing turns faces round so that neighbours agree: each is taken as it lies in the result.
-    sewn = explored(shape, TopAbs_ShapeEnum.TopAbs_FACE)
+    sewn = list_shapes(shape, TopAbs_ShapeEnum.TopAbs_FACE)
     lying = []
     for named in faces:
         made = sewing.ModifiedSubShape(named.face)
@@ -179,13 +198,13 @@ def _sewn(faces: Sequence[NamedFace], gap: float) -> tuple[TopoDS_Shape, list[Na
             f"{len(faces) - len(lying)} of {len(faces)} loose faces vanish when sewn over "
             f"{gap / MM:g} mm; give a smaller gap"
         )
-    edges = explored(shape, TopAbs_ShapeEnum.TopAbs_EDGE)
+    edges = list_shapes(shape, TopAbs_ShapeEnum.TopAbs_EDGE)
     widest = max((BRep_Tool.Tolerance_s(TopoDS.Edge(edge)) for edge in edges), default=0.0)
-    told = (
+    note = (
         f"{len(faces)} loose faces sewn within {gap / MM:g} mm: {sewing.NbContigousEdges()} edges "
         f"joined, the widest gap {np.round(widest, 4):g} mm; {sewing.NbFreeEdges()} edges are free"
     )
-    return shape, lying, told
+    return shape, lying, note
 
 
 def unique(names: list[str]) -> list[str]:

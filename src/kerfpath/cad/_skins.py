@@ -14,10 +14,10 @@ from scipy.spatial import cKDTree
 
 from kerfpath._arrays import Array, Ints
 from kerfpath._told import told
-from kerfpath.cad._connected import connected
-from kerfpath.cad._loops import FaceLoop, OrientedEdge, chained
+from kerfpath.cad._connected import label_connected
+from kerfpath.cad._loops import FaceLoop, OrientedEdge, join_runs
 from kerfpath.cad._part import Side
-from kerfpath.cad._sample import Chain
+from kerfpath.cad._sample import Chain, vector_area
 
 __all__ = ["SMOOTH", "Skin", "skins_of"]
 
@@ -69,7 +69,7 @@ class Skin:
             for k, (_, loop) in enumerate(found[f])
             for run in _outside(loop.edges, [(f, k, e) in self.inside for e in _numbers(loop)])
         ]
-        chains = [Chain(edges=edges) for edges in chained(runs)]
+        chains = [Chain(edges=edges) for edges in join_runs(runs)]
         loops = [(_is_hole(chain), chain) for chain in chains]
         if loops and all(hole for hole, _ in loops):
             # A trim line may face away from its sheet, as that of a C-shaped channel does.
@@ -91,7 +91,7 @@ def skins_of(faces: Sequence[TopoDS_Face], found: Sequence[list[FaceLoop]]) -> l
     pairs = [(a, b) for at in uses if len(at) == 2 for a, b in [at] if a[0] != b[0]]
     smooth = [pair for pair in pairs if _is_smooth(*(found[f][k][1].edges[e] for f, k, e in pair))]
     group, whole = (
-        connected(np.array([[a[0], b[0]] for a, b in of], dtype=np.int64), len(faces))
+        label_connected(np.array([[a[0], b[0]] for a, b in of], dtype=np.int64), len(faces))
         for of in (smooth, pairs)
     )
     inside: dict[int, set[tuple[int, int, int]]] = {}
@@ -150,16 +150,11 @@ def _outside(edges: Sequence[OrientedEdge], inside: list[bool]) -> list[list[Ori
 
 def _is_hole(loop: Chain[OrientedEdge]) -> bool:
     """Return whether a closed chain runs about a hole of its skin, by its normals."""
-    area = _vector_area(loop.around)
+    area = vector_area(loop.around)
     middles = [(edge.start + edge.end) / 2 for edge in loop.edges]
     normals = [e.evaluate(np.array([t]))[1][0] for e, t in zip(loop.edges, middles, strict=True)]
     facing = loop.lengths @ np.array(normals) / loop.lengths.sum()
     return bool(area @ facing < HOLE * np.linalg.norm(area))
-
-
-def _vector_area(points: Array) -> Array:
-    """Return the vector area (3,) that a closed polygon (K, 3) encloses."""
-    return np.asarray(np.cross(points, np.roll(points, -1, axis=0)).sum(axis=0) / 2)
 
 
 def _sides(
@@ -181,7 +176,7 @@ def _sides(
             BRepGProp.SurfaceProperties_s(faces[f], props, ACCURACY)
             areas[g] += abs(props.Mass())  # a damaged face may count as less than nothing
             for k, (_, loop) in enumerate(found[f]):
-                vector[g] += _vector_area(loop.around)
+                vector[g] += vector_area(loop.around)
                 around.append(loop.around)
                 outside = [(f, k, e) not in inside[g] for e in _numbers(loop)]
                 rims[g] += loop.lengths[outside].sum()

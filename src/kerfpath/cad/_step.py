@@ -13,11 +13,11 @@ from OCP.STEPControl import STEPControl_Reader
 from OCP.StepGeom import StepGeom_Curve, StepGeom_Pcurve
 from OCP.StepRepr import StepRepr_NextAssemblyUsageOccurrence, StepRepr_RepresentationItem
 from OCP.TopAbs import TopAbs_ShapeEnum
-from OCP.TopoDS import TopoDS, TopoDS_Iterator, TopoDS_Shape
+from OCP.TopoDS import TopoDS, TopoDS_Shape
 
 from kerfpath._arrays import Array
 from kerfpath.cad._part21 import points_in, sound_data
-from kerfpath.cad._shape import Drawn, NamedFace, drawn_of, occt, unique
+from kerfpath.cad._shape import Drawn, NamedFace, children, drawn_of, failures, occt, unique
 from kerfpath.cad._styles import styles_in
 from kerfpath.cad._units import LARGEST, UNITS_MM
 from kerfpath.errors import InputError
@@ -116,10 +116,8 @@ def _faces(
         if isinstance(entity, StepRepr_NextAssemblyUsageOccurrence):
             into = []
             components.append((_product(entity), into))
-        children = TopoDS_Iterator(shape)
-        while children.More():
-            walk(children.Value(), into, layer, colour)
-            children.Next()
+        for child in children(shape):
+            walk(child, into, layer, colour)
 
     walk(shape, components[0][1], "", "")
     components = [(name, faces) for name, faces in components if faces]
@@ -139,15 +137,10 @@ def _product(used: StepRepr_NextAssemblyUsageOccurrence) -> str:
 
 
 def _require_sound(reader: STEPControl_Reader) -> bool:
-    """Refuse broken syntax and geometry, on which OCCT may crash; say if styles are sound."""
+    """Return whether styles are sound; raise InputError for what OCCT may crash on."""
     has_styles = True
-    model, checks = reader.WS().Model(), reader.WS().ModelCheckList()
-    checks.Start()
-    while checks.More():
-        check, number = checks.Value(), checks.Number()
-        checks.Next()
-        if not check.HasFailed():
-            continue
+    model = reader.WS().Model()
+    for number, reason in failures(reader.WS().ModelCheckList()):
         where = ""
         if number:
             package, _, entity = type(model.Value(number)).__name__.partition("_")
@@ -155,7 +148,6 @@ def _require_sound(reader: STEPControl_Reader) -> bool:
             if package not in ("StepGeom", "StepShape") and entity != "DefinitionalRepresentation":
                 continue
             where = f"{entity}: "
-        reason = " ".join(check.CFail(1).split())
         raise InputError(f"the file is damaged ({where}{reason}); copy or export it again")
     for number in range(1, model.NbEntities() + 1):
         drawn = model.Value(number)
@@ -169,7 +161,7 @@ def _require_sound(reader: STEPControl_Reader) -> bool:
 
 
 def _require_near(points: Array) -> None:
-    """Refuse points (K, 3) mm that no part has: OCCT would spend minutes on curves through them."""
+    """Raise InputError for points (K, 3) mm so far off that OCCT would spend minutes on them."""
     far = points[~(np.abs(points) <= LARGEST).all(axis=1)]
     if len(far):
         raise InputError(

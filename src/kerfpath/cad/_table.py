@@ -4,17 +4,18 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
 from itertools import groupby
 from pathlib import Path
 
 import numpy as np
 
-from kerfpath._arrays import Array, freeze
+from kerfpath._arrays import Array
+from kerfpath.cad._build import loop_of, part_without_faces
 from kerfpath.cad._cells import Cells, cells_of
-from kerfpath.cad._part import Kind, Part, loop_of
-from kerfpath.cad._sample import Points
+from kerfpath.cad._part import Kind, Part
+from kerfpath.cad._sample import Points, vector_area
 from kerfpath.cad._units import LARGEST, MM, UNITS_MM
+from kerfpath.contour import angle_between
 from kerfpath.errors import InputError
 
 __all__ = ["read_table"]
@@ -40,20 +41,6 @@ UNIT_QUATERNION = 1e-2
 """How far a quaternion's length may be from one: rounded digits pass, other columns fail."""
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class _Rows:
-    """The cells of a table, and what the columns are."""
-
-    columns: tuple[str, ...]
-    unit: str
-    table: Cells
-
-    @property
-    def lines(self) -> Sequence[int]:
-        """The line that each row stands in."""
-        return self.table.lines
-
-
 def read_table(path: Path, content: bytes, unit: str | None, gap: float) -> Part:
     """Return the contours of a table of points, one per name in its column `contour`.
 
@@ -63,44 +50,35 @@ def read_table(path: Path, content: bytes, unit: str | None, gap: float) -> Part
         Anything wrong with a row (its line is named), columns that are not known, no unit known.
     """
     try:
-        rows = _rows(cells_of(content, EXPECTED))
-        if not (unit or rows.unit):
+        columns, declared, table = _rows(cells_of(content, EXPECTED))
+        if not (unit or declared):
             raise InputError(
                 f"states no length unit; say it with unit= one of {', '.join(UNITS_MM)}, "
                 "or in the header, as x_mm"
             )
         notes = []
-        if unit and rows.unit and unit != rows.unit:
-            notes.append(f"unit {unit} as asked; the header says {rows.unit}")
+        if unit and declared and unit != declared:
+            notes.append(f"unit {unit} as asked; the header says {declared}")
         known = (*POSITION, *NORMAL, *AXIS, *QUATERNION, NAME)
-        if unknown := [name for name in rows.columns if name not in known]:
+        if unknown := [name for name in columns if name not in known]:
             notes.append(f"columns not used: {', '.join(unknown)}")
-        points, normals = _numbers(rows, UNITS_MM[unit or rows.unit])
+        points, normals = _numbers(columns, table, UNITS_MM[unit or declared])
         loops = []
-        for name, chosen in _contours(rows):
-            lines = np.array(rows.lines)[chosen]
-            trace, told = _trace(points[chosen], normals[chosen], lines, gap / MM)
-            notes += [f"contour {name!r}: {what}" for what in told]
+        for name, chosen in _contours(columns, table):
+            lines = np.array(table.lines)[chosen]
+            trace, repaired = _trace(points[chosen], normals[chosen], lines, gap / MM)
+            notes += [f"contour {name!r}: {what}" for what in repaired]
             kind = _kind(trace)
             loops.append(
                 loop_of(name=name, face=name, kind=kind, trace=trace, surface="points", gap=gap)
             )
     except InputError as error:
         raise InputError(f"{path}: {error}") from None
-    boxes = np.array([loop.bounding_box for loop in loops])
-    return Part(
-        path=path,
-        unit=unit or rows.unit,
-        bounding_box=freeze(np.stack([boxes[:, 0].min(axis=0), boxes[:, 1].max(axis=0)])),
-        faces=0,
-        loops=tuple(loops),
-        notes=tuple(notes),
-        _gap=gap,
-    )
+    return part_without_faces(path, unit or declared, loops, gap=gap, notes=notes)
 
 
-def _rows(table: Cells) -> _Rows:
-    """Return the rows under their columns."""
+def _rows(table: Cells) -> tuple[tuple[str, ...], str, Cells]:
+    """Return the names of the columns, the unit that they state, and the rows under them."""
     columns, unit = _header(table)
     if columns:
         table = table.without_header()
@@ -114,7 +92,7 @@ def _rows(table: Cells) -> _Rows:
     if not table.rows:
         raise InputError("holds a header but no rows of points")
     table.require_width(len(columns))
-    return _Rows(columns=columns, unit=unit, table=table)
+    return columns, unit, table
 
 
 def _header(table: Cells) -> tuple[tuple[str, ...], str]:
@@ -141,33 +119,33 @@ def _header(table: Cells) -> tuple[tuple[str, ...], str]:
     return tuple(columns), units[0] if units else ""
 
 
-def _numbers(rows: _Rows, mm: float) -> tuple[Array, Array]:
+def _numbers(columns: Sequence[str], table: Cells, mm: float) -> tuple[Array, Array]:
     """Return points (K, 3) mm and outward unit normals (K, 3)."""
-    at = {name: k for k, name in enumerate(rows.columns)}
+    at = {name: k for k, name in enumerate(columns)}
     axes = next(a for a in (AXIS, NORMAL, QUATERNION) if set(a) <= set(at))
     wanted = [at[name] for name in (*POSITION, *axes)]
     values = np.array(
         [
-            [rows.table.number(k, column, rows.columns[column]) for column in wanted]
-            for k in range(len(rows.table.rows))
+            [table.number(k, column, columns[column]) for column in wanted]
+            for k in range(len(table.rows))
         ]
     )
     points, directions = values[:, :3] * mm, values[:, 3:]
     if (far := np.flatnonzero((np.abs(points) > LARGEST).any(axis=1))).size:
         raise InputError(
-            f"line {rows.lines[far[0]]}: a point further than {LARGEST / 1e6:g} km from the "
+            f"line {table.lines[far[0]]}: a point further than {LARGEST / 1e6:g} km from the "
             "origin; check the unit"
         )
     size = np.abs(directions).max(axis=1)
     if (zero := np.flatnonzero(size == 0)).size:
-        raise InputError(f"line {rows.lines[zero[0]]}: {' '.join(axes)} are all 0; no direction")
+        raise InputError(f"line {table.lines[zero[0]]}: {' '.join(axes)} are all 0; no direction")
     directions = directions / size[:, None]  # no square overflows
     length = np.linalg.norm(directions, axis=1)
     if axes == QUATERNION:
         if (off := np.flatnonzero(np.abs(length * size - 1) > UNIT_QUATERNION)).size:
             raise InputError(
-                f"line {rows.lines[off[0]]}: a quaternion of length {(length * size)[off[0]]:.3g}, "
-                "expected 1; check the columns"
+                f"line {table.lines[off[0]]}: a quaternion of length "
+                f"{(length * size)[off[0]]:.3g}, expected 1; check the columns"
             )
         x, y, z, w = (directions / length[:, None]).T
         z_axis = np.stack([2 * (x * z + w * y), 2 * (y * z - w * x), 1 - 2 * (x * x + y * y)], 1)
@@ -175,18 +153,18 @@ def _numbers(rows: _Rows, mm: float) -> tuple[Array, Array]:
     return points, directions / (length if axes == NORMAL else -length)[:, None]
 
 
-def _contours(rows: _Rows) -> Iterator[tuple[str, slice]]:
+def _contours(columns: Sequence[str], table: Cells) -> Iterator[tuple[str, slice]]:
     """Yield each contour's name and rows."""
-    if NAME not in rows.columns:
-        yield NAME, slice(len(rows.table.rows))
+    if NAME not in columns:
+        yield NAME, slice(len(table.rows))
         return
-    column = rows.columns.index(NAME)
+    column = columns.index(NAME)
     first, seen = 0, set()
-    for name, group in groupby(row[column] for row in rows.table.rows):
+    for name, group in groupby(row[column] for row in table.rows):
         last = first + len(list(group))
         if not name or name in seen:
             what = f"rows of contour {name!r} stand apart" if name else "no name of a contour"
-            raise InputError(f"line {rows.lines[first]}: {what}; put its rows together")
+            raise InputError(f"line {table.lines[first]}: {what}; put its rows together")
         seen.add(name)
         yield name, slice(first, last)
         first = last
@@ -195,8 +173,8 @@ def _contours(rows: _Rows) -> Iterator[tuple[str, slice]]:
 def _trace(points: Array, normals: Array, lines: Array, gap: float) -> tuple[Points, list[str]]:
     """Return the points without repeated ones, closed if they end where they began."""
     steps = np.linalg.norm(np.diff(points, axis=0), axis=1)
-    turns = _angle(normals[:-1], normals[1:])
-    told = []
+    turns = angle_between(normals[:-1], normals[1:])
+    repaired = []
     again = steps <= REPEATED
     if (bad := np.flatnonzero(again & (turns > TURNED))).size:
         raise InputError(
@@ -205,12 +183,12 @@ def _trace(points: Array, normals: Array, lines: Array, gap: float) -> tuple[Poi
         )
     if again.any():
         first = int(np.argmax(again)) + 1
-        told.append(f"{again.sum()} repeated points left out, the first in line {lines[first]}")
+        repaired.append(f"{again.sum()} repeated points left out, the first in line {lines[first]}")
         keep = np.concatenate([[True], ~again])
         points, normals, lines = points[keep], normals[keep], lines[keep]
     if len(points) < 2:
         raise InputError(f"line {lines[0]}: a contour needs at least 2 points, got {len(points)}")
-    for k, angle in enumerate(_angle(normals[:-1], normals[1:])):
+    for k, angle in enumerate(angle_between(normals[:-1], normals[1:])):
         if angle > FLIP:
             raise InputError(
                 f"line {lines[k + 1]}: the axis turns by {np.degrees(angle):.0f} deg from line "
@@ -218,22 +196,17 @@ def _trace(points: Array, normals: Array, lines: Array, gap: float) -> tuple[Poi
             )
     is_closed = len(points) > 3 and float(np.linalg.norm(points[-1] - points[0])) <= gap
     if is_closed:
-        if _angle(normals[-1:], normals[:1])[0] > TURNED:
+        if angle_between(normals[-1:], normals[:1])[0] > TURNED:
             raise InputError(
                 f"line {lines[-1]}: ends where it began, line {lines[0]}, but with another axis"
             )
         points, normals = points[:-1], normals[:-1]
-    return Points(points=points, normals=normals, is_closed=is_closed), told
+    return Points(points=points, normals=normals, is_closed=is_closed), repaired
 
 
 def _kind(trace: Points) -> Kind:
     """Return how a closed line runs about its mean normal: an outer one counter-clockwise."""
     if not trace.is_closed:
         return "open"
-    area = np.cross(trace.points, np.roll(trace.points, -1, axis=0)).sum(axis=0)
+    area = vector_area(trace.points)
     return "outer" if area @ trace.normals.mean(axis=0) >= 0 else "inner"
-
-
-def _angle(a: Array, b: Array) -> Array:
-    sine = np.linalg.norm(np.cross(a, b), axis=1)
-    return np.asarray(np.arctan2(sine, (a * b).sum(axis=1)))

@@ -9,7 +9,7 @@ __all__ = ["GAP", "LARGEST", "MM", "UNITS_MM", "require_unit"]
 MM = 1e-3
 """OCCT works in mm, and so does this package; every length that leaves it is in m."""
 GAP = 5e-5
-"""Distance (m) between the ends of two curves that a loop bridges unless told: half a kerf."""
+"""Distance (m) between the ends of two curves that a loop bridges by default: half a kerf."""
 LARGEST = 1e7
 """No drawing reaches further than this, mm; a damaged number or a wrong unit soon makes it so."""
 
@@ -28,6 +28,6 @@ UNITS_MM = {
 
 
 def require_unit(unit: str | None) -> None:
-    """Refuse a unit that is not known; None passes."""
+    """Raise InputError for a unit that is not known; None passes."""
     if unit is not None and unit not in UNITS_MM:
         raise InputError(f"unit: expected one of {', '.join(UNITS_MM)}, got {unit!r}")

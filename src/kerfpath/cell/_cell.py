@@ -9,7 +9,7 @@ from itertools import combinations
 import numpy as np
 from numpy.typing import ArrayLike
 
-from kerfpath._arrays import Array, Bools, Ints, as_pose, bools, floats, freeze, scalar
+from kerfpath._arrays import Array, Bools, Ints, as_pose, bools, floats, freeze, not_negative
 from kerfpath.cell._bodies import Body
 from kerfpath.cell._head import CuttingHead, MeshHead
 from kerfpath.cell._links import link_bodies
@@ -194,12 +194,12 @@ class Cell:
         return over[np.arange(len(q)), pair], pair
 
     def clear(self, q: ArrayLike) -> Bools:
-        """Say for each of q (B, n) rad whether every pair keeps its near-miss distance."""
+        """Return for each of q (B, n) rad whether every pair keeps its near-miss distance."""
         enough = float(self.required.max(initial=0.0)) + 1e-9
         return np.asarray((self.distances(q, enough=enough) > self.required).all(axis=1))
 
     def clear_motion(self, q0: ArrayLike, q1: ArrayLike) -> Bools:
-        """Say for each straight joint motion q0 to q1, (B, n) rad, whether it is proved clear.
+        """Return for each straight joint motion q0 to q1, (B, n) rad, whether it is proved clear.
 
         Endless joints go the short way round. Clear is what keeps more than the near-miss
         distances all the way; what keeps them by less than 0.1 mm may be refused.
@@ -213,7 +213,7 @@ class Cell:
         )
 
     def clear_through(self, q: ArrayLike) -> bool:
-        """Say whether the straight joint motions through q (m, n) rad are all proved clear.
+        """Return whether the straight joint motions through q (m, n) rad are all proved clear.
 
         As in `clear_motion`, but endless joints turn as q says.
         """
@@ -385,7 +385,4 @@ def _scene(bodies: Sequence[Body], judged: Mapping[Places, tuple[float, Design]]
 
 def _distance(value: float, names: Sequence[str], pair: tuple[int, int]) -> float:
     what = f"near-miss distance of {names[pair[0]]!r} and {names[pair[1]]!r}"
-    number = scalar(value, what, unit="m")
-    if number < 0:
-        raise InputError(f"{what}: must not be negative, got {number:g} m")
-    return number
+    return not_negative(value, what, unit="m")

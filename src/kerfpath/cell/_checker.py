@@ -11,7 +11,7 @@ from __future__ import annotations
 import numpy as np
 from scipy.spatial import cKDTree
 
-from kerfpath._arrays import Array, Bools, Ints, floats, scalar
+from kerfpath._arrays import Array, Bools, Ints, floats, not_negative
 from kerfpath.cell._cell import Cell
 from kerfpath.cell._motion import TOLERANCE
 from kerfpath.cell._scene import ACCURACY
@@ -28,7 +28,7 @@ NEAREST = 4
 
 
 class Checker:
-    """The checks that `kerfpath.search.clear_path` asks for.
+    """The checks that `kerfpath.search.find_clear` asks for.
 
     Parameters
     ----------
@@ -54,8 +54,8 @@ class Checker:
     ) -> None:
         self._cell = cell
         self._q = floats(q, "q", (None, len(cell.chain.axes)), copy=False)
-        self._comfort = scalar(comfort, "comfort", unit="m", above=-1e-300)
-        self._comfort_cost = scalar(comfort_cost, "comfort_cost", above=-1e-300)
+        self._comfort = not_negative(comfort, "comfort", unit="m")
+        self._comfort_cost = not_negative(comfort_cost, "comfort_cost")
         self._needed = cell.required + np.where(cell.own, 0.0, comfort if comfort_cost else 0.0)
         self._apart: dict[int, tuple[Array, Array]] = {}
         self._price: dict[int, float] = {}
@@ -77,7 +77,7 @@ class Checker:
         return np.array([self._price[v] for v in vertices.tolist()])
 
     def passable(self, p: Ints, j: Ints) -> Bools:
-        """Say which of the motions from vertices p to vertices j, (B,) each, are clear.
+        """Return which of the motions from vertices p to vertices j, (B,) each, are clear.
 
         Pairs that closed a motion before are looked at half way first: there most motions hit.
         """
@@ -105,7 +105,7 @@ class Checker:
         return passable
 
     def blocked(self, p: Ints, j: Ints) -> Bools:
-        """Say of which motions, (B,) each, it is seen at little cost that they are not clear.
+        """Return which motions, (B,) each, are seen at little cost not to be clear.
 
         Half way, pairs that closed a motion before are too near.
         """

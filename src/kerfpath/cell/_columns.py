@@ -1,4 +1,4 @@
-"""Which points lie inside a closed surface: a line upwards counts the triangles it crosses.
+"""Points inside a closed surface: a line upwards counts the triangles it crosses.
 
 Triangles are sorted into columns along z, so that a line meets a few only. Where it passes an edge
 too closely to count, the winding number decides, over all triangles: the solid angle under which a
@@ -48,7 +48,7 @@ class Columns:
         self._start = np.searchsorted(key[order], np.arange(n * n + 1))
 
     def contains(self, point: Array) -> bool:
-        """Say whether a point (3,) m that is not on the surface lies inside."""
+        """Return whether a point (3,) m that is not on the surface lies inside."""
         if not ((point > self.low) & (point < self.high)).all():
             return False
         x, y = self._column(point[:2])

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, fields
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -21,8 +22,29 @@ PAST = 1e-5
 """m: a mesh may reach this far beyond the stand-off point; files round their numbers."""
 
 
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class _Head:
+    """The base of cutting heads: a nozzle, at a stand-off above the part."""
+
+    stand_off: float = 1e-3
+    share: float = 0.5
+    nozzle_length: float = 0.06
+
+    def __post_init__(self) -> None:
+        for field in fields(self):
+            if field.type == "float" and field.name != "share":
+                scalar(getattr(self, field.name), f"head {field.name}", unit="m", above=0.0)
+        if not 0 <= self.share < 1:
+            raise InputError(f"head share: expected 0 to below 1, got {self.share:g}")
+
+    @property
+    def keeps(self) -> float:
+        """Distance (m) that the nozzle must keep to the part."""
+        return self.share * self.stand_off
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
-class CuttingHead:
+class CuttingHead(_Head):
     """A generic cutting head: a conical nozzle, a round body above it, an arm to the flange.
 
     Everything lies along the beam, the tip's z axis. The tip is where the beam meets the part; the
@@ -41,25 +63,12 @@ class CuttingHead:
     arm_radius : float m
     """
 
-    stand_off: float = 1e-3
-    share: float = 0.5
-    nozzle_length: float = 0.06
     nozzle_radii: tuple[float, float] = (2.5e-3, 16e-3)
     body_length: float = 0.14
     body_radius: float = 0.04
     arm_radius: float = 0.05
 
     __repr__ = told
-
-    def __post_init__(self) -> None:
-        for name in ("stand_off", "nozzle_length", "body_length", "body_radius", "arm_radius"):
-            scalar(getattr(self, name), f"head {name}", unit="m", above=0.0)
-        _require_share(self.share)
-
-    @property
-    def keeps(self) -> float:
-        """Distance (m) that the nozzle must keep to the part."""
-        return self.share * self.stand_off
 
     def bodies(self, chain: Chain, T_flange_tip: ArrayLike) -> tuple[Body, ...]:
         """Return nozzle, head and, from the flange to the head, the arm."""
@@ -73,14 +82,11 @@ class CuttingHead:
             "head": frustum(neck, top, (self.body_radius, self.body_radius)),
             "arm": Capsule(start=np.zeros(3), end=top, radius=self.arm_radius),
         }
-        return tuple(
-            Body(name=name, shape=shape.moved(chain.end), frame=len(chain.axes), kind="head")
-            for name, shape in shapes.items()
-        )
+        return _mounted(shapes, chain)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class MeshHead:
+class MeshHead(_Head):
     """A cutting head as a closed mesh, cut in two across the beam: the nozzle, and all above it.
 
     The nozzle is what lies within `nozzle_length` of the stand-off point along the beam. It must
@@ -98,21 +104,8 @@ class MeshHead:
     """
 
     mesh: Mesh
-    stand_off: float = 1e-3
-    share: float = 0.5
-    nozzle_length: float = 0.06
 
     __repr__ = told
-
-    def __post_init__(self) -> None:
-        for name in ("stand_off", "nozzle_length"):
-            scalar(getattr(self, name), f"head {name}", unit="m", above=0.0)
-        _require_share(self.share)
-
-    @property
-    def keeps(self) -> float:
-        """Distance (m) that the nozzle must keep to the part."""
-        return self.share * self.stand_off
 
     def bodies(self, chain: Chain, T_flange_tip: ArrayLike) -> tuple[Body, ...]:
         """Return the nozzle and the head above it.
@@ -139,14 +132,13 @@ class MeshHead:
                 "in the flange frame, m"
             )
         nozzle, above = mesh.cut(end - self.nozzle_length * beam, beam)
-        shapes = {"nozzle": nozzle, "head": above}
-        return tuple(
-            Body(name=name, shape=shape.moved(chain.end), frame=len(chain.axes), kind="head")
-            for name, shape in shapes.items()
-            if shape is not None
-        )
+        return _mounted({"nozzle": nozzle, "head": above}, chain)
 
 
-def _require_share(share: float) -> None:
-    if not 0 <= share < 1:
-        raise InputError(f"head share: expected 0 to below 1, got {share:g}")
+def _mounted(shapes: Mapping[str, Shape | None], chain: Chain) -> tuple[Body, ...]:
+    """Return the bodies of shapes in the flange frame, those that are there."""
+    return tuple(
+        Body(name=name, shape=shape.moved(chain.end), frame=len(chain.axes), kind="head")
+        for name, shape in shapes.items()
+        if shape is not None
+    )

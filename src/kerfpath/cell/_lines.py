@@ -12,7 +12,7 @@ from kerfpath.cell._shapes import Capsule
 __all__ = ["Lines", "lines_apart"]
 
 PARALLEL = 1e-12
-"""Of the squared sine of two lines: below it they are parallel, and ends tell their distance."""
+"""Of the squared sine of two lines: below it they are parallel, and nearest at an end."""
 
 
 class Lines:

@@ -11,7 +11,7 @@ from kerfpath._arrays import Array
 from kerfpath.cell._bodies import Body
 from kerfpath.cell._mesh import size_of
 from kerfpath.cell._shapes import Capsule, Hull, Shape, box, frustum
-from kerfpath.cell._stl import closed, read_surface
+from kerfpath.cell._stl import close_surface, read_surface
 from kerfpath.errors import InputError
 from kerfpath.robots import Robot, chain_of, model_chain
 from kerfpath.urdf import Body as Described
@@ -161,7 +161,7 @@ def _shape(body: Described, hulls: bool) -> Shape:
     name = f"link {body.link!r}, {body.path.name}"
     vertices, triangles = read_surface(body.path, name)
     if not hulls:
-        return closed(vertices, triangles, body.size, name).moved(body.pose)
+        return close_surface(vertices, triangles, body.size, name).moved(body.pose)
     with np.errstate(over="ignore"):  # what becomes infinite is refused for its size
         vertices = vertices * body.size
     size_of(vertices, triangles, name)

@@ -1,4 +1,4 @@
-"""How clear very many joint vectors are, at as few distances as proofs allow.
+"""Clearances of very many joint vectors, at as few distances as proofs allow.
 
 One pair of bodies at a time: seen from its first body, the second takes a cloud of poses, one for
 each joint vector. A block of that cloud is measured at its middle, d. No point of the second body
@@ -124,7 +124,7 @@ class _Cloud:
     def bounds(self, aim: Array, resolution: float) -> tuple[Array, Array]:
         """Return bounds (B,) m on the distances beyond the required one.
 
-        They tell on which side of zero it is; and where it is between zero and `aim`, the bounds
+        They settle on which side of zero it is; and where it is between zero and `aim`, the bounds
         are `resolution` or less apart.
         """
         over, above = np.full(len(aim), -np.inf), np.full(len(aim), np.inf)
@@ -144,9 +144,9 @@ class _Cloud:
             above[left] = np.minimum(above[left], np.repeat(high, count) + delta)
             over[middle], above[middle] = low, np.where(np.isinf(high), high, low)
             o, a = over[left], above[left]
-            told = (a <= 0) | ((o > 0) & ((o >= aim[left]) | (a - o <= resolution)))
-            told[np.isin(left, middle)] = True
-            left, block = self._halved(*self._halved(left[~told], block[~told]))
+            settled = (a <= 0) | ((o > 0) & ((o >= aim[left]) | (a - o <= resolution)))
+            settled[np.isin(left, middle)] = True
+            left, block = self._halved(*self._halved(left[~settled], block[~settled]))
         return over, above
 
     def _middles(self, left: Ints, block: Ints, start: Ints) -> Ints:
@@ -184,7 +184,7 @@ class _Cloud:
 
 
 class _Outline(NamedTuple):
-    """What tells how far a body moves: points that hold it, or a cylinder if it is a round one.
+    """The outline by which motions are bounded: points that hold a body, or a round one's cylinder.
 
     Parameters
     ----------

@@ -14,20 +14,20 @@ from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
-from kerfpath._arrays import Array, Bools, Ints, as_pose, floats, freeze, integers, scalar
+from kerfpath._arrays import Array, Bools, Ints, as_pose, floats, freeze, integers, not_negative
 from kerfpath._told import told
 from kerfpath.cell._columns import Columns
 from kerfpath.cell._sheet import edges_of
 from kerfpath.errors import InputError
 
-__all__ = ["SAME", "Mesh", "size_of", "welded"]
+__all__ = ["SAME", "Mesh", "size_of", "weld"]
 
 LARGEST = 100.0
 """m: nothing in a cell is larger; a mesh that is has the wrong unit."""
 SMALLEST = 1e-4
 """m: a whole body smaller than this has the wrong unit, too."""
 SAME = 1e-6
-"""Vertices closer than this share of the body's size are one: single precision tells no more."""
+"""Vertices closer than this share of the body's size are one, as single precision has it."""
 CROWDED = 64
 """Vertices within the tolerance of each that welding takes, on average: memory grows with them."""
 MOST = 2_000_000
@@ -66,9 +66,7 @@ class Mesh:
         _set, name = object.__setattr__, self.name
         _set(self, "vertices", floats(self.vertices, f"{name} vertices", (None, 3)))
         _set(self, "triangles", integers(self.triangles, f"{name} triangles", (None, 3)))
-        _set(self, "deviation", scalar(self.deviation, f"{name} deviation", unit="m"))
-        if self.deviation < 0:
-            raise InputError(f"{name}: deviation must not be negative, got {self.deviation:g} m")
+        _set(self, "deviation", not_negative(self.deviation, f"{name} deviation", unit="m"))
         size_of(self.vertices, self.triangles, name)
         _require_closed(self.triangles, name)
         _set(self, "_columns", Columns(self.vertices[self.triangles]))
@@ -110,7 +108,7 @@ class Mesh:
         )
 
     def contains(self, points: Array) -> Bools:
-        """Say which of the points (m, 3) m, none of them on the surface, lie inside."""
+        """Return which of the points (m, 3) m, none of them on the surface, lie inside."""
         return freeze(np.array([self._columns.contains(p) for p in points], dtype=np.bool_))
 
     def cut(self, point: Array, normal: Array) -> tuple[Mesh | None, Mesh | None]:
@@ -160,7 +158,7 @@ class Mesh:
         ]
         points = np.vstack([self.vertices, rim, rim.mean(axis=0)])
         size = float(np.ptp(self.bounds, axis=0).max())
-        vertices, corners = welded(points, np.vstack(triangles), SAME * size)
+        vertices, corners = weld(points, np.vstack(triangles), SAME * size)
         used, corners = np.unique(corners, return_inverse=True)
         return Mesh(
             vertices=vertices[used],
@@ -194,7 +192,7 @@ def size_of(vertices: Array, triangles: Ints, name: str) -> float:
     return size
 
 
-def welded(
+def weld(
     vertices: ArrayLike, triangles: ArrayLike, tolerance: float, name: str = "mesh"
 ) -> tuple[Array, Ints]:
     """Return the mesh with vertices closer than `tolerance` (m) made one, slivers left out."""

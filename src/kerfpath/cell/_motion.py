@@ -27,7 +27,7 @@ from kerfpath.urdf import Chain
 __all__ = ["TOLERANCE", "Sweep", "relative"]
 
 TOLERANCE = 1e-4
-"""m: a motion too close to tell by this much is refused."""
+"""m: a motion that is not proved clear at this resolution is refused."""
 HALVINGS = 24
 """Never reached by motions of a robot; a motion not proved clear by then is refused."""
 
@@ -97,7 +97,7 @@ class Sweep:
         distances: Distances,
         wanted: Bools | None = None,
     ) -> Bools:
-        """Say which of the motions q0 to q1 (B, n) rad are proved to keep more than `required`.
+        """Return which of the motions q0 to q1 (B, n) rad are proved to keep more than `required`.
 
         Of pairs that are not `wanted` (B, P) it is known already.
         """

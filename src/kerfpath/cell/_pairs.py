@@ -1,4 +1,4 @@
-"""What the design of an arm leaves between its bodies, hence which pairs of them can be judged.
+"""The distances that an arm's design leaves between its bodies, hence which pairs can be judged.
 
 Links of a compact wrist overlap as convex hulls, a head touches the link that it is mounted before,
 capsules are drawn too thick. What is so by design is so whatever the joints do: distances are found
@@ -24,7 +24,7 @@ from kerfpath.cell._mesh import Mesh
 from kerfpath.cell._motion import TOLERANCE, Sweep
 from kerfpath.cell._scene import ACCURACY, Scene
 from kerfpath.cell._shapes import Shape
-from kerfpath.cell._shaved import shaved
+from kerfpath.cell._shaved import shave
 from kerfpath.urdf import Chain
 
 __all__ = ["BY_DESIGN", "MEANT", "Design", "Places", "designs", "kept_all_round", "stand_still"]
@@ -39,7 +39,7 @@ POSES, FIRST = 128, 32
 """Poses tried, a power of two, so that each joint stands at as many even steps of a turn; and how
 many come first, to settle most pairs."""
 TOUCH = 2 * TOLERANCE
-"""m: nearer than this, hardly any motion could be told clear, so it is as good as contact."""
+"""m: nearer than this, hardly any motion could be proved clear, so it is as good as contact."""
 SPARED = 0.1
 """Of the most that the design leaves a pair, what it need not keep, or no pose would be clear."""
 SKIN = (5e-4, 1e-3, 2e-3)
@@ -64,7 +64,7 @@ MEANT = "they may touch"
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Design:
-    """What the design leaves between two bodies.
+    """The distance that the design leaves between two bodies, and what of them is judged.
 
     Parameters
     ----------
@@ -94,7 +94,7 @@ class Design:
 
 
 def stand_still(one: Body, two: Body) -> str:
-    """Say why two bodies need no judging whatever their shapes; nothing where they do."""
+    """Return why two bodies need no judging whatever their shapes; "" where they do."""
     return "they do not move against each other" if one.frame == two.frame else ""
 
 
@@ -139,7 +139,7 @@ def designs(
 def kept_all_round(
     chain: Chain, bodies: Sequence[Body], pair: Places, asked: float, design: Design
 ) -> str:
-    """Say what a pair is proved to keep at every angle of the one joint between; nothing if not."""
+    """Return what a pair is proved to keep at every angle of the one joint between; "" if not."""
     a, b = (bodies[i].frame for i in pair)
     if b - a != 1 or not {bodies[i].kind for i in pair} <= ARM:
         return ""
@@ -228,6 +228,6 @@ def _touching(
 def _first_shaved(bodies: Sequence[Body], pair: Places, depth: float) -> tuple[int, Shape] | None:
     """Return what is left of one of two bodies, a convex one if there is, and its place."""
     for i in sorted(pair, key=lambda i: isinstance(bodies[i].shape, Mesh)):
-        if (shape := shaved(bodies[i].shape, depth)) is not None:
+        if (shape := shave(bodies[i].shape, depth)) is not None:
             return i, shape
     return None

@@ -1,4 +1,4 @@
-"""Distances between the bodies of a cell, by coal, where cheap bounds do not already tell enough.
+"""Distances between the bodies of a cell, by coal, where cheap bounds do not suffice.
 
 A distance here is a lower bound on the true one: exact to coal's tolerance where it is below
 `enough`, lessened by what meshes may deviate from what they stand for, negative where solids
@@ -208,7 +208,7 @@ class Scene:
 
 
 def _inside(inner: _Solid, outer: _Solid, frames: Array) -> bool:
-    """Say whether a body that does not touch the surface of a mesh lies inside it."""
+    """Return whether a body that does not touch the surface of a mesh lies inside it."""
     if outer.mesh is None:
         return False
     T, into = frames[inner.frame], frames[outer.frame]

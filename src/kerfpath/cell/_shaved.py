@@ -13,7 +13,7 @@ from kerfpath.cell._mesh import Mesh
 from kerfpath.cell._shapes import Capsule, Hull, Shape
 from kerfpath.errors import InputError
 
-__all__ = ["shaved"]
+__all__ = ["shave"]
 
 DEEPEST = 8e-3
 """m: a mesh is not shaved deeper; its walls may be thin."""
@@ -25,7 +25,7 @@ CORE = 1e-4
 """m: radius of the ball that must be left of a convex solid."""
 
 
-def shaved(shape: Shape, depth: float) -> Shape | None:
+def shave(shape: Shape, depth: float) -> Shape | None:
     """Return what is left of a solid whose faces go in by `depth` (m).
 
     Exact for capsules and convex solids: no point is left out that is deeper behind every face. Of

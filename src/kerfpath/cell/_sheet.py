@@ -8,7 +8,7 @@ from numpy.typing import ArrayLike
 from kerfpath._arrays import Array, Ints, floats, freeze, integers, scalar
 from kerfpath.errors import InputError
 
-__all__ = ["edges_of", "thickened"]
+__all__ = ["edges_of", "thicken"]
 
 
 def edges_of(triangles: Ints) -> tuple[Ints, Ints]:
@@ -25,7 +25,7 @@ def edges_of(triangles: Ints) -> tuple[Ints, Ints]:
     return freeze(keys), freeze(np.abs(balance))
 
 
-def thickened(vertices: ArrayLike, triangles: ArrayLike, thickness: float) -> tuple[Array, Ints]:
+def thicken(vertices: ArrayLike, triangles: ArrayLike, thickness: float) -> tuple[Array, Ints]:
     """Return the closed mesh of a sheet, its material behind the surface given.
 
     Parameters

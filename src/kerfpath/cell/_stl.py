@@ -9,10 +9,10 @@ import numpy as np
 
 from kerfpath._arrays import Array, Ints
 from kerfpath.apart import apart
-from kerfpath.cell._mesh import SAME, Mesh, size_of, welded
+from kerfpath.cell._mesh import SAME, Mesh, size_of, weld
 from kerfpath.errors import InputError
 
-__all__ = ["UNITS", "closed", "read_stl", "read_surface"]
+__all__ = ["UNITS", "close_surface", "read_stl", "read_surface"]
 
 UNITS = {"mm": 1e-3, "cm": 1e-2, "m": 1.0, "in": 0.0254}
 """Metres in each unit."""
@@ -36,15 +36,15 @@ def read_stl(path: str | Path, unit: str) -> Mesh:
             f"{path.name}: an STL file does not say its unit; expected one of "
             f"{', '.join(UNITS)}, got {unit!r}"
         )
-    return closed(*_stl(_bytes(path), path.name), UNITS[unit], path.name)
+    return close_surface(*_stl(_bytes(path), path.name), UNITS[unit], path.name)
 
 
-def closed(vertices: Array, triangles: Ints, scale: Array | float, name: str) -> Mesh:
+def close_surface(vertices: Array, triangles: Ints, scale: Array | float, name: str) -> Mesh:
     """Return the solid inside a surface: scaled, and what the file tears apart welded."""
     with np.errstate(over="ignore"):  # what becomes infinite is refused for its size
         points = vertices * scale
     size = size_of(points, triangles, name)
-    points, triangles = welded(points, triangles, SAME * size, name)
+    points, triangles = weld(points, triangles, SAME * size, name)
     return Mesh(vertices=points, triangles=triangles, name=name)
 
 
@@ -88,7 +88,7 @@ def _loaded(path: Path, name: str) -> tuple[Array, Ints]:
     unit = _UNIT.search(content) if path.suffix.lower() == ".dae" else None
     try:
         scale = 1.0 if unit is None else float(unit[1])
-        vertices, triangles = apart(loaded, str(path.absolute()), scale, size=len(content))
+        vertices, triangles = apart(load_mesh, str(path.absolute()), scale, size=len(content))
     except InputError as error:
         raise InputError(f"{name}: {error}") from None
     except ValueError:
@@ -100,7 +100,7 @@ def _loaded(path: Path, name: str) -> tuple[Array, Ints]:
     return vertices, triangles
 
 
-def loaded(path: str, scale: float) -> tuple[Array, Ints]:
+def load_mesh(path: str, scale: float) -> tuple[Array, Ints]:
     """Return the vertices (V, 3), scaled, and triangles (F, 3) of a mesh file; may crash."""
     import coal
 

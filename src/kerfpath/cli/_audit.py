@@ -1,4 +1,4 @@
-"""`kerfpath audit`: every check of every contour of a plan or a program, made again."""
+"""`kerfpath audit`: check every contour of a plan or a program again."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ __all__ = ["show_audit"]
 
 
 def show_audit(file: Path, job: Path | None, *, as_json: bool) -> bool:
-    """Print the audit's table of each contour of a file; return whether all of them pass."""
+    """Print the table of checks of each contour of a file; return whether all of them pass."""
     found = _audited(file, job)
     if as_json:
         print_json(

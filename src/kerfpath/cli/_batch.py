@@ -1,4 +1,4 @@
-"""`kerfpath batch`: many jobs planned, a row for each."""
+"""`kerfpath batch`: plan many jobs and print a row for each."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ def plan_jobs(
     *,
     as_json: bool,
 ) -> bool:
-    """Plan jobs, write their files and say what came of each; return whether all have passed."""
+    """Plan jobs, write their files and print a row for each; return whether all have passed."""
     if scheduler is None:
         compile_kernels()
     with sweep_bar("jobs") as progress:

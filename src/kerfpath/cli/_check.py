@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 from rich.markup import escape
 
@@ -48,8 +46,8 @@ def show_check(checked: JobPreview, *, as_json: bool) -> None:
     for s in checked.starts:
         row = [escape(s.name), str(s.nodes), str(s.poses)]
         if cell is not None:
-            said = "" if np.isnan(s.clearance) else f"{s.clearance * 1e3:.1f}"
-            row += [str(s.clear), said, "" if s.pair is None else escape(" - ".join(s.pair))]
+            clearance = "" if np.isnan(s.clearance) else f"{s.clearance * 1e3:.1f}"
+            row += [str(s.clear), clearance, "" if s.pair is None else escape(" - ".join(s.pair))]
         rows.append(row)
     columns = ["contour", "nodes", "poses at its start"]
     columns += [] if cell is None else ["clear", "clearance mm", "nearest"]
@@ -58,7 +56,7 @@ def show_check(checked: JobPreview, *, as_json: bool) -> None:
 
 
 def _note(checked: JobPreview) -> str:
-    """Say what `kerfpath plan` checks for collisions; here only the starts are looked at."""
+    """Return what `kerfpath plan` checks for collisions; this command checks only the starts."""
     moves_too = checked.job.sequence is not None and checked.cell is not None
     return collision_note(checked.cell, moves_too=moves_too)
 
@@ -76,22 +74,22 @@ def _show_cell(cell: Cell) -> None:
         for i, body in enumerate(cell.bodies)
     ]
     table(["body", "kind", "moves with", "box mm", "shape", "pairs"], rows, numbers=["pairs"])
-    for said in odd_sizes(cell):
-        out.print(f"warning: {escape(said)}")
+    for warning in odd_sizes(cell):
+        out.print(f"warning: {escape(warning)}")
     out.print(f"{len(cell.pairs)} pairs are judged; all keep {cell.near_miss * 1e3:g} mm, but for:")
     rules = zip(cell.pair_names, cell.asked, cell.required, cell.depth, cell.own, strict=True)
     for (a, b), asked, required, depth, own in rules:
         if own or required < asked or depth > 0:
-            said = f"{required * 1e3:.3g} mm"
+            rule = f"{required * 1e3:.3g} mm"
             if depth > 0:
-                said = f"beyond the {depth * 1e3:g} mm that they overlap by design"
+                rule = f"beyond the {depth * 1e3:g} mm that they overlap by design"
             elif required < asked:
-                said += f" of {asked * 1e3:g} mm asked, nearly all that the design leaves"
-            out.print(f"  {escape(a)} - {escape(b)}: {said}")
+                rule += f" of {asked * 1e3:g} mm asked, nearly all that the design leaves"
+            out.print(f"  {escape(a)} - {escape(b)}: {rule}")
     out.print("not judged:")
     for why, pairs in _not_judged(cell).items():
-        said = ", ".join(f"{a} - {b}" for a, b in pairs)
-        out.print(f"  {escape(why)}: {escape(said)}")
+        names = ", ".join(f"{a} - {b}" for a, b in pairs)
+        out.print(f"  {escape(why)}: {escape(names)}")
 
 
 def _partners(cell: Cell, body: int) -> list[int]:
@@ -117,7 +115,7 @@ def _shape(body: Body) -> str:
     return f"convex, {len(shape.points)} corners{hull}{surface}"
 
 
-def _cell_entry(cell: Cell) -> dict[str, Any]:
+def _cell_entry(cell: Cell) -> dict[str, object]:
     return {
         "near_miss_m": cell.near_miss,
         "bodies": [

@@ -1,4 +1,4 @@
-"""`kerfpath compare`: what differs between two programs, in words."""
+"""`kerfpath compare`: say in words what differs between two programs."""
 
 from __future__ import annotations
 

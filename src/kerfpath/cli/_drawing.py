@@ -1,9 +1,8 @@
-"""What a drawing holds in one line: shown wherever one is read, before anything is planned."""
+"""The summary of a drawing in one line: printed wherever a command reads one."""
 
 from __future__ import annotations
 
 from dataclasses import asdict
-from typing import Any
 
 from rich.markup import escape
 
@@ -43,14 +42,14 @@ def summary(part: Part) -> str:
 
 
 def show_drawing(part: Part) -> None:
-    """Print what a part holds, and what was assumed, repaired or left out in reading it."""
+    """Print the summary of a part, and what reading it assumed, repaired or left out."""
     out.print(escape(f"{part.path}: {summary(part)}"))
     for note in part.notes:
         out.print(escape(f"note: {note}"))
 
 
-def drawing_entry(part: Part) -> dict[str, Any]:
-    """Return the same for JSON."""
+def drawing_entry(part: Part) -> dict[str, object]:
+    """Return the summary of a part as JSON data."""
     return {
         "file": str(part.path),
         "unit": part.unit,

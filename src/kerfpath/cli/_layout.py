@@ -1,10 +1,10 @@
-"""`kerfpath layout`: the best placement, what it gains, and why others are not feasible."""
+"""`kerfpath layout`: find the best placement, what it gains, and why others are infeasible."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import Any
 
 from rich.markup import escape
 
@@ -15,13 +15,15 @@ from kerfpath.cli._show import (
     print_json,
     progress_bars,
     resumable,
+    show_files,
     table,
 )
-from kerfpath.job import make_folder
+from kerfpath.job import Goal, make_folder
 from kerfpath.planner import FINER, ON_THIS_GRID
+from kerfpath.report import LayoutEntry
 from kerfpath.study import layout, layout_entry, ranges_of, write_layout
 
-__all__ = ["show_layout"]
+__all__ = ["LayoutOptions", "show_layout"]
 
 REMEDIES = {
     "unreachable": "bring the part nearer, allow another posture, or widen the ranges",
@@ -32,8 +34,32 @@ ON_ONE_LINE = 200
 """Characters of a reason that are printed."""
 
 
+@dataclass(frozen=True, slots=True, kw_only=True)
+class LayoutOptions:
+    """Options of `kerfpath.study.layout` that the command line takes; None: as the job says."""
+
+    goal: Goal | None
+    evaluations: int | None
+    seed: int | None
+    tolerance_mm: float | None
+    tolerance_deg: float | None
+    map_points: int | None
+
+    def given(self) -> list[str]:
+        """Return the names of the options that were given, as typed."""
+        values = asdict(self).items()
+        return [f"--{name.replace('_', '-')}" for name, value in values if value is not None]
+
+
 def show_layout(
-    job: Path, folder: Path, vary: Sequence[str], options: Mapping[str, Any], *, as_json: bool
+    job: Path,
+    folder: Path,
+    *,
+    vary: Sequence[str],
+    options: LayoutOptions,
+    scheduler: str | None,
+    processes: int | None,
+    as_json: bool,
 ) -> bool:
     """Find the best placement, write its files, print it; return whether any is feasible."""
     ranges = ranges_of(vary)
@@ -41,37 +67,43 @@ def show_layout(
     compile_kernels()
     with progress_bars("") as progress, resumable():
         found = layout(
-            job, store=folder / "layout.sqlite", ranges=ranges, progress=progress, **options
+            job,
+            store=folder / "layout.sqlite",
+            ranges=ranges,
+            scheduler=scheduler,
+            processes=processes,
+            progress=progress,
+            **asdict(options),
         )
     with busy("writing"):
         written = write_layout(found, folder)
     entry = layout_entry(found)
     if as_json:
-        print_json(entry | {"files": [str(path) for path in written]})
+        print_json({**entry, "files": [str(path) for path in written]})
         return bool(entry["feasible"])
     by_default = " (by default: neither [layout] nor --vary says)" if found.by_default else ""
     spans = ", ".join(f"{name} {low:g} to {high:g}" for name, (low, high) in found.ranges.items())
     out.print(escape(f"varied{by_default}: {spans}"))
-    if entry["feasible"]:
-        _show_best(entry)
-    else:
-        _show_why(entry)
-    for path in written:
-        out.print(f"wrote {escape(str(path))}")
+    _show_best(entry)
+    _show_why(entry)
+    show_files(written)
     return bool(entry["feasible"])
 
 
-def _show_best(entry: Mapping[str, Any]) -> None:
+def _show_best(entry: LayoutEntry) -> None:
     best, shipped, unit = entry["best"], entry["shipped"], f" {entry['unit']}".rstrip()
+    if best is None:
+        return
     tried, solved = len(entry["tried"]), entry["exact_searches"]
     motion = entry["goal"] == "motion"
     rows = []
     for contour in entry["contours"]:
         row = [escape(contour["name"])]
         for side in (contour["before"], contour["after"]):
-            value = None if side is None else side.get("value" if motion else "fastest_m_min")
+            side = side or {}
+            value = side.get("value") if motion else side.get("fastest_m_min")
             row.append("-" if value is None else f"{value:.3f}")
-            known = side is not None and "joint" in side
+            known = "joint" in side
             binds = f"joint {side['joint']} {side['limit']}" if known else ""
             row += [] if motion else [binds, str(side["node"]) if known else ""]
         rows.append(row)
@@ -81,8 +113,8 @@ def _show_best(entry: Mapping[str, Any]) -> None:
     columns = ["contour", *sides[0], *sides[1]]
     spare = [c for c in columns if "node" in c or c == "binds before"]
     table(columns, rows, numbers=[c for c in columns if what in c or "node" in c], spare=spare)
-    told = ", ".join(f"{name} = {value:g}" for name, value in best["offsets"].items())
-    out.print(f"[bold]best placement[/]: {escape(told)}")
+    offsets = ", ".join(f"{name} = {value:g}" for name, value in best["offsets"].items())
+    out.print(f"[bold]best placement[/]: {escape(offsets)}")
     was = f"{shipped['value']:.3f}{unit}" if shipped["value"] is not None else shipped["status"]
     gain = "" if best["gain"] is None else f", {100 * best['gain']:+.1f} %"
     out.print(f"{entry['goal']}: {best['value']:.3f}{unit}, as the job has it {was}{gain}")
@@ -96,7 +128,10 @@ def _show_best(entry: Mapping[str, Any]) -> None:
     out.print(f"speeds and displacements are those {ON_THIS_GRID}; {FINER}: see kerfpath speed")
 
 
-def _show_why(entry: Mapping[str, Any]) -> None:
+def _show_why(entry: LayoutEntry) -> None:
+    near = entry["nearest"]
+    if near is None:
+        return
     parts = []
     for why in entry["reasons"]:
         at = f" ({why['contour']}, node {why['node']})" if why["contour"] else ""
@@ -108,7 +143,6 @@ def _show_why(entry: Mapping[str, Any]) -> None:
             f"{', '.join(parts)}: {REMEDIES[worst]}; {FINER}"
         )
     )
-    near = entry["nearest"]
-    told = ", ".join(f"{name} = {value:g}" for name, value in near["offsets"].items())
+    offsets = ", ".join(f"{name} = {value:g}" for name, value in near["offsets"].items())
     where = f"{near['contour']}, node {near['node']} of {near['nodes']}: " if "node" in near else ""
-    out.print(escape(f"nearest: {told}; {where}{near['reason'][:ON_ONE_LINE]}"))
+    out.print(escape(f"nearest: {offsets}; {where}{near['reason'][:ON_ONE_LINE]}"))

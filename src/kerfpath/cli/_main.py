@@ -1,4 +1,7 @@
-"""Arguments, summaries and exit codes: 0 done, 1 no feasible plan or failed audit, 2 bad input."""
+"""The commands for one job or file: their arguments, help and exit codes.
+
+Exit codes are 0 for done, 1 for no feasible plan or a failed audit, 2 for bad input.
+"""
 
 from __future__ import annotations
 
@@ -31,13 +34,15 @@ app = typer.Typer(
 
 Json = Annotated[bool, typer.Option("--json", help="Print one JSON object instead of tables.")]
 Out = Annotated[
-    Path | None, typer.Option("--out", help="Folder for the files; made if it is not there.")
+    Path | None, typer.Option("--out", help="Folder for the files; the command makes it if needed.")
 ]
 JobArgument = Annotated[Path, typer.Argument(metavar="JOB.toml", help="The job file.")]
 Strict = Annotated[
-    bool, typer.Option("--strict", help="Refuse programs that would only be warned of.")
+    bool, typer.Option("--strict", help="Refuse a program where it would only be warned of.")
 ]
-PlanFileArgument = Annotated[Path, typer.Argument(metavar="PLAN.json", help="A plan, as written.")]
+PlanFileArgument = Annotated[
+    Path, typer.Argument(metavar="PLAN.json", help="The plan.json of a run.")
+]
 
 
 def run() -> None:
@@ -68,7 +73,7 @@ def _root(
         bool, typer.Option("--version", callback=_version, is_eager=True, help="Print the version.")
     ] = False,
     silent: Annotated[
-        bool, typer.Option("--quiet", help="Show no progress: results, notes and errors alone.")
+        bool, typer.Option("--quiet", help="Show results, notes and errors, but no progress.")
     ] = False,
 ) -> None:
     if silent:
@@ -80,6 +85,8 @@ def _root(
 @app.command()
 def demo(to: Out = None, as_json: Json = False) -> None:
     """Plan the shipped B-pillar from its STEP file to an audited ABB program.
+
+    The folder gets report.html (look at it first), plan.json, trajectory.csv and b_pillar.mod.
 
     Example: kerfpath demo --out my-demo
     """
@@ -94,16 +101,17 @@ def plan(
     job: JobArgument,
     to: Out = None,
     draw_map: Annotated[
-        bool, typer.Option("--map", help="Draw every pose by its clearance; needs a cell.")
+        bool,
+        typer.Option("--map", help="Draw every pose, coloured by its clearance; needs a cell."),
     ] = False,
     strict: Strict = False,
     as_json: Json = False,
 ) -> None:
     """Plan and audit every contour of a job; write plan, trajectory, report and program.
 
-    The files go to the folder JOB-plan beside you unless --out names another. No program is
-    written unless every contour has a plan that passes its audit, nor with language = "none".
-    With a cell in the job the motions keep clear of collisions along the contours.
+    The files go to the folder JOB-plan in the current one unless --out names another. A program is
+    written only if every contour has a plan that passes its audit, and not with language = "none".
+    With a cell in the job the motions are clear of collisions along the contours.
 
     Example: kerfpath plan door.toml --out door
     """
@@ -116,8 +124,9 @@ def plan(
 def check(job: JobArgument, as_json: Json = False) -> None:
     """Read a job without planning it: the bodies and pairs of its cell, and how contours begin.
 
-    Clear: of the robot's poses at the first node, those that keep every near-miss distance.
-    Clearance: of the best of them, its least distance among the pairs that keep near_miss_mm.
+    The column clear counts the poses at the first node that keep every near-miss distance; the
+    column clearance has the least distance of the best of them, over the pairs that keep
+    near_miss_mm.
 
     Example: kerfpath check door.toml
     """
@@ -142,9 +151,10 @@ def speed(
 ) -> None:
     """Find the fastest constant cutting speed of each contour, and what binds where.
 
-    On the grid: exact on the graph that the job describes (its spacing, gamma step, limits and
-    eta), and clear in its cell, if it has one. Fastest: with gamma moved off the grid from there,
-    if the job refines; what binds is said of that. The speeds that the job asks for play no part.
+    The column on the grid is exact on the graph that the job describes (its spacing, gamma step,
+    limits and eta), and clear in its cell, if it has one. The column refined has the speed with
+    gamma moved off the grid from there, if the job refines; what binds belongs to that
+    speed. The speeds in the job play no part.
 
     Example: kerfpath speed door.toml
     """
@@ -166,7 +176,7 @@ def post(
         str | None,
         typer.Option(
             help="Robot language: rapid, krl, fanuc, val3, inform, urscript, ros, csv, or your "
-            "own; default: the one that the job asks for."
+            "own; default: that of the job."
         ),
     ] = None,
     output: Annotated[
@@ -174,13 +184,14 @@ def post(
         typer.Option(
             "-o",
             "--output",
-            help="File to write, or folder of a program of several files; default: print it.",
+            help="File to write, or folder for a program of several files; default: print it.",
         ),
     ] = None,
     job: Annotated[
         Path | None,
         typer.Option(
-            metavar="JOB.toml", help="Take [program] from this job, and audit in its cell."
+            metavar="JOB.toml",
+            help="Job to take [program] from, and whose cell the audit looks at.",
         ),
     ] = None,
     strict: Strict = False,
@@ -189,29 +200,29 @@ def post(
         typer.Option(
             "--dry-run",
             metavar="SHARE",
-            help="Switch nothing, wait nowhere, and move at this share of the speed.",
+            help="Write a dry run: no outputs, no waits, this share of the speed.",
         ),
     ] = None,
     measured: Annotated[
         Path | None,
         typer.Option(
-            metavar="POINTS.csv", help="Lead the plan to the part as measured, and audit it there."
+            metavar="POINTS.csv", help="Move the plan to the part as measured, and audit it there."
         ),
     ] = None,
     residual_mm: Annotated[
-        float, typer.Option(help="Most that a measured point may be off the fitted placement.")
+        float, typer.Option(help="Largest distance of a measured point from the fitted placement.")
     ] = 0.5,
     as_json: Json = False,
 ) -> None:
     """Write the robot program of a plan, after auditing it again.
 
-    Options such as names, retract and zone are taken from the [program] table of the job that
-    the plan was made from, or of --job: there, [program.LANGUAGE] has the settings of a language.
+    Names, retract, zone and so on come from the table [program] of the job that the plan was made
+    from, or of --job; its table [program.LANGUAGE] has the settings of a language.
 
     Example: kerfpath post door/plan.json --language rapid -o door.mod
 
     A table of measured points has columns nominal_x_mm, nominal_y_mm, nominal_z_mm (in the part)
-    and measured_x_mm, measured_y_mm, measured_z_mm (in the robot base), and three rows at least.
+    and measured_x_mm, measured_y_mm, measured_z_mm (in the robot base), and at least three rows.
     Collisions are not checked again at the measured placement: its cell is not known.
 
     Example: kerfpath post door/plan.json --dry-run 0.2 -o dry_door.mod
@@ -229,22 +240,22 @@ def post(
 @app.command()
 def audit(
     file: Annotated[
-        Path, typer.Argument(metavar="PLAN.json|PROGRAM", help="A plan, or a program of ours.")
+        Path, typer.Argument(metavar="PLAN.json|PROGRAM", help="A plan, or a kerfpath program.")
     ],
     job: Annotated[
         Path | None,
-        typer.Option(metavar="JOB.toml", help="Compare with the drawing that this job names."),
+        typer.Option(metavar="JOB.toml", help="Job to compare with; a program needs it."),
     ] = None,
     as_json: Json = False,
 ) -> None:
     """Check a plan or a program again, by kinematics that share nothing with the planner.
 
-    Of a plan, without --job the way between nodes is compared with the straight lines between
-    them; with it, with the curve as drawn, and the motion with the cell of the job, if it has one.
+    A plan is compared with its job, drawing and cell where --job names them. Without --job the
+    path between the nodes is compared with the straight lines between them.
 
-    A program, also one that a person has edited since, needs its job: its text is read, its targets
-    are led through the robot's kinematics, and the motion is audited as a plan's is; frames,
-    speeds, postures, turns, switches and waits are compared with what the job asks for.
+    A program needs its job. The audit reads its text, also where a person has edited it, takes
+    the targets through the robot's kinematics and checks the motion as that of a plan; it compares
+    frames, speeds, postures, turns, switches and waits with those of the job.
 
     Example: kerfpath audit door/plan.json --job door.toml
 
@@ -258,15 +269,15 @@ def audit(
 
 @app.command()
 def compare(
-    a: Annotated[Path, typer.Argument(metavar="A", help="A program of ours.")],
-    b: Annotated[Path, typer.Argument(metavar="B", help="Another, or the same edited.")],
-    job: Annotated[Path, typer.Option(metavar="JOB.toml", help="The job that they were made for.")],
+    a: Annotated[Path, typer.Argument(metavar="A", help="A kerfpath program.")],
+    b: Annotated[Path, typer.Argument(metavar="B", help="Another one, or the same edited.")],
+    job: Annotated[Path, typer.Option(metavar="JOB.toml", help="The job of both programs.")],
     as_json: Json = False,
 ) -> None:
     """Say in words what differs between two programs, in the same language or in two.
 
-    Contours are told apart by their paths, targets by their places; of each kind of difference the
-    count and the largest is told, with file and line. Exit code 0: the same, 1: not.
+    Contours are matched by their paths, targets by their places. Each kind of difference has a
+    line with its count, the largest one, file and line. Exit code 0: the same, 1: not.
 
     Example: kerfpath compare door/door.mod edited.mod --job door.toml
     """
@@ -279,22 +290,22 @@ def compare(
 @app.command()
 def touch_up(
     program: Annotated[
-        Path, typer.Argument(metavar="PROGRAM", help="A program in which targets were moved.")
+        Path, typer.Argument(metavar="PROGRAM", help="A program with moved targets.")
     ],
-    job: Annotated[Path, typer.Option(metavar="JOB.toml", help="The job it was made for.")],
-    plan: Annotated[Path, typer.Option(metavar="PLAN.json", help="The plan it was written from.")],
+    job: Annotated[Path, typer.Option(metavar="JOB.toml", help="The job of the program.")],
+    plan: Annotated[Path, typer.Option(metavar="PLAN.json", help="The plan of the program.")],
     to: Out = None,
     ease_mm: Annotated[
-        float, typer.Option(help="Distance along the path over which a shift fades out.")
+        float, typer.Option(help="Distance along the path over which a shift fades to zero.")
     ] = 10.0,
     as_json: Json = False,
 ) -> None:
     """Plan a job again around the targets that a person has moved in its program.
 
-    Moved targets keep tip and tool axis as taught, and the path eases back to the planned one; the
-    rotation about the beam is planned again, in the posture of the plan. The files, as of a plan,
-    go to the folder PROGRAM-touched beside you unless --out names another; the audit is that of the
-    touched-up path.
+    Moved targets keep tip and tool axis as taught, and the path fades back to the planned one; the
+    rotation about the beam is planned again, in the posture of the plan. The files are those of
+    kerfpath plan and go to the folder PROGRAM-touched in the current one unless --out names
+    another; the audit is that of the touched-up path.
 
     Example: kerfpath touch-up edited.mod --job door.toml --plan door/plan.json --out door-2
     """
@@ -311,20 +322,22 @@ def contours(
     ],
     unit: Annotated[
         str | None,
-        typer.Option(help="Length unit, if the file says none or a wrong one: mm, cm, m, in."),
+        typer.Option(help="Length unit, if the file has none or a wrong one: mm, cm, m, in."),
     ] = None,
     html: Annotated[
         Path | None,
-        typer.Option(help="Page to write: the part with its loops by name."),
+        typer.Option(help="HTML page to write: the part with its loops by name."),
     ] = None,
     everything: Annotated[
-        bool, typer.Option("--all", help="Single faces of skins and cut edges of sheets too.")
+        bool,
+        typer.Option("--all", help="List loops of single faces of skins and of cut edges, too."),
     ] = False,
     as_json: Json = False,
 ) -> None:
     """List the loops of a drawing, by the names that jobs pick them by.
 
-    Check the bounding box first: a wrong unit in the file's header shows there.
+    Check the bounding box first: it shows a wrong unit in the file's header. A job takes a loop by
+    pick = "NAME" in its table [[contour]].
 
     Example: kerfpath contours door.step --html door.html
     """
@@ -335,10 +348,14 @@ def contours(
 
 @app.command()
 def robots(
-    name: Annotated[str | None, typer.Argument(help="Id of one robot; default: list all.")] = None,
+    name: Annotated[
+        str | None, typer.Argument(help="Id of one robot; default: all robots.")
+    ] = None,
     as_json: Json = False,
 ) -> None:
     """List the robots of the library, or show one with its limits and their sources.
+
+    A job takes a robot by model = "ID" in its table [robot].
 
     Example: kerfpath robots abb_irb4600_60_205
     """

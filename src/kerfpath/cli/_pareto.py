@@ -1,21 +1,21 @@
-"""`kerfpath pareto`: the front of a contour, and the plan that is picked from it."""
+"""`kerfpath pareto`: find the front of a contour, and write the plan picked from it."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
 
 from rich.markup import escape
 
 from kerfpath.cli._drawing import show_drawing
-from kerfpath.cli._plan import leave
+from kerfpath.cli._plan import finish_run
 from kerfpath.cli._show import (
     busy,
     compile_kernels,
     out,
     print_json,
     progress_bars,
+    show_files,
     sweep_bar,
     table,
 )
@@ -26,7 +26,7 @@ from kerfpath.study import Studied, axes_of, pareto_of_job, picked, plan_picked,
 __all__ = ["pick_plan", "show_front"]
 
 SHOWN = 12
-"""Rows of the table: the rest is in the report."""
+"""Rows of the table at most: the report has all plans."""
 
 
 def show_front(
@@ -43,7 +43,7 @@ def show_front(
     processes: int | None,
     as_json: bool,
 ) -> None:
-    """Find the front of a contour, write pareto.json and pareto.html, and say what is in it."""
+    """Find the front of a contour, write pareto.json and pareto.html, and print its plans."""
     make_folder(folder)
     compile_kernels()
     with sweep_bar("runs") as progress:
@@ -75,8 +75,7 @@ def show_front(
     _show_plans(front)
     for why, number in front.failures.items():
         out.print(f"no plan in {number} runs: {escape(why)}")
-    for path in written:
-        out.print(f"wrote {escape(str(path))}")
+    show_files(written)
     out.print(
         f"write one: kerfpath pareto {escape(str(job_file))} --out {escape(str(folder))} "
         f"--pick {front.numbers[front.balanced_at]} (the balanced one)"
@@ -97,7 +96,7 @@ def _show_plans(front: Front) -> None:
     out.print(f"arrows: where better is{more}")
 
 
-def _entry(studied: Studied, written: Sequence[Path]) -> dict[str, Any]:
+def _entry(studied: Studied, written: Sequence[Path]) -> dict[str, object]:
     front = studied.front
     return {
         "contour": studied.contour,
@@ -138,4 +137,4 @@ def pick_plan(
         show_drawing(part)
         out.print(f"[bold]{escape(pick.contour)}[/] as plan {pick.number} of its front")
     more = {"picked": {"contour": pick.contour, "number": pick.number, "refined": refine}}
-    leave(outcome, part, to, as_json=as_json, strict=strict, more=more)
+    finish_run(outcome, part, to, as_json=as_json, strict=strict, more=more)

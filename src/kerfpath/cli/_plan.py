@@ -1,11 +1,10 @@
-"""`kerfpath plan`: the run of a job, what came of each contour, and the files it left."""
+"""`kerfpath plan`: the run of a job, the result of each contour, and the files written."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import typer
@@ -17,11 +16,12 @@ from kerfpath.cli._show import (
     busy,
     compile_kernels,
     errors,
+    merge_notes,
     out,
     print_json,
     progress_bars,
+    show_files,
     table,
-    told_once,
 )
 from kerfpath.job import (
     CutResult,
@@ -35,7 +35,7 @@ from kerfpath.job import (
     write_outcome,
 )
 
-__all__ = ["leave", "plan_job"]
+__all__ = ["finish_run", "plan_job"]
 
 
 def plan_job(
@@ -46,7 +46,7 @@ def plan_job(
     draw_map: bool = False,
     strict: bool = False,
 ) -> None:
-    """Plan a job, write its files into a folder and say what came of it.
+    """Plan a job, write its files into a folder and print the result.
 
     Raises
     ------
@@ -64,19 +64,19 @@ def plan_job(
     compile_kernels()
     with progress_bars() as progress:
         outcome = run_job(job, part, progress=progress)
-    leave(outcome, part, folder, as_json=as_json, strict=strict)
+    finish_run(outcome, part, folder, as_json=as_json, strict=strict)
 
 
-def leave(
+def finish_run(
     outcome: JobResult,
     part: Part,
     folder: Path,
     *,
     as_json: bool,
     strict: bool = False,
-    more: dict[str, Any] | None = None,
+    more: Mapping[str, object] | None = None,
 ) -> None:
-    """Write the files of a run into a folder and say what came of it; `more` is for JSON.
+    """Write the files of a run into a folder and print the result; `more` goes into the JSON.
 
     Raises
     ------
@@ -112,12 +112,9 @@ def leave(
             for check in cut.checks:
                 if not check.ok:
                     out.print(f"[bold]{escape(cut.task.name)}[/]: {escape(str(check.issue()))}")
-        for note in told_once(written.notes, [cut.task.name for cut in outcome.cuts]):
+        for note in merge_notes(written.notes, [cut.task.name for cut in outcome.cuts]):
             out.print(f"note: {escape(note)}")
-        for path in written.removed:
-            out.print(f"removed {escape(str(path))}, of an earlier run")
-        for path in written.files:
-            out.print(f"wrote {escape(str(path))}")
+        show_files(written.files, written.removed, of="an earlier run")
     if written.stale is not None:
         errors.print(
             f"kerfpath: {escape(str(written.stale))} is from an earlier run and does not belong "
@@ -134,8 +131,8 @@ def _largest_tilt(cut: CutResult) -> float | None:
     return float(np.degrees(np.hypot(*cut.plan.tilt.T).max()))
 
 
-def _cut_entry(cut: CutResult) -> dict[str, Any]:
-    entry: dict[str, Any] = {"name": cut.task.name, "passed": cut.passed}
+def _cut_entry(cut: CutResult) -> dict[str, object]:
+    entry: dict[str, object] = {"name": cut.task.name, "passed": cut.passed}
     entry |= {"length_m": cut.drawn.length, "nodes": len(cut.nodes), "speed_m_s": cut.task.speed}
     entry["departure"] = None if cut.departure is None else asdict(cut.departure)
     if cut.plan is None:

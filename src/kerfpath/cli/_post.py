@@ -1,15 +1,14 @@
-"""`kerfpath post`: the program of a plan, written or printed."""
+"""`kerfpath post`: write or print the program of a plan."""
 
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from rich.markup import escape
 
 from kerfpath.cad import read_measured
-from kerfpath.cli._show import errors, out, print_json, told_once
+from kerfpath.cli._show import errors, merge_notes, out, print_json, show_files
 from kerfpath.errors import InputError, KerfpathError
 from kerfpath.job import program_from_file, program_language, read_job, read_plan_file
 from kerfpath.placement import MeasuredFrame, placement_from_points
@@ -85,12 +84,9 @@ def write_post(
             if len(files) > 1:
                 print(f"----- {name} -----")
             print(text, end="")
-    for note in told_once(notes) if written or frame is not None else ():
+    for note in merge_notes(notes) if written or frame is not None else ():
         console.print(f"note: {escape(note)}")
-    for path in () if replaced is None else replaced.removed:
-        out.print(f"removed {escape(str(path))}, of the earlier program")
-    for path in written:
-        out.print(f"wrote {escape(str(path))}")
+    show_files(written, () if replaced is None else replaced.removed, of="the earlier program")
 
 
 def _name(output: Path | None, chosen: Language) -> str | None:
@@ -124,7 +120,7 @@ def _name(output: Path | None, chosen: Language) -> str | None:
 
 
 def _in_words(frame: MeasuredFrame, plan_file: Path) -> list[str]:
-    """Return the residuals, how far the part is from where it was planned, and its frame."""
+    """Return lines for people: residuals, distance from the planned placement, and the frame."""
     residuals = ", ".join(f"{r * 1e3:.3f}" for r in frame.residuals)
     planned = read_plan_file(plan_file).plans[0].T_base_part
     shift, turn = frame.moved_from(planned)
@@ -137,7 +133,7 @@ def _in_words(frame: MeasuredFrame, plan_file: Path) -> list[str]:
     ]
 
 
-def _frame_entry(frame: MeasuredFrame) -> dict[str, Any]:
+def _frame_entry(frame: MeasuredFrame) -> dict[str, object]:
     return {
         "T_base_part": frame.T_base_part.tolist(),
         "residuals_m": frame.residuals.tolist(),

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 from rich.markup import escape
 
@@ -57,7 +55,7 @@ def list_robots(*, as_json: bool) -> None:
 def show_robot(name: str, *, as_json: bool) -> None:
     """Print one robot's geometry, limits, notes and sources."""
     r = robot(name)
-    limits: dict[str, Any] = {
+    limits = {
         "lower deg": _degrees(r.lower),
         "upper deg": _degrees(r.upper),
         "velocity deg/s": _degrees(r.velocity),

@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from pathlib import Path
-from typing import Any
 
 from rich.markup import escape
 
-from kerfpath.cli._show import compile_kernels, out, print_json, sweep_bar, table
+from kerfpath.cli._show import compile_kernels, out, print_json, show_files, sweep_bar, table
 from kerfpath.job import make_folder
 from kerfpath.study import (
     ROBOT_COLUMNS,
@@ -26,14 +24,13 @@ __all__ = ["show_robots_for"]
 def show_robots_for(
     job: Path,
     folder: Path,
-    workers: Mapping[str, Any],
-    ratio: str | None,
     *,
+    scheduler: str | None,
+    processes: int | None,
+    ratio: str | None,
     as_json: bool,
 ) -> bool:
     """Print what each robot can do of a job, and write it; return whether any can do it as asked.
-
-    `workers` are scheduler and processes, as `which_robots` takes them.
 
     Raises
     ------
@@ -41,13 +38,14 @@ def show_robots_for(
         As `which_robots`; a folder that cannot be made.
     """
     make_folder(folder)
-    if workers["scheduler"] is None:
+    if scheduler is None:
         compile_kernels()
     with sweep_bar("robots") as progress:
         found = which_robots(
             job,
             store=folder / "robots.sqlite",
-            **workers,
+            scheduler=scheduler,
+            processes=processes,
             acceleration_ratio=ratio,
             progress=progress,
         )
@@ -62,6 +60,5 @@ def show_robots_for(
     rows = [[escape(v) for v in row] for row in robot_rows(found)]
     table(columns, rows, numbers=numbers, spare=[columns[1], columns[2], columns[5]])
     out.print(" ".join(ROBOT_NOTES))
-    for path in written:
-        out.print(f"wrote {escape(str(path))}")
+    show_files(written)
     return able

@@ -1,60 +1,64 @@
-"""What commands print: tables for people on stdout, or one JSON object; progress on stderr."""
+"""Output of commands: tables for people or one JSON object on stdout, progress on stderr."""
 
 from __future__ import annotations
 
 import json
 import re
 import sys
-from collections.abc import Callable, Collection, Iterator, Sequence
-from contextlib import AbstractContextManager, contextmanager, nullcontext
-from datetime import timedelta
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
+from contextlib import AbstractContextManager, contextmanager
+from pathlib import Path
 from threading import Event, Thread
 from time import monotonic
-from typing import Any
 
 from rich.cells import cell_len
 from rich.console import Console
-from rich.progress import BarColumn, MofNCompleteColumn, TextColumn, TimeElapsedColumn
+from rich.markup import escape
+from rich.progress import BarColumn, TaskID, TextColumn, TimeElapsedColumn, TimeRemainingColumn
 from rich.progress import Progress as Bars
 from rich.table import Table
 from rich.text import Text
 
-from kerfpath.cli._stop import in_order
+from kerfpath.cli._stop import stop_in_order
+from kerfpath.progress import Progress, no_progress
 
 __all__ = [
     "busy",
     "compile_kernels",
     "errors",
+    "merge_notes",
     "out",
     "print_json",
     "progress_bars",
     "quiet",
     "resumable",
+    "show_files",
     "sweep_bar",
     "table",
-    "told_once",
 ]
 
 _PIPED = 200
-"""Columns for output that goes to a file or another program: nothing is cut off there."""
+"""Characters of a line that goes to a file or another program: nothing is cut off there."""
 
 _LEAST_OF_WORDS = 16
-"""Columns that a cell of words has at least, or its own length."""
+"""Characters that a column of words has at least, or its own length."""
 _ROOM_FOR_WORDS = 40
-"""Columns for words that are enough: headings are not folded for more."""
+"""Characters that are enough for words: headings are not folded for more."""
 _BETWEEN = 2
-"""Columns between those of a table."""
+"""Characters between two columns of a table."""
 LINE_SECONDS = 10.0
-"""From line to line of progress where there is no terminal."""
+"""Time between two lines of progress where there is no terminal."""
+DAY = 86400.0
+"""Seconds over which the speed of a bar is averaged: tasks may take minutes each."""
 
 quiet = Event()
-"""Set where no progress is to be shown."""
+"""Is set where no progress is to be shown."""
 
 out = Console(highlight=False, soft_wrap=True, width=None if sys.stdout.isatty() else _PIPED)
 errors = Console(stderr=True, highlight=False, soft_wrap=True)
 
 
-def print_json(data: dict[str, Any]) -> None:
+def print_json(data: Mapping[str, object]) -> None:
     """Print one JSON object on stdout."""
     print(json.dumps(data, allow_nan=False))
 
@@ -68,11 +72,11 @@ def table(
     whole: Collection[str] = (),
     spare: Sequence[str] = (),
 ) -> None:
-    """Print a table that can be read at the width there is.
+    """Print a table that fits the terminal.
 
-    Columns named in `numbers` stand to the right; these and those in `whole` are never folded. In a
-    narrow terminal headings longer than what stands below are folded, then the columns in `spare`
-    left out, the first one first, until the others fit, and last of all words are folded.
+    Columns in `numbers` are aligned right; these and those in `whole` are never folded. In a narrow
+    terminal headings longer than their column are folded first, then columns in `spare` are left
+    out, in that order, until the others fit, and last of all words are folded.
     """
     fixed = {*numbers, *whole}
     cells = [
@@ -81,21 +85,21 @@ def table(
     ]
     kept, heads, left_out = list(range(len(columns))), list(columns), list[str]()
 
-    def needed(least_of_words: int) -> int:
-        """Return the width of what is kept, words folded to so much if they are longer."""
+    def width_with(least_of_words: int) -> int:
+        """Return the width of the kept columns, with words folded to so many characters."""
         widths = []
         for i in kept:
             width = cells[i] if columns[i] in fixed else min(cells[i], least_of_words)
             widths.append(max(width, *map(len, heads[i].split("\n"))))
         return sum(widths) + _BETWEEN * (len(kept) - 1)
 
-    if needed(_ROOM_FOR_WORDS) > out.width:
+    if width_with(_ROOM_FOR_WORDS) > out.width:
         heads = [
             head.replace(" ", "\n") if len(head) > width else head
             for head, width in zip(columns, cells, strict=True)
         ]
     for name in spare:
-        if needed(_LEAST_OF_WORDS) <= out.width:
+        if width_with(_LEAST_OF_WORDS) <= out.width:
             break
         kept.remove(columns.index(name))
         left_out.append(name)
@@ -115,11 +119,8 @@ def table(
         out.print(f"no room for: {', '.join(left_out)}; a wider terminal or --json has them")
 
 
-def told_once(notes: Sequence[str], names: Collection[str] = ()) -> list[str]:
-    """Return notes with those that differ by figures and by `names` alone told once, and counted.
-
-    Told is the first of them.
-    """
+def merge_notes(notes: Sequence[str], names: Collection[str] = ()) -> list[str]:
+    """Return notes with those that differ by figures and `names` alone as one, and counted."""
     groups: dict[str, list[str]] = {}
     longest = sorted(names, key=len, reverse=True)
     pattern = "|".join([*map(re.escape, longest), r"\d+(?:\.\d+)?"])
@@ -131,44 +132,48 @@ def told_once(notes: Sequence[str], names: Collection[str] = ()) -> list[str]:
     ]
 
 
-class _Lines:
-    """Progress where there is no terminal: a line every few seconds on what is being done."""
-
-    def __init__(self, unit: str) -> None:
-        self._unit, self._now, self._begun = unit, "", monotonic()
-        self._over = Event()
-        self._thread = Thread(target=self._tell, daemon=True)
-
-    def __enter__(self) -> Callable[[str, int, int], None]:
-        self._thread.start()
-        return self._take
-
-    def __exit__(self, *_: object) -> None:
-        self._over.set()
-        self._thread.join()
-
-    def _take(self, what: str, done: int, total: int) -> None:
-        of = f", {done} of {total} {self._unit}".rstrip() if total else ""
-        self._now = f"{what}{of}"
-
-    def _tell(self) -> None:
-        while not self._over.wait(LINE_SECONDS):
-            if self._now:
-                errors.print(f"kerfpath: {self._now} ({monotonic() - self._begun:.0f} s)")
+def show_files(written: Iterable[Path], removed: Iterable[Path] = (), *, of: str = "") -> None:
+    """Print the files that were removed, each with whose it was, and those that were written."""
+    for path in removed:
+        out.print(f"removed {escape(str(path))}, of {of}")
+    for path in written:
+        out.print(f"wrote {escape(str(path))}")
 
 
 @contextmanager
-def progress_bars(unit: str = "nodes") -> Iterator[Callable[[str, int, int], None]]:
-    """Give a function that shows what is done and how far it is.
+def progress_lines(unit: str) -> Iterator[Progress]:
+    """Give a `Progress` that prints a line every few seconds: for output without a terminal."""
+    state, begun, over = "", monotonic(), Event()
 
-    A total of 0 is a piece of work without a measure; it is over when the next begins. Where there
-    is no terminal, lines are written now and then, unless the command is to be `quiet`.
+    def take(what: str, done: int, total: int) -> None:
+        nonlocal state
+        state = what + (f", {done} of {total} {unit}".rstrip() if total else "")
+
+    def repeat() -> None:
+        while not over.wait(LINE_SECONDS):
+            if state:
+                errors.print(f"kerfpath: {state} ({monotonic() - begun:.0f} s)")
+
+    thread = Thread(target=repeat, daemon=True)
+    thread.start()
+    try:
+        yield take
+    finally:
+        over.set()
+        thread.join()
+
+
+@contextmanager
+def progress_bars(unit: str = "nodes", *, time_left: bool = False) -> Iterator[Progress]:
+    """Give a `Progress` that draws a bar for each piece of work; the unit is that of its parts.
+
+    Without a terminal it prints lines instead, and after `--quiet` nothing.
     """
     if quiet.is_set():
-        yield lambda what, done, total: None
+        yield no_progress
         return
     if not errors.is_terminal:
-        with _Lines(unit) as take:
+        with progress_lines(unit) as take:
             yield take
         return
     columns = (
@@ -176,53 +181,41 @@ def progress_bars(unit: str = "nodes") -> Iterator[Callable[[str, int, int], Non
         BarColumn(),
         TextColumn("{task.fields[measure]}"),
         TimeElapsedColumn(),
+        *((TimeRemainingColumn(), TextColumn("left")) if time_left else ()),
     )
-    with Bars(*columns, console=errors, transient=True) as bars:
-        tasks: dict[str, Any] = {}
-        phase: list[Any] = []
+    with Bars(*columns, console=errors, transient=True, speed_estimate_period=DAY) as bars:
+        tasks: dict[str, TaskID] = {}
+        unmeasured: list[TaskID] = []
 
         def advance(what: str, done: int, total: int) -> None:
-            while phase:
-                bars.remove_task(phase.pop())
+            while unmeasured:
+                bars.remove_task(unmeasured.pop())
             if not total:
-                phase.append(bars.add_task(what, total=None, measure=""))
+                unmeasured.append(bars.add_task(what, total=None, measure=""))
                 return
             if what not in tasks:
                 tasks[what] = bars.add_task(what, total=total, measure="")
-            bars.update(tasks[what], completed=done, total=total, measure=f"{done}/{total} {unit}")
+            measure = f"{done}/{total} {unit}"
+            bars.update(tasks[what], completed=done, total=total, measure=measure)
 
         yield advance
 
 
 @contextmanager
-def sweep_bar(unit: str) -> Iterator[Callable[[int, int, float | None], None]]:
-    """Give a function that shows how far a sweep is, and the time left; see `resumable`."""
-    if quiet.is_set() or not errors.is_terminal:
-        lines = nullcontext() if quiet.is_set() else _Lines(unit)
-        with resumable(), lines as take:
-            yield lambda done, total, left: take and take(f"{unit} done", done, total)
-        return
-    left_over = TextColumn("{task.fields[left]}")
-    columns = (BarColumn(), MofNCompleteColumn(), TextColumn(unit), left_over)
-    with Bars(*columns, console=errors, transient=True) as bars:
-        bar = bars.add_task("", total=None, left="")
-
-        def advance(done: int, total: int, left: float | None) -> None:
-            told = "" if left is None else f"{timedelta(seconds=round(left))} left"
-            bars.update(bar, completed=done, total=total, left=told)
-
-        with resumable():
-            yield advance
+def sweep_bar(unit: str) -> Iterator[Progress]:
+    """Give a `Progress` that shows how far a sweep is, and the time left; see `resumable`."""
+    with resumable(), progress_bars(unit, time_left=True) as show:
+        yield lambda what, done, total: show(f"{unit} done", done, total)
 
 
 def resumable() -> AbstractContextManager[None]:
-    """Say at Ctrl-C how to go on, and leave with code 130."""
-    return in_order("kerfpath: stopped; the same command goes on from the results so far")
+    """Print at Ctrl-C how to go on, and exit with code 130."""
+    return stop_in_order("kerfpath: stopped; the same command goes on from the results so far")
 
 
 @contextmanager
 def busy(what: str) -> Iterator[None]:
-    """Show that something is being done that has no measure; silent where nobody looks."""
+    """Show a piece of work without a measure on a terminal; print nothing elsewhere."""
     if errors.is_terminal and not quiet.is_set():
         with errors.status(what):
             yield
@@ -231,7 +224,7 @@ def busy(what: str) -> Iterator[None]:
 
 
 def compile_kernels() -> None:
-    """Compile the kernels if this copy never has, and show it then."""
+    """Compile the kernels if this copy never has, and say so then."""
     from kerfpath.job import is_compiled, warm_up
 
     if is_compiled():

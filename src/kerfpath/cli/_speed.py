@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
 
 from rich.markup import escape
 
@@ -19,11 +18,11 @@ __all__ = ["show_speeds"]
 def show_speeds(
     answers: Sequence[tuple[ContourTask, Contour, FastestSpeed | NoFeasiblePath]], *, as_json: bool
 ) -> bool:
-    """Print the answers; return whether every contour has a speed."""
-    entries: list[dict[str, Any]] = []
+    """Print the fastest speed of each contour; return whether every contour has one."""
+    entries: list[dict[str, object]] = []
     rows = []
     for task, nodes, found in answers:
-        entry: dict[str, Any] = {"name": task.name, "asked_m_min": task.speed * 60}
+        entry: dict[str, object] = {"name": task.name, "asked_m_min": task.speed * 60}
         row = [escape(task.name), f"{task.speed * 60:g}"]
         if isinstance(found, FastestSpeed):
             place = (nodes.points[found.node] * 1000).round(1).tolist()

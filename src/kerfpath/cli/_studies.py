@@ -1,4 +1,4 @@
-"""Commands that plan many times: each keeps what it has done, and goes on from there."""
+"""The commands that plan many times: each keeps its results and continues from them."""
 
 from __future__ import annotations
 
@@ -15,13 +15,13 @@ __all__ = ["batch", "layout", "pareto"]
 Scheduler = Annotated[
     str | None,
     typer.Option(
-        metavar="ADDRESS", help="Dask scheduler whose workers do it: tcp://10.0.0.1:8786."
+        metavar="ADDRESS", help="Dask scheduler whose workers do the work: tcp://10.0.0.1:8786."
     ),
 ]
 Processes = Annotated[
-    int | None, typer.Option(help="Processes of this machine that do it; default: one per core.")
+    int | None, typer.Option(help="Local processes that do the work; default: one per core.")
 ]
-Seed = Annotated[int, typer.Option(help="Of all that is random.")]
+Seed = Annotated[int, typer.Option(help="Seed of all that is random.")]
 
 
 @app.command()
@@ -32,26 +32,26 @@ def pareto(
         str | None, typer.Option(help="Name of the contour in the job; default: the longest.")
     ] = None,
     criteria: Annotated[
-        str, typer.Option(help="What to compare plans by, names with commas between.")
+        str, typer.Option(help="Criteria to compare plans by, with commas between.")
     ] = "displacement,velocity,range",
-    runs: Annotated[int, typer.Option(help="How often to plan.")] = 100,
+    runs: Annotated[int, typer.Option(help="Number of runs: how often to plan.")] = 100,
     search: Annotated[
         Literal["adaptive", "grid"],
-        typer.Option(help="Where the front is sparse, or over a grid of weights."),
+        typer.Option(help="Choose runs where the front is sparse, or from a grid of weights."),
     ] = "adaptive",
     seed: Seed = 0,
     ahead: Annotated[
-        int, typer.Option(help="Runs under way at a time; a cluster wants as many as workers.")
+        int, typer.Option(help="Runs under way at a time; on a cluster as many as workers.")
     ] = 8,
     pick: Annotated[
         str | None,
         typer.Option(
             metavar="N|NAME",
-            help="Write plan N of the front that is there, the balanced one, or the best in NAME.",
+            help="Write plan N of the front found before, the balanced one, or the best in NAME.",
         ),
     ] = None,
     refine: Annotated[
-        bool, typer.Option("--refine", help="Move the picked plan off the grid of gamma.")
+        bool, typer.Option("--refine", help="Refine the picked plan: move gamma off its grid.")
     ] = False,
     strict: Strict = False,
     scheduler: Scheduler = None,
@@ -60,16 +60,16 @@ def pareto(
 ) -> None:
     """Find plans of a contour that weigh its criteria differently, none better than another in all.
 
-    Criteria: displacement, range, velocity, acceleration, speed, time (from home_deg in
+    The criteria are displacement, range, velocity, acceleration, speed, time (from home_deg in
     [sequence]), clearance (in the cell), wrist, elbow, shoulder, limits, manipulability,
     and displacement_J, increment_J, range_J of joint J. Every plan is the proved optimum of its
-    run on the grid, and audited. pareto.json and pareto.html go to the folder JOB-pareto beside
-    you unless --out names another. Stopped, even by kill -9, the same command goes on.
+    run on the grid, and audited. pareto.json and pareto.html go to the folder JOB-pareto in the
+    current one unless --out names another. After a stop, even kill -9, the same command continues.
 
     Example: kerfpath pareto door.toml --criteria displacement,velocity,range_6 --runs 200
 
-    With --pick nothing is searched: the whole job is planned, that contour as picked, and plan,
-    report and program go to the folder plan-N in there.
+    With --pick nothing is searched: the whole job is planned, with that contour as picked, and
+    plan, report and program go to the folder plan-N in that folder.
 
     Example: kerfpath pareto door.toml --pick balanced
     """
@@ -98,14 +98,14 @@ def batch(
 ) -> None:
     """Plan, audit and write many jobs, each as `kerfpath plan` does, on all cores or a cluster.
 
-    The files of door.toml go to the folder door in the one that --out names (kerfpath-batch). A job
-    that is refused or has no plan gets its row with the reason, and the others go on.
+    The files of door.toml go to the folder door in the one that --out names (kerfpath-batch). The
+    row of a job that is refused or has no plan has the reason, and the other jobs go on.
 
-    What is done is kept in batch.sqlite there: the same command again, after Ctrl-C or a power cut,
-    plans only what is new or has changed, and writes what is missing. On a cluster every worker
+    Results are kept in batch.sqlite there: the same command after Ctrl-C or a power cut plans only
+    jobs that are new or have changed, and writes files that are missing. On a cluster every worker
     needs the job files at the same path, as on a shared disk.
 
-    Exit codes: 0 every job has passed, 1 some has not, 2 the command itself was wrong.
+    Exit codes: 0 every job has passed, 1 some job has not, 2 the command itself was wrong.
 
     Example: kerfpath batch parts/*.toml --out cut
 
@@ -123,34 +123,38 @@ def layout(
     to: Out = None,
     goal: Annotated[
         Literal["speed", "margin", "motion"] | None,
-        typer.Option(help="What the best placement is best in; default: speed."),
+        typer.Option(help="Goal of the placement; default: speed."),
     ] = None,
     vary: Annotated[
         list[str] | None,
-        typer.Option(metavar="NAME=LOW:HIGH", help="What may vary and how far; may come often."),
+        typer.Option(
+            metavar="NAME=LOW:HIGH", help="Variable and its range; repeat it for more variables."
+        ),
     ] = None,
     evaluations: Annotated[
-        int | None, typer.Option(help="How many placements to look at; default: 240.")
+        int | None, typer.Option(help="Number of placements to try; default: 240.")
     ] = None,
-    seed: Annotated[int | None, typer.Option(help="Of all that is random; default: 0.")] = None,
+    seed: Annotated[
+        int | None, typer.Option(help="Seed of all that is random; default: 0.")
+    ] = None,
     tolerance_mm: Annotated[
-        float | None, typer.Option(help="What lengths may be off: the worst counts.")
+        float | None, typer.Option(help="Tolerance of lengths, over which the worst value counts.")
     ] = None,
     tolerance_deg: Annotated[
-        float | None, typer.Option(help="What angles may be off: the worst counts.")
+        float | None, typer.Option(help="Tolerance of angles, over which the worst value counts.")
     ] = None,
     map_points: Annotated[
-        int | None, typer.Option(help="Points of the map each way, 0 for none; default: 15.")
+        int | None, typer.Option(help="Points of the map each way, 0 for no map; default: 15.")
     ] = None,
     robots: Annotated[
         bool,
-        typer.Option("--robots", help="Move nothing: tell which robots can do the job, how fast."),
+        typer.Option("--robots", help="Move nothing: list which robots can do the job."),
     ] = False,
     acceleration_ratio: Annotated[
         str | None,
         typer.Option(
             metavar="NAME|nearest",
-            help="With --robots: assume accelerations that the maker does not publish.",
+            help="With --robots: accelerations to assume where the maker publishes none.",
         ),
     ] = None,
     scheduler: Scheduler = None,
@@ -159,18 +163,18 @@ def layout(
 ) -> None:
     """Find where to put the part, or the robot, or how to turn the head, for a chosen goal.
 
-    Goals: speed, the fastest constant speed of the slowest contour; margin, the least share of a
-    fastest speed and the speed asked for; motion, the least total displacement of the joints at
-    the speeds asked for. Placements that cannot cut every contour come after all that can.
+    The goal speed is the fastest constant speed of the slowest contour; margin is the least ratio
+    of a fastest speed to the speed in the job; motion is the least total displacement of the joints
+    at the speeds in the job. Placements that cannot cut every contour come after all that can.
 
-    What may vary, as offsets in the robot base: x_mm, y_mm, z_mm, yaw_deg, tilt_x_deg, tilt_y_deg
+    The variables are offsets in the robot base: x_mm, y_mm, z_mm, yaw_deg, tilt_x_deg, tilt_y_deg
     of the part with its fixtures; base_x_mm, base_y_mm, base_z_mm, base_yaw_deg of the robot's
-    base; mount_deg, the turn of the head about the flange. Ranges are those of --vary, or else of
-    the layout table of the job, or else x_mm and y_mm by 200 mm, yaw_deg by 30 deg either way.
+    base; mount_deg, the turn of the head about the flange. Their ranges come from --vary, or else
+    from the table [layout] of the job; by default x_mm and y_mm vary by 200 mm, yaw_deg by 30 deg.
 
     layout.json, layout.html and placed.toml, the job with its new numbers, go to the folder
-    JOB-layout beside you unless --out names another. Stopped, even by kill -9, the same command
-    goes on. Exit code 1: no placement is feasible, and why.
+    JOB-layout in the current one unless --out names another. After a stop, even kill -9, the same
+    command continues. Exit code 1: no placement is feasible; the command prints why.
 
     Example: kerfpath layout door.toml
 
@@ -180,31 +184,33 @@ def layout(
 
     Then: kerfpath plan door-layout/placed.toml
 
-    With --robots nothing is moved: every robot of the library is put in the place of the job's own,
-    and told are its reach, the fastest speed of each contour and the margin over what is asked,
-    the best first, in robots.json and robots.html. Exit code 1: none does it as fast as asked.
+    With --robots nothing is moved: every robot of the library takes the place of the job's own.
+    robots.json and robots.html list reach, fastest speed of each contour and margin over the speeds
+    of the job, the best robot first. Exit code 1: no robot is as fast as the job asks.
 
     Example: kerfpath layout door.toml --robots --acceleration-ratio nearest
     """
-    options = {
-        "goal": goal, "evaluations": evaluations, "seed": seed, "tolerance_mm": tolerance_mm,
-        "tolerance_deg": tolerance_deg, "map_points": map_points,
-    }  # fmt: skip
-    workers = {"scheduler": scheduler, "processes": processes}
+    from kerfpath.cli._layout import LayoutOptions, show_layout
+    from kerfpath.cli._robots_for import show_robots_for
+
+    options = LayoutOptions(
+        goal=goal, evaluations=evaluations, seed=seed, tolerance_mm=tolerance_mm,
+        tolerance_deg=tolerance_deg, map_points=map_points,
+    )  # fmt: skip
     folder = to or Path(f"{job.stem}-layout")
     if robots:
-        from kerfpath.cli._robots_for import show_robots_for
-
-        given = [name for name, value in {"vary": vary, **options}.items() if value is not None]
-        if given:
-            said = ", ".join(f"--{name.replace('_', '-')}" for name in given)
-            raise InputError(f"--robots: nothing is moved with it; leave out {said}")
-        found = show_robots_for(job, folder, workers, acceleration_ratio, as_json=as_json)
+        if given := [*(["--vary"] if vary is not None else []), *options.given()]:
+            raise InputError(f"--robots: nothing is moved with it; leave out {', '.join(given)}")
+        found = show_robots_for(
+            job, folder, scheduler=scheduler, processes=processes, ratio=acceleration_ratio,
+            as_json=as_json,
+        )  # fmt: skip
     elif acceleration_ratio is not None:
         raise InputError("--acceleration-ratio: only with --robots; else the job says it")
     else:
-        from kerfpath.cli._layout import show_layout
-
-        found = show_layout(job, folder, vary or [], options | workers, as_json=as_json)
+        found = show_layout(
+            job, folder, vary=vary or [], options=options, scheduler=scheduler,
+            processes=processes, as_json=as_json,
+        )  # fmt: skip
     if not found:
         raise typer.Exit(1)

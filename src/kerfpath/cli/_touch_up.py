@@ -1,4 +1,4 @@
-"""`kerfpath touch-up`: a job planned again around targets that a person has moved."""
+"""`kerfpath touch-up`: plan a job again around targets that a person has moved."""
 
 from __future__ import annotations
 
@@ -8,8 +8,8 @@ from pathlib import Path
 import numpy as np
 from rich.markup import escape
 
-from kerfpath.cli._plan import leave
-from kerfpath.cli._show import compile_kernels, out, progress_bars, told_once
+from kerfpath.cli._plan import finish_run
+from kerfpath.cli._show import compile_kernels, merge_notes, out, progress_bars
 from kerfpath.job import require_folder, touch_up
 
 __all__ = ["touch_up_program"]
@@ -18,7 +18,7 @@ __all__ = ["touch_up_program"]
 def touch_up_program(
     program: Path, job: Path, plan: Path, folder: Path, ease_mm: float, *, as_json: bool
 ) -> None:
-    """Plan a job again around the moved targets of a program, and say what came of it."""
+    """Plan a job again around the moved targets of a program, and print the result."""
     require_folder(folder)
     compile_kernels()
     with progress_bars() as progress:
@@ -30,6 +30,6 @@ def touch_up_program(
                 f"{escape(each.place)}: {escape(each.contour)}, node {each.node}, moved by "
                 f"{each.off * 1e3:.3f} mm, axis turned by {np.degrees(each.turned):.3f} deg"
             )
-        for note in told_once(done.notes):
+        for note in merge_notes(done.notes):
             out.print(f"note: {escape(note)}")
-    leave(done.outcome, done.part, folder, as_json=as_json, more=more)
+    finish_run(done.outcome, done.part, folder, as_json=as_json, more=more)

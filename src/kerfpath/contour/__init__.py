@@ -7,5 +7,5 @@ from kerfpath.contour._contour import FrameKind as FrameKind
 from kerfpath.contour._join import join as join
 from kerfpath.contour._sampling import CORNER as CORNER
 from kerfpath.contour._vectors import angle_between as angle_between
-from kerfpath.contour._vectors import turned as turned
+from kerfpath.contour._vectors import slerp as slerp
 from kerfpath.contour._vectors import unit as unit

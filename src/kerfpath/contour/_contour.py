@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike
 
 from kerfpath._arrays import Array, Ints, floats, freeze, integers, positive, scalar
 from kerfpath.contour import _sampling
-from kerfpath.contour._vectors import turned, unit
+from kerfpath.contour._vectors import unit
 from kerfpath.errors import InputError
 from kerfpath.kernels.frames import closing_twist, rotation_minimising_x, tangent_x
 
@@ -145,11 +145,11 @@ class Contour:
 
     def at(self, s: ArrayLike) -> tuple[Array, Array]:
         """Return points (..., 3) m and unit axes (..., 3) at arc lengths `s` (...,) m."""
-        where = np.clip(np.asarray(s, dtype=float), self.s[0], self.s[-1])
-        k = np.clip(np.searchsorted(self.s, where, side="right") - 1, 0, len(self) - 2)
-        part = ((where - self.s[k]) / (self.s[k + 1] - self.s[k]))[..., None]
-        points = self.points[k] + part * (self.points[k + 1] - self.points[k])
-        return points, turned(self.axes[k], self.axes[k + 1], part)
+        return self._polyline.at(np.asarray(s, dtype=float))
+
+    @property
+    def _polyline(self) -> _sampling.Polyline:
+        return _sampling.Polyline(self.s, self.points, self.axes)
 
     @property
     def returns(self) -> bool:
@@ -237,14 +237,14 @@ class Contour:
             return self.at_nodes(np.linspace(self.s[0], self.s[-1], int(count)))
         if spacing is not None:
             step = scalar(spacing, "spacing", unit="m", above=0.0)
-            return self.at_nodes(_sampling.evenly(self.s, ends, step, "mm", self.name))
+            return self.at_nodes(_sampling.divide_evenly(self.s, ends, step, "mm", self.name))
         if dt is not None or speed is not None:
             return self._in_time(dt, speed, ends)
         position = np.inf if tolerance is None else scalar(tolerance, "tolerance", above=0.0)
         angle = (
             np.inf if axis_tolerance is None else scalar(axis_tolerance, "axis_tolerance", above=0)
         )
-        return self.at_nodes(_sampling.fewest(self, position, angle))
+        return self.at_nodes(_sampling.sample_fewest(self._polyline, position, angle))
 
     def frames(self, kind: FrameKind = "tangent") -> Array:
         """Return the task frames H_k, (K, 4, 4): x along the path, z along the tool axis.
@@ -346,7 +346,7 @@ class Contour:
             raise InputError("resample: sampling in time needs both dt= (s) and speed= (m/s)")
         step = scalar(dt, "dt", unit="s", above=0.0)
         v = positive(np.broadcast_to(np.asarray(speed), len(self)), "speed", (len(self),))
-        s, time = _sampling.in_time(self, v * self.speed_share, step, ends)
+        s, time = _sampling.sample_in_time(self.s, v * self.speed_share, step, ends, self.name)
         return self.at_nodes(s, freeze(time))
 
 

@@ -1,20 +1,17 @@
-"""Where the nodes of a sampling lie: evenly between features, evenly in time, or fewest."""
+"""Samplings of a path: evenly between features, evenly in time, or by the fewest nodes."""
 
 from __future__ import annotations
 
 from itertools import pairwise
-from typing import TYPE_CHECKING
+from typing import NamedTuple
 
 import numpy as np
 
 from kerfpath._arrays import Array, Ints
-from kerfpath.contour._vectors import angle_between, turned, unit
+from kerfpath.contour._vectors import angle_between, slerp, unit
 from kerfpath.errors import InputError
 
-if TYPE_CHECKING:
-    from kerfpath.contour._contour import Contour
-
-__all__ = ["corners", "evenly", "fewest", "in_time"]
+__all__ = ["Polyline", "corners", "divide_evenly", "sample_fewest", "sample_in_time"]
 
 CORNER = np.radians(20)
 """Turn of the path at one node from which on it is a corner, which sampling keeps."""
@@ -28,6 +25,25 @@ REPEATED_POINT = 1e-9
 """m; keeps a chord of no length from dividing by zero."""
 
 
+class Polyline(NamedTuple):
+    """The path through the nodes, the axis turning evenly between them."""
+
+    s: Array
+    """(K,) m: arc lengths, increasing."""
+    points: Array
+    """(K, 3) m."""
+    axes: Array
+    """(K, 3): unit vectors."""
+
+    def at(self, s: Array) -> tuple[Array, Array]:
+        """Return points (..., 3) m and unit axes (..., 3) at arc lengths s (...,) m."""
+        where = np.clip(s, self.s[0], self.s[-1])
+        k = np.clip(np.searchsorted(self.s, where, side="right") - 1, 0, len(self.s) - 2)
+        part = ((where - self.s[k]) / (self.s[k + 1] - self.s[k]))[..., None]
+        points = self.points[k] + part * (self.points[k + 1] - self.points[k])
+        return points, slerp(self.axes[k], self.axes[k + 1], part)
+
+
 def corners(points: Array, closed: bool) -> Ints:
     """Return the nodes of points (K, 3) m at which the path turns sharply, in their order.
 
@@ -39,7 +55,7 @@ def corners(points: Array, closed: bool) -> Ints:
     return np.flatnonzero(turn > CORNER)
 
 
-def evenly(at: Array, ends: Ints, step: float, unit_name: str, name: str) -> Array:
+def divide_evenly(at: Array, ends: Ints, step: float, unit_name: str, name: str) -> Array:
     """Return values that divide the stretches between at[ends] evenly, none longer than `step`.
 
     Parameters
@@ -79,41 +95,44 @@ def evenly(at: Array, ends: Ints, step: float, unit_name: str, name: str) -> Arr
     return np.concatenate([*pieces, at[-1:]])
 
 
-def in_time(line: Contour, speed: Array, dt: float, ends: Ints) -> tuple[Array, Array]:
+def sample_in_time(s: Array, speed: Array, dt: float, ends: Ints, name: str) -> tuple[Array, Array]:
     """Return arc lengths (M,) m and times (M,) s of nodes evenly spaced in time, at most `dt`.
 
     Parameters
     ----------
-    line : Contour
+    s : (K,) m
+        Arc lengths of the nodes.
     speed : (K,) m/s
         At each node, linear in arc length between them.
     dt : float s
     ends : (e,) int
         Nodes that are kept.
+    name : str
+        The contour's, for messages.
     """
     # With the speed linear in s over a segment, its mean slowness is ln(v1/v0)/(v1-v0).
     log_ratio, change = np.log(speed[1:] / speed[:-1]), np.diff(speed)
     even = np.abs(log_ratio) < 1e-6
     slowness = np.where(even, 2.0 / (speed[1:] + speed[:-1]), log_ratio / np.where(even, 1, change))
-    t = np.concatenate([[0.0], np.cumsum(np.diff(line.s) * slowness)])
-    at = evenly(t, ends, dt, "ms", line.name)
+    t = np.concatenate([[0.0], np.cumsum(np.diff(s) * slowness)])
+    at = divide_evenly(t, ends, dt, "ms", name)
     k = np.clip(np.searchsorted(t, at, side="right") - 1, 0, len(t) - 2)
     # Within a segment s(t) solves ds/dt = v: exponential where the speed changes.
-    rate = np.append(change, 0.0)[k] / np.diff(line.s)[k]
+    rate = np.append(change, 0.0)[k] / np.diff(s)[k]
     tau = at - t[k]
     still = np.abs(rate * tau) < 1e-12
     grown = np.where(still, tau, np.expm1(rate * tau) / np.where(still, 1.0, rate))
-    s = line.s[k] + speed[k] * grown
-    s[0], s[-1] = line.s[0], line.s[-1]
+    made = s[k] + speed[k] * grown
+    made[0], made[-1] = s[0], s[-1]
     # A stretch whose steps are shorter than the longest is run through in as much time each.
-    return s, np.diff(at).max(initial=0.0) * np.arange(len(at))
+    return made, np.diff(at).max(initial=0.0) * np.arange(len(at))
 
 
-def fewest(line: Contour, tolerance: float, axis_tolerance: float) -> Array:
+def sample_fewest(line: Polyline, tolerance: float, axis_tolerance: float) -> Array:
     """Return the arc lengths of the fewest evenly spaced nodes that keep both tolerances."""
     # Cells this short keep both: in one, path and axis move less than is allowed.
     rate = float((angle_between(line.axes[:-1], line.axes[1:]) / np.diff(line.s)).max())
-    enough = line.length * max(1 / tolerance, rate / axis_tolerance) + 1
+    enough = (line.s[-1] - line.s[0]) * max(1 / tolerance, rate / axis_tolerance) + 1
     witness = len(line.s) // 2
     for cells in range(1, int(min(enough, MOST_NODES)) + 1):
         s = np.linspace(line.s[0], line.s[-1], cells + 1)
@@ -129,7 +148,7 @@ def fewest(line: Contour, tolerance: float, axis_tolerance: float) -> Array:
     )
 
 
-def _spoilt(line: Contour, s: Array, nodes: Ints, tolerance: float, axis_tolerance: float) -> int:
+def _spoilt(line: Polyline, s: Array, nodes: Ints, tolerance: float, axis_tolerance: float) -> int:
     """Return -1 if chords over `s` stay close at these nodes, or the worst of them."""
     cell = np.clip(np.searchsorted(s, line.s[nodes], side="right") - 1, 0, len(s) - 2)
     p0, n0 = line.at(s[cell])
@@ -138,7 +157,7 @@ def _spoilt(line: Contour, s: Array, nodes: Ints, tolerance: float, axis_toleran
     chord, there = p1 - p0, line.points[nodes]
     along = ((there - p0) * chord).sum(1) / np.maximum((chord * chord).sum(1), REPEATED_POINT**2)
     off = np.linalg.norm(p0 + np.clip(along, 0, 1)[:, None] * chord - there, axis=1)
-    angle = angle_between(turned(n0, n1, part), line.axes[nodes])
+    angle = angle_between(slerp(n0, n1, part), line.axes[nodes])
     excess = np.maximum(off / tolerance, angle / axis_tolerance)
     worst = int(np.argmax(excess))
     return -1 if excess[worst] <= 1.0 else int(nodes[worst])

@@ -7,7 +7,7 @@ import numpy as np
 from kerfpath._arrays import Array
 from kerfpath.errors import InputError
 
-__all__ = ["angle_between", "turned", "unit"]
+__all__ = ["angle_between", "slerp", "unit"]
 
 ZERO = 1e-9
 """A vector shorter than this (any unit) has no direction."""
@@ -35,7 +35,7 @@ def angle_between(n0: Array, n1: Array) -> Array:
     return np.asarray(np.arctan2(sine, (n0 * n1).sum(-1)))
 
 
-def turned(n0: Array, n1: Array, part: Array) -> Array:
+def slerp(n0: Array, n1: Array, part: Array) -> Array:
     """Turn unit vectors n0 (..., 3) by `part` (..., 1) of the angle towards n1, evenly."""
     angle = angle_between(n0, n1)[..., None]
     small = angle < 1e-7

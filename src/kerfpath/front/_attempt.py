@@ -11,8 +11,9 @@ from kerfpath.auditor import audit as full_audit
 from kerfpath.cell import Cell
 from kerfpath.contour import Contour
 from kerfpath.errors import NoFeasiblePath
-from kerfpath.front._runs import WINDOW, Run
+from kerfpath.front._runs import Run
 from kerfpath.graph import LayeredGraph
+from kerfpath.losses import Loss
 from kerfpath.options import PlanOptions
 from kerfpath.planner import plan
 from kerfpath.plans import Plan
@@ -50,8 +51,7 @@ class Attempts:
         try:
             return self._audited(self.planned(run))
         except NoFeasiblePath as broken:
-            windows = [why for why in broken.counts if why.startswith(WINDOW)]
-            if windows:
+            if windows := broken.lost_by(Loss.WINDOW):
                 return f"no pose in the {windows[0]}"
             counts = broken.counts
             most = max(counts, key=counts.__getitem__, default="the seam")

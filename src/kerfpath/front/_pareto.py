@@ -78,7 +78,7 @@ def pareto(
         Less is better of: "displacement" (7) and "range" (9), over the joints' velocity limits and
         added up (s); "velocity", the largest increment (8) of any joint, and "acceleration", as
         shares of the limits; "displacement_J", "increment_J" and "range_J" of joint J, from 1
-        (rad, of a rail m); "time" from home along the contour and back (s). More is better of
+        (rad; m for a rail); "time" from home along the contour and back (s). More is better of
         "speed", the fastest constant one of the plan's path (m/s), of "clearance" in the cell (m),
         and of the measures of `kerfpath.comfort`, at their least.
     runs : int

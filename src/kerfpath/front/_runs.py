@@ -15,13 +15,12 @@ from kerfpath.cell import Cell
 from kerfpath.front._clearance import roomier
 from kerfpath.front._criteria import Criterion
 from kerfpath.graph import LayeredGraph
+from kerfpath.losses import Loss, Reason
 from kerfpath.options import PlanOptions
 from kerfpath.search import Metric, ObjectiveKind, Relaxations
 
-__all__ = ["WINDOW", "Run", "RunData", "anchors", "grid", "in_window", "quicker", "whole", "within"]
+__all__ = ["Run", "RunData", "anchors", "grid", "in_window", "quicker", "whole", "within"]
 
-WINDOW = "window of joint"
-"""What vertices outside a window are counted under, before the joint's number."""
 FAINT = 1e-6
 """Weight of the other joints where one joint counts: they decide between equals, or as good as."""
 LEVELS = (0.25, 4.0)
@@ -199,7 +198,7 @@ def within(graph: LayeredGraph, window: Array, endless: Bools) -> LayeredGraph:
         if not np.isfinite(high - low) or (endless[joint] and high - low >= 2 * np.pi):
             continue
         inside = in_window(graph.q[:, joint], low, high - low, endless=bool(endless[joint]))
-        outside[f"{WINDOW} {joint + 1}"] = ~inside
+        outside[Reason(Loss.WINDOW, joint + 1)] = ~inside
     return graph.without(outside) if outside else graph
 
 

@@ -42,7 +42,6 @@ from kerfpath.job.programs import touch_up as touch_up
 from kerfpath.job.run import CutResult as CutResult
 from kerfpath.job.run import JobPreview as JobPreview
 from kerfpath.job.run import JobResult as JobResult
-from kerfpath.job.run import Progress as Progress
 from kerfpath.job.run import check_job as check_job
 from kerfpath.job.run import fastest_along as fastest_along
 from kerfpath.job.run import fastest_speeds as fastest_speeds

@@ -1,7 +1,8 @@
 """The one way kernels are compiled, and where the compiled code is kept.
 
 Numba's cache does not notice an edited helper in another file, so the cache folder is named by the
-content of all kernels: an edit anywhere starts a new one, in a checkout as in an installed copy.
+content of all kernels and of the codes that they use: an edit anywhere starts a new one, in a
+checkout as in an installed copy.
 """
 
 from __future__ import annotations
@@ -47,7 +48,7 @@ def _cache_folder() -> Path:
         return Path(config.CACHE_DIR)
     here = Path(__file__).parent
     digest = hashlib.sha256(numba.__version__.encode())
-    for source in sorted(here.glob("*.py")):
+    for source in (*sorted(here.glob("*.py")), here.parent / "losses.py"):
         digest.update(source.name.encode() + source.read_bytes())
     name = f"numba-{digest.hexdigest()[:16]}"
     pycache = here / "__pycache__"

@@ -28,8 +28,8 @@ from kerfpath.kernels.limits import (
 )
 from kerfpath.kernels.reach import fill_candidates
 from kerfpath.kernels.search import (
-    Layers,
-    Objective,
+    Aim,
+    SortedLayers,
     distance,
     fill_increment,
     is_shut,
@@ -37,7 +37,7 @@ from kerfpath.kernels.search import (
     late,
     shut_edges,
 )
-from kerfpath.kernels.states import Scratch, States, grown, in_order
+from kerfpath.kernels.states import Scratch, States, grown, in_order, joined_states
 
 __all__ = ["Reached", "count_closing", "recursion", "trace"]
 
@@ -70,7 +70,7 @@ class Reached(NamedTuple):
 
 @jit
 def _begin(
-    layers: Layers, aim: Objective, h: Array, bound: float, k: int, cost: float
+    layers: SortedLayers, aim: Aim, h: Array, bound: float, k: int, cost: float
 ) -> tuple[States, float]:
     """States of layer k, one per vertex, with no edge before them; and the least cost dropped.
 
@@ -80,7 +80,7 @@ def _begin(
     m = layers.start[k + 1] - a
     vertex, d, first = np.empty(m, np.int64), np.empty(m), np.zeros(m + 1, np.int64)
     for i in range(m):
-        enter = joined(aim.minimax, cost, aim.vertex_cost[a + i])
+        enter = joined(aim.minimax, cost, layers.cost[a + i])
         f = joined(aim.minimax, enter, h[a + i])
         if f <= bound and f < np.inf:
             vertex[count], d[count] = a + i, enter
@@ -93,41 +93,35 @@ def _begin(
 
 
 @jit_inline
-def _cheapest(
-    states: States,
-    a: int,
-    b: int,
-    aim: Objective,
-    step: float,
-    dq: Array,
-    rest: float,
-    bound: float,
-) -> tuple[int, float]:
-    """First of the states a..b, cheapest first, that (6) lets go on by dq; -1 if none in the bound.
+def _predecessor(
+    states: States, a: int, b: int, aim: Aim, step: float, dq: Array, rest: float, bound: float
+) -> tuple[int, float, float]:
+    """Find which of the states a..b, cheapest first, goes on by dq at the least cost.
 
-    Also returns the cost bound of the state at which the search was given up, or infinity.
+    `step` is the cost of the step on its own, `rest` that of what is to come. Returns the state, -1
+    if none keeps the bound; the cost up to and with the step; and the least one over the bound.
     """
+    if aim.timed:
+        return _quickest(states, a, b, aim, step, dq, rest, bound)
     for s in range(a, b):
-        f = joined(aim.minimax, joined(aim.minimax, states.d[s], step), rest)
+        d = joined(aim.minimax, states.d[s], step)
+        f = joined(aim.minimax, d, rest)
         if f > bound:
-            return -1, f
+            return -1, np.inf, f
         if states.parent[s] < 0 or acceleration_excess(dq, states.dq[s], aim.acceleration) < 0:
-            return s, np.inf
-    return -1, np.inf
+            return s, d, np.inf
+    return -1, np.inf, np.inf
 
 
 @jit_inline
 def _quickest(
-    states: States, a: int, b: int, aim: Objective, step: float, paid: float, dq: Array,
-    rest: float, bound: float,
-) -> tuple[int, float, float]:  # fmt: skip
-    """Find which of the states a..b, cheapest first, goes on by dq at the least cost (timed).
-
-    `step` is the cost of the step on its own, with `paid` for lost time, `rest` that of what is to
-    come. Returns the state, -1 if none keeps the bound; the cost up to and with the step; and the
-    least one over the bound.
-    """
-    best, best_d, over = -1, np.inf, np.inf
+    states: States, a: int, b: int, aim: Aim, step: float, dq: Array, rest: float, bound: float
+) -> tuple[int, float, float]:
+    """As `_predecessor`, where a change asks for time."""
+    best, best_d, over, paid = -1, np.inf, np.inf, 0.0
+    if aim.lost.penalty > 0:
+        paid = late(aim.lost, aim.lost.stretch * velocity_time(dq, aim.velocity))
+        step += paid
     for s in range(a, b):
         d = joined(aim.minimax, states.d[s], step)
         if d >= best_d:
@@ -140,7 +134,7 @@ def _quickest(
             time = acceleration_time(dq, states.dq[s], aim.acceleration)
         elif states.parent[s] == LEAPT:
             time = _braking_time(dq, aim)
-        d = max(d, time) if aim.minimax else d + max(0.0, late(aim, time) - paid)
+        d = max(d, time) if aim.minimax else d + max(0.0, late(aim.lost, time) - paid)
         f = joined(aim.minimax, d, rest)
         if f > bound:
             over = min(over, f)
@@ -150,7 +144,7 @@ def _quickest(
 
 
 @jit_inline
-def _braking_time(dq: Array, aim: Objective) -> float:
+def _braking_time(dq: Array, aim: Aim) -> float:
     """Least time that the change between dq and any step beyond `aim.velocity` asks for."""
     least = np.inf
     for i in range(len(dq)):
@@ -160,35 +154,31 @@ def _braking_time(dq: Array, aim: Objective) -> float:
 
 @jit
 def _with_leaps(
-    aim: Objective, h: Array, bound: float, before: States, states: States, a: int, b: int,
-    width: int,
+    layers: SortedLayers, aim: Aim, h: Array, bound: float, k: int, before: States,
+    states: States, width: int,
 ) -> tuple[States, float]:  # fmt: skip
-    """Add to the states of vertices a..b-1 those that steps beyond `aim.velocity` may lead to.
+    """Add to the states of layer k those that steps beyond `aim.velocity` may lead to.
 
     They cost no more than any such step from the states before, wherever from and to.
     """
-    d, lowest, paid = np.inf, np.inf, late(aim, aim.stretch)
+    a, b, d, lowest = layers.start[k], layers.start[k + 1], np.inf, np.inf
+    paid = late(aim.lost, aim.lost.stretch)
     for s in range(len(before.vertex)):
         time = _braking_time(before.dq[s], aim) if before.parent[s] >= 0 else 0.0
-        d = min(d, before.d[s] + aim.leap + max(0.0, late(aim, time) - paid))
-    f = d + aim.vertex_cost[a:b] + h[a:b]
+        d = min(d, before.d[s] + aim.lost.leap + max(0.0, late(aim.lost, time) - paid))
+    f = d + layers.cost[a:b] + h[a:b]
     leapt = a + np.flatnonzero(f <= bound)
     m = len(leapt)
     for v in range(b - a):
         lowest = min(lowest, f[v]) if f[v] > bound else lowest
-    together = States(
-        np.concatenate((states.vertex, leapt)),
-        np.concatenate((states.d, d + aim.vertex_cost[leapt])),
-        np.concatenate((states.dq, np.zeros((m, states.dq.shape[1])))),
-        np.concatenate((states.parent, np.full(m, LEAPT))),
-        states.first,
-    )
-    return in_order(together, a, b, width), lowest
+    none = np.zeros((m, states.dq.shape[1]))
+    more = States(leapt, d + layers.cost[leapt], none, np.full(m, LEAPT), states.first)
+    return in_order(joined_states(states, more), a, b, width), lowest
 
 
 @jit_inline
 def _fill_from(
-    layers: Layers, aim: Objective, h: Array, bound: float, seam: Array, k: int, states: States,
+    layers: SortedLayers, aim: Aim, h: Array, bound: float, seam: Array, k: int, states: States,
     i: int, count: int, scratch: Scratch, out: States,
 ) -> tuple[int, float]:  # fmt: skip
     """Append the states that leave vertex i of layer k; their number so far, least cost dropped."""
@@ -201,7 +191,7 @@ def _fill_from(
         j = scratch.vertex[v]
         if h[j] == np.inf:
             continue
-        step = joined(aim.minimax, distance(layers, aim, p, j), aim.vertex_cost[j])
+        step = joined(aim.minimax, distance(layers, aim, p, j), layers.cost[j])
         if step == np.inf:
             continue
         f = joined(aim.minimax, joined(aim.minimax, states.d[a], step), h[j])
@@ -214,14 +204,7 @@ def _fill_from(
         fill_increment(layers, p, j, dq)
         if closes and acceleration_excess(seam, dq, aim.acceleration) >= 0:
             continue
-        if aim.timed:
-            paid = 0.0
-            if aim.penalty > 0:
-                paid = late(aim, aim.stretch * velocity_time(dq, aim.velocity))
-            s, cost, dropped = _quickest(states, a, b, aim, step + paid, paid, dq, h[j], bound)
-        else:
-            s, dropped = _cheapest(states, a, b, aim, step, dq, h[j], bound)
-            cost = joined(aim.minimax, states.d[s], step) if s >= 0 else np.inf
+        s, cost, dropped = _predecessor(states, a, b, aim, step, dq, h[j], bound)
         lowest = min(lowest, dropped)
         if s >= 0:
             out.vertex[count], out.parent[count], out.d[count] = j, s, cost
@@ -233,7 +216,7 @@ def _fill_from(
 
 @jit_inline
 def _fill_states(
-    layers: Layers, aim: Objective, h: Array, bound: float, seam: Array, k: int, states: States,
+    layers: SortedLayers, aim: Aim, h: Array, bound: float, seam: Array, k: int, states: States,
     i: int, count: int, scratch: Scratch, out: States,
 ) -> tuple[int, int, float]:  # fmt: skip
     """Append what leaves vertex i of layer k and those after it, while there is room for one more.
@@ -249,7 +232,7 @@ def _fill_states(
 
 @jit
 def _extend(
-    layers: Layers, aim: Objective, h: Array, bound: float, seam: Array, k: int, states: States,
+    layers: SortedLayers, aim: Aim, h: Array, bound: float, seam: Array, k: int, states: States,
     width: int,
 ) -> tuple[States, float]:  # fmt: skip
     """States of layer k + 1 from those of layer k, sorted; and the least cost dropped."""
@@ -274,7 +257,7 @@ def _extend(
 
 @jit
 def _next(
-    layers: Layers, aim: Objective, h: Array, bound: float, seam: Array, k: int, states: States,
+    layers: SortedLayers, aim: Aim, h: Array, bound: float, seam: Array, k: int, states: States,
     least: Array, width: int,
 ) -> tuple[States, float]:  # fmt: skip
     """States of layer k + 1, also leapt to or beginning anew; and the least cost dropped.
@@ -283,25 +266,18 @@ def _next(
     """
     a, b = layers.start[k + 1], layers.start[k + 2]
     on, lowest = _extend(layers, aim, h, bound, seam, k, states, width)
-    if aim.leap < np.inf:
-        on, dropped = _with_leaps(aim, h, bound, states, on, a, b, width)
+    if aim.lost.leap < np.inf:
+        on, dropped = _with_leaps(layers, aim, h, bound, k + 1, states, on, width)
         lowest = min(lowest, dropped)
     if layers.after[k + 1] < 0:
         return on, lowest
     anew, dropped = _begin(layers, aim, h, bound, k + 1, least[layers.after[k + 1]])
-    both = States(
-        np.concatenate((on.vertex, anew.vertex)),
-        np.concatenate((on.d, anew.d)),
-        np.concatenate((on.dq, anew.dq)),
-        np.concatenate((on.parent, anew.parent)),
-        on.first,
-    )
-    return in_order(both, a, b, width), min(lowest, dropped)
+    return in_order(joined_states(on, anew), a, b, width), min(lowest, dropped)
 
 
 @jit
 def recursion(
-    layers: Layers, aim: Objective, h: Array, bound: float, seam: Array, room: int, width: int
+    layers: SortedLayers, aim: Aim, h: Array, bound: float, seam: Array, room: int, width: int
 ) -> Reached:
     """Best path whose cost keeps `bound`, exactly, under (5) and (6).
 
@@ -337,7 +313,7 @@ def recursion(
 
 
 @jit
-def trace(layers: Layers, found: Reached, out_path: Ints) -> None:
+def trace(layers: SortedLayers, found: Reached, out_path: Ints) -> None:
     """Read the best path (K,) back from a record, as vertices of the sorted graph.
 
     Layers that it does not go through, between breaking off and beginning anew, get -1; before a
@@ -359,7 +335,7 @@ def trace(layers: Layers, found: Reached, out_path: Ints) -> None:
 
 
 @jit
-def count_closing(layers: Layers, aim: Objective, states: States, k: int) -> tuple[Ints, int]:
+def count_closing(layers: SortedLayers, aim: Aim, states: States, k: int) -> tuple[Ints, int]:
     """Count, for ways from the states of layer k-1 into layer k, what forbids them.
 
     Row 0: edges whose first velocity excess (5) is at joint i; row 1: of the others that are not

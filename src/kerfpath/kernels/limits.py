@@ -11,6 +11,7 @@ __all__ = [
     "LIMIT_TOLERANCE",
     "acceleration_excess",
     "acceleration_time",
+    "exceeds",
     "velocity_excess",
     "velocity_time",
 ]
@@ -20,13 +21,19 @@ LIMIT_TOLERANCE = 1e-9
 
 
 @jit_inline
+def exceeds(size: float, bound: float) -> bool:
+    """Whether an increment, or a change of one, of this size is over its bound; both rad."""
+    return size > bound + LIMIT_TOLERANCE
+
+
+@jit_inline
 def velocity_excess(dq: Array, bound: Array) -> int:
     """First joint with |q_k - q_{k-1}| > eta_v dq^(v), or -1: the test f_v (Eq. 5).
 
     dq (n,) is the increment, bound (n,) is eta_v q'max dt, both rad.
     """
     for i in range(len(dq)):
-        if abs(dq[i]) > bound[i] + LIMIT_TOLERANCE:
+        if exceeds(abs(dq[i]), bound[i]):
             return i
     return -1
 
@@ -38,27 +45,27 @@ def acceleration_excess(dq: Array, dq_before: Array, bound: Array) -> int:
     dq, dq_before (n,) are successive increments, bound (n,) is eta_a q''max dt^2, all rad.
     """
     for i in range(len(dq)):
-        if abs(dq[i] - dq_before[i]) > bound[i] + LIMIT_TOLERANCE:
+        if exceeds(abs(dq[i] - dq_before[i]), bound[i]):
             return i
     return -1
 
 
 @jit_inline
-def velocity_time(dq: Array, velocity: Array) -> float:
-    """Least node interval, s, in which (5) holds: largest |dq_i| / q'max_i; dq (n,) rad."""
+def velocity_time(dq: Array, bound: Array) -> float:
+    """Node intervals in which (5) would hold: largest |dq_i| over its bound, both (n,) rad."""
     least = 0.0
     for i in range(len(dq)):
-        least = max(least, abs(dq[i]) / velocity[i])
+        least = max(least, abs(dq[i]) / bound[i])
     return least
 
 
 @jit_inline
-def acceleration_time(dq: Array, dq_before: Array, acceleration: Array) -> float:
-    """Least node interval, s, in which (6) holds: largest sqrt(|ddq_i| / q''max_i).
+def acceleration_time(dq: Array, dq_before: Array, bound: Array) -> float:
+    """Node intervals in which (6) would hold: the root of the largest change over its bound.
 
-    dq, dq_before (n,) are successive increments, rad; acceleration (n,) rad/s^2.
+    dq, dq_before (n,) are successive increments, bound (n,) is that of their change, all rad.
     """
     least = 0.0
     for i in range(len(dq)):
-        least = max(least, abs(dq[i] - dq_before[i]) / acceleration[i])
+        least = max(least, abs(dq[i] - dq_before[i]) / bound[i])
     return sqrt(least)

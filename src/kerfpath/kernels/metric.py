@@ -3,33 +3,97 @@
 from __future__ import annotations
 
 from math import pi, sqrt
+from typing import TypeVar
 
 import numpy as np
 
 from kerfpath._arrays import Array, Bools
-from kerfpath.kernels._jit import jit, jit_inline
+from kerfpath.kernels._jit import either, jit, jit_inline, jit_vector, larger, smaller
 
 __all__ = [
     "CHEBYCHEV",
     "EUCLID",
     "MANHATTAN",
+    "apart",
     "coordinate_range",
+    "extend",
+    "finish",
     "increment",
     "increments",
+    "increments_between",
     "largest_increment",
     "maximum_distance",
     "rho",
     "total_displacement",
     "total_distance",
+    "turns_of",
+    "wrap",
+    "wrap_angle",
 ]
 
+_X = TypeVar("_X", float, Array)
+
 EUCLID, MANHATTAN, CHEBYCHEV = 0, 1, 2
+
+
+def _short(dq: _X) -> _X:
+    """Return the short way round, of a number or an array."""
+    short: _X = dq - 2.0 * pi * np.rint(dq / (2.0 * pi))
+    return short
+
+
+def turns_of(q: _X) -> _X:
+    """Return by how many turns of 2 pi each angle lies outside (-pi, pi]."""
+    turns: _X = np.ceil((q - pi) / (2.0 * pi))
+    return turns
+
+
+def wrap(q: _X) -> _X:
+    """Bring angles into (-pi, pi]."""
+    wrapped: _X = q - 2.0 * pi * np.ceil((q - pi) / (2.0 * pi))
+    return wrapped
+
+
+_short_way, wrap_angle = jit_inline(_short), jit_inline(wrap)
 
 
 @jit_inline
 def increment(dq: float, endless: bool) -> float:
     """Smallest representative of a joint difference, min over p of dq + 2 pi p (Eq. 13)."""
-    return dq - 2.0 * pi * np.round(dq / (2.0 * pi)) if endless else dq
+    return _short_way(dq) if endless else dq
+
+
+def increments_between(q0: Array, q1: Array, endless: Bools) -> Array:
+    """Return the joint increments (..., n) rad from q0 to q1 (..., n) rad."""
+    dq = q1 - q0
+    return np.where(endless, _short(dq), dq)
+
+
+def increments(q: Array, endless: Bools) -> Array:
+    """Return the joint increments (K-1, n) rad along a path q (K, n) rad."""
+    return increments_between(q[:-1], q[1:], endless)
+
+
+@jit_vector
+def apart(difference: float, turn: float) -> float:
+    """Size of the increment between two wrapped angles, from the size of their difference.
+
+    turn is 2 pi of an endless joint, infinity of another. It vectorises.
+    """
+    return smaller(difference, turn - difference)
+
+
+@jit_vector
+def extend(total: float, part: float, metric: int) -> float:
+    """Take one more weighted increment into what `finish` makes a distance of. It vectorises."""
+    euclid = either(metric == EUCLID, total + part * part, larger(total, part))
+    return either(metric == MANHATTAN, total + part, euclid)
+
+
+@jit_vector
+def finish(total: float, metric: int) -> float:
+    """Return the distance rho_a that all weighted increments of a step come to."""
+    return either(metric == EUCLID, sqrt(total), total)
 
 
 @jit
@@ -37,24 +101,8 @@ def rho(dq: Array, weight: Array, metric: int) -> float:
     """Weighted length rho_a of a joint increment dq (n,), a in {E, M, C}."""
     total = 0.0
     for i in range(len(dq)):
-        part = weight[i] * abs(dq[i])
-        if metric == EUCLID:
-            total += part * part
-        elif metric == MANHATTAN:
-            total += part
-        else:
-            total = max(total, part)
-    return sqrt(total) if metric == EUCLID else total
-
-
-@jit
-def increments(q: Array, endless: Bools) -> Array:
-    """Joint increments (K-1, n) rad along a path q (K, n) rad."""
-    dq = q[1:] - q[:-1]
-    for k in range(len(dq)):
-        for i in range(len(endless)):
-            dq[k, i] = increment(dq[k, i], endless[i])
-    return dq
+        total = extend(total, weight[i] * abs(dq[i]), metric)
+    return finish(total, metric)
 
 
 @jit

@@ -10,9 +10,10 @@ from __future__ import annotations
 import numpy as np
 
 from kerfpath._arrays import Array
-from kerfpath.kernels._jit import jit_inline, jit_vector, larger, smaller, trailing_zeros
+from kerfpath.kernels._jit import jit_inline, jit_vector, larger, trailing_zeros
 from kerfpath.kernels.limits import LIMIT_TOLERANCE
-from kerfpath.kernels.search import Layers, Objective, reduced, runs
+from kerfpath.kernels.metric import apart, wrap_angle
+from kerfpath.kernels.search import Aim, SortedLayers, runs
 from kerfpath.kernels.states import Scratch, States
 from kerfpath.kernels.to_go import LANES, SIX
 
@@ -21,7 +22,7 @@ __all__ = ["fill_candidates"]
 
 @jit_inline
 def _fill_reach(
-    layers: Layers, aim: Objective, states: States, a: int, b: int, p: int,
+    layers: SortedLayers, aim: Aim, states: States, a: int, b: int, p: int,
     out_to: Array, out_by: Array,
 ) -> None:  # fmt: skip
     """Fill the box, middle (n,) and half width (n,) rad, that the states a..b of p can go on to.
@@ -39,12 +40,12 @@ def _fill_reach(
                 least, most = min(least, states.dq[s, i]), max(most, states.dq[s, i])
             low, high = max(low, least - aim.acceleration[i]), min(high, most + aim.acceleration[i])
         to = layers.q[i, p] + (low + high) / 2
-        out_to[i] = reduced(to) if layers.endless[i] else to
+        out_to[i] = wrap_angle(to) if layers.endless[i] else to
         out_by[i] = (high - low) / 2 + 2 * LIMIT_TOLERANCE
 
 
 @jit_inline
-def _inside(layers: Layers, to: Array, by: Array, a: int, m: int) -> np.uint64:
+def _inside(layers: SortedLayers, to: Array, by: Array, a: int, m: int) -> np.uint64:
     """Which of the vertices a..a+m-1, 64 at most, lie in the box: one bit each."""
     if len(to) == SIX:
         return _inside_of(layers.q, layers.turn, to, by, a, m, SIX)
@@ -58,15 +59,14 @@ def _inside_of(q: Array, turn: Array, to: Array, by: Array, a: int, m: int, n: i
     for v in range(np.uintp(m)):
         over = -np.inf
         for i in range(n):
-            z = abs(to[i] - q[i, begin + v])
-            over = larger(over, smaller(z, turn[i] - z) - by[i])
+            over = larger(over, apart(abs(to[i] - q[i, begin + v]), turn[i]) - by[i])
         mask |= np.uint64(over <= 0) << np.uint64(v)
     return mask
 
 
 @jit_inline
 def fill_candidates(
-    layers: Layers, aim: Objective, states: States, a: int, b: int, k: int, p: int,
+    layers: SortedLayers, aim: Aim, states: States, a: int, b: int, k: int, p: int,
     out: Scratch,
 ) -> int:  # fmt: skip
     """Fill the vertices that lie in the box that the states a..b of p can go on to; their number.

@@ -6,21 +6,21 @@ vertices of the layer before that can pass the velocity test lie in one or two s
 
 from __future__ import annotations
 
-from math import ceil, pi, sqrt
+from math import pi
 from typing import NamedTuple
 
 import numpy as np
 
 from kerfpath._arrays import Array, Bools, Ints
 from kerfpath.kernels._jit import jit, jit_inline
-from kerfpath.kernels.limits import LIMIT_TOLERANCE, acceleration_excess, velocity_excess
-from kerfpath.kernels.metric import EUCLID, MANHATTAN, increment
+from kerfpath.kernels.limits import acceleration_excess, exceeds
+from kerfpath.kernels.metric import apart, extend, finish, increment, wrap_angle
 
 __all__ = [
-    "Layers",
-    "Objective",
+    "Aim",
+    "LostTime",
+    "SortedLayers",
     "arrange",
-    "closing_counts",
     "count_within",
     "distance",
     "fill_increment",
@@ -29,20 +29,21 @@ __all__ = [
     "joined",
     "late",
     "path_planning",
-    "reduced",
     "runs",
     "shut_edges",
     "windows",
 ]
 
 
-class Layers(NamedTuple):
-    """A sorted layered graph: vertices by column, edges implied."""
+class SortedLayers(NamedTuple):
+    """A layered graph as the kernels take it: vertices by column, sorted in each layer."""
 
     q: Array
-    """(n, N) rad, endless joints reduced to (-pi, pi]."""
+    """(n, N) rad, endless joints wrapped to (-pi, pi]."""
     start: Ints
     """(K+1,): layer k is q[:, start[k]:start[k+1]]."""
+    cost: Array
+    """(N,): what visiting a vertex costs, finite."""
     rank: Ints
     """(N,): place of each vertex in its layer as the user gave it; breaks ties."""
     low: Ints
@@ -61,32 +62,35 @@ class Layers(NamedTuple):
     """(S,): vertices, those of one p in growing order. Both are empty where no edge is shut."""
 
 
-class Objective(NamedTuple):
-    """What (14) or (15) adds up, and the bounds (5) and (6) on the increments."""
+class LostTime(NamedTuple):
+    """What the time costs that steps ask for beyond their node interval."""
 
-    weight: Array
-    metric: int
-    minimax: bool
-    vertex_cost: Array
-    velocity: Array
-    acceleration: Array
-    cap: float
-    """Largest distance, and largest cost of a vertex, that is allowed."""
-    timed: bool
-    """(6) does not forbid, it takes the time in which it would hold. Costs are times, or, where
-    they add up, lost time has a price:"""
     penalty: float = 0.0
-    """cost of one node interval of lost time; `velocity` and `acceleration` are then in rad,"""
+    """Cost of one node interval of lost time; 0 where time has no price."""
     stretch: float = 1.0
-    """`velocity` is this many times what a step covers without losing time,"""
+    """`Aim.velocity` is this many times what a step covers without losing time,"""
     leap: float = np.inf
     """and a step beyond it costs this or more; infinite if there are none."""
 
 
-@jit_inline
-def reduced(angle: float) -> float:
-    """Bring an angle into (-pi, pi]."""
-    return angle - 2.0 * pi * ceil((angle - pi) / (2.0 * pi))
+class Aim(NamedTuple):
+    """What (14) or (15) puts together, and the bounds (5) and (6) on the increments."""
+
+    weight: Array
+    """(n,) 1/rad."""
+    metric: int
+    minimax: bool
+    """(15), not (14)."""
+    velocity: Array
+    """(n,) rad: largest increment of each joint."""
+    acceleration: Array
+    """(n,) rad: largest change of its increment."""
+    cap: float = np.inf
+    """Largest distance, and largest cost of a vertex, that is allowed."""
+    timed: bool = False
+    """(6) does not forbid a change: it asks for the node intervals in which it would hold, which
+    are costs by (15), and by (14) cost what `lost` says."""
+    lost: LostTime = LostTime()
 
 
 @jit
@@ -102,7 +106,7 @@ def count_within(here: Array, there: Array, bound: Array, endless: Bools, out_co
 def fill_key(q: Array, joint: int, endless: bool, out_key: Array) -> None:
     """Fill the angle (N,) of one joint of q (N, n), an endless one brought into (-pi, pi]."""
     for v in range(len(out_key)):
-        out_key[v] = reduced(q[v, joint]) if endless else q[v, joint]
+        out_key[v] = wrap_angle(q[v, joint]) if endless else q[v, joint]
 
 
 @jit
@@ -116,7 +120,7 @@ def arrange(
             out_key[a + v], out_rank[a + v] = key[a + rank], rank
             for i in range(len(endless)):
                 x = q[a + rank, i]
-                out_q[i, a + v] = reduced(x) if endless[i] else x
+                out_q[i, a + v] = wrap_angle(x) if endless[i] else x
 
 
 @jit
@@ -159,7 +163,7 @@ def runs(
 
 
 @jit_inline
-def shut_edges(layers: Layers, p: int) -> tuple[int, int]:
+def shut_edges(layers: SortedLayers, p: int) -> tuple[int, int]:
     """Return where in `shut` the edges from vertex p stand, a..b; a == b where none is shut."""
     if len(layers.shut) == 0:
         return 0, 0
@@ -180,22 +184,15 @@ def is_shut(shut: Ints, a: int, b: int, j: int) -> bool:
 
 
 @jit_inline
-def distance(layers: Layers, aim: Objective, p: int, j: int) -> float:
+def distance(layers: SortedLayers, aim: Aim, p: int, j: int) -> float:
     """Distance rho from vertex p to vertex j; infinite where (5) or the cap forbids it."""
     total = 0.0
     for i in range(len(layers.endless)):
-        y = abs(layers.q[i, j] - layers.q[i, p])
-        y = min(y, layers.turn[i] - y)
-        if y > aim.velocity[i] + LIMIT_TOLERANCE:
+        y = apart(abs(layers.q[i, j] - layers.q[i, p]), layers.turn[i])
+        if exceeds(y, aim.velocity[i]):
             return np.inf
-        part = aim.weight[i] * y
-        if aim.metric == MANHATTAN:
-            total += part
-        elif aim.metric == EUCLID:
-            total += part * part
-        else:
-            total = max(total, part)
-    total = sqrt(total) if aim.metric == EUCLID else total
+        total = extend(total, aim.weight[i] * y, aim.metric)
+    total = finish(total, aim.metric)
     return total if total <= aim.cap else np.inf
 
 
@@ -206,13 +203,13 @@ def joined(minimax: bool, a: float, b: float) -> float:
 
 
 @jit_inline
-def late(aim: Objective, time: float) -> float:
+def late(lost: LostTime, time: float) -> float:
     """Price of a step that asks for `time` node intervals."""
-    return aim.penalty * max(0.0, time - 1.0)
+    return lost.penalty * max(0.0, time - 1.0)
 
 
 @jit_inline
-def fill_increment(layers: Layers, p: int, j: int, out_dq: Array) -> None:
+def fill_increment(layers: SortedLayers, p: int, j: int, out_dq: Array) -> None:
     """Fill the joint increment (n,) from vertex p to vertex j."""
     for i in range(len(layers.endless)):
         out_dq[i] = increment(layers.q[i, j] - layers.q[i, p], layers.endless[i])
@@ -220,7 +217,7 @@ def fill_increment(layers: Layers, p: int, j: int, out_dq: Array) -> None:
 
 @jit_inline
 def _offer(
-    layers: Layers, aim: Objective, k: int, p: int, dq: Array, dq_before: Array,
+    layers: SortedLayers, aim: Aim, k: int, p: int, dq: Array, dq_before: Array,
     out_dist: Array, out_before: Ints, out_free: Array,
 ) -> None:  # fmt: skip
     """Offer vertex p of layer k as predecessor to the vertices its edges lead to, step (2b).
@@ -250,7 +247,7 @@ def _offer(
 
 @jit_inline
 def _step(
-    layers: Layers, aim: Objective, k: int, dq: Array, dq_before: Array,
+    layers: SortedLayers, aim: Aim, k: int, dq: Array, dq_before: Array,
     out_dist: Array, out_before: Ints, out_free: Array,
 ) -> tuple[bool, bool]:  # fmt: skip
     """Step (2) from layer k to the next: whether any vertex was reached, and any turned away."""
@@ -261,13 +258,13 @@ def _step(
     for j in range(layers.start[k + 1], layers.start[k + 2]):
         turned_away |= out_free[j] < out_dist[j]
         reached |= out_before[j] >= 0
-        out_dist[j] = joined(aim.minimax, out_dist[j], aim.vertex_cost[j])
+        out_dist[j] = joined(aim.minimax, out_dist[j], layers.cost[j])
     return reached, turned_away
 
 
 @jit
 def path_planning(
-    layers: Layers, aim: Objective, out_dist: Array, out_before: Ints
+    layers: SortedLayers, aim: Aim, out_dist: Array, out_before: Ints
 ) -> tuple[int, bool]:
     """Fill d*_{k,j} = min over p of d*_{k-1,p} + rho(p, j), and the best p, by layers (Eq. 16).
 
@@ -279,42 +276,10 @@ def path_planning(
     n, K, turned_away = len(layers.endless), len(layers.start) - 1, False
     dq, dq_before, free = np.empty(n), np.empty(n), np.full(len(layers.low), np.inf)
     first = layers.start[1]
-    out_dist[:first] = aim.vertex_cost[:first]
+    out_dist[:first] = layers.cost[:first]
     for k in range(K - 1):
         reached, away = _step(layers, aim, k, dq, dq_before, out_dist, out_before, free)
         turned_away |= away
         if not reached:
             return k + 1, turned_away
     return K, turned_away
-
-
-@jit
-def closing_counts(
-    layers: Layers, aim: Objective, dist: Array, before: Ints, k: int
-) -> tuple[Ints, int]:
-    """Count, for edges from reached vertices of layer k-1 into layer k, what forbids them.
-
-    Row 0: edges whose first velocity excess (5) is at joint i; row 1: of the others that are not
-    shut, those whose first acceleration excess (6) is at joint i. Also returns how many are shut.
-    """
-    n, shut = len(layers.endless), 0
-    counts = np.zeros((2, n), np.int64)
-    dq, dq_before = np.empty(n), np.empty(n)
-    for p in range(layers.start[k - 1], layers.start[k]):
-        if dist[p] == np.inf:
-            continue
-        if k > 1:
-            fill_increment(layers, before[p], p, dq_before)
-        first, last = shut_edges(layers, p)
-        for j in range(layers.start[k], layers.start[k + 1]):
-            fill_increment(layers, p, j, dq)
-            i = velocity_excess(dq, aim.velocity)
-            if i >= 0:
-                counts[0, i] += 1
-            elif is_shut(layers.shut, first, last, j):
-                shut += 1
-            elif k > 1:
-                i = acceleration_excess(dq, dq_before, aim.acceleration)
-                if i >= 0:
-                    counts[1, i] += 1
-    return counts, shut

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from kerfpath._arrays import Array, Ints
 from kerfpath.kernels._jit import jit
 
-__all__ = ["EVERY", "Scratch", "States", "grown", "in_order"]
+__all__ = ["EVERY", "Scratch", "States", "grown", "in_order", "joined_states"]
 
 _T = TypeVar("_T", bound="np.generic[Any]")
 
@@ -54,6 +54,18 @@ def grown(old: NDArray[_T]) -> NDArray[_T]:
     new = np.empty((2 * len(old), *old.shape[1:]), old.dtype)
     new[: len(old)] = old
     return new
+
+
+@jit
+def joined_states(one: States, two: States) -> States:
+    """Return the states of the one and then those of the other, not in order."""
+    return States(
+        np.concatenate((one.vertex, two.vertex)),
+        np.concatenate((one.d, two.d)),
+        np.concatenate((one.dq, two.dq)),
+        np.concatenate((one.parent, two.parent)),
+        one.first,
+    )
 
 
 @jit

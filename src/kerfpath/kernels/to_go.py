@@ -6,15 +6,13 @@ really to come, and all that the exact search needs to leave out what cannot be 
 
 from __future__ import annotations
 
-from math import sqrt
-
 import numpy as np
 
 from kerfpath._arrays import Array, Bools
 from kerfpath.kernels._jit import either, jit, jit_inline, jit_vector, larger, smaller
-from kerfpath.kernels.limits import LIMIT_TOLERANCE
-from kerfpath.kernels.metric import EUCLID, MANHATTAN
-from kerfpath.kernels.search import Layers, Objective, joined, shut_edges
+from kerfpath.kernels.limits import exceeds
+from kerfpath.kernels.metric import apart, extend, finish
+from kerfpath.kernels.search import Aim, SortedLayers, joined, shut_edges
 
 __all__ = ["LANES", "SIX", "cost_to_go"]
 
@@ -25,24 +23,23 @@ SIX = 6
 
 
 @jit
-def cost_to_go(layers: Layers, aim: Objective, allowed: Bools, out_h: Array) -> None:
+def cost_to_go(layers: SortedLayers, aim: Aim, allowed: Bools, out_h: Array) -> None:
     """First-order bound h (N,): least cost from each vertex to the last layer, its own left out.
 
     Vertices that are not allowed, or from which no edges within (5) lead to the end, get infinity.
     """
-    last, bound = len(layers.start) - 2, aim.velocity + LIMIT_TOLERANCE
-    slowness, tail = aim.stretch / aim.velocity, np.empty(len(layers.low))
+    last = len(layers.start) - 2
+    slowness, tail = aim.lost.stretch / aim.velocity, np.empty(len(layers.low))
     anew = np.full(last + 1, np.inf)  # least cost to go of a path that breaks off at the layer
     out_h[layers.start[last] :] = 0.0
     for k in range(last, -1, -1):
         a, b = layers.start[k], layers.start[k + 1]
         if k < last:
-            _layer_to_go(layers, aim, bound, slowness, k, tail, out_h)
-            if aim.leap < np.inf:
-                out_h[a:b] = np.minimum(out_h[a:b], aim.leap + tail[b : layers.start[k + 2]].min())
-        least = _join(
-            aim.minimax, aim.vertex_cost[a:b], allowed[a:b], anew[k], out_h[a:b], tail[a:b]
-        )
+            _layer_to_go(layers, aim, slowness, k, tail, out_h)
+            if aim.lost.leap < np.inf:
+                leap = aim.lost.leap + tail[b : layers.start[k + 2]].min()
+                out_h[a:b] = np.minimum(out_h[a:b], leap)
+        least = _join(aim.minimax, layers.cost[a:b], allowed[a:b], anew[k], out_h[a:b], tail[a:b])
         if layers.after[k] >= 0:
             anew[layers.after[k]] = least
 
@@ -66,9 +63,8 @@ def _join(
 
 @jit_inline
 def _layer_to_go(
-    layers: Layers, aim: Objective, bound: Array, slowness: Array, k: int, tail: Array,
-    out_h: Array,
-) -> None:  # fmt: skip
+    layers: SortedLayers, aim: Aim, slowness: Array, k: int, tail: Array, out_h: Array
+) -> None:
     """For each vertex p of layer k the least of its distance to a next vertex joined with its tail.
 
     A run is lengthened to whole `LANES`: what it takes in breaks (5), or it would be in the run.
@@ -82,69 +78,54 @@ def _layer_to_go(
         a, b = layers.low[p], layers.high[p]
         if a <= b:
             m = min((b - a + LANES - 1) // LANES * LANES, last - first)
-            out_h[p] = _least(layers, aim, bound, slowness, p, min(a, last - m), m, tail)
+            out_h[p] = _least(layers, aim, slowness, p, min(a, last - m), m, tail)
         else:
-            ahead = _least(layers, aim, bound, slowness, p, a, last - a, tail)
-            out_h[p] = min(ahead, _least(layers, aim, bound, slowness, p, first, b - first, tail))
+            ahead = _least(layers, aim, slowness, p, a, last - a, tail)
+            out_h[p] = min(ahead, _least(layers, aim, slowness, p, first, b - first, tail))
         for i in range(s, t):
             j = layers.shut[i]
-            tail[j] = joined(aim.minimax, aim.vertex_cost[j], out_h[j])
+            tail[j] = joined(aim.minimax, layers.cost[j], out_h[j])
 
 
 @jit_inline
 def _least(
-    layers: Layers, aim: Objective, bound: Array, slowness: Array, p: int, a: int, m: int,
-    tail: Array,
-) -> float:  # fmt: skip
+    layers: SortedLayers, aim: Aim, slowness: Array, p: int, a: int, m: int, tail: Array
+) -> float:
     """Least of the distances from vertex p to the vertices a..a+m-1, joined with their tails.
 
-    With a penalty, the price of the time that the step asks for counts with the distance.
+    With a penalty, the price of the time that the step asks for counts with the distance. What is
+    handed on as a constant is not in the loop.
     """
-    if aim.penalty > 0:
-        return _least_of_joints(layers, aim, bound, slowness, p, a, m, tail, True)
-    return _least_of_joints(layers, aim, bound, slowness, p, a, m, tail, False)
-
-
-@jit_inline
-def _least_of_joints(
-    layers: Layers, aim: Objective, bound: Array, slowness: Array, p: int, a: int, m: int,
-    tail: Array, priced: bool,
-) -> float:  # fmt: skip
-    """As `_least`; what is handed on as a constant is not in the loop."""
+    n = len(slowness)
     none = aim.cap + np.inf  # infinity: a constant would be folded into jumps
-    if len(bound) == SIX:
-        return _least_of(
-            layers.q, layers.turn, bound, aim.weight, aim.metric, aim.cap, aim.minimax,
-            aim.penalty, slowness, p, a, m, tail, priced, SIX, none,
-        )  # fmt: skip
-    return _least_of(
-        layers.q, layers.turn, bound, aim.weight, aim.metric, aim.cap, aim.minimax,
-        aim.penalty, slowness, p, a, m, tail, priced, len(bound), none,
-    )  # fmt: skip
+    if aim.lost.penalty > 0:
+        if n == SIX:
+            return _least_of(layers, aim, slowness, p, a, m, tail, True, SIX, none)
+        return _least_of(layers, aim, slowness, p, a, m, tail, True, n, none)
+    if n == SIX:
+        return _least_of(layers, aim, slowness, p, a, m, tail, False, SIX, none)
+    return _least_of(layers, aim, slowness, p, a, m, tail, False, n, none)
 
 
 @jit_vector
 def _least_of(
-    q: Array, turn: Array, bound: Array, weight: Array, metric: int, cap: float, minimax: bool,
-    penalty: float, slowness: Array, p: int, a: int, m: int, tail: Array, priced: bool, n: int,
-    none: float,
+    layers: SortedLayers, aim: Aim, slowness: Array, p: int, a: int, m: int, tail: Array,
+    priced: bool, n: int, none: float,
 ) -> float:  # fmt: skip
     """As `_least`, of n joints: the innermost loop of the first-order problem.
 
     The distance is that of `distance`, to the bit, in one straight line of code that vectorises.
     """
-    best, begin = np.inf, np.uintp(a)
+    best, begin, q = np.inf, np.uintp(a), layers.q
     for v in range(np.uintp(m)):
         j, r, time = begin + v, 0.0, 1.0
         for i in range(n):
-            y = abs(q[i, p] - q[i, j])
-            y = smaller(y, turn[i] - y)
+            y = apart(abs(q[i, p] - q[i, j]), layers.turn[i])
             time = larger(time, slowness[i] * y) if priced else time
-            y = either(y > bound[i], none, weight[i] * y)
-            longest = larger(r, y)
-            r = either(metric == MANHATTAN, r + y, either(metric == EUCLID, r + y * y, longest))
-        r = either(metric == EUCLID, sqrt(r), r)
-        r = either(r <= cap, r, none)
-        r = r + penalty * (time - 1.0) if priced else r
-        best = smaller(best, either(minimax, larger(r, tail[j]), r + tail[j]))
+            y = either(exceeds(y, aim.velocity[i]), none, aim.weight[i] * y)
+            r = extend(r, y, aim.metric)
+        r = finish(r, aim.metric)
+        r = either(r <= aim.cap, r, none)
+        r = r + aim.lost.penalty * (time - 1.0) if priced else r
+        best = smaller(best, either(aim.minimax, larger(r, tail[j]), r + tail[j]))
     return best

@@ -3,9 +3,9 @@
 A joint with a finite range admits every representative q + 2 pi t inside it, each a vertex of its
 own; an endless joint has one representative, compared modulo 2 pi by (13).
 
-Reason codes: 0 admitted, 1 unreachable, 2 + 2 i joint i below its range, 3 + 2 i above it,
-2 + 2 n + 2 r coupling r below its range, 3 + 2 n + 2 r above it; one more than the last of these:
-the posture is not wanted.
+Reason codes are places in `Robot.reasons`: the `Loss` where a pose is admitted or unreachable,
+LOW + 2 i and HIGH + 2 i for bound i, the couplings after the n joints, and one more than the last
+of these where the posture is not wanted.
 """
 
 from __future__ import annotations
@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 
 from kerfpath._arrays import Array, Bools, Ints
 from kerfpath.kernels._jit import jit
+from kerfpath.losses import Loss
 
 __all__ = [
     "ADMITTED",
@@ -28,7 +29,8 @@ __all__ = [
     "fill_admissible",
 ]
 
-ADMITTED, UNREACHABLE = 0, 1
+ADMITTED, UNREACHABLE = int(Loss.ADMITTED), int(Loss.UNREACHABLE)
+LOW, HIGH = int(Loss.LOW), int(Loss.HIGH)
 
 EDGE = 1e-9
 """Slack on joint limits, rad, so that rounding does not drop a pose that sits on a limit."""
@@ -63,9 +65,9 @@ def _broken_coupling(q: Array, turn: Ints, limits: JointLimits) -> int:
         for i in range(n):
             value += limits.rows[r, i] * (q[i] + 2.0 * pi * turn[i])
         if value < limits.row_lower[r] - EDGE:
-            return 2 + 2 * n + 2 * r
+            return LOW + 2 * (n + r)
         if value > limits.row_upper[r] + EDGE:
-            return 3 + 2 * n + 2 * r
+            return HIGH + 2 * (n + r)
     return ADMITTED
 
 
@@ -85,7 +87,7 @@ def admissible_turns(q: Array, limits: JointLimits, out_turn: Ints) -> tuple[int
             if last[i] < first[i]:
                 below = limits.lower[i] - (q[i] + 2.0 * pi * last[i])
                 above = q[i] + 2.0 * pi * first[i] - limits.upper[i]
-                return 0, 2 + 2 * i if below <= above else 3 + 2 * i
+                return 0, (LOW if below <= above else HIGH) + 2 * i
     turn, count, reason = first.copy(), 0, ADMITTED
     while True:
         broken = _broken_coupling(q, turn, limits)
@@ -123,7 +125,7 @@ def count_admissible(
         for j in range(m):
             for mu in range(P):
                 if not (wanted[mu] and reach[k, j, mu]):
-                    unwanted = 2 + 2 * n + 2 * len(limits.rows)
+                    unwanted = LOW + 2 * (n + len(limits.rows))
                     out_reason[k, j, mu] = UNREACHABLE if wanted[mu] else unwanted
                     continue
                 count, reason = admissible_turns(q[k, j, mu], limits, turn)

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from kerfpath._arrays import Array, floats, scalar
-from kerfpath.contour import Contour, angle_between, turned, unit
+from kerfpath.contour import Contour, angle_between, slerp, unit
 from kerfpath.errors import InputError
 from kerfpath.operations._surface import Side, lateral
 
@@ -58,7 +58,7 @@ def smooth_axes(contour: Contour, distance: float, *, limit: float) -> Contour:
     smooth = unit(smooth, "smoothed axes")
     angle = angle_between(axes, smooth)[:, None]
     part = np.where(angle > limit, limit / np.where(angle > 0, angle, 1.0), 1.0)
-    return replace(contour, axes=turned(axes, smooth, part), x=None)
+    return replace(contour, axes=slerp(axes, smooth, part), x=None)
 
 
 def bevel(contour: Contour, angle: ArrayLike, *, side: Side = "right") -> Contour:

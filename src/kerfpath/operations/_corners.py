@@ -7,11 +7,11 @@ from dataclasses import replace
 
 import numpy as np
 
-from kerfpath._arrays import Array, scalar
-from kerfpath.contour import KINDS, Contour, angle_between, join, turned, unit
+from kerfpath._arrays import Array, not_negative, scalar
+from kerfpath.contour import KINDS, Contour, angle_between, join, slerp, unit
 from kerfpath.errors import InputError
 from kerfpath.operations._start import smoothest_start, start_at, with_nodes
-from kerfpath.operations._surface import Side, Surface, laid, lateral, require_in_scrap, tilted
+from kerfpath.operations._surface import Side, Surface, lateral, lay_on, lean_axes, require_in_scrap
 
 __all__ = ["loop_corners", "round_corners", "slow_corners"]
 
@@ -115,7 +115,7 @@ def slow_corners(
     share = scalar(share, "corner speed share", above=0.0)
     if share >= 1:
         raise InputError(f"corner speed share: expected less than 1, got {share:g}")
-    distance = scalar(distance, "distance", unit="m", above=-1e-300)
+    distance = not_negative(distance, "distance", unit="m")
     ramp = scalar(ramp, "ramp", unit="m", above=0.0)
     at = contour.s[contour.corners]
     if not at.size:
@@ -174,10 +174,10 @@ def _replaced(contour: Contour, corner: Corner, kind: int, surface: Surface | No
         if surface is None:
             before, after = (np.tile(axis, (len(part), 1)) for axis in axes)
         else:
-            points, normals = laid(surface, points, contour, "corner")
+            points, normals = lay_on(surface, points, contour, "corner")
             points = _between(ends, points, part)  # the cut may lie beside the surface
-            before, after = (tilted(normals, normals[e], axes[e]) for e in (0, -1))
-        axes = turned(before, after, part)
+            before, after = (lean_axes(normals, normals[e], axes[e]) for e in (0, -1))
+        axes = slerp(before, after, part)
         share = np.full(len(points), np.interp(s[k], s, contour.speed_share))
         kinds = np.full(len(points), kind)
         pieces += [contour.between(here, s[k] - reach)]

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from kerfpath._arrays import Array, Ints, scalar
-from kerfpath.contour import CORNER, Contour, angle_between, turned, unit
+from kerfpath.contour import CORNER, Contour, angle_between, slerp, unit
 from kerfpath.errors import InputError
 from kerfpath.operations._surface import Side, lateral, nearest
 
@@ -95,7 +95,7 @@ def _moved(contour: Contour, distance: float, side: Side, sharp: bool) -> tuple[
             ways = (l0 + l1)[None] / (1.0 + float(l0 @ l1))
         elif outer[k]:
             part = np.linspace(0, 1, int(np.ceil(turn[k] / ARC_STEP - 1e-9)) + 1)[:, None]
-            ways = turned(np.tile(l0, (len(part), 1)), np.tile(l1, (len(part), 1)), part)
+            ways = slerp(np.tile(l0, (len(part), 1)), np.tile(l1, (len(part), 1)), part)
         else:
             ways = np.array([l0, l1])  # the way between them is cut off, where the sides meet
         points.append(contour.points[k] + distance * ways)
@@ -130,7 +130,7 @@ def _without_loops(
         _require_corner(contour, np.unique(source[i + 1 : j + 1]), distance, side)
         part = np.array([[f]])
         kept += [points[first : i + 1], points[[i]] + f * (points[[i + 1]] - points[[i]])]
-        kept_axes += [axes[first : i + 1], turned(axes[[i]], axes[[i + 1]], part)]
+        kept_axes += [axes[first : i + 1], slerp(axes[[i]], axes[[i + 1]], part)]
         first, place = j + 1, j + g
     return np.vstack([*kept, points[first:]]), np.vstack([*kept_axes, axes[first:]])
 

@@ -8,7 +8,7 @@ from typing import Literal, get_args
 import numpy as np
 
 from kerfpath._arrays import Array, scalar
-from kerfpath.contour import KINDS, Contour, join, turned, unit
+from kerfpath.contour import KINDS, Contour, join, slerp, unit
 from kerfpath.errors import InputError
 from kerfpath.operations._start import reverse
 from kerfpath.operations._surface import (
@@ -17,11 +17,11 @@ from kerfpath.operations._surface import (
     Side,
     Surface,
     edge,
-    laid,
     lateral,
+    lay_on,
+    lean_axes,
     nearest,
     require_in_scrap,
-    tilted,
 )
 
 __all__ = ["LeadShape", "lead_in", "lead_out"]
@@ -146,12 +146,12 @@ def _laid(
     else:
         radius, turn = length / angle, back[:, None] / length * angle
         flat = start - radius * (np.sin(turn) * along - (1 - np.cos(turn)) * aside)
-    points, normals = laid(surface, flat, contour, what)
+    points, normals = lay_on(surface, flat, contour, what)
     # The cut may lie beside the surface by rounding or kerf: close that gap along the lead.
     points = points + (1 - back / length)[:, None] * (start - points[-1])
     # What tilts the cut's axis from the surface's normal tilts the lead's more and more.
-    leaning = tilted(normals, normal[0], contour.axes[0])
-    axes = turned(-normals, leaning, 1 - np.minimum(back / fan, 1)[:, None])
+    leaning = lean_axes(normals, normal[0], contour.axes[0])
+    axes = slerp(-normals, leaning, 1 - np.minimum(back / fan, 1)[:, None])
     _require_clearance(contour, points, side, clearance, what)
     return points, axes
 

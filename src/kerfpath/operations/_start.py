@@ -1,4 +1,4 @@
-"""Where a closed cut begins, which way it runs, how far it overlaps, what it leaves standing."""
+"""Starts, directions, overlaps and micro joints of cuts."""
 
 from __future__ import annotations
 

@@ -18,11 +18,11 @@ __all__ = [
     "Side",
     "Surface",
     "edge",
-    "laid",
     "lateral",
+    "lay_on",
+    "lean_axes",
     "nearest",
     "require_in_scrap",
-    "tilted",
 ]
 
 TOUCH = 1e-5
@@ -48,7 +48,7 @@ class Surface(Protocol):
 
 
 class Ribbon:
-    """The surface as a contour tells it: the plane across the tool axis at the nearest node."""
+    """The surface as a contour has it: the plane across the tool axis at the nearest node."""
 
     def __init__(self, contour: Contour) -> None:
         self._contour = contour
@@ -60,7 +60,7 @@ class Ribbon:
         return points - ((points - where) * axis).sum(1, keepdims=True) * axis, -axis
 
 
-def laid(surface: Surface, flat: Array, contour: Contour, what: str) -> tuple[Array, Array]:
+def lay_on(surface: Surface, flat: Array, contour: Contour, what: str) -> tuple[Array, Array]:
     """Return points (B, 3) m laid on a surface, and its outward normals (B, 3).
 
     Raises
@@ -77,7 +77,7 @@ def laid(surface: Surface, flat: Array, contour: Contour, what: str) -> tuple[Ar
     return points, normals
 
 
-def tilted(normals: Array, normal: Array, axis: Array) -> Array:
+def lean_axes(normals: Array, normal: Array, axis: Array) -> Array:
     """Return tool axes (B, 3) that lean from the normals as `axis` (3,) does from `normal` (3,)."""
     tilt, _ = Rotation.align_vectors(axis[None], -normal[None])
     return np.asarray(tilt.apply(-normals))
@@ -132,7 +132,7 @@ def require_in_scrap(contour: Contour, points: Array, side: Side, what: str) -> 
     ring = np.linalg.norm(nodes[0] - nodes[-1]) <= SAME_PLACE
     before = np.where(k > 0, k - 1, last if ring else 0)
     after = np.where(k < last, k + 1, 0 if ring else last)
-    # Beside a corner the segment on either side of it alone may tell the wrong side.
+    # Beside a corner, either of its segments alone may give the wrong side.
     at_start, at_end = (np.linalg.norm(where - nodes[i], axis=1) <= SAME_PLACE for i in (k, k + 1))
     other = np.where(at_start, before, np.where(at_end, after, k))
     depth = ((points - where) * (across[k] + across[other]) / 2).sum(1)

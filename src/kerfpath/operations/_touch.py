@@ -1,4 +1,4 @@
-"""A path led through poses that a person has taught, and eased back to where it was."""
+"""A path moved to poses that a person has taught, and eased back to where it was."""
 
 from __future__ import annotations
 
@@ -68,7 +68,7 @@ def touched_up(
     base = path.at_nodes(s)
     shift = np.hstack([points - nodes.points[moved], _turns(nodes.axes[moved], axes)])
     eased = _eased(s, nodes.s[moved], shift, ease)
-    led = Contour(
+    touched = Contour(
         base.points + eased[:, :3],
         Rotation.from_rotvec(eased[:, 3:]).apply(np.array(base.axes)),
         closed=base.closed,
@@ -76,7 +76,7 @@ def touched_up(
         speed_share=base.speed_share,
         name=nodes.name,
     )
-    return led, freeze(np.searchsorted(s, nodes.s[moved]))
+    return touched, freeze(np.searchsorted(s, nodes.s[moved]))
 
 
 def _turns(before: Array, after: Array) -> Array:

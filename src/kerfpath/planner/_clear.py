@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any, TypeVar
+from typing import TypeVar
 
 import numpy as np
 
@@ -12,6 +12,7 @@ from kerfpath.cell import UNPROVED, Cell, Checker
 from kerfpath.comfort import Band
 from kerfpath.errors import InputError, NoFeasiblePath
 from kerfpath.graph import LayeredGraph
+from kerfpath.losses import Loss, Reason
 from kerfpath.planner._task import Task
 from kerfpath.plans import Plan
 from kerfpath.search import (
@@ -19,19 +20,20 @@ from kerfpath.search import (
     Known,
     LayeredPath,
     LeastInterval,
+    SearchProblem,
     SlowedPath,
-    clear_path,
+    find_clear,
 )
 
 __all__ = ["Finder"]
 
 _P = TypeVar("_P", LayeredPath, SlowedPath, InterruptedPath, LeastInterval)
 
-POSES_TOLD, PAIRS_TOLD = 100, 3
+POSES_MEASURED, PAIRS_NAMED = 100, 3
 """Poses of a node that are measured, and pairs of bodies that are named, where it is closed."""
 POSES_SETTLED = 20_000
 """Poses asked about to find the nodes at which none is clear."""
-RANGES_TOLD = 6
+RANGES_LISTED = 6
 """Ranges of nodes that a message lists."""
 SAME_PLACE = 1e-9
 """m: two poses of the same tool or part differ by rounding at most."""
@@ -41,7 +43,7 @@ class Finder:
     """How the searches of a task run: as they are or, in a cell, for what is clear in it."""
 
     def __init__(self, task: Task, cell: Cell | None) -> None:
-        self._limits, self._cell, self._graph = task.limits, cell, task.graph
+        self._cell, self._graph = cell, task.graph
         self._but = f" ({UNPROVED})" if cell is not None and cell.unproved else ""
         if cell is None:
             return
@@ -58,14 +60,12 @@ class Finder:
             around=_beside(task.graph),
         )
 
-    def best(self, search: Callable[..., _P], **options: Any) -> _P:
-        """Return what a search finds within the limits of the task, `options` before them."""
-        options = self._limits | options
+    def best(self, search: Callable[[SearchProblem], _P], problem: SearchProblem) -> _P:
+        """Return what a search finds for a problem on the graph of the task."""
         if self._cell is None:
-            return search(**options)
-        del options["q"], options["start"]
+            return search(problem)
         try:
-            return clear_path(search, self._known, **options)
+            return find_clear(search, problem, self._known)
         except NoFeasiblePath as broken:
             raise self._named(broken) from None
 
@@ -73,9 +73,9 @@ class Finder:
         """Say of a break by collision where no pose is clear at all, and which bodies collide.
 
         A search learns what it needs in any order, and may break at a node of many that are closed:
-        the first of them is what is told.
+        the message is about the first of them.
         """
-        if self._cell is None or not any("collision" in word for word in broken.counts):
+        if self._cell is None or not broken.lost_by(Loss.COLLISION):
             return broken
         closed, settled = self._known.closed_layers(POSES_SETTLED)
         if not closed:
@@ -83,10 +83,11 @@ class Finder:
         first, nodes = closed[0], len(self._known.start) - 1
         others = f" ({len(closed)} such nodes: {_ranges(closed)})" if len(closed) > 1 else ""
         rest = "" if settled == nodes else f"; nodes from {settled} on have not been looked at"
-        counts = {
-            word: number for word, number in self._graph.counts(first).items() if word != "admitted"
-        }
-        counts["collision at the node"] = int(np.diff(self._known.start[first : first + 2])[0])
+        counts = self._graph.counts(first)
+        counts.pop(Reason(Loss.ADMITTED), None)
+        counts[Reason(Loss.COLLISION, "at the node")] = int(
+            np.diff(self._known.start[first : first + 2])[0]
+        )
         reasons = ", ".join(f"{word}: {number}" for word, number in counts.items())
         return NoFeasiblePath(
             f"no pose at node {first} of {nodes} is clear{others}{rest}; of the candidates there, "
@@ -106,26 +107,26 @@ class Finder:
         if node >= len(self._known.start) - 1:
             return ""
         first, last = self._known.start[node : node + 2]
-        some = np.unique(np.linspace(first, last - 1, POSES_TOLD).astype(np.int64))
+        some = np.unique(np.linspace(first, last - 1, POSES_MEASURED).astype(np.int64))
         over = self._cell.distances(self._known.q[some]) - self._cell.required
         hits = over <= 0
-        told = []
-        for p in np.argsort(-hits.sum(axis=0), kind="stable")[:PAIRS_TOLD]:
+        nearest = []
+        for p in np.argsort(-hits.sum(axis=0), kind="stable")[:PAIRS_NAMED]:
             if hits[:, p].any():
                 one, two = self._cell.pair_names[p]
                 deep = -over[hits[:, p], p] * 1e3
-                told.append(
+                nearest.append(
                     f"{one} and {two} at {hits[:, p].sum()} of {len(some)} poses, "
                     f"{deep.min():.3g} to {deep.max():.3g} mm nearer than allowed"
                 )
-        if not told:
+        if not nearest:
             return ""
         best = int(np.argmax(over.min(axis=1)))
         least = ""
         if hits.any(axis=1).all():
             one, two = self._cell.pair_names[int(np.argmin(over[best]))]
             least = f"; the best of them lacks {-over[best].min() * 1e3:.3g} mm ({one} and {two})"
-        return f" (most often {'; '.join(told)}{least})"
+        return f" (most often {'; '.join(nearest)}{least})"
 
     def claimed(self, claim: str) -> str:
         """Return a claim and, in a cell, that it holds for what is clear, after how many checks."""
@@ -193,5 +194,5 @@ def _ranges(numbers: list[int]) -> str:
             runs[-1][1] = number
         else:
             runs.append([number, number])
-    words = [f"{a}" if a == b else f"{a} to {b}" for a, b in runs[:RANGES_TOLD]]
-    return ", ".join(words) + (", ..." if len(runs) > RANGES_TOLD else "")
+    words = [f"{a}" if a == b else f"{a} to {b}" for a, b in runs[:RANGES_LISTED]]
+    return ", ".join(words) + (", ..." if len(runs) > RANGES_LISTED else "")

@@ -12,7 +12,7 @@ from kerfpath.planner._refined import first_order
 from kerfpath.planner._task import Task
 from kerfpath.plans import Plan, Proof
 from kerfpath.retime import feed, retime
-from kerfpath.search import slowed_path
+from kerfpath.search import find_slowed
 
 __all__ = ["slowed"]
 
@@ -50,14 +50,7 @@ def slowed(task: Task, finder: Finder, *, refine: bool) -> Plan:
 
 
 def _least_lost(task: Task, finder: Finder) -> Plan:
-    s = task.settings
-    found = finder.best(
-        slowed_path,
-        dt=task.dt,
-        weights=s.weights,
-        metric=s.metric,
-        vertex_cost=task.vertex_cost,
-    )
+    found = finder.best(find_slowed, task.problem)
     claim = finder.claimed(
         "at constant speed the graph has no path; of all its paths this one loses the least time "
         "step by step"
@@ -67,8 +60,7 @@ def _least_lost(task: Task, finder: Finder) -> Plan:
 
 def _timed(task: Task, made: Plan) -> Plan:
     """Return the plan with the least times, and where they dip."""
-    velocity, acceleration = task.robot.speed_limits()
-    limits = task.settings.eta_v * velocity, task.settings.eta_a * acceleration
-    tau = retime(made.increments, task.dt, *limits)
-    dips = feed(tau, task.dt, made.increments, *limits, np.diff(made.contour.s))
+    limits = task.problem.limits
+    tau = retime(made.increments, task.dt, limits)
+    dips = feed(tau, task.dt, made.increments, limits, np.diff(made.contour.s))
     return replace(made, time=np.concatenate([[0.0], np.cumsum(tau)]), feed=dips)

@@ -13,6 +13,7 @@ from kerfpath.cell import Cell
 from kerfpath.contour import Contour
 from kerfpath.errors import InputError
 from kerfpath.graph import LayeredGraph
+from kerfpath.limits import Limits
 from kerfpath.options import GraphKeywords, PlanOptions, chosen
 from kerfpath.planner._clear import Finder
 from kerfpath.planner._graph import node_interval, require_even
@@ -20,7 +21,13 @@ from kerfpath.planner._task import task_of
 from kerfpath.plans import Proof
 from kerfpath.refiner import quicken
 from kerfpath.robots import Robot
-from kerfpath.search import LeastInterval, Relaxations, least_interval, least_relaxations
+from kerfpath.search import (
+    LeastInterval,
+    Relaxations,
+    SearchProblem,
+    find_least_interval,
+    find_relaxations,
+)
 
 __all__ = ["FastestSpeed", "fastest_speed", "relaxations"]
 
@@ -106,12 +113,13 @@ def fastest_speed(
         progress=progress,
     )
     finder = Finder(task, cell)
-    least = finder.best(least_interval)
+    least = finder.best(find_least_interval, task.problem.free())
     found = FastestSpeed.of(contour, least)
     if not (asked.refine and robot.family.free_rotation):
         return found
     claim = Proof(optimal=False, statement="the fastest path on this graph")
-    quick, at = quicken(replace(task, dt=least.dt).plan(least.index, 0.0, claim))
+    task = replace(task, problem=replace(task.problem, dt=least.dt))
+    quick, at = quicken(task.plan(least.index, 0.0, claim))
     broken = comfort is not None and comfort.broken(robot, quick.q, task.T_flange_tip)
     if broken or not finder.is_clear(quick):
         return found
@@ -137,14 +145,11 @@ def relaxations(
 
     Arguments as in `plan`; what to ask after a `NoFeasiblePath` whose node has poses.
     """
-    velocity, acceleration = robot.speed_limits()
-    return least_relaxations(
-        graph.q,
-        graph.start,
+    problem = SearchProblem(
+        q=graph.q,
+        start=graph.start,
         dt=node_interval(contour, speed),
-        velocity=velocity,
-        acceleration=acceleration,
+        limits=Limits.of(*robot.speed_limits(), eta_v=eta_v, eta_a=eta_a),
         endless=robot.endless,
-        eta_v=eta_v,
-        eta_a=eta_a,
     )
+    return find_relaxations(problem)

@@ -15,7 +15,7 @@ from kerfpath.errors import InputError, NoFeasiblePath
 from kerfpath.graph import LayeredGraph, build, gamma_grid
 from kerfpath.options import GraphKeywords, PlanOptions, chosen
 from kerfpath.robots import Robot
-from kerfpath.tilt import tilted
+from kerfpath.tilt import tilt_frames
 
 __all__ = [
     "layered_graph",
@@ -49,7 +49,7 @@ def layered_graph(
     H = contour.frames(asked.frames)
     samples = None if asked.tilt is None else asked.tilt.samples()
     if samples is not None and samples.any():
-        H = tilted(H[:, None], contour.along[:, None], samples)
+        H = tilt_frames(H[:, None], contour.along[:, None], samples)
     if nodes is not None:
         H = H[np.asarray(nodes)]
     T_flange_tip = as_pose(tool, "tool")

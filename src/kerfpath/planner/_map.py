@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from kerfpath._arrays import Array, Bools, Ints, freeze, scalar
+from kerfpath._arrays import Array, Bools, Ints, freeze, not_negative, scalar
 from kerfpath._told import told
 from kerfpath.cell import Cell, clearances
 from kerfpath.errors import InputError
@@ -87,7 +87,7 @@ def clearance_map(
     InputError
         A cell of another robot, a negative band, a resolution that is not positive.
     """
-    band = scalar(band, "band", unit="m", above=-1e-300)
+    band = not_negative(band, "band", unit="m")
     resolution = scalar(resolution, "resolution", unit="m", above=0.0)
     if graph.q.shape[1] != len(cell.chain.axes):
         raise InputError(

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import partial
 from typing import Unpack
 
 from numpy.typing import ArrayLike
@@ -17,7 +18,7 @@ from kerfpath.planner._refined import refined
 from kerfpath.planner._task import Task, task_of
 from kerfpath.plans import Plan, Proof
 from kerfpath.robots import Robot
-from kerfpath.search import Piece, interrupted_path
+from kerfpath.search import Piece, find_interrupted
 
 __all__ = ["plan_in_pieces"]
 
@@ -87,9 +88,8 @@ def plan_in_pieces(
     begin = phase or (lambda what: None)
     begin("search for pieces")
     try:
-        found = finder.best(
-            interrupted_path, **task.aim, s=contour.s, least_piece=asked.least_piece
-        )
+        search = partial(find_interrupted, s=contour.s, least_piece=asked.least_piece)
+        found = finder.best(search, task.problem)
     except NoFeasiblePath as broken:
         raise broken.retold(
             f"contour {contour.name!r}: no number of interruptions helps: {broken}"

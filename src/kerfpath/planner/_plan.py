@@ -19,7 +19,7 @@ from kerfpath.planner._task import Task, task_of
 from kerfpath.planner._words import ON_THIS_GRID
 from kerfpath.plans import Plan, Proof
 from kerfpath.robots import Robot, posture_name
-from kerfpath.search import Method, shortest_path
+from kerfpath.search import Method, find_shortest
 
 __all__ = ["plan"]
 
@@ -111,14 +111,7 @@ def plan(
     begin = phase or (lambda what: None)
     begin("search")
     try:
-        path = finder.best(
-            shortest_path,
-            **task.aim,
-            posture=task.graph.posture,
-            method=asked.method,
-            closure=asked.closure,
-            rotation=task.settings.rotation,
-        )
+        path = finder.best(find_shortest, task.problem)
     except NoFeasiblePath as at_speed:
         return _otherwise(task, finder, at_speed, begin)
     made = task.plan(path.index, path.cost, _proof(asked.method, path.optimal, finder))

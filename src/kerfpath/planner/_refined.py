@@ -12,12 +12,10 @@ from kerfpath.planner._clear import Finder
 from kerfpath.planner._task import Task
 from kerfpath.plans import Plan, Proof
 from kerfpath.refiner import Refinement
-from kerfpath.search import least_interval, shortest_path
+from kerfpath.search import find_least_interval, find_shortest
 
 __all__ = ["first_order", "off_grid", "refined"]
 
-FREE = 1e6
-"""Multiple of the acceleration limits that never binds."""
 TOO_SLOW = 2.0
 """Multiple of the node interval up to which the fastest path is worth an attempt off the grid."""
 
@@ -62,7 +60,7 @@ def off_grid(task: Task, finder: Finder) -> Refinement | None:
     if found is not None and found.done:
         return found
     try:
-        least = finder.best(least_interval)
+        least = finder.best(find_least_interval, task.problem.free())
     except NoFeasiblePath:
         return found
     if least.dt > TOO_SLOW * task.dt:
@@ -81,15 +79,9 @@ def _cleared(found: Refinement, finder: Finder) -> Refinement:
 
 def first_order(task: Task, finder: Finder) -> Plan | None:
     """Return the best path without (6); None where (5) alone closes the way."""
-    settings = task.settings
+    limits = task.problem.limits.without_acceleration()
     try:
-        path = finder.best(
-            shortest_path,
-            **task.aim,
-            acceleration=FREE * task.limits["acceleration"],
-            closure=settings.closure,
-            rotation=settings.rotation,
-        )
+        path = finder.best(find_shortest, replace(task.problem, limits=limits, method="exact"))
     except NoFeasiblePath:
         return None
     claim = "the best path on this graph without acceleration limits"

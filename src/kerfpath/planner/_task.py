@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -24,6 +23,7 @@ from kerfpath.planner._graph import (
 )
 from kerfpath.plans import Plan, Proof, path_cost
 from kerfpath.robots import Robot
+from kerfpath.search import SearchProblem
 from kerfpath.tilt import Tilt
 
 __all__ = ["Task", "task_of"]
@@ -38,47 +38,28 @@ class Task:
     contour : Contour
     robot : Robot
     T_flange_tip, T_base_part : (4, 4) m
-    dt : float s
-        Time from node to node at the speed asked for.
     settings : PlanOptions
         With the weights that are used.
     graph : LayeredGraph
         No layer of it is empty.
-    vertex_cost : (N,), optional
-        What each vertex costs on top of the distances.
+    problem : SearchProblem
+        What is asked of a path through it, at the speed asked for.
     """
 
     contour: Contour
     robot: Robot
     T_flange_tip: Array
     T_base_part: Array
-    dt: float
     settings: PlanOptions
     graph: LayeredGraph
-    vertex_cost: Array | None = None
+    problem: SearchProblem
 
     __repr__ = told
 
     @property
-    def limits(self) -> dict[str, Any]:
-        """The graph and the limits, as the searches take them."""
-        velocity, acceleration = self.robot.speed_limits()
-        return {
-            "q": self.graph.q,
-            "start": self.graph.start,
-            "velocity": velocity,
-            "acceleration": acceleration,
-            "endless": self.robot.endless,
-            "eta_v": self.settings.eta_v,
-            "eta_a": self.settings.eta_a,
-        }
-
-    @property
-    def aim(self) -> dict[str, Any]:
-        """What the searches are to minimise."""
-        s = self.settings
-        aim = {"dt": self.dt, "weights": s.weights, "metric": s.metric, "objective": s.objective}
-        return aim if self.vertex_cost is None else aim | {"vertex_cost": self.vertex_cost}
+    def dt(self) -> float:
+        """Time from node to node at the speed asked for, s."""
+        return self.problem.dt
 
     def cost(self, index: Ints) -> float:
         """Return the objective (14) or (15) of a path through the graph, vertex costs included."""
@@ -88,7 +69,7 @@ class Task:
             s.weights,
             s.metric,
             s.objective,
-            None if self.vertex_cost is None else self.vertex_cost[vertex],
+            self.problem.vertex_cost[vertex],
         )
 
     def plan(self, index: Ints, cost: float, proof: Proof) -> Plan:
@@ -116,12 +97,17 @@ class Task:
         """Return the task of nodes first to last alone."""
         part = self.contour.part(first, last, self.settings.frames)
         vertices = slice(self.graph.start[first], self.graph.start[last + 1])
+        graph = self.graph.part(first, last)
         return replace(
             self,
             contour=replace(part, name=name),
-            graph=self.graph.part(first, last),
-            vertex_cost=None if self.vertex_cost is None else self.vertex_cost[vertices],
-            settings=replace(self.settings, closure="free"),
+            graph=graph,
+            problem=replace(
+                self.problem,
+                q=graph.q,
+                start=graph.start,
+                vertex_cost=self.problem.vertex_cost[vertices],
+            ),
         )
 
 
@@ -161,10 +147,23 @@ def task_of(
         robot=robot,
         T_flange_tip=T_flange_tip,
         T_base_part=T_base_part,
-        dt=dt,
         settings=options,
         graph=graph,
-        vertex_cost=_vertex_cost(graph, options, robot, T_flange_tip),
+        problem=SearchProblem(
+            q=graph.q,
+            start=graph.start,
+            dt=dt,
+            limits=options.limits(robot),
+            endless=robot.endless,
+            vertex_cost=_vertex_cost(graph, options, robot, T_flange_tip),
+            weights=options.weights,
+            metric=options.metric,
+            objective=options.objective,
+            closure=options.closure,
+            rotation=options.rotation,
+            method=options.method,
+            posture=graph.posture if options.method == "known" else None,
+        ),
     )
 
 

@@ -7,8 +7,8 @@ from kerfpath.post._compare import deviations as deviations
 from kerfpath.post._differences import Difference as Difference
 from kerfpath.post._differences import differences as differences
 from kerfpath.post._differences import not_compared as not_compared
-from kerfpath.post._divide import in_files as in_files
-from kerfpath.post._divide import renamed as renamed
+from kerfpath.post._divide import divide_sections as divide_sections
+from kerfpath.post._divide import rename_sections as rename_sections
 from kerfpath.post._dry_run import dry_run as dry_run
 from kerfpath.post._folder import MANIFEST as MANIFEST
 from kerfpath.post._folder import Replaced as Replaced
@@ -54,6 +54,6 @@ from kerfpath.post._settings import Settings as Settings
 from kerfpath.post._settings import setting as setting
 from kerfpath.post._writer import Posted as Posted
 from kerfpath.post._writer import post as post
-from kerfpath.post._writer import posted as posted
+from kerfpath.post._writer import post_and_read as post_and_read
+from kerfpath.post._writer import read_as_written as read_as_written
 from kerfpath.post._writer import read_program as read_program
-from kerfpath.post._writer import said_in as said_in

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
-from dataclasses import replace
-from typing import Any
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 
-from kerfpath._arrays import Array, scalar
+from kerfpath._arrays import Array, not_negative, scalar
+from kerfpath._told import told
 from kerfpath.air import AirMove, End, backed_off, least_time, speed_share
 from kerfpath.cell import UNPROVED
 from kerfpath.errors import InputError
@@ -112,44 +112,24 @@ def build_program(
             raise InputError(f"program: no language writes the {axis.kind} of a plan yet")
     for plan in plans[1:]:
         _require_same_cell(first, plan)
-    retract = scalar(retract, "retract", unit="m", above=0.0)
-    zone = scalar(zone, "zone", unit="m", above=-1e-300)
-    pierce_time = scalar(pierce_time, "pierce_time", unit="s", above=-1e-300)
-    approach_speed = scalar(approach_speed, "approach_speed", unit="m/s", above=0.0)
+    process = _Process(
+        retract=scalar(retract, "retract", unit="m", above=0.0),
+        zone=not_negative(zone, "zone", unit="m"),
+        lead_time=lead_time,
+        gas_lead=gas_lead,
+        pierce_time=not_negative(pierce_time, "pierce_time", unit="s"),
+        approach_speed=scalar(approach_speed, "approach_speed", unit="m/s", above=0.0),
+        handshakes=tuple(handshakes),
+    )
     title = identifier(f"cut {first.name}" if name is None else name)
     names = identifiers((plan.name for plan in plans), taken=(title,))
-    *ways, home = _corners(plans, moves, retract)
-    starts: tuple[Switch, ...] = (Switch(signal="laser", on=True, lead_time=lead_time),)
-    ends: tuple[Switch, ...] = (Switch(signal="laser", on=False, lead_time=lead_time),)
-    if gas_lead is not None:
-        starts = (Switch(signal="gas", on=True, lead_time=gas_lead), *starts)
-        ends = (*ends, Switch(signal="gas", on=False))
-    asked = [step for step in handshakes if isinstance(step, Request) and step.on]
-    withdrawn = [replace(step, on=False) for step in reversed(asked)]
+    *ways, home = _corners(plans, moves, process.retract)
     air = _Air(first, air_speed or (PLANNED if moves else UNPLANNED))
     sections = []
     for plan, section_name, way in zip(plans, names, ways, strict=True):
-        q = plan.q[0] + np.vstack([np.zeros_like(plan.q[0]), np.cumsum(plan.increments, axis=0)])
-        _require_on_contour(plan)
-        T_part_tip = plan.T_part_tip
-        T_out = T_part_tip[-1].copy()
-        T_out[:3, 3] -= retract * T_out[:3, 2]
-        slow: dict[str, Any] = {"speed": approach_speed, "duration": retract / approach_speed}
-        steps: tuple[Step, ...] = (
-            Comment(
-                f"{plan.name}: {len(q)} nodes, {plan.contour.length * 1e3:.1f} mm, "
-                f"posture {posture_name(int(plan.posture[0]))}"
-            ),
-            *air.moves(way),
-            *handshakes,
-            LinearMove(T_part_tip=T_part_tip[0], q=q[0], switches=starts, **slow),
-            *([Wait(time=pierce_time)] if pierce_time > 0 else []),
-            *_cut(plan, T_part_tip, q, zone, lead_time, ends),
-            LinearMove(T_part_tip=T_out, q=backed_off(plan, "end", retract), **slow),
-            *withdrawn,
-        )
+        steps = tuple(process.steps(plan, air.moves(way)))
         sections.append(Section(name=section_name, steps=steps))
-        air.here = backed_off(plan, "end", retract)
+        air.here = backed_off(plan, "end", process.retract)
     if home:
         back = tuple(air.moves(home))
         sections[-1] = replace(sections[-1], steps=sections[-1].steps + back)
@@ -169,11 +149,82 @@ def build_program(
     return with_arcs(program, arc_tolerance, eta_v=eta_v, eta_a=eta_a)
 
 
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _Process:
+    """What is done for each contour, with the parameters of `build_program`."""
+
+    retract: float
+    zone: float
+    lead_time: float
+    gas_lead: float | None
+    pierce_time: float
+    approach_speed: float
+    handshakes: tuple[Handshake, ...]
+
+    __repr__ = told
+
+    def steps(self, plan: Plan, way: Iterable[JointMove]) -> Iterator[Step]:
+        """Yield the steps of a contour, `way` leading to where the tool has backed off."""
+        _require_on_contour(plan)
+        T = plan.T_part_tip
+        q = plan.q[0] + np.vstack([np.zeros_like(plan.q[0]), np.cumsum(plan.increments, axis=0)])
+        starts: tuple[Switch, ...] = (self._laser(on=True),)
+        if self.gas_lead is not None:
+            starts = (Switch(signal="gas", on=True, lead_time=self.gas_lead), *starts)
+        yield Comment(
+            f"{plan.name}: {len(q)} nodes, {plan.contour.length * 1e3:.1f} mm, "
+            f"posture {posture_name(int(plan.posture[0]))}"
+        )
+        yield from way
+        yield from self.handshakes
+        yield self._straight(T[0], q[0], starts)
+        if self.pierce_time > 0:
+            yield Wait(time=self.pierce_time)
+        yield from self._cut(plan, T, q)
+        T_out = T[-1].copy()
+        T_out[:3, 3] -= self.retract * T_out[:3, 2]
+        yield self._straight(T_out, backed_off(plan, "end", self.retract))
+        for step in reversed(self.handshakes):
+            if isinstance(step, Request) and step.on:
+                yield replace(step, on=False)
+
+    def _laser(self, *, on: bool) -> Switch:
+        return Switch(signal="laser", on=on, lead_time=self.lead_time)
+
+    def _straight(self, T: Array, q: Array, switches: tuple[Switch, ...] = ()) -> LinearMove:
+        """Return a move along the tool axis, to a stop."""
+        speed, duration = self.approach_speed, self.retract / self.approach_speed
+        return LinearMove(T_part_tip=T, q=q, speed=speed, duration=duration, switches=switches)
+
+    def _cut(self, plan: Plan, T: Array, q: Array) -> Iterator[LinearMove]:
+        """Yield the moves to the second node of a contour and on, the laser off along joints."""
+        took = np.diff(plan.time)
+        speed = np.diff(plan.contour.s) / took
+        joint = [kind == "micro joint" for kind in plan.contour.kinds]
+        for k, radius in enumerate(_zones(plan.contour.points, self.zone), 1):
+            switches: tuple[Switch, ...] = ()
+            if k == len(took):
+                # At the end of a micro joint the laser is off already.
+                switches = () if joint[k - 1] else (self._laser(on=False),)
+                if self.gas_lead is not None:
+                    switches = (*switches, Switch(signal="gas", on=False))
+            elif joint[k] != joint[k - 1]:
+                switches = (self._laser(on=joint[k - 1]),)
+            yield LinearMove(
+                T_part_tip=T[k],
+                q=q[k],
+                speed=float(speed[k - 1]),
+                duration=float(took[k - 1]),
+                zone=radius,
+                switches=switches,
+            )
+
+
 class _Air:
     """Joint moves that take the times that are planned.
 
     A controller runs all joints from stop to stop together, the slowest at the share of its full
-    speed that it is told, and gains speed as fast as it may; the share is that which takes the
+    speed that it is given, and gains speed as fast as it may; the share is that which takes the
     time.
     """
 
@@ -198,31 +249,6 @@ class _Air:
             took = least_time(way, eta_v * limits[0], eta_a * limits[1]) / self._share
             speed = np.clip(speed_share(way, *limits, took), LOWEST_SHARE, 1.0)
             yield JointMove(q=q, speed=float(speed[0]), duration=float(took[0]))
-
-
-def _cut(
-    plan: Plan, T_part_tip: Array, q: Array, zone: float, lead_time: float,
-    ends: tuple[Switch, ...],
-) -> Iterator[LinearMove]:  # fmt: skip
-    """Yield the moves of a contour to its second node and on, the laser off along micro joints."""
-    took = np.diff(plan.time)
-    speed = np.diff(plan.contour.s) / took
-    joint = np.array([kind == "micro joint" for kind in plan.contour.kinds])
-    for k, radius in enumerate(_zones(plan.contour.points, zone), 1):
-        switches: tuple[Switch, ...] = ()
-        if k == len(took):
-            switches = ends[int(joint[k - 1]) :]  # at the end of a joint the laser is off already
-        elif joint[k] != joint[k - 1]:
-            on = bool(joint[k - 1])
-            switches = (Switch(signal="laser", on=on, lead_time=lead_time),)
-        yield LinearMove(
-            T_part_tip=T_part_tip[k],
-            q=q[k],
-            speed=float(speed[k - 1]),
-            duration=float(took[k - 1]),
-            zone=radius,
-            switches=switches,
-        )
 
 
 def _zones(points: Array, zone: float) -> list[float]:

@@ -6,11 +6,11 @@ from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
-from scipy.spatial.transform import Rotation
 
 from kerfpath._arrays import Array
 from kerfpath.post._issue import ProgramIssue
 from kerfpath.post._languages import Language
+from kerfpath.post._orientations import distances
 from kerfpath.post._program import (
     Await,
     CircularMove,
@@ -27,7 +27,7 @@ from kerfpath.post._read import ReadHandshake, ReadMove, ReadProgram, ReadStep, 
 from kerfpath.post._settings import Rules, Settings
 from kerfpath.post._times import air_times, cruises
 
-__all__ = ["deviations", "events", "handshake"]
+__all__ = ["deviations", "handshake_in_words", "switches_in_words"]
 
 POINT = 1e-6
 """How far (m) a target that is read back may be from the one written, beyond its digits."""
@@ -66,12 +66,12 @@ def deviations(
     """
     if language.sayable is not None:
         program = language.sayable(program, settings)
-    issues = list(_frames(program, read))
+    issues = list(_compare_frames(program, read))
     ours = [step for step in program.steps if not isinstance(step, Comment)]
     theirs = list(read.steps)
     if len(ours) != len(theirs):
-        said = f"{len(theirs)} moves and waits are read back, expected {len(ours)}"
-        return [*issues, ProgramIssue("error", "read-back", said, "program")]
+        message = f"{len(theirs)} moves and waits are read back, expected {len(ours)}"
+        return [*issues, ProgramIssue("error", "read-back", message, "program")]
     pairs: list[tuple[Move, ReadMove]] = []
     for step, back in zip(ours, theirs, strict=True):
         if isinstance(step, Wait) and isinstance(back, ReadWait):
@@ -79,17 +79,17 @@ def deviations(
                 issues.append(_issue(back, f"waits {back.time:g} s, expected {step.time:g} s"))
         elif isinstance(step, Request | Await) and isinstance(back, ReadHandshake):
             if step != back.what:
-                said = f"{handshake(back.what)}, expected {handshake(step)}"
-                issues.append(_issue(back, said))
+                message = f"{handshake_in_words(back.what)}, expected {handshake_in_words(step)}"
+                issues.append(_issue(back, message))
         elif not isinstance(back, ReadMove) or _kind(step) != back.kind:
             issues.append(_issue(back, f"is a {_kind_read(back)}, expected a {_kind(step)}"))
         else:
             assert isinstance(step, JointMove | LinearMove)
             pairs.append((step, back))
     rules = language.rules(settings)
-    issues += _places(program, pairs, rules)
-    issues += _motion(pairs, rules, _Air(program, read))
-    issues += _postures(program, pairs, language, settings)
+    issues += _compare_places(program, pairs, rules)
+    issues += _compare_motion(pairs, rules, _Air(program, read))
+    issues += _compare_postures(program, pairs, language, settings)
     return issues
 
 
@@ -113,14 +113,14 @@ def _kind_read(back: ReadStep) -> str:
     return "wait" if isinstance(back, ReadWait) else "handshake"
 
 
-def handshake(what: Handshake) -> str:
+def handshake_in_words(what: Handshake) -> str:
     """Return a handshake in words."""
     if isinstance(what, Await):
         return f"awaits {what.partner} for {what.timeout:g} s"
     return f"{what.partner} request {'on' if what.on else 'off'}"
 
 
-def _frames(program: Program, read: ReadProgram) -> Iterator[ProgramIssue]:
+def _compare_frames(program: Program, read: ReadProgram) -> Iterator[ProgramIssue]:
     for what in ("T_flange_tip", "T_base_part"):
         back = getattr(read, what)
         if back is not None and np.abs(back - getattr(program, what)).max() > FRAME:
@@ -128,7 +128,7 @@ def _frames(program: Program, read: ReadProgram) -> Iterator[ProgramIssue]:
             yield ProgramIssue("error", "read-back", f"the {name} is another", "program")
 
 
-def _places(
+def _compare_places(
     program: Program, pairs: list[tuple[Move, ReadMove]], rules: Rules
 ) -> Iterator[ProgramIssue]:
     """Compare the tips of all targets, by joints where the text says them."""
@@ -145,14 +145,14 @@ def _places(
         if isinstance(m, CircularMove) and b.T_part_via is not None
     ]
     if posed:
-        yield from _apart(
+        yield from _compare_poses(
             [b for b, _, _ in posed],
             np.array([ours for _, ours, _ in posed]),
             np.array([theirs for _, _, theirs in posed]),
             point,
             angle,
         )
-    jointed = [(m, b) for m, b in pairs if b.q is not None and not _follows(b)]
+    jointed = [(m, b) for m, b in pairs if b.q is not None and not _joints_follow(b)]
     if jointed:
         q, q_back = np.array([m.q for m, _ in jointed]), np.array([b.q for _, b in jointed])
         forward = program.robot.forward
@@ -160,13 +160,13 @@ def _places(
         tool = program.T_flange_tip
         left = q.shape[1] * rules.angle_step
         tips, tips_back = forward(q) @ tool, forward(q_back) @ tool
-        yield from _apart(backs, tips, tips_back, point + REACH * left, angle + left)
+        yield from _compare_poses(backs, tips, tips_back, point + REACH * left, angle + left)
         off = np.abs(q - q_back).max(axis=1)
         for k in np.flatnonzero(off > angle).tolist():
             joint = int(np.abs(q[k] - q_back[k]).argmax()) + 1
             yield _issue(backs[k], f"joint {joint} is {np.degrees(off[k]):.4f} deg off")
     for move, back in pairs:
-        if back.q is not None and _follows(back):
+        if back.q is not None and _joints_follow(back):
             off_by = float(np.abs(move.q - back.q).max())
             if off_by > DERIVED:
                 yield _issue(back, f"its words lead to joints {np.degrees(off_by):.1f} deg off")
@@ -174,34 +174,34 @@ def _places(
             yield _issue(back, "says no target")
 
 
-def _follows(back: ReadMove) -> bool:
+def _joints_follow(back: ReadMove) -> bool:
     """Return whether the joints of a move follow from a pose and its words."""
     return back.T_part_tip is not None and back.posture != ()
 
 
-def _apart(
+def _compare_poses(
     backs: list[ReadMove], ours: Array, theirs: Array, point: float, angle: float
 ) -> Iterator[ProgramIssue]:
-    off = np.linalg.norm(ours[:, :3, 3] - theirs[:, :3, 3], axis=1)
-    between = np.swapaxes(ours[:, :3, :3], 1, 2) @ theirs[:, :3, :3]
-    turned = np.asarray(Rotation.from_matrix(between).magnitude())
+    off, turned = distances(ours, theirs)
     for k in np.flatnonzero((off > point) | (turned > angle)).tolist():
-        said = f"the tip is {off[k] * 1e3:.4f} mm and {np.degrees(turned[k]):.4f} deg off"
-        yield _issue(backs[k], said)
+        message = f"the tip is {off[k] * 1e3:.4f} mm and {np.degrees(turned[k]):.4f} deg off"
+        yield _issue(backs[k], message)
 
 
-def _motion(pairs: list[tuple[Move, ReadMove]], rules: Rules, air: _Air) -> Iterator[ProgramIssue]:
+def _compare_motion(
+    pairs: list[tuple[Move, ReadMove]], rules: Rules, air: _Air
+) -> Iterator[ProgramIssue]:
     for move, back in pairs:
         joint, timed = isinstance(move, JointMove), False
         if isinstance(move, JointMove):
             timed = back.duration is not None
-            if said := air.apart(move, back):
-                yield _issue(back, said)
+            if message := air.apart(move, back):
+                yield _issue(back, message)
         off = SHARE if joint else 0.51 * rules.speed_step + 1e-9
         if back.speed is not None and not timed and abs(move.speed - back.speed) > off:
             unit, scale = ("of the full speed", 1.0) if joint else ("mm/s", 1e3)
-            said = f"the speed is {back.speed * scale:g} {unit}, expected {move.speed * scale:g}"
-            yield _issue(back, said)
+            message = f"the speed is {back.speed * scale:g} {unit}, expected {move.speed * scale:g}"
+            yield _issue(back, message)
         if (
             isinstance(move, LinearMove)
             and (took := back.duration) is not None
@@ -211,15 +211,17 @@ def _motion(pairs: list[tuple[Move, ReadMove]], rules: Rules, air: _Air) -> Iter
         if back.zone is None and move.zone == 0:
             yield _issue(back, "does not stop, but should")
         if back.zone is not None and abs(move.zone - back.zone) > POINT:
-            said = f"the zone is {back.zone * 1e3:g} mm, expected {move.zone * 1e3:g} mm"
-            yield _issue(back, said)
+            message = f"the zone is {back.zone * 1e3:g} mm, expected {move.zone * 1e3:g} mm"
+            yield _issue(back, message)
         ours: Any = getattr(move, "switches", ())
         same = [(s.signal, s.on) for s in ours] == [(s.signal, s.on) for s in back.switches]
         if not same or any(
             abs(s.lead_time - b.lead_time) > LEAD for s, b in zip(ours, back.switches, strict=True)
         ):
-            said = f"switches {events(back.switches)}, expected {events(ours)}"
-            yield _issue(back, said)
+            message = (
+                f"switches {switches_in_words(back.switches)}, expected {switches_in_words(ours)}"
+            )
+            yield _issue(back, message)
 
 
 class _Air:
@@ -240,20 +242,20 @@ class _Air:
         return ""
 
 
-def events(switches: Any) -> str:
+def switches_in_words(switches: Any) -> str:
     """Return switches in words."""
     words = [f"{s.signal} {'on' if s.on else 'off'} {s.lead_time:g} s ahead" for s in switches]
     return " and ".join(words) or "nothing"
 
 
-def _postures(
+def _compare_postures(
     program: Program, pairs: list[tuple[Move, ReadMove]], language: Language, settings: Settings
 ) -> Iterator[ProgramIssue]:
-    told = [(move, back) for move, back in pairs if back.posture]
-    if not told or language.posture is None:
+    worded = [(move, back) for move, back in pairs if back.posture]
+    if not worded or language.posture is None:
         return
-    expected = language.posture(program.robot, np.array([m.q for m, _ in told]), settings)
-    for (_, back), ours in zip(told, expected, strict=True):
+    expected = language.posture(program.robot, np.array([m.q for m, _ in worded]), settings)
+    for (_, back), ours in zip(worded, expected, strict=True):
         if back.posture != ours:
             yield _issue(back, f"the posture is {_words(back.posture)}, expected {_words(ours)}")
 

@@ -6,13 +6,20 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.spatial.transform import Rotation
 
-from kerfpath._arrays import Array
 from kerfpath._told import told
-from kerfpath.post._compare import ANGLE, FRAME, LEAD, POINT, SHARE, events, handshake
+from kerfpath.post._compare import (
+    ANGLE,
+    FRAME,
+    LEAD,
+    POINT,
+    SHARE,
+    handshake_in_words,
+    switches_in_words,
+)
 from kerfpath.post._groups import ReadGroup, groups_of
-from kerfpath.post._matching import Pair, Stop, matched, pairs_of
+from kerfpath.post._matching import Pair, Stop, match_groups, pair_moves
+from kerfpath.post._orientations import distances
 from kerfpath.post._read import ReadMove, ReadProgram
 from kerfpath.post._settings import Rules
 
@@ -89,7 +96,7 @@ def differences(
 ) -> list[Difference]:
     """Return what differs between two programs for the same robot, at most one of each kind.
 
-    Contours are told apart by their paths, and the targets along them by their places, so that one
+    Contours are known by their paths, and the targets along them by their places, so that one
     that is added or left out moves no other. Names of routines and comments are not compared, nor
     what only one of the two says, see `not_compared`.
 
@@ -119,21 +126,21 @@ def differences(
         speed=1e-9 + 0.51 * speed,
         lead=LEAD * len(steps),
     )
-    found = list(_frames(a, b, digits))
+    found = list(_compare_frames(a, b, digits))
     one, two = groups_of(a), groups_of(b)
-    same = matched(one, two)
-    found += _contours(one, {i for i, _ in same}, "removed", f"left out in {names[1]}")
-    found += _contours(two, {j for _, j in same}, "added", f"only in {names[1]}")
-    found += _order(two, [j for _, j in same], names)
-    pairs = [pair for i, j in same for pair in pairs_of(one[i], two[j], digits.point)]
+    same = match_groups(one, two)
+    found += _name_contours(one, {i for i, _ in same}, "removed", f"left out in {names[1]}")
+    found += _name_contours(two, {j for _, j in same}, "added", f"only in {names[1]}")
+    found += _compare_order(two, [j for _, j in same], names)
+    pairs = [pair for i, j in same for pair in pair_moves(one[i], two[j], digits.point)]
     both = [(pair.a, pair.b) for pair in pairs if pair.a is not None and pair.b is not None]
-    found += _alone(pairs, names)
-    found += _targets(both, digits)
-    found += _joints(both, digits)
-    found += _said(both, digits, names)
+    found += _name_moves(pairs, names)
+    found += _compare_targets(both, digits)
+    found += _compare_joints(both, digits)
+    found += _compare_values(both, digits, names)
     if strict:
-        found += _unsaid(both, names)
-    found += _handshakes([(one[i], two[j]) for i, j in same], names)
+        found += _find_unsaid(both, names)
+    found += _compare_handshakes([(one[i], two[j]) for i, j in same], names)
     return found
 
 
@@ -151,17 +158,17 @@ def not_compared(a: ReadProgram, b: ReadProgram) -> list[str]:
     return said
 
 
-def _frames(a: ReadProgram, b: ReadProgram, digits: _Digits) -> Iterator[Difference]:
+def _compare_frames(a: ReadProgram, b: ReadProgram, digits: _Digits) -> Iterator[Difference]:
     for attribute, words in (("T_flange_tip", "tool"), ("T_base_part", "part frame")):
         one, two = getattr(a, attribute), getattr(b, attribute)
         if one is None or two is None or np.abs(one - two).max() <= digits.frame:
             continue
-        off, turned = _apart(one[None], two[None])
+        off, turned = distances(one[None], two[None])
         message = f"the {words} is {off[0] * 1e3:.4f} mm and {np.degrees(turned[0]):.4f} deg off"
         yield Difference(code="frames", count=1, message=message)
 
 
-def _contours(
+def _name_contours(
     groups: Sequence[ReadGroup], known: set[int], code: str, words: str
 ) -> Iterator[Difference]:
     alone = [group for k, group in enumerate(groups) if k not in known]
@@ -173,7 +180,9 @@ def _contours(
         yield Difference(code=code, count=len(alone), message=message, places=places)
 
 
-def _order(groups: Sequence[ReadGroup], numbers: list[int], both: Names) -> Iterator[Difference]:
+def _compare_order(
+    groups: Sequence[ReadGroup], numbers: list[int], both: Names
+) -> Iterator[Difference]:
     """Compare the order of contours, given the numbers in B of those of A."""
     if numbers != sorted(numbers):
         names = ", ".join(groups[j].name for j in sorted(numbers) if groups[j].path)
@@ -185,15 +194,8 @@ def _count(number: int, word: str) -> str:
     return f"{number} {word}{'' if number == 1 else 's'}"
 
 
-def _apart(one: Array, two: Array) -> tuple[Array, Array]:
-    """Return distances (m) and angles (rad) between poses (K, 4, 4)."""
-    off = np.linalg.norm(one[:, :3, 3] - two[:, :3, 3], axis=1)
-    between = np.swapaxes(one[:, :3, :3], 1, 2) @ two[:, :3, :3]
-    return off, np.asarray(Rotation.from_matrix(between).magnitude())
-
-
-def _alone(pairs: Sequence[Pair], names: Names) -> Iterator[Difference]:
-    """Tell of moves that only one of the programs has; one left out, before which of the other."""
+def _name_moves(pairs: Sequence[Pair], names: Names) -> Iterator[Difference]:
+    """Find moves that only one of the programs has; one left out, before which of the other."""
     for side, code, words in (
         (1, "removed", f"left out in {names[1]}"), (0, "added", f"only in {names[1]}"),
     ):  # fmt: skip
@@ -211,7 +213,7 @@ def _alone(pairs: Sequence[Pair], names: Names) -> Iterator[Difference]:
         )
 
 
-def _targets(both: Both, digits: _Digits) -> Iterator[Difference]:
+def _compare_targets(both: Both, digits: _Digits) -> Iterator[Difference]:
     """Compare the tip poses that moves lead to and by."""
     posed = [
         (a, b, getattr(a.move, which), getattr(b.move, which))
@@ -221,7 +223,9 @@ def _targets(both: Both, digits: _Digits) -> Iterator[Difference]:
     ]
     if not posed:
         return
-    off, turned = _apart(np.array([one[2] for one in posed]), np.array([one[3] for one in posed]))
+    off, turned = distances(
+        np.array([one[2] for one in posed]), np.array([one[3] for one in posed])
+    )
     moved = np.flatnonzero((off > digits.point) | (turned > digits.angle))
     if moved.size:
         a, b, _, _ = posed[moved[np.lexsort((turned[moved], off[moved]))[-1]]]
@@ -229,10 +233,10 @@ def _targets(both: Both, digits: _Digits) -> Iterator[Difference]:
             f"{len(moved)} moved, at most by {off[moved].max() * 1e3:.4f} mm "
             f"and {np.degrees(turned[moved].max()):.4f} deg"
         )
-        yield _found("targets", len(moved), message, a, b)
+        yield _difference("targets", len(moved), message, a, b)
 
 
-def _joints(both: Both, digits: _Digits) -> Iterator[Difference]:
+def _compare_joints(both: Both, digits: _Digits) -> Iterator[Difference]:
     """Compare the joints of targets, where both programs say them."""
     said = [(a, b) for a, b in both if a.move.q is not None and b.move.q is not None]
     if not said:
@@ -242,16 +246,16 @@ def _joints(both: Both, digits: _Digits) -> Iterator[Difference]:
     if moved.size:
         worst = int(moved[np.argmax(off[moved])])
         message = f"{len(moved)} moved, at most by {np.degrees(off[worst]):.4f} deg"
-        yield _found("joints", len(moved), message, *said[worst])
+        yield _difference("joints", len(moved), message, *said[worst])
 
 
-def _found(code: str, count: int, message: str, a: Stop, b: Stop) -> Difference:
+def _difference(code: str, count: int, message: str, a: Stop, b: Stop) -> Difference:
     said_at = b.move.elsewhere.get("target", "")
     places = (a.move.place, b.move.place)
     return Difference(code=code, count=count, message=message, places=places, said_at=said_at)
 
 
-def _said(both: Both, digits: _Digits, names: Names) -> Iterator[Difference]:
+def _compare_values(both: Both, digits: _Digits, names: Names) -> Iterator[Difference]:
     """Compare what else moves say, one thing after the other."""
     rows: tuple[tuple[str, Callable[[Stop, Stop], float], Callable[[Stop], str]], ...] = (
         ("kinds", lambda a, b: a.move.kind != b.move.kind, lambda a: a.move.kind),
@@ -272,7 +276,7 @@ def _said(both: Both, digits: _Digits, names: Names) -> Iterator[Difference]:
         (
             "switches",
             lambda a, b: _switches(a.move, b.move, digits),
-            lambda a: events(a.move.switches),
+            lambda a: switches_in_words(a.move.switches),
         ),
         ("waits", lambda a, b: _excess(a.wait, b.wait, digits.lead), lambda a: f"{a.wait:g} s"),
         (
@@ -297,8 +301,8 @@ def _said(both: Both, digits: _Digits, names: Names) -> Iterator[Difference]:
             )
 
 
-def _unsaid(both: Both, names: Names) -> Iterator[Difference]:
-    """Tell of moves that say a speed, a time or a zone in one of the programs alone."""
+def _find_unsaid(both: Both, names: Names) -> Iterator[Difference]:
+    """Find moves that say a speed, a time or a zone in one of the programs alone."""
     for attribute, code in UNSAID:
         said = [[getattr(stop.move, attribute) is not None for stop in pair] for pair in both]
         if alone := [k for k, (one, two) in enumerate(said) if one != two]:
@@ -309,7 +313,7 @@ def _unsaid(both: Both, names: Names) -> Iterator[Difference]:
             yield Difference(code=code, count=len(alone), message=message, places=places)
 
 
-def _handshakes(
+def _compare_handshakes(
     groups: Sequence[tuple[ReadGroup, ReadGroup]], names: Names
 ) -> Iterator[Difference]:
     """Compare who is asked and awaited, and when."""
@@ -317,7 +321,7 @@ def _handshakes(
     differ = [both for both, (one, two) in zip(groups, said, strict=True) if one != two]
     if differ:
         one, two = (
-            ", ".join(handshake(h.what) for _, h in group.handshakes) or "none"
+            ", ".join(handshake_in_words(h.what) for _, h in group.handshakes) or "none"
             for group in differ[0]
         )
         message = f"{_count(len(differ), 'contour')}, {one} in {names[0]}, {two} in {names[1]}"

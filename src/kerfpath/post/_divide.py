@@ -2,19 +2,25 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import replace
-from typing import Literal
 
 from kerfpath.errors import InputError
+from kerfpath.post._formatter import Formatter
 from kerfpath.post._issue import ProgramIssue
 from kerfpath.post._names import LONGEST_NAME, identifiers
 from kerfpath.post._program import Program, Section
 
-__all__ = ["in_files", "in_one_file", "long_contours", "renamed"]
+__all__ = [
+    "divide_program",
+    "divide_sections",
+    "find_long_contours",
+    "rename_sections",
+    "require_one_file",
+]
 
 
-def renamed(
+def rename_sections(
     program: Program, taken: Iterable[str] = (), *, longest_name: int = LONGEST_NAME
 ) -> Program:
     """Return the program with names of sections cut to `longest_name`, and none twice or taken."""
@@ -24,7 +30,7 @@ def renamed(
     return replace(program, sections=tuple(sections))
 
 
-def in_files(
+def divide_sections(
     sections: Sequence[Section], lines: Sequence[int], most_lines: int
 ) -> list[list[Section]]:
     """Return sections, of so many lines each, in order, in files of at most `most_lines` lines.
@@ -43,30 +49,36 @@ def in_files(
     return files
 
 
-def long_contours(
-    lines: Mapping[str, int], most_lines: int, level: Literal["error", "warning"]
-) -> Iterator[ProgramIssue]:
-    """Yield the contours of more lines, by name, than a file is to have: none is divided.
+def find_long_contours(written: Formatter) -> Iterator[ProgramIssue]:
+    """Yield the contours of more lines than a file is to have: none is divided.
 
-    Parameters
-    ----------
-    lines : mapping of str to int
-    most_lines : int
-    level : {"error", "warning"}
-        A warning where a file may be longer than that.
+    A warning where the language gives each of them a file of its own.
     """
+    if written.too_long is None:
+        return
     remedy = "allow more with lines_per_file, or take fewer nodes (spacing_mm) or arcs (arcs_mm)"
-    kept = "" if level == "error" else ", and has a file of its own"
-    for name, count in lines.items():
-        if count > most_lines:
-            said = (
-                f"the contour has {count} lines, lines_per_file allows {most_lines}; it is not "
+    kept = "" if written.too_long == "error" else ", and has a file of its own"
+    most = written.room()
+    for name, count in written.lengths().items():
+        if count > most:
+            message = (
+                f"the contour has {count} lines, lines_per_file allows {most}; it is not "
                 f"divided, as the robot could stop there with the beam on{kept}: {remedy}"
             )
-            yield ProgramIssue(level, "file-length", said, name)
+            yield ProgramIssue(written.too_long, "file-length", message, name)
 
 
-def in_one_file(name: str, lines: Sequence[str], most_lines: int) -> dict[str, str]:
+def divide_program(
+    program: Program, lines: Sequence[int], room: int, longest_name: int
+) -> dict[str, list[Section]]:
+    """Return the files, by their names, that sections of so many lines each are divided in."""
+    groups = divide_sections(program.sections, lines, room)
+    taken = [program.name, *(section.name for section in program.sections)]
+    names = identifiers([program.name] * len(groups), taken=taken, longest=longest_name)
+    return dict(zip(names, groups, strict=True))
+
+
+def require_one_file(name: str, lines: Sequence[str], most_lines: int) -> dict[str, str]:
     """Return the text of a program that cannot be divided, by the name of its file.
 
     Raises

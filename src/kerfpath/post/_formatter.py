@@ -7,6 +7,7 @@ from abc import ABC, abstractmethod
 from collections.abc import Iterator
 from typing import Any, Literal
 
+from kerfpath.auditor import Level
 from kerfpath.errors import InputError
 from kerfpath.post._program import (
     Await,
@@ -41,6 +42,10 @@ class Formatter(ABC):
 
     program: Program
     settings: Any
+    around = 0
+    """Lines of a contour's routine, or of a file, beside those of its steps."""
+    too_long: Level | None = None
+    """What it is that a contour is longer than a file is to be; None where nothing looks at it."""
 
     def __init__(self, program: Program, settings: Settings) -> None:
         self.program, self.settings = program, settings
@@ -104,6 +109,14 @@ class Formatter(ABC):
         for step in section.steps:
             yield from self.step(step)
 
+    def lengths(self) -> dict[str, int]:
+        """Return how many lines each contour takes, by its name."""
+        return {s.name: sum(1 for _ in self.lines(s)) + self.around for s in self.program.sections}
+
+    def room(self) -> int:
+        """Return how many lines of contours a file has room for."""
+        return int(self.settings.lines_per_file)
+
     def step(self, step: Step) -> Iterator[str]:
         """Yield the lines of one step."""
         if isinstance(step, JointMove):
@@ -120,6 +133,18 @@ class Formatter(ABC):
             yield from self.wait_for(step)
         elif isinstance(step, Comment):
             yield from self.comment(plain(step.text))
+
+    def head(self, *about: str) -> list[str]:
+        """Return what is said first: for which robot it is, `about`, what is and is not proved."""
+        robot = self.program.robot
+        clear = "been proved clear in the planned cell"
+        checked = clear if self.program.air_checked else "not been checked for collisions"
+        return [
+            f"Written by kerfpath for {plain(robot.model)} ({plain(robot.id)}).",
+            *about,
+            f"Moves through the air have {checked}.",
+            *self.program.caveats,
+        ]
 
     def output(self, signal: Signal) -> Any:
         """Return the output of a signal, from the settings `laser_output` and `gas_output`.

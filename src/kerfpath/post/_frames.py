@@ -1,14 +1,20 @@
-"""Frames of several controllers: the world at axis 2, the flange, angles about fixed axes."""
+"""Frames of several controllers: the world at axis 2, the flange, positions with three angles."""
 
 from __future__ import annotations
 
+from typing import Literal
+
 import numpy as np
+from numpy.typing import ArrayLike
 from scipy.spatial.transform import Rotation
 
 from kerfpath._arrays import Array, freeze
+from kerfpath.post._program import Program
 from kerfpath.robots import Robot
 
-__all__ = ["faceplate", "world", "xyzwpr"]
+__all__ = ["Order", "controller_frames", "euler", "faceplate", "from_euler", "world"]
+
+Order = Literal["xyz", "XYZ", "ZYX"]
 
 
 def world(robot: Robot) -> Array:
@@ -23,11 +29,30 @@ def faceplate(robot: Robot) -> Array:
     return freeze(np.asarray(np.linalg.inv(robot.T_end_flange), dtype=np.float64))
 
 
-def xyzwpr(T: Array) -> Array:
-    """Return poses (K, 4, 4) m as X, Y, Z in mm and W, P, R in deg, (K, 6).
+def controller_frames(program: Program) -> tuple[Array, Array]:
+    """Return the poses (4, 4) m of part and tool in the controller's world and flange."""
+    robot = program.robot
+    part = np.linalg.inv(world(robot)) @ program.T_base_part
+    tool = np.linalg.inv(faceplate(robot)) @ program.T_flange_tip
+    return np.asarray(part), np.asarray(tool)
 
-    The rotation is W about x, then P about y, then R about z, all axes fixed.
+
+def euler(T: ArrayLike, order: Order) -> Array:
+    """Return poses (K, 4, 4) m as X, Y, Z in mm and three angles in deg, (K, 6).
+
+    The angles are about the axes of `order`, one after the other: about fixed axes where it has
+    small letters, each about the axes turned before where it has capitals.
     """
-    turned = Rotation.from_matrix(T[:, :3, :3])
-    angles = turned.as_euler("xyz", degrees=True, suppress_warnings=True)
-    return np.hstack([T[:, :3, 3] * 1e3, angles])
+    poses = np.asarray(T, dtype=np.float64).reshape(-1, 4, 4)
+    turned = Rotation.from_matrix(poses[:, :3, :3])
+    angles = turned.as_euler(order, degrees=True, suppress_warnings=True)
+    return np.hstack([poses[:, :3, 3] * 1e3, angles])
+
+
+def from_euler(values: ArrayLike, order: Order) -> Array:
+    """Return the poses (K, 4, 4) m of X, Y, Z in mm and three angles in deg, (K, 6), as `euler`."""
+    rows = np.asarray(values, dtype=np.float64).reshape(-1, 6)
+    T = np.tile(np.eye(4), (len(rows), 1, 1))
+    T[:, :3, :3] = Rotation.from_euler(order, rows[:, 3:], degrees=True).as_matrix()
+    T[:, :3, 3] = rows[:, :3] * 1e-3
+    return freeze(T)

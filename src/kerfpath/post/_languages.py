@@ -69,7 +69,7 @@ class Language:
     check : callable, optional
         (program, settings) to the issues that only this language has.
     sayable : callable, optional
-        (program, settings) to what the language can say of it, where that is less; `check` tells
+        (program, settings) to what the language can say of it, where that is less; `check` warns
         of all that is left out.
     ahead : bool
         Whether outputs are switched ahead of a target, on the path; else where the tip stands.

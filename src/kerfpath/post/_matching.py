@@ -15,7 +15,7 @@ from kerfpath.errors import InputError
 from kerfpath.post._groups import ReadGroup
 from kerfpath.post._read import ReadMove, ReadWait
 
-__all__ = ["Pair", "Stop", "matched", "pairs_of"]
+__all__ = ["Pair", "Stop", "match_groups", "pair_moves"]
 
 NEAR = 5e-3
 """Contours whose paths are farther apart (m) are the same by their names only."""
@@ -45,7 +45,7 @@ class Pair(NamedTuple):
         return tuple(stop.move.place for stop in self if stop is not None)
 
 
-def matched(a: Sequence[ReadGroup], b: Sequence[ReadGroup]) -> list[tuple[int, int]]:
+def match_groups(a: Sequence[ReadGroup], b: Sequence[ReadGroup]) -> list[tuple[int, int]]:
     """Return which contours of A are which of B: those along the same path, or of the same name."""
     one, two = [_trace(group) for group in a], [_trace(group) for group in b]
     cost = np.full((len(a), len(b)), NEVER)
@@ -89,7 +89,7 @@ def _points(moves: Sequence[ReadMove]) -> Array:
     return np.array(ends).reshape(-1, 4, 4)[:, :3, 3]
 
 
-def pairs_of(a: ReadGroup, b: ReadGroup, near: float) -> list[Pair]:
+def pair_moves(a: ReadGroup, b: ReadGroup, near: float) -> list[Pair]:
     """Return the moves of a contour in A with those in B that end at the same place.
 
     Between moves that do, as many as there are in both belong together in order.

@@ -16,7 +16,7 @@ LONG = re.compile(r"\d{10,}|[eE]\+?\d", re.ASCII)
 """What a number needs in its text to be so large."""
 
 REMARK = re.compile(r"\s*(?:\d+:\s*)?(?:!|;|//|'|#) ", re.ASCII)
-"""How a person's remark begins in any of the languages; one that tells a frame has no space."""
+"""How a person's remark begins in any of the languages; one that gives a frame has no space."""
 
 
 class Meant(Mapping[str, str]):

@@ -1,4 +1,4 @@
-"""Orientations of many targets at once, without jumps along the path."""
+"""Poses of many targets at once: how far they are apart, orientations without jumps."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from scipy.spatial.transform import Rotation
 
 from kerfpath._arrays import Array, freeze
 
-__all__ = ["pose_of", "quaternions", "rotation_vectors"]
+__all__ = ["distances", "pose_of", "quaternions", "rotation_vectors"]
 
 UNIT = 1e-6
 """How far the length of a quaternion may be from one: eight printed decimals pass."""
@@ -23,6 +23,13 @@ def pose_of(position: ArrayLike, wxyz: ArrayLike) -> Array | None:
     T[:3, :3] = Rotation.from_quat(quaternion, scalar_first=True).as_matrix()
     T[:3, 3] = position
     return freeze(T)
+
+
+def distances(one: Array, two: Array) -> tuple[Array, Array]:
+    """Return distances (m) and angles (rad) between poses (K, 4, 4)."""
+    off = np.linalg.norm(one[:, :3, 3] - two[:, :3, 3], axis=1)
+    between = np.swapaxes(one[:, :3, :3], 1, 2) @ two[:, :3, :3]
+    return off, np.asarray(Rotation.from_matrix(between).magnitude())
 
 
 def quaternions(T: Array) -> Array:

@@ -6,13 +6,25 @@ import re
 from collections.abc import Iterator
 
 import numpy as np
-from scipy.spatial.transform import Rotation
 
 from kerfpath.errors import InputError
+from kerfpath.post._divide import find_long_contours
 from kerfpath.post._issue import ProgramIssue
 from kerfpath.post._languages import Language
 from kerfpath.post._languages import language as find_language
-from kerfpath.post._program import Await, JointMove, LinearMove, Program, Request, Section, Wait
+from kerfpath.post._orientations import distances
+from kerfpath.post._program import (
+    SIGNALS,
+    Await,
+    JointMove,
+    LinearMove,
+    Program,
+    Request,
+    Section,
+    Step,
+    Wait,
+    switches_of,
+)
 from kerfpath.post._settings import Rules, Settings, handshakes
 
 __all__ = ["preflight"]
@@ -59,24 +71,24 @@ def preflight(
             f"{type(settings).__name__}"
         )
     rules = chosen.rules(settings)
-    issues = list(_robot(program, chosen))
-    numbers = [issue for section in program.sections for issue in _numbers(section, rules)]
-    outputs = list(_outputs(program, chosen, settings))
-    outputs += _ports(program, chosen, settings)
+    issues = list(_check_robot(program, chosen))
+    numbers = [issue for section in program.sections for issue in _check_numbers(section, rules)]
+    outputs = list(_check_outputs(program, chosen, settings))
+    outputs += _check_ports(program, chosen, settings)
     settings = chosen.completed(settings)
     issues += numbers + outputs
     # Speeds and zones are named by their formatted values: only finite ones can be.
     unnamed = any(issue.level == "error" for issue in outputs)
     if not numbers and not unnamed and not chosen.refusal(program.robot):
-        issues += _names(program, chosen, rules, settings)
+        issues += _check_names(program, chosen, rules, settings)
     for section in program.sections:
-        issues += _laser(section)
-        issues += _waits(section)
-        issues += _handshakes(section)
-        issues += _motion(program, section, rules)
-        issues += _limits(program, section)
-    if chosen.check is not None and not any(issue.level == "error" for issue in issues):
-        issues += chosen.check(program, settings)
+        issues += _check_laser(section)
+        issues += _check_stays(section)
+        issues += _check_motion(program, section, rules)
+        issues += _check_limits(program, section)
+    if not any(issue.level == "error" for issue in issues):
+        issues += find_long_contours(chosen.formatter(program, settings))
+        issues += [] if chosen.check is None else chosen.check(program, settings)
     if not program.air_checked and any(isinstance(move, JointMove) for move in program.moves):
         issues.append(
             ProgramIssue(
@@ -90,7 +102,9 @@ def preflight(
     return issues
 
 
-def _outputs(program: Program, language: Language, settings: Settings) -> Iterator[ProgramIssue]:
+def _check_outputs(
+    program: Program, language: Language, settings: Settings
+) -> Iterator[ProgramIssue]:
     """Check that there is an output for everything that is switched, and warn of one assumed."""
     assumed = [key.removesuffix("_output") for key in language.assumed]
     for signal in sorted({*program.signals, *assumed}):
@@ -98,38 +112,43 @@ def _outputs(program: Program, language: Language, settings: Settings) -> Iterat
         if key not in type(settings).model_fields or getattr(settings, key) is not None:
             continue
         remedy = f"say which with {key} in [program.{language.name}]"
-        said = f"the {signal} is switched, but no output is named for it; {remedy}"
+        message = f"the {signal} is switched, but no output is named for it; {remedy}"
         if (taken := language.assumed.get(key)) is not None:
-            said = f"no output is named for the {signal}, {taken} is taken; {remedy}"
-        yield ProgramIssue("error" if taken is None else "warning", "output", said, "program")
+            message = f"no output is named for the {signal}, {taken} is taken; {remedy}"
+        yield ProgramIssue("error" if taken is None else "warning", "output", message, "program")
 
 
-def _ports(program: Program, language: Language, settings: Settings) -> Iterator[ProgramIssue]:
+def _check_ports(
+    program: Program, language: Language, settings: Settings
+) -> Iterator[ProgramIssue]:
     """Check that every handshake has an input or output of its own."""
     known = handshakes(settings)
     steps = dict.fromkeys(s for s in program.steps if isinstance(s, Request | Await))
     wanted = {(s.partner, "input" if isinstance(s, Await) else "output") for s in steps}
     for partner, way in sorted(wanted):
         if (partner, way) not in known:
-            said = f"{language.title} has no {way} for the handshake {partner}; leave it out"
-            yield ProgramIssue("error", "handshake", said, "program")
+            message = f"{language.title} has no {way} for the handshake {partner}; leave it out"
+            yield ProgramIssue("error", "handshake", message, "program")
         elif known[partner, way] is None:
-            said = (
+            message = (
                 f"no {way} is named for the handshake {partner}; say which with {partner}_{way} in "
                 f"[program.{language.name}]"
             )
-            yield ProgramIssue("error", "handshake", said, "program")
-    taken = {
-        ("output", getattr(settings, key, None)): key for key in ("laser_output", "gas_output")
-    }
-    for (name, way), port in known.items():
+            yield ProgramIssue("error", "handshake", message, "program")
+    ports: list[tuple[str, str, object]] = [
+        (signal, "output", getattr(settings, f"{signal}_output", None)) for signal in SIGNALS
+    ]
+    ports += [(partner, way, port) for (partner, way), port in known.items()]
+    taken: dict[tuple[str, object], str] = {}
+    for name, way, port in ports:
         key = f"{name}_{way}"
         if port is not None and (other := taken.setdefault((way, port), key)) != key:
-            said = f"{other} and {key} are both {port}; name one for each"
-            yield ProgramIssue("error", "handshake", said, "program")
+            message = f"{other} and {key} are both {port}; name one for each"
+            code = "output" if name in SIGNALS else "handshake"
+            yield ProgramIssue("error", code, message, "program")
 
 
-def _robot(program: Program, language: Language) -> Iterator[ProgramIssue]:
+def _check_robot(program: Program, language: Language) -> Iterator[ProgramIssue]:
     if refusal := language.refusal(program.robot):
         yield ProgramIssue("error", "wrong-arm", refusal, "program")
     if doubt := language.doubt(program.robot):
@@ -138,7 +157,7 @@ def _robot(program: Program, language: Language) -> Iterator[ProgramIssue]:
         yield ProgramIssue("error", "empty", "there is no contour to cut", "program")
 
 
-def _names(
+def _check_names(
     program: Program, language: Language, rules: Rules, settings: Settings
 ) -> Iterator[ProgramIssue]:
     seen: dict[str, str] = {}
@@ -158,8 +177,8 @@ def _names(
                 what,
             )
         elif language.is_reserved(name):
-            said = f"{name!r} is reserved in {language.title}; rename it"
-            yield ProgramIssue("error", "name-reserved", said, what)
+            message = f"{name!r} is reserved in {language.title}; rename it"
+            yield ProgramIssue("error", "name-reserved", message, what)
         elif (other := seen.get(name.lower())) is not None:
             yield ProgramIssue(
                 "error", "name-collision", f"{name!r} is also the name of {other}; rename it", what
@@ -167,118 +186,81 @@ def _names(
         seen[name.lower()] = what
 
 
-def _numbers(section: Section, rules: Rules) -> Iterator[ProgramIssue]:
-    for number, step in enumerate(section.steps):
-        place = f"{section.name}, step {number}"
-        in_reach = np.isfinite(getattr(step, "speed", 0.0))
+def _check_numbers(section: Section, rules: Rules) -> Iterator[ProgramIssue]:
+    """Check that speeds, zones and lead times are numbers that the language can write."""
+    lead = f"the lead time must lie between 0 and {rules.longest_lead:g} s"
+    share = f"the share of the full speed must lie between {LOWEST_SHARE:g} and 1"
+    most = "" if np.isinf(rules.fastest) else f" and at most {rules.fastest * 1e3:g} mm/s"
+    speed = f"the speed must be at least {rules.slowest * 1e3:g} mm/s{most}"
+    for place, step, _, _ in _walk(section):
+        wrong: list[tuple[str, str]] = []
         if isinstance(step, LinearMove) and not (
-            in_reach and rules.slowest <= step.speed <= rules.fastest
+            np.isfinite(step.speed) and rules.slowest <= step.speed <= rules.fastest
         ):
-            most = "" if np.isinf(rules.fastest) else f" and at most {rules.fastest * 1e3:g} mm/s"
-            yield ProgramIssue(
-                "error",
-                "speed",
-                f"the speed must be at least {rules.slowest * 1e3:g} mm/s{most}, "
-                f"got {step.speed * 1e3:g} mm/s",
-                place,
-            )
+            wrong.append(("speed", f"{speed}, got {step.speed * 1e3:g} mm/s"))
         if isinstance(step, JointMove) and not LOWEST_SHARE <= step.speed <= 1:
-            yield ProgramIssue(
-                "error",
-                "speed",
-                f"the share of the full speed must lie between {LOWEST_SHARE:g} and 1, "
-                f"got {step.speed:g}",
-                place,
-            )
+            wrong.append(("speed", f"{share}, got {step.speed:g}"))
         if isinstance(step, LinearMove | JointMove) and not 0 <= step.zone < np.inf:
-            yield ProgramIssue(
-                "error",
-                "zone",
-                f"the zone must be 0 mm (stop) or more, got {step.zone * 1e3:g} mm",
-                place,
-            )
-        for switch in step.switches if isinstance(step, LinearMove) else ():
-            if not (0 <= switch.lead_time <= rules.longest_lead and np.isfinite(switch.lead_time)):
-                yield ProgramIssue(
-                    "error",
-                    "lead-time",
-                    f"the lead time must lie between 0 and {rules.longest_lead:g} s, "
-                    f"got {switch.lead_time:g} s",
-                    place,
-                )
+            message = f"the zone must be 0 mm (stop) or more, got {step.zone * 1e3:g} mm"
+            wrong.append(("zone", message))
+        for switch in switches_of(step):
+            if not (0 <= switch.lead_time < np.inf and switch.lead_time <= rules.longest_lead):
+                wrong.append(("lead-time", f"{lead}, got {switch.lead_time:g} s"))
+        for code, message in wrong:
+            yield ProgramIssue("error", code, message, place)
 
 
-def _waits(section: Section) -> Iterator[ProgramIssue]:
-    """Check that waits are of a sensible length, and where the robot stands."""
-    stopped = False
+def _walk(section: Section) -> Iterator[tuple[str, Step, bool, bool]]:
+    """Yield place and step, and whether the robot stands before it and the laser is on."""
+    stands, on = False, False
     for number, step in enumerate(section.steps):
+        yield f"{section.name}, step {number}", step, stands, on
         if isinstance(step, JointMove | LinearMove):
-            stopped = step.zone == 0
-        if not isinstance(step, Wait):
-            continue
-        place = f"{section.name}, step {number}"
-        if not 0 < step.time <= LONGEST_WAIT:
-            yield ProgramIssue(
-                "error",
-                "wait",
-                f"a wait must last more than 0 s and at most {LONGEST_WAIT:g} s, got "
-                f"{step.time:g} s",
-                place,
-            )
-        if not stopped:
-            yield ProgramIssue("error", "wait", "a wait must follow a move that stops", place)
-
-
-def _handshakes(section: Section) -> Iterator[ProgramIssue]:
-    """Check that partners are asked and awaited where the robot stands with the laser off."""
-    stopped, on = False, False
-    for number, step in enumerate(section.steps):
-        if isinstance(step, JointMove | LinearMove):
-            stopped = step.zone == 0
-        for switch in step.switches if isinstance(step, LinearMove) else ():
+            stands = step.zone == 0
+        for switch in switches_of(step):
             on = switch.on if switch.signal == "laser" else on
-        if not isinstance(step, Request | Await):
-            continue
-        place = f"{section.name}, step {number}"
-        if not stopped or on:
-            said = "a handshake must follow a move that stops, with the laser off"
-            yield ProgramIssue("error", "handshake", said, place)
+
+
+def _check_stays(section: Section) -> Iterator[ProgramIssue]:
+    """Check that waits and handshakes take a sensible time, where the robot stands."""
+    for place, step, stands, on in _walk(section):
+        if isinstance(step, Wait):
+            if not 0 < step.time <= LONGEST_WAIT:
+                message = f"more than 0 s and at most {LONGEST_WAIT:g} s, got {step.time:g} s"
+                yield ProgramIssue("error", "wait", f"a wait must last {message}", place)
+            if not stands:
+                yield ProgramIssue("error", "wait", "a wait must follow a move that stops", place)
+        if isinstance(step, Request | Await) and (on or not stands):
+            message = "a handshake must follow a move that stops, with the laser off"
+            yield ProgramIssue("error", "handshake", message, place)
         if isinstance(step, Await) and not 0 < step.timeout <= LONGEST_TIMEOUT:
-            yield ProgramIssue(
-                "error",
-                "handshake",
-                f"a timeout must be more than 0 s and at most {LONGEST_TIMEOUT:g} s, got "
-                f"{step.timeout:g} s",
-                place,
-            )
+            message = f"more than 0 s and at most {LONGEST_TIMEOUT:g} s, got {step.timeout:g} s"
+            yield ProgramIssue("error", "handshake", f"a timeout must be {message}", place)
 
 
-def _laser(section: Section) -> Iterator[ProgramIssue]:
+def _check_laser(section: Section) -> Iterator[ProgramIssue]:
     """Check that the laser is only on between its switches, along the path, and off after."""
     on = False
-    for number, step in enumerate(section.steps):
-        place = f"{section.name}, step {number}"
+    for place, step, _, on in _walk(section):
         if isinstance(step, JointMove) and on:
             yield ProgramIssue("error", "laser-order", "a joint move with the laser on", place)
-        for switch in step.switches if isinstance(step, LinearMove) else ():
+        for switch in switches_of(step):
             if switch.signal == "laser" and on == switch.on:
-                said = f"the laser is switched {'on' if on else 'off'}, but is so already"
-                yield ProgramIssue("error", "laser-order", said, place)
+                message = f"the laser is switched {'on' if on else 'off'}, but is so already"
+                yield ProgramIssue("error", "laser-order", message, place)
             on = switch.on if switch.signal == "laser" else on
     if on:
         yield ProgramIssue("error", "laser-order", "the laser is still on at the end", section.name)
 
 
-def _motion(program: Program, section: Section, rules: Rules) -> Iterator[ProgramIssue]:
+def _check_motion(program: Program, section: Section, rules: Rules) -> Iterator[ProgramIssue]:
     """Check the path of a section: steps, zones, turning speed, lead times."""
     moves = section.moves
     if len(moves) < 2:
         return
     T = program.tips(moves)
     q = np.array([move.q for move in moves])
-    lengths = np.linalg.norm(np.diff(T[:, :3, 3], axis=0), axis=1)
-    between = np.swapaxes(T[:-1, :3, :3], 1, 2) @ T[1:, :3, :3]
-    turn = np.asarray(Rotation.from_matrix(between).magnitude())
+    lengths, turn = distances(T[:-1], T[1:])
     on_path = np.array([isinstance(move, LinearMove) for move in moves[1:]])
     step = np.abs(np.diff(q, axis=0))
     for k in np.flatnonzero(on_path & (step.max(axis=1) >= LARGEST_JOINT_STEP)).tolist():
@@ -317,10 +299,10 @@ def _motion(program: Program, section: Section, rules: Rules) -> Iterator[Progra
             "neighbour; the controller will reduce it",
             section.name,
         )
-    yield from _late_switches(section, lengths.tolist())
+    yield from _check_lead_times(section, lengths.tolist())
 
 
-def _late_switches(section: Section, lengths: list[float]) -> Iterator[ProgramIssue]:
+def _check_lead_times(section: Section, lengths: list[float]) -> Iterator[ProgramIssue]:
     for k, (move, length) in enumerate(zip(section.moves[1:], lengths, strict=True), 1):
         for switch in move.switches if isinstance(move, LinearMove) and move.speed > 0 else ():
             if switch.lead_time > length / move.speed:
@@ -334,11 +316,11 @@ def _late_switches(section: Section, lengths: list[float]) -> Iterator[ProgramIs
                 )
 
 
-def _limits(program: Program, section: Section) -> Iterator[ProgramIssue]:
+def _check_limits(program: Program, section: Section) -> Iterator[ProgramIssue]:
     if not section.moves:
         return
     limits = program.robot.joint_limits()
-    words = program.robot.reasons()[2:]
+    words = program.robot.bounds()
     q = np.array([move.q for move in section.moves])
     sums = q @ limits.rows.T
     below = np.hstack([limits.lower - q, limits.row_lower - sums])

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
-from typing import Literal, get_args
+from typing import Literal, NamedTuple, get_args
 
 import numpy as np
 
@@ -31,7 +31,10 @@ __all__ = [
     "Signal",
     "Step",
     "Switch",
+    "Target",
     "Wait",
+    "switches_of",
+    "targets_of",
 ]
 
 Signal = Literal["laser", "gas"]
@@ -201,6 +204,29 @@ class Comment:
     __repr__ = told
 
 
+class Target(NamedTuple):
+    """What a move leads to or by: joints (n,) rad, and of a path move the tip's pose (4, 4) m."""
+
+    move: Move
+    q: Array
+    T_part_tip: Array | None
+
+
+def targets_of(moves: Iterable[Move]) -> list[Target]:
+    """Return the targets of moves in order, each behind the point on the way to it."""
+    found: list[Target] = []
+    for move in moves:
+        if isinstance(move, CircularMove):
+            found.append(Target(move, move.q_via, move.T_part_via))
+        found.append(Target(move, move.q, getattr(move, "T_part_tip", None)))
+    return found
+
+
+def switches_of(step: Step) -> tuple[Switch, ...]:
+    """Return what is switched at the end of a step; nothing but at that of a move of the path."""
+    return step.switches if isinstance(step, LinearMove) else ()
+
+
 PathMove = LinearMove | CircularMove
 Move = JointMove | LinearMove | CircularMove
 Handshake = Request | Await
@@ -269,8 +295,7 @@ class Program:
     @property
     def signals(self) -> tuple[Signal, ...]:
         """What is switched anywhere."""
-        linear = [move for move in self.moves if isinstance(move, LinearMove)]
-        return tuple(sorted({switch.signal for move in linear for switch in move.switches}))
+        return tuple(sorted({switch.signal for move in self.moves for switch in switches_of(move)}))
 
     @property
     def moves(self) -> tuple[Move, ...]:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from typing import Any, Literal, Protocol, get_args
@@ -12,13 +11,12 @@ import numpy as np
 from kerfpath._arrays import Array, freeze
 from kerfpath._told import told
 from kerfpath.errors import InputError
-from kerfpath.post._program import Handshake, Partner, Switch
-from kerfpath.post._settings import Settings, handshakes
+from kerfpath.post._program import Handshake, Switch
 from kerfpath.robots import Robot
 
 __all__ = [
     "MOVE_KINDS", "MoveKind", "ReadHandshake", "ReadMove", "ReadProgram", "ReadSection",
-    "ReadStep", "ReadWait", "Reader", "partner_of", "patterns", "same_output", "with_tips",
+    "ReadStep", "ReadWait", "Reader", "with_tips",
 ]  # fmt: skip
 
 
@@ -27,8 +25,23 @@ MOVE_KINDS: dict[str, MoveKind] = {word: word for word in get_args(MoveKind)}
 """Every kind of move by its word, for readers."""
 
 
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _InFile:
+    """Something that stands on a line of a file."""
+
+    file: str
+    line: int
+
+    __repr__ = told
+
+    @property
+    def place(self) -> str:
+        """Where it stands."""
+        return f"{self.file}, line {self.line}"
+
+
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class ReadMove:
+class ReadMove(_InFile):
     """One move as its text says it.
 
     Parameters
@@ -60,8 +73,6 @@ class ReadMove:
     """
 
     kind: MoveKind
-    file: str
-    line: int
     speed: float | None
     duration: float | None = None
     cruise: float | None = None
@@ -75,42 +86,23 @@ class ReadMove:
 
     __repr__ = told
 
-    @property
-    def place(self) -> str:
-        """Where it stands."""
-        return f"{self.file}, line {self.line}"
-
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class ReadWait:
+class ReadWait(_InFile):
     """A wait of `time` (s) where the robot stands."""
 
     time: float
-    file: str
-    line: int
 
     __repr__ = told
-
-    @property
-    def place(self) -> str:
-        """Where it stands."""
-        return f"{self.file}, line {self.line}"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class ReadHandshake:
+class ReadHandshake(_InFile):
     """A handshake with a partner where the robot stands."""
 
     what: Handshake
-    file: str
-    line: int
 
     __repr__ = told
-
-    @property
-    def place(self) -> str:
-        """Where it stands."""
-        return f"{self.file}, line {self.line}"
 
 
 ReadStep = ReadMove | ReadWait | ReadHandshake
@@ -216,24 +208,3 @@ class Reader(Protocol):
         InputError
             A line that is not of our making, or that does not fit the others: file and line.
         """
-
-
-def patterns(by_kind: Mapping[str, str]) -> dict[str, re.Pattern[str]]:
-    """Return regular expressions of lines by their kind, compiled; digits and letters are ASCII."""
-    return {kind: re.compile(pattern, re.ASCII) for kind, pattern in by_kind.items()}
-
-
-def partner_of(
-    port: object, way: Literal["input", "output"], settings: Settings, place: str
-) -> Partner:
-    """Return whose input or output a port is, by the settings, or raise InputError."""
-    for (partner, its_way), name in handshakes(settings).items():
-        if its_way == way and name == port:
-            return partner
-    raise InputError(f"{place}: {port} is the {way} of no partner that the settings name")
-
-
-def same_output(said: object, expected: object, place: str) -> None:
-    """Raise InputError where a switch is of another output than the settings name."""
-    if said != expected:
-        raise InputError(f"{place}: switches the output {said}; expected {expected}")

@@ -11,7 +11,10 @@ from pydantic import BaseModel, ConfigDict, Field
 from kerfpath._told import told
 from kerfpath.post._program import PARTNERS, Partner
 
-__all__ = ["Rules", "Settings", "handshakes", "setting"]
+__all__ = [
+    "LinesPerFile", "PortSettings", "Rules", "Settings", "handshakes", "numbered", "outputs",
+    "setting",
+]  # fmt: skip
 
 
 def setting(expected: str, example: str, **bounds: Any) -> Any:
@@ -19,15 +22,53 @@ def setting(expected: str, example: str, **bounds: Any) -> Any:
     return Field(description=expected, examples=[example], **bounds)
 
 
+def numbered(port: str, most: int, least: int = 1) -> Any:
+    """Return the bounds of a setting that is the number of a port."""
+    return setting(f"the number of {port}, {least} to {most}", "5", ge=least, le=most)
+
+
+LinesPerFile = Annotated[
+    int, setting("a whole number of lines from 100 to 1000000", "5000", ge=100, le=1_000_000)
+]
+
+
 class Settings(BaseModel):
     """The settings of one language; in jobs the table [program.LANGUAGE]."""
 
     model_config = ConfigDict(extra="forbid", strict=True, frozen=True)
 
-    lines_per_file: Annotated[
-        int,
-        setting("a whole number of lines from 100 to 1000000", "5000", ge=100, le=1_000_000),
-    ] = 5000
+    lines_per_file: LinesPerFile = 5000
+
+
+class PortSettings(Settings):
+    """Settings that name inputs and outputs: of laser and gas, and of handshakes.
+
+    A subclass gives, as keywords, the annotations of what its language calls an output and an
+    input, with their bounds and what messages say of them; they become those of all fields here
+    that it does not annotate itself.
+    """
+
+    laser_output: Any = None
+    gas_output: Any = None
+    ready_input: Any = None
+    shutter_input: Any = None
+    gas_pressure_input: Any = None
+    height_input: Any = None
+    interlock_input: Any = None
+    ready_output: Any = None
+    shutter_output: Any = None
+    height_output: Any = None
+
+    def __init_subclass__(cls, *, output: Any = None, input: Any = None, **others: Any) -> None:
+        super().__init_subclass__(**others)
+        if output is None:
+            return
+        own = cls.__annotations__
+        ports = [name for name in PortSettings.__annotations__ if name not in own]
+        for name in ports:
+            setattr(cls, name, None)
+        ways = {name: output if name.endswith("_output") else input for name in ports}
+        cls.__annotations__ = ways | own
 
 
 def handshakes(settings: Settings) -> dict[tuple[Partner, str], Any]:
@@ -38,6 +79,13 @@ def handshakes(settings: Settings) -> dict[tuple[Partner, str], Any]:
         for partner, _, way in fields
         if partner in PARTNERS and way in ("input", "output")
     }
+
+
+def outputs(settings: Any) -> list[Any]:
+    """Return all outputs that settings name: laser, gas, and those of requests."""
+    requests = (port for (_, way), port in handshakes(settings).items() if way == "output")
+    named = (settings.laser_output, settings.gas_output, *requests)
+    return [output for output in named if output is not None]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -1,20 +1,20 @@
-"""Switches for languages that know none on the path: where the robot stands, without a lead."""
+"""What controllers do otherwise than planned: switches where the robot stands, other postures."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
 from kerfpath.post._issue import ProgramIssue
 from kerfpath.post._program import LinearMove, Program, Section
 
-__all__ = ["stopping_to_switch", "switched_later"]
+__all__ = ["stop_to_switch", "warn_of_changed_postures", "warn_of_late_switches"]
 
 
-def stopping_to_switch(program: Program, settings: object = None) -> Program:
+def stop_to_switch(program: Program, settings: object = None) -> Program:
     """Return a program with all its switches where the tip stands, and without a lead."""
 
-    def said(move: LinearMove) -> LinearMove:
+    def stop(move: LinearMove) -> LinearMove:
         switches = tuple(replace(switch, lead_time=0.0) for switch in move.switches)
         return replace(move, switches=switches, zone=0.0)
 
@@ -22,7 +22,7 @@ def stopping_to_switch(program: Program, settings: object = None) -> Program:
         replace(
             section,
             steps=tuple(
-                said(s) if isinstance(s, LinearMove) and s.switches else s for s in section.steps
+                stop(s) if isinstance(s, LinearMove) and s.switches else s for s in section.steps
             ),
         )
         for section in program.sections
@@ -30,8 +30,22 @@ def stopping_to_switch(program: Program, settings: object = None) -> Program:
     return replace(program, sections=sections)
 
 
-def switched_later(section: Section, title: str) -> Iterator[ProgramIssue]:
-    """Tell of switches that come later than planned, and of stops that they need."""
+def warn_of_changed_postures(
+    section: Section, words: Sequence[tuple[int | str, ...]]
+) -> Iterator[ProgramIssue]:
+    """Warn of straight moves that change the words for the posture, given at each target."""
+    for k, move in enumerate(section.moves):
+        if k > 0 and isinstance(move, LinearMove) and words[k] != words[k - 1]:
+            before, after = (" ".join(map(str, words[i])) for i in (k - 1, k))
+            message = f"the configuration changes from {before} to {after} in a straight move"
+            place = f"{section.name}, move {k}"
+            yield ProgramIssue(
+                "warning", "posture-change", f"{message}, which the controller may refuse", place
+            )
+
+
+def warn_of_late_switches(section: Section, title: str) -> Iterator[ProgramIssue]:
+    """Warn of switches that come later than planned, and of stops that they need."""
     moves = [m for m in section.moves if isinstance(m, LinearMove) and m.switches]
     leads = [switch.lead_time for m in moves for switch in m.switches if switch.lead_time > 0]
     if leads:

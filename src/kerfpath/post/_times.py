@@ -12,10 +12,16 @@ from kerfpath.errors import InputError
 from kerfpath.post._issue import ProgramIssue
 from kerfpath.post._program import JointMove, LinearMove, Move, Program, Wait
 
-__all__ = ["SHORTEST_CRUISE", "air_times", "cruises", "refusals", "timetable"]
+__all__ = [
+    "SHORTEST_CRUISE", "TICK", "air_times", "cruises", "not_whole", "refusals", "timetable",
+]  # fmt: skip
 
 SHORTEST_CRUISE = 1e-3
 """s; a joint move that takes less goes nowhere worth a time."""
+TICK = 0.01
+"""s; some controllers count times in whole numbers of it."""
+TICK_NOISE = 1e-4
+"""How far (s) a time may be from them."""
 SHORTEST = 1e-6
 """s; a move that takes less has no duration worth writing."""
 
@@ -75,6 +81,11 @@ def air_times(program: Program) -> list[float | None]:
     ]
 
 
+def not_whole(time: float) -> bool:
+    """Return whether a time (s) is no whole number of `TICK`."""
+    return abs(time - TICK * round(time / TICK)) > TICK_NOISE
+
+
 def refusals(program: Program) -> Iterator[ProgramIssue]:
     """Yield what forbids to say times: unknown limits, no start, a move without a duration."""
     try:
@@ -82,11 +93,11 @@ def refusals(program: Program) -> Iterator[ProgramIssue]:
     except InputError as error:
         yield ProgramIssue("error", "joint-speed", str(error), "program")
     if not isinstance(next(iter(program.moves), None), JointMove):
-        said = "times are counted from a first joint move, but there is none"
-        yield ProgramIssue("error", "start", said, "program")
+        message = "times are counted from a first joint move, but there is none"
+        yield ProgramIssue("error", "start", message, "program")
     for section in program.sections:
         for number, move in enumerate(section.moves):
             took = move.duration if isinstance(move, LinearMove) else 1.0
             if not SHORTEST <= took < np.inf:
-                said = f"the move takes {took:g} s, expected at least {SHORTEST:g} s"
-                yield ProgramIssue("error", "duration", said, f"{section.name}, move {number}")
+                message = f"the move takes {took:g} s, expected at least {SHORTEST:g} s"
+                yield ProgramIssue("error", "duration", message, f"{section.name}, move {number}")

@@ -22,7 +22,7 @@ from kerfpath.post._read import ReadProgram
 from kerfpath.post._settings import Settings
 from kerfpath.robots import Robot
 
-__all__ = ["Posted", "post", "posted", "read_program", "said_in"]
+__all__ = ["Posted", "post", "post_and_read", "read_as_written", "read_program"]
 
 
 def post(
@@ -59,7 +59,7 @@ def post(
         or one that does not read back as it was meant.
     """
     program = source if isinstance(source, Program) else build_program(source)
-    return posted(program, language, settings, strict=strict).files
+    return post_and_read(program, language, settings, strict=strict).files
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -83,7 +83,7 @@ class Posted:
     __repr__ = told
 
 
-def posted(
+def post_and_read(
     program: Program,
     language: str = "rapid",
     settings: Settings | None = None,
@@ -158,7 +158,7 @@ def read_program(
         ) from None
 
 
-def said_in(program: Program, chosen: Language, settings: Settings) -> ReadProgram:
+def read_as_written(program: Program, chosen: Language, settings: Settings) -> ReadProgram:
     """Return what the reader of a language makes of a program that its formatter writes.
 
     Neither refused nor compared: what a text would say, as a measure for another.

@@ -12,7 +12,7 @@ from kerfpath._told import told
 from kerfpath.kernels.turns import JointLimits
 from kerfpath.plans import path_cost
 from kerfpath.refiner._curves import JointCurves
-from kerfpath.refiner._program import MARGIN, PRICE, Aim, Model, solve
+from kerfpath.refiner._program import MARGIN, PRICE, Model, Target, solve
 from kerfpath.refiner._rates import Rates
 from kerfpath.search import Metric, ObjectiveKind
 
@@ -64,12 +64,12 @@ class Stand:
         """Every limit is kept."""
         return self.excess <= 0 and self.outside <= 0
 
-    def value(self, aim: Aim) -> float:
+    def value(self, target: Target) -> float:
         """Return what is brought down: the excess, or the cost."""
         away = AWAY * max(self.outside, 0)
-        if aim == "excess":
+        if target == "excess":
             return self.excess + away
-        return self.cost + PRICE * self.lost + away if aim == "lost" else self.cost
+        return self.cost + PRICE * self.lost + away if target == "lost" else self.cost
 
 
 class _Step(NamedTuple):
@@ -98,7 +98,7 @@ class Descent:
     radius : float rad
         Largest change of gamma in the first iteration.
     node_cost : (K,), optional
-        What each node costs, taken as fixed: what it comes to once gamma has moved is told after.
+        What each node costs, taken as fixed; what it comes to once gamma has moved is found after.
     cap : float
         Largest distance that is allowed.
     """
@@ -166,35 +166,36 @@ class Descent:
             found, programs = self.stand(smooth.gamma, smooth.q), programs + more
         return found, programs
 
-    def _run(self, at: Stand, aim: Aim, enough: float = -np.inf) -> tuple[Stand, int]:
+    def _run(self, at: Stand, target: Target, enough: float = -np.inf) -> tuple[Stand, int]:
         """Go down in steps of at most a radius, which grows and shrinks as the model proves."""
         radius, programs = self.radius, 0
         while radius > SMALLEST_RADIUS and programs < MOST_PROGRAMS:
-            step = self._step(at, radius, aim)
+            step = self._step(at, radius, target)
             programs += step.programs
-            if step.to is not None and step.promised <= CONVERGED * abs(at.value(aim)):
+            if step.to is not None and step.promised <= CONVERGED * abs(at.value(target)):
                 break
-            if step.to is not None and at.value(aim) - step.to.value(aim) > ENOUGH * step.promised:
+            gained = 0.0 if step.to is None else at.value(target) - step.to.value(target)
+            if step.to is not None and gained > ENOUGH * step.promised:
                 at = step.to
-                if at.value(aim) <= enough:
+                if at.value(target) <= enough:
                     break
                 radius *= 2 if step.programs == 1 else 1
             else:
                 radius = min(radius, step.longest) / 3
         return at, programs
 
-    def _step(self, at: Stand, radius: float, aim: Aim) -> _Step:
+    def _step(self, at: Stand, radius: float, target: Target) -> _Step:
         """Solve the model, and again laid on where it led, until the true motion is admissible."""
         model, promised, longest = self._model(at, radius), 0.0, radius
         for programs in range(1, 2 + CORRECTIONS):
-            delta = solve(model, self.rates, aim)
+            delta = solve(model, self.rates, target)
             if delta is None:
                 break
             if programs == 1:
-                promised = at.value(aim) - self._modelled(model, delta, aim)
+                promised = at.value(target) - self._modelled(model, delta, target)
             longest = float(np.abs(delta).max())
             there = self.stand(at.gamma + delta, at.q)
-            soft = aim in ("excess", "lost")
+            soft = target in ("excess", "lost")
             if there.admitted or (soft and there.outside <= max(at.outside, 0)):
                 return _Step(there, promised, longest, programs)
             if there.outside == np.inf:
@@ -203,12 +204,12 @@ class Descent:
             model = replace(model, q=there.q - model.slope * delta[:, None])
         return _Step(None, promised, longest, programs)
 
-    def _modelled(self, model: Model, delta: Array, aim: Aim) -> float:
+    def _modelled(self, model: Model, delta: Array, target: Target) -> float:
         q = model.q + model.slope * delta[:, None]
         dq = np.diff(q, axis=0)
-        if aim == "excess":
+        if target == "excess":
             return self.rates.excess(dq)
-        return self.cost(q) + (PRICE * self.rates.lost(dq) if aim == "lost" else 0.0)
+        return self.cost(q) + (PRICE * self.rates.lost(dq) if target == "lost" else 0.0)
 
     def _model(self, at: Stand, radius: float) -> Model:
         slope = self.curves.slope(at.gamma, at.q)

@@ -20,9 +20,9 @@ from kerfpath.refiner._rates import Rates
 from kerfpath.refiner._rows import Rows, Sparse, wide
 from kerfpath.search import Metric
 
-__all__ = ["MARGIN", "PRICE", "Aim", "Model", "solve"]
+__all__ = ["MARGIN", "PRICE", "Model", "Target", "solve"]
 
-Aim = Literal["sum", "max", "excess", "lost"]
+Target = Literal["sum", "max", "excess", "lost"]
 """(14); (15); the largest share of the limits (5) and (6), whatever the distances; or (14) and, at
 `PRICE` each, what every interval and every node asks for beyond them."""
 
@@ -71,21 +71,21 @@ class Model:
     __repr__ = told
 
 
-def solve(model: Model, rates: Rates, aim: Aim) -> Array | None:
+def solve(model: Model, rates: Rates, target: Target) -> Array | None:
     """Return the best change of gamma (K,) rad by the linear model; None where there is none."""
     K = len(model.q)
     rows = Rows(K)
     dq, D = np.diff(model.q, axis=0), _increments(model)
     beyond = None
-    if aim in ("excess", "lost"):
-        beyond = rows.new(1 if aim == "excess" else len(rates.tau) + len(rates.span))
+    if target in ("excess", "lost"):
+        beyond = rows.new(1 if target == "excess" else len(rates.tau) + len(rates.span))
     _limits(rows, dq, D, rates, beyond)
     _ranges(rows, model)
     for sign in (1.0, -1.0):
         rows.hold(sign * sparse.eye_array(K, format="csr"), np.ones(K))
-    cost = np.zeros(K) if aim == "excess" else _cost(rows, dq, D, model, minimax=aim == "max")
+    cost = np.zeros(K) if target == "excess" else _cost(rows, dq, D, model, minimax=target == "max")
     if beyond is not None:
-        price = (1.0 if aim == "excess" else PRICE) * beyond.sum(axis=0)
+        price = (1.0 if target == "excess" else PRICE) * beyond.sum(axis=0)
         cost = np.pad(cost, (0, rows.variables - len(cost)))
         cost[: len(price)] += price
     equal = None
@@ -134,11 +134,11 @@ def _limits(rows: Rows, dq: Array, D: Sparse, rates: Rates, beyond: Sparse | Non
     before, after = ((joints + n * at[:, None]).ravel() for at in (rates.before, rates.after))
     A = _scaled(np.repeat(1 / rates.span, n), V[after] - V[before])
     for value, slope, limit, of in (
-        (rates.velocities(dq), V, rates.velocity, owner[:edges]),
-        (rates.accelerations(dq), A, rates.acceleration, owner[edges:]),
+        (rates.velocities(dq), V, rates.limits.velocity, owner[:edges]),
+        (rates.accelerations(dq), A, rates.limits.acceleration, owner[edges:]),
     ):
-        share = (value / limit).ravel()
-        per_share = _scaled(1 / np.tile(limit, len(value)), slope)
+        share = (value / limit.usable).ravel()
+        per_share = _scaled(1 / np.tile(limit.usable, len(value)), slope)
         for sign in (1.0, -1.0):
             if beyond is None:
                 rows.at_most(sign * share, sign * per_share, 1 - MARGIN)

@@ -8,6 +8,7 @@ import numpy as np
 
 from kerfpath._arrays import Array, Ints
 from kerfpath._told import told
+from kerfpath.limits import Limits
 
 __all__ = ["Rates"]
 
@@ -20,15 +21,14 @@ class Rates:
     ----------
     tau : (K-1,) s
         Time of each interval.
-    velocity, acceleration : (n,) rad/s, rad/s^2
-        Limits (5) and (6), eta included.
+    limits : Limits
+        What (5) and (6) hold it to.
     periodic : bool
         The last node is the first one again, and (6) holds across the seam.
     """
 
     tau: Array
-    velocity: Array
-    acceleration: Array
+    limits: Limits
     periodic: bool
 
     __repr__ = told
@@ -60,8 +60,8 @@ class Rates:
 
     def shares(self, dq: Array) -> tuple[Array, Array]:
         """Return the shares of the velocity limits (K-1, n) and the acceleration limits (M, n)."""
-        fast = np.abs(self.velocities(dq)) / self.velocity
-        return fast, np.abs(self.accelerations(dq)) / self.acceleration
+        fast = np.abs(self.velocities(dq)) / self.limits.velocity.usable
+        return fast, np.abs(self.accelerations(dq)) / self.limits.acceleration.usable
 
     def excess(self, dq: Array) -> float:
         """Return the largest share of a limit that increments (K-1, n) rad ask for, less one."""

@@ -12,10 +12,12 @@ from kerfpath._arrays import Array, scalar
 from kerfpath._told import told
 from kerfpath.contour import Contour
 from kerfpath.errors import InputError
+from kerfpath.kernels.metric import turns_of, wrap
 from kerfpath.plans import Plan, Proof, path_cost
 from kerfpath.refiner._curves import JointCurves
 from kerfpath.refiner._descent import Descent, Stand
 from kerfpath.refiner._rates import Rates
+from kerfpath.search import rotation_limits
 
 __all__ = ["Binding", "Refinement", "ease", "quicken", "refine"]
 
@@ -195,20 +197,18 @@ def _unrefined(plan: Plan, why: str) -> Refinement:
 
 def _descent(plan: Plan) -> tuple[Descent, Stand]:
     """Return the task of refining a plan, and where it stands."""
-    velocity, acceleration = plan.robot.speed_limits()
     settings, comfort = plan.settings, plan.settings.comfort
     descent = Descent(
         curves=JointCurves(plan.robot, plan.frames, plan.T_flange_tip, plan.posture),
         rates=Rates(
             tau=np.diff(plan.time),
-            velocity=settings.eta_v * velocity,
-            acceleration=settings.eta_a * acceleration,
+            limits=settings.limits(plan.robot),
             periodic=settings.closure == "periodic",
         ),
         limits=plan.robot.joint_limits()
         if comfort is None
         else comfort.narrowed(plan.robot, plan.q),
-        rotation=np.full(len(velocity), np.inf) if settings.rotation is None else settings.rotation,
+        rotation=rotation_limits(settings.rotation, plan.robot.endless),
         weight=settings.weights,
         metric=settings.metric,
         objective=settings.objective,
@@ -225,15 +225,13 @@ def _unwrapped(plan: Plan) -> Array:
 
 def _moved(plan: Plan, found: Stand) -> Plan:
     """Return the plan with the motion found, and what that costs at its own nodes."""
-    turn = np.ceil((found.q - np.pi) / (2 * np.pi))
-    gamma = found.gamma - 2 * np.pi * np.ceil((found.gamma - np.pi) / (2 * np.pi))
+    turn = turns_of(found.q)
     turn[:, plan.robot.endless] = 0
     turn[:, plan.robot.family.joints :] = 0
-    wrapped = found.q - 2 * np.pi * np.ceil((found.q - np.pi) / (2 * np.pi))
     moved = replace(
         plan,
-        q=np.where(plan.robot.endless, wrapped, found.q),
-        gamma=gamma,
+        q=np.where(plan.robot.endless, wrap(found.q), found.q),
+        gamma=wrap(found.gamma),
         turn=turn.astype(np.int64),
     )
     s, dq = plan.settings, np.diff(found.q, axis=0)

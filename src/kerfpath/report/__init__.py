@@ -5,6 +5,7 @@ from kerfpath.report._front import FrontAxis, FrontPlan
 from kerfpath.report._front_page import render_front
 from kerfpath.report._html import with_library, without_library
 from kerfpath.report._layout import render_layout
+from kerfpath.report._layout_entry import LayoutEntry
 from kerfpath.report._map import feasibility_map
 from kerfpath.report._page import render
 from kerfpath.report._section import ContourSection
@@ -15,6 +16,7 @@ __all__ = [
     "DrawnLoop",
     "FrontAxis",
     "FrontPlan",
+    "LayoutEntry",
     "feasibility_map",
     "render",
     "render_drawing",

@@ -72,7 +72,7 @@ def add_cell(
         }
     )
     # The step in use is named above the slider; the names of all would run into each other.
-    look: dict[str, Any] = {
+    look: dict[str, object] = {
         "currentvalue": {"prefix": "Shown: ", "font": {"size": 13, "color": INK}},
         "font": {"size": 1, "color": "white"},
         "ticklen": 0,

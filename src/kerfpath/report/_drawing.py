@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from html import escape
-from typing import Any
 
 import numpy as np
 import plotly.graph_objects as go
@@ -114,7 +113,7 @@ def _figure(loops: Sequence[DrawnLoop], mesh: tuple[ArrayLike, ArrayLike]) -> go
     return figure
 
 
-def _view(points: Array) -> dict[str, Any]:
+def _view(points: Array) -> dict[str, object]:
     """Return a scene around `points` (m) to scale; a flat drawing is looked at from above."""
     low, high = points.min(axis=0) * 1e3, points.max(axis=0) * 1e3
     size = float((high - low).max())
@@ -136,7 +135,7 @@ def _view(points: Array) -> dict[str, Any]:
     }
 
 
-def _labels(loops: Sequence[DrawnLoop]) -> list[dict[str, Any]]:
+def _labels(loops: Sequence[DrawnLoop]) -> list[dict[str, object]]:
     """Return the names at the starts of loops, in front of the part; heights alternate."""
     return [
         {
@@ -162,12 +161,12 @@ def _add(
     """Add loops as one line with breaks."""
     lines = [floats(loop.points, f"loop {loop.name}", (None, 3)) * 1e3 for loop in loops]
     broken = [np.vstack([line, np.full((1, 3), np.nan)]) for line in lines]
-    told = [f"<b>{escape(loop.name)}</b><br>{escape(loop.facts)}" for loop in loops]
+    texts = [f"<b>{escape(loop.name)}</b><br>{escape(loop.facts)}" for loop in loops]
     figure.add_scatter3d(
         **xyz(np.vstack(broken)),
         mode="lines",
         line={"color": colour, "width": 6},
-        text=np.repeat(told, [len(line) for line in broken]).tolist(),
+        text=np.repeat(texts, [len(line) for line in broken]).tolist(),
         hovertemplate="%{text}<extra></extra>",
         name=f"{len(loops)} {caption}",
         visible="legendonly" if aside else True,

@@ -1,4 +1,4 @@
-"""What the page of a Pareto set is told: its criteria and its plans."""
+"""The data on the page of a Pareto set: its criteria and its plans."""
 
 from __future__ import annotations
 

@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from html import escape
-from typing import Any
 
 from kerfpath.report._html import Figures, header, job_part, page
+from kerfpath.report._layout_entry import ContourSide, LayoutEntry
 from kerfpath.report._layout_plots import convergence, placement_map
 from kerfpath.report._tables import FAIL, PASS, WARN, number, sign, table, td
 
@@ -34,13 +33,13 @@ LONGEST = 160
 """Characters of a reason that are shown."""
 
 
-def render_layout(entry: Mapping[str, Any], *, job_text: str = "") -> str:
+def render_layout(entry: LayoutEntry, *, job_text: str = "") -> str:
     """Return the page of a layout as one self-contained HTML page.
 
     Parameters
     ----------
-    entry : mapping
-        What layout.json holds.
+    entry : LayoutEntry
+        The data of layout.json.
     job_text : str
         The job file as read.
     """
@@ -66,12 +65,12 @@ def render_layout(entry: Mapping[str, Any], *, job_text: str = "") -> str:
     return page(f"{entry['job']}: placement", body, figures)
 
 
-def _foot(entry: Mapping[str, Any]) -> str:
+def _foot(entry: LayoutEntry) -> str:
     lost = "Infeasible placements stand at the foot. " if entry["reasons"] else ""
     return lost + (f"From {entry['evolved']} on they are the map's." if entry["map"] else "")
 
 
-def _value(entry: Mapping[str, Any], value: float | None) -> str:
+def _value(entry: LayoutEntry, value: float | None) -> str:
     """Return a value of the goal in words."""
     if value is None:
         return "none"
@@ -80,19 +79,19 @@ def _value(entry: Mapping[str, Any], value: float | None) -> str:
     return f"{value:.3f} {'m/min' if entry['goal'] == 'speed' else 'times'}"
 
 
-def _verdict(entry: Mapping[str, Any]) -> tuple[str, str]:
+def _verdict(entry: LayoutEntry) -> tuple[str, str]:
     best, shipped = entry["best"], entry["shipped"]
     if best is None:
         return FAIL, f"None of {len(entry['tried'])} placements is feasible"
-    told = f"{GOALS[entry['goal']].capitalize()}: {_value(entry, best['value'])}"
+    result = f"{GOALS[entry['goal']].capitalize()}: {_value(entry, best['value'])}"
     if best["gain"] is None:
-        return PASS, f"{told}; where the job has it, it is not feasible ({shipped['status']})"
+        return PASS, f"{result}; where the job has it, it is not feasible ({shipped['status']})"
     if best["gain"] <= 0:
-        return WARN, f"{told}, as the job has it: none of those tried is better"
-    return PASS, f"{told}, {best['gain'] * 100:.1f} % better than where the job has it"
+        return WARN, f"{result}, as the job has it: none of those tried is better"
+    return PASS, f"{result}, {best['gain'] * 100:.1f} % better than where the job has it"
 
 
-def _facts(entry: Mapping[str, Any]) -> list[tuple[str, str]]:
+def _facts(entry: LayoutEntry) -> list[tuple[str, str]]:
     tried, exact = len(entry["tried"]), entry["exact_searches"]
     facts = [
         ("Goal", GOALS[entry["goal"]]),
@@ -105,14 +104,14 @@ def _facts(entry: Mapping[str, Any]) -> list[tuple[str, str]]:
         still = f"others may come to {_value(entry, entry['open_bound'])}"
         facts.append(("Claim", proved if entry["proved"] else still))
     if entry["tolerance"]:
-        told = ", ".join(f"{name} ±{size:g}" for name, size in entry["tolerance"].items())
-        facts.append(("The worst within", f"{told}, one at a time"))
+        spans = ", ".join(f"{name} ±{size:g}" for name, size in entry["tolerance"].items())
+        facts.append(("The worst within", f"{spans}, one at a time"))
     if entry["standing"]:
         facts.append(("Standing", ", ".join(entry["standing"])))
     return facts
 
 
-def _notes(entry: Mapping[str, Any]) -> list[str]:
+def _notes(entry: LayoutEntry) -> list[str]:
     notes = []
     if entry["default_ranges"]:
         notes.append("Nobody said what may vary: these ranges are a default.")
@@ -120,24 +119,26 @@ def _notes(entry: Mapping[str, Any]) -> list[str]:
     if entry["goal"] == "margin" and best is not None and best["value"] < 1:
         notes.append("Some contour cannot be cut at the speed asked for, even there.")
     if best is None and entry["reasons"]:
-        told = entry["reasons"][0]
-        where = f" {told['contour']}, node {told['node']}:" if told["contour"] else ""
-        notes.append(f"Most common:{where} {told['reason']} ({told['count']} placements).")
+        why = entry["reasons"][0]
+        where = f" {why['contour']}, node {why['node']}:" if why["contour"] else ""
+        notes.append(f"Most common:{where} {why['reason']} ({why['count']} placements).")
     return notes
 
 
-def _placement(entry: Mapping[str, Any]) -> list[str]:
-    best = entry["best"] or entry["nearest"]
-    what = "Best" if entry["best"] else "Nearest to feasible"
+def _placement(entry: LayoutEntry) -> list[str]:
+    best = entry["best"]
+    at = best or entry["nearest"]
+    assert at is not None, "a layout has a best placement or a nearest one"
+    what = "Best" if best else "Nearest to feasible"
     rows = []
     for name, (low, high) in entry["ranges"].items():
-        value, unit = best["offsets"][name], name.rpartition("_")[2]
+        value, unit = at["offsets"][name], name.rpartition("_")[2]
         at_end = min(value - low, high - value) < 0.01 * (high - low)
-        told = number(value, 2 if unit == "mm" else 3)
-        told += " <small>at the end</small>" if at_end else ""
+        shown = number(value, 2 if unit == "mm" else 3)
+        shown += " <small>at the end</small>" if at_end else ""
         rows.append(
             f'<tr><th scope="row">{escape(name)}</th>{td(f"{low:g}".replace("-", "&minus;"))}'
-            f"{td(f'{high:g}'.replace('-', '&minus;'))}{td(told)}</tr>"
+            f"{td(f'{high:g}'.replace('-', '&minus;'))}{td(shown)}</tr>"
         )
     parts = [
         "<section><h2>The placement</h2>",
@@ -147,7 +148,7 @@ def _placement(entry: Mapping[str, Any]) -> list[str]:
         "better one.</p>",
         table((("Variable", ""), ("From", ""), ("To", ""), (what, "")), rows),
     ]
-    if entry["best"]:
+    if best:
         numbers = "".join(
             f"<li><b>{escape(key)}</b> = {escape(str(value))}</li>"
             for key, value in best["numbers"].items()
@@ -159,7 +160,7 @@ def _placement(entry: Mapping[str, Any]) -> list[str]:
     return [*parts, "</section>"]
 
 
-def _contours(entry: Mapping[str, Any]) -> list[str]:
+def _contours(entry: LayoutEntry) -> list[str]:
     if not entry["contours"]:
         return []
     motion = entry["goal"] == "motion"
@@ -170,7 +171,8 @@ def _contours(entry: Mapping[str, Any]) -> list[str]:
     for contour in entry["contours"]:
         sides = [contour["before"], contour["after"]]
         values = [
-            None if s is None else s.get("value" if motion else "fastest_m_min") for s in sides
+            None if s is None else s.get("value") if motion else s.get("fastest_m_min")
+            for s in sides
         ]
         change = ""
         if values[0] is not None and values[1] is not None:
@@ -188,31 +190,35 @@ def _contours(entry: Mapping[str, Any]) -> list[str]:
     ]
 
 
-def _binds(side: Mapping[str, Any] | None) -> str:
+def _binds(side: ContourSide | None) -> str:
     if side is None or "joint" not in side:
         return ""
     return f"joint {side['joint']} {side['limit']} <small>node {side['node']}</small>"
 
 
-def _map(entry: Mapping[str, Any], figures: Figures) -> list[str]:
-    if entry["map"] is None:
+def _map(entry: LayoutEntry, figures: Figures) -> list[str]:
+    drawn = entry["map"]
+    if drawn is None:
         return []
-    others = [name for name in entry["ranges"] if name not in entry["map"]["variables"]]
+    others = [name for name in entry["ranges"] if name not in drawn["variables"]]
     held = f", {' and '.join(others)} as in the best placement" if others else ""
-    over = f"{' and '.join(entry['map']['variables'])}{held}"
+    over = f"{' and '.join(drawn['variables'])}{held}"
     return [
         "<section><h2>Map</h2>",
         f'<p class="caption">What the goal can come to at best over {over}; elsewhere why nothing '
-        f"can be cut there.{DOTS if entry['map']['y'] else ''}</p>",
-        figures.place(placement_map(entry), "placements"),
+        f"can be cut there.{DOTS if drawn['y'] else ''}</p>",
+        figures.place(placement_map(entry, drawn), "placements"),
         "</section>",
     ]
 
 
-def _tallies(entry: Mapping[str, Any]) -> str:
+def _tallies(entry: LayoutEntry) -> str:
     parts, total = [], len(entry["tried"])
-    for title, words, key in (("Decided by", STAGES, "stages"), ("Outcome", STATUSES, "statuses")):
-        tally = {name: count for name in words if (count := entry[key].get(name))}
+    for title, words, counts in (
+        ("Decided by", STAGES, entry["stages"]),
+        ("Outcome", STATUSES, entry["statuses"]),
+    ):
+        tally = {name: count for name in words if (count := counts.get(name))}
         rows = [
             f'<tr><th scope="row">{words[name]}</th>{td(str(count))}'
             f"{td(f'{100 * count / total:.0f}')}</tr>"
@@ -221,14 +227,14 @@ def _tallies(entry: Mapping[str, Any]) -> str:
         heads = [("", ""), ("Placements", ""), ("", "%")]
         parts += [f"<h4>{title}</h4>", table(heads, rows)]
     reasons = [
-        f'<tr><th scope="row">{STATUSES[told["status"]]}</th>'
-        f"<td>{escape(told['contour'] or '')}</td>"
-        f"{td('' if told['node'] is None else str(told['node']))}{td(str(told['count']))}"
-        f"<td>{escape(told['reason'][:LONGEST])}</td></tr>"
-        for told in entry["reasons"]
+        f'<tr><th scope="row">{STATUSES[why["status"]]}</th>'
+        f"<td>{escape(why['contour'] or '')}</td>"
+        f"{td('' if why['node'] is None else str(why['node']))}{td(str(why['count']))}"
+        f"<td>{escape(why['reason'][:LONGEST])}</td></tr>"
+        for why in entry["reasons"]
     ]
     if reasons:
         heads = [("", ""), ("Contour", ""), ("Node, most often", ""), ("Placements", "")]
-        told = table([*heads, ("Such as", "")], reasons, text_columns=(0, 1, 4))
-        parts += ["<h4>Why not</h4>", told]
+        why_not = table([*heads, ("Such as", "")], reasons, text_columns=(0, 1, 4))
+        parts += ["<h4>Why not</h4>", why_not]
     return "\n".join(parts)

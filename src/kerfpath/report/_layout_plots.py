@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from typing import Any
-
 import numpy as np
 import plotly.graph_objects as go
 
+from kerfpath.report._layout_entry import LayoutEntry, LayoutMap, MapSquare
 from kerfpath.report._look import (
     ACCENT,
     ALERT,
@@ -28,28 +26,28 @@ SCALE = [[0.0, "#f3f8e6"], [0.35, "#bfe0c4"], [0.7, "#4fa897"], [1.0, "#0b5c58"]
 WORDS = {"speed": "m/min", "margin": "times asked", "motion": "displacement"}
 
 
-def placement_map(entry: Mapping[str, Any]) -> go.Figure:
+def placement_map(entry: LayoutEntry, drawn: LayoutMap) -> go.Figure:
     """Return the bounds over the first two variables, or over the only one, and those tried."""
-    return _plane(entry) if entry["map"]["y"] else _line(entry)
+    return _plane(entry, drawn) if drawn["y"] else _line(entry, drawn)
 
 
-def _title(name: str) -> dict[str, Any]:
+def _title(name: str) -> dict[str, object]:
     words, _, unit = name.rpartition("_")
     return axis_title(f"{words.replace('_', ' ')} ({unit})")
 
 
-def _hover(entry: Mapping[str, Any], cell: Mapping[str, Any]) -> str:
-    if cell["status"] != "feasible":
-        where = f"{cell['contour']}, node {cell['node']}: " if "contour" in cell else ""
-        return f"{cell['status']}<br>{where}{str(cell.get('reason', ''))[:90]}"
-    if cell["bound"] is None:
+def _hover(entry: LayoutEntry, square: MapSquare) -> str:
+    if square["status"] != "feasible":
+        where = f"{square['contour']}, node {square['node']}: " if "contour" in square else ""
+        return f"{square['status']}<br>{where}{square.get('reason', '')[:90]}"
+    if square["bound"] is None:
         return "feasible as far as is known"
     least = "at least" if entry["goal"] == "motion" else "at most"
-    return f"{least} {cell['bound']:.3f} {WORDS[entry['goal']]}"
+    return f"{least} {square['bound']:.3f} {WORDS[entry['goal']]}"
 
 
-def _plane(entry: Mapping[str, Any]) -> go.Figure:
-    drawn, (first, second) = entry["map"], entry["map"]["variables"]
+def _plane(entry: LayoutEntry, drawn: LayoutMap) -> go.Figure:
+    first, second = drawn["variables"]
     shape = len(drawn["y"]), len(drawn["x"])
     cells = np.array(drawn["cells"], dtype=object).reshape(shape)
     bound = [[c["bound"] if c["status"] == "feasible" else None for c in row] for row in cells]
@@ -110,8 +108,8 @@ def _mark(
     figure.add_scatter(x=[x], y=[y], mode="markers", marker=look, name=name)
 
 
-def _line(entry: Mapping[str, Any]) -> go.Figure:
-    drawn, (name, *_) = entry["map"], entry["map"]["variables"]
+def _line(entry: LayoutEntry, drawn: LayoutMap) -> go.Figure:
+    name = drawn["variables"][0]
     figure = go.Figure(layout=base_layout(380, legend={"orientation": "h", "y": 1.12}))
     bounds = [c["bound"] if c["status"] == "feasible" else None for c in drawn["cells"]]
     figure.add_scatter(
@@ -119,10 +117,10 @@ def _line(entry: Mapping[str, Any]) -> go.Figure:
         text=[_hover(entry, c) for c in drawn["cells"]], hovertemplate="%{text}<extra></extra>",
     )  # fmt: skip
     half = _half(drawn["x"])
-    for x, cell in zip(drawn["x"], drawn["cells"], strict=True):
-        if cell["status"] != "feasible":
+    for x, square in zip(drawn["x"], drawn["cells"], strict=True):
+        if square["status"] != "feasible":
             figure.add_vrect(
-                x0=x - half, x1=x + half, fillcolor=WHY[cell["status"]], line_width=0,
+                x0=x - half, x1=x + half, fillcolor=WHY[square["status"]], line_width=0,
                 layer="below",
             )  # fmt: skip
     for status in WHY:
@@ -131,14 +129,14 @@ def _line(entry: Mapping[str, Any]) -> go.Figure:
     if entry["shipped"]["value"] is not None:
         _mark(figure, 0.0, entry["shipped"]["value"], "as the job has it", "x", INK, 11)
     if entry["best"]:
-        at = entry["best"]
-        _mark(figure, at["offsets"][name], at["value"], "best", "star", "#ffb000", 19)
+        best = entry["best"]
+        _mark(figure, best["offsets"][name], best["value"], "best", "star", "#ffb000", 19)
     figure.update_xaxes(**axis(title=_title(name), range=_ends(drawn["x"])))
     figure.update_yaxes(**axis(title=axis_title(WORDS[entry["goal"]])))
     return figure
 
 
-def convergence(entry: Mapping[str, Any]) -> go.Figure:
+def convergence(entry: LayoutEntry) -> go.Figure:
     """Return what each placement tried can come to, in order, and the best so far."""
     tried, less = entry["tried"], entry["goal"] == "motion"
     figure = go.Figure(layout=base_layout(360, legend={"orientation": "h", "y": 1.12}))

@@ -8,6 +8,8 @@ from typing import Any
 
 import plotly.graph_objects as go
 
+from kerfpath.losses import Loss, Reason
+
 __all__ = [
     "ACCENT",
     "ALERT",
@@ -33,17 +35,21 @@ SCALE = ("#440154", "#414487", "#2a788e", "#22a884", "#7ad151")
 JOINT_COLOURS = ("#0061cc", "#f4a918", "#0ea069", "#df5ac2", "#f05d16", "#55bdff")
 _LOW = ("#4089d9", "#fce3b4", "#6bc5a3", "#f6ceed", "#f6a076", "#86d0ff")
 _HIGH = ("#003875", "#be8313", "#09603f", "#c34fa9", "#742d0b", "#2f688d")
-_REASONS = {"admitted": "#eef7ee", "unreachable": "#b4bac4", "posture not wanted": "#d9d4e2"}
-_REASONS |= {f"joint {i + 1} low": colour for i, colour in enumerate(_LOW)}
-_REASONS |= {f"joint {i + 1} high": colour for i, colour in enumerate(_HIGH)}
-_REASONS["collision"] = "#d7263d"
+_REASONS = {
+    Reason(Loss.ADMITTED): "#eef7ee",
+    Reason(Loss.UNREACHABLE): "#b4bac4",
+    Reason(Loss.UNWANTED): "#d9d4e2",
+    Reason(Loss.COLLISION): "#d7263d",
+    **{Reason(Loss.LOW, f"joint {i + 1}"): colour for i, colour in enumerate(_LOW)},
+    **{Reason(Loss.HIGH, f"joint {i + 1}"): colour for i, colour in enumerate(_HIGH)},
+}
 _SPARE = ("#d3e7a4", "#f7c46c", "#f08a4b")
 _OTHER_REASONS = ("#7a7f88", "#33373e")
 
 FONT = 'system-ui, -apple-system, "Segoe UI", Roboto, "Helvetica Neue", Arial, sans-serif'
 
 
-def reason_colours(reasons: Sequence[str]) -> tuple[str, ...]:
+def reason_colours(reasons: Sequence[Reason]) -> tuple[str, ...]:
     """Return one colour per reason: a joint's light shade below its limits, dark above them.
 
     Clearances run from green to orange. Reasons without a colour of their own (couplings, low and
@@ -51,14 +57,14 @@ def reason_colours(reasons: Sequence[str]) -> tuple[str, ...]:
     """
     greys, spare = cycle(_OTHER_REASONS), cycle(_SPARE)
     return tuple(
-        _REASONS[word] if word in _REASONS else next(spare if word.endswith("to spare") else greys)
-        for word in reasons
+        _REASONS[why] if why in _REASONS else next(spare if why.loss is Loss.SPARE else greys)
+        for why in reasons
     )
 
 
 def base_layout(height: int, **more: Any) -> go.Layout:
     """Return a calm white layout of `height` px, without plotly's default template."""
-    look: dict[str, Any] = {
+    look: dict[str, object] = {
         "template": go.layout.Template(),
         "height": height,
         "font": {"family": FONT, "size": 12, "color": INK},
@@ -74,7 +80,7 @@ def base_layout(height: int, **more: Any) -> go.Layout:
     return go.Layout(**(look | more))
 
 
-def axis(**more: Any) -> dict[str, Any]:
+def axis(**more: Any) -> dict[str, object]:
     """Return the look of a plot axis."""
     return {
         "showgrid": True,
@@ -90,12 +96,12 @@ def axis(**more: Any) -> dict[str, Any]:
     } | more
 
 
-def axis_title(text: str) -> dict[str, Any]:
+def axis_title(text: str) -> dict[str, object]:
     """Return an axis title."""
     return {"text": text, "font": {"size": 12, "color": QUIET}, "standoff": 8}
 
 
-def band(x0: float, x1: float, **where: Any) -> dict[str, Any]:
+def band(x0: float, x1: float, **where: Any) -> dict[str, object]:
     """Return a pale vertical band from x0 to x1, below the lines."""
     return {
         "type": "rect",

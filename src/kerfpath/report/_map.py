@@ -11,6 +11,7 @@ import plotly.graph_objects as go
 
 from kerfpath._arrays import Array
 from kerfpath.graph import LayeredGraph
+from kerfpath.losses import Loss
 from kerfpath.plans import Plan
 from kerfpath.report._look import (
     ALERT,
@@ -30,8 +31,6 @@ ROW, GAP, TOP, BOTTOM = 150, 34, 48, 50
 
 HALF_TURN = 180.0
 """deg: the map ends there, and begins at its negative."""
-ADMITTED = 0
-"""The reason code of a candidate that is not dropped, see `LayeredGraph`."""
 
 
 def feasibility_map(
@@ -122,7 +121,8 @@ def feasibility_map(
 def shown_postures(graph: LayeredGraph) -> list[int]:
     """Return the postures with an admitted candidate; if there is none, those worth a look."""
     every = range(graph.reason.shape[-1])
-    codes = [c for c, word in enumerate(graph.reasons) if c == ADMITTED or word.endswith("spare")]
+    kept = (Loss.ADMITTED, Loss.SPARE)
+    codes = [c for c, why in enumerate(graph.reasons) if why.loss in kept]
     admitted = [mu for mu in every if np.isin(graph.reason_by_gamma[:, :, mu], codes).any()]
     # Where one reason holds everywhere, a word says as much as a panel.
     mixed = [mu for mu in every if np.ptp(graph.reason_by_gamma[:, :, mu])]
@@ -131,7 +131,7 @@ def shown_postures(graph: LayeredGraph) -> list[int]:
 
 def hidden_postures(graph: LayeredGraph) -> list[str]:
     """Say of each posture without a panel why its candidates were dropped."""
-    shown, told = shown_postures(graph), []
+    shown, left_out = shown_postures(graph), list[str]()
     for mu in range(graph.reason.shape[-1]):
         if mu in shown:
             continue
@@ -143,8 +143,8 @@ def hidden_postures(graph: LayeredGraph) -> list[str]:
         else:
             shares = [f"{graph.reasons[c]} {_share(number[c] / codes.size)}" for c in order]
             why = "no admitted candidate (" + ", ".join(shares) + ")"
-        told.append(f"{posture_name(mu)}: {why}")
-    return told
+        left_out.append(f"{posture_name(mu)}: {why}")
+    return left_out
 
 
 def chosen_line(plan: Plan, posture: int, parts: int = 1) -> list[tuple[Array, Array]]:

@@ -233,7 +233,7 @@ def _share_range(share: Array) -> list[float]:
     return [-1.08 * most, 1.08 * most]
 
 
-def _level(value: float, x: str, y: str, colour: str, dash: str) -> dict[str, Any]:
+def _level(value: float, x: str, y: str, colour: str, dash: str) -> dict[str, object]:
     return {
         "type": "line",
         "x0": 0,

@@ -213,9 +213,9 @@ def _postures_in_words(plan: Plan) -> str:
     runs = _motion.posture_runs(plan)
     if len(runs) == 1:
         return f"Posture {posture_name(runs[0][0])} throughout."
-    told = [f"{posture_name(mu)} (nodes {a} to {b})" for mu, a, b in runs[:6]]
+    stretches = [f"{posture_name(mu)} (nodes {a} to {b})" for mu, a, b in runs[:6]]
     more = f", and {len(runs) - 6} more" if len(runs) > 6 else ""
-    return f"{len(runs) - 1} changes of posture, shaded: {', '.join(told)}{more}."
+    return f"{len(runs) - 1} changes of posture, shaded: {', '.join(stretches)}{more}."
 
 
 def _verdict(sections: Sequence[ContourSection], faults: Sequence[str]) -> tuple[str, str]:
@@ -243,13 +243,13 @@ def _verdict(sections: Sequence[ContourSection], faults: Sequence[str]) -> tuple
 
 
 def _origin(sections: Sequence[ContourSection]) -> str:
-    told = [f"kerfpath {version('kerfpath')}"]
+    lines = [f"kerfpath {version('kerfpath')}"]
     plan = next((section.plan for section in sections if section.plan is not None), None)
     if plan is not None:
-        told.append(f"robot {plan.robot.id}")
+        lines.append(f"robot {plan.robot.id}")
         source = plan.robot.acceleration_source or "source not stated"
-        told.append(f"joint acceleration limits: {source}")
+        lines.append(f"joint acceleration limits: {source}")
         if "geometry_limits_velocity" in plan.robot.sources:
             limits = plan.robot.sources["geometry_limits_velocity"]
-            told.append(f"geometry, joint and velocity limits: {limits}")
-    return escape(" · ".join(told))
+            lines.append(f"geometry, joint and velocity limits: {limits}")
+    return escape(" · ".join(lines))

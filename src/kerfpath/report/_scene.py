@@ -163,15 +163,15 @@ def _add_move(figure: go.Figure, points: Array, number: int) -> None:
     )
 
 
-def _labels(sections: Sequence[ContourSection]) -> list[dict[str, Any]]:
+def _labels(sections: Sequence[ContourSection]) -> list[dict[str, object]]:
     """Name contours at their starts, and the first place where each failed one fails.
 
     Alternate heights keep neighbouring names apart.
     """
     named = sections if len(sections) <= LABELS else ()
-    told = [(section.path.points[0], section.name, INK) for section in named]
+    labels = [(section.path.points[0], section.name, INK) for section in named]
     failed = [section for section in sections if section.marks][:LABELS]
-    told += [(s.marks[0].point, f"{s.name}: {s.marks[0].words}", ALERT) for s in failed]
+    labels += [(s.marks[0].point, f"{s.name}: {s.marks[0].words}", ALERT) for s in failed]
     return [
         {
             **dict(zip("xyz", (point * 1e3).tolist(), strict=True)),
@@ -186,11 +186,11 @@ def _labels(sections: Sequence[ContourSection]) -> list[dict[str, Any]]:
             "ay": (-34, 34, -66, 66)[i % 4],
             "xanchor": "left",
         }
-        for i, (point, text, colour) in enumerate(told)
+        for i, (point, text, colour) in enumerate(labels)
     ]
 
 
-def _camera(sections: Sequence[ContourSection], cell: Cell | None) -> dict[str, Any]:
+def _camera(sections: Sequence[ContourSection], cell: Cell | None) -> dict[str, object]:
     """Look at the part from the side of the nozzle, a little from above and from the side.
 
     Up is up in the cell; without one, of the part.
@@ -210,7 +210,7 @@ def _camera(sections: Sequence[ContourSection], cell: Cell | None) -> dict[str, 
     }
 
 
-def space_axis(name: str) -> dict[str, Any]:
+def space_axis(name: str) -> dict[str, object]:
     """Return the look of an axis in space."""
     return {
         "title": {"text": f"{name}, mm", "font": {"size": 12, "color": QUIET}},
@@ -235,12 +235,12 @@ def checked(mesh: tuple[ArrayLike, ArrayLike]) -> tuple[Array, Any]:
     return vertices, triangles
 
 
-def xyz(points: Array) -> dict[str, Any]:
+def xyz(points: Array) -> dict[str, object]:
     """Return points (K, 3) as plotly takes them."""
     return dict(zip("xyz", points.T.astype(np.float32), strict=True))
 
 
-def _lines(starts: Array, ends: Array) -> dict[str, Any]:
+def _lines(starts: Array, ends: Array) -> dict[str, object]:
     """Return many separate lines as one trace; NaN is plotly's sign for a break."""
     breaks = np.full_like(starts, np.nan)
     return xyz(np.stack([starts, ends, breaks], axis=1).reshape(-1, 3))

@@ -1,4 +1,4 @@
-"""What the report is told about one contour."""
+"""The data of one contour on the page of a job."""
 
 from __future__ import annotations
 
@@ -15,14 +15,14 @@ from kerfpath.auditor import Check
 from kerfpath.contour import Contour
 from kerfpath.errors import InputError
 from kerfpath.graph import LayeredGraph
+from kerfpath.losses import Loss, Reason
 from kerfpath.planner import ClearanceMap
 from kerfpath.plans import Plan
 
-__all__ = ["COLLISION", "SPARE", "ContourSection", "Mark", "with_clearance"]
+__all__ = ["SPARE", "ContourSection", "Mark", "with_clearance"]
 
-COLLISION = "collision"
 SPARE = (0.25, 0.5, 1.0)
-"""Shares of the band of a clearance map up to which clearances are told apart."""
+"""Shares of the band of a clearance map up to which clearances have colours of their own."""
 
 
 def with_clearance(graph: LayeredGraph, found: ClearanceMap) -> LayeredGraph:
@@ -30,11 +30,11 @@ def with_clearance(graph: LayeredGraph, found: ClearanceMap) -> LayeredGraph:
 
     A candidate that is not clear is called a collision; one whose clearance is less than the band
     of the map, by how much it has to spare. The turns of a candidate have the same pose, so that
-    any of them tells.
+    one of them is enough.
     """
     steps = [1e3 * share * found.band for share in (0.0, *SPARE)]
-    spare = [f"{a:g} to {b:g} mm to spare" for a, b in pairwise(steps)][::-1]
-    reasons = (graph.reasons[0], *spare, COLLISION, *graph.reasons[1:])
+    spare = [Reason(Loss.SPARE, f"{a:g} to {b:g} mm") for a, b in pairwise(steps)][::-1]
+    reasons = (graph.reasons[0], *spare, Reason(Loss.COLLISION), *graph.reasons[1:])
     added = len(spare) + 1
     above = np.searchsorted(np.array(SPARE) * found.band, found.lower, side="right")
     layer = np.repeat(np.arange(len(graph.reason)), np.diff(graph.start))
@@ -109,14 +109,14 @@ class ContourSection:
                 )
         intervals = {count - 1 for count in nodes.values()}
         if any(count % min(intervals) for count in intervals) or len(self.path) != nodes["graph"]:
-            told = ", ".join(f"{name} {count}" for name, count in nodes.items())
+            counts = ", ".join(f"{name} {count}" for name, count in nodes.items())
             raise InputError(
-                f"section {self.name!r}: expected the same nodes throughout, got {told}"
+                f"section {self.name!r}: expected the same nodes throughout, got {counts}"
             )
 
     @property
     def mapped(self) -> LayeredGraph:
-        """The graph, its vertices told apart by how clear they are where that is known."""
+        """The graph, with the clearance of its vertices among the reasons where it is known."""
         return self.graph if self.clearance is None else with_clearance(self.graph, self.clearance)
 
     @property

@@ -1,15 +1,16 @@
-"""What axis 3 of a controller measures: the elbow, or the upper arm from the horizontal.
+"""The meaning of a controller's axis 3: the elbow, or the upper arm from the horizontal.
 
 A parallel rod from the foot of an arm (IRB 2400, 4400) holds its upper arm as it was while axis 2
 moves, and every FANUC pendant shows J3 so: then axis 3 is joint 2 and joint 3 of the serial model
-together, and its limits bound both. Nothing in a description tells. An arm read from one is known
-by the lengths of a robot of the library, or it is told; otherwise it is not known, and languages
-that say axis 3 refuse it.
+together, and its limits bound both. No description says which. For an arm read from one it is that
+of a robot of the library with the same lengths, or it is given; otherwise it is not known, and
+languages that say axis 3 refuse the arm.
 """
 
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -17,11 +18,12 @@ from numpy.typing import ArrayLike
 from kerfpath._arrays import Array, floats
 from kerfpath.errors import InputError
 from kerfpath.robots._coupling import Coupling
-from kerfpath.robots._library import robot as known_robot
-from kerfpath.robots._library import robot_ids
-from kerfpath.robots._robot import Robot
+from kerfpath.robots._library import read_robot, robot_ids
+from kerfpath.robots._manipulator import Manipulator
 
 __all__ = ["level", "with_axis_3"]
+
+A = TypeVar("A", bound=Manipulator)
 
 COUNTED = {
     "ABB": ("serial", "horizontal"),
@@ -41,7 +43,7 @@ ARM = ("a1", "a2", "b", "c2", "c3")
 """The lengths from axis 1 to the wrist: foot and flange may be described elsewhere."""
 
 
-def level(robot: Robot) -> tuple[Array, float]:
+def level(robot: Manipulator) -> tuple[Array, float]:
     """Return row (n,) and shift rad of axis 3 from the horizontal: row @ q + shift.
 
     As the robot's maker counts it, zero where the upper arm lies level.
@@ -53,8 +55,8 @@ def level(robot: Robot) -> tuple[Array, float]:
     return way * row, way * shift
 
 
-def with_axis_3(robot: Robot, axis_3: str = "", limits: ArrayLike | None = None) -> Robot:
-    """Return the robot with axis 3 as it is told, or else as the library knows it.
+def with_axis_3(robot: A, axis_3: str = "", limits: ArrayLike | None = None) -> A:
+    """Return the robot with axis 3 as given, or else as the library knows it.
 
     Parameters
     ----------
@@ -72,20 +74,20 @@ def with_axis_3(robot: Robot, axis_3: str = "", limits: ArrayLike | None = None)
         not do, or the library knows otherwise of an arm with these lengths.
     """
     if axis_3:
-        return _told(robot, axis_3, limits)
+        return _given(robot, axis_3, limits)
     if limits is not None:
         raise InputError('axis_3_limits=: expected them with axis_3="horizontal", got no axis_3=')
     return _looked_up(robot)
 
 
-def _looked_up(robot: Robot) -> Robot:
+def _looked_up(robot: A) -> A:
     """Return the robot with what the library knows of axis 3 of an arm with its lengths.
 
     Unchanged where no arm of its maker has them, or where those that have them do not agree.
     """
     twins = [
         twin
-        for twin in (known_robot(name) for name in robot_ids())
+        for twin in (read_robot(Manipulator, name) for name in robot_ids())
         if twin.kinematics == robot.kinematics == "opw"
         and robot.manufacturer in ("", twin.manufacturer)
         and all(abs(robot.geometry[k] - twin.geometry[k]) <= ALIKE for k in ARM)
@@ -105,8 +107,8 @@ def _looked_up(robot: Robot) -> Robot:
     return replace(robot, axis_3=counted, couplings=_tightest(bounds), notes=(*robot.notes, *notes))
 
 
-def _told(robot: Robot, axis_3: str, limits: ArrayLike | None) -> Robot:
-    """Return the robot with axis 3 as it is told, once nothing known speaks against it."""
+def _given(robot: A, axis_3: str, limits: ArrayLike | None) -> A:
+    """Return the robot with axis 3 as given, unless something known contradicts it."""
     counted = COUNTED.get(robot.manufacturer, ("serial", "horizontal"))
     if axis_3 not in counted:
         raise InputError(
@@ -147,7 +149,7 @@ def _told(robot: Robot, axis_3: str, limits: ArrayLike | None) -> Robot:
     return replace(robot, axis_3=axis_3, couplings=(one,))
 
 
-def _carried_over(coupling: Coupling, twin: Robot, robot: Robot) -> Coupling:
+def _carried_over(coupling: Coupling, twin: Manipulator, robot: Manipulator) -> Coupling:
     """Return a bound of a twin in the joints of a robot, which may count them otherwise."""
     row = coupling.row * twin.sign * robot.sign
     shift = float(coupling.row @ (twin.sign * _turned(twin.offset - robot.offset)))

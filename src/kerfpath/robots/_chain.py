@@ -36,8 +36,8 @@ def model_chain(robot: Robot) -> Chain:
     """Return the joint frames of the model of its family, whatever its description says."""
     if robot.kinematics not in _MODELS:
         raise InputError(
-            f"robot {robot.id!r}: where the joints of an {robot.family.words} are is told by its "
-            "description alone; read it with Robot.from_urdf"
+            f"robot {robot.id!r}: only its description says where the joints of an "
+            f"{robot.family.words} are; read it with Robot.from_urdf"
         )
     model = _MODELS[robot.kinematics](robot.geometry)
     # q_model = sign q - offset: a frame at angle zero is turned back by the offset.

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any
+from typing import TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -13,18 +13,20 @@ from scipy.spatial.transform import Rotation
 from kerfpath._arrays import Array
 from kerfpath.errors import InputError
 from kerfpath.robots._axis_three import with_axis_3
-from kerfpath.robots._recognise import in_closed_form, model_of
-from kerfpath.robots._robot import Robot
+from kerfpath.robots._manipulator import Manipulator
+from kerfpath.robots._recognise import in_closed_form, recognise
 from kerfpath.urdf import Chain, Description, read_urdf
 
-__all__ = ["described", "robot_of"]
+__all__ = ["build_robot", "read_description"]
+
+A = TypeVar("A", bound=Manipulator)
 
 SNAPS = (5e-6, 5e-5, 5e-4, 5e-3)
 """rad: by how much angles of five, four, three and two digits after the point may be rounded."""
 POSES = 256
 
 
-def described(
+def read_description(
     path: str | Path,
     snap: float | None,
     *,
@@ -69,7 +71,7 @@ def described(
 
 
 def _alike(one: Chain, two: Chain) -> bool:
-    """Say whether two chains have the same frames."""
+    """Return whether two chains have the same frames."""
     return np.array_equal(one.origins, two.origins) and np.array_equal(one.end, two.end)
 
 
@@ -82,7 +84,8 @@ def _moved(found: Description, meant: Chain) -> tuple[float, float]:
     return float(off.max()), float(Rotation.from_matrix(between).magnitude().max())
 
 
-def robot_of(
+def build_robot(
+    kind: type[A],
     description: Description,
     *,
     as_written: bool = False,
@@ -94,7 +97,7 @@ def robot_of(
     velocity: ArrayLike | None = None,
     acceleration: ArrayLike | None = None,
     endless: ArrayLike | None = None,
-) -> Robot:
+) -> A:
     """Return the robot of a description; limits given (rad, s) come before those written.
 
     Raises
@@ -105,18 +108,25 @@ def robot_of(
     """
     where = f"{description.path} ({description.base} to {description.tip})"
     try:
-        model = model_of(description.chain, as_written=as_written)
+        model = recognise(description.chain, as_written=as_written)
     except InputError as error:
         raise InputError(f"{where}: {error}") from None
     continuous = np.array([joint.kind == "continuous" for joint in description.joints])
     left_out = ", ".join(description.left_out)
     outside = [f"Links on joints outside the chain are left out: {left_out}."] if left_out else []
-    found = Robot(
+    low, high = _ranges(description, lower, upper, endless)
+    found = kind(
         id=description.name,
         manufacturer=manufacturer,
-        notes=(*model.pop("notes", ()), *outside),
-        **model,
-        **_ranges(description, lower, upper, endless),
+        notes=(*model.notes, *outside),
+        kinematics=model.kinematics,
+        geometry=model.geometry,
+        sign=model.sign,
+        offset=model.offset,
+        T_base_foot=model.T_base_foot,
+        T_end_flange=model.T_end_flange,
+        lower=low,
+        upper=high,
         velocity=_velocity(description) if velocity is None else np.asarray(velocity),
         acceleration=None if acceleration is None else np.asarray(acceleration),
         acceleration_source="" if acceleration is None else "given by the user",
@@ -134,11 +144,11 @@ def _ranges(
     lower: ArrayLike | None,
     upper: ArrayLike | None,
     endless: ArrayLike | None,
-) -> dict[str, Any]:
+) -> tuple[Array, Array]:
     """Return lower and upper limits; an endless joint, which has none, gets one turn."""
     n = len(description.joints)
     free = np.zeros(n, bool) if endless is None else np.asarray(endless, bool)
-    ranges = {"lower": -np.pi * np.ones(n), "upper": np.pi * np.ones(n)}
+    low, high = -np.pi * np.ones(n), np.pi * np.ones(n)
     for i, joint in enumerate(description.joints):
         if joint.kind == "continuous" or free[i]:
             continue
@@ -151,9 +161,11 @@ def _ranges(
                 f"may only be at {joint.lower:g} rad, so that it cannot move",
                 "lower= and upper=",
             )
-        ranges["lower"][i], ranges["upper"][i] = joint.lower or 0.0, joint.upper or 0.0
-    given = {"lower": lower, "upper": upper}
-    return {**ranges, **{key: np.asarray(v) for key, v in given.items() if v is not None}}
+        low[i], high[i] = joint.lower or 0.0, joint.upper or 0.0
+    return (
+        low if lower is None else np.asarray(lower),
+        high if upper is None else np.asarray(upper),
+    )
 
 
 def _velocity(description: Description) -> Array:

@@ -2,25 +2,21 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any, Literal, TypedDict
+from dataclasses import dataclass
+from typing import Literal, TypedDict
 
 import numpy as np
-from numpy.typing import ArrayLike
 from scipy.spatial.transform import Rotation
 
 from kerfpath._arrays import Array, floats, freeze, scalar
 from kerfpath._told import told
 from kerfpath.errors import InputError
 
-if TYPE_CHECKING:
-    from kerfpath.robots._robot import Robot
-
-__all__ = ["ExternalAxis", "Travel", "alone", "carried", "held"]
+__all__ = ["ExternalAxis", "Travel"]
 
 
 class Travel(TypedDict):
-    """Range, limits and grid of an external axis; m for a rail, rad for a positioner."""
+    """Range, limits and grid of an external axis: rad; m for a rail."""
 
     lower: float
     upper: float
@@ -32,6 +28,8 @@ class Travel(TypedDict):
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class ExternalAxis:
     """A joint that moves the whole robot against the part; its value is the last column of q.
+
+    Known to the search, the refinement and the audit; jobs, cells, reports and programs have none.
 
     Where it stands at x: a rail has taken the robot's base x metres along `axis`; a positioner has
     turned the part by x about `axis` through `point`. All frames and poses stay those of base and
@@ -90,7 +88,7 @@ class ExternalAxis:
             )
 
     def no_inverse(self) -> InputError:
-        """Say why one pose is not solved, and what to ask instead."""
+        """Return the error for a pose to be solved: why it is not, and what to ask instead."""
         return InputError(
             f"inverse: with a {self.kind} a pose has solutions without end; ask "
             f"robot.held(x).inverse(T), x in {self.unit}"
@@ -108,51 +106,3 @@ class ExternalAxis:
         T[..., :3, :3] = turn.reshape(*x.shape, 3, 3)
         T[..., :3, 3] = self.point - T[..., :3, :3] @ self.point
         return T
-
-
-def carried(robot: Robot, kind: Literal["rail", "positioner"], axis: ArrayLike, point: ArrayLike,
-            travel: Travel) -> Robot:  # fmt: skip
-    """Return the robot with an external axis."""
-    if robot.external is not None:
-        raise InputError(f"robot {robot.id!r}: it has an external axis already; only one is known")
-    limits, (velocity, acceleration) = robot.joint_limits(), robot.speed_limits()
-    return replace(
-        robot,
-        external=ExternalAxis(
-            kind=kind,
-            axis=axis,  # type: ignore[arg-type]  # cast by __post_init__
-            point=point,  # type: ignore[arg-type]  # cast by __post_init__
-            step=travel["step"],
-        ),
-        lower=np.append(limits.lower, travel["lower"]),
-        upper=np.append(limits.upper, travel["upper"]),
-        velocity=np.append(velocity, travel["velocity"]),
-        acceleration=np.append(acceleration, travel["acceleration"]),
-        endless=np.append(robot.endless, False),
-        couplings=tuple(replace(c, row=np.append(c.row, 0.0)) for c in robot.couplings),
-    )
-
-
-def alone(robot: Robot) -> Robot:
-    """Return the arm without its external axis, standing where it does at zero."""
-    if robot.external is None:
-        return robot
-    n = robot.family.joints
-    own: dict[str, Any] = {
-        name: None if getattr(robot, name) is None else getattr(robot, name)[:n]
-        for name in ("lower", "upper", "velocity", "acceleration", "endless")
-    }
-    couplings = tuple(replace(c, row=c.row[:n]) for c in robot.couplings)
-    return replace(robot, external=None, couplings=couplings, **own)
-
-
-def held(robot: Robot, x: float) -> Robot:
-    """Return the arm alone, standing where its external axis takes it at x (m or rad)."""
-    if robot.external is None:
-        raise InputError(f"robot {robot.id!r}: it has no external axis to be held")
-    T, chain = robot.external.poses(np.asarray(x)), robot.chain
-    if chain is not None:
-        chain = replace(chain, origins=np.concatenate([T @ chain.origins[:1], chain.origins[1:]]))
-    # A family without lengths has the chain for its model: that has been moved already.
-    foot = T @ robot.T_base_foot if robot.family.lengths else robot.T_base_foot
-    return replace(alone(robot), T_base_foot=foot, chain=chain)

@@ -52,7 +52,7 @@ class Family:
         As `kernels.kinematics.inverse_nodes`, where a family has it in one piece.
     follow_all : callable, optional
         (model, T (B, 4, 4), q (B, n)): brings each q onto its pose along its own branch, or makes
-        it NaN. Of a family whose branches are not told apart by their posture alone.
+        it NaN. Of a family where several branches have one posture.
     poses_at_once : int
         Poses solved per piece of work: large against the overhead, small against the memory.
     free_rotation : bool
@@ -134,7 +134,7 @@ FAMILIES = {
 
 
 def posture_name(posture: int) -> str:
-    """Say a posture in words: shoulder, elbow, wrist, as in "front/up/plus" (every family's)."""
+    """Return a posture in words: shoulder, elbow, wrist, as in "front/up/plus" (every family's)."""
     return (*EIGHT, *MORE)[posture]
 
 

@@ -66,7 +66,7 @@ def model(*, chain: Chain | None, sign: Array, offset: Array) -> general.Arm:
 
 
 def inverse_all(arm: general.Arm, T: Array, out_q: Array, out_reach: Bools) -> None:
-    """All solutions (B, 16, 6) of tip poses (B, 4, 4), each within `general.EXACT` of its pose.
+    """Fill all solutions (B, 16, 6) of tip poses (B, 4, 4), each within `EXACT` of its pose.
 
     Raises
     ------

@@ -7,16 +7,18 @@ from dataclasses import replace
 from difflib import get_close_matches
 from functools import cache
 from importlib.resources import files
-from typing import Any
+from typing import TypeVar
 
 import numpy as np
 
 from kerfpath._arrays import Array
 from kerfpath.errors import InputError
 from kerfpath.robots._coupling import Coupling
-from kerfpath.robots._robot import Robot
+from kerfpath.robots._manipulator import Manipulator
 
-__all__ = ["acceleration_ratios", "robot", "robot_ids"]
+__all__ = ["acceleration_ratios", "read_robot", "robot_ids"]
+
+A = TypeVar("A", bound=Manipulator)
 
 _HERE = files("kerfpath.robots")
 
@@ -38,47 +40,16 @@ def acceleration_ratios() -> dict[str, tuple[float, ...]]:
     return {name: tuple(values) for name, values in tomllib.loads(text).items()}
 
 
-def robot(name: str, *, acceleration_ratio: str | None = None) -> Robot:
-    """Return a robot of the library by its id.
-
-    Parameters
-    ----------
-    name : str
-        One of `robot_ids()`.
-    acceleration_ratio : str, optional
-        Take the accelerations as this ratio (one of `acceleration_ratios()`) times the speeds.
-
-    Raises
-    ------
-    InputError
-        An unknown robot or ratio; the message names the nearest ones.
-    """
+def read_robot(kind: type[A], name: str, acceleration_ratio: str | None = None) -> A:
+    """Return a robot of the library by its id, see `kerfpath.robots.robot`."""
     if name not in robot_ids():
         raise InputError(
             f"robot {name!r} is not in the library of {len(robot_ids())}; "
             f"{_nearest(name, robot_ids())}; 'kerfpath robots' lists all"
         )
-    text = (_HERE / "library" / f"{name}.toml").read_text(encoding="utf-8")
-    known = _read(tomllib.loads(text))
-    if acceleration_ratio is None:
-        return known
-    ratios = acceleration_ratios()
-    if acceleration_ratio not in ratios:
-        raise InputError(
-            f"acceleration_ratio: {acceleration_ratio!r} is not one of {', '.join(ratios)}"
-        )
-    if known.velocity is None:
-        raise InputError(f"robot {name!r}: its speeds are not known, so no ratio can apply to them")
-    return replace(
-        known,
-        acceleration=np.multiply(ratios[acceleration_ratio], known.velocity),
-        acceleration_source=f"assumed: ratio {acceleration_ratio} times the speeds",
-    )
-
-
-def _read(data: dict[str, Any]) -> Robot:
+    data = tomllib.loads((_HERE / "library" / f"{name}.toml").read_text(encoding="utf-8"))
     joints = data["joints"]
-    return Robot(
+    found = kind(
         id=data["id"],
         manufacturer=data["manufacturer"],
         model=data["model"],
@@ -109,6 +80,20 @@ def _read(data: dict[str, Any]) -> Robot:
         notes=tuple(data.get("notes", ())),
         frames=data["frames"],
         sources=data["source"],
+    )
+    if acceleration_ratio is None:
+        return found
+    ratios = acceleration_ratios()
+    if acceleration_ratio not in ratios:
+        raise InputError(
+            f"acceleration_ratio: {acceleration_ratio!r} is not one of {', '.join(ratios)}"
+        )
+    if found.velocity is None:
+        raise InputError(f"robot {name!r}: its speeds are not known, so no ratio can apply to them")
+    return replace(
+        found,
+        acceleration=np.multiply(ratios[acceleration_ratio], found.velocity),
+        acceleration_source=f"assumed: ratio {acceleration_ratio} times the speeds",
     )
 
 

@@ -1,16 +1,15 @@
-"""Which family an arm belongs to, told from the lines that its joints turn about.
+"""Recognise the family of an arm by the lines that its joints turn about.
 
-The joint axes at angle zero say everything: the model is laid into them, its lengths are measured
-between them, and its angles at that pose become the joint offsets. Whether it then is the robot is
-not argued but measured, against the chain of the description at joint angles of all kinds. An arm
-that is of no family with a closed form is "general", and its chain is its model.
+The joint axes at angle zero suffice: the model is laid into them, its lengths are measured between
+them, and its angles at that pose become the joint offsets. The model is then compared with the
+chain of the description at random joint angles. An arm that is of no family with a closed form is
+"general", and its chain is its model.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
-from typing import Any
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -18,10 +17,10 @@ from kerfpath._arrays import Array
 from kerfpath.errors import InputError
 from kerfpath.robots._families import FAMILIES
 from kerfpath.robots._general import require_solver
-from kerfpath.robots._robot import Robot
+from kerfpath.robots._manipulator import Manipulator
 from kerfpath.urdf import Chain
 
-__all__ = ["EXACT", "in_closed_form", "model_of"]
+__all__ = ["EXACT", "in_closed_form", "recognise"]
 
 EXACT = 1e-9
 """m, and entries of a rotation: how far a model may be from the description it stands for."""
@@ -63,7 +62,7 @@ class _Lines:
         return float(np.linalg.norm(np.cross(point - self.place[i], self.along[i])))
 
     def misfit(self, parallel: Sequence[int], square: Sequence[int]) -> str:
-        """Name the first of the joints i that is not parallel, or square, to joint i + 1."""
+        """Return in words the first joint i that is not parallel, or square, to joint i + 1."""
         for i in parallel:
             if float(np.linalg.norm(np.cross(*self.along[i : i + 2]))) > NEARLY:
                 return f"axes {i + 1} and {i + 2} are not parallel"
@@ -74,7 +73,7 @@ class _Lines:
 
 
 def in_closed_form(chain: Chain) -> bool:
-    """Say whether a chain of six joints is of a family with a closed form."""
+    """Return whether a chain of six joints is of a family with a closed form."""
     lines = _lines(chain)
     return any(
         not isinstance(derived := derive(lines), str)
@@ -83,8 +82,8 @@ def in_closed_form(chain: Chain) -> bool:
     )
 
 
-def model_of(chain: Chain, *, as_written: bool = False) -> dict[str, Any]:
-    """Return family, geometry, joint convention and frames of a chain, as `Robot` takes them.
+def recognise(chain: Chain, *, as_written: bool = False) -> Manipulator:
+    """Return family, geometry, joint convention and frames of a chain.
 
     Parameters
     ----------
@@ -102,18 +101,18 @@ def model_of(chain: Chain, *, as_written: bool = False) -> dict[str, Any]:
         redundant = "the arm is redundant, and planning with a free elbow is not offered"
         why = redundant if n > 6 else "such arms are not recognised from descriptions"
         raise InputError(f"expected 6 joints between base and tip, got {n}: {why}")
-    lines, told = _lines(chain), []
+    lines, misfits = _lines(chain), []
     for name, derive in DERIVED:
         derived = derive(lines)
         words = FAMILIES[name].words
         if isinstance(derived, str):
-            told.append(f"not an {words}, as {derived}")
+            misfits.append(f"not an {words}, as {derived}")
             continue
         model = _laid(name, lines, *derived)
         miss = _miss(chain, model)
         if miss <= EXACT:
             return model
-        told.append(f"not an {words}, which it misses by {miss:.1e} (m and rad)")
+        misfits.append(f"not an {words}, which it misses by {miss:.1e} (m and rad)")
         if miss > ROUNDED or as_written:
             continue
         raise InputError(
@@ -123,8 +122,9 @@ def model_of(chain: Chain, *, as_written: bool = False) -> dict[str, Any]:
     try:
         require_solver()
     except InputError as error:
-        raise InputError(f"{'; '.join(told)}: {error}") from None
-    return {"kinematics": "general", "geometry": {}, "notes": (f"General arm: {'; '.join(told)}.",)}
+        raise InputError(f"{'; '.join(misfits)}: {error}") from None
+    notes = (f"General arm: {'; '.join(misfits)}.",)
+    return Manipulator(id="", kinematics="general", geometry={}, notes=notes, chain=chain)
 
 
 def _lines(chain: Chain) -> _Lines:
@@ -223,42 +223,41 @@ def _ur(at: _Lines) -> tuple[dict[str, float], list[float], list[float]] | str:
     return lengths, signs, [np.arctan2(x[1], x[0]), q2, q23 - q2, theta - q23, q5, 0.0]
 
 
-def _turned(direction: Array, *wanted: Any) -> tuple[Array, float]:
+def _turned(direction: Array, *wanted: Callable[[Array], float]) -> tuple[Array, float]:
     """Return a direction or its opposite, and which: whatever makes `wanted` of it positive.
 
     The first of the functions that is not zero decides; after them, the larger x and then y.
     """
-    for want in (*wanted, lambda d: d[1], lambda d: d[0], lambda d: d[2]):
-        value = want(direction)
-        if abs(value) > NEARLY:
-            sign = 1.0 if value > 0 else -1.0
-            break
+    values = [*(want(direction) for want in wanted), *direction[[1, 0, 2]]]
+    sign = 1.0 if next(value for value in values if abs(value) > NEARLY) > 0 else -1.0
     return sign * direction, sign
 
 
 def _laid(
     family: str, at: _Lines, lengths: dict[str, float], signs: list[float], zero: list[float]
-) -> dict[str, Any]:
+) -> Manipulator:
     """Return the model with joint 6 and the end turned onto the tip."""
-    model: dict[str, Any] = {
-        "kinematics": family,
-        "geometry": {k: _round(float(v)) for k, v in lengths.items()},
-        "sign": np.array(signs),
-        "offset": np.array([_round(-float(q)) for q in zero]),
-        "T_base_foot": at.foot,
-    }
+    model = Manipulator(
+        id="",
+        kinematics=family,
+        geometry={k: _round(float(v)) for k, v in lengths.items()},
+        sign=np.array(signs),
+        offset=np.array([_round(-float(q)) for q in zero]),
+        T_base_foot=at.foot,
+    )
     want = at.foot @ at.tip
-    left = np.linalg.inv(Robot(id="", **model).forward(np.zeros(6))) @ want
+    left = np.linalg.inv(model.forward(np.zeros(6))) @ want
     if np.hypot(left[0, 2], left[1, 2]) < NEARLY and left[2, 2] > 0:
-        model["offset"][5] = _round(-float(np.arctan2(left[1, 0], left[0, 0])))
-        left = np.linalg.inv(Robot(id="", **model).forward(np.zeros(6))) @ want
-    return {**model, "T_end_flange": _tidy(left)}
+        sixth = _round(-float(np.arctan2(left[1, 0], left[0, 0])))
+        model = replace(model, offset=np.append(model.offset[:5], sixth))
+        left = np.linalg.inv(model.forward(np.zeros(6))) @ want
+    return replace(model, T_end_flange=_tidy(left))
 
 
-def _miss(chain: Chain, model: dict[str, Any]) -> float:
+def _miss(chain: Chain, model: Manipulator) -> float:
     """Return the largest entry by which the model's poses differ from the chain's."""
     q = np.random.default_rng(2008).uniform(-np.pi, np.pi, (POSES, 6))
-    return float(np.abs(Robot(id="", **model).forward(q) - chain.forward(q)).max())
+    return float(np.abs(model.forward(q) - chain.forward(q)).max())
 
 
 def _round(value: float) -> float:

@@ -1,30 +1,27 @@
-"""A robot: geometry, joint convention, limits, and closed-form kinematics in bulk."""
+"""A robot: an arm as the library or a description has it, alone or with an external axis."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any, Unpack
+from typing import Literal, Unpack
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from kerfpath._arrays import Array, Bools, Ints, as_pose, bools, floats, freeze, positive
+from kerfpath._arrays import Array
 from kerfpath.errors import InputError
-from kerfpath.kernels import turns
-from kerfpath.robots._coupling import AXIS_3, Coupling
-from kerfpath.robots._external import ExternalAxis, Travel, alone, carried, held
-from kerfpath.robots._families import FAMILIES, Family
-from kerfpath.robots._limits import for_each, require_few_turns, require_order
-from kerfpath.robots._solutions import Solutions, admitted, every
-from kerfpath.urdf import Body, Chain
+from kerfpath.robots._described import build_robot, read_description
+from kerfpath.robots._external import ExternalAxis, Travel
+from kerfpath.robots._library import read_robot
+from kerfpath.robots._manipulator import Manipulator
 
-__all__ = ["Robot"]
+__all__ = ["Robot", "robot"]
 
 
-@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class Robot:
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False, repr=False)
+class Robot(Manipulator):
     """An arm of one of the families, its limits and where they come from.
 
     Joint vectors follow the robot's own description (its URDF where `frames` says so); poses are
@@ -72,84 +69,6 @@ class Robot:
         Limits reversed, a speed that is not positive, a length missing, an unknown family.
     """
 
-    id: str
-    geometry: dict[str, float]
-    kinematics: str = "opw"
-    sign: Array = field(default_factory=lambda: np.ones(()))
-    offset: Array = field(default_factory=lambda: np.zeros(()))
-    T_base_foot: Array = field(default_factory=lambda: np.eye(4))
-    T_end_flange: Array = field(default_factory=lambda: np.eye(4))
-    lower: Array | None = None
-    upper: Array | None = None
-    velocity: Array | None = None
-    acceleration: Array | None = None
-    endless: Bools = field(default_factory=lambda: np.zeros((), bool))
-    couplings: tuple[Coupling, ...] = ()
-    axis_3: str = ""
-    chain: Chain | None = None
-    bodies: tuple[Body, ...] = ()
-    external: ExternalAxis | None = None
-    manufacturer: str = ""
-    model: str = ""
-    payload: float | None = None
-    reach: float | None = None
-    acceleration_source: str = ""
-    acceleration_ratio: str = ""
-    limits_missing: str = ""
-    notes: tuple[str, ...] = ()
-    frames: dict[str, object] = field(default_factory=dict)
-    sources: dict[str, str] = field(default_factory=dict)
-
-    def __repr__(self) -> str:
-        known = f"accelerations {'not ' if self.acceleration is None else ''}known"
-        words = f"{self.manufacturer} {self.model}, {self.joints} joints, {self.kinematics}"
-        return f"Robot({self.id!r}, {words}, {known})"
-
-    def __post_init__(self) -> None:
-        _set = object.__setattr__
-        if self.kinematics not in FAMILIES:
-            raise InputError(
-                f"robot {self.id!r}: kinematics {self.kinematics!r} is none of "
-                f"{', '.join(FAMILIES)}"
-            )
-        n, arm, lengths = self.joints, self.family.joints, self.family.lengths
-        if self.axis_3 not in AXIS_3:
-            raise InputError(f"axis_3: expected one of {AXIS_3}, got {self.axis_3!r}")
-        missing = [k for k in lengths if k not in self.geometry]
-        if missing:
-            raise InputError(f"robot {self.id!r}: geometry lacks {', '.join(missing)} (m)")
-        for name in ("sign", "offset"):
-            _set(self, name, floats(for_each(getattr(self, name), arm), name, (arm,)))
-        if not (np.abs(self.sign) == 1).all():
-            raise InputError(f"robot {self.id!r}: sign must be +1 or -1, got {self.sign.tolist()}")
-        for name in ("T_base_foot", "T_end_flange"):
-            _set(self, name, as_pose(getattr(self, name), name))
-        _set(self, "endless", bools(for_each(self.endless, n), "endless", (n,)))
-        for coupling in self.couplings:
-            floats(coupling.row, "coupling row", (n,))
-        for name in ("lower", "upper"):
-            if getattr(self, name) is not None:
-                _set(self, name, floats(getattr(self, name), name, (n,)))
-        for name in ("velocity", "acceleration"):
-            if getattr(self, name) is not None:
-                _set(self, name, positive(getattr(self, name), name, (n,)))
-        require_order(self)
-
-    @property
-    def family(self) -> Family:
-        """The kind of arm."""
-        return FAMILIES[self.kinematics]
-
-    @property
-    def joints(self) -> int:
-        """Number of joints, n, with the external axis."""
-        return self.family.joints + (self.external is not None)
-
-    @property
-    def postures(self) -> int:
-        """Number of postures, P: mu runs from 0 to P - 1."""
-        return len(self.family.postures)
-
     @classmethod
     def from_urdf(
         cls,
@@ -186,10 +105,9 @@ class Robot:
         InputError
             A bad description; a chain of no family; limits that are missing or zero, and not given.
         """
-        from kerfpath.robots._described import described, robot_of
-
-        return robot_of(
-            described(path, snap, base=base, tip=tip, packages=packages, meshes=meshes),
+        return build_robot(
+            cls,
+            read_description(path, snap, base=base, tip=tip, packages=packages, meshes=meshes),
             as_written=snap == 0,
             manufacturer=manufacturer,
             axis_3=axis_3,
@@ -224,177 +142,91 @@ class Robot:
 
         Keywords lower, upper, velocity, acceleration, step (m, m/s, m/s^2); see `ExternalAxis`.
         """
-        return carried(self, "rail", direction, np.zeros(3), travel)
+        return self._with_axis("rail", direction, np.zeros(3), travel)
 
     def with_positioner(self, axis: ArrayLike, point: ArrayLike, **travel: Unpack[Travel]) -> Robot:
         """Return this robot with a part that turns about `axis` (3,) through `point` (3,) m.
 
         Keywords as in `on_rail`, in rad, rad/s, rad/s^2; see `ExternalAxis`.
         """
-        return carried(self, "positioner", axis, point, travel)
+        return self._with_axis("positioner", axis, point, travel)
 
-    alone, held = alone, held  # as they are: each a function of a robot
+    def _with_axis(
+        self, kind: Literal["rail", "positioner"], axis: ArrayLike, point: ArrayLike, travel: Travel
+    ) -> Robot:
+        if self.external is not None:
+            raise InputError(
+                f"robot {self.id!r}: it has an external axis already; only one is known"
+            )
+        limits, (velocity, acceleration) = self.joint_limits(), self.speed_limits()
+        return replace(
+            self,
+            external=ExternalAxis(
+                kind=kind,
+                axis=axis,  # type: ignore[arg-type]  # cast by __post_init__
+                point=point,  # type: ignore[arg-type]  # cast by __post_init__
+                step=travel["step"],
+            ),
+            lower=np.append(limits.lower, travel["lower"]),
+            upper=np.append(limits.upper, travel["upper"]),
+            velocity=np.append(velocity, travel["velocity"]),
+            acceleration=np.append(acceleration, travel["acceleration"]),
+            endless=np.append(self.endless, False),
+            couplings=tuple(replace(c, row=np.append(c.row, 0.0)) for c in self.couplings),
+        )
 
-    def forward(self, q: ArrayLike) -> Array:
-        """Return the flange poses (..., 4, 4) in the robot base of joint vectors q (..., n) rad.
-
-        The base is that at zero of an external axis, and the part's place at zero, too.
-        """
-        q = np.asarray(q, dtype=float)
-        rows = floats(q.reshape(-1, q.shape[-1]) if q.ndim else q, "q", (None, self.joints))
-        T = np.empty((len(rows), 4, 4))
+    def alone(self) -> Robot:
+        """Return the arm without its external axis, standing where it does at zero."""
+        if self.external is None:
+            return self
         n = self.family.joints
-        self.family.forward_all(self.arm(), np.ascontiguousarray(rows[:, :n]), T)
-        if self._placed:
-            T = self.T_base_foot @ T @ self.T_end_flange
-        if self.external is not None:
-            T = self.external.poses(rows[:, n]) @ T
-        return freeze(T.reshape(*q.shape[:-1], 4, 4))
-
-    def inverse(self, T: ArrayLike, *, within_limits: bool = True) -> Solutions:
-        """Return every joint vector that brings the flange to T (4, 4) or (B, 4, 4), base frame.
-
-        Parameters
-        ----------
-        T : (4, 4) or (B, 4, 4)
-            Flange poses, m.
-        within_limits : bool
-            True: all postures, all turns inside the joint limits. False: all postures, joints in
-            (-pi, pi], limits ignored.
-
-        Raises
-        ------
-        InputError
-            A wrong shape, or limits that are not known.
-        """
-        poses = np.asarray(T, dtype=float)
-        poses = floats(poses[None] if poses.ndim == 2 else poses, "T", (None, 4, 4))
-        q, reach = self.inverse_all(poses)
-        if not within_limits:
-            return every(q, reach)
-        require_few_turns(self)
-        return admitted(q, reach, self.joint_limits())
-
-    def inverse_all(self, T: Array) -> tuple[Array, Bools]:
-        """Return every posture of flange poses T (B, 4, 4), limits ignored, as bare arrays.
-
-        q (B, P, n) in (-pi, pi], and reach (B, P): which of its rows are solutions. A family
-        without free rotation brings the flange's origin and z-axis there.
-        """
-        if not self.family.free_rotation:
-            q, reach = self.inverse_nodes(T, np.zeros(1), np.eye(4))
-            return q[:, 0], reach[:, 0]
-        q = np.empty((len(T), self.postures, self.joints))
-        reach = np.empty(q.shape[:2], dtype=np.bool_)
-        self.family.inverse_all(self.arm(), self._model_poses(T), q, reach)
-        return q, reach
-
-    def follow(self, T: Array, q: Array, posture: Ints) -> Array:
-        """Return the joints (B, n) that bring the flange to T (B, 4, 4) on the branch of each q.
-
-        Each on the turn nearest to its q (B, n), whose postures (B,) are given; NaN where the
-        branch does not reach.
-        """
-        if self.family.follow_all is None:
-            solved, reach = self.inverse_all(T)
-            b = np.arange(len(q))
-            found = np.where(reach[b, posture, None], solved[b, posture], np.nan)
-            return np.asarray(found + 2 * np.pi * np.round((q - found) / (2 * np.pi)))
-        found = np.array(q)
-        self.family.follow_all(self.arm(), self._model_poses(T), found)
-        return found
-
-    def inverse_nodes(self, H: Array, gamma: Array, T_flange_tip: Array) -> tuple[Array, Bools]:
-        """Return every posture of task frames H (K, 4, 4) turned by each gamma (m,), with tool.
-
-        q (K, m, P, n) in (-pi, pi] and reach (K, m, P); frames in the robot base, limits ignored.
-        """
-        self._require_alone()
-        T_tip_flange = np.linalg.inv(T_flange_tip)
-        if self.family.inverse_nodes is None:
-            spin = np.tile(np.eye(4), (len(gamma), 1, 1))
-            spin[:, 0, 0] = spin[:, 1, 1] = np.cos(gamma)
-            spin[:, 1, 0], spin[:, 0, 1] = np.sin(gamma), -np.sin(gamma)
-            q, reach = self.inverse_all((H[:, None] @ (spin @ T_tip_flange)).reshape(-1, 4, 4))
-            size = (len(H), len(gamma), self.postures)
-            return q.reshape(*size, self.joints), reach.reshape(size)
-        if self._placed:
-            H = np.linalg.inv(self.T_base_foot) @ H
-            T_tip_flange = T_tip_flange @ np.linalg.inv(self.T_end_flange)
-        q = np.empty((len(H), len(gamma), self.postures, self.joints))
-        reach = np.empty(q.shape[:3], np.bool_)
-        self.family.inverse_nodes(self.arm(), H, gamma, T_tip_flange, q, reach)
-        return q, reach
-
-    def arm(self) -> Any:
-        """Return the geometry as the family's kernels take it."""
-        given: dict[str, Any] = {k: float(self.geometry[k]) for k in self.family.lengths}
-        if not given:
-            given["chain"] = self.chain
-        return self.family.model(**given, sign=self.sign, offset=self.offset)
-
-    def _model_poses(self, T: Array) -> Array:
-        """Return flange poses (B, 4, 4) as poses of the model's end in its own base."""
-        self._require_alone()
-        if self._placed:
-            T = np.linalg.inv(self.T_base_foot) @ T @ np.linalg.inv(self.T_end_flange)
-        return np.ascontiguousarray(T)
-
-    @property
-    def _placed(self) -> bool:
-        """Whether base or flange differ from the model's own."""
-        return not all(np.array_equal(T, np.eye(4)) for T in (self.T_base_foot, self.T_end_flange))
-
-    def joint_limits(self) -> turns.JointLimits:
-        """Return the position limits as the kernels take them.
-
-        Raises
-        ------
-        InputError
-            The limits are not known.
-        """
-        if self.lower is None or self.upper is None:
-            raise self._lacks("joint limits", "lower= and upper=")
-        rows = [c.row for c in self.couplings]
-        return turns.JointLimits(
-            lower=self.lower,
-            upper=self.upper,
-            endless=self.endless,
-            rows=np.array(rows).reshape(-1, self.joints),
-            row_lower=np.array([c.lower for c in self.couplings]),
-            row_upper=np.array([c.upper for c in self.couplings]),
+        return replace(
+            self,
+            external=None,
+            lower=_first(self.lower, n),
+            upper=_first(self.upper, n),
+            velocity=_first(self.velocity, n),
+            acceleration=_first(self.acceleration, n),
+            endless=self.endless[:n],
+            couplings=tuple(replace(c, row=c.row[:n]) for c in self.couplings),
         )
 
-    def speed_limits(self) -> tuple[Array, Array]:
-        """Return joint velocity (6,) rad/s and acceleration (6,) rad/s^2.
+    def held(self, x: float) -> Robot:
+        """Return the arm alone, standing where its external axis takes it at x (rad; m for a rail).
 
         Raises
         ------
         InputError
-            One of them is not known; says how to give it.
+            It has no external axis.
         """
-        if self.velocity is None:
-            raise self._lacks("joint velocities", "velocity=")
-        if self.acceleration is None:
-            ratio = self.acceleration_ratio
-            hint = f", or robot({self.id!r}, acceleration_ratio={ratio!r})" if ratio else ""
-            raise self._lacks("joint accelerations", "acceleration=", hint)
-        return self.velocity, self.acceleration
+        if self.external is None:
+            raise InputError(f"robot {self.id!r}: it has no external axis to be held")
+        T, chain = self.external.poses(np.asarray(x)), self.chain
+        if chain is not None:
+            origins = np.concatenate([T @ chain.origins[:1], chain.origins[1:]])
+            chain = replace(chain, origins=origins)
+        # A family without lengths has the chain for its model: that has been moved already.
+        foot = T @ self.T_base_foot if self.family.lengths else self.T_base_foot
+        return replace(self.alone(), T_base_foot=foot, chain=chain)
 
-    def reasons(self) -> tuple[str, ...]:
-        """Say what each reason code of a dropped pose means, by code."""
-        names = [f"joint {i + 1}" for i in range(self.family.joints)]
-        names += [c.name for c in self.couplings]
-        bounds = [f"{name} {end}" for name in names for end in ("low", "high")]
-        return ("admitted", "unreachable", *bounds, "posture not wanted")
 
-    def _require_alone(self) -> None:
-        if self.external is not None:
-            raise self.external.no_inverse()
+def robot(name: str, *, acceleration_ratio: str | None = None) -> Robot:
+    """Return a robot of the library by its id.
 
-    def _lacks(self, what: str, keys: str, hint: str = "") -> InputError:
-        why = f" ({self.limits_missing})" if self.limits_missing else ""
-        return InputError(
-            f"robot {self.id!r}: {what} are not known{why}; "
-            f"give them with robot.with_limits({keys}...){hint}"
-        )
+    Parameters
+    ----------
+    name : str
+        One of `robot_ids()`.
+    acceleration_ratio : str, optional
+        Take the accelerations as this ratio (one of `acceleration_ratios()`) times the speeds.
+
+    Raises
+    ------
+    InputError
+        An unknown robot or ratio; the message names the nearest ones.
+    """
+    return read_robot(Robot, name, acceleration_ratio)
+
+
+def _first(values: Array | None, n: int) -> Array | None:
+    return None if values is None else values[:n]

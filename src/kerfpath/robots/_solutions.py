@@ -10,7 +10,7 @@ from kerfpath._arrays import Array, Bools, Ints, freeze
 from kerfpath._told import told
 from kerfpath.kernels import turns
 
-__all__ = ["Solutions", "admitted", "every"]
+__all__ = ["Solutions", "all_solutions", "solutions_within"]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -40,7 +40,7 @@ class Solutions:
         return len(self.q)
 
 
-def every(q: Array, reach: Bools) -> Solutions:
+def all_solutions(q: Array, reach: Bools) -> Solutions:
     """Return the rows of q (B, P, n) that `reach` (B, P) has for solutions, limits ignored."""
     pose, posture = np.nonzero(reach)
     found = q[reach]
@@ -48,7 +48,7 @@ def every(q: Array, reach: Bools) -> Solutions:
     return Solutions(q=freeze(found), pose=freeze(pose), posture=freeze(posture), turn=freeze(turn))
 
 
-def admitted(q: Array, reach: Bools, limits: turns.JointLimits) -> Solutions:
+def solutions_within(q: Array, reach: Bools, limits: turns.JointLimits) -> Solutions:
     """Return every turn within the limits of the rows of q (B, P, n) that `reach` (B, P) has."""
     B, P, n = q.shape
     q, reach = q[:, None], reach[:, None]  # one node a pose, one sample of gamma

@@ -26,13 +26,13 @@ A_PROCESS = 4000
 
 
 class Prepared(NamedTuple):
-    """What ssik knows of an arm: its joint frames at angle zero, and an elimination done once."""
+    """An arm as ssik takes it: its joint frames at angle zero, and an elimination done once."""
 
     trafos: Array
     """(7, 4, 4): each joint frame in the one before it, and the end in the last."""
     axes: Array
     """(6, 3)"""
-    elimination: dict[str, Any] | None
+    elimination: Any
     """Of an arm without intersecting or parallel axes that would spare it."""
 
 

@@ -16,14 +16,14 @@ import numpy as np
 
 from kerfpath._arrays import Array, Bools, Ints
 from kerfpath.kernels.limits import LIMIT_TOLERANCE, acceleration_excess
-from kerfpath.kernels.metric import increments
-from kerfpath.kernels.search import Layers, Objective
+from kerfpath.kernels.metric import increments, increments_between
+from kerfpath.kernels.search import Aim, SortedLayers
 from kerfpath.search._exact import NO_SEAM, Best, Dead, best_allowed, best_path, dead_end
 
 __all__ = ["best_closed_path", "best_from_its_start"]
 
 
-def best_closed_path(layers: Layers, aim: Objective) -> Best | Dead:
+def best_closed_path(layers: SortedLayers, aim: Aim) -> Best | Dead:
     """Return the best path that returns to the vertex it left, with (6) across the seam."""
     if len(layers.start) == 2:
         return best_path(layers, aim)
@@ -32,35 +32,37 @@ def best_closed_path(layers: Layers, aim: Objective) -> Best | Dead:
 
 
 def best_from_its_start(
-    layers: Layers, aim: Objective, rotation: Array, *, closed: bool
+    layers: SortedLayers, aim: Aim, rotation: Array, *, closed: bool
 ) -> Best | None:
     """Return the best path that keeps its distance (n,) rad from its start, K >= 2; None if none.
 
     If `closed`, it returns to the vertex it left, and (6) holds across the seam.
     """
     twin = _twins(layers) if closed else None
-    task = _Task(layers=layers, aim=aim, rotation=rotation, twin=twin)
+    within = _Starts(layers=layers, aim=aim, rotation=rotation, twin=twin)
     count = itertools.count()
     queue: list[tuple[float, float, int, Best, Ints, Ints]] = []
     every = np.arange(layers.start[1]), np.arange(layers.start[1], layers.start[2])
     parts, floor = [every], 0.0
     while True:
         for starts, firsts in parts:
-            found = task.relaxed(starts, firsts, floor)
+            found = within.relaxed(starts, firsts, floor)
             if found is not None:
                 entry = (found.cost, found.total, next(count), found, starts, firsts)
                 heapq.heappush(queue, entry)
         if not queue:
             return None
         floor, _, _, found, starts, firsts = heapq.heappop(queue)
-        parts = task.parted(starts, firsts, found.path)
+        parts = within.parted(starts, firsts, found.path)
         if not parts:
             return found
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class _Task:
-    """What is asked, and the relaxations of it: by vertices to begin at, and to go to from there.
+class _Starts:
+    """What is asked of a path from its start, and the relaxations of it.
+
+    A relaxation is given by vertices to begin at, and vertices to go to from there.
 
     Parameters
     ----------
@@ -73,8 +75,8 @@ class _Task:
         closed; None: the path need not return.
     """
 
-    layers: Layers
-    aim: Objective
+    layers: SortedLayers
+    aim: Aim
     rotation: Array
     twin: Ints | None
 
@@ -137,7 +139,7 @@ class _Task:
         return starts[nearer], starts[~nearer]
 
 
-def _twins(layers: Layers) -> Ints:
+def _twins(layers: SortedLayers) -> Ints:
     """Return, for each vertex of the last layer, the vertex of the first one that it repeats."""
     first, last = layers.start[1], layers.start[-2]
     by_rank = np.full(layers.rank[last:].max(initial=-1) + 1, -1)
@@ -146,16 +148,16 @@ def _twins(layers: Layers) -> Ints:
     return by_rank[layers.rank[last:]]
 
 
-def _increments(layers: Layers, path: Ints) -> Array:
-    return increments(np.ascontiguousarray(layers.q[:, path].T), layers.endless)
+def _increments(layers: SortedLayers, path: Ints) -> Array:
+    return np.ascontiguousarray(increments(layers.q[:, path].T, layers.endless))
 
 
-def _passes_seam(layers: Layers, aim: Objective, path: Ints) -> bool:
+def _passes_seam(layers: SortedLayers, aim: Aim, path: Ints) -> bool:
     dq = _increments(layers, path)
     return acceleration_excess(dq[0], dq[-1], aim.acceleration) < 0
 
 
-def _split(layers: Layers, starts: Ints, a: int, b: int) -> tuple[Ints, Ints]:
+def _split(layers: SortedLayers, starts: Ints, a: int, b: int) -> tuple[Ints, Ints]:
     """Part the vertices by which of a and b they are nearer to; these come to different parts."""
     nearer = _gap(layers, starts, a) < _gap(layers, starts, b)
     nearer |= starts == a
@@ -163,8 +165,7 @@ def _split(layers: Layers, starts: Ints, a: int, b: int) -> tuple[Ints, Ints]:
     return starts[nearer], starts[~nearer]
 
 
-def _gap(layers: Layers, vertices: Ints, v: int) -> Array:
+def _gap(layers: SortedLayers, vertices: Ints, v: int) -> Array:
     """Return the sum of joint differences from vertex v to others of its layer, rad."""
-    gap = np.abs(layers.q[:, vertices] - layers.q[:, [v]])
-    around = np.minimum(gap, 2 * np.pi - gap)
-    return np.asarray(np.where(layers.endless[:, None], around, gap).sum(axis=0))
+    gap = increments_between(layers.q[:, [v]].T, layers.q[:, vertices].T, layers.endless)
+    return np.asarray(np.abs(gap).sum(axis=1))

@@ -9,21 +9,23 @@ checks.
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any, TypeVar
+from dataclasses import replace
+from typing import TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from kerfpath._arrays import Array, Bools, Ints, integers
 from kerfpath.errors import InputError, NoFeasiblePath
+from kerfpath.kernels.metric import increments_between
+from kerfpath.losses import Loss, Reason
 from kerfpath.search._fastest import LeastInterval
 from kerfpath.search._interrupted import InterruptedPath
-from kerfpath.search._layers import reduced
-from kerfpath.search._problem import offsets
+from kerfpath.search._problem import SearchProblem, offsets
 from kerfpath.search._shortest import LayeredPath
 from kerfpath.search._slowed import SlowedPath
 
-__all__ = ["Known", "clear_path"]
+__all__ = ["Known", "find_clear"]
 
 Price = Callable[[Ints], Array]
 Passable = Callable[[Ints, Ints], Bools]
@@ -111,7 +113,7 @@ class Known:
         """The edges (E, 2) found closed."""
         return np.stack(np.divmod(self._edges[self._state == CLOSED], len(self.q)), axis=1)
 
-    def learn(self, runs: list[Ints], near: Callable[[Ints, Ints], Bools]) -> bool:
+    def learn(self, runs: list[Ints], near: Passable) -> bool:
         """Ask for what is not known of a path; False where all of it is clear and free.
 
         Parameters
@@ -157,7 +159,7 @@ class Known:
         self._asked[new], self.cost[new] = True, price
         return new[price > 0]
 
-    def _look_at_edges(self, edges: Ints, near: Callable[[Ints, Ints], Bools]) -> bool:
+    def _look_at_edges(self, edges: Ints, near: Passable) -> bool:
         """Ask for what is not known of a path's edges; True where one is closed.
 
         Around closed ones it looks the wider, the more often edges of that layer were closed.
@@ -232,38 +234,38 @@ class Known:
                 closed.append(k)
         return closed, len(self.start) - 1
 
-    def told(self, broken: NoFeasiblePath) -> NoFeasiblePath:
-        """Say of a break what collision has to do with it."""
+    def explain(self, broken: NoFeasiblePath) -> NoFeasiblePath:
+        """Return a break with what collision has to do with it."""
         counts = dict(broken.counts)
-        counts.pop("closed vertices", None)
+        counts.pop(Reason(Loss.CLOSED), None)
         there, closed = broken.node + 1, np.isinf(self.cost)
         ways = {
-            "collision at the node": int(closed[self._layer == there].sum()),
-            "collision on the way": counts.pop("shut edges", 0),
+            Reason(Loss.COLLISION, "at the node"): int(closed[self._layer == there].sum()),
+            Reason(Loss.COLLISION, "on the way"): counts.pop(Reason(Loss.SHUT), 0),
         }
+        elsewhere = Reason(Loss.COLLISION, "elsewhere")
         if not broken.counts or not any(ways.values()):
-            ways = {"collision elsewhere": self.vertices_closed + self.edges_closed}
+            ways = {elsewhere: self.vertices_closed + self.edges_closed}
         if not any(ways.values()):
             return broken
         counts |= {name: number for name, number in ways.items() if number}
-        told = ", ".join(f"{name}: {number}" for name, number in counts.items())
-        message = f"no admissible way to node {there} that is clear; forbidden by {told}"
-        if "collision elsewhere" in ways:
-            message = f"{broken}, collision elsewhere: {ways['collision elsewhere']}"
+        reasons = ", ".join(f"{name}: {number}" for name, number in counts.items())
+        message = f"no admissible way to node {there} that is clear; forbidden by {reasons}"
+        if elsewhere in ways:
+            message = f"{broken}, {elsewhere}: {ways[elsewhere]}"
         return broken.retold(message, counts)
 
 
-def clear_path(search: Callable[..., _P], known: Known, **options: Any) -> _P:
+def find_clear(search: Callable[[SearchProblem], _P], problem: SearchProblem, known: Known) -> _P:
     """Return the best path of a search through open vertices and passable edges alone, exactly.
 
     Parameters
     ----------
     search : callable
-        `shortest_path`, `slowed_path`, `interrupted_path` or `least_interval`.
+        `find_shortest`, `find_slowed`, `find_interrupted` or `find_least_interval`.
+    problem : SearchProblem
     known : Known
-        The graph, and what is known of it; it learns more.
-    **options
-        Of the search, but q, start and shut; a method must be "exact".
+        What is known of its graph; it learns more.
 
     Raises
     ------
@@ -272,23 +274,15 @@ def clear_path(search: Callable[..., _P], known: Known, **options: Any) -> _P:
     InputError
         As the search; another method; a price that is negative or not a number.
     """
-    if options.get("method", "exact") != "exact":
-        raise InputError(
-            f'method: only "exact" finds the best clear path, got {options["method"]!r}'
-        )
-    given = options.pop("vertex_cost", None)
+    if problem.method != "exact":
+        raise InputError(f'method: only "exact" finds the best clear path, got {problem.method!r}')
     while True:
+        cost, shut = problem.vertex_cost + known.cost, np.vstack([problem.shut, known.shut])
         try:
-            found = search(
-                q=known.q,
-                start=known.start,
-                vertex_cost=known.cost + (0.0 if given is None else np.asarray(given)),
-                shut=known.shut,
-                **options,
-            )
+            found = search(replace(problem, vertex_cost=cost, shut=shut))
         except NoFeasiblePath as broken:
-            raise known.told(broken) from None
-        if not known.learn(_runs(found, known.start), _near(known.q, options)):
+            raise known.explain(broken) from None
+        if not known.learn(_runs(found, known.start), _near(problem, found)):
             return found
 
 
@@ -299,16 +293,12 @@ def _runs(found: Path, start: Ints) -> list[Ints]:
     return [start[p.first : p.first + len(p.index)] + p.index for p in found.pieces]
 
 
-def _near(q: Array, options: dict[str, Any]) -> Callable[[Ints, Ints], Bools]:
-    """Return what tells which edges keep the velocity limit; without a node interval, all do."""
-    given = options.get("endless")
-    endless = np.zeros(q.shape[1], bool) if given is None else np.asarray(given, dtype=np.bool_)
-    bound = np.inf
-    if "dt" in options:
-        velocity = np.asarray(options["velocity"], dtype=np.float64)
-        bound = options["dt"] * options.get("eta_v", 1.0) * velocity
+def _near(problem: SearchProblem, found: Path) -> Passable:
+    """Return what tells which edges keep the velocity limit; at the least interval, all do."""
+    bound = np.inf if isinstance(found, LeastInterval) else problem.aim.velocity
 
     def near(p: Ints, j: Ints) -> Bools:
-        return np.asarray((np.abs(reduced(q[j] - q[p], endless)) <= bound).all(axis=1))
+        dq = increments_between(problem.q[p], problem.q[j], problem.endless)
+        return np.asarray((np.abs(dq) <= bound).all(axis=1))
 
     return near

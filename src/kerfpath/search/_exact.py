@@ -9,7 +9,7 @@ import numpy as np
 from kerfpath._arrays import Array, Bools, Ints
 from kerfpath._told import told
 from kerfpath.kernels import exact, to_go
-from kerfpath.kernels.search import Layers, Objective
+from kerfpath.kernels.search import Aim, SortedLayers
 from kerfpath.kernels.states import EVERY
 
 __all__ = [
@@ -84,13 +84,13 @@ class Best:
     __repr__ = told
 
 
-def best_path(layers: Layers, aim: Objective) -> Best | Dead:
+def best_path(layers: SortedLayers, aim: Aim) -> Best | Dead:
     """Return the best path, or how far any goes."""
     every = np.ones(len(layers.low), np.bool_)
     return best_allowed(layers, aim, every, NO_SEAM, 0.0) or dead_end(layers, aim)
 
 
-def quickest_path(layers: Layers, aim: Objective, ceiling: float) -> Best | None:
+def quickest_path(layers: SortedLayers, aim: Aim, ceiling: float) -> Best | None:
     """Return the path of least node interval, if that is `ceiling` or less (a timed objective)."""
     every = np.ones(len(layers.low), np.bool_)
     found = _grow(layers, aim, every, NO_SEAM, 0.0, ceiling)
@@ -102,7 +102,7 @@ def quickest_path(layers: Layers, aim: Objective, ceiling: float) -> Best | None
 
 
 def best_allowed(
-    layers: Layers, aim: Objective, allowed: Bools, seam: Array, floor: float
+    layers: SortedLayers, aim: Aim, allowed: Bools, seam: Array, floor: float
 ) -> Best | None:
     """Return the best path through allowed vertices, (6) across a seam kept; None if there is none.
 
@@ -116,14 +116,14 @@ def best_allowed(
         return Best(path=found[0], cost=found[1], total=found[1])
     cap = found[1]
     least_sum = aim._replace(minimax=False, cap=cap)
-    again = _grow(layers, least_sum, allowed & (aim.vertex_cost <= cap), seam, 0.0)
+    again = _grow(layers, least_sum, allowed & (layers.cost <= cap), seam, 0.0)
     assert again is not None, "the path that gave the cap keeps it"
     return Best(path=again[0], cost=cap, total=again[1])
 
 
 def _grow(
-    layers: Layers,
-    aim: Objective,
+    layers: SortedLayers,
+    aim: Aim,
     allowed: Bools,
     seam: Array,
     floor: float,
@@ -136,7 +136,7 @@ def _grow(
     h = np.empty(len(layers.low))
     to_go.cost_to_go(layers, aim, allowed, h)
     entry = h[: layers.start[1]]
-    enter = aim.vertex_cost[: layers.start[1]]
+    enter = layers.cost[: layers.start[1]]
     least = float((np.maximum(enter, entry) if aim.minimax else enter + entry).min(initial=np.inf))
     if least == np.inf:
         return None
@@ -161,7 +161,7 @@ def _grow(
     return path, float(reached.cost)
 
 
-def dead_end(layers: Layers, aim: Objective) -> Dead:
+def dead_end(layers: SortedLayers, aim: Aim) -> Dead:
     """Go as far as any admissible path goes, and count what forbids to go on."""
     reached = _as_far_as_any(layers, aim)
     K, n = len(layers.start) - 1, len(layers.endless)
@@ -173,12 +173,12 @@ def dead_end(layers: Layers, aim: Objective) -> Dead:
     return Dead(layers=reached.layers, counts=counts, shut=int(shut), reached=ends)
 
 
-def layers_reached(layers: Layers, aim: Objective) -> int:
+def layers_reached(layers: SortedLayers, aim: Aim) -> int:
     """Return the number of layers that some admissible path reaches."""
     return int(_as_far_as_any(layers, aim).layers)
 
 
-def _as_far_as_any(layers: Layers, aim: Objective) -> exact.Reached:
+def _as_far_as_any(layers: SortedLayers, aim: Aim) -> exact.Reached:
     """Go as far as any admissible path goes, whatever it costs."""
     free = np.zeros(len(layers.low))
     return exact.recursion(layers, aim, free, np.inf, NO_SEAM, 0, EVERY)

@@ -6,18 +6,17 @@ from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
-from numpy.typing import ArrayLike
 
-from kerfpath._arrays import Array, Bools, Ints, bools, floats, freeze, positive, scalar
+from kerfpath._arrays import Array, Bools, Ints, freeze
 from kerfpath._told import told
 from kerfpath.errors import InputError
-from kerfpath.kernels import search as kernel
-from kerfpath.kernels.metric import CHEBYCHEV, increments
+from kerfpath.kernels.metric import CHEBYCHEV, increments, increments_between
+from kerfpath.kernels.search import Aim
 from kerfpath.search._exact import quickest_path
-from kerfpath.search._layers import require_joined, sorted_layers
-from kerfpath.search._problem import Problem, closed_vertices, offsets, shut_edges
+from kerfpath.search._layers import Layers, require_joined, sort_layers
+from kerfpath.search._problem import SearchProblem, refuse_ends
 
-__all__ = ["LeastInterval", "least_interval", "quickest"]
+__all__ = ["LeastInterval", "aim_at_least_time", "find_least_interval", "quickest", "times_asked"]
 
 _LAYERS_SAMPLED = 8
 """Layers whose nearest pairs give the first guess of the interval; any guess ends right."""
@@ -49,18 +48,7 @@ class LeastInterval:
     __repr__ = told
 
 
-def least_interval(
-    q: ArrayLike,
-    start: ArrayLike,
-    *,
-    velocity: ArrayLike,
-    acceleration: ArrayLike,
-    endless: ArrayLike | None = None,
-    vertex_cost: ArrayLike | None = None,
-    shut: ArrayLike | None = None,
-    eta_v: float = 1.0,
-    eta_a: float = 1.0,
-) -> LeastInterval:
+def find_least_interval(problem: SearchProblem) -> LeastInterval:
     """Return the least node interval in which a path through the layers keeps (5) and (6), exactly.
 
     Minimises over all paths the largest of |dq_i| / (eta_v q'max_i) over edges and of
@@ -68,110 +56,91 @@ def least_interval(
 
     Parameters
     ----------
-    q, start, velocity, acceleration, endless, shut, eta_v, eta_a
-        As in `shortest_path`; K >= 2.
-    vertex_cost : (N,), optional
-        0, or infinity where a vertex is closed.
+    problem : SearchProblem
+        K >= 2; vertices cost 0, or infinity where they are closed. Its dt, weights, metric and
+        objective play no part.
 
     Raises
     ------
     NoFeasiblePath
         An empty layer, or closed vertices and shut edges that leave no path; says where.
     InputError
-        Arrays that do not fit each other, NaN, limits that are not positive, other vertex costs.
+        A single layer, other vertex costs, a closure or a rotation limit.
     """
-    q = floats(q, "q", (None, None), copy=False)
-    start, n = offsets(start, len(q)), q.shape[1]
-    v = scalar(eta_v, "eta_v", above=0.0) * positive(velocity, "velocity", (n,))
-    a = scalar(eta_a, "eta_a", above=0.0) * positive(acceleration, "acceleration", (n,))
-    endless = bools(np.zeros(n, bool) if endless is None else endless, "endless", (n,))
-    if len(start) < 3:
+    refuse_ends(problem, "least node interval")
+    if len(problem.start) < 3:
         raise InputError("start: a node interval needs at least two layers, got 1")
-    problem = timed(
-        q, start, endless, weight=1 / v, acceleration=a, vertex_cost=vertex_cost, shut=shut
-    )
-    if not np.isin(problem.aim.vertex_cost, (0.0, np.inf)).all():
+    if not np.isin(problem.vertex_cost, (0.0, np.inf)).all():
         raise InputError("vertex_cost: here a vertex is open (0) or closed (infinity)")
-    require_joined(problem)
-    ceiling = _guess(q, start, v, endless)
+    layers = problem.layers
+    require_joined(layers)
+    v, a = problem.limits.velocity.usable, problem.limits.acceleration.usable
+    aim, ceiling = aim_at_least_time(1 / v, a), _guess(layers, v)
     while True:
         # Edges that take longer than the ceiling are not looked at: right if a path keeps it.
-        found = quickest(problem, ceiling * v, ceiling)
+        found = quickest(layers, aim, ceiling * v, ceiling)
         if found is not None:
-            index, _ = found
-            return _binding(q[start[:-1] + index], index, v, a, endless)
+            return _binding(layers, found[0], v, a)
         ceiling *= 2
 
 
-def timed(
-    q: Array,
-    start: Ints,
-    endless: Bools,
-    *,
-    weight: Array,
-    acceleration: Array,
-    vertex_cost: ArrayLike | None = None,
-    shut: ArrayLike | None = None,
-) -> Problem:
-    """Return the problem of the path whose steps and changes ask for the least time at most.
+def aim_at_least_time(weight: Array, acceleration: Array) -> Aim:
+    """Return the aim that the slowest step or change of a path asks for the least time, s.
 
     A step asks for its Chebychev distance under `weight` (n,) s/rad, a change for the time in which
-    `acceleration` (n,) rad/s^2 allows it.
+    `acceleration` (n,) rad/s^2 allows it: node intervals of a second.
     """
-    aim = kernel.Objective(
+    return Aim(
         weight=freeze(weight),
         metric=CHEBYCHEV,
         minimax=True,
-        vertex_cost=closed_vertices(vertex_cost, len(q)),
-        velocity=np.full(len(endless), np.inf),
-        acceleration=freeze(acceleration),
-        cap=np.inf,
+        velocity=np.full(len(weight), np.inf),
+        acceleration=acceleration,
         timed=True,
     )
-    return Problem(q=q, start=start, endless=endless, aim=aim, shut=shut_edges(shut, start))
 
 
-def quickest(problem: Problem, bound: Array, ceiling: float) -> tuple[Ints, float] | None:
-    """Return the best path of a timed problem whose steps keep `bound` (n,) rad, and its time.
+def quickest(layers: Layers, aim: Aim, bound: Array, ceiling: float) -> tuple[Ints, float] | None:
+    """Return the path of least time whose steps keep `bound` (n,) rad, and its time.
 
     None where more than `ceiling` s is asked for, or no path keeps the bound.
     """
-    aim = problem.aim._replace(velocity=freeze(bound), cap=ceiling)
-    layers, aim, _ = sorted_layers(problem._replace(aim=aim))
-    best = quickest_path(layers, aim, ceiling)
-    return None if best is None else (layers.rank[best.path], best.cost)
+    graph = sort_layers(layers, bound)
+    best = quickest_path(graph, aim._replace(velocity=freeze(bound), cap=ceiling), ceiling)
+    return None if best is None else (graph.rank[best.path], best.cost)
 
 
-def _guess(q: Array, start: Ints, v: Array, endless: Bools) -> float:
+def times_asked(path: Array, endless: Bools, velocity: Array, acceleration: Array) -> list[Array]:
+    """Return the times in which (5) and (6) would hold on a path (K, n) rad.
+
+    Those of its steps, (K-1, n), and of their changes, (K-2, n): in s under limits (n,) in rad/s
+    and rad/s^2, in node intervals under limits in rad.
+    """
+    dq = increments(path, endless)
+    return [np.abs(dq) / velocity, np.sqrt(np.abs(np.diff(dq, axis=0)) / acceleration)]
+
+
+def _guess(layers: Layers, v: Array) -> float:
     """Return a node interval to begin with: twice what the nearest vertices of some layers need."""
-    least = 0.0
+    q, start, least = layers.q, layers.start, 0.0
     for k in np.unique(np.linspace(0, len(start) - 3, _LAYERS_SAMPLED).astype(int)):
         here, there = (q[start[i] : start[i + 1]] for i in (k, k + 1))
         nearest = np.full(len(here), np.inf)
         for j in range(0, len(there), max(1, len(there) // 64)):
-            step = np.abs(here - there[j])
-            short = np.abs(step - 2 * np.pi * np.round(step / (2 * np.pi)))
-            nearest = np.minimum(nearest, (np.where(endless, short, step) / v).max(axis=1))
+            step = np.abs(increments_between(there[j], here, layers.endless))
+            nearest = np.minimum(nearest, (step / v).max(axis=1))
         least = max(least, float(nearest.min()))
     return 2 * least or 1e-6
 
 
-def _binding(path: Array, index: Ints, v: Array, a: Array, endless: Bools) -> LeastInterval:
+def _binding(layers: Layers, index: Ints, v: Array, a: Array) -> LeastInterval:
     """Measure a path: its least interval, and what asks for it."""
-    dq = increments(np.ascontiguousarray(path), endless)
-    fast = np.abs(dq) / v
-    sharp = np.sqrt(np.abs(np.diff(dq, axis=0)) / a)
+    path = layers.q[layers.start[:-1] + index]
+    fast, sharp = times_asked(path, layers.endless, v, a)
     limit: Literal["velocity", "acceleration"]
-    if sharp.size and sharp.max() > fast.max():
-        k, joint = np.unravel_index(np.argmax(sharp), sharp.shape)
-        dt, node, limit = float(sharp.max()), int(k) + 1, "acceleration"
-    else:
-        k, joint = np.unravel_index(np.argmax(fast), fast.shape)
-        dt, node, limit = float(fast.max()), int(k) + 1, "velocity"
+    limit = "acceleration" if sharp.max(initial=0.0) > fast.max() else "velocity"
+    time = sharp if limit == "acceleration" else fast
+    k, joint = np.unravel_index(np.argmax(time), time.shape)
     return LeastInterval(
-        dt=dt,
-        index=freeze(index),
-        joint=int(joint),
-        node=node,
-        limit=limit,
+        dt=float(time.max()), index=freeze(index), joint=int(joint), node=int(k) + 1, limit=limit
     )

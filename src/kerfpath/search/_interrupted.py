@@ -17,7 +17,7 @@ from numpy.typing import ArrayLike
 from kerfpath._arrays import Array, Bools, Ints, floats, freeze, scalar
 from kerfpath._told import told
 from kerfpath.errors import InputError, NoFeasiblePath
-from kerfpath.kernels.search import Layers, Objective
+from kerfpath.kernels.search import Aim, SortedLayers
 from kerfpath.search._exact import (
     NO_SEAM,
     Best,
@@ -26,11 +26,11 @@ from kerfpath.search._exact import (
     dead_end,
     layers_reached,
 )
-from kerfpath.search._layers import backwards, broken_edge, empty_layer, sorted_layers
+from kerfpath.search._layers import Layers, broken_edge, empty_layer, reverse, sort_layers
 from kerfpath.search._long_enough import Lengths, Spans, all_reaches, cheapest, fewest
-from kerfpath.search._problem import Metric, ObjectiveKind, Problem, checked
+from kerfpath.search._problem import SearchProblem, refuse_ends
 
-__all__ = ["InterruptedPath", "Piece", "interrupted_path"]
+__all__ = ["InterruptedPath", "Piece", "find_interrupted"]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -77,23 +77,8 @@ class InterruptedPath:
         return len(self.pieces) - 1
 
 
-def interrupted_path(
-    q: ArrayLike,
-    start: ArrayLike,
-    *,
-    dt: float,
-    velocity: ArrayLike,
-    acceleration: ArrayLike,
-    endless: ArrayLike | None = None,
-    vertex_cost: ArrayLike | None = None,
-    shut: ArrayLike | None = None,
-    weights: ArrayLike | None = None,
-    metric: Metric = "manhattan",
-    objective: ObjectiveKind = "sum",
-    eta_v: float = 1.0,
-    eta_a: float = 1.0,
-    s: ArrayLike | None = None,
-    least_piece: float | None = None,
+def find_interrupted(
+    problem: SearchProblem, *, s: ArrayLike | None = None, least_piece: float | None = None
 ) -> InterruptedPath:
     """Return the cheapest of the plans with the fewest interruptions, exactly.
 
@@ -105,9 +90,7 @@ def interrupted_path(
 
     Parameters
     ----------
-    q, start, dt, velocity, acceleration, endless, vertex_cost, shut, weights, metric, objective, \
-eta_v, eta_a
-        As in `shortest_path`.
+    problem : SearchProblem
     s : (K,) m, optional
         How far along the cut each node is, increasing; what `least_piece` is measured on.
     least_piece : float m, optional
@@ -121,32 +104,19 @@ eta_v, eta_a
         layers is open and keeps (5). `node` is the last one before. Or no division has only pieces
         of the least length; `node` is then where the first one breaks at the latest.
     InputError
-        As `shortest_path`.
+        A closure or a rotation limit; nodes that do not fit the layers.
     """
-    problem = checked(
-        q,
-        start,
-        dt=dt,
-        velocity=velocity,
-        acceleration=acceleration,
-        endless=endless,
-        vertex_cost=vertex_cost,
-        shut=shut,
-        weights=weights,
-        metric=metric,
-        objective=objective,
-        eta_v=eta_v,
-        eta_a=eta_a,
-    )
+    refuse_ends(problem, "interrupted path")
     if least_piece is not None:
         least_piece = scalar(least_piece, "least_piece", unit="m", above=0.0)
         s = _increasing(s, len(problem.start) - 1)
-    layers, aim, _ = sorted_layers(problem)
-    last = _reach(problem, layers, aim)
+    given, aim = problem.layers, problem.aim
+    layers = sort_layers(given, aim.velocity)
+    last = _reach(given, layers, aim)
     if least_piece is not None and len(last) > 1:
         return _long_enough(layers, aim, last, np.asarray(s), least_piece)
-    first = np.zeros(1, np.int64) if len(last) == 1 else _first(problem)
-    layers, aim, nodes = _in_stages(layers, aim, first, last)
+    first = np.zeros(1, np.int64) if len(last) == 1 else _first(given, aim)
+    layers, nodes = _in_stages(layers, first, last)
     found = best_path(layers, aim)
     assert isinstance(found, Best), "a plan with this number of interruptions has been found"
     return InterruptedPath(pieces=_pieces(layers, nodes, found.path), cost=found.cost, optimal=True)
@@ -164,7 +134,7 @@ def _increasing(s: ArrayLike | None, K: int) -> Array:
 
 
 def _long_enough(
-    layers: Layers, aim: Objective, last: Ints, s: Array, least_piece: float
+    layers: SortedLayers, aim: Aim, last: Ints, s: Array, least_piece: float
 ) -> InterruptedPath:
     """Return the cheapest plan of the fewest pieces that are all long enough.
 
@@ -186,9 +156,9 @@ def _long_enough(
         )
 
     def solve(spans: Spans) -> tuple[tuple[float, float], Ints, InterruptedPath] | None:
-        staged, asked, nodes = _in_stages(layers, aim, spans.low[:-1], spans.high[1:])
+        staged, nodes = _in_stages(layers, spans.low[:-1], spans.high[1:])
         every = np.ones(len(staged.low), np.bool_)
-        best = best_allowed(staged, asked, every, NO_SEAM, 0.0)
+        best = best_allowed(staged, aim, every, NO_SEAM, 0.0)
         if best is None:
             return None
         pieces = _pieces(staged, nodes, best.path)
@@ -199,7 +169,7 @@ def _long_enough(
     return cheapest(spans, reached, apart, solve)
 
 
-def _reach(problem: Problem, layers: Layers, aim: Objective) -> Ints:
+def _reach(given: Layers, layers: SortedLayers, aim: Aim) -> Ints:
     """Return the farthest node that can be cut with 0, 1, 2... interruptions, up to the last one.
 
     Raises
@@ -209,14 +179,14 @@ def _reach(problem: Problem, layers: Layers, aim: Objective) -> Ints:
     """
     K, k = len(layers.start) - 1, 0
     if layers.start[1] == 0:
-        raise empty_layer(problem, 0)
+        raise empty_layer(given, 0)
     reached: list[int] = []
     while not reached or k < K - 1:
         rest = layers._replace(start=layers.start[k:])
         edges = layers_reached(rest, aim) - 1
         if edges == 0 and K > 1:
             if layers.start[k + 1] == layers.start[k + 2]:
-                raise empty_layer(problem, k + 1)
+                raise empty_layer(given, k + 1)
             dead = dead_end(rest, aim)
             raise broken_edge(k + 1, dead.counts, dead.shut, proved=True)
         k += edges
@@ -224,23 +194,21 @@ def _reach(problem: Problem, layers: Layers, aim: Objective) -> Ints:
     return np.array(reached)
 
 
-def _first(problem: Problem) -> Ints:
+def _first(given: Layers, aim: Aim) -> Ints:
     """Return the first node from which the end is cut with as few interruptions as are left.
 
     (5) and (6) hold for a path and its reverse alike: it is the reach from the last layer back.
     """
-    problem = backwards(problem)
-    layers, aim, _ = sorted_layers(problem)
-    return (len(layers.start) - 2 - _reach(problem, layers, aim))[::-1]
+    given = reverse(given)
+    layers = sort_layers(given, aim.velocity)
+    return (len(layers.start) - 2 - _reach(given, layers, aim))[::-1]
 
 
-def _in_stages(
-    layers: Layers, aim: Objective, first: Ints, last: Ints
-) -> tuple[Layers, Objective, Ints]:
+def _in_stages(layers: SortedLayers, first: Ints, last: Ints) -> tuple[SortedLayers, Ints]:
     """Lay out, one after the other, the layers first[i]..last[i] that piece i can go through.
 
     Where the layers of two pieces are the same nodes, a path may break off in the one and begin
-    anew in the other. Returns the graph, what is asked of it, and the node of each of its layers.
+    anew in the other. Returns the graph, and the node of each of its layers.
     """
     nodes = np.concatenate([np.arange(a, b + 1) for a, b in zip(first, last, strict=True)])
     begin = np.concatenate([[0], np.cumsum(last + 1 - first)])
@@ -261,6 +229,7 @@ def _in_stages(
     staged = layers._replace(
         q=np.ascontiguousarray(layers.q[:, order]),
         start=freeze(start),
+        cost=freeze(layers.cost[order]),
         rank=layers.rank[order],
         low=low,
         high=high,
@@ -268,11 +237,11 @@ def _in_stages(
         shut_from=shut_from,
         shut=shut,
     )
-    return staged, aim._replace(vertex_cost=freeze(aim.vertex_cost[order])), nodes
+    return staged, nodes
 
 
 def _shut_in_stages(
-    layers: Layers, order: Ints, onwards: Ints, leading: Bools
+    layers: SortedLayers, order: Ints, onwards: Ints, leading: Bools
 ) -> tuple[Ints, Ints]:
     """Return the shut edges of the vertices `order` (N,), which lead `onwards` vertices before.
 
@@ -287,7 +256,7 @@ def _shut_in_stages(
     return shut_from, layers.shut[place] - np.repeat(onwards, count)
 
 
-def _pieces(layers: Layers, nodes: Ints, path: Ints) -> tuple[Piece, ...]:
+def _pieces(layers: SortedLayers, nodes: Ints, path: Ints) -> tuple[Piece, ...]:
     """Part a path through the stages, -1 where it skips a layer, into its pieces."""
     visited = np.flatnonzero(path >= 0)
     again = nodes[visited[1:]] == nodes[visited[:-1]]

@@ -1,4 +1,4 @@
-"""From bare arrays to the sorted graph that the kernels search."""
+"""A layered graph as it is given, and sorted as the kernels search it."""
 
 from __future__ import annotations
 
@@ -10,17 +10,16 @@ from kerfpath._arrays import Array, Bools, Ints, freeze
 from kerfpath.errors import NoFeasiblePath
 from kerfpath.kernels import search as kernel
 from kerfpath.kernels.limits import LIMIT_TOLERANCE
-from kerfpath.kernels.search import Layers, Objective
-from kerfpath.search._problem import Problem
+from kerfpath.kernels.search import SortedLayers
+from kerfpath.losses import Loss, Reason
 
 __all__ = [
-    "Sorted",
-    "backwards",
+    "Layers",
     "broken_edge",
     "empty_layer",
-    "reduced",
     "require_joined",
-    "sorted_layers",
+    "reverse",
+    "sort_layers",
 ]
 
 _LAYERS_SAMPLED = 32
@@ -29,30 +28,38 @@ _VERTICES_SAMPLED = 16
 """Vertices of each of them whose windows are counted."""
 
 
-class Sorted(NamedTuple):
-    """A problem as the kernels take it: without closed vertices, each layer sorted by one key."""
+class Layers(NamedTuple):
+    """A layered graph as it is given: a row for each vertex."""
 
-    layers: Layers
-    """Its ranks count all vertices of a layer, the closed ones too."""
-    aim: Objective
-    order: Ints
-    """(N,): where each of its vertices stands in q."""
+    q: Array
+    """(N, n) rad."""
+    start: Ints
+    """(K+1,): layer k is q[start[k]:start[k+1]]."""
+    endless: Bools
+    """(n,): joints that turn without end."""
+    cost: Array
+    """(N,): what visiting a vertex costs, infinite where it is closed."""
+    shut: Ints
+    """(E, 2): edges that may not be used, from and to."""
 
 
-def sorted_layers(
-    problem: Problem, key: Array | None = None, width: float = 0.0, *, circular: bool = False
-) -> Sorted:
-    """Return the problem sorted by a key (N,) that may change by `width` along an edge.
+def sort_layers(
+    layers: Layers, velocity: Array, key: Array | None = None, width: float = 0.0
+) -> SortedLayers:
+    """Return the graph without closed vertices, each layer sorted by a key (N,).
 
-    Without a key, by the joint whose velocity window leaves the fewest vertices.
+    Along an edge the key may change by `width`. Without a key they are sorted by the joint whose
+    window under `velocity` (n,) rad leaves the fewest vertices. Ranks count all vertices of a
+    layer, the closed ones too.
     """
-    q, start, endless, aim, _ = problem
-    kept = np.flatnonzero(aim.vertex_cost < np.inf) if _any_closed(aim) else None
-    if kept is not None:
+    q, start, endless, cost, shut = layers
+    kept, circular = None, False
+    if cost.max(initial=0.0) == np.inf:
+        kept = np.flatnonzero(cost < np.inf)
         q, start = q[kept], np.searchsorted(kept, start)
         key = None if key is None else key[kept]
     if key is None:
-        key, width, circular = _narrowest_key(q, start, aim.velocity, endless)
+        key, width, circular = _narrowest_key(q, start, velocity, endless)
     N, n = q.shape
     columns, keys, rank = np.empty((n, N)), np.empty(N), np.empty(N, np.int64)
     kernel.arrange(q, key, start, endless, columns, keys, rank)
@@ -64,13 +71,12 @@ def sorted_layers(
     order += rank
     if kept is not None:
         order = kept[order]
-        rank = order - np.repeat(problem.start[:-1], sizes)
-    if aim.vertex_cost.any():
-        aim = aim._replace(vertex_cost=freeze(aim.vertex_cost[order]))
-    shut_from, shut = _by_vertex(problem.shut, order, len(problem.q))
-    layers = Layers(
+        rank = order - np.repeat(layers.start[:-1], sizes)
+    shut_from, shut = _by_vertex(shut, order, len(layers.q))
+    return SortedLayers(
         q=columns,
-        start=start,
+        start=freeze(start),
+        cost=freeze(cost[order] if cost.any() else cost),
         rank=rank,
         low=low,
         high=high,
@@ -80,15 +86,10 @@ def sorted_layers(
         shut_from=shut_from,
         shut=shut,
     )
-    return Sorted(layers, aim, order)
-
-
-def _any_closed(aim: Objective) -> bool:
-    return bool(aim.vertex_cost.max(initial=0.0) == np.inf)
 
 
 def _by_vertex(edges: Ints, order: Ints, vertices: int) -> tuple[Ints, Ints]:
-    """Return shut edges as `Layers` holds them, those of closed vertices left out."""
+    """Return shut edges as `SortedLayers` holds them, those of closed vertices left out."""
     if not len(edges):
         return np.empty(0, np.int64), np.empty(0, np.int64)
     place = np.full(vertices, -1)
@@ -98,42 +99,43 @@ def _by_vertex(edges: Ints, order: Ints, vertices: int) -> tuple[Ints, Ints]:
     return np.searchsorted(p[by], np.arange(len(order) + 1)), np.ascontiguousarray(j[by])
 
 
-def empty_layer(problem: Problem, k: int) -> NoFeasiblePath:
+def empty_layer(layers: Layers, k: int) -> NoFeasiblePath:
     """Return the answer for a graph whose layer k has no vertex, or none that is open."""
-    closed = int(problem.start[k + 1] - problem.start[k])
+    closed = int(layers.start[k + 1] - layers.start[k])
     why = "no path can start" if k == 0 else "no admissible pose at that node"
     return NoFeasiblePath(
         f"layer {k} is empty: {why}" + (f"; closed vertices: {closed}" if closed else ""),
         proved=True,
         node=k - 1,
-        counts={"closed vertices": closed} if closed else {},
+        counts={Reason(Loss.CLOSED): closed} if closed else {},
     )
 
 
 def broken_edge(k: int, forbidden: Ints, shut: int, *, proved: bool) -> NoFeasiblePath:
-    """Say that no admissible edge leads into layer k, and what forbids how many."""
-    counts = {
-        f"{test}, joint {i + 1}": int(number)
-        for test, row in zip(("velocity", "acceleration"), forbidden, strict=True)
+    """Return the answer that no admissible edge leads into layer k: what forbids how many."""
+    counts: dict[str, int] = {
+        Reason(test, i + 1): int(number)
+        for test, row in zip((Loss.VELOCITY, Loss.ACCELERATION), forbidden, strict=True)
         for i, number in enumerate(row)
         if number
     }
     if shut:
-        counts["shut edges"] = shut
-    told = ", ".join(f"{name}: {number}" for name, number in counts.items())
+        counts[Reason(Loss.SHUT)] = shut
+    reasons = ", ".join(f"{name}: {number}" for name, number in counts.items())
     total = int(sum(counts.values()))
     return NoFeasiblePath(
-        f"no admissible edge from node {k - 1} to node {k}; of {total} edges, forbidden by {told}",
+        f"no admissible edge from node {k - 1} to node {k}; "
+        f"of {total} edges, forbidden by {reasons}",
         proved=proved,
         node=k - 1,
         counts=counts,
     )
 
 
-def require_joined(problem: Problem) -> None:
+def require_joined(layers: Layers) -> None:
     """Raise NoFeasiblePath where closed vertices and shut edges alone leave no path."""
-    _, start, _, aim, edges = problem
-    open_ = reached = aim.vertex_cost < np.inf
+    q, start, _, cost, edges = layers
+    open_ = reached = cost < np.inf
     edges = edges[np.argsort(edges[:, 0])]
     begin = np.searchsorted(edges[:, 0], start)
     for k in range(len(start) - 1):
@@ -144,24 +146,25 @@ def require_joined(problem: Problem) -> None:
             shut = int(ways[here].sum())
             here = here & (ways < reached.sum())
             if shut and not here.any():
-                none = np.zeros((2, problem.q.shape[1]), np.int64)
+                none = np.zeros((2, q.shape[1]), np.int64)
                 raise broken_edge(k, none, shut, proved=True)
         if not here.any():
-            raise empty_layer(problem, k)
+            raise empty_layer(layers, k)
         reached = here
 
 
-def backwards(problem: Problem) -> Problem:
-    """Return the same problem with its layers in reverse order."""
-    q, start, _, aim, shut = problem
+def reverse(layers: Layers) -> Layers:
+    """Return the layers in reverse order."""
+    q, start, endless, cost, shut = layers
     sizes = np.diff(start)[::-1]
     begin = np.concatenate([[0], np.cumsum(sizes)])
     # Vertex i of reversed layer k comes from where that layer stood.
     order = np.arange(len(q)) + np.repeat(start[:-1][::-1] - begin[:-1], sizes)
-    return problem._replace(
+    return Layers(
         q=freeze(q[order]),
         start=freeze(begin),
-        aim=aim._replace(vertex_cost=freeze(aim.vertex_cost[order])),
+        endless=endless,
+        cost=freeze(cost[order]),
         shut=np.argsort(order)[shut[:, ::-1]] if len(shut) else shut,
     )
 
@@ -182,9 +185,3 @@ def _narrowest_key(
     kernel.fill_key(q, best, bool(endless[best]), key)
     # Twice the slack of (5): the key must never exclude what the test itself would pass.
     return key, float(bound[best] + 2 * LIMIT_TOLERANCE), bool(endless[best])
-
-
-def reduced(q: Array, endless: Bools) -> Array:
-    """Bring the endless joints of q (N, n) into (-pi, pi]."""
-    turned = q - 2 * np.pi * np.ceil((q - np.pi) / (2 * np.pi))
-    return np.where(endless, turned, q)

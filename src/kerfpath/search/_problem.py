@@ -1,32 +1,37 @@
-"""The border of the searches: what users hand in, cast and checked."""
+"""What a search is to solve, cast and checked once."""
 
 from __future__ import annotations
 
-from typing import Literal, NamedTuple, get_args
+from dataclasses import dataclass, replace
+from typing import Any, Literal, get_args
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from kerfpath._arrays import Array, Bools, Ints, bools, floats, freeze, integers, positive, scalar
+from kerfpath._arrays import Array, Bools, Ints, bools, floats, freeze, integers, scalar
+from kerfpath._told import told
 from kerfpath.errors import InputError
 from kerfpath.kernels import metric as metrics
-from kerfpath.kernels.search import Objective
+from kerfpath.kernels.search import Aim
+from kerfpath.limits import Limits
+from kerfpath.search._layers import Layers
 
 __all__ = [
     "METRIC_CODES",
+    "Closure",
+    "Method",
     "Metric",
     "ObjectiveKind",
-    "Problem",
-    "checked",
-    "closed_vertices",
+    "SearchProblem",
     "offsets",
-    "one_of",
+    "refuse_ends",
     "rotation_limits",
-    "shut_edges",
 ]
 
 Metric = Literal["manhattan", "chebychev", "euclid"]
 ObjectiveKind = Literal["sum", "max"]
+Method = Literal["exact", "paper", "known"]
+Closure = Literal["free", "periodic"]
 
 METRIC_CODES: dict[str, int] = {
     "euclid": metrics.EUCLID,
@@ -35,22 +40,131 @@ METRIC_CODES: dict[str, int] = {
 }
 
 
-class Problem(NamedTuple):
-    """A layered graph, not sorted yet, and what is asked of a path through it."""
+@dataclass(frozen=True, slots=True, eq=False, init=False)
+class SearchProblem:
+    """A layered graph given as bare arrays, and what is asked of a path through it.
+
+    A path takes one vertex of each layer, in order.
+
+    Parameters
+    ----------
+    q, start, dt, endless, vertex_cost, shut, weights, metric, objective, closure, rotation, posture
+        As in `kerfpath.shortest_path`; q is not copied.
+    limits : Limits
+        What (5) and (6) hold each step to.
+    method : {"exact", "paper", "known"}
+        How the shortest path is searched; all other searches are exact.
+
+    Raises
+    ------
+    InputError
+        Arrays that do not fit each other, NaN, a dt that is not positive, unknown names, a finite
+        rotation of a joint that is not endless, another method than the exact one for a closure or
+        a rotation.
+    """
 
     q: Array
-    """(N, n) rad."""
     start: Ints
-    """(K+1,): layer k is q[start[k]:start[k+1]]."""
+    dt: float
+    limits: Limits
     endless: Bools
-    """(n,): joints that turn without end."""
-    aim: Objective
-    """Its vertex costs are in the order of q, infinite where a vertex is closed."""
+    vertex_cost: Array
     shut: Ints
-    """(E, 2): edges that may not be used, from and to, in the order of q."""
+    weights: Array
+    metric: Metric
+    objective: ObjectiveKind
+    closure: Closure
+    rotation: Array
+    method: Method
+    posture: Ints | None
+
+    __repr__ = told
+
+    def __init__(
+        self,
+        *,
+        q: ArrayLike,
+        start: ArrayLike,
+        dt: float,
+        limits: Limits,
+        endless: ArrayLike | None = None,
+        vertex_cost: ArrayLike | None = None,
+        shut: ArrayLike | None = None,
+        weights: ArrayLike | None = None,
+        metric: Metric = "manhattan",
+        objective: ObjectiveKind = "sum",
+        closure: Closure = "free",
+        rotation: ArrayLike | None = None,
+        method: Method = "exact",
+        posture: ArrayLike | None = None,
+    ) -> None:
+        for name, value, known in (
+            ("method", method, get_args(Method)),
+            ("closure", closure, get_args(Closure)),
+            ("metric", metric, tuple(METRIC_CODES)),
+            ("objective", objective, get_args(ObjectiveKind)),
+        ):
+            if value not in known:
+                raise InputError(f"{name}: expected one of {', '.join(known)}, got {value!r}")
+        q = floats(q, "q", (None, None), copy=False)
+        N, n = q.shape
+        if n == 0:
+            raise InputError(f"q: expected at least one joint, got shape {q.shape}")
+        dt = scalar(dt, "dt", unit="s", above=0.0)
+        limits.require_joints(n)
+        start = offsets(start, N)
+        turning = bools(np.zeros(n, bool) if endless is None else endless, "endless", (n,))
+        cast: dict[str, Any] = {
+            "q": q,
+            "start": start,
+            "dt": dt,
+            "limits": limits,
+            "endless": turning,
+            "vertex_cost": _vertex_costs(vertex_cost, N),
+            "shut": _shut_edges(shut, start),
+            "weights": _weights(weights, limits, dt),
+            "metric": metric,
+            "objective": objective,
+            "closure": closure,
+            "rotation": rotation_limits(rotation, turning),
+            "method": method,
+            "posture": None if posture is None else integers(posture, "posture", (N,)),
+        }
+        for name, value in cast.items():
+            object.__setattr__(self, name, value)
+        if method != "exact" and closure == "periodic":
+            raise InputError(f'closure: "periodic" needs method="exact", got method={method!r}')
+        if method != "exact" and np.isfinite(self.rotation).any():
+            raise InputError(f'rotation: a limit needs method="exact", got method={method!r}')
+
+    @property
+    def layers(self) -> Layers:
+        """The layered graph."""
+        return Layers(self.q, self.start, self.endless, self.vertex_cost, self.shut)
+
+    def free(self) -> SearchProblem:
+        """Return the problem with no closure, no rotation limit and no cost of open vertices."""
+        return replace(
+            self,
+            vertex_cost=np.where(self.vertex_cost < np.inf, 0.0, np.inf),
+            closure="free",
+            rotation=np.full(len(self.endless), np.inf),
+        )
+
+    @property
+    def aim(self) -> Aim:
+        """What the kernels are to minimise, and the bounds on the increments."""
+        return Aim(
+            weight=self.weights,
+            metric=METRIC_CODES[self.metric],
+            minimax=self.objective == "max",
+            velocity=self.limits.velocity.per_interval(self.dt),
+            acceleration=self.limits.acceleration.per_interval(self.dt),
+        )
 
 
 def offsets(start: ArrayLike, vertices: int) -> Ints:
+    """Return `start` as offsets of layers, or refuse it."""
     start = integers(start, "start", (None,))
     if len(start) < 2 or start[0] != 0 or start[-1] != vertices or (np.diff(start) < 0).any():
         raise InputError(
@@ -60,57 +174,17 @@ def offsets(start: ArrayLike, vertices: int) -> Ints:
     return start
 
 
-def checked(
-    q: ArrayLike,
-    start: ArrayLike,
-    *,
-    dt: float,
-    velocity: ArrayLike,
-    acceleration: ArrayLike,
-    endless: ArrayLike | None,
-    vertex_cost: ArrayLike | None,
-    shut: ArrayLike | None,
-    weights: ArrayLike | None,
-    metric: Metric,
-    objective: ObjectiveKind,
-    eta_v: float,
-    eta_a: float,
-) -> Problem:
-    """Return the problem that the arguments of `shortest_path` pose.
-
-    Raises
-    ------
-    InputError
-        Arrays that do not fit each other, NaN, limits or dt that are not positive, unknown names.
-    """
-    q = floats(q, "q", (None, None), copy=False)
-    start, n = offsets(start, len(q)), q.shape[1]
-    if n == 0:
-        raise InputError("q: expected at least one joint, got shape " + str(q.shape))
-    dt = scalar(dt, "dt", unit="s", above=0.0)
-    velocity = positive(velocity, "velocity", (n,))
-    acceleration = positive(acceleration, "acceleration", (n,))
-    endless = bools(np.zeros(n, bool) if endless is None else endless, "endless", (n,))
-    one_of("metric", metric, tuple(METRIC_CODES))
-    one_of("objective", objective, get_args(ObjectiveKind))
-    weight = 1.0 / (velocity * dt) if weights is None else floats(weights, "weights", (n,))
-    if (weight < 0).any():
-        raise InputError(f"weights: must not be negative, got {weight.tolist()}")
-    aim = Objective(
-        weight=freeze(np.ascontiguousarray(weight)),
-        metric=METRIC_CODES[metric],
-        minimax=objective == "max",
-        vertex_cost=closed_vertices(vertex_cost, len(q)),
-        velocity=freeze(scalar(eta_v, "eta_v", above=0.0) * velocity * dt),
-        acceleration=freeze(scalar(eta_a, "eta_a", above=0.0) * acceleration * dt**2),
-        cap=np.inf,
-        timed=False,
-    )
-    return Problem(q=q, start=start, endless=endless, aim=aim, shut=shut_edges(shut, start))
+def _weights(weights: ArrayLike | None, limits: Limits, dt: float) -> Array:
+    velocity = limits.velocity.bound
+    if weights is None:
+        return freeze(1.0 / (velocity * dt))
+    weights = floats(weights, "weights", velocity.shape)
+    if (weights < 0).any():
+        raise InputError(f"weights: must not be negative, got {weights.tolist()}")
+    return weights
 
 
-def closed_vertices(vertex_cost: ArrayLike | None, vertices: int) -> Array:
-    """Return what vertices (N,) cost, infinity where they are closed."""
+def _vertex_costs(vertex_cost: ArrayLike | None, vertices: int) -> Array:
     if vertex_cost is None:
         return freeze(np.zeros(vertices))
     cost = floats(vertex_cost, "vertex_cost", (vertices,), infinite=True)
@@ -119,8 +193,7 @@ def closed_vertices(vertex_cost: ArrayLike | None, vertices: int) -> Array:
     return cost
 
 
-def shut_edges(shut: ArrayLike | None, start: Ints) -> Ints:
-    """Return the edges (E, 2) that may not be used, each from a layer to the next."""
+def _shut_edges(shut: ArrayLike | None, start: Ints) -> Ints:
     if shut is None:
         return np.empty((0, 2), np.int64)
     edges = integers(shut, "shut", (None, 2))
@@ -158,7 +231,10 @@ def rotation_limits(rotation: ArrayLike | None, endless: Bools) -> Array:
     return limit
 
 
-def one_of(name: str, value: str, known: tuple[str, ...]) -> None:
-    """Refuse a name that is not known."""
-    if value not in known:
-        raise InputError(f"{name}: expected one of {', '.join(known)}, got {value!r}")
+def refuse_ends(problem: SearchProblem, what: str) -> None:
+    """Refuse a closure or a rotation limit, which a search does not know."""
+    if problem.closure != "free" or np.isfinite(problem.rotation).any():
+        raise InputError(
+            f'{what}: needs closure "free" and no rotation limit, got {problem.closure!r} and '
+            f"{problem.rotation.tolist()}"
+        )

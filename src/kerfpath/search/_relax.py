@@ -2,19 +2,17 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import ArrayLike
 
-from kerfpath._arrays import bools, floats, positive, scalar
 from kerfpath._told import told
 from kerfpath.errors import NoFeasiblePath
-from kerfpath.search._fastest import LeastInterval, least_interval, quickest, timed
-from kerfpath.search._problem import offsets
-from kerfpath.search._shortest import shortest_path
+from kerfpath.search._fastest import LeastInterval, aim_at_least_time, find_least_interval, quickest
+from kerfpath.search._problem import SearchProblem
+from kerfpath.search._shortest import find_shortest
 
-__all__ = ["Relaxations", "least_relaxations"]
+__all__ = ["Relaxations", "find_relaxations"]
 
 LARGEST_ETA_V = 2.0
 """Velocity limits are not raised further than this: beyond it no robot goes."""
@@ -46,74 +44,49 @@ class Relaxations:
         return self.slower.dt
 
 
-def least_relaxations(
-    q: ArrayLike,
-    start: ArrayLike,
-    *,
-    dt: float,
-    velocity: ArrayLike,
-    acceleration: ArrayLike,
-    endless: ArrayLike | None = None,
-    eta_v: float = 1.0,
-    eta_a: float = 1.0,
-) -> Relaxations:
+def find_relaxations(problem: SearchProblem) -> Relaxations:
     """Return the least eta_v, eta_a and dt, each on its own, with which a path exists.
 
-    Each is a second-order minimax problem on the graph and exact. Arguments as in `shortest_path`.
+    Each is a second-order minimax problem on the graph and exact.
+
+    Parameters
+    ----------
+    problem : SearchProblem
+        As in `find_least_interval`.
 
     Raises
     ------
     NoFeasiblePath
         An empty layer, which no limit opens.
     InputError
-        As `shortest_path`.
+        As `find_least_interval`.
     """
-    q = floats(q, "q", (None, None), copy=False)
-    start, n = offsets(start, len(q)), q.shape[1]
-    dt = scalar(dt, "dt", unit="s", above=0.0)
-    v = positive(velocity, "velocity", (n,))
-    a = positive(acceleration, "acceleration", (n,))
-    turning = bools(np.zeros(n, bool) if endless is None else endless, "endless", (n,))
-    slower = least_interval(
-        q, start, velocity=v, acceleration=a, endless=turning, eta_v=eta_v, eta_a=eta_a
-    )
+    slower = find_least_interval(problem)
     # Velocity as it is, and of all paths the one whose sharpest change asks for the least time.
-    changes = timed(q, start, turning, weight=np.zeros(n), acceleration=a)
-    sharpest = quickest(changes, eta_v * v * dt, np.inf)
+    velocity, limits = problem.aim.velocity, problem.limits
+    changes = aim_at_least_time(np.zeros(len(velocity)), limits.acceleration.bound)
+    sharpest = quickest(problem.layers, changes, velocity, np.inf)
     return Relaxations(
-        eta_v=_least_eta_v(q, start, dt, v, a, turning, eta_v, eta_a),
-        eta_a=None if sharpest is None else (sharpest[1] / dt) ** 2,
+        eta_v=_least_eta_v(problem),
+        eta_a=None if sharpest is None else (sharpest[1] / problem.dt) ** 2,
         slower=slower,
     )
 
 
-def _least_eta_v(
-    q: ArrayLike,
-    start: ArrayLike,
-    dt: float,
-    v: ArrayLike,
-    a: ArrayLike,
-    endless: ArrayLike,
-    eta_v: float,
-    eta_a: float,
-) -> float | None:
+def _least_eta_v(problem: SearchProblem) -> float | None:
     """Return the least largest share of the velocity limits over paths that keep (6)."""
-    tried = eta_v
+    limits, tried = problem.limits, problem.limits.velocity.share
     while True:
+        # Within the share tried, the share itself is a Chebychev distance to be minimised.
+        asked = replace(
+            problem,
+            limits=replace(limits, velocity=replace(limits.velocity, share=tried)),
+            weights=1.0 / (limits.velocity.bound * problem.dt),
+            metric="chebychev",
+            objective="max",
+        )
         try:
-            # Within the share tried, the share itself is a Chebychev distance to be minimised.
-            return shortest_path(
-                q,
-                start,
-                dt=dt,
-                velocity=v,
-                acceleration=a,
-                endless=endless,
-                metric="chebychev",
-                objective="max",
-                eta_v=tried,
-                eta_a=eta_a,
-            ).cost
+            return find_shortest(asked).cost
         except NoFeasiblePath:
             if tried >= LARGEST_ETA_V:
                 return None

@@ -12,10 +12,10 @@ import numpy as np
 from kerfpath._arrays import Array, Bools, Ints, freeze
 from kerfpath.errors import NoFeasiblePath
 from kerfpath.kernels.limits import LIMIT_TOLERANCE
-from kerfpath.kernels.metric import MANHATTAN, increments
+from kerfpath.kernels.metric import MANHATTAN, increments, wrap
+from kerfpath.kernels.search import Aim
 from kerfpath.search._branch import best_from_its_start
-from kerfpath.search._layers import reduced, sorted_layers
-from kerfpath.search._problem import Problem
+from kerfpath.search._layers import Layers, sort_layers
 
 __all__ = ["best_within", "too_far", "why_closed"]
 
@@ -27,7 +27,7 @@ def too_far(path: Array, endless: Bools, rotation: Array) -> Bools:
 
 
 def best_within(
-    problem: Problem, rotation: Array, unroll: Bools, *, closed: bool
+    layers: Layers, aim: Aim, rotation: Array, unroll: Bools, *, closed: bool
 ) -> tuple[Bools, tuple[Ints, float] | None]:
     """Return the joints unrolled in the end, and the best path that keeps `rotation` (n,) rad.
 
@@ -35,32 +35,29 @@ def best_within(
     cost; None where the limits of the joints unrolled leave none.
     """
     while True:
-        found = _best(problem, np.where(unroll, rotation, np.inf), closed=closed)
+        found = _best(layers, aim, np.where(unroll, rotation, np.inf), closed=closed)
         if found is None:
             return unroll, None
-        path = problem.q[problem.start[:-1] + found[0]]
-        more = too_far(path, problem.endless, rotation) & ~unroll
+        path = layers.q[layers.start[:-1] + found[0]]
+        more = too_far(path, layers.endless, rotation) & ~unroll
         if not more.any():
             return unroll, found
         unroll = unroll | more
 
 
 def why_closed(
-    problem: Problem, rotation: Array, closing: Bools, *, closed: bool
+    layers: Layers, aim: Aim, rotation: Array, closing: Bools, *, closed: bool
 ) -> NoFeasiblePath:
-    """Say which limits close the way: those of the joints `closing` (n,) leave no path."""
+    """Return the answer that limits close the way: those of the joints `closing` (n,)."""
     # Whether there is a path is soonest seen from those that turn least.
-    turning = problem.aim._replace(
-        weight=closing.astype(float),
-        metric=MANHATTAN,
-        minimax=False,
-        vertex_cost=np.where(problem.aim.vertex_cost < np.inf, 0.0, np.inf),
-    )
-    problem = problem._replace(aim=turning)
+    aim = aim._replace(weight=freeze(closing.astype(float)), metric=MANHATTAN, minimax=False)
+    layers = layers._replace(cost=np.where(layers.cost < np.inf, 0.0, np.inf))
     joints = np.flatnonzero(closing).tolist()
     only = np.isfinite(rotation).sum() == 1
-    opening = [i for i in joints if only or _opens(problem, rotation, closing, i, closed=closed)]
-    node = _last_node(problem, rotation, closing, closed=closed)
+    opening = [
+        i for i in joints if only or _opens(layers, aim, rotation, closing, i, closed=closed)
+    ]
+    node = _last_node(layers, aim, rotation, closing, closed=closed)
     named = [f"joint {i + 1} ({rotation[i]:.4g} rad)" for i in opening or joints]
     one = "it" if len(named) == 1 else "any one of them"
     without = one if opening else "rotation limits"
@@ -72,57 +69,57 @@ def why_closed(
     )
 
 
-def _opens(problem: Problem, rotation: Array, closing: Bools, i: int, *, closed: bool) -> bool:
+def _opens(
+    layers: Layers, aim: Aim, rotation: Array, closing: Bools, i: int, *, closed: bool
+) -> bool:
     """Return whether there is a path once the limit of joint i alone is taken away."""
     others = np.arange(len(rotation)) != i
     unlimited = np.where(others, rotation, np.inf)
-    return best_within(problem, unlimited, closing & others, closed=closed)[1] is not None
+    return best_within(layers, aim, unlimited, closing & others, closed=closed)[1] is not None
 
 
-def _last_node(problem: Problem, rotation: Array, closing: Bools, *, closed: bool) -> int:
+def _last_node(layers: Layers, aim: Aim, rotation: Array, closing: Bools, *, closed: bool) -> int:
     """Return the last node that a path within `rotation` reaches, by halving.
 
     Without `closed` it is known that none reaches the end.
     """
-    q, start, endless, aim, shut = problem
+    q, start, endless, cost, shut = layers
     reached, beyond = 0, len(start) - (1 if closed else 2)
     while beyond - reached > 1:
         node = (reached + beyond) // 2
         N = start[node + 1]
-        part = Problem(
-            q=q[:N],
-            start=start[: node + 2],
-            endless=endless,
-            aim=aim._replace(vertex_cost=aim.vertex_cost[:N]),
-            shut=shut[shut[:, 1] < N],
-        )
-        if best_within(part, rotation, closing, closed=False)[1] is None:
+        part = Layers(q[:N], start[: node + 2], endless, cost[:N], shut[shut[:, 1] < N])
+        if best_within(part, aim, rotation, closing, closed=False)[1] is None:
             beyond = node
         else:
             reached = node
     return reached
 
 
-def _best(problem: Problem, rotation: Array, *, closed: bool) -> tuple[Ints, float] | None:
+def _best(layers: Layers, aim: Aim, rotation: Array, *, closed: bool) -> tuple[Ints, float] | None:
     """Return the best path that keeps `rotation`, all joints that have a limit unrolled."""
-    unrolled, place = _unrolled(problem, rotation)
-    layers, aim, order = sorted_layers(unrolled)
-    if (np.diff(layers.start) == 0).any():
+    unrolled, place = _unroll(layers, rotation)
+    # The other way round would be shorter.
+    most = np.where(np.isfinite(rotation), np.minimum(aim.velocity, np.pi), aim.velocity)
+    graph = sort_layers(unrolled, freeze(most))
+    sizes = np.diff(graph.start)
+    if (sizes == 0).any():
         return None
-    layers = layers._replace(rank=place[order])
-    found = best_from_its_start(layers, aim, rotation, closed=closed)
-    return None if found is None else (layers.rank[found.path], found.cost)
+    rank = place[graph.rank + np.repeat(unrolled.start[:-1], sizes)]
+    aim = aim._replace(velocity=most)
+    found = best_from_its_start(graph._replace(rank=rank), aim, rotation, closed=closed)
+    return None if found is None else (rank[found.path], found.cost)
 
 
-def _unrolled(problem: Problem, rotation: Array) -> tuple[Problem, Ints]:
-    """Return the problem with its limited joints unrolled, and which of its layer each vertex is.
+def _unroll(layers: Layers, rotation: Array) -> tuple[Layers, Ints]:
+    """Return the graph with its limited joints unrolled, and which of its layer each vertex is.
 
     Vertices that are too far from wherever a path begins are left out.
     """
-    q, start, endless, aim, shut = problem
+    q, start, endless, cost, shut = layers
     place = np.arange(len(q)) - np.repeat(start[:-1], np.diff(start))
     limited, origin = np.isfinite(rotation), np.arange(len(q))
-    q = reduced(q, limited)
+    q = np.where(limited, wrap(q), q)
     for i in np.flatnonzero(limited):
         x, m, reach = q[:, i], start[1], rotation[i] + LIMIT_TOLERANCE
         first = np.ceil((x[:m].min() - reach - x) / (2 * np.pi)).astype(np.int64)
@@ -134,15 +131,11 @@ def _unrolled(problem: Problem, rotation: Array) -> tuple[Problem, Ints]:
         origin, q = np.repeat(origin, copies), np.repeat(q, copies, axis=0)
         q[:, i] += 2 * np.pi * turn
         start = begin[start]
-    unrolled = Problem(
+    unrolled = Layers(
         q=freeze(q),
         start=freeze(start),
         endless=freeze(endless & ~limited),
-        aim=aim._replace(
-            vertex_cost=aim.vertex_cost[origin],
-            # The other way round would be shorter.
-            velocity=np.where(limited, np.minimum(aim.velocity, np.pi), aim.velocity),
-        ),
+        cost=cost[origin],
         shut=_every_copy(shut, origin, len(place)),
     )
     return unrolled, place[origin]

@@ -3,32 +3,26 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Literal, get_args
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from kerfpath._arrays import Array, Bools, Ints, freeze, integers
+from kerfpath._arrays import Array, Bools, Ints, freeze
 from kerfpath._told import told
 from kerfpath.errors import InputError, NoFeasiblePath
 from kerfpath.kernels import search as kernel
+from kerfpath.kernels.exact import count_closing
+from kerfpath.kernels.metric import increments_between
+from kerfpath.kernels.search import Aim, SortedLayers
+from kerfpath.kernels.states import States
+from kerfpath.limits import Limits
 from kerfpath.search._branch import best_closed_path
 from kerfpath.search._exact import Best, best_path, dead_end
-from kerfpath.search._layers import backwards, broken_edge, empty_layer, reduced, sorted_layers
-from kerfpath.search._problem import (
-    Metric,
-    ObjectiveKind,
-    Problem,
-    checked,
-    one_of,
-    rotation_limits,
-)
+from kerfpath.search._layers import Layers, broken_edge, empty_layer, reverse, sort_layers
+from kerfpath.search._problem import Closure, Method, Metric, ObjectiveKind, SearchProblem
 from kerfpath.search._rotation import best_within, too_far, why_closed
 
-__all__ = ["Closure", "LayeredPath", "Method", "shortest_path"]
-
-Method = Literal["exact", "paper", "known"]
-Closure = Literal["free", "periodic"]
+__all__ = ["LayeredPath", "find_shortest", "shortest_path"]
 
 SAME_END = 1e-6
 """Joint difference (rad) up to which the ends of a closed contour count as the same vertex."""
@@ -132,80 +126,73 @@ def shortest_path(
     the number of layers. It runs on the thread that calls it, without the interpreter lock:
     searches may run at once, and each answer is the same to the bit.
     """
-    one_of("method", method, get_args(Method))
-    one_of("closure", closure, get_args(Closure))
-    problem = checked(
-        q,
-        start,
+    problem = SearchProblem(
+        q=q,
+        start=start,
         dt=dt,
-        velocity=velocity,
-        acceleration=acceleration,
+        limits=Limits.of(velocity, acceleration, eta_v=eta_v, eta_a=eta_a),
         endless=endless,
         vertex_cost=vertex_cost,
         shut=shut,
         weights=weights,
         metric=metric,
         objective=objective,
-        eta_v=eta_v,
-        eta_a=eta_a,
+        closure=closure,
+        rotation=rotation,
+        method=method,
+        posture=posture,
     )
-    q, start, endless, aim, _ = problem
-    reach = rotation_limits(rotation, endless)
-    if posture is not None:
-        posture = integers(posture, "posture", (len(q),))
-    if closure == "periodic" and method != "exact":
-        raise InputError(f'closure: "periodic" needs method="exact", got method={method!r}')
-    if np.isfinite(reach).any() and method != "exact":
-        raise InputError(f'rotation: a limit needs method="exact", got method={method!r}')
+    return find_shortest(problem)
 
-    if method == "known":
-        free = np.full(q.shape[1], np.inf)
-        limitless = problem._replace(aim=aim._replace(velocity=free, acceleration=free))
-        key = np.zeros(len(q)) if posture is None else posture.astype(float)
-        layers, aim = sorted_layers(limitless, key, 0.5)[:2]
-        del key
+
+def find_shortest(problem: SearchProblem) -> LayeredPath:
+    """Return the best path through the layers of a problem; see `shortest_path`."""
+    given, aim = problem.layers, problem.aim
+    if problem.method == "known":
+        free = freeze(np.full(len(aim.weight), np.inf))
+        aim = aim._replace(velocity=free, acceleration=free)
+        key = np.zeros(len(given.q)) if problem.posture is None else problem.posture.astype(float)
+        layers = sort_layers(given, free, key, 0.5)
+        del key  # as large as the graph
     else:
-        layers, aim = sorted_layers(problem)[:2]
-    del posture  # as large as the graph
-    filled = _filled(layers)
-    if filled == 0:
-        raise empty_layer(problem, 0)
-    if method == "exact":
-        if closure == "periodic":
-            _require_same_ends(problem)
-        try:
-            found = _exactly(problem, layers, aim, filled, closure)
-        except NoFeasiblePath as broken:
-            broken.back, broken.leaving = _from_the_back(problem)
-            raise
-        over = too_far(q[start[:-1] + found.index], endless, reach)
-        return _turning_less(problem, reach, over, closure) if over.any() else found
-    return _search(problem, layers, aim, filled, may_prove=method == "paper")
+        layers = sort_layers(given, aim.velocity)
+    if _filled(layers) == 0:
+        raise empty_layer(given, 0)
+    if problem.method != "exact":
+        return _follow_procedure(given, layers, aim, may_prove=problem.method == "paper")
+    closed = problem.closure == "periodic"
+    if closed:
+        _require_same_ends(given)
+    try:
+        found = _find_exactly(given, layers, aim, closed=closed)
+    except NoFeasiblePath as broken:
+        broken.back, broken.leaving = _from_the_back(given, aim)
+        raise
+    over = too_far(given.q[given.start[:-1] + found.index], given.endless, problem.rotation)
+    return _turn_less(given, aim, problem.rotation, over, closed=closed) if over.any() else found
 
 
-def _filled(layers: kernel.Layers) -> int:
+def _filled(layers: SortedLayers) -> int:
     """Return the first layer that has no vertex; without one, the number of layers."""
     sizes = np.diff(layers.start)
     return int(np.argmin(sizes)) if (sizes == 0).any() else len(sizes)
 
 
-def _exactly(
-    problem: Problem, layers: kernel.Layers, aim: kernel.Objective, filled: int, closure: Closure
-) -> LayeredPath:
+def _find_exactly(given: Layers, layers: SortedLayers, aim: Aim, *, closed: bool) -> LayeredPath:
     """Return the proved optimum, or prove that there is no path (and say where it breaks)."""
+    filled = _filled(layers)
     whole = filled == len(layers.start) - 1
-    to_search = layers._replace(start=layers.start[: filled + 1])
-    if closure == "periodic" and whole:
+    if closed and whole:
         found = best_closed_path(layers, aim)
     else:
-        found = best_path(to_search, aim)
+        found = best_path(layers._replace(start=layers.start[: filled + 1]), aim)
     if isinstance(found, Best):
         if not whole:
-            raise empty_layer(problem, filled)
+            raise empty_layer(given, filled)
         index = layers.rank[found.path]
         return LayeredPath(index=freeze(index), cost=found.cost, optimal=True)
     breaks = found.counts.any() or found.shut
-    if closure == "periodic" and found.layers >= filled - 1 and not breaks:
+    if closed and found.layers >= filled - 1 and not breaks:
         raise NoFeasiblePath(
             "paths reach the last node, but none returns to the vertex that it left"
             " with its acceleration across the seam admissible",
@@ -217,23 +204,24 @@ def _exactly(
     raise broken
 
 
-def _turning_less(problem: Problem, rotation: Array, over: Bools, closure: Closure) -> LayeredPath:
+def _turn_less(
+    given: Layers, aim: Aim, rotation: Array, over: Bools, *, closed: bool
+) -> LayeredPath:
     """Return the proved optimum within the limits that the joints `over` do not keep without."""
-    closed = closure == "periodic"
-    unrolled, found = best_within(problem, rotation, over, closed=closed)
+    unrolled, found = best_within(given, aim, rotation, over, closed=closed)
     if found is None:
-        raise why_closed(problem, rotation, unrolled, closed=closed)
+        raise why_closed(given, aim, rotation, unrolled, closed=closed)
     index, cost = found
     return LayeredPath(index=freeze(index), cost=cost, optimal=True)
 
 
-def _from_the_back(problem: Problem) -> tuple[int, Ints | None]:
+def _from_the_back(given: Layers, aim: Aim) -> tuple[int, Ints | None]:
     """Return the first node from which admissible paths reach the end, and their vertices there.
 
     (5) and (6) hold for a path and its reverse alike, so that it is as far as any path goes from
     the last layer backwards.
     """
-    layers, aim = sorted_layers(backwards(problem))[:2]
+    layers = sort_layers(reverse(given), aim.velocity)
     K, filled = len(layers.start) - 1, _filled(layers)
     if filled == 0:
         return K, None
@@ -241,40 +229,49 @@ def _from_the_back(problem: Problem) -> tuple[int, Ints | None]:
     return K - found.layers, freeze(layers.rank[found.reached])
 
 
-def _search(
-    problem: Problem, layers: kernel.Layers, aim: kernel.Objective, filled: int, *, may_prove: bool
+def _follow_procedure(
+    given: Layers, layers: SortedLayers, aim: Aim, *, may_prove: bool
 ) -> LayeredPath:
     """Run steps (1) to (5) of the procedure and read the path back (or say where it breaks)."""
-    start = layers.start
-    sizes = np.diff(start)
+    start, filled = layers.start, _filled(layers)
     dist, before = np.full(len(layers.low), np.inf), np.full(len(layers.low), -1)
     to_search = layers._replace(start=start[: filled + 1])
     reached, turned_away = kernel.path_planning(to_search, aim, dist, before)
     if reached < filled:
-        counts, shut = kernel.closing_counts(layers, aim, dist, before, reached)
+        ends = _ends(layers, dist, before, reached - 1)
+        counts, shut = count_closing(layers, aim, ends, reached)
         raise broken_edge(reached, counts, int(shut), proved=not turned_away)
-    if filled < len(sizes):
-        raise empty_layer(problem, filled)
+    if filled < len(start) - 1:
+        raise empty_layer(given, filled)
     a, b = start[-2], start[-1]
     best = np.flatnonzero(dist[a:b] == dist[a:b].min()) + a
     j = int(best[np.argmin(layers.rank[best])])
     cost = float(dist[j])
-    path = np.empty(len(sizes), dtype=np.int64)
-    for k in range(len(sizes) - 1, -1, -1):
+    path = np.empty(len(start) - 1, dtype=np.int64)
+    for k in range(len(path) - 1, -1, -1):
         path[k] = layers.rank[j]
         j = int(before[j])
     return LayeredPath(index=freeze(path), cost=cost, optimal=may_prove and not turned_away)
 
 
-def _require_same_ends(problem: Problem) -> None:
-    q, start = problem.q, problem.start
-    first, last = q[: start[1]], q[start[-2] :]
+def _ends(layers: SortedLayers, dist: Array, before: Ints, k: int) -> States:
+    """Return the last edges of the paths that the procedure has found into layer k."""
+    a, b = layers.start[k : k + 2]
+    vertex = a + np.flatnonzero(dist[a:b] < np.inf)
+    parent = before[vertex]
+    dq = increments_between(layers.q[:, parent].T, layers.q[:, vertex].T, layers.endless)
+    first = np.searchsorted(vertex, np.arange(a, b + 1))
+    return States(vertex, dist[vertex], np.ascontiguousarray(dq), parent, first)
+
+
+def _require_same_ends(given: Layers) -> None:
+    first, last = given.q[: given.start[1]], given.q[given.start[-2] :]
     if len(first) != len(last):
         raise InputError(
             "closure: periodic needs a last layer that repeats the first, but they have "
             f"{len(first)} and {len(last)} vertices"
         )
-    gap = np.abs(reduced(last - first, problem.endless))
+    gap = np.abs(increments_between(first, last, given.endless))
     if gap.max(initial=0.0) > SAME_END:
         i = int(np.argmax(gap.max(axis=1)))
         raise InputError(

@@ -5,19 +5,19 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike
 
-from kerfpath._arrays import Array, Bools, Ints, freeze, scalar
+from kerfpath._arrays import Array, Ints, freeze, scalar
 from kerfpath._told import told
+from kerfpath.errors import InputError
 from kerfpath.kernels import exact, to_go
-from kerfpath.kernels import search as kernel
-from kerfpath.kernels.metric import increments
+from kerfpath.kernels.search import Aim, LostTime, SortedLayers
 from kerfpath.kernels.states import EVERY
 from kerfpath.search._exact import FIRST_GAP, NO_SEAM, ROOM, ROUNDING, UNLIMITED
-from kerfpath.search._layers import require_joined, sorted_layers
-from kerfpath.search._problem import Metric, Problem, checked
+from kerfpath.search._fastest import times_asked
+from kerfpath.search._layers import Layers, require_joined, sort_layers
+from kerfpath.search._problem import SearchProblem, refuse_ends
 
-__all__ = ["SlowedPath", "slowed_path"]
+__all__ = ["SlowedPath", "find_slowed"]
 
 FIRST_STRETCH = 2.0
 """Steps that take longer than this many node intervals are left out at first; it doubles."""
@@ -48,34 +48,19 @@ class SlowedPath:
     __repr__ = told
 
 
-def slowed_path(
-    q: ArrayLike,
-    start: ArrayLike,
-    *,
-    dt: float,
-    velocity: ArrayLike,
-    acceleration: ArrayLike,
-    endless: ArrayLike | None = None,
-    vertex_cost: ArrayLike | None = None,
-    shut: ArrayLike | None = None,
-    weights: ArrayLike | None = None,
-    metric: Metric = "manhattan",
-    eta_v: float = 1.0,
-    eta_a: float = 1.0,
-    penalty: float = 100.0,
-) -> SlowedPath:
+def find_slowed(problem: SearchProblem, *, penalty: float = 100.0) -> SlowedPath:
     """Return the path with the least sum of distances and of time lost, at `penalty` an interval.
 
     A step asks for the time t in which (5) would hold on it, and (6) with the step before it: the
     larger of |dq_i| / (eta_v q'max_i) and sqrt(|ddq_i| / (eta_a q''max_i)). It loses t / dt - 1
     node intervals, if that is positive. The answer is exact: the second-order recursion with both
     tests turned into prices. Where a path keeps dt throughout and the penalty outweighs the
-    distances, it is that of `shortest_path`.
+    distances, it is that of `find_shortest`.
 
     Parameters
     ----------
-    q, start, dt, velocity, acceleration, endless, vertex_cost, shut, weights, metric, eta_v, eta_a
-        As in `shortest_path` with objective "sum".
+    problem : SearchProblem
+        With objective "sum".
     penalty : float
         Cost of one node interval of lost time.
 
@@ -84,62 +69,53 @@ def slowed_path(
     NoFeasiblePath
         An empty layer, or closed vertices and shut edges that leave no path; says where.
     InputError
-        As `shortest_path`; a penalty that is not positive.
+        Another objective, a closure or a rotation limit; a penalty that is not positive.
     """
-    problem = checked(
-        q,
-        start,
-        dt=dt,
-        velocity=velocity,
-        acceleration=acceleration,
-        endless=endless,
-        vertex_cost=vertex_cost,
-        shut=shut,
-        weights=weights,
-        metric=metric,
-        objective="sum",
-        eta_v=eta_v,
-        eta_a=eta_a,
-    )
+    refuse_ends(problem, "slowed path")
+    if problem.objective != "sum":
+        raise InputError(f'objective: a slowed path needs "sum", got "{problem.objective}"')
     penalty = scalar(penalty, "penalty", above=0.0)
-    require_joined(problem)
-    aim = problem.aim._replace(timed=True, penalty=penalty)
-    index, least = _least(problem._replace(aim=aim))
-    path = np.ascontiguousarray(problem.q[problem.start[:-1] + index])
-    lost = _lost(path, problem.endless, aim)
+    layers, aim = problem.layers, problem.aim
+    require_joined(layers)
+    index, least = _least(layers, aim, penalty)
+    path = layers.q[layers.start[:-1] + index]
+    time, sharp = (
+        asked.max(axis=1)
+        for asked in times_asked(path, layers.endless, aim.velocity, aim.acceleration)
+    )
+    time[1:] = np.maximum(time[1:], sharp)
+    lost = np.maximum(time - 1.0, 0.0)
     return SlowedPath(index=freeze(index), cost=least, lost=freeze(lost))
 
 
-def _least(problem: Problem) -> tuple[Ints, float]:
+def _least(layers: Layers, aim: Aim, penalty: float) -> tuple[Ints, float]:
     """Return the best path, as vertices of each layer, and its cost.
 
     Steps beyond `stretch` times the velocity are left out, but a step at the least price that any
     of them has may lead from anywhere to anywhere. A best path without such a leap is the best of
     all; else more steps are let in.
     """
-    q, _, endless, aim, _ = problem
-    reach = np.where(endless, np.pi, np.ptp(q, axis=0))
+    reach = np.where(layers.endless, np.pi, np.ptp(layers.q, axis=0))
     every = float((reach / aim.velocity).max())
     stretch = FIRST_STRETCH
     while True:
         bound = stretch * aim.velocity
-        leap = float((aim.weight * bound).min()) + aim.penalty * (stretch - 1)
-        stretched = aim._replace(
-            velocity=freeze(bound), stretch=stretch, leap=leap if stretch < every else np.inf
-        )
-        layers, stretched, _ = sorted_layers(problem._replace(aim=stretched))
-        path, cost = _best(layers, stretched)
+        leap = float((aim.weight * bound).min()) + penalty * (stretch - 1)
+        lost = LostTime(penalty, stretch, leap if stretch < every else np.inf)
+        stretched = aim._replace(velocity=freeze(bound), timed=True, lost=lost)
+        graph = sort_layers(layers, bound)
+        path, cost = _best(graph, stretched)
         if path[0] >= 0:
-            return layers.rank[path], cost
+            return graph.rank[path], cost
         stretch *= 2
 
 
-def _best(layers: kernel.Layers, aim: kernel.Objective) -> tuple[Ints, float]:
+def _best(layers: SortedLayers, aim: Aim) -> tuple[Ints, float]:
     """Let the bound grow until the recursion comes through; return the path and its cost."""
     K, h = len(layers.start) - 1, np.empty(len(layers.low))
     to_go.cost_to_go(layers, aim, np.ones(len(h), np.bool_), h)
     _add_corners(layers, aim, h)
-    least = float((aim.vertex_cost + h)[: layers.start[1]].min())
+    least = float((layers.cost + h)[: layers.start[1]].min())
     bound = least * (1 + ROUNDING)
     while (reached := exact.recursion(layers, aim, h, bound, NO_SEAM, ROOM, EVERY)).best[-1] < 0:
         gap = max(2 * (bound - least), FIRST_GAP * least)
@@ -152,7 +128,7 @@ def _best(layers: kernel.Layers, aim: kernel.Objective) -> tuple[Ints, float]:
     return path, float(reached.cost)
 
 
-def _add_corners(layers: kernel.Layers, aim: kernel.Objective, h: Array) -> None:
+def _add_corners(layers: SortedLayers, aim: Aim, h: Array) -> None:
     """Add to the first-order bound h (N,) what is lost at corners at least.
 
     Measured by h, no step costs less than nothing. So what it takes at least to come through some
@@ -163,11 +139,11 @@ def _add_corners(layers: kernel.Layers, aim: kernel.Objective, h: Array) -> None
     last, at = len(layers.start) - 2, 0
     prices = []
     while at < last:
-        stuck = at + _through(layers, aim, h, at, last, CORNER * aim.penalty).layers
+        stuck = at + _through(layers, aim, h, at, last, CORNER * aim.lost.penalty).layers
         if stuck > last:
             break
         first, at = max(stuck - AROUND, at), min(stuck + AROUND, last)
-        gap = CORNER * aim.penalty
+        gap = CORNER * aim.lost.penalty
         while (reached := _through(layers, aim, h, first, at, gap)).best[-1] < 0:
             gap = max(2 * gap, reached.lowest * (1 + ROUNDING))
         prices.append((layers.start[first + 1], reached.cost))
@@ -176,22 +152,13 @@ def _add_corners(layers: kernel.Layers, aim: kernel.Objective, h: Array) -> None
 
 
 def _through(
-    layers: kernel.Layers, aim: kernel.Objective, h: Array, first: int, last: int, gap: float
+    layers: SortedLayers, aim: Aim, h: Array, first: int, last: int, gap: float
 ) -> exact.Reached:
     """Go through the layers first..last with all costs measured by h, for `gap` at most."""
     enter, leave = (slice(layers.start[k], layers.start[k + 1]) for k in (first, last))
-    cost, rest = aim.vertex_cost.copy(), h.copy()
+    cost, rest = layers.cost.copy(), h.copy()
     cost[enter] = np.where(h[enter] < np.inf, -h[enter], 0.0)
     cost[leave] += h[leave]
     rest[leave] = np.where(h[leave] < np.inf, 0.0, np.inf)
-    part = layers._replace(start=layers.start[first : last + 2])
-    return exact.recursion(part, aim._replace(vertex_cost=cost), rest, gap, NO_SEAM, 0, EVERY)
-
-
-def _lost(path: Array, endless: Bools, aim: kernel.Objective) -> Array:
-    """Return the time (K-1,) that each step asks for beyond its node interval, in intervals."""
-    dq = increments(path, endless)
-    time = (np.abs(dq) / aim.velocity).max(axis=1)
-    sharp = np.sqrt((np.abs(np.diff(dq, axis=0)) / aim.acceleration).max(axis=1))
-    time[1:] = np.maximum(time[1:], sharp)
-    return np.asarray(np.maximum(time - 1.0, 0.0))
+    part = layers._replace(start=layers.start[first : last + 2], cost=freeze(cost))
+    return exact.recursion(part, aim, rest, gap, NO_SEAM, 0, EVERY)

@@ -12,6 +12,7 @@ from kerfpath._arrays import Array, Bools, Ints, freeze
 from kerfpath.air import AirMove, air_move, backed_off, least_time
 from kerfpath.cell import Cell
 from kerfpath.errors import NoFeasiblePath
+from kerfpath.kernels.metric import increments_between
 from kerfpath.plans import Plan
 from kerfpath.robots import posture_name
 
@@ -194,18 +195,14 @@ class Moves:
 
     def _planned(self, one: Array, two: Array) -> AirMove:
         move = air_move(
-            self._robot, one, one + self._wrapped(two - one), cell=self._cell,
-            eta_v=self._eta_v, eta_a=self._eta_a, seconds=self._seconds,
+            self._robot, one, one + increments_between(one, two, self._robot.endless),
+            cell=self._cell, eta_v=self._eta_v, eta_a=self._eta_a, seconds=self._seconds,
         )  # fmt: skip
         return replace(move, time=freeze(move.time / self._air_speed))
 
-    def _wrapped(self, dq: Array) -> Array:
-        short = dq - 2 * np.pi * np.round(dq / (2 * np.pi))
-        return np.where(self._robot.endless, short, dq)
-
     def _least(self, one: Array, two: Array) -> Array:
         velocity, acceleration = self._robot.speed_limits()
-        dq = self._wrapped(two - one)
+        dq = increments_between(one, two, self._robot.endless)
         least = least_time(dq, self._eta_v * velocity, self._eta_a * acceleration)
         return np.asarray(least / self._air_speed)
 

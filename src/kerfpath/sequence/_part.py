@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy.spatial import cKDTree
 
-from kerfpath._arrays import Array, Bools, Ints, floats, scalar
+from kerfpath._arrays import Array, Bools, Ints, floats, not_negative, scalar
 from kerfpath._told import told
 from kerfpath.air import AirMove
 from kerfpath.cell import Cell
@@ -283,8 +283,8 @@ def order_plans(
     """
     retract = scalar(retract, "retract", unit="m", above=0.0)
     approach_speed = scalar(approach_speed, "approach_speed", unit="m/s", above=0.0)
-    heat_spacing = scalar(heat_spacing, "heat_spacing", unit="m", above=-1e-300)
-    pierce_time = scalar(pierce_time, "pierce_time", unit="s", above=-1e-300)
+    heat_spacing = not_negative(heat_spacing, "heat_spacing", unit="m")
+    pierce_time = not_negative(pierce_time, "pierce_time", unit="s")
     air_speed = scalar(air_speed, "air_speed", above=0.0)
     every = [list(made) for made in candidates]
     further = MorePlans(every, more)

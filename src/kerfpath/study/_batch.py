@@ -26,9 +26,10 @@ from kerfpath.job import (
     stale_program,
 )
 from kerfpath.post import replace_program
+from kerfpath.progress import Progress, no_progress
 from kerfpath.report import with_library, without_library
 from kerfpath.study._job import digest, loaded
-from kerfpath.sweep import Progress, Result, Sweep
+from kerfpath.sweep import Result, Sweep
 
 __all__ = ["STORE", "Planned", "batch"]
 
@@ -84,7 +85,7 @@ def batch(
     *,
     scheduler: str | None = None,
     processes: int | None = None,
-    progress: Progress | None = None,
+    progress: Progress = no_progress,
 ) -> list[Planned]:
     """Plan, audit and write many jobs, as `kerfpath plan` does each; one that fails stops no other.
 

@@ -30,8 +30,9 @@ from kerfpath.front import (
 )
 from kerfpath.job import Job, cell_of_job
 from kerfpath.plans import Plan
+from kerfpath.progress import Progress, no_progress
 from kerfpath.study._job import Loaded, digest, loaded
-from kerfpath.sweep import Progress, Result, Sweep
+from kerfpath.sweep import Result, Sweep
 
 __all__ = ["Studied", "pareto_of_job"]
 
@@ -72,7 +73,7 @@ def pareto_of_job(
     ahead: int = AHEAD,
     scheduler: str | None = None,
     processes: int | None = None,
-    progress: Progress | None = None,
+    progress: Progress = no_progress,
 ) -> Studied:
     """Return the front of a contour; what is in the store already is not done again.
 

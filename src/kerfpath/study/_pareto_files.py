@@ -15,8 +15,9 @@ from kerfpath._told import told
 from kerfpath.cad import Part
 from kerfpath.errors import InputError
 from kerfpath.front import Front, Run
-from kerfpath.job import JobResult, Progress, make_folder, prepare, run_prepared
+from kerfpath.job import JobResult, make_folder, prepare, run_prepared
 from kerfpath.post import write_files
+from kerfpath.progress import Progress, no_progress
 from kerfpath.report import FrontAxis, FrontPlan, render_front
 from kerfpath.robots import Robot
 from kerfpath.study._job import digest, loaded
@@ -210,7 +211,7 @@ def picked(folder: Path, job_file: Path, which: str) -> Pick:
 
 
 def plan_picked(
-    job_file: Path, pick: Pick, *, refine: bool, progress: Progress = lambda what, done, total: None
+    job_file: Path, pick: Pick, *, refine: bool, progress: Progress = no_progress
 ) -> tuple[Part, JobResult]:
     """Return what comes of the whole job with the contour planned as picked; its part, too.
 

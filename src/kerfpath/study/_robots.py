@@ -16,10 +16,11 @@ from kerfpath.cell import Cell, Checker
 from kerfpath.errors import InputError, NoFeasiblePath
 from kerfpath.graph import LayeredGraph
 from kerfpath.job import Job, cell_of_job, fastest_along, read_job
+from kerfpath.progress import Progress, no_progress
 from kerfpath.robots import Robot, acceleration_ratios, postures_named, robot, robot_ids
 from kerfpath.study._clear import has_clear_pose
 from kerfpath.study._job import digest, loaded
-from kerfpath.sweep import Progress, Sweep
+from kerfpath.sweep import Sweep
 
 __all__ = ["NEAREST", "ContourSpeed", "RobotSpeed", "contour_speeds", "which_robots", "with_robot"]
 
@@ -27,8 +28,6 @@ NEAREST = "nearest"
 """In place of a ratio: of each robot the one that the library calls its nearest."""
 EVERY = 8
 """Nodes from one that is looked at for a clear pose to the next."""
-NOT_ASKED = "posture not wanted"
-"""What drops a candidate without telling anything about the robot."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -112,7 +111,7 @@ def which_robots(
     processes: int | None = None,
     robots: Sequence[str] | None = None,
     acceleration_ratio: str | None = None,
-    progress: Progress | None = None,
+    progress: Progress = no_progress,
 ) -> list[RobotSpeed]:
     """Return what each robot can do of a job, the fastest first; each is a task of its own.
 
@@ -267,11 +266,9 @@ def _reached(name: str, asked: float, graph: LayeredGraph) -> ContourSpeed:
     empty, nodes = np.flatnonzero(np.diff(graph.start) == 0), len(graph.start) - 1
     reason = ""
     if empty.size:
-        counts = graph.counts(int(empty[0]))
-        counts.pop(NOT_ASKED, None)
         reason = (
             f"no pose at {empty.size} of {nodes} nodes, at node {empty[0]} mostly: "
-            f"{max(counts, key=lambda word: counts[word])}"
+            f"{graph.main_loss(int(empty[0]))}"
         )
     return ContourSpeed(name=name, asked=asked, reached=1 - empty.size / nodes, reason=reason)
 

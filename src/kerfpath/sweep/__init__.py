@@ -1,6 +1,7 @@
 """Many tasks at once: each done exactly once and kept, on local processes or a Dask cluster."""
 
-from kerfpath.sweep._run import Progress, Result, Sweep, run
+from kerfpath.progress import Progress
+from kerfpath.sweep._run import Result, Sweep, run
 from kerfpath.sweep._task import Failure, UnfitWorker
 
 __all__ = ["Failure", "Progress", "Result", "Sweep", "UnfitWorker", "run"]

@@ -130,7 +130,7 @@ def _begin(link: Connection, call: bytes) -> None:
     Thread(target=_leave_with, args=(link,), daemon=True).start()
     with suppress(OSError):  # a sweep that was killed meanwhile hears nothing
         link.send(None)
-    with suppress(ImportError, AttributeError):  # the task tells
+    with suppress(ImportError, AttributeError):  # the task reports it
         pickle.loads(call)
 
 

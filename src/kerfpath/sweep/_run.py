@@ -8,20 +8,17 @@ from collections import deque
 from collections.abc import Callable, Generator, Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from time import perf_counter
 from typing import Any
 
 from kerfpath._told import told
 from kerfpath.errors import InputError
+from kerfpath.progress import Progress, no_progress
 from kerfpath.sweep._cluster import on_cluster
 from kerfpath.sweep._local import on_processes
 from kerfpath.sweep._store import Store
 from kerfpath.sweep._task import Failure, Outcome, Task, name_of, task_of
 
-__all__ = ["Progress", "Result", "Sweep", "run"]
-
-Progress = Callable[[int, int, float | None], None]
-"""Called with the tasks done, all tasks, and the seconds left (None while nothing is known)."""
+__all__ = ["Result", "Sweep", "run"]
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)
@@ -57,8 +54,9 @@ class Sweep:
     ----------
     function, store, scheduler, processes
         As in `run`.
-    progress : callable, optional
-        Called with the tasks done, all tasks, and the seconds left (None while nothing is known).
+    progress : Progress, optional
+        Called with "tasks", the number of tasks done, and the number of all; see
+        `kerfpath.progress`.
     total : int, optional
         How many tasks there will be; default: as many as were handed in so far.
 
@@ -75,7 +73,7 @@ class Sweep:
         store: str | os.PathLike[str],
         scheduler: str | None = None,
         processes: int | None = None,
-        progress: Progress | None = None,
+        progress: Progress = no_progress,
         total: int | None = None,
     ) -> None:
         if processes is not None and (scheduler is not None or processes < 1):
@@ -91,8 +89,7 @@ class Sweep:
             self._source = on_cluster(function, self._waiting, scheduler)
         self._tasks: dict[str, Task] = {}
         self._coming: set[str] = set()
-        self._known, self._total, self._progress = 0, total, progress
-        self._begun = 0.0
+        self._total, self._progress, self._begun = total, progress, False
         self._kept = Store(Path(store))
         self._there = self._kept.keys()
 
@@ -109,9 +106,7 @@ class Sweep:
     def _hand_in(self, task: Task) -> str:
         if task.key not in self._tasks:
             self._tasks[task.key] = task
-            if task.key in self._there:
-                self._known += 1
-            else:
+            if task.key not in self._there:
                 self._coming.add(task.key)
                 self._waiting.append(task)
         return task.key
@@ -119,14 +114,14 @@ class Sweep:
     def result(self, key: str) -> Result:
         """Return what became of a task, as soon as it is there."""
         if not self._begun:
-            self._begun = perf_counter()
-            self._tell()
+            self._begun = True
+            self._report()
         while key in self._coming:
             batch = next(self._source)
             self._kept.add(self._name, [(self._tasks[done.key], done) for done in batch])
             self._coming -= {done.key for done in batch}
             if batch:
-                self._tell()
+                self._report()
         outcome = self._kept.outcome(key)
         try:
             value = None if outcome.value is None else json.loads(outcome.value)
@@ -139,15 +134,9 @@ class Sweep:
             seconds=outcome.seconds,
         )
 
-    def _tell(self) -> None:
-        if self._progress is None:
-            return
+    def _report(self) -> None:
         total = len(self._tasks) if self._total is None else self._total
-        done = len(self._tasks) - len(self._coming)
-        left = None if done < total else 0.0
-        if left is None and done > self._known:
-            left = (perf_counter() - self._begun) / (done - self._known) * (total - done)
-        self._progress(done, total, left)
+        self._progress("tasks", len(self._tasks) - len(self._coming), total)
 
     def __enter__(self) -> Sweep:
         return self
@@ -166,7 +155,7 @@ def run(
     store: str | os.PathLike[str],
     scheduler: str | None = None,
     processes: int | None = None,
-    progress: Progress | None = None,
+    progress: Progress = no_progress,
 ) -> list[Result]:
     """Call a function with each of many parameters, exactly once each, and keep the results.
 
@@ -187,8 +176,9 @@ def run(
         Address of a Dask scheduler, as "tcp://10.0.0.1:8786", whose workers do the tasks.
     processes : int, optional
         How many local processes of one thread do them; as many as there are cores if not given.
-    progress : callable, optional
-        Called with the tasks done, all tasks, and the seconds left (None while nothing is known).
+    progress : Progress, optional
+        Called with "tasks", the number of tasks done, and the number of all; see
+        `kerfpath.progress`.
 
     Returns
     -------

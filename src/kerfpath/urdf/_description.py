@@ -23,7 +23,7 @@ SAME_LINE = 1e-9
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Description:
-    """What a description says about the chain from `base` to `tip`.
+    """The chain from `base` to `tip` as a description has it.
 
     Parameters
     ----------

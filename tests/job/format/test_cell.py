@@ -14,7 +14,7 @@ from tests.robots.test_five_axes import ARM
 from tests.urdf.test_urdf import described
 
 from kerfpath.cad import read as read_drawing
-from kerfpath.cell import Mesh, box, edges_of, thickened
+from kerfpath.cell import Mesh, box, edges_of, thicken
 from kerfpath.comfort import Band, Comfort
 from kerfpath.errors import InputError
 from kerfpath.graph import LayeredGraph
@@ -324,7 +324,7 @@ def test_a_thickened_sheet_is_closed_and_as_thick_as_asked():
     j = (i + 1) % 40
     pipe = np.vstack([np.c_[i, j, i + 40], np.c_[j, j + 40, i + 40]])  # outward, open at both ends
     assert edges_of(pipe)[1].sum() == 80
-    points, triangles = thickened(vertices, pipe, 0.1)
+    points, triangles = thicken(vertices, pipe, 0.1)
     solid = Mesh(vertices=points, triangles=triangles)
     radius = np.hypot(*solid.vertices[:, :2].T)
     # Of a corner's three triangles two are of one side: the mean normal leans by a few degrees.

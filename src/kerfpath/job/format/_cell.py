@@ -24,8 +24,8 @@ from kerfpath.cell import (
     edges_of,
     link_capsules,
     read_stl,
-    thickened,
-    welded,
+    thicken,
+    weld,
 )
 from kerfpath.errors import InputError
 from kerfpath.job.format._poses import pose
@@ -172,7 +172,7 @@ def _solid(job: Job, table: CellTable, part: Part) -> Mesh:
             f"{job.part_file.name} is a closed solid, which has its thickness; remove sheet_mm",
         )
     if table.sheet_mm is not None:
-        vertices, triangles = thickened(vertices, triangles, table.sheet_mm / 1000)
+        vertices, triangles = thicken(vertices, triangles, table.sheet_mm / 1000)
     return Mesh(
         vertices=vertices,
         triangles=triangles,
@@ -207,4 +207,4 @@ def _solid_in(path: Path, unit: str | None, deviation: float, _stamp: tuple[int,
 
 @lru_cache(maxsize=2)
 def _triangles(part: Part, deviation: float) -> tuple[Array, Ints]:
-    return welded(*part.mesh(deviation), SAME)
+    return weld(*part.mesh(deviation), SAME)

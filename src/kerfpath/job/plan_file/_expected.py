@@ -208,15 +208,13 @@ def _options(job: Job, dt: float, said: PlanOptions, *, picked: bool) -> PlanOpt
 
 def _dipping(plan: Plan, dt: float, said: Array) -> Plan:
     """Return the plan in the least time that its limits allow; what is said where that is it."""
-    velocity, acceleration = plan.robot.speed_limits()
-    limits = plan.settings.eta_v * velocity, plan.settings.eta_a * acceleration
-    tau = retime(plan.increments, dt, *limits)
+    limits = plan.settings.limits(plan.robot)
+    tau = retime(plan.increments, dt, limits)
     time, found = np.concatenate([[0.0], np.cumsum(tau)]), np.diff(said)
     if said[0] == 0 and (np.abs(found - tau) <= RETIMED * tau).all():
         time, tau = said, found
-    return replace(
-        plan, time=time, feed=feed(tau, dt, plan.increments, *limits, np.diff(plan.contour.s))
-    )
+    dips = feed(tau, dt, plan.increments, limits, np.diff(plan.contour.s))
+    return replace(plan, time=time, feed=dips)
 
 
 def _postures(job: Job, made: Plan) -> list[Check]:

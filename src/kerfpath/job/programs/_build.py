@@ -15,7 +15,7 @@ from kerfpath.job.plan_file import AuditReport
 from kerfpath.job.programs._audit import ProgramAudit
 from kerfpath.job.run import CutResult
 from kerfpath.plans import Plan
-from kerfpath.post import dry_run, language, posted
+from kerfpath.post import dry_run, language, post_and_read
 
 __all__ = ["audit_of_cuts", "audit_of_plans", "program_of"]
 
@@ -85,7 +85,7 @@ def program_of(
     if refusal := chosen.refusal(plans[0].robot):
         raise InputError(f"no program: {refusal}")
     program = options.program(plans, moves)
-    written = posted(program, options.language, options.settings, strict=strict)
+    written = post_and_read(program, options.language, options.settings, strict=strict)
     if written.read is not None:
         audit = replace(audit, job=replace(audit.job, program=options))
         settings = chosen.completed(options.settings)
@@ -93,7 +93,7 @@ def program_of(
         _require_passed(found, chosen.title)
     if dry_share is not None:
         dry = dry_run(program, dry_share)
-        written = posted(dry, options.language, options.settings, strict=strict)
+        written = post_and_read(dry, options.language, options.settings, strict=strict)
     return written.files, [str(issue) for issue in written.warnings]
 
 

@@ -24,7 +24,7 @@ from kerfpath.post import (
     Rules,
     Settings,
     Step,
-    said_in,
+    read_as_written,
 )
 
 __all__ = ["TargetNodes", "expected_program", "nodes_at_targets"]
@@ -128,7 +128,7 @@ def expected_program(
         if options.arc_tolerance is not None:
             steps = _with_arcs(steps, cut, asked)
         sections.append(replace(section, steps=tuple(steps)))
-    return said_in(replace(program, sections=tuple(sections)), language, settings)
+    return read_as_written(replace(program, sections=tuple(sections)), language, settings)
 
 
 def _whole(job: Job, cut: ReadCut, asked: TargetNodes, plan: Plan) -> Plan:

@@ -19,10 +19,11 @@ from kerfpath.job.plan_file import PlanFile, read_plan_file
 from kerfpath.job.programs._build import audit_of_plans, program_of
 from kerfpath.job.programs._from_plan import require_same
 from kerfpath.job.programs._read import language_of, program_on_disk
-from kerfpath.job.run import JobResult, Progress, run_prepared
+from kerfpath.job.run import JobResult, run_prepared
 from kerfpath.operations import touched_up
 from kerfpath.plans import Plan
 from kerfpath.post import ReadGroup, ReadMove, differences, groups_of, read_program, with_tips
+from kerfpath.progress import Progress, no_progress
 
 __all__ = ["Taught", "TouchUp", "touch_up"]
 
@@ -91,7 +92,7 @@ def touch_up(
     job_file: Path,
     *,
     ease: float = 0.01,
-    progress: Progress = lambda what, done, total: None,
+    progress: Progress = no_progress,
 ) -> TouchUp:
     """Return what comes of planning a job again around the targets moved in its program.
 

@@ -4,7 +4,6 @@ from kerfpath.job.run._preview import JobPreview as JobPreview
 from kerfpath.job.run._preview import check_job as check_job
 from kerfpath.job.run._result import CutResult as CutResult
 from kerfpath.job.run._result import JobResult as JobResult
-from kerfpath.job.run._run import Progress as Progress
 from kerfpath.job.run._run import run_job as run_job
 from kerfpath.job.run._run import run_prepared as run_prepared
 from kerfpath.job.run._speeds import fastest_along as fastest_along

@@ -17,6 +17,7 @@ from kerfpath.job.run._result import CutResult
 from kerfpath.job.run._speeds import fastest_along
 from kerfpath.planner import FastestSpeed, clearance_map, plan, plan_in_pieces, relaxations
 from kerfpath.plans import Plan
+from kerfpath.progress import Progress
 from kerfpath.refiner import refine
 
 __all__ = ["cut_candidate", "cut_in_posture"]
@@ -28,7 +29,7 @@ def cut_candidate(
     prepared: PreparedJob,
     request: CutRequest,
     candidate: Candidate,
-    progress: Callable[[str, int, int], None],
+    progress: Progress,
 ) -> tuple[CutResult, ...]:
     """Return what came of a candidate: one cut, or several where it is interrupted."""
     job, cell = replace(prepared.job, options=request.options), prepared.cell

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
 
@@ -15,6 +15,7 @@ from kerfpath.job.format import PreparedJob
 from kerfpath.job.run._contour import cut_in_posture
 from kerfpath.job.run._result import CutResult
 from kerfpath.plans import Plan
+from kerfpath.progress import Progress
 from kerfpath.sequence import PartPlan, order_candidates
 
 __all__ = ["CutOrder", "order_cuts"]
@@ -46,7 +47,7 @@ class CutOrder:
 def order_cuts(
     prepared: PreparedJob,
     tried: Sequence[Sequence[tuple[CutResult, ...]]],
-    progress: Callable[[str, int, int], None],
+    progress: Progress,
 ) -> CutOrder:
     """Return one cut (or its pieces) of each contour's candidates, in the order asked for.
 

@@ -2,25 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-
 from kerfpath.cad import Part
 from kerfpath.job.format import Job, PreparedJob, prepare
 from kerfpath.job.run._contour import cut_candidate
 from kerfpath.job.run._order import order_cuts
 from kerfpath.job.run._result import JobResult
+from kerfpath.progress import Progress, no_progress
 from kerfpath.sequence import longest_search
 
-__all__ = ["Progress", "run_job", "run_prepared"]
-
-Progress = Callable[[str, int, int], None]
-"""Called with what is being done, how much of it is done, and how much there is: 0 of what has no
-measure, like a search."""
+__all__ = ["run_job", "run_prepared"]
 
 
-def run_job(
-    job: Job, part: Part | None = None, *, progress: Progress = lambda what, done, total: None
-) -> JobResult:
+def run_job(job: Job, part: Part | None = None, *, progress: Progress = no_progress) -> JobResult:
     """Return what comes of planning and auditing every contour of a job.
 
     `part` is what its drawing holds, if that is read already. A contour without a feasible path
@@ -34,9 +27,7 @@ def run_job(
     return run_prepared(prepare(job, part), progress=progress)
 
 
-def run_prepared(
-    prepared: PreparedJob, *, progress: Progress = lambda what, done, total: None
-) -> JobResult:
+def run_prepared(prepared: PreparedJob, *, progress: Progress = no_progress) -> JobResult:
     """Return the same of a job with its drawing and cell read, its contours in their order there.
 
     Its contours are all that is asked for: a touch-up has other paths in them, a plan picked from

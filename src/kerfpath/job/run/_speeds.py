@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import replace
 
 from kerfpath.cad import read as read_drawing
@@ -12,6 +11,7 @@ from kerfpath.errors import NoFeasiblePath
 from kerfpath.graph import LayeredGraph
 from kerfpath.job.format import ContourTask, Job, cell_of_job
 from kerfpath.planner import FastestSpeed, fastest_speed
+from kerfpath.progress import Progress, no_progress
 
 __all__ = ["fastest_along", "fastest_speeds"]
 
@@ -37,7 +37,7 @@ def fastest_along(
 
 
 def fastest_speeds(
-    job: Job, *, progress: Callable[[str, int, int], None] = lambda what, done, total: None
+    job: Job, *, progress: Progress = no_progress
 ) -> list[tuple[ContourTask, Contour, FastestSpeed | NoFeasiblePath]]:
     """Return, for each contour of a job, its task, its nodes and the fastest constant speed.
 

@@ -11,7 +11,8 @@ from kerfpath._arrays import Array, freeze
 from kerfpath.errors import InputError
 from kerfpath.post._orientations import pose_of
 from kerfpath.post._program import SIGNALS, Switch
-from kerfpath.post._read import MOVE_KINDS, ReadMove, ReadProgram, ReadSection, ReadStep, ReadWait
+from kerfpath.post._read import MOVE_KINDS, ReadProgram, ReadSection, ReadStep
+from kerfpath.post._reading import LineReader
 from kerfpath.post.csv._write import POSE, CsvSettings, columns
 from kerfpath.robots import Robot
 
@@ -30,9 +31,9 @@ def read(main: str, files: Mapping[str, str], robot: Robot, settings: CsvSetting
         raise InputError(
             f"{main}, line 1: expected the columns {expected},..., got {header[:60]!r}"
         )
-    reader = _Reader(main, robot)
-    for number, line in enumerate(lines, 2):
-        reader.row(number, line.split(","))
+    reader = _Reader(main, robot, settings)
+    for reader.line, line in enumerate(lines, 2):
+        reader.read_row(line.split(","))
     if reader.via is not None:
         raise reader.fault("a point on the way without its target")
     name = main.removesuffix(".csv")
@@ -40,18 +41,19 @@ def read(main: str, files: Mapping[str, str], robot: Robot, settings: CsvSetting
     return ReadProgram(name=name, sections=tuple(sections))
 
 
-class _Reader:
+class _Reader(LineReader):
     """Reads row by row; knows the last time and the section."""
 
-    def __init__(self, file: str, robot: Robot) -> None:
-        self.file, self.joints, self.line = file, robot.joints, 1
-        self.time = 0.0
-        self.section = ""
-        self.sections: dict[str, list[ReadStep]] = {}
-        self.via: Array | None = None
+    time = 0.0
+    section = ""
+    via: Array | None = None
 
-    def row(self, number: int, fields: list[str]) -> None:
-        self.line = number
+    def __init__(self, file: str, robot: Robot, settings: CsvSettings) -> None:
+        super().__init__(file, robot, settings)
+        self.line, self.joints = 1, robot.joints
+        self.sections: dict[str, list[ReadStep]] = {}
+
+    def read_row(self, fields: list[str]) -> None:
         if len(fields) != len(columns(self.joints)):
             raise self.fault(f"expected {len(columns(self.joints))} fields, got {len(fields)}")
         name, kind, time, *rest = fields
@@ -63,7 +65,7 @@ class _Reader:
         if name != self.section and name in self.sections:
             raise self.fault(f"the rows of section {name!r} do not stand together")
         self.section = name
-        steps = self.sections.setdefault(name, [])
+        self.steps = self.sections.setdefault(name, [])
         empty = {
             "joint": [speed, events],
             "linear": [share],
@@ -83,26 +85,21 @@ class _Reader:
         if kind == "wait":
             if took == 0:
                 raise self.fault("the wait takes no time")
-            steps.append(ReadWait(time=took, file=self.file, line=number))
+            self.wait(took)
             return
         if (kind == "circular") != (self.via is not None):
             raise self.fault("an arc must follow the point on its way")
         q, T_part_tip = self.target(target)
-        steps.append(
-            ReadMove(
-                kind=MOVE_KINDS[kind],
-                file=self.file,
-                line=number,
-                speed=self.numbers([share])[0] / 100
-                if kind == "joint"
-                else self.numbers([speed])[0] * 1e-3,
-                duration=took,
-                zone=self.numbers([zone])[0] * 1e-3,
-                q=q,
-                T_part_tip=T_part_tip,
-                T_part_via=self.via,
-                switches=self.switches(events),
-            )
+        said, unit = (share, 100) if kind == "joint" else (speed, 1e3)
+        self.add_move(
+            MOVE_KINDS[kind],
+            self.numbers([said])[0] / unit,
+            duration=took,
+            zone=self.numbers([zone])[0] * 1e-3,
+            q=q,
+            T_part_tip=T_part_tip,
+            T_part_via=self.via,
+            switches=self.switches(events),
         )
         self.via = None
 
@@ -130,6 +127,3 @@ class _Reader:
             if _NUMBER.fullmatch(field) is None:
                 raise self.fault(f"expected a number with decimals, got {field[:20]!r}")
         return np.array(fields, dtype=np.float64)
-
-    def fault(self, message: str) -> InputError:
-        return InputError(f"{self.file}, line {self.line}: {message}")

@@ -8,17 +8,24 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from functools import cached_property
-from typing import Annotated
 
 import numpy as np
 
-from kerfpath._arrays import Array
-from kerfpath.post._divide import in_one_file
+from kerfpath.post._divide import require_one_file
 from kerfpath.post._formatter import Formatter, number
 from kerfpath.post._issue import ProgramIssue
 from kerfpath.post._orientations import quaternions
-from kerfpath.post._program import CircularMove, JointMove, LinearMove, Move, Program, Switch, Wait
-from kerfpath.post._settings import Rules, Settings, setting
+from kerfpath.post._program import (
+    CircularMove,
+    JointMove,
+    LinearMove,
+    Move,
+    Program,
+    Switch,
+    Wait,
+    targets_of,
+)
+from kerfpath.post._settings import LinesPerFile, Rules, Settings
 from kerfpath.post._times import refusals, timetable
 
 __all__ = ["Csv", "CsvSettings", "check", "columns", "event", "is_reserved", "rules"]
@@ -29,10 +36,7 @@ POSE = ("x_mm", "y_mm", "z_mm", "qw", "qx", "qy", "qz")
 class CsvSettings(Settings):
     """How long a table may be."""
 
-    lines_per_file: Annotated[
-        int,
-        setting("a whole number of lines from 100 to 1000000", "5000", ge=100, le=1_000_000),
-    ] = 1_000_000
+    lines_per_file: LinesPerFile = 1_000_000
 
 
 def rules(settings: CsvSettings) -> Rules:
@@ -75,7 +79,7 @@ class Csv(Formatter):
         lines = [",".join(columns(program.robot.joints))]
         for section in program.sections:
             lines += (f"{section.name},{row}" for row in self.lines(section))
-        return in_one_file(f"{program.name}.csv", lines, self.settings.lines_per_file)
+        return require_one_file(f"{program.name}.csv", lines, self.settings.lines_per_file)
 
     def names(self) -> list[tuple[str, str]]:
         """Return the name of the file; sections are only words in a column."""
@@ -115,13 +119,9 @@ class Csv(Formatter):
     def _targets(self) -> dict[Move, list[str]]:
         """Joints and tip of each target, those on the way first."""
         program, moves = self.program, list(dict.fromkeys(self.program.moves))
-        points: list[tuple[Move, Array, Array]] = []
-        for move, T in zip(moves, program.tips(moves), strict=True):
-            if isinstance(move, CircularMove):
-                points.append((move, move.q_via, move.T_part_via))
-            points.append((move, move.q, T))
+        points, tips = targets_of(moves), dict(zip(moves, program.tips(moves), strict=True))
         q_deg = np.degrees([q for _, q, _ in points]).round(9)
-        T = np.array([T for _, _, T in points])
+        T = np.array([tips[move] if T is None else T for move, _, T in points])
         point_mm, wxyz = (T[:, :3, 3] * 1e3).round(7), quaternions(T).round(11)
         text = ",".join(["%.9f"] * q_deg.shape[1] + ["%.7f"] * 3 + ["%.11f"] * 4)
         texts: dict[Move, list[str]] = {move: [] for move in moves}

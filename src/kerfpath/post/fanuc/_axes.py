@@ -22,7 +22,7 @@ from numpy.typing import ArrayLike
 
 from kerfpath._arrays import Array, Ints, floats, freeze
 from kerfpath.post._arm_plane import wrist_in_plane
-from kerfpath.post._counting import offset_near
+from kerfpath.post._axes import AxisCount
 from kerfpath.post.fanuc._settings import FanucSettings
 from kerfpath.robots import Robot
 
@@ -36,23 +36,12 @@ NOISE = 1e-8
 """Sine that counts as zero."""
 MATRIX = np.diag([1.0, 1.0, -1.0, -1.0, -1.0, -1.0])
 MATRIX[2, 1] = -1.0
-SHIFT = np.array([0.0, 0.0, np.pi / 2, 0.0, 0.0, np.pi])
-"""Axes = MATRIX @ angles + SHIFT; angles are those of the ortho-parallel model, upright at 0."""
+COUNT = AxisCount(
+    counted_from=COUNTED_FROM, matrix=MATRIX, shift=np.array([0.0, 0.0, np.pi / 2, 0.0, 0.0, np.pi])
+)
+axes_from_joints = COUNT.from_joints
+joints_from_axes = COUNT.to_joints
 TURNING = {"J1 J4 J6": [0, 3, 5], "J4 J5 J6": [3, 4, 5]}
-
-
-def axes_from_joints(robot: Robot, q: ArrayLike) -> Array:
-    """Return the controller's axes (K, 6) rad of joint vectors q (K, 6) rad."""
-    angles = robot.sign * floats(q, "q", (None, 6)) - offset_near(robot, COUNTED_FROM)
-    return freeze(np.asarray(angles @ MATRIX.T + SHIFT, dtype=np.float64))
-
-
-def joints_from_axes(robot: Robot, axes: ArrayLike) -> Array:
-    """Return the joint vectors (K, 6) rad of a controller's axes (K, 6) rad."""
-    angles = (floats(axes, "axes", (None, 6)) - SHIFT) @ np.linalg.inv(MATRIX).T
-    return freeze(
-        np.asarray(robot.sign * (angles + offset_near(robot, COUNTED_FROM)), dtype=np.float64)
-    )
 
 
 def turns(robot: Robot, q: ArrayLike, settings: FanucSettings) -> Ints:

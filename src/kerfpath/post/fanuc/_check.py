@@ -6,18 +6,19 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from kerfpath.post._divide import long_contours
+from kerfpath._arrays import Ints
 from kerfpath.post._issue import ProgramIssue
 from kerfpath.post._program import (
     Await,
     JointMove,
     LinearMove,
-    Move,
     Program,
     Section,
     Switch,
     Wait,
 )
+from kerfpath.post._standing import warn_of_changed_postures
+from kerfpath.post._times import TICK, not_whole
 from kerfpath.post.fanuc._axes import posture, turns
 from kerfpath.post.fanuc._settings import FanucSettings, unit
 from kerfpath.post.fanuc._switching import switching
@@ -27,10 +28,6 @@ __all__ = ["check"]
 
 ROUNDED_SPEED = 0.005
 """Share of a speed that the step of speeds may change without a warning."""
-TICK = 0.01
-"""Times are written in whole numbers of this (s)."""
-TICK_NOISE = 1e-4
-"""How far (s) a time may be from them."""
 LARGEST_CORNER = 1.0
 """Largest corner region, m."""
 CORNER_STEP = 1e-3
@@ -43,28 +40,24 @@ FEWEST_TURNS, MOST_TURNS = -8, 7
 
 def check(program: Program, settings: FanucSettings) -> Iterator[ProgramIssue]:
     """Yield the issues that only this language has."""
-    if settings.laser_output is not None and settings.laser_output == settings.gas_output:
-        said = f"laser and gas are both switched by DO[{settings.laser_output}]; name two outputs"
-        yield ProgramIssue("error", "output", said, "program")
-    written, most = Fanuc(program, settings), settings.lines_per_file
-    yield from long_contours(written.lengths(), most, "error")
-    lines = len(written.main())
+    lines, most = len(Fanuc(program, settings).main()), settings.lines_per_file
     if lines > most:
-        said = (
+        message = (
             f"the main program would have {lines} lines, {most} are allowed; raise lines_per_file"
         )
-        yield ProgramIssue("error", "file-length", said, "program")
+        yield ProgramIssue("error", "file-length", message, "program")
     for section in program.sections:
-        moves = section.moves
-        yield from _times(section)
+        yield from _check_times(section)
         if settings.corner == "CR":
-            yield from _corners(section)
-        yield from _speeds(section, unit(settings))
-        if moves:
-            yield from _postures(program, section.name, moves, settings)
+            yield from _check_corners(section)
+        yield from _check_speeds(section, unit(settings))
+        q = np.array([move.q for move in section.moves]).reshape(-1, 6)
+        yield from _check_turns(section, turns(program.robot, q, settings), settings)
+        letters = [words[:3] for words in posture(program.robot, q, settings)]
+        yield from warn_of_changed_postures(section, letters)
 
 
-def _times(section: Section) -> Iterator[ProgramIssue]:
+def _check_times(section: Section) -> Iterator[ProgramIssue]:
     stands = False
     for number, step in enumerate(section.steps):
         place = f"{section.name}, step {number}"
@@ -74,33 +67,33 @@ def _times(section: Section) -> Iterator[ProgramIssue]:
             before, timed, _ = switching(step)
             times = [switch.lead_time for switch in timed]
             if before:
-                yield from _early(before, stands, place)
+                yield from _check_early(before, stands, place)
         for time in times:
-            if abs(time - TICK * round(time / TICK)) > TICK_NOISE:
-                said = f"times are written in whole {TICK * 1e3:g} ms, got {time * 1e3:g} ms"
-                yield ProgramIssue("error", "time-step", said, place)
+            if not_whole(time):
+                message = f"times are written in whole {TICK * 1e3:g} ms, got {time * 1e3:g} ms"
+                yield ProgramIssue("error", "time-step", message, place)
         if isinstance(step, JointMove | LinearMove):
             stands = step.zone == 0
 
 
-def _early(before: tuple[Switch, ...], stands: bool, place: str) -> Iterator[ProgramIssue]:
-    """Tell of what is switched before a motion, as one TB on its line switches something else."""
+def _check_early(before: tuple[Switch, ...], stands: bool, place: str) -> Iterator[ProgramIssue]:
+    """Check what is switched before a motion, as one TB on its line switches something else."""
     signals = " and ".join(switch.signal for switch in before)
     if not stands or any(switch.signal == "laser" for switch in before):
-        said = (
+        message = (
             f"the {signals} cannot be switched here: one TB stands on the line of a motion, and "
             "before it the robot does not stand, or the laser would be on"
         )
-        yield ProgramIssue("error", "two-switches", said, place)
+        yield ProgramIssue("error", "two-switches", message, place)
     else:
-        said = (
+        message = (
             f"the {signals} is switched as the motion begins, earlier than planned: one TB stands "
             "on the line of a motion"
         )
-        yield ProgramIssue("warning", "two-switches", said, place)
+        yield ProgramIssue("warning", "two-switches", message, place)
 
 
-def _corners(section: Section) -> Iterator[ProgramIssue]:
+def _check_corners(section: Section) -> Iterator[ProgramIssue]:
     zones = [move.zone for move in section.moves if isinstance(move, LinearMove)]
     whole = [abs(z - CORNER_STEP * round(z / CORNER_STEP)) <= CORNER_NOISE for z in zones]
     wrong = [z for z, w in zip(zones, whole, strict=True) if not w or z > LARGEST_CORNER]
@@ -114,7 +107,7 @@ def _corners(section: Section) -> Iterator[ProgramIssue]:
         )
 
 
-def _speeds(section: Section, step: float) -> Iterator[ProgramIssue]:
+def _check_speeds(section: Section, step: float) -> Iterator[ProgramIssue]:
     speeds = np.array([move.speed for move in section.moves if isinstance(move, LinearMove)])
     off = np.abs(np.round(speeds / step) * step / speeds - 1)
     if (off > ROUNDED_SPEED).any():
@@ -127,30 +120,14 @@ def _speeds(section: Section, step: float) -> Iterator[ProgramIssue]:
         )
 
 
-def _postures(
-    program: Program, name: str, moves: tuple[Move, ...], settings: FanucSettings
+def _check_turns(
+    section: Section, counted: Ints, settings: FanucSettings
 ) -> Iterator[ProgramIssue]:
-    """Check that the turns can be written, and that no straight move changes the letters."""
-    q = np.array([move.q for move in moves])
-    counted = turns(program.robot, q, settings)
-    beyond = np.flatnonzero(((counted < FEWEST_TURNS) | (counted > MOST_TURNS)).any(axis=1))
-    straight = np.array([not isinstance(move, JointMove) for move in moves])
-    if len(posed := beyond[straight[beyond]]):
-        yield ProgramIssue(
-            "error",
-            "turns",
-            f"turns must lie between {FEWEST_TURNS} and {MOST_TURNS}, got "
-            f"{', '.join(map(str, counted[posed[0]]))} of {settings.turns}",
-            f"{name}, move {posed[0]}",
-        )
-    letters = np.array([words[:3] for words in posture(program.robot, q, settings)])
-    changed = (letters[1:] != letters[:-1]).any(axis=1) & straight[1:]
-    for k in (np.flatnonzero(changed) + 1).tolist():
-        said = f"{' '.join(letters[k - 1])} to {' '.join(letters[k])}"
-        yield ProgramIssue(
-            "warning",
-            "posture-change",
-            f"the configuration changes from {said} in a straight move, which the controller may "
-            "refuse",
-            f"{name}, move {k}",
-        )
+    """Check that the turns (K, 3) of targets can be written."""
+    for k, move in enumerate(section.moves):
+        beyond = counted[k].min() < FEWEST_TURNS or counted[k].max() > MOST_TURNS
+        if beyond and isinstance(move, LinearMove):
+            message = f"turns must lie between {FEWEST_TURNS} and {MOST_TURNS}, got "
+            found = f"{', '.join(map(str, counted[k]))} of {settings.turns}"
+            yield ProgramIssue("error", "turns", message + found, f"{section.name}, move {k}")
+            return

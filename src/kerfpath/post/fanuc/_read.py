@@ -5,30 +5,34 @@ from __future__ import annotations
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
-from scipy.spatial.transform import Rotation
 
 from kerfpath._arrays import Array, freeze
 from kerfpath.errors import InputError
-from kerfpath.post._frames import faceplate, world
-from kerfpath.post._program import Await, Handshake, Request, Switch
+from kerfpath.post._called import off_name
+from kerfpath.post._frames import faceplate, from_euler, world
+from kerfpath.post._program import Await, Switch
 from kerfpath.post._read import (
+    MoveKind,
     ReadHandshake,
     ReadMove,
     ReadProgram,
     ReadSection,
     ReadStep,
-    ReadWait,
-    partner_of,
-    patterns,
 )
+from kerfpath.post._reading import patterns
 from kerfpath.post.fanuc._axes import joints_from_axes
 from kerfpath.post.fanuc._listing import Listing
 from kerfpath.post.fanuc._settings import UNITS, FanucSettings
 from kerfpath.post.fanuc._switching import time_before
-from kerfpath.post.fanuc._write import aborting, off_name, selection, switched_off, watching
+from kerfpath.post.fanuc._write import (
+    ANGLES,
+    abort_lines,
+    selection_lines,
+    switch_off_lines,
+    watch_lines,
+)
 from kerfpath.robots import Robot
 
 __all__ = ["read"]
@@ -44,7 +48,7 @@ def read(main: str, files: Mapping[str, str], robot: Robot, settings: FanucSetti
     sections = []
     for name in top.calls:
         listing = _Section(f"{name}.ls", files[f"{name}.ls"], robot, settings)
-        steps = _timed(listing.steps(), listing.early, robot, part, tool)
+        steps = _timed(listing.completed(), listing.early, robot, part, tool)
         sections.append(ReadSection(name=listing.name, steps=steps))
     return ReadProgram(name=top.name, sections=tuple(sections), T_flange_tip=tool, T_base_part=part)
 
@@ -82,7 +86,7 @@ _TB = r"((?: TB +\d*\.\d\dsec,DO\[\d+\]=O(?:N|FF))*)"
 _SWITCH = re.compile(r" TB +(\d*\.\d\d)sec,DO\[(\d+)\]=(ON|OFF)")
 _MAIN = patterns(
     {
-        "told": rf"  !(UFRAME|UTOOL) (\d+) ([XYZWPR]) {_NUMBER}",
+        "frame_value": rf"  !(UFRAME|UTOOL) (\d+) ([XYZWPR]) {_NUMBER}",
         "remark": r"  !.*",
         "select": r"  (UFRAME|UTOOL)_NUM=(\d+)",
         "reset": r"  (DO\[\d+\]=OFF)",
@@ -115,7 +119,7 @@ _POSITION = re.compile(
 
 
 class _Main(Listing):
-    """The main program: frames told in remarks, and calls."""
+    """The main program: frames as remarks give them, and calls."""
 
     def __init__(self, file: str, text: str, robot: Robot, settings: FanucSettings) -> None:
         super().__init__(file, text, robot, settings)
@@ -125,19 +129,19 @@ class _Main(Listing):
         self.resets: list[str] = []
         self.body(_MAIN)
         self.end()
-        if self.resets != [line.strip(" ;") for line in switched_off(settings)]:
+        if self.resets != [line.strip(" ;") for line in switch_off_lines(settings)]:
             raise self.fault("expected every output that is named to be reset once")
         for kind in ("UFRAME", "UTOOL"):
             if kind not in self.selected:
                 raise self.fault(f"{kind}_NUM is not set")
-        self.frames(self.selected["UFRAME"], self.selected["UTOOL"])
+        self.require_frames(self.selected["UFRAME"], self.selected["UTOOL"])
 
-    def told(self, kind: str, number: str, letter: str, value: str) -> None:
+    def frame_value(self, kind: str, number: str, letter: str, value: str) -> None:
         if self.calls:
-            raise self.fault("frames must be told before the first CALL")
+            raise self.fault("frames must be given before the first CALL")
         if (kind, letter) in self.values:
-            raise self.fault(f"{letter} of {kind} is told twice")
-        self.frames(
+            raise self.fault(f"{letter} of {kind} is given twice")
+        self.require_frames(
             number if kind == "UFRAME" else str(self.settings.user_frame),
             number if kind == "UTOOL" else str(self.settings.tool_frame),
         )
@@ -159,12 +163,12 @@ class _Main(Listing):
         self.calls.append(name)
 
     def frame(self, kind: str) -> Array:
-        """Return a frame that remarks tell, (4, 4) m."""
+        """Return a frame that remarks give, (4, 4) m."""
         missing = [letter for letter in "XYZWPR" if (kind, letter) not in self.values]
         if missing:
-            raise self.fault(f"no remark tells {', '.join(missing)} of {kind}")
-        values = np.array([[self.values[kind, letter] for letter in "XYZWPR"]])
-        return freeze(_poses(values)[0])
+            raise self.fault(f"no remark gives {', '.join(missing)} of {kind}")
+        values = [self.values[kind, letter] for letter in "XYZWPR"]
+        return freeze(from_euler(values, ANGLES)[0])
 
 
 class _Watching(Listing):
@@ -172,7 +176,7 @@ class _Watching(Listing):
 
     def __init__(self, file: str, text: str, robot: Robot, settings: FanucSettings) -> None:
         super().__init__(file, text, robot, settings)
-        self.say(watching(settings))
+        self.require(watch_lines(settings))
         self.body({})
         self.end()
 
@@ -182,22 +186,20 @@ class _Section(Listing):
 
     def __init__(self, file: str, text: str, robot: Robot, settings: FanucSettings) -> None:
         super().__init__(file, text, robot, settings)
-        self.read_steps: list[ReadWait | ReadHandshake | dict[str, Any]] = []
+        self.named: dict[int, list[int]] = {}
+        """Numbers of the targets of each motion, by its line."""
         self.targets: dict[int, tuple[str | None, ...]] = {}
         self.said_at: dict[int, str] = {}
         self.early: dict[int, tuple[Switch, ...]] = {}
         self.pending: tuple[Switch, ...] = ()
         self.timeout_s: float | None = None
         self.says_abort = False
-        self.say(selection(settings))
+        self.require(selection_lines(settings))
         self.body(_SECTION)
         if self.pending or self.timeout_s is not None:
             raise self.fault("expected a motion, or the wait of a timeout, before the end")
-        awaited = any(
-            isinstance(step, ReadHandshake) and isinstance(step.what, Await)
-            for step in self.read_steps
-        )
-        if self.says_abort != awaited:
+        asked = [step.what for step in self.steps if isinstance(step, ReadHandshake)]
+        if self.says_abort != any(isinstance(what, Await) for what in asked):
             raise self.fault("a program that waits for inputs must say what it does without them")
         self.positions()
         self.end()
@@ -205,10 +207,10 @@ class _Section(Listing):
     def joint(self, target: str, per_cent: str, fine: str | None, cnt: str | None) -> None:
         self.motion("joint", [target], int(per_cent) / 100, self.zone(fine, cnt, None), "")
 
-    def linear(self, target: str, *end: Any) -> None:
+    def linear(self, target: str, *end: str) -> None:
         self.motion("linear", [target], *self.path_end(*end))
 
-    def circular(self, via: str, target: str, *end: Any) -> None:
+    def circular(self, via: str, target: str, *end: str) -> None:
         self.motion("circular", [target, via], *self.path_end(*end))
 
     def path_end(
@@ -231,46 +233,33 @@ class _Section(Listing):
         return None if corner is None else int(corner) * 1e-3
 
     def motion(
-        self, kind: str, targets: list[str], speed: float, zone: float | None, before: str
+        self, kind: MoveKind, targets: list[str], speed: float, zone: float | None, before: str
     ) -> None:
         switches = tuple(
-            Switch(signal=self.signal(output), on=value == "ON", lead_time=float(lead))
+            Switch(signal=self.signal(int(output)), on=value == "ON", lead_time=float(lead))
             for lead, output, value in _SWITCH.findall(before)
         )
-        if self.pending and (kind == "joint" or not self.read_steps):
+        if self.pending and (kind == "joint" or not self.steps):
             raise self.fault("an output must not be switched before this motion")
         if self.pending:
             self.early[self.line], self.pending = self.pending, ()
-        self.read_steps.append(
-            {
-                "kind": kind,
-                "line": self.line,
-                "targets": [int(target) for target in targets],
-                "speed": speed,
-                "zone": zone,
-                "switches": switches,
-                "elsewhere": {},
-            }
-        )
-
-    def wait(self, time: str) -> None:
-        self.read_steps.append(ReadWait(time=float(time), file=self.file, line=self.line))
+        self.named[self.line] = [int(target) for target in targets]
+        self.add_move(kind, speed, zone=zone, switches=switches)
 
     def switch(self, output: str, value: str) -> None:
-        signals = (self.settings.laser_output, self.settings.gas_output)
-        if int(output) not in signals:
-            partner = partner_of(int(output), "output", self.settings, self.place)
-            self.handshake(Request(partner=partner, on=value == "ON"))
+        on = value == "ON"
+        if int(output) not in (self.settings.laser_output, self.settings.gas_output):
+            self.ask(int(output), on=on)
             return
-        move = self.read_steps[-1] if self.read_steps else None
-        stands = [s for s in self.read_steps if isinstance(s, dict)][-1:]
-        if stands and stands[0]["kind"] == "joint" and stands[0]["zone"] == 0:
-            self.pending += (Switch(signal=self.signal(output), on=value == "ON"),)
+        switch = Switch(signal=self.signal(int(output)), on=on)
+        *_, before = [None, *(step for step in self.steps if isinstance(step, ReadMove))]
+        if before is not None and before.kind == "joint" and before.zone == 0:
+            self.pending += (switch,)
             return
-        if not isinstance(move, dict) or move["zone"] != 0 or move["kind"] == "joint":
+        last = self.last_on_path()
+        if last is None or last.zone != 0:
             raise self.fault("an output may only be switched here after a path motion with FINE")
-        move["switches"] += (Switch(signal=self.signal(output), on=value == "ON"),)
-        move["elsewhere"]["switches"] = self.place
+        self.add_switch(last, switch, self.place)
 
     def timeout(self, hundredths: str) -> None:
         if self.timeout_s is not None:
@@ -280,20 +269,16 @@ class _Section(Listing):
     def answer(self, number: str) -> None:
         if self.timeout_s is None:
             raise self.fault("expected $WAITTMOUT before the wait")
-        partner = partner_of(int(number), "input", self.settings, self.place)
-        self.handshake(Await(partner=partner, timeout=self.timeout_s))
+        self.expect_answer(int(number), self.timeout_s)
         self.timeout_s = None
 
     def aborting(self) -> None:
         self.says_abort = True
-        self.say(aborting(self.settings)[1:])
-
-    def handshake(self, what: Handshake) -> None:
-        self.read_steps.append(ReadHandshake(what=what, file=self.file, line=self.line))
+        self.require(abort_lines(self.settings)[1:])
 
     def positions(self) -> None:
         """Read the positions, each a block of rows."""
-        rows = self.rows[self.line :]
+        rows = [row for _, row in self.rows[self.line :]]
         last = rows.index("/END") if "/END" in rows else len(rows)
         text, at = "\n".join([*rows[:last], ""]), 0
         while at < len(text) and last:
@@ -302,49 +287,51 @@ class _Section(Listing):
                 raise self.fault("no position of ours begins after this line")
             number, user, tool, *said = match.groups()
             self.said_at[int(number)] = f"{self.file}, line {self.line + 1}"
+            self.row += match[0].count("\n")
             self.line += match[0].count("\n")
-            self.frames(user, tool)
+            self.require_frames(user, tool)
             if int(number) in self.targets:
                 raise self.fault(f"P[{number}] is there twice")
             self.targets[int(number)] = tuple(said)
             at = match.end()
 
-    def steps(self) -> tuple[ReadStep, ...]:
+    def completed(self) -> list[ReadStep]:
         """Return the steps with their targets, all of which are turned into SI units at once."""
-        numbers = {number: k for k, number in enumerate(self.targets)}
-        said = list(self.targets.values())
-        posed = [words[0] is not None for words in said]
-        values = np.array([_six(words) for words in said], dtype=np.float64).reshape(-1, 6)
-        q = joints_from_axes(self.robot, np.radians(values))
-        poses = _poses(values)
-        steps: list[ReadStep] = []
-        used: set[int] = set()
-        for step in self.read_steps:
-            if not isinstance(step, dict):
-                steps.append(step)
-                continue
-            self.line = step["line"]
-            targets = step.pop("targets")
-            used.update(targets)
-            if unknown := [n for n in targets if n not in numbers]:
-                raise self.fault(f"P[{unknown[0]}] is not there")
-            at, *vias = [numbers[n] for n in targets]
-            wrong = [n for n in targets if posed[numbers[n]] == (step["kind"] == "joint")]
-            if wrong:
-                form = "J1 to J6" if step["kind"] == "joint" else "X to R"
-                raise self.fault(f"P[{wrong[0]}] must be given by {form}")
-            step["elsewhere"]["target"] = self.said_at[targets[0]]
-            if step["kind"] == "joint":
-                step["q"] = q[at]
-            else:
-                step |= {"T_part_tip": poses[at], "posture": _posture(said[at])}
-            if vias:
-                step["T_part_via"] = poses[vias[0]]
-            steps.append(ReadMove(file=self.file, **step))
+        values = np.array([_six(words) for words in self.targets.values()]).reshape(-1, 6)
+        q = dict(zip(self.targets, joints_from_axes(self.robot, np.radians(values)), strict=True))
+        poses = dict(zip(self.targets, from_euler(values, ANGLES), strict=True))
+        steps = [
+            self.with_targets(step, q, poses) if isinstance(step, ReadMove) else step
+            for step in self.steps
+        ]
+        used = {number for numbers in self.named.values() for number in numbers}
         if unused := [number for number in self.targets if number not in used]:
             self.line = len(self.rows)
             raise self.fault(f"P[{unused[0]}] is used by no motion")
-        return tuple(steps)
+        return steps
+
+    def with_targets(
+        self, move: ReadMove, q: Mapping[int, Array], poses: Mapping[int, Array]
+    ) -> ReadMove:
+        """Return a move with its targets, of joints and poses by their numbers."""
+        self.line, joint = move.line, move.kind == "joint"
+        targets = self.named[move.line]
+        if unknown := [n for n in targets if n not in self.targets]:
+            raise self.fault(f"P[{unknown[0]}] is not there")
+        if wrong := [n for n in targets if (self.targets[n][0] is None) != joint]:
+            form = "J1 to J6" if joint else "X to R"
+            raise self.fault(f"P[{wrong[0]}] must be given by {form}")
+        at, *vias = targets
+        elsewhere = {**move.elsewhere, "target": self.said_at[at]}
+        if joint:
+            return replace(move, q=q[at], elsewhere=elsewhere)
+        return replace(
+            move,
+            T_part_tip=poses[at],
+            T_part_via=poses[vias[0]] if vias else None,
+            posture=_posture(self.targets[at]),
+            elsewhere=elsewhere,
+        )
 
 
 def _six(words: tuple[str | None, ...]) -> list[float]:
@@ -354,11 +341,3 @@ def _six(words: tuple[str | None, ...]) -> list[float]:
 def _posture(words: tuple[str | None, ...]) -> tuple[int | str, ...]:
     letters, numbers = words[:3], words[3:6]
     return (*map(str, letters), *(int(str(number)) for number in numbers))
-
-
-def _poses(values: Array) -> Array:
-    """Return the poses (K, 4, 4) m of X, Y, Z in mm and W, P, R in deg, (K, 6)."""
-    T = np.tile(np.eye(4), (len(values), 1, 1))
-    T[:, :3, :3] = Rotation.from_euler("xyz", values[:, 3:], degrees=True).as_matrix()
-    T[:, :3, 3] = values[:, :3] * 1e-3
-    return freeze(T)

@@ -8,7 +8,7 @@ from typing import Annotated, Literal
 import numpy as np
 from pydantic import StringConstraints
 
-from kerfpath.post._settings import Rules, Settings, setting
+from kerfpath.post._settings import PortSettings, Rules, numbered, setting
 
 __all__ = ["FanucSettings", "is_reserved", "rules", "unit"]
 
@@ -25,32 +25,16 @@ WORDS = (
 )
 """Words of the language, where a contour may be named so."""
 
-Output = Annotated[
-    int | None, setting("the number of a digital output, 1 to 4096", "5", ge=1, le=4096)
-]
+Output = Annotated[int | None, numbered("a digital output", 4096)]
+Input = Annotated[int | None, numbered("a digital input", 4096)]
 
 
-Input = Annotated[
-    int | None, setting("the number of a digital input, 1 to 4096", "5", ge=1, le=4096)
-]
-
-
-class FanucSettings(Settings):
+class FanucSettings(PortSettings, output=Output, input=Input):
     """Frames, outputs and options of the controller."""
 
     lines_per_file: Annotated[
         int, setting("a whole number of lines from 100 to 9999", "9999", ge=100, le=9999)
     ] = 9999
-    laser_output: Output = None
-    gas_output: Output = None
-    ready_input: Input = None
-    shutter_input: Input = None
-    gas_pressure_input: Input = None
-    height_input: Input = None
-    interlock_input: Input = None
-    ready_output: Output = None
-    shutter_output: Output = None
-    height_output: Output = None
     date: Annotated[
         Annotated[str, StringConstraints(pattern=r"^\d\d-\d\d-\d\d \d\d:\d\d:\d\d$")],
         setting("a date as YY-MM-DD hh:mm:ss", '"26-11-21 10:00:00"'),

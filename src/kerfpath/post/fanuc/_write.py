@@ -11,47 +11,43 @@ tests/fixtures/fanuc/roboguide_export, JuniorNatalin/VASC (TB).
 
 from __future__ import annotations
 
-import textwrap
 from collections.abc import Iterator
-from dataclasses import replace
 from itertools import count
+from typing import Final
 
 import numpy as np
 
-from kerfpath._arrays import Array
-from kerfpath.post._formatter import Formatter, number, plain
-from kerfpath.post._frames import faceplate, world, xyzwpr
-from kerfpath.post._names import identifiers
+from kerfpath.post._called import CalledFormatter
+from kerfpath.post._formatter import number
+from kerfpath.post._frames import euler
 from kerfpath.post._program import (
     Await,
     CircularMove,
     JointMove,
     LinearMove,
-    Program,
     Request,
     Section,
     Switch,
     Wait,
+    targets_of,
 )
-from kerfpath.post._settings import handshakes
+from kerfpath.post._settings import outputs
 from kerfpath.post.fanuc._axes import axes_from_joints, posture
 from kerfpath.post.fanuc._settings import FanucSettings, unit
 from kerfpath.post.fanuc._switching import switching
 
-__all__ = ["Fanuc", "aborting", "off_name", "selection", "switched_off", "watching"]
+__all__ = [
+    "ANGLES", "Fanuc", "abort_lines", "selection_lines", "switch_off_lines", "watch_lines",
+]  # fmt: skip
 
+ANGLES: Final = "xyz"
+"""W turns about x, then P about y, then R about z, all axes fixed."""
 NEW_LINE = "\r\n"
 PADDING = "    "
 REMARK = 32
 """Characters of a remark that every controller keeps."""
-MOST_REMARKS = 3
-"""Lines that a comment is cut to."""
 NO_ANSWER = 1
 """The label to which a wait for an input jumps when nobody answers."""
-OFF = "_OFF"
-"""End of the name of the program that the background logic runs."""
-FRAME_DECIMALS = (4, 6)
-"""Decimals of mm and of deg with which a person is told the frames."""
 JOINT_WORDS = tuple((f"J{k}=", "deg") for k in range(1, 7))
 POSE_WORDS = tuple((f"{k} =", " mm") for k in "XYZ") + tuple((f"{k} =", "deg") for k in "WPR")
 ATTRIBUTES = """/ATTR
@@ -77,55 +73,37 @@ CONTROL_CODE\t= 00000000 00000000;
 """Controllers count sizes themselves; the date is that of the settings, so that bytes repeat."""
 
 
-def selection(settings: FanucSettings) -> list[str]:
+def selection_lines(settings: FanucSettings) -> list[str]:
     """Return the lines that select the frames; each program has them, to be started alone."""
     return [f"  UFRAME_NUM={settings.user_frame} ;", f"  UTOOL_NUM={settings.tool_frame} ;"]
 
 
-def outputs(settings: FanucSettings) -> list[int]:
-    """Return all outputs that the settings name."""
-    requests = (n for (_, way), n in handshakes(settings).items() if way == "output")
-    named = (settings.laser_output, settings.gas_output, *requests)
-    return [output for output in named if output is not None]
-
-
-def switched_off(settings: FanucSettings) -> list[str]:
+def switch_off_lines(settings: FanucSettings) -> list[str]:
     """Return the lines that switch everything off."""
     return [f"  DO[{output}]=OFF ;" for output in outputs(settings)]
 
 
-def aborting(settings: FanucSettings) -> list[str]:
+def abort_lines(settings: FanucSettings) -> list[str]:
     """Return the last lines of a program that waits for inputs: what is done without an answer."""
-    return ["  END ;", f"  LBL[{NO_ANSWER}] ;", *switched_off(settings), "  ABORT ;"]
+    return ["  END ;", f"  LBL[{NO_ANSWER}] ;", *switch_off_lines(settings), "  ABORT ;"]
 
 
-def off_name(name: str, settings: FanucSettings) -> str:
-    """Return the name of the program that the background logic is to run, by that of the main."""
-    return name[: settings.longest_name - len(OFF)] + OFF
-
-
-def watching(settings: FanucSettings) -> list[str]:
-    """Return the lines of that program: all is off wherever no program runs (UO[3])."""
+def watch_lines(settings: FanucSettings) -> list[str]:
+    """Return the lines that background logic runs: all is off wherever no program runs (UO[3])."""
     off = (f"  IF (!UO[3]),DO[{output}]=(OFF) ;" for output in outputs(settings))
     return ["  ! Run this as BG logic (SETUP) ;", *off]
 
 
-class Fanuc(Formatter):
+class Fanuc(CalledFormatter):
     """Writes one listing for each section, and a main program that calls them."""
 
     settings: FanucSettings
+    too_long = "error"
 
-    def __init__(self, program: Program, settings: FanucSettings) -> None:
-        (name,) = identifiers([program.name], (), settings.longest_name)
-        taken, longest = (name, off_name(name, settings)), settings.longest_name
-        names = identifiers((section.name for section in program.sections), taken, longest)
-        sections = tuple(
-            replace(section, name=own.upper())
-            for section, own in zip(program.sections, names, strict=True)
-        )
-        whole = program
-        super().__init__(replace(whole, name=name.upper(), sections=sections), settings)
-        self._target = count(1)
+    remark_width = REMARK - 1
+    angles = ANGLES
+    frame_words = tuple("XYZWPR")
+    frame_line = "  !%s %s %s ;"
 
     def files(self) -> dict[str, str]:
         """Return the main program and those that it calls."""
@@ -135,53 +113,30 @@ class Fanuc(Formatter):
             lines = list(self.lines(section))
             positions = self._positions(section)
             files[f"{section.name}.ls"] = _listing(section.name, lines, positions, settings)
-        off = off_name(name, settings)
-        files[f"{off}.ls"] = _listing(off, watching(settings), [], settings, group="*")
+        off = self.off_name
+        files[f"{off}.ls"] = _listing(off, watch_lines(settings), [], settings, group="*")
         return files
-
-    def lengths(self) -> dict[str, int]:
-        """Return how many lines each contour takes, by its name."""
-        return {s.name: sum(1 for _ in self.lines(s)) for s in self.program.sections}
 
     def main(self) -> list[str]:
         """Return the lines of the main program."""
         program, settings = self.program, self.settings
-        clear = "proved clear in the planned cell"
-        checked = clear if program.air_checked else "not checked for collisions"
-        lines = [
-            *self.comment(f"kerfpath, for {plain(program.robot.model)}"),
-            *self.comment(f"Moves through the air: {checked}."),
-            *(line for said in program.caveats for line in self.comment(said)),
-            *self.comment(
-                f"{off_name(program.name, settings)} as BG logic switches off at a stop."
-            ),
-            *self.comment("The cell's safety has to switch the laser off, too."),
-            *self.comment("Enter these frames (mm, deg). World: on J1, at the height of J2."),
-        ]
-        frame = np.linalg.inv(world(program.robot)) @ program.T_base_part
-        tool = np.linalg.inv(faceplate(program.robot)) @ program.T_flange_tip
-        lines += _frame(f"UFRAME {settings.user_frame}", frame)
-        lines += _frame(f"UTOOL {settings.tool_frame}", tool)
-        lines += [*selection(settings), *switched_off(settings)]
-        return lines + [f"  CALL {section.name}{PADDING};" for section in program.sections]
-
-    def names(self) -> list[tuple[str, str]]:
-        """Return the names of all programs."""
-        sections = ((section.name, "a contour") for section in self.program.sections)
-        off = off_name(self.program.name, self.settings)
-        return [
-            (self.program.name, "the program"),
-            (off, "the program that is watching"),
-            *sections,
-        ]
+        lines = self.heading(
+            f"{self.off_name} as BG logic switches off at a stop.",
+            "The cell's safety has to switch the laser off, too.",
+            "Enter these frames (mm, deg). World: on J1, at the height of J2.",
+            frame=f"UFRAME {settings.user_frame}",
+            tool=f"UTOOL {settings.tool_frame}",
+        )
+        calls = [f"  CALL {section.name}{PADDING};" for section in program.sections]
+        return [*lines, *selection_lines(settings), *switch_off_lines(settings), *calls]
 
     def lines(self, section: Section) -> Iterator[str]:
         """Yield the lines of all steps of a section, its targets numbered from 1."""
         self._target = count(1)
-        yield from selection(self.settings)
+        yield from selection_lines(self.settings)
         yield from super().lines(section)
         if any(isinstance(step, Await) for step in section.steps):
-            yield from aborting(self.settings)
+            yield from abort_lines(self.settings)
 
     def joint_move(self, move: JointMove) -> Iterator[str]:
         """Yield a J motion; it knows no corner region."""
@@ -217,8 +172,8 @@ class Fanuc(Formatter):
         yield f"  WAIT DI[{number}]=ON TIMEOUT,LBL[{NO_ANSWER}] ;"
 
     def comment(self, text: str) -> Iterator[str]:
-        """Yield remarks; a semicolon would end them, and the frames are told without a space."""
-        yield from (f"  ! {line} ;" for line in _remarks(text))
+        """Yield remarks; a semicolon would end them, those of frames have no space."""
+        yield from (f"  ! {line} ;" for line in self.wrap(text.replace(";", ",")))
 
     def _path_end(self, move: LinearMove) -> str:
         """Say how fast a move is, how it ends, and what is switched on the way there."""
@@ -243,21 +198,17 @@ class Fanuc(Formatter):
 
     def _positions(self, section: Section) -> list[str]:
         """Return the targets of a section in the order in which its lines number them."""
-        targets: list[tuple[Array, Array | None]] = []
-        for move in section.moves:
-            if isinstance(move, CircularMove):
-                targets.append((move.q_via, move.T_part_via))
-            targets.append((move.q, getattr(move, "T_part_tip", None)))
+        targets = targets_of(section.moves)
         if not targets:
             return []
         robot, settings = self.program.robot, self.settings
-        q = np.array([q for q, _ in targets])
+        q = np.array([target.q for target in targets])
         axes_deg = np.degrees(axes_from_joints(robot, q)).tolist()
-        poses = xyzwpr(np.array([np.eye(4) if T is None else T for _, T in targets])).tolist()
+        poses = euler([np.eye(4) if T is None else T for _, _, T in targets], ANGLES).tolist()
         configurations = posture(robot, q, settings)
         frames = f"\tUF : {settings.user_frame}, UT : {settings.tool_frame},\t"
         texts = []
-        for n, (_, T) in enumerate(targets):
+        for n, (_, _, T) in enumerate(targets):
             if T is None:
                 rows = [frames, *self._values(JOINT_WORDS, axes_deg[n])]
             else:
@@ -275,18 +226,6 @@ class Fanuc(Formatter):
             for (word, measure), value in zip(words, values, strict=True)
         ]
         return ["\t" + ",\t".join(said[:3]) + ",", "\t" + ",\t".join(said[3:])]
-
-
-def _remarks(text: str) -> list[str]:
-    """Return a text as remarks, cut where there would be too many."""
-    words = text.replace(";", ",")
-    return textwrap.wrap(words, REMARK - 1, max_lines=MOST_REMARKS, placeholder=" ...")
-
-
-def _frame(name: str, T: Array) -> Iterator[str]:
-    """Yield a frame as remarks, to be entered by a person and read back."""
-    for k, (letter, value) in enumerate(zip("XYZWPR", xyzwpr(T[None])[0], strict=True)):
-        yield f"  !{name} {letter} {number(value, FRAME_DECIMALS[k // 3])} ;"
 
 
 def _seconds(time: float) -> str:

@@ -1,7 +1,7 @@
 """INFORM, the language of Yaskawa controllers, as jobs (.JBI)."""
 
 from kerfpath.post._languages import Language
-from kerfpath.post._standing import stopping_to_switch
+from kerfpath.post._standing import stop_to_switch
 from kerfpath.post.inform._axes import axes_from_joints as axes_from_joints
 from kerfpath.post.inform._axes import joints_from_axes as joints_from_axes
 from kerfpath.post.inform._axes import manipulator_type as manipulator_type
@@ -25,7 +25,7 @@ INFORM = Language(
     is_reserved=is_reserved,
     posture=posture,
     check=check,
-    sayable=stopping_to_switch,
+    sayable=stop_to_switch,
     ahead=False,
     assumed={"laser_output": 1},
     read=read,

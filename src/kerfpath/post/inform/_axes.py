@@ -27,33 +27,25 @@ from numpy.typing import ArrayLike
 
 from kerfpath._arrays import Array, Ints, floats, freeze
 from kerfpath.post._arm_plane import wrist_in_plane
-from kerfpath.post._counting import offset_near
+from kerfpath.post._axes import AxisCount
 from kerfpath.post.inform._settings import InformSettings
 from kerfpath.robots import Robot
 
 __all__ = ["axes_from_joints", "joints_at", "joints_from_axes", "manipulator_type", "posture"]
 
-SIGN = np.array([1.0, 1.0, -1.0, -1.0, -1.0, -1.0])
-SHIFT = np.array([0.0, 0.0, np.pi / 2, 0.0, 0.0, np.pi])
-"""Axes = SIGN * angles + SHIFT; angles are those of the ortho-parallel model, upright at 0."""
 COUNTED_FROM = (0.0, 0.0, -90.0, 0.0, 0.0, -180.0)
 """Offsets (deg) of the maker's own descriptions."""
+COUNT = AxisCount(
+    counted_from=COUNTED_FROM,
+    matrix=np.diag([1.0, 1.0, -1.0, -1.0, -1.0, -1.0]),
+    shift=np.array([0.0, 0.0, np.pi / 2, 0.0, 0.0, np.pi]),
+)
+axes_from_joints = COUNT.from_joints
+joints_from_axes = COUNT.to_joints
 NOISE = 1e-6
 """How far (rad) an axis may be beyond its limit for digits."""
 NOISE_DECIMALS = 6
 """Angles are rounded to this many decimals (deg) before they are compared."""
-
-
-def axes_from_joints(robot: Robot, q: ArrayLike) -> Array:
-    """Return the controller's axes (K, 6) rad of joint vectors q (K, 6) rad."""
-    angles = robot.sign * floats(q, "q", (None, 6)) - offset_near(robot, COUNTED_FROM)
-    return freeze(np.asarray(SIGN * angles + SHIFT))
-
-
-def joints_from_axes(robot: Robot, axes: ArrayLike) -> Array:
-    """Return the joint vectors (K, 6) rad of a controller's axes (K, 6) rad."""
-    angles = SIGN * (floats(axes, "axes", (None, 6)) - SHIFT)
-    return freeze(np.asarray(robot.sign * (angles + offset_near(robot, COUNTED_FROM))))
 
 
 def manipulator_type(robot: Robot, q: ArrayLike, flip: Literal["B", "R"] = "B") -> Ints:
@@ -79,9 +71,9 @@ def posture(robot: Robot, q: Array, settings: InformSettings) -> list[tuple[int 
 def joints_at(
     robot: Robot, T_base_flange: Array, bits: tuple[int, ...], flip: Literal["B", "R"]
 ) -> Array | None:
-    """Return the joints (6,) rad at a flange pose (4, 4) m that a type of six bits tells.
+    """Return the joints (6,) rad at a flange pose (4, 4) m by a type of six bits.
 
-    S, R and T within 360 deg either way, as the type tells them; of the other axes the turn within
+    S, R and T within 360 deg either way, as the type gives them; of the other axes the turn within
     their limits. None where the type fits no way to reach the pose, or several.
     """
     solved = robot.inverse(T_base_flange, within_limits=False).q

@@ -6,30 +6,22 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from kerfpath.post._divide import long_contours
 from kerfpath.post._issue import ProgramIssue
 from kerfpath.post._program import Await, JointMove, Program, Section, Wait
-from kerfpath.post._standing import switched_later
+from kerfpath.post._standing import warn_of_late_switches
+from kerfpath.post._times import TICK, not_whole
 from kerfpath.post.inform._axes import axes_from_joints
 from kerfpath.post.inform._settings import InformSettings
-from kerfpath.post.inform._write import Inform
 
 __all__ = ["check"]
 
-TICK = 0.01
-"""Times are written in whole numbers of this (s)."""
-TICK_NOISE = 1e-4
-"""How far (s) a time may be from them."""
 TURNING = {3: "R", 5: "T", 0: "S"}
-"""The axes whose turns a type tells, within 360 deg."""
+"""The axes whose turns a type gives, within 360 deg."""
 WHOLE_TURN_DEG = 360.0
 
 
 def check(program: Program, settings: InformSettings) -> Iterator[ProgramIssue]:
     """Yield the issues that only this language has."""
-    if settings.laser_output is not None and settings.laser_output == settings.gas_output:
-        said = f"laser and gas are both switched by OT#({settings.laser_output}); name two outputs"
-        yield ProgramIssue("error", "output", said, "program")
     if settings.pulses_per_deg is None and any(isinstance(m, JointMove) for m in program.moves):
         yield ProgramIssue(
             "warning",
@@ -38,18 +30,17 @@ def check(program: Program, settings: InformSettings) -> Iterator[ProgramIssue]:
             "pulses_per_deg, from the robot's parameters, or check each start at low speed",
             "program",
         )
-    yield from long_contours(Inform(program, settings).lengths(), settings.lines_per_file, "error")
     for section in program.sections:
-        yield from switched_later(section, "INFORM")
-        yield from _times(section)
-        yield from _turns(program, section, settings)
+        yield from warn_of_late_switches(section, "INFORM")
+        yield from _check_times(section)
+        yield from _check_turns(program, section, settings)
 
 
-def _times(section: Section) -> Iterator[ProgramIssue]:
+def _check_times(section: Section) -> Iterator[ProgramIssue]:
     for number, step in enumerate(section.steps):
         times = [step.time] if isinstance(step, Wait) else []
         times += [step.timeout] if isinstance(step, Await) else []
-        if any(abs(time - TICK * round(time / TICK)) > TICK_NOISE for time in times):
+        if any(not_whole(time) for time in times):
             yield ProgramIssue(
                 "error",
                 "time-step",
@@ -58,7 +49,9 @@ def _times(section: Section) -> Iterator[ProgramIssue]:
             )
 
 
-def _turns(program: Program, section: Section, settings: InformSettings) -> Iterator[ProgramIssue]:
+def _check_turns(
+    program: Program, section: Section, settings: InformSettings
+) -> Iterator[ProgramIssue]:
     """Check that the turns of R, T and S can be said where a position is no pulses."""
     if not section.moves:
         return

@@ -3,38 +3,27 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping
-from dataclasses import replace
-from typing import Any, Literal
+from collections.abc import Mapping, Sequence
+from typing import Any
 
 import numpy as np
-from scipy.spatial.transform import Rotation
 
 from kerfpath._arrays import Array, freeze
-from kerfpath.errors import InputError
-from kerfpath.post._frames import faceplate, world
-from kerfpath.post._program import Await, Handshake, Request, Signal, Switch
-from kerfpath.post._read import (
-    ReadHandshake,
-    ReadMove,
-    ReadProgram,
-    ReadSection,
-    ReadStep,
-    ReadWait,
-    partner_of,
-    patterns,
-    same_output,
-)
+from kerfpath.post._called import off_name
+from kerfpath.post._frames import faceplate, from_euler, world
+from kerfpath.post._program import Switch
+from kerfpath.post._read import MoveKind, ReadProgram, ReadSection
+from kerfpath.post._reading import LineReader, patterns
 from kerfpath.post.inform._axes import joints_at, joints_from_axes
 from kerfpath.post.inform._settings import InformSettings
 from kerfpath.post.inform._write import (
+    ANGLES,
     FRAME_WORDS,
     SUFFIX,
-    awaiting,
     head,
     middle,
-    off_name,
-    switched_off,
+    switch_off_lines,
+    wait_lines,
 )
 from kerfpath.robots import Robot
 
@@ -48,7 +37,7 @@ _COUNT = re.compile(r"///NPOS (\d+),0,0,0,0,0", re.ASCII)
 _MAIN = patterns(
     {
         "remark": r"' .*",
-        "told": rf"'(UFRAME|TOOL) (\d+) (R?[XYZ]) {_NUMBER}",
+        "frame_value": rf"'(UFRAME|TOOL) (\d+) (R?[XYZ]) {_NUMBER}",
         "call": r"CALL JOB:([A-Z][A-Z0-9_]*)",
     }
 )
@@ -78,7 +67,7 @@ def read(
     sections, last = [], None
     for name in calls:
         job = _Job(f"{name}{SUFFIX}", files[f"{name}{SUFFIX}"], robot, settings, last, part, tool)
-        sections.append(ReadSection(name=name, steps=tuple(job.found)))
+        sections.append(ReadSection(name=name, steps=tuple(job.steps)))
         last = job.last
     return ReadProgram(
         name=top.name,
@@ -88,73 +77,39 @@ def read(
     )
 
 
-class _Text:
-    """The lines of one job, taken one after the other."""
+class _Text(LineReader):
+    """The lines of one job."""
+
+    settings: InformSettings
+    too_early = "the job ends too early; END is missing"
 
     def __init__(self, file: str, text: str, robot: Robot, settings: InformSettings) -> None:
-        self.file, self.robot, self.settings = file, robot, settings
-        self.rows = [row.rstrip() for row in text.splitlines()]
-        self.line = 0
+        rows = [(n, row.rstrip()) for n, row in enumerate(text.splitlines(), 1)]
+        super().__init__(file, robot, settings, rows)
         self.name = file.rpartition("/")[2].removesuffix(SUFFIX)
-        self.must_say: list[str] = []
 
-    def take(self) -> str:
-        """Return the next line."""
-        self.line += 1
-        if self.line > len(self.rows):
-            raise self.fault("the job ends too early; END is missing")
-        return self.rows[self.line - 1]
-
-    def expect(self, *lines: str) -> None:
-        """Take lines that are known."""
-        for line in lines:
-            if (row := self.take()) != line:
-                raise self.fault(f"expected {line!r}, got {row[:60]!r}")
+    def require_rows(self, expected: Sequence[str]) -> None:
+        """Read rows that are known."""
+        for line in expected:
+            self.require_line(self.next_row(), line)
 
     def begin(self) -> int:
         """Take the first lines; return how many positions the job is said to have."""
         *known, _ = head(self.name, 0)
-        self.expect(*known)
-        match = _COUNT.fullmatch(self.take())
+        self.require_rows(known)
+        match = _COUNT.fullmatch(self.next_row())
         if match is None:
             raise self.fault("expected the number of positions, ///NPOS n,0,0,0,0,0")
         return int(match[1])
 
-    def read(self, kinds: Mapping[str, re.Pattern[str]]) -> None:
-        """Read instructions to END, each by the method of its kind."""
-        while (row := self.take()) != "END":
-            if self.must_say:
-                if row != self.must_say[0]:
-                    raise self.fault(f"expected {self.must_say[0]!r}, got {row[:60]!r}")
-                del self.must_say[0]
-                continue
-            for kind, pattern in kinds.items():
-                if match := pattern.fullmatch(row):
-                    getattr(self, kind)(*match.groups())
-                    break
-            else:
-                raise self.fault(f"not expected here: {row[:60]!r}")
-        if self.must_say:
-            raise self.fault(f"{self.must_say[0]!r} is missing")
-        if any(self.rows[self.line :]):
+    def instructions(self, kinds: Mapping[str, re.Pattern[str]]) -> None:
+        """Read instructions to END."""
+        while (row := self.next_row()) != "END":
+            self.read(row, kinds)
+        self.require_complete()
+        if any(row for _, row in self.rows[self.line :]):
             self.line += 1
             raise self.fault("nothing may follow END")
-
-    def remark(self) -> None:
-        """Keep nothing of a remark."""
-
-    def signal(self, output: str) -> Signal:
-        if int(output) == self.settings.gas_output:
-            return "gas"
-        same_output(int(output), self.settings.laser_output, f"{self.file}, line {self.line}")
-        return "laser"
-
-    def fault(self, message: str) -> InputError:
-        return InputError(f"{self.place}: {message}")
-
-    @property
-    def place(self) -> str:
-        return f"{self.file}, line {self.line}"
 
 
 class _Off(_Text):
@@ -164,13 +119,13 @@ class _Off(_Text):
         super().__init__(file, text, robot, settings)
         if self.begin():
             raise self.fault("this job must have no positions")
-        self.expect(*middle("main", settings)[1])
-        self.must_say = switched_off(settings)
-        self.read({})
+        self.require_rows(middle("main", settings)[1])
+        self.required = switch_off_lines(settings)
+        self.instructions({})
 
 
 class _Main(_Text):
-    """The main job: frames as they are told, outputs, calls."""
+    """The main job: frames as remarks give them, outputs, calls."""
 
     def __init__(self, file: str, text: str, robot: Robot, settings: InformSettings) -> None:
         super().__init__(file, text, robot, settings)
@@ -178,16 +133,16 @@ class _Main(_Text):
         self.calls: list[str] = []
         if self.begin():
             raise self.fault("the main job must have no positions")
-        self.expect(*middle("main", settings)[1])
-        self.read(_MAIN)
+        self.require_rows(middle("main", settings)[1])
+        self.instructions(_MAIN)
         if self.calls[:1] != [off_name(self.name, settings)]:
             raise self.fault(f"expected {off_name(self.name, settings)} to be called first")
 
-    def told(self, frame: str, number: str, word: str, value: str) -> None:
+    def frame_value(self, frame: str, number: str, word: str, value: str) -> None:
         if self.calls:
-            raise self.fault("frames must be told before the first job is called")
+            raise self.fault("frames must be given before the first job is called")
         if (f"{frame} {number}", word) in self.frames:
-            raise self.fault(f"{frame} {number} {word} is told twice")
+            raise self.fault(f"{frame} {number} {word} is given twice")
         self.frames[f"{frame} {number}", word] = float(value)
 
     def call(self, name: str) -> None:
@@ -196,11 +151,11 @@ class _Main(_Text):
         self.calls.append(name)
 
     def frame(self, name: str) -> Array:
-        """Return a frame (4, 4) m that is told."""
+        """Return a frame (4, 4) m that remarks give."""
         values = [self.frames.get((name, word)) for word in FRAME_WORDS]
         if None in values:
-            raise self.fault(f"{name} is not told whole")
-        return freeze(_poses(np.array([values], dtype=np.float64))[0])
+            raise self.fault(f"{name} is not given whole")
+        return freeze(from_euler(np.array(values, dtype=np.float64), ANGLES)[0])
 
 
 class _Job(_Text):
@@ -213,13 +168,12 @@ class _Job(_Text):
         super().__init__(file, text, robot, settings)
         self.last = last
         self.T_base_part, self.T_tip_flange = T_base_part, np.linalg.inv(T_flange_tip)
-        self.found: list[ReadStep] = []
         self.arc_poses: list[Array] = []
         self.stands = False
         count = self.begin()
-        pulses = self.rows[self.line + 1 : self.line + 2] == ["///POSTYPE PULSE"]
+        pulses = "///POSTYPE PULSE" in [row for _, row in self.rows[self.line + 1 : self.line + 2]]
         before, after = middle("pulse" if pulses else "user", settings)
-        self.expect(*before)
+        self.require_rows(before)
         self.said_at: list[str] = []
         self.target_at = ""
         self.arc_speed = ""
@@ -230,24 +184,24 @@ class _Job(_Text):
             self._read_pulses(count)
         else:
             self._read_poses(count)
-        self.expect(*after)
-        self.read(_JOB)
+        self.require_rows(after)
+        self.instructions(_JOB)
         if self.arc_poses:
             raise self.fault("an arc needs three MOVC, one after the other")
 
     def _read_pulses(self, count: int) -> None:
         if self.settings.pulses_per_deg is None:
             raise self.fault("positions are in pulses: give pulses_per_deg")
-        rows = [self._position(_PULSES, self.take(), k) for k in range(count)]
+        rows = [self._position(_PULSES, self.next_row(), k) for k in range(count)]
         pulses = np.array(rows, dtype=np.float64).reshape(-1, 6)
         axes = np.radians(pulses / np.array(self.settings.pulses_per_deg))
         self.q = joints_from_axes(self.robot, axes)
 
     def _read_poses(self, count: int) -> None:
-        rows: list[Any] = []
+        rows: list[tuple[str, ...]] = []
         bits: tuple[int, ...] | None = None
         while len(rows) < count:
-            row = self.take()
+            row = self.next_row()
             if match := _TYPE.fullmatch(row):
                 bits = tuple(int(bit) for bit in match[1].split(","))
                 if len(bits) != self.settings.rconf_values or any(bits[6:]):
@@ -259,7 +213,7 @@ class _Job(_Text):
             if bits is None:
                 raise self.fault("expected ///RCONF before the first position")
             self.types.append(bits[:6])
-        self.T = _poses(np.array(rows, dtype=np.float64).reshape(-1, 6))
+        self.T = from_euler(np.array(rows, dtype=np.float64), ANGLES)
 
     def _position(self, pattern: re.Pattern[str], row: str, number: int) -> tuple[str, ...]:
         match = pattern.fullmatch(row)
@@ -287,9 +241,15 @@ class _Job(_Text):
         return joints_at(self.robot, T_base_flange, self.types[k], self.settings.flip)
 
     def linear(self, target: str, speed: str, level: str) -> None:
+        self.path("linear", target, speed, level)
+
+    def path(
+        self, kind: MoveKind, target: str, speed: str, level: str, via: Array | None = None
+    ) -> None:
         T, posture = self.pose(target)
         self.last = T
-        self.move("linear", float(speed) * 1e-3, level, T_part_tip=T, posture=posture)
+        said = {"T_part_tip": T, "T_part_via": via, "posture": posture}
+        self.move(kind, float(speed) * 1e-3, level, **said)
 
     def part(self, target: str, speed: str) -> None:
         """Check a move to where the tip is already, which parts two arcs."""
@@ -297,7 +257,7 @@ class _Job(_Text):
         self.arc_speed = speed
 
     def arc(self, target: str, speed: str, level: str | None) -> None:
-        T, posture = self.pose(target)
+        T, _ = self.pose(target)
         if not self.arc_poses:
             self.require_here(T)
             self.arc_speed = self.arc_speed or speed
@@ -309,51 +269,33 @@ class _Job(_Text):
         if level is None:
             self.stands = False
             return
-        via, self.arc_poses, self.last = self.arc_poses[1], [], T
-        self.arc_speed = ""
-        self.move(
-            "circular",
-            float(speed) * 1e-3,
-            level,
-            T_part_tip=T,
-            T_part_via=via,
-            posture=posture,
-        )
+        via, self.arc_poses, self.arc_speed = self.arc_poses[1], [], ""
+        self.path("circular", target, speed, level, via)
 
     def switch(self, output: str, state: str) -> None:
+        on = state == "ON"
         if int(output) not in (self.settings.laser_output, self.settings.gas_output):
-            partner = partner_of(int(output), "output", self.settings, self.place)
-            self.handshake(Request(partner=partner, on=state == "ON"))
+            self.ask(int(output), on=on)
             return
-        signal, last = self.signal(output), self.found[-1] if self.found else None
-        if not self.stands or not isinstance(last, ReadMove) or last.kind == "joint":
+        last = self.last_on_path()
+        if not self.stands or last is None:
             raise self.fault("a switch must follow a move of the path with PL=0")
-        switches = (*last.switches, Switch(signal=signal, on=state == "ON"))
-        elsewhere = {**last.elsewhere, "switches": self.place}
-        self.found[-1] = replace(last, switches=switches, elsewhere=elsewhere)
+        self.add_switch(last, Switch(signal=self.signal(int(output)), on=on), self.place)
 
     def wait_for(self, label: str) -> None:
-        said = re.match(r"WAIT IN#\((\d+)\)=ON T=(\d+\.\d\d)$", "".join(self.rows[self.line :][:1]))
+        _, below = (*self.rows[self.line : self.line + 1], (0, ""))[0]
+        said = re.match(r"WAIT IN#\((\d+)\)=ON T=(\d+\.\d\d)$", below)
         if said is None:
             raise self.fault("expected the wait for an input behind the label")
-        partner = partner_of(int(said[1]), "input", self.settings, self.place)
-        lines = awaiting(int(label), int(said[1]), float(said[2]), self.settings)
-        self.must_say = lines[1:]
-        self.handshake(Await(partner=partner, timeout=float(said[2])))
+        port, timeout = int(said[1]), float(said[2])
+        self.required = wait_lines(int(label), port, timeout, self.settings)[1:]
+        self.expect_answer(port, timeout)
 
-    def handshake(self, what: Handshake) -> None:
+    def require_standing(self, what: str) -> None:
         if not self.stands:
-            raise self.fault("a handshake must follow a move with PL=0")
-        self.found.append(ReadHandshake(what=what, file=self.file, line=self.line))
+            raise self.fault(f"{what} must follow a move with PL=0")
 
-    def wait(self, time: str) -> None:
-        if not self.stands:
-            raise self.fault("a wait must follow a move with PL=0")
-        self.found.append(ReadWait(time=float(time), file=self.file, line=self.line))
-
-    def move(
-        self, kind: Literal["joint", "linear", "circular"], speed: float, level: str, **said: Any
-    ) -> None:
+    def move(self, kind: MoveKind, speed: float, level: str, **said: Any) -> None:
         """Add a move; a position level above 0 is no length."""
         if self.arc_poses:
             raise self.fault("an arc needs three MOVC, one after the other")
@@ -361,9 +303,7 @@ class _Job(_Text):
             raise self.fault(f"expected PL=0 or PL={self.settings.position_level}, got PL={level}")
         self.stands = level == "0"
         zone = 0.0 if self.stands else None
-        place: dict[str, Any] = {"file": self.file, "line": self.line}
-        place["elsewhere"] = {"target": self.target_at}
-        self.found.append(ReadMove(kind=kind, speed=speed, zone=zone, **place, **said))
+        self.add_move(kind, speed, zone=zone, elsewhere={"target": self.target_at}, **said)
 
     def pose(self, target: str) -> tuple[Array, tuple[int, ...]]:
         k = self.number(target)
@@ -380,12 +320,3 @@ class _Job(_Text):
             raise self.fault(f"C{target} is not there")
         self.target_at = self.said_at[int(target)]
         return int(target)
-
-
-def _poses(rows: Array) -> Array:
-    """Return poses (K, 4, 4) m of mm and deg about fixed x, y, z."""
-    T = np.tile(np.eye(4), (len(rows), 1, 1))
-    if len(rows):
-        T[:, :3, :3] = Rotation.from_euler("xyz", rows[:, 3:], degrees=True).as_matrix()
-    T[:, :3, 3] = rows[:, :3] * 1e-3
-    return T

@@ -7,7 +7,7 @@ from typing import Annotated, Literal
 import numpy as np
 from pydantic import AfterValidator, StringConstraints
 
-from kerfpath.post._settings import Rules, Settings, setting
+from kerfpath.post._settings import PortSettings, Rules, numbered, setting
 
 __all__ = ["InformSettings", "is_reserved", "rules"]
 
@@ -25,28 +25,16 @@ def _not_zero(values: list[float]) -> list[float]:
     return values
 
 
-Output = Annotated[int | None, setting("the number of an output, 1 to 4096", "5", ge=1, le=4096)]
+Output = Annotated[int | None, numbered("an output", 4096)]
+Input = Annotated[int | None, numbered("an input", 4096)]
 
 
-Input = Annotated[int | None, setting("the number of an input, 1 to 4096", "5", ge=1, le=4096)]
-
-
-class InformSettings(Settings):
+class InformSettings(PortSettings, output=Output, input=Input):
     """Frames, outputs and the pulses of the very robot."""
 
     lines_per_file: Annotated[
         int, setting("a whole number of lines from 100 to 9999", "9999", ge=100, le=9999)
     ] = 9999
-    laser_output: Output = None
-    gas_output: Output = None
-    ready_input: Input = None
-    shutter_input: Input = None
-    gas_pressure_input: Input = None
-    height_input: Input = None
-    interlock_input: Input = None
-    ready_output: Output = None
-    shutter_output: Output = None
-    height_output: Output = None
     user_frame: Annotated[int, setting("a user frame, 1 to 63", "2", ge=1, le=63)] = 1
     tool_number: Annotated[int, setting("a tool, 0 to 63", "2", ge=0, le=63)] = 0
     pulses_per_deg: Annotated[
@@ -71,7 +59,7 @@ class InformSettings(Settings):
         Literal[6, 8, 24], setting("the values after RCONF: 6, 8 or 24", "6")
     ] = 24
     flip: Annotated[
-        Literal["B", "R"], setting("the axis whose angle tells flip, B or R", '"R"')
+        Literal["B", "R"], setting("the axis whose angle decides flip, B or R", '"R"')
     ] = "B"
     date: Annotated[
         Annotated[str, StringConstraints(pattern=r"^\d{4}/\d\d/\d\d \d\d:\d\d$")],

@@ -1,25 +1,25 @@
 """INFORM, the language of Yaskawa controllers, as jobs (.JBI): this module only formats.
 
 Units: mm, deg, mm/s, per cent of the joint speed, seconds. A job holds its positions, then its
-instructions. The main job has none of the first: it tells a person the frames, which are the
+instructions. The main job has none of the first: a person finds the frames in it, which are the
 controller's, and calls the others. Each of them is of one kind: joint positions in pulses, or a
 relative job with positions in the user frame. Outputs are switched where the tip stands.
 """
 
 from __future__ import annotations
 
-import textwrap
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from itertools import count
+from typing import Final
 
 import numpy as np
 
 from kerfpath._arrays import Array
 from kerfpath.errors import InputError
-from kerfpath.post._formatter import Formatter, number, plain
-from kerfpath.post._frames import faceplate, world, xyzwpr
-from kerfpath.post._names import identifiers
+from kerfpath.post._called import CalledFormatter
+from kerfpath.post._formatter import number
+from kerfpath.post._frames import euler
 from kerfpath.post._program import (
     Await,
     CircularMove,
@@ -32,30 +32,33 @@ from kerfpath.post._program import (
     Step,
     Wait,
 )
-from kerfpath.post._settings import handshakes
-from kerfpath.post._standing import stopping_to_switch
+from kerfpath.post._settings import outputs
+from kerfpath.post._standing import stop_to_switch
 from kerfpath.post.inform._axes import axes_from_joints, manipulator_type
 from kerfpath.post.inform._settings import InformSettings
 
 __all__ = [
-    "FRAME_WORDS", "SUFFIX", "Inform", "awaiting", "head", "middle", "off_name", "switched_off",
+    "ANGLES",
+    "FRAME_WORDS",
+    "SUFFIX",
+    "Inform",
+    "head",
+    "middle",
+    "switch_off_lines",
+    "wait_lines",
 ]  # fmt: skip
 
+ANGLES: Final = "xyz"
+"""RX, RY, RZ turn about x, y, z, one after the other, all fixed."""
 SUFFIX = ".JBI"
 NEW_LINE = "\r\n"
 REMARK = 30
 """Characters of a remark, which with its mark may have 32."""
-MOST_REMARKS = 3
-"""Lines that a comment is cut to."""
 AROUND = 16
 """Lines of a job beside those of its steps."""
-OFF = "_OFF"
-"""End of the name of the job that switches everything off."""
 POSE = "%.3f,%.3f,%.3f,%.4f,%.4f,%.4f"
 """mm and deg."""
 FRAME_WORDS = ("X", "Y", "Z", "RX", "RY", "RZ")
-FRAME_DECIMALS = (4, 4, 4, 6, 6, 6)
-"""Of mm and deg, with which a person is told the frames."""
 
 
 def head(name: str, count: int) -> list[str]:
@@ -77,19 +80,12 @@ def middle(kind: str, settings: InformSettings) -> tuple[list[str], list[str]]:
     return before, [*after, "///GROUP1 RB1", "NOP"]
 
 
-def off_name(name: str, settings: InformSettings) -> str:
-    """Return the name of the job that switches everything off, by that of the main job."""
-    return name[: settings.longest_name - len(OFF)] + OFF
-
-
-def switched_off(settings: InformSettings) -> list[str]:
+def switch_off_lines(settings: InformSettings) -> list[str]:
     """Return the instructions that switch off everything that the settings name."""
-    requests = (n for (_, way), n in handshakes(settings).items() if way == "output")
-    outputs = (settings.laser_output, settings.gas_output, *requests)
-    return [f"DOUT OT#({output}) OFF" for output in outputs if output is not None]
+    return [f"DOUT OT#({output}) OFF" for output in outputs(settings)]
 
 
-def awaiting(label: int, number: int, timeout: float, settings: InformSettings) -> list[str]:
+def wait_lines(label: int, number: int, timeout: float, settings: InformSettings) -> list[str]:
     """Return the instructions that wait for an input.
 
     After `timeout` (s) everything is off and the job pauses; started again it waits again.
@@ -98,28 +94,25 @@ def awaiting(label: int, number: int, timeout: float, settings: InformSettings) 
         f"*WAIT{label}",
         f"WAIT IN#({number})=ON T={timeout:.2f}",
         f"JUMP *GO{label} IF IN#({number})=ON",
-        *switched_off(settings),
+        *switch_off_lines(settings),
         "PAUSE",
         f"JUMP *WAIT{label}",
         f"*GO{label}",
     ]
 
 
-class Inform(Formatter):
+class Inform(CalledFormatter):
     """Writes a main job, and one for the way to each contour and for its path."""
 
     settings: InformSettings
+    too_long = "error"
+    remark_width = REMARK
+    angles = ANGLES
+    frame_words = FRAME_WORDS
+    frame_line = "'%s %s %s"
 
     def __init__(self, program: Program, settings: InformSettings) -> None:
-        longest = settings.longest_name
-        (name,) = identifiers([program.name], (), longest)
-        whole = by_kind(replace(stopping_to_switch(program), name=name))
-        taken = (name, off_name(name, settings))
-        names = identifiers((section.name for section in whole.sections), taken, longest)
-        sections = tuple(
-            replace(part, name=own.upper()) for part, own in zip(whole.sections, names, strict=True)
-        )
-        super().__init__(replace(whole, name=name.upper(), sections=sections), settings)
+        super().__init__(by_kind(stop_to_switch(program)), settings)
         self._targets: list[tuple[Array, Array | None]] = []
         self._labels = count(1)
         moves = self.program.moves
@@ -136,8 +129,8 @@ class Inform(Formatter):
             )
         texts = {f"{program.name}{SUFFIX}": self._job(program.name, "main", [], main)}
         texts |= {f"{s.name}{SUFFIX}": self._section(s) for s in program.sections}
-        off = off_name(program.name, settings)
-        texts[f"{off}{SUFFIX}"] = self._job(off, "main", [], switched_off(settings))
+        off = self.off_name
+        texts[f"{off}{SUFFIX}"] = self._job(off, "main", [], switch_off_lines(settings))
         return texts
 
     def lengths(self) -> dict[str, int]:
@@ -153,28 +146,15 @@ class Inform(Formatter):
     def main(self) -> Iterator[str]:
         """Yield the instructions of the main job."""
         program, settings = self.program, self.settings
-        clear = "proved clear in the planned cell"
-        checked = clear if program.air_checked else "not checked for collisions"
-        yield from self.comment(f"kerfpath, for {plain(program.robot.model)}")
-        yield from self.comment(f"Moves through the air: {checked}.")
-        for said in program.caveats:
-            yield from self.comment(said)
-        off = off_name(program.name, settings)
-        yield from self.comment(f"{off} switches off: run it after a stop.")
-        yield from self.comment("A stop does not switch the laser off: the cell's safety has to.")
-        yield from self.comment("Enter these frames (mm, deg). Robot frame: on S, as high as L.")
-        frame = np.linalg.inv(world(program.robot)) @ program.T_base_part
-        tool = np.linalg.inv(faceplate(program.robot)) @ program.T_flange_tip
-        yield from _frame(f"UFRAME {settings.user_frame}", frame)
-        yield from _frame(f"TOOL {settings.tool_number}", tool)
-        yield f"CALL JOB:{off}"
+        yield from self.heading(
+            f"{self.off_name} switches off: run it after a stop.",
+            "A stop does not switch the laser off: the cell's safety has to.",
+            "Enter these frames (mm, deg). Robot frame: on S, as high as L.",
+            frame=f"UFRAME {settings.user_frame}",
+            tool=f"TOOL {settings.tool_number}",
+        )
+        yield f"CALL JOB:{self.off_name}"
         yield from (f"CALL JOB:{section.name}" for section in program.sections)
-
-    def names(self) -> list[tuple[str, str]]:
-        """Return the names of all jobs."""
-        sections = ((section.name, "a contour") for section in self.program.sections)
-        off = off_name(self.program.name, self.settings)
-        return [(self.program.name, "the program"), (off, "the job that switches off"), *sections]
 
     def lines(self, section: Section) -> Iterator[str]:
         """Yield the instructions of a section, its positions numbered from 0."""
@@ -219,12 +199,11 @@ class Inform(Formatter):
     def wait_for(self, awaited: Await) -> Iterator[str]:
         """Yield a WAIT with a time, and what is done without an answer."""
         port = self.port(awaited.partner, "input")
-        yield from awaiting(next(self._labels), port, awaited.timeout, self.settings)
+        yield from wait_lines(next(self._labels), port, awaited.timeout, self.settings)
 
     def comment(self, text: str) -> Iterator[str]:
-        """Yield remarks; the frames are told in remarks without a space."""
-        rows = textwrap.wrap(text, REMARK, max_lines=MOST_REMARKS, placeholder=" ...")
-        yield from (f"' {row}" for row in rows)
+        """Yield remarks; those of frames have no space."""
+        yield from (f"' {row}" for row in self.wrap(text))
 
     def _end(self, move: Move) -> str:
         return f" PL={0 if move.zone == 0 else self.settings.position_level}"
@@ -255,7 +234,7 @@ class Inform(Formatter):
         types = manipulator_type(
             self.program.robot, [q for q, _ in self._targets], self.settings.flip
         ).tolist()
-        poses = xyzwpr(np.array([T for _, T in self._targets]))
+        poses = euler(np.array([T for _, T in self._targets]), ANGLES)
         poses = np.hstack([poses[:, :3].round(3), poses[:, 3:].round(4)]) + 0.0
         unused = [0] * (self.settings.rconf_values - 6)
         lines, said = [], None
@@ -298,13 +277,6 @@ def by_kind(program: Program) -> Program:
 
 def _speed(move: LinearMove) -> str:
     return f"V={number(move.speed * 1e3, 1)}"
-
-
-def _frame(name: str, T: Array) -> Iterator[str]:
-    """Yield a frame as remarks, to be entered by a person and read back."""
-    values = xyzwpr(T[None])[0]
-    for word, value, decimals in zip(FRAME_WORDS, values, FRAME_DECIMALS, strict=True):
-        yield f"'{name} {word} {number(value, decimals)}"
 
 
 def _moves(step: Step) -> bool:

@@ -15,29 +15,21 @@ from numpy.typing import ArrayLike
 
 from kerfpath._arrays import Array, Ints, floats, freeze
 from kerfpath.post._arm_plane import wrist_in_plane
-from kerfpath.post._counting import offset_near
+from kerfpath.post._axes import AxisCount
 from kerfpath.robots import Robot
 
 __all__ = ["axes_from_joints", "joints_from_axes", "posture", "status_and_turn"]
 
 SIGN = np.array([-1.0, 1.0, 1.0, -1.0, 1.0, -1.0])
 COUNTED_FROM = (0.0, -90.0, 0.0, 0.0, 0.0, 0.0)
-OFFSET = np.radians(COUNTED_FROM)
-"""KUKA's axes of an ortho-parallel arm: joints of the model = SIGN * axes - OFFSET."""
+"""KUKA's axes (deg) where the angles of the model are 0, before their senses."""
+COUNT = AxisCount(
+    counted_from=COUNTED_FROM, matrix=np.diag(SIGN), shift=SIGN * np.radians(COUNTED_FROM)
+)
+axes_from_joints = COUNT.from_joints
+joints_from_axes = COUNT.to_joints
 NOISE_DECIMALS = 6
 """Angles are rounded to this many decimals (deg) before their sign: -1e-15 deg is zero."""
-
-
-def axes_from_joints(robot: Robot, q: ArrayLike) -> Array:
-    """Return the controller's axes (K, 6) rad of joint vectors q (K, 6) rad."""
-    model = robot.sign * floats(q, "q", (None, 6)) - offset_near(robot, COUNTED_FROM)
-    return freeze(SIGN * (model + OFFSET))
-
-
-def joints_from_axes(robot: Robot, axes: ArrayLike) -> Array:
-    """Return the joint vectors (K, 6) rad of a controller's axes (K, 6) rad."""
-    model = SIGN * floats(axes, "axes", (None, 6)) - OFFSET
-    return freeze(robot.sign * (model + offset_near(robot, COUNTED_FROM)))
 
 
 def status_and_turn(robot: Robot, q: ArrayLike) -> Ints:

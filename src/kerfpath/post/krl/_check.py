@@ -7,12 +7,10 @@ from collections.abc import Iterator
 import numpy as np
 
 from kerfpath._arrays import Array
-from kerfpath.post._divide import long_contours
 from kerfpath.post._issue import ProgramIssue
 from kerfpath.post._program import JointMove, Program
 from kerfpath.post.krl._axes import axes_from_joints, joints_from_axes
 from kerfpath.post.krl._settings import KrlSettings
-from kerfpath.post.krl._write import Krl
 from kerfpath.robots import Robot
 
 __all__ = ["check"]
@@ -31,11 +29,7 @@ HALF_TURN_DEG = 180.0 - 1e-3
 
 def check(program: Program, settings: KrlSettings) -> Iterator[ProgramIssue]:
     """Yield what KRL or a KUKA controller cannot say or do of a program."""
-    if settings.laser_output is not None and settings.laser_output == settings.gas_output:
-        said = f"laser and gas are switched by the same output, {settings.gas_output}"
-        yield ProgramIssue("error", "output", said, "program")
-    yield from long_contours(Krl(program, settings).lengths(), settings.lines_per_file, "warning")
-    yield from _frames(program.robot)
+    yield from _check_frames(program.robot)
     moves = program.moves
     places = [
         f"{s.name}, move {number}" for s in program.sections for number in range(len(s.moves))
@@ -43,18 +37,18 @@ def check(program: Program, settings: KrlSettings) -> Iterator[ProgramIssue]:
     axes_deg = np.degrees(axes_from_joints(program.robot, np.array([move.q for move in moves])))
     beyond = (np.abs(axes_deg) > TURN_DEG) & ~program.robot.endless
     for k, i in np.argwhere(beyond).tolist():
-        said = f"A{i + 1} = {axes_deg[k, i]:.1f} deg cannot be said by Status and Turn"
+        message = f"A{i + 1} = {axes_deg[k, i]:.1f} deg cannot be said by Status and Turn"
         fix = "only an endless axis may pass 360 deg: set endless, or bound the axis"
-        yield ProgramIssue("error", "turn", f"{said}; {fix}", places[k])
+        yield ProgramIssue("error", "turn", f"{message}; {fix}", places[k])
     for k, move in enumerate(moves):
         if isinstance(move, JointMove) and move.zone > 0:
-            said = "a joint move cannot round its corner by a length; give it no zone"
-            yield ProgramIssue("error", "zone", said, places[k])
+            message = "a joint move cannot round its corner by a length; give it no zone"
+            yield ProgramIssue("error", "zone", message, places[k])
         if isinstance(move, JointMove) and k > 0:
-            yield from _short_way(program, axes_deg[k] - axes_deg[k - 1], places[k])
+            yield from _check_short_way(program, axes_deg[k] - axes_deg[k - 1], places[k])
 
 
-def _frames(robot: Robot) -> Iterator[ProgramIssue]:
+def _check_frames(robot: Robot) -> Iterator[ProgramIssue]:
     """Check that the robot's base and flange are $ROBROOT and the controller's flange."""
     g = robot.geometry
     T = robot.forward(joints_from_axes(robot, HOME))[0]
@@ -71,7 +65,7 @@ def _frames(robot: Robot) -> Iterator[ProgramIssue]:
         )
 
 
-def _short_way(program: Program, step_deg: Array, place: str) -> Iterator[ProgramIssue]:
+def _check_short_way(program: Program, step_deg: Array, place: str) -> Iterator[ProgramIssue]:
     """Check the joint moves of endless axes, which turn by less than half a turn in a motion.
 
     Where the way through the air has been checked, another one is an error.

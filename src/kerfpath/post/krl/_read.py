@@ -4,37 +4,28 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping, Sequence
-from typing import Any, Literal
 
 import numpy as np
-from scipy.spatial.transform import Rotation
 
 from kerfpath._arrays import Array, freeze
 from kerfpath.errors import InputError
-from kerfpath.post._program import Await, Handshake, Request, Signal, Switch
-from kerfpath.post._read import (
-    ReadHandshake,
-    ReadMove,
-    ReadProgram,
-    ReadSection,
-    ReadStep,
-    ReadWait,
-    partner_of,
-    patterns,
-    same_output,
-)
+from kerfpath.post._frames import from_euler
+from kerfpath.post._program import Switch
+from kerfpath.post._read import MoveKind, ReadProgram, ReadSection, ReadStep
+from kerfpath.post._reading import LineReader, patterns, statements
 from kerfpath.post.krl._axes import joints_from_axes
 from kerfpath.post.krl._settings import KrlSettings
 from kerfpath.post.krl._write import (
+    ANGLES,
     AXES,
     FIRST,
     HEAD,
     PASSED,
     SWITCH_OFF,
-    awaiting,
     data_list,
-    opening,
-    switched_off,
+    opening_lines,
+    switch_off_lines,
+    wait_lines,
 )
 from kerfpath.robots import Robot
 
@@ -65,10 +56,16 @@ _LINES = patterns(
         "base": rf"\$BASE={{{_POINT}}}",
     }
 )
-_CALLS = ("condition", "call", "end_condition", "end")
-_IN_MAIN = ("tool", "base", "again", *_CALLS)
-_IN_FIRST = _CALLS
-_IN_ROUTINE = (
+
+
+def _of(*kinds: str) -> dict[str, re.Pattern[str]]:
+    return {kind: _LINES[kind] for kind in kinds}
+
+
+_OUTSIDE = _of("routine")
+_IN_FIRST = _of("condition", "call", "end_condition", "end")
+_IN_MAIN = _of("tool", "base", "again") | _IN_FIRST
+_IN_ROUTINE = _of(
     "linear", "speed", "zone", "trigger", "circular", "joint", "share", "wait", "request",
     "wait_for", "end",
 )  # fmt: skip
@@ -77,16 +74,16 @@ _FIRST = re.compile(rf"INT {FIRST}=(\d+)", re.ASCII)
 
 def read(main: str, files: Mapping[str, str], robot: Robot, settings: KrlSettings) -> ReadProgram:
     """Return the program that .src and .dat files of ours say; see `kerfpath.post.Reader`."""
-    first = _File(main, files, robot, settings, opening(settings))
-    begin = first.require_data([name for name in first.calls if name not in first.steps])
+    first = _File(main, files, robot, settings, opening_lines(settings))
+    begin = first.require_data([name for name in first.calls if name not in first.contours])
     sections: list[ReadSection] = []
     for name, number in first.calls.items():
-        if name in first.steps:
-            sections.append(ReadSection(name=name, steps=tuple(first.steps[name])))
+        if name in first.contours:
+            sections.append(ReadSection(name=name, steps=tuple(first.contours[name])))
         else:
             own = _File(f"{name}.src", files, robot, settings, [], before=len(sections))
             own.require_data([])
-            sections += [ReadSection(name=n, steps=tuple(own.steps[n])) for n in own.calls]
+            sections += [ReadSection(name=n, steps=tuple(own.contours[n])) for n in own.calls]
         if number != len(sections):
             first.line = 1
             raise first.fault(f"{name} is called for contours up to {number}, not {len(sections)}")
@@ -100,11 +97,10 @@ def read(main: str, files: Mapping[str, str], robot: Robot, settings: KrlSetting
     )
 
 
-class _File:
-    """One .src, read line by line; each kind of line has a method of its name.
+class _File(LineReader):
+    """One .src; the main file is the one with an opening."""
 
-    The main file is the one with an opening.
-    """
+    settings: KrlSettings
 
     def __init__(
         self,
@@ -116,54 +112,43 @@ class _File:
         *,
         before: int = 0,
     ) -> None:
-        self.file, self.files, self.robot, self.settings = file, files, robot, settings
-        self.name = file.removesuffix(".src")
+        lines = files[file].splitlines()
+        super().__init__(file, robot, settings, statements(lines, ";"))
+        self.files, self.name = files, file.removesuffix(".src")
         self.is_main, self.opening, self.head = bool(opening), opening, list(HEAD)
         self.routines: list[str] = []
         self.inside = False
         self.calls: dict[str, int] = {}
         self.before, self.condition_open, self.number = before, False, 0
-        self.must_say: list[str] = []
         self.begins_again = False
-        self.steps: dict[str, list[ReadStep]] = {}
+        self.contours: dict[str, list[ReadStep]] = {}
         self.frames: dict[str, Array] = {}
         self.held: dict[str, float] = {}
         self.held_at: dict[str, str] = {}
         self.switches: tuple[Switch, ...] = ()
-        self.line = 0
-        self.rows = [row.strip() for row in files[file].splitlines()]
-        for number, line in enumerate(self.rows, 1):
-            self.line = number
-            if line and not line.startswith(";"):
-                self.read(line)
-        self.line += 1
-        if self.inside or self.must_say or not self.routines:
+        for _ in self.rows:
+            self.read_line(self.advance())
+        self.line = len(lines) + 1
+        if self.inside or self.required or not self.routines:
             raise self.fault("END is missing")
 
-    def read(self, line: str) -> None:
-        if self.must_say:
-            if line != self.must_say[0]:
-                raise self.fault(f"expected {self.must_say[0]!r}, got {line[:60]!r}")
-            del self.must_say[0]
-            return
+    def read_line(self, line: str) -> None:
         for rest in (self.head, self.opening if self.inside else []):
-            if rest and line == rest[0]:
+            if not self.required and rest and line == rest[0]:
                 del rest[0]
                 return
-        for kind in self.expected():
-            if match := _LINES[kind].fullmatch(line):
-                if self.switches and kind not in {"linear", "circular", "trigger"}:
-                    raise self.fault("a trigger must stand right before its motion")
-                getattr(self, kind)(*match.groups())
-                return
-        raise self.fault(f"not expected here: {line[:60]!r}")
+        self.read(line, self.expected())
 
-    def expected(self) -> tuple[str, ...]:
+    def expected(self) -> dict[str, re.Pattern[str]]:
         if not self.inside:
-            return ("routine",)
+            return _OUTSIDE
         if len(self.routines) > 1:
             return _IN_ROUTINE
         return _IN_MAIN if self.is_main else _IN_FIRST
+
+    def admit(self, kind: str) -> None:
+        if self.switches and kind not in {"linear", "circular", "trigger"}:
+            raise self.fault("a trigger must stand right before its motion")
 
     def require_data(self, others: list[str]) -> int:
         """Check that all routines are called and that the .dat declares exactly the other files.
@@ -171,7 +156,7 @@ class _File:
         Returns the contour at which the program begins, if it is the main file's.
         """
         self.line = 1
-        if unknown := set(self.calls) ^ {*self.steps, *others}:
+        if unknown := set(self.calls) ^ {*self.contours, *others}:
             raise self.fault(f"calls and routines do not match: {', '.join(sorted(unknown))}")
         if self.is_main and SWITCH_OFF not in self.routines:
             raise self.fault(f"{SWITCH_OFF} is missing")
@@ -197,12 +182,12 @@ class _File:
             raise self.fault("only the first routine of a file that is called takes a number")
         self.routines.append(name)
         if name == SWITCH_OFF:
-            self.must_say = [*switched_off(self.settings), "END"]
+            self.required = [*switch_off_lines(self.settings), "END"]
             return
         if len(self.routines) > 1:
-            self.steps[name] = []
+            self.steps = self.contours[name] = []
         elif passed:
-            self.must_say = [f"INT {PASSED}"]
+            self.required = [f"INT {PASSED}"]
         self.inside, self.held = True, {}
 
     def end(self) -> None:
@@ -244,25 +229,18 @@ class _File:
         self.condition_open = False
 
     def request(self, output: str, state: str) -> None:
-        partner = partner_of(int(output), "output", self.settings, self.place)
-        self.handshake(Request(partner=partner, on=state == "TRUE"))
+        self.ask(int(output), on=state == "TRUE")
 
     def wait_for(self, timeout_ms: str) -> None:
-        said = re.match(
-            r"WAIT FOR \$IN\[(\d+)\]", "".join(self.rows[self.line + 1 : self.line + 2])
-        )
+        here, (_, below) = self.text, (*self.rows[self.row + 2 : self.row + 3], (0, ""))[0]
+        said = re.match(r"WAIT FOR \$IN\[(\d+)\]", below)
         if said is None:
             raise self.fault("expected the wait for an input two lines below")
-        timeout = float(timeout_ms) * 1e-3
-        first, *rest = awaiting(int(said[1]), timeout, self.settings)
-        if self.rows[self.line - 1] != first:
+        port, timeout = int(said[1]), float(timeout_ms) * 1e-3
+        first, *self.required = wait_lines(port, timeout, self.settings)
+        if here != first:
             raise self.fault(f"expected {first!r}")
-        self.must_say = rest
-        partner = partner_of(int(said[1]), "input", self.settings, self.place)
-        self.handshake(Await(partner=partner, timeout=timeout))
-
-    def handshake(self, what: Handshake) -> None:
-        self.append(ReadHandshake(what=what, file=self.file, line=self.line))
+        self.expect_answer(port, timeout)
 
     def require_opening(self) -> None:
         if self.opening:
@@ -281,7 +259,7 @@ class _File:
     def frame(self, kind: str, numbered: int | None, point: Sequence[str]) -> None:
         if numbered is not None or kind in self.frames:
             raise self.fault(f"another {kind}")
-        self.frames[kind] = _pose(point)
+        self.frames[kind] = self.pose(point)
 
     def share(self, percent: str) -> None:
         self.hold("share", int(percent) / 100)
@@ -298,58 +276,43 @@ class _File:
     def trigger(self, delay_ms: str, output: str, state: str) -> None:
         if int(delay_ms) > 0:
             raise self.fault("a trigger must not come after its place")
-        signal: Signal = "gas" if int(output) == self.settings.gas_output else "laser"
-        if signal == "laser":
-            same_output(int(output), self.settings.laser_output, self.place)
-        lead = -int(delay_ms) * 1e-3
         self.held_at.setdefault("switches", self.place)
-        self.switches += (Switch(signal=signal, on=state == "TRUE", lead_time=lead),)
-
-    def wait(self, time: str) -> None:
-        self.append(ReadWait(time=float(time), file=self.file, line=self.line))
+        lead = -int(delay_ms) * 1e-3
+        switch = Switch(signal=self.signal(int(output)), on=state == "TRUE", lead_time=lead)
+        self.switches += (switch,)
 
     def joint(self, *axes_deg: str) -> None:
         axes = np.radians([[float(axis) for axis in axes_deg]])
-        self.append(
-            ReadMove(
-                kind="joint",
-                file=self.file,
-                line=self.line,
-                q=joints_from_axes(self.robot, axes)[0],
-                speed=self.holds("share", "BAS(#VEL_PTP,...)"),
-                elsewhere={"speed": self.held_at["share"]},
-            )
-        )
+        speed = self.holds("share", "BAS(#VEL_PTP,...)")
+        q = joints_from_axes(self.robot, axes)[0]
+        self.add_move("joint", speed, q=q, elsewhere={"speed": self.held_at["share"]})
 
     def linear(self, *fields: str | None) -> None:
-        self.path("linear", fields, None)
+        self.path("linear", fields)
 
     def circular(self, *fields: str | None) -> None:
-        self.path("circular", fields[6:], _pose(fields[:6]))
+        self.path("circular", fields[6:], self.pose(fields[:6]))
 
     def path(
-        self, kind: Literal["linear", "circular"], fields: Sequence[Any], T_part_via: Array | None
+        self, kind: MoveKind, fields: Sequence[str | None], T_part_via: Array | None = None
     ) -> None:
         *point, status, turn, blended = fields
-        self.append(
-            ReadMove(
-                kind=kind,
-                file=self.file,
-                line=self.line,
-                T_part_tip=_pose(point),
-                T_part_via=T_part_via,
-                posture=(int(status), int(turn)),
-                speed=self.holds("speed", "$VEL.CP"),
-                zone=self.holds("zone", "$APO.CDIS") if blended else 0.0,
-                switches=self.switches,
-                elsewhere=self.elsewhere("speed", *(["zone"] if blended else []), "switches"),
-            )
+        self.add_move(
+            kind,
+            self.holds("speed", "$VEL.CP"),
+            T_part_tip=self.pose(point),
+            T_part_via=T_part_via,
+            posture=(int(str(status)), int(str(turn))),
+            zone=self.holds("zone", "$APO.CDIS") if blended else 0.0,
+            switches=self.switches,
+            elsewhere=self.elsewhere("speed", *(["zone"] if blended else []), "switches"),
         )
         self.switches = ()
         self.held_at.pop("switches", None)
 
-    def append(self, step: ReadStep) -> None:
-        self.steps[self.routines[-1]].append(step)
+    def pose(self, fields: Sequence[str | None]) -> Array:
+        """Return the pose (4, 4) m of X, Y, Z in mm and A, B, C in deg."""
+        return freeze(from_euler([float(str(field)) for field in fields], ANGLES)[0])
 
     def elsewhere(self, *whats: str) -> dict[str, str]:
         """Return where what holds for a motion has been set."""
@@ -359,19 +322,3 @@ class _File:
         if what not in self.held:
             raise self.fault(f"{word} has not been set in this routine")
         return self.held[what]
-
-    def fault(self, message: str) -> InputError:
-        return InputError(f"{self.place}: {message}")
-
-    @property
-    def place(self) -> str:
-        return f"{self.file}, line {self.line}"
-
-
-def _pose(fields: Sequence[Any]) -> Array:
-    """Return the pose (4, 4) m of X, Y, Z in mm and A, B, C in deg."""
-    values = [float(field) for field in fields]
-    T = np.eye(4)
-    T[:3, :3] = Rotation.from_euler("ZYX", values[3:], degrees=True).as_matrix()
-    T[:3, 3] = np.array(values[:3]) * 1e-3
-    return freeze(T)

@@ -6,7 +6,7 @@ from typing import Annotated
 
 import numpy as np
 
-from kerfpath.post._settings import Rules, Settings, setting
+from kerfpath.post._settings import LinesPerFile, PortSettings, Rules, numbered, setting
 
 __all__ = ["LONGEST_NAME", "KrlSettings", "rules"]
 
@@ -21,32 +21,14 @@ SPEED_STEP = 1e-6
 LONGEST_LEAD = 10.0
 """The longest lead (s) of a trigger that is no mistake in its unit; KUKA's bound is 10000 s."""
 
-Output = Annotated[
-    int | None, setting("the number of a digital output, 1 to 8192", "5", ge=1, le=8192)
-]
+Output = Annotated[int | None, numbered("a digital output", 8192)]
+Input = Annotated[int | None, numbered("a digital input", 8192)]
 
 
-Input = Annotated[
-    int | None, setting("the number of a digital input, 1 to 8192", "5", ge=1, le=8192)
-]
-
-
-class KrlSettings(Settings):
+class KrlSettings(PortSettings, output=Output, input=Input):
     """Which outputs, tool and base, and what the machine data allow."""
 
-    lines_per_file: Annotated[
-        int, setting("a whole number of lines from 100 to 1000000", "1400", ge=100, le=1_000_000)
-    ] = 1400
-    laser_output: Output = None
-    gas_output: Output = None
-    ready_input: Input = None
-    shutter_input: Input = None
-    gas_pressure_input: Input = None
-    height_input: Input = None
-    interlock_input: Input = None
-    ready_output: Output = None
-    shutter_output: Output = None
-    height_output: Output = None
+    lines_per_file: LinesPerFile = 1400
     tool_number: Annotated[
         int | None, setting("the number of a TOOL_DATA, 1 to 128", "1", ge=1, le=128)
     ] = None

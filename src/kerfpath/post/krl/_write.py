@@ -10,18 +10,17 @@ output would stop the advance run and with it the blending.
 
 from __future__ import annotations
 
-import warnings
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from typing import Final
 
 import numpy as np
-from scipy.spatial.transform import Rotation
 
 from kerfpath._arrays import Array
 from kerfpath.errors import InputError
-from kerfpath.post._divide import in_files, renamed
-from kerfpath.post._formatter import Formatter, number, plain
-from kerfpath.post._names import identifiers
+from kerfpath.post._divide import divide_program, rename_sections
+from kerfpath.post._formatter import Formatter, number
+from kerfpath.post._frames import euler
 from kerfpath.post._program import (
     Await,
     CircularMove,
@@ -32,14 +31,23 @@ from kerfpath.post._program import (
     Request,
     Section,
     Wait,
+    targets_of,
 )
-from kerfpath.post._settings import handshakes
+from kerfpath.post._settings import outputs
 from kerfpath.post.krl._axes import axes_from_joints, status_and_turn
 from kerfpath.post.krl._settings import LONGEST_NAME, KrlSettings
 
 __all__ = [
-    "FIRST", "HEAD", "SWITCH_OFF", "Krl", "awaiting", "called_from", "data_list", "opening",
-    "switched_off",
+    "ANGLES",
+    "FIRST",
+    "HEAD",
+    "SWITCH_OFF",
+    "Krl",
+    "call_lines",
+    "data_list",
+    "opening_lines",
+    "switch_off_lines",
+    "wait_lines",
 ]  # fmt: skip
 
 HEAD = ("&ACCESS RVP", "&REL 1")
@@ -50,8 +58,6 @@ MOST_ROUTINES = 254
 """Local routines that a file may have, but for the one that switches off."""
 LINES_OF_A_FILE = 5
 """HEAD, DEF and END of its first routine, and the empty line at its end."""
-LINES_OF_A_ROUTINE = 6
-"""DEF, END, the empty line before them, and the call with its condition."""
 FIRST = "first_contour"
 """Number of the contour at which the program begins, for a restart; in the .dat."""
 PASSED = "first"
@@ -62,10 +68,11 @@ INTERRUPT = 20
 TIMER = 20
 """The interrupt and the timer that are used; KUKA's own programs take others."""
 AXES = ("A1", "A2", "A3", "A4", "A5", "A6")
-NOT_CHECKED = "not been checked for collisions"
+ANGLES: Final = "ZYX"
+"""A, B, C turn about Z, the new Y, the new X."""
 
 
-def opening(settings: KrlSettings) -> list[str]:
+def opening_lines(settings: KrlSettings) -> list[str]:
     """Return the statements that a main routine makes before it calls others, but for frames."""
     turning_deg_s = number(settings.turning_speed_deg_s, 1)
     numbered = (("TOOL", settings.tool_number), ("BASE", settings.base_number))
@@ -84,14 +91,12 @@ def opening(settings: KrlSettings) -> list[str]:
     ]
 
 
-def switched_off(settings: KrlSettings) -> list[str]:
+def switch_off_lines(settings: KrlSettings) -> list[str]:
     """Return the lines that switch off everything that the settings name."""
-    requests = (n for (_, way), n in handshakes(settings).items() if way == "output")
-    outputs = (settings.laser_output, settings.gas_output, *requests)
-    return [f"$OUT[{output}]=FALSE" for output in outputs if output is not None]
+    return [f"$OUT[{output}]=FALSE" for output in outputs(settings)]
 
 
-def awaiting(number: int, timeout: float, settings: KrlSettings) -> list[str]:
+def wait_lines(number: int, timeout: float, settings: KrlSettings) -> list[str]:
     """Return the lines that wait for an input; after `timeout` (s) all is off until it comes."""
     return [
         f"$TIMER[{TIMER}]={-round(timeout * 1e3)}",
@@ -99,13 +104,13 @@ def awaiting(number: int, timeout: float, settings: KrlSettings) -> list[str]:
         f"WAIT FOR $IN[{number}] OR $TIMER_FLAG[{TIMER}]",
         f"$TIMER_STOP[{TIMER}]=TRUE",
         f"WHILE NOT $IN[{number}]",
-        *switched_off(settings),
+        *switch_off_lines(settings),
         "HALT",
         "ENDWHILE",
     ]
 
 
-def called_from(first: str, number: int, call: str) -> list[str]:
+def call_lines(first: str, number: int, call: str) -> list[str]:
     """Return the lines that call a contour, or a file up to it, unless the program begins later."""
     return [f"IF {first}<={number} THEN", call, "ENDIF"]
 
@@ -141,11 +146,13 @@ class Krl(Formatter):
     """Writes a main .src with a routine for each section, and more files where it is too long."""
 
     settings: KrlSettings
+    around = 6  # DEF, END, the empty line before them, the call with its condition
+    too_long = "warning"
 
     def __init__(self, program: Program, settings: KrlSettings) -> None:
         named = replace(program, name=program.name[:LONGEST_NAME])
         super().__init__(
-            renamed(named, (FIRST, PASSED, SWITCH_OFF), longest_name=LONGEST_NAME), settings
+            rename_sections(named, (FIRST, PASSED, SWITCH_OFF), longest_name=LONGEST_NAME), settings
         )
         self._held: dict[str, str] = {}
         self._target = self._target_texts()
@@ -203,7 +210,7 @@ class Krl(Formatter):
 
     def wait_for(self, awaited: Await) -> Iterator[str]:
         """Yield a wait for an input with its timer."""
-        yield from awaiting(self.port(awaited.partner, "input"), awaited.timeout, self.settings)
+        yield from wait_lines(self.port(awaited.partner, "input"), awaited.timeout, self.settings)
 
     def comment(self, text: str) -> Iterator[str]:
         """Yield a comment; a bar keeps one that says FOLD from folding the program."""
@@ -225,40 +232,29 @@ class Krl(Formatter):
             self._held[what] = line
             yield line
 
-    def lengths(self) -> dict[str, int]:
-        """Return how many lines each contour takes, by its name."""
-        return {
-            section.name: sum(1 for _ in self.lines(section)) + LINES_OF_A_ROUTINE
-            for section in self.program.sections
-        }
-
     def _in_one_file(self) -> list[_File]:
         """Return the program as one file; nothing where that is too long."""
         sections = self.program.sections
         routines = {section.name: list(self.lines(section)) for section in sections}
-        calls = (called_from(FIRST, n, f"{name}()") for n, name in enumerate(routines, 1))
+        calls = (call_lines(FIRST, n, f"{name}()") for n, name in enumerate(routines, 1))
         file = self._main([line for call in calls for line in call], routines)
         fits = len(file.lines()) <= self.settings.lines_per_file
         return [file] if fits and len(sections) <= MOST_ROUTINES else []
 
     def _in_more_files(self) -> list[_File]:
         """Return a main program and the files it calls between contours, the beam off."""
-        sections = self.program.sections
         room = self.settings.lines_per_file - LINES_OF_A_FILE
         share = -(-room // MOST_ROUTINES)
         counts = [max(count, share) for count in self.lengths().values()]
-        groups = in_files(sections, counts, room)
-        taken = [self.program.name, *(section.name for section in sections)]
-        names = identifiers([self.program.name] * len(groups), taken=taken, longest=LONGEST_NAME)
         others, calls, number = [], [], 0
-        for name, group in zip(names, groups, strict=True):
+        for name, group in divide_program(self.program, counts, room, LONGEST_NAME).items():
             first = [f"INT {PASSED}"]
             for section in group:
                 number += 1
-                first += called_from(PASSED, number, f"{section.name}()")
+                first += call_lines(PASSED, number, f"{section.name}()")
             own = {section.name: list(self.lines(section)) for section in group}
             others.append(_File(name=name, first=first, routines=own, passed=f"{PASSED} :IN"))
-            calls += called_from(FIRST, number, f"{name}({FIRST})")
+            calls += call_lines(FIRST, number, f"{name}({FIRST})")
         main = self._main(calls, {})
         if len(main.lines()) > self.settings.lines_per_file:
             raise InputError(
@@ -269,24 +265,20 @@ class Krl(Formatter):
         return [main, *others]
 
     def _main(self, calls: Sequence[str], routines: Mapping[str, Sequence[str]]) -> _File:
-        every = {SWITCH_OFF: switched_off(self.settings), **routines}
+        every = {SWITCH_OFF: switch_off_lines(self.settings), **routines}
         first = [*self._start(), *calls, f"{FIRST}=1"]
         return _File(name=self.program.name, first=first, routines=every)
 
     def _start(self) -> Iterator[str]:
         program, settings = self.program, self.settings
-        checked = "been proved clear in the planned cell" if program.air_checked else NOT_CHECKED
-        yield f"; Written by kerfpath for {plain(program.robot.model)} ({plain(program.robot.id)})."
-        if settings.tool_number is None:
-            yield "; Complete the load of the tool: $LOAD."
-        if settings.base_number is None:
-            yield "; $BASE is the part in the robot's base, which is $WORLD, too."
-        yield f"; Moves through the air have {checked}."
-        yield from (f"; {said}" for said in program.caveats)
+        load = ["Complete the load of the tool: $LOAD."] * (settings.tool_number is None)
+        base = ["$BASE is the part in the robot's base, which is $WORLD, too."]
+        base *= settings.base_number is None
+        yield from (f"; {remark}" for remark in self.head(*load, *base))
         yield f"; {SWITCH_OFF}() runs at a stop message; the safety circuit of the cell has to"
         yield "; switch the laser off, too."
         yield f"; To begin at a contour set {FIRST} in the .dat to its number, and reset."
-        yield from opening(settings)
+        yield from opening_lines(settings)
         if settings.tool_number is None:
             yield f"$TOOL={{{_frames(program.T_flange_tip[None])[0]}}}"
         if settings.base_number is None:
@@ -294,35 +286,28 @@ class Krl(Formatter):
 
     def _target_texts(self) -> dict[Move, str]:
         """Return the targets of each move, all at once."""
-        robot, moves = self.program.robot, self.program.moves
-        q = np.array([move.q for move in moves]).reshape(-1, robot.joints)
+        robot, points = self.program.robot, targets_of(self.program.moves)
+        q = np.array([point.q for point in points]).reshape(-1, robot.joints)
         axes_deg = np.degrees(axes_from_joints(robot, q)).tolist()
         words = status_and_turn(robot, q).tolist()
-        path = [move for move in moves if isinstance(move, LinearMove)]
-        frames = dict(zip(path, _frames([move.T_part_tip for move in path]), strict=True))
-        arcs = [move for move in path if isinstance(move, CircularMove)]
-        vias = dict(zip(arcs, _frames([arc.T_part_via for arc in arcs]), strict=True))
+        frames = iter(_frames([T for _, _, T in points if T is not None]))
         texts: dict[Move, str] = {}
-        for move, axes, (status, turn) in zip(moves, axes_deg, words, strict=True):
-            if isinstance(move, JointMove):
+        for (move, _, T), axes, (status, turn) in zip(points, axes_deg, words, strict=True):
+            if T is None:
                 texts[move] = f"{{{_fields(AXES, axes, 6)}}}"
-                continue
-            via = f"{{{vias[move]}}}," if isinstance(move, CircularMove) else ""
-            texts[move] = f"{via}{{{frames[move]},S {status},T {turn}}}"
+            elif isinstance(move, CircularMove) and T is move.T_part_via:
+                texts[move] = f"{{{next(frames)}}},"
+            else:
+                via = texts[move] if isinstance(move, CircularMove) else ""
+                texts[move] = f"{via}{{{next(frames)},S {status},T {turn}}}"
         return texts
 
 
 def _frames(T: Array | Sequence[Array]) -> list[str]:
     """Return the fields of poses (K, 4, 4) m: mm, and deg about Z, the new Y, the new X."""
-    poses = np.asarray(T).reshape(-1, 4, 4)
-    points = (poses[:, :3, 3] * 1e3).tolist()
-    rotations = Rotation.from_matrix(poses[:, :3, :3])
-    with warnings.catch_warnings():
-        warnings.filterwarnings("ignore", "Gimbal lock", UserWarning)  # C is 0 there
-        turns = rotations.as_euler("ZYX", degrees=True).tolist()
     return [
-        f"{_fields('XYZ', point, 4)},{_fields('ABC', turn, 6)}"
-        for point, turn in zip(points, turns, strict=True)
+        f"{_fields('XYZ', values[:3], 4)},{_fields('ABC', values[3:], 6)}"
+        for values in euler(T, ANGLES).tolist()
     ]
 
 

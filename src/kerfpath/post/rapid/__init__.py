@@ -5,7 +5,6 @@ from kerfpath.post.rapid._axes import axes_from_joints as axes_from_joints
 from kerfpath.post.rapid._axes import confdata as confdata
 from kerfpath.post.rapid._axes import joints_from_axes as joints_from_axes
 from kerfpath.post.rapid._axes import posture
-from kerfpath.post.rapid._check import check
 from kerfpath.post.rapid._read import read
 from kerfpath.post.rapid._settings import RapidSettings as RapidSettings
 from kerfpath.post.rapid._settings import is_reserved, rules
@@ -23,7 +22,6 @@ RAPID = Language(
     formatter=Rapid,
     is_reserved=is_reserved,
     posture=posture,
-    check=check,
     read=read,
 )
 """What is registered."""

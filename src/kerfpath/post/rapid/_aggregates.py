@@ -8,17 +8,14 @@ from typing import Any
 import numpy as np
 
 from kerfpath._arrays import Array
-from kerfpath.errors import InputError
 from kerfpath.post._orientations import pose_of
+from kerfpath.post._reading import LineReader
 
 __all__ = ["Aggregates"]
 
 
-class Aggregates:
-    """Reads aggregates at a line of a file."""
-
-    file: str
-    line: int
+class Aggregates(LineReader):
+    """Reads aggregates on the lines of a file."""
 
     def values(self, text: str, count: int) -> list[Any]:
         """Return the `count` parts of an aggregate; RAPID writes it almost as JSON does."""
@@ -31,12 +28,14 @@ class Aggregates:
         return values
 
     def numbers(self, values: Any, count: int) -> Array:
+        """Return a list of so many numbers as an array."""
         is_list = isinstance(values, list) and len(values) == count
         if not is_list or any(type(value) not in (int, float) for value in values):
             raise self.fault(f"expected {count} numbers, got {values!r}")
         return np.array(values, dtype=np.float64)
 
     def pose(self, value: Any) -> Array:
+        """Return a pose (4, 4) m, written as a position and a quaternion."""
         if not isinstance(value, list) or len(value) != 2:
             raise self.fault(f"expected a position and a quaternion, got {value!r}")
         point_mm, wxyz = self.numbers(value[0], 3), self.numbers(value[1], 4)
@@ -44,10 +43,3 @@ class Aggregates:
         if T is None:
             raise self.fault(f"the quaternion {value[1]} must have length 1")
         return T
-
-    @property
-    def place(self) -> str:
-        return f"{self.file}, line {self.line}"
-
-    def fault(self, message: str) -> InputError:
-        return InputError(f"{self.place}: {message}")

@@ -11,19 +11,24 @@ IRB 6700 that others had RobotStudio compute (tests/post/test_measured.py).
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 from numpy.typing import ArrayLike
 
 from kerfpath._arrays import Array, Ints, floats, freeze
 from kerfpath.post._arm_plane import wrist_in_plane
-from kerfpath.post._counting import offset_near
+from kerfpath.post._axes import AxisCount
 from kerfpath.robots import Robot
 
 __all__ = ["axes_from_joints", "confdata", "joints_from_axes", "posture"]
 
-COUNTED_FROM = (0.0, 0.0, -90.0, 0.0, 0.0, 0.0)
-OFFSET = np.radians(COUNTED_FROM)
-"""ABB's axes of an ortho-parallel arm: angles of the model = axes - OFFSET, upright at 0."""
+UPRIGHT = (0.0, 0.0, -90.0, 0.0, 0.0, 0.0)
+"""ABB's axes (deg) where the angles of the model are 0, the arm upright."""
+ROD = np.eye(6) + np.outer(np.eye(6)[2], np.eye(6)[1])
+"""With a parallel rod axis 3 is joint 2 + joint 3."""
+SERIAL = AxisCount(counted_from=UPRIGHT, shift=np.radians(UPRIGHT))
+HORIZONTAL = replace(SERIAL, matrix=ROD)
 NOISE_DECIMALS = 6
 """Angles are rounded to this many decimals (deg) before a quadrant: -1e-15 deg is zero."""
 
@@ -34,24 +39,16 @@ def axes_from_joints(robot: Robot, q: ArrayLike) -> Array:
     With a parallel rod (IRB 2400, IRB 4400: `Robot.axis_3` is "horizontal") axis 3 is joint 2 +
     joint 3. Descriptions that count joints otherwise than ABB are converted by the arm's model.
     """
-    matrix, shift = _from_joints(robot)
-    return freeze(np.asarray(floats(q, "q", (None, 6)) @ matrix.T + shift, dtype=np.float64))
+    return _count(robot).from_joints(robot, q)
 
 
 def joints_from_axes(robot: Robot, axes: ArrayLike) -> Array:
     """Return the joint vectors (K, 6) rad of a controller's axes (K, 6) rad."""
-    matrix, shift = _from_joints(robot)
-    rows = floats(axes, "axes", (None, 6)) - shift
-    return freeze(np.asarray(rows @ np.linalg.inv(matrix).T, dtype=np.float64))
+    return _count(robot).to_joints(robot, axes)
 
 
-def _from_joints(robot: Robot) -> tuple[Array, Array]:
-    """Return matrix (6, 6) and shift (6,) rad with axes = matrix @ joints + shift."""
-    matrix, shift = np.diag(robot.sign), OFFSET - offset_near(robot, COUNTED_FROM)
-    if robot.axis_3 == "horizontal":
-        matrix[2] += matrix[1]
-        shift[2] += shift[1]
-    return matrix, shift
+def _count(robot: Robot) -> AxisCount:
+    return HORIZONTAL if robot.axis_3 == "horizontal" else SERIAL
 
 
 def confdata(robot: Robot, q: ArrayLike) -> Ints:

@@ -2,18 +2,19 @@
 
 from __future__ import annotations
 
-from kerfpath.post._read import patterns
+import re
+
+from kerfpath.post._reading import patterns
 from kerfpath.post.rapid._write import FIRST
 
-__all__ = ["DECLARED", "IN_MAIN", "IN_PART", "IN_ROUTINE", "LINES", "OUTSIDE"]
+__all__ = ["DECLARED", "IN_MAIN", "IN_PART", "IN_ROUTINE", "MODULE", "OUTSIDE"]
 
 _NAME = r"([A-Za-z]\w*)"
 _POSE = r"(\[\[.*?9E9\]\])"
 _TRIGGERS = r"([A-Za-z]\w*(?:\\T\d:=[A-Za-z]\w*)*)"
 _FRAMES = rf"{_NAME}\\WObj:={_NAME}"
-LINES = patterns(
+_LINES = patterns(
     {
-        "blank": r"(?:!.*)?",
         "module": rf"MODULE {_NAME}",
         "end_module": "ENDMODULE",
         "tool": rf"PERS tooldata {_NAME}:=(\[.*\]);",
@@ -40,15 +41,18 @@ LINES = patterns(
         "switching_arc": rf"TriggC {_POSE},{_POSE},{_NAME},{_TRIGGERS},{_NAME},{_FRAMES};",
     }
 )
-OUTSIDE = {
-    "tool", "work_object", "speed", "zone", "trigger", "first", "routine", "end_module",
-}  # fmt: skip
-DECLARED = OUTSIDE - {"routine", "end_module"}
-IN_PART = {"routine", "end_module"}
-IN_MAIN = {
-    "set_trigger", "load", "condition", "late_call", "unload", "call", "end_routine",
-}  # fmt: skip
-IN_ROUTINE = {
+DECLARED = ("tool", "work_object", "speed", "zone", "trigger", "first")
+
+
+def _of(*kinds: str) -> dict[str, re.Pattern[str]]:
+    return {kind: _LINES[kind] for kind in kinds}
+
+
+MODULE = _of("module")
+OUTSIDE = _of(*DECLARED, "routine", "end_module")
+IN_PART = _of("routine", "end_module")
+IN_MAIN = _of("set_trigger", "load", "condition", "late_call", "unload", "call", "end_routine")
+IN_ROUTINE = _of(
     "joint_move", "linear_move", "circular_move", "switching_move", "switching_arc", "wait",
     "request", "wait_for", "end_routine",
-}  # fmt: skip
+)  # fmt: skip

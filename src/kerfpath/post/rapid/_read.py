@@ -3,35 +3,27 @@ r"""Read back the RAPID that `Rapid` writes, and nothing else: what it does not 
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Container, Mapping
 from dataclasses import replace
 from typing import Any, TypeVar
 
 import numpy as np
 
 from kerfpath._arrays import Array
-from kerfpath.post._program import Await, Handshake, Request, Signal, Switch
-from kerfpath.post._read import (
-    ReadHandshake,
-    ReadMove,
-    ReadProgram,
-    ReadSection,
-    ReadStep,
-    ReadWait,
-    partner_of,
-    same_output,
-)
+from kerfpath.post._program import Switch
+from kerfpath.post._read import ReadMove, ReadProgram, ReadSection, ReadStep
+from kerfpath.post._reading import statements
 from kerfpath.post.rapid._aggregates import Aggregates
 from kerfpath.post.rapid._axes import joints_from_axes
-from kerfpath.post.rapid._lines import DECLARED, IN_MAIN, IN_PART, IN_ROUTINE, LINES, OUTSIDE
+from kerfpath.post.rapid._lines import DECLARED, IN_MAIN, IN_PART, IN_ROUTINE, MODULE, OUTSIDE
 from kerfpath.post.rapid._settings import SWITCH_OFF, RapidSettings
 from kerfpath.post.rapid._write import (
     FIRST,
     FULL_AIR_SPEED,
     air_speed_data,
-    ending,
+    ending_lines,
     linear_speed_data,
-    switched_off,
+    switch_off_lines,
     zone_data,
 )
 from kerfpath.robots import Robot
@@ -52,13 +44,15 @@ def read(main: str, files: Mapping[str, str], robot: Robot, settings: RapidSetti
 
 
 class _Reader(Aggregates):
-    """Reads line by line; each kind of line has a method of its name."""
+    """Reads modules line by line."""
+
+    settings: RapidSettings
 
     def __init__(
         self, main: str, files: Mapping[str, str], robot: Robot, settings: RapidSettings
     ) -> None:
-        self.main, self.files, self.robot, self.settings = main, files, robot, settings
-        self.file, self.line = main, 0
+        super().__init__(main, robot, settings)
+        self.main, self.files = main, files
         self.name = ""
         self.modules: dict[str, str] = {}
         self.loaded = ""
@@ -73,45 +67,34 @@ class _Reader(Aggregates):
         self.routines: dict[str, list[ReadStep]] = {}
         self.homes: dict[str, str] = {}
         self.first_number = 0
-        self.must_say: list[str] = []
         self.number: str | None = None
 
     def read_module(self, file: str) -> None:
-        self.file, self.line, self.ended, self.name = file, 0, False, ""
-        for number, line in enumerate(self.files[file].splitlines(), 1):
-            self.read(number, line.strip())
-        self.line += 1
+        self.file, self.ended, self.name = file, False, ""
+        lines = self.files[file].splitlines()
+        for self.line, line in statements(lines, "!"):
+            self.read_line(line)
+        self.line = len(lines) + 1
         if not self.ended:
             raise self.fault("ENDMODULE is missing")
 
-    def read(self, number: int, line: str) -> None:
-        self.line = number
-        if LINES["blank"].fullmatch(line):
-            return
+    def read_line(self, line: str) -> None:
         if self.ended:
             raise self.fault("nothing may follow ENDMODULE")
-        if self.must_say:
-            if line != self.must_say[0]:
-                raise self.fault(f"expected {self.must_say[0]!r}, got {line[:60]!r}")
-            del self.must_say[0]
-            return
-        if self.routine_name == "main" and self.number is None and line == ending()[0].strip():
-            self.must_say = [*(row.strip() for row in ending()[1:]), "ENDPROC"]
+        in_main = self.routine_name == "main"
+        if in_main and not self.required and not self.number and line == ending_lines()[0].strip():
+            self.required = [*(row.strip() for row in ending_lines()[1:]), "ENDPROC"]
             self.routine_name = None
-            return
-        if not self.name:
-            expected = {"module"}
+        elif not self.name:
+            self.read(line, MODULE)
         elif self.routine_name is None:
-            expected = OUTSIDE if self.file == self.main else IN_PART
+            self.read(line, OUTSIDE if self.file == self.main else IN_PART)
         else:
-            expected = IN_MAIN if self.routine_name == "main" else IN_ROUTINE
-        for kind in expected:
-            if match := LINES[kind].fullmatch(line):
-                if kind in DECLARED and self.routines:
-                    raise self.fault("data must be declared before the first routine")
-                getattr(self, kind)(*match.groups())
-                return
-        raise self.fault(f"not expected here: {line[:60]!r}")
+            self.read(line, IN_MAIN if in_main else IN_ROUTINE)
+
+    def admit(self, kind: str) -> None:
+        if kind in DECLARED and self.routines:
+            raise self.fault("data must be declared before the first routine")
 
     def program(self) -> ReadProgram:
         for kind in ("tool", "work_object"):
@@ -178,12 +161,13 @@ class _Reader(Aggregates):
     def routine(self, name: str) -> None:
         self.unused(name, self.routines)
         if name == SWITCH_OFF and self.file == self.main:
-            self.must_say = [*switched_off(self.settings), "ENDPROC"]
+            self.required = [*switch_off_lines(self.settings), "ENDPROC"]
             self.homes[name] = self.main
             return
-        self.routine_name, self.routines[name] = name, []
+        self.routine_name = name
+        self.steps = self.routines[name] = []
         if name == "main":
-            self.must_say = [r"ConfL\Off;", f"{SWITCH_OFF};"]
+            self.required = [r"ConfL\Off;", f"{SWITCH_OFF};"]
         if name != "main":
             self.homes[name] = self.file
         elif self.file != self.main:
@@ -191,7 +175,7 @@ class _Reader(Aggregates):
 
     def end_routine(self) -> None:
         if self.routine_name == "main":
-            raise self.fault(f"expected {ending()[0].strip()}, ERROR and UNDO before its end")
+            raise self.fault(f"expected {ending_lines()[0].strip()}, ERROR and UNDO before its end")
         self.routine_name = None
 
     def first(self, number: str) -> None:
@@ -200,30 +184,20 @@ class _Reader(Aggregates):
         self.first_number = int(number)
 
     def request(self, output: str, value: str) -> None:
-        partner = partner_of(output, "output", self.settings, f"{self.file}, line {self.line}")
-        self.handshake(Request(partner=partner, on=value == "1"))
+        self.ask(output, on=value == "1")
 
     def wait_for(self, name: str, timeout: str) -> None:
-        partner = partner_of(name, "input", self.settings, f"{self.file}, line {self.line}")
-        self.handshake(Await(partner=partner, timeout=float(timeout)))
-
-    def handshake(self, what: Handshake) -> None:
-        self.append(ReadHandshake(what=what, file=self.file, line=self.line))
+        self.expect_answer(name, float(timeout))
 
     def set_trigger(self, name: str, lead_time: str, output: str, value: str) -> None:
         if self.called_in:
             raise self.fault("triggers must be set before the first contour is called")
         if name not in self.triggers or self.triggers[name] is not None:
             raise self.fault(f"{name} must be declared once and set once")
-        lead = float(self.numbers([float(lead_time)], 1)[0])
         self.said_at[name] = self.place
-        self.triggers[name] = Switch(signal=self.signal(output), on=value == "1", lead_time=lead)
-
-    def signal(self, output: str) -> Signal:
-        if output == self.settings.gas_output:
-            return "gas"
-        same_output(output, self.settings.laser_output, f"{self.file}, line {self.line}")
-        return "laser"
+        self.triggers[name] = Switch(
+            signal=self.signal(output), on=value == "1", lead_time=float(lead_time)
+        )
 
     def load(self, folder: str, file: str) -> None:
         if self.loaded or folder != self.settings.folder:
@@ -244,7 +218,7 @@ class _Reader(Aggregates):
         if not self.loaded or self.number is None:
             raise self.fault(f"{name} is called while no module is loaded, or without a condition")
         self.call(self.number, name)
-        self.number, self.must_say = None, ["ENDIF"]
+        self.number, self.required = None, ["ENDIF"]
 
     def call(self, number: str, name: str) -> None:
         if name in self.called_in:
@@ -259,32 +233,24 @@ class _Reader(Aggregates):
         axes_deg, external = self.values(text, 2)
         self.require_frames(tool, work_object, external)
         axes, said = np.radians(self.numbers(axes_deg, 6)), self.speed_of(speed, air_speed_data)
-        self.append(
-            ReadMove(
-                kind="joint",
-                file=self.file,
-                line=self.line,
-                q=joints_from_axes(self.robot, axes[None])[0],
-                speed=said if timed is None else None,
-                cruise=None if timed is None else float(timed),
-                zone=self.named(zone, self.zones),
-                elsewhere=self.elsewhere(speed=speed, zone=zone),
-            )
+        self.add_move(
+            "joint",
+            said if timed is None else None,
+            q=joints_from_axes(self.robot, axes[None])[0],
+            cruise=None if timed is None else float(timed),
+            zone=self.named(zone, self.zones),
+            elsewhere=self.elsewhere(speed=speed, zone=zone),
         )
 
     def linear_move(self, text: str, speed: str, zone: str, tool: str, work_object: str) -> None:
         T_part_tip, quarters = self.target(text, tool, work_object)
-        self.append(
-            ReadMove(
-                kind="linear",
-                file=self.file,
-                line=self.line,
-                T_part_tip=T_part_tip,
-                posture=quarters,
-                speed=self.speed_of(speed, linear_speed_data),
-                zone=self.named(zone, self.zones),
-                elsewhere=self.elsewhere(speed=speed, zone=zone),
-            )
+        self.add_move(
+            "linear",
+            self.speed_of(speed, linear_speed_data),
+            T_part_tip=T_part_tip,
+            posture=quarters,
+            zone=self.named(zone, self.zones),
+            elsewhere=self.elsewhere(speed=speed, zone=zone),
         )
 
     def circular_move(
@@ -292,19 +258,19 @@ class _Reader(Aggregates):
     ) -> None:
         self.linear_move(text, speed, zone, tool, work_object)
         T_part_via, _ = self.target(via, tool, work_object)
-        self.amend(kind="circular", T_part_via=T_part_via)
+        self.steps[-1] = replace(self.last(), kind="circular", T_part_via=T_part_via)
 
     def switching_move(
         self, text: str, speed: str, triggers: str, zone: str, tool: str, work_object: str
     ) -> None:
         self.linear_move(text, speed, zone, tool, work_object)
-        self.amend_switches(triggers)
+        self.add_triggers(triggers)
 
     def switching_arc(
         self, via: str, text: str, speed: str, triggers: str, zone: str, tool: str, work: str
     ) -> None:
         self.circular_move(via, text, speed, zone, tool, work)
-        self.amend_switches(triggers)
+        self.add_triggers(triggers)
 
     def target(self, text: str, tool: str, work_object: str) -> tuple[Array, tuple[int, ...]]:
         point, wxyz, conf, external = self.values(text, 4)
@@ -314,34 +280,19 @@ class _Reader(Aggregates):
             raise self.fault(f"configuration {conf} must be whole numbers")
         return self.pose([point, wxyz]), tuple(quarters.astype(int).tolist())
 
-    def switches(self, text: str) -> tuple[Switch, ...]:
-        switches = []
-        for name in re.split(r"\\T\d:=", text):
+    def last(self) -> ReadMove:
+        last = self.last_on_path()
+        assert last is not None
+        return last
+
+    def add_triggers(self, text: str) -> None:
+        """Add what the triggers of a move switch; `text` names them."""
+        first, *_ = names = re.split(r"\\T\d:=", text)
+        for name in names:
             switch = self.triggers.get(name)
             if switch is None:
                 raise self.fault(f"{name} has not been set")
-            switches.append(switch)
-        return tuple(switches)
-
-    def wait(self, time: str) -> None:
-        seconds = float(self.numbers([float(time)], 1)[0])
-        self.append(ReadWait(time=seconds, file=self.file, line=self.line))
-
-    def append(self, step: ReadStep) -> None:
-        assert self.routine_name is not None
-        self.routines[self.routine_name].append(step)
-
-    def amend(self, **changes: Any) -> None:
-        assert self.routine_name is not None
-        steps = self.routines[self.routine_name]
-        steps[-1] = replace(steps[-1], **changes)
-
-    def amend_switches(self, text: str) -> None:
-        assert self.routine_name is not None
-        said = self.elsewhere(switches=re.split(r"\\T\d:=", text)[0])
-        before = self.routines[self.routine_name][-1]
-        assert isinstance(before, ReadMove)
-        self.amend(switches=self.switches(text), elsewhere={**before.elsewhere, **said})
+            self.add_switch(self.last(), switch, self.said_at[first])
 
     def require_frames(self, tool: str, work_object: str, external: Any) -> None:
         known = [self.frames[kind][0] for kind in ("tool", "work_object") if kind in self.frames]
@@ -363,12 +314,12 @@ class _Reader(Aggregates):
         self.require_same(values, data(speed), f"speeds of {name}")
         return speed
 
-    def named(self, name: str, known: dict[str, _T]) -> _T:
+    def named(self, name: str, known: Mapping[str, _T]) -> _T:
         if name not in known:
             raise self.fault(f"{name} is not declared")
         return known[name]
 
-    def unused(self, name: str, known: dict[str, Any]) -> None:
+    def unused(self, name: str, known: Container[str]) -> None:
         if name in known:
             raise self.fault(f"{name} is declared twice")
 

@@ -8,7 +8,7 @@ from typing import Annotated
 import numpy as np
 from pydantic import StringConstraints
 
-from kerfpath.post._settings import Rules, Settings, setting
+from kerfpath.post._settings import PortSettings, Rules, setting
 
 __all__ = ["SWITCH_OFF", "TURNING_SPEED", "RapidSettings", "is_reserved", "rules"]
 
@@ -52,7 +52,7 @@ Request = Annotated[Name | None, setting("the name of a digital output", '"doShu
 Folder = Annotated[str, StringConstraints(pattern=r"^[A-Za-z0-9_:/.\-]{1,60}$")]
 
 
-class RapidSettings(Settings):
+class RapidSettings(PortSettings, output=Request, input=Input):
     """What the controller calls things."""
 
     laser_output: Annotated[Name, setting("the name of a digital output", '"doLaser"')] = "doLaser"
@@ -60,14 +60,6 @@ class RapidSettings(Settings):
     tool_name: Annotated[Name, setting("a name for the tool", '"tLaser"')] = "tLaser"
     folder: Annotated[Folder, setting("a folder of the controller", '"HOME:"')] = "HOME:"
     work_object: Annotated[Name, setting("a name for the part's frame", '"wPart"')] = "wPart"
-    ready_input: Input = None
-    shutter_input: Input = None
-    gas_pressure_input: Input = None
-    height_input: Input = None
-    interlock_input: Input = None
-    ready_output: Request = None
-    shutter_output: Request = None
-    height_output: Request = None
 
 
 def rules(settings: RapidSettings) -> Rules:

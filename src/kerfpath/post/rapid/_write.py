@@ -16,8 +16,8 @@ from typing import TypeVar
 import numpy as np
 
 from kerfpath._arrays import Array
-from kerfpath.post._divide import in_files, renamed
-from kerfpath.post._formatter import Formatter, number, plain
+from kerfpath.post._divide import divide_sections, rename_sections
+from kerfpath.post._formatter import Formatter, number
 from kerfpath.post._names import identifiers
 from kerfpath.post._orientations import quaternions
 from kerfpath.post._program import (
@@ -31,8 +31,9 @@ from kerfpath.post._program import (
     Section,
     Switch,
     Wait,
+    targets_of,
 )
-from kerfpath.post._settings import handshakes
+from kerfpath.post._settings import handshakes, outputs
 from kerfpath.post._times import SHORTEST_CRUISE, cruises
 from kerfpath.post.rapid._axes import axes_from_joints, confdata
 from kerfpath.post.rapid._settings import SWITCH_OFF, TURNING_SPEED, RapidSettings
@@ -42,9 +43,9 @@ __all__ = [
     "FULL_AIR_SPEED",
     "Rapid",
     "air_speed_data",
-    "ending",
+    "ending_lines",
     "linear_speed_data",
-    "switched_off",
+    "switch_off_lines",
     "zone_data",
 ]
 
@@ -52,7 +53,6 @@ _Key = TypeVar("_Key", bound=Hashable)
 
 FULL_AIR_SPEED = 1.0
 """Tip speed (m/s) that a joint move at its full share is given: RAPID knows no share."""
-NOT_CHECKED = "not been checked for collisions"
 NO_EXTERNAL_AXES = "[9E9,9E9,9E9,9E9,9E9,9E9]"
 JOINT_TARGET = "[[" + ",".join(["%.6f"] * 6) + "]," + NO_EXTERNAL_AXES + "]"
 TARGET = "[[%.4f,%.4f,%.4f],[%.8f,%.8f,%.8f,%.8f],[%d,%d,%d,%d]," + NO_EXTERNAL_AXES + "]"
@@ -60,8 +60,6 @@ NO_POSE = np.eye(4)
 """Stands in for that of a joint move."""
 FIRST = "nFirst"
 """Number of the contour at which the program begins, for a restart."""
-AROUND_A_ROUTINE = 4
-"""Its first and last line, the empty one before it, and its call."""
 EXTERNAL_SPEEDS = "5000,1000"
 """mm/s and deg/s of external axes; there are none, but speed data must say something."""
 
@@ -70,9 +68,11 @@ class Rapid(Formatter):
     """Writes one module: frames, speeds, zones, a main routine, and one for each section."""
 
     settings: RapidSettings
+    around = 4  # first and last line, the empty one before, the call
+    too_long = "warning"
 
     def __init__(self, program: Program, settings: RapidSettings) -> None:
-        super().__init__(renamed(program, (FIRST, SWITCH_OFF)), settings)
+        super().__init__(rename_sections(program, (FIRST, SWITCH_OFF)), settings)
         moves = program.moves
         joint = [move for move in moves if isinstance(move, JointMove)]
         self._cruise = cruises(self.program)
@@ -101,7 +101,7 @@ class Rapid(Formatter):
         if len(whole) <= most:
             return {f"{name}.mod": _text(whole)}
         files, calls = {}, []
-        parts = in_files(sections, list(self.lengths().values()), most)
+        parts = divide_sections(sections, list(self.lengths().values()), most)
         for module, part in zip(self._modules(), parts, strict=False):
             place = f'"{self.settings.folder}/{module}.mod"'
             calls += [rf"Load \Dynamic,{place};"]
@@ -113,13 +113,6 @@ class Rapid(Formatter):
             files[f"{module}.mod"] = _text([f"MODULE {module}", *body, "ENDMODULE"])
         return {f"{name}.mod": _text(self._module(calls, ()))} | files
 
-    def lengths(self) -> dict[str, int]:
-        """Return how many lines each contour takes, by its name."""
-        return {
-            section.name: sum(1 for _ in self.lines(section)) + AROUND_A_ROUTINE
-            for section in self.program.sections
-        }
-
     def _modules(self) -> list[str]:
         """Return names for modules of routines, as many as there might be."""
         count = len(self.program.sections)
@@ -128,14 +121,12 @@ class Rapid(Formatter):
     def _module(self, calls: Iterable[str], sections: Iterable[Section]) -> Iterator[str]:
         program, settings = self.program, self.settings
         tool, part = _pose(program.T_flange_tip), _pose(program.T_base_part)
-        checked = "been proved clear in the planned cell" if program.air_checked else NOT_CHECKED
         yield f"MODULE {program.name}"
-        robot = f"{plain(program.robot.model)} ({plain(program.robot.id)})"
-        yield f"  ! Written by kerfpath for {robot}."
-        yield "  ! Complete the load of the tool: mass -1 stands for not known."
-        yield "  ! The work object is the part in the robot's base, which is the world's, too."
-        yield f"  ! Moves through the air have {checked}."
-        yield from (f"  ! {said}" for said in program.caveats)
+        head = self.head(
+            "Complete the load of the tool: mass -1 stands for not known.",
+            "The work object is the part in the robot's base, which is the world's, too.",
+        )
+        yield from (f"  ! {remark}" for remark in head)
         yield f"  ! {SWITCH_OFF} is for the events STOP and QSTOP: enter it there. A stop switches"
         yield "  ! the laser off only then; the safety circuit of the cell has to, too."
         yield f"  ! To begin at a contour, set {FIRST} to its number and move PP to Main."
@@ -151,11 +142,11 @@ class Rapid(Formatter):
         yield "  PROC main()"
         yield from (f"    {line}" for line in self.begin())
         yield from (f"    {line}" for line in calls)
-        yield from (f"  {line}" for line in ending())
+        yield from (f"  {line}" for line in ending_lines())
         yield "  ENDPROC"
         yield ""
         yield f"  PROC {SWITCH_OFF}()"
-        yield from (f"    {line}" for line in switched_off(settings))
+        yield from (f"    {line}" for line in switch_off_lines(settings))
         yield "  ENDPROC"
         for section in sections:
             yield from self._routine(section)
@@ -237,15 +228,10 @@ class Rapid(Formatter):
     @cached_property
     def target(self) -> dict[Move, list[str]]:
         """The targets of each move, all at once; quaternions without a jump of sign."""
-        points: list[tuple[Move, Array, Array]] = []
-        for move in self.program.moves:
-            if isinstance(move, CircularMove):
-                points.append((move, move.q_via, move.T_part_via))
-            points.append((move, move.q, getattr(move, "T_part_tip", NO_POSE)))
-        robot = self.program.robot
-        q = np.array([q for _, q, _ in points]).reshape(-1, robot.joints)
+        points, robot = targets_of(self.program.moves), self.program.robot
+        q = np.array([point.q for point in points]).reshape(-1, robot.joints)
         axes_deg = (np.degrees(axes_from_joints(robot, q)).round(6) + 0.0).tolist()
-        T = np.array([T for _, _, T in points]).reshape(-1, 4, 4)
+        T = np.array([NO_POSE if T is None else T for _, _, T in points]).reshape(-1, 4, 4)
         point_mm = (T[:, :3, 3] * 1e3).round(4) + 0.0
         wxyz = quaternions(T).round(8) + 0.0
         rows = np.hstack([point_mm, wxyz, confdata(robot, q)]).tolist()
@@ -275,7 +261,7 @@ class Rapid(Formatter):
         return rf"{zone},{self.settings.tool_name}\WObj:={self.settings.work_object}"
 
 
-def ending() -> list[str]:
+def ending_lines() -> list[str]:
     """Return how main ends: the next time with the first contour; and its handlers.
 
     Those are of an error, and of leaving main before its end. What is not handled below ends here:
@@ -285,11 +271,9 @@ def ending() -> list[str]:
     return [f"  {FIRST}:=1;", "ERROR", off, "  StopMove;", "  RAISE;", "UNDO", off]
 
 
-def switched_off(settings: RapidSettings) -> list[str]:
+def switch_off_lines(settings: RapidSettings) -> list[str]:
     """Return the lines that switch off everything that the settings name."""
-    requests = (name for (_, way), name in handshakes(settings).items() if way == "output")
-    outputs = (settings.laser_output, settings.gas_output, *requests)
-    return [f"SetDO {name},0;" for name in outputs if name is not None]
+    return [f"SetDO {name},0;" for name in outputs(settings)]
 
 
 def _numbered(prefix: str, keys: Iterable[_Key]) -> dict[_Key, str]:

@@ -27,28 +27,28 @@ def is_reserved(name: str) -> bool:
 
 def check(program: Program, settings: RosSettings) -> Iterator[ProgramIssue]:
     """Yield what cannot be said in a trajectory, and where it asks too much of the joints."""
-    issues = [*refusals(program), *_shape(program, settings)]
+    issues = [*refusals(program), *_check_shape(program, settings)]
     yield from issues
     if not issues:
-        yield from _limits(program, settings)
+        yield from _check_limits(program, settings)
 
 
-def _shape(program: Program, settings: RosSettings) -> Iterator[ProgramIssue]:
+def _check_shape(program: Program, settings: RosSettings) -> Iterator[ProgramIssue]:
     count, joints = len(joint_names(program.robot.joints, settings)), program.robot.joints
     if count != joints:
-        said = f"joint_names has {count} names, the robot {joints} joints"
-        yield ProgramIssue("error", "joint-names", said, "program")
+        message = f"joint_names has {count} names, the robot {joints} joints"
+        yield ProgramIssue("error", "joint-names", message, "program")
     steps = [(section.name, step) for section in program.sections for step in section.moves]
     for (name, move), (_, after) in zip(steps, [*steps[1:], ("", None)], strict=True):
         if isinstance(move, CircularMove):
-            said = "a trajectory has no arcs; leave arcs_mm out of the job"
-            yield ProgramIssue("error", "arc", said, name)
+            message = "a trajectory has no arcs; leave arcs_mm out of the job"
+            yield ProgramIssue("error", "arc", message, name)
         if move.zone > 0 and not (isinstance(move, LinearMove) and isinstance(after, LinearMove)):
-            said = "only between linear moves can a corner be rounded; expected a stop"
-            yield ProgramIssue("error", "zone", said, name)
+            message = "only between linear moves can a corner be rounded; expected a stop"
+            yield ProgramIssue("error", "zone", message, name)
 
 
-def _limits(program: Program, settings: RosSettings) -> Iterator[ProgramIssue]:
+def _check_limits(program: Program, settings: RosSettings) -> Iterator[ProgramIssue]:
     try:
         motion = trajectory(program, settings.step_ms * 1e-3)
     except InputError as error:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping
-from dataclasses import replace
 
 import numpy as np
 
@@ -12,7 +11,8 @@ from kerfpath._arrays import Array, freeze
 from kerfpath.errors import InputError
 from kerfpath.post._orientations import pose_of
 from kerfpath.post._program import SIGNALS, Switch
-from kerfpath.post._read import ReadMove, ReadProgram, ReadSection, ReadStep, ReadWait
+from kerfpath.post._read import ReadProgram, ReadSection, ReadStep
+from kerfpath.post._reading import LineReader, patterns
 from kerfpath.post.ros._trajectory import rates
 from kerfpath.post.ros._write import SECOND, RosSettings, head, joint_names
 from kerfpath.robots import Robot
@@ -37,16 +37,20 @@ _NAME = re.compile(r"trajectory: ([A-Za-z]\w*)\.yaml", re.ASCII)
 _FRAMES = {
     what: re.compile(rf"{what}: {_NUMBERS}", re.ASCII) for what in ("tip_in_flange", "part_in_base")
 }
-_SECTION = re.compile(r'- {section: "([A-Za-z]\w*)"}', re.ASCII)
-_DONE = re.compile(_TIME + "done: (joint|linear|wait)}", re.ASCII)
-_SET = re.compile(_TIME + "set: (laser|gas), to: (true|false)}", re.ASCII)
+_EVENTS = patterns(
+    {
+        "section": r'- {section: "([A-Za-z]\w*)"}',
+        "done": _TIME + "done: (joint|linear|wait)}",
+        "switch": _TIME + "set: (laser|gas), to: (true|false)}",
+    }
+)
 
 
 def read(main: str, files: Mapping[str, str], robot: Robot, settings: RosSettings) -> ReadProgram:
     """Return the program that a trajectory of ours and its events say; see `Reader`."""
     points = _Points(main, files[main], robot, settings)
     events = f"{main.removesuffix('.yaml')}.events.yaml"
-    return _Events(events, files[events], robot, points).program()
+    return _Events(events, files[events], robot, settings, points).program()
 
 
 def _lines(text: str) -> list[tuple[int, str]]:
@@ -110,43 +114,46 @@ class _Points:
                 raise InputError(f"{self.file}, line {self.line[bad[0]]}: {said}")
 
 
-class _Events:
-    """Reads the events, and tells moves by the points between them."""
+class _Events(LineReader):
+    """Reads the events, and the moves from the points between them."""
 
-    def __init__(self, file: str, text: str, robot: Robot, points: _Points) -> None:
-        self.file, self.robot, self.points = file, robot, points
-        self.lines = [*_lines(text), (len(text.splitlines()) + 1, "the end of the file")]
-        self.at = 0
+    def __init__(
+        self, file: str, text: str, robot: Robot, settings: RosSettings, points: _Points
+    ) -> None:
+        super().__init__(file, robot, settings, _lines(text))
+        self.points = points
         self.last = -1
         self.tips = np.empty((0, 3))
         self.sections: dict[str, list[ReadStep]] = {}
+        self.advance()
 
     def program(self) -> ReadProgram:
-        name = self.take(_NAME)[1]
+        (name,) = self.take(_NAME, "trajectory")
         if f"{name}.yaml" != self.points.file:
             raise self.fault(f"are the events of {name}.yaml, expected {self.points.file}")
-        tool, part = (self.frame(self.take(pattern)[1]) for pattern in _FRAMES.values())
+        tool, part = (self.frame(*self.take(pattern, what)) for what, pattern in _FRAMES.items())
         self.tips = (self.robot.forward(self.points.q) @ tool)[:, :3, 3]
-        self.take(re.compile("events:"))
-        while self.at < len(self.lines) - 1:
-            if match := _SECTION.fullmatch(self.text):
-                if match[1] in self.sections:
-                    raise self.fault(f"a second section {match[1]!r}")
-                self.sections[match[1]] = []
-            elif match := _DONE.fullmatch(self.text):
-                self.done(round(float(match[1]) * SECOND), match[2])
-            elif match := _SET.fullmatch(self.text):
-                self.switch(float(match[1]), match[2], match[3] == "true")
-            else:
-                raise self.fault(f"not expected here: {self.text[:60]!r}")
-            self.at += 1
+        self.take(re.compile("events:"), "events")
+        while self.row < len(self.rows):
+            self.read(self.text, _EVENTS)
+            self.advance()
         if self.last != len(self.points.time) - 1:
             raise self.fault("the trajectory goes on after the last event")
         sections = [ReadSection(name=word, steps=tuple(s)) for word, s in self.sections.items()]
         return ReadProgram(name=name, sections=tuple(sections), T_flange_tip=tool, T_base_part=part)
 
-    def done(self, ns: int, kind: str) -> None:
-        """Add the step that ends at a time, told by its points."""
+    def section(self, name: str) -> None:
+        if name in self.sections:
+            raise self.fault(f"a second section {name!r}")
+        self.steps = self.sections[name] = []
+
+    def admit(self, kind: str) -> None:
+        if kind != "section" and not self.sections:
+            raise self.fault("expected a section first")
+
+    def done(self, time: str, kind: str) -> None:
+        """Add the step that ends at a time, as the points before it say."""
+        ns = round(float(time) * SECOND)
         points, first = self.points, max(self.last, 0)
         end = points.index.get(ns)
         if end is None or end < first:
@@ -162,26 +169,22 @@ class _Events:
         if kind == "wait":
             if np.abs(between - between[0]).max() > OFF_LINE:
                 raise self.fault("the robot moves in a wait")
-            self.append(ReadWait(time=took, file=self.file, line=self.line))
+            self.wait(took)
             self.last = end
             return
         if points.stops[first] and points.stops[end] and end > first:
             self.require_dense(first, end)
         if kind == "joint":
-            self.require_line(between, OFF_LINE)
+            self.require_straight(between, OFF_LINE)
         else:
-            self.require_line(self.tips[first : end + 1], TIP_OFF_LINE)
-        self.append(
-            ReadMove(
-                kind="joint" if kind == "joint" else "linear",
-                file=self.file,
-                line=self.line,
-                speed=None,
-                duration=took if kind == "linear" or self.last >= 0 else None,
-                zone=0.0 if points.stops[end] else None,
-                q=freeze(points.q[end]),
-                elsewhere={"target": f"{points.file}, line {points.line[end]}"},
-            )
+            self.require_straight(self.tips[first : end + 1], TIP_OFF_LINE)
+        self.add_move(
+            "joint" if kind == "joint" else "linear",
+            None,
+            duration=took if kind == "linear" or self.last >= 0 else None,
+            zone=0.0 if points.stops[end] else None,
+            q=freeze(points.q[end]),
+            elsewhere={"target": f"{points.file}, line {points.line[end]}"},
         )
         self.last = end
 
@@ -191,7 +194,7 @@ class _Events:
         if step > self.points.step_time + 2e-9:  # times are whole ns
             raise self.fault(f"expected a point every {self.points.step_time:g} s, got {step:g} s")
 
-    def require_line(self, points: Array, most: float) -> None:
+    def require_straight(self, points: Array, most: float) -> None:
         """Require that points (m, k) lie on the line from the first to the last, one by one."""
         if len(points) < 3:
             return
@@ -201,43 +204,17 @@ class _Events:
         if off > most or (np.diff(share) < -1e-9).any():
             raise self.fault("the points before it do not lie on the straight way")
 
-    def switch(self, time: float, signal: str, on: bool) -> None:
-        steps = next(reversed(self.sections.values()), [])
-        move = steps[-1] if steps else None
-        if not isinstance(move, ReadMove) or move.kind != "linear":
+    def switch(self, time: str, signal: str, to: str) -> None:
+        move = self.last_on_path()
+        if move is None:
             raise self.fault("a switch must follow a linear move")
-        lead = float(self.points.time[self.last]) - time
-        switch = Switch(signal=SIGNALS[signal], on=on, lead_time=lead)
-        steps[-1] = replace(move, switches=(*move.switches, switch))
-
-    def append(self, step: ReadStep) -> None:
-        if not self.sections:
-            raise self.fault("expected a section first")
-        next(reversed(self.sections.values())).append(step)
+        lead = float(self.points.time[self.last]) - float(time)
+        switch = Switch(signal=SIGNALS[signal], on=to == "true", lead_time=lead)
+        self.add_switch(move, switch, self.place)
 
     def frame(self, text: str) -> Array:
-        values = _numbers(text, 7, f"{self.file}, line {self.line}")
+        values = _numbers(text, 7, self.place)
         T = pose_of(values[:3], values[3:])
         if T is None:
             raise self.fault("the quaternion must have length 1")
         return T
-
-    @property
-    def text(self) -> str:
-        return self.lines[self.at][1]
-
-    @property
-    def line(self) -> int:
-        return self.lines[self.at][0]
-
-    def take(self, pattern: re.Pattern[str]) -> re.Match[str]:
-        match = pattern.fullmatch(self.text)
-        if match is None:
-            raise self.fault(
-                f"expected {pattern.pattern.partition(':')[0]}, got {self.text[:60]!r}"
-            )
-        self.at += 1
-        return match
-
-    def fault(self, message: str) -> InputError:
-        return InputError(f"{self.file}, line {self.line}: {message}")

@@ -13,28 +13,24 @@ from typing import Annotated
 import numpy as np
 
 from kerfpath._arrays import Array, Ints
-from kerfpath.post._divide import in_one_file
-from kerfpath.post._formatter import Formatter, number, plain
+from kerfpath.post._divide import require_one_file
+from kerfpath.post._formatter import Formatter, number
 from kerfpath.post._orientations import quaternions
 from kerfpath.post._program import JointMove, LinearMove, Wait
-from kerfpath.post._settings import Rules, Settings, setting
+from kerfpath.post._settings import LinesPerFile, Rules, Settings, setting
 from kerfpath.post.ros._trajectory import Trajectory, rates, trajectory
 
 __all__ = ["Ros", "RosSettings", "head", "joint_names", "rules"]
 
 DECIMALS = {"positions": 10, "velocities": 6, "accelerations": 6}
-NOT_CHECKED = "not been checked for collisions"
 SECOND = 1_000_000_000
 """In ns."""
 
 
 class RosSettings(Settings):
-    """What the robot's driver calls things, and how densely it is told the way."""
+    """What the robot's driver calls things, and how densely the way is written."""
 
-    lines_per_file: Annotated[
-        int,
-        setting("a whole number of lines from 100 to 1000000", "5000", ge=100, le=1_000_000),
-    ] = 1_000_000
+    lines_per_file: LinesPerFile = 1_000_000
     joint_names: Annotated[
         list[str] | None, setting("a list of joint names", '["joint_1", "joint_2"]')
     ] = None
@@ -73,18 +69,16 @@ class Ros(Formatter):
         motion = trajectory(program, self.settings.step_ms * 1e-3)
         self._ends = iter((_ns(motion.time[motion.done]) / SECOND).tolist())
         name = program.name
-        return in_one_file(f"{name}.yaml", [*self._message(motion)], most) | in_one_file(
+        return require_one_file(f"{name}.yaml", [*self._message(motion)], most) | require_one_file(
             f"{name}.events.yaml", [*self._events()], most
         )
 
     def _message(self, motion: Trajectory) -> Iterator[str]:
-        program = self.program
-        robot = program.robot
-        checked = "been proved clear in the planned cell" if program.air_checked else NOT_CHECKED
-        yield f"# Written by kerfpath for {plain(robot.model)} ({plain(robot.id)})."
-        yield "# A trajectory_msgs/JointTrajectory; rad and s. Bring the robot to its first point."
-        yield f"# Moves through the air have {checked}."
-        yield from (f"# {said}" for said in program.caveats)
+        program, robot = self.program, self.program.robot
+        message = (
+            "A trajectory_msgs/JointTrajectory; rad and s. Bring the robot to its first point."
+        )
+        yield from (f"# {remark}" for remark in self.head(message))
         yield f"# What is switched when is in {program.name}.events.yaml."
         yield from head(joint_names(robot.joints, self.settings))
         ns = _ns(motion.time)

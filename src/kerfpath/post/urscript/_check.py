@@ -47,7 +47,7 @@ def check(program: Program, settings: URScriptSettings) -> Iterator[ProgramIssue
         full_joint_speed(program.robot)
     except InputError as error:
         yield ProgramIssue("error", "joint-speed", str(error), "program")
-    yield from _blends(program)
+    yield from _check_blends(program)
     beyond = max((float(np.abs(move.q).max()) for move in program.moves), default=0.0)
     if beyond > FULL_TURN:
         yield ProgramIssue(
@@ -61,11 +61,11 @@ def check(program: Program, settings: URScriptSettings) -> Iterator[ProgramIssue
         for k, move in enumerate(section.moves):
             signals = [s.signal for s in getattr(move, "switches", ())]
             if len(signals) > len(set(signals)):
-                said = "a signal is switched twice at the end of one move, expected once"
-                yield ProgramIssue("error", "switches", said, f"{section.name}, move {k}")
+                message = "a signal is switched twice at the end of one move, expected once"
+                yield ProgramIssue("error", "switches", message, f"{section.name}, move {k}")
 
 
-def _blends(program: Program) -> Iterator[ProgramIssue]:
+def _check_blends(program: Program) -> Iterator[ProgramIssue]:
     """Check that blends do not meet: the controller leaves out a move whose blend does."""
     moves = program.moves
     if not moves:
@@ -77,11 +77,11 @@ def _blends(program: Program) -> Iterator[ProgramIssue]:
     met = np.flatnonzero(blended & (room < BLEND_ROOM))
     if met.size:
         k = int(met[0])
-        said = "a linear" if isinstance(moves[k + 1], LinearMove) else "a joint"
+        kind = "a linear" if isinstance(moves[k + 1], LinearMove) else "a joint"
         yield ProgramIssue(
             "error",
             "blend-overlap",
-            f"{met.size} moves are no longer than the blends at their ends, the first {said} move "
+            f"{met.size} moves are no longer than the blends at their ends, the first {kind} move "
             f"of {np.linalg.norm(points[k + 1] - points[k]) * 1e3:.3f} mm between blends of "
             f"{zone[k] * 1e3:g} and {zone[k + 1] * 1e3:g} mm; the controller would leave moves "
             "out; lower zone_mm or use fewer nodes",

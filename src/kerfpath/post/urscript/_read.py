@@ -4,27 +4,18 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping
-from dataclasses import replace
 
 import numpy as np
 from scipy.spatial.transform import Rotation
 
 from kerfpath._arrays import Array, freeze
-from kerfpath.errors import InputError
-from kerfpath.post._counting import offset_near
-from kerfpath.post._program import SIGNALS, Await, Handshake, Request, Switch
-from kerfpath.post._read import (
-    ReadHandshake,
-    ReadMove,
-    ReadProgram,
-    ReadSection,
-    ReadStep,
-    ReadWait,
-    partner_of,
-    patterns,
-)
-from kerfpath.post.urscript._switching import time_ahead, waiting, when_stopped, words
-from kerfpath.post.urscript._write import FIRST, URScriptSettings, full_joint_speed, outputs
+from kerfpath.post._axes import offset_near
+from kerfpath.post._program import SIGNALS, Switch
+from kerfpath.post._read import MoveKind, ReadProgram, ReadSection, ReadStep
+from kerfpath.post._reading import END_OF_FILE, LineReader, patterns, statements
+from kerfpath.post._settings import outputs
+from kerfpath.post.urscript._switching import stop_lines, switch_lines, time_ahead, wait_lines
+from kerfpath.post.urscript._write import FIRST, URScriptSettings, full_joint_speed
 from kerfpath.robots import Robot
 
 __all__ = ["read"]
@@ -65,58 +56,56 @@ _STEPS = patterns(
 )
 
 
-class _Reader:
-    """Reads one part of the program after the other; comments and blank lines are passed over."""
+class _Reader(LineReader):
+    """Reads one part of the program after the other."""
+
+    settings: URScriptSettings
 
     def __init__(self, file: str, text: str, robot: Robot, settings: URScriptSettings) -> None:
-        self.file, self.robot, self.settings = file, robot, settings
-        lines = [(n, line.strip()) for n, line in enumerate(text.splitlines(), 1)]
-        self.lines = [(n, line) for n, line in lines if line and not line.startswith("#")]
-        self.lines.append((len(text.splitlines()) + 1, "the end of the file"))
-        self.at = 0
-        self.steps: list[ReadStep] = []
+        super().__init__(file, robot, settings, statements(text.splitlines(), "#"))
         self.signals: list[str] = []
         self.can_wait = False
         self.ahead: dict[str, tuple[tuple[str, ...], float, str]] = {}
         self.ahead_at: dict[str, str] = {}
         self.leads: dict[str, tuple[float, str]] = {}
+        self.advance()
 
     def program(self) -> ReadProgram:
         (name,) = self.take(_DEFINITION, "def NAME():")
         tool = _pose(self.take(_TOOL, "set_tcp(p[...])"))
         part = _pose(self.take(_PART, "global part_frame = p[...]"))
         begin = int(self.take(_FIRST, f"global {FIRST} = 1")[0])
-        self.expect(when_stopped(outputs(self.settings)))
-        self.can_wait = self.line == waiting([])[0]
+        self.expect(stop_lines(outputs(self.settings)))
+        self.can_wait = self.text == wait_lines([])[0]
         if self.can_wait:
-            self.expect(waiting(outputs(self.settings)))
+            self.expect(wait_lines(outputs(self.settings)))
         signals = self.signals
         for known in SIGNALS.values():
-            if self.line != f"global {known}_waits = False":
+            if self.text != f"global {known}_waits = False":
                 continue
             output = getattr(self.settings, f"{known}_output")
             if output is None:
                 raise self.fault(f"switches the {known}; say by which output with {known}_output")
             signals.append(known)
-            self.expect(words(known, output))
+            self.expect(switch_lines(known, output))
         sections: dict[str, ReadSection] = {}
-        while match := _DEFINITION.fullmatch(self.line):
+        while match := _DEFINITION.fullmatch(self.text):
             if match[1] in sections:
                 raise self.fault(f"{match[1]} is defined twice")
-            self.at += 1
+            self.advance()
             sections[match[1]] = ReadSection(name=match[1], steps=self.section())
         for signal in signals:
             self.expect([f"{signal}_set(False)", f"{signal}_run = run {signal}_thread()"])
         calls: list[str] = []
-        while self.line == f"if {FIRST} <= {len(calls) + 1}:":
-            self.at += 1
+        while self.text == f"if {FIRST} <= {len(calls) + 1}:":
+            self.advance()
             calls += self.take(_CALL, "the call of a contour")
             self.expect(["end"])
         if not 1 <= begin <= len(calls):
             raise self.fault(f"{FIRST} must be the number of a contour")
         if calls != list(sections):
             raise self.fault("the contours must be called once each, in their order")
-        self.expect([*(f"kill {signal}_run" for signal in signals), "end", "the end of the file"])
+        self.expect([*(f"kill {signal}_run" for signal in signals), "end", END_OF_FILE])
         robot = self.robot
         return ReadProgram(
             name=name,
@@ -128,34 +117,24 @@ class _Reader:
     def section(self) -> tuple[ReadStep, ...]:
         """Return the steps of a contour, to its end."""
         self.steps = []
-        while self.line != "end":
-            for kind, pattern in _STEPS.items():
-                if match := pattern.fullmatch(self.line):
-                    getattr(self, kind)(match.groups())
-                    break
-            else:
-                raise self.fault(f"not expected here: {self.line[:60]!r}")
-            self.at += 1
-        self.settled()
-        self.at += 1
+        while self.text != "end":
+            self.read(self.text, _STEPS)
+            self.advance()
+        self.require_standing("a move")
+        self.advance()
         return tuple(self.steps)
 
-    def joint(self, words: tuple[str, ...]) -> None:
-        self.settled()
-        *angles, a, v, _, r = (float(word or "nan") for word in words)
+    def joint(self, *said: str | None) -> None:
+        self.require_standing("a move")
+        *angles, a, v, _, r = (float(word or "nan") for word in said)
         self.require_acceleration(a, np.radians(self.settings.joint_acceleration_deg_s2))
-        timed = words[-2]
-        robot = self.robot
-        self.steps.append(
-            ReadMove(
-                kind="joint",
-                file=self.file,
-                line=self.number,
-                q=freeze(robot.sign * (np.array(angles) + offset_near(robot, 0.0))),
-                speed=v / full_joint_speed(robot) if timed is None else None,
-                duration=None if timed is None else float(timed),
-                zone=r,
-            )
+        timed, robot = said[-2], self.robot
+        self.add_move(
+            "joint",
+            v / full_joint_speed(robot) if timed is None else None,
+            duration=None if timed is None else float(timed),
+            q=freeze(robot.sign * (np.array(angles) + offset_near(robot, 0.0))),
+            zone=r,
         )
 
     def require_acceleration(self, said: float, expected: float) -> None:
@@ -163,17 +142,17 @@ class _Reader:
         if abs(said - expected) > DIGIT:
             raise self.fault(f"expected the acceleration a={expected:.6f}, got {said:g}")
 
-    def linear(self, words: tuple[str, ...]) -> None:
-        self.path_move(words[:6], words[6:], None)
+    def linear(self, *said: str) -> None:
+        self.path(said[:6], said[6:])
 
-    def circular(self, words: tuple[str, ...]) -> None:
-        self.path_move(words[6:12], words[12:], _pose(words[:6]))
+    def circular(self, *said: str) -> None:
+        self.path(said[6:12], said[12:], _pose(said[:6]))
 
-    def path_move(
-        self, target: tuple[str, ...], motion: tuple[str, ...], via: Array | None
+    def path(
+        self, target: tuple[str, ...], motion: tuple[str, ...], via: Array | None = None
     ) -> None:
         armed, self.ahead = self.ahead, {}
-        self.settled()
+        self.require_standing("a move")
         a, v, r = (float(word) for word in motion)
         if min(a, v) <= 0:
             raise self.fault("speed and acceleration must be above 0")
@@ -182,97 +161,45 @@ class _Reader:
             if point != target:
                 raise self.fault(f"the {signal} is switched ahead of another point")
             self.leads[signal] = time_ahead(near, v, a, stops=r == 0), on
-        self.steps.append(
-            ReadMove(
-                kind="linear" if via is None else "circular",
-                file=self.file,
-                line=self.number,
-                T_part_tip=_pose(target),
-                T_part_via=via,
-                speed=v,
-                zone=r,
-            )
-        )
+        kind: MoveKind = "linear" if via is None else "circular"
+        self.add_move(kind, v, T_part_tip=_pose(target), T_part_via=via, zone=r)
 
-    def switch_ahead(self, words: tuple[str, ...]) -> None:
-        signal, *target, near, on = words
+    def switch_ahead(self, signal: str, *said: str) -> None:
+        *target, near, on = said
         self.require_signal(signal)
         if signal in self.ahead:
             raise self.fault(f"the {signal} is switched ahead twice")
         self.ahead[signal] = tuple(target), float(near), on
-        self.ahead_at[signal] = f"{self.file}, line {self.number}"
+        self.ahead_at[signal] = self.place
 
-    def switch(self, words: tuple[str, str]) -> None:
-        signal, on = words
+    def switch(self, signal: str, on: str) -> None:
         self.require_signal(signal)
-        move = self.steps[-1] if self.steps else None
-        if self.ahead or not isinstance(move, ReadMove) or move.kind == "joint":
+        move = self.last_on_path()
+        if self.ahead or move is None:
             raise self.fault("a switch must follow a linear or circular move")
         lead, before = self.leads.pop(signal, (0.0, on))
         if before != on:
             raise self.fault(f"the {signal} is switched to {before} ahead, to {on} here")
+        place = move.elsewhere.get("switches", self.ahead_at.pop(signal, self.place))
         switch = Switch(signal=SIGNALS[signal], on=on == "True", lead_time=lead)
-        at = self.ahead_at.pop(signal, f"{self.file}, line {self.number}")
-        self.steps[-1] = replace(
-            move,
-            switches=(*move.switches, switch),
-            elsewhere={"switches": at, **move.elsewhere},
-        )
+        self.add_switch(move, switch, place)
 
-    def wait(self, words: tuple[str, ...]) -> None:
-        self.settled()
-        self.steps.append(ReadWait(time=float(words[0]), file=self.file, line=self.number))
+    def request(self, port: str, on: str) -> None:
+        self.ask(int(port), on=on == "True")
 
-    def request(self, words: tuple[str, str]) -> None:
-        port, on = words
-        partner = partner_of(int(port), "output", self.settings, f"{self.file}, line {self.number}")
-        self.handshake(Request(partner=partner, on=on == "True"))
-
-    def wait_for(self, words: tuple[str, str]) -> None:
-        port, timeout = words
+    def wait_for(self, port: str, timeout: str) -> None:
         if not self.can_wait:
             raise self.fault("the program does not say how it waits for an input")
-        partner = partner_of(int(port), "input", self.settings, f"{self.file}, line {self.number}")
-        self.handshake(Await(partner=partner, timeout=float(timeout)))
+        self.expect_answer(int(port), float(timeout))
 
-    def handshake(self, what: Handshake) -> None:
-        self.settled()
-        self.steps.append(ReadHandshake(what=what, file=self.file, line=self.number))
-
-    def settled(self) -> None:
+    def require_standing(self, what: str) -> None:
         """Require that what is switched ahead of a move is switched at its end, too."""
-        if unsettled := [*self.ahead, *self.leads]:
-            raise self.fault(f"the {unsettled[0]} is switched ahead of a move, not at its end")
+        if ahead := [*self.ahead, *self.leads]:
+            raise self.fault(f"the {ahead[0]} is switched ahead of a move, not at its end")
 
     def require_signal(self, signal: str) -> None:
         if signal not in self.signals:
             raise self.fault(f"the program does not say how it switches the {signal}")
-
-    @property
-    def line(self) -> str:
-        return self.lines[self.at][1]
-
-    @property
-    def number(self) -> int:
-        return self.lines[self.at][0]
-
-    def take(self, pattern: re.Pattern[str], what: str) -> tuple[str, ...]:
-        """Return the groups of the next line, which must match."""
-        match = pattern.fullmatch(self.line)
-        if match is None:
-            raise self.fault(f"expected {what}, got {self.line[:60]!r}")
-        self.at += 1
-        return match.groups()
-
-    def expect(self, lines: list[str]) -> None:
-        """Pass over lines that must stand here, word for word."""
-        for line in lines:
-            if self.line != line.strip():
-                raise self.fault(f"expected {line.strip()!r}, got {self.line[:60]!r}")
-            self.at += 1
-
-    def fault(self, message: str) -> InputError:
-        return InputError(f"{self.file}, line {self.number}: {message}")
 
 
 def _pose(words: tuple[str, ...]) -> Array:

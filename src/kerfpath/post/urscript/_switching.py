@@ -13,10 +13,18 @@ from math import sqrt
 
 from kerfpath.post._program import Signal
 
-__all__ = ["LOCAL", "distance_ahead", "names", "time_ahead", "waiting", "when_stopped", "words"]
+__all__ = [
+    "LOCAL",
+    "distance_ahead",
+    "names",
+    "stop_lines",
+    "switch_lines",
+    "time_ahead",
+    "wait_lines",
+]
 
 LOCAL = ("due", "gap", "most", "near", "on", "port", "target", "value", "waited")
-"""Names inside the thread and the functions of `words`; a contour of that name would hide them."""
+"""Names inside the thread and the functions of `switch_lines`; no contour may have them."""
 
 
 def distance_ahead(lead_time: float, speed: float, acceleration: float, *, stops: bool) -> float:
@@ -39,17 +47,17 @@ def time_ahead(distance: float, speed: float, acceleration: float, *, stops: boo
 
 
 def names(signal: Signal) -> list[str]:
-    """Return every name that the lines of `words` define."""
+    """Return every name that the lines of `switch_lines` define."""
     parts = ("waits", "point", "distance", "value", "thread", "ahead", "set", "run")
     return [f"{signal}_{part}" for part in parts]
 
 
-def when_stopped(outputs: Sequence[int]) -> list[str]:
+def stop_lines(outputs: Sequence[int]) -> list[str]:
     """Return the lines by which the controller sets outputs low whenever no program runs."""
     return [f"set_runstate_standard_digital_output_to_value({output}, 1)" for output in outputs]
 
 
-def waiting(outputs: Sequence[int]) -> list[str]:
+def wait_lines(outputs: Sequence[int]) -> list[str]:
     """Return the lines that define how an input is waited for.
 
     Without an answer all `outputs` are switched off and the program ends.
@@ -70,7 +78,7 @@ def waiting(outputs: Sequence[int]) -> list[str]:
     ]
 
 
-def words(signal: Signal, output: int) -> list[str]:
+def switch_lines(signal: Signal, output: int) -> list[str]:
     """Return the lines that define how a signal is switched, by which digital output."""
     put = f"set_standard_digital_out({output}, "
     return [

@@ -16,9 +16,9 @@ import numpy as np
 
 from kerfpath._arrays import Array
 from kerfpath.errors import InputError
-from kerfpath.post._counting import offset_near
-from kerfpath.post._divide import in_one_file
-from kerfpath.post._formatter import Formatter, number, plain
+from kerfpath.post._axes import offset_near
+from kerfpath.post._divide import require_one_file
+from kerfpath.post._formatter import Formatter, number
 from kerfpath.post._orientations import rotation_vectors
 from kerfpath.post._program import (
     Await,
@@ -29,19 +29,20 @@ from kerfpath.post._program import (
     Request,
     Signal,
     Wait,
+    targets_of,
 )
-from kerfpath.post._settings import Rules, Settings, handshakes, setting
+from kerfpath.post._settings import PortSettings, Rules, outputs, setting
 from kerfpath.post.urscript._switching import (
     LOCAL,
     distance_ahead,
     names,
-    waiting,
-    when_stopped,
-    words,
+    stop_lines,
+    switch_lines,
+    wait_lines,
 )
 from kerfpath.robots import Robot
 
-__all__ = ["FIRST", "URScript", "URScriptSettings", "full_joint_speed", "outputs", "rules"]
+__all__ = ["FIRST", "URScript", "URScriptSettings", "full_joint_speed", "rules"]
 
 SPEED_STEP = 1e-6
 """Speeds (m/s) have six decimals."""
@@ -49,27 +50,14 @@ FIRST = "first_contour"
 """Number of the contour at which the program begins, for a restart."""
 POINT_STEP, ANGLE_STEP = 0.5e-7, 0.5e-9
 """What seven decimals of m leave of positions, and nine of rad of turns."""
-NOT_CHECKED = "not been checked for collisions"
 
 Output = Annotated[int | None, setting("a standard digital output from 0 to 7", "0", ge=0, le=7)]
-
-
 Input = Annotated[int | None, setting("a standard digital input from 0 to 7", "0", ge=0, le=7)]
 
 
-class URScriptSettings(Settings):
+class URScriptSettings(PortSettings, output=Output, input=Input):
     """What is wired to the controller, and how fast it may speed up."""
 
-    laser_output: Output = None
-    gas_output: Output = None
-    ready_input: Input = None
-    shutter_input: Input = None
-    gas_pressure_input: Input = None
-    height_input: Input = None
-    interlock_input: Input = None
-    ready_output: Output = None
-    shutter_output: Output = None
-    height_output: Output = None
     acceleration_mm_s2: Annotated[
         float, setting("a number from 1 to 50000, in mm/s^2", "1200", ge=1, le=50_000)
     ] = 1200.0
@@ -81,13 +69,6 @@ class URScriptSettings(Settings):
     def acceleration(self) -> float:
         """Of the tip, m/s^2."""
         return self.acceleration_mm_s2 * 1e-3
-
-
-def outputs(settings: URScriptSettings) -> list[int]:
-    """Return all outputs that the settings name."""
-    requests = (n for (_, way), n in handshakes(settings).items() if way == "output")
-    named = (settings.laser_output, settings.gas_output, *requests)
-    return [output for output in named if output is not None]
 
 
 def rules(settings: URScriptSettings) -> Rules:
@@ -119,14 +100,11 @@ class URScript(Formatter):
         """Return the one file."""
         self.target = self._target_texts()
         lines = [*self._program()]
-        return in_one_file(f"{self.program.name}.script", lines, self.settings.lines_per_file)
+        return require_one_file(f"{self.program.name}.script", lines, self.settings.lines_per_file)
 
     def _program(self) -> Iterator[str]:
         program, robot = self.program, self.program.robot
-        checked = "been proved clear in the planned cell" if program.air_checked else NOT_CHECKED
-        yield f"# Written by kerfpath for {plain(robot.model)} ({plain(robot.id)})."
-        yield f"# Moves through the air have {checked}."
-        yield from (f"# {said}" for said in program.caveats)
+        yield from (f"# {remark}" for remark in self.head())
         yield "# Payload and centre of gravity are those of the installation."
         yield "# The controller sets the outputs low while no program runs; the safety circuit of"
         yield "# the cell has to switch the laser off, too."
@@ -138,11 +116,11 @@ class URScript(Formatter):
         yield f"  set_tcp({_pose(tool)})"
         yield f"  global part_frame = {_pose(part)}"
         yield f"  global {FIRST} = 1"
-        yield from (f"  {line}" for line in when_stopped(outputs(self.settings)))
+        yield from (f"  {line}" for line in stop_lines(outputs(self.settings)))
         if any(isinstance(step, Await) for step in program.steps):
-            yield from (f"  {line}" for line in waiting(outputs(self.settings)))
+            yield from (f"  {line}" for line in wait_lines(outputs(self.settings)))
         for signal in self.signals:
-            yield from (f"  {line}" for line in words(signal, self.output(signal)))
+            yield from (f"  {line}" for line in switch_lines(signal, self.output(signal)))
         for section in program.sections:
             yield f"  def {section.name}():"
             yield from (f"    {line}" for line in self.lines(section))
@@ -158,10 +136,8 @@ class URScript(Formatter):
     @property
     def signals(self) -> list[Signal]:
         """What the program can switch."""
-        moves = [move for move in self.program.moves if isinstance(move, LinearMove)]
-        gas = any(switch.signal == "gas" for move in moves for switch in move.switches)
         found: list[Signal] = [] if self.settings.laser_output is None else ["laser"]
-        return [*found, "gas"] if gas else found
+        return [*found, "gas"] if "gas" in self.program.signals else found
 
     def names(self) -> list[tuple[str, str]]:
         """Return every name in the program, with what it names."""
@@ -231,15 +207,11 @@ class URScript(Formatter):
 
     def _target_texts(self) -> dict[Move, list[str]]:
         """Return the poses of each move in the part frame, those on the way first."""
-        points: list[tuple[Move, Array]] = []
-        for move in dict.fromkeys(self.program.moves):
-            if isinstance(move, CircularMove):
-                points.append((move, move.T_part_via))
-            if isinstance(move, LinearMove):
-                points.append((move, move.T_part_tip))
-        T = np.array([T for _, T in points]).reshape(-1, 4, 4)
-        texts: dict[Move, list[str]] = {move: [] for move, _ in points}
-        for (move, _), point, turn in zip(points, T[:, :3, 3], rotation_vectors(T), strict=True):
+        moves = dict.fromkeys(self.program.moves)
+        points = targets_of(move for move in moves if isinstance(move, LinearMove))
+        T = np.array([T for _, _, T in points]).reshape(-1, 4, 4)
+        texts: dict[Move, list[str]] = {move: [] for move, _, _ in points}
+        for (move, _, _), point, turn in zip(points, T[:, :3, 3], rotation_vectors(T), strict=True):
             texts[move].append(_pose_text(point, turn, 7))
         return texts
 

@@ -1,7 +1,7 @@
 """VAL 3, the language of Staubli controllers, as projects of XML files."""
 
 from kerfpath.post._languages import Language
-from kerfpath.post._standing import stopping_to_switch
+from kerfpath.post._standing import stop_to_switch
 from kerfpath.post.val3._axes import axes_from_joints as axes_from_joints
 from kerfpath.post.val3._axes import configurations as configurations
 from kerfpath.post.val3._axes import joints_from_axes as joints_from_axes
@@ -25,7 +25,7 @@ VAL3 = Language(
     is_reserved=is_reserved,
     posture=posture,
     check=check,
-    sayable=stopping_to_switch,
+    sayable=stop_to_switch,
     ahead=False,
     assumed={"laser_output": r"BasicIO-1\%Q0"},
     read=read,

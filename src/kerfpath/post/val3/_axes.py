@@ -18,9 +18,9 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike
 
-from kerfpath._arrays import Array, floats, freeze
+from kerfpath._arrays import Array, floats
 from kerfpath.post._arm_plane import wrist_in_plane
-from kerfpath.post._counting import offset_near
+from kerfpath.post._axes import AxisCount
 from kerfpath.post.val3._settings import Val3Settings
 from kerfpath.robots import Robot
 
@@ -29,20 +29,11 @@ __all__ = ["SAME", "axes_from_joints", "configurations", "joints_from_axes", "po
 SAME = ("ssame", "esame", "wsame")
 """What a point says that keeps the configuration."""
 
+COUNT = AxisCount()
+axes_from_joints = COUNT.from_joints
+joints_from_axes = COUNT.to_joints
 NOISE = 1e-8
 """Sines and lengths (m) below zero by less than this are zero."""
-
-
-def axes_from_joints(robot: Robot, q: ArrayLike) -> Array:
-    """Return the controller's axes (K, 6) rad of joint vectors q (K, 6) rad."""
-    return freeze(np.asarray(robot.sign * floats(q, "q", (None, 6)) - offset_near(robot, 0.0)))
-
-
-def joints_from_axes(robot: Robot, axes: ArrayLike) -> Array:
-    """Return the joint vectors (K, 6) rad of a controller's axes (K, 6) rad."""
-    return freeze(
-        np.asarray(robot.sign * (floats(axes, "axes", (None, 6)) + offset_near(robot, 0.0)))
-    )
 
 
 def posture(robot: Robot, q: Array, settings: Val3Settings) -> list[tuple[int | str, ...]]:

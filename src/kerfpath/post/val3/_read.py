@@ -4,25 +4,17 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping
-from dataclasses import replace
 from pathlib import PurePosixPath
-from typing import Literal
+from typing import Any
 
 import numpy as np
 
 from kerfpath._arrays import Array, freeze
 from kerfpath.errors import InputError
 from kerfpath.post._frames import faceplate, world
-from kerfpath.post._program import PARTNERS, Await, Handshake, Partner, Request, Signal, Switch
-from kerfpath.post._read import (
-    ReadHandshake,
-    ReadMove,
-    ReadProgram,
-    ReadSection,
-    ReadStep,
-    ReadWait,
-    patterns,
-)
+from kerfpath.post._program import PARTNERS, Partner, Switch
+from kerfpath.post._read import MoveKind, ReadMove, ReadProgram, ReadSection, ReadStep
+from kerfpath.post._reading import LineReader, patterns, statements
 from kerfpath.post.val3._read_data import Data
 from kerfpath.post.val3._settings import Val3Settings
 from kerfpath.post.val3._write import (
@@ -31,12 +23,12 @@ from kerfpath.post.val3._write import (
     PORTS,
     PROGRAM,
     PROJECT,
-    awaiting,
-    closing,
+    closing_lines,
     links,
-    opening,
+    opening_lines,
     parameters,
-    stopping,
+    stop_lines,
+    wait_lines,
 )
 from kerfpath.post.val3._xml import Element, parse
 from kerfpath.robots import Robot
@@ -99,7 +91,7 @@ class _Project:
     def __init__(
         self, file: str, files: Mapping[str, str], robot: Robot, settings: Val3Settings
     ) -> None:
-        self.files, self.settings = files, settings
+        self.files, self.robot, self.settings = files, robot, settings
         self.folder = PurePosixPath(file).parent
         self.name = PurePosixPath(file).stem
         root = parse(file, files[file], "Project", PROJECT)
@@ -167,14 +159,12 @@ class _Project:
 
     def statements(self, code: Element) -> list[tuple[int, str]]:
         """Return the lines of a routine without comments, with their numbers."""
-        rows = enumerate(code.text.split("\n")[1:-1], code.line + 1)
-        stripped = ((number, row.strip()) for number, row in rows)
-        return [(n, row) for n, row in stripped if row and not row.startswith("//")]
+        return statements(code.text.split("\n")[1:-1], "//", code.line + 1)
 
     def calls(self, start: Element) -> list[tuple[int, str, str]]:
         """Return what start() calls: line, alias of the library or nothing, routine."""
         rows = self.statements(start)
-        begin, end = opening(self.settings), closing()
+        begin, end = opening_lines(self.settings), closing_lines()
         count = len(rows) - len(begin) - len(end)
         for number, row in enumerate(begin):
             if [text for _, text in rows[number : number + 1]] != [row]:
@@ -195,146 +185,92 @@ class _Project:
     def require_stop(self) -> None:
         """Check that stop() switches everything off."""
         stop = self.routine("stop")
-        if [row for _, row in self.statements(stop)] != stopping(self.settings):
-            raise stop.fault(f"expected {' and '.join(stopping(self.settings))} in stop()")
+        if [row for _, row in self.statements(stop)] != stop_lines(self.settings):
+            raise stop.fault(f"expected {' and '.join(stop_lines(self.settings))} in stop()")
 
     def steps(self, name: str) -> tuple[ReadStep, ...]:
         """Return what a routine does."""
-        code = self.routine(name)
-        reader = _Routine(self, code)
-        for line, row in self.statements(code):
-            reader.read(line, row)
-        if reader.must_say:
-            raise code.fault(f"{reader.must_say[0]!r} is missing")
-        return tuple(reader.found)
+        return tuple(_Routine(self, self.routine(name)).steps)
 
 
-class _Routine:
-    """Reads the statements of one routine; each kind has a method of its name."""
+class _Routine(LineReader):
+    """The statements of one routine."""
 
     def __init__(self, project: _Project, code: Element) -> None:
-        self.project, self.code, self.line = project, code, 0
-        self.found: list[ReadStep] = []
+        super().__init__(code.file, project.robot, project.settings, project.statements(code))
+        self.data = project.data
         self.stands = False
-        self.must_say: list[str] = []
-
-    def read(self, line: int, row: str) -> None:
-        self.line = line
-        if self.must_say:
-            if row != self.must_say[0]:
-                raise self.fault(f"expected {self.must_say[0]!r}, got {row[:60]!r}")
-            del self.must_say[0]
-            return
-        for kind, pattern in _LINES.items():
-            if match := pattern.fullmatch(row):
-                getattr(self, kind)(*match.groups())
-                return
-        raise self.fault(f"not expected here: {row[:60]!r}")
+        for _ in self.rows:
+            self.read(self.advance(), _LINES)
+        self.line = code.line
+        self.require_complete()
 
     def joint(self, target: str, motion: str) -> None:
-        q = self.project.data.q
-        share, zone = self.motion("mAir", motion)
-        self.found.append(
-            ReadMove(
-                kind="joint",
-                file=self.code.file,
-                line=self.line,
-                q=freeze(q[self.place("jAir", target, len(q))]),
-                speed=share,
-                zone=zone,
-                elsewhere=self.elsewhere("jAir", target, "mAir", motion),
-            )
-        )
-        self.stands = False
+        q = self.data.q[self.index("jAir", target, len(self.data.q))]
+        self.move("joint", ("jAir", target), ("mAir", motion), q=freeze(q))
 
     def linear(self, target: str, motion: str) -> None:
         self.path("linear", target, motion)
 
     def circular(self, via: str, target: str, motion: str) -> None:
-        T = self.project.data.T
-        self.path("circular", target, motion, freeze(T[self.place("pPath", via, len(T))]))
+        self.path("circular", target, motion, self.pose(via))
 
-    def path(
-        self,
-        kind: Literal["linear", "circular"],
-        target: str,
-        motion: str,
-        T_part_via: Array | None = None,
+    def path(self, kind: MoveKind, target: str, motion: str, via: Array | None = None) -> None:
+        said = {"T_part_tip": self.pose(target), "T_part_via": via}
+        posture = self.data.words[int(target)]
+        self.move(kind, ("pPath", target), ("mPath", motion), posture=posture, **said)
+
+    def pose(self, key: str) -> Array:
+        """Return a point (4, 4) m of the data."""
+        return freeze(self.data.T[self.index("pPath", key, len(self.data.T))])
+
+    def move(
+        self, kind: MoveKind, target: tuple[str, str], motion: tuple[str, str], **said: Any
     ) -> None:
-        T = self.project.data.T
-        k = self.place("pPath", target, len(T))
-        speed, zone = self.motion("mPath", motion)
-        self.found.append(
-            ReadMove(
-                kind=kind,
-                file=self.code.file,
-                line=self.line,
-                T_part_tip=freeze(T[k]),
-                T_part_via=T_part_via,
-                posture=self.project.data.words[k],
-                speed=speed,
-                zone=zone,
-                elsewhere=self.elsewhere("pPath", target, "mPath", motion),
-            )
-        )
+        """Add a move to a target with a speed and a corner, each by the name and key of a datum."""
+        name, key = motion
+        motions, at = self.data.motions[name], self.data.said_at
+        speed, zone = motions[self.index(name, key, len(motions))]
+        place = at[name][int(key)]
+        elsewhere = {"target": at[target[0]][int(target[1])], "speed": place, "zone": place}
+        self.add_move(kind, speed, zone=zone, elsewhere=elsewhere, **said)
         self.stands = False
 
     def stand(self) -> None:
-        last = self.found[-1] if self.found else None
+        last = self.steps[-1] if self.steps else None
         if isinstance(last, ReadMove) and last.zone:
             raise self.fault("the robot is to stand where a corner is to be rounded")
         self.stands = True
 
     def switch(self, name: str, state: str) -> None:
-        last = self.found[-1] if self.found else None
-        if not self.stands or not isinstance(last, ReadMove) or last.kind == "joint":
+        last = self.last_on_path()
+        if not self.stands or last is None:
             raise self.fault("a switch must follow a move of the path and waitEndMove()")
-        signal: Signal = "laser" if name == "dioLaser" else "gas"
-        if name not in links(self.project.settings):
+        if name not in links(self.settings):
             raise self.fault(f"{name} is not declared")
-        switches = (*last.switches, Switch(signal=signal, on=state == "true"))
-        elsewhere = {**last.elsewhere, "switches": f"{self.code.file}, line {self.line}"}
-        self.found[-1] = replace(last, switches=switches, elsewhere=elsewhere)
+        switch = Switch(signal="laser" if name == "dioLaser" else "gas", on=state == "true")
+        self.add_switch(last, switch, self.place)
 
     def request(self, name: str, state: str) -> None:
-        self.handshake(Request(partner=self.partner(name, "output"), on=state == "true"))
+        self.ask(name, on=state == "true")
 
     def wait_for(self, name: str, timeout: str) -> None:
         partner = self.partner(name, "input")
-        self.must_say = awaiting(partner, float(timeout), self.project.settings)[1:]
-        self.handshake(Await(partner=partner, timeout=float(timeout)))
+        self.required = wait_lines(partner, float(timeout), self.settings)[1:]
+        self.expect_answer(name, float(timeout))
 
-    def partner(self, name: str, way: str) -> Partner:
-        if name in links(self.project.settings):
+    def partner(self, port: object, way: str) -> Partner:
+        if port in links(self.settings):
             for (partner, its_way), known in PORTS.items():
-                if (known, its_way) == (name, way):
+                if (known, its_way) == (port, way):
                     return PARTNERS[partner]
-        raise self.fault(f"{name} is not declared")
+        raise self.fault(f"{port} is not declared")
 
-    def handshake(self, what: Handshake) -> None:
+    def require_standing(self, what: str) -> None:
         if not self.stands:
-            raise self.fault("a handshake must follow waitEndMove()")
-        self.found.append(ReadHandshake(what=what, file=self.code.file, line=self.line))
+            raise self.fault(f"{what} must follow waitEndMove()")
 
-    def wait(self, time: str) -> None:
-        if not self.stands:
-            raise self.fault("a delay must follow waitEndMove()")
-        self.found.append(ReadWait(time=float(time), file=self.code.file, line=self.line))
-
-    def elsewhere(self, targets: str, target: str, motions: str, motion: str) -> dict[str, str]:
-        """Return where the data of a move stand."""
-        at = self.project.data.said_at
-        moves = at[motions][int(motion)]
-        return {"target": at[targets][int(target)], "speed": moves, "zone": moves}
-
-    def motion(self, name: str, key: str) -> tuple[float, float]:
-        motions = self.project.data.motions[name]
-        return motions[self.place(name, key, len(motions))]
-
-    def place(self, name: str, key: str, count: int) -> int:
+    def index(self, name: str, key: str, count: int) -> int:
         if int(key) >= count:
             raise self.fault(f"{name}[{key}] is not declared")
         return int(key)
-
-    def fault(self, message: str) -> InputError:
-        return self.code.fault(message, self.line)

@@ -5,13 +5,12 @@ from __future__ import annotations
 import re
 
 import numpy as np
-from scipy.spatial.transform import Rotation
 
-from kerfpath._arrays import Array, freeze
-from kerfpath.post._read import same_output
+from kerfpath._arrays import Array
+from kerfpath.post._frames import from_euler
 from kerfpath.post.val3._axes import SAME, joints_from_axes
 from kerfpath.post.val3._settings import Val3Settings
-from kerfpath.post.val3._write import FIRST, OUTPUTS, PORTS, TYPES, links
+from kerfpath.post.val3._write import ANGLES, FIRST, OUTPUTS, PORTS, TYPES, links
 from kerfpath.post.val3._xml import Element
 from kerfpath.robots import Robot
 
@@ -88,7 +87,8 @@ class Data:
     def _output(self, name: str, values: list[Element]) -> None:
         (value,) = values
         link = value.attributes.get("link", "")
-        same_output(link, links(self.settings).get(name), f"{value.file}, line {value.line}")
+        if link != (expected := links(self.settings).get(name)):
+            raise value.fault(f"switches the output {link}; expected {expected}")
         value.take(link=link)
 
     def _air_targets(self, name: str, values: list[Element]) -> None:
@@ -154,7 +154,4 @@ def _poses(values: list[Element], father: str) -> Array:
             raise value.fault(f"expected a pose, got {value.shown()}")
         if value.attributes["fatherId"] != father:
             raise value.fault(f"expected it in {father}, got {value.attributes['fatherId'][:60]!r}")
-    T = np.tile(np.eye(4), (len(rows), 1, 1))
-    T[:, :3, :3] = Rotation.from_euler("XYZ", rows[:, 3:], degrees=True).as_matrix()
-    T[:, :3, 3] = rows[:, :3] * 1e-3
-    return freeze(T)
+    return from_euler(rows, ANGLES)

@@ -7,7 +7,7 @@ from typing import Annotated, Literal
 import numpy as np
 from pydantic import StringConstraints
 
-from kerfpath.post._settings import Rules, Settings, setting
+from kerfpath.post._settings import PortSettings, Rules, setting
 
 __all__ = ["LONGEST_NAME", "Val3Settings", "is_reserved", "rules"]
 
@@ -43,33 +43,22 @@ MEANINGS = (
 """Types, data, words and instructions of a controller, where a contour may be named so."""
 RESERVED = frozenset((KEYWORDS + " " + MEANINGS).split())
 
+Link = Annotated[str, StringConstraints(pattern=r"^[A-Za-z0-9_.%\\/:\-]{1,80}$")]
 Output = Annotated[
-    Annotated[str, StringConstraints(pattern=r"^[A-Za-z0-9_.%\\/:\-]{1,80}$")] | None,
+    Link | None,
     setting("the link of a digital output, as the controller lists it", r'"BasicIO-1\\%Q0"'),
 ]
-
-
 Input = Annotated[
-    Annotated[str, StringConstraints(pattern=r"^[A-Za-z0-9_.%\\/:\-]{1,80}$")] | None,
+    Link | None,
     setting("the link of a digital input, as the controller lists it", r'"BasicIO-1\\%I0"'),
 ]
 
 
-class Val3Settings(Settings):
+class Val3Settings(PortSettings, output=Output, input=Input):
     """Which outputs, where the projects lie, and for which version they are."""
 
-    laser_output: Output = None
-    gas_output: Output = None
-    ready_input: Input = None
-    shutter_input: Input = None
-    gas_pressure_input: Input = None
-    height_input: Input = None
-    interlock_input: Input = None
-    ready_output: Output = None
-    shutter_output: Output = None
-    height_output: Output = None
     tool_link: Annotated[
-        Annotated[str, StringConstraints(pattern=r"^[A-Za-z0-9_.%\\/:\-]{1,80}$")],
+        Link,
         setting("the link of the tool's own output, as the controller lists it", '"valve1"'),
     ] = "valve1"
     configurations: Annotated[Literal["named", "same"], setting('"named" or "same"', '"named"')] = (

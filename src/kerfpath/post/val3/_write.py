@@ -3,24 +3,23 @@
 Units of VAL 3: mm, deg, mm/s, seconds; rx, ry, rz turn about x, the new y, the new z. A program is
 a project, a folder of XML files: what belongs to it, its data, and one file for each routine.
 Targets, speeds and frames are data. Motions are queued while the routine runs on: to switch an
-output where the tip stands, the routine waits for the end of the motion; see `stopping_to_switch`.
+output where the tip stands, the routine waits for the end of the motion; see `stop_to_switch`.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
+from typing import Final
 from xml.sax.saxutils import quoteattr
 
 import numpy as np
-from scipy.spatial.transform import Rotation
 
 from kerfpath._arrays import Array
 from kerfpath.errors import InputError
-from kerfpath.post._divide import in_files, renamed
-from kerfpath.post._formatter import Formatter, number, plain
-from kerfpath.post._frames import faceplate, world
-from kerfpath.post._names import identifiers
+from kerfpath.post._divide import divide_program, rename_sections
+from kerfpath.post._formatter import Formatter, number
+from kerfpath.post._frames import controller_frames, euler
 from kerfpath.post._program import (
     Await,
     CircularMove,
@@ -31,18 +30,33 @@ from kerfpath.post._program import (
     Request,
     Section,
     Wait,
+    targets_of,
 )
 from kerfpath.post._settings import handshakes
-from kerfpath.post._standing import stopping_to_switch
+from kerfpath.post._standing import stop_to_switch
 from kerfpath.post.val3._axes import axes_from_joints, posture
 from kerfpath.post.val3._settings import LONGEST_NAME, Val3Settings
 from kerfpath.post.val3._xml import SCHEMA
 
 __all__ = [
-    "DATA", "FIRST", "OUTPUTS", "PORTS", "PROGRAM", "PROJECT", "Val3", "awaiting", "closing",
-    "links", "opening", "parameters", "stopping",
+    "ANGLES",
+    "DATA",
+    "FIRST",
+    "OUTPUTS",
+    "PORTS",
+    "PROGRAM",
+    "PROJECT",
+    "Val3",
+    "closing_lines",
+    "links",
+    "opening_lines",
+    "parameters",
+    "stop_lines",
+    "wait_lines",
 ]  # fmt: skip
 
+ANGLES: Final = "XYZ"
+"""rx, ry, rz turn about x, the new y, the new z."""
 PROJECT = "http://www.staubli.com/robotics/VAL3/Project/3"
 PROGRAM = "http://www.staubli.com/robotics/VAL3/Program/2"
 DATA = "http://www.staubli.com/robotics/VAL3/Data/2"
@@ -74,7 +88,6 @@ AROUND = 40
 """Lines of a file beside those of its steps and their data."""
 DATA_OF_A_STEP = 3
 """A circular move: two points and a speed."""
-NOT_CHECKED = "not been checked for collisions"
 
 
 def parameters(settings: Val3Settings) -> dict[str, str]:
@@ -89,13 +102,13 @@ def links(settings: Val3Settings) -> dict[str, str]:
     return {name: link for name, link in named.items() if link is not None}
 
 
-def opening(settings: Val3Settings) -> list[str]:
+def opening_lines(settings: Val3Settings) -> list[str]:
     """Return the statements that switch everything off, as start() does before it calls others."""
     inputs = [name for (_, way), name in PORTS.items() if way == "input"]
     return [f"{name}=false" for name in links(settings) if name not in inputs]
 
 
-def awaiting(partner: str, timeout: float, settings: Val3Settings) -> list[str]:
+def wait_lines(partner: str, timeout: float, settings: Val3Settings) -> list[str]:
     """Return the statements that wait for an input.
 
     After `timeout` (s) everything is off, the arm's power too, until the input comes.
@@ -103,7 +116,7 @@ def awaiting(partner: str, timeout: float, settings: Val3Settings) -> list[str]:
     asked = f"{PORTS[partner, 'input']}==true"
     return [
         f"if watch({asked},{number(timeout, 3)})==false",
-        *opening(settings),
+        *opening_lines(settings),
         "disablePower()",
         f'logMsg("{partner}: no answer")',
         f"wait({asked})",
@@ -111,14 +124,14 @@ def awaiting(partner: str, timeout: float, settings: Val3Settings) -> list[str]:
     ]
 
 
-def closing() -> list[str]:
+def closing_lines() -> list[str]:
     """Return the last statements of start(); the next time it begins with the first contour."""
     return ["waitEndMove()", f"{FIRST}=1"]
 
 
-def stopping(settings: Val3Settings) -> list[str]:
+def stop_lines(settings: Val3Settings) -> list[str]:
     """Return the statements of stop(), which the controller calls when the project is stopped."""
-    return [*opening(settings), "resetMotion()"]
+    return [*opening_lines(settings), "resetMotion()"]
 
 
 @dataclass(slots=True)
@@ -144,26 +157,26 @@ class Val3(Formatter):
     """Writes a project with a routine for each section, and libraries where it is too long."""
 
     settings: Val3Settings
+    too_long = "warning"
 
     def __init__(self, program: Program, settings: Val3Settings) -> None:
-        short = replace(stopping_to_switch(program), name=program.name[:LONGEST_NAME])
-        super().__init__(renamed(short, (FIRST,), longest_name=LONGEST_NAME), settings)
+        short = replace(stop_to_switch(program), name=program.name[:LONGEST_NAME])
+        super().__init__(rename_sections(short, (FIRST,), longest_name=LONGEST_NAME), settings)
         self._target = self._target_texts()
         self._database = _Database()
         self._moving = True
-        counts, room = list(self.lengths().values()), settings.lines_per_file - AROUND
-        self._parts: dict[str, Sequence[Section]] = {}
-        if sum(counts) > room:
-            groups = in_files(self.program.sections, counts, room)
-            taken = [self.program.name, *(section.name for section in self.program.sections)]
-            names = identifiers(
-                [self.program.name] * len(groups), taken=taken, longest=LONGEST_NAME
-            )
-            self._parts = dict(zip(names, groups, strict=True))
+        counts = list(self.lengths().values())
+        self._parts: dict[str, list[Section]] = {}
+        if sum(counts) > self.room():
+            self._parts = divide_program(self.program, counts, self.room(), LONGEST_NAME)
 
     def lengths(self) -> dict[str, int]:
         """Return how many lines of data each contour takes at most, by its name."""
         return {s.name: DATA_OF_A_STEP * len(s.steps) for s in self.program.sections}
+
+    def room(self) -> int:
+        """Return how many lines of contours a file has room for."""
+        return super().room() - AROUND
 
     def files(self) -> dict[str, str]:
         """Return the files of the project, and those of the libraries that it calls."""
@@ -229,7 +242,7 @@ class Val3(Formatter):
     def wait_for(self, awaited: Await) -> Iterator[str]:
         """Yield a wait for an input, once the robot stands."""
         yield from self.standing()
-        yield from awaiting(awaited.partner, awaited.timeout, self.settings)
+        yield from wait_lines(awaited.partner, awaited.timeout, self.settings)
 
     def comment(self, text: str) -> Iterator[str]:
         """Yield a comment that does not end the text in which it stands."""
@@ -260,11 +273,11 @@ class Val3(Formatter):
         routines = {section.name: list(self.lines(section)) for section in sections}
         start = ["// A library: its routines are called."]
         if calls is not None:
-            start = [*self._remarks(), *opening(self.settings)]
+            start = [*self._remarks(), *opening_lines(self.settings)]
             for n, call in enumerate(calls, 1):
                 start += [f"if {FIRST}<={n}", f"  call {call}()", "endIf"]
-            start += closing()
-        routines = {"start": start, "stop": stopping(self.settings), **routines}
+            start += closing_lines()
+        routines = {"start": start, "stop": stop_lines(self.settings), **routines}
         texts = {
             f"{name}.pjx": self._contents(name, routines, () if calls is None else self._parts)
         }
@@ -284,9 +297,8 @@ class Val3(Formatter):
         return _text([*rows, "  </Libraries>", "</Project>"])
 
     def _data(self, *, is_main: bool) -> str:
-        program, settings = self.program, self.settings
-        frame = np.linalg.inv(world(program.robot)) @ program.T_base_part
-        tool = np.linalg.inv(faceplate(program.robot)) @ program.T_flange_tip
+        settings = self.settings
+        frame, tool = controller_frames(self.program)
         rows = [f'<Database xmlns:xsi="{SCHEMA}" xmlns="{DATA}">', "  <Datas>"]
         rows += _array("fPart", "frame", [f'{POSE % _poses(frame)[0]} fatherId="world[0]"'])
         own = f"ioLink={quoteattr(settings.tool_link)}"
@@ -299,18 +311,10 @@ class Val3(Formatter):
         return _text([*rows, "  </Datas>", "</Database>"])
 
     def _remarks(self) -> Iterator[str]:
-        program = self.program
-        checked = "been proved clear in the planned cell" if program.air_checked else NOT_CHECKED
-        robot = f"{plain(program.robot.model)} ({plain(program.robot.id)})"
-        yield from self.comment(f"Written by kerfpath for {robot}.")
-        yield from self.comment("fPart is the part in the world, which starts at axis 2.")
-        yield from self.comment(f"Moves through the air have {checked}.")
-        for said in program.caveats:
-            yield from self.comment(said)
-        yield from self.comment(
-            "stop() switches the laser off; the safety circuit of the cell has to, too."
-        )
-        yield from self.comment(f"To begin at a contour, set {FIRST} to its number.")
+        head = self.head("fPart is the part in the world, which starts at axis 2.")
+        stop = "stop() switches the laser off; the safety circuit of the cell has to, too."
+        for remark in (*head, stop, f"To begin at a contour, set {FIRST} to its number."):
+            yield from self.comment(remark)
 
     def _target_texts(self) -> dict[Move, list[str]]:
         """Return the targets of each move as they stand in the data, all at once."""
@@ -321,15 +325,9 @@ class Val3(Formatter):
             axes_deg = np.degrees(axes_from_joints(robot, [m.q for m in joint])).round(6) + 0.0
             for target, row in zip(joint, axes_deg.tolist(), strict=True):
                 texts[target].append(JOINTS % tuple(row))
-        points: list[tuple[Move, Array, Array]] = []
-        for move in moves:
-            if isinstance(move, CircularMove):
-                points.append((move, move.q_via, move.T_part_via))
-            if isinstance(move, LinearMove):
-                points.append((move, move.q, move.T_part_tip))
-        if points:
+        if points := targets_of(move for move in moves if isinstance(move, LinearMove)):
             words = posture(robot, np.array([q for _, q, _ in points]), self.settings)
-            poses = _poses([T for _, _, T in points])
+            poses = _poses(np.array([T for _, _, T in points]))
             for (end, _, _), pose, three in zip(points, poses, words, strict=True):
                 texts[end].append(f'{POSE % pose} {CONFIGURATION % three} fatherId="fPart[0]"')
         return texts
@@ -337,11 +335,9 @@ class Val3(Formatter):
 
 def _poses(T: Array | Sequence[Array]) -> list[tuple[float, ...]]:
     """Return poses (K, 4, 4) m as x, y, z in mm and rx, ry, rz in deg."""
-    poses = np.asarray(T).reshape(-1, 4, 4)
-    turned = Rotation.from_matrix(poses[:, :3, :3])
-    angles = turned.as_euler("XYZ", degrees=True, suppress_warnings=True).round(6) + 0.0
-    points = (poses[:, :3, 3] * 1e3).round(4) + 0.0
-    return [tuple(row) for row in np.hstack([points, angles]).tolist()]
+    values = euler(T, ANGLES)
+    rows = np.hstack([values[:, :3].round(4), values[:, 3:].round(6)]) + 0.0
+    return [tuple(row) for row in rows.tolist()]
 
 
 def _blend(kind: str, move: Move) -> str:

@@ -6,12 +6,12 @@ import json
 from collections import Counter
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
 from kerfpath import __version__
 from kerfpath.job import make_folder
 from kerfpath.post import write_files
-from kerfpath.report import render_layout
+from kerfpath.report import LayoutEntry, render_layout
 from kerfpath.study.placing._layout import Layout
 from kerfpath.study.placing._place import placed_text
 from kerfpath.study.placing._search import Trial
@@ -26,10 +26,10 @@ OF_CONTOUR = ("value", "at_least", "fastest_m_min", "joint", "limit", "node")
 WHY = ("reason", "contour", "node", "nodes", "progress")
 
 
-def layout_entry(found: Layout) -> dict[str, Any]:
+def layout_entry(found: Layout) -> LayoutEntry:
     """Return what layout.json holds: plain data, the same for the same seed."""
     best, before = found.best, found.before
-    return {
+    entry = {
         "schema": SCHEMA,
         "kerfpath": __version__,
         "job": found.job.path.name,
@@ -56,6 +56,7 @@ def layout_entry(found: Layout) -> dict[str, Any]:
         "tried": [_trial(trial) for trial in found.tried],
         "map": _map(found),
     }
+    return cast(LayoutEntry, entry)
 
 
 def _best(found: Layout, best: Trial) -> dict[str, Any]:

@@ -30,6 +30,7 @@ from kerfpath.cell import Cell, Checker
 from kerfpath.errors import InputError, NoFeasiblePath
 from kerfpath.graph import LayeredGraph
 from kerfpath.job import Job, cell_of_job
+from kerfpath.losses import Loss, Reason
 from kerfpath.options import PlanOptions
 from kerfpath.planner import fastest_speed, plan
 from kerfpath.search import shortest_path
@@ -162,11 +163,8 @@ class Worth:
         for subject, graph, here in zip(self.subjects, self.graphs, bad, strict=True):
             if here.any():
                 k = int(np.argmax(here))
-                counts = graph.counts(k)
-                for word in ("admitted", "posture not wanted"):
-                    counts.pop(word, None)
-                told = max(counts, key=lambda word: counts[word]) if counts else ""
-                why = "no clear pose" if status == "collision" else f"no pose, most often {told}"
+                most = f"no pose, most often {graph.main_loss(k)}"
+                why = "no clear pose" if status == "collision" else most
                 where = {"contour": subject.name, "node": EVERY * k, "nodes": len(subject.nodes)}
                 raise Lost(status, so_far + share - PER_METRE * away, reason=why, **where)
 
@@ -260,7 +258,7 @@ class Worth:
 
     def _enough(self, subject: Subject, graph: LayeredGraph, least: float) -> float | None:
         """Return a value that is reached on a part of the graph, if it is `least` or more."""
-        thin = graph.without({"left out": graph.sample % THIN != 0})
+        thin = graph.without({Reason(Loss.LEFT_OUT): graph.sample % THIN != 0})
         try:
             value = float(self._value(subject, thin)["value"])
         except NoFeasiblePath:
@@ -298,7 +296,7 @@ class Worth:
         """Say of a contour without a path why that is, and where it breaks."""
         if not np.diff(graph.start).all():
             status = "unreachable"
-        elif self.goal != "motion" or any("collision" in word for word in broken.counts):
+        elif self.goal != "motion" or broken.lost_by(Loss.COLLISION):
             status = "collision"
         else:
             status = "speed"

@@ -26,16 +26,16 @@ def why_not_clear(cell: Cell, corners: Array) -> str:
     over = cell.distances(q) - cell.required
     hits = over <= 0
     worst = np.argsort(-hits.sum(axis=0), kind="stable")[:PAIRS]
-    told = []
+    words = []
     for p in worst[hits[:, worst].any(axis=0)]:
         one, two = cell.pair_names[int(p)]
         k = int(np.argmin(over[:, p]))
-        told.append(
+        words.append(
             f"{one!r} and {two!r} come {-over[k, p] * 1e3:.3g} mm nearer than allowed "
             f"{100 * steps[k] / steps[-1]:.0f} % of the way"
         )
-    if told:
-        return "; ".join(told)
+    if words:
+        return "; ".join(words)
     k, p = (int(i) for i in np.unravel_index(np.argmin(over), over.shape))
     one, two = cell.pair_names[p]
     return (

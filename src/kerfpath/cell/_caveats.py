@@ -1,4 +1,4 @@
-"""What a cell does not prove, in words for whoever reads a plan, a report or an audit."""
+"""Caveats: what a cell does not prove, in words for readers of plans, reports and audits."""
 
 from __future__ import annotations
 

@@ -1,0 +1,57 @@
+"""Why candidates and edges are lost: one enumeration, from the kernels to the report."""
+
+from __future__ import annotations
+
+from enum import IntEnum
+
+__all__ = ["Loss", "Reason"]
+
+
+class Loss(IntEnum):
+    """The tests that take a candidate pose out of its layer, or an edge out of the graph.
+
+    Kernels code the bounds of joint (or coupling) i as LOW + 2 i and HIGH + 2 i.
+    """
+
+    words: str
+
+    def __new__(cls, code: int, words: str) -> Loss:
+        """Return the member of a code; {} in its words stands for which joint, margin, place."""
+        made = int.__new__(cls, code)
+        made._value_, made.words = code, words
+        return made
+
+    ADMITTED = 0, "admitted"
+    UNREACHABLE = 1, "unreachable"
+    LOW = 2, "{} low"
+    HIGH = 3, "{} high"
+    UNWANTED = 4, "posture not wanted"
+    MARGIN = 5, "{} margin"
+    WINDOW = 6, "window of joint {}"
+    LEFT_OUT = 7, "left out"
+    SPARE = 8, "{} to spare"
+    COLLISION = 9, "collision {}"
+    CLOSED = 10, "closed vertices"
+    SHUT = 11, "shut edges"
+    VELOCITY = 12, "velocity, joint {}"
+    ACCELERATION = 13, "acceleration, joint {}"
+
+
+class Reason(str):
+    """A loss and what it concerns, in the words of plan.json and messages: "joint 3 low".
+
+    It is these words; code asks for its `loss`.
+    """
+
+    loss: Loss
+    which: object
+
+    def __new__(cls, loss: Loss, which: object = "") -> Reason:
+        """Return the reason; which: the joint, margin or place that the words of the loss name."""
+        made = str.__new__(cls, loss.words.format(which).rstrip())
+        made.loss, made.which = loss, which
+        return made
+
+    def __getnewargs__(self) -> tuple[Loss, object]:  # type: ignore[override]  # not a str's own
+        """Return what a copy is made of."""
+        return self.loss, self.which

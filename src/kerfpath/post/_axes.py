@@ -1,0 +1,60 @@
+"""How controllers count the axes of an arm: from which zeros, in which senses."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from kerfpath._arrays import Array, floats, freeze
+from kerfpath._told import told
+from kerfpath.robots import Robot
+
+__all__ = ["AxisCount", "offset_near"]
+
+
+def offset_near(robot: Robot, makers_deg: ArrayLike) -> Array:
+    """Return the joint offsets (6,) rad of a robot, each within half a turn of its maker's (deg).
+
+    The geometry of an arm is the same whether joint 6 counts from -180 or from 180 deg; the axes
+    and turns that its controller reads are not.
+    """
+    # The least share less than half a turn: halves are rounded one way, whatever their last digit.
+    makers = np.radians(np.asarray(makers_deg, dtype=float))
+    off = robot.offset - makers
+    return np.asarray(makers + off - 2 * np.pi * np.round(off / (2 * np.pi) - 1e-9))
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class AxisCount:
+    """Axes of an ortho-parallel arm: matrix @ angles + shift; the model's are 0 with it upright.
+
+    Parameters
+    ----------
+    counted_from : (6,) deg
+        Joint offsets of the maker's own descriptions.
+    matrix : (6, 6)
+    shift : (6,) rad
+    """
+
+    counted_from: tuple[float, ...] = (0.0,) * 6
+    matrix: Array = field(default_factory=lambda: np.eye(6))
+    shift: Array = field(default_factory=lambda: np.zeros(6))
+
+    __repr__ = told
+
+    def from_joints(self, robot: Robot, q: ArrayLike) -> Array:
+        """Return the controller's axes (K, 6) rad of joint vectors q (K, 6) rad."""
+        angles = robot.sign * floats(q, "q", (None, 6))
+        return freeze(np.asarray(angles @ self.matrix.T + self._shift(robot), dtype=np.float64))
+
+    def to_joints(self, robot: Robot, axes: ArrayLike) -> Array:
+        """Return the joint vectors (K, 6) rad of a controller's axes (K, 6) rad."""
+        rows = floats(axes, "axes", (None, 6)) - self._shift(robot)
+        angles = rows @ np.linalg.inv(self.matrix).T
+        return freeze(np.asarray(robot.sign * angles, dtype=np.float64))
+
+    def _shift(self, robot: Robot) -> Array:
+        """Return the axes (6,) rad where the robot's own joints are 0, but for their senses."""
+        return np.asarray(self.shift - self.matrix @ offset_near(robot, self.counted_from))

@@ -1,0 +1,80 @@
+"""Programs that are called by a main one, in whose remarks a person finds the frames to enter."""
+
+from __future__ import annotations
+
+import textwrap
+from collections.abc import Iterator
+from dataclasses import replace
+from typing import Any
+
+from kerfpath._arrays import Array
+from kerfpath.post._formatter import Formatter, number, plain
+from kerfpath.post._frames import Order, controller_frames, euler
+from kerfpath.post._names import identifiers
+from kerfpath.post._program import Program
+
+__all__ = ["CalledFormatter", "off_name"]
+
+OFF = "_OFF"
+"""End of the name of the program that switches everything off."""
+MOST_REMARKS = 3
+"""Lines that a comment is cut to."""
+FRAME_DECIMALS = (4, 4, 4, 6, 6, 6)
+"""Of mm and deg in remarks."""
+
+
+def off_name(name: str, settings: Any) -> str:
+    """Return the name of the program that switches everything off, by that of the main one."""
+    return name[: settings.longest_name - len(OFF)] + OFF
+
+
+class CalledFormatter(Formatter):
+    """Writes a main program, one for each section, and one that switches off, named in capitals."""
+
+    remark_width: int
+    """Characters of a remark."""
+    angles: Order
+    frame_words: tuple[str, ...]
+    """What the three lengths and three angles of a frame are called."""
+    frame_line: str
+    """The remark that gives one of them: frame, word, value."""
+
+    def __init__(self, program: Program, settings: Any) -> None:
+        longest = settings.longest_name
+        (name,) = identifiers([program.name], (), longest)
+        taken = (name, off_name(name, settings))
+        names = identifiers((section.name for section in program.sections), taken, longest)
+        sections = tuple(
+            replace(section, name=own.upper())
+            for section, own in zip(program.sections, names, strict=True)
+        )
+        super().__init__(replace(program, name=name.upper(), sections=sections), settings)
+        self.off_name = off_name(self.program.name, settings)
+
+    def names(self) -> list[tuple[str, str]]:
+        """Return the names of all programs."""
+        sections = ((section.name, "a contour") for section in self.program.sections)
+        off = (self.off_name, "the program that switches off")
+        return [(self.program.name, "the program"), off, *sections]
+
+    def heading(self, *about: str, frame: str, tool: str) -> Iterator[str]:
+        """Yield the remarks of the main program: what is proved, `about`, and the two frames."""
+        program = self.program
+        clear = "proved clear in the planned cell"
+        checked = clear if program.air_checked else "not checked for collisions"
+        for_robot = f"kerfpath, for {plain(program.robot.model)}"
+        moves = f"Moves through the air: {checked}."
+        for remark in (for_robot, moves, *program.caveats, *about):
+            yield from self.comment(remark)
+        for name, T in zip((frame, tool), controller_frames(program), strict=True):
+            yield from self._frame(name, T)
+
+    def _frame(self, name: str, T: Array) -> Iterator[str]:
+        """Yield a frame as remarks, to be entered by a person and read back."""
+        values = euler(T, self.angles)[0]
+        for word, value, decimals in zip(self.frame_words, values, FRAME_DECIMALS, strict=True):
+            yield self.frame_line % (name, word, number(value, decimals))
+
+    def wrap(self, text: str) -> list[str]:
+        """Return a comment as remarks, cut where there would be too many."""
+        return textwrap.wrap(text, self.remark_width, max_lines=MOST_REMARKS, placeholder=" ...")
