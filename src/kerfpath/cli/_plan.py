@@ -102,17 +102,15 @@ def finish_run(
         _show_cuts(outcome.cuts)
         for cut in outcome.cuts:
             if cut.broken is not None:
-                out.print(f"[bold]{escape(cut.task.name)}[/]: {escape(cut.failure)}")
+                out.print(f"[bold]{escape(cut.name)}[/]: {escape(cut.failure)}")
             if cut.plan is not None and cut.plan.feed is not None:
-                out.print(f"[bold]{escape(cut.task.name)}[/]: {cut.plan.feed}")
+                out.print(f"[bold]{escape(cut.name)}[/]: {cut.plan.feed}")
             if (tilt := _largest_tilt(cut)) is not None:
-                out.print(
-                    f"[bold]{escape(cut.task.name)}[/]: tool axis tilted by up to {tilt:.2f} deg"
-                )
+                out.print(f"[bold]{escape(cut.name)}[/]: tool axis tilted by up to {tilt:.2f} deg")
             for check in cut.checks:
                 if not check.ok:
-                    out.print(f"[bold]{escape(cut.task.name)}[/]: {escape(str(check.issue()))}")
-        for note in merge_notes(written.notes, [cut.task.name for cut in outcome.cuts]):
+                    out.print(f"[bold]{escape(cut.name)}[/]: {escape(str(check.issue()))}")
+        for note in merge_notes(written.notes, [cut.name for cut in outcome.cuts]):
             out.print(f"note: {escape(note)}")
         show_files(written.files, written.removed, of="an earlier run")
     if written.stale is not None:
@@ -132,8 +130,12 @@ def _largest_tilt(cut: CutResult) -> float | None:
 
 
 def _cut_entry(cut: CutResult) -> dict[str, object]:
-    entry: dict[str, object] = {"name": cut.task.name, "passed": cut.passed}
-    entry |= {"length_m": cut.drawn.length, "nodes": len(cut.nodes), "speed_m_s": cut.task.speed}
+    entry: dict[str, object] = {"name": cut.name, "passed": cut.passed}
+    entry |= {
+        "length_m": cut.candidate.path.length,
+        "nodes": len(cut.candidate.nodes),
+        "speed_m_s": cut.request.task.speed,
+    }
     entry["departure"] = None if cut.departure is None else asdict(cut.departure)
     if cut.plan is None:
         assert cut.broken is not None
@@ -162,10 +164,10 @@ def _show_cuts(cuts: Sequence[CutResult]) -> None:
     rows = []
     for cut in cuts:
         row = [
-            escape(cut.task.name),
-            f"{cut.drawn.length * 1000:.1f}",
-            str(len(cut.nodes)),
-            f"{cut.task.speed * 60:g}",
+            escape(cut.name),
+            f"{cut.candidate.path.length * 1000:.1f}",
+            str(len(cut.candidate.nodes)),
+            f"{cut.request.task.speed * 60:g}",
         ]
         sampling = _sampling(cut)
         if cut.plan is None:

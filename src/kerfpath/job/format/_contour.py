@@ -65,8 +65,10 @@ class ContourTask:
         """
         if self.table.pick_all is None:
             return [replace(self, pick=part.loop(self.pick).name)]
-        loops = part.pick(**self.table.pick_all.resolve())
-        return [replace(self, pick=loop.name, name=loop.name) for loop in loops]
+        return [
+            replace(self, pick=loop.name, name=loop.name)
+            for loop in self.table.pick_all.loops(part)
+        ]
 
     def drawn(self, part: Part) -> Contour:
         """Return its loop as the part has it.

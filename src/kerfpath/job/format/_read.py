@@ -347,10 +347,10 @@ def _tables(path: Path, text: str) -> dict[str, Any]:
     except RecursionError:
         raise error_at(path, None, "arrays or tables are nested too deeply; flatten them") from None
     except tomllib.TOMLDecodeError as error:
-        told = str(error)
-        at = re.search(r" \(at line (\d+), column \d+\)$", told)
+        said = str(error)
+        at = re.search(r" \(at line (\d+), column \d+\)$", said)
         line = int(at[1]) if at else text.rstrip("\n").count("\n") + 1
-        raise error_at(path, line, f"not valid TOML: {told}; correct it there") from None
+        raise error_at(path, line, f"not valid TOML: {said}; correct it there") from None
     except ValueError:  # what Python's int() refuses
         raise error_at(path, None, "not valid TOML: an integer is too long; shorten it") from None
     if not tables:

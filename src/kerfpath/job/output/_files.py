@@ -167,7 +167,7 @@ def planned_text(outcome: JobResult) -> str:
         if cut.plan is not None:
             entries.append(plan_entry(cut.plan, cut.contour, cut.checks, picked=cut.picked))
         elif cut.broken is not None:
-            entries.append(broken_entry(cut.task.name, cut.broken, cut.fastest))
+            entries.append(broken_entry(cut.name, cut.broken, cut.fastest))
     return plan_text(
         plan_document(
             job.robot, job.tool, job.placement, entries, job.source, outcome.cell, outcome.part

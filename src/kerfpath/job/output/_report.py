@@ -24,9 +24,9 @@ def report_text(outcome: JobResult, notes: Sequence[str], faults: Sequence[str] 
     job = outcome.job
     sections = [
         ContourSection(
-            name=cut.task.name,
+            name=cut.name,
             graph=cut.graph,
-            path=cut.nodes,
+            path=cut.candidate.nodes,
             plan=cut.plan,
             checks=cut.checks,
             failure="" if cut.broken is None else str(cut.broken),

@@ -228,6 +228,6 @@ class PlanDocument(TypedDict):
     T_flange_tip: Rows
     T_base_part: Rows
     limits: LimitsData
-    cell: dict[str, Any] | None
+    cell: dict[str, object] | None
     contours: list[ContourData]
     sequence: SequenceData | None

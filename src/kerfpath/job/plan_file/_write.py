@@ -195,7 +195,7 @@ def _limits_entry(robot: Robot) -> LimitsData:
     }
 
 
-def _cell_entry(cell: Cell) -> dict[str, Any]:
+def _cell_entry(cell: Cell) -> dict[str, object]:
     """Return what was kept apart and how far: a record, as the cell itself is that of the job."""
     return {
         "bodies": [

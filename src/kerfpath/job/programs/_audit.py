@@ -19,9 +19,16 @@ from kerfpath.job.plan_file import AuditReport, check, collision_note, count, or
 from kerfpath.job.programs._cut_checks import cut_checks
 from kerfpath.job.programs._expected import TargetNodes, expected_program
 from kerfpath.job.programs._laser_and_gas import Process, beam_checks
-from kerfpath.job.programs._read import ReadCut, at_interval, cuts_of, language_of, program_on_disk
+from kerfpath.job.programs._read import (
+    ReadCut,
+    at_interval,
+    cuts_of,
+    language_of,
+    program_on_disk,
+    tips_of,
+)
 from kerfpath.plans import Plan
-from kerfpath.post import Language, ReadProgram, Settings, differences, with_tips
+from kerfpath.post import Language, ReadProgram, Settings, differences
 
 __all__ = ["ProgramAudit", "audit_program"]
 
@@ -124,8 +131,8 @@ class ProgramAudit:
         """Return what the audit says of every cut of a program that was read."""
         job, contours, cell = self.job, self.contours, self.cell
         names = [candidates[0].nodes.name for candidates in contours]
-        read = with_tips(read, job.robot, job.tool, job.placement)
-        cuts, home = cuts_of(read, job.robot, job.tool, job.placement)
+        read = tips_of(read, job)
+        cuts, home = cuts_of(read, job)
         tables: dict[str, list[Check]] = {}
         places: dict[str, tuple[str, ...]] = {name: tuple(step.place for step in read.steps)}
         tool = job.tool if read.T_flange_tip is None else read.T_flange_tip
@@ -148,7 +155,7 @@ class ProgramAudit:
                 tables[title] = [check("contour", said, apart, NEAR, "m")]
                 continue
             candidate = contours[which][c]
-            cut = at_interval(cut, candidate.dt, job.robot, job.tool, job.placement)
+            cut = at_interval(cut, candidate.dt, job)
             places[title] = tuple(move.place for move in (*cut.moves, cut.group.path[-1]))
             tables[title], along = cut_checks(job, candidate, cut, cell, chosen, settings)
             tables[title].append(count("once", "earlier cuts of this contour", done.count(which)))
@@ -190,7 +197,7 @@ def _compared(
         said = f"a program as the job asks for cannot be made along these paths ({error})"
         return [count("asked", said, 1)]
     rules = chosen.rules(settings)
-    asked = with_tips(asked, job.robot, job.tool, job.placement)
+    asked = tips_of(asked, job)
     found = differences(asked, read, rules=(rules,), names=("the job", "the text"), strict=True)
     places = [step.place for step in read.steps]
     rows = [

@@ -37,12 +37,8 @@ OTHERWISE = "change the job there and plan it again"
 
 def audit_of_cuts(job: Job, cuts: Sequence[CutResult], cell: Cell | None) -> ProgramAudit:
     """Return the audit of the program of a job's cuts: by their paths, nodes and speeds."""
-    candidates = (
-        Candidate.at(cut.task.speed, cut.drawn, replace(cut.nodes, name=cut.task.name))
-        for cut in cuts
-        if cut.plan is not None
-    )
-    return ProgramAudit(job=job, contours=tuple((each,) for each in candidates), cell=cell)
+    planned = tuple((cut.candidate,) for cut in cuts if cut.plan is not None)
+    return ProgramAudit(job=job, contours=planned, cell=cell)
 
 
 def audit_of_plans(job: Job, plans: Sequence[Plan]) -> ProgramAudit:

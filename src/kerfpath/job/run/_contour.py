@@ -9,6 +9,7 @@ from typing import TypeVar
 
 import numpy as np
 
+from kerfpath.cell import Cell
 from kerfpath.contour import Contour
 from kerfpath.errors import NoFeasiblePath
 from kerfpath.graph import LayeredGraph
@@ -49,7 +50,7 @@ def cut_candidate(
     if cell is not None and job.cell is not None and job.cell.map:
         begin("map of the cell")
         clearance = clearance_map(graph, cell)
-    whole = CutResult.of(request, candidate, graph, clearance=clearance)
+    whole = CutResult(request=request, candidate=candidate, graph=graph, clearance=clearance)
     kept = cell
     if request.run is not None:
         graph, kept = request.run.graph(graph, job.robot.endless), request.run.cell(cell)
@@ -69,7 +70,7 @@ def cut_candidate(
             plans = planned(plan_in_pieces)
     except NoFeasiblePath as broken:
         without = replace(whole, broken=broken)
-        return (_with_remedy(prepared, job, candidate, without, graph, begin),)
+        return (_with_remedy(without, job, prepared.cell, graph, begin),)
     begin("audit")
     return tuple(_audited(prepared, whole, made) for made in plans)
 
@@ -89,12 +90,12 @@ def cut_in_posture(prepared: PreparedJob, request: CutRequest, posture: int) -> 
         candidate.nodes, job.robot, tool=job.tool, placement=job.placement, speed=candidate.speed,
         options=job.options, cell=prepared.cell, graph=graph,
     )  # fmt: skip
-    cut = _audited(prepared, CutResult.of(request, candidate, graph), made)
+    cut = _audited(prepared, CutResult(request=request, candidate=candidate, graph=graph), made)
     return cut if cut.passed else None
 
 
 def _with_remedy(
-    prepared: PreparedJob, job: Job, candidate: Candidate, without: CutResult, graph: LayeredGraph,
+    without: CutResult, job: Job, cell: Cell | None, graph: LayeredGraph,
     begin: Callable[[str], None],
 ) -> CutResult:  # fmt: skip
     """Return a cut without a plan, and where that is known the speed and the limits that would do.
@@ -102,7 +103,7 @@ def _with_remedy(
     With poses everywhere slower would do; for a loop that cannot close, or an axis that may not
     turn as far, it need not, and a reduced feed has tried.
     """
-    options, nodes, cell = job.options, candidate.nodes, prepared.cell
+    options, nodes = job.options, without.candidate.nodes
     plain = options.closure == "free" and options.rotation is None
     constant = options.feed == "constant" and nodes.time is None
     if not (np.diff(graph.start).all() and plain and constant):
@@ -115,7 +116,12 @@ def _with_remedy(
             return replace(without, fastest=slower)
         return without
     least = relaxations(
-        nodes, job.robot, graph, without.task.speed, eta_v=options.eta_v, eta_a=options.eta_a
+        nodes,
+        job.robot,
+        graph,
+        without.request.task.speed,
+        eta_v=options.eta_v,
+        eta_a=options.eta_a,
     )
     fastest = FastestSpeed.of(nodes, least.slower)
     if options.refine:
@@ -125,30 +131,24 @@ def _with_remedy(
 
 def _audited(prepared: PreparedJob, whole: CutResult, made: Plan) -> CutResult:
     """Return the cut of one plan, at finer intervals if the job asks for them, and its audit."""
-    job, drawn, graph, nodes = prepared.job, whole.drawn, whole.graph, whole.nodes
+    job, candidate, graph = prepared.job, whole.candidate, whole.graph
     # The postures that the job allows, of which the search may have had only some.
     made = replace(made, settings=replace(made.settings, postures=job.options.postures))
-    s = made.contour.s
+    s, nodes = made.contour.s, candidate.nodes
     if len(s) < len(nodes):
         first = int(np.searchsorted(nodes.s, s[0]))
-        drawn, nodes = drawn.between(float(s[0]), float(s[-1])), made.contour
         graph = graph.part(first, first + len(s) - 1)
+        path = candidate.path.between(float(s[0]), float(s[-1]))
+        candidate = Candidate.at(whole.request.task.speed, path, made.contour)
     if job.options.refine_parts > 1:
-        made = _divided(made, drawn, job.options.refine_parts)
-    return replace(
-        whole,
-        task=replace(whole.task, name=made.name),
-        drawn=drawn,
-        nodes=nodes,
-        graph=graph,
-        plan=made,
-        checks=tuple(job.tolerances.checks(made, reference=drawn, cell=prepared.cell)),
-    )
+        made = _divided(made, candidate.path, job.options.refine_parts)
+    checks = job.tolerances.checks(made, reference=candidate.path, cell=prepared.cell)
+    return replace(whole, candidate=candidate, graph=graph, plan=made, checks=tuple(checks))
 
 
-def _divided(made: Plan, drawn: Contour, parts: int) -> Plan:
+def _divided(made: Plan, path: Contour, parts: int) -> Plan:
     """Return the plan on nodes that divide its intervals, where one keeps the limits there."""
-    found = refine(made, nodes=divide_nodes(drawn, made.contour, parts))
+    found = refine(made, nodes=divide_nodes(path, made.contour, parts))
     if found.done:
         return found.plan
     statement = f"{made.proof.statement}; at {parts} parts of an interval {found.statement}"

@@ -3,53 +3,31 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
 
-from kerfpath._told import told
-from kerfpath.auditor import Check, air_checks, worst_of
+from kerfpath.auditor import air_checks, worst_of
 from kerfpath.errors import NoFeasiblePath
 from kerfpath.job.format import PreparedJob
 from kerfpath.job.run._contour import cut_in_posture
-from kerfpath.job.run._result import CutResult
+from kerfpath.job.run._result import CutResult, JobResult
 from kerfpath.plans import Plan
 from kerfpath.progress import Progress
-from kerfpath.sequence import PartPlan, order_candidates
+from kerfpath.sequence import order_candidates
 
-__all__ = ["CutOrder", "order_cuts"]
-
-
-@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class CutOrder:
-    """The cuts that are made, in order, and how the robot gets from one to the next.
-
-    Parameters
-    ----------
-    cuts : tuple of CutResult
-    part : PartPlan or None
-        The moves between them; None where the job asks for none, or a contour has no plan.
-    stuck : NoFeasiblePath or None
-        Why there is no order, or no way between two cuts.
-    air : tuple of Check
-        The audit of the moves, the worst of each check.
-    """
-
-    cuts: tuple[CutResult, ...]
-    part: PartPlan | None = None
-    stuck: NoFeasiblePath | None = None
-    air: tuple[Check, ...] = ()
-
-    __repr__ = told
+__all__ = ["order_cuts"]
 
 
 def order_cuts(
     prepared: PreparedJob,
     tried: Sequence[Sequence[tuple[CutResult, ...]]],
     progress: Progress,
-) -> CutOrder:
+) -> JobResult:
     """Return one cut (or its pieces) of each contour's candidates, in the order asked for.
+
+    With the moves between them where the job asks for them and every contour has a plan.
 
     Parameters
     ----------
@@ -59,10 +37,11 @@ def order_cuts(
     progress : callable
     """
     job = prepared.job
+    result = JobResult(job=job, cuts=(), mesh=prepared.part.mesh(), cell=prepared.cell)
     passed = [[cuts for cuts in each if all(cut.passed for cut in cuts)] for each in tried]
     if job.sequence is None or not all(passed):
         first = [(fine or each)[0] for fine, each in zip(passed, tried, strict=True)]
-        return CutOrder(cuts=tuple(cut for cuts in first for cut in cuts))
+        return replace(result, cuts=tuple(cut for cuts in first for cut in cuts))
     units, owner, before = _units(passed, prepared.inner_first)
 
     requests = [prepared.contours[i] for i in owner]
@@ -93,7 +72,7 @@ def order_cuts(
             seconds=job.sequence.seconds,
         )
     except NoFeasiblePath as stuck:
-        return CutOrder(cuts=tuple(unit[0] for unit in units), stuck=stuck)
+        return replace(result, cuts=tuple(unit[0] for unit in units), stuck=stuck)
     cuts = [
         replace(units[unit][candidate], plan=made)
         for (unit, candidate), made in zip(part.chosen, part.plans, strict=True)
@@ -103,7 +82,7 @@ def order_cuts(
         air_checks(job.robot, m.q, m.time, cell=prepared.cell, eta_v=o.eta_v, eta_a=o.eta_a)
         for m in part.moves
     )
-    return CutOrder(cuts=tuple(cuts), part=part, air=tuple(worst_of(audited)))
+    return replace(result, cuts=tuple(cuts), part=part, air=tuple(worst_of(audited)))
 
 
 def _units(

@@ -15,7 +15,7 @@ from kerfpath.job.format import Job, cell_of_job
 __all__ = ["JobPreview", "Start", "check_job"]
 
 FAR = 0.05
-"""m beyond the near-miss distance: farther is not told apart."""
+"""m beyond the near-miss distance: farther off, how far is not said."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -32,7 +32,7 @@ class Start:
         Those of them that keep every near-miss distance.
     clearance : float m
         Of the pose that keeps most distance: its least distance among the pairs that must keep the
-        near-miss distance of the cell, at most 50 mm more than that is told; NaN without poses.
+        near-miss distance of the cell, up to 50 mm more than that; NaN without poses.
     pair : (str, str) or None
         The two bodies that have it.
     """

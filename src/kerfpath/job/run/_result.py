@@ -9,10 +9,9 @@ from kerfpath._told import told
 from kerfpath.auditor import Check
 from kerfpath.cad import Departure, Part, departure_from
 from kerfpath.cell import Cell
-from kerfpath.contour import Contour
 from kerfpath.errors import NoFeasiblePath
 from kerfpath.graph import LayeredGraph
-from kerfpath.job.format import Candidate, ContourTask, CutRequest, Job
+from kerfpath.job.format import Candidate, CutRequest, Job
 from kerfpath.planner import FINER, ON_THIS_GRID, ClearanceMap, FastestSpeed, at_least, at_most
 from kerfpath.plans import Plan
 from kerfpath.search import Relaxations
@@ -27,13 +26,10 @@ class CutResult:
 
     Parameters
     ----------
-    contour : str
-        What the job calls the contour.
-    task : ContourTask
-    drawn : Contour
-        The path to cut, densely sampled, part frame.
-    nodes : Contour
-        Its nodes, part frame.
+    request : CutRequest
+        What was asked for.
+    candidate : Candidate
+        The path that is cut and its nodes, or a stretch of it.
     graph : LayeredGraph
     plan : Plan or None
         None when no feasible path was found.
@@ -49,14 +45,10 @@ class CutResult:
         How clear every pose is in the cell, where the job asks for the map.
     departure : Departure or None
         How far the nodes leave the CAD curve; measured once it is settled what is cut.
-    picked : bool
-        Whether the plan is one of a Pareto set, which aims at something else than the job does.
     """
 
-    contour: str
-    task: ContourTask
-    drawn: Contour
-    nodes: Contour
+    request: CutRequest
+    candidate: Candidate
     graph: LayeredGraph
     plan: Plan | None = None
     broken: NoFeasiblePath | None = None
@@ -65,29 +57,23 @@ class CutResult:
     checks: tuple[Check, ...] = ()
     clearance: ClearanceMap | None = None
     departure: Departure | None = None
-    picked: bool = False
 
     __repr__ = told
 
-    @classmethod
-    def of(
-        cls,
-        request: CutRequest,
-        candidate: Candidate,
-        graph: LayeredGraph,
-        *,
-        clearance: ClearanceMap | None = None,
-    ) -> CutResult:
-        """Return the result of a candidate before its plan is known."""
-        return cls(
-            contour=request.task.name,
-            task=request.task,
-            drawn=candidate.path,
-            nodes=candidate.nodes,
-            graph=graph,
-            clearance=clearance,
-            picked=request.run is not None,
-        )
+    @property
+    def contour(self) -> str:
+        """What the job calls the contour."""
+        return self.request.task.name
+
+    @property
+    def name(self) -> str:
+        """What it is called itself; a piece has a number, too."""
+        return self.contour if self.plan is None else self.plan.name
+
+    @property
+    def picked(self) -> bool:
+        """Whether the plan is one of a Pareto set, which aims at something else than the job."""
+        return self.request.run is not None
 
     @property
     def passed(self) -> bool:
@@ -106,11 +92,11 @@ class CutResult:
             That of the loop as drawn, where operations moved it: the nodes are then measured from
             the path as cut.
         """
-        nodes = self.nodes if self.plan is None else self.plan.contour
+        nodes = self.candidate.nodes if self.plan is None else self.plan.contour
         found = (
-            part.departure(self.task.pick, nodes)
+            part.departure(self.request.task.pick, nodes)
             if loop is None
-            else departure_from(self.drawn, nodes, loop)
+            else departure_from(self.candidate.path, nodes, loop)
         )
         return replace(self, departure=found)
 
@@ -130,7 +116,7 @@ class CutResult:
 
     def _speeds(self, found: FastestSpeed) -> str:
         """Say up to which speed a path exists on the grid, and which one is known off it."""
-        point = self.nodes.points[found.node] * 1000
+        point = self.candidate.nodes.points[found.node] * 1000
         binds = (
             f", where the {found.limit} of joint {found.joint + 1} binds at node {found.node}, "
             f"{' '.join(f'{v:.1f}' for v in point)} mm"
@@ -138,7 +124,7 @@ class CutResult:
         if found.on_grid is None:
             return f"{ON_THIS_GRID} a path exists up to {at_most(found.speed * 60)} m/min{binds}"
         on_grid = f"{ON_THIS_GRID} a path exists up to {at_most(found.on_grid * 60)} m/min"
-        if found.speed < self.task.speed:
+        if found.speed < self.request.task.speed:
             return f"{on_grid}, refined up to {at_most(found.speed * 60)} m/min{binds}"
         return (
             f"{on_grid}; a refined one was found at {at_most(found.speed * 60)} m/min, but none at "

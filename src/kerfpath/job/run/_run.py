@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 from kerfpath.cad import Part
 from kerfpath.job.format import Job, PreparedJob, prepare
 from kerfpath.job.run._contour import cut_candidate
@@ -41,18 +43,11 @@ def run_prepared(prepared: PreparedJob, *, progress: Progress = no_progress) -> 
     if job.sequence is not None:
         longest = longest_search(job.sequence.seconds)
         progress(f"order and moves, {longest:g} s at most without a way", 0, 0)
-    ordered = order_cuts(prepared, tried, progress)
+    result = order_cuts(prepared, tried, progress)
     moved = {
         contour.task.name: part.departure(contour.task.pick, contour.loop)
         for contour in prepared.contours
         if contour.leaves_the_loop
     }
-    return JobResult(
-        job=job,
-        cuts=tuple(cut.measured(part, moved.get(cut.contour)) for cut in ordered.cuts),
-        mesh=part.mesh(),
-        cell=prepared.cell,
-        part=ordered.part,
-        stuck=ordered.stuck,
-        air=ordered.air,
-    )
+    measured = tuple(cut.measured(part, moved.get(cut.contour)) for cut in result.cuts)
+    return replace(result, cuts=measured)

@@ -7,7 +7,7 @@ from typing import Annotated
 from pydantic import BaseModel, Field, ValidationInfo, model_validator
 
 from kerfpath.errors import InputError
-from kerfpath.job.format._values import fault, folder_of, told
+from kerfpath.job.format._values import fault, fault_in_words, folder_of
 from kerfpath.job.format.tables._cell import CellTable, FixtureTable, HeadTable, PairTable
 from kerfpath.job.format.tables._comfort import ComfortTable
 from kerfpath.job.format.tables._contour import ContourTable
@@ -80,7 +80,7 @@ class JobFile(Table):
             try:
                 postures_named(self.plan.posture, self.robot.resolve(folder_of(info)).kinematics)
             except InputError as error:
-                raise told(f"{error}", ("plan", "posture")) from None
+                raise fault_in_words(f"{error}", ("plan", "posture")) from None
         return self
 
     @model_validator(mode="after")
