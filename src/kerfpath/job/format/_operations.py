@@ -27,13 +27,13 @@ from kerfpath.operations import (
     start_at,
 )
 
-__all__ = ["closed_only", "shaped"]
+__all__ = ["keys_of_closed_loops", "shape_contour"]
 
 MM = 1e-3
 OTHER: dict[Side, Side] = {"left": "right", "right": "left"}
 
 
-def closed_only(table: ContourTable) -> dict[str, str]:
+def keys_of_closed_loops(table: ContourTable) -> dict[str, str]:
     """Return the keys in use that only a closed loop can have, and what an open line lacks."""
     ends = 'begins at one of its ends: the other with direction = "reversed"'
     asked = {
@@ -44,7 +44,7 @@ def closed_only(table: ContourTable) -> dict[str, str]:
     return {key: lacks for key, (used, lacks) in asked.items() if used}
 
 
-def shaped(table: ContourTable, drawn: Contour, surface: Surface | None) -> list[Contour]:
+def shape_contour(table: ContourTable, drawn: Contour, surface: Surface | None) -> list[Contour]:
     """Return the contours that may be cut for a loop: one, or several starts and directions.
 
     Corners and leads are laid on `surface`.

@@ -22,7 +22,7 @@ from kerfpath.contour import Contour
 from kerfpath.errors import InputError
 from kerfpath.graph import LayeredGraph
 from kerfpath.job.format._contour import ContourTask, task_of
-from kerfpath.job.format._operations import closed_only
+from kerfpath.job.format._operations import keys_of_closed_loops
 from kerfpath.job.format._refusals import error_at, refusal, refused_at
 from kerfpath.job.format.tables import (
     AuditTable,
@@ -257,7 +257,7 @@ class Job:
     def _require_open(self, task: ContourTask, number: int) -> None:
         """Raise InputError where a task of table `number` asks of an open line what it has not."""
         line = f"loop {task.pick!r} is an open line, which"
-        for key, why in closed_only(task.table).items():
+        for key, why in keys_of_closed_loops(task.table).items():
             raise refused_at(self.path, ("contour", number, key), f"{line} {why}; remove {key}")
         if self.options.closure == "periodic":
             said = f'{line} does not come back to its start; write closure = "free"'

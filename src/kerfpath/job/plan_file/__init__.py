@@ -5,7 +5,7 @@ from kerfpath.job.plan_file._audit import audit_file as audit_file
 from kerfpath.job.plan_file._checks import check as check
 from kerfpath.job.plan_file._checks import count as count
 from kerfpath.job.plan_file._layout import ContourData as ContourData
-from kerfpath.job.plan_file._order_checks import order_checks as order_checks
+from kerfpath.job.plan_file._order_checks import check_order as check_order
 from kerfpath.job.plan_file._read import PlanFile as PlanFile
 from kerfpath.job.plan_file._read import read_plan_file as read_plan_file
 from kerfpath.job.plan_file._read import table_of as table_of

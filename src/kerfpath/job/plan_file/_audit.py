@@ -12,13 +12,13 @@ from kerfpath._told import told
 from kerfpath.auditor import Check, air_checks, worst_of
 from kerfpath.job.format import AuditTable, PreparedJob, prepare, read_job, tolerances_of
 from kerfpath.job.plan_file._checks import check, count
-from kerfpath.job.plan_file._compare import disagreement, job_disagreement
-from kerfpath.job.plan_file._expected import Expected, expected_plans
+from kerfpath.job.plan_file._compare import compare_jobs, compare_values
+from kerfpath.job.plan_file._expected import Expected, expect_plans
 from kerfpath.job.plan_file._layout import NodesData, PlanData
-from kerfpath.job.plan_file._moves import expected_sequence, move_checks
-from kerfpath.job.plan_file._order_checks import sequence_checks
+from kerfpath.job.plan_file._moves import check_moves, expect_sequence
+from kerfpath.job.plan_file._order_checks import check_sequence
 from kerfpath.job.plan_file._read import PlanFile, read_plan_file, table_of
-from kerfpath.job.plan_file._recompute import SAME, recomputed
+from kerfpath.job.plan_file._recompute import SAME, recompute
 from kerfpath.job.plan_file._report import AuditReport, collision_note
 from kerfpath.job.plan_file._write import plan_document, plan_entry
 from kerfpath.plans import Plan
@@ -88,7 +88,7 @@ class PlanAudit:
         """
         prepared, file = self.prepared, read_plan_file(plan_file)
         job, cell, entries = prepared.job, prepared.cell, file.entries
-        expected, rows = expected_plans(prepared, file)
+        expected, rows = expect_plans(prepared, file)
         tables: dict[str, list[Check]] = {file.path.name: rows}
         judged: list[PlanData] = []
         for each in expected:
@@ -101,14 +101,14 @@ class PlanAudit:
             judged.append(entry)
             table += made
             table += _claims(each.plan)
-            table += disagreement(entry, entries[each.name], JOB)
-        rows += job_disagreement(job, file.job)
+            table += compare_values(entry, entries[each.name], JOB)
+        rows += compare_jobs(job, file.job)
         paths = [p.contour for p in file.plans]
-        rows += sequence_checks(prepared, [each.number for each in expected], paths)
+        rows += check_sequence(prepared, [each.number for each in expected], paths)
         rows += self._whole(file, judged, expected)
         plans = [each.plan for each in expected if each.plan is not None]
         if len(plans) == len(expected) and plans:
-            tables.setdefault(AIR, []).extend(move_checks(prepared, plans, file.moves))
+            tables.setdefault(AIR, []).extend(check_moves(prepared, plans, file.moves))
         note = collision_note(cell, moves_too=job.sequence is not None)
         return AuditReport(
             tables={name: table for name, table in tables.items() if table},
@@ -124,7 +124,7 @@ class PlanAudit:
         plans = [each.plan for each in expected if each.plan is not None]
         part = None
         if job.sequence is not None and data["sequence"] is not None and plans:
-            part = expected_sequence(prepared, plans, file.moves, data["sequence"]["at_least_s"])
+            part = expect_sequence(prepared, plans, file.moves, data["sequence"]["at_least_s"])
         own: Mapping[str, object] = data
         whole: Mapping[str, object] = plan_document(
             job.robot, job.tool, job.placement, judged, {}, prepared.cell, part
@@ -133,10 +133,10 @@ class PlanAudit:
         for key in whole.keys() - {"job", "contours", "kerfpath", "schema"}:
             if key == "sequence" and len(plans) < len(expected):
                 continue  # a contour is refused already, and its times are not known
-            rows += [row for row in disagreement(whole[key], own[key], JOB, (key,)) if not row.ok]
+            rows += [row for row in compare_values(whole[key], own[key], JOB, (key,)) if not row.ok]
         if job.sequence is not None and data["sequence"] is None:
             rows.append(count("moves", "moves between contours that the job asks for", 1))
-        return rows or disagreement({}, {}, JOB)
+        return rows or compare_values({}, {}, JOB)
 
 
 def _entry(plan: Plan, said: PlanData, made: Sequence[Check], file: PlanFile) -> PlanData:
@@ -177,12 +177,12 @@ def _by_itself(file: PlanFile) -> AuditReport:
     tolerances = table_of(file, "audit", AuditTable, tolerances_of)
     tables = {}
     for p in file.plans:
-        own, said = recomputed(p), file.entries[p.name]
+        own, said = recompute(p), file.entries[p.name]
         made = tolerances.checks(own)
         entry = plan_entry(own, said["contour"], made, picked=p.name in file.picked)
         follow = {key: value for key, value in entry["nodes"].items() if key in OWN_NODES}
         entry["audit"], entry["nodes"] = said["audit"], cast(NodesData, said["nodes"] | follow)
-        tables[p.name] = [*made, *_claims(own), *disagreement(entry, said, FILE)]
+        tables[p.name] = [*made, *_claims(own), *compare_values(entry, said, FILE)]
     if not file.plans and not file.missing:
         tables[file.path.name] = [count("contours", "plans lacking: the file has none", 1)]
     if file.moves and file.plans:

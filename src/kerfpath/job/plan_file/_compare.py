@@ -16,7 +16,7 @@ from kerfpath.job.format import Job, JobFile
 from kerfpath.job.plan_file._checks import count
 from kerfpath.job.plan_file._recompute import SAME
 
-__all__ = ["CLAIMS", "disagreement", "job_disagreement"]
+__all__ = ["CLAIMS", "compare_jobs", "compare_values"]
 
 CLAIMS = {
     r"kerfpath$": "the version that wrote the file",
@@ -53,7 +53,7 @@ class _Difference:
         return f"{where}: expected {_shown(self.expected)}, found {_shown(self.found)}"
 
 
-def disagreement(
+def compare_values(
     expected: Any, found: Any, whose: str, under: tuple[str | int, ...] = ()
 ) -> list[Check]:
     """Return a check for each kind of place at which `found` is not what is expected.
@@ -82,7 +82,7 @@ def disagreement(
     return checks or [count("agrees", f"values that are not {whose}", 0)]
 
 
-def job_disagreement(job: Job, source: Mapping[str, Any]) -> list[Check]:
+def compare_jobs(job: Job, source: Mapping[str, Any]) -> list[Check]:
     """Return the checks of the job that a plan.json repeats, by what its text means.
 
     Tables that do not say what the motion is have a check of their own.

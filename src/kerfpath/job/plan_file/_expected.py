@@ -13,12 +13,12 @@ from kerfpath.contour import Contour
 from kerfpath.job.format import Candidate, Job, PreparedJob, divide_nodes
 from kerfpath.job.plan_file._checks import check, count
 from kerfpath.job.plan_file._read import PlanFile
-from kerfpath.job.plan_file._recompute import recomputed
+from kerfpath.job.plan_file._recompute import recompute
 from kerfpath.options import PlanOptions
 from kerfpath.plans import Plan
 from kerfpath.retime import feed, retime
 
-__all__ = ["Expected", "expected_plans"]
+__all__ = ["Expected", "expect_plans"]
 
 SAME_PLACE = 1e-6
 """m: a node and one of the job's are the same up to this distance."""
@@ -51,7 +51,7 @@ class Expected:
     checks: tuple[Check, ...] = ()
 
 
-def expected_plans(prepared: PreparedJob, file: PlanFile) -> tuple[list[Expected], list[Check]]:
+def expect_plans(prepared: PreparedJob, file: PlanFile) -> tuple[list[Expected], list[Check]]:
     """Return what is expected of each plan of a file, and the checks of which contours it has."""
     names = prepared.names
     members = [[p for p in file.plans if file.contours[p.name] == name] for name in names]
@@ -178,7 +178,7 @@ def _expected(
     )
     if job.options.feed == "dip" and made.feed is not None and not picked:
         plan = _dipping(plan, whole.dt, made.time)
-    plan = recomputed(plan)
+    plan = recompute(plan)
     rows = (place, *_postures(job, plan))
     return Expected(name=made.name, number=number, plan=plan, path=own.path, checks=rows)
 

@@ -16,7 +16,7 @@ from kerfpath.job.plan_file._checks import check, count
 from kerfpath.plans import Plan
 from kerfpath.sequence import Order, PartPlan
 
-__all__ = ["expected_sequence", "move_checks"]
+__all__ = ["check_moves", "expect_sequence"]
 
 SAME_CORNER = 1e-6
 """rad: an end of a move and where the tool backs off to differ by rounding at most."""
@@ -26,7 +26,7 @@ SHARES = np.linspace(0.0, 1.0, 9)
 """Of the retract, at which the way to and from a cut is looked at for collisions."""
 
 
-def move_checks(
+def check_moves(
     prepared: PreparedJob, plans: Sequence[Plan], moves: Sequence[AirMove]
 ) -> list[Check]:
     """Return the worst of each check over all moves; its node is the number of the move.
@@ -67,7 +67,7 @@ def move_checks(
     return rows
 
 
-def expected_sequence(
+def expect_sequence(
     prepared: PreparedJob, plans: Sequence[Plan], moves: Sequence[AirMove], at_least: float
 ) -> PartPlan | None:
     """Return the plans and moves as the job asks for them, in the times that the moves need.

@@ -13,10 +13,10 @@ from kerfpath.contour import Contour
 from kerfpath.job.format import PreparedJob, SequenceTable
 from kerfpath.job.plan_file._checks import count
 
-__all__ = ["order_checks", "sequence_checks"]
+__all__ = ["check_order", "check_sequence"]
 
 
-def sequence_checks(
+def check_sequence(
     prepared: PreparedJob, done: Sequence[int], paths: Sequence[Contour]
 ) -> list[Check]:
     """Return the checks of an order of cutting; their node is the number of the cut.
@@ -31,7 +31,7 @@ def sequence_checks(
         The nodes of each cut.
     """
     sequence = prepared.job.sequence
-    rows = order_checks(sequence, prepared.inner_first, done)
+    rows = check_order(sequence, prepared.inner_first, done)
     rows.append(
         _count("pieces", "pieces cut before one that lies before them", _early(done, paths))
     )
@@ -41,10 +41,10 @@ def sequence_checks(
     return rows
 
 
-def order_checks(
+def check_order(
     sequence: SequenceTable | None, inner_first: Sequence[tuple[int, int]], done: Sequence[int]
 ) -> list[Check]:
-    """Return the checks of which contour is cut before which; `done` as in `sequence_checks`."""
+    """Return the checks of which contour is cut before which; `done` as in `check_sequence`."""
     early = [k for k, i in enumerate(done) if any(a == i and j in done[:k] for a, j in inner_first)]
     given = sequence is None or sequence.order == "given"
     turned = [k + 1 for k, (a, b) in enumerate(pairwise(done)) if given and b < a]

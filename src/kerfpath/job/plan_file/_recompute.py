@@ -11,7 +11,7 @@ from kerfpath.auditor import chain_of
 from kerfpath.plans import Plan, path_cost
 from kerfpath.robots import Robot
 
-__all__ = ["SAME", "recomputed"]
+__all__ = ["SAME", "recompute"]
 
 SAME = 1e-7
 """Relative, or absolute below 1 (m, rad, s): two machines reckon alike far better."""
@@ -21,7 +21,7 @@ NO_TILT = 1e-9
 """rad: a tilt by less is rounding."""
 
 
-def recomputed(plan: Plan) -> Plan:
+def recompute(plan: Plan) -> Plan:
     """Return the plan with everything that its joints, contour and settings decide.
 
     What the plan says and agrees is kept to the last digit: an angle near pi may be written as one

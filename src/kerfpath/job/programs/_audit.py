@@ -15,17 +15,17 @@ from kerfpath.auditor import Check, air_checks, worst_of
 from kerfpath.cell import Cell
 from kerfpath.errors import InputError
 from kerfpath.job.format import Candidate, Job, PreparedJob, prepare, read_job
-from kerfpath.job.plan_file import AuditReport, check, collision_note, count, order_checks
-from kerfpath.job.programs._cut_checks import cut_checks
-from kerfpath.job.programs._expected import TargetNodes, expected_program
-from kerfpath.job.programs._laser_and_gas import Process, beam_checks
+from kerfpath.job.plan_file import AuditReport, check, check_order, collision_note, count
+from kerfpath.job.programs._cut_checks import check_cut
+from kerfpath.job.programs._expected import TargetNodes, expect_program
+from kerfpath.job.programs._laser_and_gas import Process, check_laser_and_gas
 from kerfpath.job.programs._read import (
     ReadCut,
-    at_interval,
-    cuts_of,
+    add_tips,
+    divide_arcs,
     language_of,
     program_on_disk,
-    tips_of,
+    read_cuts,
 )
 from kerfpath.plans import Plan
 from kerfpath.post import Language, ReadProgram, Settings, differences
@@ -131,8 +131,8 @@ class ProgramAudit:
         """Return what the audit says of every cut of a program that was read."""
         job, contours, cell = self.job, self.contours, self.cell
         names = [candidates[0].nodes.name for candidates in contours]
-        read = tips_of(read, job)
-        cuts, home = cuts_of(read, job)
+        read = add_tips(read, job)
+        cuts, home = read_cuts(read, job)
         tables: dict[str, list[Check]] = {}
         places: dict[str, tuple[str, ...]] = {name: tuple(step.place for step in read.steps)}
         tool = job.tool if read.T_flange_tip is None else read.T_flange_tip
@@ -141,7 +141,7 @@ class ProgramAudit:
         process = Process.of(job.program, ahead=chosen.ahead)
         tables[name] = [
             check("frames", "tool and part, off the job's", off, SAME_FRAME, "m"),
-            *beam_checks(read, job.robot, process),
+            *check_laser_and_gas(read, job.robot, process),
         ]
         done: list[int] = []
         starts: list[str] = []
@@ -155,9 +155,9 @@ class ProgramAudit:
                 tables[title] = [check("contour", said, apart, NEAR, "m")]
                 continue
             candidate = contours[which][c]
-            cut = at_interval(cut, candidate.dt, job)
+            cut = divide_arcs(cut, candidate.dt, job)
             places[title] = tuple(move.place for move in (*cut.moves, cut.group.path[-1]))
-            tables[title], along = cut_checks(job, candidate, cut, cell, chosen, settings)
+            tables[title], along = check_cut(job, candidate, cut, cell, chosen, settings)
             tables[title].append(count("once", "earlier cuts of this contour", done.count(which)))
             done.append(which)
             starts.append(cut.moves[0].place)
@@ -165,7 +165,7 @@ class ProgramAudit:
         steps = [places[name].index(start) for start in starts]
         tables[name] += [
             row if row.ok else replace(row, node=steps[row.node])
-            for row in order_checks(job.sequence, self.inner_first, done)
+            for row in check_order(job.sequence, self.inner_first, done)
         ]
         tables[name] += _compared(job, followed, home, read, chosen, settings)
         tables[_unused("air", tables)] = _air(
@@ -192,12 +192,12 @@ def _compared(
     if not followed:
         return []
     try:
-        asked = expected_program(job, followed, home, chosen, settings)
+        asked = expect_program(job, followed, home, chosen, settings)
     except InputError as error:
         said = f"a program as the job asks for cannot be made along these paths ({error})"
         return [count("asked", said, 1)]
     rules = chosen.rules(settings)
-    asked = tips_of(asked, job)
+    asked = add_tips(asked, job)
     found = differences(asked, read, rules=(rules,), names=("the job", "the text"), strict=True)
     places = [step.place for step in read.steps]
     rows = [

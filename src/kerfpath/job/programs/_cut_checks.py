@@ -18,7 +18,7 @@ from kerfpath.job.programs._read import ReadCut
 from kerfpath.plans import Plan, Proof
 from kerfpath.post import Language, Rules, Settings
 
-__all__ = ["cut_checks"]
+__all__ = ["check_cut"]
 
 SAME_SPEED = 0.02
 """Share by which a speed may differ from the one asked for, beyond its digits."""
@@ -28,7 +28,7 @@ CLIMB = 0.05
 """What a step along the path counts beside one away from it, where a place on it is looked for."""
 
 
-def cut_checks(
+def check_cut(
     job: Job, candidate: Candidate, cut: ReadCut, cell: Cell | None, chosen: Language,
     settings: Settings,
 ) -> tuple[list[Check], tuple[TargetNodes, Plan] | None]:  # fmt: skip

@@ -12,7 +12,7 @@ from kerfpath._told import told
 from kerfpath.air import AirMove, backed_off
 from kerfpath.contour import Contour
 from kerfpath.job.format import Candidate, Job, divide_nodes
-from kerfpath.job.programs._read import ReadCut, branch_of, followed, poses_on_arc
+from kerfpath.job.programs._read import ReadCut, branch_of, follow_poses, poses_on_arc
 from kerfpath.plans import Plan
 from kerfpath.post import (
     CircularMove,
@@ -27,7 +27,7 @@ from kerfpath.post import (
     read_as_written,
 )
 
-__all__ = ["TargetNodes", "expected_program", "nodes_at_targets"]
+__all__ = ["TargetNodes", "expect_program", "nodes_at_targets"]
 
 REACH = 4.0
 """Farther (m) than a tip is from any axis: the lever of what digits leave of joints."""
@@ -97,7 +97,7 @@ def nodes_at_targets(job: Job, candidate: Candidate, cut: ReadCut, s: Array) -> 
     )
 
 
-def expected_program(
+def expect_program(
     job: Job, cuts: Sequence[tuple[ReadCut, TargetNodes, Plan]], home: Array,
     language: Language, settings: Settings,
 ) -> ReadProgram:  # fmt: skip
@@ -145,7 +145,7 @@ def _whole(job: Job, cut: ReadCut, asked: TargetNodes, plan: Plan) -> Plan:
             s = asked.nodes.s[first : last + 1]
             parts = ((s - s[0]) / (s[-1] - s[0]))[1:-1]
             T[inner] = poses_on_arc(T[first], move.T_part_via, T[last], parts)
-            q[inner] = followed(plan.robot, plan.T_base_part @ T[inner] @ flange, q[first])
+            q[inner] = follow_poses(plan.robot, plan.T_base_part @ T[inner] @ flange, q[first])
     time = asked.time
     if job.options.feed != "constant":  # it may be slower, which is judged by itself
         time = np.interp(np.arange(K), at, _as_fast(cut, asked.nodes.s[at]))

@@ -38,7 +38,7 @@ from kerfpath.placement import MeasuredFrame, placed, placed_moves, planned_agai
 from kerfpath.plans import Plan
 from kerfpath.post import language as find_language
 
-__all__ = ["program_from_file", "program_language", "require_same"]
+__all__ = ["program_from_file", "program_language", "require_same_setup"]
 
 MEASURED_NOTE = (
     "The joints are moved to the measured part and audited there for path, limits, velocities and "
@@ -252,7 +252,7 @@ def _options(file: PlanFile, language: str, stem: str) -> ProgramOptions:
     )
 
 
-def require_same(plan: Plan, job: Job, path: Path) -> None:
+def require_same_setup(plan: Plan, job: Job, path: Path) -> None:
     """Raise InputError where a plan's tool, part or arm is not where the job has it."""
     pairs = {
         "tool": (plan.T_flange_tip, job.tool),

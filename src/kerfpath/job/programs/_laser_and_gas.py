@@ -22,7 +22,7 @@ from kerfpath.job.plan_file import check
 from kerfpath.post import ReadMove, ReadProgram, ReadWait, Signal, groups_of
 from kerfpath.robots import Robot
 
-__all__ = ["Process", "beam_checks"]
+__all__ = ["Process", "check_laser_and_gas"]
 
 SAME_TIME = 2e-3
 """s: controllers round times."""
@@ -95,7 +95,7 @@ class _Event:
     step: int
 
 
-def beam_checks(read: ReadProgram, robot: Robot, process: Process) -> list[Check]:
+def check_laser_and_gas(read: ReadProgram, robot: Robot, process: Process) -> list[Check]:
     """Return the checks of beam and gas over a whole program; their node is the step of it.
 
     Parameters

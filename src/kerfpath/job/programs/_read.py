@@ -29,14 +29,14 @@ from kerfpath.robots import Robot
 
 __all__ = [
     "ReadCut",
-    "at_interval",
+    "add_tips",
     "branch_of",
-    "cuts_of",
-    "followed",
+    "divide_arcs",
+    "follow_poses",
     "language_of",
     "poses_on_arc",
     "program_on_disk",
-    "tips_of",
+    "read_cuts",
 ]
 
 ARC_STEP = np.radians(2.0)
@@ -160,12 +160,12 @@ class ReadCut:
         return tuple(self.moves[k] for k in self.ends)
 
 
-def tips_of(read: ReadProgram, job: Job) -> ReadProgram:
+def add_tips(read: ReadProgram, job: Job) -> ReadProgram:
     """Return a program with the tip poses of its joints, by the job's robot, tool and part."""
     return with_tips(read, job.robot, job.tool, job.placement)
 
 
-def cuts_of(read: ReadProgram, job: Job) -> tuple[list[ReadCut], Array]:
+def read_cuts(read: ReadProgram, job: Job) -> tuple[list[ReadCut], Array]:
     """Return the cuts of a program in order, and the corners (m, n) rad of the way home.
 
     Raises
@@ -173,7 +173,7 @@ def cuts_of(read: ReadProgram, job: Job) -> tuple[list[ReadCut], Array]:
     InputError
         Moves in an order that makes no cut: where.
     """
-    groups = groups_of(tips_of(read, job))
+    groups = groups_of(add_tips(read, job))
     home = np.zeros((0, job.robot.joints))
     if groups and not groups[-1].path:
         home = np.array([move.q for move in groups.pop().joint])
@@ -190,7 +190,7 @@ def cuts_of(read: ReadProgram, job: Job) -> tuple[list[ReadCut], Array]:
     return cuts, home
 
 
-def at_interval(cut: ReadCut, interval: float, job: Job) -> ReadCut:
+def divide_arcs(cut: ReadCut, interval: float, job: Job) -> ReadCut:
     """Return a cut whose arcs have a node at each interval (s), as straight moves would have.
 
     So rates along arcs, and where arcs end, are judged over the same times as all others.
@@ -225,7 +225,7 @@ def _cut(group: ReadGroup, job: Job, interval: float | None = None) -> ReadCut:
             laser = switch.on if switch.signal == "laser" else laser
     poses = np.array(T)
     flange = job.placement @ poses @ np.linalg.inv(job.tool)
-    q = followed(job.robot, flange, _q(group.joint[-1]))
+    q = follow_poses(job.robot, flange, _q(group.joint[-1]))
     last = len(poses) - 1
     switches = [s for move in group.path for s in move.switches if s.signal == "laser"]
     return ReadCut(
@@ -320,7 +320,7 @@ def branch_of(robot: Robot, q: Array) -> int:
     return int(np.argmin(np.where(reach[0], apart, np.inf)))
 
 
-def followed(robot: Robot, T: Array, q0: Array) -> Array:
+def follow_poses(robot: Robot, T: Array, q0: Array) -> Array:
     """Return joints (K, n) at flange poses T (K, 4, 4), on the branch of q0; NaN out of reach."""
     posture = branch_of(robot, q0)
     if robot.family.follow_all is None:

@@ -17,8 +17,8 @@ from kerfpath.errors import InputError
 from kerfpath.job.format import Candidate, CutRequest, Job, prepare, read_job
 from kerfpath.job.plan_file import PlanFile, read_plan_file
 from kerfpath.job.programs._build import audit_of_plans, program_of
-from kerfpath.job.programs._from_plan import require_same
-from kerfpath.job.programs._read import language_of, program_on_disk, tips_of
+from kerfpath.job.programs._from_plan import require_same_setup
+from kerfpath.job.programs._read import add_tips, language_of, program_on_disk
 from kerfpath.job.run import JobResult, run_prepared
 from kerfpath.operations import touched_up
 from kerfpath.plans import Plan
@@ -161,7 +161,7 @@ def _require_kind(job: Job, file: PlanFile) -> None:
         names = ", ".join(file.missing + file.failed)
         raise InputError(f"{file.path}: {names} has no plan that passed; plan the job again")
     for p in file.plans:
-        require_same(p, job, file.path)
+        require_same_setup(p, job, file.path)
 
 
 def _edited(program: Path, job: Job, file: PlanFile) -> tuple[list[ReadGroup], list[str]]:
@@ -170,7 +170,7 @@ def _edited(program: Path, job: Job, file: PlanFile) -> tuple[list[ReadGroup], l
     options = replace(job.program, language=chosen.name, settings=settings)
     texts, _ = program_of(file.plans, options, file.moves, audit=audit_of_plans(job, file.plans))
     planned, edited = (
-        tips_of(read, job)
+        add_tips(read, job)
         for read in (
             read_program(texts, chosen.name, job.robot, settings),
             program_on_disk(program, chosen, settings, job.robot),
@@ -229,7 +229,7 @@ def _touched_up(
         k = np.array([target.node for target in moved])
         T = np.array([moves[node].T_part_tip for node in k])
         path, keep = touched_up(planned.path, planned.nodes, k, T[:, :3, 3], T[:, :3, 2], ease=ease)
-        nodes = replace(_sampled(path, planned.nodes, keep, asked.task.speed), name=p.name)
+        nodes = _sampled(path, planned.nodes, keep, asked.task.speed)
         planned = Candidate.at(asked.task.speed, path, nodes)
     postures = tuple(np.unique(p.posture).tolist())
     return replace(
