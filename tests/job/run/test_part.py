@@ -304,6 +304,8 @@ def test_a_contour_that_no_way_leads_to_is_planned_in_its_other_postures(folder,
     result = run_job(read_job(path), progress=lambda *words: done.append(words))
     assert str(result.stuck) == "no way"
     # The job allows two postures, front/up with either wrist; it has two candidates.
-    assert [{int(p) for p in plan.posture} for plan in plans] == [{0}, {0}, {1}]
+    first, second, other = [{int(p) for p in plan.posture} for plan in plans]
+    assert first == second
+    assert sorted([first, other], key=min) == [{0}, {1}]
     assert not any(issue.level == "error" for plan in plans for issue in audit(plan))
     assert ("led in: other postures", 0, 1) in done
