@@ -1,7 +1,10 @@
-"""The browser that pages are looked at in, without a window."""
+"""Pages: what a browser without a window makes of them, and the figures that they hold."""
 
+import base64
+import json
 import re
 import subprocess
+import zlib
 from pathlib import Path
 
 import pytest
@@ -27,3 +30,9 @@ def dom_of(page: Path, fragment: str = "") -> str:
 def without_scripts(html: str) -> str:
     """Return a page without its scripts and data."""
     return re.sub(r"<script.*?</script>", "", html, flags=re.DOTALL)
+
+
+def figures(page: str) -> list[dict]:
+    """Return the figures of a page as plotly draws them."""
+    packed = re.findall(r'<script type="application/octet-stream"[^>]*>([^<]*)<', page)
+    return [json.loads(zlib.decompress(base64.b64decode(data))) for data in packed]

@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 from hypothesis import settings
 
+from kerfpath import apart
 from kerfpath.contour import Contour
 from kerfpath.robots import robot
 
@@ -29,6 +30,14 @@ def pose(xyz, rotation=None):
     if rotation is not None:
         T[:3, :3] = rotation
     return T
+
+
+@pytest.fixture(scope="session", autouse=True)
+def reader():
+    """Keep the process that reads files: between tests it would leave, and start again for 2 s."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(apart, "IDLE", 600.0)
+        yield
 
 
 @pytest.fixture(scope="session")

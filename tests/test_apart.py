@@ -82,12 +82,7 @@ def test_a_process_that_has_left_is_replaced(monkeypatch):
     # It leaves by itself, just when it is asked: the answer says so, and a new one is asked.
     worker = module._worker
     worker.end()
-    monkeypatch.setattr(
-        module,
-        "_START",
-        "import sys; sys.path[:] = {path!r}; from kerfpath import apart; apart.IDLE = 0.0; "
-        "apart._serve({fd})",
-    )
+    monkeypatch.setattr(module, "IDLE", 0.0)
     module._worker = None
     module.stand_by()
     idle = module._worker.process

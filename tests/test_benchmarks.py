@@ -1,25 +1,22 @@
 """The yardsticks of the benchmarks measure against the right thing."""
 
-import importlib.util
-import sys
+import importlib
 import time
 
 import numpy as np
 import pytest
+from benchmarks import (
+    _arm,
+    _dense,
+    _figures,
+    _following,
+    _process,
+    _random_contours,
+    _tally,
+    part,
+)
 
 import kerfpath
-from conftest import ROOT
-
-
-def benchmark_module(name):
-    """Import benchmarks._dense and the like, which live beside the package, not in it."""
-    if "benchmarks" not in sys.modules:
-        folder = ROOT / "benchmarks"
-        spec = importlib.util.spec_from_file_location(
-            "benchmarks", folder / "__init__.py", submodule_search_locations=[str(folder)]
-        )
-        sys.modules["benchmarks"] = importlib.util.module_from_spec(spec)
-    return importlib.import_module(f"benchmarks.{name}")
 
 
 @pytest.mark.parametrize("metric", ["manhattan", "euclid"])
@@ -38,7 +35,7 @@ def test_the_dense_recursion_finds_the_cost_of_the_shortest_path(metric, velocit
         "metric": metric,
     }
     path = kerfpath.shortest_path(q, start, acceleration=np.full(6, 1e9), method="paper", **task)
-    dense = benchmark_module("_dense").dense_cost(q, start, **task)
+    dense = _dense.dense_cost(q, start, **task)
     assert path.optimal
     # Two orders of summation of a dozen numbers near one.
     assert dense == pytest.approx(path.cost, rel=1e-12)
@@ -47,7 +44,7 @@ def test_the_dense_recursion_finds_the_cost_of_the_shortest_path(metric, velocit
 def test_the_dense_recursion_says_when_there_is_no_path():
     q, start = np.zeros((2, 6)), np.array([0, 1, 2])
     q[1] = 1.0
-    dense = benchmark_module("_dense").dense_cost
+    dense = _dense.dense_cost
     ones = np.ones(6)
     task = {"endless": np.zeros(6, bool), "weights": ones, "metric": "manhattan"}
     assert dense(q, start, dt=0.5, velocity=ones, **task) == np.inf
@@ -68,7 +65,7 @@ def test_the_brute_recursion_finds_the_cost_of_the_exact_path(seed):
     }
     q = rng.uniform(-0.5, 0.5, (start[-1], 6))
     q[:, task["endless"]] += np.pi
-    brute = benchmark_module("_dense").second_order_cost(q, start, **task)
+    brute = _dense.second_order_cost(q, start, **task)
     try:
         cost = kerfpath.shortest_path(q, start, **task).cost
     except kerfpath.NoFeasiblePath:
@@ -77,9 +74,8 @@ def test_the_brute_recursion_finds_the_cost_of_the_exact_path(seed):
 
 
 def test_the_serial_chain_given_to_the_peers_is_the_robot():
-    arm = benchmark_module("_arm")
-    robot = arm.arm()
-    axes, origins = arm.chain(robot)
+    robot = _arm.arm()
+    axes, origins = _arm.chain(robot)
     q = np.array([0.3, -0.4, 0.5, -0.6, 0.7, -0.8])
     R, p = np.eye(3), np.zeros(3)
     for (x, y, z), origin, angle in zip(axes, origins[:6], q, strict=True):
@@ -95,10 +91,9 @@ def test_the_serial_chain_given_to_the_peers_is_the_robot():
 @pytest.fixture(scope="module")
 def cut():
     """A random cut whose grid has a path, and its exact plan."""
-    random = benchmark_module("_random_contours")
     name = "kuka_kr16_r1610_2"
     for index in range(10):
-        task = random.cut(name, index)
+        task = _random_contours.cut(name, index)
         try:
             made = kerfpath.plan(
                 task.contour, task.robot, speed=task.speed, graph=task.graph, **task.options
@@ -110,9 +105,8 @@ def cut():
 
 
 def test_the_seed_decides_the_random_cuts():
-    random = benchmark_module("_random_contours")
-    for name in random.ROBOTS:
-        one, again, other = (random.cut(name, i) for i in (3, 3, 4))
+    for name in _random_contours.ROBOTS:
+        one, again, other = (_random_contours.cut(name, i) for i in (3, 3, 4))
         assert np.array_equal(one.contour.points, again.contour.points)
         assert one.speed == again.speed
         assert len(one.contour) != len(other.contour) or one.speed != other.speed
@@ -124,7 +118,7 @@ def test_the_seed_decides_the_random_cuts():
 
 def test_following_the_gamma_of_a_plan_gives_its_cost_and_keeps_its_limits(cut):
     task, made = cut
-    follower = benchmark_module("_following").Follower(task)
+    follower = _following.Follower(task)
     found = follower.follow(made.gamma[None])
     assert found.excess[0] == 0.0
     # The nearest pose at each node is the plan's own, or one that costs less.
@@ -136,7 +130,7 @@ def test_following_the_gamma_of_a_plan_gives_its_cost_and_keeps_its_limits(cut):
 
 def test_following_says_by_how_much_the_limits_are_exceeded(cut):
     task, made = cut
-    follower = benchmark_module("_following").Follower(task)
+    follower = _following.Follower(task)
     q = np.array(made.q)
     q[5, 0] += 1.5 * follower.task.bound_v[0] + 2 * abs(q[5, 0] - q[4, 0])
     assert not follower.weigh(q)[1]
@@ -144,20 +138,20 @@ def test_following_says_by_how_much_the_limits_are_exceeded(cut):
 
 def test_edges_add_up_to_the_cost_of_a_plan_of_one_posture(cut):
     task, made = cut
-    following = benchmark_module("_following")
-    given = following.Follower(task).task
+    given = _following.Follower(task).task
     assert np.ptp(made.posture) == 0
     mu, gamma, nodes = int(made.posture[0]), made.gamma, range(len(made.gamma) - 1)
-    cost = sum(following.edge_cost(given, mu, k, gamma[k], k + 1, gamma[k + 1]) for k in nodes)
+    cost = sum(_following.edge_cost(given, mu, k, gamma[k], k + 1, gamma[k + 1]) for k in nodes)
     assert cost == pytest.approx(made.cost, rel=1e-9)
-    assert following.edge_cost(given, mu, 4, gamma[4], 4, gamma[4]) == np.inf
-    assert following.edge_cost(given, mu, 4, gamma[4], 3, gamma[3]) == np.inf
+    assert _following.edge_cost(given, mu, 4, gamma[4], 4, gamma[4]) == np.inf
+    assert _following.edge_cost(given, mu, 4, gamma[4], 3, gamma[3]) == np.inf
 
 
 def test_the_genetic_algorithm_repeats_itself(cut):
     pytest.importorskip("pymoo")
-    genetic = benchmark_module("_genetic")
-    follower = benchmark_module("_following").Follower(cut[0])
+    from benchmarks import _genetic as genetic
+
+    follower = _following.Follower(cut[0])
     gamma, again = (genetic.genetic(follower, seed=1, generations=5) for _ in range(2))
     assert gamma.shape == (len(cut[0].contour),)
     assert np.array_equal(gamma, again)
@@ -167,8 +161,9 @@ def test_the_genetic_algorithm_repeats_itself(cut):
 
 def test_sampling_finds_a_course_that_keeps_the_velocity_limits(cut):
     pytest.importorskip("ompl")
-    sampling = benchmark_module("_sampling")
-    follower = benchmark_module("_following").Follower(cut[0])
+    from benchmarks import _sampling as sampling
+
+    follower = _following.Follower(cut[0])
     sampling.start_generators(1)
     gamma = sampling.sampled(follower, seed=1, edges=8000)
     assert gamma is not None
@@ -177,35 +172,32 @@ def test_sampling_finds_a_course_that_keeps_the_velocity_limits(cut):
 
 
 def test_the_tally_counts_what_is_missed_and_what_lies_beyond_the_grid():
-    tally = benchmark_module("_tally")
 
     def outcome(index, method, cost):
-        return tally.Outcome(robot="r", index=index, method=method, seconds=2.0, cost=cost)
+        return _tally.Outcome(robot="r", index=index, method=method, seconds=2.0, cost=cost)
 
     outcomes = [
         *(outcome(i, "exact", cost) for i, cost in enumerate((10.0, 10.0, 10.0, None))),
         *(outcome(i, "other", cost) for i, cost in enumerate((11.0, 9.0, None, 5.0))),
     ]
-    exact, other = tally.sheet(outcomes, ("exact", "other")).rows
+    exact, other = _tally.sheet(outcomes, ("exact", "other")).rows
     assert exact[1:6] == ("exact", "4", "3", "0", "0")
     assert other[1:6] == ("other", "4", "3", "1", "1")
     assert other[6:] == ("0.00", "0.00", "10.00", "1 of 2", "2")
 
 
 def test_a_sheet_is_written_with_its_own_columns():
-    figures = benchmark_module("_figures")
-    sheet = figures.Sheet(columns=("what", "number"), rows=[("this", "1")])
-    report = figures.Report(title="A", how="So.", sheets=[sheet])
-    text = figures.markdown([report], {}, "")
+    sheet = _figures.Sheet(columns=("what", "number"), rows=[("this", "1")])
+    report = _figures.Report(title="A", how="So.", sheets=[sheet])
+    text = _figures.markdown([report], {}, "")
     assert "| what | number |\n| --- | ---: |\n| this | 1 |" in text
     assert "median" not in text
 
 
 def test_a_run_keeps_the_sections_that_it_did_not_make():
-    figures = benchmark_module("_figures")
-    old, new = (figures.Report(title=title, how="how") for title in ("Old", "New"))
-    before = figures.markdown([old, new], {"note": "at a"}, "2026-01-01")
-    again = figures.markdown([new], {"note": "at b"}, "2026-02-02", before)
+    old, new = (_figures.Report(title=title, how="how") for title in ("Old", "New"))
+    before = _figures.markdown([old, new], {"note": "at a"}, "2026-01-01")
+    again = _figures.markdown([new], {"note": "at b"}, "2026-02-02", before)
     assert again.count("## Old\n\n*Measured 2026-01-01, at a.*") == 1
     assert again.count("## New\n\n*Measured 2026-02-02, at b.*") == 1
     assert again.index("## Old") < again.index("## New")
@@ -214,12 +206,12 @@ def test_a_run_keeps_the_sections_that_it_did_not_make():
 
 @pytest.mark.parametrize("name", ["demo", "part"])
 def test_a_benchmark_clocks_functions_that_are_there(name):
-    for module, function in benchmark_module(name).CLOCKS.values():
+    for module, function in importlib.import_module(f"benchmarks.{name}").CLOCKS.values():
         assert callable(getattr(importlib.import_module(module), function))
 
 
 def test_a_clock_counts_the_outer_of_two_calls():
-    clock = benchmark_module("_process").Clock({"outer": ("", ""), "inner": ("", "")})
+    clock = _process.Clock({"outer": ("", ""), "inner": ("", "")})
     inner = clock.around("inner", lambda: time.sleep(0.01))
     clock.around("outer", inner)()
     assert clock.seconds["inner"] == 0
@@ -231,6 +223,6 @@ def test_a_clock_counts_the_outer_of_two_calls():
 def test_the_nearest_order_goes_on_to_the_nearest_that_may_come():
     at = np.array([0.0, 1.0, 2.5, -1.2, 9.0])  # home, and four contours
     between = np.abs(at - at[:, None])
-    nearest = benchmark_module("part").nearest_first
+    nearest = part.nearest_first
     assert nearest(between, []) == [0, 1, 2, 3]
     assert nearest(between, [(3, 0), (1, 0)]) == [2, 1, 3, 0]

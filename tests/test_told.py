@@ -8,9 +8,9 @@ from collections.abc import Mapping
 
 import numpy as np
 import pytest
-from tests.cli.test_commands import DEMO, SMALL
 
 import kerfpath
+from jobs import DEMO, SMALL
 from kerfpath._told import LONGEST, told
 from kerfpath.cad import read
 from kerfpath.cell import Cell

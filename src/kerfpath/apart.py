@@ -41,7 +41,9 @@ IDLE = 10.0
 
 _T = TypeVar("_T")
 _LEAVES = "leaves"
-_START = "import sys; sys.path[:] = {path!r}; from kerfpath.apart import _serve; _serve({fd})"
+_START = (
+    "import sys; sys.path[:] = {path!r}; from kerfpath.apart import _serve; _serve({fd}, {idle})"
+)
 
 
 def apart(function: Callable[..., _T], *arguments: object, size: int) -> _T:
@@ -126,7 +128,7 @@ class _Worker:
     def __init__(self) -> None:
         self.ours, theirs = Pipe()
         self.process = subprocess.Popen(
-            [sys.executable, "-c", _START.format(path=sys.path, fd=theirs.fileno())],
+            [sys.executable, "-c", _START.format(path=sys.path, fd=theirs.fileno(), idle=IDLE)],
             stdin=subprocess.DEVNULL,
             stdout=subprocess.DEVNULL,
             stderr=subprocess.DEVNULL,
@@ -173,12 +175,12 @@ def _forget() -> None:
 os.register_at_fork(after_in_child=_forget)
 
 
-def _serve(fd: int) -> None:
-    """Do what is asked over a line, until it is closed or nothing comes."""
+def _serve(fd: int, idle: float) -> None:
+    """Do what is asked over a line, until it is closed or nothing comes for `idle` seconds."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     line = Connection(fd)
     with suppress(EOFError, BrokenPipeError, ConnectionResetError):
-        while line.poll(IDLE):
+        while line.poll(idle):
             line.send_bytes(_attempt(line.recv_bytes()))
         line.send((_LEAVES, None))
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, fields, replace
-from typing import Any, Literal, TypedDict, get_args
+from typing import Any, Literal, TypedDict, cast, get_args
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -249,33 +249,8 @@ class PlanOptions:
 
     def to_data(self) -> OptionData:
         """Return the options as JSON holds them; `from_data` reads the same options back."""
-        tilt = self.tilt
-        return {
-            "method": self.method,
-            "objective": self.objective,
-            "metric": self.metric,
-            "weights_per_rad": None if self.weights is None else self.weights.tolist(),
-            "eta_v": self.eta_v,
-            "eta_a": self.eta_a,
-            "closure": self.closure,
-            "rotation_rad": None
-            if self.rotation is None
-            else [angle if np.isfinite(angle) else None for angle in self.rotation.tolist()],
-            "comfort": None
-            if self.comfort is None
-            else {name: band for name, band in asdict(self.comfort).items() if band is not None},
-            "gamma_step_rad": self.gamma_step,
-            "tilt": None
-            if tilt is None
-            else {"cone_rad": tilt.cone, "steps": tilt.steps, "cost_per_rad": tilt.cost},
-            "frames": self.frames,
-            "postures": None if self.postures is None else list(self.postures),
-            "feed_kind": self.feed,
-            "refine": self.refine,
-            "refine_parts": self.refine_parts,
-            "interruptions": self.interruptions,
-            "least_piece_m": self.least_piece,
-        }
+        names = {key: _NAMES.get(key, key) for key in OptionData.__annotations__}
+        return cast(OptionData, {key: _to_json(getattr(self, name)) for key, name in names.items()})
 
     @classmethod
     def from_data(cls, data: OptionData) -> PlanOptions:
@@ -288,34 +263,38 @@ class PlanOptions:
         KeyError
             A key is missing.
         """
-        tilt, rotation, comfort = data["tilt"], data["rotation_rad"], data["comfort"]
-        weights, postures = data["weights_per_rad"], data["postures"]
-        return cls(
-            gamma_step=data["gamma_step_rad"],
-            frames=data["frames"],
-            tilt=None
-            if tilt is None
-            else Tilt(cone=tilt["cone_rad"], steps=tilt["steps"], cost=tilt["cost_per_rad"]),
-            postures=None if postures is None else tuple(postures),
-            method=data["method"],
-            objective=data["objective"],
-            metric=data["metric"],
-            weights=None if weights is None else np.array(weights, dtype=np.float64),  # type: ignore[arg-type]
-            eta_v=data["eta_v"],
-            eta_a=data["eta_a"],
-            closure=data["closure"],
-            rotation=None
-            if rotation is None
-            else np.array([np.inf if angle is None else angle for angle in rotation]),
-            feed=data["feed_kind"],
-            refine=data["refine"],
-            refine_parts=data["refine_parts"],
-            interruptions=data["interruptions"],
-            least_piece=data["least_piece_m"],
-            comfort=None
-            if comfort is None
-            else Comfort(**{name: Band(**band) for name, band in comfort.items()}),
-        )
+        every: Mapping[str, Any] = data
+        values = {_NAMES.get(key, key): every[key] for key in OptionData.__annotations__}
+        if (tilt := data["tilt"]) is not None:
+            values["tilt"] = Tilt(
+                cone=tilt["cone_rad"], steps=tilt["steps"], cost=tilt["cost_per_rad"]
+            )
+        if (comfort := data["comfort"]) is not None:
+            values["comfort"] = Comfort(**{name: Band(**band) for name, band in comfort.items()})
+        if (rotation := data["rotation_rad"]) is not None:
+            values["rotation"] = [np.inf if angle is None else angle for angle in rotation]
+        return cls(**values)
+
+
+_NAMES = {
+    "weights_per_rad": "weights",
+    "rotation_rad": "rotation",
+    "gamma_step_rad": "gamma_step",
+    "feed_kind": "feed",
+    "least_piece_m": "least_piece",
+}
+"""Options whose key in JSON has another name, by that key."""
+
+
+def _to_json(value: object) -> object:
+    """Return the value of an option as JSON holds it, null for infinity."""
+    if isinstance(value, Tilt):
+        return {"cone_rad": value.cone, "steps": value.steps, "cost_per_rad": value.cost}
+    if isinstance(value, Comfort):
+        return {name: band for name, band in asdict(value).items() if band is not None}
+    if isinstance(value, np.ndarray):
+        return [number if np.isfinite(number) else None for number in value.tolist()]
+    return list(value) if isinstance(value, tuple) else value
 
 
 def chosen(

@@ -5,9 +5,9 @@ from itertools import combinations
 
 import numpy as np
 import pytest
+from benchmarks._boxes import with_collimator
 from scipy.spatial import ConvexHull
 from tests.cell.test_cell import at, mesh_of
-from tests.test_benchmarks import benchmark_module
 
 from kerfpath import robot
 from kerfpath.cell import (
@@ -26,7 +26,6 @@ from kerfpath.cell._pairs import BY_DESIGN
 from kerfpath.cell._shaved import shave
 from kerfpath.urdf import Chain
 
-with_collimator = benchmark_module("_boxes").with_collimator
 ARM = robot("abb_irb2600_12_165")
 LADDER = [0.0, 2e-3, 0.01, 0.02, 0.2]
 """m: near-miss distances, each asking for more than the one before."""

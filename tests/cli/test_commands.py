@@ -1,66 +1,24 @@
 """The command line as a user meets it: summaries, JSON, files, exit codes, bad input."""
 
 import csv
-import io
 import json
 import re
 import shutil
 import subprocess
 import sys
-from contextlib import redirect_stderr, redirect_stdout
-from importlib.resources import files
 from pathlib import Path
-from typing import NamedTuple
 
 import numpy as np
 import pytest
 from hypothesis import example, given
 from hypothesis import strategies as st
 
+from commands import assert_refused, run
+from jobs import DEMO, SMALL
 from kerfpath import robot
-from kerfpath.cli import main
 from kerfpath.job import read_plan_file
 from kerfpath.planner import at_least, at_most
 from programs import read_text
-
-DEMO = Path(str(files("kerfpath") / "demo"))
-SMALL = (DEMO / "b_pillar.toml").read_text()
-# Two small contours at a coarse step: everything the demo does, in a second.
-HEAD, *CONTOURS, TAIL = re.split(r"(?=\[\[contour\]\]|\[plan\])", SMALL)
-SMALL = "".join(
-    [HEAD, CONTOURS[4], CONTOURS[2], TAIL.replace("gamma_step_deg = 1", "gamma_step_deg = 3")]
-)
-
-
-class Result(NamedTuple):
-    returncode: int
-    stdout: str
-    stderr: str
-
-
-def run(*arguments, cwd="."):
-    """Run the command in this process, as its entry point would."""
-    stdout, stderr = io.StringIO(), io.StringIO()
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(sys, "argv", ["kerfpath", *map(str, arguments)])
-        patch.chdir(cwd)
-        with redirect_stdout(stdout), redirect_stderr(stderr):
-            try:
-                main()
-                code = 0
-            except SystemExit as leaving:
-                code = leaving.code or 0
-    return Result(code, stdout.getvalue(), stderr.getvalue())
-
-
-def refused(result, *words):
-    """Assert bad input: exit code 2, one line on stderr, on stdout at most the drawing's line."""
-    assert result.returncode == 2, result.stderr
-    assert all("(file in" in line for line in result.stdout.splitlines())
-    assert len(result.stderr.strip().splitlines()) == 1, result.stderr
-    assert result.stderr.startswith("kerfpath: error: ")
-    for word in words:
-        assert word in result.stderr
 
 
 @pytest.fixture(scope="module")
@@ -142,13 +100,13 @@ def test_plan_json_carries_everything_and_round_trips(planned, folder):
 
 def test_post_takes_the_settings_of_a_language_from_the_job_as_it_is_now(planned, folder):
     post = ("post", "small-plan/plan.json", "--language", "krl")
-    refused(run(*post, "--strict", cwd=folder), "krl")
+    assert_refused(run(*post, "--strict", cwd=folder), "krl")
     (folder / "there").mkdir()
     guessed = run(*post, "-o", "there/guessed.src", cwd=folder)
     written = {path.name for path in (folder / "there").glob("[!.]*")}
     assert written == {"guessed.src", "guessed.dat"}
     assert "DEF guessed()" in (folder / "there" / "guessed.src").read_text()
-    refused(run(*post, "-o", "no name.src", cwd=folder), "letters, digits and _")
+    assert_refused(run(*post, "-o", "no name.src", cwd=folder), "letters, digits and _")
     assert "laser, 1 is taken; say which with laser_output in [program.krl]" in guessed.stdout
     text = (folder / "small.toml").read_text() + "\n[program.krl]\nlaser_output = 7\n"
     (folder / "krl.toml").write_text(text)
@@ -439,7 +397,7 @@ def test_bad_input_is_one_line_and_nothing_is_written(planned, folder, arguments
     (folder / "wrong-loop.toml").write_text(SMALL.replace("skin/hole16", "skin/hole99"))
     (folder / "slow.toml").write_text(SMALL.replace("speed_m_min = 3", "speed_m_min = -3", 1))
     before = sorted(folder.iterdir())
-    refused(run(*arguments, cwd=folder), *words)
+    assert_refused(run(*arguments, cwd=folder), *words)
     assert sorted(folder.iterdir()) == before
 
 

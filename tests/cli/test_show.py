@@ -8,8 +8,9 @@ from contextlib import redirect_stderr, redirect_stdout
 
 import numpy as np
 import pytest
-from tests.cli.test_commands import DEMO, SMALL, run
 
+from commands import run
+from jobs import DEMO, SMALL
 from kerfpath import plan
 from kerfpath.cli import _show
 from kerfpath.cli._show import merge_notes, progress_bars, sweep_bar, table

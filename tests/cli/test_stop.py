@@ -10,7 +10,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from tests.cli.test_commands import DEMO, SMALL
+
+from jobs import DEMO, SMALL
 
 KERFPATH = Path(sys.executable).parent / "kerfpath"
 TRIES = int(os.environ.get("KERFPATH_STOPS", "8"))

@@ -1,14 +1,12 @@
 """`kerfpath contours` for every source, and the page that it draws."""
 
-import base64
 import json
-import re
-import zlib
 
 import numpy as np
 import pytest
-from tests.cli.test_commands import run
 
+from browser import figures
+from commands import run
 from kerfpath.report import DrawnLoop, render_drawing
 
 
@@ -19,11 +17,6 @@ def drawings(tmp_path_factory, examples):
     examples.write_iges(folder / "bracket.iges", examples.bracket())
     (folder / "line.csv").write_text("x_mm;y_mm;z_mm;nx;ny;nz\n0;0;0;0;0;1\n10,5;0;0;0;0;1\n")
     return folder
-
-
-def figures(page):
-    packed = re.findall(r'<script type="application/octet-stream"[^>]*>([^<]*)<', page)
-    return [json.loads(zlib.decompress(base64.b64decode(data))) for data in packed]
 
 
 @pytest.mark.parametrize("name", ["bracket.step", "bracket.iges", "blank.dxf", "line.csv"])

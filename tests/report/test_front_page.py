@@ -5,9 +5,8 @@ import re
 from html import escape, unescape
 
 import pytest
-from tests.report.test_drawing_page import figures
 
-from browser import dom_of, needs_chromium, without_scripts
+from browser import dom_of, figures, needs_chromium, without_scripts
 from kerfpath.errors import InputError
 from kerfpath.report import FrontAxis, FrontPlan, render_front
 

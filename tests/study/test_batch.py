@@ -8,60 +8,26 @@ from contextlib import closing
 from pathlib import Path
 
 import pytest
-from tests.cli.test_commands import refused, run
 
+from commands import assert_refused, run
+from jobs import SLIT_JOB, write_slit_jobs
 from kerfpath.errors import InputError
 from kerfpath.post import MANIFEST
 from kerfpath.study import batch
 from kerfpath.sweep import _cluster, _local
 from kerfpath.sweep._store import Store
 
-SLITS = """\
-contour,x_mm,y_mm,z_mm,nx,ny,nz
-a,0,0,0,0,0,1
-a,30,0,0,0,0,1
-b,0,20,0,0,0,1
-b,30,20,0,0,0,1
-"""
-JOB = """\
-[robot]
-model = "abb_irb4600_60_205"
-acceleration_ratio = "iontec_20_to_70kg"
-[tool]
-head = "laser-head-45"
-[part]
-file = "slits.csv"
-xyz_mm = [1200, 0, 500]
-rpy_deg = [0, 0, 0]
-[[contour]]
-pick = "a"
-speed_m_min = 2
-count = 11
-[[contour]]
-pick = "b"
-speed_m_min = 2
-count = 11
-[plan]
-gamma_step_deg = 15
-"""
-FAST = JOB.replace("speed_m_min = 2", "speed_m_min = 900", 1)
+FAST = SLIT_JOB.replace("speed_m_min = 2", "speed_m_min = 900", 1)
 JOBS = {
-    "good": JOB,
+    "good": SLIT_JOB,
     "fast": FAST,
-    "misspelt": JOB.replace("gamma_step", "gama_step"),
-    "unknown": JOB.replace('pick = "b"', 'pick = "c"'),
-    "mute": JOB + '[program]\nlanguage = "krl"\n',  # whose Status and Turn say no 360 deg
-    "foreign": JOB + '[program]\nlanguage = "urscript"\n',
-    "dry": JOB + '[program]\nlanguage = "none"\n',
+    "misspelt": SLIT_JOB.replace("gamma_step", "gama_step"),
+    "unknown": SLIT_JOB.replace('pick = "b"', 'pick = "c"'),
+    "mute": SLIT_JOB + '[program]\nlanguage = "krl"\n',  # whose Status and Turn say no 360 deg
+    "foreign": SLIT_JOB + '[program]\nlanguage = "urscript"\n',
+    "dry": SLIT_JOB + '[program]\nlanguage = "none"\n',
 }
 FILES = {"good.mod", "plan.json", "trajectory.csv", "report.html"}
-
-
-def write_jobs(folder, jobs):
-    (folder / "slits.csv").write_text(SLITS)
-    for name, text in jobs.items():
-        (folder / f"{name}.toml").write_text(text)
-    return [f"{name}.toml" for name in jobs]
 
 
 @pytest.fixture
@@ -77,7 +43,7 @@ def idle(monkeypatch):
 @pytest.fixture(scope="module")
 def done(tmp_path_factory):
     folder = tmp_path_factory.mktemp("batch")
-    names = write_jobs(folder, JOBS)
+    names = write_slit_jobs(folder, JOBS)
     command = ["batch", *names, "gone.toml", "--out", "out", "--processes", 1, "--json"]
     result = run(*command, cwd=folder)
     assert result.returncode == 1, result.stderr
@@ -153,11 +119,11 @@ def test_again_writes_what_is_missing_and_plans_nothing(done, idle):
 
 
 def test_a_job_that_was_refused_is_tried_again_once_it_has_changed(tmp_path):
-    names = write_jobs(tmp_path, {n: JOBS[n] for n in ("dry", "misspelt", "unknown")})
+    names = write_slit_jobs(tmp_path, {n: JOBS[n] for n in ("dry", "misspelt", "unknown")})
     command = ["batch", *names, "--out", "out", "--processes", 1, "--json"]
     first = rows_of(json.loads(run(*command, cwd=tmp_path).stdout))
-    (tmp_path / "unknown.toml").write_text(JOB)
-    (tmp_path / "misspelt.toml").write_text(JOB)
+    (tmp_path / "unknown.toml").write_text(SLIT_JOB)
+    (tmp_path / "misspelt.toml").write_text(SLIT_JOB)
     result = run(*command, cwd=tmp_path)
     assert result.returncode == 0
     again = rows_of(json.loads(result.stdout))
@@ -194,10 +160,10 @@ def test_a_table_for_people(done, idle):
 def test_bad_input_of_the_command_is_one_line(tmp_path, monkeypatch, idle):
     def said(*arguments):
         result = run("batch", *arguments, cwd=tmp_path)
-        refused(result)
+        assert_refused(result)
         return result.stderr
 
-    write_jobs(tmp_path, {"good": JOB})
+    write_slit_jobs(tmp_path, {"good": SLIT_JOB})
     (tmp_path / "file").write_text("")
     (tmp_path / "other").mkdir()
     (tmp_path / "out").mkdir()
@@ -236,7 +202,7 @@ def test_a_full_disk_under_the_files_is_one_line_and_the_same_command_goes_on(
     with monkeypatch.context() as patch:
         patch.setattr(Path, "write_bytes", full)
         result = run(*command, cwd=folder)
-    refused(result, "plan.json", "No space left on device")
+    assert_refused(result, "plan.json", "No space left on device")
     assert not plan.exists()
     assert json.loads(run(*command, cwd=folder).stdout) == told
     assert plan.exists()
@@ -245,15 +211,15 @@ def test_a_full_disk_under_the_files_is_one_line_and_the_same_command_goes_on(
 def test_no_jobs_at_all_is_bad_input(tmp_path):
     result = run("batch", cwd=tmp_path)
     assert result.returncode == 2
-    assert "Missing argument 'JOB.toml'" in result.stderr
+    assert "Missing argument 'SLIT_JOB.toml'" in result.stderr
 
 
 def test_a_job_that_changes_meanwhile_ends_the_batch(tmp_path):
-    write_jobs(tmp_path, {"good": JOB})
+    write_slit_jobs(tmp_path, {"good": SLIT_JOB})
     job, out = tmp_path / "good.toml", tmp_path / "out"
 
     def edit(what, done, total):
-        job.write_text(JOB + "\n# a remark\n")
+        job.write_text(SLIT_JOB + "\n# a remark\n")
 
     with pytest.raises(InputError, match=r"good\.toml: .*has changed.*start the study again"):
         batch([job], out, processes=1, progress=edit)
@@ -266,11 +232,11 @@ def test_workers_of_a_cluster_need_the_job_folder_alone_and_that_they_need(
     workers(1)
     shared, out = tmp_path / "shared", tmp_path / "out"
     shared.mkdir()
-    write_jobs(shared, {"good": JOB})
+    write_slit_jobs(shared, {"good": SLIT_JOB})
     (row,) = batch([shared / "good.toml"], out, scheduler=scheduler)
     assert row.passed
     assert {path.name for path in row.folder.iterdir()} == FILES | {MANIFEST}
-    (other,) = write_jobs(shared, {"other": JOB})
+    (other,) = write_slit_jobs(shared, {"other": SLIT_JOB})
 
     def lost(what, done, total):
         (shared / other).unlink()

@@ -10,9 +10,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 from scipy.spatial.distance import cdist
-from tests.cli.test_commands import refused, run
 
 from browser import CHROMIUM, dom_of
+from commands import assert_refused, run
 from conftest import ROOT
 from kerfpath.cad import read as read_drawing
 from kerfpath.errors import InputError
@@ -501,5 +501,5 @@ def test_the_command_refuses_what_it_does_not_know(coarse, tmp_path):
         ("x=0:1", "no variable 'x'"),
         ("yaw_deg=5:-5", "with LOW below HIGH"),
     ):
-        refused(run("layout", coarse, "--vary", given, "--out", tmp_path / "out"), word)
+        assert_refused(run("layout", coarse, "--vary", given, "--out", tmp_path / "out"), word)
     assert not (tmp_path / "out").exists()

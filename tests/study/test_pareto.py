@@ -13,9 +13,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from tests.cli.test_commands import run
-from tests.job.run.test_part import HEAD
 
+from commands import run
+from jobs import HEAD
 from kerfpath import InputError, NoFeasiblePath, pareto
 from kerfpath.cad import read as read_drawing
 from kerfpath.job import read_job, read_plan_file

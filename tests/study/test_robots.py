@@ -8,9 +8,9 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from tests.cli.test_commands import refused, run
-from tests.study.test_batch import JOB, write_jobs
 
+from commands import assert_refused, run
+from jobs import SLIT_JOB, write_slit_jobs
 from kerfpath.cad import read
 from kerfpath.errors import InputError
 from kerfpath.graph import gamma_grid
@@ -30,7 +30,7 @@ from kerfpath.study._robots import judged
 from kerfpath.sweep import _local
 
 # The job gives accelerations of its own robot, and none that could be assumed of others.
-KNOWN = JOB.replace(
+KNOWN = SLIT_JOB.replace(
     'acceleration_ratio = "iontec_20_to_70kg"',
     "acceleration_deg_s2 = [320, 270, 420, 1300, 1400, 2000]\nendless = [4, 6]",
 ).replace('pick = "b"\nspeed_m_min = 2', 'pick = "b"\nspeed_m_min = 400')
@@ -41,7 +41,7 @@ SMALL, UNKNOWN = "staubli_tx60", "kuka_kr120_r2500_pro"
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory):
     folder = tmp_path_factory.mktemp("robots")
-    write_jobs(folder, {"job": KNOWN})
+    write_slit_jobs(folder, {"job": KNOWN})
     return folder
 
 
@@ -89,7 +89,7 @@ def test_speeds_are_those_of_a_job_with_that_robot(found, folder):
 def test_reach_is_the_share_of_nodes_with_a_pose(tmp_path):
     # A slit that runs out of reach, nodes every 100 mm.
     far = KNOWN.replace("count = 11", "count = 21")
-    write_jobs(tmp_path, {"job": far})
+    write_slit_jobs(tmp_path, {"job": far})
     table = (tmp_path / "slits.csv").read_text().replace("a,30,0,0,0", "a,2000,0,0,0")
     (tmp_path / "slits.csv").write_text(table)
     job = read_job(tmp_path / "job.toml")
@@ -153,7 +153,7 @@ def test_a_cell_is_kept_clear_of_and_links_are_never_guessed(tmp_path):
         '[cell]\nnear_miss_mm = 5\npart = false\n[[cell.fixture]]\nname = "wall"\n'
         "size_mm = [40, 900, 900]\nxyz_mm = [1215, 0, 520]\n"
     )
-    write_jobs(tmp_path, {"job": JOB + cell})
+    write_slit_jobs(tmp_path, {"job": SLIT_JOB + cell})
     job = read_job(tmp_path / "job.toml")
     part = read(job.part_file)
     other = with_robot(job, robot(STATED))
@@ -197,7 +197,7 @@ def test_the_command_prints_and_writes_what_was_found(folder, found, monkeypatch
 def test_bad_input_of_the_command_is_one_line(folder):
     def said(*arguments):
         result = run("layout", "job.toml", *arguments, cwd=folder)
-        refused(result)
+        assert_refused(result)
         return result.stderr
 
     (folder / "file").write_text("")

@@ -8,10 +8,11 @@ from __future__ import annotations
 
 import numpy as np
 
-from kerfpath._arrays import Array, Bools, Ints
+from kerfpath._arrays import Array, Ints
 from kerfpath.auditor._chain import JointChain
 from kerfpath.auditor._motion import Motion
-from kerfpath.auditor._swept import frames_of, in_between
+from kerfpath.auditor._nearest import nearest
+from kerfpath.auditor._swept import Moves, frames_of
 from kerfpath.auditor._table import Check
 from kerfpath.cell import Cell
 
@@ -19,11 +20,6 @@ __all__ = ["collision_along", "collisions"]
 
 TOUCHING = -1e-9
 """m: to touch is not to be clear."""
-FIRST, FARTHER = 1e-3, 8.0
-"""m beyond the near-miss distance up to which distances are found exactly, and how many times
-farther is looked next where all are farther apart."""
-FARTHEST = 1.0
-"""m: from there on it need not be told."""
 
 
 def collisions(cell: Cell, motion: Motion, chain: JointChain) -> list[Check]:
@@ -43,7 +39,8 @@ def collision_along(cell: Cell, q0: Array, q1: Array, node: Ints, chain: JointCh
 
     They are divided until nothing nearer can hide; where that cannot be said, it is counted.
     """
-    between, nodes, open_ = in_between(cell, q0, q1, node, chain)
+    moves = Moves(cell, chain, q1 - q0)
+    between, nodes, open_ = moves.in_between(q0, q1, node)
     q, first = np.unique(np.vstack([q0, q1, between]), axis=0, return_index=True)
     node = np.concatenate([node, node, nodes])[first]
     frames = frames_of(chain, q)
@@ -57,7 +54,7 @@ def collision_along(cell: Cell, q0: Array, q1: Array, node: Ints, chain: JointCh
     )
     rows = [("collision", "", ~cell.own), ("collision-own", " of their own", cell.own)]
     found = [
-        _nearest(cell, frames, wanted, code, whose, node)
+        _check(cell, nearest(cell, moves.rates, q, frames, wanted), code, whose, node)
         for code, whose, wanted in rows
         if wanted.any()
     ]
@@ -68,37 +65,18 @@ def _rows(q: Array) -> Array:
     return q.reshape(-1, q.shape[-1])
 
 
-def _nearest(cell: Cell, frames: Array, wanted: Bools, code: str, whose: str, node: Ints) -> Check:
-    beyond = FIRST
-    while True:
-        short = np.where(
-            wanted,
-            cell.required
-            - cell.scene.distances(
-                frames, cell.required + beyond, np.broadcast_to(wanted, (len(frames), len(wanted)))
-            ),
-            -np.inf,
-        )
-        worst = _worst(short)
-        row, pair = worst // short.shape[1], worst % short.shape[1]
-        if not short[row, pair] <= -beyond or beyond > FARTHEST:
-            break
-        beyond *= FARTHER
-    (one, two), value = cell.pair_names[pair], float(short[row, pair])
-    needed = float(cell.required[pair])
+def _check(cell: Cell, found: tuple[int, int, float], code: str, whose: str, node: Ints) -> Check:
+    """Return the check of what `nearest` found."""
+    row, pair, beyond = found
+    (one, two), needed = cell.pair_names[pair], float(cell.required[pair])
     whence = "left by design" if needed < cell.asked[pair] else "asked"
     return Check(
         code=code,
         title=f"shortfall of near-miss distances{whose} (nearest: {one} and {two}, "
-        f"{(needed - value) * 1e3:.2f} mm apart, {needed * 1e3:.4g} mm {whence})",
-        value=value,
+        f"{(needed + beyond) * 1e3:.2f} mm apart, {needed * 1e3:.4g} mm {whence})",
+        value=-beyond,
         limit=TOUCHING,
         unit="m",
         node=int(node[row]),
         advice="move the part or the fixture, or plan with the cell",
     )
-
-
-def _worst(short: Array) -> int:
-    """Return the place of the largest value, NaN counting as the worst of all."""
-    return int(np.argmax(np.where(np.isnan(short), np.inf, short)))

@@ -14,7 +14,7 @@ from kerfpath._arrays import Array, Ints
 from kerfpath.auditor._chain import JointChain
 from kerfpath.cell import Cell
 
-__all__ = ["frames_of", "in_between"]
+__all__ = ["Moves", "frames_of"]
 
 HIDDEN = 1e-4
 """m that bodies may come nearer to each other than at the samples."""
@@ -32,46 +32,17 @@ def frames_of(chain: JointChain, q: Array) -> Array:
     return np.ascontiguousarray(frames)
 
 
-def in_between(
-    cell: Cell, q0: Array, q1: Array, node: Ints, chain: JointChain
-) -> tuple[Array, Ints, Ints]:
-    """Return the joints (S, n) to be looked at between samples q0 and q1 (B, n), and their nodes.
+class Moves:
+    """The judged pairs of a cell, and how far their bodies come in steps dq (B, n) rad.
 
-    Last the nodes of the steps in which bodies may still come nearer by more than `HIDDEN`.
+    Attributes
+    ----------
+    rates : (P, n) m/rad
+        How far a corner of each pair comes at most as a joint turns, seen from the other body.
     """
-    moves = _Moves(cell, chain, q1 - q0)
-    middle: list[Array] = []
-    nodes: list[Ints] = []
-    # Where a step ends, the next begins: each sample is looked at once.
-    samples, place = np.unique(np.vstack([q0, q1]), axis=0, return_inverse=True)
-    frames = frames_of(chain, samples)
-    apart, (at0, at1) = moves.apart(frames), place.reshape(2, -1)
-    F0, F1, d0, d1 = frames[at0], frames[at1], apart[at0], apart[at1]
-    most = MOST * len(q0) + 1000
-    for _ in range(DEEPEST):
-        left = moves.left(q1 - q0, F0, F1, d0, d1)
-        q0, q1, node = q0[left], q1[left], node[left]
-        if not len(node) or sum(map(len, nodes)) + len(node) > most:
-            F0, F1, d0, d1 = F0[left], F1[left], d0[left], d1[left]
-            break
-        half = (q0 + q1) / 2
-        F = frames_of(chain, half)
-        d = moves.apart(F)
-        middle.append(half)
-        nodes.append(node)
-        q0, q1, node = np.vstack([q0, half]), np.vstack([half, q1]), np.tile(node, 2)
-        F0, F1 = np.concatenate([F0[left], F]), np.concatenate([F, F1[left]])
-        d0, d1 = np.vstack([d0[left], d]), np.vstack([d, d1[left]])
-    open_ = node[moves.left(q1 - q0, F0, F1, d0, d1)] if len(node) else node
-    found = np.vstack(middle) if middle else np.zeros((0, q0.shape[1]))
-    return found, np.concatenate([np.zeros(0, np.int64), *nodes]), open_
-
-
-class _Moves:
-    """The judged pairs of a cell, and how far their bodies come in steps dq (B, n) rad."""
 
     def __init__(self, cell: Cell, chain: JointChain, dq: Array) -> None:
-        self._cell, self._joints = cell, np.arange(len(chain.axes))
+        self._cell, self._chain, self._joints = cell, chain, np.arange(len(chain.axes))
         bodies = cell.bodies
         pairs = [sorted((int(a), int(b)), key=lambda k: bodies[k].frame) for a, b in cell.pairs]
         self._pairs = [
@@ -83,19 +54,51 @@ class _Moves:
         self._reach = np.array(
             [_reach(chain, b, corners) for _, b, corners in self._pairs]
         ).reshape(len(pairs), -1)
+        self.rates = self._turns * self._reach
         # Farther apart than any step could bring them, pairs are clear whatever they are.
         self._enough = cell.required + self._way(dq).max(axis=0, initial=0.0)
 
-    def apart(self, frames: Array) -> Array:
+    def in_between(self, q0: Array, q1: Array, node: Ints) -> tuple[Array, Ints, Ints]:
+        """Return the joints (S, n) to be looked at between samples q0 and q1, and their nodes (B,).
+
+        Last the nodes of the steps in which bodies may still come nearer by more than `HIDDEN`.
+        """
+        middle: list[Array] = []
+        nodes: list[Ints] = []
+        # Where a step ends, the next begins: each sample is looked at once.
+        samples, place = np.unique(np.vstack([q0, q1]), axis=0, return_inverse=True)
+        frames = frames_of(self._chain, samples)
+        apart, (at0, at1) = self._apart(frames), place.reshape(2, -1)
+        F0, F1, d0, d1 = frames[at0], frames[at1], apart[at0], apart[at1]
+        most = MOST * len(q0) + 1000
+        for _ in range(DEEPEST):
+            left = self._left(q1 - q0, F0, F1, d0, d1)
+            q0, q1, node = q0[left], q1[left], node[left]
+            if not len(node) or sum(map(len, nodes)) + len(node) > most:
+                F0, F1, d0, d1 = F0[left], F1[left], d0[left], d1[left]
+                break
+            half = (q0 + q1) / 2
+            F = frames_of(self._chain, half)
+            d = self._apart(F)
+            middle.append(half)
+            nodes.append(node)
+            q0, q1, node = np.vstack([q0, half]), np.vstack([half, q1]), np.tile(node, 2)
+            F0, F1 = np.concatenate([F0[left], F]), np.concatenate([F, F1[left]])
+            d0, d1 = np.vstack([d0[left], d]), np.vstack([d, d1[left]])
+        open_ = node[self._left(q1 - q0, F0, F1, d0, d1)] if len(node) else node
+        found = np.vstack(middle) if middle else np.zeros((0, q0.shape[1]))
+        return found, np.concatenate([np.zeros(0, np.int64), *nodes]), open_
+
+    def _apart(self, frames: Array) -> Array:
         """Return the distances (B, P) m of the pairs, exact up to where no step can hide more."""
         found = self._cell.scene.distances(frames, self._enough)
         return np.asarray(np.minimum(found, self._enough))
 
     def _way(self, dq: Array) -> Array:
         """Return how far (B, P) m a corner of each pair can come in steps, seen from the other."""
-        return np.asarray(np.abs(dq) @ (self._turns * self._reach).T)
+        return np.asarray(np.abs(dq) @ self.rates.T)
 
-    def left(self, dq: Array, F0: Array, F1: Array, d0: Array, d1: Array) -> Ints:
+    def _left(self, dq: Array, F0: Array, F1: Array, d0: Array, d1: Array) -> Ints:
         """Return the steps in which a pair may be nearer than asked without being seen."""
         required = self._cell.required
         way = self._way(dq)

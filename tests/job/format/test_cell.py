@@ -9,10 +9,10 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from tests.cli.test_commands import refused, run
 from tests.robots.test_five_axes import ARM
 from tests.urdf.test_urdf import described
 
+from commands import assert_refused, run
 from kerfpath.cad import read as read_drawing
 from kerfpath.cell import Mesh, box, edges_of, thicken
 from kerfpath.comfort import Band, Comfort
@@ -293,7 +293,7 @@ def test_a_fault_in_the_cell_is_told_in_one_line(folder, old, new, message):
     assert SMALL.count(old) >= 1
     path = job(folder, SMALL.replace(old, new, 1), "fault.toml")
     result = run("check", path, cwd=folder)
-    refused(result, f"{path}:")
+    assert_refused(result, f"{path}:")
     assert re.search(message, result.stderr), result.stderr
 
 
@@ -434,7 +434,7 @@ def test_a_fault_of_the_robot_is_told_in_one_line(folder, old, new, message):
     (folder / "bad.urdf").write_text("<robot name='x'><link name='a'/></robot>")
     path = job(folder, SMALL.replace(old, new, 1), "fault.toml")
     result = run("check", path, cwd=folder)
-    refused(result, f"{path}:")
+    assert_refused(result, f"{path}:")
     assert re.search(message, result.stderr), result.stderr
 
 
@@ -486,7 +486,9 @@ def test_a_language_that_the_robot_does_not_speak_is_refused_before_planning(fol
     text = free(robot).replace('language = "none"', 'language = "rapid"')
     path = job(folder, text, "ur.toml")
     result = run("plan", path, cwd=folder)
-    refused(result, f"{path}:", "program.language", "cannot yet say the axes", 'language = "none"')
+    assert_refused(
+        result, f"{path}:", "program.language", "cannot yet say the axes", 'language = "none"'
+    )
 
 
 def test_an_arm_whose_axis_3_is_not_known_is_asked_for_it_before_planning(folder, arm):

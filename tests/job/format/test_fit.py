@@ -7,8 +7,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from tests.cli.test_commands import refused, run
 
+from commands import assert_refused, run
 from kerfpath.air import least_time
 from kerfpath.errors import AuditFailed, InputError
 from kerfpath.job import planned_text, program_from_file, read_job, read_plan_file, run_job
@@ -322,5 +322,7 @@ def test_post_follows_the_language_of_the_job(planned, tmp_path):
     result = run("post", plan, "--job", job, "-o", tmp_path / "out")
     assert result.returncode == 0, result.stderr
     assert {p.name for p in (tmp_path / "out").iterdir()} == {"cut.dat", "cut.src", MANIFEST}
-    refused(run("post", plan, "--job", job, "-o", tmp_path / "cut.mod"), "krl", ".src", "rapid")
-    refused(run("post", folder / "plan.json", "-o", tmp_path / "x"), "--language")
+    assert_refused(
+        run("post", plan, "--job", job, "-o", tmp_path / "cut.mod"), "krl", ".src", "rapid"
+    )
+    assert_refused(run("post", folder / "plan.json", "-o", tmp_path / "x"), "--language")

@@ -6,8 +6,8 @@ import shutil
 
 import numpy as np
 import pytest
-from tests.cli.test_commands import refused, run
 
+from commands import assert_refused, run
 from conftest import ROOT
 from kerfpath.cad import read
 from kerfpath.errors import InputError
@@ -152,7 +152,7 @@ def test_what_only_a_closed_loop_can_have_is_one_line(folder, keys, where, why):
     path = job_of(folder, HEAD + keys + "\n", "bad.toml")
     line = len(path.read_text().splitlines())
     result = run("plan", str(path), "--out", str(folder / "bad"))
-    refused(result, f"bad.toml:{line}: {where}loop 'MARK/line1' is an open line, which")
+    assert_refused(result, f"bad.toml:{line}: {where}loop 'MARK/line1' is an open line, which")
     assert why in result.stderr
 
 

@@ -5,10 +5,10 @@ import shutil
 
 import numpy as np
 import pytest
-from tests.cli.test_commands import run
-from tests.test_benchmarks import benchmark_module
+from benchmarks import _plan_jobs, plan_edits
 
 import kerfpath
+from commands import run
 from kerfpath.errors import InputError
 from kerfpath.job import PlanAudit, audit_file, read_plan_file
 
@@ -23,16 +23,14 @@ def folder(tmp_path_factory):
 
 @pytest.fixture(scope="module")
 def made(folder):
-    jobs = benchmark_module("_plan_jobs")
-    return {name: jobs.planned(folder, name) for name in jobs.JOBS}
+    return {name: _plan_jobs.planned(folder, name) for name in _plan_jobs.JOBS}
 
 
 def test_no_harmful_edit_of_a_plan_passes(made):
-    bench = benchmark_module("plan_edits")
-    tally = bench.Tally()
+    tally = plan_edits.Tally()
     for job, plan in made.values():
         audit = PlanAudit.of(job)
-        bench.edited_plans(tally, lambda p, a=audit: a.audited(p).passed, plan, EDITS, seed=1)
+        plan_edits.edited_plans(tally, lambda p, a=audit: a.audited(p).passed, plan, EDITS, seed=1)
     assert tally.passed == []
     assert tally.broke == []
     assert tally.total("caught") > EDITS  # the edits do get as far as the audit
@@ -42,11 +40,11 @@ def test_no_harmful_edit_of_a_plan_passes(made):
 
 @pytest.mark.parametrize("name", ["part", "cell", "dip", "pieces"])
 def test_no_job_edited_since_passes(made, name):
-    bench, (job, plan) = benchmark_module("plan_edits"), made[name]
+    job, plan = made[name]
     assert audit_file(plan, job).passed
     found = [
-        (what, bench.judged(lambda p, o=other: audit_file(p, o).passed, plan))
-        for what, other in bench.edited_jobs(job)
+        (what, plan_edits.judged(lambda p, o=other: audit_file(p, o).passed, plan))
+        for what, other in plan_edits.edited_jobs(job)
     ]
     assert len(found) >= 5
     assert [what for what, verdict in found if verdict == "passed"] == []

@@ -8,10 +8,9 @@ from itertools import count
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
-from tests.cli.test_commands import SMALL, run
-from tests.cli.test_commands import refused as assert_refused
-from tests.job.run.test_part import DEMO, WHOLE
 
+from commands import assert_refused, run
+from jobs import DEMO, SMALL, WHOLE
 from kerfpath import audit, placed, plan
 from kerfpath.job import read_job, read_plan_file
 from kerfpath.placement import planned_again

@@ -4,7 +4,7 @@ import re
 
 import numpy as np
 import pytest
-from tests.test_benchmarks import benchmark_module
+from benchmarks import program_edits
 
 FAULTS, EDITS = 6, 8
 """One fault in so many, and so many edits of the text, for each; the benchmark makes all."""
@@ -28,21 +28,16 @@ TURNING = {
 
 
 @pytest.fixture(scope="module")
-def campaign():
-    return benchmark_module("program_edits")
-
-
-@pytest.fixture(scope="module")
-def subjects(campaign, tmp_path_factory):
+def subjects(tmp_path_factory):
     folder = tmp_path_factory.mktemp("edits")
-    return {subject.language.name: subject for subject in campaign.subjects(folder)}
+    return {subject.language.name: subject for subject in program_edits.subjects(folder)}
 
 
 @pytest.mark.parametrize("language", LANGUAGES)
-def test_no_fault_and_no_edit_that_does_harm_passes(campaign, subjects, language):
+def test_no_fault_and_no_edit_that_does_harm_passes(subjects, language):
     subject = subjects[language]
     assert subject.outcome(subject.files) == ("passed", "")
-    tally, number = campaign.Tally(), LANGUAGES.index(language)
+    tally, number = program_edits.Tally(), LANGUAGES.index(language)
     tally.try_faults(subject, np.random.default_rng(number), every=FAULTS, first=number)
     assert tally.of("harmful") > 60 / FAULTS
     tally.try_edits(subject, np.random.default_rng(number), EDITS)

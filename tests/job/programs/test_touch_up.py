@@ -7,9 +7,9 @@ import shutil
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
-from tests.cli.test_commands import refused, run
-from tests.job.run.test_part import DEMO, WHOLE
 
+from commands import assert_refused, run
+from jobs import DEMO, WHOLE
 from kerfpath import Contour, InputError
 from kerfpath.contour import angle_between
 from kerfpath.job import read_plan_file
@@ -255,7 +255,7 @@ def many(text):
 )
 def test_what_is_no_touch_up_is_refused_in_one_line(folder, change, words):
     out = folder / "never"
-    refused(touch(folder, change((folder / "out/job.mod").read_text()), "--out", out), words)
+    assert_refused(touch(folder, change((folder / "out/job.mod").read_text()), "--out", out), words)
     assert not out.exists()
 
 
@@ -265,7 +265,7 @@ def test_jobs_and_plans_that_do_not_fit_are_refused(folder):
     arcs.write_text(WHOLE.replace("[program]", "[program]\narcs_mm = 0.02"))
     command = ("touch-up", folder / "edited.mod", "--plan", folder / "out/plan.json", "--job")
     (folder / "edited.mod").write_text(edited(text, "led_in", 21, (0, 0, 0.4)))
-    refused(run(*command, arcs), "jobs with arcs_mm cannot be touched up")
+    assert_refused(run(*command, arcs), "jobs with arcs_mm cannot be touched up")
     other = folder / "elsewhere.toml"
     other.write_text(WHOLE.replace("[1200, -600, 500]", "[1201, -600, 500]"))
-    refused(run(*command, other), "its part is not where that of")
+    assert_refused(run(*command, other), "its part is not where that of")

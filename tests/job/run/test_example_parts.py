@@ -6,8 +6,8 @@ import shutil
 
 import numpy as np
 import pytest
-from tests.cli.test_commands import run
 
+from commands import run
 from conftest import ROOT
 from kerfpath.cad import read
 

@@ -3,85 +3,17 @@
 import csv
 import json
 import shutil
-from importlib.resources import files
-from pathlib import Path
 
 import numpy as np
 import pytest
-from tests.cli.test_commands import refused, run
 
+from commands import assert_refused, run
+from jobs import CONTOURS, DEMO, HEAD, PLAN, SEQUENCE, WHOLE
 from kerfpath import audit, robot
 from kerfpath.cad import read
 from kerfpath.errors import InputError, NoFeasiblePath
 from kerfpath.job import program_from_file, read_job, read_plan_file, run_job
 from programs import read_text
-
-DEMO = Path(str(files("kerfpath") / "demo"))
-HEAD = """\
-[robot]
-model = "abb_irb4600_60_205"
-endless = [4, 6]
-acceleration_deg_s2 = [320, 270, 420, 1300, 1400, 2000]
-[tool]
-head = "laser-head-45"
-[part]
-file = "b_pillar.step"
-xyz_mm = [1200, -600, 500]
-rpy_deg = [0, 0, 90]
-"""
-CONTOURS = """\
-[[contour]]
-pick = "skin/hole1"
-name = "led in"
-speed_m_min = 3
-spacing_mm = 2
-start = "best"
-candidates = 2
-overlap_mm = 2
-kerf_mm = 0.2
-[contour.lead_in]
-length_mm = 4
-shape = "arc"
-angle_deg = 90
-[contour.lead_out]
-length_mm = 3
-shape = "arc"
-[[contour]]
-pick = "skin/hole21"
-name = "joined"
-speed_m_min = 3
-spacing_mm = 2
-direction = "best"
-[contour.micro_joints]
-width_mm = 2
-count = 2
-[[contour]]
-pick = "skin/hole13"
-name = "cornered"
-speed_m_min = 3
-spacing_mm = 2
-start_mm = 10
-bevel_deg = 5
-[contour.lead_in]
-length_mm = 4
-[contour.corners]
-slow_share = 0.1
-ramp_mm = 6
-"""
-PLAN = """\
-[plan]
-gamma_step_deg = 10
-posture = "front/up"
-"""
-SEQUENCE = """\
-[sequence]
-home_deg = [0, -20, 10, 0, 60, 0]
-[program]
-name = "job"
-pierce_time_s = 0.25
-lead_time_s = 0.005
-"""
-WHOLE = HEAD + CONTOURS + PLAN + SEQUENCE
 
 
 @pytest.fixture(scope="module")
@@ -276,7 +208,7 @@ def test_what_is_best_needs_a_sequence(folder):
 def test_operations_that_cannot_be_are_one_line_and_code_2(folder, old, new, message):
     bad = folder / "bad.toml"
     bad.write_text(WHOLE.replace(old, new, 1))
-    refused(run("plan", str(bad), "--out", str(folder / "bad")), message)
+    assert_refused(run("plan", str(bad), "--out", str(folder / "bad")), message)
 
 
 def test_every_cut_of_the_shipped_part_can_be_made():

@@ -1,0 +1,88 @@
+"""Where in many poses bodies come nearest to their near-miss distance, at few distance queries.
+
+From one joint vector to another no corner of a body moves farther, seen from the other body of its
+pair, than the sum of |dq_j| times its reach from joint j, and their distance changes by no more.
+So a distance that was found bounds those at all other poses from below, and only where no bound is
+above the least one found does another have to be found: what comes out is exact all the same.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy.spatial import cKDTree
+
+from kerfpath._arrays import Array, Bools, Ints
+from kerfpath.cell import Cell
+
+__all__ = ["nearest"]
+
+SURE = 1e-5
+"""m above the least found from which on a bound rules a pose out; distances are exact to 1e-6 m."""
+NEIGHBOURS = 4
+"""Poses found before that a pose is compared with."""
+
+
+def nearest(
+    cell: Cell, rates: Array, q: Array, frames: Array, wanted: Bools
+) -> tuple[int, int, float]:
+    """Return a pose, a pair, and how far (m) it is beyond its near-miss distance there: the least.
+
+    Parameters
+    ----------
+    cell : Cell
+    rates : (P, n) m/rad
+        How far a corner of each pair comes at most as a joint turns, seen from the other body.
+    q : (B, n) rad
+    frames : (B, n+1, 4, 4)
+        Of base and links at q.
+    wanted : (P,) bool
+        The pairs to look at, one at least.
+
+    Returns
+    -------
+    row, pair : int
+    beyond : float m
+        NaN where a joint vector is.
+    """
+    pairs = np.flatnonzero(wanted)
+    beyond = cell.scene.cheap(frames)[:, pairs] - cell.required[pairs]
+    found = np.isnan(beyond) | cell.scene.round[pairs]
+    least = float(beyond[found].min(initial=np.inf))
+    count = 1
+    while True:
+        looked = False
+        for c in np.argsort(beyond.min(axis=0)):
+            p, own = pairs[c], beyond[:, c]
+            # Of meshes that overlap the depth is no bound: nothing is ruled out below contact.
+            clear = max(least, float(-cell.required[p])) + SURE
+            open_ = np.flatnonzero(~found[:, c] & (own <= clear))
+            if not open_.size:
+                continue
+            looked = True
+            rows = open_[_spread(own[open_], count)]
+            enough = np.full(len(rows), clear + cell.required[p])
+            own[rows] = cell.scene.pair_bounds(p, frames[rows], enough)[0] - cell.required[p]
+            found[rows, c] = True
+            least = min(least, float(own[rows].min()))
+            near, far = np.flatnonzero(found[:, c]), open_[~found[open_, c]]
+            own[far] = np.maximum(own[far], _bounds(q[near], own[near], q[far], rates[p]))
+        if not looked:
+            break
+        count *= 2
+    row, c = divmod(int(np.argmin(np.where(found, beyond, np.inf))), len(pairs))
+    return row, int(pairs[c]), float(beyond[row, c])
+
+
+def _spread(bounds: Array, count: int) -> Ints:
+    """Return places of the least bound first of all, later of so many spread over all of them."""
+    if count == 1:
+        return np.array([np.argmin(bounds)])
+    return np.unique(np.linspace(0, len(bounds) - 1, min(count, len(bounds))).astype(np.int64))
+
+
+def _bounds(q: Array, beyond: Array, there: Array, rate: Array) -> Array:
+    """Return lower bounds (S,) m at joints `there` (S, n) by what is known at q (F, n) rad."""
+    count = min(NEIGHBOURS, len(q))
+    moved, at = cKDTree(q * rate).query(there * rate, count, p=1)
+    shape = (len(there), count)
+    return np.asarray((beyond[at].reshape(shape) - moved.reshape(shape)).max(axis=1))

@@ -1,0 +1,41 @@
+"""The command, run in this process, and what it leaves."""
+
+import io
+import sys
+from contextlib import redirect_stderr, redirect_stdout
+from typing import NamedTuple
+
+import pytest
+
+from kerfpath.cli import main
+
+
+class Result(NamedTuple):
+    returncode: int
+    stdout: str
+    stderr: str
+
+
+def run(*arguments, cwd="."):
+    """Run the command in this process, as its entry point would."""
+    stdout, stderr = io.StringIO(), io.StringIO()
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(sys, "argv", ["kerfpath", *map(str, arguments)])
+        patch.chdir(cwd)
+        with redirect_stdout(stdout), redirect_stderr(stderr):
+            try:
+                main()
+                code = 0
+            except SystemExit as leaving:
+                code = leaving.code or 0
+    return Result(code, stdout.getvalue(), stderr.getvalue())
+
+
+def assert_refused(result, *words):
+    """Assert bad input: exit code 2, one line on stderr, on stdout at most the drawing's line."""
+    assert result.returncode == 2, result.stderr
+    assert all("(file in" in line for line in result.stdout.splitlines())
+    assert len(result.stderr.strip().splitlines()) == 1, result.stderr
+    assert result.stderr.startswith("kerfpath: error: ")
+    for word in words:
+        assert word in result.stderr

@@ -1,0 +1,125 @@
+"""Jobs that several tests start from, as text."""
+
+import re
+from importlib.resources import files
+from pathlib import Path
+
+DEMO = Path(str(files("kerfpath") / "demo"))
+
+_BEFORE, *_CONTOURS, _AFTER = re.split(
+    r"(?=\[\[contour\]\]|\[plan\])", (DEMO / "b_pillar.toml").read_text()
+)
+SMALL = "".join(
+    [
+        _BEFORE,
+        _CONTOURS[4],
+        _CONTOURS[2],
+        _AFTER.replace("gamma_step_deg = 1", "gamma_step_deg = 3"),
+    ]
+)
+"""Two small contours of the demo at a coarse step: everything that it does, in a second."""
+
+HEAD = """\
+[robot]
+model = "abb_irb4600_60_205"
+endless = [4, 6]
+acceleration_deg_s2 = [320, 270, 420, 1300, 1400, 2000]
+[tool]
+head = "laser-head-45"
+[part]
+file = "b_pillar.step"
+xyz_mm = [1200, -600, 500]
+rpy_deg = [0, 0, 90]
+"""
+CONTOURS = """\
+[[contour]]
+pick = "skin/hole1"
+name = "led in"
+speed_m_min = 3
+spacing_mm = 2
+start = "best"
+candidates = 2
+overlap_mm = 2
+kerf_mm = 0.2
+[contour.lead_in]
+length_mm = 4
+shape = "arc"
+angle_deg = 90
+[contour.lead_out]
+length_mm = 3
+shape = "arc"
+[[contour]]
+pick = "skin/hole21"
+name = "joined"
+speed_m_min = 3
+spacing_mm = 2
+direction = "best"
+[contour.micro_joints]
+width_mm = 2
+count = 2
+[[contour]]
+pick = "skin/hole13"
+name = "cornered"
+speed_m_min = 3
+spacing_mm = 2
+start_mm = 10
+bevel_deg = 5
+[contour.lead_in]
+length_mm = 4
+[contour.corners]
+slow_share = 0.1
+ramp_mm = 6
+"""
+PLAN = """\
+[plan]
+gamma_step_deg = 10
+posture = "front/up"
+"""
+SEQUENCE = """\
+[sequence]
+home_deg = [0, -20, 10, 0, 60, 0]
+[program]
+name = "job"
+pierce_time_s = 0.25
+lead_time_s = 0.005
+"""
+WHOLE = HEAD + CONTOURS + PLAN + SEQUENCE
+"""A whole part: lead-ins, micro-joints, corners, a bevel, and moves through the air."""
+
+SLITS = """\
+contour,x_mm,y_mm,z_mm,nx,ny,nz
+a,0,0,0,0,0,1
+a,30,0,0,0,0,1
+b,0,20,0,0,0,1
+b,30,20,0,0,0,1
+"""
+SLIT_JOB = """\
+[robot]
+model = "abb_irb4600_60_205"
+acceleration_ratio = "iontec_20_to_70kg"
+[tool]
+head = "laser-head-45"
+[part]
+file = "slits.csv"
+xyz_mm = [1200, 0, 500]
+rpy_deg = [0, 0, 0]
+[[contour]]
+pick = "a"
+speed_m_min = 2
+count = 11
+[[contour]]
+pick = "b"
+speed_m_min = 2
+count = 11
+[plan]
+gamma_step_deg = 15
+"""
+"""The job of two slits in the air that `SLITS` are the table of."""
+
+
+def write_slit_jobs(folder, jobs):
+    """Write jobs by name beside the table of slits; return their files."""
+    (folder / "slits.csv").write_text(SLITS)
+    for name, text in jobs.items():
+        (folder / f"{name}.toml").write_text(text)
+    return [f"{name}.toml" for name in jobs]
