@@ -154,7 +154,7 @@ def plan_part(
     of_order = keywords.keys() & OrderKeywords.__annotations__.keys()
     order = cast(OrderKeywords, {k: v for k, v in keywords.items() if k in of_order})
     rest = {k: v for k, v in keywords.items() if k not in of_order}
-    wanted = chosen(options, rest, PlanKeywords)
+    wanted = chosen(options, rest, PartKeywords)
 
     def planned(i: int, contour: Contour, options: PlanOptions) -> Plan:
         return plan(

@@ -56,28 +56,11 @@ class ProgramOptions:
     ----------
     language : str
         Robot language, or "none".
-    name : str
-        Name of the module: letters, digits and _, a letter first.
-    retract : float m
-        How far the head backs off along the tool axis between contours.
-    zone : float m
-        How far from a node the robot may begin to turn towards the next.
     settings : Settings or None
         Those of the language.
-    lead_time : float s
-        How long before the robot reaches a point the laser is switched for it.
-    pierce_time : float s
-        How long the laser stays on at the start before the cut goes on.
-    approach_speed : float m/s
-        Along the tool axis before and after a contour.
-    air_speed : float or None
-        Share of the full speed of joint moves; None: what is usual for planned moves and others.
-    arc_tolerance : float m or None
-        How near to the path circular moves stay; None: there are none.
-    gas_lead : float s or None
-        How long before the start the gas is switched on; None: not by the program.
-    handshakes : tuple of Request or Await
-        Before each contour.
+    name, retract, zone, lead_time, pierce_time, approach_speed, air_speed, arc_tolerance, gas_lead,
+    handshakes
+        As in `kerfpath.post.build_program`.
     """
 
     language: str
