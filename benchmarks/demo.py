@@ -21,11 +21,11 @@ start, frames and sampling, plan and program files, kernels that `warm_up` leave
 
 CLOCKS = {
     "compile (cold only)": ("kerfpath.job", "warm_up"),
-    "read STEP": ("kerfpath.job.run._run", "read_drawing"),
-    "graph": ("kerfpath.job.run._run", "layered_graph"),
-    "search": ("kerfpath.planner._plan", "shortest_path"),
-    "refinement": ("kerfpath.planner._plan", "refined"),
-    "audit": ("kerfpath.job.run._run", "checks"),
+    "read STEP": ("kerfpath.cli._plan", "drawing_of"),
+    "graph": ("kerfpath.job.format._read", "layered_graph"),
+    "search": ("kerfpath.planner._plan", "find_shortest"),
+    "refinement": ("kerfpath.planner._plan", "refine_plan"),
+    "audit": ("kerfpath.job.format._read", "checks"),
     "report": ("kerfpath.job.output._files", "report_text"),
 }
 PARTS = ("import", *CLOCKS, "other")

@@ -32,8 +32,8 @@ TARGET = 60.0
 CLOCKS = {
     "compiling": ("kerfpath.cli._plan", "compile_kernels"),
     "reading the STEP file": ("kerfpath.cli._plan", "drawing_of"),
-    "planning and audit": ("kerfpath.job.run._run", "_cut"),
-    "order and air moves": ("kerfpath.job.run._run", "ordered"),
+    "planning and audit": ("kerfpath.job.run._run", "cut_candidate"),
+    "order and air moves": ("kerfpath.job.run._run", "order_cuts"),
     "writing": ("kerfpath.cli._plan", "write_outcome"),
 }
 PARTS = ("import", *CLOCKS, "other")

@@ -17,13 +17,12 @@ from benchmarks._program_edits import edits
 from benchmarks._program_faults import faults
 from benchmarks._program_oracle import verdict
 from kerfpath.errors import InputError
-from kerfpath.job import ProgramAsked, run_job
+from kerfpath.job import ProgramAudit, run_job
 from kerfpath.post import (
     Language,
     Program,
     ReadProgram,
     Settings,
-    build_program,
     languages,
     read_program,
 )
@@ -113,7 +112,7 @@ class Subject:
 
     Parameters
     ----------
-    asked : ProgramAsked
+    audit : ProgramAudit
     language : Language
     settings : Settings
     program : Program
@@ -121,7 +120,7 @@ class Subject:
     files : mapping of str to str
     """
 
-    asked: ProgramAsked
+    audit: ProgramAudit
     language: Language
     settings: Settings
     program: Program
@@ -138,13 +137,13 @@ class Subject:
     def outcome(self, files: Mapping[str, str]) -> tuple[Outcome, str]:
         """Return what comes of the audit of files, and the first finding."""
         try:
-            found = self.asked.audit(self.read(files), self.language, self.settings, "job")
+            found = self.audit.audited(self.read(files), self.language, self.settings, "job")
         except InputError as error:
             return "refused", str(error)
         if found.passed:
             return "passed", ""
         wrong = [(n, c) for n, table in found.tables.items() for c in table if not c.ok]
-        said = [found.said(n, c) for n, c in wrong]
+        said = [found.sentence(n, c) for n, c in wrong]
         return "caught", "; ".join([*said, *found.missing])
 
 
@@ -243,23 +242,17 @@ def subjects(folder: Path, only: tuple[str, ...] = (), more: str = "") -> Iterat
                 language=name, lead=0.01 if chosen.ahead else 0.0, more=more,
             )
         )  # fmt: skip
-        asked = ProgramAsked.of(path)
-        options = asked.job.program
+        audit = ProgramAudit.of(path)
+        options = audit.job.program
         if arm not in plans:
-            outcome = run_job(asked.job)
+            outcome = run_job(audit.job)
             assert outcome.passed, outcome
             plans[arm] = outcome.plans, () if outcome.part is None else outcome.part.moves
         made, moves = plans[arm]
-        program = build_program(
-            made, moves=moves, name=options.name, retract=options.retract, zone=options.zone,
-            lead_time=options.lead_time, gas_lead=options.gas_lead,
-            pierce_time=options.pierce_time, approach_speed=options.approach_speed,
-            air_speed=options.air_speed, arc_tolerance=options.arc_tolerance,
-            handshakes=options.handshakes,
-        )  # fmt: skip
+        program = options.program(made, moves)
         settings = chosen.completed(options.settings)
         files = chosen.formatter(program, settings).files()
-        yield Subject(asked=asked, language=chosen, settings=settings, program=program, files=files)
+        yield Subject(audit=audit, language=chosen, settings=settings, program=program, files=files)
 
 
 def _draw(path: Path) -> None:

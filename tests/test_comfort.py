@@ -28,7 +28,7 @@ from kerfpath.auditor._margins import margins
 from kerfpath.cell import Checker, box_between, cell_of
 from kerfpath.comfort import MEASURES, jacobian, measure, measures
 from kerfpath.job import read_plan_file
-from kerfpath.job.plan_file._write import plan_entry, plan_text
+from kerfpath.job.plan_file._write import plan_document, plan_entry, plan_text
 from kerfpath.planner import layered_graph
 from kerfpath.robots import Robot
 from kerfpath.tilt import Tilt
@@ -322,6 +322,9 @@ def test_a_near_miss_costs_and_the_plan_is_the_best_of_all(small, posted, closur
     assert made.cost > blind.cost
     with pytest.raises(InputError, match="clearance: is measured in a cell"):
         plan(nodes, arm, comfort=comfort, **options)
+    # Off the grid it is not known what clearance costs, so no motion there is looked for.
+    with pytest.raises(NoFeasiblePath, match="no admissible"):
+        plan(nodes, arm, cell=posted, comfort=comfort, refine=True, **options | {"speed": 50.0})
 
 
 @pytest.fixture(scope="module")
@@ -399,7 +402,7 @@ def test_a_plan_file_tells_the_comfort_asked_for(small, tmp_path):
     nodes, arm, options = small
     made = plan(nodes, arm, comfort=EVERY, **options)
     entry = plan_entry(made, "circle", checks(made))
-    text = plan_text(arm, made.T_flange_tip, made.T_base_part, [entry], {})
+    text = plan_text(plan_document(arm, made.T_flange_tip, made.T_base_part, [entry], {}))
     (tmp_path / "plan.json").write_text(text)
     (again,) = read_plan_file(tmp_path / "plan.json").plans
     assert again.settings.comfort == EVERY

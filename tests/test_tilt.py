@@ -24,7 +24,7 @@ from kerfpath import (
 from kerfpath.auditor import checks
 from kerfpath.graph import gamma_grid
 from kerfpath.job import read_plan_file
-from kerfpath.job.plan_file._write import plan_entry, plan_text
+from kerfpath.job.plan_file._write import plan_document, plan_entry, plan_text
 from kerfpath.planner import layered_graph
 from kerfpath.planner._clear import _beside
 from kerfpath.post import build_program, post
@@ -239,7 +239,7 @@ def test_the_feed_dips_with_a_tilt(arc, arm, options):
 def test_a_plan_file_keeps_the_tilt_and_its_program_is_written(made, tmp_path):
     entry = plan_entry(made, "arc", checks(made))
     assert np.shape(entry["nodes"]["lead_lean_rad"]) == (25, 2)
-    text = plan_text(made.robot, made.T_flange_tip, made.T_base_part, [entry], {})
+    text = plan_text(plan_document(made.robot, made.T_flange_tip, made.T_base_part, [entry], {}))
     (tmp_path / "plan.json").write_text(text)
     (read,) = read_plan_file(tmp_path / "plan.json").plans
     assert read.settings.tilt == made.settings.tilt

@@ -16,7 +16,7 @@ from kerfpath.cell import cell_of
 from kerfpath.comfort import Band, Comfort, measure, measures
 from kerfpath.graph import gamma_grid
 from kerfpath.job import read_plan_file
-from kerfpath.job.plan_file._write import plan_entry, plan_text
+from kerfpath.job.plan_file._write import plan_document, plan_entry, plan_text
 from kerfpath.planner import layered_graph
 from kerfpath.post import build_program
 from kerfpath.report import ContourSection
@@ -243,13 +243,16 @@ def test_a_plan_file_keeps_the_extra_joint_in_its_own_unit(kind, short, options,
     assert np.shape(entry["nodes"]["q_rad"]) == (21, 6)
     np.testing.assert_array_equal(entry["nodes"][f"external_q_{unit}"], made.q[:, 6])
     assert entry[f"external_weights_per_{unit}"] == made.settings.weights[6]
-    text = plan_text(robot, made.T_flange_tip, made.T_base_part, [entry], {})
+    text = plan_text(plan_document(robot, made.T_flange_tip, made.T_base_part, [entry], {}))
     (tmp_path / "plan.json").write_text(text)
     (read,) = read_plan_file(tmp_path / "plan.json").plans
     np.testing.assert_array_equal(read.q, made.q)
     np.testing.assert_array_equal(read.settings.weights, made.settings.weights)
     assert plan_entry(read, "short", [])["criteria"] == entry["criteria"]
-    assert plan_text(read.robot, read.T_flange_tip, read.T_base_part, [entry], {}) == text
+    assert (
+        plan_text(plan_document(read.robot, read.T_flange_tip, read.T_base_part, [entry], {}))
+        == text
+    )
     assert audit(read, path_tolerance=1e-3) == []
 
 

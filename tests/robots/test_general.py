@@ -14,7 +14,7 @@ from kerfpath import Contour, InputError, Robot, audit, plan
 from kerfpath.auditor import chain_of, checks
 from kerfpath.graph import build, gamma_grid
 from kerfpath.job import read_plan_file
-from kerfpath.job.plan_file._write import plan_entry, plan_text
+from kerfpath.job.plan_file._write import plan_document, plan_entry, plan_text
 from kerfpath.robots import _general, _ssik
 from kerfpath.urdf import Chain
 
@@ -204,7 +204,9 @@ def test_a_general_arm_is_read_planned_and_audited(tmp_path):
     assert audit(done) == []
     file = tmp_path / "plan.json"
     entry = plan_entry(done, done.name, checks(done))
-    file.write_text(plan_text(read, done.T_flange_tip, done.T_base_part, [entry], {}))
+    file.write_text(
+        plan_text(plan_document(read, done.T_flange_tip, done.T_base_part, [entry], {}))
+    )
     assert audit(read_plan_file(file).plans[0]) == []
 
 

@@ -271,6 +271,8 @@ def test_what_contradicts_the_given_order_or_does_not_exist_is_refused(part, arm
         plan_part(two, arm, before=[(0, 2)], **asked)
     with pytest.raises(InputError, match="heat_spacing"):
         plan_part(two, arm, heat_spacing=-0.1, **asked)
+    with pytest.raises(TypeError, match=r"'gama_step'; the options are .*gamma_step.*retract"):
+        plan_part(two, arm, gama_step=0.1, **asked)
 
 
 def test_a_cut_that_the_tool_cannot_back_off_from_is_infeasible(part, arm, tool, placement):

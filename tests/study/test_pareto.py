@@ -161,8 +161,8 @@ def test_a_plan_that_is_picked_has_the_criteria_of_the_front(job, studied, tmp_p
         row = studied.front.numbers.index(pick.number)
         _, outcome = plan_picked(job, pick, refine=False)
         assert outcome.passed
-        (cut,) = [cut for cut in outcome.cuts if cut.task.name == "large"]
-        (other,) = [cut for cut in outcome.cuts if cut.task.name == "small"]
+        (cut,) = [cut for cut in outcome.cuts if cut.name == "large"]
+        (other,) = [cut for cut in outcome.cuts if cut.name == "small"]
         criteria = cut.plan.criteria
         speed, _ = cut.plan.robot.speed_limits()
         assert [
@@ -178,7 +178,7 @@ def test_refined_from_there_it_is_no_worse_by_what_it_minimised(job, studied, tm
     write_pareto(studied, tmp_path)
     pick = picked(tmp_path, job, "displacement")
     _, outcome = plan_picked(job, pick, refine=True)
-    (cut,) = [cut for cut in outcome.cuts if cut.task.name == "large"]
+    (cut,) = [cut for cut in outcome.cuts if cut.name == "large"]
     assert outcome.passed
     assert cut.plan.cost < cut.plan.proof.grid_cost
 

@@ -13,7 +13,7 @@ from tests.robots.test_robot import joint_frames
 from kerfpath import InputError, Robot, audit, plan, robot
 from kerfpath.auditor import chain_of, checks
 from kerfpath.job import read_plan_file
-from kerfpath.job.plan_file._write import plan_entry, plan_text
+from kerfpath.job.plan_file._write import plan_document, plan_entry, plan_text
 from kerfpath.robots import robot_ids
 from kerfpath.urdf import read_urdf
 
@@ -241,7 +241,7 @@ def test_a_described_robot_is_planned_and_audited(tmp_path, circle, tool, placem
     assert audit(made) == []
     # The plan file keeps what the audit needs: where the model stands, and the chain.
     entry = plan_entry(made, made.name, checks(made))
-    text = plan_text(r, made.T_flange_tip, made.T_base_part, [entry], {})
+    text = plan_text(plan_document(r, made.T_flange_tip, made.T_base_part, [entry], {}))
     (tmp_path / "plan.json").write_text(text)
     (read,) = read_plan_file(tmp_path / "plan.json").plans
     np.testing.assert_array_equal(read.robot.chain.origins, r.chain.origins)

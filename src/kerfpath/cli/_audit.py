@@ -10,14 +10,14 @@ from rich.markup import escape
 from kerfpath.auditor import in_words
 from kerfpath.cli._show import busy, out, print_json, table
 from kerfpath.errors import InputError, about
-from kerfpath.job import Audited, audit_file, audit_program
+from kerfpath.job import AuditReport, audit_file, audit_program
 
 __all__ = ["show_audit"]
 
 
 def show_audit(file: Path, job: Path | None, *, as_json: bool) -> bool:
     """Print the table of checks of each contour of a file; return whether all of them pass."""
-    found = _audited(file, job)
+    found = _run_audit(file, job)
     if as_json:
         print_json(
             {
@@ -54,7 +54,7 @@ def show_audit(file: Path, job: Path | None, *, as_json: bool) -> bool:
             )
             for c in checks if name in found.places else ():
                 if not c.ok:
-                    out.print(escape(found.said(name, c)), soft_wrap=True)
+                    out.print(escape(found.sentence(name, c)), soft_wrap=True)
         for name in found.missing:
             out.print(f"{escape(name)}: {'not cut' if found.places else 'no plan'}")
         out.print(f"note: {escape(found.note)}")
@@ -62,7 +62,7 @@ def show_audit(file: Path, job: Path | None, *, as_json: bool) -> bool:
     return found.passed
 
 
-def _audited(file: Path, job: Path | None) -> Audited:
+def _run_audit(file: Path, job: Path | None) -> AuditReport:
     if file.suffix.lower() == ".json":
         with about(file):
             return audit_file(file, job)

@@ -1,4 +1,4 @@
-"""`kerfpath check`: the bodies and pairs of a job's cell, and how its contours begin in it."""
+"""`kerfpath check`: print bodies and pairs of the cell of a job, and how contours begin."""
 
 from __future__ import annotations
 
@@ -8,12 +8,12 @@ from rich.markup import escape
 from kerfpath.cell import Body, Capsule, Cell, Mesh, caveats, odd_sizes
 from kerfpath.cli._drawing import drawing_entry
 from kerfpath.cli._show import out, print_json, table
-from kerfpath.job import Checked, collision_note
+from kerfpath.job import JobPreview, collision_note
 
 __all__ = ["show_check"]
 
 
-def show_check(checked: Checked, *, as_json: bool) -> None:
+def show_check(checked: JobPreview, *, as_json: bool) -> None:
     """Print a job's robot, the bodies and pairs of its cell, and the start of every contour."""
     job, cell = checked.job, checked.cell
     if as_json:
@@ -55,7 +55,7 @@ def show_check(checked: Checked, *, as_json: bool) -> None:
     out.print(f"note: {escape(_note(checked))}")
 
 
-def _note(checked: Checked) -> str:
+def _note(checked: JobPreview) -> str:
     """Return what `kerfpath plan` checks for collisions; this command checks only the starts."""
     moves_too = checked.job.sequence is not None and checked.cell is not None
     return collision_note(checked.cell, moves_too=moves_too)

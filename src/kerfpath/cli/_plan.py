@@ -24,8 +24,8 @@ from kerfpath.cli._show import (
     table,
 )
 from kerfpath.job import (
-    Cut,
-    Outcome,
+    CutResult,
+    JobResult,
     read_job,
     require_folder,
     require_language,
@@ -68,7 +68,7 @@ def plan_job(
 
 
 def finish_run(
-    outcome: Outcome,
+    outcome: JobResult,
     part: Part,
     folder: Path,
     *,
@@ -102,17 +102,15 @@ def finish_run(
         _show_cuts(outcome.cuts)
         for cut in outcome.cuts:
             if cut.broken is not None:
-                out.print(f"[bold]{escape(cut.task.name)}[/]: {escape(cut.failure)}")
+                out.print(f"[bold]{escape(cut.name)}[/]: {escape(cut.failure)}")
             if cut.plan is not None and cut.plan.feed is not None:
-                out.print(f"[bold]{escape(cut.task.name)}[/]: {cut.plan.feed}")
+                out.print(f"[bold]{escape(cut.name)}[/]: {cut.plan.feed}")
             if (tilt := _largest_tilt(cut)) is not None:
-                out.print(
-                    f"[bold]{escape(cut.task.name)}[/]: tool axis tilted by up to {tilt:.2f} deg"
-                )
+                out.print(f"[bold]{escape(cut.name)}[/]: tool axis tilted by up to {tilt:.2f} deg")
             for check in cut.checks:
                 if not check.ok:
-                    out.print(f"[bold]{escape(cut.task.name)}[/]: {escape(str(check.issue()))}")
-        for note in merge_notes(written.notes, [cut.task.name for cut in outcome.cuts]):
+                    out.print(f"[bold]{escape(cut.name)}[/]: {escape(str(check.issue()))}")
+        for note in merge_notes(written.notes, [cut.name for cut in outcome.cuts]):
             out.print(f"note: {escape(note)}")
         show_files(written.files, written.removed, of="an earlier run")
     if written.stale is not None:
@@ -124,16 +122,20 @@ def finish_run(
         raise typer.Exit(1)
 
 
-def _largest_tilt(cut: Cut) -> float | None:
+def _largest_tilt(cut: CutResult) -> float | None:
     """Return the largest tilt of the tool axis at the nodes, deg; None where none is allowed."""
     if cut.plan is None or cut.plan.settings.tilt is None:
         return None
     return float(np.degrees(np.hypot(*cut.plan.tilt.T).max()))
 
 
-def _cut_entry(cut: Cut) -> dict[str, object]:
-    entry: dict[str, object] = {"name": cut.task.name, "passed": cut.passed}
-    entry |= {"length_m": cut.drawn.length, "nodes": len(cut.nodes), "speed_m_s": cut.task.speed}
+def _cut_entry(cut: CutResult) -> dict[str, object]:
+    entry: dict[str, object] = {"name": cut.name, "passed": cut.passed}
+    entry |= {
+        "length_m": cut.candidate.path.length,
+        "nodes": len(cut.candidate.nodes),
+        "speed_m_s": cut.request.task.speed,
+    }
     entry["departure"] = None if cut.departure is None else asdict(cut.departure)
     if cut.plan is None:
         assert cut.broken is not None
@@ -158,14 +160,14 @@ def _cut_entry(cut: Cut) -> dict[str, object]:
     }
 
 
-def _show_cuts(cuts: Sequence[Cut]) -> None:
+def _show_cuts(cuts: Sequence[CutResult]) -> None:
     rows = []
     for cut in cuts:
         row = [
-            escape(cut.task.name),
-            f"{cut.drawn.length * 1000:.1f}",
-            str(len(cut.nodes)),
-            f"{cut.task.speed * 60:g}",
+            escape(cut.name),
+            f"{cut.candidate.path.length * 1000:.1f}",
+            str(len(cut.candidate.nodes)),
+            f"{cut.request.task.speed * 60:g}",
         ]
         sampling = _sampling(cut)
         if cut.plan is None:
@@ -205,7 +207,7 @@ def _show_cuts(cuts: Sequence[Cut]) -> None:
         out.print("where the drawing has points, the lines through them stand for the CAD curve")
 
 
-def _sampling(cut: Cut) -> list[str]:
+def _sampling(cut: CutResult) -> list[str]:
     """Return the chord error and the axis step of a cut's nodes."""
     found = cut.departure
     if found is None:

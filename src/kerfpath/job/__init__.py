@@ -2,11 +2,14 @@
 
 from kerfpath.job.format import VARIABLES as VARIABLES
 from kerfpath.job.format import ContourTask as ContourTask
+from kerfpath.job.format import CutRequest as CutRequest
 from kerfpath.job.format import Goal as Goal
 from kerfpath.job.format import Job as Job
+from kerfpath.job.format import PreparedJob as PreparedJob
 from kerfpath.job.format import ProgramOptions as ProgramOptions
 from kerfpath.job.format import cell_of_job as cell_of_job
 from kerfpath.job.format import pose as pose
+from kerfpath.job.format import prepare as prepare
 from kerfpath.job.format import program_options as program_options
 from kerfpath.job.format import read_job as read_job
 from kerfpath.job.format import with_map as with_map
@@ -19,7 +22,7 @@ from kerfpath.job.output import require_folder as require_folder
 from kerfpath.job.output import require_language as require_language
 from kerfpath.job.output import stale_program as stale_program
 from kerfpath.job.output import write_outcome as write_outcome
-from kerfpath.job.plan_file import Audited as Audited
+from kerfpath.job.plan_file import AuditReport as AuditReport
 from kerfpath.job.plan_file import PlanAudit as PlanAudit
 from kerfpath.job.plan_file import PlanFile as PlanFile
 from kerfpath.job.plan_file import audit_file as audit_file
@@ -27,7 +30,7 @@ from kerfpath.job.plan_file import collision_note as collision_note
 from kerfpath.job.plan_file import read_plan_file as read_plan_file
 from kerfpath.job.plan_file import sequence_entry as sequence_entry
 from kerfpath.job.programs import Compared as Compared
-from kerfpath.job.programs import ProgramAsked as ProgramAsked
+from kerfpath.job.programs import ProgramAudit as ProgramAudit
 from kerfpath.job.programs import Taught as Taught
 from kerfpath.job.programs import TouchUp as TouchUp
 from kerfpath.job.programs import audit_program as audit_program
@@ -36,14 +39,13 @@ from kerfpath.job.programs import program_from_file as program_from_file
 from kerfpath.job.programs import program_language as program_language
 from kerfpath.job.programs import program_of as program_of
 from kerfpath.job.programs import touch_up as touch_up
-from kerfpath.job.run import Checked as Checked
-from kerfpath.job.run import Chosen as Chosen
-from kerfpath.job.run import Cut as Cut
-from kerfpath.job.run import Outcome as Outcome
-from kerfpath.job.run import Progress as Progress
+from kerfpath.job.run import CutResult as CutResult
+from kerfpath.job.run import JobPreview as JobPreview
+from kerfpath.job.run import JobResult as JobResult
 from kerfpath.job.run import check_job as check_job
 from kerfpath.job.run import fastest_along as fastest_along
 from kerfpath.job.run import fastest_speeds as fastest_speeds
 from kerfpath.job.run import is_compiled as is_compiled
 from kerfpath.job.run import run_job as run_job
+from kerfpath.job.run import run_prepared as run_prepared
 from kerfpath.job.run import warm_up as warm_up

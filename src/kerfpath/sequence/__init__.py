@@ -1,10 +1,10 @@
 """A part of many contours: their order, the start of each, and the moves through the air."""
 
-from kerfpath.sequence._candidates import unused_postures as unused_postures
 from kerfpath.sequence._inner import inner_first as inner_first
 from kerfpath.sequence._order import Order as Order
 from kerfpath.sequence._order import best_order as best_order
 from kerfpath.sequence._part import PartPlan as PartPlan
 from kerfpath.sequence._part import longest_search as longest_search
+from kerfpath.sequence._part import order_candidates as order_candidates
 from kerfpath.sequence._part import order_plans as order_plans
 from kerfpath.sequence._part import plan_part as plan_part

@@ -12,7 +12,7 @@ from kerfpath.errors import InputError, NoFeasiblePath
 from kerfpath.plans import Plan
 from kerfpath.robots import posture_name
 
-__all__ = ["Asked", "further", "reachable", "unused_postures"]
+__all__ = ["MorePlans", "more_reachable", "reachable", "unused_postures"]
 
 BACK_BY = (0.0, 0.1, 0.4, 0.7, 1.0)
 """Shares of the retract between which the joints are taken to run straight."""
@@ -25,15 +25,15 @@ def unused_postures(made: Sequence[Plan], wanted: Sequence[int] | None) -> list[
     return [int(p) for p in every if p not in used]
 
 
-class Asked:
-    """The contours that have been asked for more plans, and what came of it."""
+class MorePlans:
+    """Further plans of contours, each asked for once, and how many came."""
 
     def __init__(self, every: list[list[Plan]], more: Callable[[int], Sequence[Plan]]) -> None:
         self._every, self._more = every, more
         self._got: dict[int, int] = {}
 
-    def more_of(self, contour: int) -> range:
-        """Ask a contour for further plans, once; return the numbers of its new candidates."""
+    def of(self, contour: int) -> range:
+        """Ask for further plans of a contour, once; return the numbers of its new candidates."""
         made = self._every[contour]
         first = len(made)
         if contour not in self._got:
@@ -41,8 +41,8 @@ class Asked:
             self._got[contour] = len(made) - first
         return range(first, len(made))
 
-    def told(self, broken: NoFeasiblePath) -> NoFeasiblePath:
-        """Say of a failure which other plans have been tried."""
+    def mentioned_in(self, broken: NoFeasiblePath) -> NoFeasiblePath:
+        """Return a failure that says, too, which further plans have been tried."""
         tried = [
             f"{self._every[i][0].name!r} in {count} other postures"
             for i, count in self._got.items()
@@ -54,31 +54,26 @@ class Asked:
 
 
 def reachable(
-    every: Sequence[Sequence[Plan]], cell: Cell | None, retract: float, asked: Asked
+    every: Sequence[Sequence[Plan]], cell: Cell | None, retract: float, further: MorePlans
 ) -> list[tuple[int, int]]:
     """Return contour and candidate of each plan that the tool can go down to and leave again."""
     places: list[tuple[int, int]] = []
     for i, made in enumerate(every):
         broken, found = _reached(made, range(len(made)), cell, retract)
         if broken is not None and not found:
-            _, found = _reached(made, asked.more_of(i), cell, retract)
+            _, found = _reached(made, further.of(i), cell, retract)
             if not found:
-                raise asked.told(broken)
+                raise further.mentioned_in(broken)
         places += [(i, c) for c in found]
     return places
 
 
-def further(
-    every: Sequence[Sequence[Plan]],
-    cell: Cell | None,
-    retract: float,
-    asked: Asked,
+def more_reachable(
+    every: Sequence[Sequence[Plan]], cell: Cell | None, retract: float, further: MorePlans,
     contours: Sequence[int],
-) -> list[tuple[int, int]]:
-    """Return contour and candidate of what contours have to offer beside what did not do."""
-    return [
-        (i, c) for i in contours for c in _reached(every[i], asked.more_of(i), cell, retract)[1]
-    ]
+) -> list[tuple[int, int]]:  # fmt: skip
+    """Return contour and candidate of the further plans of contours that the tool can reach."""
+    return [(i, c) for i in contours for c in _reached(every[i], further.of(i), cell, retract)[1]]
 
 
 def _reached(

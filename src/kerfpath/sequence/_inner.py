@@ -35,7 +35,7 @@ def inner_first(contours: Sequence[Contour]) -> list[tuple[int, int]]:
         for i, inner in enumerate(contours):
             faces = i != j and float(inner.axes.mean(axis=0) @ n) > 0
             at = inner.points @ plane
-            # The first point alone tells for most: they lie far beside.
+            # For most the first point is enough: they lie far beside.
             if faces and _inside(ring, at[:1])[0] and _inside(ring, at).all():
                 pairs.append((i, j))
     return pairs

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 from itertools import pairwise
-from typing import Any
 
 import numpy as np
 
@@ -123,8 +122,8 @@ class Moves:
                 return True  # another order avoids it: what else this one asks for can wait
         return changed
 
-    def told(self, none: NoFeasiblePath | None) -> NoFeasiblePath:
-        """Say which moves no way was found for, and what is in the way of the first.
+    def why_no_order(self, none: NoFeasiblePath | None) -> NoFeasiblePath:
+        """Return a failure that names the moves without a way, and what is in the way of the first.
 
         `none` is why no order is left without them; None where patience has ended.
         """
@@ -172,7 +171,7 @@ class Moves:
             (self.first, b) if a == HOME else (self.last, a) if b == HOME else (self.between[a], b)
         )
 
-    def unrolled(self, candidates: Ints) -> dict[str, tuple[Any, ...]]:
+    def unrolled(self, candidates: Ints) -> tuple[tuple[Plan, ...], tuple[AirMove, ...]]:
         """Return the plans and moves of an order, endless joints going on from one to the next."""
         legs = self._legs(candidates)
         here = self._ends[candidates[0]] if self._home is None else self._home
@@ -188,7 +187,7 @@ class Moves:
                 here = self._ends[b] + shift
         if not legs:
             plans = [self._plans[int(candidates[0])]]
-        return {"plans": tuple(plans), "moves": tuple(moves)}
+        return tuple(plans), tuple(moves)
 
     def _legs(self, candidates: Ints) -> list[tuple[int, int]]:
         around = candidates.tolist() if self._home is None else [HOME, *candidates.tolist(), HOME]

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from contextlib import suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import combinations
-from typing import Any
+from typing import TypedDict, TypeVar, Unpack, cast
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -18,14 +18,22 @@ from kerfpath.air import AirMove
 from kerfpath.cell import Cell
 from kerfpath.contour import Contour
 from kerfpath.errors import InputError, NoFeasiblePath
+from kerfpath.options import PlanKeywords, PlanOptions, chosen
 from kerfpath.planner import plan
 from kerfpath.plans import Plan
 from kerfpath.robots import Robot
-from kerfpath.sequence._candidates import Asked, further, reachable, unused_postures
+from kerfpath.sequence._candidates import (
+    MorePlans,
+    more_reachable,
+    reachable,
+    unused_postures,
+)
 from kerfpath.sequence._moves import HOME, PATIENCE, Moves
 from kerfpath.sequence._order import Order, best_order
 
-__all__ = ["PartPlan", "longest_search", "order_plans", "plan_part"]
+__all__ = ["PartPlan", "longest_search", "order_candidates", "order_plans", "plan_part"]
+
+T = TypeVar("T")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -81,6 +89,25 @@ class PartPlan:
         return self.cutting_time + self.air_time + self.piercing_time
 
 
+class OrderKeywords(TypedDict, total=False):
+    """The keywords of `order_plans` that say what is asked of the order and of the moves."""
+
+    home: ArrayLike | None
+    cell: Cell | None
+    before: Sequence[tuple[int, int]]
+    heat_spacing: float
+    given_order: bool
+    retract: float
+    approach_speed: float
+    air_speed: float
+    pierce_time: float
+    seconds: float
+
+
+class PartKeywords(OrderKeywords, PlanKeywords, total=False):
+    """The keywords of `plan_part`."""
+
+
 def plan_part(
     contours: Sequence[Contour | Sequence[Contour]],
     robot: Robot,
@@ -88,18 +115,9 @@ def plan_part(
     tool: ArrayLike,
     placement: ArrayLike,
     speed: float | Sequence[float | None] | None = None,
-    home: ArrayLike | None = None,
-    cell: Cell | None = None,
-    before: Sequence[tuple[int, int]] = (),
-    heat_spacing: float = 0.0,
-    given_order: bool = False,
-    retract: float = 0.05,
-    approach_speed: float = 0.1,
-    air_speed: float = 1.0,
-    pierce_time: float = 0.0,
-    seconds: float = 10.0,
+    options: PlanOptions | None = None,
     progress: Callable[[int], None] | None = None,
-    **options: Any,
+    **keywords: Unpack[PartKeywords],
 ) -> PartPlan:
     """Return plans for all contours of a part, cut in the order that takes the least time.
 
@@ -110,14 +128,14 @@ def plan_part(
     ----------
     contours : sequence of Contour, or of sequences of Contour
         Candidates of each: other starts, directions, leads.
-    robot, tool, placement, cell, **options
-        As in `kerfpath.plan`, for every contour.
+    robot, tool, placement, options
+        As in `kerfpath.plan`, for every contour; so are its keywords.
     speed : float m/s, or one for each contour
-    home, before, heat_spacing, given_order, retract, approach_speed, air_speed, pierce_time,
-    seconds
-        As in `order_plans`.
     progress : callable, optional
         Called with the number of candidates planned since the last call.
+    home, cell, before, heat_spacing, given_order, retract, approach_speed, air_speed, pierce_time,
+    seconds
+        As in `order_plans`; the plans are clear in the cell, too.
 
     Raises
     ------
@@ -133,46 +151,78 @@ def plan_part(
             "plan_part: expected one contour at least, candidates for each, and one speed or one "
             f"for each; got {len(groups)} contours and {len(speeds)} speeds"
         )
-    options |= {"tool": tool, "placement": placement, "cell": cell}
-    plans = []
-    for candidates, fast in zip(groups, speeds, strict=True):
-        made, broken = [], None
+    of_order = keywords.keys() & OrderKeywords.__annotations__.keys()
+    order = cast(OrderKeywords, {k: v for k, v in keywords.items() if k in of_order})
+    rest = {k: v for k, v in keywords.items() if k not in of_order}
+    wanted = chosen(options, rest, PartKeywords)
+
+    def planned(i: int, contour: Contour, options: PlanOptions) -> Plan:
+        return plan(
+            contour, robot, tool=tool, placement=placement, options=options,
+            speed=None if contour.time is not None else speeds[i], cell=order.get("cell"),
+        )  # fmt: skip
+
+    tried: list[list[Plan]] = []
+    for i, candidates in enumerate(groups):
+        tried.append([])
+        broken = None
         for contour in candidates:
             try:
-                laid_on = None if contour.time is not None else fast
-                made.append(plan(contour, robot, speed=laid_on, **options))
+                tried[i].append(planned(i, contour, wanted))
             except NoFeasiblePath as error:
                 broken = broken or error
             if progress is not None:
                 progress(1)
-        if not made:
-            assert broken is not None
+        if broken is not None and not tried[i]:
             raise broken
-        plans.append(made)
 
-    def in_other_postures(i: int) -> list[Plan]:
-        found, contour = [], groups[i][0]
-        for posture in unused_postures(plans[i], options.get("postures")):
-            asked = options | {"postures": (posture,)}
-            laid_on = None if contour.time is not None else speeds[i]
+    def in_posture(i: int, posture: int) -> Plan:
+        return planned(i, groups[i][0], replace(wanted, postures=(posture,)))
+
+    postures = [wanted.postures] * len(groups)
+    return order_candidates(tried, lambda made: made, in_posture, postures, **order)
+
+
+def order_candidates(
+    tried: Sequence[list[T]],
+    plan_of: Callable[[T], Plan],
+    in_posture: Callable[[int, int], T | None],
+    postures: Sequence[Sequence[int] | None],
+    progress: Callable[[int, int, int], None] = lambda contour, done, total: None,
+    **order: Unpack[OrderKeywords],
+) -> PartPlan:
+    """Order candidates as `order_plans`, and plan contours in other postures where it asks for it.
+
+    Parameters
+    ----------
+    tried : sequence of lists
+        What was made of the candidates of each contour, a plan each; what is made in other
+        postures is added to it.
+    plan_of : callable
+        Returns the plan of one of them.
+    in_posture : callable
+        Plans a contour in one posture, by their numbers; returns None, or raises NoFeasiblePath,
+        where it cannot be cut so.
+    postures : sequence of sequences of int, or None
+        Those that each contour may be cut in; None: all.
+    progress : callable
+        Called with the number of a contour, how many other postures of it are done, and how many
+        there are.
+    order
+        The other keywords of `order_plans`.
+    """
+
+    def more(i: int) -> list[Plan]:
+        made = len(tried[i])
+        unused = unused_postures([plan_of(one) for one in tried[i]], postures[i])
+        for k, posture in enumerate(unused):
+            progress(i, k, len(unused))
             with suppress(NoFeasiblePath):
-                found.append(plan(contour, robot, speed=laid_on, **asked))
-        return found
+                one = in_posture(i, posture)
+                tried[i] += [] if one is None else [one]
+        return [plan_of(one) for one in tried[i][made:]]
 
-    return order_plans(
-        plans,
-        more=in_other_postures,
-        home=home,
-        cell=cell,
-        before=before,
-        heat_spacing=heat_spacing,
-        given_order=given_order,
-        retract=retract,
-        approach_speed=approach_speed,
-        air_speed=air_speed,
-        pierce_time=pierce_time,
-        seconds=seconds,
-    )
+    return order_plans([[plan_of(one) for one in each] for each in tried], more=more, **order)
 
 
 def order_plans(
@@ -237,8 +287,8 @@ def order_plans(
     pierce_time = not_negative(pierce_time, "pierce_time", unit="s")
     air_speed = scalar(air_speed, "air_speed", above=0.0)
     every = [list(made) for made in candidates]
-    asked = Asked(every, more)
-    places = reachable(every, cell, retract, asked)
+    further = MorePlans(every, more)
+    places = reachable(every, cell, retract, further)
     if given_order:
         before = [*before, *((i, i + 1) for i in range(len(every) - 1))]
     warm = _too_warm([c[0].contour for c in every], heat_spacing)
@@ -261,12 +311,14 @@ def order_plans(
             order = found
             break
         contours = sorted({int(group[c]) for leg in air.failed for c in leg if c != HOME})
-        fresh = further(every, cell, retract, asked, contours) if air.failed else []
+        fresh = more_reachable(every, cell, retract, further, contours) if air.failed else []
         if not fresh:
-            raise asked.told(found)
+            raise further.mentioned_in(found)
         places += fresh
+    made, moves = air.unrolled(order.candidates)
     return PartPlan(
-        **air.unrolled(order.candidates),
+        plans=made,
+        moves=moves,
         order=order,
         chosen=tuple(places[k] for k in order.candidates.tolist()),
         retract=retract,
@@ -295,10 +347,10 @@ def _settled(
                 first=air.first, last=air.last, before=before, seconds=seconds,
             )  # fmt: skip
         except NoFeasiblePath as none:
-            return air.told(none)
+            return air.why_no_order(none)
         if not air.look_at(order.candidates):
             return order
-    return air.told(None)
+    return air.why_no_order(None)
 
 
 def _too_warm(contours: Sequence[Contour], spacing: float) -> Bools:

@@ -14,7 +14,7 @@ from typing import Any
 from kerfpath._told import told
 from kerfpath.errors import InputError
 from kerfpath.job import (
-    Outcome,
+    JobResult,
     ProgramOptions,
     Texts,
     make_folder,
@@ -192,10 +192,10 @@ def planned(*, path: str, digest_then: str) -> dict[str, Any]:
     }
 
 
-def _reason(outcome: Outcome, texts: Texts) -> str:
+def _reason(outcome: JobResult, texts: Texts) -> str:
     """Say why a run has not passed: the first reason, and how many more there are."""
     reasons = [
-        f"{cut.task.name}: {cut.failure or issue}"
+        f"{cut.name}: {cut.failure or issue}"
         for cut in outcome.cuts
         if not cut.passed
         for issue in [next((str(c.issue()) for c in cut.checks if not c.ok), "no plan")]

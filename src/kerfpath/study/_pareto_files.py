@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from shlex import quote
 from typing import Any
@@ -15,8 +15,9 @@ from kerfpath._told import told
 from kerfpath.cad import Part
 from kerfpath.errors import InputError
 from kerfpath.front import Front, Run
-from kerfpath.job import Chosen, Outcome, Progress, make_folder, run_job
+from kerfpath.job import JobResult, make_folder, prepare, run_prepared
 from kerfpath.post import write_files
+from kerfpath.progress import Progress, no_progress
 from kerfpath.report import FrontAxis, FrontPlan, render_front
 from kerfpath.robots import Robot
 from kerfpath.study._job import digest, loaded
@@ -210,12 +211,16 @@ def picked(folder: Path, job_file: Path, which: str) -> Pick:
 
 
 def plan_picked(
-    job_file: Path, pick: Pick, *, refine: bool, progress: Progress = lambda what, done, total: None
-) -> tuple[Part, Outcome]:
+    job_file: Path, pick: Pick, *, refine: bool, progress: Progress = no_progress
+) -> tuple[Part, JobResult]:
     """Return what comes of the whole job with the contour planned as picked; its part, too.
 
     With `refine`, the plan is moved off the grid of gamma from there; its criteria then differ.
     """
     known = loaded(str(job_file.resolve()), digest(job_file))
-    chosen = {pick.contour: Chosen(run=pick.run, refine=refine)}
-    return known.part, run_job(known.job, known.part, chosen=chosen, progress=progress)
+    prepared = prepare(known.job, known.part)
+    contours = tuple(
+        asked.picked(pick.run, refine=refine) if asked.task.name == pick.contour else asked
+        for asked in prepared.contours
+    )
+    return known.part, run_prepared(replace(prepared, contours=contours), progress=progress)

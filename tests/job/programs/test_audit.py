@@ -311,7 +311,7 @@ def test_a_measured_part_that_is_none_or_out_of_reach_gives_no_program(folder):
     with_points(folder, shift=1200)
     result = run(*command)
     assert result.returncode == 1
-    assert "led to the measured placement it fails" in result.stderr
+    assert "moved to the measured placement it fails" in result.stderr
     assert "out of the robot's reach at this placement" in result.stderr
     assert "and planned again there: " in result.stderr
     # Where the part stands is told all the same, so that a job can be planned there.
@@ -321,7 +321,7 @@ def test_a_measured_part_that_is_none_or_out_of_reach_gives_no_program(folder):
     with_points(folder, shift=300)
     result = run(*command)
     assert result.returncode == 0
-    said = "was planned again there; only led there it fails: error: excess over the joint limits"
+    said = "was planned again there; only moved there it fails: error: excess over the joint limits"
     assert said in result.stdout
 
 
@@ -340,7 +340,7 @@ def test_a_plan_on_its_limits_is_planned_again_around_a_part_that_was_measured(f
         result = run("post", folder / "edge/plan.json", "--measured", path, "-o", moved)
         assert result.returncode == 0, result.stdout + result.stderr
         for name in beyond:
-            assert f"Contour '{name}' was planned again there; only led there it" in result.stdout
+            assert f"Contour '{name}' was planned again there; only moved there it" in result.stdout
         over += len(beyond)
     assert over
 

@@ -9,11 +9,10 @@ import pytest
 
 from commands import assert_refused, run
 from jobs import CONTOURS, DEMO, HEAD, PLAN, SEQUENCE, WHOLE
-from kerfpath import robot
+from kerfpath import audit, robot
 from kerfpath.cad import read
-from kerfpath.errors import InputError
-from kerfpath.job import program_from_file, read_job, read_plan_file
-from kerfpath.job.run._run import Given, _cut, _in_other_postures
+from kerfpath.errors import InputError, NoFeasiblePath
+from kerfpath.job import program_from_file, read_job, read_plan_file, run_job
 from programs import read_text
 
 
@@ -224,23 +223,21 @@ def test_every_cut_of_the_shipped_part_can_be_made():
             assert {"pierce", "lead-in", "cut"} <= set(task.sample(cut).kinds)
 
 
-def test_a_contour_that_no_way_leads_to_is_planned_in_its_other_postures(folder):
+def test_a_contour_that_no_way_leads_to_is_planned_in_its_other_postures(folder, monkeypatch):
     path = folder / "one.toml"
     path.write_text(HEAD + CONTOURS.split('[[contour]]\npick = "skin/hole21"')[0] + PLAN + SEQUENCE)
-    job = read_job(path)
-    part = read(job.part_file)
-    (task,) = job.tasks(part)
-    way = task.candidates(part, task.drawn(part))[0]
-    given = Given(way, task.sample(way), job.options.postures, touched=False)
-    told = []
+    done, plans = [], []
 
-    def progress(*words):
-        told.append(words)
+    def order_plans(candidates, *, more, **order):
+        plans.extend([*candidates[0], *more(0)])
+        raise NoFeasiblePath("no way", proved=False, node=-1)
 
-    made = _cut(job, task, given, None, None, progress)
-    others = _in_other_postures(job, task, given, made, None, progress)
-    # The job allows two postures, front/up with either wrist.
-    used = [{int(p) for p in cut.plan.posture} for cut in (*made, *others)]
-    assert sorted(used, key=min) == [{0}, {1}]
-    assert all(cut.passed for cut in others)
-    assert ("led in: other postures", 0, 1) in told
+    monkeypatch.setattr("kerfpath.sequence._part.order_plans", order_plans)
+    result = run_job(read_job(path), progress=lambda *words: done.append(words))
+    assert str(result.stuck) == "no way"
+    # The job allows two postures, front/up with either wrist; it has two candidates.
+    first, second, other = [{int(p) for p in plan.posture} for plan in plans]
+    assert first == second
+    assert sorted([first, other], key=min) == [{0}, {1}]
+    assert not any(issue.level == "error" for plan in plans for issue in audit(plan))
+    assert ("led in: other postures", 0, 1) in done

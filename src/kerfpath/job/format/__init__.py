@@ -4,6 +4,11 @@ from kerfpath.job.format._cell import cell_of_job as cell_of_job
 from kerfpath.job.format._cell import with_map as with_map
 from kerfpath.job.format._contour import ContourTask as ContourTask
 from kerfpath.job.format._poses import pose as pose
+from kerfpath.job.format._prepared import Candidate as Candidate
+from kerfpath.job.format._prepared import CutRequest as CutRequest
+from kerfpath.job.format._prepared import PreparedJob as PreparedJob
+from kerfpath.job.format._prepared import divide_nodes as divide_nodes
+from kerfpath.job.format._prepared import prepare as prepare
 from kerfpath.job.format._read import Job as Job
 from kerfpath.job.format._read import ProgramOptions as ProgramOptions
 from kerfpath.job.format._read import Tolerances as Tolerances

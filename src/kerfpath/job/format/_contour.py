@@ -10,7 +10,7 @@ from kerfpath._told import told
 from kerfpath.cad import Part
 from kerfpath.contour import Contour
 from kerfpath.errors import InputError
-from kerfpath.job.format._operations import shaped
+from kerfpath.job.format._operations import shape_contour
 from kerfpath.job.format._values import MOST_NODES
 from kerfpath.job.format.tables import ContourTable
 
@@ -65,8 +65,10 @@ class ContourTask:
         """
         if self.table.pick_all is None:
             return [replace(self, pick=part.loop(self.pick).name)]
-        loops = part.pick(**self.table.pick_all.resolve())
-        return [replace(self, pick=loop.name, name=loop.name) for loop in loops]
+        return [
+            replace(self, pick=loop.name, name=loop.name)
+            for loop in self.table.pick_all.loops(part)
+        ]
 
     def drawn(self, part: Part) -> Contour:
         """Return its loop as the part has it.
@@ -81,14 +83,14 @@ class ContourTask:
         return part.contour(self.pick, closed=everything is not None and everything.kind != "open")
 
     def candidates(self, part: Part, drawn: Contour | None = None) -> list[Contour]:
-        """Return the contours that may be cut for its loop, see `shaped`.
+        """Return the contours that may be cut for its loop, see `shape_contour`.
 
         `drawn` is the loop as the part has it, where that is at hand.
         """
         laid = self.table.lead_in or self.table.lead_out or self.table.corners
         surface = part.surface(self.pick) if laid else None
         drawn = self.drawn(part) if drawn is None else drawn
-        return shaped(self.table, drawn, surface)
+        return shape_contour(self.table, drawn, surface)
 
     def evenly_fast(self, part: Part) -> Contour:
         """Return the first of its paths, sampled, without shares of the speed."""

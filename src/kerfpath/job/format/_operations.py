@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any
+from collections.abc import Callable
 
 import numpy as np
 
@@ -27,13 +27,13 @@ from kerfpath.operations import (
     start_at,
 )
 
-__all__ = ["closed_only", "shaped"]
+__all__ = ["keys_of_closed_loops", "shape_contour"]
 
 MM = 1e-3
 OTHER: dict[Side, Side] = {"left": "right", "right": "left"}
 
 
-def closed_only(table: ContourTable) -> dict[str, str]:
+def keys_of_closed_loops(table: ContourTable) -> dict[str, str]:
     """Return the keys in use that only a closed loop can have, and what an open line lacks."""
     ends = 'begins at one of its ends: the other with direction = "reversed"'
     asked = {
@@ -44,7 +44,7 @@ def closed_only(table: ContourTable) -> dict[str, str]:
     return {key: lacks for key, (used, lacks) in asked.items() if used}
 
 
-def shaped(table: ContourTable, drawn: Contour, surface: Surface | None) -> list[Contour]:
+def shape_contour(table: ContourTable, drawn: Contour, surface: Surface | None) -> list[Contour]:
     """Return the contours that may be cut for a loop: one, or several starts and directions.
 
     Corners and leads are laid on `surface`.
@@ -106,9 +106,9 @@ def _featured(
     if table.overlap_mm is not None:
         contour = overlap(contour, table.overlap_mm * MM)
     if table.lead_out is not None:
-        contour = lead_out(contour, side=scrap, surface=surface, **_lead(table.lead_out))
+        contour = _with_lead(lead_out, contour, table.lead_out, scrap, surface)
     if table.lead_in is not None:
-        contour = lead_in(contour, side=scrap, surface=surface, **_lead(table.lead_in))
+        contour = _with_lead(lead_in, contour, table.lead_in, scrap, surface)
     corners = table.corners
     if corners is not None and corners.slow_share is not None:
         contour = slow_corners(
@@ -120,11 +120,17 @@ def _featured(
     return contour
 
 
-def _lead(table: LeadTable) -> dict[str, Any]:
-    return {
-        "length": table.length_mm * MM,
-        "shape": table.shape,
-        "angle": float(np.radians(table.angle_deg)),
-        "fan": None if table.fan_mm is None else table.fan_mm * MM,
-        "speed_share": table.speed_share,
-    }
+def _with_lead(
+    lead: Callable[..., Contour], contour: Contour, table: LeadTable, scrap: Side,
+    surface: Surface | None,
+) -> Contour:  # fmt: skip
+    return lead(
+        contour,
+        table.length_mm * MM,
+        shape=table.shape,
+        angle=float(np.radians(table.angle_deg)),
+        side=scrap,
+        surface=surface,
+        fan=None if table.fan_mm is None else table.fan_mm * MM,
+        speed_share=table.speed_share,
+    )

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 import tomllib
-from collections.abc import Callable
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -14,6 +14,7 @@ from pydantic import ValidationError
 
 from kerfpath._arrays import Array, Ints
 from kerfpath._told import told
+from kerfpath.air import AirMove
 from kerfpath.auditor import Check, Rounding, checks
 from kerfpath.cad import Part
 from kerfpath.cell import Cell
@@ -21,7 +22,7 @@ from kerfpath.contour import Contour
 from kerfpath.errors import InputError
 from kerfpath.graph import LayeredGraph
 from kerfpath.job.format._contour import ContourTask, task_of
-from kerfpath.job.format._operations import closed_only
+from kerfpath.job.format._operations import keys_of_closed_loops
 from kerfpath.job.format._refusals import error_at, refusal, refused_at
 from kerfpath.job.format.tables import (
     AuditTable,
@@ -35,7 +36,7 @@ from kerfpath.job.format.tables._plan import said_in_keys
 from kerfpath.options import OptionConflict, PlanOptions
 from kerfpath.planner import layered_graph
 from kerfpath.plans import Plan
-from kerfpath.post import Handshake, Settings
+from kerfpath.post import Handshake, Program, Settings, build_program
 from kerfpath.robots import Robot
 
 __all__ = ["Job", "ProgramOptions", "Tolerances", "program_options", "read_job", "tolerances_of"]
@@ -55,28 +56,11 @@ class ProgramOptions:
     ----------
     language : str
         Robot language, or "none".
-    name : str
-        Name of the module: letters, digits and _, a letter first.
-    retract : float m
-        How far the head backs off along the tool axis between contours.
-    zone : float m
-        How far from a node the robot may begin to turn towards the next.
     settings : Settings or None
         Those of the language.
-    lead_time : float s
-        How long before the robot reaches a point the laser is switched for it.
-    pierce_time : float s
-        How long the laser stays on at the start before the cut goes on.
-    approach_speed : float m/s
-        Along the tool axis before and after a contour.
-    air_speed : float or None
-        Share of the full speed of joint moves; None: what is usual for planned moves and others.
-    arc_tolerance : float m or None
-        How near to the path circular moves stay; None: there are none.
-    gas_lead : float s or None
-        How long before the start the gas is switched on; None: not by the program.
-    handshakes : tuple of Request or Await
-        Before each contour.
+    name, retract, zone, lead_time, pierce_time, approach_speed, air_speed, arc_tolerance, gas_lead,
+    handshakes
+        As in `kerfpath.post.build_program`.
     """
 
     language: str
@@ -93,6 +77,29 @@ class ProgramOptions:
     handshakes: tuple[Handshake, ...] = ()
 
     __repr__ = told
+
+    def program(self, plans: Sequence[Plan], moves: Sequence[AirMove] = ()) -> Program:
+        """Return the neutral program that cuts the plans, see `kerfpath.post.build_program`.
+
+        Raises
+        ------
+        InputError
+            As there.
+        """
+        return build_program(
+            plans,
+            moves=moves,
+            name=self.name,
+            retract=self.retract,
+            zone=self.zone,
+            lead_time=self.lead_time,
+            gas_lead=self.gas_lead,
+            pierce_time=self.pierce_time,
+            approach_speed=self.approach_speed,
+            air_speed=self.air_speed,
+            arc_tolerance=self.arc_tolerance,
+            handshakes=self.handshakes,
+        )
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -163,7 +170,7 @@ class Job:
         What the audit allows between the nodes.
     program : ProgramOptions
         For the robot program.
-    source : dict
+    source : mapping
         The whole file as read: tables, keys and values that JSON can hold.
     """
 
@@ -180,7 +187,7 @@ class Job:
     layout: LayoutTable
     tolerances: Tolerances
     program: ProgramOptions
-    source: dict[str, Any]
+    source: Mapping[str, Any]
 
     __repr__ = told
 
@@ -233,7 +240,7 @@ class Job:
     def _require_open(self, task: ContourTask, number: int) -> None:
         """Raise InputError where a task of table `number` asks of an open line what it has not."""
         line = f"loop {task.pick!r} is an open line, which"
-        for key, why in closed_only(task.table).items():
+        for key, why in keys_of_closed_loops(task.table).items():
             raise refused_at(self.path, ("contour", number, key), f"{line} {why}; remove {key}")
         if self.options.closure == "periodic":
             said = f'{line} does not come back to its start; write closure = "free"'
@@ -323,10 +330,10 @@ def _tables(path: Path, text: str) -> dict[str, Any]:
     except RecursionError:
         raise error_at(path, None, "arrays or tables are nested too deeply; flatten them") from None
     except tomllib.TOMLDecodeError as error:
-        told = str(error)
-        at = re.search(r" \(at line (\d+), column \d+\)$", told)
+        said = str(error)
+        at = re.search(r" \(at line (\d+), column \d+\)$", said)
         line = int(at[1]) if at else text.rstrip("\n").count("\n") + 1
-        raise error_at(path, line, f"not valid TOML: {told}; correct it there") from None
+        raise error_at(path, line, f"not valid TOML: {said}; correct it there") from None
     except ValueError:  # what Python's int() refuses
         raise error_at(path, None, "not valid TOML: an integer is too long; shorten it") from None
     if not tables:

@@ -16,8 +16,8 @@ from kerfpath.robots import acceleration_ratios
 __all__ = [
     "FAULT", "LARGEST", "MOST_NODES", "SMALLEST", "Axis", "Head", "Identifier", "Joints",
     "JointsNotNegative", "JointsPositive", "Lengths", "NotNegative", "Number", "Positive",
-    "Ratio", "Signs", "Text", "Three", "existing", "fault", "folder_of", "key",
-    "nearest", "one_of", "told",
+    "Ratio", "Signs", "Text", "Three", "existing", "fault", "fault_in_words", "folder_of", "key",
+    "nearest", "one_of",
 ]  # fmt: skip
 
 LARGEST = 1e6
@@ -53,7 +53,7 @@ def fault(
     return PydanticCustomError(FAULT, "expected {expected}, got {got}; {remedy}", said)
 
 
-def told(said: str, where: tuple[str | int, ...] = ()) -> PydanticCustomError:
+def fault_in_words(said: str, where: tuple[str | int, ...] = ()) -> PydanticCustomError:
     """Return an error that says `said`, a whole line but for its place, at `where` from here."""
     return PydanticCustomError(FAULT, "{said}", {"said": said, "where": where})
 

@@ -16,9 +16,16 @@ from kerfpath.air import AirMove
 from kerfpath.errors import AuditFailed, InputError
 from kerfpath.job.format import Job, ProgramOptions, refused_at
 from kerfpath.job.output._report import report_text
-from kerfpath.job.plan_file import broken_entry, collision_note, plan_entry, plan_text
-from kerfpath.job.programs import asked_of_cuts, program_of
-from kerfpath.job.run import Outcome
+from kerfpath.job.plan_file import (
+    ContourData,
+    broken_entry,
+    collision_note,
+    plan_document,
+    plan_entry,
+    plan_text,
+)
+from kerfpath.job.programs import audit_of_cuts, program_of
+from kerfpath.job.run import JobResult
 from kerfpath.plans import Plan
 from kerfpath.post import language, replace_program
 from kerfpath.sequence import PartPlan
@@ -77,7 +84,7 @@ class Texts:
     program : tuple of str
         Which of them are the program, the one that is started first; none without one.
     refused : str
-        Why there is no program though every plan has passed; empty where there is none to tell.
+        Why there is no program though every plan has passed; empty otherwise.
     unsafe : bool
         Whether that is because the program, as its language says it, fails its audit.
     notes : tuple of str
@@ -93,7 +100,7 @@ class Texts:
     __repr__ = told
 
 
-def write_outcome(outcome: Outcome, folder: Path, *, strict: bool = False) -> Written:
+def write_outcome(outcome: JobResult, folder: Path, *, strict: bool = False) -> Written:
     """Write the files of a run into `folder`; the program only if every audit has passed.
 
     Raises
@@ -119,7 +126,7 @@ def write_outcome(outcome: Outcome, folder: Path, *, strict: bool = False) -> Wr
     )
 
 
-def outcome_texts(outcome: Outcome, *, strict: bool = False) -> Texts:
+def outcome_texts(outcome: JobResult, *, strict: bool = False) -> Texts:
     """Return the files of a run as text; the program only if every audit has passed."""
     job = outcome.job
     part, moves = outcome.part, () if outcome.part is None else outcome.part.moves
@@ -132,9 +139,9 @@ def outcome_texts(outcome: Outcome, *, strict: bool = False) -> Texts:
     faults += [f"The moves between contours: {c.issue()}" for c in outcome.air if not c.ok]
     if outcome.passed and job.program.language != "none":
         try:
-            asked = asked_of_cuts(job, outcome.cuts, outcome.cell)
+            audit = audit_of_cuts(job, outcome.cuts, outcome.cell)
             program, warnings = program_of(
-                outcome.plans, job.program, moves, asked=asked, strict=strict
+                outcome.plans, job.program, moves, audit=audit, strict=strict
             )
             notes += warnings
         except (InputError, AuditFailed) as error:
@@ -146,21 +153,25 @@ def outcome_texts(outcome: Outcome, *, strict: bool = False) -> Texts:
         "trajectory.csv": trajectory_text(outcome.plans, moves),
         "report.html": report_text(outcome, notes, faults),
     }
-    told = (*notes, *faults)
-    return Texts(files=files, program=tuple(program), refused=refused, unsafe=unsafe, notes=told)
+    return Texts(
+        files=files, program=tuple(program), refused=refused, unsafe=unsafe,
+        notes=(*notes, *faults),
+    )  # fmt: skip
 
 
-def planned_text(outcome: Outcome) -> str:
+def planned_text(outcome: JobResult) -> str:
     """Return the text of the plan.json of a run."""
     job = outcome.job
-    entries = []
+    entries: list[ContourData] = []
     for cut in outcome.cuts:
         if cut.plan is not None:
             entries.append(plan_entry(cut.plan, cut.contour, cut.checks, picked=cut.picked))
         elif cut.broken is not None:
-            entries.append(broken_entry(cut.task.name, cut.broken, cut.fastest))
+            entries.append(broken_entry(cut.name, cut.broken, cut.fastest))
     return plan_text(
-        job.robot, job.tool, job.placement, entries, job.source, outcome.cell, outcome.part
+        plan_document(
+            job.robot, job.tool, job.placement, entries, job.source, outcome.cell, outcome.part
+        )
     )
 
 
@@ -198,7 +209,7 @@ def order_note(part: PartPlan) -> str:
     )
 
 
-def short_pieces(outcome: Outcome) -> list[str]:
+def short_pieces(outcome: JobResult) -> list[str]:
     """Say of interrupted contours which piece is shortest, if it is short and nobody asked."""
     if outcome.job.options.least_piece is not None:
         return []

@@ -10,7 +10,7 @@ from kerfpath._arrays import Array
 from kerfpath.air import AirMove
 from kerfpath.cad import Departure
 from kerfpath.job.format import Job
-from kerfpath.job.run import Outcome
+from kerfpath.job.run import JobResult
 from kerfpath.report import ContourSection, render
 
 __all__ = ["report_text"]
@@ -19,14 +19,14 @@ PER_LEG = 17
 """Points that a straight joint motion is drawn by."""
 
 
-def report_text(outcome: Outcome, notes: Sequence[str], faults: Sequence[str] = ()) -> str:
+def report_text(outcome: JobResult, notes: Sequence[str], faults: Sequence[str] = ()) -> str:
     """Return the HTML report of a run; `faults` say why it is not to be cut though planned."""
     job = outcome.job
     sections = [
         ContourSection(
-            name=cut.task.name,
+            name=cut.name,
             graph=cut.graph,
-            path=cut.nodes,
+            path=cut.candidate.nodes,
             plan=cut.plan,
             checks=cut.checks,
             failure="" if cut.broken is None else str(cut.broken),
@@ -92,8 +92,8 @@ def _sampling(found: Departure) -> list[tuple[str, str]]:
         ),
     ]
     if (loop := found.path) is not None:
-        told = f"{loop.chord_error * 1e3:.4f} mm and {np.degrees(loop.axis_error):.3f} deg"
-        rows.append(("Drawn loop", f"within {told} of {against[loop.against]}"))
+        off = f"{loop.chord_error * 1e3:.4f} mm and {np.degrees(loop.axis_error):.3f} deg"
+        rows.append(("Drawn loop", f"within {off} of {against[loop.against]}"))
     return rows
 
 

@@ -2,23 +2,25 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import cast
 
 from kerfpath import __version__
 from kerfpath._told import told
 from kerfpath.auditor import Check, air_checks, worst_of
-from kerfpath.job.format import AuditTable, read_job, tolerances_of
-from kerfpath.job.plan_file._asked import Asked, asked_of, order_checks
-from kerfpath.job.plan_file._differs import disagreement, job_disagreement
-from kerfpath.job.plan_file._expected import Expected, expected_plans
-from kerfpath.job.plan_file._follows import SAME, following
-from kerfpath.job.plan_file._moves import expected_sequence, move_checks
+from kerfpath.job.format import AuditTable, PreparedJob, prepare, read_job, tolerances_of
+from kerfpath.job.plan_file._checks import check, count
+from kerfpath.job.plan_file._compare import compare_jobs, compare_values
+from kerfpath.job.plan_file._expected import Expected, expect_plans
+from kerfpath.job.plan_file._layout import NodesData, PlanData
+from kerfpath.job.plan_file._moves import check_moves, expect_sequence
+from kerfpath.job.plan_file._order_checks import check_sequence
 from kerfpath.job.plan_file._read import PlanFile, read_plan_file, table_of
-from kerfpath.job.plan_file._result import Audited, collision_note
-from kerfpath.job.plan_file._write import plan_data, plan_entry
+from kerfpath.job.plan_file._recompute import SAME, recompute
+from kerfpath.job.plan_file._report import AuditReport, collision_note
+from kerfpath.job.plan_file._write import plan_document, plan_entry
 from kerfpath.plans import Plan
 
 __all__ = ["PlanAudit", "audit_file"]
@@ -30,7 +32,7 @@ AIR = "air"
 """Name of the table of the moves."""
 
 
-def audit_file(plan_file: Path, job_file: Path | None = None) -> Audited:
+def audit_file(plan_file: Path, job_file: Path | None = None) -> AuditReport:
     """Return what the audit says of every contour of a plan.json.
 
     With a job, the job alone says what is asked for and allowed; what the plan repeats of it, or
@@ -58,10 +60,10 @@ class PlanAudit:
 
     Parameters
     ----------
-    asked : Asked
+    prepared : PreparedJob
     """
 
-    asked: Asked
+    prepared: PreparedJob
 
     __repr__ = told
 
@@ -74,9 +76,9 @@ class PlanAudit:
         InputError
             The job, its drawing or its cell cannot be read.
         """
-        return cls(asked=asked_of(read_job(job_file)))
+        return cls(prepared=prepare(read_job(job_file)))
 
-    def audited(self, plan_file: Path) -> Audited:
+    def audited(self, plan_file: Path) -> AuditReport:
         """Return what the audit says of every contour of a plan.json, by the job.
 
         Raises
@@ -84,62 +86,60 @@ class PlanAudit:
         InputError
             The file cannot be read.
         """
-        asked, file = self.asked, read_plan_file(plan_file)
-        expected, rows = expected_plans(asked, file)
-        entries = {entry["name"]: entry for entry in file.data["contours"] if entry["feasible"]}
+        prepared, file = self.prepared, read_plan_file(plan_file)
+        job, cell, entries = prepared.job, prepared.cell, file.entries
+        expected, rows = expect_plans(prepared, file)
         tables: dict[str, list[Check]] = {file.path.name: rows}
-        told: list[dict[str, Any]] = []
+        judged: list[PlanData] = []
         for each in expected:
             table = tables.setdefault(each.name, [])
             table += each.checks
             if each.plan is None:
                 continue
-            made = asked.job.tolerances.checks(each.plan, reference=each.path, cell=asked.cell)
+            made = job.tolerances.checks(each.plan, reference=each.path, cell=cell)
             entry = _entry(each.plan, entries[each.name], made, file)
-            told.append(entry)
+            judged.append(entry)
             table += made
             table += _claims(each.plan)
-            table += disagreement(entry, entries[each.name], JOB)
-        rows += job_disagreement(asked.job, file.job)
+            table += compare_values(entry, entries[each.name], JOB)
+        rows += compare_jobs(job, file.job)
         paths = [p.contour for p in file.plans]
-        rows += order_checks(asked, [each.number for each in expected], paths)
-        rows += self._whole(file, told, expected)
+        rows += check_sequence(prepared, [each.number for each in expected], paths)
+        rows += self._whole(file, judged, expected)
         plans = [each.plan for each in expected if each.plan is not None]
         if len(plans) == len(expected) and plans:
-            tables.setdefault(AIR, []).extend(move_checks(asked, plans, file.moves))
-        note = collision_note(asked.cell, moves_too=asked.job.sequence is not None)
-        return Audited(
+            tables.setdefault(AIR, []).extend(check_moves(prepared, plans, file.moves))
+        note = collision_note(cell, moves_too=job.sequence is not None)
+        return AuditReport(
             tables={name: table for name, table in tables.items() if table},
             missing=file.missing,
             note=f"{note} {_unverified(file)}".strip(),
         )
 
     def _whole(
-        self, file: PlanFile, told: list[dict[str, Any]], expected: Sequence[Expected]
+        self, file: PlanFile, judged: Sequence[PlanData], expected: Sequence[Expected]
     ) -> list[Check]:
         """Compare what stands in the file beside its contours: robot, limits, cell, sequence."""
-        asked, data = self.asked, file.data
+        prepared, job, data = self.prepared, self.prepared.job, file.data
         plans = [each.plan for each in expected if each.plan is not None]
         part = None
-        if asked.job.sequence is not None and data["sequence"] is not None and plans:
-            least = data["sequence"]["at_least_s"]
-            part = expected_sequence(asked, plans, file.moves, least)
-        whole = plan_data(
-            asked.job.robot, asked.job.tool, asked.job.placement, told, {}, asked.cell, part
+        if job.sequence is not None and data["sequence"] is not None and plans:
+            part = expect_sequence(prepared, plans, file.moves, data["sequence"]["at_least_s"])
+        own: Mapping[str, object] = data
+        whole: Mapping[str, object] = plan_document(
+            job.robot, job.tool, job.placement, judged, {}, prepared.cell, part
         )
         rows = []
         for key in whole.keys() - {"job", "contours", "kerfpath", "schema"}:
             if key == "sequence" and len(plans) < len(expected):
                 continue  # a contour is refused already, and its times are not known
-            rows += [row for row in disagreement(whole[key], data[key], JOB, (key,)) if not row.ok]
-        if asked.job.sequence is not None and data["sequence"] is None:
-            rows.append(_count("moves", "moves between contours that the job asks for", 1))
-        return rows or disagreement({}, {}, JOB)
+            rows += [row for row in compare_values(whole[key], own[key], JOB, (key,)) if not row.ok]
+        if job.sequence is not None and data["sequence"] is None:
+            rows.append(count("moves", "moves between contours that the job asks for", 1))
+        return rows or compare_values({}, {}, JOB)
 
 
-def _entry(
-    plan: Plan, said: dict[str, Any], made: Sequence[Check], file: PlanFile
-) -> dict[str, Any]:
+def _entry(plan: Plan, said: PlanData, made: Sequence[Check], file: PlanFile) -> PlanData:
     """Return what plan.json should say of a contour, the record of the audit included.
 
     The record of another version is its own.
@@ -153,17 +153,13 @@ def _entry(
 
 def _claims(plan: Plan) -> list[Check]:
     """Check of what is claimed of other motions the part that can be checked."""
-    before = plan.proof.grid_cost
-    rows = []
+    before, rows = plan.proof.grid_cost, []
     if before is not None:
-        over = plan.cost - before * (1 + SAME)
-        rows.append(
-            Check(code="grid-cost", title="cost above that of the path it was refined from",
-                  value=float(over), limit=SAME, unit="count", node=0)
-        )  # fmt: skip
+        title = "cost above that of the path it was refined from"
+        rows.append(check("grid-cost", title, plan.cost - before * (1 + SAME), SAME, "count"))
     if plan.settings.method != "exact":
-        claimed = plan.proof.optimal
-        rows.append(_count("optimal", "claims to be best that its method cannot prove", claimed))
+        title = "claims to be best that its method cannot prove"
+        rows.append(count("optimal", title, plan.proof.optimal))
     return rows
 
 
@@ -176,23 +172,19 @@ def _unverified(file: PlanFile) -> str:
     return f"Claimed, not verified: {' and '.join(claims)}." if claims else ""
 
 
-def _by_itself(file: PlanFile) -> Audited:
+def _by_itself(file: PlanFile) -> AuditReport:
     """Return the audit of a plan.json by what it says itself."""
     tolerances = table_of(file, "audit", AuditTable, tolerances_of)
-    entries = {entry["name"]: entry for entry in file.data["contours"] if entry["feasible"]}
     tables = {}
     for p in file.plans:
-        own = following(p)
+        own, said = recompute(p), file.entries[p.name]
         made = tolerances.checks(own)
-        entry = plan_entry(own, entries[p.name]["contour"], made, picked=p.name in file.picked)
-        entry["audit"], entry["nodes"] = (
-            entries[p.name]["audit"],
-            entries[p.name]["nodes"]
-            | {key: value for key, value in entry["nodes"].items() if key in OWN_NODES},
-        )
-        tables[p.name] = [*made, *_claims(own), *disagreement(entry, entries[p.name], FILE)]
+        entry = plan_entry(own, said["contour"], made, picked=p.name in file.picked)
+        follow = {key: value for key, value in entry["nodes"].items() if key in OWN_NODES}
+        entry["audit"], entry["nodes"] = said["audit"], cast(NodesData, said["nodes"] | follow)
+        tables[p.name] = [*made, *_claims(own), *compare_values(entry, said, FILE)]
     if not file.plans and not file.missing:
-        tables[file.path.name] = [_count("contours", "plans lacking: the file has none", 1)]
+        tables[file.path.name] = [count("contours", "plans lacking: the file has none", 1)]
     if file.moves and file.plans:
         robot = file.plans[0].robot
         tables[AIR] = worst_of(air_checks(robot, m.q, m.time) for m in file.moves)
@@ -200,15 +192,11 @@ def _by_itself(file: PlanFile) -> Audited:
         "Limits, tool, placement and speed were taken from the plan itself; give its job with "
         "--job to judge by that."
     )
-    if file.in_cell:
-        note = (
-            f"{note} Planned clear of collisions in a cell, which was not checked again: give its "
-            "job with --job."
-        )
-    else:
-        note = f"{note} {collision_note(None)}"
-    return Audited(tables=tables, missing=file.missing, note=f"{note} {_unverified(file)}".strip())
-
-
-def _count(code: str, title: str, count: float) -> Check:
-    return Check(code=code, title=title, value=float(count), limit=0.0, unit="count", node=0)
+    collisions = (
+        "Planned clear of collisions in a cell, which was not checked again: give its job with "
+        "--job."
+        if file.in_cell
+        else collision_note(None)
+    )
+    note = f"{note} {collisions} {_unverified(file)}".strip()
+    return AuditReport(tables=tables, missing=file.missing, note=note)

@@ -8,16 +8,17 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from kerfpath._arrays import Array
-from kerfpath.auditor import Check, Unit
+from kerfpath.auditor import Check
 from kerfpath.contour import Contour
-from kerfpath.job.plan_file._asked import Asked, Candidate
-from kerfpath.job.plan_file._follows import following
+from kerfpath.job.format import Candidate, Job, PreparedJob, divide_nodes
+from kerfpath.job.plan_file._checks import check, count
 from kerfpath.job.plan_file._read import PlanFile
+from kerfpath.job.plan_file._recompute import recompute
 from kerfpath.options import PlanOptions
 from kerfpath.plans import Plan
 from kerfpath.retime import feed, retime
 
-__all__ = ["Expected", "expected_plans"]
+__all__ = ["Expected", "expect_plans"]
 
 SAME_PLACE = 1e-6
 """m: a node and one of the job's are the same up to this distance."""
@@ -50,58 +51,58 @@ class Expected:
     checks: tuple[Check, ...] = ()
 
 
-def expected_plans(asked: Asked, file: PlanFile) -> tuple[list[Expected], list[Check]]:
+def expect_plans(prepared: PreparedJob, file: PlanFile) -> tuple[list[Expected], list[Check]]:
     """Return what is expected of each plan of a file, and the checks of which contours it has."""
-    names = [task.name for task in asked.tasks]
+    names = prepared.names
     members = [[p for p in file.plans if file.contours[p.name] == name] for name in names]
     found: dict[str, Expected] = {}
     for number, plans in enumerate(members):
-        for each in _of_contour(asked, number, plans, file.picked):
+        for each in _of_contour(prepared, number, plans, file.picked):
             found[each.name] = each
     foreign = [p.name for p in file.plans if p.name not in found]
     for name in foreign:
-        row = _count("contour", "contours that the job does not ask for", 1)
+        row = count("contour", "contours that the job does not ask for", 1)
         found[name] = Expected(name=name, number=-1, checks=(row,))
     missing = [
         name
         for name, plans in zip(names, members, strict=True)
         if not plans and name not in file.missing
     ]
-    told = f": {', '.join(missing)}" if missing else ""
+    which = f": {', '.join(missing)}" if missing else ""
     rows = [
-        _count("contours", f"contours of the job that the plan lacks{told}", len(missing)),
-        _count("contour", "contours that the job does not ask for", len(foreign)),
+        count("contours", f"contours of the job that the plan lacks{which}", len(missing)),
+        count("contour", "contours that the job does not ask for", len(foreign)),
     ]
     return [found[p.name] for p in file.plans], rows
 
 
 def _of_contour(
-    asked: Asked, number: int, plans: Sequence[Plan], picked: frozenset[str]
+    prepared: PreparedJob, number: int, plans: Sequence[Plan], picked: frozenset[str]
 ) -> list[Expected]:
     """Return what is expected of the plans of one contour: it alone, or its pieces."""
     if not plans:
         return []
-    name, job = asked.tasks[number].name, asked.job
+    name, job = prepared.names[number], prepared.job
     if len(plans) == 1 and plans[0].name == name:
         (made,) = plans
-        candidate = _nearest(asked.candidates[number], made, job.options.refine_parts)
+        candidate = _nearest(prepared.contours[number].candidates, made, job.options.refine_parts)
         if candidate is None:
-            counts = sorted({len(c.nodes) for c in asked.candidates[number]})
+            counts = sorted({len(c.nodes) for c in prepared.contours[number].candidates})
             row = _node_count(made, " or ".join(map(str, counts)))
             return [Expected(name=name, number=number, checks=(row,))]
-        nodes, path = _fine(candidate.nodes, candidate.path, made, job.options.refine_parts)
-        return [_expected(asked, number, made, candidate, nodes, path, made.name in picked)]
+        own = _divided(candidate, made, job.options.refine_parts)
+        return [_expected(prepared, number, made, candidate, own, picked=made.name in picked)]
     words = [f"{name}, piece {k + 1} of {len(plans)}" for k in range(len(plans))]
     by_name = {p.name: p for p in plans}
     if len(plans) == 1 or job.options.interruptions == "none" or set(by_name) != set(words):
-        row = _count("once", "plans of a contour that is cut once", len(plans))
+        row = count("once", "plans of a contour that is cut once", len(plans))
         return [Expected(name=p.name, number=number, checks=(row,)) for p in plans]
-    return _pieces(asked, number, [by_name[word] for word in words])
+    return _pieces(prepared, number, [by_name[word] for word in words])
 
 
-def _pieces(asked: Asked, number: int, plans: Sequence[Plan]) -> list[Expected]:
+def _pieces(prepared: PreparedJob, number: int, plans: Sequence[Plan]) -> list[Expected]:
     """Return what is expected of the pieces of a contour, in the order along it."""
-    job = asked.job
+    job = prepared.job
 
     def off(candidate: Candidate) -> float:
         ends = [candidate.path.at(p.contour.s[[0, -1]])[0] for p in plans]
@@ -110,19 +111,19 @@ def _pieces(asked: Asked, number: int, plans: Sequence[Plan]) -> list[Expected]:
             for p, end in zip(plans, ends, strict=True)
         )
 
-    candidate = min(asked.candidates[number], key=off)
+    candidate = min(prepared.contours[number].candidates, key=off)
     whole, found, at = candidate.nodes, [], 0
     for p in plans:
         last = int(np.argmin(np.abs(whole.s - p.contour.s[-1])))
         last = len(whole) - 1 if p is plans[-1] else min(max(last, at + 1), len(whole) - 1)
         if at >= last:
-            row = _count("pieces", "pieces that do not go on where the one before them ends", 1)
+            row = count("pieces", "pieces that do not go on where the one before them ends", 1)
             found.append(Expected(name=p.name, number=number, checks=(row,)))
             continue
         part = replace(whole.part(at, last, job.options.frames), name=p.name)
         path = candidate.path.between(float(whole.s[at]), float(whole.s[last]))
-        nodes, path = _fine(part, path, p, job.options.refine_parts)
-        found.append(_expected(asked, number, p, candidate, nodes, path, picked=False))
+        own = _divided(Candidate(path=path, nodes=part), p, job.options.refine_parts)
+        found.append(_expected(prepared, number, p, candidate, own, picked=False))
         at = last
     return found
 
@@ -139,46 +140,47 @@ def _nearest(candidates: Sequence[Candidate], made: Plan, parts: int) -> Candida
     return min(fitting, key=off, default=None)
 
 
-def _fine(nodes: Contour, path: Contour, made: Plan, parts: int) -> tuple[Contour, Contour]:
-    """Return the nodes, divided where those of the plan are, and their path."""
-    coarse = np.arange(len(nodes))
-    if parts == 1 or len(made.contour) != coarse[-1] * parts + 1:
-        return nodes, path
-    s = np.interp(np.arange(coarse[-1] * parts + 1) / parts, coarse, nodes.s)
-    return replace(path.at_nodes(s), name=nodes.name), path
+def _divided(candidate: Candidate, made: Plan, parts: int) -> Candidate:
+    """Return the candidate with its intervals divided, where those of the plan are."""
+    if parts == 1 or len(made.contour) != (len(candidate.nodes) - 1) * parts + 1:
+        return candidate
+    return replace(candidate, nodes=divide_nodes(candidate.path, candidate.nodes, parts))
 
 
 def _expected(
-    asked: Asked, number: int, made: Plan, candidate: Candidate, nodes: Contour, path: Contour,
-    picked: bool,
+    prepared: PreparedJob, number: int, made: Plan, whole: Candidate, own: Candidate,
+    *, picked: bool,
 ) -> Expected:  # fmt: skip
-    """Return the plan that has the joints of a plan and all else of the job."""
-    robot = asked.job.robot
+    """Return the plan that has the joints of a plan and all else of the job.
+
+    Its nodes are those of its `own` candidate: a piece of the `whole` one, or its nodes divided.
+    """
+    job, nodes = prepared.job, own.nodes
     if len(nodes) != len(made.contour):
         row = _node_count(made, str(len(nodes)))
         return Expected(name=made.name, number=number, checks=(row,))
-    if made.q.shape[1] != robot.joints:
-        row = _count("joints", f"joints, where the robot has {robot.joints}", made.q.shape[1])
+    if made.q.shape[1] != job.robot.joints:
+        row = count("joints", f"joints, where the robot has {job.robot.joints}", made.q.shape[1])
         return Expected(name=made.name, number=number, checks=(row,))
     far = np.linalg.norm(made.contour.points - nodes.points, axis=1)
     worst = int(np.argmax(far))
-    place = _check("place", "nodes, off those of the job", far[worst], SAME_PLACE, "m", worst)
-    parts = _parts(candidate, nodes, asked.job.options.refine_parts)
+    place = check("place", "nodes, off those of the job", far[worst], SAME_PLACE, "m", worst)
+    parts = _parts(whole, nodes, job.options.refine_parts)
     plan = replace(
         made,
         contour=replace(nodes, time=None),
-        robot=robot,
-        T_flange_tip=asked.job.tool,
-        T_base_part=asked.job.placement,
-        time=candidate.dt / parts * np.arange(len(nodes), dtype=float),
-        settings=_options(asked, candidate.dt, made.settings, picked=picked),
+        robot=job.robot,
+        T_flange_tip=job.tool,
+        T_base_part=job.placement,
+        time=whole.dt / parts * np.arange(len(nodes), dtype=float),
+        settings=_options(job, whole.dt, made.settings, picked=picked),
         feed=None,
     )
-    if asked.job.options.feed == "dip" and made.feed is not None and not picked:
-        plan = _dipping(plan, candidate.dt, made.time)
-    plan = following(plan)
-    rows = (place, *_postures(asked, plan))
-    return Expected(name=made.name, number=number, plan=plan, path=path, checks=rows)
+    if job.options.feed == "dip" and made.feed is not None and not picked:
+        plan = _dipping(plan, whole.dt, made.time)
+    plan = recompute(plan)
+    rows = (place, *_postures(job, plan))
+    return Expected(name=made.name, number=number, plan=plan, path=own.path, checks=rows)
 
 
 def _parts(candidate: Candidate, nodes: Contour, parts: int) -> int:
@@ -187,9 +189,9 @@ def _parts(candidate: Candidate, nodes: Contour, parts: int) -> int:
     return parts if parts > 1 and step > (1 + parts) / 2 else 1
 
 
-def _options(asked: Asked, dt: float, said: PlanOptions, *, picked: bool) -> PlanOptions:
+def _options(job: Job, dt: float, said: PlanOptions, *, picked: bool) -> PlanOptions:
     """Return how the job asks for a plan; one that was picked may aim at less than the limits."""
-    options = asked.job.options.of(asked.job.robot, dt)
+    options = job.options.of(job.robot, dt)
     if not picked:
         return options
     return replace(
@@ -208,33 +210,22 @@ def _dipping(plan: Plan, dt: float, said: Array) -> Plan:
     """Return the plan in the least time that its limits allow; what is said where that is it."""
     limits = plan.settings.limits(plan.robot)
     tau = retime(plan.increments, dt, limits)
-    told = np.diff(said)
-    if said[0] == 0 and (np.abs(told - tau) <= RETIMED * tau).all():
-        tau = told
+    time, found = np.concatenate([[0.0], np.cumsum(tau)]), np.diff(said)
+    if said[0] == 0 and (np.abs(found - tau) <= RETIMED * tau).all():
+        time, tau = said, found
     dips = feed(tau, dt, plan.increments, limits, np.diff(plan.contour.s))
-    time = np.concatenate([[0.0], np.cumsum(tau)])
-    return replace(plan, time=said if tau is told else time, feed=dips)
+    return replace(plan, time=time, feed=dips)
 
 
-def _postures(asked: Asked, made: Plan) -> list[Check]:
-    allowed = asked.job.options.postures
+def _postures(job: Job, made: Plan) -> list[Check]:
+    allowed = job.options.postures
     if allowed is None:
         return []
     other = np.flatnonzero(~np.isin(made.posture, list(allowed)))
     node = int(other[0]) if other.size else 0
-    return [_count("posture", "nodes in a posture that the job does not allow", len(other), node)]
+    return [count("posture", "nodes in a posture that the job does not allow", len(other), node)]
 
 
 def _node_count(made: Plan, asked: str) -> Check:
     said = f"nodes too many or too few: expected {asked}, found {len(made.contour)}"
-    return _count("nodes", said, 1)
-
-
-def _count(code: str, title: str, count: float, node: int = 0) -> Check:
-    return _check(code, title, count, 0, "count", node)
-
-
-def _check(code: str, title: str, value: float, limit: float, unit: Unit, node: int = 0) -> Check:
-    return Check(
-        code=code, title=title, value=float(value), limit=float(limit), unit=unit, node=node
-    )
+    return count("nodes", said, 1)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -10,11 +11,12 @@ from kerfpath._arrays import Array
 from kerfpath.air import AirMove, End, backed_off, least_time
 from kerfpath.auditor import Check, air_checks, worst_of
 from kerfpath.errors import InputError
-from kerfpath.job.plan_file._asked import Asked
+from kerfpath.job.format import PreparedJob
+from kerfpath.job.plan_file._checks import check, count
 from kerfpath.plans import Plan
 from kerfpath.sequence import Order, PartPlan
 
-__all__ = ["expected_sequence", "move_checks"]
+__all__ = ["check_moves", "expect_sequence"]
 
 SAME_CORNER = 1e-6
 """rad: an end of a move and where the tool backs off to differ by rounding at most."""
@@ -24,76 +26,72 @@ SHARES = np.linspace(0.0, 1.0, 9)
 """Of the retract, at which the way to and from a cut is looked at for collisions."""
 
 
-def move_checks(asked: Asked, plans: Sequence[Plan], moves: Sequence[AirMove]) -> list[Check]:
+def check_moves(
+    prepared: PreparedJob, plans: Sequence[Plan], moves: Sequence[AirMove]
+) -> list[Check]:
     """Return the worst of each check over all moves; its node is the number of the move.
 
     Each goes from where the tool backs off one cut to where it comes down to the next, or home;
     within the limits, not faster than the robot can, and clear in the cell, as is the way down.
     """
-    sequence, robot = asked.job.sequence, asked.job.robot
+    sequence, robot = prepared.job.sequence, prepared.job.robot
     if sequence is None:
-        return [_count("moves", "moves that the job does not ask for", len(moves))] if moves else []
+        return [count("moves", "moves that the job does not ask for", len(moves))] if moves else []
     homes = 2 if sequence.home_deg is not None else 0
     wanted = len(plans) - 1 + homes
-    rows = [_count("moves", "moves too many or too few", abs(len(moves) - wanted))]
+    rows = [count("moves", "moves too many or too few", abs(len(moves) - wanted))]
     odd = [m for m in moves if m.q.shape[1] != robot.joints or len(m.q) < 2]
     far = [m for m in moves if not np.abs(m.q).max(initial=0.0) < FARTHEST]
-    rows.append(_count("corners", "moves without two corners of the robot's joints", len(odd)))
-    rows.append(_count("air-limits", "moves with corners beyond any joint's range", len(far)))
+    rows.append(count("corners", "moves without two corners of the robot's joints", len(odd)))
+    rows.append(count("air-limits", "moves with corners beyond any joint's range", len(far)))
     if len(moves) != wanted or odd or far:
         return rows
     try:
-        ways = [(_way(asked, p, "start"), _way(asked, p, "end")) for p in plans]
+        ways = [(_way(prepared, p, "start"), _way(prepared, p, "end")) for p in plans]
     except InputError as error:
-        return [*rows, _count("retract", f"ends of cuts that cannot be backed off: {error}", 1)]
-    o = asked.job.options
+        return [*rows, count("retract", f"ends of cuts that cannot be backed off: {error}", 1)]
+    o, cell = prepared.job.options, prepared.cell
     tables = [
-        air_checks(robot, m.q, m.time, cell=asked.cell, eta_v=o.eta_v, eta_a=o.eta_a) for m in moves
+        air_checks(robot, m.q, m.time, cell=cell, eta_v=o.eta_v, eta_a=o.eta_a) for m in moves
     ]
-    for table, move, ends in zip(tables, moves, _ends(asked, ways), strict=True):
-        table += _fits(asked, move, ends)
+    for table, move, ends in zip(tables, moves, _ends(prepared, ways), strict=True):
+        table += _fits(prepared, move, ends)
     rows += worst_of(tables)
-    if asked.cell is not None:
+    if cell is not None:
         ups = [
-            [c for c in air_checks(robot, way, np.arange(len(way)) * 1e3, cell=asked.cell)
+            [c for c in air_checks(robot, way, np.arange(len(way)) * 1e3, cell=cell)
              if c.code.startswith("collision")]
             for pair in ways for way in pair
         ]  # fmt: skip
-        rows += [_way_row(check) for check in worst_of(ups)]
+        rows += [_way_row(row) for row in worst_of(ups)]
     return rows
 
 
-def expected_sequence(
-    asked: Asked, plans: Sequence[Plan], moves: Sequence[AirMove], at_least: float
+def expect_sequence(
+    prepared: PreparedJob, plans: Sequence[Plan], moves: Sequence[AirMove], at_least: float
 ) -> PartPlan | None:
     """Return the plans and moves as the job asks for them, in the times that the moves need.
 
     What is claimed of other orders (`at_least` s) is taken as it is.
     """
-    if asked.job.sequence is None:
+    if prepared.job.sequence is None:
         return None
-    program = asked.job.program
+    program = prepared.job.program
+    candidates = np.arange(len(plans))
     part = PartPlan(
         plans=tuple(plans),
         moves=tuple(
-            AirMove(q=m.q, time=_times(plans[0], m.q), clear=asked.cell is not None) for m in moves
+            AirMove(q=m.q, time=_times(plans[0], m.q), clear=prepared.cell is not None)
+            for m in moves
         ),
-        order=Order(candidates=np.arange(len(plans)), duration=0.0, at_least=at_least),
+        order=Order(candidates=candidates, duration=0.0, at_least=at_least),
         chosen=(),
         retract=program.retract,
         approach_speed=program.approach_speed,
         pierce_time=program.pierce_time,
     )
-    order = Order(candidates=part.order.candidates, duration=part.cycle_time, at_least=at_least)
-    return PartPlan(
-        plans=part.plans,
-        moves=part.moves,
-        order=order,
-        chosen=(),
-        retract=part.retract,
-        approach_speed=part.approach_speed,
-        pierce_time=part.pierce_time,
-    )
+    order = Order(candidates=candidates, duration=part.cycle_time, at_least=at_least)
+    return replace(part, order=order)
 
 
 def _times(first: Plan, q: Array) -> Array:
@@ -104,16 +102,16 @@ def _times(first: Plan, q: Array) -> Array:
     return np.concatenate([[0.0], np.cumsum(np.maximum(took, 1e-9))])
 
 
-def _way(asked: Asked, plan: Plan, end: End) -> Array:
+def _way(prepared: PreparedJob, plan: Plan, end: End) -> Array:
     """Return joints (9, n) rad along the way down to a cut, or back from it, from the cut."""
-    retract = asked.job.program.retract
+    retract = prepared.job.program.retract
     return np.array([backed_off(plan, end, float(share) * retract) for share in SHARES])
 
 
-def _ends(asked: Asked, ways: Sequence[tuple[Array, Array]]) -> list[tuple[Array, Array]]:
+def _ends(prepared: PreparedJob, ways: Sequence[tuple[Array, Array]]) -> list[tuple[Array, Array]]:
     """Return where each move begins and ends, (n,) rad each."""
-    assert asked.job.sequence is not None
-    home = asked.job.sequence.home_deg
+    assert prepared.job.sequence is not None
+    home = prepared.job.sequence.home_deg
     starts, ends = [way[0][-1] for way in ways], [way[1][-1] for way in ways]
     if home is not None:
         starts, ends = [*starts, np.radians(home)], [np.radians(home), *ends]
@@ -121,35 +119,27 @@ def _ends(asked: Asked, ways: Sequence[tuple[Array, Array]]) -> list[tuple[Array
     return list(zip(ends[:-1], starts[1:], strict=True))
 
 
-def _fits(asked: Asked, move: AirMove, ends: tuple[Array, Array]) -> list[Check]:
+def _fits(prepared: PreparedJob, move: AirMove, ends: tuple[Array, Array]) -> list[Check]:
     """Compare a move with where it has to begin and end, and with the time that it needs.
 
     Home is the same with endless joints turned on by whole turns, as the last move may have them.
     """
     first, last = np.abs(move.q[0] - ends[0]), np.abs(move.q[-1] - ends[1])
-    assert asked.job.sequence is not None
-    home = asked.job.sequence.home_deg
+    assert prepared.job.sequence is not None
+    home = prepared.job.sequence.home_deg
     if home is not None and np.array_equal(ends[1], np.radians(home)):
         whole = 2 * np.pi * np.round(last / (2 * np.pi))
-        last = np.where(asked.job.robot.endless, np.abs(last - whole), last)
+        last = np.where(prepared.job.robot.endless, np.abs(last - whole), last)
     off = max(float(first.max()), float(last.max()))
     begins = abs(float(move.time[0]))
     return [
-        Check(code="air-ends", title="ends of a move, off those of the cuts and home", value=off,
-              limit=SAME_CORNER, unit="rad", node=0),
-        Check(code="air-begins", title="time that a move begins at", value=begins, limit=1e-9,
-              unit="s", node=0),
-    ]  # fmt: skip
+        check(
+            "air-ends", "ends of a move, off those of the cuts and home", off, SAME_CORNER, "rad"
+        ),
+        check("air-begins", "time that a move begins at", begins, 1e-9, "s"),
+    ]
 
 
-def _way_row(check: Check) -> Check:
-    code = f"approach-{check.code}"
-    title = f"on the way to a cut and back: {check.title}"
-    return Check(
-        code=code, title=title, value=check.value, limit=check.limit, unit=check.unit,
-        node=check.node // 2, level=check.level, advice=check.advice,
-    )  # fmt: skip
-
-
-def _count(code: str, title: str, count: float) -> Check:
-    return Check(code=code, title=title, value=float(count), limit=0.0, unit="count", node=0)
+def _way_row(row: Check) -> Check:
+    title = f"on the way to a cut and back: {row.title}"
+    return replace(row, code=f"approach-{row.code}", title=title, node=row.node // 2)

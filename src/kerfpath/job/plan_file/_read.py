@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any, TypeVar, cast
 
 import numpy as np
 from pydantic import BaseModel, ValidationError
@@ -15,9 +15,10 @@ from kerfpath.air import AirMove
 from kerfpath.contour import KINDS, Contour
 from kerfpath.errors import InputError
 from kerfpath.job.plan_file._external import joints, with_external
+from kerfpath.job.plan_file._layout import PlanData, PlanDocument
 from kerfpath.job.plan_file._schema import read_document
 from kerfpath.job.plan_file._sequence import read_moves
-from kerfpath.options import PlanOptions
+from kerfpath.options import OptionData, PlanOptions
 from kerfpath.plans import Feed, Plan, Proof
 from kerfpath.robots import Coupling, Robot
 from kerfpath.urdf import Chain
@@ -56,17 +57,22 @@ class PlanFile:
     """
 
     path: Path
-    job: dict[str, Any]
+    job: Mapping[str, Any]
     plans: tuple[Plan, ...]
     missing: tuple[str, ...]
     failed: tuple[str, ...]
     contours: dict[str, str]
     moves: tuple[AirMove, ...]
     in_cell: bool
+    picked: frozenset[str]
+    data: PlanDocument
 
     __repr__ = told
-    picked: frozenset[str]
-    data: dict[str, Any]
+
+    @property
+    def entries(self) -> dict[str, PlanData]:
+        """What the file says of each contour, or piece, that has a plan, by its name."""
+        return {entry["name"]: entry for entry in planned_entries(self.data)}
 
 
 def read_plan_file(path: str | Path) -> PlanFile:
@@ -92,7 +98,7 @@ def read_plan_file(path: str | Path) -> PlanFile:
     try:
         arm = _read_robot(data["robot"], data["limits"])
         robot = with_external(data["external_axis"], arm)
-        entries = [entry for entry in data["contours"] if entry["feasible"]]
+        entries = planned_entries(data)
         return PlanFile(
             path=path,
             job=data["job"],
@@ -116,6 +122,11 @@ def read_plan_file(path: str | Path) -> PlanFile:
         raise InputError(f"{path}: something in it is of the wrong kind ({said})") from None
 
 
+def planned_entries(data: PlanDocument) -> list[PlanData]:
+    """Return what a document says of the contours that have a plan."""
+    return [cast(PlanData, entry) for entry in data["contours"] if entry["feasible"]]
+
+
 def table_of(
     file: PlanFile, name: str, model: type[_M], read: Callable[[_M], _R], **changes: str
 ) -> _R:
@@ -128,7 +139,8 @@ def table_of(
         raise InputError(f"{file.path}: its [{name}] table is not valid ({said})") from None
 
 
-def _read_robot(robot: dict[str, Any], limits: dict[str, Any]) -> Robot:
+def _read_robot(robot: Mapping[str, Any], limits: Mapping[str, Any]) -> Robot:
+    """Return the arm; its arrays are cast and checked by itself."""
     return Robot(
         id=robot["id"],
         manufacturer=robot["manufacturer"],
@@ -154,8 +166,9 @@ def _read_robot(robot: dict[str, Any], limits: dict[str, Any]) -> Robot:
     )
 
 
-def _read_plan(entry: dict[str, Any], robot: Robot, tool: Any, placement: Any) -> Plan:
-    nodes = entry["nodes"]
+def _read_plan(entry: PlanData, robot: Robot, tool: Any, placement: Any) -> Plan:
+    nodes: Mapping[str, Any] = entry["nodes"]
+    weights = {"weights_per_rad": joints(entry, "weights_per", robot).tolist()}
     return Plan(
         contour=Contour(
             nodes["points_m"],
@@ -176,9 +189,7 @@ def _read_plan(entry: dict[str, Any], robot: Robot, tool: Any, placement: Any) -
         posture=nodes["posture"],
         turn=nodes["turn"],
         time=nodes["time_s"],
-        settings=PlanOptions.from_data(
-            {**entry, "weights_per_rad": joints(entry, "weights_per", robot).tolist()}  # type: ignore[typeddict-item]
-        ),
+        settings=PlanOptions.from_data(cast(OptionData, entry | weights)),
         cost=entry["cost"],
         proof=Proof(
             optimal=entry["optimal"],

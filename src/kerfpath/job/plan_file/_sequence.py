@@ -2,16 +2,15 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 from kerfpath._arrays import floats
 from kerfpath.air import AirMove
+from kerfpath.job.plan_file._layout import SequenceData
 from kerfpath.sequence import PartPlan
 
 __all__ = ["read_moves", "sequence_entry"]
 
 
-def sequence_entry(part: PartPlan) -> dict[str, Any]:
+def sequence_entry(part: PartPlan) -> SequenceData:
     """Return what plan.json says of a part's order, its times and its moves."""
     return {
         "optimal": part.order.optimal,
@@ -29,7 +28,7 @@ def sequence_entry(part: PartPlan) -> dict[str, Any]:
     }
 
 
-def read_moves(entry: dict[str, Any] | None) -> tuple[AirMove, ...]:
+def read_moves(entry: SequenceData | None) -> tuple[AirMove, ...]:
     """Return the moves of such an entry."""
     if entry is None:
         return ()

@@ -4,18 +4,27 @@ from __future__ import annotations
 
 import json
 import re
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 
 from kerfpath import __version__
+from kerfpath._arrays import Array
 from kerfpath.auditor import Check
 from kerfpath.cell import Cell, caveats
 from kerfpath.comfort import MEASURES
 from kerfpath.errors import NoFeasiblePath
 from kerfpath.job.plan_file._external import by_unit, external_entry
+from kerfpath.job.plan_file._layout import (
+    BrokenData,
+    ContourData,
+    LimitsData,
+    PlanData,
+    PlanDocument,
+    RobotData,
+)
 from kerfpath.job.plan_file._schema import SCHEMA
 from kerfpath.job.plan_file._sequence import sequence_entry
 from kerfpath.planner import FastestSpeed
@@ -23,46 +32,38 @@ from kerfpath.plans import Plan
 from kerfpath.robots import Robot
 from kerfpath.sequence import PartPlan
 
-__all__ = ["broken_entry", "plan_data", "plan_entry", "plan_text"]
+__all__ = ["broken_entry", "plan_document", "plan_entry", "plan_text"]
 
 _NUMBERS = re.compile(r"\[\s+([-+.\deE,\s]+?)\s+\]")
 
 
-def plan_text(
-    robot: Robot,
-    T_flange_tip: np.ndarray[Any, Any],
-    T_base_part: np.ndarray[Any, Any],
-    contours: Sequence[dict[str, Any]],
-    job: dict[str, Any],
-    cell: Cell | None = None,
-    part: PartPlan | None = None,
-) -> str:
-    """Return the text of a plan.json, see `plan_data`; the same input gives the same bytes."""
-    data = plan_data(robot, T_flange_tip, T_base_part, contours, job, cell, part)
-    text = json.dumps(data, indent=1, allow_nan=False)
+def plan_text(document: PlanDocument) -> str:
+    """Return the text of a plan.json; the same document gives the same bytes."""
+    text = json.dumps(document, indent=1, allow_nan=False)
     # One row of numbers to a line: a person can still read it, and a diff shows a node.
     return _NUMBERS.sub(lambda m: "[" + re.sub(r"\s+", " ", m[1]) + "]", text) + "\n"
 
 
-def plan_data(
+def plan_document(
     robot: Robot,
-    T_flange_tip: np.ndarray[Any, Any],
-    T_base_part: np.ndarray[Any, Any],
-    contours: Sequence[dict[str, Any]],
-    job: dict[str, Any],
+    tool: Array,
+    placement: Array,
+    contours: Sequence[ContourData],
+    job: Mapping[str, Any],
     cell: Cell | None = None,
     part: PartPlan | None = None,
-) -> dict[str, Any]:
+) -> PlanDocument:
     """Return what a plan.json says.
 
     Parameters
     ----------
     robot : Robot
         With the limits used.
-    T_flange_tip, T_base_part : (4, 4) m
+    tool, placement : (4, 4) m
+        T_flange_tip and T_base_part.
     contours : sequence of dict
         From `plan_entry` and `broken_entry`.
-    job : dict
+    job : mapping
         The job file as read.
     cell : Cell, optional
         What the motions were planned and audited clear of.
@@ -72,11 +73,11 @@ def plan_data(
     return {
         "schema": SCHEMA,
         "kerfpath": __version__,
-        "job": job,
+        "job": dict(job),
         "robot": _robot_entry(robot),
         "external_axis": external_entry(robot),
-        "T_flange_tip": T_flange_tip.tolist(),
-        "T_base_part": T_base_part.tolist(),
+        "T_flange_tip": tool.tolist(),
+        "T_base_part": placement.tolist(),
         "limits": _limits_entry(robot),
         "cell": None if cell is None else _cell_entry(cell),
         "contours": list(contours),
@@ -86,13 +87,13 @@ def plan_data(
 
 def plan_entry(
     plan: Plan, contour: str, checks: Sequence[Check], *, picked: bool = False
-) -> dict[str, Any]:
+) -> PlanData:
     """Return what plan.json says of a planned and audited contour, or of a piece of it.
 
-    `picked`: from a Pareto set, by which its objective, weights and eta are then told.
+    `picked`: from a Pareto set, which then says its objective, weights and eta.
     """
     criteria, settings = plan.criteria, plan.settings
-    return {
+    entry = {
         "name": plan.name,
         "contour": contour,
         "feasible": True,
@@ -138,9 +139,10 @@ def plan_entry(
             "turn": plan.turn.tolist(),
         },
     }
+    return cast(PlanData, entry)  # keys of an external axis have its unit in their name
 
 
-def broken_entry(name: str, broken: NoFeasiblePath, fastest: FastestSpeed | None) -> dict[str, Any]:
+def broken_entry(name: str, broken: NoFeasiblePath, fastest: FastestSpeed | None) -> BrokenData:
     """Return what plan.json says of a contour without a feasible path."""
     return {
         "name": name,
@@ -153,7 +155,7 @@ def broken_entry(name: str, broken: NoFeasiblePath, fastest: FastestSpeed | None
     }
 
 
-def _robot_entry(robot: Robot) -> dict[str, Any]:
+def _robot_entry(robot: Robot) -> RobotData:
     return {
         "id": robot.id,
         "manufacturer": robot.manufacturer,
@@ -166,12 +168,16 @@ def _robot_entry(robot: Robot) -> dict[str, Any]:
         "T_base_foot": robot.T_base_foot.tolist(),
         "T_end_flange": robot.T_end_flange.tolist(),
         "chain": None
-        if robot.chain is None
-        else {name: getattr(robot.chain, name).tolist() for name in ("origins", "axes", "end")},
+        if (chain := robot.chain) is None
+        else {
+            "origins": chain.origins.tolist(),
+            "axes": chain.axes.tolist(),
+            "end": chain.end.tolist(),
+        },
     }
 
 
-def _limits_entry(robot: Robot) -> dict[str, Any]:
+def _limits_entry(robot: Robot) -> LimitsData:
     robot = robot.alone()
     limits = robot.joint_limits()
     velocity, acceleration = robot.speed_limits()
@@ -189,8 +195,8 @@ def _limits_entry(robot: Robot) -> dict[str, Any]:
     }
 
 
-def _cell_entry(cell: Cell) -> dict[str, Any]:
-    """Return what kept apart and how far: a record, as the cell itself is that of the job."""
+def _cell_entry(cell: Cell) -> dict[str, object]:
+    """Return what was kept apart and how far: a record, as the cell itself is that of the job."""
     return {
         "bodies": [
             {
@@ -202,21 +208,17 @@ def _cell_entry(cell: Cell) -> dict[str, Any]:
             }
             for b in cell.bodies
         ],
-        "near_miss_m": _pair_entries(cell),
+        "near_miss_m": [
+            {
+                "between": list(pair),
+                "at_least": float(required),
+                "asked": float(asked),
+                "overlap_by_design": float(depth),
+            }
+            for pair, asked, required, depth in zip(
+                cell.pair_names, cell.asked, cell.required, cell.depth, strict=True
+            )
+        ],
         "not_judged": [{"between": list(pair), "why": why} for pair, why in cell.unjudged.items()],
         "not_proved": list(caveats(cell)),
     }
-
-
-def _pair_entries(cell: Cell) -> list[dict[str, Any]]:
-    """Return what every judged pair keeps, what it is asked, and the overlap that is left out."""
-    rules = zip(cell.pair_names, cell.asked, cell.required, cell.depth, strict=True)
-    return [
-        {
-            "between": list(pair),
-            "at_least": float(required),
-            "asked": float(asked),
-            "overlap_by_design": float(depth),
-        }
-        for pair, asked, required, depth in rules
-    ]

@@ -1,8 +1,8 @@
 """Robot programs of a job: built from plans, read back, audited, compared and touched up."""
 
-from kerfpath.job.programs._audit import ProgramAsked as ProgramAsked
+from kerfpath.job.programs._audit import ProgramAudit as ProgramAudit
 from kerfpath.job.programs._audit import audit_program as audit_program
-from kerfpath.job.programs._build import asked_of_cuts as asked_of_cuts
+from kerfpath.job.programs._build import audit_of_cuts as audit_of_cuts
 from kerfpath.job.programs._build import program_of as program_of
 from kerfpath.job.programs._compare import Compared as Compared
 from kerfpath.job.programs._compare import compare_programs as compare_programs

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -13,18 +13,24 @@ from kerfpath._told import told
 from kerfpath.air import least_time
 from kerfpath.auditor import Check, air_checks, worst_of
 from kerfpath.cell import Cell
-from kerfpath.contour import Contour
 from kerfpath.errors import InputError
-from kerfpath.job.format import ContourTask, Job, read_job
-from kerfpath.job.plan_file import Asked, Audited, asked_of, collision_note
-from kerfpath.job.programs._asked import AskedNodes, asked_program
-from kerfpath.job.programs._beam import Process, beam_checks
-from kerfpath.job.programs._cut import asked_times, cut_checks, row
-from kerfpath.job.programs._read import ReadCut, at_interval, cuts_of, language_of, program_on_disk
+from kerfpath.job.format import Candidate, Job, PreparedJob, prepare, read_job
+from kerfpath.job.plan_file import AuditReport, check, check_order, collision_note, count
+from kerfpath.job.programs._cut_checks import check_cut
+from kerfpath.job.programs._expected import TargetNodes, expect_program
+from kerfpath.job.programs._laser_and_gas import Process, check_laser_and_gas
+from kerfpath.job.programs._read import (
+    ReadCut,
+    add_tips,
+    divide_arcs,
+    language_of,
+    program_on_disk,
+    read_cuts,
+)
 from kerfpath.plans import Plan
-from kerfpath.post import Language, ReadProgram, Settings, differences, with_tips
+from kerfpath.post import Language, ReadProgram, Settings, differences
 
-__all__ = ["ProgramAsked", "audit_program"]
+__all__ = ["ProgramAudit", "audit_program"]
 
 NEAR = 5e-3
 """A cut that leaves every contour of the job by more (m), all along, is none of them."""
@@ -45,10 +51,10 @@ WHAT = {
 """What differs, by the code of the difference."""
 
 
-def audit_program(path: Path, job_file: Path) -> Audited:
+def audit_program(path: Path, job_file: Path) -> AuditReport:
     """Return what the audit says of every cut of a program.
 
-    Its targets are led through the robot's kinematics to joints, and these are audited as those of
+    The robot's kinematics give the joints of its targets, and these are audited as those of
     a plan are: against the drawing, the limits and the cell of the job. Frames, speeds, switches
     and waits are compared with what the job asks for.
 
@@ -65,50 +71,48 @@ def audit_program(path: Path, job_file: Path) -> Audited:
         A file cannot be read, a line is not of our making, or the job is of a kind that programs
         cannot be compared with.
     """
-    asked = ProgramAsked.of(job_file)
-    chosen, settings = language_of(path, asked.job)
-    read = program_on_disk(path, chosen, settings, asked.job.robot)
-    return asked.audit(read, chosen, settings, path.name)
+    audit = ProgramAudit.of(job_file)
+    chosen, settings = language_of(path, audit.job)
+    read = program_on_disk(path, chosen, settings, audit.job.robot)
+    return audit.audited(read, chosen, settings, path.name)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class ProgramAsked:
-    """A job and its drawing, read once, to audit programs by.
+class ProgramAudit:
+    """The audit of programs of one job, whose drawing and cell are read once.
 
     Parameters
     ----------
     job : Job
-    tasks : tuple of ContourTask
-    candidates : tuple of tuples of Contour
-        The paths that each of them may be cut along.
+    contours : tuple of tuples of Candidate
+        The ways in which each of its contours may be cut; their nodes have its name.
     cell : Cell or None
     inner_first : tuple of (int, int)
         Contours of which the first is to be cut before the second.
     """
 
     job: Job
-    tasks: tuple[ContourTask, ...]
-    candidates: tuple[tuple[Contour, ...], ...]
+    contours: tuple[tuple[Candidate, ...], ...]
     cell: Cell | None
     inner_first: tuple[tuple[int, int], ...] = ()
 
     __repr__ = told
 
     @classmethod
-    def of(cls, job_file: Path) -> ProgramAsked:
-        """Return what a job asks of its program.
+    def of(cls, job_file: Path) -> ProgramAudit:
+        """Return the audit of a job's programs.
 
         Raises
         ------
         InputError
             A file cannot be read, or the job is of a kind that programs cannot be compared with.
         """
-        return cls.by(asked_of(read_job(job_file)))
+        return cls.by(prepare(read_job(job_file)))
 
     @classmethod
-    def by(cls, asked: Asked) -> ProgramAsked:
+    def by(cls, prepared: PreparedJob) -> ProgramAudit:
         """Return the same of a job whose drawing and cell are read already."""
-        job = asked.job
+        job = prepared.job
         if job.options.interruptions != "none":
             raise InputError(
                 f"{job.path}: programs of jobs with interruptions cannot be compared with the "
@@ -116,17 +120,19 @@ class ProgramAsked:
             )
         return cls(
             job=job,
-            tasks=asked.tasks,
-            candidates=tuple(tuple(way.path for way in ways) for ways in asked.candidates),
-            cell=asked.cell,
-            inner_first=asked.inner_first,
+            contours=tuple(contour.candidates for contour in prepared.contours),
+            cell=prepared.cell,
+            inner_first=prepared.inner_first,
         )
 
-    def audit(self, read: ReadProgram, chosen: Language, settings: Settings, name: str) -> Audited:
+    def audited(
+        self, read: ReadProgram, chosen: Language, settings: Settings, name: str
+    ) -> AuditReport:
         """Return what the audit says of every cut of a program that was read."""
-        job, tasks, candidates, cell = self.job, self.tasks, self.candidates, self.cell
-        read = with_tips(read, job.robot, job.tool, job.placement)
-        cuts, home = cuts_of(read, job.robot, job.tool, job.placement)
+        job, contours, cell = self.job, self.contours, self.cell
+        names = [candidates[0].nodes.name for candidates in contours]
+        read = add_tips(read, job)
+        cuts, home = read_cuts(read, job)
         tables: dict[str, list[Check]] = {}
         places: dict[str, tuple[str, ...]] = {name: tuple(step.place for step in read.steps)}
         tool = job.tool if read.T_flange_tip is None else read.T_flange_tip
@@ -134,64 +140,40 @@ class ProgramAsked:
         off = max(np.abs(tool - job.tool).max(), np.abs(placed - job.placement).max())
         process = Process.of(job.program, ahead=chosen.ahead)
         tables[name] = [
-            row("frames", "tool and part, off the job's", off, SAME_FRAME, "m"),
-            *beam_checks(read, job.robot, process),
+            check("frames", "tool and part, off the job's", off, SAME_FRAME, "m"),
+            *check_laser_and_gas(read, job.robot, process),
         ]
         done: list[int] = []
         starts: list[str] = []
-        followed: list[tuple[ReadCut, AskedNodes, Plan]] = []
+        followed: list[tuple[ReadCut, TargetNodes, Plan]] = []
         for cut in cuts:
-            apart, which, candidate = _closest(cut, candidates)
-            title = _unused(
-                f"{cut.name} ({tasks[which].name})" if apart < NEAR else cut.name, tables
-            )
+            apart, which, c = _closest(cut, contours)
+            title = _unused(f"{cut.name} ({names[which]})" if apart < NEAR else cut.name, tables)
             places[title] = tuple(move.place for move in cut.moves)
             if apart >= NEAR:
                 said = "distance from the nearest contour of the job"
-                tables[title] = [row("contour", said, apart, NEAR, "m")]
+                tables[title] = [check("contour", said, apart, NEAR, "m")]
                 continue
-            reference = candidates[which][candidate]
-            dt = asked_times(tasks[which], reference)[1]
-            cut = at_interval(cut, dt, job.robot, job.tool, job.placement)
+            candidate = contours[which][c]
+            cut = divide_arcs(cut, candidate.dt, job)
             places[title] = tuple(move.place for move in (*cut.moves, cut.group.path[-1]))
-            tables[title], along = cut_checks(
-                job, tasks[which], cut, reference, cell, chosen, settings
-            )
-            times = done.count(which)
-            tables[title].append(row("once", "earlier cuts of this contour", times, 0, "count"))
+            tables[title], along = check_cut(job, candidate, cut, cell, chosen, settings)
+            tables[title].append(count("once", "earlier cuts of this contour", done.count(which)))
             done.append(which)
             starts.append(cut.moves[0].place)
             followed += [] if along is None else [(cut, *along)]
-        tables[name] += self._order(done, [places[name].index(start) for start in starts])
-        tables[name] += _asked_for(job, followed, home, read, chosen, settings)
+        steps = [places[name].index(start) for start in starts]
+        tables[name] += [
+            row if row.ok else replace(row, node=steps[row.node])
+            for row in check_order(job.sequence, self.inner_first, done)
+        ]
+        tables[name] += _compared(job, followed, home, read, chosen, settings)
         tables[_unused("air", tables)] = _air(
             job, cuts, home, cell if job.sequence is not None else None
         )
-        missing = tuple(task.name for i, task in enumerate(tasks) if i not in done)
+        missing = tuple(name for i, name in enumerate(names) if i not in done)
         note = collision_note(cell, moves_too=job.sequence is not None)
-        return Audited(tables=tables, missing=missing, note=note, places=places)
-
-    def _order(self, done: Sequence[int], starts: Sequence[int]) -> list[Check]:
-        """Compare the order of contours with that of the job, or with the rules of [sequence].
-
-        Parameters
-        ----------
-        done : sequence of int
-            Which contour each cut is of.
-        starts : sequence of int
-            The step of the program that each begins with.
-        """
-        sequence = self.job.sequence
-        given = sequence is None or sequence.order == "given"
-        wrong = [
-            k
-            for k, i in enumerate(done)
-            if (given and any(j > i for j in done[:k]))
-            or any(inner == i and outer in done[:k] for inner, outer in self.inner_first)
-        ]
-        said = "contours cut after one that comes later in the job, or that they lie in"
-        node = starts[wrong[0]] if wrong else 0
-        return [row("order", said, len(wrong), 0, "count", node)]
+        return AuditReport(tables=tables, missing=missing, note=note, places=places)
 
 
 def _unused(title: str, tables: Mapping[str, object]) -> str:
@@ -199,8 +181,8 @@ def _unused(title: str, tables: Mapping[str, object]) -> str:
     return title if title not in tables else _unused(f"{title}, again", tables)
 
 
-def _asked_for(
-    job: Job, followed: Sequence[tuple[ReadCut, AskedNodes, Plan]], home: Array,
+def _compared(
+    job: Job, followed: Sequence[tuple[ReadCut, TargetNodes, Plan]], home: Array,
     read: ReadProgram, chosen: Language, settings: Settings,
 ) -> list[Check]:  # fmt: skip
     """Compare a program with the one that the job would have along the same paths.
@@ -210,32 +192,30 @@ def _asked_for(
     if not followed:
         return []
     try:
-        asked = asked_program(job, followed, home, chosen, settings)
+        asked = expect_program(job, followed, home, chosen, settings)
     except InputError as error:
         said = f"a program as the job asks for cannot be made along these paths ({error})"
-        return [row("asked", said, 1, 0, "count")]
+        return [count("asked", said, 1)]
     rules = chosen.rules(settings)
-    asked = with_tips(asked, job.robot, job.tool, job.placement)
+    asked = add_tips(asked, job)
     found = differences(asked, read, rules=(rules,), names=("the job", "the text"), strict=True)
     places = [step.place for step in read.steps]
     rows = [
-        row(
+        count(
             f"asked-{each.code}",
             f"not as the job asks for, {WHAT.get(each.code, each.code)}: {each.message}"
             + (f" (said in {each.said_at})" if each.said_at else ""),
             each.count,
-            0,
-            "count",
             places.index(each.place) if each.place in places else 0,
         )
         for each in found
         if each.code not in FOLLOWED
     ]
-    return rows or [row("asked", "what is not as the job asks for", 0, 0, "count")]
+    return rows or [count("asked", "what is not as the job asks for", 0)]
 
 
-def _closest(cut: ReadCut, candidates: Sequence[Sequence[Contour]]) -> tuple[float, int, int]:
-    """Return how far (m) the cut leaves the contour that it follows best, its task and candidate.
+def _closest(cut: ReadCut, contours: Sequence[Sequence[Candidate]]) -> tuple[float, int, int]:
+    """Return how far (m) the cut leaves the contour that it follows best, and which candidate.
 
     Compared at the same shares of the way.
     """
@@ -243,10 +223,10 @@ def _closest(cut: ReadCut, candidates: Sequence[Sequence[Contour]]) -> tuple[flo
     way = np.append(0.0, np.cumsum(np.linalg.norm(np.diff(points, axis=0), axis=1)))
     some = np.unique(np.linspace(0, len(points) - 1, 100).round().astype(int))
     found = []
-    for i, tried in enumerate(candidates):
-        for c, contour in enumerate(tried):
-            s = contour.s[0] + way[some] / way[-1] * contour.length
-            apart = np.linalg.norm(contour.at(s)[0] - points[some], axis=1)
+    for i, candidates in enumerate(contours):
+        for c, path in enumerate(candidate.path for candidate in candidates):
+            s = path.s[0] + way[some] / way[-1] * path.length
+            apart = np.linalg.norm(path.at(s)[0] - points[some], axis=1)
             found.append((float(np.median(apart)), i, c))
     return min(found)
 
@@ -268,5 +248,4 @@ def _way_checks(job: Job, q: Array, cell: Cell | None) -> list[Check]:
         return []
     took = np.maximum(least_time(np.diff(q, axis=0), *job.robot.speed_limits()), 1e-9)
     time = np.append(0.0, np.cumsum(took))
-    checked = air_checks(job.robot, q, time, cell=cell)
-    return [check for check in checked if check.code != "air-time"]
+    return [row for row in air_checks(job.robot, q, time, cell=cell) if row.code != "air-time"]

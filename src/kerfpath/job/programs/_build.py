@@ -3,22 +3,21 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
 from kerfpath.air import AirMove
 from kerfpath.cell import Cell
-from kerfpath.contour import Contour
 from kerfpath.errors import AuditFailed, InputError
-from kerfpath.job.format import ContourTable, ContourTask, Job, ProgramOptions
-from kerfpath.job.plan_file import Audited
-from kerfpath.job.programs._audit import ProgramAsked
-from kerfpath.job.run import Cut
+from kerfpath.job.format import Candidate, Job, ProgramOptions
+from kerfpath.job.plan_file import AuditReport
+from kerfpath.job.programs._audit import ProgramAudit
+from kerfpath.job.run import CutResult
 from kerfpath.plans import Plan
-from kerfpath.post import build_program, dry_run, language, post_and_read
+from kerfpath.post import dry_run, language, post_and_read
 
-__all__ = ["asked_of_cuts", "asked_of_plans", "program_of"]
+__all__ = ["audit_of_cuts", "audit_of_plans", "program_of"]
 
 REMEDIES = {
     "acceleration": "lower eta_acceleration in [plan] or raise the spacing of the nodes, and plan "
@@ -36,40 +35,20 @@ REMEDIES = {
 OTHERWISE = "change the job there and plan it again"
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class _Planned(ContourTask):
-    """A contour whose nodes are those of its plan."""
-
-    nodes: Contour
-
-    def sample(self, contour: Contour) -> Contour:
-        """Return its nodes, whatever the contour."""
-        return self.nodes
+def audit_of_cuts(job: Job, cuts: Sequence[CutResult], cell: Cell | None) -> ProgramAudit:
+    """Return the audit of the program of a job's cuts: by their paths, nodes and speeds."""
+    planned = tuple((cut.candidate,) for cut in cuts if cut.plan is not None)
+    return ProgramAudit(job=job, contours=planned, cell=cell)
 
 
-def asked_of_cuts(job: Job, cuts: Sequence[Cut], cell: Cell | None) -> ProgramAsked:
-    """Return what a job asks of the program of its cuts: their paths, nodes and speeds."""
-    tasks = [
-        _task(cut.task.name, cut.nodes, cut.task.speed) for cut in cuts if cut.plan is not None
-    ]
-    drawn = [(cut.drawn,) for cut in cuts if cut.plan is not None]
-    return ProgramAsked(job=job, tasks=tuple(tasks), candidates=tuple(drawn), cell=cell)
-
-
-def asked_of_plans(job: Job, plans: Sequence[Plan]) -> ProgramAsked:
-    """Return what plans ask of their program, where drawing and cell of the job are not at hand."""
-    tasks = []
+def audit_of_plans(job: Job, plans: Sequence[Plan]) -> ProgramAudit:
+    """Return the audit of the program of plans, without the drawing and the cell of their job."""
+    contours = []
     for made in plans:
-        dt = float(np.diff(made.time).min())  # where the feed dips it is longer
+        dt = float(np.diff(made.time).min())  # where the feed is reduced it is longer
         nodes = replace(made.contour, time=dt * np.arange(len(made.contour), dtype=float))
-        tasks.append(_task(made.name, nodes, 0.0))
-    drawn = tuple((made.contour,) for made in plans)
-    return ProgramAsked(job=job, tasks=tuple(tasks), candidates=drawn, cell=None)
-
-
-def _task(name: str, nodes: Contour, speed: float) -> ContourTask:
-    table = ContourTable(pick=name, speed_m_min=1.0, count=len(nodes))  # not looked at
-    return _Planned(pick=name, name=name, speed=speed, nodes=nodes, table=table)
+        contours.append((Candidate(path=made.contour, nodes=nodes),))
+    return ProgramAudit(job=job, contours=tuple(contours), cell=None)
 
 
 def program_of(
@@ -77,7 +56,7 @@ def program_of(
     options: ProgramOptions,
     moves: Sequence[AirMove] = (),
     *,
-    asked: ProgramAsked,
+    audit: ProgramAudit,
     strict: bool = False,
     dry_share: float | None = None,
 ) -> tuple[dict[str, str], list[str]]:
@@ -101,25 +80,12 @@ def program_of(
     chosen = language(options.language)
     if refusal := chosen.refusal(plans[0].robot):
         raise InputError(f"no program: {refusal}")
-    program = build_program(
-        plans,
-        moves=moves,
-        name=options.name,
-        retract=options.retract,
-        zone=options.zone,
-        lead_time=options.lead_time,
-        pierce_time=options.pierce_time,
-        approach_speed=options.approach_speed,
-        air_speed=options.air_speed,
-        gas_lead=options.gas_lead,
-        arc_tolerance=options.arc_tolerance,
-        handshakes=options.handshakes,
-    )
+    program = options.program(plans, moves)
     written = post_and_read(program, options.language, options.settings, strict=strict)
     if written.read is not None:
-        asked = replace(asked, job=replace(asked.job, program=options))
+        audit = replace(audit, job=replace(audit.job, program=options))
         settings = chosen.completed(options.settings)
-        found = asked.audit(written.read, chosen, settings, next(iter(written.files)))
+        found = audit.audited(written.read, chosen, settings, next(iter(written.files)))
         _require_passed(found, chosen.title)
     if dry_share is not None:
         dry = dry_run(program, dry_share)
@@ -127,7 +93,7 @@ def program_of(
     return written.files, [str(issue) for issue in written.warnings]
 
 
-def _require_passed(found: Audited, title: str) -> None:
+def _require_passed(found: AuditReport, title: str) -> None:
     """Raise AuditFailed where a program fails: the first reason, how many more, and what to do."""
     failed = [
         (name, check)

@@ -7,7 +7,7 @@ from pathlib import Path
 
 from kerfpath._told import told
 from kerfpath.job.format import read_job
-from kerfpath.job.programs._read import language_of, program_on_disk
+from kerfpath.job.programs._read import add_tips, language_of, program_on_disk
 from kerfpath.post import (
     Difference,
     ReadMove,
@@ -15,7 +15,6 @@ from kerfpath.post import (
     Rules,
     differences,
     not_compared,
-    with_tips,
 )
 
 __all__ = ["Compared", "compare_programs"]
@@ -57,7 +56,7 @@ def compare_programs(a: Path, b: Path, job_file: Path) -> Compared:
     job = read_job(job_file)
     (one, settings), (two, other) = language_of(a, job), language_of(b, job)
     reads = [
-        with_tips(program_on_disk(path, chosen, of, job.robot), job.robot, job.tool, job.placement)
+        add_tips(program_on_disk(path, chosen, of, job.robot), job)
         for path, chosen, of in ((a, one, settings), (b, two, other))
     ]
     rules: tuple[Rules, ...] = ()

@@ -1,14 +1,13 @@
-"""Work with a plan.json again: audit it, and write its program."""
+"""The program of a plan.json, which is audited again; there, or at a measured part."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any
 
 import numpy as np
-from pydantic import BaseModel
 
 from kerfpath.auditor import Check
 from kerfpath.errors import AuditFailed, InputError, NoFeasiblePath
@@ -16,43 +15,40 @@ from kerfpath.job.format import (
     AuditTable,
     Job,
     LayoutTable,
+    PreparedJob,
     ProgramOptions,
     ProgramTable,
     SequenceTable,
     Tolerances,
+    prepare,
     program_options,
     read_job,
     tolerances_of,
 )
 from kerfpath.job.plan_file import (
-    Asked,
-    Audited,
+    AuditReport,
     PlanAudit,
     PlanFile,
-    asked_of,
     read_plan_file,
     table_of,
 )
-from kerfpath.job.programs._audit import ProgramAsked
-from kerfpath.job.programs._build import asked_of_plans, program_of
+from kerfpath.job.programs._audit import ProgramAudit
+from kerfpath.job.programs._build import audit_of_plans, program_of
 from kerfpath.placement import MeasuredFrame, placed, placed_moves, planned_again
 from kerfpath.plans import Plan
 from kerfpath.post import language as find_language
 
-__all__ = ["program_from_file", "program_language", "require_same"]
+__all__ = ["program_from_file", "program_language", "require_same_setup"]
 
-LED_NOTE = (
-    "The joints are led to the measured part and audited there for path, limits, velocities and "
+MEASURED_NOTE = (
+    "The joints are moved to the measured part and audited there for path, limits, velocities and "
     "accelerations; collisions are not checked there, as its cell is not known: simulate the "
     "program in the cell before running it."
 )
-LED_MOVES_NOTE = (
+MEASURED_MOVES_NOTE = (
     "The moves between contours are straight joint motions between their new ends, and not proved "
     "clear any more."
 )
-_M = TypeVar("_M", bound=BaseModel)
-
-
 SAME_PLACE = 1e-6
 """m: what a plan.json and its job say of the same place differs by rounding at most."""
 
@@ -84,7 +80,7 @@ def program_from_file(
     dry_share : float, optional
         Make it a dry run at this share of the speed, see `kerfpath.post.dry_run`.
     frame : MeasuredFrame, optional
-        Where the part really stands; the plans are led there and audited, but for collisions.
+        Where the part really stands; the plans are moved there and audited, but for collisions.
 
     Raises
     ------
@@ -95,7 +91,7 @@ def program_from_file(
         The robot does not reach the measured part as planned.
     InputError
         The file cannot be read, an unknown language, a program that its preflight refuses, or moves
-        around obstacles that cannot be led to a measured part.
+        around obstacles that cannot be moved to a measured part.
     """
     file = read_plan_file(plan_file)
     if file.missing:
@@ -105,18 +101,19 @@ def program_from_file(
             f"no program: {', '.join(file.failed)} failed the audit against the drawing when it "
             "was planned; mend the job and plan it again"
         )
-    notes, to_do = [], None
+    notes: list[str] = []
+    by_job = None
     if job_file is not None:
         if frame is not None:
             raise InputError(
                 f"{job_file}: the cell of a job says nothing of a part that was measured; give "
                 "one of the two"
             )
-        asked = _as_planned(asked_of(read_job(job_file)), file)
-        _require_passed(PlanAudit(asked=asked).audited(plan_file))
-        if asked.job.options.interruptions == "none":
-            to_do = ProgramAsked.by(asked)
-        file = replace(file, job=asked.job.source)
+        prepared = _as_planned(prepare(read_job(job_file)), file)
+        _require_passed(PlanAudit(prepared=prepared).audited(plan_file))
+        if prepared.job.options.interruptions == "none":
+            by_job = ProgramAudit.by(prepared)
+        file = replace(file, job=prepared.job.source)
     options = _options(
         file,
         language or program_language(file.job, job_file or plan_file),
@@ -124,21 +121,20 @@ def program_from_file(
     )
     options = options if name is None else replace(options, name=name)
     if frame is not None:
-        file, again = _led(file, frame, options.retract)
-        notes += [*again, LED_NOTE, *([LED_MOVES_NOTE] if file.moves else [])]
+        file, again = _at_measured(file, frame, options.retract)
+        notes += [*again, MEASURED_NOTE, *([MEASURED_MOVES_NOTE] if file.moves else [])]
     tolerances = table_of(file, "audit", AuditTable, tolerances_of)
+    there = "" if frame is None else " at the measured placement"
     for p in file.plans:
-        for check in tolerances.checks(p):
-            if check.level == "error" and not check.ok:
-                there = "" if frame is None else " at the measured placement"
-                raise AuditFailed(
-                    f"no program: contour {p.name!r} fails its audit{there}: {check.issue()}"
-                )
+        if (failed := _first_failed(tolerances.checks(p))) is not None:
+            raise AuditFailed(
+                f"no program: contour {p.name!r} fails its audit{there}: {failed.issue()}"
+            )
     files, warnings = program_of(
         file.plans,
         options,
         file.moves,
-        asked=to_do or asked_of_plans(_job_of(file, options), file.plans),
+        audit=by_job or audit_of_plans(_job_of(file, options), file.plans),
         strict=strict,
         dry_share=dry_share,
     )
@@ -164,7 +160,9 @@ def program_language(source: Mapping[str, Any], path: Path) -> str:
 def _job_of(file: PlanFile, options: ProgramOptions) -> Job:
     """Return what a plan.json keeps of its job: all but the drawing and the cell."""
     first = file.plans[0]
-    sequence = file.job.get("sequence")
+    sequence = None
+    if file.job.get("sequence") is not None:
+        sequence = table_of(file, "sequence", SequenceTable, lambda table: table)
     return Job(
         path=file.path,
         robot=first.robot,
@@ -175,7 +173,9 @@ def _job_of(file: PlanFile, options: ProgramOptions) -> Job:
         contours=(),
         options=replace(first.settings, refine_parts=1, interruptions="none", least_piece=None),
         cell=None,
-        sequence=None if sequence is None else table_of(file, "sequence", SequenceTable, _same),
+        sequence=None
+        if sequence is None
+        else table_of(file, "sequence", SequenceTable, lambda table: table),
         layout=LayoutTable(),
         tolerances=table_of(file, "audit", AuditTable, tolerances_of),
         program=options,
@@ -183,62 +183,60 @@ def _job_of(file: PlanFile, options: ProgramOptions) -> Job:
     )
 
 
-def _same(table: _M) -> _M:
-    return table
-
-
-def _as_planned(asked: Asked, file: PlanFile) -> Asked:
-    """Return what a job asks for, with the [program] that a plan.json was made with.
+def _as_planned(prepared: PreparedJob, file: PlanFile) -> PreparedJob:
+    """Return a job with the [program] that a plan.json was made with.
 
     Retract, air and pierce times of the plan follow from that one. The program is built with that
     of the job as it is now, and refused where the planned moves do not meet its retract.
     """
-    stem = asked.job.path.stem
+    stem = prepared.job.path.stem
     then = table_of(file, "program", ProgramTable, lambda table: program_options(table, stem))
-    return replace(asked, job=replace(asked.job, program=then))
+    return replace(prepared, job=replace(prepared.job, program=then))
 
 
-def _require_passed(found: Audited) -> None:
+def _require_passed(found: AuditReport) -> None:
     for name, table in found.tables.items():
-        for check in table:
-            own = check.code == "job-program"  # [program] is taken from the job as it is now
-            if check.level == "error" and not check.ok and not own:
-                raise AuditFailed(f"no program: {name!r} fails its audit: {check.issue()}")
+        # [program] is taken from the job as it is now.
+        failed = _first_failed([row for row in table if row.code != "job-program"])
+        if failed is not None:
+            raise AuditFailed(f"no program: {name!r} fails its audit: {failed.issue()}")
 
 
-def _led(file: PlanFile, frame: MeasuredFrame, retract: float) -> tuple[PlanFile, list[str]]:
-    """Return a plan.json with its plans and the moves between them led to a measured part.
+def _at_measured(
+    file: PlanFile, frame: MeasuredFrame, retract: float
+) -> tuple[PlanFile, list[str]]:
+    """Return a plan.json with its plans and the moves between them moved to a measured part.
 
     A contour that would not pass its audit there is planned again around it; notes say which.
     """
     tolerances, plans, notes = table_of(file, "audit", AuditTable, tolerances_of), [], []
     for p in file.plans:
-        led, why = _there(p, frame, tolerances)
+        moved, why = _moved(p, frame, tolerances)
         if why:
             try:
-                led = planned_again(p, frame.T_base_part)
+                moved = planned_again(p, frame.T_base_part)
             except NoFeasiblePath as broken:
                 raise broken.retold(
-                    f"contour {p.name!r}: led to the measured placement {why}, and planned again "
+                    f"contour {p.name!r}: moved to the measured placement {why}, and planned again "
                     f"there: {broken}"
                 ) from None
-            notes.append(f"Contour {p.name!r} was planned again there; only led there {why}.")
-        plans.append(led)
+            notes.append(f"Contour {p.name!r} was planned again there; only moved there {why}.")
+        plans.append(moved)
     moves = placed_moves(file.moves, plans, retract)
     return replace(file, plans=tuple(plans), moves=moves, in_cell=False), notes
 
 
-def _there(p: Plan, frame: MeasuredFrame, tolerances: Tolerances) -> tuple[Plan, str]:
-    """Return a plan led to a measured part, and what then fails; empty where nothing does."""
+def _moved(p: Plan, frame: MeasuredFrame, tolerances: Tolerances) -> tuple[Plan, str]:
+    """Return a plan moved to a measured part, and what then fails; empty where nothing does."""
     try:
-        led = placed(p, frame.T_base_part)
+        moved = placed(p, frame.T_base_part)
     except NoFeasiblePath as away:
         return p, f"it fails: {away}"
-    failed = first_failed(tolerances.checks(led))
-    return led, "" if failed is None else f"it fails: {failed.issue()}"
+    failed = _first_failed(tolerances.checks(moved))
+    return moved, "" if failed is None else f"it fails: {failed.issue()}"
 
 
-def first_failed(table: Sequence[Check]) -> Check | None:
+def _first_failed(table: Sequence[Check]) -> Check | None:
     """Return the first check that is an error; None where the plan passes."""
     return next((check for check in table if check.level == "error" and not check.ok), None)
 
@@ -254,7 +252,7 @@ def _options(file: PlanFile, language: str, stem: str) -> ProgramOptions:
     )
 
 
-def require_same(plan: Plan, job: Job, path: Path) -> None:
+def require_same_setup(plan: Plan, job: Job, path: Path) -> None:
     """Raise InputError where a plan's tool, part or arm is not where the job has it."""
     pairs = {
         "tool": (plan.T_flange_tip, job.tool),

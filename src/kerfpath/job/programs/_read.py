@@ -29,13 +29,14 @@ from kerfpath.robots import Robot
 
 __all__ = [
     "ReadCut",
-    "at_interval",
+    "add_tips",
     "branch_of",
-    "cuts_of",
-    "followed",
+    "divide_arcs",
+    "follow_poses",
     "language_of",
     "poses_on_arc",
     "program_on_disk",
+    "read_cuts",
 ]
 
 ARC_STEP = np.radians(2.0)
@@ -159,9 +160,12 @@ class ReadCut:
         return tuple(self.moves[k] for k in self.ends)
 
 
-def cuts_of(
-    read: ReadProgram, robot: Robot, T_flange_tip: Array, T_base_part: Array
-) -> tuple[list[ReadCut], Array]:
+def add_tips(read: ReadProgram, job: Job) -> ReadProgram:
+    """Return a program with the tip poses of its joints, by the job's robot, tool and part."""
+    return with_tips(read, job.robot, job.tool, job.placement)
+
+
+def read_cuts(read: ReadProgram, job: Job) -> tuple[list[ReadCut], Array]:
     """Return the cuts of a program in order, and the corners (m, n) rad of the way home.
 
     Raises
@@ -169,8 +173,8 @@ def cuts_of(
     InputError
         Moves in an order that makes no cut: where.
     """
-    groups = groups_of(with_tips(read, robot, T_flange_tip, T_base_part))
-    home = np.zeros((0, robot.joints))
+    groups = groups_of(add_tips(read, job))
+    home = np.zeros((0, job.robot.joints))
     if groups and not groups[-1].path:
         home = np.array([move.q for move in groups.pop().joint])
     cuts = []
@@ -182,29 +186,21 @@ def cuts_of(
                 f"{group.path[-1].place}: expected a way down, a cut and a way back, got "
                 f"{len(group.path)} moves"
             )
-        cuts.append(_cut(group, robot, T_flange_tip, T_base_part))
+        cuts.append(_cut(group, job))
     return cuts, home
 
 
-def at_interval(
-    cut: ReadCut, interval: float, robot: Robot, T_flange_tip: Array, T_base_part: Array
-) -> ReadCut:
+def divide_arcs(cut: ReadCut, interval: float, job: Job) -> ReadCut:
     """Return a cut whose arcs have a node at each interval (s), as straight moves would have.
 
     So rates along arcs, and where arcs end, are judged over the same times as all others.
     """
     if all(move.kind != "circular" for move in cut.moves):
         return cut
-    return _cut(cut.group, robot, T_flange_tip, T_base_part, interval)
+    return _cut(cut.group, job, interval)
 
 
-def _cut(
-    group: ReadGroup,
-    robot: Robot,
-    T_flange_tip: Array,
-    T_base_part: Array,
-    interval: float | None = None,
-) -> ReadCut:
+def _cut(group: ReadGroup, job: Job, interval: float | None = None) -> ReadCut:
     """Return the cut of a group; an arc gets nodes of its own along it."""
     T: list[Array] = []
     took: list[float] = []
@@ -228,7 +224,8 @@ def _cut(
         for switch in move.switches:
             laser = switch.on if switch.signal == "laser" else laser
     poses = np.array(T)
-    q = followed(robot, T_base_part @ poses @ np.linalg.inv(T_flange_tip), _q(group.joint[-1]))
+    flange = job.placement @ poses @ np.linalg.inv(job.tool)
+    q = follow_poses(job.robot, flange, _q(group.joint[-1]))
     last = len(poses) - 1
     switches = [s for move in group.path for s in move.switches if s.signal == "laser"]
     return ReadCut(
@@ -323,7 +320,7 @@ def branch_of(robot: Robot, q: Array) -> int:
     return int(np.argmin(np.where(reach[0], apart, np.inf)))
 
 
-def followed(robot: Robot, T: Array, q0: Array) -> Array:
+def follow_poses(robot: Robot, T: Array, q0: Array) -> Array:
     """Return joints (K, n) at flange poses T (K, 4, 4), on the branch of q0; NaN out of reach."""
     posture = branch_of(robot, q0)
     if robot.family.follow_all is None:

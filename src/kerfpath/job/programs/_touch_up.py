@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -14,15 +14,16 @@ from kerfpath.cad import Part
 from kerfpath.cad import read as read_drawing
 from kerfpath.contour import Contour, angle_between
 from kerfpath.errors import InputError
-from kerfpath.job.format import Job, read_job
+from kerfpath.job.format import Candidate, CutRequest, Job, prepare, read_job
 from kerfpath.job.plan_file import PlanFile, read_plan_file
-from kerfpath.job.programs._build import asked_of_plans, program_of
-from kerfpath.job.programs._from_plan import require_same
-from kerfpath.job.programs._read import language_of, program_on_disk
-from kerfpath.job.run import Given, Outcome, Progress, run_job
+from kerfpath.job.programs._build import audit_of_plans, program_of
+from kerfpath.job.programs._from_plan import require_same_setup
+from kerfpath.job.programs._read import add_tips, language_of, program_on_disk
+from kerfpath.job.run import JobResult, run_prepared
 from kerfpath.operations import touched_up
 from kerfpath.plans import Plan
-from kerfpath.post import ReadGroup, ReadMove, differences, groups_of, read_program, with_tips
+from kerfpath.post import ReadGroup, ReadMove, differences, groups_of, read_program
+from kerfpath.progress import Progress, no_progress
 
 __all__ = ["Taught", "TouchUp", "touch_up"]
 
@@ -71,14 +72,14 @@ class TouchUp:
     Parameters
     ----------
     part : Part
-    outcome : Outcome
+    outcome : JobResult
     targets : tuple of Taught
     notes : tuple of str
         What else was changed in the program, and is not kept.
     """
 
     part: Part
-    outcome: Outcome
+    outcome: JobResult
     targets: tuple[Taught, ...]
     notes: tuple[str, ...]
 
@@ -91,7 +92,7 @@ def touch_up(
     job_file: Path,
     *,
     ease: float = 0.01,
-    progress: Progress = lambda what, done, total: None,
+    progress: Progress = no_progress,
 ) -> TouchUp:
     """Return what comes of planning a job again around the targets moved in its program.
 
@@ -124,24 +125,19 @@ def touch_up(
         for p, group in zip(file.plans, groups, strict=True)
     ]
     _require_few(program, targets, file.plans)
-    given = {}
-    tasks = {task.name: task for task in job.tasks(part)}
-    if set(tasks) != set(file.contours.values()):
+    if job.sequence is not None:
+        job = replace(job, sequence=job.sequence.model_copy(update={"order": "given"}))
+    prepared = prepare(job, part)
+    asked = dict(zip(prepared.names, prepared.contours, strict=True))
+    if set(asked) != set(file.contours.values()):
         raise InputError(
             f"{job.path}: has other contours than {file.path}; give the job of that plan"
         )
-    for p, moved, group in zip(file.plans, targets, groups, strict=True):
-        path, nodes = _planned_from(p, tasks[p.name].candidates(part), tasks[p.name].sample)
-        if moved:
-            k = np.array([target.node for target in moved])
-            T = np.array([group.path[node].T_part_tip for node in k])
-            path, keep = touched_up(path, nodes, k, T[:, :3, 3], T[:, :3, 2], ease=ease)
-            nodes = _sampled(path, nodes, keep, tasks[p.name].speed)
-        postures = tuple(np.unique(p.posture).tolist())
-        given[p.name] = Given(path=path, nodes=nodes, postures=postures, touched=bool(moved))
-    if job.sequence is not None:
-        job = replace(job, sequence=job.sequence.model_copy(update={"order": "given"}))
-    outcome = run_job(job, part, given=given, progress=progress)
+    contours = tuple(
+        _touched_up(asked[p.name], p, moved, group.path, ease)
+        for p, moved, group in zip(file.plans, targets, groups, strict=True)
+    )
+    outcome = run_prepared(replace(prepared, contours=contours), progress=progress)
     found = tuple(target for moved in targets for target in moved)
     return TouchUp(part=part, outcome=outcome, targets=found, notes=tuple(notes))
 
@@ -165,16 +161,16 @@ def _require_kind(job: Job, file: PlanFile) -> None:
         names = ", ".join(file.missing + file.failed)
         raise InputError(f"{file.path}: {names} has no plan that passed; plan the job again")
     for p in file.plans:
-        require_same(p, job, file.path)
+        require_same_setup(p, job, file.path)
 
 
 def _edited(program: Path, job: Job, file: PlanFile) -> tuple[list[ReadGroup], list[str]]:
     """Return what an edited program does, a group for each plan, and what else was changed."""
     chosen, settings = language_of(program, job)
     options = replace(job.program, language=chosen.name, settings=settings)
-    texts, _ = program_of(file.plans, options, file.moves, asked=asked_of_plans(job, file.plans))
+    texts, _ = program_of(file.plans, options, file.moves, audit=audit_of_plans(job, file.plans))
     planned, edited = (
-        with_tips(read, job.robot, job.tool, job.placement)
+        add_tips(read, job)
         for read in (
             read_program(texts, chosen.name, job.robot, settings),
             program_on_disk(program, chosen, settings, job.robot),
@@ -224,20 +220,38 @@ def _require_few(program: Path, targets: Sequence[Sequence[Taught]], plans: Sequ
                 )
 
 
-def _planned_from(
-    p: Plan, candidates: Sequence[Contour], sample: Callable[[Contour], Contour]
-) -> tuple[Contour, Contour]:
-    """Return the path that a plan's nodes were sampled from, and the nodes.
+def _touched_up(
+    asked: CutRequest, p: Plan, moved: Sequence[Taught], moves: Sequence[ReadMove], ease: float
+) -> CutRequest:
+    """Return what is asked for a contour around its moved targets, in the postures of its plan."""
+    planned = _planned_from(p, asked)
+    if moved:
+        k = np.array([target.node for target in moved])
+        T = np.array([moves[node].T_part_tip for node in k])
+        path, keep = touched_up(planned.path, planned.nodes, k, T[:, :3, 3], T[:, :3, 2], ease=ease)
+        nodes = _sampled(path, planned.nodes, keep, asked.task.speed)
+        planned = Candidate.at(asked.task.speed, path, nodes)
+    postures = tuple(np.unique(p.posture).tolist())
+    return replace(
+        asked,
+        candidates=(planned,),
+        options=replace(asked.options, postures=postures),
+        touched_up=bool(moved),
+    )
 
-    Those of a plan that was touched up before are its own, with straight lines between.
+
+def _planned_from(p: Plan, asked: CutRequest) -> Candidate:
+    """Return the candidate that a plan is of.
+
+    That of a plan that was touched up before has its own nodes, with straight lines between.
     """
-    for path in candidates:
-        if _apart(p.contour, path) < SAME_PATH:
-            nodes = sample(path)
-            if len(nodes) == len(p.contour):
-                return path, nodes
+    for candidate in asked.candidates:
+        fits = len(candidate.nodes) == len(p.contour)
+        if fits and _apart(p.contour, candidate.path) < SAME_PATH:
+            return candidate
     slowed = bool((p.contour.speed_share < 1).any())
-    return p.contour, replace(p.contour, time=p.time if slowed else None)
+    nodes = replace(p.contour, time=p.time if slowed else None)
+    return Candidate.at(asked.task.speed, p.contour, nodes)
 
 
 def _sampled(path: Contour, nodes: Contour, keep: Ints, speed: float) -> Contour:

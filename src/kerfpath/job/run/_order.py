@@ -1,104 +1,68 @@
-"""The order in which the cuts of a job are made, and the moves through the air between them."""
+"""The order in which the contours of a job are cut, and the moves through the air between them."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Sequence
+from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
 
-from kerfpath._told import told
-from kerfpath.auditor import Check, air_checks, worst_of
-from kerfpath.cell import Cell
-from kerfpath.contour import Contour
+from kerfpath.auditor import air_checks, worst_of
 from kerfpath.errors import NoFeasiblePath
-from kerfpath.job.format import Job
-from kerfpath.job.run._cut import Cut
+from kerfpath.job.format import PreparedJob
+from kerfpath.job.run._contour import cut_in_posture
+from kerfpath.job.run._result import CutResult, JobResult
 from kerfpath.plans import Plan
-from kerfpath.sequence import PartPlan, inner_first, order_plans
+from kerfpath.progress import Progress
+from kerfpath.sequence import order_candidates
 
-__all__ = ["Ordered", "ordered"]
-
-Tries = Sequence[tuple[Cut, ...]]
-"""What came of each candidate of a contour: one cut, or its pieces."""
+__all__ = ["order_cuts"]
 
 
-@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class Ordered:
-    """The cuts that are made, in order, and how the robot gets from one to the next.
-
-    Parameters
-    ----------
-    cuts : tuple of Cut
-    part : PartPlan or None
-        The moves between them; None where the job asks for none, or a contour has no plan.
-    stuck : NoFeasiblePath or None
-        Why there is no order, or no way between two cuts.
-    air : tuple of Check
-        The audit of the moves, the worst of each check.
-    """
-
-    cuts: tuple[Cut, ...]
-    part: PartPlan | None = None
-    stuck: NoFeasiblePath | None = None
-    air: tuple[Check, ...] = ()
-
-    __repr__ = told
-
-
-def ordered(
-    job: Job,
-    loops: Sequence[Contour],
-    tries: Sequence[Tries],
-    cell: Cell | None,
-    more: Callable[[int, Sequence[Cut]], Sequence[Cut]],
-) -> Ordered:
+def order_cuts(
+    prepared: PreparedJob,
+    tried: Sequence[Sequence[tuple[CutResult, ...]]],
+    progress: Progress,
+) -> JobResult:
     """Return one cut (or its pieces) of each contour's candidates, in the order asked for.
 
+    With the moves between them where the job asks for them and every contour has a plan.
+
     Parameters
     ----------
-    job : Job
-    loops : sequence of Contour
-        The loops as drawn, one for each contour.
-    tries : sequence of sequences of tuples of Cut
-        What came of the candidates of each.
-    cell : Cell or None
-    more : callable
-        Given the number of a contour and its cuts, further ones in other postures; asked where
-        there is no way to those.
+    prepared : PreparedJob
+    tried : sequence of sequences of tuples of CutResult
+        What came of each candidate of each contour: one cut, or its pieces.
+    progress : callable
     """
-    good = [[cuts for cuts in each if all(cut.passed for cut in cuts)] for each in tries]
-    if job.sequence is None or not all(good):
-        first = [(fine or each)[0] for fine, each in zip(good, tries, strict=True)]
-        return Ordered(cuts=tuple(cut for cuts in first for cut in cuts))
-    units: list[list[Cut]] = []
-    owner: list[int] = []
-    pieces: list[tuple[int, int]] = []
-    for i, fine in enumerate(good):
-        whole = [cuts[0] for cuts in fine if len(cuts) == 1]
-        new = [whole] if whole else [[piece] for piece in fine[0]]
-        pieces += pairwise(range(len(units), len(units) + len(new)))
-        units += new
-        owner += [i] * len(new)
-    inner = inner_first(loops) if job.sequence.inner_first else []
-    members = [[u for u, i in enumerate(owner) if i == k] for k in range(len(loops))]
-    before = [(a, b) for i, j in inner for a in members[i] for b in members[j]]
+    job = prepared.job
+    result = JobResult(job=job, cuts=(), mesh=prepared.part.mesh(), cell=prepared.cell)
+    passed = [[cuts for cuts in each if all(cut.passed for cut in cuts)] for each in tried]
+    if job.sequence is None or not all(passed):
+        first = [(fine or each)[0] for fine, each in zip(passed, tried, strict=True)]
+        return replace(result, cuts=tuple(cut for cuts in first for cut in cuts))
+    units, owner, before = _units(passed, prepared.inner_first)
+
+    requests = [prepared.contours[i] for i in owner]
+    # A plan that was picked is settled, and a piece follows another in its posture.
+    others = [
+        () if r.run is not None or owner.count(i) > 1 else r.options.postures
+        for r, i in zip(requests, owner, strict=True)
+    ]
     home = job.sequence.home_deg
-
-    def further(unit: int) -> list[Plan]:
-        if owner.count(owner[unit]) > 1:
-            return []  # one piece of an interrupted cut follows another in its posture
-        fresh = more(owner[unit], units[unit])
-        units[unit] += fresh
-        return [_plan(cut) for cut in fresh]
-
     try:
-        part = order_plans(
-            [[_plan(cut) for cut in unit] for unit in units],
+        part = order_candidates(
+            units,
+            _plan,
+            lambda unit, posture: cut_in_posture(prepared, requests[unit], posture),
+            others,
+            progress=lambda unit, done, total: progress(
+                f"{requests[unit].task.name}: other postures", done, total
+            ),
             home=None if home is None else np.radians(home),
-            cell=cell,
-            before=before + pieces,
+            cell=prepared.cell,
+            before=before,
             heat_spacing=job.sequence.heat_spacing_mm / 1000,
             given_order=job.sequence.order == "given",
             retract=job.program.retract,
@@ -106,28 +70,43 @@ def ordered(
             approach_speed=job.program.approach_speed,
             pierce_time=job.program.pierce_time,
             seconds=job.sequence.seconds,
-            more=further,
         )
     except NoFeasiblePath as stuck:
-        return Ordered(cuts=tuple(unit[0] for unit in units), stuck=stuck)
+        return replace(result, cuts=tuple(unit[0] for unit in units), stuck=stuck)
     cuts = [
         replace(units[unit][candidate], plan=made)
         for (unit, candidate), made in zip(part.chosen, part.plans, strict=True)
     ]
-    return Ordered(cuts=tuple(cuts), part=part, air=_audited(job, part, cell))
-
-
-def _audited(job: Job, part: PartPlan, cell: Cell | None) -> tuple[Check, ...]:
-    """Return the worst of each check over all moves; its node is the number of the move."""
     o = job.options
-    tables = (
-        air_checks(job.robot, m.q, m.time, cell=cell, eta_v=o.eta_v, eta_a=o.eta_a)
+    audited = (
+        air_checks(job.robot, m.q, m.time, cell=prepared.cell, eta_v=o.eta_v, eta_a=o.eta_a)
         for m in part.moves
     )
-    return tuple(worst_of(tables))
+    return replace(result, cuts=tuple(cuts), part=part, air=tuple(worst_of(audited)))
 
 
-def _plan(cut: Cut) -> Plan:
+def _units(
+    passed: Sequence[Sequence[tuple[CutResult, ...]]], inner_first: Sequence[tuple[int, int]]
+) -> tuple[list[list[CutResult]], list[int], list[tuple[int, int]]]:
+    """Return what is ordered, the contour of each, and which come before which.
+
+    That is the candidates of a contour that are cut in one go, or each piece by itself.
+    """
+    units: list[list[CutResult]] = []
+    owner: list[int] = []
+    pieces: list[tuple[int, int]] = []
+    for i, fine in enumerate(passed):
+        whole = [cuts[0] for cuts in fine if len(cuts) == 1]
+        new = [whole] if whole else [[piece] for piece in fine[0]]
+        pieces += pairwise(range(len(units), len(units) + len(new)))
+        units += new
+        owner += [i] * len(new)
+    members = [[u for u, i in enumerate(owner) if i == k] for k in range(len(passed))]
+    inner = [(a, b) for i, j in inner_first for a in members[i] for b in members[j]]
+    return units, owner, inner + pieces
+
+
+def _plan(cut: CutResult) -> Plan:
     """Return the plan of a cut that has passed."""
     assert cut.plan is not None
     return cut.plan

@@ -12,10 +12,10 @@ from kerfpath.cad import read as read_drawing
 from kerfpath.cell import Cell
 from kerfpath.job.format import Job, cell_of_job
 
-__all__ = ["Checked", "Start", "check_job"]
+__all__ = ["JobPreview", "Start", "check_job"]
 
 FAR = 0.05
-"""m beyond the near-miss distance: farther is not told apart."""
+"""m beyond the near-miss distance: farther off, how far is not said."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -32,7 +32,7 @@ class Start:
         Those of them that keep every near-miss distance.
     clearance : float m
         Of the pose that keeps most distance: its least distance among the pairs that must keep the
-        near-miss distance of the cell, at most 50 mm more than that is told; NaN without poses.
+        near-miss distance of the cell, up to 50 mm more than that; NaN without poses.
     pair : (str, str) or None
         The two bodies that have it.
     """
@@ -48,7 +48,7 @@ class Start:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class Checked:
+class JobPreview:
     """A job that can be read, its part, its cell if it has one, and how every contour begins."""
 
     job: Job
@@ -59,7 +59,7 @@ class Checked:
     __repr__ = told
 
 
-def check_job(job: Job, part: Part | None = None) -> Checked:
+def check_job(job: Job, part: Part | None = None) -> JobPreview:
     """Return the cell of a job and how its contours begin in it; `part` if it is read already.
 
     Raises
@@ -76,7 +76,7 @@ def check_job(job: Job, part: Part | None = None) -> Checked:
         graph = job.graph(first, replace(job.options, comfort=None))
         q = graph.q[: graph.start[1]]
         starts.append(_start(task.name, len(nodes), q, cell))
-    return Checked(job=job, part=part, cell=cell, starts=tuple(starts))
+    return JobPreview(job=job, part=part, cell=cell, starts=tuple(starts))
 
 
 def _start(name: str, nodes: int, q: np.ndarray, cell: Cell | None) -> Start:

@@ -16,7 +16,7 @@ from kerfpath.job.format._values import (
     fault,
     key,
 )
-from kerfpath.job.format.tables._table import Table, given
+from kerfpath.job.format.tables._table import Table, given, require_distinct, require_one
 
 __all__ = ["CellTable", "FixtureTable", "HeadTable", "PairTable"]
 
@@ -120,14 +120,8 @@ class FixtureTable(Table):
 
     @model_validator(mode="after")
     def _one_shape(self) -> FixtureTable:
-        shapes = given(self, "size_mm", "file")
-        if len(shapes) != 1:
-            raise fault(
-                "one of size_mm (a box) and file (STL or STEP)",
-                "both" if shapes else "none",
-                "remove one" if shapes else "add, for example, size_mm = [1000, 800, 50]",
-                ("size_mm",),
-            )
+        what = "one of size_mm (a box) and file (STL or STEP)"
+        require_one(self, ("size_mm", "file"), what, "size_mm = [1000, 800, 50]")
         unit_of(self)
         return self
 
@@ -143,14 +137,8 @@ class PairTable(Table):
 
     @model_validator(mode="after")
     def _one_rule(self) -> PairTable:
-        rules = given(self, "near_miss_mm", "allowed")
-        if len(rules) != 1:
-            raise fault(
-                "one of near_miss_mm (how near they may come) and allowed (why they may touch)",
-                "both" if rules else "none",
-                "remove one" if rules else "add, for example, near_miss_mm = 2",
-                ("near_miss_mm",),
-            )
+        what = "one of near_miss_mm (how near they may come) and allowed (why they may touch)"
+        require_one(self, ("near_miss_mm", "allowed"), what, "near_miss_mm = 2")
         return self
 
 
@@ -181,16 +169,8 @@ class CellTable(Table):
 
     @model_validator(mode="after")
     def _names_differ(self) -> CellTable:
-        seen: set[str] = set()
-        for i, table in enumerate(self.fixture):
-            if table.name in seen:
-                raise fault(
-                    "a name that no other body has",
-                    f'"{table.name}" again',
-                    "give one of them another name",
-                    ("fixture", i, "name"),
-                )
-            seen.add(table.name)
+        names = [table.name for table in self.fixture]
+        require_distinct(names, "body", "fixture", ["name"] * len(names))
         if self.sheet_mm is not None and not self.part:
             raise fault("sheet_mm only with the part", "part = false", "remove one", ("sheet_mm",))
         return self

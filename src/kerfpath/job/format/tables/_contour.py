@@ -14,7 +14,7 @@ from kerfpath.job.format.tables._cut import (
     PickTable,
     SmoothAxesTable,
 )
-from kerfpath.job.format.tables._table import Table, given
+from kerfpath.job.format.tables._table import Table, given, require_one
 from kerfpath.operations import Side
 
 __all__ = ["ContourTable"]
@@ -65,14 +65,8 @@ class ContourTable(Table):
 
     @model_validator(mode="after")
     def _one_pick(self) -> ContourTable:
-        found = given(self, "pick", "pick_all")
-        if len(found) != 1:
-            raise fault(
-                "pick (a loop's name) or [contour.pick_all]",
-                "both" if found else "none",
-                "remove one" if found else 'add, for example, pick = "trim"',
-                ("pick",),
-            )
+        what = "pick (a loop's name) or [contour.pick_all]"
+        require_one(self, ("pick", "pick_all"), what, 'pick = "trim"')
         if self.pick_all is not None and self.name is not None:
             raise fault("name only with pick", "pick_all", "remove it", ("name",))
         return self

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Any, Literal
+from typing import Annotated, Literal
 
+import numpy as np
 from pydantic import Field, model_validator
 
+from kerfpath.cad import Loop, Part
 from kerfpath.job.format._values import NotNegative, Positive, Text, Three, fault, key
 from kerfpath.job.format.tables._table import Table, given
 from kerfpath.operations import LeadShape
@@ -44,15 +46,17 @@ class PickTable(Table):
             raise fault("what to pick by", "none", 'add, for example, kind = "inner"', ("kind",))
         return self
 
-    def resolve(self) -> dict[str, Any]:
-        """Return the keyword arguments of `Part.pick`, in m."""
-        lengths = ("diameter_mm", "length_mm", "near_mm")
-        asked = {name: getattr(self, name) for name in self.model_fields_set}
-        return {
-            name.removesuffix("_mm"): tuple(v / 1000 for v in value) if name in lengths else value
-            for name, value in asked.items()
-            if value is not None
-        }
+    def loops(self, part: Part) -> tuple[Loop, ...]:
+        """Return the loops of a part that are all of this."""
+        return part.pick(
+            kind=self.kind, face=self.face, side=self.side, layer=self.layer, colour=self.colour,
+            diameter=_metres(self.diameter_mm), length=_metres(self.length_mm),
+            near=None if self.near_mm is None else np.divide(self.near_mm, 1000),
+        )  # fmt: skip
+
+
+def _metres(mm: tuple[float, ...] | None) -> tuple[float, float] | None:
+    return None if mm is None else (mm[0] / 1000, mm[1] / 1000)
 
 
 class LeadTable(Table):

@@ -7,7 +7,7 @@ from typing import Annotated
 from pydantic import BaseModel, Field, ValidationInfo, model_validator
 
 from kerfpath.errors import InputError
-from kerfpath.job.format._values import fault, folder_of, told
+from kerfpath.job.format._values import fault, fault_in_words, folder_of
 from kerfpath.job.format.tables._cell import CellTable, FixtureTable, HeadTable, PairTable
 from kerfpath.job.format.tables._comfort import ComfortTable
 from kerfpath.job.format.tables._contour import ContourTable
@@ -24,7 +24,7 @@ from kerfpath.job.format.tables._plan import PlanTable
 from kerfpath.job.format.tables._program import AuditTable, ProgramTable
 from kerfpath.job.format.tables._robot import RobotTable
 from kerfpath.job.format.tables._sequence import SequenceTable
-from kerfpath.job.format.tables._table import Table
+from kerfpath.job.format.tables._table import Table, require_distinct
 from kerfpath.job.format.tables._tool import ToolTable
 from kerfpath.robots import postures_named
 
@@ -48,19 +48,9 @@ class JobFile(Table):
 
     @model_validator(mode="after")
     def _names_differ(self) -> JobFile:
-        seen: set[str] = set()
-        for i, table in enumerate(self.contour):
-            name = table.name or table.pick
-            if name is None:
-                continue
-            if name in seen:
-                raise fault(
-                    "a name that no other contour has",
-                    f'"{name}" again',
-                    "give one of them another name",
-                    ("contour", i, "name" if table.name else "pick"),
-                )
-            seen.add(name)
+        names = [table.name or table.pick for table in self.contour]
+        keys = ["name" if table.name else "pick" for table in self.contour]
+        require_distinct(names, "contour", "contour", keys)
         return self
 
     @model_validator(mode="after")
@@ -80,7 +70,7 @@ class JobFile(Table):
             try:
                 postures_named(self.plan.posture, self.robot.resolve(folder_of(info)).kinematics)
             except InputError as error:
-                raise told(f"{error}", ("plan", "posture")) from None
+                raise fault_in_words(f"{error}", ("plan", "posture")) from None
         return self
 
     @model_validator(mode="after")

@@ -23,10 +23,10 @@ from kerfpath.job.format._values import (
     Text,
     existing,
     fault,
+    fault_in_words,
     folder_of,
     key,
     one_of,
-    told,
 )
 from kerfpath.job.format.tables._table import Table, given
 from kerfpath.robots import FAMILIES, Robot, acceleration_ratios, robot, robot_ids, with_axis_3
@@ -146,7 +146,7 @@ class RobotTable(Table):
             said = _in_keys(str(error))
             keys = "axis_3_deg", "axis_3", "urdf" if self.urdf else "geometry_mm"
             where = next((k for k in keys[:2] if said.startswith(f"{k}: ")), keys[2])
-            raise told(said.removeprefix(f"{where}: "), (where,)) from None
+            raise fault_in_words(said.removeprefix(f"{where}: "), (where,)) from None
         if len(given(self, "acceleration_deg_s2", "acceleration_ratio")) == 2:
             raise fault(
                 "acceleration_deg_s2 or acceleration_ratio",
@@ -257,7 +257,6 @@ class RobotTable(Table):
         if self.model is not None:
             return robot(self.model)
         limits = None if self.axis_3_deg is None else np.radians(self.axis_3_deg)
-        counted: dict[str, Any] = {"axis_3": self.axis_3 or "", "axis_3_limits": limits}
         maker = self.manufacturer or ""
         if self.urdf is not None:
             return Robot.from_urdf(
@@ -265,7 +264,8 @@ class RobotTable(Table):
                 **self._chain(folder),
                 meshes=bodies,
                 manufacturer=maker,
-                **counted,
+                axis_3=self.axis_3 or "",
+                axis_3_limits=limits,
                 **self._limits(self.joints(folder)),
             )
         assert self.kinematics is not None

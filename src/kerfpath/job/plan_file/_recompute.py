@@ -11,7 +11,7 @@ from kerfpath.auditor import chain_of
 from kerfpath.plans import Plan, path_cost
 from kerfpath.robots import Robot
 
-__all__ = ["SAME", "following"]
+__all__ = ["SAME", "recompute"]
 
 SAME = 1e-7
 """Relative, or absolute below 1 (m, rad, s): two machines reckon alike far better."""
@@ -21,10 +21,10 @@ NO_TILT = 1e-9
 """rad: a tilt by less is rounding."""
 
 
-def following(plan: Plan) -> Plan:
+def recompute(plan: Plan) -> Plan:
     """Return the plan with everything that its joints, contour and settings decide.
 
-    What is said of it and agrees is kept to the last digit: an angle near pi may be told as one
+    What the plan says and agrees is kept to the last digit: an angle near pi may be written as one
     near -pi, and at a singularity several postures are the joints'.
     """
     tilt, gamma = _rotation(plan)
@@ -65,7 +65,7 @@ def _rotation(plan: Plan) -> tuple[Array, Array]:
 def _posture(robot: Robot, q: Array, said: Ints) -> Ints:
     """Return the postures (K,) of joints q (K, n); what is `said` where the joints are that, too.
 
-    Where no posture gives the joints back, at a singularity, they do not tell them apart.
+    Where no posture gives the joints back, at a singularity, any may be right.
     """
     arm = robot.alone()
     q = np.ascontiguousarray(q[:, : arm.joints])

@@ -18,10 +18,11 @@ import numpy as np
 from kerfpath.air import least_time
 from kerfpath.auditor import Check, Unit
 from kerfpath.job.format import ProgramOptions
+from kerfpath.job.plan_file import check
 from kerfpath.post import ReadMove, ReadProgram, ReadWait, Signal, groups_of
 from kerfpath.robots import Robot
 
-__all__ = ["Process", "beam_checks"]
+__all__ = ["Process", "check_laser_and_gas"]
 
 SAME_TIME = 2e-3
 """s: controllers round times."""
@@ -94,7 +95,7 @@ class _Event:
     step: int
 
 
-def beam_checks(read: ReadProgram, robot: Robot, process: Process) -> list[Check]:
+def check_laser_and_gas(read: ReadProgram, robot: Robot, process: Process) -> list[Check]:
     """Return the checks of beam and gas over a whole program; their node is the step of it.
 
     Parameters
@@ -131,9 +132,7 @@ def _row(
     value, step = max(found, default=(0.0, 0), key=lambda one: (one[0], -one[1]))
     if unit == "count":
         value = float(sum(one for one, _ in found))
-    return Check(
-        code=code, title=title, value=float(value), limit=float(limit), unit=unit, node=step
-    )
+    return check(code, title, value, limit, unit, step)
 
 
 def _timeline(read: ReadProgram, robot: Robot) -> tuple[list[_Span], list[_Event]]:
@@ -237,7 +236,7 @@ def _wrongly(
 ) -> list[tuple[float, int]]:
     """Return for how long (s) the beam is on where it must not be, and the step there.
 
-    What begins in one span and ends in the next is told at each.
+    What begins in one span and ends in the next is counted at each.
     """
     found = []
     pierced = 0.0

@@ -11,9 +11,8 @@ from kerfpath._arrays import Array, Bools, Ints
 from kerfpath._told import told
 from kerfpath.air import AirMove, backed_off
 from kerfpath.contour import Contour
-from kerfpath.job.format import ContourTask, Job
-from kerfpath.job.programs._read import ReadCut, branch_of, followed, poses_on_arc
-from kerfpath.planner import node_interval
+from kerfpath.job.format import Candidate, Job, divide_nodes
+from kerfpath.job.programs._read import ReadCut, branch_of, follow_poses, poses_on_arc
 from kerfpath.plans import Plan
 from kerfpath.post import (
     CircularMove,
@@ -25,11 +24,10 @@ from kerfpath.post import (
     Rules,
     Settings,
     Step,
-    build_program,
     read_as_written,
 )
 
-__all__ = ["AskedNodes", "asked_nodes", "asked_program"]
+__all__ = ["TargetNodes", "expect_program", "nodes_at_targets"]
 
 REACH = 4.0
 """Farther (m) than a tip is from any axis: the lever of what digits leave of joints."""
@@ -44,7 +42,7 @@ SAME_SPEED = 1e-3
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class AskedNodes:
+class TargetNodes:
     """The nodes that a job asks for along a cut, and which of them its targets stand at.
 
     Parameters
@@ -75,41 +73,32 @@ class AskedNodes:
         return not self.alone.any() and self.at[-1] == len(self.nodes) - 1
 
 
-def asked_nodes(
-    job: Job, task: ContourTask, cut: ReadCut, reference: Contour, s: Array
-) -> AskedNodes:
+def nodes_at_targets(job: Job, candidate: Candidate, cut: ReadCut, s: Array) -> TargetNodes:
     """Return the nodes that the job asks for along a cut, by the arc lengths s (m,) of its targets.
 
     Where the job asks for finer intervals, those are taken if there are as many targets.
     """
-    asked = task.sample(reference)
-    dt = node_interval(asked, task.speed if asked.time is None else None)
-    time: Array = dt * np.arange(len(asked), dtype=np.float64)
+    nodes, dt, parts = candidate.nodes, candidate.dt, job.options.refine_parts
     targets = cut.ends
-    if job.options.refine_parts > 1 and len(targets) > len(asked):
-        k = np.arange(len(asked))
-        fine = np.arange((len(asked) - 1) * job.options.refine_parts + 1) / job.options.refine_parts
-        asked, time = (
-            reference.at_nodes(np.interp(fine, k, asked.s)),
-            np.asarray(np.interp(fine, k, time)),
-        )
-    if len(targets) == len(asked):
-        at = np.arange(len(asked))
+    if parts > 1 and len(targets) > len(nodes):
+        nodes, dt = divide_nodes(candidate.path, nodes, parts), dt / parts
+    if len(targets) == len(nodes):
+        at = np.arange(len(nodes))
     else:
-        at = np.abs(asked.s[None] - s[targets][:, None]).argmin(axis=1)
+        at = np.abs(nodes.s[None] - s[targets][:, None]).argmin(axis=1)
     arc = np.array([move.kind == "circular" for move in cut.targets])
     step = np.diff(at, prepend=-1)
-    return AskedNodes(
-        nodes=asked,
-        time=time,
+    return TargetNodes(
+        nodes=nodes,
+        time=dt * np.arange(len(nodes), dtype=np.float64),
         at=at,
-        off=np.linalg.norm(cut.T_part_tip[targets, :3, 3] - asked.points[at], axis=1),
+        off=np.linalg.norm(cut.T_part_tip[targets, :3, 3] - nodes.points[at], axis=1),
         alone=np.where(arc, step < 1, step != 1),
     )
 
 
-def asked_program(
-    job: Job, cuts: Sequence[tuple[ReadCut, AskedNodes, Plan]], home: Array,
+def expect_program(
+    job: Job, cuts: Sequence[tuple[ReadCut, TargetNodes, Plan]], home: Array,
     language: Language, settings: Settings,
 ) -> ReadProgram:  # fmt: skip
     """Return what the job's program along the paths of these cuts would say, read back.
@@ -125,19 +114,9 @@ def asked_program(
     """
     rules, options = language.rules(settings), job.program
     plans = [_whole(job, cut, asked, plan) for cut, asked, plan in cuts]
-    program = build_program(
-        plans,
-        moves=_moves(job, [cut for cut, _, _ in cuts], plans, home),
-        name=options.name,
-        retract=options.retract,
-        zone=options.zone,
-        lead_time=options.lead_time,
-        gas_lead=options.gas_lead,
-        pierce_time=options.pierce_time,
-        approach_speed=options.approach_speed,
-        air_speed=options.air_speed,
-        handshakes=options.handshakes,
-    )
+    moves = _moves(job, [cut for cut, _, _ in cuts], plans, home)
+    # Arcs are put in where they were read.
+    program = replace(options, arc_tolerance=None).program(plans, moves)
     sections = []
     for section, (cut, asked, _) in zip(program.sections, cuts, strict=True):
         steps = [
@@ -152,7 +131,7 @@ def asked_program(
     return read_as_written(replace(program, sections=tuple(sections)), language, settings)
 
 
-def _whole(job: Job, cut: ReadCut, asked: AskedNodes, plan: Plan) -> Plan:
+def _whole(job: Job, cut: ReadCut, asked: TargetNodes, plan: Plan) -> Plan:
     """Return the plan of a cut with a node wherever the job asks for one, along arcs, too."""
     targets, at = cut.ends, asked.at
     K = len(asked.nodes)
@@ -166,7 +145,7 @@ def _whole(job: Job, cut: ReadCut, asked: AskedNodes, plan: Plan) -> Plan:
             s = asked.nodes.s[first : last + 1]
             parts = ((s - s[0]) / (s[-1] - s[0]))[1:-1]
             T[inner] = poses_on_arc(T[first], move.T_part_via, T[last], parts)
-            q[inner] = followed(plan.robot, plan.T_base_part @ T[inner] @ flange, q[first])
+            q[inner] = follow_poses(plan.robot, plan.T_base_part @ T[inner] @ flange, q[first])
     time = asked.time
     if job.options.feed != "constant":  # it may be slower, which is judged by itself
         time = np.interp(np.arange(K), at, _as_fast(cut, asked.nodes.s[at]))
@@ -226,7 +205,7 @@ def _same_pose(program: Program, asked: Array, read: Array, rules: Rules) -> Arr
     return read if near and np.abs(asked - read).max() <= SAME_BRANCH else asked
 
 
-def _with_arcs(steps: Sequence[Step], cut: ReadCut, asked: AskedNodes) -> list[Step]:
+def _with_arcs(steps: Sequence[Step], cut: ReadCut, asked: TargetNodes) -> list[Step]:
     """Return the steps of a cut with arcs where it was read with arcs and there may be one."""
     path = [k for k, step in enumerate(steps) if isinstance(step, LinearMove)]
     found, done = list(steps[: path[0] + 1]), path[0] + 1

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -13,9 +13,10 @@ from pydantic import ValidationError
 
 from kerfpath.auditor import Check
 from kerfpath.job.format import Job, JobFile
-from kerfpath.job.plan_file._follows import SAME
+from kerfpath.job.plan_file._checks import count
+from kerfpath.job.plan_file._recompute import SAME
 
-__all__ = ["CLAIMS", "disagreement", "job_disagreement"]
+__all__ = ["CLAIMS", "compare_jobs", "compare_values"]
 
 CLAIMS = {
     r"kerfpath$": "the version that wrote the file",
@@ -52,12 +53,12 @@ class _Difference:
         return f"{where}: expected {_shown(self.expected)}, found {_shown(self.found)}"
 
 
-def disagreement(
+def compare_values(
     expected: Any, found: Any, whose: str, under: tuple[str | int, ...] = ()
 ) -> list[Check]:
     """Return a check for each kind of place at which `found` is not what is expected.
 
-    The first of each kind is told; a single check that passes where there is none.
+    The title says the first of each kind; a single check that passes where there is none.
 
     Parameters
     ----------
@@ -76,25 +77,25 @@ def disagreement(
         first = alike[0]
         many = "" if len(alike) == 1 else f" (and {len(alike) - 1} more such)"
         checks.append(
-            _check("agrees", f"values that are not {whose}: {first}{many}", len(alike), first.node)
+            count("agrees", f"values that are not {whose}: {first}{many}", len(alike), first.node)
         )
-    return checks or [_check("agrees", f"values that are not {whose}", 0)]
+    return checks or [count("agrees", f"values that are not {whose}", 0)]
 
 
-def job_disagreement(job: Job, source: dict[str, Any]) -> list[Check]:
+def compare_jobs(job: Job, source: Mapping[str, Any]) -> list[Check]:
     """Return the checks of the job that a plan.json repeats, by what its text means.
 
     Tables that do not say what the motion is have a check of their own.
     """
     title = "values of the job that the plan was made from that are not the job's"
     if _same(job.source, source):
-        return [_check("job", title, 0)]
+        return [count("job", title, 0)]
     context = {"folder": job.path.parent}
     try:
         then = JobFile.model_validate(source, context=context).model_dump(mode="json")
     except (ValidationError, ValueError, TypeError, OverflowError) as error:
         said = " ".join(str(error).split())[:SHOWN]
-        return [_check("job", f"{title}: it is no job ({said}...)", 1)]
+        return [count("job", f"{title}: it is no job ({said}...)", 1)]
     now = JobFile.model_validate(job.source, context=context).model_dump(mode="json")
     found = list(_differences(now, then, ("job",)))
     rows = []
@@ -103,8 +104,7 @@ def job_disagreement(job: Job, source: dict[str, Any]) -> list[Check]:
         ("job-program", [each for each in found if each.path[1] in PROGRAM]),
     ):
         many = f" (and {len(mine) - 1} more)" if len(mine) > 1 else ""
-        told = f"{title}: {mine[0]}{many}" if mine else title
-        rows.append(_check(code, told, len(mine)))
+        rows.append(count(code, f"{title}: {mine[0]}{many}" if mine else title, len(mine)))
     return rows
 
 
@@ -191,7 +191,3 @@ def _shown(value: Any) -> str:
     text = "nothing" if value is _Absent else str(value)
     text = "".join(c if c.isprintable() else "?" for c in text)
     return text if len(text) <= SHOWN else f"{text[:SHOWN]}..."
-
-
-def _check(code: str, title: str, count: float, node: int = 0) -> Check:
-    return Check(code=code, title=title, value=float(count), limit=0.0, unit="count", node=node)

@@ -8,17 +8,17 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from kerfpath._arrays import Array
-from kerfpath.auditor import Check, Rounding, Unit, rounding_of
+from kerfpath.auditor import Check, Rounding, rounding_of
 from kerfpath.cell import Cell
 from kerfpath.contour import KINDS, Contour
-from kerfpath.job.format import ContourTask, Job
-from kerfpath.job.programs._asked import AskedNodes, asked_nodes
+from kerfpath.job.format import Candidate, Job
+from kerfpath.job.plan_file import check, count
+from kerfpath.job.programs._expected import TargetNodes, nodes_at_targets
 from kerfpath.job.programs._read import ReadCut
-from kerfpath.planner import node_interval
 from kerfpath.plans import Plan, Proof
 from kerfpath.post import Language, Rules, Settings
 
-__all__ = ["asked_times", "cut_checks", "row"]
+__all__ = ["check_cut"]
 
 SAME_SPEED = 0.02
 """Share by which a speed may differ from the one asked for, beyond its digits."""
@@ -28,47 +28,39 @@ CLIMB = 0.05
 """What a step along the path counts beside one away from it, where a place on it is looked for."""
 
 
-def row(code: str, title: str, value: float, limit: float, unit: Unit, node: int = 0) -> Check:
-    """Return a check, its numbers as Python's own."""
-    return Check(
-        code=code, title=title, value=float(value), limit=float(limit), unit=unit, node=node
-    )
-
-
-def cut_checks(
-    job: Job, task: ContourTask, cut: ReadCut, reference: Contour, cell: Cell | None,
-    chosen: Language, settings: Settings,
-) -> tuple[list[Check], tuple[AskedNodes, Plan] | None]:  # fmt: skip
+def check_cut(
+    job: Job, candidate: Candidate, cut: ReadCut, cell: Cell | None, chosen: Language,
+    settings: Settings,
+) -> tuple[list[Check], tuple[TargetNodes, Plan] | None]:  # fmt: skip
     """Return the checks of a cut, and its nodes and plan where it can be compared with the job."""
     unreached = np.flatnonzero(np.isnan(cut.q).any(axis=1))
     if unreached.size:
         said = "targets out of the robot's reach in the posture of the start"
-        return [row("reach", said, unreached.size, 0, "count", int(unreached[0]))], None
+        return [count("reach", said, unreached.size, int(unreached[0]))], None
+    reference = candidate.path
     s, ends = _along(cut, reference)
-    rows = [row("ends", "ends of the cut, off those of the contour", ends.max(), 1e-4, "m")]
+    rows = [check("ends", "ends of the cut, off those of the contour", ends.max(), 1e-4, "m")]
     if (np.diff(s) <= 0).any():
         node = int(np.flatnonzero(np.diff(s) <= 0)[0])
         said = "stretches that go back along the contour"
-        return [*rows, row("order", said, (np.diff(s) <= 0).sum(), 0, "count", node)], None
+        return [*rows, count("order", said, (np.diff(s) <= 0).sum(), node)], None
     took = np.where(np.isnan(cut.speed), cut.took, np.diff(s) / cut.speed)
-    made = _plan(job, task, cut, s, np.append(0.0, np.cumsum(took)))
+    made = _plan(job, candidate.nodes.name, cut, s, np.append(0.0, np.cumsum(took)))
     allowed, tilt = job.tolerances, job.options.tilt
     if tilt is not None:
         allowed = replace(allowed, axis=allowed.axis + tilt.cone)
     rules = chosen.rules(settings)
     digits = _rounding(cut, made, rules)
     rows += allowed.checks(made, reference=reference, cell=cell, rounding=digits)
-    rows += _asked(job, task, cut, reference, made, digits.time, ahead=chosen.ahead)
+    rows += _process_checks(job, candidate, cut, made, digits.time, ahead=chosen.ahead)
     rows += _postures(job, cut, chosen, settings, digits.q)
-    asked = asked_nodes(job, task, cut, reference, s)
-    off, alone = int(np.argmax(asked.off)), int(np.argmax(asked.alone))
+    found = nodes_at_targets(job, candidate, cut, s)
+    off, alone = int(np.argmax(found.off)), int(np.argmax(found.alone))
+    said = "targets, off the nodes that the job asks for"
+    rows.append(check("nodes", said, found.off[off], allowed.path, "m", int(cut.ends[off])))
     said = "targets that leave a node of the job out, or are none"
-    rows += [
-        row("nodes", "targets, off the nodes that the job asks for", asked.off[off],
-               allowed.path, "m", int(cut.ends[off])),
-        row("every-node", said, asked.alone.sum(), 0, "count", int(cut.ends[alone])),
-    ]  # fmt: skip
-    return rows, (asked, made) if asked.complete else None
+    rows.append(count("every-node", said, found.alone.sum(), int(cut.ends[alone])))
+    return rows, (found, made) if found.complete else None
 
 
 def _along(cut: ReadCut, reference: Contour) -> tuple[Array, Array]:
@@ -99,11 +91,11 @@ def _along(cut: ReadCut, reference: Contour) -> tuple[Array, Array]:
     return s, ends
 
 
-def _plan(job: Job, task: ContourTask, cut: ReadCut, s: Array, time: Array) -> Plan:
+def _plan(job: Job, name: str, cut: ReadCut, s: Array, time: Array) -> Plan:
     """Return what the text says of a cut as a plan, so that it is audited as one."""
     K = len(cut.q)
     return Plan(
-        contour=Contour(cut.T_part_tip[:, :3, 3], cut.T_part_tip[:, :3, 2], s=s, name=task.name),
+        contour=Contour(cut.T_part_tip[:, :3, 3], cut.T_part_tip[:, :3, 2], s=s, name=name),
         robot=job.robot,
         T_flange_tip=job.tool,
         T_base_part=job.placement,
@@ -126,49 +118,34 @@ def _rounding(cut: ReadCut, made: Plan, rules: Rules) -> Rounding:
     return rounding_of(made, rules.point_step, rules.angle_step, time, jointed=jointed)
 
 
-def _asked(
-    job: Job, task: ContourTask, cut: ReadCut, reference: Contour, made: Plan, digits: Array,
-    *, ahead: bool,
-) -> list[Check]:  # fmt: skip
+def _process_checks(
+    job: Job, candidate: Candidate, cut: ReadCut, made: Plan, digits: Array, *, ahead: bool
+) -> list[Check]:
     """Compare speeds, switches and waits with what the job asks for.
 
     Where the language cannot switch `ahead` of a target, it has to do so at the target.
     """
-    s = made.contour.s
+    s, nodes, path = made.contour.s, candidate.nodes, candidate.path
     middle = (s[1:] + s[:-1]) / 2
-    asked, dt = asked_times(task, reference)
-    when = dt * np.arange(len(asked))
-    k = np.clip(np.searchsorted(reference.s, middle, side="right") - 1, 0, len(reference) - 1)
-    wanted = reference.kind[k] != KINDS.index("micro joint")
-    wrong = wanted != cut.laser
-    excess = np.diff(np.interp(s, asked.s, when)) / np.diff(made.time) - 1
+    when = candidate.dt * np.arange(len(nodes))
+    k = np.clip(np.searchsorted(path.s, middle, side="right") - 1, 0, len(path) - 1)
+    wrong = (path.kind[k] != KINDS.index("micro joint")) != cut.laser
+    excess = np.diff(np.interp(s, nodes.s, when)) / np.diff(made.time) - 1
     if job.options.feed == "constant":
         excess = np.abs(excess)
     fast = int(np.argmax(excess - digits))
+    most = SAME_SPEED + digits[fast]
     node = int(np.argmax(wrong)) if wrong.any() else 0
     lead = np.abs(cut.lead_times - (job.program.lead_time if ahead else 0.0))
     wait = abs(float(cut.waits.sum()) - job.program.pierce_time)
     lengths = np.diff(s)[wrong].sum()
     return [
-        row(
-            "speed",
-            "speed, off the one asked for",
-            excess[fast],
-            SAME_SPEED + digits[fast],
-            "share",
-            fast,
-        ),
-        row("laser", "length with the laser wrongly on or off", lengths, 1e-6, "m", node),
-        row("laser-off", "laser left on at the end", cut.left_on, 0, "count", len(s) - 1),
-        row("lead-time", "lead time of the laser, off", lead.max(initial=0), SAME_TIME, "s"),
-        row("pierce", "wait at the start, off the one asked for", wait, SAME_TIME, "s"),
+        check("speed", "speed, off the one asked for", excess[fast], most, "share", fast),
+        check("laser", "length with the laser wrongly on or off", lengths, 1e-6, "m", node),
+        count("laser-off", "laser left on at the end", cut.left_on, len(s) - 1),
+        check("lead-time", "lead time of the laser, off", lead.max(initial=0), SAME_TIME, "s"),
+        check("pierce", "wait at the start, off the one asked for", wait, SAME_TIME, "s"),
     ]
-
-
-def asked_times(task: ContourTask, reference: Contour) -> tuple[Contour, float]:
-    """Return the nodes that are asked for and the time (s) between them."""
-    asked = task.sample(reference)
-    return asked, node_interval(asked, task.speed if asked.time is None else None)
 
 
 def _postures(
@@ -181,16 +158,16 @@ def _postures(
     """
     moves, q = (*cut.moves, cut.group.path[-1]), np.vstack([cut.q, cut.q_out])
     left = np.vstack([left, left[-1:]])
-    told = [k for k in (*cut.ends.tolist(), len(cut.moves)) if moves[k].posture]
-    if not told or chosen.posture is None:
+    worded = [k for k in (*cut.ends.tolist(), len(cut.moves)) if moves[k].posture]
+    if not worded or chosen.posture is None:
         return []
-    ways = [q[told] + sign * left[told] for sign in (0, -1, 1)]
+    ways = [q[worded] + sign * left[worded] for sign in (0, -1, 1)]
     expected = zip(*(chosen.posture(job.robot, way, settings) for way in ways), strict=True)
     wrong = [
         k
-        for k, words in zip(told, expected, strict=True)
+        for k, words in zip(worded, expected, strict=True)
         if len(moves[k].posture) != len(words[0])
         or any(said not in right for said, *right in zip(moves[k].posture, *words, strict=True))
     ]
     said = "targets whose posture or turn is not the motion's"
-    return [row("posture", said, len(wrong), 0, "count", wrong[0] if wrong else 0)]
+    return [count("posture", said, len(wrong), wrong[0] if wrong else 0)]

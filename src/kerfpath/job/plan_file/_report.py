@@ -8,14 +8,14 @@ from kerfpath._told import told
 from kerfpath.auditor import Check, in_words
 from kerfpath.cell import Cell, caveats
 
-__all__ = ["Audited", "collision_note"]
+__all__ = ["AuditReport", "collision_note"]
 
 NOT_CHECKED = "Collisions are not checked: simulate the program in the cell before running it."
 """What is said of a job without a [cell]."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Audited:
+class AuditReport:
     """What the audit of a plan.json or of a program says.
 
     Parameters
@@ -51,7 +51,7 @@ class Audited:
         lines = self.places.get(name, ())
         return f"{lines[check.node]}" if check.node < len(lines) else f"node {check.node}"
 
-    def said(self, name: str, check: Check) -> str:
+    def sentence(self, name: str, check: Check) -> str:
         """Say in one sentence where a check of a table failed, what was found, what is allowed."""
         if check.unit == "count" and check.limit == 0:
             found = f"{check.title}: {check.value:g}, expected none"

@@ -1,36 +1,35 @@
-"""What came of one contour of a job."""
+"""What came of a job, and of each of its contours."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
 
+from kerfpath._arrays import Array, Ints
 from kerfpath._told import told
 from kerfpath.auditor import Check
 from kerfpath.cad import Departure, Part, departure_from
-from kerfpath.contour import Contour
+from kerfpath.cell import Cell
 from kerfpath.errors import NoFeasiblePath
 from kerfpath.graph import LayeredGraph
-from kerfpath.job.format import ContourTask
+from kerfpath.job.format import Candidate, CutRequest, Job
 from kerfpath.planner import FINER, ON_THIS_GRID, ClearanceMap, FastestSpeed, at_least, at_most
 from kerfpath.plans import Plan
 from kerfpath.search import Relaxations
+from kerfpath.sequence import PartPlan
 
-__all__ = ["Cut"]
+__all__ = ["CutResult", "JobResult"]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class Cut:
+class CutResult:
     """What came of one contour of a job, or of one piece of it.
 
     Parameters
     ----------
-    contour : str
-        What the job calls the contour.
-    task : ContourTask
-    drawn : Contour
-        The loop as drawn, densely sampled, part frame.
-    nodes : Contour
-        Its nodes, part frame.
+    request : CutRequest
+        What was asked for.
+    candidate : Candidate
+        The path that is cut and its nodes, or a stretch of it.
     graph : LayeredGraph
     plan : Plan or None
         None when no feasible path was found.
@@ -46,14 +45,10 @@ class Cut:
         How clear every pose is in the cell, where the job asks for the map.
     departure : Departure or None
         How far the nodes leave the CAD curve; measured once it is settled what is cut.
-    picked : bool
-        Whether the plan is one of a Pareto set, which aims at something else than the job does.
     """
 
-    contour: str
-    task: ContourTask
-    drawn: Contour
-    nodes: Contour
+    request: CutRequest
+    candidate: Candidate
     graph: LayeredGraph
     plan: Plan | None = None
     broken: NoFeasiblePath | None = None
@@ -62,9 +57,23 @@ class Cut:
     checks: tuple[Check, ...] = ()
     clearance: ClearanceMap | None = None
     departure: Departure | None = None
-    picked: bool = False
 
     __repr__ = told
+
+    @property
+    def contour(self) -> str:
+        """What the job calls the contour."""
+        return self.request.task.name
+
+    @property
+    def name(self) -> str:
+        """What it is called itself; a piece has a number, too."""
+        return self.contour if self.plan is None else self.plan.name
+
+    @property
+    def picked(self) -> bool:
+        """Whether the plan is one of a Pareto set, which aims at something else than the job."""
+        return self.request.run is not None
 
     @property
     def passed(self) -> bool:
@@ -73,7 +82,7 @@ class Cut:
             c.level == "error" and not c.ok for c in self.checks
         )
 
-    def measured(self, part: Part, loop: Departure | None) -> Cut:
+    def measured(self, part: Part, loop: Departure | None) -> CutResult:
         """Return the cut with the departure of its nodes.
 
         Parameters
@@ -83,11 +92,11 @@ class Cut:
             That of the loop as drawn, where operations moved it: the nodes are then measured from
             the path as cut.
         """
-        nodes = self.nodes if self.plan is None else self.plan.contour
+        nodes = self.candidate.nodes if self.plan is None else self.plan.contour
         found = (
-            part.departure(self.task.pick, nodes)
+            part.departure(self.request.task.pick, nodes)
             if loop is None
-            else departure_from(self.drawn, nodes, loop)
+            else departure_from(self.candidate.path, nodes, loop)
         )
         return replace(self, departure=found)
 
@@ -107,7 +116,7 @@ class Cut:
 
     def _speeds(self, found: FastestSpeed) -> str:
         """Say up to which speed a path exists on the grid, and which one is known off it."""
-        point = self.nodes.points[found.node] * 1000
+        point = self.candidate.nodes.points[found.node] * 1000
         binds = (
             f", where the {found.limit} of joint {found.joint + 1} binds at node {found.node}, "
             f"{' '.join(f'{v:.1f}' for v in point)} mm"
@@ -115,7 +124,7 @@ class Cut:
         if found.on_grid is None:
             return f"{ON_THIS_GRID} a path exists up to {at_most(found.speed * 60)} m/min{binds}"
         on_grid = f"{ON_THIS_GRID} a path exists up to {at_most(found.on_grid * 60)} m/min"
-        if found.speed < self.task.speed:
+        if found.speed < self.request.task.speed:
             return f"{on_grid}, refined up to {at_most(found.speed * 60)} m/min{binds}"
         return (
             f"{on_grid}; a refined one was found at {at_most(found.speed * 60)} m/min, but none at "
@@ -130,8 +139,36 @@ class Cut:
             "eta_velocity": self.relaxations.eta_v,
             "eta_acceleration": self.relaxations.eta_a,
         }
-        told = {k: "none" if v is None or v > 1 else at_least(v) for k, v in shares.items()}
-        ways = [f"{name} = {share}" for name, share in told.items() if share != "none"]
-        closed = [name for name, share in told.items() if share == "none"]
+        ways = [f"{k} = {at_least(v)}" for k, v in shares.items() if v is not None and v <= 1]
+        closed = [k for k, v in shares.items() if v is None or v > 1]
         said = f"; at the speed asked for with {' or '.join(ways)}" if ways else ""
         return said + (f"; no {' and no '.join(closed)} up to 1 is enough there" if closed else "")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class JobResult:
+    """What came of a job: every cut, in order, its cell, and the part's mesh for pictures.
+
+    With [sequence]: the moves between the cuts and their audit, or why there is no way.
+    """
+
+    job: Job
+    cuts: tuple[CutResult, ...]
+    mesh: tuple[Array, Ints]
+    cell: Cell | None = None
+    part: PartPlan | None = None
+    stuck: NoFeasiblePath | None = None
+    air: tuple[Check, ...] = ()
+
+    __repr__ = told
+
+    @property
+    def passed(self) -> bool:
+        """True when every contour has a plan that passes its audit, and every move too."""
+        moves = self.stuck is None and all(check.ok for check in self.air)
+        return moves and all(cut.passed for cut in self.cuts)
+
+    @property
+    def plans(self) -> tuple[Plan, ...]:
+        """The plans there are, in the order of cutting."""
+        return tuple(cut.plan for cut in self.cuts if cut.plan is not None)

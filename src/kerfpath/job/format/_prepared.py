@@ -1,0 +1,158 @@
+"""A job made ready: its drawing and cell are read, and each contour has the ways to cut it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from kerfpath._told import told
+from kerfpath.cad import Part
+from kerfpath.cad import read as read_drawing
+from kerfpath.cell import Cell
+from kerfpath.contour import Contour
+from kerfpath.front import Run
+from kerfpath.job.format._cell import cell_of_job
+from kerfpath.job.format._contour import ContourTask
+from kerfpath.job.format._read import Job
+from kerfpath.options import PlanOptions
+from kerfpath.planner import node_interval
+from kerfpath.sequence import inner_first
+
+__all__ = ["Candidate", "CutRequest", "PreparedJob", "divide_nodes", "prepare"]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Candidate:
+    """One of the ways in which a contour may be cut.
+
+    Parameters
+    ----------
+    path : Contour
+        The path to cut with its operations (leads, micro joints, ...), part frame.
+    nodes : Contour
+        It, sampled as the job says: points, axes, kinds, speed shares and arc lengths.
+    speed : float m/s, optional
+        Along the path; None where the nodes carry their own times.
+    """
+
+    path: Contour
+    nodes: Contour
+    speed: float | None = None
+
+    __repr__ = told
+
+    @classmethod
+    def at(cls, speed: float, path: Contour, nodes: Contour) -> Candidate:
+        """Return the candidate with nodes of a path, at a speed (m/s) unless they carry times."""
+        return cls(path=path, nodes=nodes, speed=speed if nodes.time is None else None)
+
+    @property
+    def dt(self) -> float:
+        """Time from node to node at the speed asked for, s."""
+        return node_interval(self.nodes, self.speed)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class CutRequest:
+    """What is asked for one contour: the ways to cut it, and how its plan is to be.
+
+    Parameters
+    ----------
+    task : ContourTask
+        What the job says of it.
+    loop : Contour
+        As drawn, part frame.
+    candidates : tuple of Candidate
+        Of which one is cut.
+    options : PlanOptions
+    run : Run or None
+        The run of a Pareto set that the plan follows, with its windows and clearance.
+    touched_up : bool
+        Whether targets of the path were moved by hand.
+    """
+
+    task: ContourTask
+    loop: Contour
+    candidates: tuple[Candidate, ...]
+    options: PlanOptions
+    run: Run | None = None
+    touched_up: bool = False
+
+    __repr__ = told
+
+    @property
+    def leaves_the_loop(self) -> bool:
+        """Whether points or tool axes of the cut are other than those of the loop as drawn."""
+        return self.touched_up or self.task.table.moves_the_path
+
+    def picked(self, run: Run, *, refine: bool) -> CutRequest:
+        """Return the request for the first candidate, planned as a run of a Pareto set."""
+        options = replace(run.applied_to(self.options), feed="constant", refine=refine)
+        return replace(self, candidates=self.candidates[:1], options=options, run=run)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class PreparedJob:
+    """A job with its drawing and its cell: what runs, and what plans and programs are judged by.
+
+    Parameters
+    ----------
+    job : Job
+    part : Part
+    cell : Cell or None
+    contours : tuple of CutRequest
+        In the order of the job.
+    inner_first : tuple of (int, int)
+        Contours of which the first is to be cut before the second.
+    """
+
+    job: Job
+    part: Part
+    cell: Cell | None
+    contours: tuple[CutRequest, ...]
+    inner_first: tuple[tuple[int, int], ...] = ()
+
+    __repr__ = told
+
+    @property
+    def names(self) -> list[str]:
+        """The names of the contours."""
+        return [contour.task.name for contour in self.contours]
+
+
+def prepare(job: Job, part: Part | None = None) -> PreparedJob:
+    """Return a job with its drawing and cell read; `part` if the drawing is read already.
+
+    Raises
+    ------
+    InputError
+        The drawing or the cell cannot be read, a loop does not exist, a contour cannot be sampled.
+    """
+    part = part or read_drawing(job.part_file, unit=job.part_unit)
+    tasks = job.tasks(part)  # a misspelt name shall not wait for the cell
+    cell = cell_of_job(job, part)
+    contours = tuple(_request(job, task, part) for task in tasks)
+    inner = job.sequence is not None and job.sequence.inner_first
+    return PreparedJob(
+        job=job,
+        part=part,
+        cell=cell,
+        contours=contours,
+        inner_first=tuple(inner_first([each.loop for each in contours])) if inner else (),
+    )
+
+
+def _request(job: Job, task: ContourTask, part: Part) -> CutRequest:
+    loop = task.drawn(part)
+    candidates = tuple(
+        Candidate.at(task.speed, path, task.sample(path)) for path in task.candidates(part, loop)
+    )
+    return CutRequest(task=task, loop=loop, candidates=candidates, options=job.options)
+
+
+def divide_nodes(path: Contour, nodes: Contour, parts: int) -> Contour:
+    """Return the nodes of a path that divide every interval between `nodes` into parts."""
+    k = np.arange(len(nodes))
+    s = np.interp(np.arange(k[-1] * parts + 1) / parts, k, nodes.s)
+    return replace(path.at_nodes(s), name=nodes.name)

@@ -1,0 +1,233 @@
+"""The layout of a plan.json: every key and the type of its value, SI, the unit in the name.
+
+It stands here once: the file is written as these types and checked against them, see `_schema`.
+"""
+
+from __future__ import annotations
+
+from typing import Any, Literal, NotRequired, TypedDict
+
+from kerfpath.auditor import Level, Unit
+from kerfpath.options import OptionData
+
+__all__ = [
+    "AuditData", "BrokenData", "ContourData", "CriteriaData", "ExternalData", "LimitsData",
+    "PlanData", "PlanDocument", "RobotData", "SequenceData",
+]  # fmt: skip
+
+Row = list[float]
+Rows = list[Row]
+Kind = Literal["cut", "pierce", "lead-in", "micro joint", "overlap", "lead-out", "loop"]
+
+
+class ChainData(TypedDict):
+    """The joint frames of a robot that is known by its description."""
+
+    origins: list[Rows]
+    axes: Rows
+    end: Rows
+
+
+class RobotData(TypedDict):
+    """A robot: which, and its geometry."""
+
+    id: str
+    manufacturer: str
+    model: str
+    kinematics: str
+    geometry_m: dict[str, float]
+    sign: Row
+    offset_rad: Row
+    axis_3: str
+    T_base_foot: Rows
+    T_end_flange: Rows
+    chain: ChainData | None
+
+
+class ExternalData(TypedDict):
+    """A rail, in m, or a positioner, in rad."""
+
+    kind: Literal["rail", "positioner"]
+    axis: Row
+    point_m: Row
+    step_m: NotRequired[float | None]
+    lower_m: NotRequired[float | None]
+    upper_m: NotRequired[float | None]
+    velocity_m_s: NotRequired[float | None]
+    acceleration_m_s2: NotRequired[float | None]
+    step_rad: NotRequired[float | None]
+    lower_rad: NotRequired[float | None]
+    upper_rad: NotRequired[float | None]
+    velocity_rad_s: NotRequired[float | None]
+    acceleration_rad_s2: NotRequired[float | None]
+
+
+class CouplingData(TypedDict):
+    """A limit of several joints together."""
+
+    row: Row
+    lower_rad: float
+    upper_rad: float
+    note: str
+
+
+class LimitsData(TypedDict):
+    """The limits of the arm's joints that were used."""
+
+    lower_rad: Row
+    upper_rad: Row
+    endless: list[bool]
+    velocity_rad_s: Row
+    acceleration_rad_s2: Row
+    acceleration_source: str
+    couplings: list[CouplingData]
+
+
+class NearestData(TypedDict):
+    """How near the arm comes to what comfort keeps it from, and where."""
+
+    least: float | None
+    unit: str
+    node: int
+
+
+class CriteriaData(TypedDict):
+    """The criteria of a plan, joint by joint; those of an external axis apart."""
+
+    displacement_rad: Row
+    external_displacement_m: NotRequired[float | None]
+    external_displacement_rad: NotRequired[float | None]
+    largest_increment_rad: Row
+    external_largest_increment_m: NotRequired[float | None]
+    external_largest_increment_rad: NotRequired[float | None]
+    range_rad: Row
+    external_range_m: NotRequired[float | None]
+    external_range_rad: NotRequired[float | None]
+    peak_velocity_share: Row
+    peak_acceleration_share: Row
+    nearest: dict[str, NearestData]
+
+
+class FeedData(TypedDict):
+    """Where the feed is reduced, and by what."""
+
+    full: float
+    slowest: float
+    node: int
+    joint: int
+    limit: Literal["velocity", "acceleration"] | None
+
+
+class CheckData(TypedDict):
+    """A row of the audit."""
+
+    code: str
+    title: str
+    value: float
+    limit: float
+    unit: Unit
+    node: int
+    level: Level
+    advice: str
+    ok: bool
+
+
+class AuditData(TypedDict):
+    """The audit made when the contour was planned."""
+
+    passed: bool
+    checks: list[CheckData]
+
+
+class NodesData(TypedDict):
+    """The nodes of a plan, a row each."""
+
+    s_m: Row
+    time_s: Row
+    points_m: Rows
+    axes: Rows
+    kind: list[Kind]
+    speed_share: Row
+    x: Rows | None
+    q_rad: Rows
+    external_q_m: NotRequired[Row | None]
+    external_q_rad: NotRequired[Row | None]
+    gamma_rad: Row
+    lead_lean_rad: Rows | None
+    posture: list[int]
+    turn: list[list[int]]
+
+
+class PlanData(OptionData):
+    """A contour, or a piece of one, that has a plan: how it was asked for, and what came of it."""
+
+    name: str
+    contour: str
+    feasible: bool
+    picked: NotRequired[bool]
+    closed: bool
+    external_weights_per_m: NotRequired[float | None]
+    external_weights_per_rad: NotRequired[float | None]
+    dt: float
+    cost: float
+    optimal: bool
+    proof: str
+    grid_cost: float | None
+    criteria: CriteriaData
+    feed: FeedData | None
+    counts: dict[str, int]
+    audit: AuditData
+    nodes: NodesData
+
+
+class BrokenData(TypedDict):
+    """A contour without a plan, and why."""
+
+    name: str
+    feasible: bool
+    reason: str
+    proved: bool
+    last_node_reached: int
+    counts: dict[str, int]
+    fastest_speed_m_s: float | None
+
+
+ContourData = PlanData | BrokenData
+
+
+class MoveData(TypedDict):
+    """A move through the air."""
+
+    clear: bool
+    time_s: Row
+    q_rad: Rows
+
+
+class SequenceData(TypedDict):
+    """The order of cutting and the moves between the contours."""
+
+    optimal: bool
+    duration_s: float
+    at_least_s: float
+    cycle_s: float
+    cutting_s: float
+    air_s: float
+    piercing_s: float
+    retract_m: float
+    moves: list[MoveData]
+
+
+class PlanDocument(TypedDict):
+    """The whole file; `job` is the job file as read, `cell` a record that no reader relies on."""
+
+    schema: int
+    kerfpath: str
+    job: dict[str, Any]
+    robot: RobotData
+    external_axis: ExternalData | None
+    T_flange_tip: Rows
+    T_base_part: Rows
+    limits: LimitsData
+    cell: dict[str, object] | None
+    contours: list[ContourData]
+    sequence: SequenceData | None

@@ -1,0 +1,155 @@
+"""One contour of a job: its plan or the plans of its pieces, and their audit."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from contextlib import suppress
+from dataclasses import replace
+from typing import TypeVar
+
+import numpy as np
+
+from kerfpath.cell import Cell
+from kerfpath.contour import Contour
+from kerfpath.errors import NoFeasiblePath
+from kerfpath.graph import LayeredGraph
+from kerfpath.job.format import Candidate, CutRequest, Job, PreparedJob, divide_nodes
+from kerfpath.job.run._result import CutResult
+from kerfpath.job.run._speeds import fastest_along
+from kerfpath.planner import FastestSpeed, clearance_map, plan, plan_in_pieces, relaxations
+from kerfpath.plans import Plan
+from kerfpath.progress import Progress
+from kerfpath.refiner import refine
+
+__all__ = ["cut_candidate", "cut_in_posture"]
+
+_T = TypeVar("_T")
+
+
+def cut_candidate(
+    prepared: PreparedJob,
+    request: CutRequest,
+    candidate: Candidate,
+    progress: Progress,
+) -> tuple[CutResult, ...]:
+    """Return what came of a candidate: one cut, or several where it is interrupted."""
+    job, cell = replace(prepared.job, options=request.options), prepared.cell
+    name, total, done = request.task.name, len(candidate.nodes), 0
+
+    def solved(count: int) -> None:
+        nonlocal done
+        done += count
+        progress(name, done, total)
+
+    def begin(what: str) -> None:
+        progress(f"{name}: {what}", 0, 0)
+
+    progress(name, 0, total)
+    graph = job.graph(candidate.nodes, progress=solved)
+    clearance = None
+    if cell is not None and job.cell is not None and job.cell.map:
+        begin("map of the cell")
+        clearance = clearance_map(graph, cell)
+    whole = CutResult(request=request, candidate=candidate, graph=graph, clearance=clearance)
+    kept = cell
+    if request.run is not None:
+        graph, kept = request.run.graph(graph, job.robot.endless), request.run.cell(cell)
+
+    def planned(by: Callable[..., _T]) -> _T:
+        return by(
+            candidate.nodes, job.robot, tool=job.tool, placement=job.placement,
+            speed=candidate.speed, options=job.options, cell=kept, graph=graph, phase=begin,
+        )  # fmt: skip
+
+    try:
+        try:
+            plans: tuple[Plan, ...] = (planned(plan),)
+        except NoFeasiblePath:
+            if job.options.interruptions == "none" or not np.diff(graph.start).all():
+                raise
+            plans = planned(plan_in_pieces)
+    except NoFeasiblePath as broken:
+        without = replace(whole, broken=broken)
+        return (_with_remedy(without, job, prepared.cell, graph, begin),)
+    begin("audit")
+    return tuple(_audited(prepared, whole, made) for made in plans)
+
+
+def cut_in_posture(prepared: PreparedJob, request: CutRequest, posture: int) -> CutResult | None:
+    """Return a contour's first candidate cut in one posture; None where its audit fails.
+
+    Raises
+    ------
+    NoFeasiblePath
+        It cannot be cut so.
+    """
+    candidate = request.candidates[0]
+    job = replace(prepared.job, options=replace(request.options, postures=(posture,)))
+    graph = job.graph(candidate.nodes)
+    made = plan(
+        candidate.nodes, job.robot, tool=job.tool, placement=job.placement, speed=candidate.speed,
+        options=job.options, cell=prepared.cell, graph=graph,
+    )  # fmt: skip
+    cut = _audited(prepared, CutResult(request=request, candidate=candidate, graph=graph), made)
+    return cut if cut.passed else None
+
+
+def _with_remedy(
+    without: CutResult, job: Job, cell: Cell | None, graph: LayeredGraph,
+    begin: Callable[[str], None],
+) -> CutResult:  # fmt: skip
+    """Return a cut without a plan, and where that is known the speed and the limits that would do.
+
+    With poses everywhere slower would do; for a loop that cannot close, or an axis that may not
+    turn as far, it need not, and a reduced feed has tried.
+    """
+    options, nodes = job.options, without.candidate.nodes
+    plain = options.closure == "free" and options.rotation is None
+    constant = options.feed == "constant" and nodes.time is None
+    if not (np.diff(graph.start).all() and plain and constant):
+        return without
+    begin("fastest speed")
+    if cell is not None:
+        # Shares of the limits at which a clear path exists are not looked for.
+        with suppress(NoFeasiblePath):
+            slower = fastest_along(job, nodes, cell, refine=options.refine, graph=graph)
+            return replace(without, fastest=slower)
+        return without
+    least = relaxations(
+        nodes,
+        job.robot,
+        graph,
+        without.request.task.speed,
+        eta_v=options.eta_v,
+        eta_a=options.eta_a,
+    )
+    fastest = FastestSpeed.of(nodes, least.slower)
+    if options.refine:
+        fastest = fastest_along(job, nodes, None, refine=True, graph=graph)
+    return replace(without, fastest=fastest, relaxations=least)
+
+
+def _audited(prepared: PreparedJob, whole: CutResult, made: Plan) -> CutResult:
+    """Return the cut of one plan, at finer intervals if the job asks for them, and its audit."""
+    job, candidate, graph = prepared.job, whole.candidate, whole.graph
+    # The postures that the job allows, of which the search may have had only some.
+    made = replace(made, settings=replace(made.settings, postures=job.options.postures))
+    s, nodes = made.contour.s, candidate.nodes
+    if len(s) < len(nodes):
+        first = int(np.searchsorted(nodes.s, s[0]))
+        graph = graph.part(first, first + len(s) - 1)
+        path = candidate.path.between(float(s[0]), float(s[-1]))
+        candidate = Candidate.at(whole.request.task.speed, path, made.contour)
+    if job.options.refine_parts > 1:
+        made = _divided(made, candidate.path, job.options.refine_parts)
+    checks = job.tolerances.checks(made, reference=candidate.path, cell=prepared.cell)
+    return replace(whole, candidate=candidate, graph=graph, plan=made, checks=tuple(checks))
+
+
+def _divided(made: Plan, path: Contour, parts: int) -> Plan:
+    """Return the plan on nodes that divide its intervals, where one keeps the limits there."""
+    found = refine(made, nodes=divide_nodes(path, made.contour, parts))
+    if found.done:
+        return found.plan
+    statement = f"{made.proof.statement}; at {parts} parts of an interval {found.statement}"
+    return replace(made, proof=replace(made.proof, statement=statement))

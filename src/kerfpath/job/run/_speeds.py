@@ -1,0 +1,65 @@
+"""The fastest constant speeds of a job's contours."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from kerfpath.cad import read as read_drawing
+from kerfpath.cell import Cell
+from kerfpath.contour import Contour
+from kerfpath.errors import NoFeasiblePath
+from kerfpath.graph import LayeredGraph
+from kerfpath.job.format import ContourTask, Job, cell_of_job
+from kerfpath.planner import FastestSpeed, fastest_speed
+from kerfpath.progress import Progress, no_progress
+
+__all__ = ["fastest_along", "fastest_speeds"]
+
+
+def fastest_along(
+    job: Job,
+    nodes: Contour,
+    cell: Cell | None,
+    *,
+    refine: bool,
+    graph: LayeredGraph | None = None,
+) -> FastestSpeed:
+    """Return the fastest constant speed of a contour, clear in the cell where there is one."""
+    return fastest_speed(
+        nodes,
+        job.robot,
+        tool=job.tool,
+        placement=job.placement,
+        options=replace(job.options.without_penalties, refine=refine),
+        cell=cell,
+        graph=graph,
+    )
+
+
+def fastest_speeds(
+    job: Job, *, progress: Progress = no_progress
+) -> list[tuple[ContourTask, Contour, FastestSpeed | NoFeasiblePath]]:
+    """Return, for each contour of a job, its task, its nodes and the fastest constant speed.
+
+    The speeds that the job asks for, and shares of them, play no part, nor does what comfort costs.
+
+    Raises
+    ------
+    InputError
+        As `run_job`.
+    """
+    part = read_drawing(job.part_file, unit=job.part_unit)
+    cell = cell_of_job(job, part)
+    answers: list[tuple[ContourTask, Contour, FastestSpeed | NoFeasiblePath]] = []
+    tasks = job.tasks(part)
+    for i, task in enumerate(tasks):
+        progress("contours", i, len(tasks))
+        progress(f"{task.name}: fastest speed", 0, 0)
+        nodes = task.evenly_fast(part)
+        try:
+            answers.append(
+                (task, nodes, fastest_along(job, nodes, cell, refine=job.options.refine))
+            )
+        except NoFeasiblePath as broken:
+            answers.append((task, nodes, broken))
+    return answers
