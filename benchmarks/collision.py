@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from functools import partial
 from itertools import pairwise, product
-from time import perf_counter
+from time import perf_counter, process_time
 from typing import TypeVar
 
 import numpy as np
@@ -17,6 +17,7 @@ from benchmarks._figures import Figure, Report, Sheet, in_turn
 from benchmarks._scene import against_descartes
 from kerfpath import Plan, robot
 from kerfpath._arrays import Array, Bools, Ints
+from kerfpath.auditor import checks
 from kerfpath.cell import Cell
 from kerfpath.planner import clearance_map
 
@@ -53,11 +54,17 @@ as meshes and as their hulls; near-miss distance 0. Whether boxes overlap, a for
 separating axes), beyond what a pair overlaps by design. Wrong: called clear, and overlaps. Lost:
 refused, and no judged pair overlaps."""
 
+AUDITS = """\
+`auditor.checks(cell=)` of plans in a cell, eight samples and more of every interval: distances that
+it asks the collision library for, and processor time. Every distance: judged pairs at the eight
+samples of all intervals."""
+
 VERDICTS = ("arm", "link 5 ends", "links", "poses", "called clear", "wrong", "lost")
 ARMS = (
     "abb_irb2600_12_165", "abb_irb4600_60_205", "kuka_kr16_2", "fanuc_m710ic_50",
     "staubli_tx2_90", "yaskawa_gp25_12", "abb_irb1200_5_90", "kuka_kr60_ha",
 )  # fmt: skip
+ASKED = ("case", "nodes", "pairs", "every distance", "distances asked", "audit, CPU s")
 COUNTS = ("case", "vertices", "closed", "looked at", "measured", "motions", "searches", "distances")
 SECONDS = ("case, s", "lazy", "with graph", "search alone", "every vertex", "every edge")
 MAPS_OF = (
@@ -80,6 +87,7 @@ def run(*, quick: bool) -> list[Report]:
     return [
         _distances(cases, runs=2 if quick else 5),
         _lazy(cases, sample, small),
+        _audits(cases),
         _maps(whole, 2 * sample),
         _verdicts(ARMS[:1] if quick else ARMS, 100 if quick else 1000),
         against_descartes(quick=quick),
@@ -133,6 +141,23 @@ def _lazy(cases: list[Case], sample: int, small: Case | None) -> Report:
     report.sheets.append(Sheet(columns=SECONDS, rows=seconds))
     if small is not None:
         report.findings.append(_exhaustive(small))
+    return report
+
+
+def _audits(cases: Sequence[Case]) -> Report:
+    """Count what the audit of a plan in a cell asks for."""
+    report, rows = Report(title="Audits in a cell", how=AUDITS), []
+    for case in cases:
+        made = case.plan(cell=case.cell, graph=case.graph)
+        before, began = case.cell.queries, process_time()
+        table = checks(made, cell=case.cell)
+        seconds, asked = process_time() - began, case.cell.queries - before
+        every = len(case.cell.pairs) * 8 * (len(made.q) - 1)
+        rows.append([case.name, *map(str, (len(made.q), len(case.cell.pairs), every, asked)),
+                     f"{seconds:.3g}"])  # fmt: skip
+        near = next(check for check in table if check.code == "collision")
+        report.findings.append(f"{case.name}: {near.title}")
+    report.sheets.append(Sheet(columns=ASKED, rows=rows))
     return report
 
 

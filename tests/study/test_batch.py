@@ -211,7 +211,7 @@ def test_a_full_disk_under_the_files_is_one_line_and_the_same_command_goes_on(
 def test_no_jobs_at_all_is_bad_input(tmp_path):
     result = run("batch", cwd=tmp_path)
     assert result.returncode == 2
-    assert "Missing argument 'SLIT_JOB.toml'" in result.stderr
+    assert "Missing argument 'JOB.toml'" in result.stderr
 
 
 def test_a_job_that_changes_meanwhile_ends_the_batch(tmp_path):
