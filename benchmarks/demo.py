@@ -23,8 +23,8 @@ CLOCKS = {
     "compile (cold only)": ("kerfpath.job", "warm_up"),
     "read STEP": ("kerfpath.cli._plan", "drawing_of"),
     "graph": ("kerfpath.job.format._read", "layered_graph"),
-    "search": ("kerfpath.planner._plan", "shortest_path"),
-    "refinement": ("kerfpath.planner._plan", "refined"),
+    "search": ("kerfpath.planner._plan", "find_shortest"),
+    "refinement": ("kerfpath.planner._plan", "refine_plan"),
     "audit": ("kerfpath.job.format._read", "checks"),
     "report": ("kerfpath.job.output._files", "report_text"),
 }

@@ -322,6 +322,9 @@ def test_a_near_miss_costs_and_the_plan_is_the_best_of_all(small, posted, closur
     assert made.cost > blind.cost
     with pytest.raises(InputError, match="clearance: is measured in a cell"):
         plan(nodes, arm, comfort=comfort, **options)
+    # Off the grid it is not known what clearance costs, so no motion there is looked for.
+    with pytest.raises(NoFeasiblePath, match="no admissible"):
+        plan(nodes, arm, cell=posted, comfort=comfort, refine=True, **options | {"speed": 50.0})
 
 
 @pytest.fixture(scope="module")

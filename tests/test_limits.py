@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from kerfpath import InputError
-from kerfpath.limits import AccelerationLimit, Limits, VelocityLimit
+from kerfpath.limits import AccelerationLimit, Limits, VelocityLimit, meetings, rates_of
 
 BOUND = np.array([1.0, 2.5])
 
@@ -67,3 +67,17 @@ def test_a_limit_of_other_joints_is_named():
         Limits.of(BOUND, [1.0]).require_joints(2)
     with pytest.raises(InputError, match="velocity: must be positive, got"):
         VelocityLimit(bound=-BOUND)
+
+
+@pytest.mark.parametrize("periodic", [False, True])
+def test_the_rates_of_a_motion_by_its_definition(periodic):
+    rng = np.random.default_rng(91)
+    dq, tau = rng.normal(size=(5, 2)), rng.uniform(0.5, 2.0, 5)
+    v, a = rates_of(dq, tau, periodic=periodic)
+    np.testing.assert_allclose(v * tau[:, None], dq)
+    assert len(a) == (5 if periodic else 4)
+    for k, rate in enumerate(a):
+        later = (k + 1) % 5
+        span = (tau[k] + tau[later]) / 2
+        np.testing.assert_allclose(rate * span, v[later] - v[k])
+    assert [len(ends) for ends in meetings(1, periodic=periodic)] == [0, 0]

@@ -13,11 +13,11 @@ from typing import ClassVar
 import numpy as np
 from numpy.typing import ArrayLike
 
-from kerfpath._arrays import Array, floats, freeze, positive, scalar
+from kerfpath._arrays import Array, Ints, floats, freeze, positive, scalar
 from kerfpath._told import told
 from kerfpath.errors import InputError
 
-__all__ = ["AccelerationLimit", "Limits", "RateLimit", "VelocityLimit"]
+__all__ = ["AccelerationLimit", "Limits", "RateLimit", "VelocityLimit", "meetings", "rates_of"]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -123,3 +123,29 @@ class Limits:
         """Return the limits with none on the acceleration."""
         free = np.full(len(self.acceleration.bound), np.inf)
         return replace(self, acceleration=AccelerationLimit(bound=free))
+
+
+def meetings(intervals: int, *, periodic: bool = False) -> tuple[Ints, Ints]:
+    """Return the intervals before and after each node where two meet, (M,) each.
+
+    With `periodic` the last one is followed by the first.
+    """
+    before = np.arange(intervals if periodic and intervals > 1 else intervals - 1)
+    return before, (before + 1) % intervals
+
+
+def rates_of(dq: Array, tau: Array, *, periodic: bool = False) -> tuple[Array, Array]:
+    """Return the velocities (K-1, n) and accelerations (M, n) of a motion in rad and s.
+
+    Parameters
+    ----------
+    dq : (K-1, n) rad
+        Joint increments.
+    tau : (K-1,) s
+        Time of each interval.
+    periodic : bool
+        Whether the last interval is followed by the first.
+    """
+    v, (before, after) = dq / tau[:, None], meetings(len(tau), periodic=periodic)
+    span = (tau[before] + tau[after]) / 2
+    return v, (v[after] - v[before]) / span[:, None]

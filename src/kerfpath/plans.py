@@ -16,6 +16,7 @@ from kerfpath.comfort import measures
 from kerfpath.contour import Contour
 from kerfpath.errors import InputError
 from kerfpath.kernels import metric
+from kerfpath.limits import rates_of
 from kerfpath.options import PlanOptions
 from kerfpath.robots import Robot
 from kerfpath.search import METRIC_CODES, Metric, ObjectiveKind
@@ -265,16 +266,18 @@ class Plan:
         return freeze(metric.increments(self.q, self.robot.endless))
 
     @property
+    def _rates(self) -> tuple[Array, Array]:
+        return rates_of(self.increments, np.diff(self.time))
+
+    @property
     def velocity_share(self) -> Array:
         """Joint speed between nodes over its limit, (K-1, n), signed."""
-        return freeze(self.increments / np.diff(self.time)[:, None] / self.robot.speed_limits()[0])
+        return freeze(self._rates[0] / self.robot.speed_limits()[0])
 
     @property
     def acceleration_share(self) -> Array:
         """Second difference at the inner nodes over the acceleration limit, (K-2, n), signed."""
-        tau = np.diff(self.time)[:, None]
-        change = np.diff(self.increments / tau, axis=0)
-        return freeze(change / ((tau[1:] + tau[:-1]) / 2) / self.robot.speed_limits()[1])
+        return freeze(self._rates[1] / self.robot.speed_limits()[1])
 
     @property
     def criteria(self) -> Criteria:

@@ -22,7 +22,7 @@ from scipy import sparse
 
 from kerfpath._arrays import Array, Ints, floats, freeze, positive
 from kerfpath.errors import InputError
-from kerfpath.limits import Limits
+from kerfpath.limits import Limits, meetings, rates_of
 from kerfpath.plans import Feed
 
 __all__ = ["feed", "retime"]
@@ -134,12 +134,10 @@ def feed(
     if at_speed.all():
         return Feed(full=full, slowest=1.0, node=-1, joint=-1, limit=None)
     k = int(np.argmin(dt / tau))
-    speed = np.abs(dq[k] / tau[k]) / velocity
-    change = np.zeros_like(speed)
-    for before, after in zip(*_meetings(len(dq), periodic), strict=True):
-        if k in (before, after):
-            rate = (dq[after] / tau[after] - dq[before] / tau[before]) / acceleration
-            change = np.maximum(change, np.abs(rate) * 2 / (tau[before] + tau[after]))
+    v, a = (np.abs(rates) for rates in rates_of(dq, tau, periodic=periodic))
+    before, after = meetings(len(dq), periodic=periodic)
+    speed = v[k] / velocity
+    change = (a[(before == k) | (after == k)] / acceleration).max(axis=0, initial=0.0)
     fast = speed.max() >= change.max()
     return Feed(
         full=full,
@@ -162,18 +160,12 @@ def _inputs(dq: ArrayLike, dt: ArrayLike, limits: Limits) -> tuple[Array, Array,
     return dq, dt, limits.velocity.usable, limits.acceleration.usable
 
 
-def _meetings(intervals: int, periodic: bool) -> tuple[Ints, Ints]:
-    """Return the intervals before and after each node where two meet."""
-    before = np.arange(intervals if periodic and intervals > 1 else intervals - 1)
-    return before, (before + 1) % intervals
-
-
 def _rows(step: Array, least: Array, periodic: bool) -> _Rows:
     """Return the acceleration limits that can bind; step (K-1, n) s^2 is dq over acceleration.
 
     Of the rows of one node, the one with the larger b and the smaller a implies the other.
     """
-    before, after = _meetings(len(step), periodic)
+    before, after = meetings(len(step), periodic=periodic)
     a = np.hstack([step[before], -step[before]])
     b = np.hstack([step[after], -step[after]])
     early, late = least[before, None], least[after, None]

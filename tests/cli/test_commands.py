@@ -36,14 +36,15 @@ def planned(folder):
     return json.loads(result.stdout)
 
 
+@pytest.fixture(scope="module")
+def fastest(folder):
+    """What `speed` says of the first contour."""
+    return json.loads(run("speed", "small.toml", "--json", cwd=folder).stdout)["contours"][0]
+
+
 def test_the_demo_leaves_all_four_files(tmp_path):
-    command = [
-        Path(sys.executable).parent / "kerfpath",
-        "demo",
-        "--out",
-        tmp_path / "deep" / "demo",
-    ]
-    result = subprocess.run(command, capture_output=True, text=True, check=True)
+    result = run("demo", "--out", tmp_path / "deep" / "demo")
+    assert result.returncode == 0, result.stderr
     assert result.stdout.count("passed") == 7
     assert "Collisions are not checked" in result.stdout
     names = {p.name for p in (tmp_path / "deep" / "demo").iterdir()}
@@ -84,7 +85,7 @@ def test_the_trajectory_is_the_plan_in_degrees_and_millimetres(planned, folder):
 
 def test_plan_json_carries_everything_and_round_trips(planned, folder):
     data = json.loads((folder / "small-plan" / "plan.json").read_text())
-    assert data["schema"] == 4
+    assert data["schema"] == 5
     assert data["robot"]["id"] == "abb_irb4600_60_205"
     assert data["job"]["tool"]["head"] == "laser-head-45"
     assert np.array(data["T_flange_tip"]).shape == (4, 4)
@@ -180,7 +181,7 @@ def test_a_part_out_of_reach_is_reported_without_a_program(folder):
     assert run("post", "far-plan/plan.json", cwd=folder).returncode == 1
 
 
-def test_a_contour_that_is_too_fast_is_told_how_fast_it_could_be(folder):
+def test_a_contour_that_is_too_fast_is_told_how_fast_it_could_be(folder, fastest):
     (folder / "fast.toml").write_text(SMALL.replace("speed_m_min = 3", "speed_m_min = 30", 1))
     result = run("plan", "fast.toml", cwd=folder)
     assert result.returncode == 1
@@ -190,9 +191,8 @@ def test_a_contour_that_is_too_fast_is_told_how_fast_it_could_be(folder):
     )  # fmt: skip
     assert 3 < float(told[1]) < float(told[2]) < 30
     # As `speed` has it, and the limits of a robot cannot be raised.
-    found = json.loads(run("speed", "small.toml", "--json", cwd=folder).stdout)["contours"][0]
     for shown, key in ((told[1], "on_grid_m_min"), (told[2], "fastest_m_min")):
-        assert float(shown) <= found[key] == pytest.approx(float(shown), rel=1e-3)
+        assert float(shown) <= fastest[key] == pytest.approx(float(shown), rel=1e-3)
     assert "no eta_velocity and no eta_acceleration up to 1 is enough there" in result.stdout
     assert "a finer gamma_step_deg or the refinement may do more" in result.stdout
     data = json.loads((folder / "fast-plan" / "plan.json").read_text())["contours"][0]
@@ -201,11 +201,10 @@ def test_a_contour_that_is_too_fast_is_told_how_fast_it_could_be(folder):
     assert "a path exists up to" in (folder / "fast-plan" / "report.html").read_text()
 
 
-def test_what_a_message_advises_can_be_done(folder):
+def test_what_a_message_advises_can_be_done(folder, fastest):
     """A little over the fastest speed of the grid: either remedy, as it is printed, is one."""
     grid = SMALL.replace("[plan]", "[plan]\nrefine = false")
-    found = json.loads(run("speed", "small.toml", "--json", cwd=folder).stdout)["contours"][0]
-    over = found["on_grid_m_min"] * 1.0001
+    over = fastest["on_grid_m_min"] * 1.0001
     asked = grid.replace("speed_m_min = 3", f"speed_m_min = {over!r}", 1)
     (folder / "over.toml").write_text(asked)
     result = run("plan", "over.toml", "--out", "advised", cwd=folder)
@@ -255,17 +254,15 @@ def test_an_older_program_in_the_folder_is_pointed_out(folder):
     assert "is from an earlier run and does not belong to this plan" in result.stderr
 
 
-def test_speed_names_the_fastest_and_what_binds(folder):
+def test_speed_names_the_fastest_and_what_binds(folder, fastest):
     result = run("speed", "small.toml", cwd=folder)
     assert result.returncode == 0, result.stderr
     assert re.search(r"hole 10 +3 +\d+\.\d+ +\d+\.\d+ +\d+ +joint \d acceleration", result.stdout)
-    data = json.loads(run("speed", "small.toml", "--json", cwd=folder).stdout)
-    hole = data["contours"][0]
-    assert hole["fastest_m_min"] > hole["on_grid_m_min"] > hole["asked_m_min"]
-    assert hole["asked_m_min"] == pytest.approx(3)
+    assert fastest["fastest_m_min"] > fastest["on_grid_m_min"] > fastest["asked_m_min"]
+    assert fastest["asked_m_min"] == pytest.approx(3)
     # A job at that speed is feasible, one a little over it is not, unless gamma leaves its grid.
     for share, refine, code in ((0.999, "false", 0), (1.01, "false", 1), (1.01, "true", 0)):
-        asked = f"speed_m_min = {hole['on_grid_m_min'] * share}"
+        asked = f"speed_m_min = {fastest['on_grid_m_min'] * share}"
         edge = SMALL.replace("speed_m_min = 3", asked, 1)
         (folder / "edge.toml").write_text(edge.replace("[plan]", f"[plan]\nrefine = {refine}"))
         assert run("plan", "edge.toml", "--out", "edge", cwd=folder).returncode == code
@@ -371,8 +368,8 @@ def test_help_teaches():
         (("plan", "."), ["got a folder"]),
         (("post", "none.json"), ["none.json", "cannot be read"]),
         (("post", "small.toml"), ["not a plan.json"]),
-        (("post", "list.json"), ['expected a plan.json with schema 4, got "list"']),
-        (("post", "old.json"), ["schema 4, got 0", "plan the job again"]),
+        (("post", "list.json"), ['expected a plan.json with schema 5, got "list"']),
+        (("post", "old.json"), ["schema 5, got 0", "plan the job again"]),
         (("post", "short.json"), ["the key kerfpath is missing", "plan the job again"]),
         (("audit", "none.json"), ["cannot be read"]),
         (("audit", "small-plan/plan.json", "--job", "none.toml"), ["no such file"]),
@@ -393,7 +390,7 @@ def test_help_teaches():
 def test_bad_input_is_one_line_and_nothing_is_written(planned, folder, arguments, words):
     (folder / "list.json").write_text("[]")
     (folder / "old.json").write_text('{"schema": 0}')
-    (folder / "short.json").write_text('{"schema": 4}')
+    (folder / "short.json").write_text('{"schema": 5}')
     (folder / "wrong-loop.toml").write_text(SMALL.replace("skin/hole16", "skin/hole99"))
     (folder / "slow.toml").write_text(SMALL.replace("speed_m_min = 3", "speed_m_min = -3", 1))
     before = sorted(folder.iterdir())

@@ -29,11 +29,6 @@ TABLE = "cut_skin_outer.csv"
 GOLDEN = CASE.golden[TABLE]
 
 
-@pytest.fixture(scope="module")
-def program():
-    return CASE.program
-
-
 def table(source):
     return text_of(post(source, "csv"))
 

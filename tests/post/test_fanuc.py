@@ -54,16 +54,6 @@ MEASURED = """
 controller, measured by others: source in kerfpath.post.fanuc._axes."""
 
 
-@pytest.fixture(scope="module")
-def cell():
-    return CASE.cell
-
-
-@pytest.fixture(scope="module")
-def program():
-    return CASE.program
-
-
 def read(program, options=OPTIONS):
     """What the listings of a program say; post() has compared them with it."""
     return CASE.read(CASE.post(program, options), program.robot, options)

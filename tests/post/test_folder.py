@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 from kerfpath import InputError
-from kerfpath.post import MANIFEST, replace_program, write_files
+from kerfpath.post import MANIFEST, replace_program, write_files, write_program
 
 LONG = {"cut.src": "calls a and b", "a.src": "a", "b.src": "b", "sub/c.src": "c"}
 SHORT = {"cut.src": "calls a", "a.src": "a anew"}
@@ -103,3 +103,15 @@ def test_all_files_are_written_or_none(folder):
         write_files(folder, {"cut.src": "new", "a.src": "new", "z.src": "new"})
     assert (folder / "cut.src").read_text() == LONG["cut.src"]
     assert names(folder) == {*MINE, *LONG, MANIFEST}
+
+
+def test_writing_replaces_the_file_at_one_stroke(tmp_path):
+    target = tmp_path / "cut.mod"
+    write_program(target, "first\n")
+    write_program(target, "second\n")
+    assert target.read_bytes() == b"second\n"
+    assert list(tmp_path.iterdir()) == [target]
+    for bad in (tmp_path / "missing" / "cut.mod", tmp_path, target / "x.mod", ""):
+        with pytest.raises(InputError, match="cannot write the program"):
+            write_program(bad, "text")
+    assert list(tmp_path.iterdir()) == [target]

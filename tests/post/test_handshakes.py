@@ -150,8 +150,8 @@ def test_handshakes_belong_where_the_robot_stands_with_the_laser_off():
 
 def test_a_number_in_a_remark_is_no_number_of_the_program():
     made = program("urscript")
-    told = with_steps(made, [Comment("1E100"), *made.steps])
-    post(told, "urscript", settings("urscript"))
+    remarked = with_steps(made, [Comment("1E100"), *made.steps])
+    post(remarked, "urscript", settings("urscript"))
     text = post(made, "urscript", settings("urscript"))["cut_one.script"]
     large = {"cut_one.script": text.replace("sleep(0.100)", "sleep(1E100)")}
     with pytest.raises(InputError, match="larger than any number of a program"):

@@ -43,16 +43,6 @@ def reads_back(program, options=IN_PULSES):
 ARMS = [name for name in robot_ids() if name.startswith("yaskawa")]
 
 
-@pytest.fixture(scope="module")
-def cell():
-    return CASE.cell
-
-
-@pytest.fixture(scope="module")
-def program():
-    return CASE.program
-
-
 def counts_what_it_holds(files):
     """Check from the text alone: counts, names, jobs, and that every used position is there."""
     for name, text in files.items():

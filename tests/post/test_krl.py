@@ -30,13 +30,8 @@ OUTPUTS, golden, reads_back, found_codes = CASE.settings, CASE.golden, CASE.read
 
 
 @pytest.fixture(scope="module")
-def kuka():
-    return CASE.cell[0]
-
-
-@pytest.fixture(scope="module")
-def program():
-    return CASE.program
+def arm(cell):
+    return cell[0]
 
 
 # The text.
@@ -54,8 +49,8 @@ def test_positions_are_a_about_z_then_b_about_y_then_c_about_x(program):
     np.testing.assert_allclose(np.array(Rz) @ Ry @ Rx, expected, atol=1e-7)  # six decimals of deg
 
 
-def test_speed_and_zone_are_written_only_where_they_change(kuka):
-    made = hand_plan(arc(count=30), kuka, *frames(), speed=0.12)
+def test_speed_and_zone_are_written_only_where_they_change(arm):
+    made = hand_plan(arc(count=30), arm, *frames(), speed=0.12)
     text = post(build_program([made]), "krl", OUTPUTS)["cut_skin_outer.src"]
     assert text.count("$VEL.CP=") == 3  # to the start, cut, back
     assert text.count("$APO.CDIS=") == 1
@@ -73,14 +68,14 @@ def test_tool_and_base_by_number_leave_the_frames_to_the_controller(program):
     assert read.T_base_part is None
 
 
-def test_a_cut_straight_down_with_the_beam_ahead_reads_back(kuka):
+def test_a_cut_straight_down_with_the_beam_ahead_reads_back(arm):
     """B is 90 deg there, so that A and C turn about the same axis: C is 0."""
     points = np.c_[np.zeros(8), np.zeros(8), np.linspace(0, -0.1, 8)]
     contour = Contour(points, np.tile([1.0, 0.0, 0.0], (8, 1)), name="skin/outer")
     placement, tool = np.eye(4), np.eye(4)
     placement[:3, 3] = 1.2, 0.1, 1.2
     tool[2, 3] = 0.2
-    files, _ = reads_back(build_program([hand_plan(contour, kuka, tool, placement)]))
+    files, _ = reads_back(build_program([hand_plan(contour, arm, tool, placement)]))
     assert files["cut_skin_outer.src"].count(",B 90.000000,C 0.000000,S 2,") == 9
 
 
@@ -92,16 +87,16 @@ def test_arcs_are_written_as_circ(program):
 # Axes, Status and Turn.
 
 
-def test_the_home_of_the_manuals_has_status_and_turn_2(kuka):
+def test_the_home_of_the_manuals_has_status_and_turn_2(arm):
     home = np.radians([[0.0, -90, 90, 0, 0, 0]])
-    assert status_and_turn(kuka, joints_from_axes(kuka, home)).tolist() == [[2, 2]]
-    T = kuka.forward(joints_from_axes(kuka, home))[0]
+    assert status_and_turn(arm, joints_from_axes(arm, home)).tolist() == [[2, 2]]
+    T = arm.forward(joints_from_axes(arm, home))[0]
     np.testing.assert_allclose(T[:3, :3] @ [0, 0, 1], [1, 0, 0], atol=1e-12)
 
 
-def test_positive_a1_and_a6_turn_clockwise_seen_against_their_axes(kuka):
+def test_positive_a1_and_a6_turn_clockwise_seen_against_their_axes(arm):
     home = np.radians([0.0, -90, 90, 0, 0, 0])
-    T = kuka.forward(joints_from_axes(kuka, home + np.radians(90) * np.eye(6)[[0, 5]]))
+    T = arm.forward(joints_from_axes(arm, home + np.radians(90) * np.eye(6)[[0, 5]]))
     np.testing.assert_allclose(T[0, :3, 2], [0, -1, 0], atol=1e-12)
     np.testing.assert_allclose(T[1, :3, 0], [0, -1, 0], atol=1e-12)  # it pointed down before
 
@@ -145,15 +140,15 @@ def test_the_elbow_bit_turns_over_at_the_stretched_arm():
     np.testing.assert_array_equal(status_and_turn(arm, q)[:, 0] & 2, [0, 0, 2, 2])
 
 
-def test_turn_ignores_rounding_and_counts_endless_axes_once(kuka):
+def test_turn_ignores_rounding_and_counts_endless_axes_once(arm):
     q = np.radians([[-1e-12, 0, 0, 0, -1e-12, 190], [0, 0, 0, 0, 0, -190], [0, 0, 0, 0, 0, 720]])
-    np.testing.assert_array_equal(status_and_turn(kuka, q)[:, 1], [0, 32, 0])
-    endless = kuka.with_limits(endless=np.arange(6) == 5)
+    np.testing.assert_array_equal(status_and_turn(arm, q)[:, 1], [0, 32, 0])
+    endless = arm.with_limits(endless=np.arange(6) == 5)
     np.testing.assert_array_equal(status_and_turn(endless, q)[:, 1], [32, 0, 0])
 
 
-def test_a_planned_circle_with_an_endless_axis_reads_back(circle, kuka, tool, placement):
-    endless = kuka.with_limits(endless=np.arange(6) == 5, acceleration=np.full(6, 50.0))
+def test_a_planned_circle_with_an_endless_axis_reads_back(circle, arm, tool, placement):
+    endless = arm.with_limits(endless=np.arange(6) == 5, acceleration=np.full(6, 50.0))
     made = plan(
         circle, endless, tool=tool, placement=placement, speed=0.1, gamma_step=np.radians(10)
     )
@@ -166,9 +161,9 @@ def test_a_planned_circle_with_an_endless_axis_reads_back(circle, kuka, tool, pl
 
 
 @pytest.fixture(scope="module")
-def long(kuka):
+def long(arm):
     plans = [
-        hand_plan(arc(name, count=count), kuka, *frames())
+        hand_plan(arc(name, count=count), arm, *frames())
         for name, count in (("a contour with a long name", 400), ("hole", 20), ("Hole", 30))
     ]
     return build_program(plans, name="a program with a very long name", gas_lead=0.3)
@@ -214,11 +209,11 @@ def test_preflight_refuses_a_speed_beyond_that_of_the_machine_data(program):
     assert set(found_codes(program, "error", slow)) == {"speed"}
 
 
-def test_preflight_refuses_frames_that_are_not_the_controllers(program, kuka):
+def test_preflight_refuses_frames_that_are_not_the_controllers(program, arm):
     turned = np.eye(4)
     turned[:3, :3] = Rotation.from_euler("z", 90, degrees=True).as_matrix()
-    for arm in (replace(kuka, T_end_flange=turned), replace(kuka, T_base_foot=turned)):
-        issues = list(CASE.language.check(replace(program, robot=arm), OUTPUTS))
+    for other in (replace(arm, T_end_flange=turned), replace(arm, T_base_foot=turned)):
+        issues = list(CASE.language.check(replace(program, robot=other), OUTPUTS))
         assert [(i.level, i.code) for i in issues] == [("error", "frames")]
         assert "[1173.0, 0.0, 1650.0] mm" in issues[0].message
 

@@ -202,12 +202,24 @@ def test_every_setting_says_what_it_expects(case):
 
 
 @cases(*OUTPUTS)
+def test_settings_of_a_dialect_inherit_the_ports(case):
+    kind = case.language.settings
+    own = type("Own", (kind,), {"__annotations__": {"macro": str}, "macro": "x"})
+    assert list(own.model_fields) == [*kind.model_fields, "macro"]
+    assert own(**case.options).model_dump() == {**case.settings.model_dump(), "macro": "x"}
+
+
+@cases(*OUTPUTS)
 def test_what_is_switched_has_an_output_of_its_own(case):
     program = build_program([case.small], gas_lead=0.3, lead_time=0.0)
     laser = case.settings.laser_output
     for gas in (None, laser):
         wired = case.settings.model_copy(update={"gas_output": gas})
         assert case.codes(program, "error", wired) == ["output"]
+    assumed = case.language.assumed.get("laser_output", laser)
+    unnamed = {"laser_output": None} if case.language.assumed else {}
+    wired = case.settings.model_copy(update={"gas_output": assumed, **unnamed})
+    assert case.codes(program, "error", wired) == ["output"], "nor is it the one assumed"
 
 
 @cases(*OUTPUTS)

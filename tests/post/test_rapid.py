@@ -1,4 +1,4 @@
-"""The neutral program, its preflight, the RAPID formatter, and the reader that checks it."""
+"""ABB RAPID: what is written, how it reads back, and what is refused."""
 
 import re
 from dataclasses import replace
@@ -8,50 +8,27 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
-from tests.post.cases import CASES, kinds_of
+from tests.post.cases import CASES
 
 from kerfpath import InputError, plan, robot
 from kerfpath.post import (
-    Comment,
     LinearMove,
-    ReadWait,
     Switch,
-    Wait,
     build_program,
     deviations,
     post,
-    preflight,
     read_program,
-    write_program,
 )
 from kerfpath.post.rapid import RapidSettings, axes_from_joints, confdata, joints_from_axes
-from programs import arc, changed, codes, edited, hand_plan, read_text, text_of, with_steps
+from programs import arc, codes, edited, hand_plan, read_text, text_of
 
 CASE = CASES["rapid"]
 MODULE = "cut_skin_outer.mod"
 GOLDEN = CASE.golden[MODULE]
 
 
-@pytest.fixture(scope="module")
-def cell():
-    return CASE.cell
-
-
-@pytest.fixture(scope="module")
-def small():
-    return CASE.small
-
-
-@pytest.fixture(scope="module")
-def program():
-    return CASE.program
-
-
 def moves_of(section, kind):
     return [step for step in section.steps if isinstance(step, kind)]
-
-
-# The text.
 
 
 # The law: what is read back is what was planned.
@@ -224,25 +201,6 @@ def test_a_program_for_a_parallel_rod_arm_reads_back(cell):
     assert axis_3 == pytest.approx(np.degrees(q_in[1] + q_in[2]), abs=1e-6)
 
 
-# Preflight.
-
-
-def test_a_good_program_has_only_the_warning_about_air_moves(program):
-    assert [(i.level, i.code) for i in preflight(program)] == [("warning", "air-moves")]
-
-
-@pytest.mark.parametrize(
-    ("change", "code"),
-    [
-        ({"name": "a" * 33}, "name-length"),
-        ({"name": "main"}, "name-collision"),
-        ({"sections": ()}, "empty"),
-    ],
-)
-def test_preflight_refuses_what_concerns_the_whole_program(program, change, code):
-    assert codes(replace(program, **change), "error") == [code]
-
-
 @pytest.mark.parametrize(
     ("settings", "code"),
     [
@@ -267,147 +225,9 @@ def test_gas_flows_from_before_the_start_to_the_end_and_needs_an_output(small):
     assert [s.signal for s in read.moves[1].switches] == ["gas", "laser"]
 
 
-@pytest.mark.parametrize(
-    ("number", "change", "code"),
-    [
-        (2, {"speed": 0.0}, "speed"),
-        (2, {"speed": -0.1}, "speed"),
-        (2, {"speed": float("nan")}, "speed"),
-        (1, {"speed": 1.5}, "speed"),
-        (2, {"zone": -1e-3}, "zone"),
-        (2, {"switches": (Switch(signal="laser", on=True, lead_time=0.6),)}, "lead-time"),
-    ],
-)
-def test_preflight_refuses_numbers_out_of_range(program, number, change, code):
-    assert codes(changed(program, number, **change), "error") == [code]
-
-
-def test_preflight_refuses_a_joint_step_of_half_a_turn(program):
-    q = program.sections[0].steps[4].q + 3.5 * np.eye(6)[3]
-    bad = changed(program, 4, q=q)
-    issues = [i for i in preflight(bad) if i.code == "joint-step"]
-    assert [i.place for i in issues] == ["skin_outer, move 3", "skin_outer, move 4"]
-    assert "joint 4 turns 2" in issues[0].message
-
-
-def test_preflight_refuses_a_turn_of_the_tool_by_a_right_angle(program):
-    T = program.sections[0].steps[-1].T_part_tip.copy()
-    T[:3, :3] = T[:3, :3] @ Rotation.from_euler("z", 91, degrees=True).as_matrix()
-    assert codes(changed(program, -1, T_part_tip=T), "error") == ["orientation-step"]
-
-
-def test_preflight_refuses_axes_beyond_their_limits(program):
-    upper = program.robot.upper.copy()
-    upper[1] = program.sections[0].steps[2].q[1] - 0.01
-    tight = replace(program, robot=program.robot.with_limits(upper=upper))
-    issues = [i for i in preflight(tight) if i.code == "axis-limit"]
-    assert issues[0].place.startswith("skin_outer, move")
-    assert all("joint 2 high" in i.message for i in issues)
-
-
-def test_preflight_checks_the_sum_that_a_parallel_rod_bounds(cell):
-    _, tool, placement = cell
-    program = build_program([hand_plan(arc(), robot("abb_irb2400_155"), tool, placement)])
-    q = program.sections[0].steps[1].q.copy()
-    q[1:3] = np.radians([50, 40])
-    issues = [i for i in preflight(changed(program, 1, q=q)) if i.code == "axis-limit"]
-    assert "joint 2 + joint 3 high: 25.000 deg" in issues[0].message
-
-
-def test_preflight_refuses_a_laser_that_is_not_switched_in_turn(program):
-    steps = list(program.sections[0].steps)
-    start, end = steps[2], steps[-2]
-    orders = {
-        "still on": [*steps[:-2], replace(end, switches=()), steps[-1]],
-        "twice on": [*steps[:5], replace(steps[5], switches=start.switches), *steps[6:]],
-        "joint move": [*steps[:5], steps[1], *steps[5:]],
-    }
-    for order in orders.values():
-        assert "laser-order" in codes(with_steps(program, order), "error")
-    assert codes(with_steps(program, [*steps[:3], Comment("x"), *steps[3:]]), "error") == []
-
-
-def test_preflight_warns_of_zones_that_overlap(program):
-    wide = program
-    for number in range(3, 9):
-        wide = changed(wide, number, zone=0.02)
-    found = [i for i in preflight(wide) if i.code == "zone-overlap"]
-    assert len(found) == 1
-    assert found[0].level == "warning"
-    assert "at 6 of 10 targets" in found[0].message  # all inner nodes, none of the stops
-
-
-def test_zones_are_halved_until_they_do_not_overlap(small):
-    program = build_program([small], zone=0.1)
-    gaps = np.linalg.norm(np.diff(small.contour.points, axis=0), axis=1)
-    zones = [move.zone for move in program.sections[0].moves[2:-1]]
-    assert zones[-1] == 0
-    for k, zone in enumerate(zones[:-1]):
-        room = min(gaps[k], gaps[k + 1]) / 2
-        assert room / 2 < zone <= room
-        assert np.log2(0.1 / zone) == round(np.log2(0.1 / zone))
-    assert codes(program) == ["air-moves"]
-
-
-def test_preflight_warns_of_a_lead_longer_than_its_move(small):
-    found = [i for i in preflight(build_program([small], lead_time=0.4)) if i.code == "short-lead"]
-    assert [i.place for i in found] == ["skin_outer, move 8"]
-    assert "400 ms ahead" in found[0].message
-
-
-def test_preflight_warns_where_turning_the_tool_would_slow_it_down(cell):
-    quick = hand_plan(arc(), *cell, speed=2.0)
-    assert "turning-speed" in codes(build_program([quick], lead_time=0.0), "warning")
-
-
 def test_what_preflight_refuses_is_not_written(program):
     with pytest.raises(InputError, match="tool: 't-laser' is no name in ABB RAPID"):
         post(program, settings=RapidSettings(tool_name="t-laser"))
-
-
-# Bad input.
-
-
-def test_plans_that_do_not_belong_together_are_refused(cell, small):
-    arm, tool, placement = cell
-    moved = placement.copy()
-    moved[0, 3] += 0.01
-    other = hand_plan(arc("hole"), arm, tool, moved)
-    with pytest.raises(InputError, match=r"'skin/outer' and 'hole' differ in placement"):
-        build_program([small, other])
-    with pytest.raises(InputError, match="differ in robot"):
-        build_program([small, replace(small, robot=replace(arm, id="another"))])
-    with pytest.raises(InputError, match="at least one plan"):
-        build_program([])
-
-
-def test_joints_that_miss_the_contour_are_refused(small):
-    with pytest.raises(InputError, match=r"node 3: the planned joints put the tool tip \d"):
-        build_program([replace(small, q=small.q + np.where(np.arange(8) == 3, 1e-3, 0)[:, None])])
-
-
-def test_a_retract_out_of_reach_says_to_lower_it(small):
-    with pytest.raises(InputError, match=r"back off by 5000 mm .* lower the retract"):
-        build_program([small], retract=5.0)
-    with pytest.raises(InputError, match="retract: expected a number above 0 m"):
-        build_program([small], retract=0.0)
-
-
-def test_an_unknown_language_lists_those_known(small):
-    with pytest.raises(InputError, match=r"'basic' is not known; expected .*rapid"):
-        post([small], "basic")
-
-
-def test_writing_replaces_the_file_at_one_stroke(tmp_path):
-    target = tmp_path / "cut.mod"
-    write_program(target, "first\n")
-    write_program(target, "second\n")
-    assert target.read_bytes() == b"second\n"
-    assert list(tmp_path.iterdir()) == [target]
-    for bad in (tmp_path / "missing" / "cut.mod", tmp_path, target / "x.mod", ""):
-        with pytest.raises(InputError, match="cannot write the program"):
-            write_program(bad, "text")
-    assert list(tmp_path.iterdir()) == [target]
 
 
 @pytest.mark.parametrize(
@@ -461,44 +281,6 @@ def test_the_reader_refuses_a_module_without_a_tool():
     lines = [line for line in GOLDEN.splitlines() if "tooldata" not in line]
     with pytest.raises(InputError, match="tool tLaser and work object wPart are not the module's"):
         read_text("\n".join(lines), robot("abb_irb4600_60_205"))
-
-
-def test_the_laser_is_off_along_micro_joints_and_waits_at_the_pierce(cell):
-    contour = replace(arc(), kind=kinds_of("picmmcoo"))
-    made = hand_plan(contour, *cell, speed=0.12)
-    program = build_program([made], pierce_time=0.4, lead_time=0.005)
-    assert codes(program, "error") == []
-    steps = read_text(text_of(post(program)), program.robot).sections[0].steps
-    moves, on, waits, switched = 0, False, [], []
-    for step in steps:
-        if isinstance(step, ReadWait):
-            waits.append((moves, on, step.time))
-            continue
-        switched.append(on)
-        moves += 1
-        for switch in step.switches:
-            on = switch.on
-    # Approach twice, then seven stretches of which two are micro joints, then the retract.
-    assert switched == [False, False, True, True, True, False, False, True, True, False]
-    assert waits == [(2, True, 0.4)]
-
-
-def test_preflight_refuses_waits_on_the_fly_or_without_an_end(program):
-    steps = list(program.sections[0].steps)
-    assert "wait" in codes(with_steps(program, [*steps[:6], Wait(time=1.0), *steps[6:]]), "error")
-    for time in (0.0, np.inf, 400.0):
-        odd = with_steps(program, [*steps[:3], Wait(time=time), *steps[3:]])
-        assert "wait" in codes(odd, "error")
-
-
-def test_a_contour_with_times_of_its_own_is_cut_in_them(cell):
-    contour = replace(arc(count=40), speed_share=np.linspace(1, 0.5, 40))
-    timed = contour.resample(dt=0.02, speed=0.12)
-    made = hand_plan(timed, *cell, speed=0.12)
-    made = replace(made, time=timed.time)
-    moves = moves_of(build_program([made]).sections[0], LinearMove)[1:-1]
-    np.testing.assert_allclose([m.speed for m in moves], np.diff(timed.s) / np.diff(timed.time))
-    assert moves[-1].speed < 0.6 * moves[0].speed
 
 
 @pytest.fixture(scope="module")

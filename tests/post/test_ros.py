@@ -26,13 +26,8 @@ GOLDEN = CASE.golden
 
 
 @pytest.fixture(scope="module")
-def arm():
-    return CASE.cell[0]
-
-
-@pytest.fixture(scope="module")
-def program():
-    return CASE.program
+def arm(cell):
+    return cell[0]
 
 
 @pytest.fixture(scope="module")
@@ -118,7 +113,7 @@ def test_targets_are_reached_when_planned_and_points_follow_the_plan(two):
         if isinstance(step, JointMove):
             dq = (step.q - steps[k].q)[None]
             least = least_time(dq, *two.robot.speed_limits())[0]
-            # A quarter of the speed, though more is told to those who gain it in full.
+            # A quarter of the speed, though more is given to those who gain it in full.
             assert step.duration == pytest.approx(least / 0.25, rel=1e-12)
             assert took[k] == pytest.approx(step.duration, rel=1e-12)
         else:

@@ -32,16 +32,6 @@ def of(text):
     return np.array([float(word) for word in re.findall(r"-?\d+\.\d+", text)])
 
 
-@pytest.fixture(scope="module")
-def cell():
-    return CASE.cell
-
-
-@pytest.fixture(scope="module")
-def program():
-    return CASE.program
-
-
 def script(source, settings=GAS):
     return text_of(post(source, "urscript", settings))
 

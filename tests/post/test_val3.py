@@ -51,16 +51,6 @@ NAMESPACES = {suffix: f"http://www.staubli.com/robotics/VAL3/{space}" for suffix
     (".pjx", "Project/3"), (".dtx", "Data/2"), (".pgx", "Program/2"))}  # fmt: skip
 
 
-@pytest.fixture(scope="module")
-def cell():
-    return CASE.cell
-
-
-@pytest.fixture(scope="module")
-def program():
-    return CASE.program
-
-
 def declares_what_it_uses(files):
     """Check by another parser: namespaces, files, sizes, and that every used datum is there."""
     roots = {name: ET.fromstring(text) for name, text in files.items()}

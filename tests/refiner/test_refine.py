@@ -173,7 +173,7 @@ def _random_model(rng, metric, *, cap=np.inf):
         limits=Limits.of(velocity, np.full(n, 9.0)),
         periodic=bool(rng.random() < 0.5),
     )
-    acceleration = np.abs(rates.accelerations(dq)).max(0) * 1.05
+    acceleration = np.abs(rates.of(dq)[1]).max(0) * 1.05
     return model, replace(rates, limits=Limits.of(velocity, acceleration))
 
 

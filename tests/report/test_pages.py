@@ -325,7 +325,7 @@ def test_a_failed_report_opens_at_the_failed_contour_and_says_first_what_to_do(
     first = head[head.index("What to do first") : head.index('<dl class="facts">')]
     assert first.index("contour-2") < first.index(advice) < first.index("contour-3")
     assert "tool tip, node 3" in first
-    assert "path breaks at node 7): cut slower, or give way on a limit: slow down" in first
+    assert "path breaks at node 7): cut slower, or relax a limit: slow down" in first
     assert "no way between &lt;holes&gt;" in first
     assert "What to do first" not in render("Part", [section])
     assert "not ready to be cut" in render("Part", [section], faults=["no program"])

@@ -85,4 +85,5 @@ def _bounds(q: Array, beyond: Array, there: Array, rate: Array) -> Array:
     count = min(NEIGHBOURS, len(q))
     moved, at = cKDTree(q * rate).query(there * rate, count, p=1)
     shape = (len(there), count)
-    return np.asarray((beyond[at].reshape(shape) - moved.reshape(shape)).max(axis=1))
+    bounds = beyond[np.asarray(at).reshape(shape)] - np.asarray(moved).reshape(shape)
+    return np.asarray(bounds.max(axis=1))

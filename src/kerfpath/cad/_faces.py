@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
-from functools import partial
+from functools import lru_cache, partial
 from pathlib import Path
 
 from OCP.BRepAdaptor import BRepAdaptor_Surface
@@ -20,6 +20,9 @@ from kerfpath.cad._skins import Skin, skins_of
 from kerfpath.cad._units import MM
 
 __all__ = ["part_of"]
+
+MESHES = 2
+"""Meshes of a part that are kept: one for its cell, one for its pictures."""
 
 SURFACES = {
     GeomAbs_SurfaceType.GeomAbs_Plane: "plane",
@@ -62,7 +65,7 @@ def part_of(path: Path, drawn: Drawn, gap: float) -> Part:
         loops=tuple(loops),
         notes=tuple(drawn.notes),
         _gap=gap,
-        _triangulate=partial(triangulate, drawn.shape),
+        _triangulate=lru_cache(MESHES)(partial(triangulate, drawn.shape)),
     )
 
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+from hashlib import sha256
 from pathlib import Path
 
 from kerfpath._arrays import scalar
@@ -11,6 +13,9 @@ from kerfpath.cad._units import GAP, require_unit
 from kerfpath.errors import InputError
 
 __all__ = ["content_of", "read"]
+
+KEPT = 4
+"""Parts that are kept for when a file of the same content is read again, those read last."""
 
 
 def read(path: str | Path, unit: str | None = None, *, gap: float = GAP) -> Part:
@@ -81,15 +86,23 @@ def _drawn(kind: str, path: Path, content: bytes, unit: str | None, gap: float) 
     from kerfpath.cad._shape import occt
     from kerfpath.cad._step import read_step
 
-    translate = read_step if kind == "STEP" else read_iges
-    try:
-        drawn = apart(translate, path.absolute(), unit, gap, size=len(content))
-        with occt():
-            return part_of(path, drawn, gap)
-    except InputError as error:
-        raise InputError(f"{path}: {error}") from None
+    key = (kind, sha256(content).digest(), unit, gap)
+    part = _kept.pop(key, None)
+    if part is None:
+        translate = read_step if kind == "STEP" else read_iges
+        try:
+            drawn = apart(translate, path.absolute(), unit, gap, size=len(content))
+            with occt():
+                part = part_of(path, drawn, gap)
+        except InputError as error:
+            raise InputError(f"{path}: {error}") from None
+    _kept[key] = part
+    while len(_kept) > KEPT:
+        _kept.pop(next(iter(_kept)), None)
+    return replace(part, path=path)
 
 
+_kept: dict[tuple[str, bytes, str | None, float], Part] = {}
 _KINDS = {
     ".step": "STEP",
     ".stp": "STEP",

@@ -17,7 +17,7 @@ __all__ = ["show_audit"]
 
 def show_audit(file: Path, job: Path | None, *, as_json: bool) -> bool:
     """Print the table of checks of each contour of a file; return whether all of them pass."""
-    found = _audited(file, job)
+    found = _run_audit(file, job)
     if as_json:
         print_json(
             {
@@ -62,7 +62,7 @@ def show_audit(file: Path, job: Path | None, *, as_json: bool) -> bool:
     return found.passed
 
 
-def _audited(file: Path, job: Path | None) -> AuditReport:
+def _run_audit(file: Path, job: Path | None) -> AuditReport:
     if file.suffix.lower() == ".json":
         with about(file):
             return audit_file(file, job)

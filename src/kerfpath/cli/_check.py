@@ -1,4 +1,4 @@
-"""`kerfpath check`: the bodies and pairs of a job's cell, and how its contours begin in it."""
+"""`kerfpath check`: print bodies and pairs of the cell of a job, and how contours begin."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""`kerfpath contours`: the loops of a drawing, by the names that jobs pick them by."""
+"""`kerfpath contours`: list the loops of a drawing by the names that jobs pick them by."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ __all__ = ["list_contours"]
 def list_contours(
     file: Path, unit: str | None, html: Path | None, *, everything: bool, as_json: bool
 ) -> None:
-    """Print the size of a part, and every loop's name, surface, length, edges and place."""
+    """Print the size of a part, and the name, surface, length, edges and place of every loop."""
     with busy(f"reading {file.name}"):
         part = read_drawing(file, unit=unit)
     main = [loop for loop in part.loops if not loop.skin and loop.side != "edge"]
@@ -27,7 +27,7 @@ def list_contours(
         with busy(f"drawing {html.name}"):
             write_program(html, _page(part, main))
     if as_json:
-        print_json(_as_json(part, html))
+        print_json(_contours_entry(part, html))
         return
     show_drawing(part)
     shown = part.loops if everything else main
@@ -86,7 +86,7 @@ def _page(part: Part, main: list[Loop]) -> str:
     return render_drawing(part.path.name, loops, mesh=part.mesh(), facts=facts, notes=part.notes)
 
 
-def _as_json(part: Part, html: Path | None) -> dict[str, object]:
+def _contours_entry(part: Part, html: Path | None) -> dict[str, object]:
     return drawing_entry(part) | {
         "html": None if html is None else str(html),
         "loops": [

@@ -36,7 +36,7 @@ def write_post(
         points = read_measured(measured)
         frame = placement_from_points(*points, most_residual=residual_mm / 1000)
         if not as_json:  # first of all: also where no program comes of it
-            for line in _in_words(frame, plan_file):
+            for line in _frame_lines(frame, plan_file):
                 (errors if output is None else out).print(line)
     name = _name(output, find_language(language))
     if name is not None and dry_share is not None:
@@ -47,7 +47,7 @@ def write_post(
             frame=frame,
         )  # fmt: skip
     except KerfpathError:
-        for line in _in_words(frame, plan_file) if as_json and frame is not None else ():
+        for line in _frame_lines(frame, plan_file) if as_json and frame is not None else ():
             errors.print(line)
         raise
     written: list[Path] = []
@@ -90,7 +90,7 @@ def write_post(
 
 
 def _name(output: Path | None, chosen: Language) -> str | None:
-    """Return the name of a program that is to be written to a file of the language's own suffix.
+    """Return the name of a program for a file with the suffix of its language, else None.
 
     Raises
     ------
@@ -119,7 +119,7 @@ def _name(output: Path | None, chosen: Language) -> str | None:
     return output.stem
 
 
-def _in_words(frame: MeasuredFrame, plan_file: Path) -> list[str]:
+def _frame_lines(frame: MeasuredFrame, plan_file: Path) -> list[str]:
     """Return lines for people: residuals, distance from the planned placement, and the frame."""
     residuals = ", ".join(f"{r * 1e3:.3f}" for r in frame.residuals)
     planned = read_plan_file(plan_file).plans[0].T_base_part

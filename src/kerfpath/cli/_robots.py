@@ -1,4 +1,4 @@
-"""`kerfpath robots`: the library as a table, or one robot with its sources."""
+"""`kerfpath robots`: print the library as a table, or one robot with its sources."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ __all__ = ["list_robots", "show_robot"]
 
 
 def list_robots(*, as_json: bool) -> None:
-    """Print every robot's id, maker, model, payload, reach, and whether accelerations are known."""
+    """Print id, maker, model, payload and reach of every robot, and which limits are known."""
     known = [robot(name) for name in robot_ids()]
     if as_json:
         print_json(
@@ -53,7 +53,7 @@ def list_robots(*, as_json: bool) -> None:
 
 
 def show_robot(name: str, *, as_json: bool) -> None:
-    """Print one robot's geometry, limits, notes and sources."""
+    """Print geometry, limits, notes and sources of one robot."""
     r = robot(name)
     limits = {
         "lower deg": _degrees(r.lower),

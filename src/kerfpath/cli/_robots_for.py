@@ -1,4 +1,4 @@
-"""`kerfpath layout --robots`: which robots can do a job, and how fast."""
+"""`kerfpath layout --robots`: find which robots can do a job, and how fast."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ def show_robots_for(
     ratio: str | None,
     as_json: bool,
 ) -> bool:
-    """Print what each robot can do of a job, and write it; return whether any can do it as asked.
+    """Print how fast each robot can do a job, write the list; return whether one is fast enough.
 
     Raises
     ------

@@ -1,4 +1,4 @@
-"""`kerfpath speed`: the fastest constant speed of each contour, and what binds where."""
+"""`kerfpath speed`: find the fastest constant speed of each contour, and what binds where."""
 
 from __future__ import annotations
 

@@ -15,19 +15,11 @@ from kerfpath.graph import LayeredGraph
 from kerfpath.losses import Loss, Reason
 from kerfpath.planner._task import Task
 from kerfpath.plans import Plan
-from kerfpath.search import (
-    InterruptedPath,
-    Known,
-    LayeredPath,
-    LeastInterval,
-    SearchProblem,
-    SlowedPath,
-    find_clear,
-)
+from kerfpath.search import FoundPath, Known, SearchProblem, find_clear
 
 __all__ = ["Finder"]
 
-_P = TypeVar("_P", LayeredPath, SlowedPath, InterruptedPath, LeastInterval)
+_P = TypeVar("_P", bound=FoundPath)
 
 POSES_MEASURED, PAIRS_NAMED = 100, 3
 """Poses of a node that are measured, and pairs of bodies that are named, where it is closed."""
@@ -60,7 +52,7 @@ class Finder:
             around=_beside(task.graph),
         )
 
-    def best(self, search: Callable[[SearchProblem], _P], problem: SearchProblem) -> _P:
+    def find(self, search: Callable[[SearchProblem], _P], problem: SearchProblem) -> _P:
         """Return what a search finds for a problem on the graph of the task."""
         if self._cell is None:
             return search(problem)

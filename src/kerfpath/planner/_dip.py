@@ -8,16 +8,16 @@ import numpy as np
 
 from kerfpath import refiner
 from kerfpath.planner._clear import Finder
-from kerfpath.planner._refined import first_order
+from kerfpath.planner._refined import plan_first_order
 from kerfpath.planner._task import Task
 from kerfpath.plans import Plan, Proof
 from kerfpath.retime import feed, retime
 from kerfpath.search import find_slowed
 
-__all__ = ["slowed"]
+__all__ = ["plan_slowed"]
 
 
-def slowed(task: Task, finder: Finder, *, refine: bool) -> Plan:
+def plan_slowed(task: Task, finder: Finder, *, refine: bool) -> Plan:
     """Return a plan that keeps the speed asked for wherever its path lets it, and dips elsewhere.
 
     On the grid the path is the one that loses the least time, priced above all distances, if each
@@ -27,7 +27,7 @@ def slowed(task: Task, finder: Finder, *, refine: bool) -> Plan:
     What would not be clear off the grid stays on it.
     """
     free = refine and task.robot.family.free_rotation
-    start = first_order(task, finder) if free else None
+    start = plan_first_order(task, finder) if free else None
     start = _least_lost(task, finder) if start is None else start
     if not free:
         return _timed(task, start)
@@ -44,13 +44,13 @@ def slowed(task: Task, finder: Finder, *, refine: bool) -> Plan:
         broken = "not be clear"
     if not broken:
         return best
-    kept = slowed(task, finder, refine=False)
+    kept = plan_slowed(task, finder, refine=False)
     claim = f"{kept.proof.statement}; not refined: off the grid it would {broken}"
     return replace(kept, proof=replace(kept.proof, statement=claim))
 
 
 def _least_lost(task: Task, finder: Finder) -> Plan:
-    found = finder.best(find_slowed, task.problem)
+    found = finder.find(find_slowed, task.problem)
     claim = finder.claimed(
         "at constant speed the graph has no path; of all its paths this one loses the least time "
         "step by step"

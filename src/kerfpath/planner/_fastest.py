@@ -113,7 +113,7 @@ def fastest_speed(
         progress=progress,
     )
     finder = Finder(task, cell)
-    least = finder.best(find_least_interval, task.problem.free())
+    least = finder.find(find_least_interval, task.problem.free())
     found = FastestSpeed.of(contour, least)
     if not (asked.refine and robot.family.free_rotation):
         return found

@@ -14,7 +14,7 @@ from kerfpath.errors import NoFeasiblePath
 from kerfpath.graph import LayeredGraph
 from kerfpath.options import PlanKeywords, PlanOptions, chosen
 from kerfpath.planner._clear import Finder
-from kerfpath.planner._refined import refined
+from kerfpath.planner._refined import refine_plan
 from kerfpath.planner._task import Task, task_of
 from kerfpath.plans import Plan, Proof
 from kerfpath.robots import Robot
@@ -89,7 +89,7 @@ def plan_in_pieces(
     begin("search for pieces")
     try:
         search = partial(find_interrupted, s=contour.s, least_piece=asked.least_piece)
-        found = finder.best(search, task.problem)
+        found = finder.find(search, task.problem)
     except NoFeasiblePath as broken:
         raise broken.retold(
             f"contour {contour.name!r}: no number of interruptions helps: {broken}"
@@ -99,7 +99,7 @@ def plan_in_pieces(
         part, made = _planned(task, finder, piece, number, len(found.pieces))
         if asked.refine:
             begin(f"refinement of piece {number} of {len(found.pieces)}")
-        plans.append(refined(part, Finder(part, cell), made) if asked.refine else made)
+        plans.append(refine_plan(part, Finder(part, cell), made) if asked.refine else made)
     return tuple(plans)
 
 

@@ -13,8 +13,8 @@ from kerfpath.errors import InputError, NoFeasiblePath
 from kerfpath.graph import LayeredGraph
 from kerfpath.options import PlanKeywords, PlanOptions, chosen
 from kerfpath.planner._clear import Finder
-from kerfpath.planner._dip import slowed
-from kerfpath.planner._refined import off_grid, refined
+from kerfpath.planner._dip import plan_slowed
+from kerfpath.planner._refined import plan_off_grid, refine_plan
 from kerfpath.planner._task import Task, task_of
 from kerfpath.planner._words import ON_THIS_GRID
 from kerfpath.plans import Plan, Proof
@@ -111,14 +111,14 @@ def plan(
     begin = phase or (lambda what: None)
     begin("search")
     try:
-        path = finder.best(find_shortest, task.problem)
+        path = finder.find(find_shortest, task.problem)
     except NoFeasiblePath as at_speed:
         return _otherwise(task, finder, at_speed, begin)
     made = task.plan(path.index, path.cost, _proof(asked.method, path.optimal, finder))
     if not asked.refine:
         return made
     begin("refinement")
-    return refined(task, finder, made)
+    return refine_plan(task, finder, made)
 
 
 def _otherwise(
@@ -134,12 +134,12 @@ def _otherwise(
     asked, found = task.settings, None
     if asked.feed == "dip":
         try:
-            return slowed(task, finder, refine=asked.refine)
+            return plan_slowed(task, finder, refine=asked.refine)
         except NoFeasiblePath as at_any_speed:
             broken = at_any_speed
     elif asked.refine and asked.closure == "free":
         begin("refinement")
-        found = off_grid(task, finder)
+        found = plan_off_grid(task, finder)
     if found is not None and found.done:
         return found.plan
     tried = "" if found is None else f"; off the grid {found.statement}"

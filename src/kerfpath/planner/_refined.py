@@ -14,20 +14,20 @@ from kerfpath.plans import Plan, Proof
 from kerfpath.refiner import Refinement
 from kerfpath.search import find_least_interval, find_shortest
 
-__all__ = ["first_order", "off_grid", "refined"]
+__all__ = ["plan_first_order", "plan_off_grid", "refine_plan"]
 
 TOO_SLOW = 2.0
 """Multiple of the node interval up to which the fastest path is worth an attempt off the grid."""
 
 
-def refined(task: Task, finder: Finder, made: Plan) -> Plan:
+def refine_plan(task: Task, finder: Finder, made: Plan) -> Plan:
     """Return the plan off its grid, at least as good and clear; where that cannot be, as it is.
 
     A refinement ends in the nearest optimum. The grid quantises the acceleration, so that its best
     path under (6) may lie far from the best motion, and its best path without (6) close by: both
     are begun from.
     """
-    first = first_order(task, finder)
+    first = plan_first_order(task, finder)
     starts = [made]
     if first is not None and not np.array_equal(first.q, made.q):
         starts.append(first)
@@ -48,19 +48,21 @@ def refined(task: Task, finder: Finder, made: Plan) -> Plan:
     return replace(best.plan, proof=proof)
 
 
-def off_grid(task: Task, finder: Finder) -> Refinement | None:
+def plan_off_grid(task: Task, finder: Finder) -> Refinement | None:
     """Look for a motion where the graph has no path; None where that is hopeless.
 
     Of a path that breaks (6) because gamma can only step, the motion close by may not. Begun from
     the best path without (6), and from the one that asks for the least time. What is found is clear
     in the cell.
     """
-    first = first_order(task, finder)
+    first = plan_first_order(task, finder)
     found = None if first is None else _cleared(refiner.refine(first), finder)
-    if found is not None and found.done:
-        return found
+    comfort = task.settings.comfort
+    priced = comfort is not None and comfort.clearance is not None and comfort.clearance.cost
+    if priced or (found is not None and found.done):
+        return found  # what clearance costs is known on the grid only
     try:
-        least = finder.best(find_least_interval, task.problem.free())
+        least = finder.find(find_least_interval, task.problem.free())
     except NoFeasiblePath:
         return found
     if least.dt > TOO_SLOW * task.dt:
@@ -77,11 +79,11 @@ def _cleared(found: Refinement, finder: Finder) -> Refinement:
     return replace(found, done=False, statement="what keeps the limits would not be clear")
 
 
-def first_order(task: Task, finder: Finder) -> Plan | None:
+def plan_first_order(task: Task, finder: Finder) -> Plan | None:
     """Return the best path without (6); None where (5) alone closes the way."""
     limits = task.problem.limits.without_acceleration()
     try:
-        path = finder.best(find_shortest, replace(task.problem, limits=limits, method="exact"))
+        path = finder.find(find_shortest, replace(task.problem, limits=limits, method="exact"))
     except NoFeasiblePath:
         return None
     claim = "the best path on this graph without acceleration limits"

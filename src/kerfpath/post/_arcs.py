@@ -120,7 +120,7 @@ class _Arcs:
         self, start: LinearMove, moves: Sequence[LinearMove], k: int
     ) -> tuple[CircularMove, Array] | None:
         """Return the circular move that replaces `moves`, the joints along it, or None."""
-        poses = _evenly(start, moves, self._tolerance, self._angle)
+        poses = _spread_evenly(start, moves, self._tolerance, self._angle)
         if poses is None:
             return None
         end, after = moves[-1], None
@@ -171,7 +171,7 @@ def _middle(T: Array) -> int:
     return int(np.argmin(np.abs(ends[:, 0] - ends[:, 1])))
 
 
-def _evenly(
+def _spread_evenly(
     start: LinearMove, moves: Sequence[LinearMove], tolerance: float, angle: float
 ) -> Array | None:
     """Return the poses (m, 4, 4) m at even shares of an arc through m moves; None: there is none.

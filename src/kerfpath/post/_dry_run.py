@@ -50,13 +50,13 @@ def dry_run(program: Program, share: float) -> Program:
         [f"dry_{program.name}", *(f"dry_{section.name}" for section in program.sections)], ()
     )
     sections = tuple(
-        Section(name=name, steps=(said, *_slowed(section, share)))
+        Section(name=name, steps=(said, *_slow_steps(section, share)))
         for name, section in zip(names, program.sections, strict=True)
     )
     return replace(program, name=title, sections=sections)
 
 
-def _slowed(section: Section, share: float) -> list[Step]:
+def _slow_steps(section: Section, share: float) -> list[Step]:
     left_out = Wait | Request | Await
     return [_slow(step, share) for step in section.steps if not isinstance(step, left_out)]
 

@@ -71,7 +71,7 @@ def replace_program(
         A file cannot be written, or was edited.
     """
     folder = Path(folder)
-    ours = _listed(folder)
+    ours = _read_list(folder)
     old = {n: entry for n, entry in ours.items() if only is None or entry["of"] == only}
     there = [n for n in old if n not in program and (folder / n).is_file()]
     edited = [n for n in there if _hash((folder / n).read_bytes()) != old[n]["sha256"]]
@@ -83,7 +83,7 @@ def replace_program(
     stale = [n for n in there if n not in edited]
     if not program:
         _remove(folder, stale)
-    new = {n: text for n, text in files.items() if not _is(folder / n, text)}
+    new = {n: text for n, text in files.items() if not _holds(folder / n, text)}
     write_files(folder, new)
     if program:
         _remove(folder, stale)
@@ -91,7 +91,7 @@ def replace_program(
     kept |= {
         n: {"of": program[0], "sha256": _hash(files[n].encode("utf-8"))} for n in program
     }  # fmt: skip
-    _list(folder, kept, needed=only is None or len(program) > 1 or bool(ours))
+    _write_list(folder, kept, needed=only is None or len(program) > 1 or bool(ours))
     return Replaced(
         written=tuple(folder / n for n in files),
         removed=tuple(folder / n for n in stale),
@@ -145,7 +145,7 @@ def _write(texts: Mapping[Path, str]) -> None:
         ) from None
 
 
-def _listed(folder: Path) -> dict[str, dict[str, str]]:
+def _read_list(folder: Path) -> dict[str, dict[str, str]]:
     """Return the files that are listed as ours; none where the list is not there, or not ours."""
     try:
         found = json.loads((folder / MANIFEST).read_text(encoding="utf-8"))["programs"]
@@ -156,10 +156,10 @@ def _listed(folder: Path) -> dict[str, dict[str, str]]:
     return {n: e for n, e in entries.items() if (folder / n).resolve().is_relative_to(inside)}
 
 
-def _list(folder: Path, entries: Mapping[str, Mapping[str, str]], *, needed: bool) -> None:
+def _write_list(folder: Path, entries: Mapping[str, Mapping[str, str]], *, needed: bool) -> None:
     if entries and needed:
         text = json.dumps({"programs": dict(entries)}, indent=1, sort_keys=True) + "\n"
-        if not _is(folder / MANIFEST, text):
+        if not _holds(folder / MANIFEST, text):
             write_program(folder / MANIFEST, text)
     else:
         with suppress(OSError):
@@ -187,7 +187,7 @@ def _remove(folder: Path, names: Sequence[str]) -> None:
                 parent.rmdir()
 
 
-def _is(path: Path, text: str) -> bool:
+def _holds(path: Path, text: str) -> bool:
     """Return whether a file is there with this very text."""
     try:
         return path.read_bytes() == text.encode("utf-8")

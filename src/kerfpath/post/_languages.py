@@ -38,6 +38,10 @@ BROKEN = (ImportError, AttributeError, NameError, SyntaxError, TypeError, ValueE
 """What a module that was written for another version raises when it is imported."""
 
 
+def _none_is_reserved(name: str) -> bool:
+    return False
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Language:
     """One robot language, or a dialect of one.
@@ -61,8 +65,8 @@ class Language:
     rules : callable
         (settings) to the Rules of programs.
     formatter : type of Formatter
-    is_reserved : callable
-        Whether a name means something else in the language.
+    is_reserved : callable, optional
+        Whether a name means something else in the language; default: none does.
     posture : callable, optional
         (robot, q (K, n) rad, settings) to what the text says of posture and turns at each target,
         in the words of its reader; None where a target says nothing of them.
@@ -87,7 +91,7 @@ class Language:
     settings: type[Settings]
     rules: Callable[[Any], Rules]
     formatter: type[Formatter]
-    is_reserved: Callable[[str], bool]
+    is_reserved: Callable[[str], bool] = _none_is_reserved
     posture: Callable[[Robot, Array, Any], list[tuple[int | str, ...]]] | None = None
     check: Callable[[Program, Any], Iterator[ProgramIssue]] | None = None
     sayable: Callable[[Program, Any], Program] | None = None

@@ -53,7 +53,7 @@ def match_groups(a: Sequence[ReadGroup], b: Sequence[ReadGroup]) -> list[tuple[i
         for j, other in enumerate(two):
             if (path is None) == (other is None):
                 # Of two that are alike the one in order.
-                cost[i, j] = _apart(path, other) + 1e-9 * abs(i - j)
+                cost[i, j] = _distance(path, other) + 1e-9 * abs(i - j)
     rows, columns = linear_sum_assignment(np.minimum(cost, NEAR))
     found = {int(i): int(j) for i, j in zip(rows, columns, strict=True) if cost[i, j] < NEAR}
     for i, group in enumerate(a):
@@ -64,7 +64,7 @@ def match_groups(a: Sequence[ReadGroup], b: Sequence[ReadGroup]) -> list[tuple[i
     return sorted(found.items())
 
 
-def _apart(one: Array | None, two: Array | None) -> float:
+def _distance(one: Array | None, two: Array | None) -> float:
     """Return how far (m) two paths mostly are from each other."""
     if one is None or two is None:
         return 0.0
@@ -101,12 +101,12 @@ def pair_moves(a: ReadGroup, b: ReadGroup, near: float) -> list[Pair]:
         Distance up to which two places are the same.
     """
     joint = min(len(a.joint), len(b.joint))
-    ways = [_stops(g.joint, [(len(g.joint), w) for k, w in g.waits if k == 0]) for g in (a, b)]
+    ways = [_add_waits(g.joint, [(len(g.joint), w) for k, w in g.waits if k == 0]) for g in (a, b)]
     pairs = [Pair(stop, None) for stop in ways[0][: len(ways[0]) - joint]]
     pairs += [Pair(None, stop) for stop in ways[1][: len(ways[1]) - joint]]
     pairs += [Pair(*both) for both in zip(*(way[len(way) - joint :] for way in ways), strict=True)]
-    one, two = _stops(a.path, a.waits), _stops(b.path, b.waits)
-    keys = _keys(a.path, b.path, near)
+    one, two = _add_waits(a.path, a.waits), _add_waits(b.path, b.waits)
+    keys = _number_places(a.path, b.path, near)
     if len(one) == len(two) and 2 * (keys[0] == keys[1]).sum() >= len(one):
         return pairs + [Pair(*both) for both in zip(one, two, strict=True)]
     matcher = SequenceMatcher(None, keys[0].tolist(), keys[1].tolist(), autojunk=False)
@@ -118,7 +118,7 @@ def pair_moves(a: ReadGroup, b: ReadGroup, near: float) -> list[Pair]:
     return pairs
 
 
-def _stops(moves: Sequence[ReadMove], waits: Sequence[tuple[int, ReadWait]]) -> list[Stop]:
+def _add_waits(moves: Sequence[ReadMove], waits: Sequence[tuple[int, ReadWait]]) -> list[Stop]:
     """Return moves with the waits behind them."""
     stops = [Stop(move) for move in moves]
     for behind, wait in waits:
@@ -128,7 +128,7 @@ def _stops(moves: Sequence[ReadMove], waits: Sequence[tuple[int, ReadWait]]) -> 
     return stops
 
 
-def _keys(a: Sequence[ReadMove], b: Sequence[ReadMove], near: float) -> tuple[Ints, Ints]:
+def _number_places(a: Sequence[ReadMove], b: Sequence[ReadMove], near: float) -> tuple[Ints, Ints]:
     """Return a number for each place that moves of a path end at."""
     one, two = _points(a), _points(b)
     if not len(one):

@@ -74,8 +74,8 @@ def preflight(
     issues = list(_check_robot(program, chosen))
     numbers = [issue for section in program.sections for issue in _check_numbers(section, rules)]
     outputs = list(_check_outputs(program, chosen, settings))
-    outputs += _check_ports(program, chosen, settings)
     settings = chosen.completed(settings)
+    outputs += _check_ports(program, chosen, settings)
     issues += numbers + outputs
     # Speeds and zones are named by their formatted values: only finite ones can be.
     unnamed = any(issue.level == "error" for issue in outputs)

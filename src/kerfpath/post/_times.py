@@ -13,7 +13,7 @@ from kerfpath.post._issue import ProgramIssue
 from kerfpath.post._program import JointMove, LinearMove, Move, Program, Wait
 
 __all__ = [
-    "SHORTEST_CRUISE", "TICK", "air_times", "cruises", "not_whole", "refusals", "timetable",
+    "SHORTEST_CRUISE", "TICK", "air_times", "check_times", "cruises", "not_whole", "timetable",
 ]  # fmt: skip
 
 SHORTEST_CRUISE = 1e-3
@@ -86,7 +86,7 @@ def not_whole(time: float) -> bool:
     return abs(time - TICK * round(time / TICK)) > TICK_NOISE
 
 
-def refusals(program: Program) -> Iterator[ProgramIssue]:
+def check_times(program: Program, settings: object = None) -> Iterator[ProgramIssue]:
     """Yield what forbids to say times: unknown limits, no start, a move without a duration."""
     try:
         program.robot.speed_limits()

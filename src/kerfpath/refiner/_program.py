@@ -78,7 +78,7 @@ def solve(model: Model, rates: Rates, target: Target) -> Array | None:
     dq, D = np.diff(model.q, axis=0), _increments(model)
     beyond = None
     if target in ("excess", "lost"):
-        beyond = rows.new(1 if target == "excess" else len(rates.tau) + len(rates.span))
+        beyond = rows.new(1 if target == "excess" else len(rates.tau) + len(rates.meetings[0]))
     _limits(rows, dq, D, rates, beyond)
     _ranges(rows, model)
     for sign in (1.0, -1.0):
@@ -125,17 +125,19 @@ def _limits(rows: Rows, dq: Array, D: Sparse, rates: Rates, beyond: Sparse | Non
     One unknown for all, or one for each interval and then each node, none of these negative.
     """
     edges, n = dq.shape
-    owner = np.zeros(edges + len(rates.span), np.int64)
+    meetings, (v, a) = rates.meetings, rates.of(dq)
+    span = (rates.tau[meetings[0]] + rates.tau[meetings[1]]) / 2
+    owner = np.zeros(edges + len(span), np.int64)
     if beyond is not None and beyond.shape[0] > 1:
         owner = np.arange(len(owner))
         rows.hold(-beyond, np.zeros(len(owner)))
     V = _scaled(np.repeat(1 / rates.tau, n), D)
     joints = np.arange(n)
-    before, after = ((joints + n * at[:, None]).ravel() for at in (rates.before, rates.after))
-    A = _scaled(np.repeat(1 / rates.span, n), V[after] - V[before])
+    before, after = ((joints + n * at[:, None]).ravel() for at in meetings)
+    A = _scaled(np.repeat(1 / span, n), V[after] - V[before])
     for value, slope, limit, of in (
-        (rates.velocities(dq), V, rates.limits.velocity, owner[:edges]),
-        (rates.accelerations(dq), A, rates.limits.acceleration, owner[edges:]),
+        (v, V, rates.limits.velocity, owner[:edges]),
+        (a, A, rates.limits.acceleration, owner[edges:]),
     ):
         share = (value / limit.usable).ravel()
         per_share = _scaled(1 / np.tile(limit.usable, len(value)), slope)

@@ -8,7 +8,7 @@ import numpy as np
 
 from kerfpath._arrays import Array, Ints
 from kerfpath._told import told
-from kerfpath.limits import Limits
+from kerfpath.limits import Limits, meetings, rates_of
 
 __all__ = ["Rates"]
 
@@ -34,34 +34,18 @@ class Rates:
     __repr__ = told
 
     @property
-    def before(self) -> Ints:
-        """Intervals that end at the nodes where (6) is tested, (M,)."""
-        inner = np.arange(len(self.tau) - 1)
-        return np.append(inner, len(self.tau) - 1) if self.periodic else inner
+    def meetings(self) -> tuple[Ints, Ints]:
+        """Intervals that end and that begin at the nodes where (6) is tested, (M,) each."""
+        return meetings(len(self.tau), periodic=self.periodic)
 
-    @property
-    def after(self) -> Ints:
-        """Intervals that begin there, (M,)."""
-        return np.asarray((self.before + 1) % len(self.tau))
-
-    @property
-    def span(self) -> Array:
-        """Time over which the velocity changes there, (M,) s."""
-        return np.asarray((self.tau[self.before] + self.tau[self.after]) / 2)
-
-    def velocities(self, dq: Array) -> Array:
-        """Return the joint velocities (K-1, n) rad/s of increments (K-1, n) rad."""
-        return dq / self.tau[:, None]
-
-    def accelerations(self, dq: Array) -> Array:
-        """Return the joint accelerations (M, n) rad/s^2 of increments (K-1, n) rad."""
-        v = self.velocities(dq)
-        return (v[self.after] - v[self.before]) / self.span[:, None]
+    def of(self, dq: Array) -> tuple[Array, Array]:
+        """Return the velocities (K-1, n) and accelerations (M, n) of increments (K-1, n) rad."""
+        return rates_of(dq, self.tau, periodic=self.periodic)
 
     def shares(self, dq: Array) -> tuple[Array, Array]:
         """Return the shares of the velocity limits (K-1, n) and the acceleration limits (M, n)."""
-        fast = np.abs(self.velocities(dq)) / self.limits.velocity.usable
-        return fast, np.abs(self.accelerations(dq)) / self.limits.acceleration.usable
+        v, a = (np.abs(rates) for rates in self.of(dq))
+        return v / self.limits.velocity.usable, a / self.limits.acceleration.usable
 
     def excess(self, dq: Array) -> float:
         """Return the largest share of a limit that increments (K-1, n) rad ask for, less one."""

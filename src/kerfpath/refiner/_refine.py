@@ -172,7 +172,7 @@ def _binding(descent: Descent, fast: Array, sharp: Array) -> tuple[float, Bindin
         edge, joint = np.unravel_index(np.argmax(fast), fast.shape)
         return velocity, Binding(int(joint), int(edge) + 1, "velocity")
     change, joint = np.unravel_index(np.argmax(sharp), sharp.shape)
-    return acceleration, Binding(int(joint), int(descent.rates.after[change]), "acceleration")
+    return acceleration, Binding(int(joint), int(descent.rates.meetings[1][change]), "acceleration")
 
 
 def _done(plan: Plan, asked: Plan, start: Stand, cost: float) -> str:

@@ -1,4 +1,4 @@
-"""The cell in three dimensions: what stands still, and robot and head at poses to choose from."""
+"""The cell in 3-D: fixed bodies, and robot and head at a choice of poses."""
 
 from __future__ import annotations
 
@@ -18,17 +18,17 @@ __all__ = ["add_cell", "poses_shown"]
 
 COLOURS = {"robot": "#c9a227", "head": "#5b6675", "fixture": "#8fa8c4"}
 HEIGHT = 760
-"""px: a cell is larger than a part."""
+"""Height of the figure, px; a cell is larger than a part."""
 FILL = 1.35
-"""How much larger than plotly draws it."""
+"""Factor on the size at which plotly would draw the scene."""
 MOST = 12
-"""Poses to choose from."""
+"""Number of poses to choose from."""
 BALL = 48
-"""Points on a ball, of which a capsule is drawn."""
+"""Number of points on a ball, of which a capsule is drawn."""
 
 
 def poses_shown(plans: Sequence[Plan]) -> list[tuple[str, Array]]:
-    """Return a few poses, what each is and its joints (n,) rad: starts, and middles if few."""
+    """Return a few poses, each with its words and joints (n,) rad: starts, and middles if few."""
     nodes = [(plan, k) for plan in plans for k in (0, len(plan.q) // 2)]
     if len(nodes) > MOST:
         nodes = nodes[::2]
@@ -87,7 +87,7 @@ def add_cell(
 
 
 def _size(figure: go.Figure) -> dict[str, float]:
-    """Return the sides of the box around all that is shown, to one scale, to fill the figure."""
+    """Return the sides of the box around the scene, to one scale, such that it fills the figure."""
     sides = {}
     for axis in "xyz":
         # Lines break, and the cursor waits, at what is no number.

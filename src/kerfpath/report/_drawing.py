@@ -1,4 +1,4 @@
-"""The page of a drawing: the part with every loop drawn and called by its name."""
+"""The page of a drawing: the part with every loop and its name."""
 
 from __future__ import annotations
 
@@ -20,14 +20,14 @@ __all__ = ["DrawnLoop", "render_drawing"]
 
 HEIGHT = 720
 LABELS = 80
-"""Names drawn; the others show where a pointer is."""
+"""Number of names that are drawn; the others show on hover."""
 COLOURS = {"outer": ACCENT, "inner": JOINT_COLOURS[0], "open": JOINT_COLOURS[4]}
 CAPTIONS = {"outer": "trim lines", "inner": "holes", "open": "open lines"}
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class DrawnLoop:
-    """A loop for the picture.
+    """One loop of the picture.
 
     Parameters
     ----------
@@ -114,7 +114,7 @@ def _figure(loops: Sequence[DrawnLoop], mesh: tuple[ArrayLike, ArrayLike]) -> go
 
 
 def _view(points: Array) -> dict[str, object]:
-    """Return a scene around `points` (m) to scale; a flat drawing is looked at from above."""
+    """Return a scene around `points` (m) to scale, seen from above for a flat drawing."""
     low, high = points.min(axis=0) * 1e3, points.max(axis=0) * 1e3
     size = float((high - low).max())
     # An axis without length would leave plotly no scale.
@@ -136,7 +136,7 @@ def _view(points: Array) -> dict[str, object]:
 
 
 def _labels(loops: Sequence[DrawnLoop]) -> list[dict[str, object]]:
-    """Return the names at the starts of loops, in front of the part; heights alternate."""
+    """Return the names at the starts of loops, in front of the part, at alternating heights."""
     return [
         {
             **dict(zip("xyz", (loop.points[0] * 1e3).tolist(), strict=True)),

@@ -42,7 +42,7 @@ class FrontAxis:
     __repr__ = told
 
     def __post_init__(self) -> None:
-        """Check the sense."""
+        """Require a known sense."""
         if self.sense not in (1.0, -1.0):
             raise InputError(
                 f"axis {self.name}: expected sense 1 (less is better) or -1 (more is), "
@@ -51,19 +51,19 @@ class FrontAxis:
 
     @property
     def shown(self) -> tuple[float, str]:
-        """What values are multiplied by, and the unit that they are then in."""
+        """The factor from the criterion's unit to the one that is shown, and that unit."""
         factor, unit = shown_unit(self.unit)
         return factor, unit.strip()
 
     @property
     def title(self) -> str:
-        """Words and unit, as HTML."""
+        """The words and the unit of the criterion, as HTML."""
         unit = self.shown[1]
         return escape(f"{self.words} ({unit})" if unit else self.words)
 
     @property
     def unit_and_arrow(self) -> str:
-        """The unit, and where the better end is."""
+        """The unit, and an arrow to the better end."""
         return f"{self.shown[1]} {'↓' if self.sense > 0 else '↑'}".strip()
 
 

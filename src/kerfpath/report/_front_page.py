@@ -23,7 +23,7 @@ __all__ = ["render_front"]
 NUMBER = "{number}"
 _BEATEN = " Grey points were beaten: some plan is as good in every criterion and better in one."
 AXIS_WIDTH = 112
-"""Least distance of parallel axes, px: what a line of a label takes."""
+"""Least distance of parallel axes, px: the height of a line of a label."""
 
 
 def render_front(
@@ -65,7 +65,7 @@ def render_front(
         No axis or plan, values that do not fit the axes or are not finite, names or numbers given
         twice, a mark of no plan, a command without the number.
     """
-    values, beaten = _checked(axes, plans, dominated, marks, command)
+    values, beaten = _shown_values(axes, plans, dominated, marks, command)
     figures = Figures()
     views = [
         f"<section><h2>{'Criteria in pairs' if len(axes) > 1 else 'The criterion'}</h2>",
@@ -95,14 +95,14 @@ def render_front(
     return page(title, body, figures, also="front")
 
 
-def _checked(
+def _shown_values(
     axes: Sequence[FrontAxis],
     plans: Sequence[FrontPlan],
     dominated: Sequence[Sequence[float]],
     marks: Mapping[str, int],
     command: str,
 ) -> tuple[Array, Array]:
-    """Return the values of plans (P, C) and dominated ones (D, C), as they are shown."""
+    """Return the values of plans (P, C) and of dominated runs (D, C), in the shown units."""
     names, numbers = [a.name for a in axes], [plan.number for plan in plans]
     for what, found in (("axes", names), ("plans", numbers)):
         if not found or len(set(found)) != len(found):
@@ -121,7 +121,7 @@ def _checked(
 
 
 def _decimals(column: Array) -> int:
-    """Return the decimals that tell the values apart: a thousandth of their spread."""
+    """Return the number of decimals that shows a thousandth of the spread of values."""
     size, largest = float(np.ptp(column)), float(np.abs(column).max())
     if size < 1e-9 * largest:  # rounding
         size = largest
@@ -148,7 +148,7 @@ def _parallel_part(axes: Sequence[FrontAxis], values: Array, figures: Figures) -
 
 
 def _choices(axes: Sequence[FrontAxis]) -> str:
-    """Return the boxes that choose what is plotted; values are places among the criteria."""
+    """Return the menus that choose the plotted criteria; their values are indices of criteria."""
     none = [(-1, "none")]
     every = [(i, criterion.words) for i, criterion in enumerate(axes)]
     boxes = (
@@ -195,7 +195,7 @@ def _plan_table(
 
 
 def _panel(axes: Sequence[FrontAxis], marks: Mapping[str, int]) -> str:
-    """Return the panel of the picked plan, to be filled by the script."""
+    """Return the empty panel of the picked plan, which the script fills."""
     buttons = "".join(
         f'<li><button type="button" data-plan="{chosen}">{escape(mark)} '
         f"<small>plan {chosen}</small></button></li>"
@@ -231,7 +231,7 @@ def _data(
     marks: Mapping[str, int],
     command: str,
 ) -> str:
-    """Return what the script works on; titles and names of marks are HTML, as plotly reads them."""
+    """Return the data of the script; titles and names of marks are HTML, as plotly reads them."""
     data = {
         "axes": [
             {"title": criterion.title, "unit": criterion.shown[1], "sense": criterion.sense}

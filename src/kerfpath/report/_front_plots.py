@@ -33,9 +33,9 @@ LABEL_LOOK = {
     "font": {"size": 12, "color": INK},
     "bgcolor": "rgba(255, 255, 255, 0.85)",
 }
-"""Of the names of marked plans."""
+"""Look of the names of marked plans."""
 LABEL = 16
-"""Characters in a line of an axis label."""
+"""Number of characters in a line of an axis label."""
 
 
 def scatter(axes: Sequence[FrontAxis]) -> go.Figure:
@@ -69,7 +69,7 @@ def scatter(axes: Sequence[FrontAxis]) -> go.Figure:
 
 
 def axis_labels(axes: Sequence[FrontAxis]) -> list[list[str]]:
-    """Return the lines of each axis's label, as many for each; the first ones may be empty."""
+    """Return the lines of each axis label, equally many for all; the first ones may be empty."""
     labels = [
         [
             *textwrap.wrap(criterion.words, LABEL, max_lines=3, placeholder=" …"),

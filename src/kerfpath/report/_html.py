@@ -44,7 +44,7 @@ _SKELETON = """<!DOCTYPE html>
 """
 
 _LEAN = '<script src="plotly.js"></script>'
-"""In place of the library; text from outside is escaped and cannot look like it."""
+"""Stands in place of the library; text from outside is escaped and cannot look like it."""
 
 
 class Figures:
@@ -76,7 +76,7 @@ def header(
     verdict: str = "",
     tools: str = "",
 ) -> str:
-    """Return the head of a page: what it is, its title, a verdict (HTML), facts and notes.
+    """Return the head of a page: its kind, title, verdict (HTML), facts and notes.
 
     `tools` (HTML) stand beside the title.
     """
@@ -102,7 +102,7 @@ def facts_list(facts: Sequence[tuple[str, str]]) -> str:
 
 
 def job_part(text: str) -> str:
-    """Return the job file as read, to be opened; nothing without one."""
+    """Return the job file in an element that opens; empty without one."""
     if not text:
         return ""
     return (
@@ -128,12 +128,12 @@ def page(title: str, body: Sequence[str], figures: Figures, *, also: str = "") -
 
 
 def without_library(text: str) -> str:
-    """Return a page without the drawing library that makes up most of it, to be kept or sent."""
+    """Return a page without the drawing library, which is most of it, for storage."""
     return text.replace(_library(), _LEAN)
 
 
 def with_library(text: str) -> str:
-    """Return the whole page of what `without_library` gave."""
+    """Return the page that `without_library` shortened, with the library again."""
     return text.replace(_LEAN, _library())
 
 

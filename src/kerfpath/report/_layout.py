@@ -1,4 +1,4 @@
-"""The page of a layout: the best placement, what it gains, and what became of the others."""
+"""The page of a layout: the best placement, its gain, and the other placements tried."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ STAGES = {
 
 DOTS = " Small dots are the placements tried, wherever the other variables were then."
 LONGEST = 160
-"""Characters of a reason that are shown."""
+"""Number of characters of a reason that are shown."""
 
 
 def render_layout(entry: LayoutEntry, *, job_text: str = "") -> str:

@@ -1,4 +1,4 @@
-"""The figures of a layout's page: the map of placements, and how the search came on."""
+"""The figures on the page of a layout: the map of placements, and the course of the search."""
 
 from __future__ import annotations
 
@@ -137,7 +137,7 @@ def _line(entry: LayoutEntry, drawn: LayoutMap) -> go.Figure:
 
 
 def convergence(entry: LayoutEntry) -> go.Figure:
-    """Return what each placement tried can come to, in order, and the best so far."""
+    """Return the bound of each placement tried, in order, and the best bound so far."""
     tried, less = entry["tried"], entry["goal"] == "motion"
     figure = go.Figure(layout=base_layout(360, legend={"orientation": "h", "y": 1.12}))
     feasible = [i for i, t in enumerate(tried) if t["status"] == "feasible" and t["bound"]]

@@ -1,4 +1,4 @@
-"""The feasibility map: node times gamma, one panel per posture, coloured by what became of it."""
+"""The feasibility map: node times gamma, one panel per posture, coloured by the reason of loss."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ ROW, GAP, TOP, BOTTOM = 150, 34, 48, 50
 """Height of a panel, of the space between two, and of the margins (the upper with buttons), px."""
 
 HALF_TURN = 180.0
-"""deg: the map ends there, and begins at its negative."""
+"""End of the map, deg; it begins at its negative."""
 
 
 def feasibility_map(
@@ -130,7 +130,7 @@ def shown_postures(graph: LayeredGraph) -> list[int]:
 
 
 def hidden_postures(graph: LayeredGraph) -> list[str]:
-    """Say of each posture without a panel why its candidates were dropped."""
+    """Return a line for each posture without a panel: why its candidates were dropped."""
     shown, left_out = shown_postures(graph), list[str]()
     for mu in range(graph.reason.shape[-1]):
         if mu in shown:

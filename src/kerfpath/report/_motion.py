@@ -31,11 +31,11 @@ ROW, GAP, TOP, BOTTOM = 130, 36, 48, 48
 SHARE_ROW, SHARE_TOP = 210, 74
 SPEED_HEIGHT = 220
 LEAST_SPAN = 1.0
-"""deg: a joint that hardly moves is not drawn as if it did."""
+"""Least height of a panel, deg: a joint that hardly moves looks so."""
 
 
 def posture_runs(plan: Plan) -> list[tuple[int, int, int]]:
-    """Return the postures in turn as (posture, first node, last node)."""
+    """Return the runs of one posture as (posture, first node, last node)."""
     change = np.flatnonzero(np.diff(plan.posture)) + 1
     firsts = [0, *change.tolist()]
     lasts = [*(change - 1).tolist(), len(plan.posture) - 1]
@@ -45,7 +45,7 @@ def posture_runs(plan: Plan) -> list[tuple[int, int, int]]:
 def joint_positions(plan: Plan) -> go.Figure:
     """Return a panel per joint: position over time, deg, to the scale of its motion.
 
-    Endless joints are unrolled. The title of a panel says how far its joint stays from its limits.
+    Endless joints are not wrapped. The title of a panel has the distance to the joint limits.
     """
     height = TOP + BOTTOM + 3 * ROW + 2 * GAP
     figure = go.Figure(layout=base_layout(height, hovermode="x unified", showlegend=False))
@@ -53,13 +53,13 @@ def joint_positions(plan: Plan) -> go.Figure:
     _add_posture_bands(figure, plan, panels=plan.robot.joints, labelled=range(2))
     figure.update_layout(meta={"nodes": np.round(plan.time, 4).tolist()})
     limits = plan.robot.joint_limits()
-    unrolled = np.degrees(plan.q[0] + np.vstack([0 * plan.q[:1], plan.increments.cumsum(axis=0)]))
+    continuous = np.degrees(plan.q[0] + np.vstack([0 * plan.q[:1], plan.increments.cumsum(axis=0)]))
     for joint in range(plan.robot.joints):
         row, column = divmod(joint, 2)
         x, y = _axis("x", joint), _axis("y", joint)
         top = 1 - row * (ROW + GAP) / (height - TOP - BOTTOM)
         low, high = np.degrees(limits.lower[joint]), np.degrees(limits.upper[joint])
-        q, endless = unrolled[:, joint], bool(limits.endless[joint])
+        q, endless = continuous[:, joint], bool(limits.endless[joint])
         middle, half = (q.max() + q.min()) / 2, 0.58 * max(float(np.ptp(q)), LEAST_SPAN)
         figure.update_layout(
             {

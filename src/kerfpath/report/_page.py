@@ -45,7 +45,7 @@ def render(
     cell : Cell, optional
         What stands around it, and robot and head, drawn at a few poses.
     moves : sequence of (m, 3) m
-        Ways of the tool tip through the air, in the part frame.
+        Paths of the tool tip on the transfer moves, in the part frame.
     facts : sequence of (what, value)
         Rows such as ("Robot", "ABB IRB 4600-60/2.05").
     faults : sequence of str
@@ -108,7 +108,7 @@ def _contour(number: int, section: ContourSection, is_open: bool, figures: Figur
     if plan is None:
         parts.append(_failure(section))
     else:
-        parts.append(f'<p class="caption">{escape(_in_words(plan))}</p>')
+        parts.append(f'<p class="caption">{escape(_objective_line(plan))}</p>')
     if section.sampling:
         parts += ["<h4>Sampling</h4>", facts_list(section.sampling)]
     parts += _map_part(section, figures)
@@ -121,7 +121,7 @@ def _contour(number: int, section: ContourSection, is_open: bool, figures: Figur
     if plan is not None:
         parts += [
             "<h4>Joint positions</h4>",
-            f'<p class="caption">{escape(_postures_in_words(plan))}</p>',
+            f'<p class="caption">{escape(_posture_line(plan))}</p>',
             figures.place(_motion.joint_positions(plan), "positions"),
             "<h4>Joint velocity and acceleration</h4>",
             '<p class="caption">As shares of the limits of the joints, from differences of nodes. '
@@ -182,7 +182,7 @@ def _first_steps(sections: Sequence[ContourSection], faults: Sequence[str]) -> s
     for i, section in failed[:MOST_STEPS]:
         place = f" ({escape(section.marks[0].words)})" if section.marks else ""
         link = f'<a href="#contour-{i + 1}">{escape(section.name)}</a>{place}'
-        items.append(f"<li>{link}: {escape(_what_to_do(section))}</li>")
+        items.append(f"<li>{link}: {escape(_remedy(section))}</li>")
     if len(failed) > MOST_STEPS:
         items.append(f"<li>and {len(failed) - MOST_STEPS} more contours, listed below</li>")
     items += [f"<li>{escape(fault)}</li>" for fault in faults]
@@ -191,16 +191,16 @@ def _first_steps(sections: Sequence[ContourSection], faults: Sequence[str]) -> s
     return f'<div class="failure first"><b>What to do first</b><ul>{"".join(items)}</ul></div>'
 
 
-def _what_to_do(section: ContourSection) -> str:
+def _remedy(section: ContourSection) -> str:
     if section.plan is None:
         if section.remedy:
-            return f"cut slower, or give way on a limit: {section.remedy}"
-        return section.failure or "give way on the limits that the map shows"
+            return f"cut slower, or relax a limit: {section.remedy}"
+        return section.failure or "relax the limits that the map shows"
     worst = section.errors[0]
     return worst.advice or f"{worst.title} is beyond what is allowed; see its audit"
 
 
-def _in_words(plan: Plan) -> str:
+def _objective_line(plan: Plan) -> str:
     s = plan.settings
     claim = plan.proof.statement
     return (
@@ -209,7 +209,7 @@ def _in_words(plan: Plan) -> str:
     )
 
 
-def _postures_in_words(plan: Plan) -> str:
+def _posture_line(plan: Plan) -> str:
     runs = _motion.posture_runs(plan)
     if len(runs) == 1:
         return f"Posture {posture_name(runs[0][0])} throughout."

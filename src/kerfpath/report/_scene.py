@@ -1,4 +1,4 @@
-"""The part and its contours in three dimensions."""
+"""The 3-D scene of the part, its contours and the transfer moves."""
 
 from __future__ import annotations
 
@@ -21,13 +21,13 @@ __all__ = ["add_part", "checked", "scene", "space_axis", "xyz"]
 
 HEIGHT = 560
 AXES_DRAWN = 6, 48
-"""Tool axes drawn per contour, at least and at most."""
+"""Least and largest number of tool axes drawn per contour."""
 APART = 0.02
-"""How far they stand apart, as a share of the part's size."""
+"""Distance between drawn tool axes, as a share of the part's size."""
 LARGE = 10.0
-"""How many times larger than a contour the part may be before its marks shrink with it."""
+"""Ratio of part to contour size above which the marks of the contour shrink with it."""
 LABELS = 12
-"""With more contours than this, names only show on hover."""
+"""Number of contours above which names only show on hover."""
 
 
 def scene(
@@ -36,7 +36,7 @@ def scene(
     cell: Cell | None = None,
     moves: Sequence[ArrayLike] = (),
 ) -> go.Figure:
-    """Return the part (a mesh, m), its contours, cell and moves between, in mm, axes alike."""
+    """Return the part (a mesh, m), its contours, cell and transfer moves, in mm, to one scale."""
     figure = go.Figure(layout=base_layout(HEIGHT, showlegend=False))
     corners = [section.path.points * 1e3 for section in sections]
     if mesh is not None:
@@ -164,7 +164,7 @@ def _add_move(figure: go.Figure, points: Array, number: int) -> None:
 
 
 def _labels(sections: Sequence[ContourSection]) -> list[dict[str, object]]:
-    """Name contours at their starts, and the first place where each failed one fails.
+    """Return the names of contours at their starts, and the first failure of each failed one.
 
     Alternate heights keep neighbouring names apart.
     """
@@ -191,7 +191,7 @@ def _labels(sections: Sequence[ContourSection]) -> list[dict[str, object]]:
 
 
 def _camera(sections: Sequence[ContourSection], cell: Cell | None) -> dict[str, object]:
-    """Look at the part from the side of the nozzle, a little from above and from the side.
+    """Return a camera on the side of the nozzle, a little above and beside the part.
 
     Up is up in the cell; without one, of the part.
     """
@@ -224,7 +224,7 @@ def space_axis(name: str) -> dict[str, object]:
 
 
 def checked(mesh: tuple[ArrayLike, ArrayLike]) -> tuple[Array, Any]:
-    """Return a mesh (vertices, triangles), its indices checked."""
+    """Return a mesh (vertices, triangles) after checking its indices."""
     vertices = floats(mesh[0], "mesh vertices", (None, 3))
     triangles = integers(mesh[1], "mesh triangles", (None, 3))
     if triangles.size and not (triangles.min() >= 0 and triangles.max() < len(vertices)):
@@ -241,6 +241,6 @@ def xyz(points: Array) -> dict[str, object]:
 
 
 def _lines(starts: Array, ends: Array) -> dict[str, object]:
-    """Return many separate lines as one trace; NaN is plotly's sign for a break."""
+    """Return many separate lines as one trace; plotly breaks a line at NaN."""
     breaks = np.full_like(starts, np.nan)
     return xyz(np.stack([starts, ends, breaks], axis=1).reshape(-1, 3))

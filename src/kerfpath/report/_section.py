@@ -26,10 +26,10 @@ SPARE = (0.25, 0.5, 1.0)
 
 
 def with_clearance(graph: LayeredGraph, found: ClearanceMap) -> LayeredGraph:
-    """Return the graph with what was found of its vertices among the reasons, by candidate.
+    """Return the graph with the clearances of its candidates among the reasons.
 
-    A candidate that is not clear is called a collision; one whose clearance is less than the band
-    of the map, by how much it has to spare. The turns of a candidate have the same pose, so that
+    A candidate that is not clear has the reason collision, one whose clearance is less than the
+    band of the map a range of clearances. The turns of a candidate have the same pose, so that
     one of them is enough.
     """
     steps = [1e3 * share * found.band for share in (0.0, *SPARE)]
@@ -54,7 +54,7 @@ class Mark(NamedTuple):
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class ContourSection:
-    """One contour of a report: what was searched, what came of it, and what the audit says.
+    """One contour of a report: the search, its plan or failure, and its audit.
 
     Parameters
     ----------
@@ -121,17 +121,17 @@ class ContourSection:
 
     @property
     def failed(self) -> bool:
-        """True where there is no plan, or one that its audit refuses."""
+        """True without a plan, or with one that fails its audit."""
         return self.plan is None or bool(self.errors)
 
     @property
     def parts(self) -> int:
-        """Into how many parts the plan divides the intervals between the nodes."""
+        """Number of parts into which the plan divides each interval."""
         return 1 if self.plan is None else (len(self.plan.q) - 1) // (len(self.path) - 1)
 
     @property
     def marks(self) -> list[Mark]:
-        """Where it fails: the node at which the path breaks, or the worst of each failed check."""
+        """Places of failure: the node of the break, or the worst node of each failed check."""
         if self.plan is None:
             if self.broken_at is None or not 0 <= self.broken_at < len(self.path):
                 return []

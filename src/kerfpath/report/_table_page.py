@@ -1,4 +1,4 @@
-"""A page with one table: what a study found, row by row."""
+"""A page with one table: the results of a study, row by row."""
 
 from __future__ import annotations
 

@@ -45,7 +45,7 @@ _UNITS = {
 
 
 def summary_table(sections: Sequence[ContourSection]) -> str:
-    """Return one row per contour: its size, its cost and how close it comes to the limits."""
+    """Return one row per contour: size, cost, and largest shares of the limits."""
     heads = (
         ("Contour", ""),
         ("Length", "mm"),
@@ -115,7 +115,7 @@ def criteria_table(plan: Plan) -> str:
 
 
 def nearest_table(plan: Plan) -> str:
-    """Return how near the nodes come to singularities and limits, and the margins asked for."""
+    """Return the least distances of nodes from singularities and limits, and their margins."""
     heads = (("Nearest to", ""), ("Least", ""), ("At node", ""), ("Margin", ""))
     bands = {} if plan.settings.comfort is None else plan.settings.comfort.bands
     rows = []
@@ -124,16 +124,16 @@ def nearest_table(plan: Plan) -> str:
         margin = bands[name].margin if name in bands else 0.0
         rows.append(
             f'<tr><th scope="row">{escape(MEASURES[name].words)}</th>'
-            + td(_measured(least, unit))
+            + td(_with_unit(least, unit))
             + td(str(node))
-            + td(_measured(margin, unit) if margin else "&ndash;")
+            + td(_with_unit(margin, unit) if margin else "&ndash;")
             + "</tr>"
         )
     return table(heads, rows)
 
 
 def audit_table(checks: Sequence[Check]) -> str:
-    """Return the audit: what was checked, the worst value, what is allowed, where, the verdict."""
+    """Return the audit: each check, its worst value, the allowed value, the node, the verdict."""
     if not checks:
         return '<p class="quiet">The audit was not run.</p>'
     heads = (("Check", ""), ("Worst", ""), ("Allowed", ""), ("At node", ""), ("Result", ""))
@@ -146,8 +146,8 @@ def audit_table(checks: Sequence[Check]) -> str:
         words = {PASS: "passed", FAIL: "failed", WARN: "warning"}
         rows.append(
             f'<tr class="{state}"><th scope="row">{escape(check.title)}{advice}</th>'
-            + td(_measured(check.value, check.unit))
-            + td("≤ " + _measured(check.limit, check.unit))
+            + td(_with_unit(check.value, check.unit))
+            + td("≤ " + _with_unit(check.limit, check.unit))
             + td(str(check.node) if check.node >= 0 else "&ndash;")
             + f"<td>{sign(state, words[state])}</td></tr>"
         )
@@ -155,7 +155,7 @@ def audit_table(checks: Sequence[Check]) -> str:
 
 
 def counts_table(graph: LayeredGraph) -> str:
-    """Return what became of the candidates, in numbers, per cent and as bars."""
+    """Return the counts of candidates, kept and dropped by reason, in per cent and as bars."""
     counts, colours = graph.counts(), reason_colours(graph.reasons)
     whole, rows = sum(counts.values()), []
     for word, count in counts.items():
@@ -183,7 +183,7 @@ def reason_legend(graph: LayeredGraph, postures: Sequence[int], *, has_plan: boo
 
 
 def audit_sign(section: ContourSection) -> str:
-    """Return what the audit says of a section, with a sign."""
+    """Return the verdict of the audit on a section, with its sign."""
     if not section.checks:
         return sign(WARN, "not audited")
     if section.errors:
@@ -199,7 +199,7 @@ def sign(state: str, words: str) -> str:
 
 
 def number(value: float, digits: int) -> str:
-    """Return `value` with `digits` decimals, in words where it is not finite."""
+    """Return `value` with `digits` decimals, or a word where it is not finite."""
     if math.isnan(value):
         return "not a number"
     if math.isinf(value):
@@ -208,11 +208,11 @@ def number(value: float, digits: int) -> str:
 
 
 def shown_unit(unit: str) -> tuple[float, str]:
-    """Return what a value in `unit` is multiplied by to be shown, and the unit that follows it."""
+    """Return the factor from `unit` to the unit that is shown, and that unit."""
     return _UNITS.get(unit, (1.0, f" {unit}" if unit else ""))
 
 
-def _measured(value: float, unit: str) -> str:
+def _with_unit(value: float, unit: str) -> str:
     factor, suffix = _UNITS[unit]
     scaled = value * factor
     if not math.isfinite(scaled) or unit == "count":

@@ -25,12 +25,12 @@ from kerfpath.search._problem import SearchProblem, offsets
 from kerfpath.search._shortest import LayeredPath
 from kerfpath.search._slowed import SlowedPath
 
-__all__ = ["Known", "find_clear"]
+__all__ = ["FoundPath", "Known", "find_clear"]
 
 Price = Callable[[Ints], Array]
 Passable = Callable[[Ints, Ints], Bools]
-Path = LayeredPath | SlowedPath | InterruptedPath | LeastInterval
-_P = TypeVar("_P", LayeredPath, SlowedPath, InterruptedPath, LeastInterval)
+FoundPath = LayeredPath | SlowedPath | InterruptedPath | LeastInterval
+_P = TypeVar("_P", bound=FoundPath)
 
 LIKELY, OPEN, CLOSED = 1, 2, 3
 """What is known of an edge: not seen to be closed, passable, or closed."""
@@ -286,14 +286,14 @@ def find_clear(search: Callable[[SearchProblem], _P], problem: SearchProblem, kn
             return found
 
 
-def _runs(found: Path, start: Ints) -> list[Ints]:
+def _runs(found: FoundPath, start: Ints) -> list[Ints]:
     """Return the vertices of each piece of a path."""
     if not isinstance(found, InterruptedPath):
         return [start[:-1] + found.index]
     return [start[p.first : p.first + len(p.index)] + p.index for p in found.pieces]
 
 
-def _near(problem: SearchProblem, found: Path) -> Passable:
+def _near(problem: SearchProblem, found: FoundPath) -> Passable:
     """Return what tells which edges keep the velocity limit; at the least interval, all do."""
     bound = np.inf if isinstance(found, LeastInterval) else problem.aim.velocity
 

@@ -14,25 +14,25 @@ from kerfpath.sweep._task import Failure, Outcome, Task, attempt
 __all__ = ["on_cluster"]
 
 AHEAD = 4096
-"""Tasks at the scheduler at a time: more than a cluster has workers, few for its memory."""
+"""Number of tasks at the scheduler at a time: more than workers, few for its memory."""
 
 GROUP = "task-"
-"""What the keys of tasks begin with: Dask takes them for one group, which it keeps in a queue.
+"""Prefix of the keys of tasks: Dask takes them for one group, which it keeps in a queue.
 
 Without it each task would be a group of its own, which the scheduler never forgets."""
 
 PATIENCE = 10.0
-"""How long a scheduler, and then its first worker, is waited for, s."""
+"""Longest wait for a scheduler, and then for its first worker, s."""
 
 
 def on_cluster(
     function: Callable[..., Any], waiting: deque[Task], address: str
 ) -> Generator[list[Outcome], None, None]:
-    """Take what is waiting and yield the outcomes as they come, none where there is nothing to do.
+    """Do the waiting tasks and yield outcomes as they come, none where nothing is waiting.
 
-    It goes on for as long as it is asked; closing it takes the rest back from the scheduler. Dask
-    gives the tasks of a worker that is lost to the others; a task that has lost several is its
-    failure (Dask's `allowed-failures`).
+    The generator never ends; closing it takes the rest back from the scheduler. Dask gives the
+    tasks of a lost worker to the others; a task that has lost several workers has failed (Dask's
+    `allowed-failures`).
 
     Raises
     ------
@@ -56,7 +56,7 @@ def on_cluster(
     try:
         with client:
             _check(client, address)
-            yield from _gathered(distributed, client, function, waiting)
+            yield from _gather(distributed, client, function, waiting)
     except (distributed.CancelledError, OSError, RuntimeError) as error:
         # Closing a client that has lost its scheduler may end in a RuntimeError of Dask's own.
         raise InputError(
@@ -66,7 +66,7 @@ def on_cluster(
 
 
 def _check(client: Any, address: str) -> None:
-    """Refuse a cluster without workers, or with one of another version, by its address."""
+    """Require at least one worker, and the same version of kerfpath on all."""
     try:
         client.wait_for_workers(1, timeout=PATIENCE)
     except TimeoutError as error:
@@ -83,7 +83,7 @@ def _check(client: Any, address: str) -> None:
         )
 
 
-def _gathered(
+def _gather(
     distributed: Any, client: Any, function: Callable[..., Any], waiting: deque[Task]
 ) -> Iterator[list[Outcome]]:
     call = distributed.protocol.pickle.dumps(function)
@@ -102,14 +102,14 @@ def _gathered(
             whole = [future for future in batch if future.status == "finished"]
             yield [
                 *client.gather(whole),
-                *(_failed(distributed, f) for f in batch if f not in whole),
+                *(_failure_of(distributed, f) for f in batch if f not in whole),
             ]
             hand_out()
         yield []
 
 
-def _failed(distributed: Any, future: Any) -> Outcome:
-    """Return the outcome of a task that kills its workers; raise whatever else it is."""
+def _failure_of(distributed: Any, future: Any) -> Outcome:
+    """Return the failure of a task that kills its workers; raise any other error."""
     error = future.exception()
     if isinstance(error, distributed.KilledWorker):
         failure = Failure(kind="WorkerDied", message="the task took several workers with it")

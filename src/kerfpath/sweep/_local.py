@@ -22,7 +22,7 @@ from kerfpath.sweep._task import Failure, Outcome, Task, attempt
 __all__ = ["on_processes"]
 
 AHEAD = 8
-"""Tasks handed out per process: enough that none waits for the next, few to lose."""
+"""Number of tasks handed out per process: enough that none is idle, few to lose."""
 
 ONE_THREAD = dict.fromkeys(("NUMBA_NUM_THREADS", "OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS"), "1")
 
@@ -30,11 +30,11 @@ ONE_THREAD = dict.fromkeys(("NUMBA_NUM_THREADS", "OMP_NUM_THREADS", "OPENBLAS_NU
 def on_processes(
     function: Callable[..., Any], waiting: deque[Task], processes: int
 ) -> Generator[list[Outcome], None, None]:
-    """Take what is waiting and yield the outcomes as they come, none where there is nothing to do.
+    """Do the waiting tasks and yield outcomes as they come, none where nothing is waiting.
 
-    It goes on for as long as it is asked; closing it stops the processes at once. When a process
-    dies, nobody can say which task did it: those handed out are tried again one by one, and the one
-    that is alone with the next death is its cause.
+    The generator never ends; closing it stops the processes at once. When a process dies, the task
+    that killed it is not known: those handed out are tried again one by one, and a task during
+    which the process dies again has failed.
 
     Raises
     ------
@@ -46,24 +46,24 @@ def on_processes(
         if not waiting:
             yield []
             continue
-        suspects = deque((yield from _pooled(call, waiting, processes, processes * AHEAD)))
+        suspects = deque((yield from _run_pool(call, waiting, processes, processes * AHEAD)))
         while suspects:
-            for task in (yield from _pooled(call, suspects, 1, 1, lasting=False)):
+            for task in (yield from _run_pool(call, suspects, 1, 1, lasting=False)):
                 failure = Failure(kind="WorkerDied", message="the task took its process with it")
                 yield [Outcome(key=task.key, value=None, failure=failure, seconds=0.0)]
 
 
-def _pooled(
+def _run_pool(
     call: bytes, waiting: deque[Task], processes: int, ahead: int, *, lasting: bool = True
 ) -> Generator[list[Outcome], None, list[Task]]:
-    """Take and do what is waiting; return, at the first death, the tasks that it interrupted.
+    """Do the waiting tasks; return, at the first death of a process, the tasks that it interrupted.
 
-    A lasting pool stays when there is nothing to do, and yields no outcomes.
+    A lasting pool stays when nothing is waiting, and yields no outcomes.
     """
     context = get_context("spawn")
     ours, theirs = context.Pipe()
     pool = ProcessPoolExecutor(
-        processes, mp_context=context, initializer=_begin, initargs=(theirs, call)
+        processes, mp_context=context, initializer=_set_up, initargs=(theirs, call)
     )
     flying: dict[Future[Outcome], Task] = {}
     broken = False
@@ -71,7 +71,7 @@ def _pooled(
         while True:
             while waiting and not broken and len(flying) < ahead:
                 try:
-                    with _unheard():
+                    with _interrupt_blocked():
                         future = pool.submit(attempt, __version__, call, waiting[0])
                 except BrokenProcessPool:
                     broken = True
@@ -108,8 +108,8 @@ def _pooled(
 
 
 @contextmanager
-def _unheard() -> Iterator[None]:
-    """Let processes that are started here begin deaf to Ctrl-C, before they can say so."""
+def _interrupt_blocked() -> Iterator[None]:
+    """Start processes with Ctrl-C blocked, until they ignore it by themselves."""
     if not hasattr(signal, "pthread_sigmask"):
         yield
         return
@@ -120,10 +120,10 @@ def _unheard() -> Iterator[None]:
         signal.pthread_sigmask(signal.SIG_SETMASK, before)
 
 
-def _begin(link: Connection, call: bytes) -> None:
-    """Set up a process: one thread, deaf to Ctrl-C, and gone as soon as the sweep lets go.
+def _set_up(link: Connection, call: bytes) -> None:
+    """Set up a process: one thread, Ctrl-C ignored, and an end as soon as the sweep ends.
 
-    What the function needs is imported at once, not by the first task.
+    Imports of the function happen here, not in the first task.
     """
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     os.environ.update(ONE_THREAD)
@@ -135,6 +135,6 @@ def _begin(link: Connection, call: bytes) -> None:
 
 
 def _leave_with(link: Connection) -> None:
-    """End this process when the other end of `link` closes: by choice, or because it was killed."""
+    """End this process when the other end of `link` closes: after close() or a kill."""
     link.poll(None)
     os._exit(1)

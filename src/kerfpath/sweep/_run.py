@@ -1,4 +1,4 @@
-"""A sweep: what is not in the store yet is done, and kept as it comes."""
+"""A sweep: tasks whose results are not in the store are done, and their results kept."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ __all__ = ["Result", "Sweep", "run"]
 
 @dataclass(frozen=True, kw_only=True, slots=True)
 class Result:
-    """What became of one task.
+    """The result of one task.
 
     Parameters
     ----------
@@ -45,10 +45,11 @@ class Result:
 
 
 class Sweep:
-    """Calls of one function, handed in one by one and kept as they come; a context manager.
+    """Calls of one function, submitted one by one, with results kept as they come.
 
-    For searches whose next task depends on what came of others; `run` has all of them at once.
-    What the store holds already is not done again. Workers start with the first task that is new.
+    A sweep is a context manager, for searches whose next task depends on results; `run` takes all
+    tasks at once. Results in the store are not computed again. Workers start with the first task
+    that is new.
 
     Parameters
     ----------
@@ -58,7 +59,7 @@ class Sweep:
         Called with "tasks", the number of tasks done, and the number of all; see
         `kerfpath.progress`.
     total : int, optional
-        How many tasks there will be; default: as many as were handed in so far.
+        Number of tasks that there will be; default: the number submitted so far.
 
     Raises
     ------
@@ -94,7 +95,7 @@ class Sweep:
         self._there = self._kept.keys()
 
     def submit(self, **parameters: Any) -> str:
-        """Hand in a call with these parameters and return what `result` knows it by.
+        """Submit a call with these parameters and return its key for `result`.
 
         Raises
         ------
@@ -112,7 +113,7 @@ class Sweep:
         return task.key
 
     def result(self, key: str) -> Result:
-        """Return what became of a task, as soon as it is there."""
+        """Wait for the result of a task and return it."""
         if not self._begun:
             self._begun = True
             self._report()

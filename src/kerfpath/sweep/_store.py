@@ -1,4 +1,4 @@
-"""Where results stay: one SQLite file, which one sweep at a time holds."""
+"""The store of results: one SQLite file, held by one sweep at a time."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from kerfpath.sweep._task import SCHEMA, Failure, Outcome, Task
 __all__ = ["Store"]
 
 APPLICATION = 0x6B657266
-"""SQLite's mark of whose file it is: "kerf"."""
+"""Application id of the SQLite file: "kerf"."""
 
 TABLES = f"""
 BEGIN EXCLUSIVE;
@@ -57,7 +57,7 @@ class Store:
 
     def __init__(self, path: Path) -> None:
         self._path = path
-        with self._explained():
+        with self._explain():
             self._base = sqlite3.connect(path, timeout=0)
             try:
                 self._open()
@@ -91,7 +91,7 @@ class Store:
         return int(self._base.execute(query).fetchone()[0])
 
     @contextmanager
-    def _explained(self) -> Iterator[None]:
+    def _explain(self) -> Iterator[None]:
         try:
             yield
         except sqlite3.DatabaseError as error:
@@ -100,11 +100,11 @@ class Store:
 
     def keys(self) -> set[str]:
         """Return the keys of all results."""
-        with self._explained():
+        with self._explain():
             return {key for (key,) in self._base.execute("SELECT key FROM result")}
 
     def add(self, function: str, done: Iterable[tuple[Task, Outcome]]) -> None:
-        """Keep outcomes, all or none of them; a key that is there already is an error."""
+        """Store outcomes, all or none of them; a key that is there already is an error."""
         rows = [
             (
                 task.key,
@@ -117,13 +117,13 @@ class Store:
             )
             for task, outcome in done
         ]
-        with self._explained(), self._base:
+        with self._explain(), self._base:
             self._base.executemany("INSERT INTO result VALUES (?, ?, ?, ?, ?, ?, ?)", rows)
 
     def outcome(self, key: str) -> Outcome:
-        """Return what is kept under a key."""
+        """Return the outcome stored under a key."""
         query = "SELECT value, kind, message, seconds FROM result WHERE key = ?"
-        with self._explained():
+        with self._explain():
             row = self._base.execute(query, (key,)).fetchone()
         match row:
             case (str() as value, None, None, float() as seconds):
@@ -134,7 +134,7 @@ class Store:
         raise self.damaged(key)
 
     def damaged(self, key: str) -> InputError:
-        """Return the error that says that what is kept under a key is no result."""
+        """Return the error for a row that is no result."""
         return InputError(
             f"{self._path}: the store is damaged, result {str(key)[:16]!r} is none; name another "
             "store, and the sweep is done anew"
@@ -147,5 +147,5 @@ class Store:
         self.close()
 
     def close(self) -> None:
-        """Let go of the file."""
+        """Close the file."""
         self._base.close()

@@ -20,15 +20,15 @@ from kerfpath.errors import InputError
 __all__ = ["SCHEMA", "Failure", "Outcome", "Task", "UnfitWorker", "attempt", "name_of", "task_of"]
 
 SCHEMA = 1
-"""Counts the ways in which sweeps were kept; another number is another store."""
+"""Version of the store; another number is another store."""
 
 
 class UnfitWorker(InputError):
-    """A worker that cannot do a task as others could: it ends the sweep, and nothing is kept."""
+    """The worker lacks what a task needs and others have: the sweep ends, nothing is kept."""
 
 
 class Task(NamedTuple):
-    """The key under which a result is kept, and the parameters as JSON."""
+    """A call to do: the key of its result, and its parameters as JSON."""
 
     key: str
     parameters: str
@@ -36,7 +36,7 @@ class Task(NamedTuple):
 
 @dataclass(frozen=True, kw_only=True, slots=True)
 class Failure:
-    """Why a task has no value.
+    """The reason why a task has no value.
 
     Parameters
     ----------
@@ -53,14 +53,14 @@ class Failure:
 
     @property
     def reason(self) -> str:
-        """The message, after the kind where that is not one of kerfpath's own errors."""
+        """The message, after the kind if that is not one of kerfpath's own errors."""
         own = self.kind in ("InputError", "NoFeasiblePath")
         return self.message if own else f"{self.kind}: {self.message}"
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)
 class Outcome:
-    """What an attempt came to: a value as JSON, or a failure; `seconds` is the time it took."""
+    """The outcome of an attempt: a value as JSON, or a failure, and the time it took, s."""
 
     key: str
     value: str | None
@@ -71,7 +71,7 @@ class Outcome:
 
 
 def name_of(function: Callable[..., Any]) -> str:
-    """Return "module:name" of a top-level function; a script counts under its file's name.
+    """Return "module:name" of a top-level function; a script has its file's name.
 
     Raises
     ------
@@ -117,7 +117,7 @@ def task_of(function: Callable[..., Any], parameters: Mapping[str, Any], where: 
 
 
 def attempt(version: str, function: bytes, task: Task) -> Outcome:
-    """Call a pickled function in a worker; whatever it raises becomes part of the outcome.
+    """Call a pickled function in a worker; an exception becomes part of the outcome.
 
     Raises
     ------

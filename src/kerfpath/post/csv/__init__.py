@@ -1,10 +1,11 @@
 """A table of all targets (CSV), for spreadsheets and programs of one's own."""
 
 from kerfpath.post._languages import Language
+from kerfpath.post._times import check_times
 from kerfpath.post.csv._read import read
 from kerfpath.post.csv._write import Csv as Csv
 from kerfpath.post.csv._write import CsvSettings as CsvSettings
-from kerfpath.post.csv._write import check, is_reserved, rules
+from kerfpath.post.csv._write import is_reserved, rules
 
 CSV = Language(
     name="csv",
@@ -16,7 +17,7 @@ CSV = Language(
     rules=rules,
     formatter=Csv,
     is_reserved=is_reserved,
-    check=check,
+    check=check_times,
     read=read,
 )
 """What is registered."""

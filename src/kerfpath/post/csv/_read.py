@@ -9,10 +9,10 @@ import numpy as np
 
 from kerfpath._arrays import Array, freeze
 from kerfpath.errors import InputError
+from kerfpath.post._line_reader import LineReader
 from kerfpath.post._orientations import pose_of
 from kerfpath.post._program import SIGNALS, Switch
 from kerfpath.post._read import MOVE_KINDS, ReadProgram, ReadSection, ReadStep
-from kerfpath.post._reading import LineReader
 from kerfpath.post.csv._write import POSE, CsvSettings, columns
 from kerfpath.robots import Robot
 

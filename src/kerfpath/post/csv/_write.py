@@ -13,22 +13,20 @@ import numpy as np
 
 from kerfpath.post._divide import require_one_file
 from kerfpath.post._formatter import Formatter, number
-from kerfpath.post._issue import ProgramIssue
 from kerfpath.post._orientations import quaternions
 from kerfpath.post._program import (
     CircularMove,
     JointMove,
     LinearMove,
     Move,
-    Program,
     Switch,
     Wait,
     targets_of,
 )
 from kerfpath.post._settings import LinesPerFile, Rules, Settings
-from kerfpath.post._times import refusals, timetable
+from kerfpath.post._times import timetable
 
-__all__ = ["Csv", "CsvSettings", "check", "columns", "event", "is_reserved", "rules"]
+__all__ = ["Csv", "CsvSettings", "columns", "event", "is_reserved", "rules"]
 
 POSE = ("x_mm", "y_mm", "z_mm", "qw", "qx", "qy", "qz")
 
@@ -47,11 +45,6 @@ def rules(settings: CsvSettings) -> Rules:
 def is_reserved(name: str) -> bool:
     """Return whether a run of a job writes a file of that name already."""
     return name.lower() == "trajectory"
-
-
-def check(program: Program, settings: CsvSettings) -> Iterator[ProgramIssue]:
-    """Yield what forbids to say times."""
-    yield from refusals(program)
 
 
 def columns(joints: int) -> list[str]:

@@ -21,7 +21,7 @@ from kerfpath.post._standing import warn_of_changed_postures
 from kerfpath.post._times import TICK, not_whole
 from kerfpath.post.fanuc._axes import posture, turns
 from kerfpath.post.fanuc._settings import FanucSettings, unit
-from kerfpath.post.fanuc._switching import switching
+from kerfpath.post.fanuc._switching import split_switches
 from kerfpath.post.fanuc._write import Fanuc
 
 __all__ = ["check"]
@@ -64,7 +64,7 @@ def _check_times(section: Section) -> Iterator[ProgramIssue]:
         times = [step.time] if isinstance(step, Wait) else []
         times += [step.timeout] if isinstance(step, Await) else []
         if isinstance(step, LinearMove):
-            before, timed, _ = switching(step)
+            before, timed, _ = split_switches(step)
             times = [switch.lead_time for switch in timed]
             if before:
                 yield from _check_early(before, stands, place)

@@ -8,7 +8,7 @@ from __future__ import annotations
 import re
 from collections.abc import Mapping, Sequence
 
-from kerfpath.post._reading import LineReader
+from kerfpath.post._line_reader import LineReader
 from kerfpath.post.fanuc._settings import FanucSettings
 from kerfpath.robots import Robot
 

@@ -12,6 +12,7 @@ from kerfpath._arrays import Array, freeze
 from kerfpath.errors import InputError
 from kerfpath.post._called import off_name
 from kerfpath.post._frames import faceplate, from_euler, world
+from kerfpath.post._line_reader import patterns
 from kerfpath.post._program import Await, Switch
 from kerfpath.post._read import (
     MoveKind,
@@ -21,7 +22,6 @@ from kerfpath.post._read import (
     ReadSection,
     ReadStep,
 )
-from kerfpath.post._reading import patterns
 from kerfpath.post.fanuc._axes import joints_from_axes
 from kerfpath.post.fanuc._listing import Listing
 from kerfpath.post.fanuc._settings import UNITS, FanucSettings
@@ -48,12 +48,12 @@ def read(main: str, files: Mapping[str, str], robot: Robot, settings: FanucSetti
     sections = []
     for name in top.calls:
         listing = _Section(f"{name}.ls", files[f"{name}.ls"], robot, settings)
-        steps = _timed(listing.completed(), listing.early, robot, part, tool)
+        steps = _time_early(listing.completed(), listing.early, robot, part, tool)
         sections.append(ReadSection(name=listing.name, steps=steps))
     return ReadProgram(name=top.name, sections=tuple(sections), T_flange_tip=tool, T_base_part=part)
 
 
-def _timed(
+def _time_early(
     steps: Sequence[ReadStep], early: Mapping[int, tuple[Switch, ...]], robot: Robot,
     part: Array, tool: Array,
 ) -> tuple[ReadStep, ...]:  # fmt: skip

@@ -17,7 +17,7 @@ from kerfpath._arrays import Array
 from kerfpath.post._program import JointMove, LinearMove, Move, Program, Section, Step, Switch
 from kerfpath.post.fanuc._settings import FanucSettings, unit
 
-__all__ = ["Switching", "sayable", "switching", "time_before"]
+__all__ = ["Switching", "sayable", "split_switches", "time_before"]
 
 
 class Switching(NamedTuple):
@@ -28,7 +28,7 @@ class Switching(NamedTuple):
     after: tuple[Switch, ...]
 
 
-def switching(move: LinearMove) -> Switching:
+def split_switches(move: LinearMove) -> Switching:
     """Return which switches of a move stand where; of those ahead the last has the TB."""
     switches = move.switches
     after = 0
@@ -46,19 +46,24 @@ def time_before(start: Array, end: Array, speed: float) -> float:
 
 def sayable(program: Program, settings: FanucSettings) -> Program:
     """Return the program with what is switched before a motion that long ahead of its end."""
-    sections = tuple(replace(s, steps=tuple(_said(program, s, settings))) for s in program.sections)
+    sections = tuple(
+        replace(s, steps=tuple(_with_early_switches(program, s, settings)))
+        for s in program.sections
+    )
     return replace(program, sections=sections)
 
 
-def _said(program: Program, section: Section, settings: FanucSettings) -> Sequence[Step]:
+def _with_early_switches(
+    program: Program, section: Section, settings: FanucSettings
+) -> Sequence[Step]:
     steps: list[Step] = []
     before: Move | None = None
     for step in section.steps:
-        if isinstance(step, LinearMove) and before is not None and switching(step).before:
+        if isinstance(step, LinearMove) and before is not None and split_switches(step).before:
             (start,) = program.tips([before])
             speed = round(step.speed / unit(settings)) * unit(settings)
             early = time_before(start, step.T_part_tip, speed)
-            first, timed, after = switching(step)
+            first, timed, after = split_switches(step)
             moved = (replace(switch, lead_time=early) for switch in first)
             steps.append(replace(step, switches=(*moved, *timed, *after)))
         else:

@@ -34,7 +34,7 @@ from kerfpath.post._program import (
 from kerfpath.post._settings import outputs
 from kerfpath.post.fanuc._axes import axes_from_joints, posture
 from kerfpath.post.fanuc._settings import FanucSettings, unit
-from kerfpath.post.fanuc._switching import switching
+from kerfpath.post.fanuc._switching import split_switches
 
 __all__ = [
     "ANGLES", "Fanuc", "abort_lines", "selection_lines", "switch_off_lines", "watch_lines",
@@ -183,15 +183,15 @@ class Fanuc(CalledFormatter):
             end = f"CNT{settings.cnt_percent}"
         elif move.zone > 0:
             end = f"CR{number(move.zone * 1e3, 0)}"
-        timed = switching(move).timed
+        timed = split_switches(move).timed
         before = "".join(f" TB {_seconds(s.lead_time)}sec,{self._set(s)}" for s in timed)
         return f"{number(move.speed / unit(settings), 0)}{settings.speed_unit} {end}{before}"
 
     def _before(self, move: LinearMove) -> Iterator[str]:
-        yield from (f"  {self._set(switch)} ;" for switch in switching(move).before)
+        yield from (f"  {self._set(switch)} ;" for switch in split_switches(move).before)
 
     def _after(self, move: LinearMove) -> Iterator[str]:
-        yield from (f"  {self._set(switch)} ;" for switch in switching(move).after)
+        yield from (f"  {self._set(switch)} ;" for switch in split_switches(move).after)
 
     def _set(self, switch: Switch) -> str:
         return f"DO[{self.output(switch.signal)}]={'ON' if switch.on else 'OFF'}"

@@ -11,9 +11,9 @@ import numpy as np
 from kerfpath._arrays import Array, freeze
 from kerfpath.post._called import off_name
 from kerfpath.post._frames import faceplate, from_euler, world
+from kerfpath.post._line_reader import LineReader, patterns
 from kerfpath.post._program import Switch
 from kerfpath.post._read import MoveKind, ReadProgram, ReadSection
-from kerfpath.post._reading import LineReader, patterns
 from kerfpath.post.inform._axes import joints_at, joints_from_axes
 from kerfpath.post.inform._settings import InformSettings
 from kerfpath.post.inform._write import (

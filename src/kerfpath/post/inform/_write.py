@@ -112,7 +112,7 @@ class Inform(CalledFormatter):
     frame_line = "'%s %s %s"
 
     def __init__(self, program: Program, settings: InformSettings) -> None:
-        super().__init__(by_kind(stop_to_switch(program)), settings)
+        super().__init__(split_by_kind(stop_to_switch(program)), settings)
         self._targets: list[tuple[Array, Array | None]] = []
         self._labels = count(1)
         moves = self.program.moves
@@ -252,7 +252,7 @@ class Inform(CalledFormatter):
         return NEW_LINE.join(rows)
 
 
-def by_kind(program: Program) -> Program:
+def split_by_kind(program: Program) -> Program:
     """Return the program with joint moves in sections of their own.
 
     Comments and waits stay with the move before them, at the start with the one behind.

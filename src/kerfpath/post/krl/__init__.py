@@ -6,10 +6,9 @@ from kerfpath.post.krl._axes import joints_from_axes as joints_from_axes
 from kerfpath.post.krl._axes import posture
 from kerfpath.post.krl._axes import status_and_turn as status_and_turn
 from kerfpath.post.krl._check import check
-from kerfpath.post.krl._names import is_reserved
 from kerfpath.post.krl._read import read
 from kerfpath.post.krl._settings import KrlSettings as KrlSettings
-from kerfpath.post.krl._settings import rules
+from kerfpath.post.krl._settings import is_reserved, rules
 from kerfpath.post.krl._write import Krl as Krl
 
 KRL = Language(

@@ -10,9 +10,9 @@ import numpy as np
 from kerfpath._arrays import Array, freeze
 from kerfpath.errors import InputError
 from kerfpath.post._frames import from_euler
+from kerfpath.post._line_reader import LineReader, only, patterns, statements
 from kerfpath.post._program import Switch
 from kerfpath.post._read import MoveKind, ReadProgram, ReadSection, ReadStep
-from kerfpath.post._reading import LineReader, patterns, statements
 from kerfpath.post.krl._axes import joints_from_axes
 from kerfpath.post.krl._settings import KrlSettings
 from kerfpath.post.krl._write import (
@@ -57,15 +57,11 @@ _LINES = patterns(
     }
 )
 
-
-def _of(*kinds: str) -> dict[str, re.Pattern[str]]:
-    return {kind: _LINES[kind] for kind in kinds}
-
-
-_OUTSIDE = _of("routine")
-_IN_FIRST = _of("condition", "call", "end_condition", "end")
-_IN_MAIN = _of("tool", "base", "again") | _IN_FIRST
-_IN_ROUTINE = _of(
+_OUTSIDE = only(_LINES, "routine")
+_IN_FIRST = only(_LINES, "condition", "call", "end_condition", "end")
+_IN_MAIN = only(_LINES, "tool", "base", "again") | _IN_FIRST
+_IN_ROUTINE = only(
+    _LINES,
     "linear", "speed", "zone", "trigger", "circular", "joint", "share", "wait", "request",
     "wait_for", "end",
 )  # fmt: skip

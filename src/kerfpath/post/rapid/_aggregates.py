@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 
 from kerfpath._arrays import Array
+from kerfpath.post._line_reader import LineReader
 from kerfpath.post._orientations import pose_of
-from kerfpath.post._reading import LineReader
 
 __all__ = ["Aggregates"]
 

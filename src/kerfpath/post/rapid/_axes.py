@@ -17,8 +17,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from kerfpath._arrays import Array, Ints, floats, freeze
-from kerfpath.post._arm_plane import wrist_in_plane
-from kerfpath.post._axes import AxisCount
+from kerfpath.post._axes import AxisCount, wrist_in_plane
 from kerfpath.robots import Robot
 
 __all__ = ["axes_from_joints", "confdata", "joints_from_axes", "posture"]

@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import re
-
-from kerfpath.post._reading import patterns
+from kerfpath.post._line_reader import only, patterns
 from kerfpath.post.rapid._write import FIRST
 
 __all__ = ["DECLARED", "IN_MAIN", "IN_PART", "IN_ROUTINE", "MODULE", "OUTSIDE"]
@@ -43,16 +41,14 @@ _LINES = patterns(
 )
 DECLARED = ("tool", "work_object", "speed", "zone", "trigger", "first")
 
-
-def _of(*kinds: str) -> dict[str, re.Pattern[str]]:
-    return {kind: _LINES[kind] for kind in kinds}
-
-
-MODULE = _of("module")
-OUTSIDE = _of(*DECLARED, "routine", "end_module")
-IN_PART = _of("routine", "end_module")
-IN_MAIN = _of("set_trigger", "load", "condition", "late_call", "unload", "call", "end_routine")
-IN_ROUTINE = _of(
+MODULE = only(_LINES, "module")
+OUTSIDE = only(_LINES, *DECLARED, "routine", "end_module")
+IN_PART = only(_LINES, "routine", "end_module")
+IN_MAIN = only(
+    _LINES, "set_trigger", "load", "condition", "late_call", "unload", "call", "end_routine"
+)
+IN_ROUTINE = only(
+    _LINES,
     "joint_move", "linear_move", "circular_move", "switching_move", "switching_arc", "wait",
     "request", "wait_for", "end_routine",
 )  # fmt: skip

@@ -10,9 +10,9 @@ from typing import Any, TypeVar
 import numpy as np
 
 from kerfpath._arrays import Array
+from kerfpath.post._line_reader import statements
 from kerfpath.post._program import Switch
 from kerfpath.post._read import ReadMove, ReadProgram, ReadSection, ReadStep
-from kerfpath.post._reading import statements
 from kerfpath.post.rapid._aggregates import Aggregates
 from kerfpath.post.rapid._axes import joints_from_axes
 from kerfpath.post.rapid._lines import DECLARED, IN_MAIN, IN_PART, IN_ROUTINE, MODULE, OUTSIDE

@@ -76,18 +76,20 @@ class Rapid(Formatter):
         moves = program.moves
         joint = [move for move in moves if isinstance(move, JointMove)]
         self._cruise = cruises(self.program)
-        self.air_speed = _numbered("vAir", (air_speed_data(move.speed) for move in joint))
-        self._laser_on = dict(_with_laser(moves))
+        self.air_speed = _number_names("vAir", (air_speed_data(move.speed) for move in joint))
+        self._laser_on = dict(_mark_laser(moves))
         linear = [(on, linear_speed_data(move.speed)) for move, on in self._laser_on.items()]
-        self.linear_speed = _numbered("vApproach", (key for key in linear if not key[0]))
-        self.linear_speed |= _numbered("vCut", (key for key in linear if key[0]))
-        self.zone = _numbered("zCorner", (zone_data(move.zone) for move in moves if move.zone > 0))
+        self.linear_speed = _number_names("vApproach", (key for key in linear if not key[0]))
+        self.linear_speed |= _number_names("vCut", (key for key in linear if key[0]))
+        self.zone = _number_names(
+            "zCorner", (zone_data(move.zone) for move in moves if move.zone > 0)
+        )
         switches = [s for m in moves if isinstance(m, LinearMove) for s in m.switches]
         self.trigger: dict[Switch, str] = {}
         for signal, prefix in (("laser", "tr"), ("gas", "trGas")):
             for on, suffix in ((True, "On"), (False, "Off")):
                 keys = (s for s in switches if (s.signal, s.on) == (signal, on))
-                self.trigger |= _numbered(f"{prefix}{suffix}", keys)
+                self.trigger |= _number_names(f"{prefix}{suffix}", keys)
 
     def files(self) -> dict[str, str]:
         """Return one module, or a main one and those with its routines that it loads.
@@ -276,14 +278,14 @@ def switch_off_lines(settings: RapidSettings) -> list[str]:
     return [f"SetDO {name},0;" for name in outputs(settings)]
 
 
-def _numbered(prefix: str, keys: Iterable[_Key]) -> dict[_Key, str]:
+def _number_names(prefix: str, keys: Iterable[_Key]) -> dict[_Key, str]:
     distinct = list(dict.fromkeys(keys))
     if len(distinct) == 1:
         return {distinct[0]: prefix}
     return {key: f"{prefix}{n}" for n, key in enumerate(distinct, 1)}
 
 
-def _with_laser(moves: Iterable[Move]) -> list[tuple[LinearMove, bool]]:
+def _mark_laser(moves: Iterable[Move]) -> list[tuple[LinearMove, bool]]:
     """Return the linear and circular moves, with whether each is made with the laser on."""
     on, found = False, []
     for move in moves:

@@ -1,7 +1,7 @@
 """ROS trajectories: trajectory_msgs/JointTrajectory as YAML, and what is switched when."""
 
 from kerfpath.post._languages import Language
-from kerfpath.post.ros._check import check, is_reserved
+from kerfpath.post.ros._check import check
 from kerfpath.post.ros._read import read
 from kerfpath.post.ros._trajectory import Trajectory as Trajectory
 from kerfpath.post.ros._trajectory import trajectory as trajectory
@@ -18,7 +18,6 @@ ROS = Language(
     settings=RosSettings,
     rules=rules,
     formatter=Ros,
-    is_reserved=is_reserved,
     check=check,
     read=read,
 )

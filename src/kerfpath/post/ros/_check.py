@@ -10,24 +10,19 @@ from kerfpath.auditor import Level
 from kerfpath.errors import InputError
 from kerfpath.post._issue import ProgramIssue
 from kerfpath.post._program import CircularMove, LinearMove, Program
-from kerfpath.post._times import refusals
+from kerfpath.post._times import check_times
 from kerfpath.post.ros._trajectory import rates, trajectory
 from kerfpath.post.ros._write import RosSettings, joint_names
 
-__all__ = ["check", "is_reserved"]
+__all__ = ["check"]
 
 NOISE = 1e-3
 """Share of a limit that rounding, and the parabola through uneven points, may add."""
 
 
-def is_reserved(name: str) -> bool:
-    """Return whether a name means something else: none does, they stand in quotes."""
-    return False
-
-
 def check(program: Program, settings: RosSettings) -> Iterator[ProgramIssue]:
     """Yield what cannot be said in a trajectory, and where it asks too much of the joints."""
-    issues = [*refusals(program), *_check_shape(program, settings)]
+    issues = [*check_times(program), *_check_shape(program, settings)]
     yield from issues
     if not issues:
         yield from _check_limits(program, settings)

@@ -9,10 +9,10 @@ import numpy as np
 
 from kerfpath._arrays import Array, freeze
 from kerfpath.errors import InputError
+from kerfpath.post._line_reader import LineReader, patterns
 from kerfpath.post._orientations import pose_of
 from kerfpath.post._program import SIGNALS, Switch
 from kerfpath.post._read import ReadProgram, ReadSection, ReadStep
-from kerfpath.post._reading import LineReader, patterns
 from kerfpath.post.ros._trajectory import rates
 from kerfpath.post.ros._write import SECOND, RosSettings, head, joint_names
 from kerfpath.robots import Robot

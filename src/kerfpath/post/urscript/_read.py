@@ -10,9 +10,9 @@ from scipy.spatial.transform import Rotation
 
 from kerfpath._arrays import Array, freeze
 from kerfpath.post._axes import offset_near
+from kerfpath.post._line_reader import END_OF_FILE, LineReader, patterns, statements
 from kerfpath.post._program import SIGNALS, Switch
 from kerfpath.post._read import MoveKind, ReadProgram, ReadSection, ReadStep
-from kerfpath.post._reading import END_OF_FILE, LineReader, patterns, statements
 from kerfpath.post._settings import outputs
 from kerfpath.post.urscript._switching import stop_lines, switch_lines, time_ahead, wait_lines
 from kerfpath.post.urscript._write import FIRST, URScriptSettings, full_joint_speed

@@ -19,8 +19,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from kerfpath._arrays import Array, floats
-from kerfpath.post._arm_plane import wrist_in_plane
-from kerfpath.post._axes import AxisCount
+from kerfpath.post._axes import AxisCount, wrist_in_plane
 from kerfpath.post.val3._settings import Val3Settings
 from kerfpath.robots import Robot
 

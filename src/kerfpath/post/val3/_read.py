@@ -12,9 +12,9 @@ import numpy as np
 from kerfpath._arrays import Array, freeze
 from kerfpath.errors import InputError
 from kerfpath.post._frames import faceplate, world
+from kerfpath.post._line_reader import LineReader, patterns, statements
 from kerfpath.post._program import PARTNERS, Partner, Switch
 from kerfpath.post._read import MoveKind, ReadMove, ReadProgram, ReadSection, ReadStep
-from kerfpath.post._reading import LineReader, patterns, statements
 from kerfpath.post.val3._read_data import Data
 from kerfpath.post.val3._settings import Val3Settings
 from kerfpath.post.val3._write import (

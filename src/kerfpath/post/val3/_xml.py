@@ -34,7 +34,7 @@ class Element:
     def take(self, **expected: str) -> None:
         """Check that the attributes are these and no others."""
         if self.attributes != expected:
-            raise self.fault(f"expected {_shown(self.tag, expected)}, got {self.shown()}")
+            raise self.fault(f"expected {_show(self.tag, expected)}, got {self.shown()}")
 
     def only(self, *tags: str) -> list[Element]:
         """Return the children, which must be called so, one after the other."""
@@ -53,7 +53,7 @@ class Element:
 
     def shown(self) -> str:
         """Return the beginning of the element, on one line."""
-        return _shown(self.tag, self.attributes)
+        return _show(self.tag, self.attributes)
 
 
 def parse(file: str, text: str, tag: str, namespace: str) -> Element:
@@ -102,6 +102,6 @@ def parse(file: str, text: str, tag: str, namespace: str) -> Element:
     return root
 
 
-def _shown(tag: str, attributes: dict[str, str]) -> str:
+def _show(tag: str, attributes: dict[str, str]) -> str:
     said = "".join(f" {key}={value!r}" for key, value in attributes.items())
     return f"<{tag}{said[:60]}>"

@@ -13,7 +13,7 @@ from kerfpath.post._read import MoveKind, ReadHandshake, ReadMove, ReadStep, Rea
 from kerfpath.post._settings import Settings, handshakes
 from kerfpath.robots import Robot
 
-__all__ = ["END_OF_FILE", "LineReader", "patterns", "statements"]
+__all__ = ["END_OF_FILE", "LineReader", "only", "patterns", "statements"]
 
 SHOWN = 60
 """Characters of a line that a message shows."""
@@ -24,6 +24,11 @@ END_OF_FILE = "the end of the file"
 def patterns(by_kind: Mapping[str, str]) -> dict[str, re.Pattern[str]]:
     """Return regular expressions of lines by their kind, compiled; digits and letters are ASCII."""
     return {kind: re.compile(pattern, re.ASCII) for kind, pattern in by_kind.items()}
+
+
+def only(by_kind: Mapping[str, re.Pattern[str]], *kinds: str) -> dict[str, re.Pattern[str]]:
+    """Return the regular expressions of some kinds of lines."""
+    return {kind: by_kind[kind] for kind in kinds}
 
 
 def statements(lines: Iterable[str], comment: str, first: int = 1) -> list[tuple[int, str]]:
