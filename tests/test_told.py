@@ -95,9 +95,8 @@ def test_what_a_job_comes_to_is_told_in_lines(tmp_path):
     kinds = {}
     for thing in objects_in((outcome, part), {}):
         kinds.setdefault(type(thing).__name__, []).append(repr(thing))
-    assert {"Outcome", "Job", "Cut", "Plan", "Contour", "Robot", "LayeredGraph", "Part"} <= set(
-        kinds
-    )
+    results = {"JobResult", "CutResult", "CutRequest", "Candidate"}
+    assert results | {"Job", "Plan", "Contour", "Robot", "LayeredGraph", "Part"} <= set(kinds)
     longest = {name: max(map(len, said)) for name, said in kinds.items()}
     assert max(longest.values()) < MOST, longest
     assert all("\n" not in line for said in kinds.values() for line in said)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 from shlex import quote
 
@@ -201,8 +201,8 @@ def plan_picked(
     """
     known = load_job(str(job_file.resolve()), digest(job_file))
     prepared = prepare(known.job, known.part)
-    contours = tuple(
+    contours = [
         asked.picked(pick.run, refine=refine) if asked.task.name == pick.contour else asked
         for asked in prepared.contours
-    )
-    return known.part, run_prepared(replace(prepared, contours=contours), progress=progress)
+    ]
+    return known.part, run_prepared(prepared.with_contours(contours), progress=progress)

@@ -10,7 +10,7 @@ from benchmarks import _plan_jobs, plan_edits
 import kerfpath
 from commands import run
 from kerfpath.errors import InputError
-from kerfpath.job import PlanAudit, audit_file, read_plan_file
+from kerfpath.job import PlanAudit, audit_file, prepare, read_job, read_plan_file
 
 EDITS = 25
 """Of each of four jobs: what a few seconds allow. `python -m benchmarks plan_edits` does 3000."""
@@ -126,3 +126,12 @@ def test_a_move_through_a_fixture_is_found(made, folder, tmp_path):
     other.write_text(job.read_text() + cell)
     found = audit_file(plan, other)
     assert any(c.code.startswith("collision") and not c.ok for c in found.tables["air"])
+
+
+def test_contours_in_another_order_know_which_of_them_lie_in_which(made):
+    prepared = prepare(read_job(made["part"][0]))
+    assert prepared.names == ["hole", "trim"]
+    assert prepared.inner_first == ((0, 1),)
+    turned = prepared.with_contours(prepared.contours[::-1])
+    assert turned.names == ["trim", "hole"]
+    assert turned.inner_first == ((1, 0),)

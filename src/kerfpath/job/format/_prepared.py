@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -102,7 +103,7 @@ class PreparedJob:
     part : Part
     cell : Cell or None
     contours : tuple of CutRequest
-        In the order of the job.
+        In the order of the job, or in that in which they are to be cut.
     inner_first : tuple of (int, int)
         Contours of which the first is to be cut before the second.
     """
@@ -111,9 +112,25 @@ class PreparedJob:
     part: Part
     cell: Cell | None
     contours: tuple[CutRequest, ...]
-    inner_first: tuple[tuple[int, int], ...] = ()
+    inner_first: tuple[tuple[int, int], ...]
 
     __repr__ = told
+
+    @classmethod
+    def of(
+        cls, job: Job, part: Part, cell: Cell | None, contours: Sequence[CutRequest]
+    ) -> PreparedJob:
+        """Return the job with its contours; which lie in which follows from their loops."""
+        inner: Sequence[tuple[int, int]] = ()
+        if job.sequence is not None and job.sequence.inner_first:
+            inner = inner_first([contour.loop for contour in contours])
+        return cls(
+            job=job, part=part, cell=cell, contours=tuple(contours), inner_first=tuple(inner)
+        )
+
+    def with_contours(self, contours: Sequence[CutRequest]) -> PreparedJob:
+        """Return the job with other requests, in their order."""
+        return PreparedJob.of(self.job, self.part, self.cell, contours)
 
     @property
     def names(self) -> list[str]:
@@ -132,15 +149,7 @@ def prepare(job: Job, part: Part | None = None) -> PreparedJob:
     part = part or read_drawing(job.part_file, unit=job.part_unit)
     tasks = job.tasks(part)  # a misspelt name shall not wait for the cell
     cell = cell_of_job(job, part)
-    contours = tuple(_request(job, task, part) for task in tasks)
-    inner = job.sequence is not None and job.sequence.inner_first
-    return PreparedJob(
-        job=job,
-        part=part,
-        cell=cell,
-        contours=contours,
-        inner_first=tuple(inner_first([each.loop for each in contours])) if inner else (),
-    )
+    return PreparedJob.of(job, part, cell, [_request(job, task, part) for task in tasks])
 
 
 def _request(job: Job, task: ContourTask, part: Part) -> CutRequest:

@@ -133,11 +133,11 @@ def touch_up(
         raise InputError(
             f"{job.path}: has other contours than {file.path}; give the job of that plan"
         )
-    contours = tuple(
+    contours = [
         _touched_up(asked[p.name], p, moved, group.path, ease)
         for p, moved, group in zip(file.plans, targets, groups, strict=True)
-    )
-    outcome = run_prepared(replace(prepared, contours=contours), progress=progress)
+    ]
+    outcome = run_prepared(prepared.with_contours(contours), progress=progress)
     found = tuple(target for moved in targets for target in moved)
     return TouchUp(part=part, outcome=outcome, targets=found, notes=tuple(notes))
 

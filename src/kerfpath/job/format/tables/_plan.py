@@ -47,6 +47,8 @@ def said_in_keys(conflict: OptionConflict, table: PlanTable) -> tuple[tuple[str,
     ]
     at = KEYS.get(standing[0], standing[0]) if standing else key
     said = f"expected {expected} with {' and '.join(beside)}, got {_toml(got)}; change one"
+    if "comfort clearance" in conflict.beside:
+        return ("comfort", KEYS["comfort clearance"]), said
     return ("plan", at), said
 
 
