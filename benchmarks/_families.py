@@ -11,7 +11,7 @@ from eaik.IK_DH import DhRobot
 from benchmarks._figures import Figure, Report, in_turn
 from kerfpath import Robot, robot
 from kerfpath._arrays import Array
-from kerfpath.urdf import Chain
+from kerfpath.urdf import KinematicChain
 
 __all__ = ["run"]
 
@@ -72,7 +72,7 @@ def _general() -> Robot:
         link[:3] = [[1, 0, 0, a], [0, c, -s, 0], [0, s, c, d]]
     origins = np.concatenate([np.eye(4)[None], links[:5]])
     axes = np.tile([0.0, 0.0, 1.0], (6, 1))
-    chain = Chain(origins=origins, axes=axes, end=links[5])
+    chain = KinematicChain(origins=origins, axes=axes, end=links[5])
     return Robot(id="general", kinematics="general", geometry={}, chain=chain)
 
 

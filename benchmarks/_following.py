@@ -18,7 +18,7 @@ import numpy as np
 from benchmarks._random_contours import Cut
 from kerfpath._arrays import Array, Bools, Ints
 from kerfpath.kernels.frames import location
-from kerfpath.kernels.kinematics import POSTURES, Arm, inverse
+from kerfpath.kernels.kinematics import POSTURES, OpwArm, inverse
 from kerfpath.kernels.turns import JointLimits
 
 __all__ = ["Followed", "Follower", "Task", "edge_cost"]
@@ -33,7 +33,7 @@ SLACK = 1e-9
 class Task(NamedTuple):
     """What the compiled functions need of a cut."""
 
-    arm: Arm
+    arm: OpwArm
     limits: JointLimits
     H: Array
     T_tip_flange: Array

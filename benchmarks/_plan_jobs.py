@@ -6,7 +6,7 @@ from pathlib import Path
 
 from ezdxf.filemanagement import new
 
-from kerfpath.job import planned_text, read_job, run_job
+from kerfpath.job import plan_file_text, read_job, run_job
 
 __all__ = ["JOBS", "planned"]
 
@@ -125,5 +125,5 @@ def planned(folder: Path, name: str) -> tuple[Path, Path]:
     job.write_text(JOBS[name], encoding="utf-8")
     outcome = run_job(read_job(job))
     assert outcome.passed, f"{name}: the job has no plan that passes"
-    plan.write_text(planned_text(outcome), encoding="utf-8")
+    plan.write_text(plan_file_text(outcome), encoding="utf-8")
     return job, plan

@@ -17,7 +17,7 @@ from kerfpath.search import SearchProblem, find_least_interval
 from kerfpath.study import Layout, digest, layout
 from kerfpath.study._evaluator import SampledContour
 from kerfpath.study.placing._evaluate import contours_of, middle_of
-from kerfpath.study.placing._place import moved, numbers_of
+from kerfpath.study.placing._place import move_job, numbers_of
 from kerfpath.study.placing._search import HALF
 
 __all__ = ["run"]
@@ -93,7 +93,7 @@ def _bounds(found: Layout, contours: Sequence[SampledContour], placements: int) 
     _timed(found.job, contours[0], np.arange(len(contours[0].nodes)))  # what is loaded once
     for _ in range(placements):
         at = {name: float(rng.uniform(*span)) for name, span in found.ranges.items()}
-        job = moved(found.job, numbers_of(found.job, at, middle))
+        job = move_job(found.job, numbers_of(found.job, at, middle))
         for contour, known in zip(contours, found.before.contours, strict=True):
             last, node = len(contour.nodes) - 1, known.node
             assert node is not None

@@ -17,11 +17,11 @@ from benchmarks._figures import Figure, Report, Sheet
 from benchmarks._process import parts
 from kerfpath import Contour, Plan, plan
 from kerfpath._arrays import Array
-from kerfpath.air import backed_off, least_time
 from kerfpath.cad import read as read_drawing
 from kerfpath.cell import Cell
-from kerfpath.job import ContourTask, Job, cell_of_job, read_job
+from kerfpath.job import ContourSpec, Job, cell_of_job, read_job
 from kerfpath.sequence import inner_first, order_plans
+from kerfpath.transfer import back_off, least_time
 
 __all__ = ["nearest_first", "run"]
 
@@ -174,7 +174,7 @@ def _compared(job_file: Path, scene: Path | None) -> Report:
     )
 
 
-def _planned(job: Job, task: ContourTask, drawn: Contour) -> Plan:
+def _planned(job: Job, task: ContourSpec, drawn: Contour) -> Plan:
     nodes = task.sample(drawn)
     laid_on = task.speed if nodes.time is None else None
     return plan(
@@ -205,8 +205,8 @@ def _best(
 
 def _nearest(job: Job, plans: Sequence[Plan], before: Pairs, cell: Cell | None) -> Sequenced:
     retract, robot, settings = job.program.retract, job.robot, plans[0].settings
-    starts = np.array([_home(job), *(backed_off(made, "start", retract) for made in plans)])
-    ends = np.array([_home(job), *(backed_off(made, "end", retract) for made in plans)])
+    starts = np.array([_home(job), *(back_off(made, "start", retract) for made in plans)])
+    ends = np.array([_home(job), *(back_off(made, "end", retract) for made in plans)])
     dq = starts[None] - ends[:, None]
     dq = np.where(robot.endless, dq - 2 * np.pi * np.round(dq / (2 * np.pi)), dq)
     velocity, acceleration = robot.speed_limits()

@@ -20,9 +20,9 @@ from kerfpath.errors import InputError
 from kerfpath.job import ProgramAudit, run_job
 from kerfpath.post import (
     Language,
+    LanguageSettings,
     Program,
     ReadProgram,
-    Settings,
     languages,
     read_program,
 )
@@ -114,7 +114,7 @@ class Subject:
     ----------
     audit : ProgramAudit
     language : Language
-    settings : Settings
+    settings : LanguageSettings
     program : Program
         What the language can say of it.
     files : mapping of str to str
@@ -122,7 +122,7 @@ class Subject:
 
     audit: ProgramAudit
     language: Language
-    settings: Settings
+    settings: LanguageSettings
     program: Program
     files: Mapping[str, str]
 

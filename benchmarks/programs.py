@@ -12,10 +12,10 @@ from kerfpath import robot
 from kerfpath.post import (
     JointMove,
     Language,
+    LanguageSettings,
     LinearMove,
     Program,
     Section,
-    Settings,
     Step,
     Switch,
     deviations,
@@ -80,7 +80,7 @@ def run(*, quick: bool = False) -> Report:
     return report
 
 
-def _write(chosen: Language, program: Program, settings: Settings) -> None:
+def _write(chosen: Language, program: Program, settings: LanguageSettings) -> None:
     chosen.formatter(program, settings).files()
 
 

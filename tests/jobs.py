@@ -84,7 +84,7 @@ pierce_time_s = 0.25
 lead_time_s = 0.005
 """
 WHOLE = HEAD + CONTOURS + PLAN + SEQUENCE
-"""A whole part: lead-ins, micro-joints, corners, a bevel, and moves through the air."""
+"""A whole part: lead-ins, micro-joints, corners, a bevel, and transfer moves."""
 
 SLITS = """\
 contour,x_mm,y_mm,z_mm,nx,ny,nz

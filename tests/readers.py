@@ -28,13 +28,13 @@ from kerfpath.job import (
     program_from_file,
     read_job,
     run_job,
-    write_outcome,
+    write_result,
 )
 from kerfpath.placement import placement_from_points
 from kerfpath.post import languages
 from kerfpath.robots import Robot
 from kerfpath.sweep._store import Store
-from kerfpath.sweep._task import Failure, Outcome, Task
+from kerfpath.sweep._task import Failure, Task, TaskOutcome
 from spoilt import Reader, Whole
 
 LOOPS = 8
@@ -128,7 +128,7 @@ def _planned(folder: Path, language: str, more: str = "") -> list[Path]:
     job = read_job(_job(folder, language, more))
     part = read(job.part_file)
     outcome = run_job(job, part)
-    return [Path(file) for file in write_outcome(outcome, folder / "out").files]
+    return [Path(file) for file in write_result(outcome, folder / "out").files]
 
 
 # ---------------------------------------------------------------------------------------- drawings
@@ -402,9 +402,10 @@ def stores(folder: Path) -> list[Whole]:
     tasks = [Task(f"{k:064}", f'{{"speed":{k}}}') for k in range(4)]
     failure = Failure(kind="NoFeasiblePath", message="none")
     outcomes = [
-        Outcome(key=task.key, value='{"cost": 1.5}', failure=None, seconds=0.1) for task in tasks
+        TaskOutcome(key=task.key, value='{"cost": 1.5}', failure=None, seconds=0.1)
+        for task in tasks
     ]
-    outcomes[-1] = Outcome(key=tasks[-1].key, value=None, failure=failure, seconds=0.1)
+    outcomes[-1] = TaskOutcome(key=tasks[-1].key, value=None, failure=failure, seconds=0.1)
     with Store(folder / "sweep.sqlite") as store:
         store.add("a.function", zip(tasks, outcomes, strict=True))
     return _alone([folder / "sweep.sqlite"])

@@ -21,17 +21,17 @@ from apart_calls import (
     whose,
 )  # fmt: skip
 from kerfpath import apart as module
-from kerfpath.apart import apart
+from kerfpath.apart import call_apart
 from kerfpath.errors import InputError
 
 
 def asked_in_a_fork(answers):
-    answers.put((apart(doubled, 21, size=0), apart(whose, size=0)))
+    answers.put((call_apart(doubled, 21, size=0), call_apart(whose, size=0)))
 
 
 def test_a_call_is_made_in_another_process_that_is_kept():
-    assert apart(doubled, 21, size=0) == 42
-    assert apart(whose, size=0) == apart(whose, size=0) != os.getpid()
+    assert call_apart(doubled, 21, size=0) == 42
+    assert call_apart(whose, size=0) == call_apart(whose, size=0) != os.getpid()
 
 
 @pytest.mark.parametrize(
@@ -40,28 +40,28 @@ def test_a_call_is_made_in_another_process_that_is_kept():
 )
 def test_a_crash_is_one_line_and_the_next_call_goes_on(function, said):
     with pytest.raises(InputError) as caught:
-        apart(function, size=0)
+        call_apart(function, size=0)
     assert said in str(caught.value)
     assert "\n" not in str(caught.value)
-    assert apart(doubled, 21, size=0) == 42
+    assert call_apart(doubled, 21, size=0) == 42
 
 
 def test_what_takes_too_long_is_ended(monkeypatch):
     monkeypatch.setattr(module, "SECONDS", 1.0)
     with pytest.raises(InputError, match="more than 1 s"):
-        apart(hang, size=0)
+        call_apart(hang, size=0)
     monkeypatch.setattr(module, "PATIENCE", 0.3)  # of what waits, and takes no processor time
     with pytest.raises(InputError, match="more than 1 s"):
-        apart(time.sleep, 60, size=0)
+        call_apart(time.sleep, 60, size=0)
     monkeypatch.undo()
-    assert apart(doubled, 21, size=0) == 42
+    assert call_apart(doubled, 21, size=0) == 42
 
 
 def test_a_larger_file_may_take_longer(monkeypatch):
     monkeypatch.setattr(module, "SECONDS", 0.0)
     with pytest.raises(InputError, match="more than 1 s"):
-        apart(hang, size=30_000)
-    assert apart(doubled, 21, size=10_000_000) == 42
+        call_apart(hang, size=30_000)
+    assert call_apart(doubled, 21, size=10_000_000) == 42
 
 
 @pytest.mark.parametrize(
@@ -70,15 +70,15 @@ def test_a_larger_file_may_take_longer(monkeypatch):
 )
 def test_what_the_function_raises_comes_through(function, error, said):
     with pytest.raises(error, match=said):
-        apart(function, size=0)
-    assert apart(doubled, 21, size=0) == 42
+        call_apart(function, size=0)
+    assert call_apart(doubled, 21, size=0) == 42
 
 
 def test_a_process_that_has_left_is_replaced(monkeypatch):
-    first = apart(whose, size=0)
+    first = call_apart(whose, size=0)
     os.kill(first, signal.SIGKILL)
     time.sleep(0.1)
-    assert apart(whose, size=0) != first
+    assert call_apart(whose, size=0) != first
     # It leaves by itself, just when it is asked: the answer says so, and a new one is asked.
     worker = module._worker
     worker.end()
@@ -88,19 +88,19 @@ def test_a_process_that_has_left_is_replaced(monkeypatch):
     idle = module._worker.process
     idle.wait(30)
     monkeypatch.undo()
-    assert apart(doubled, 21, size=0) == 42
+    assert call_apart(doubled, 21, size=0) == 42
     assert module._worker.process is not idle
 
 
 def test_an_interrupt_ends_the_call(monkeypatch):
     with pytest.raises(KeyboardInterrupt):
-        apart(interrupted, size=0)
-    assert apart(doubled, 21, size=0) == 42
+        call_apart(interrupted, size=0)
+    assert call_apart(doubled, 21, size=0) == 42
 
 
 @pytest.mark.filterwarnings("ignore:This process:DeprecationWarning")
 def test_a_fork_has_a_process_of_its_own():
-    ours = apart(whose, size=0)
+    ours = call_apart(whose, size=0)
     context = multiprocessing.get_context("fork")
     answers = context.Queue()
     child = context.Process(target=asked_in_a_fork, args=(answers,))
@@ -109,4 +109,4 @@ def test_a_fork_has_a_process_of_its_own():
     child.join()
     assert doubled_ == 42
     assert theirs != ours
-    assert apart(whose, size=0) == ours
+    assert call_apart(whose, size=0) == ours

@@ -25,7 +25,7 @@ from kerfpath import (
 )
 from kerfpath.auditor import chain_of, checks
 from kerfpath.auditor._margins import margins
-from kerfpath.cell import Checker, box_between, cell_of
+from kerfpath.cell import CollisionChecker, box_between, cell_of
 from kerfpath.comfort import MEASURES, jacobian, measure, measures
 from kerfpath.job import read_plan_file
 from kerfpath.job.plan_file._write import plan_document, plan_entry, plan_text
@@ -306,7 +306,9 @@ def test_a_near_miss_costs_and_the_plan_is_the_best_of_all(small, posted, closur
     comfort = Comfort(clearance=Band(width=0.1, cost=5), wrist=EVERY.wrist)
     made = plan(nodes, arm, cell=posted, comfort=comfort, closure=closure, **options)
     graph = options["graph"]
-    price = Checker(posted, graph.q, comfort=0.1, comfort_cost=5).price(np.arange(len(graph.q)))
+    price = CollisionChecker(posted, graph.q, comfort=0.1, comfort_cost=5).price(
+        np.arange(len(graph.q))
+    )
     price += by_hand(arm, graph.q, comfort)
     open_ = np.isfinite(price)
     layer = np.repeat(np.arange(13), np.diff(graph.start))[open_]

@@ -9,9 +9,9 @@ from scipy.spatial.transform import Rotation
 
 from conftest import pose
 from kerfpath import InputError, NoFeasiblePath, audit, placed, placement_from_points, robot
-from kerfpath.air import air_move, backed_off
 from kerfpath.cad import read_measured
-from kerfpath.placement import placed_moves
+from kerfpath.placement import place_moves
+from kerfpath.transfer import back_off, transfer_move
 from programs import arc, frames, hand_plan
 
 POINTS = np.array([[0, 0, 0], [0.5, 0, 0.02], [0.4, 0.3, 0], [0.1, 0.25, 0.1]])
@@ -132,21 +132,25 @@ def test_an_endless_joint_stays_on_its_turn(made):
 
 def test_moves_end_where_the_plans_begin_now(made, arm):
     home, retract = np.radians([0, -20, 10, 0, 60, 0]), 0.05
-    start, end = (backed_off(made, which, retract) for which in ("start", "end"))
-    moves = [air_move(arm, home, start), air_move(arm, end, start), air_move(arm, end, home)]
+    start, end = (back_off(made, which, retract) for which in ("start", "end"))
+    moves = [
+        transfer_move(arm, home, start),
+        transfer_move(arm, end, start),
+        transfer_move(arm, end, home),
+    ]
     T = at([0, 0, 0], [0, 0, 0.02]) @ made.T_base_part
     plans = [placed(made, T)] * 2
-    led = placed_moves(moves, plans, retract)
+    led = place_moves(moves, plans, retract)
     shift = np.array([0.02, 0, 0, 0, 0, 0])
     for move, ends in zip(led, ((home, start + shift), (end + shift, start + shift),
                                 (end + shift, home)), strict=True):  # fmt: skip
         np.testing.assert_allclose(move.q, ends, atol=EXACT)
         assert not move.clear
-    (between,) = placed_moves(moves[1:2], plans, retract)
+    (between,) = place_moves(moves[1:2], plans, retract)
     np.testing.assert_allclose(between.q, led[1].q)
     around = replace(moves[1], q=np.array([end, home, start]), time=np.arange(3.0))
     with pytest.raises(InputError, match="move 2 of 3 between contours goes around obstacles"):
-        placed_moves([moves[0], around, moves[2]], plans, retract)
+        place_moves([moves[0], around, moves[2]], plans, retract)
 
 
 TABLE = """\

@@ -26,7 +26,7 @@ from kerfpath.graph import gamma_grid
 from kerfpath.job import read_plan_file
 from kerfpath.job.plan_file._write import plan_document, plan_entry, plan_text
 from kerfpath.planner import layered_graph
-from kerfpath.planner._clear import _beside
+from kerfpath.planner._clear import _gamma_neighbours
 from kerfpath.post import build_program, post
 from kerfpath.tilt import tilt_frames
 
@@ -265,7 +265,7 @@ def test_the_graph_tells_its_variants_apart(arc, arm, options):
     np.testing.assert_array_equal(graph.q[nominal], plain.q)
     admitted = graph.reason.reshape(25, 5, 36, 8) == 0
     np.testing.assert_array_equal(graph.reason_by_gamma == 0, admitted.any(axis=1))
-    for side in _beside(graph).T:
+    for side in _gamma_neighbours(graph).T:
         has = side >= 0
         np.testing.assert_array_equal(graph.variant[side[has]], graph.variant[has])
     kept = plan(arc, arm, graph=graph, tilt=tilt, **options)

@@ -24,7 +24,7 @@ from typing import Any, TypeVar
 
 from kerfpath.errors import InputError
 
-__all__ = ["apart", "stand_by"]
+__all__ = ["call_apart", "stand_by"]
 
 SECONDS = 20.0
 """Processor time that a small file may take."""
@@ -46,7 +46,7 @@ _START = (
 )
 
 
-def apart(function: Callable[..., _T], *arguments: object, size: int) -> _T:
+def call_apart(function: Callable[..., _T], *arguments: object, size: int) -> _T:
     """Return `function(*arguments)`, called in a process of its own.
 
     Parameters

@@ -32,7 +32,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from kerfpath._arrays import Array, Bools, as_pose, floats, freeze, not_negative
-from kerfpath._told import told
+from kerfpath._repr import short_repr
 from kerfpath.errors import InputError
 from kerfpath.kernels.turns import JointLimits
 from kerfpath.losses import Loss, Reason
@@ -58,7 +58,7 @@ class Measure:
     most: float = np.inf
     families: tuple[str, ...] | None = None
 
-    __repr__ = told
+    __repr__ = short_repr
 
     def has(self, robot: Robot) -> bool:
         """Return whether the arm has it."""
@@ -127,7 +127,7 @@ class Comfort:
     manipulability: Band | None = None
     clearance: Band | None = None
 
-    __repr__ = told
+    __repr__ = short_repr
 
     def __post_init__(self) -> None:
         for name in (each.name for each in fields(self)):

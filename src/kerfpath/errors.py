@@ -91,7 +91,7 @@ class NoFeasiblePath(KerfpathError):
         """Return the reasons of one kind among the counts."""
         return [why for why in self.counts if isinstance(why, Reason) and why.loss is loss]
 
-    def retold(self, message: str, counts: Mapping[str, int] | None = None) -> NoFeasiblePath:
+    def with_message(self, message: str, counts: Mapping[str, int] | None = None) -> NoFeasiblePath:
         """Return the same answer in other words, and with other counts if they are given."""
         return NoFeasiblePath(
             message,

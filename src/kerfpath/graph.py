@@ -203,7 +203,7 @@ def build(
     samples = len(tilt) * len(gamma)
     reason = np.empty((len(frames), samples, robot.postures), np.uint8)
 
-    def layers_of(first: int, last: int) -> _Piece:
+    def layers_of(first: int, last: int) -> _NodeRun:
         """Solve nodes first..last-1 and keep what the limits admit."""
         H = frames[first:last, :, None]
         H = np.ascontiguousarray(part_in_base @ H if robot.external else H).reshape(-1, 4, 4)
@@ -266,7 +266,7 @@ def _end_to_end(parts: list[NDArray[Any]]) -> NDArray[Any]:
     return whole
 
 
-class _Piece(NamedTuple):
+class _NodeRun(NamedTuple):
     """The vertices of a run of nodes, and how many each node has."""
 
     sizes: Ints
@@ -278,13 +278,13 @@ class _Piece(NamedTuple):
 
 def _admitted(
     q: Array, reach: Bools, wanted: Bools, limits: JointLimits, out_reason: NDArray[np.uint8]
-) -> _Piece:
+) -> _NodeRun:
     """Return the turns that the limits admit of q (K, V m, P, n); fills the reasons (K, V m, P)."""
     sizes = np.empty(len(q), np.int64)
     count_admissible(q, reach, wanted, limits, sizes, out_reason)
     N, n = int(sizes.sum()), q.shape[3]
     sample, posture = np.empty(N, np.int32), np.empty(N, np.int8)
-    found = _Piece(sizes, np.empty((N, n)), sample, posture, np.empty((N, n), np.int8))
+    found = _NodeRun(sizes, np.empty((N, n)), sample, posture, np.empty((N, n), np.int8))
     fill_admissible(q, out_reason, limits, *found[1:])
     return found
 

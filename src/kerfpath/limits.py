@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from kerfpath._arrays import Array, Ints, floats, freeze, positive, scalar
-from kerfpath._told import told
+from kerfpath._repr import short_repr
 from kerfpath.errors import InputError
 
 __all__ = ["AccelerationLimit", "Limits", "RateLimit", "VelocityLimit", "meetings", "rates_of"]
@@ -44,7 +44,7 @@ class RateLimit:
     bound: Array
     share: float = 1.0
 
-    __repr__ = told
+    __repr__ = short_repr
 
     def __post_init__(self) -> None:
         bound = floats(self.bound, self.quantity, (None,), infinite=True)
@@ -94,7 +94,7 @@ class Limits:
     velocity: VelocityLimit
     acceleration: AccelerationLimit
 
-    __repr__ = told
+    __repr__ = short_repr
 
     @classmethod
     def of(

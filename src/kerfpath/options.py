@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from kerfpath._arrays import Array, floats, scalar
-from kerfpath._told import told
+from kerfpath._repr import short_repr
 from kerfpath.comfort import Band, Comfort
 from kerfpath.contour import FrameKind
 from kerfpath.errors import InputError
@@ -27,7 +27,7 @@ __all__ = [
     "OptionData",
     "PlanKeywords",
     "PlanOptions",
-    "chosen",
+    "with_keywords",
 ]
 
 FeedKind = Literal["constant", "dip"]
@@ -173,7 +173,7 @@ class PlanOptions:
     method: Method = "exact"
     objective: ObjectiveKind = "sum"
     metric: Metric = "manhattan"
-    weights: Array = None  # type: ignore[assignment]  # `of` fills in the default
+    weights: Array = None  # type: ignore[assignment]  # `resolve` fills in the default
     eta_v: float = 1.0
     eta_a: float = 1.0
     closure: Closure = "free"
@@ -185,7 +185,7 @@ class PlanOptions:
     least_piece: float | None = None
     comfort: Comfort | None = None
 
-    __repr__ = told
+    __repr__ = short_repr
 
     def __post_init__(self) -> None:
         for name, known in _KNOWN.items():
@@ -217,7 +217,7 @@ class PlanOptions:
 
     __hash__ = None  # type: ignore[assignment]  # arrays have none
 
-    def of(self, robot: Robot, dt: float) -> PlanOptions:
+    def resolve(self, robot: Robot, dt: float) -> PlanOptions:
         """Return the options with the default weights of a robot at `dt` s from node to node.
 
         Raises
@@ -297,7 +297,7 @@ def _to_json(value: object) -> object:
     return list(value) if isinstance(value, tuple) else value
 
 
-def chosen(
+def with_keywords(
     options: PlanOptions | None, keywords: Mapping[str, Any], allowed: type, **more: Any
 ) -> PlanOptions:
     """Return `options`, or the defaults, with the keywords that a caller gave in their place.

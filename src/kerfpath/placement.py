@@ -10,19 +10,19 @@ from numpy.typing import ArrayLike
 from scipy.spatial.transform import Rotation
 
 from kerfpath._arrays import Array, as_pose, floats, freeze, scalar
-from kerfpath._told import told
-from kerfpath.air import AirMove, air_move, backed_off
+from kerfpath._repr import short_repr
 from kerfpath.errors import InputError, NoFeasiblePath
 from kerfpath.kernels.metric import turns_of
 from kerfpath.planner import plan as plan_contour
 from kerfpath.plans import Plan, Proof, path_cost
 from kerfpath.refiner import refine
 from kerfpath.robots import posture_name
+from kerfpath.transfer import TransferMove, back_off, transfer_move
 
 __all__ = [
     "MeasuredFrame",
+    "place_moves",
     "placed",
-    "placed_moves",
     "placement_from_points",
     "planned_again",
     "xyz_rpy",
@@ -46,7 +46,7 @@ class MeasuredFrame:
     T_base_part: Array
     residuals: Array
 
-    __repr__ = told
+    __repr__ = short_repr
 
     @property
     def xyz_mm(self) -> list[float]:
@@ -216,16 +216,16 @@ def planned_again(plan: Plan, T_base_part: ArrayLike) -> Plan:
     return replace(made, contour=plan.contour)
 
 
-def placed_moves(
-    moves: Sequence[AirMove], plans: Sequence[Plan], retract: float
-) -> tuple[AirMove, ...]:
+def place_moves(
+    moves: Sequence[TransferMove], plans: Sequence[Plan], retract: float
+) -> tuple[TransferMove, ...]:
     """Return the straight moves between plans that were moved to another placement, not `clear`.
 
     Where a move begins or ends at a home position it stays there.
 
     Parameters
     ----------
-    moves : sequence of AirMove
+    moves : sequence of TransferMove
         Those of the old placement.
     plans : sequence of Plan
         At the new one, in the order of cutting.
@@ -246,11 +246,11 @@ def placed_moves(
                 " and nobody knows its way at another placement; plan the job again with it"
             )
         after = before + 1
-        q0 = move.q[0] if before < 0 else backed_off(plans[before], "end", retract)
+        q0 = move.q[0] if before < 0 else back_off(plans[before], "end", retract)
         if after < len(plans):
-            q1 = backed_off(plans[after], "start", retract)
+            q1 = back_off(plans[after], "start", retract)
         else:  # home, the short way for endless joints
             turns = np.round((q0 - move.q[-1]) / (2 * np.pi)) * plans[0].robot.endless
             q1 = move.q[-1] + 2 * np.pi * turns
-        moved.append(air_move(plans[0].robot, q0, q1))
+        moved.append(transfer_move(plans[0].robot, q0, q1))
     return tuple(moved)

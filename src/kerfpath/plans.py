@@ -11,7 +11,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from kerfpath._arrays import Array, Ints, as_pose, floats, freeze, integers, scalar
-from kerfpath._told import told
+from kerfpath._repr import short_repr
 from kerfpath.comfort import measures
 from kerfpath.contour import Contour
 from kerfpath.errors import InputError
@@ -44,7 +44,7 @@ class Proof:
     statement: str
     grid_cost: float | None = None
 
-    __repr__ = told
+    __repr__ = short_repr
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -108,7 +108,7 @@ class Criteria:
     peak_acceleration: Array
     nearest: Mapping[str, tuple[float, int]]
 
-    __repr__ = told
+    __repr__ = short_repr
 
 
 def path_cost(
@@ -200,7 +200,7 @@ class Plan:
         if (np.diff(cast["time"]) <= 0).any():
             raise InputError("time: must increase from node to node")
         if self.settings.weights is None:
-            cast["settings"] = self.settings.of(self.robot, _mean_step(cast["time"]))
+            cast["settings"] = self.settings.resolve(self.robot, _mean_step(cast["time"]))
         for name, value in cast.items():
             object.__setattr__(self, name, value)
 

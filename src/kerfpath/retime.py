@@ -39,7 +39,7 @@ ITERATIONS = 50
 """At most: each about halves how much too slow the start is, and the last ones are few."""
 
 
-class _Rows(NamedTuple):
+class _LimitRows(NamedTuple):
     """Limits b / tau[after] - a / tau[before] <= (tau[before] + tau[after]) / 2."""
 
     before: Ints
@@ -87,18 +87,18 @@ def retime(
     dq, dt, velocity, acceleration = _inputs(dq, dt, limits)
     least = np.maximum(dt, (np.abs(dq) / velocity).max(axis=1, initial=0.0))
     rows = _rows(dq / acceleration, least, periodic)
-    tau = _stretched(rows, least)
+    tau = _stretch_times(rows, least)
     if np.array_equal(tau, least):
         return freeze(tau)
     inner = rows._replace(a=rows.a / (1 - MARGIN), b=rows.b / (1 - MARGIN))
-    tau = _stretched(inner, least)
+    tau = _stretch_times(inner, least)
     for _ in range(ITERATIONS):
-        solved = _stretched(inner, np.maximum(_improved(inner, least, tau), least))
+        solved = _stretch_times(inner, np.maximum(_improve_times(inner, least, tau), least))
         gain = 1 - solved.sum() / tau.sum()
         tau = solved if gain > 0 else tau
         if gain < GAIN:
             break
-    return freeze(_snapped(rows, least, tau))
+    return freeze(_snap_times(rows, least, tau))
 
 
 def feed(
@@ -160,7 +160,7 @@ def _inputs(dq: ArrayLike, dt: ArrayLike, limits: Limits) -> tuple[Array, Array,
     return dq, dt, limits.velocity.usable, limits.acceleration.usable
 
 
-def _rows(step: Array, least: Array, periodic: bool) -> _Rows:
+def _rows(step: Array, least: Array, periodic: bool) -> _LimitRows:
     """Return the acceleration limits that can bind; step (K-1, n) s^2 is dq over acceleration.
 
     Of the rows of one node, the one with the larger b and the smaller a implies the other.
@@ -176,16 +176,16 @@ def _rows(step: Array, least: Array, periodic: bool) -> _Rows:
         same = (b == b[:, [i]]) & (a == a[:, [i]])
         kept[:, i] &= ~(implied & ~(same & (number >= i))).any(axis=1)
     node, row = np.nonzero(kept)
-    return _Rows(before[node], after[node], a[node, row], b[node, row])
+    return _LimitRows(before[node], after[node], a[node, row], b[node, row])
 
 
-def _stretched(rows: _Rows, tau: Array) -> Array:
+def _stretch_times(rows: _LimitRows, tau: Array) -> Array:
     """Return times that keep the rows: `tau`, as much slower throughout as the worst row asks."""
     worst = rows.excess(tau).max(initial=0.0)
     return tau if worst <= 1 + SLACK / 2 else tau * np.sqrt(worst)
 
 
-def _snapped(rows: _Rows, least: Array, tau: Array) -> Array:
+def _snap_times(rows: _LimitRows, least: Array, tau: Array) -> Array:
     """Set times that are the least but for rounding to the least, wherever the rows agree."""
     near = tau <= least * (1 + SNAP)
     while True:
@@ -198,7 +198,7 @@ def _snapped(rows: _Rows, least: Array, tau: Array) -> Array:
         near &= ~blamed
 
 
-def _improved(rows: _Rows, least: Array, tau: Array) -> Array:
+def _improve_times(rows: _LimitRows, least: Array, tau: Array) -> Array:
     """Return the quickest times under the rows made convex at `tau` (K-1,).
 
     Variables: y = tau / unit, and x >= 1 / y where a row has it with a positive sign.

@@ -8,7 +8,7 @@ from scipy.spatial.transform import Rotation
 
 from kerfpath import Contour, Plan
 from kerfpath.auditor import chain_of, checks
-from kerfpath.auditor._between import HIDDEN_ANGLE, HIDDEN_SPEED, between
+from kerfpath.auditor._between import HIDDEN_ANGLE, HIDDEN_SPEED, bound_between_nodes
 from kerfpath.auditor._collision import collision_along
 from kerfpath.auditor._motion import follow, motion_of, straight
 from kerfpath.auditor._swept import HIDDEN
@@ -67,7 +67,9 @@ def test_no_joint_goes_farther_or_faster_than_the_audit_says(arm, tool, seed):
     q0 = np.array([0.1, 0.2, 0.1, 0.3, 0.0, 0.1]) + rng.normal(0, 0.2, 6)
     q0[4] = rng.choice([-1, 1]) * rng.uniform(0.01, 1.2)  # some near the singularity of the wrist
     plan = plan_of(arm, tool, np.array([q0, q0 + rng.normal(0, 0.05, 6)]), 0.2)
-    found = between(plan, chain_of(arm), motion_of(plan, chain_of(arm), "linear", 8), "linear")
+    found = bound_between_nodes(
+        plan, chain_of(arm), motion_of(plan, chain_of(arm), "linear", 8), "linear"
+    )
     if found.open.any():
         assert np.abs(q0[4]) < 0.3  # it says so itself, and only where the wrist is near straight
         return

@@ -43,7 +43,7 @@ from OCP.TopoDS import TopoDS_Compound, TopoDS_Shape
 from conftest import ROOT
 from kerfpath.cad import Loop, Part, read
 from kerfpath.cad._build import loop_of
-from kerfpath.cad._sample import Chain
+from kerfpath.cad._sample import EdgeChain
 from kerfpath.errors import InputError
 
 B_PILLAR = ROOT / "src" / "kerfpath" / "demo" / "b_pillar.step"
@@ -540,7 +540,7 @@ def test_gap_in_a_loop_is_reported_with_its_place(tmp_path: Path) -> None:
     edges = part.loop("face1/outer")._trace.edges
     # OCCT widens the vertices of a gap in the file and calls it closed, so it is opened here.
     edges[1].ends[1] += (0.0, 0.0, 0.2)
-    chain = Chain(edges=edges)
+    chain = EdgeChain(edges=edges)
     gappy = loop_of(
         name="face1/outer", face="face1", kind="outer", trace=chain, surface="plane", gap=5e-5
     )

@@ -24,7 +24,7 @@ from kerfpath.cell import (
 from kerfpath.cell._scene import Scene
 from kerfpath.errors import InputError
 from kerfpath.robots import chain_of, robot, robot_ids
-from kerfpath.urdf import Chain
+from kerfpath.urdf import KinematicChain
 
 EXACT = 2e-6
 """m: coal refines distances to 1e-6."""
@@ -46,7 +46,7 @@ def ball(xyz, radius):
 
 def swivel(joints=1):
     """A chain whose only joint turns about the base's z axis, or several in one place."""
-    return Chain(
+    return KinematicChain(
         origins=np.tile(np.eye(4), (joints, 1, 1)),
         axes=np.tile([0.0, 0, 1], (joints, 1)),
         end=np.eye(4),

@@ -5,10 +5,10 @@ import pytest
 from tests.search.posed import clear_path
 
 import naive
-from kerfpath.cell import Checker, Mesh, box, box_between, cell_of
+from kerfpath.cell import CollisionChecker, Mesh, box, box_between, cell_of
 from kerfpath.errors import InputError
 from kerfpath.planner import layered_graph
-from kerfpath.search import Known, shortest_path
+from kerfpath.search import CheckedEdges, shortest_path
 
 
 @pytest.fixture(scope="module")
@@ -37,7 +37,7 @@ def graph(circle, arm, tool, placement):
 
 def test_certified_prices_are_those_of_checking_each_vertex(dome, graph):
     rng = np.random.default_rng(41)
-    checker = Checker(dome, graph.q)
+    checker = CollisionChecker(dome, graph.q)
     for size in (40, 200, 400):
         vertices = rng.integers(0, len(graph.q), size)
         price = checker.price(vertices)
@@ -54,7 +54,7 @@ def test_certified_prices_are_those_of_checking_each_vertex(dome, graph):
 
 def test_certified_motions_are_those_of_checking_each(dome, graph):
     rng = np.random.default_rng(42)
-    checker = Checker(dome, graph.q)
+    checker = CollisionChecker(dome, graph.q)
     k = rng.integers(0, len(graph.start) - 2, 400)
     p = rng.integers(graph.start[k], graph.start[k + 1])
     j = rng.integers(graph.start[k + 1], graph.start[k + 2])
@@ -104,8 +104,8 @@ def test_the_lazy_optimum_in_a_cell_is_that_of_checking_every_vertex_and_edge(
         passable.append(near)
     cost = np.where(clear, 0.0, np.inf)
     want = naive.second_order(graph.q, graph.start, "free", passable, vertex_cost=cost, **o)
-    checker = Checker(cell, graph.q)
-    known = Known(graph.q, graph.start, price=checker.price, passable=checker.passable)
+    checker = CollisionChecker(cell, graph.q)
+    known = CheckedEdges(graph.q, graph.start, price=checker.price, passable=checker.passable)
     found = clear_path(shortest_path, known, **o)
     assert found.cost == pytest.approx(want[0], rel=1e-12)
     blind = shortest_path(graph.q, graph.start, **o)
@@ -117,7 +117,7 @@ def test_the_lazy_optimum_in_a_cell_is_that_of_checking_every_vertex_and_edge(
 
 def test_near_misses_can_cost_instead_of_being_forbidden(dome, graph):
     vertices = np.arange(0, len(graph.q), 97)
-    checker = Checker(dome, graph.q, comfort=0.03, comfort_cost=2.0)
+    checker = CollisionChecker(dome, graph.q, comfort=0.03, comfort_cost=2.0)
     price = checker.price(vertices)
     over = (dome.distances(graph.q[vertices]) - dome.required)[:, ~dome.own].min(axis=1)
     clear = dome.clear(graph.q[vertices])
@@ -126,12 +126,12 @@ def test_near_misses_can_cost_instead_of_being_forbidden(dome, graph):
     np.testing.assert_allclose(price, want, atol=1e-4)
     assert ((price > 0) & (price < np.inf)).any()
     with pytest.raises(InputError, match="comfort"):
-        Checker(dome, graph.q, comfort=-1.0)
+        CollisionChecker(dome, graph.q, comfort=-1.0)
 
 
 def test_a_body_that_overlaps_deeply_closes_its_neighbours_without_measuring(dome, graph, arm):
     inside = box([4, 4, 4])
     cell = cell_of(arm, tool=np.eye(4), fixtures={"block": inside}, may_touch=[("block", "base")])
-    checker = Checker(cell, graph.q)
+    checker = CollisionChecker(cell, graph.q)
     assert np.isinf(checker.price(np.arange(2000))).all()
     assert checker.measured < 400

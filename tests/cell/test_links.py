@@ -28,7 +28,7 @@ from kerfpath.cell import (
     link_capsules,
 )
 from kerfpath.robots import _chain, chain_of, robot_ids
-from kerfpath.urdf import Body as Described
+from kerfpath.urdf import LinkBody as Described
 
 LIBRARY = [robot(name) for name in robot_ids()]
 PLAIN = [robot("abb_irb4600_60_205"), robot("ur_ur10e"), FIVE]

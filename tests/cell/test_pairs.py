@@ -24,7 +24,7 @@ from kerfpath.cell import (
 )
 from kerfpath.cell._pairs import BY_DESIGN
 from kerfpath.cell._shaved import shave
-from kerfpath.urdf import Chain
+from kerfpath.urdf import KinematicChain
 
 ARM = robot("abb_irb2600_12_165")
 LADDER = [0.0, 2e-3, 0.01, 0.02, 0.2]
@@ -75,7 +75,7 @@ def some_cell(rng, **asked):
     origins = np.tile(np.eye(4), (n, 1, 1))
     origins[:, :3, 3] = rng.uniform(-0.4, 0.4, (n, 3)) * rng.choice([0.1, 1], (n, 1))
     axes = rng.normal(size=(n, 3))
-    chain = Chain(
+    chain = KinematicChain(
         origins=origins, axes=axes / np.linalg.norm(axes, axis=1, keepdims=True), end=np.eye(4)
     )
     bodies = [
@@ -161,7 +161,7 @@ def wristed(gap, size=0.08):
     """A forearm and, two joints on, a head that stands `gap` before it at zero."""
     origins = np.tile(np.eye(4), (3, 1, 1))
     origins[1:, 2, 3] = 0.1, 0.04
-    chain = Chain(
+    chain = KinematicChain(
         origins=origins, axes=np.array([[0, 0, 1.0], [0, 0, 1], [0, 1, 0]]), end=np.eye(4)
     )
     bodies = [
@@ -215,7 +215,7 @@ def test_what_touches_by_design_is_told_apart_from_what_hits():
 
 def swivel_pair(gap):
     """A round face that turns on another which has a boss; a spur of it reaches over the edge."""
-    chain = Chain(origins=np.eye(4)[None], axes=np.array([[0, 0, 1.0]]), end=np.eye(4))
+    chain = KinematicChain(origins=np.eye(4)[None], axes=np.array([[0, 0, 1.0]]), end=np.eye(4))
     still = union(
         [([-0.05, -0.05, -0.2], [0.05, 0.05, 0]), ([-0.1, -0.01, -0.1], [-0.05, 0.01, -0.05])]
     )
@@ -275,7 +275,7 @@ def test_what_is_shaved_lies_inside_and_no_deeper_than_asked():
 
 def test_links_that_touch_at_most_poses_by_a_skin_are_judged_but_for_it():
     """A foot slides on a plate at zero over two thirds of a turn; what stands on the plate hits."""
-    chain = Chain(origins=np.eye(4)[None], axes=np.array([[0, 0, 1.0]]), end=np.eye(4))
+    chain = KinematicChain(origins=np.eye(4)[None], axes=np.array([[0, 0, 1.0]]), end=np.eye(4))
     plate = ([-0.3, -0.3, -0.05], [0.07, 0.3, 0])
     foot = Body(
         name="foot", frame=1, kind="robot", shape=box_between([0.1, -0.01, 0], [0.12, 0.01, 0.05])

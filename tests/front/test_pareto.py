@@ -10,12 +10,12 @@ import pytest
 
 from conftest import ROOT
 from kerfpath import Contour, InputError, NoFeasiblePath, audit, fastest_speed, pareto, plan
-from kerfpath.air import least_time
 from kerfpath.cell import Mesh, box_between, cell_of
 from kerfpath.comfort import MEASURES, Band, Comfort
 from kerfpath.front import CRITERIA, JOINT_CRITERIA, Criterion, Subproblem, hypervolume
 from kerfpath.front._subproblem import grid
 from kerfpath.planner import layered_graph
+from kerfpath.transfer import least_time
 
 STEP = np.radians(8)
 NAMES = ("displacement", "velocity", "range_6", "acceleration")

@@ -19,7 +19,7 @@ from kerfpath.kernels.search import (
     distance,
     fill_increment,
     is_shut,
-    late,
+    late_cost,
     shut_edges,
 )
 from kerfpath.search._exact import NO_SEAM, best_allowed
@@ -50,7 +50,7 @@ def scalar(layers, aim, allowed):
                 if aim.lost.penalty > 0 and rho < np.inf:
                     dq = np.empty(len(aim.velocity))
                     fill_increment(layers, p, j, dq)
-                    rho += late(aim.lost, aim.lost.stretch * velocity_time(dq, aim.velocity))
+                    rho += late_cost(aim.lost, aim.lost.stretch * velocity_time(dq, aim.velocity))
                 if aim.minimax:
                     best = min(best, max(rho, max(tail, h[j])))
                 else:

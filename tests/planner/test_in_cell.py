@@ -10,7 +10,7 @@ from kerfpath import InputError, NoFeasiblePath, audit, fastest_speed, plan
 from kerfpath.auditor import checks
 from kerfpath.cell import Mesh, box_between, cell_of
 from kerfpath.planner import layered_graph, plan_in_pieces
-from kerfpath.search import Known
+from kerfpath.search import CheckedEdges
 
 STEP = np.radians(5)
 
@@ -208,11 +208,11 @@ def test_how_many_poses_are_looked_at_to_find_closed_nodes_is_bounded():
         return np.where(vertices % 50 < 40, np.inf, 0.0)
 
     q, start = np.zeros((500, 1)), np.arange(0, 501, 40)
-    known = Known(q, [*start, 500], price=price, passable=lambda p, j: np.ones(len(p), bool))
+    known = CheckedEdges(q, [*start, 500], price=price, passable=lambda p, j: np.ones(len(p), bool))
     closed, settled = known.closed_layers(10_000)
     every = [k for k in range(13) if (np.arange(40 * k, min(40 * k + 40, 500)) % 50 < 40).all()]
     assert (closed, settled) == (every, 13)
-    fresh = Known(q, [*start, 500], price=price, passable=lambda p, j: np.ones(len(p), bool))
+    fresh = CheckedEdges(q, [*start, 500], price=price, passable=lambda p, j: np.ones(len(p), bool))
     asked.clear()
     closed, settled = fresh.closed_layers(100)
     assert sum(asked) <= 100

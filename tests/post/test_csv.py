@@ -10,11 +10,11 @@ from scipy.spatial.transform import Rotation
 from tests.post.cases import CASES
 
 from kerfpath import InputError
-from kerfpath.air import least_time
 from kerfpath.post import (
     Comment,
     post,
 )
+from kerfpath.transfer import least_time
 from programs import (
     arced,
     changed,

@@ -10,7 +10,6 @@ from scipy.spatial.transform import Rotation
 from tests.post.cases import CASES
 
 from kerfpath import InputError, robot
-from kerfpath.air import least_time
 from kerfpath.post import (
     CircularMove,
     Comment,
@@ -19,6 +18,7 @@ from kerfpath.post import (
     post,
 )
 from kerfpath.post.ros import RosSettings, trajectory
+from kerfpath.transfer import least_time
 from programs import arc, changed, codes, five_axis_program, frames, hand_plan, with_steps
 
 CASE = CASES["ros"]

@@ -8,8 +8,8 @@ from scipy.optimize import linprog, minimize
 
 from kerfpath import InputError, audit, plan, refine
 from kerfpath.limits import Limits
-from kerfpath.refiner._program import Model, solve
-from kerfpath.refiner._rates import Rates
+from kerfpath.refiner._program import LinearModel, solve
+from kerfpath.refiner._rates import RateLimits
 
 METRICS = ["manhattan", "chebychev", "euclid"]
 STEP = np.radians(2)
@@ -151,7 +151,7 @@ def test_nodes_that_do_not_divide_the_intervals_are_refused(planned, circle):
 def _random_model(rng, metric, *, cap=np.inf):
     K, n = 6, 3
     q = rng.normal(0, 0.2, (K, n)).cumsum(0)
-    model = Model(
+    model = LinearModel(
         q=q,
         slope=rng.normal(0, 1, (K, n)),
         radius=np.full(K, 0.3),
@@ -168,7 +168,7 @@ def _random_model(rng, metric, *, cap=np.inf):
     dq = np.diff(q, axis=0)
     tau = rng.uniform(0.5, 1.5, K - 1)
     velocity = np.abs(dq / tau[:, None]).max(0) * 1.1
-    rates = Rates(
+    rates = RateLimits(
         tau=tau,
         limits=Limits.of(velocity, np.full(n, 9.0)),
         periodic=bool(rng.random() < 0.5),

@@ -10,8 +10,7 @@ from tests.robots.test_five_axes import ARM, TOOLS
 import naive
 from conftest import pose
 from kerfpath import Contour, InputError, NoFeasiblePath, Tilt, audit, plan
-from kerfpath.air import air_move
-from kerfpath.auditor import air_checks, chain_of, checks
+from kerfpath.auditor import chain_of, checks, transfer_checks
 from kerfpath.cell import cell_of
 from kerfpath.comfort import Band, Comfort, measure, measures
 from kerfpath.graph import gamma_grid
@@ -21,7 +20,8 @@ from kerfpath.planner import layered_graph
 from kerfpath.post import build_program
 from kerfpath.report import ContourSection
 from kerfpath.robots import Robot
-from kerfpath.urdf import Chain
+from kerfpath.transfer import transfer_move
+from kerfpath.urdf import KinematicChain
 
 RAIL = {"velocity": 2.0, "acceleration": 4.0, "step": 0.1}
 TABLE = {"velocity": 2.0, "acceleration": 4.0, "step": np.radians(15)}
@@ -275,9 +275,9 @@ def test_what_does_not_go_with_an_extra_joint_is_refused_in_one_line(
     with pytest.raises(InputError, match="no language writes the rail"):
         build_program([made])
     with pytest.raises(InputError, match="how a rail moves"):
-        air_move(railed, made.q[0], made.q[-1])
+        transfer_move(railed, made.q[0], made.q[-1])
     with pytest.raises(InputError, match="how a rail moves"):
-        air_checks(railed, made.q[[0, -1]], [0.0, 9.0])
+        transfer_checks(railed, made.q[[0, -1]], [0.0, 9.0])
     space = {name: options[name] for name in ("tool", "placement", "gamma_step")}
     graph = layered_graph(short, railed, **space)
     with pytest.raises(InputError, match="does not show a rail"):
@@ -330,7 +330,7 @@ def test_a_general_arm_is_held_where_its_rail_stands(arm):
         id="described",
         kinematics="general",
         geometry={},
-        chain=Chain(origins=frames.origins, axes=frames.axes, end=frames.tip),
+        chain=KinematicChain(origins=frames.origins, axes=frames.axes, end=frames.tip),
         **{n: getattr(arm, n) for n in ("lower", "upper", "velocity", "acceleration", "endless")},
     )
     rides = described.on_rail([1, 1, 0], lower=-1.0, upper=1.0, **RAIL)

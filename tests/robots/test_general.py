@@ -16,7 +16,7 @@ from kerfpath.graph import build, gamma_grid
 from kerfpath.job import read_plan_file
 from kerfpath.job.plan_file._write import plan_document, plan_entry, plan_text
 from kerfpath.robots import _general, _ssik
-from kerfpath.urdf import Chain
+from kerfpath.urdf import KinematicChain
 
 HALF = np.pi / 2
 
@@ -28,7 +28,7 @@ def chain_from(alpha, a, d):
         c, s = np.cos(alpha[i]), np.sin(alpha[i])
         links[i, :3] = [[1, 0, 0, a[i]], [0, c, -s, 0], [0, s, c, d[i]]]
     origins = np.concatenate([np.eye(4)[None], links[:5]])
-    return Chain(origins=origins, axes=np.tile([0.0, 0.0, 1.0], (6, 1)), end=links[5])
+    return KinematicChain(origins=origins, axes=np.tile([0.0, 0.0, 1.0], (6, 1)), end=links[5])
 
 
 def arm_from(*parameters, **limits):

@@ -8,7 +8,7 @@ from tests.search.posed import clear_path, interrupted_path, least_interval, slo
 
 import naive
 from kerfpath import InputError, NoFeasiblePath, shortest_path
-from kerfpath.search import Known
+from kerfpath.search import CheckedEdges
 
 
 class Checks:
@@ -29,7 +29,7 @@ class Checks:
 
     def known(self, q, around=None):
         checks = {"price": self.vertices, "passable": self.passable, "blocked": self.blocked}
-        return Known(q, self.start, around=around, **checks)
+        return CheckedEdges(q, self.start, around=around, **checks)
 
     def blocked(self, p, j):
         """Two in three of what is closed."""
@@ -236,7 +236,7 @@ def test_rings_around_closed_edges_save_searches():
 
     taken, costs = [], []
     for neighbours in (None, around):
-        known = Known(
+        known = CheckedEdges(
             q, start, price=lambda v: np.zeros(len(v)), passable=passable,
             blocked=lambda p, j: ~passable(p, j), around=neighbours,
         )  # fmt: skip
@@ -251,7 +251,7 @@ def test_nothing_closed_costs_one_search_and_one_check_of_each_vertex_and_edge_o
     rng = np.random.default_rng(34)
     q, start = rng.uniform(-1, 1, (300, 3)), np.arange(0, 301, 10)
     o = {"dt": 1.0, "velocity": np.full(3, 3.0), "acceleration": np.full(3, 9.0)}
-    known = Known(
+    known = CheckedEdges(
         q, start, price=lambda v: np.zeros(len(v)), passable=lambda p, j: np.ones(len(p), bool)
     )
     found = clear_path(shortest_path, known, **o)
@@ -269,7 +269,7 @@ def test_most_of_a_graph_is_never_looked_at():
     closed = np.isin(layer, range(40, 60)) & (q[:, 0] < 0.5)
     around = np.c_[np.arange(-1, 4999), np.append(np.arange(1, 5000), -1)]
     around[::50, 0] = around[49::50, 1] = -1
-    known = Known(
+    known = CheckedEdges(
         q, start, price=lambda v: np.where(closed[v], np.inf, 0.0),
         passable=lambda p, j: np.ones(len(p), bool), around=around,
     )  # fmt: skip
@@ -287,7 +287,7 @@ def test_where_all_is_closed_the_answer_names_collision():
     def free(v):
         return np.zeros(len(v))
 
-    wall = Known(
+    wall = CheckedEdges(
         q, start, price=lambda v: np.where((v == 2) | (v == 3), np.inf, 0.0),
         passable=lambda p, j: np.ones(len(p), bool),
     )  # fmt: skip
@@ -296,12 +296,12 @@ def test_where_all_is_closed_the_answer_names_collision():
     assert no.value.proved
     assert no.value.node == 0
     assert no.value.counts == {"collision at the node": 2}
-    gate = Known(q, start, price=free, passable=lambda p, j: p > 2)
+    gate = CheckedEdges(q, start, price=free, passable=lambda p, j: p > 2)
     with pytest.raises(NoFeasiblePath, match="clear; forbidden by collision on the way: 4") as no:
         clear_path(shortest_path, gate, **o)
     assert no.value.node == 0
     q[4:] = 5
-    far = Known(q, start, price=free, passable=lambda p, j: p > 0)
+    far = CheckedEdges(q, start, price=free, passable=lambda p, j: p > 0)
     with pytest.raises(NoFeasiblePath, match=r"by velocity, joint 1: 4$"):
         clear_path(shortest_path, far, **o)
 
@@ -326,7 +326,7 @@ def test_bad_input_is_refused(change, message):
     checks = {name: options.pop(name) for name in ("price", "passable", "around")}
 
     def run():
-        clear_path(shortest_path, Known(np.zeros((4, 1)), [0, 2, 4], **checks), **options)
+        clear_path(shortest_path, CheckedEdges(np.zeros((4, 1)), [0, 2, 4], **checks), **options)
 
     with pytest.raises(InputError, match=message):
         run()

@@ -1,4 +1,4 @@
-"""Order of cutting and moves through the air."""
+"""Order of cutting and transfer moves."""
 
 import re
 from itertools import permutations, product
@@ -8,8 +8,7 @@ import numpy as np
 import pytest
 
 from kerfpath import Contour, InputError, NoFeasiblePath, plan
-from kerfpath.air import air_move, backed_off, least_time
-from kerfpath.auditor import air_checks
+from kerfpath.auditor import transfer_checks
 from kerfpath.cell import box_between, cell_of
 from kerfpath.operations import start_at
 from kerfpath.post import JointMove, build_program, post, preflight
@@ -20,6 +19,7 @@ from kerfpath.sequence import (
     order_plans,
     plan_part,
 )
+from kerfpath.transfer import back_off, least_time, transfer_move
 from programs import read_text, text_of
 
 STEP = np.radians(10)
@@ -98,21 +98,21 @@ def moved(contour, x, y, name):
 
 def test_a_move_goes_straight_where_it_is_clear_and_around_where_not(arm, tool):
     q0, q1 = np.radians([[-30, 10, 10, 0, 60, 0], [30, 10, 10, 0, 60, 0]])
-    free = air_move(arm, q0, q1, cell=cell_of(arm, tool=tool))
+    free = transfer_move(arm, q0, q1, cell=cell_of(arm, tool=tool))
     assert len(free.q) == 2
     assert free.clear
-    assert not air_move(arm, q0, q1).clear
+    assert not transfer_move(arm, q0, q1).clear
     tip = (arm.forward((q0 + q1) / 2) @ tool)[:3, 3]
     post = box_between([tip[0] - 0.02, -0.02, -0.5], [tip[0] + 0.02, 0.02, tip[2] + 0.1])
     cell = cell_of(arm, tool=tool, fixtures={"post": post})
     assert cell.clear([q0, q1]).all()
     assert not cell.clear_motion([q0], [q1])[0]
-    around = air_move(arm, q0, q1, cell=cell)
+    around = transfer_move(arm, q0, q1, cell=cell)
     assert len(around.q) > 2
     assert cell.clear_motion(around.q[:-1], around.q[1:]).all()
     assert around.duration > free.duration
     np.testing.assert_array_equal(around.q[[0, -1]], [q0, q1])
-    again = air_move(arm, q0, q1, cell=cell)
+    again = transfer_move(arm, q0, q1, cell=cell)
     np.testing.assert_array_equal(again.q, around.q)
 
 
@@ -122,7 +122,7 @@ def test_a_move_from_within_a_fixture_says_which(arm, tool):
     block = box_between(tip - 0.05, tip + 0.05)
     cell = cell_of(arm, tool=tool, fixtures={"block": block})
     with pytest.raises(NoFeasiblePath, match=r"start .* not clear: .*'block'") as none:
-        air_move(arm, q0, q1, cell=cell)
+        transfer_move(arm, q0, q1, cell=cell)
     assert none.value.proved
 
 
@@ -160,8 +160,8 @@ def test_a_part_is_cut_in_less_time_than_in_the_order_given(part, arm, tool, pla
     # Each move begins and ends where its contours back off to.
     for k, move in enumerate(free.moves):
         before, after = free.plans[k : k + 2]
-        np.testing.assert_allclose(move.q[0], backed_off(before, "end", 0.05), atol=1e-9)
-        np.testing.assert_allclose(move.q[-1], backed_off(after, "start", 0.05), atol=1e-9)
+        np.testing.assert_allclose(move.q[0], back_off(before, "end", 0.05), atol=1e-9)
+        np.testing.assert_allclose(move.q[-1], back_off(after, "start", 0.05), atol=1e-9)
 
 
 @pytest.mark.parametrize("home", [None, np.radians([0, -20, 10, 0, 60, 0])])
@@ -175,8 +175,8 @@ def test_moves_of_open_cuts_run_from_the_end_of_each_to_the_start_of_the_next(
     ]
     asked = {"tool": tool, "placement": placement, "speed": 0.05, "gamma_step": STEP}
     cut = plan_part(lines, arm, home=home, retract=0.02, **asked)
-    ends = [backed_off(p, "end", 0.02) for p in cut.plans]
-    starts = [backed_off(p, "start", 0.02) for p in cut.plans]
+    ends = [back_off(p, "end", 0.02) for p in cut.plans]
+    starts = [back_off(p, "start", 0.02) for p in cut.plans]
     if home is None:
         starts, ends = starts[1:], ends[:-1]
     else:
@@ -248,18 +248,20 @@ def test_one_program_for_the_part_says_that_its_air_moves_are_clear(walled):
 def test_the_audit_holds_moves_through_the_air_to_limits_time_and_cell(walled, arm):
     cell, cut = walled
     for move in cut.moves:
-        table = air_checks(arm, move.q, move.time, cell=cell)
+        table = transfer_checks(arm, move.q, move.time, cell=cell)
         codes = {"air-time", "air-limits", "collision", "collision-own", "collision-open"}
         assert {check.code for check in table} == codes
         assert all(check.ok for check in table)
     around = max(cut.moves, key=lambda move: len(move.q))
-    fast = air_checks(arm, around.q, 0.9 * around.time, cell=cell)
+    fast = transfer_checks(arm, around.q, 0.9 * around.time, cell=cell)
     assert [check.code for check in fast if not check.ok] == ["air-time"]
-    straight = air_checks(arm, around.q[[0, -1]], [0.0, 9.0], cell=cell)
+    straight = transfer_checks(arm, around.q[[0, -1]], [0.0, 9.0], cell=cell)
     assert [check.code for check in straight if not check.ok] == ["collision"]
     beyond = around.q.copy()
     beyond[1, 1] = np.radians(170)
-    assert "air-limits" in [c.code for c in air_checks(arm, beyond, 9 * around.time) if not c.ok]
+    assert "air-limits" in [
+        c.code for c in transfer_checks(arm, beyond, 9 * around.time) if not c.ok
+    ]
 
 
 def test_what_contradicts_the_given_order_or_does_not_exist_is_refused(part, arm, tool, placement):

@@ -20,7 +20,7 @@ from kerfpath.job import cell_of_job, fastest_speeds, pose, read_job
 from kerfpath.study import digest, layout, ranges_of
 from kerfpath.study._evaluator import EVERY
 from kerfpath.study.placing._evaluate import contours_of, evaluate_placements, middle_of
-from kerfpath.study.placing._place import moved, numbers_of, placed_text
+from kerfpath.study.placing._place import move_job, numbers_of, placed_text
 from kerfpath.study.placing._value import PlacementValue
 
 DEMO = ROOT / "src" / "kerfpath" / "demo"
@@ -208,7 +208,7 @@ def test_what_is_called_unreachable_has_a_node_without_a_pose(plain):
         if answer.status != "unreachable":
             continue
         lost += 1
-        there = moved(job, numbers_of(job, {"x_mm": x}, middle(plain)))
+        there = move_job(job, numbers_of(job, {"x_mm": x}, middle(plain)))
         graph = there.graph(subjects[answer.infeasibility.contour].nodes)
         assert answer.infeasibility.node % EVERY == 0
         assert np.diff(graph.start)[answer.infeasibility.node] == 0
@@ -240,7 +240,7 @@ def test_the_file_that_is_written_has_the_very_placement_that_was_looked_at(
     text = placed_text(job, numbers, tmp_path, "placed")
     assert "# where it lies now" in text
     file = job_file(tmp_path, text)
-    again, there = read_job(file), moved(job, numbers)
+    again, there = read_job(file), move_job(job, numbers)
     assert np.array_equal(again.placement, there.placement)
     assert np.array_equal(again.tool, there.tool)
     assert again.cell == there.cell
@@ -260,7 +260,7 @@ def test_the_file_that_is_written_has_the_very_placement_that_was_looked_at(
 def test_fixtures_go_with_the_part_but_for_the_standing_ones_and_all_against_the_base(in_cell):
     job, mid = read_job(in_cell), middle(in_cell)
     offsets = {"x_mm": 40.0, "yaw_deg": 15.0, "base_y_mm": -30.0, "base_yaw_deg": 10.0}
-    there = moved(job, numbers_of(job, offsets, mid))
+    there = move_job(job, numbers_of(job, offsets, mid))
     base = np.linalg.inv(pose([0, -30, 0], [0, 0, 10]))
     to, turn, back = np.eye(4), pose([0, 0, 0], [0, 0, 15]), np.eye(4)
     to[:3, 3], back[:3, 3] = mid + np.array([0.04, 0, 0]), -mid
@@ -282,7 +282,7 @@ def test_a_head_from_a_file_turns_with_its_mount(tmp_path):
     file = f'[cell.head]\nfile = "{cone}"\nunit = "mm"\nxyz_mm = [40, 0, 100]\n'
     cell = CELL.replace("[[cell.fixture]]", f"{file}nozzle_length_mm = 40\n\n[[cell.fixture]]", 1)
     job = read_job(job_file(tmp_path, text + CONTOURS.format(speed=2, step=10) + cell))
-    there = moved(job, numbers_of(job, {"mount_deg": 50.0}, np.zeros(3)))
+    there = move_job(job, numbers_of(job, {"mount_deg": 50.0}, np.zeros(3)))
     drawing = read_drawing(job.part_file)
     before, after = ({b.name: b for b in cell_of_job(j, drawing).bodies} for j in (job, there))
     end = cell_of_job(job, drawing).chain.end

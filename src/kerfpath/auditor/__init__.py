@@ -1,6 +1,8 @@
 """The audit: a re-check of a plan by kinematics that share no code with the planner."""
 
-from kerfpath.auditor._air import air_checks as air_checks
+import warnings
+
+from kerfpath.auditor._air import transfer_checks as transfer_checks
 from kerfpath.auditor._audit import audit as audit
 from kerfpath.auditor._audit import checks as checks
 from kerfpath.auditor._chain import JointChain as JointChain
@@ -11,5 +13,14 @@ from kerfpath.auditor._table import Check as Check
 from kerfpath.auditor._table import Issue as Issue
 from kerfpath.auditor._table import Level as Level
 from kerfpath.auditor._table import Unit as Unit
-from kerfpath.auditor._table import in_words as in_words
+from kerfpath.auditor._table import format_value as format_value
 from kerfpath.auditor._table import worst_of as worst_of
+
+
+def __getattr__(name: str) -> object:
+    if name != "air_checks":
+        raise AttributeError(f"module 'kerfpath.auditor' has no attribute {name!r}")
+    warnings.warn(
+        "kerfpath.auditor.air_checks is transfer_checks now", DeprecationWarning, stacklevel=2
+    )
+    return transfer_checks

@@ -1,4 +1,4 @@
-"""The re-check of a move through the air: joint limits, the time it has, and collisions."""
+"""The re-check of a transfer move: joint limits, the time it has, and collisions."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from kerfpath.cell import Cell
 from kerfpath.errors import InputError
 from kerfpath.robots import Robot
 
-__all__ = ["air_checks"]
+__all__ = ["transfer_checks"]
 
 STEP = np.radians(0.5)
 """Largest joint step between two samples of a move."""
@@ -23,7 +23,7 @@ SLACK = 1e-6
 """Relative slack on the time, and rad on joint limits, for rounding."""
 
 
-def air_checks(
+def transfer_checks(
     robot: Robot,
     q: ArrayLike,
     time: ArrayLike,
@@ -55,17 +55,17 @@ def air_checks(
         raise InputError(f"air move: it is not known yet how a {robot.external.kind} moves in it")
     corners = floats(q, "q", (None, robot.joints))
     duration = np.diff(floats(time, "time", (len(corners),)))
-    needed = _needed(robot, np.abs(np.diff(corners, axis=0)), eta_v, eta_a)
+    needed = _least_times(robot, np.abs(np.diff(corners, axis=0)), eta_v, eta_a)
     late = np.where(duration > 0, needed / np.where(duration > 0, duration, 1.0), np.inf)
     limits = robot.joint_limits()
     beyond = np.maximum(limits.lower - corners, corners - limits.upper)
     beyond[:, robot.endless] = -np.inf
     rows = [
-        _check("air-time", "time that a move through the air needs", late, 1 + SLACK, "share"),
+        _check("air-time", "time that a transfer move needs", late, 1 + SLACK, "share"),
         _check("air-limits", "excess over the joint limits", beyond.max(axis=1), SLACK, "rad"),
     ]
     if cell is not None and len(cell.pairs):
-        samples, leg = _sampled(corners)
+        samples, leg = _sample_motions(corners)
         steps = np.flatnonzero(leg[1:] == leg[:-1])
         rows += collision_along(
             cell, samples[steps], samples[steps + 1], leg[steps], chain_of(robot)
@@ -73,7 +73,7 @@ def air_checks(
     return rows
 
 
-def _needed(robot: Robot, step: Array, eta_v: float, eta_a: float) -> Array:
+def _least_times(robot: Robot, step: Array, eta_v: float, eta_a: float) -> Array:
     """Return the least time (m-1,) s of straight motions by |dq| (m-1, n) rad, stop to stop."""
     velocity, acceleration = robot.speed_limits()
     still = 1e-300
@@ -84,7 +84,7 @@ def _needed(robot: Robot, step: Array, eta_v: float, eta_a: float) -> Array:
     return np.asarray(1 / peak + peak / a)
 
 
-def _sampled(corners: Array) -> tuple[Array, Ints]:
+def _sample_motions(corners: Array) -> tuple[Array, Ints]:
     """Return joint vectors (S, n) along the motions, no joint step above `STEP`, and their legs."""
     samples, legs = [], []
     for k, (one, two) in enumerate(pairwise(corners)):

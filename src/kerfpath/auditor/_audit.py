@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from kerfpath._arrays import Array, Ints, scalar
-from kerfpath.auditor._between import Between, between
+from kerfpath.auditor._between import BetweenNodes, bound_between_nodes
 from kerfpath.auditor._chain import chain_of
 from kerfpath.auditor._collision import collisions
 from kerfpath.auditor._margins import margins
@@ -114,7 +114,7 @@ def checks(
             f"reference: {path.length:.6f} m long, but the plan's contour was sampled from a path "
             f"of {plan.contour.length:.6f} m"
         )
-    reached = between(plan, chain, motion, interpolation)
+    reached = bound_between_nodes(plan, chain, motion, interpolation)
     return [
         *_at_nodes(plan, chain.forward(plan.q) @ plan.T_flange_tip),
         *_between_nodes(plan, motion, reached, path, path_tolerance, axis_tolerance),
@@ -142,7 +142,7 @@ def _at_nodes(plan: Plan, tool: Array) -> list[Check]:
 
 
 def _between_nodes(
-    plan: Plan, motion: Motion, reached: Between, path: Contour, path_tolerance: float,
+    plan: Plan, motion: Motion, reached: BetweenNodes, path: Contour, path_tolerance: float,
     axis_tolerance: float,
 ) -> list[Check]:  # fmt: skip
     """Compare points of the path with the motion of the cell between nodes that they fall in."""
@@ -203,7 +203,7 @@ def _between_nodes(
 
 
 def _positions(
-    plan: Plan, motion: Motion, reached: Between, rounding: Rounding | None
+    plan: Plan, motion: Motion, reached: BetweenNodes, rounding: Rounding | None
 ) -> list[Check]:
     limits = plan.robot.joint_limits()
     left = np.zeros(plan.q.shape) if rounding is None else rounding.q
@@ -258,7 +258,7 @@ def _positions(
     return rows
 
 
-def _rates(plan: Plan, reached: Between, rounding: Rounding | None) -> list[Check]:
+def _rates(plan: Plan, reached: BetweenNodes, rounding: Rounding | None) -> list[Check]:
     velocity, acceleration = plan.robot.speed_limits()
     eta_v, eta_a = plan.settings.eta_v, plan.settings.eta_a
     dt = np.diff(plan.time)

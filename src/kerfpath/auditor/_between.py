@@ -20,7 +20,7 @@ from kerfpath.auditor._chain import JointChain
 from kerfpath.auditor._motion import Interpolation, Motion, follow, joint_increments, straight
 from kerfpath.plans import Plan
 
-__all__ = ["HIDDEN_ANGLE", "HIDDEN_SPEED", "Between", "between"]
+__all__ = ["HIDDEN_ANGLE", "HIDDEN_SPEED", "BetweenNodes", "bound_between_nodes"]
 
 HIDDEN_ANGLE = 1e-5
 """rad that a joint may be beyond what its samples show."""
@@ -35,7 +35,7 @@ MOST = 60
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class Between:
+class BetweenNodes:
     """What joints and their speeds reach between the nodes, found by bisection.
 
     Parameters
@@ -75,7 +75,9 @@ class _Steps:
         return _Steps(*(getattr(self, name)[wanted] for name in self.__slots__))
 
 
-def between(plan: Plan, chain: JointChain, motion: Motion, interpolation: Interpolation) -> Between:
+def bound_between_nodes(
+    plan: Plan, chain: JointChain, motion: Motion, interpolation: Interpolation
+) -> BetweenNodes:
     """Return what the joints reach between the nodes of a plan; `motion` has the first samples.
 
     Parameters
@@ -92,9 +94,9 @@ def between(plan: Plan, chain: JointChain, motion: Motion, interpolation: Interp
         values, none = motion.q @ rows.T, np.zeros(len(plan.q) - 1)
         low, high = values.min(axis=1), values.max(axis=1)
         speed = np.abs(motion.q[:, -1] - motion.q[:, 0])
-        return Between(low=low, high=high, speed=speed, residual=none, open=none > 0)
+        return BetweenNodes(low=low, high=high, speed=speed, residual=none, open=none > 0)
     chain = replace(chain, tip=chain.tip @ plan.T_flange_tip)
-    task = _Task(plan, chain)
+    task = _StraightMoves(plan, chain)
     parts = motion.q.shape[1] - 1
     K = len(plan.q) - 1
     k = np.repeat(np.arange(K), parts + 1)
@@ -130,10 +132,10 @@ def between(plan: Plan, chain: JointChain, motion: Motion, interpolation: Interp
     else:
         steps = steps.rows(~task.settled(steps))
     left[steps.k] = True
-    return Between(low=low, high=high, speed=speed, residual=residual, open=left)
+    return BetweenNodes(low=low, high=high, speed=speed, residual=residual, open=left)
 
 
-class _Task:
+class _StraightMoves:
     """The straight moves of a plan, and when a step of one is small enough."""
 
     def __init__(self, plan: Plan, chain: JointChain) -> None:

@@ -11,7 +11,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from kerfpath._arrays import Array
-from kerfpath._told import told
+from kerfpath._repr import short_repr
 from kerfpath.robots import ExternalAxis, Robot
 
 __all__ = ["JointChain", "chain_of"]
@@ -38,7 +38,7 @@ class JointChain:
     tip: Array
     external: ExternalAxis | None = None
 
-    __repr__ = told
+    __repr__ = short_repr
 
     def forward(self, q: Array) -> Array:
         """Return the tip poses (B, 4, 4) of joint vectors q (B, n) rad."""

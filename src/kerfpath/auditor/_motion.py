@@ -9,7 +9,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from kerfpath._arrays import Array, Ints
-from kerfpath._told import told
+from kerfpath._repr import short_repr
 from kerfpath.auditor._chain import JointChain
 from kerfpath.plans import Plan
 
@@ -45,7 +45,7 @@ class Motion:
     axis: Array
     residual: Array
 
-    __repr__ = told
+    __repr__ = short_repr
 
 
 def joint_increments(plan: Plan) -> Array:

@@ -1,4 +1,4 @@
-"""What the digits of a text may add to the rates of a motion: at most so much, and it is told."""
+"""What the digits of a text may add to the rates of a motion: a bounded share, which the audit states."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from kerfpath._arrays import Array
-from kerfpath._told import told
+from kerfpath._repr import short_repr
 from kerfpath.auditor._chain import chain_of
 from kerfpath.plans import Plan
 
@@ -36,7 +36,7 @@ class Rounding:
     q: Array
     time: Array
 
-    __repr__ = told
+    __repr__ = short_repr
 
     def of_velocity(self, dq: Array, dt: Array) -> Array:
         """Return the bound (K-1, n) rad/s on joint velocities from increments dq in dt (K-1,) s."""

@@ -8,7 +8,7 @@ from typing import Literal
 
 import numpy as np
 
-from kerfpath._told import told
+from kerfpath._repr import short_repr
 
 __all__ = ["Check", "Issue", "Level", "Unit", "worst_of"]
 
@@ -46,7 +46,7 @@ class Check:
     level: Level = "error"
     advice: str = ""
 
-    __repr__ = told
+    __repr__ = short_repr
 
     @property
     def ok(self) -> bool:
@@ -56,8 +56,8 @@ class Check:
     def issue(self) -> Issue:
         """Return the issue that a failure of this check is."""
         message = (
-            f"{self.title}: {in_words(self.value, self.unit)} at node {self.node}, "
-            f"allowed {in_words(self.limit, self.unit)}"
+            f"{self.title}: {format_value(self.value, self.unit)} at node {self.node}, "
+            f"allowed {format_value(self.limit, self.unit)}"
         )
         if self.advice:
             message += f"; {self.advice}"
@@ -73,7 +73,7 @@ class Issue:
     message: str
     node: int
 
-    __repr__ = told
+    __repr__ = short_repr
 
     def __str__(self) -> str:
         return f"{self.level}: {self.message} [{self.code}]"
@@ -90,7 +90,7 @@ def worst_of(tables: Iterable[Iterable[Check]]) -> list[Check]:
     return list(worst.values())
 
 
-def in_words(value: float, unit: Unit) -> str:
+def format_value(value: float, unit: Unit) -> str:
     """Say a value for people: mm, degrees, per cent or a number."""
     if unit == "m":
         return f"{value * 1e3:.4g} mm"

@@ -10,23 +10,23 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from kerfpath._told import told
+from kerfpath._repr import short_repr
 from kerfpath.errors import InputError
 
-__all__ = ["Cells", "cells_of"]
+__all__ = ["TableCells", "cells_of"]
 
 COMMENTS = ("#", "%", "//")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Cells:
+class TableCells:
     """The cells of a table, and the line that each row stands in."""
 
     lines: Sequence[int]
     rows: Sequence[Sequence[str]]
     has_decimal_comma: bool
 
-    __repr__ = told
+    __repr__ = short_repr
 
     def is_numbers(self, row: int) -> bool:
         """Return whether all cells of a row are numbers: whether it is no header."""
@@ -37,9 +37,9 @@ class Cells:
             return False
         return True
 
-    def without_header(self) -> Cells:
+    def without_header(self) -> TableCells:
         """Return the rows behind the first."""
-        return Cells(
+        return TableCells(
             lines=self.lines[1:], rows=self.rows[1:], has_decimal_comma=self.has_decimal_comma
         )
 
@@ -67,7 +67,7 @@ class Cells:
         return value
 
 
-def cells_of(content: bytes, expected: str) -> Cells:
+def cells_of(content: bytes, expected: str) -> TableCells:
     """Return the cells of a table, split by what its first line is split by.
 
     Raises
@@ -96,7 +96,7 @@ def cells_of(content: bytes, expected: str) -> Cells:
             raise InputError(f"cannot be split into columns ({error})") from None
         if len(rows) != len(lines):
             raise InputError("a quoted cell runs over several lines; remove its quotes")
-    return Cells(lines=lines, rows=rows, has_decimal_comma=delimiter in (";", "\t"))
+    return TableCells(lines=lines, rows=rows, has_decimal_comma=delimiter in (";", "\t"))
 
 
 def _text(content: bytes) -> str:

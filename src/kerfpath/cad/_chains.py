@@ -14,7 +14,7 @@ from kerfpath.cad._connected import label_connected
 from kerfpath.cad._curves import Curve, backwards
 from kerfpath.cad._left_out import LeftOut
 from kerfpath.cad._part import Kind, Loop, Part
-from kerfpath.cad._sample import Chain, vector_area
+from kerfpath.cad._sample import EdgeChain, vector_area
 from kerfpath.cad._units import MM
 from kerfpath.errors import InputError
 
@@ -40,10 +40,10 @@ def loops_in(
     Closed loops run counter-clockwise about what they enclose, or clockwise about a hole: one that
     lies within an odd number of others.
     """
-    chains: list[tuple[Look, Chain[Curve]]] = []
+    chains: list[tuple[Look, EdgeChain[Curve]]] = []
     notes = [*notes, *map(str, left_out)]
     for look, curves in drawn.items():
-        kept, repaired = _repaired(curves)
+        kept, repaired = _repair_curves(curves)
         notes += [f"layer {look[0]}, {look[1]}: {what}" for what in repaired]
         chains += [(look, chain) for chain in _chains(kept, gap / MM)]
     if not chains:
@@ -60,7 +60,7 @@ def loops_in(
             kind = "inner" if next(depth) % 2 else "outer"
             if (vector_area(chain.around)[2] > 0) != (kind == "outer"):
                 turned = tuple(backwards(curve) for curve in chain.edges[::-1])
-                chains[k] = look, Chain(edges=turned)
+                chains[k] = look, EdgeChain(edges=turned)
         kinds.append(kind)
     loops: list[Loop] = []
     for layer in dict.fromkeys(look[0] for look, _ in chains):
@@ -73,7 +73,7 @@ def loops_in(
     return part_without_faces(path, unit, loops, gap=gap, notes=notes, left_out=left_out)
 
 
-def _repaired(curves: Sequence[Curve]) -> tuple[list[Curve], list[str]]:
+def _repair_curves(curves: Sequence[Curve]) -> tuple[list[Curve], list[str]]:
     """Return the curves without those that have no length or lie on another, and what was done."""
     long = [curve for curve in curves if curve.length > NOTHING]
     marks = [_mark(curve) for curve in long]
@@ -95,7 +95,7 @@ def _mark(curve: Curve) -> tuple[float, ...]:
     return tuple(v for point in (*ends, *inner) for v in point)
 
 
-def _chains(curves: Sequence[Curve], gap: float) -> Iterator[Chain[Curve]]:
+def _chains(curves: Sequence[Curve], gap: float) -> Iterator[EdgeChain[Curve]]:
     """Yield the chains of curves whose ends meet within `gap` (mm), two at a place."""
     loose = list(curves)
     if not loose:
@@ -124,10 +124,12 @@ def _chains(curves: Sequence[Curve], gap: float) -> Iterator[Chain[Curve]]:
     # From the places where a chain must end, then around what is closed.
     for end in np.flatnonzero(crowd[place] != 2).tolist():
         if chain := walk(end):
-            yield Chain(edges=chain, is_closed=False, next_end=_next_end(chain, ends, crowd[place]))
+            yield EdgeChain(
+                edges=chain, is_closed=False, next_end=_next_end(chain, ends, crowd[place])
+            )
     for k in range(len(loose)):
         if chain := walk(2 * k):
-            yield Chain(edges=chain)
+            yield EdgeChain(edges=chain)
 
 
 def _places(ends: Array, gap: float) -> Ints:

@@ -10,7 +10,7 @@ import numpy as np
 from scipy.interpolate import BSpline
 
 from kerfpath._arrays import Array
-from kerfpath._told import told
+from kerfpath._repr import short_repr
 
 __all__ = ["Arc", "Curve", "Line", "Spline", "backwards"]
 
@@ -71,7 +71,7 @@ class Line(_Flat):
     start: float = 0.0
     end: float = 1.0
 
-    __repr__ = told
+    __repr__ = short_repr
 
     def at(self, t: Array) -> Array:
         return np.asarray(self.p + t[:, None] * (self.q - self.p))
@@ -90,7 +90,7 @@ class Arc(_Flat):
     start: float
     end: float
 
-    __repr__ = told
+    __repr__ = short_repr
 
     def at(self, t: Array) -> Array:
         return np.asarray(

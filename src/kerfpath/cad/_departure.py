@@ -10,7 +10,7 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from kerfpath._arrays import Array, Ints
-from kerfpath._told import told
+from kerfpath._repr import short_repr
 from kerfpath.cad._sample import Curve, Points, Polyline, Trace, off_chord, sample_curve
 from kerfpath.cad._units import MM
 from kerfpath.contour import Contour, angle_between, slerp
@@ -73,7 +73,7 @@ class Departure:
     step_node: int
     path: Departure | None = None
 
-    __repr__ = told
+    __repr__ = short_repr
 
 
 def departure(trace: Trace, contour: Contour, tolerance: float) -> Departure:
@@ -92,8 +92,8 @@ def departure(trace: Trace, contour: Contour, tolerance: float) -> Departure:
     at = _places(cells, contour.points / MM, nodes, beside, contour.name)
     around = cells.s[-1] if trace.is_closed else np.inf
     length = (contour.s[nodes[-1]] - contour.s[nodes[0]]) / MM
-    at = _unrolled(at, around, length, beside, contour.name)
-    return _measured(cells, at, nodes, contour, against)
+    at = _unroll_places(at, around, length, beside, contour.name)
+    return _measure_chords(cells, at, nodes, contour, against)
 
 
 def departure_from(path: Contour, contour: Contour, drawn: Departure) -> Departure:
@@ -123,11 +123,11 @@ def departure_from(path: Contour, contour: Contour, drawn: Departure) -> Departu
     nodes = _cut_nodes(contour)
     cells = _cells([Polyline(line=replace(path, points=path.points / MM, time=None, x=None))])
     at = np.interp(contour.s[nodes], np.append(cells.t[:, 0], cells.t[-1, 1]), cells.s)
-    return replace(_measured(cells, at, nodes, contour, "path as cut"), path=drawn)
+    return replace(_measure_chords(cells, at, nodes, contour, "path as cut"), path=drawn)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class _Cells:
+class _ShortSpans:
     """Curves end to end in short cells.
 
     Parameters
@@ -172,8 +172,8 @@ def _cut_nodes(contour: Contour) -> Ints:
     return np.union1d(chords, chords + 1)
 
 
-def _measured(
-    cells: _Cells, at: Array, nodes: Ints, contour: Contour, against: Reference
+def _measure_chords(
+    cells: _ShortSpans, at: Array, nodes: Ints, contour: Contour, against: Reference
 ) -> Departure:
     """Return how far the chords leave the cells; `nodes` lie at places `at` (mm) along them."""
     points, axes, chords = contour.points / MM, contour.axes, _chords(contour)
@@ -211,7 +211,7 @@ def _measured(
     )
 
 
-def _cells(curves: Sequence[Curve]) -> _Cells:
+def _cells(curves: Sequence[Curve]) -> _ShortSpans:
     """Return the curves in cells that bend little, none longer than its share of the whole."""
     fine = [sample_curve(curve, CHORD, ANGLE)[:2] for curve in curves]
     lengths = [np.linalg.norm(np.diff(points, axis=0), axis=1) for _, points in fine]
@@ -227,10 +227,10 @@ def _cells(curves: Sequence[Curve]) -> _Cells:
         ends.append(np.stack([points[:-1], points[1:]], axis=1))
     whole = np.concatenate(ends)
     s = np.concatenate([[0.0], np.cumsum(np.linalg.norm(whole[:, 1] - whole[:, 0], axis=1))])
-    return _Cells(curves=curves, of=np.concatenate(of), t=np.concatenate(t), ends=whole, s=s)
+    return _ShortSpans(curves=curves, of=np.concatenate(of), t=np.concatenate(t), ends=whole, s=s)
 
 
-def _places(cells: _Cells, points: Array, nodes: Ints, tolerance: float, name: str) -> Array:
+def _places(cells: _ShortSpans, points: Array, nodes: Ints, tolerance: float, name: str) -> Array:
     """Return where along the cells (mm) each node is nearest to them."""
     p, ends = points[nodes], cells.ends
     # The middle of the nearest cell is no farther than this from a node that lies on it.
@@ -262,7 +262,7 @@ def _places(cells: _Cells, points: Array, nodes: Ints, tolerance: float, name: s
     return np.asarray(cells.s[cell] + share * np.diff(cells.s)[cell])
 
 
-def _unrolled(at: Array, around: float, length: float, tolerance: float, name: str) -> Array:
+def _unroll_places(at: Array, around: float, length: float, tolerance: float, name: str) -> Array:
     """Return places along a loop that rise or fall all along: at its end another turn begins.
 
     Parameters

@@ -15,7 +15,7 @@ from kerfpath.cad._build import named_loops
 from kerfpath.cad._loops import FaceLoop, bounds_of, loops_of
 from kerfpath.cad._mesh import triangulate
 from kerfpath.cad._part import Loop, Part
-from kerfpath.cad._shape import Drawn, NamedFace, unique
+from kerfpath.cad._shape import NamedFace, NamedShape, unique
 from kerfpath.cad._skins import Skin, skins_of
 from kerfpath.cad._units import MM
 
@@ -39,7 +39,7 @@ SURFACES = {
 }
 
 
-def part_of(path: Path, drawn: Drawn, gap: float) -> Part:
+def part_of(path: Path, drawn: NamedShape, gap: float) -> Part:
     """Return the part that is drawn, every face, skin and loop given its name; `gap` in m."""
     faces = drawn.faces
     found = [loops_of(named.face) for named in faces]

@@ -14,7 +14,7 @@ from OCP.IGESData import IGESData_IGESEntity
 from OCP.TopAbs import TopAbs_ShapeEnum
 from OCP.TopoDS import TopoDS, TopoDS_Shape
 
-from kerfpath.cad._shape import Drawn, NamedFace, drawn_of, failures, list_shapes, occt
+from kerfpath.cad._shape import NamedFace, NamedShape, drawn_of, failures, list_shapes, occt
 from kerfpath.cad._units import UNITS_MM
 from kerfpath.errors import InputError
 
@@ -26,7 +26,7 @@ WIDTH = 80
 """Columns of a line; the 73rd names its section, the rest number it there."""
 
 
-def read_iges(path: Path, unit: str | None, gap: float) -> Drawn:
+def read_iges(path: Path, unit: str | None, gap: float) -> NamedShape:
     """Return what an IGES file holds, its loose faces sewn together.
 
     Raises
@@ -76,7 +76,7 @@ def _require_whole(content: bytes) -> None:
         )
 
 
-def _read(path: Path, unit: str | None, gap: float) -> Drawn:
+def _read(path: Path, unit: str | None, gap: float) -> NamedShape:
     IGESControl_Controller.Init_s()
     reader = IGESControl_Reader()
     if reader.ReadFile(str(path)) != IFSelect_ReturnStatus.IFSelect_RetDone:

@@ -19,7 +19,7 @@ from OCP.TopAbs import TopAbs_Orientation, TopAbs_ShapeEnum
 from OCP.TopoDS import TopoDS, TopoDS_Edge, TopoDS_Face, TopoDS_Shape, TopoDS_Wire
 
 from kerfpath._arrays import Array
-from kerfpath.cad._sample import Chain
+from kerfpath.cad._sample import EdgeChain
 from kerfpath.cad._shape import children, list_shapes
 from kerfpath.cad._units import LARGEST
 from kerfpath.errors import InputError
@@ -114,7 +114,7 @@ class OrientedEdge:
         return at, np.array([normal.X(), normal.Y(), normal.Z()]) * (self.outward / size)
 
 
-FaceLoop = tuple[Literal["outer", "inner"], Chain[OrientedEdge]]
+FaceLoop = tuple[Literal["outer", "inner"], EdgeChain[OrientedEdge]]
 """Whether a loop runs around its face or around a hole in it, and its edges."""
 
 
@@ -140,7 +140,7 @@ def loops_of(face: TopoDS_Face) -> list[FaceLoop]:
         runs, has_seam = _runs(wire, forward, face, surface)
         for edges in join_runs(runs):
             outer = _winds(edges) or (wire.IsSame(outer_wire) and not has_seam)
-            loops.append(("outer" if outer else "inner", Chain(edges=edges)))
+            loops.append(("outer" if outer else "inner", EdgeChain(edges=edges)))
     return loops
 
 

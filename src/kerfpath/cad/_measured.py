@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from kerfpath._arrays import Array, freeze
-from kerfpath.cad._cells import Cells, cells_of
+from kerfpath.cad._cells import TableCells, cells_of
 from kerfpath.cad._read import content_of
 from kerfpath.cad._units import MM, UNITS_MM
 from kerfpath.errors import InputError
@@ -52,7 +52,7 @@ def read_measured(path: str | Path) -> tuple[Array, Array]:
     return freeze(values[:, :3] * MM), freeze(values[:, 3:] * MM)
 
 
-def _header(table: Cells) -> tuple[list[str], dict[str, float]]:
+def _header(table: TableCells) -> tuple[list[str], dict[str, float]]:
     """Return the names of the columns without units, and the unit of each in mm."""
     columns, mm = [], {}
     for cell in table.rows[0]:

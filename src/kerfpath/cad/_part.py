@@ -12,13 +12,13 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from kerfpath._arrays import Array, Ints, floats, freeze, scalar
-from kerfpath._told import told
+from kerfpath._repr import short_repr
 from kerfpath.cad._crossing import find_crossing
 from kerfpath.cad._departure import ON_CURVE, Departure, departure
 from kerfpath.cad._healed import HealedSurface
 from kerfpath.cad._left_out import LeftOut
 from kerfpath.cad._loops import OrientedEdge
-from kerfpath.cad._sample import Chain, Trace, distance
+from kerfpath.cad._sample import EdgeChain, Trace, distance
 from kerfpath.cad._units import MM
 from kerfpath.contour import Contour
 from kerfpath.errors import InputError
@@ -87,7 +87,7 @@ class Loop:
     colour: str = ""
     _trace: Trace = field(repr=False)
 
-    __repr__ = told
+    __repr__ = short_repr
 
     def line(self, chord_tolerance: float = 1e-4) -> Array:
         """Return points (K, 3) m along the loop for pictures, whether or not it can be cut.
@@ -322,7 +322,7 @@ class Part:
             No such loop.
         """
         trace = self.loop(name)._trace
-        if isinstance(trace, Chain) and all(isinstance(e, OrientedEdge) for e in trace.edges):
+        if isinstance(trace, EdgeChain) and all(isinstance(e, OrientedEdge) for e in trace.edges):
             return HealedSurface(trace.edges)
         return Ribbon(self.contour(name, closed=False))
 

@@ -7,7 +7,7 @@ from hashlib import sha256
 from pathlib import Path
 
 from kerfpath._arrays import scalar
-from kerfpath.apart import apart, stand_by
+from kerfpath.apart import call_apart, stand_by
 from kerfpath.cad._part import Part
 from kerfpath.cad._units import GAP, require_unit
 from kerfpath.errors import InputError
@@ -91,7 +91,7 @@ def _drawn(kind: str, path: Path, content: bytes, unit: str | None, gap: float) 
     if part is None:
         translate = read_step if kind == "STEP" else read_iges
         try:
-            drawn = apart(translate, path.absolute(), unit, gap, size=len(content))
+            drawn = call_apart(translate, path.absolute(), unit, gap, size=len(content))
             with occt():
                 part = part_of(path, drawn, gap)
         except InputError as error:

@@ -11,14 +11,14 @@ from typing import Generic, Protocol, TypeVar
 import numpy as np
 
 from kerfpath._arrays import Array
-from kerfpath._told import told
+from kerfpath._repr import short_repr
 from kerfpath.contour import Contour
 from kerfpath.errors import InputError
 
 __all__ = [
-    "Chain",
     "Curve",
     "Edge",
+    "EdgeChain",
     "Points",
     "Polyline",
     "Trace",
@@ -118,7 +118,7 @@ class Trace(Protocol):
 
 
 @dataclass(frozen=True, kw_only=True)
-class Chain(Generic[E]):
+class EdgeChain(Generic[E]):
     """Edges in the order of travel; of a closed chain the last ends where the first starts.
 
     Parameters
@@ -133,7 +133,7 @@ class Chain(Generic[E]):
     is_closed: bool = True
     next_end: str = ""
 
-    __repr__ = told
+    __repr__ = short_repr
 
     @property
     def curves(self) -> Sequence[Curve]:
@@ -201,7 +201,7 @@ class Polyline:
 
     line: Contour
 
-    __repr__ = told
+    __repr__ = short_repr
 
     def breaks(self) -> Array:
         """Return the parameters of the nodes."""
@@ -220,7 +220,7 @@ class Points:
     normals: Array
     is_closed: bool
 
-    __repr__ = told
+    __repr__ = short_repr
 
     @cached_property
     def lengths(self) -> Array:

@@ -25,13 +25,13 @@ from OCP.TopAbs import TopAbs_ShapeEnum
 from OCP.TopExp import TopExp_Explorer
 from OCP.TopoDS import TopoDS, TopoDS_Compound, TopoDS_Face, TopoDS_Iterator, TopoDS_Shape
 
-from kerfpath._told import told
+from kerfpath._repr import short_repr
 from kerfpath.cad._units import MM
 from kerfpath.errors import InputError
 
 __all__ = [
-    "Drawn",
     "NamedFace",
+    "NamedShape",
     "children",
     "drawn_of",
     "failures",
@@ -62,11 +62,11 @@ class NamedFace:
     layer: str = ""
     colour: str = ""
 
-    __repr__ = told
+    __repr__ = short_repr
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Drawn:
+class NamedShape:
     """A shape and its faces, each named, as they lie in it.
 
     Parameters
@@ -95,12 +95,12 @@ class Drawn:
         stream = BytesIO()
         BinTools.Write_s(both, stream)
         names = [(n.name, n.component, n.layer, n.colour) for n in self.faces]
-        return _again, (self.unit, stream.getvalue(), names, tuple(self.notes))
+        return _copy_with_names, (self.unit, stream.getvalue(), names, tuple(self.notes))
 
 
-def _again(
+def _copy_with_names(
     unit: str, stream: bytes, names: Sequence[tuple[str, str, str, str]], notes: Sequence[str]
-) -> Drawn:
+) -> NamedShape:
     both = TopoDS_Shape()
     BinTools.Read_s(both, BytesIO(stream))
     shape, faces = children(both)
@@ -110,7 +110,7 @@ def _again(
         )
         for face, (name, component, layer, colour) in zip(children(faces), names, strict=True)
     ]
-    return Drawn(unit=unit, shape=shape, faces=named, notes=notes)
+    return NamedShape(unit=unit, shape=shape, faces=named, notes=notes)
 
 
 def children(shape: TopoDS_Shape) -> list[TopoDS_Shape]:
@@ -143,7 +143,7 @@ def drawn_of(
     *,
     gap: float,
     notes: Sequence[str] = (),
-) -> Drawn:
+) -> NamedShape:
     """Return a shape and its faces, sewn within `gap` (m) where there is no solid."""
     if not faces:
         raise InputError("the file holds no face; export the part as a solid or a surface")
@@ -151,7 +151,7 @@ def drawn_of(
     if not solids and len(faces) > 1:
         shape, faces, note = _sewn(faces, gap)
         notes = [*notes, note]
-    return Drawn(unit=unit, shape=shape, faces=faces, notes=notes)
+    return NamedShape(unit=unit, shape=shape, faces=faces, notes=notes)
 
 
 def list_shapes(shape: TopoDS_Shape, kind: TopAbs_ShapeEnum) -> list[TopoDS_Shape]:

@@ -13,11 +13,11 @@ from OCP.TopoDS import TopoDS_Face
 from scipy.spatial import cKDTree
 
 from kerfpath._arrays import Array, Ints
-from kerfpath._told import told
+from kerfpath._repr import short_repr
 from kerfpath.cad._connected import label_connected
 from kerfpath.cad._loops import FaceLoop, OrientedEdge, join_runs
 from kerfpath.cad._part import Side
-from kerfpath.cad._sample import Chain, vector_area
+from kerfpath.cad._sample import EdgeChain, vector_area
 
 __all__ = ["SMOOTH", "Skin", "skins_of"]
 
@@ -57,7 +57,7 @@ class Skin:
     side: Side
     inside: frozenset[tuple[int, int, int]]
 
-    __repr__ = told
+    __repr__ = short_repr
 
     def loops(self, found: Sequence[list[FaceLoop]]) -> list[FaceLoop]:
         """Return the loops around the skin and its holes, over all its faces."""
@@ -69,7 +69,7 @@ class Skin:
             for k, (_, loop) in enumerate(found[f])
             for run in _outside(loop.edges, [(f, k, e) in self.inside for e in _numbers(loop)])
         ]
-        chains = [Chain(edges=edges) for edges in join_runs(runs)]
+        chains = [EdgeChain(edges=edges) for edges in join_runs(runs)]
         loops = [(_is_hole(chain), chain) for chain in chains]
         if loops and all(hole for hole, _ in loops):
             # A trim line may face away from its sheet, as that of a C-shaped channel does.
@@ -119,7 +119,7 @@ def _uses(found: Sequence[list[FaceLoop]]) -> list[list[tuple[int, int, int]]]:
     return uses
 
 
-def _numbers(loop: Chain[OrientedEdge]) -> range:
+def _numbers(loop: EdgeChain[OrientedEdge]) -> range:
     return range(len(loop.edges))
 
 
@@ -148,7 +148,7 @@ def _outside(edges: Sequence[OrientedEdge], inside: list[bool]) -> list[list[Ori
     return runs
 
 
-def _is_hole(loop: Chain[OrientedEdge]) -> bool:
+def _is_hole(loop: EdgeChain[OrientedEdge]) -> bool:
     """Return whether a closed chain runs about a hole of its skin, by its normals."""
     area = vector_area(loop.around)
     middles = [(edge.start + edge.end) / 2 for edge in loop.edges]
@@ -195,7 +195,7 @@ def _sides(
         opposite = np.linalg.norm(vector[alike] + vector[g], axis=1) <= OPPOSITE * areas[g]
         large = areas[alike] > (1 - OPPOSITE) * areas[g]
         near = alike[(apart < THIN * np.sqrt(areas[g])) & opposite & large].tolist()
-        away = {h: _away(points[g], points[h]) for h in near if h != g and not sides[h]}
+        away = {h: _usual_distance(points[g], points[h]) for h in near if h != g and not sides[h]}
         h = min(away, key=away.__getitem__, default=g)
         if h != g and away[h] < THIN * np.sqrt(areas[g]):
             even = abs(rims[g] - rims[h]) <= EVEN * rims[g]
@@ -205,7 +205,7 @@ def _sides(
     return [side or ("edge" if body[g] in sheets else "") for g, side in enumerate(sides)]
 
 
-def _away(a: Array, b: Array) -> float:
+def _usual_distance(a: Array, b: Array) -> float:
     """Return how far points (K, 3) usually are from the nearest of others."""
     if not len(a) or not len(b):
         return float("inf")

@@ -17,7 +17,7 @@ from OCP.TopoDS import TopoDS, TopoDS_Shape
 
 from kerfpath._arrays import Array
 from kerfpath.cad._part21 import points_in, sound_data
-from kerfpath.cad._shape import Drawn, NamedFace, children, drawn_of, failures, occt, unique
+from kerfpath.cad._shape import NamedFace, NamedShape, children, drawn_of, failures, occt, unique
 from kerfpath.cad._styles import styles_in
 from kerfpath.cad._units import LARGEST, UNITS_MM
 from kerfpath.errors import InputError
@@ -41,7 +41,7 @@ UNNAMED = ("", "none")
 """What CAD systems write for a face without a name, in lower case."""
 
 
-def read_step(path: Path, unit: str | None, gap: float) -> Drawn:
+def read_step(path: Path, unit: str | None, gap: float) -> NamedShape:
     """Return what a STEP file (AP203, AP214, AP242) holds, its placements applied.
 
     Raises
@@ -69,7 +69,7 @@ def _require_whole(text: bytes) -> None:
         )
 
 
-def _read(path: Path, data: bytes, unit: str | None, gap: float) -> Drawn:
+def _read(path: Path, data: bytes, unit: str | None, gap: float) -> NamedShape:
     reader = STEPControl_Reader()
     if reader.ReadFile(str(path)) != IFSelect_ReturnStatus.IFSelect_RetDone:
         raise InputError("the file cannot be parsed; export the part as STEP again")

@@ -11,7 +11,7 @@ import numpy as np
 
 from kerfpath._arrays import Array
 from kerfpath.cad._build import loop_of, part_without_faces
-from kerfpath.cad._cells import Cells, cells_of
+from kerfpath.cad._cells import TableCells, cells_of
 from kerfpath.cad._part import Kind, Part
 from kerfpath.cad._sample import Points, vector_area
 from kerfpath.cad._units import LARGEST, MM, UNITS_MM
@@ -77,7 +77,7 @@ def read_table(path: Path, content: bytes, unit: str | None, gap: float) -> Part
     return part_without_faces(path, unit or declared, loops, gap=gap, notes=notes)
 
 
-def _rows(table: Cells) -> tuple[tuple[str, ...], str, Cells]:
+def _rows(table: TableCells) -> tuple[tuple[str, ...], str, TableCells]:
     """Return the names of the columns, the unit that they state, and the rows under them."""
     columns, unit = _header(table)
     if columns:
@@ -95,7 +95,7 @@ def _rows(table: Cells) -> tuple[tuple[str, ...], str, Cells]:
     return columns, unit, table
 
 
-def _header(table: Cells) -> tuple[tuple[str, ...], str]:
+def _header(table: TableCells) -> tuple[tuple[str, ...], str]:
     """Return the names of the columns and their unit, nothing if the first row is numbers."""
     if table.is_numbers(0):
         return (), ""
@@ -119,7 +119,7 @@ def _header(table: Cells) -> tuple[tuple[str, ...], str]:
     return tuple(columns), units[0] if units else ""
 
 
-def _numbers(columns: Sequence[str], table: Cells, mm: float) -> tuple[Array, Array]:
+def _numbers(columns: Sequence[str], table: TableCells, mm: float) -> tuple[Array, Array]:
     """Return points (K, 3) mm and outward unit normals (K, 3)."""
     at = {name: k for k, name in enumerate(columns)}
     axes = next(a for a in (AXIS, NORMAL, QUATERNION) if set(a) <= set(at))
@@ -153,7 +153,7 @@ def _numbers(columns: Sequence[str], table: Cells, mm: float) -> tuple[Array, Ar
     return points, directions / (length if axes == NORMAL else -length)[:, None]
 
 
-def _contours(columns: Sequence[str], table: Cells) -> Iterator[tuple[str, slice]]:
+def _contours(columns: Sequence[str], table: TableCells) -> Iterator[tuple[str, slice]]:
     """Yield each contour's name and rows."""
     if NAME not in columns:
         yield NAME, slice(len(table.rows))

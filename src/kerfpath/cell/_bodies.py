@@ -8,7 +8,7 @@ from typing import Literal
 import numpy as np
 
 from kerfpath._arrays import Array
-from kerfpath._told import told
+from kerfpath._repr import short_repr
 from kerfpath.cell._shapes import Shape
 
 __all__ = ["Body", "Kind"]
@@ -43,7 +43,7 @@ class Body:
     approximate: bool = False
     holds: bool = True
 
-    __repr__ = told
+    __repr__ = short_repr
 
     @property
     def size(self) -> Array:

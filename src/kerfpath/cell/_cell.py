@@ -14,21 +14,21 @@ from kerfpath.cell._bodies import Body
 from kerfpath.cell._head import CuttingHead, MeshHead
 from kerfpath.cell._links import link_bodies
 from kerfpath.cell._mesh import Mesh
-from kerfpath.cell._motion import Sweep
+from kerfpath.cell._motion import MotionBounds
 from kerfpath.cell._pairs import (
     BY_DESIGN,
     MEANT,
-    Design,
+    DesignClearance,
     Places,
     designs,
-    kept_all_round,
+    say_kept_all_round,
     stand_still,
 )
 from kerfpath.cell._scene import Scene
 from kerfpath.cell._shapes import Shape
 from kerfpath.errors import InputError
 from kerfpath.robots import Robot, chain_of
-from kerfpath.urdf import Chain
+from kerfpath.urdf import KinematicChain
 
 __all__ = ["Cell", "cell_of"]
 
@@ -45,7 +45,7 @@ class Cell:
 
     Parameters
     ----------
-    chain : Chain
+    chain : KinematicChain
         Moves the frames that bodies are fixed in.
     bodies : sequence of Body
     near_miss : float m
@@ -81,7 +81,7 @@ class Cell:
         part or fixture that overlaps the robot's base.
     """
 
-    chain: Chain
+    chain: KinematicChain
     bodies: tuple[Body, ...]
     near_miss: float = 0.0
     near_miss_of: Mapping[Pair, float] = field(default_factory=dict)
@@ -96,7 +96,7 @@ class Cell:
     own: Bools = field(init=False)
     unjudged: Mapping[Pair, str] = field(init=False)
     _scene: Scene = field(init=False, repr=False)
-    _sweep: Sweep = field(init=False, repr=False)
+    _sweep: MotionBounds = field(init=False, repr=False)
 
     def __repr__(self) -> str:
         return (
@@ -128,7 +128,7 @@ class Cell:
         given = np.array([pair in own for pair in judged], dtype=np.bool_)
         _set(self, "own", freeze(given | (required < asked) | (depth > 0)))
         _set(self, "_scene", _scene(bodies, judged))
-        _set(self, "_sweep", Sweep(self.chain, bodies, self.pairs))
+        _set(self, "_sweep", MotionBounds(self.chain, bodies, self.pairs))
         self._require_room_for_the_base()
 
     @property
@@ -231,7 +231,7 @@ class Cell:
         return self.chain.frames(floats(q, "q", (None, len(self.chain.axes))))
 
     @property
-    def sweep(self) -> Sweep:
+    def sweep(self) -> MotionBounds:
         """Bounds on how far bodies move against each other."""
         return self._sweep
 
@@ -242,7 +242,7 @@ class Cell:
 
     def _sorted_out(
         self, own: Mapping[Places, float]
-    ) -> tuple[dict[Places, str], dict[Places, tuple[float, Design]]]:
+    ) -> tuple[dict[Places, str], dict[Places, tuple[float, DesignClearance]]]:
         """Return why pairs are not judged; of others what each is asked to keep, and its design."""
         bodies, names, touching = self.bodies, self.names, self.may_touch
         reasons = touching if isinstance(touching, Mapping) else dict.fromkeys(touching, MEANT)
@@ -254,9 +254,9 @@ class Cell:
             else:
                 asked[a, b] = _distance(own.get((a, b), self.near_miss), names, (a, b))
         left = designs(self.chain, bodies, asked)
-        judged: dict[Places, tuple[float, Design]] = {}
+        judged: dict[Places, tuple[float, DesignClearance]] = {}
         for pair, distance in asked.items():
-            design = left.get(pair, Design())
+            design = left.get(pair, DesignClearance())
             if not design.judged:
                 why[pair] = BY_DESIGN
             else:
@@ -268,7 +268,7 @@ class Cell:
                     f"{why[a, b]}; leave the pair out"
                 )
         for pair, (distance, design) in [*judged.items()]:
-            if words := kept_all_round(self.chain, bodies, pair, distance, design):
+            if words := say_kept_all_round(self.chain, bodies, pair, distance, design):
                 del judged[pair]
                 why[pair] = words
         return why, judged
@@ -370,7 +370,7 @@ def cell_of(
     )
 
 
-def _scene(bodies: Sequence[Body], judged: Mapping[Places, tuple[float, Design]]) -> Scene:
+def _scene(bodies: Sequence[Body], judged: Mapping[Places, tuple[float, DesignClearance]]) -> Scene:
     """Return the bodies ready for distance queries, shaved where pairs overlap by design."""
     solids, ends = [*bodies], []
     for pair, (_, design) in judged.items():

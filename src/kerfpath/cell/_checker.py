@@ -16,7 +16,7 @@ from kerfpath.cell._cell import Cell
 from kerfpath.cell._motion import TOLERANCE
 from kerfpath.cell._scene import ACCURACY
 
-__all__ = ["Checker"]
+__all__ = ["CollisionChecker"]
 
 FAR = 0.1
 """m beyond what is required: distances are not refined above it, as they clear enough already."""
@@ -27,7 +27,7 @@ NEAREST = 4
 """Joint vectors measured before that a new one is compared with."""
 
 
-class Checker:
+class CollisionChecker:
     """The checks that `kerfpath.search.find_clear` asks for.
 
     Parameters

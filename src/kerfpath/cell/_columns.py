@@ -12,7 +12,7 @@ import numpy as np
 
 from kerfpath._arrays import Array, Ints
 
-__all__ = ["Columns"]
+__all__ = ["TriangleColumns"]
 
 CLOSE = 1e-9
 """Of the body's size squared: twice the area of a triangle that is too thin to count with."""
@@ -22,7 +22,7 @@ SPREAD = 64
 """Columns that a triangle may stand in on average: of wide ones there are fewer columns."""
 
 
-class Columns:
+class TriangleColumns:
     """Triangles with corners (F, 3, 3) m, sorted by where they stand in x and y."""
 
     def __init__(self, corners: Array) -> None:

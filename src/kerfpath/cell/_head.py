@@ -9,12 +9,12 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from kerfpath._arrays import as_pose, scalar
-from kerfpath._told import told
+from kerfpath._repr import short_repr
 from kerfpath.cell._bodies import Body
 from kerfpath.cell._mesh import Mesh
 from kerfpath.cell._shapes import Capsule, Shape, frustum
 from kerfpath.errors import InputError
-from kerfpath.urdf import Chain
+from kerfpath.urdf import KinematicChain
 
 __all__ = ["CuttingHead", "MeshHead"]
 
@@ -68,9 +68,9 @@ class CuttingHead(_Head):
     body_radius: float = 0.04
     arm_radius: float = 0.05
 
-    __repr__ = told
+    __repr__ = short_repr
 
-    def bodies(self, chain: Chain, T_flange_tip: ArrayLike) -> tuple[Body, ...]:
+    def bodies(self, chain: KinematicChain, T_flange_tip: ArrayLike) -> tuple[Body, ...]:
         """Return nozzle, head and, from the flange to the head, the arm."""
         tip = as_pose(T_flange_tip, "T_flange_tip")
         beam, at = tip[:3, 2], tip[:3, 3]
@@ -105,9 +105,9 @@ class MeshHead(_Head):
 
     mesh: Mesh
 
-    __repr__ = told
+    __repr__ = short_repr
 
-    def bodies(self, chain: Chain, T_flange_tip: ArrayLike) -> tuple[Body, ...]:
+    def bodies(self, chain: KinematicChain, T_flange_tip: ArrayLike) -> tuple[Body, ...]:
         """Return the nozzle and the head above it.
 
         Raises
@@ -135,7 +135,7 @@ class MeshHead(_Head):
         return _mounted({"nozzle": nozzle, "head": above}, chain)
 
 
-def _mounted(shapes: Mapping[str, Shape | None], chain: Chain) -> tuple[Body, ...]:
+def _mounted(shapes: Mapping[str, Shape | None], chain: KinematicChain) -> tuple[Body, ...]:
     """Return the bodies of shapes in the flange frame, those that are there."""
     return tuple(
         Body(name=name, shape=shape.moved(chain.end), frame=len(chain.axes), kind="head")

@@ -9,13 +9,13 @@ import numpy as np
 from kerfpath._arrays import Array
 from kerfpath.cell._shapes import Capsule
 
-__all__ = ["Lines", "lines_apart"]
+__all__ = ["CapsuleLines", "lines_apart"]
 
 PARALLEL = 1e-12
 """Of the squared sine of two lines: below it they are parallel, and nearest at an end."""
 
 
-class Lines:
+class CapsuleLines:
     """The lines of capsules, each in a frame of an arm.
 
     Parameters

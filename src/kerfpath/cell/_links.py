@@ -14,7 +14,7 @@ from kerfpath.cell._shapes import Capsule, Hull, Shape, box, frustum
 from kerfpath.cell._stl import close_surface, read_surface
 from kerfpath.errors import InputError
 from kerfpath.robots import Robot, chain_of, model_chain
-from kerfpath.urdf import Body as Described
+from kerfpath.urdf import LinkBody as Described
 
 __all__ = ["link_bodies", "link_capsules"]
 

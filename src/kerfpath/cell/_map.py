@@ -18,7 +18,7 @@ from typing import NamedTuple
 import numpy as np
 
 from kerfpath._arrays import Array, Ints
-from kerfpath._told import told
+from kerfpath._repr import short_repr
 from kerfpath.cell._cell import Cell
 from kerfpath.cell._motion import relative
 from kerfpath.cell._scene import ACCURACY
@@ -48,7 +48,7 @@ class Clearances:
     upper: Array
     pair: Ints
 
-    __repr__ = told
+    __repr__ = short_repr
 
 
 def clearances(

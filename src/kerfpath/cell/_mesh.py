@@ -15,8 +15,8 @@ from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
 from kerfpath._arrays import Array, Bools, Ints, as_pose, floats, freeze, integers, not_negative
-from kerfpath._told import told
-from kerfpath.cell._columns import Columns
+from kerfpath._repr import short_repr
+from kerfpath.cell._columns import TriangleColumns
 from kerfpath.cell._sheet import edges_of
 from kerfpath.errors import InputError
 
@@ -58,9 +58,9 @@ class Mesh:
     triangles: Ints
     deviation: float = 0.0
     name: str = "mesh"
-    _columns: Columns = field(init=False, repr=False)
+    _columns: TriangleColumns = field(init=False, repr=False)
 
-    __repr__ = told
+    __repr__ = short_repr
 
     def __post_init__(self) -> None:
         _set, name = object.__setattr__, self.name
@@ -69,7 +69,7 @@ class Mesh:
         _set(self, "deviation", not_negative(self.deviation, f"{name} deviation", unit="m"))
         size_of(self.vertices, self.triangles, name)
         _require_closed(self.triangles, name)
-        _set(self, "_columns", Columns(self.vertices[self.triangles]))
+        _set(self, "_columns", TriangleColumns(self.vertices[self.triangles]))
 
     @property
     def radius(self) -> float:

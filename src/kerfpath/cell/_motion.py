@@ -22,9 +22,9 @@ import numpy as np
 from kerfpath._arrays import Array, Bools, Ints
 from kerfpath.cell._bodies import Body
 from kerfpath.cell._scene import ACCURACY
-from kerfpath.urdf import Chain
+from kerfpath.urdf import KinematicChain
 
-__all__ = ["TOLERANCE", "Sweep", "relative"]
+__all__ = ["TOLERANCE", "MotionBounds", "relative"]
 
 TOLERANCE = 1e-4
 """m: a motion that is not proved clear at this resolution is refused."""
@@ -34,18 +34,18 @@ HALVINGS = 24
 Distances = Callable[[Array, Array, Bools], Array]
 
 
-class Sweep:
+class MotionBounds:
     """Bounds on the motion of judged pairs against each other.
 
     Parameters
     ----------
-    chain : Chain
+    chain : KinematicChain
     bodies : sequence of Body
     pairs : (P, 2) int
         The second of a pair is in the later frame.
     """
 
-    def __init__(self, chain: Chain, bodies: Sequence[Body], pairs: Ints) -> None:
+    def __init__(self, chain: KinematicChain, bodies: Sequence[Body], pairs: Ints) -> None:
         self._chain = chain
         joints = np.arange(len(chain.axes))
         ways = [(bodies[a].frame, int(b)) for a, b in pairs]

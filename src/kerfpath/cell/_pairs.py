@@ -21,13 +21,21 @@ from scipy.stats import qmc
 from kerfpath._arrays import Array
 from kerfpath.cell._bodies import Body
 from kerfpath.cell._mesh import Mesh
-from kerfpath.cell._motion import TOLERANCE, Sweep
+from kerfpath.cell._motion import TOLERANCE, MotionBounds
 from kerfpath.cell._scene import ACCURACY, Scene
 from kerfpath.cell._shapes import Shape
 from kerfpath.cell._shaved import shave
-from kerfpath.urdf import Chain
+from kerfpath.urdf import KinematicChain
 
-__all__ = ["BY_DESIGN", "MEANT", "Design", "Places", "designs", "kept_all_round", "stand_still"]
+__all__ = [
+    "BY_DESIGN",
+    "MEANT",
+    "DesignClearance",
+    "Places",
+    "designs",
+    "say_kept_all_round",
+    "stand_still",
+]
 
 Places = tuple[int, int]
 """Two bodies by their places in the cell, the one in the earlier frame first."""
@@ -63,7 +71,7 @@ MEANT = "they may touch"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class Design:
+class DesignClearance:
     """The distance that the design leaves between two bodies, and what of them is judged.
 
     Parameters
@@ -99,13 +107,13 @@ def stand_still(one: Body, two: Body) -> str:
 
 
 def designs(
-    chain: Chain, bodies: Sequence[Body], asked: Mapping[Places, float]
-) -> dict[Places, Design]:
+    chain: KinematicChain, bodies: Sequence[Body], asked: Mapping[Places, float]
+) -> dict[Places, DesignClearance]:
     """Return what the design leaves between the bodies of the arm that few joints are between.
 
     Parameters
     ----------
-    chain : Chain
+    chain : KinematicChain
     bodies : sequence of Body
     asked : mapping of (int, int) to float m
         What each pair is asked to keep: more is not told apart.
@@ -136,21 +144,25 @@ def designs(
     return found
 
 
-def kept_all_round(
-    chain: Chain, bodies: Sequence[Body], pair: Places, asked: float, design: Design
+def say_kept_all_round(
+    chain: KinematicChain,
+    bodies: Sequence[Body],
+    pair: Places,
+    asked: float,
+    design: DesignClearance,
 ) -> str:
     """Return what a pair is proved to keep at every angle of the one joint between; "" if not."""
     a, b = (bodies[i].frame for i in pair)
     if b - a != 1 or not {bodies[i].kind for i in pair} <= ARM:
         return ""
-    two, needed = left_of(bodies, pair, design), np.array([design.keeps(asked)])
+    two, needed = shaved_pair(bodies, pair, design), np.array([design.keeps(asked)])
     scene = Scene(two, np.array([[0, 1]]))
     q = np.zeros((ARCS + 1, len(chain.axes)))
     q[:, a] = np.linspace(-np.pi, np.pi, ARCS + 1)
     # Not worth a proof where it is not so, or hardly.
     if not (scene.distances(chain.frames(q), needed + FAIR) > needed + TOLERANCE).all():
         return ""
-    sweep = Sweep(chain, two, np.array([[0, 1]]))
+    sweep = MotionBounds(chain, two, np.array([[0, 1]]))
     if not sweep.clear(q[:-1], q[1:], needed, scene.distances).all():
         return ""
     said = (
@@ -162,7 +174,7 @@ def kept_all_round(
     return f"they keep {needed[0] * 1e3:.3g} mm{less} at every angle of joint {b}{said}"
 
 
-def left_of(bodies: Sequence[Body], pair: Places, design: Design) -> tuple[Body, Body]:
+def shaved_pair(bodies: Sequence[Body], pair: Places, design: DesignClearance) -> tuple[Body, Body]:
     """Return two bodies, one of them shaved by its design."""
     a, b = (
         bodies[i] if design.solid is None or design.solid[0] != i
@@ -189,26 +201,26 @@ def _apart(bodies: Sequence[Body], pairs: Sequence[Places], frames: Array, enoug
     return scene.distances(frames, enough)
 
 
-def _design(most: float, enough: float) -> Design:
-    return Design() if most >= enough else Design(most=most)
+def _design(most: float, enough: float) -> DesignClearance:
+    return DesignClearance() if most >= enough else DesignClearance(most=most)
 
 
 def _touching(
     bodies: Sequence[Body], pair: Places, frames: Array, enough: float, apart: Array
-) -> Design:
+) -> DesignClearance:
     """Return the design of two bodies that touch often: `apart` (POSES,) m is their distance."""
     touching = apart <= TOUCH
     most, always = float(apart.max()), bool(touching.all())
     if always and {bodies[i].kind for i in pair} == {"robot"}:
-        return Design(most=most, judged=False)
+        return DesignClearance(most=most, judged=False)
 
-    def freed(depth: float) -> Design | None:
+    def freed(depth: float) -> DesignClearance | None:
         """Return the design where shaving by a depth frees as many poses as it must."""
         solid = _first_shaved(bodies, pair, depth)
         if solid is None:
             return None
-        found = Design(depth=depth, solid=solid)
-        two = left_of(bodies, pair, found)
+        found = DesignClearance(depth=depth, solid=solid)
+        two = shaved_pair(bodies, pair, found)
         left = _apart(two, [(0, 1)], frames[touching], np.array([enough]))[:, 0]
         return found if (left > TOUCH).mean() >= (FREE if always else GONE) else None
 
@@ -222,7 +234,7 @@ def _touching(
                 less, found = (middle, found) if nearer is None else (less, nearer)
             return found
         less = depth
-    return Design(most=most, judged=False) if always else _design(most, enough)
+    return DesignClearance(most=most, judged=False) if always else _design(most, enough)
 
 
 def _first_shaved(bodies: Sequence[Body], pair: Places, depth: float) -> tuple[int, Shape] | None:

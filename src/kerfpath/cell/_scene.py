@@ -16,7 +16,7 @@ import numpy as np
 
 from kerfpath._arrays import Array, Bools, Ints
 from kerfpath.cell._bodies import Body
-from kerfpath.cell._lines import Lines, lines_apart
+from kerfpath.cell._lines import CapsuleLines, lines_apart
 from kerfpath.cell._mesh import Mesh
 from kerfpath.cell._shapes import Capsule, Hull, Shape, box_between
 from kerfpath.errors import InputError
@@ -81,7 +81,7 @@ class Scene:
         round_ = [all(isinstance(bodies[i].shape, Capsule) for i in pair) for pair in self._pairs]
         self.round = np.array(round_, dtype=np.bool_)
         self._lines = [
-            Lines([bodies[i].frame for i in side], [bodies[i].shape for i in side])
+            CapsuleLines([bodies[i].frame for i in side], [bodies[i].shape for i in side])
             for side in self._ends[:, self.round]
             if side.size
         ]

@@ -10,7 +10,7 @@ from scipy.spatial import ConvexHull, QhullError, cKDTree
 from scipy.spatial.transform import Rotation
 
 from kerfpath._arrays import Array, Ints, as_pose, floats, freeze, positive, scalar
-from kerfpath._told import told
+from kerfpath._repr import short_repr
 from kerfpath.cell._mesh import Mesh
 from kerfpath.errors import InputError
 
@@ -43,7 +43,7 @@ class Capsule:
     end: Array
     radius: float
 
-    __repr__ = told
+    __repr__ = short_repr
 
     def __post_init__(self) -> None:
         for name in ("start", "end"):
@@ -78,7 +78,7 @@ class Hull:
     triangles: Ints
     axis: Array | None
 
-    __repr__ = told
+    __repr__ = short_repr
 
     def __init__(self, points: ArrayLike, *, axis: ArrayLike | None = None) -> None:
         given = floats(points, "hull points", (None, 3))

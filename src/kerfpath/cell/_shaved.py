@@ -73,7 +73,7 @@ def _inward(mesh: Mesh) -> Array:
 
 def _core(hull: Hull, depth: float) -> Hull | None:
     """Return the points of a convex solid that are `depth` (m) or more behind each of its faces."""
-    planes, heart, radius = _heart(hull)
+    planes, heart, radius = _centre_and_planes(hull)
     if radius - depth <= CORE:
         return None
     try:
@@ -85,7 +85,7 @@ def _core(hull: Hull, depth: float) -> Hull | None:
 
 
 @lru_cache(maxsize=64)
-def _heart(hull: Hull) -> tuple[Array, Array, float]:
+def _centre_and_planes(hull: Hull) -> tuple[Array, Array, float]:
     """Return the planes (F, 4) of a convex solid, and centre (3,) and radius m of a ball in it.
 
     The largest there is: its centre stays the deepest point however far the planes go in.

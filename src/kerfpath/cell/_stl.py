@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from kerfpath._arrays import Array, Ints
-from kerfpath.apart import apart
+from kerfpath.apart import call_apart
 from kerfpath.cell._mesh import SAME, Mesh, size_of, weld
 from kerfpath.errors import InputError
 
@@ -62,7 +62,7 @@ def read_surface(path: Path, name: str) -> tuple[Array, Ints]:
     if path.suffix.lower() == ".stl":
         return _stl(_bytes(path), name)
     if path.suffix.lower() in (".dae", ".obj"):
-        return _loaded(path, name)
+        return _load_with_coal(path, name)
     raise InputError(f"{name}: expected a mesh as .stl, .dae or .obj, got {path.suffix!r}")
 
 
@@ -82,13 +82,13 @@ def _stl(data: bytes, name: str) -> tuple[Array, Ints]:
     return corners.reshape(-1, 3), np.arange(3 * len(corners)).reshape(-1, 3)
 
 
-def _loaded(path: Path, name: str) -> tuple[Array, Ints]:
+def _load_with_coal(path: Path, name: str) -> tuple[Array, Ints]:
     """Return what the collision library's own reader finds; it ignores the unit of COLLADA."""
     content = _bytes(path)
     unit = _UNIT.search(content) if path.suffix.lower() == ".dae" else None
     try:
         scale = 1.0 if unit is None else float(unit[1])
-        vertices, triangles = apart(load_mesh, str(path.absolute()), scale, size=len(content))
+        vertices, triangles = call_apart(load_mesh, str(path.absolute()), scale, size=len(content))
     except InputError as error:
         raise InputError(f"{name}: {error}") from None
     except ValueError:

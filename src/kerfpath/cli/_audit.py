@@ -7,7 +7,7 @@ from pathlib import Path
 
 from rich.markup import escape
 
-from kerfpath.auditor import in_words
+from kerfpath.auditor import format_value
 from kerfpath.cli._show import busy, out, print_json, table
 from kerfpath.errors import InputError, about
 from kerfpath.job import AuditReport, audit_file, audit_program
@@ -38,8 +38,8 @@ def show_audit(file: Path, job: Path | None, *, as_json: bool) -> bool:
             rows = [
                 [
                     escape(c.title),
-                    in_words(c.value, c.unit),
-                    in_words(c.limit, c.unit),
+                    format_value(c.value, c.unit),
+                    format_value(c.limit, c.unit),
                     str(c.node),
                     "ok" if c.ok else c.level.upper(),
                 ]

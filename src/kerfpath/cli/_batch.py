@@ -8,7 +8,7 @@ from pathlib import Path
 from rich.markup import escape
 
 from kerfpath.cli._show import compile_kernels, out, print_json, sweep_bar, table
-from kerfpath.study import Planned, batch
+from kerfpath.study import BatchResult, batch
 
 __all__ = ["plan_jobs"]
 
@@ -39,7 +39,7 @@ def plan_jobs(
     return passed == len(found)
 
 
-def _entry(row: Planned) -> dict[str, object]:
+def _entry(row: BatchResult) -> dict[str, object]:
     return {
         "job": str(row.job),
         "folder": str(row.folder),
@@ -54,7 +54,7 @@ def _entry(row: Planned) -> dict[str, object]:
     }
 
 
-def _cells(row: Planned) -> list[str]:
+def _cells(row: BatchResult) -> list[str]:
     return [
         escape(row.job.name),
         f"{row.kept}/{row.contours}" if row.contours else "-",

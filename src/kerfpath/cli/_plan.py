@@ -32,7 +32,7 @@ from kerfpath.job import (
     run_job,
     sequence_entry,
     with_map,
-    write_outcome,
+    write_result,
 )
 
 __all__ = ["finish_run", "plan_job"]
@@ -84,7 +84,7 @@ def finish_run(
         Code 1: some contour has no plan that passes its audit.
     """
     with busy("writing"):
-        written = write_outcome(outcome, folder, strict=strict)
+        written = write_result(outcome, folder, strict=strict)
     if as_json:
         print_json(
             {

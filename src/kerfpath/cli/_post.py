@@ -12,7 +12,14 @@ from kerfpath.cli._show import errors, merge_notes, out, print_json, show_files
 from kerfpath.errors import InputError, KerfpathError
 from kerfpath.job import program_from_file, program_language, read_job, read_plan_file
 from kerfpath.placement import MeasuredFrame, placement_from_points
-from kerfpath.post import Language, Replaced, identifier, languages, replace_program, write_program
+from kerfpath.post import (
+    FolderChanges,
+    Language,
+    identifier,
+    languages,
+    replace_program,
+    write_program,
+)
 from kerfpath.post import language as find_language
 
 __all__ = ["write_post"]
@@ -51,7 +58,7 @@ def write_post(
             errors.print(line)
         raise
     written: list[Path] = []
-    replaced: Replaced | None = None
+    replaced: FolderChanges | None = None
     if output is not None and name is not None:
         main, *_ = files
         # FANUC's names are in capitals; the file is called as it was asked for.

@@ -9,14 +9,14 @@ from rich.markup import escape
 from kerfpath.cli._show import out, print_json, table
 from kerfpath.contour import Contour
 from kerfpath.errors import NoFeasiblePath
-from kerfpath.job import ContourTask
+from kerfpath.job import ContourSpec
 from kerfpath.planner import FastestSpeed, at_most
 
 __all__ = ["show_speeds"]
 
 
 def show_speeds(
-    answers: Sequence[tuple[ContourTask, Contour, FastestSpeed | NoFeasiblePath]], *, as_json: bool
+    answers: Sequence[tuple[ContourSpec, Contour, FastestSpeed | NoFeasiblePath]], *, as_json: bool
 ) -> bool:
     """Print the fastest speed of each contour; return whether every contour has one."""
     entries: list[dict[str, object]] = []

@@ -14,7 +14,7 @@ from kerfpath.front._problem import Gap, ParetoProblem, Solution
 from kerfpath.front._subproblem import Subproblem
 from kerfpath.search import Metric, ObjectiveKind
 
-__all__ = ["Adaptive"]
+__all__ = ["AdaptiveRuns"]
 
 RANDOM = 4
 """One run in so many is drawn at random."""
@@ -24,7 +24,7 @@ FINEST = 5
 """Steps by which what is asked for beyond the best of a range nears it, half by half."""
 
 
-class Adaptive:
+class AdaptiveRuns:
     """Proposes runs between the neighbours on the front that are farthest apart.
 
     Neighbours are taken criterion by criterion. What lies between two of them is asked for by the

@@ -10,16 +10,16 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from kerfpath._arrays import Array, freeze
-from kerfpath.air import least_time
 from kerfpath.cell import Cell
 from kerfpath.comfort import MEASURES
 from kerfpath.errors import InputError
 from kerfpath.front._problem import Criterion, Gap, ParetoProblem
-from kerfpath.front._subproblem import Subproblem, counts_as_clearance, in_window
+from kerfpath.front._subproblem import Subproblem, counts_as_clearance, is_in_window
 from kerfpath.kernels.metric import increments
 from kerfpath.options import PlanOptions
 from kerfpath.plans import Plan
 from kerfpath.robots import Robot
+from kerfpath.transfer import least_time
 
 __all__ = ["CRITERIA", "JOINT_CRITERIA", "criteria_named"]
 
@@ -127,7 +127,7 @@ class Range(PerJoint):
         q = graph.q[:, self.joint]
         for _ in range(TRIES):
             low = q[rng.integers(len(q))]
-            inside = in_window(q, low, width, endless=endless)
+            inside = is_in_window(q, low, width, endless=endless)
             if np.logical_or.reduceat(inside, graph.start[:-1]).all():
                 return float(low)
         return otherwise

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from kerfpath._arrays import Array, floats, freeze
-from kerfpath._told import told
+from kerfpath._repr import short_repr
 from kerfpath.errors import InputError
 from kerfpath.front._problem import Criterion
 from kerfpath.front._subproblem import Subproblem
@@ -57,7 +57,7 @@ class Front:
     feasible: int
     failures: Mapping[str, int]
 
-    __repr__ = told
+    __repr__ = short_repr
 
     @property
     def criteria(self) -> tuple[str, ...]:
@@ -148,7 +148,7 @@ class ParetoSet(Front):
 
     plans: tuple[Plan, ...]
 
-    __repr__ = told
+    __repr__ = short_repr
 
     def best(self, criterion: str) -> Plan:
         """Return the plan that is best in a criterion.

@@ -19,7 +19,7 @@ from kerfpath.front._problem import Evaluation, ParetoProblem
 from kerfpath.front._search import AHEAD, FrontSearch, SearchKind, whole_number
 from kerfpath.front._subproblem import Subproblem
 from kerfpath.graph import LayeredGraph
-from kerfpath.options import GraphKeywords, PlanOptions, chosen
+from kerfpath.options import GraphKeywords, PlanOptions, with_keywords
 from kerfpath.planner import layered_graph
 from kerfpath.plans import Plan
 from kerfpath.robots import Robot
@@ -103,7 +103,7 @@ def pareto(
     InputError
         Unknown criteria or search, fewer than one run, and what `kerfpath.plan` refuses.
     """
-    asked = chosen(options, keywords, ParetoKeywords, feed="constant", refine=False)
+    asked = with_keywords(options, keywords, ParetoKeywords, feed="constant", refine=False)
     found = criteria_named(criteria, robot, options=asked, cell=cell, home=home)
     workers = whole_number((os.cpu_count() or 1) if workers is None else workers, "workers")
     T_flange_tip, T_base_part = as_pose(tool, "tool"), as_pose(placement, "placement")

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from kerfpath._arrays import Array, freeze
-from kerfpath._told import told
+from kerfpath._repr import short_repr
 from kerfpath.auditor import audit as full_audit
 from kerfpath.cell import Cell
 from kerfpath.contour import Contour
@@ -57,7 +57,7 @@ class Criterion:
     bounded: ClassVar[bool] = False
     """Whether `bound` can hold a run to a value of it."""
 
-    __repr__ = told
+    __repr__ = short_repr
 
     @property
     def sense(self) -> float:
@@ -94,7 +94,7 @@ class Evaluation:
     losses: Array
     spans: Array
 
-    __repr__ = told
+    __repr__ = short_repr
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -113,7 +113,7 @@ class Gap:
     better: Solution | None
     worse: Solution
 
-    __repr__ = told
+    __repr__ = short_repr
 
     @property
     def key(self) -> tuple[int, int, int]:
@@ -149,7 +149,7 @@ class ParetoProblem:
     home: Array | None = None
     audit: Callable[[Plan], Sequence[object]] | None = None
 
-    __repr__ = told
+    __repr__ = short_repr
 
     @cached_property
     def dt(self) -> float:
@@ -202,7 +202,7 @@ class ParetoProblem:
                     "stand on the grid of the rotation: where kerfpath plan finds a motion by "
                     "refining it, choose a finer gamma_step_deg or a lower speed here"
                 )
-                raise broken.retold(said) from None
+                raise broken.with_message(said) from None
             counts = broken.counts
             if windows := broken.lost_by(Loss.WINDOW):
                 return f"no pose in the {windows[0]}"

@@ -11,7 +11,7 @@ import numpy as np
 
 from kerfpath._arrays import Array, freeze
 from kerfpath.errors import InputError, NoFeasiblePath
-from kerfpath.front._adaptive import Adaptive
+from kerfpath.front._adaptive import AdaptiveRuns
 from kerfpath.front._front import Front
 from kerfpath.front._problem import Evaluation, ParetoProblem, Solution
 from kerfpath.front._subproblem import Subproblem, grid
@@ -68,7 +68,7 @@ class FrontSearch:
         yield from first[1:]
         rng = np.random.default_rng(self._seed)
         plain = grid(first[0], rng)
-        adaptive = Adaptive(self._problem, first, rng)
+        adaptive = AdaptiveRuns(self._problem, first, rng)
         while True:
             if self._search == "adaptive" and self._found:
                 ideal, reference = self._box()

@@ -10,14 +10,14 @@ from typing import TypedDict, get_args
 import numpy as np
 
 from kerfpath._arrays import Array, Bools, freeze
-from kerfpath._told import told
+from kerfpath._repr import short_repr
 from kerfpath.cell import Cell
 from kerfpath.graph import LayeredGraph
 from kerfpath.losses import Loss, Reason
 from kerfpath.options import PlanOptions
 from kerfpath.search import Metric, ObjectiveKind
 
-__all__ = ["Subproblem", "SubproblemData", "counts_as_clearance", "grid", "in_window"]
+__all__ = ["Subproblem", "SubproblemData", "counts_as_clearance", "grid", "is_in_window"]
 
 LEVELS = (0.25, 4.0)
 """Multiples of the weight of one joint at a time, in the grid."""
@@ -62,7 +62,7 @@ class Subproblem:
     window: Array
     clearance: float = 0.0
 
-    __repr__ = told
+    __repr__ = short_repr
 
     @classmethod
     def unbounded(cls, weights: Array, eta_v: float, eta_a: float) -> Subproblem:
@@ -92,7 +92,9 @@ class Subproblem:
         outside = {}
         for joint, (low, high) in enumerate(self.window):
             if np.isfinite(high - low) and not (endless[joint] and high - low >= 2 * np.pi):
-                inside = in_window(graph.q[:, joint], low, high - low, endless=bool(endless[joint]))
+                inside = is_in_window(
+                    graph.q[:, joint], low, high - low, endless=bool(endless[joint])
+                )
                 outside[Reason(Loss.WINDOW, joint + 1)] = ~inside
         return graph.without(outside) if outside else graph
 
@@ -161,7 +163,7 @@ def grid(first: Subproblem, rng: np.random.Generator) -> Iterator[Subproblem]:
         depth += 1
 
 
-def in_window(q: Array, low: float, width: float, *, endless: bool) -> Bools:
+def is_in_window(q: Array, low: float, width: float, *, endless: bool) -> Bools:
     """Return which values (N,) of a joint are in a window, modulo 2 pi where it is endless."""
     above = (q - low) % (2 * np.pi) if endless else q - low
     return np.asarray((above >= 0) & (above <= width))

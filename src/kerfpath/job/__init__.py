@@ -1,7 +1,7 @@
 """The job: one file that says what to cut and how, its run, and the files the run leaves."""
 
 from kerfpath.job.format import VARIABLES as VARIABLES
-from kerfpath.job.format import ContourTask as ContourTask
+from kerfpath.job.format import ContourSpec as ContourSpec
 from kerfpath.job.format import CutRequest as CutRequest
 from kerfpath.job.format import Goal as Goal
 from kerfpath.job.format import Job as Job
@@ -13,15 +13,15 @@ from kerfpath.job.format import prepare as prepare
 from kerfpath.job.format import program_options as program_options
 from kerfpath.job.format import read_job as read_job
 from kerfpath.job.format import with_map as with_map
-from kerfpath.job.output import Texts as Texts
-from kerfpath.job.output import Written as Written
+from kerfpath.job.output import FileTexts as FileTexts
+from kerfpath.job.output import WrittenFiles as WrittenFiles
 from kerfpath.job.output import make_folder as make_folder
-from kerfpath.job.output import outcome_texts as outcome_texts
-from kerfpath.job.output import planned_text as planned_text
+from kerfpath.job.output import plan_file_text as plan_file_text
 from kerfpath.job.output import require_folder as require_folder
 from kerfpath.job.output import require_language as require_language
+from kerfpath.job.output import result_texts as result_texts
 from kerfpath.job.output import stale_program as stale_program
-from kerfpath.job.output import write_outcome as write_outcome
+from kerfpath.job.output import write_result as write_result
 from kerfpath.job.plan_file import AuditReport as AuditReport
 from kerfpath.job.plan_file import PlanAudit as PlanAudit
 from kerfpath.job.plan_file import PlanFile as PlanFile
@@ -29,9 +29,9 @@ from kerfpath.job.plan_file import audit_file as audit_file
 from kerfpath.job.plan_file import collision_note as collision_note
 from kerfpath.job.plan_file import read_plan_file as read_plan_file
 from kerfpath.job.plan_file import sequence_entry as sequence_entry
-from kerfpath.job.programs import Compared as Compared
+from kerfpath.job.programs import MovedTarget as MovedTarget
 from kerfpath.job.programs import ProgramAudit as ProgramAudit
-from kerfpath.job.programs import Taught as Taught
+from kerfpath.job.programs import ProgramComparison as ProgramComparison
 from kerfpath.job.programs import TouchUp as TouchUp
 from kerfpath.job.programs import audit_program as audit_program
 from kerfpath.job.programs import compare_programs as compare_programs

@@ -30,22 +30,22 @@ from kerfpath.kernels.reach import fill_candidates
 from kerfpath.kernels.search import (
     Aim,
     SortedLayers,
+    combined,
     distance,
     fill_increment,
     is_shut,
-    joined,
-    late,
+    late_cost,
     shut_edges,
 )
-from kerfpath.kernels.states import Scratch, States, grown, in_order, joined_states
+from kerfpath.kernels.states import Scratch, States, group_by_vertex, joined_states, with_more_room
 
-__all__ = ["Reached", "count_closing", "recursion", "trace"]
+__all__ = ["RecursionResult", "count_closing", "recursion", "trace"]
 
 LEAPT = -2
 """Parent of a state that a step beyond `aim.velocity` has led to, from anywhere."""
 
 
-class Reached(NamedTuple):
+class RecursionResult(NamedTuple):
     """What a recursion under a bound came to."""
 
     layers: int
@@ -80,8 +80,8 @@ def _begin(
     m = layers.start[k + 1] - a
     vertex, d, first = np.empty(m, np.int64), np.empty(m), np.zeros(m + 1, np.int64)
     for i in range(m):
-        enter = joined(aim.minimax, cost, layers.cost[a + i])
-        f = joined(aim.minimax, enter, h[a + i])
+        enter = combined(aim.minimax, cost, layers.cost[a + i])
+        f = combined(aim.minimax, enter, h[a + i])
         if f <= bound and f < np.inf:
             vertex[count], d[count] = a + i, enter
             count += 1
@@ -104,8 +104,8 @@ def _predecessor(
     if aim.timed:
         return _quickest(states, a, b, aim, step, dq, rest, bound)
     for s in range(a, b):
-        d = joined(aim.minimax, states.d[s], step)
-        f = joined(aim.minimax, d, rest)
+        d = combined(aim.minimax, states.d[s], step)
+        f = combined(aim.minimax, d, rest)
         if f > bound:
             return -1, np.inf, f
         if states.parent[s] < 0 or acceleration_excess(dq, states.dq[s], aim.acceleration) < 0:
@@ -120,22 +120,22 @@ def _quickest(
     """As `_predecessor`, where a change asks for time."""
     best, best_d, over, paid = -1, np.inf, np.inf, 0.0
     if aim.lost.penalty > 0:
-        paid = late(aim.lost, aim.lost.stretch * velocity_time(dq, aim.velocity))
+        paid = late_cost(aim.lost, aim.lost.stretch * velocity_time(dq, aim.velocity))
         step += paid
     for s in range(a, b):
-        d = joined(aim.minimax, states.d[s], step)
+        d = combined(aim.minimax, states.d[s], step)
         if d >= best_d:
             break
-        if joined(aim.minimax, d, rest) > bound:
-            over = min(over, joined(aim.minimax, d, rest))
+        if combined(aim.minimax, d, rest) > bound:
+            over = min(over, combined(aim.minimax, d, rest))
             break
         time = 0.0
         if states.parent[s] >= 0:
             time = acceleration_time(dq, states.dq[s], aim.acceleration)
         elif states.parent[s] == LEAPT:
             time = _braking_time(dq, aim)
-        d = max(d, time) if aim.minimax else d + max(0.0, late(aim.lost, time) - paid)
-        f = joined(aim.minimax, d, rest)
+        d = max(d, time) if aim.minimax else d + max(0.0, late_cost(aim.lost, time) - paid)
+        f = combined(aim.minimax, d, rest)
         if f > bound:
             over = min(over, f)
         elif d < best_d:
@@ -153,7 +153,7 @@ def _braking_time(dq: Array, aim: Aim) -> float:
 
 
 @jit
-def _with_leaps(
+def _add_leaps(
     layers: SortedLayers, aim: Aim, h: Array, bound: float, k: int, before: States,
     states: States, width: int,
 ) -> tuple[States, float]:  # fmt: skip
@@ -162,10 +162,10 @@ def _with_leaps(
     They cost no more than any such step from the states before, wherever from and to.
     """
     a, b, d, lowest = layers.start[k], layers.start[k + 1], np.inf, np.inf
-    paid = late(aim.lost, aim.lost.stretch)
+    paid = late_cost(aim.lost, aim.lost.stretch)
     for s in range(len(before.vertex)):
         time = _braking_time(before.dq[s], aim) if before.parent[s] >= 0 else 0.0
-        d = min(d, before.d[s] + aim.lost.leap + max(0.0, late(aim.lost, time) - paid))
+        d = min(d, before.d[s] + aim.lost.leap + max(0.0, late_cost(aim.lost, time) - paid))
     f = d + layers.cost[a:b] + h[a:b]
     leapt = a + np.flatnonzero(f <= bound)
     m = len(leapt)
@@ -173,7 +173,7 @@ def _with_leaps(
         lowest = min(lowest, f[v]) if f[v] > bound else lowest
     none = np.zeros((m, states.dq.shape[1]))
     more = States(leapt, d + layers.cost[leapt], none, np.full(m, LEAPT), states.first)
-    return in_order(joined_states(states, more), a, b, width), lowest
+    return group_by_vertex(joined_states(states, more), a, b, width), lowest
 
 
 @jit_inline
@@ -191,10 +191,10 @@ def _fill_from(
         j = scratch.vertex[v]
         if h[j] == np.inf:
             continue
-        step = joined(aim.minimax, distance(layers, aim, p, j), layers.cost[j])
+        step = combined(aim.minimax, distance(layers, aim, p, j), layers.cost[j])
         if step == np.inf:
             continue
-        f = joined(aim.minimax, joined(aim.minimax, states.d[a], step), h[j])
+        f = combined(aim.minimax, combined(aim.minimax, states.d[a], step), h[j])
         if f > bound:
             lowest = min(lowest, f)
             continue
@@ -246,13 +246,19 @@ def _extend(
     while i < len(first) - 1:
         if count + end - begin > room:
             room *= 2
-            out = States(grown(out.vertex), grown(out.d), grown(out.dq), grown(out.parent), first)
+            out = States(
+                with_more_room(out.vertex),
+                with_more_room(out.d),
+                with_more_room(out.dq),
+                with_more_room(out.parent),
+                first,
+            )
         i, count, dropped = _fill_states(
             layers, aim, h, bound, seam, k, states, i, count, scratch, out
         )
         lowest = min(lowest, dropped)
     unsorted = States(out.vertex[:count], out.d[:count], out.dq[:count], out.parent[:count], first)
-    return in_order(unsorted, begin, end, width), lowest
+    return group_by_vertex(unsorted, begin, end, width), lowest
 
 
 @jit
@@ -267,18 +273,18 @@ def _next(
     a, b = layers.start[k + 1], layers.start[k + 2]
     on, lowest = _extend(layers, aim, h, bound, seam, k, states, width)
     if aim.lost.leap < np.inf:
-        on, dropped = _with_leaps(layers, aim, h, bound, k + 1, states, on, width)
+        on, dropped = _add_leaps(layers, aim, h, bound, k + 1, states, on, width)
         lowest = min(lowest, dropped)
     if layers.after[k + 1] < 0:
         return on, lowest
     anew, dropped = _begin(layers, aim, h, bound, k + 1, least[layers.after[k + 1]])
-    return in_order(joined_states(on, anew), a, b, width), min(lowest, dropped)
+    return group_by_vertex(joined_states(on, anew), a, b, width), min(lowest, dropped)
 
 
 @jit
 def recursion(
     layers: SortedLayers, aim: Aim, h: Array, bound: float, seam: Array, room: int, width: int
-) -> Reached:
+) -> RecursionResult:
     """Best path whose cost keeps `bound`, exactly, under (5) and (6).
 
     h (N,) is `cost_to_go`; seam (n,) is the increment that the last one must go on to by (6), or
@@ -294,12 +300,14 @@ def recursion(
     for k in range(K):
         size = len(states.vertex)
         if size == 0 and (layers.after[k:] < 0).all():
-            return Reached(k, np.inf, lowest, best, offset, vertex, parent, before, recorded)
+            return RecursionResult(
+                k, np.inf, lowest, best, offset, vertex, parent, before, recorded
+            )
         offset[k + 1] = offset[k] + size
         recorded = recorded and offset[k + 1] <= room
         if recorded:
             while offset[k + 1] > len(vertex):
-                vertex, parent = grown(vertex), grown(parent)
+                vertex, parent = with_more_room(vertex), with_more_room(parent)
             vertex[offset[k] : offset[k + 1]] = states.vertex
             parent[offset[k] : offset[k + 1]] = states.parent
         if size > 0:
@@ -309,11 +317,11 @@ def recursion(
             before = states
             states, dropped = _next(layers, aim, h, bound, seam, k, states, least, width)
             lowest = min(lowest, dropped)
-    return Reached(K, least[K - 1], lowest, best, offset, vertex, parent, states, recorded)
+    return RecursionResult(K, least[K - 1], lowest, best, offset, vertex, parent, states, recorded)
 
 
 @jit
-def trace(layers: SortedLayers, found: Reached, out_path: Ints) -> None:
+def trace(layers: SortedLayers, found: RecursionResult, out_path: Ints) -> None:
     """Read the best path (K,) back from a record, as vertices of the sorted graph.
 
     Layers that it does not go through, between breaking off and beginning anew, get -1; before a

@@ -28,7 +28,7 @@ import numpy as np
 from kerfpath._arrays import Array, Bools
 from kerfpath.kernels._jit import jit
 from kerfpath.kernels.frames import location
-from kerfpath.kernels.kinematics import ON_AXIS, POSTURES, Arm, forward, inverse, wrap
+from kerfpath.kernels.kinematics import ON_AXIS, POSTURES, OpwArm, forward, inverse, wrap
 
 __all__ = ["forward_all", "inverse_all", "inverse_nodes"]
 
@@ -44,7 +44,7 @@ ZERO = 1e-15
 
 @jit
 def _turned(
-    arm: Arm, H: Array, T_tip_end: Array, psi: float, L: Array, T: Array, q: Array, reach: Bools
+    arm: OpwArm, H: Array, T_tip_end: Array, psi: float, L: Array, T: Array, q: Array, reach: Bools
 ) -> None:
     """Solve the OPW arm for the tool turned by psi: q (8, 6), reach (8,); L and T are room."""
     location(H, cos(psi), sin(psi), L)
@@ -58,14 +58,14 @@ def _turned(
 
 
 @jit
-def _g(arm: Arm, q: Array) -> float:
+def _g(arm: OpwArm, q: Array) -> float:
     """Return sin q5 sin q6 of one solution (6,) of the OPW arm."""
     return sin(arm.sign[4] * q[4] - arm.offset[4]) * sin(q[5])
 
 
 @jit
 def _zero(
-    arm: Arm,
+    arm: OpwArm,
     H: Array,
     T_tip_end: Array,
     branch: int,
@@ -98,7 +98,7 @@ def _zero(
 
 @jit
 def _end(
-    arm: Arm,
+    arm: OpwArm,
     H: Array,
     T_tip_end: Array,
     branch: int,
@@ -121,7 +121,7 @@ def _end(
 
 @jit
 def _dip(
-    arm: Arm,
+    arm: OpwArm,
     H: Array,
     T_tip_end: Array,
     branch: int,
@@ -152,7 +152,9 @@ def _dip(
 
 
 @jit
-def _keep(arm: Arm, q: Array, branch: int, nearest: float, out_q: Array, out_reach: Bools) -> None:
+def _keep(
+    arm: OpwArm, q: Array, branch: int, nearest: float, out_q: Array, out_reach: Bools
+) -> None:
     """Write the solution of a branch whose sixth angle is zero, in the row of its posture."""
     row = q[branch] if cos(q[branch, 5]) > 0.0 else q[branch + 1]
     q4 = row[3]
@@ -172,7 +174,7 @@ def _keep(arm: Arm, q: Array, branch: int, nearest: float, out_q: Array, out_rea
 
 
 @jit
-def _solve(arm: Arm, H: Array, T_tip_end: Array, out_q: Array, out_reach: Bools) -> None:
+def _solve(arm: OpwArm, H: Array, T_tip_end: Array, out_q: Array, out_reach: Bools) -> None:
     """All postures (16, 5) of a tip frame H (4, 4); rows out of reach are left at zero."""
     L, T, q = np.zeros((4, 4)), np.zeros((4, 4)), np.zeros((POSTURES, 6))
     reach = np.zeros(POSTURES, np.bool_)
@@ -215,7 +217,7 @@ def _solve(arm: Arm, H: Array, T_tip_end: Array, out_q: Array, out_reach: Bools)
 
 
 @jit
-def forward_all(arm: Arm, q: Array, out_T: Array) -> None:
+def forward_all(arm: OpwArm, q: Array, out_T: Array) -> None:
     """End poses (B, 4, 4) of joint vectors (B, 5)."""
     six = np.zeros(6)
     for i in range(len(q)):
@@ -224,7 +226,7 @@ def forward_all(arm: Arm, q: Array, out_T: Array) -> None:
 
 
 @jit
-def inverse_all(arm: Arm, T: Array, out_q: Array, out_reach: Bools) -> None:
+def inverse_all(arm: OpwArm, T: Array, out_q: Array, out_reach: Bools) -> None:
     """All postures (B, 16, 5) that bring the end's origin and z-axis to poses (B, 4, 4)."""
     for i in range(len(T)):
         _solve(arm, T[i], np.eye(4), out_q[i], out_reach[i])
@@ -232,7 +234,7 @@ def inverse_all(arm: Arm, T: Array, out_q: Array, out_reach: Bools) -> None:
 
 @jit
 def inverse_nodes(
-    arm: Arm, H: Array, gamma: Array, T_tip_end: Array, out_q: Array, out_reach: Bools
+    arm: OpwArm, H: Array, gamma: Array, T_tip_end: Array, out_q: Array, out_reach: Bools
 ) -> None:
     """All postures (K, 1, 16, 5) that bring tip and tool axis to task frames H (K, 4, 4).
 

@@ -23,7 +23,7 @@ from kerfpath._arrays import Array, Bools, Ints
 from kerfpath.kernels._jit import jit
 from kerfpath.kernels.kinematics import wrap
 
-__all__ = ["EXACT", "POSTURES", "Arm", "follow_all", "forward_all", "sort_in"]
+__all__ = ["EXACT", "POSTURES", "GeneralArm", "follow_all", "forward_all", "sort_in"]
 
 POSTURES = 16
 """Most solutions of a pose (Primrose 1986)."""
@@ -41,7 +41,7 @@ NOTHING = 1e-9
 """A volume this small has no sign."""
 
 
-class Arm(NamedTuple):
+class GeneralArm(NamedTuple):
     """The joint axes at angle zero, in the base, and the tip."""
 
     place: Array
@@ -74,7 +74,7 @@ def _turn_about(v: Array, place: Array, along: Array, s: float, c: float) -> Non
 
 
 @jit
-def _chain(arm: Arm, q: Array, out_place: Array, out_along: Array, out_T: Array) -> None:
+def _chain(arm: GeneralArm, q: Array, out_place: Array, out_along: Array, out_T: Array) -> None:
     """Axes (6, 3) and tip pose (4, 4) of the arm at q (6,): the last joint turns first."""
     out_place[:], out_along[:], out_T[:] = arm.place, arm.along, arm.tip
     for i in range(5, -1, -1):
@@ -99,7 +99,7 @@ def _jacobian(place: Array, along: Array, T: Array, out_J: Array) -> None:
 
 
 @jit
-def _off(T: Array, now: Array, out_e: Array) -> float:
+def _pose_error(T: Array, now: Array, out_e: Array) -> float:
     """Largest entry by which a pose is off T, and the way there (6,), linear over angular."""
     off = 0.0
     out_e[3:] = 0.0
@@ -114,13 +114,13 @@ def _off(T: Array, now: Array, out_e: Array) -> float:
 
 
 @jit
-def _onto(arm: Arm, T: Array, q: Array, place: Array, along: Array, J: Array) -> bool:
+def _solve_pose(arm: GeneralArm, T: Array, q: Array, place: Array, along: Array, J: Array) -> bool:
     """Bring q (6,) onto the pose T (4, 4); whether it got there. Axes and Jacobian are left."""
     now, e = np.empty((4, 4)), np.empty(6)
     for step in range(STEPS):
         _chain(arm, q, place, along, now)
         _jacobian(place, along, now, J)
-        off = _off(T, now, e)
+        off = _pose_error(T, now, e)
         if off < CLOSED or step == STEPS - 1:
             break
         squares = J.T @ J
@@ -157,7 +157,9 @@ def _known(q: Array, rows: Array, reach: Bools) -> bool:
 
 
 @jit
-def sort_in(arm: Arm, T: Array, q: Array, pose: Ints, out_q: Array, out_reach: Bools) -> None:
+def sort_in(
+    arm: GeneralArm, T: Array, q: Array, pose: Ints, out_q: Array, out_reach: Bools
+) -> None:
     """Write candidates q (N, 6) of poses T[pose] that are solutions in the rows of their posture.
 
     Fills out_q (B, 16, 6), in (-pi, pi], and out_reach (B, 16); no solution is there twice.
@@ -167,7 +169,7 @@ def sort_in(arm: Arm, T: Array, q: Array, pose: Ints, out_q: Array, out_reach: B
     out_reach[:] = False
     for v in range(len(q)):
         b, row = pose[v], q[v].copy()
-        if not _onto(arm, T[b], row, place, along, J):
+        if not _solve_pose(arm, T[b], row, place, along, J):
             continue
         for i in range(6):
             row[i] = wrap(row[i])
@@ -183,19 +185,19 @@ def sort_in(arm: Arm, T: Array, q: Array, pose: Ints, out_q: Array, out_reach: B
 
 
 @jit
-def follow_all(arm: Arm, T: Array, q: Array) -> None:
+def follow_all(arm: GeneralArm, T: Array, q: Array) -> None:
     """Bring each q (B, 6) onto its pose T (B, 4, 4) along its own branch; NaN where there is none.
 
     Joints stay on their turns.
     """
     place, along, J = np.empty((6, 3)), np.empty((6, 3)), np.empty((6, 6))
     for i in range(len(q)):
-        if not _onto(arm, T[i], q[i], place, along, J):
+        if not _solve_pose(arm, T[i], q[i], place, along, J):
             q[i] = np.nan
 
 
 @jit
-def forward_all(arm: Arm, q: Array, out_T: Array) -> None:
+def forward_all(arm: GeneralArm, q: Array, out_T: Array) -> None:
     """Tip poses (B, 4, 4) of joint vectors (B, 6)."""
     place, along = np.empty((6, 3)), np.empty((6, 3))
     for i in range(len(q)):

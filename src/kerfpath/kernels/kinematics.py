@@ -23,7 +23,7 @@ from kerfpath.kernels.frames import location
 
 __all__ = [
     "POSTURES",
-    "Arm",
+    "OpwArm",
     "forward",
     "forward_all",
     "inverse",
@@ -40,7 +40,7 @@ ON_AXIS = 1e-12
 """Length (m) or sine below which an angle about an axis is free; it is then set to zero."""
 
 
-class Arm(NamedTuple):
+class OpwArm(NamedTuple):
     """Lengths of an OPW arm (m) and its joint convention: q_model = sign * q - offset (rad)."""
 
     a1: float
@@ -55,7 +55,7 @@ class Arm(NamedTuple):
 
 
 @jit
-def forward(arm: Arm, q: Array, out_T: Array) -> None:
+def forward(arm: OpwArm, q: Array, out_T: Array) -> None:
     """Pose of the flange in the robot base, the product of the link transforms (Eq. 3).
 
     Base and tool matrices multiply it from left and right: T_base . prod T . T_tool.
@@ -97,7 +97,9 @@ def wrap(angle: float) -> float:
 
 
 @jit
-def _wrist(arm: Arm, R: Array, s1: float, k1: float, s23: float, k23: float, out_q: Array) -> None:
+def _wrist(
+    arm: OpwArm, R: Array, s1: float, k1: float, s23: float, k23: float, out_q: Array
+) -> None:
     """Fill joints 4 to 6 of both wrist postures, out_q (2, 6), for a forearm given by q1, q2+q3."""
     x0, x1, x2 = k23 * k1, k23 * s1, -s23
     x = R[0, 2] * x0 + R[1, 2] * x1 + R[2, 2] * x2
@@ -120,7 +122,7 @@ def _wrist(arm: Arm, R: Array, s1: float, k1: float, s23: float, k23: float, out
 
 
 @jit
-def inverse(arm: Arm, T: Array, out_q: Array, out_reach: Bools) -> None:
+def inverse(arm: OpwArm, T: Array, out_q: Array, out_reach: Bools) -> None:
     """All postures of a flange pose, Q = f^-1(L, mu) in (-pi, pi] (Eq. 4).
 
     Fills out_q (8, 6) and out_reach (8,); rows out of reach are left at zero.
@@ -169,14 +171,14 @@ def inverse(arm: Arm, T: Array, out_q: Array, out_reach: Bools) -> None:
 
 
 @jit
-def forward_all(arm: Arm, q: Array, out_T: Array) -> None:
+def forward_all(arm: OpwArm, q: Array, out_T: Array) -> None:
     """Flange poses (B, 4, 4) of joint vectors (B, 6)."""
     for i in range(len(q)):
         forward(arm, q[i], out_T[i])
 
 
 @jit
-def inverse_all(arm: Arm, T: Array, out_q: Array, out_reach: Bools) -> None:
+def inverse_all(arm: OpwArm, T: Array, out_q: Array, out_reach: Bools) -> None:
     """All postures (B, 8, 6) of flange poses (B, 4, 4)."""
     for i in range(len(T)):
         inverse(arm, T[i], out_q[i], out_reach[i])
@@ -184,7 +186,7 @@ def inverse_all(arm: Arm, T: Array, out_q: Array, out_reach: Bools) -> None:
 
 @jit
 def inverse_nodes(
-    arm: Arm, H: Array, gamma: Array, T_tip_flange: Array, out_q: Array, out_reach: Bools
+    arm: OpwArm, H: Array, gamma: Array, T_tip_flange: Array, out_q: Array, out_reach: Bools
 ) -> None:
     """All postures (K, m, 8, 6) of task frames H (K, 4, 4) turned by each gamma (m,), with tool."""
     L = np.zeros((4, 4))

@@ -21,13 +21,13 @@ __all__ = [
     "LostTime",
     "SortedLayers",
     "arrange",
+    "combined",
     "count_within",
     "distance",
     "fill_increment",
     "fill_key",
     "is_shut",
-    "joined",
-    "late",
+    "late_cost",
     "path_planning",
     "runs",
     "shut_edges",
@@ -197,13 +197,13 @@ def distance(layers: SortedLayers, aim: Aim, p: int, j: int) -> float:
 
 
 @jit_inline
-def joined(minimax: bool, a: float, b: float) -> float:
+def combined(minimax: bool, a: float, b: float) -> float:
     """Costs put together: added by (14), or the larger by (15)."""
     return max(a, b) if minimax else a + b
 
 
 @jit_inline
-def late(lost: LostTime, time: float) -> float:
+def late_cost(lost: LostTime, time: float) -> float:
     """Price of a step that asks for `time` node intervals."""
     return lost.penalty * max(0.0, time - 1.0)
 
@@ -232,7 +232,7 @@ def _offer(
         j = v if v < b else v - b + c
         if is_shut(layers.shut, first, last, j):
             continue
-        cost = joined(aim.minimax, out_dist[p], distance(layers, aim, p, j))
+        cost = combined(aim.minimax, out_dist[p], distance(layers, aim, p, j))
         best, best_p = out_dist[j], out_before[j]
         tie = cost == best and best_p >= 0 and layers.rank[p] < layers.rank[best_p]
         if not (cost < best or tie):
@@ -258,7 +258,7 @@ def _step(
     for j in range(layers.start[k + 1], layers.start[k + 2]):
         turned_away |= out_free[j] < out_dist[j]
         reached |= out_before[j] >= 0
-        out_dist[j] = joined(aim.minimax, out_dist[j], layers.cost[j])
+        out_dist[j] = combined(aim.minimax, out_dist[j], layers.cost[j])
     return reached, turned_away
 
 

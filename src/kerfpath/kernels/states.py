@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from kerfpath._arrays import Array, Ints
 from kerfpath.kernels._jit import jit
 
-__all__ = ["EVERY", "Scratch", "States", "grown", "in_order", "joined_states"]
+__all__ = ["EVERY", "Scratch", "States", "group_by_vertex", "joined_states", "with_more_room"]
 
 _T = TypeVar("_T", bound="np.generic[Any]")
 
@@ -49,7 +49,7 @@ class Scratch(NamedTuple):
 
 
 @jit
-def grown(old: NDArray[_T]) -> NDArray[_T]:
+def with_more_room(old: NDArray[_T]) -> NDArray[_T]:
     """Return a copy with room for as many again."""
     new = np.empty((2 * len(old), *old.shape[1:]), old.dtype)
     new[: len(old)] = old
@@ -69,7 +69,7 @@ def joined_states(one: States, two: States) -> States:
 
 
 @jit
-def in_order(states: States, a: int, b: int, width: int) -> States:
+def group_by_vertex(states: States, a: int, b: int, width: int) -> States:
     """Group states by their vertex a..b-1, cheapest first; ties keep the order of their making.
 
     Of each vertex only the `width` cheapest are kept.

@@ -12,7 +12,7 @@ from kerfpath._arrays import Array, Bools
 from kerfpath.kernels._jit import either, jit, jit_inline, jit_vector, larger, smaller
 from kerfpath.kernels.limits import exceeds
 from kerfpath.kernels.metric import apart, extend, finish
-from kerfpath.kernels.search import Aim, SortedLayers, joined, shut_edges
+from kerfpath.kernels.search import Aim, SortedLayers, combined, shut_edges
 
 __all__ = ["LANES", "SIX", "cost_to_go"]
 
@@ -84,7 +84,7 @@ def _layer_to_go(
             out_h[p] = min(ahead, _least(layers, aim, slowness, p, first, b - first, tail))
         for i in range(s, t):
             j = layers.shut[i]
-            tail[j] = joined(aim.minimax, layers.cost[j], out_h[j])
+            tail[j] = combined(aim.minimax, layers.cost[j], out_h[j])
 
 
 @jit_inline

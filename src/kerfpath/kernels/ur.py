@@ -23,10 +23,10 @@ from kerfpath._arrays import Array, Bools
 from kerfpath.kernels._jit import jit
 from kerfpath.kernels.kinematics import ON_AXIS, REACH, wrap
 
-__all__ = ["Arm", "forward", "forward_all", "inverse", "inverse_all"]
+__all__ = ["UrArm", "forward", "forward_all", "inverse", "inverse_all"]
 
 
-class Arm(NamedTuple):
+class UrArm(NamedTuple):
     """Lengths of the arm (m) and its joint convention: q_model = sign * q - offset (rad)."""
 
     d1: float
@@ -40,7 +40,7 @@ class Arm(NamedTuple):
 
 
 @jit
-def forward(arm: Arm, q: Array, out_T: Array) -> None:
+def forward(arm: UrArm, q: Array, out_T: Array) -> None:
     """Pose of the flange in the robot base, the product of the link transforms written out."""
     q1 = arm.sign[0] * q[0] - arm.offset[0]
     q2 = arm.sign[1] * q[1] - arm.offset[1]
@@ -71,7 +71,7 @@ def forward(arm: Arm, q: Array, out_T: Array) -> None:
 
 
 @jit
-def _free_wrist(arm: Arm, x: float, y: float, side: float) -> tuple[float, float]:
+def _free_wrist(arm: UrArm, x: float, y: float, side: float) -> tuple[float, float]:
     """Return sine and cosine of theta where axes 4 and 6 are parallel and theta is free.
 
     Axis 5 is taken square to the line from shoulder to wrist (x, y), on the `side` asked for, or
@@ -94,7 +94,7 @@ def _free_wrist(arm: Arm, x: float, y: float, side: float) -> tuple[float, float
 
 @jit
 def _elbow(
-    arm: Arm, x: float, y: float, front: float, theta: float, out_q: Array, out_reach: Bools
+    arm: UrArm, x: float, y: float, front: float, theta: float, out_q: Array, out_reach: Bools
 ) -> None:
     """Fill joints 2 to 4 of both elbows, rows 0 and 2 of out_q, for axis 4 at (x, y)."""
     reach = x * x + y * y
@@ -117,7 +117,7 @@ def _elbow(
 
 
 @jit
-def inverse(arm: Arm, T: Array, out_q: Array, out_reach: Bools) -> None:
+def inverse(arm: UrArm, T: Array, out_q: Array, out_reach: Bools) -> None:
     """All postures of a flange pose, in (-pi, pi].
 
     Fills out_q (8, 6) and out_reach (8,); rows out of reach are left at zero.
@@ -169,14 +169,14 @@ def inverse(arm: Arm, T: Array, out_q: Array, out_reach: Bools) -> None:
 
 
 @jit
-def forward_all(arm: Arm, q: Array, out_T: Array) -> None:
+def forward_all(arm: UrArm, q: Array, out_T: Array) -> None:
     """Flange poses (B, 4, 4) of joint vectors (B, 6)."""
     for i in range(len(q)):
         forward(arm, q[i], out_T[i])
 
 
 @jit
-def inverse_all(arm: Arm, T: Array, out_q: Array, out_reach: Bools) -> None:
+def inverse_all(arm: UrArm, T: Array, out_q: Array, out_reach: Bools) -> None:
     """All postures (B, 8, 6) of flange poses (B, 4, 4)."""
     for i in range(len(T)):
         inverse(arm, T[i], out_q[i], out_reach[i])

@@ -44,7 +44,7 @@ def round_corners(contour: Contour, tolerance: float, *, surface: Surface | None
         leaves the surface.
     """
     tolerance = scalar(tolerance, "corner tolerance", unit="m", above=0.0)
-    contour = _begun_off_corners(contour)
+    contour = _begin_off_corners(contour)
 
     def arc(k: int, t0: Array, t1: Array, room: float) -> tuple[float, Array]:
         turn = float(angle_between(t0, t1))
@@ -52,7 +52,7 @@ def round_corners(contour: Contour, tolerance: float, *, surface: Surface | None
         reach = min(radius * np.tan(turn / 2), room)
         return reach, _arc(contour.points[k], t0, t1, reach)
 
-    return _replaced(contour, arc, KINDS.index("cut"), surface)
+    return _replace_corners(contour, arc, KINDS.index("cut"), surface)
 
 
 def loop_corners(
@@ -78,7 +78,7 @@ def loop_corners(
         contour that is more than a cut already.
     """
     radius = scalar(radius, "loop radius", unit="m", above=0.0)
-    contour = _begun_off_corners(contour)
+    contour = _begin_off_corners(contour)
     axes = contour.axes
 
     def loop(k: int, t0: Array, t1: Array, room: float) -> tuple[float, Array] | None:
@@ -94,7 +94,7 @@ def loop_corners(
         require_in_scrap(contour, ring, side, "loop")
         return 0.0, np.vstack([corner, ring, corner])
 
-    return _replaced(contour, loop, KINDS.index("loop"), surface)
+    return _replace_corners(contour, loop, KINDS.index("loop"), surface)
 
 
 def slow_corners(
@@ -134,7 +134,7 @@ def slow_corners(
     return replace(marked, speed_share=np.minimum(marked.speed_share, slowed))
 
 
-def _begun_off_corners(contour: Contour) -> Contour:
+def _begin_off_corners(contour: Contour) -> Contour:
     """Return the contour begun at its smoothest place if it is closed and begins in a corner."""
     if contour.kind.any():
         raise InputError(
@@ -146,7 +146,9 @@ def _begun_off_corners(contour: Contour) -> Contour:
     return contour
 
 
-def _replaced(contour: Contour, corner: Corner, kind: int, surface: Surface | None) -> Contour:
+def _replace_corners(
+    contour: Contour, corner: Corner, kind: int, surface: Surface | None
+) -> Contour:
     """Return the contour with what `corner` makes of each corner, all of one kind, in its place."""
     nodes = contour.corners
     if not nodes.size:
@@ -170,12 +172,12 @@ def _replaced(contour: Contour, corner: Corner, kind: int, surface: Surface | No
         ends, axes = contour.at(s[k] + reach * np.array([-1.0, 1.0]))
         part = np.linspace(0, 1, len(points))[:, None]
         # On a curved way an arc that is tangent at the corner begins and ends a little beside it.
-        points = _between(ends, points, part)
+        points = _shift_between(ends, points, part)
         if surface is None:
             before, after = (np.tile(axis, (len(part), 1)) for axis in axes)
         else:
             points, normals = lay_on(surface, points, contour, "corner")
-            points = _between(ends, points, part)  # the cut may lie beside the surface
+            points = _shift_between(ends, points, part)  # the cut may lie beside the surface
             before, after = (lean_axes(normals, normals[e], axes[e]) for e in (0, -1))
         axes = slerp(before, after, part)
         share = np.full(len(points), np.interp(s[k], s, contour.speed_share))
@@ -189,7 +191,7 @@ def _replaced(contour: Contour, corner: Corner, kind: int, surface: Surface | No
     return join(pieces, closed=contour.closed, name=contour.name)
 
 
-def _between(ends: Array, points: Array, part: Array) -> Array:
+def _shift_between(ends: Array, points: Array, part: Array) -> Array:
     """Return points (m, 3) shifted evenly, at shares (m, 1), so as to begin and end in `ends`."""
     moved: Array = points + (1 - part) * (ends[0] - points[0]) + part * (ends[1] - points[-1])
     return moved

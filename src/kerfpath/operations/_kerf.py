@@ -58,7 +58,7 @@ def offset(
             f"offset: contour {contour.name!r} has leads, joints, loops or slow corners already; "
             "offset it before"
         )
-    points, axes, source = _moved(contour, distance, side, sharp)
+    points, axes, source = _move_nodes(contour, distance, side, sharp)
     if contour.closed:
         k = _amid_what_fits(contour, points, distance)
         around = (np.arange(len(points) + 1) + k) % len(points)
@@ -80,7 +80,9 @@ def offset(
     return Contour(points, axes, closed=contour.closed, name=contour.name)
 
 
-def _moved(contour: Contour, distance: float, side: Side, sharp: bool) -> tuple[Array, Array, Ints]:
+def _move_nodes(
+    contour: Contour, distance: float, side: Side, sharp: bool
+) -> tuple[Array, Array, Ints]:
     """Return the images of all nodes, their axes, and the node of each; corners make several."""
     along = unit(np.diff(contour.points, axis=0))
     ends = (along[-1], along[0]) if contour.closed else (along[0], along[-1])

@@ -77,7 +77,7 @@ def lead_in(
     """
     if contour.kind[0] == KINDS.index("pierce"):
         raise InputError(f"lead_in: contour {contour.name!r} has a pierce already")
-    points, axes = _laid(
+    points, axes = _lay_lead(
         contour, length, shape, angle, side, surface or Ribbon(contour), fan, clearance, "lead-in"
     )
     kind = np.full(len(points), KINDS.index("lead-in"))
@@ -104,7 +104,7 @@ def lead_out(
     kinds = np.where(pierced, KINDS.index("lead-in"), contour.kind)  # for `reverse`
     plain = replace(contour, closed=False, kind=kinds, x=None, time=None)
     backwards: Side = "left" if side == "right" else "right"
-    points, axes = _laid(
+    points, axes = _lay_lead(
         reverse(plain), length, shape, angle, backwards, surface or Ribbon(contour), fan,
         clearance, "lead-out",
     )  # fmt: skip
@@ -120,7 +120,7 @@ def _share(points: Array, far: float, near: float) -> Array:
     return np.asarray(far + (near - far) * s / s[-1])
 
 
-def _laid(
+def _lay_lead(
     contour: Contour, length: float, shape: LeadShape, angle: float, side: Side, surface: Surface,
     fan: float | None, clearance: float, what: str,
 ) -> tuple[Array, Array]:  # fmt: skip

@@ -67,7 +67,7 @@ def touched_up(
     s = np.unique(np.concatenate([np.interp(step, np.arange(last + 1), nodes.s), nodes.s]))
     base = path.at_nodes(s)
     shift = np.hstack([points - nodes.points[moved], _turns(nodes.axes[moved], axes)])
-    eased = _eased(s, nodes.s[moved], shift, ease)
+    eased = _ease_shifts(s, nodes.s[moved], shift, ease)
     touched = Contour(
         base.points + eased[:, :3],
         Rotation.from_rotvec(eased[:, 3:]).apply(np.array(base.axes)),
@@ -87,7 +87,7 @@ def _turns(before: Array, after: Array) -> Array:
     return np.asarray(normal * np.where(sine > 0, angle / np.where(sine > 0, sine, 1.0), 1.0))
 
 
-def _eased(s: Array, at: Array, values: Array, ease: float) -> Array:
+def _ease_shifts(s: Array, at: Array, values: Array, ease: float) -> Array:
     """Return values (m, d) given at some arc lengths, faded out over `ease`, at all s (K,) m."""
     faded = np.concatenate([at - ease, at + ease])
     alone = np.abs(faded[:, None] - at).min(axis=1) >= ease * (1 - 1e-9)  # no other pose nearer

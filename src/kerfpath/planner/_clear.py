@@ -8,16 +8,16 @@ from typing import TypeVar
 import numpy as np
 
 from kerfpath._arrays import Array, Ints
-from kerfpath.cell import UNPROVED, Cell, Checker
+from kerfpath.cell import UNPROVED, Cell, CollisionChecker
 from kerfpath.comfort import Band
 from kerfpath.errors import InputError, NoFeasiblePath
 from kerfpath.graph import LayeredGraph
 from kerfpath.losses import Loss, Reason
-from kerfpath.planner._task import Task
+from kerfpath.planner._task import PlanningTask
 from kerfpath.plans import Plan
-from kerfpath.search import FoundPath, Known, SearchProblem, find_clear
+from kerfpath.search import CheckedEdges, FoundPath, SearchProblem, find_clear
 
-__all__ = ["Finder"]
+__all__ = ["ClearSearch"]
 
 _P = TypeVar("_P", bound=FoundPath)
 
@@ -31,10 +31,10 @@ SAME_PLACE = 1e-9
 """m: two poses of the same tool or part differ by rounding at most."""
 
 
-class Finder:
+class ClearSearch:
     """How the searches of a task run: as they are or, in a cell, for what is clear in it."""
 
-    def __init__(self, task: Task, cell: Cell | None) -> None:
+    def __init__(self, task: PlanningTask, cell: Cell | None) -> None:
         self._cell, self._graph = cell, task.graph
         self._but = f" ({UNPROVED})" if cell is not None and cell.unproved else ""
         if cell is None:
@@ -42,14 +42,16 @@ class Finder:
         _require_same_cell(task, cell)
         asked = task.settings.comfort
         band = Band() if asked is None or asked.clearance is None else asked.clearance
-        self._checker = Checker(cell, task.graph.q, comfort=band.width, comfort_cost=band.cost)
-        self._known = Known(
+        self._checker = CollisionChecker(
+            cell, task.graph.q, comfort=band.width, comfort_cost=band.cost
+        )
+        self._known = CheckedEdges(
             task.graph.q,
             task.graph.start,
             price=self._checker.price,
             passable=self._checker.passable,
             blocked=self._checker.blocked,
-            around=_beside(task.graph),
+            around=_gamma_neighbours(task.graph),
         )
 
     def find(self, search: Callable[[SearchProblem], _P], problem: SearchProblem) -> _P:
@@ -91,7 +93,7 @@ class Finder:
 
     def _at_break(self, broken: NoFeasiblePath) -> NoFeasiblePath:
         """Say of a break that is not for want of clear poses which bodies collide at its node."""
-        return broken.retold(f"{broken}{self._depths(broken.node + 1)}")
+        return broken.with_message(f"{broken}{self._depths(broken.node + 1)}")
 
     def _depths(self, node: int) -> str:
         """Say which bodies come too near to each other at a node, at how many poses, how deep."""
@@ -140,7 +142,7 @@ class Finder:
         return bool(self._cell.clear(q).all() and self._cell.clear_motion(q[:-1], q[1:]).all())
 
 
-def _require_same_cell(task: Task, cell: Cell) -> None:
+def _require_same_cell(task: PlanningTask, cell: Cell) -> None:
     """Raise InputError where the cell was built for another tool or another place of the part."""
     if task.robot.external is not None:
         raise InputError(f"cell: it does not know how a {task.robot.external.kind} moves in it")
@@ -158,7 +160,7 @@ def _same(a: Array, b: Array) -> bool:
     return bool(np.abs(a - b).max() <= SAME_PLACE)
 
 
-def _beside(graph: LayeredGraph) -> Ints:
+def _gamma_neighbours(graph: LayeredGraph) -> Ints:
     """Return the vertices (N, 2) one step of gamma before and after each, -1 where there is none.
 
     Of the same node, variant, posture and turns; where one collides, its neighbours are likely to.

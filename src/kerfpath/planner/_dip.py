@@ -7,9 +7,9 @@ from dataclasses import replace
 import numpy as np
 
 from kerfpath import refiner
-from kerfpath.planner._clear import Finder
+from kerfpath.planner._clear import ClearSearch
 from kerfpath.planner._refined import plan_first_order
-from kerfpath.planner._task import Task
+from kerfpath.planner._task import PlanningTask
 from kerfpath.plans import Plan, Proof
 from kerfpath.retime import feed, retime
 from kerfpath.search import find_slowed
@@ -17,7 +17,7 @@ from kerfpath.search import find_slowed
 __all__ = ["plan_slowed"]
 
 
-def plan_slowed(task: Task, finder: Finder, *, refine: bool) -> Plan:
+def plan_slowed(task: PlanningTask, finder: ClearSearch, *, refine: bool) -> Plan:
     """Return a plan that keeps the speed asked for wherever its path lets it, and dips elsewhere.
 
     On the grid the path is the one that loses the least time, priced above all distances, if each
@@ -30,12 +30,12 @@ def plan_slowed(task: Task, finder: Finder, *, refine: bool) -> Plan:
     start = plan_first_order(task, finder) if free else None
     start = _least_lost(task, finder) if start is None else start
     if not free:
-        return _timed(task, start)
+        return _with_least_times(task, start)
     eased = refiner.ease(start)
     claim = f"{start.proof.statement}; gamma moved off the grid to lose little time"
-    made = _timed(task, replace(eased, proof=Proof(optimal=False, statement=claim)))
+    made = _with_least_times(task, replace(eased, proof=Proof(optimal=False, statement=claim)))
     better = refiner.refine(made)
-    again = _timed(task, better.plan)
+    again = _with_least_times(task, better.plan)
     best = again if again.time[-1] <= made.time[-1] else made
     comfort, broken = task.settings.comfort, ""
     if comfort is not None and comfort.broken(task.robot, best.q, task.T_flange_tip):
@@ -49,7 +49,7 @@ def plan_slowed(task: Task, finder: Finder, *, refine: bool) -> Plan:
     return replace(kept, proof=replace(kept.proof, statement=claim))
 
 
-def _least_lost(task: Task, finder: Finder) -> Plan:
+def _least_lost(task: PlanningTask, finder: ClearSearch) -> Plan:
     found = finder.find(find_slowed, task.problem)
     claim = finder.claimed(
         "at constant speed the graph has no path; of all its paths this one loses the least time "
@@ -58,7 +58,7 @@ def _least_lost(task: Task, finder: Finder) -> Plan:
     return task.plan(found.index, task.cost(found.index), Proof(optimal=False, statement=claim))
 
 
-def _timed(task: Task, made: Plan) -> Plan:
+def _with_least_times(task: PlanningTask, made: Plan) -> Plan:
     """Return the plan with the least times, and where they dip."""
     limits = task.problem.limits
     tau = retime(made.increments, task.dt, limits)

@@ -14,8 +14,8 @@ from kerfpath.contour import Contour
 from kerfpath.errors import InputError
 from kerfpath.graph import LayeredGraph
 from kerfpath.limits import Limits
-from kerfpath.options import GraphKeywords, PlanOptions, chosen
-from kerfpath.planner._clear import Finder
+from kerfpath.options import GraphKeywords, PlanOptions, with_keywords
+from kerfpath.planner._clear import ClearSearch
 from kerfpath.planner._graph import node_interval, require_even
 from kerfpath.planner._task import task_of
 from kerfpath.plans import Proof
@@ -98,7 +98,7 @@ def fastest_speed(
         Limits that are not known, nodes unevenly spaced, values out of range, costs of comfort.
     """
     require_even(contour, np.diff(contour.s), "m")
-    asked = chosen(options, keywords, SpeedKeywords)
+    asked = with_keywords(options, keywords, SpeedKeywords)
     comfort = asked.comfort
     if comfort is not None and comfort.costs:
         raise InputError("comfort: what is fastest knows no costs; give margins alone")
@@ -112,7 +112,7 @@ def fastest_speed(
         graph=graph,
         progress=progress,
     )
-    finder = Finder(task, cell)
+    finder = ClearSearch(task, cell)
     least = finder.find(find_least_interval, task.problem.free())
     found = FastestSpeed.of(contour, least)
     if not (asked.refine and robot.family.free_rotation):

@@ -13,7 +13,7 @@ from kerfpath.comfort import Comfort
 from kerfpath.contour import Contour
 from kerfpath.errors import InputError, NoFeasiblePath
 from kerfpath.graph import LayeredGraph, build, gamma_grid
-from kerfpath.options import GraphKeywords, PlanOptions, chosen
+from kerfpath.options import GraphKeywords, PlanOptions, with_keywords
 from kerfpath.robots import Robot
 from kerfpath.tilt import tilt_frames
 
@@ -45,7 +45,7 @@ def layered_graph(
 
     With `nodes` (M,) int it has their layers alone, the very ones of the whole graph.
     """
-    asked = chosen(options, keywords, GraphKeywords)
+    asked = with_keywords(options, keywords, GraphKeywords)
     H = contour.frames(asked.frames)
     samples = None if asked.tilt is None else asked.tilt.samples()
     if samples is not None and samples.any():
@@ -133,10 +133,10 @@ def require_no_empty_layer(contour: Contour, graph: LayeredGraph) -> None:
     if empty.size:
         k = int(empty[0])
         counts = graph.counts(k)
-        told = ", ".join(f"{word}: {number}" for word, number in counts.items())
+        reasons = ", ".join(f"{word}: {number}" for word, number in counts.items())
         raise NoFeasiblePath(
             f"contour {contour.name!r}: no admissible pose at node {k} of {len(contour)} "
-            f"({empty.size} such nodes); of {sum(counts.values())} candidates there, {told}",
+            f"({empty.size} such nodes); of {sum(counts.values())} candidates there, {reasons}",
             proved=True,
             node=k - 1,
             back=int(empty[-1]) + 1,

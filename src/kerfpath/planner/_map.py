@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from kerfpath._arrays import Array, Bools, Ints, freeze, not_negative, scalar
-from kerfpath._told import told
+from kerfpath._repr import short_repr
 from kerfpath.cell import Cell, clearances
 from kerfpath.errors import InputError
 from kerfpath.graph import LayeredGraph
@@ -54,7 +54,7 @@ class ClearanceMap:
     poses: int
     queries: int
 
-    __repr__ = told
+    __repr__ = short_repr
 
 
 def clearance_map(

@@ -12,10 +12,10 @@ from kerfpath.cell import Cell
 from kerfpath.contour import Contour
 from kerfpath.errors import NoFeasiblePath
 from kerfpath.graph import LayeredGraph
-from kerfpath.options import PlanKeywords, PlanOptions, chosen
-from kerfpath.planner._clear import Finder
+from kerfpath.options import PlanKeywords, PlanOptions, with_keywords
+from kerfpath.planner._clear import ClearSearch
 from kerfpath.planner._refined import refine_plan
-from kerfpath.planner._task import Task, task_of
+from kerfpath.planner._task import PlanningTask, task_of
 from kerfpath.plans import Plan, Proof
 from kerfpath.robots import Robot
 from kerfpath.search import Piece, find_interrupted
@@ -73,7 +73,7 @@ def plan_in_pieces(
     InputError
         As `plan`; another method or closure, a rotation limit, a tilt.
     """
-    asked = chosen(options, keywords, PieceKeywords, interruptions="fewest")
+    asked = with_keywords(options, keywords, PieceKeywords, interruptions="fewest")
     task = task_of(
         contour,
         robot,
@@ -84,28 +84,28 @@ def plan_in_pieces(
         graph=graph,
         progress=progress,
     )
-    finder = Finder(task, cell)
+    finder = ClearSearch(task, cell)
     begin = phase or (lambda what: None)
     begin("search for pieces")
     try:
         search = partial(find_interrupted, s=contour.s, least_piece=asked.least_piece)
         found = finder.find(search, task.problem)
     except NoFeasiblePath as broken:
-        raise broken.retold(
+        raise broken.with_message(
             f"contour {contour.name!r}: no number of interruptions helps: {broken}"
         ) from None
     plans = []
     for number, piece in enumerate(found.pieces, 1):
-        part, made = _planned(task, finder, piece, number, len(found.pieces))
+        part, made = _plan_piece(task, finder, piece, number, len(found.pieces))
         if asked.refine:
             begin(f"refinement of piece {number} of {len(found.pieces)}")
-        plans.append(refine_plan(part, Finder(part, cell), made) if asked.refine else made)
+        plans.append(refine_plan(part, ClearSearch(part, cell), made) if asked.refine else made)
     return tuple(plans)
 
 
-def _planned(
-    task: Task, finder: Finder, piece: Piece, number: int, count: int
-) -> tuple[Task, Plan]:
+def _plan_piece(
+    task: PlanningTask, finder: ClearSearch, piece: Piece, number: int, count: int
+) -> tuple[PlanningTask, Plan]:
     """Return the task of one piece, and its plan on the grid."""
     claim = "the best path on this graph under the velocity and acceleration limits"
     if count > 1:

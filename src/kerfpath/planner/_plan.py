@@ -11,11 +11,11 @@ from kerfpath.cell import Cell
 from kerfpath.contour import Contour
 from kerfpath.errors import InputError, NoFeasiblePath
 from kerfpath.graph import LayeredGraph
-from kerfpath.options import PlanKeywords, PlanOptions, chosen
-from kerfpath.planner._clear import Finder
+from kerfpath.options import PlanKeywords, PlanOptions, with_keywords
+from kerfpath.planner._clear import ClearSearch
 from kerfpath.planner._dip import plan_slowed
 from kerfpath.planner._refined import plan_off_grid, refine_plan
-from kerfpath.planner._task import Task, task_of
+from kerfpath.planner._task import PlanningTask, task_of
 from kerfpath.planner._words import ON_THIS_GRID
 from kerfpath.plans import Plan, Proof
 from kerfpath.robots import Robot, posture_name
@@ -94,7 +94,7 @@ def plan(
     InputError
         Limits that are not known, nodes unevenly spaced, values out of range.
     """
-    asked = chosen(options, keywords, PlanKeywords)
+    asked = with_keywords(options, keywords, PlanKeywords)
     if cell is None and asked.comfort is not None and asked.comfort.clearance is not None:
         raise InputError("comfort clearance: is measured in a cell; give cell=")
     task = task_of(
@@ -107,7 +107,7 @@ def plan(
         graph=graph,
         progress=progress,
     )
-    finder = Finder(task, cell)
+    finder = ClearSearch(task, cell)
     begin = phase or (lambda what: None)
     begin("search")
     try:
@@ -122,7 +122,7 @@ def plan(
 
 
 def _otherwise(
-    task: Task, finder: Finder, broken: NoFeasiblePath, begin: Callable[[str], None]
+    task: PlanningTask, finder: ClearSearch, broken: NoFeasiblePath, begin: Callable[[str], None]
 ) -> Plan:
     """Return a plan where the graph has none at the speed asked for: slower, or off the grid.
 
@@ -144,12 +144,12 @@ def _otherwise(
         return found.plan
     tried = "" if found is None else f"; off the grid {found.statement}"
     where = f"{ON_THIS_GRID} " if task.robot.family.free_rotation else ""
-    raise broken.retold(
+    raise broken.with_message(
         f"contour {task.contour.name!r}: {where}{broken}{_bracket(broken, task)}{tried}"
     ) from None
 
 
-def _bracket(broken: NoFeasiblePath, task: Task) -> str:
+def _bracket(broken: NoFeasiblePath, task: PlanningTask) -> str:
     """Say from where on paths reach the end, and which change of posture would join the two."""
     if broken.back is None:
         return ""
@@ -167,7 +167,7 @@ def _bracket(broken: NoFeasiblePath, task: Task) -> str:
     return f"{said}; the posture would have to change from {' to '.join(names)}"
 
 
-def _proof(method: Method, optimal: bool, finder: Finder) -> Proof:
+def _proof(method: Method, optimal: bool, finder: ClearSearch) -> Proof:
     if optimal:
         claim = finder.claimed(
             "the best path on this graph under the velocity and acceleration limits"

@@ -8,8 +8,8 @@ import numpy as np
 
 from kerfpath import refiner
 from kerfpath.errors import NoFeasiblePath
-from kerfpath.planner._clear import Finder
-from kerfpath.planner._task import Task
+from kerfpath.planner._clear import ClearSearch
+from kerfpath.planner._task import PlanningTask
 from kerfpath.plans import Plan, Proof
 from kerfpath.refiner import Refinement
 from kerfpath.search import find_least_interval, find_shortest
@@ -20,7 +20,7 @@ TOO_SLOW = 2.0
 """Multiple of the node interval up to which the fastest path is worth an attempt off the grid."""
 
 
-def refine_plan(task: Task, finder: Finder, made: Plan) -> Plan:
+def refine_plan(task: PlanningTask, finder: ClearSearch, made: Plan) -> Plan:
     """Return the plan off its grid, at least as good and clear; where that cannot be, as it is.
 
     A refinement ends in the nearest optimum. The grid quantises the acceleration, so that its best
@@ -48,7 +48,7 @@ def refine_plan(task: Task, finder: Finder, made: Plan) -> Plan:
     return replace(best.plan, proof=proof)
 
 
-def plan_off_grid(task: Task, finder: Finder) -> Refinement | None:
+def plan_off_grid(task: PlanningTask, finder: ClearSearch) -> Refinement | None:
     """Look for a motion where the graph has no path; None where that is hopeless.
 
     Of a path that breaks (6) because gamma can only step, the motion close by may not. Begun from
@@ -56,7 +56,7 @@ def plan_off_grid(task: Task, finder: Finder) -> Refinement | None:
     in the cell.
     """
     first = plan_first_order(task, finder)
-    found = None if first is None else _cleared(refiner.refine(first), finder)
+    found = None if first is None else _keep_if_clear(refiner.refine(first), finder)
     comfort = task.settings.comfort
     priced = comfort is not None and comfort.clearance is not None and comfort.clearance.cost
     if priced or (found is not None and found.done):
@@ -69,17 +69,17 @@ def plan_off_grid(task: Task, finder: Finder) -> Refinement | None:
         return found
     claim = Proof(optimal=False, statement="the fastest path on this graph")
     quick = task.plan(least.index, task.cost(least.index), claim)
-    return _cleared(refiner.refine(quick), finder)
+    return _keep_if_clear(refiner.refine(quick), finder)
 
 
-def _cleared(found: Refinement, finder: Finder) -> Refinement:
+def _keep_if_clear(found: Refinement, finder: ClearSearch) -> Refinement:
     """Return the refinement, not done where its plan is not clear."""
     if not found.done or finder.is_clear(found.plan):
         return found
     return replace(found, done=False, statement="what keeps the limits would not be clear")
 
 
-def plan_first_order(task: Task, finder: Finder) -> Plan | None:
+def plan_first_order(task: PlanningTask, finder: ClearSearch) -> Plan | None:
     """Return the best path without (6); None where (5) alone closes the way."""
     limits = task.problem.limits.without_acceleration()
     try:

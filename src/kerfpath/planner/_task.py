@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from kerfpath._arrays import Array, Ints, as_pose, freeze
-from kerfpath._told import told
+from kerfpath._repr import short_repr
 from kerfpath.contour import Contour
 from kerfpath.errors import InputError
 from kerfpath.graph import LayeredGraph
@@ -26,11 +26,11 @@ from kerfpath.robots import Robot
 from kerfpath.search import SearchProblem
 from kerfpath.tilt import Tilt
 
-__all__ = ["Task", "task_of"]
+__all__ = ["PlanningTask", "task_of"]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class Task:
+class PlanningTask:
     """One contour for one robot, its settings and its layered graph.
 
     Parameters
@@ -54,7 +54,7 @@ class Task:
     graph: LayeredGraph
     problem: SearchProblem
 
-    __repr__ = told
+    __repr__ = short_repr
 
     @property
     def dt(self) -> float:
@@ -93,7 +93,7 @@ class Task:
             counts=graph.counts(),
         )
 
-    def part(self, first: int, last: int, name: str) -> Task:
+    def part(self, first: int, last: int, name: str) -> PlanningTask:
         """Return the task of nodes first to last alone."""
         part = self.contour.part(first, last, self.settings.frames)
         vertices = slice(self.graph.start[first], self.graph.start[last + 1])
@@ -121,13 +121,13 @@ def task_of(
     speed: float | None = None,
     graph: LayeredGraph | None = None,
     progress: Callable[[int], None] | None = None,
-) -> Task:
+) -> PlanningTask:
     """Return the task that the arguments of `kerfpath.plan` pose; errors as there."""
     T_flange_tip, T_base_part = as_pose(tool, "tool"), as_pose(placement, "placement")
     dt = node_interval(contour, speed)
     if options.closure == "periodic" and not contour.closed:
         raise InputError(f"closure: contour {contour.name!r} is open and cannot be periodic")
-    options = options.of(robot, dt)
+    options = options.resolve(robot, dt)
     if graph is None:
         graph = layered_graph(
             contour,
@@ -142,7 +142,7 @@ def task_of(
         periodic = options.closure == "periodic"
         graph = within_margins(graph, robot, options.comfort, T_flange_tip, periodic=periodic)
     require_no_empty_layer(contour, graph)
-    return Task(
+    return PlanningTask(
         contour=contour,
         robot=robot,
         T_flange_tip=T_flange_tip,

@@ -11,7 +11,7 @@ from kerfpath.post._divide import divide_sections as divide_sections
 from kerfpath.post._divide import rename_sections as rename_sections
 from kerfpath.post._dry_run import dry_run as dry_run
 from kerfpath.post._folder import MANIFEST as MANIFEST
-from kerfpath.post._folder import Replaced as Replaced
+from kerfpath.post._folder import FolderChanges as FolderChanges
 from kerfpath.post._folder import replace_program as replace_program
 from kerfpath.post._folder import write_files as write_files
 from kerfpath.post._folder import write_program as write_program
@@ -49,10 +49,10 @@ from kerfpath.post._read import ReadSection as ReadSection
 from kerfpath.post._read import ReadStep as ReadStep
 from kerfpath.post._read import ReadWait as ReadWait
 from kerfpath.post._read import with_tips as with_tips
+from kerfpath.post._settings import LanguageSettings as LanguageSettings
 from kerfpath.post._settings import Rules as Rules
-from kerfpath.post._settings import Settings as Settings
 from kerfpath.post._settings import setting as setting
-from kerfpath.post._writer import Posted as Posted
+from kerfpath.post._writer import ProgramText as ProgramText
 from kerfpath.post._writer import post as post
 from kerfpath.post._writer import post_and_read as post_and_read
 from kerfpath.post._writer import read_as_written as read_as_written

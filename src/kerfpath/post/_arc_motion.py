@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from kerfpath._arrays import Array
-from kerfpath._told import told
+from kerfpath._repr import short_repr
 from kerfpath.post._program import Program
 from kerfpath.robots import Robot
 
@@ -38,7 +38,7 @@ class Stretch:
     q: Array
     dt: Array
 
-    __repr__ = told
+    __repr__ = short_repr
 
     def joined(self, q: Array, dt: Array) -> tuple[Array, Array]:
         """Return joints and time steps from `before` to `after`, by way of q (m + 1, n) in dt."""

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from kerfpath._arrays import Array, floats, freeze
-from kerfpath._told import told
+from kerfpath._repr import short_repr
 from kerfpath.robots import Robot
 
 __all__ = ["AxisCount", "offset_near", "wrist_in_plane"]
@@ -42,7 +42,7 @@ class AxisCount:
     matrix: Array = field(default_factory=lambda: np.eye(6))
     shift: Array = field(default_factory=lambda: np.zeros(6))
 
-    __repr__ = told
+    __repr__ = short_repr
 
     def from_joints(self, robot: Robot, q: ArrayLike) -> Array:
         """Return the controller's axes (K, 6) rad of joint vectors q (K, 6) rad."""

@@ -8,8 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from kerfpath._arrays import Array, not_negative, scalar
-from kerfpath._told import told
-from kerfpath.air import AirMove, End, backed_off, least_time, speed_share
+from kerfpath._repr import short_repr
 from kerfpath.cell import UNPROVED
 from kerfpath.errors import InputError
 from kerfpath.plans import Plan
@@ -28,6 +27,7 @@ from kerfpath.post._program import (
     Wait,
 )
 from kerfpath.robots import Robot, posture_name
+from kerfpath.transfer import End, TransferMove, back_off, least_time, speed_share
 
 __all__ = ["build_program"]
 
@@ -46,7 +46,7 @@ PLAN_AND_CONTOUR = 1e-5
 def build_program(
     plans: Sequence[Plan],
     *,
-    moves: Sequence[AirMove] = (),
+    moves: Sequence[TransferMove] = (),
     name: str | None = None,
     retract: float = 0.05,
     zone: float = 0.0003,
@@ -69,7 +69,7 @@ def build_program(
     ----------
     plans : sequence of Plan
         In the order of cutting; same robot, tool and placement.
-    moves : sequence of AirMove
+    moves : sequence of TransferMove
         Between the contours, as `kerfpath.sequence.plan_part` returns them, one less than plans or,
         from and to a home position, one more; default: joint moves straight to each start.
     name : str, optional
@@ -129,7 +129,7 @@ def build_program(
     for plan, section_name, way in zip(plans, names, ways, strict=True):
         steps = tuple(process.steps(plan, air.moves(way)))
         sections.append(Section(name=section_name, steps=steps))
-        air.here = backed_off(plan, "end", process.retract)
+        air.here = back_off(plan, "end", process.retract)
     if home:
         back = tuple(air.moves(home))
         sections[-1] = replace(sections[-1], steps=sections[-1].steps + back)
@@ -161,7 +161,7 @@ class _Process:
     approach_speed: float
     handshakes: tuple[Handshake, ...]
 
-    __repr__ = told
+    __repr__ = short_repr
 
     def steps(self, plan: Plan, way: Iterable[JointMove]) -> Iterator[Step]:
         """Yield the steps of a contour, `way` leading to where the tool has backed off."""
@@ -183,7 +183,7 @@ class _Process:
         yield from self._cut(plan, T, q)
         T_out = T[-1].copy()
         T_out[:3, 3] -= self.retract * T_out[:3, 2]
-        yield self._straight(T_out, backed_off(plan, "end", self.retract))
+        yield self._straight(T_out, back_off(plan, "end", self.retract))
         for step in reversed(self.handshakes):
             if isinstance(step, Request) and step.on:
                 yield replace(step, on=False)
@@ -261,14 +261,16 @@ def _zones(points: Array, zone: float) -> list[float]:
     return [*(zone * 0.5**halvings).tolist(), 0.0]
 
 
-def _corners(plans: Sequence[Plan], moves: Sequence[AirMove], retract: float) -> list[list[Array]]:
+def _corners(
+    plans: Sequence[Plan], moves: Sequence[TransferMove], retract: float
+) -> list[list[Array]]:
     """Return the joint vectors on the way to each of P plans, and P + 1st those after the last."""
     if not moves:
-        return [*([backed_off(plan, "start", retract)] for plan in plans), []]
+        return [*([back_off(plan, "start", retract)] for plan in plans), []]
     ways = [list(move.q[1:]) for move in moves]
     if len(moves) == len(plans) - 1:
         _require_meeting(plans, moves, retract)
-        return [[backed_off(plans[0], "start", retract)], *ways, []]
+        return [[back_off(plans[0], "start", retract)], *ways, []]
     if len(moves) == len(plans) + 1:
         _require_meeting(plans, moves, retract)
         return [list(moves[0].q), *ways[1:]]
@@ -278,7 +280,7 @@ def _corners(plans: Sequence[Plan], moves: Sequence[AirMove], retract: float) ->
     )
 
 
-def _require_meeting(plans: Sequence[Plan], moves: Sequence[AirMove], retract: float) -> None:
+def _require_meeting(plans: Sequence[Plan], moves: Sequence[TransferMove], retract: float) -> None:
     """Raise InputError where moves do not begin and end where the tool has backed off to."""
     between = len(moves) < len(plans)
     into, starts = (moves, plans[1:]) if between else (moves[:-1], plans)
@@ -287,10 +289,10 @@ def _require_meeting(plans: Sequence[Plan], moves: Sequence[AirMove], retract: f
     meetings += [(move.q[-1], p, "start") for move, p in zip(into, starts, strict=True)]
     meetings += [(move.q[0], p, "end") for move, p in zip(out, ends, strict=True)]
     for q, plan, end in meetings:
-        T = plan.robot.forward(np.array([q, backed_off(plan, end, retract)])) @ plan.T_flange_tip
+        T = plan.robot.forward(np.array([q, back_off(plan, end, retract)])) @ plan.T_flange_tip
         if (off := np.linalg.norm(T[0, :3, 3] - T[1, :3, 3])) > MEETS:
             raise InputError(
-                f"contour {plan.name!r}: the planned move through the air is {off * 1e3:.4g} mm "
+                f"contour {plan.name!r}: the planned transfer move is {off * 1e3:.4g} mm "
                 f"off where the tool backs off to by {retract * 1e3:g} mm; write the retract_mm "
                 "that it was planned with, or plan again"
             )

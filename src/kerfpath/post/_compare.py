@@ -24,7 +24,7 @@ from kerfpath.post._program import (
     Wait,
 )
 from kerfpath.post._read import ReadHandshake, ReadMove, ReadProgram, ReadStep, ReadWait
-from kerfpath.post._settings import Rules, Settings
+from kerfpath.post._settings import LanguageSettings, Rules
 from kerfpath.post._times import air_times, cruises
 
 __all__ = ["deviations", "handshake_in_words", "switches_in_words"]
@@ -49,7 +49,7 @@ SHARE = 6e-3
 
 
 def deviations(
-    program: Program, read: ReadProgram, language: Language, settings: Settings
+    program: Program, read: ReadProgram, language: Language, settings: LanguageSettings
 ) -> list[ProgramIssue]:
     """Return every difference between a program and what was read back of it; empty = the same.
 
@@ -61,7 +61,7 @@ def deviations(
     read : ReadProgram
         What the reader of the language made of the text.
     language : Language
-    settings : Settings
+    settings : LanguageSettings
         With which it was written.
     """
     if language.sayable is not None:
@@ -249,7 +249,10 @@ def switches_in_words(switches: Any) -> str:
 
 
 def _compare_postures(
-    program: Program, pairs: list[tuple[Move, ReadMove]], language: Language, settings: Settings
+    program: Program,
+    pairs: list[tuple[Move, ReadMove]],
+    language: Language,
+    settings: LanguageSettings,
 ) -> Iterator[ProgramIssue]:
     worded = [(move, back) for move, back in pairs if back.posture]
     if not worded or language.posture is None:

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from kerfpath._told import told
+from kerfpath._repr import short_repr
 from kerfpath.post._compare import (
     ANGLE,
     FRAME,
@@ -18,7 +18,7 @@ from kerfpath.post._compare import (
     switches_in_words,
 )
 from kerfpath.post._groups import ReadGroup, groups_of
-from kerfpath.post._matching import Pair, Stop, match_groups, pair_moves
+from kerfpath.post._matching import MovePair, Stop, match_groups, pair_moves
 from kerfpath.post._orientations import distances
 from kerfpath.post._read import ReadMove, ReadProgram
 from kerfpath.post._settings import Rules
@@ -63,7 +63,7 @@ class Difference:
     said_at: str = ""
     near: str = ""
 
-    __repr__ = told
+    __repr__ = short_repr
 
     @property
     def place(self) -> str:
@@ -194,7 +194,7 @@ def _count(number: int, word: str) -> str:
     return f"{number} {word}{'' if number == 1 else 's'}"
 
 
-def _name_moves(pairs: Sequence[Pair], names: Names) -> Iterator[Difference]:
+def _name_moves(pairs: Sequence[MovePair], names: Names) -> Iterator[Difference]:
     """Find moves that only one of the programs has; one left out, before which of the other."""
     for side, code, words in (
         (1, "removed", f"left out in {names[1]}"), (0, "added", f"only in {names[1]}"),

@@ -10,18 +10,18 @@ from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 
-from kerfpath._told import told
+from kerfpath._repr import short_repr
 from kerfpath._writing import write_whole
 from kerfpath.errors import InputError
 
-__all__ = ["MANIFEST", "Replaced", "replace_program", "write_files", "write_program"]
+__all__ = ["MANIFEST", "FolderChanges", "replace_program", "write_files", "write_program"]
 
 MANIFEST = ".kerfpath.json"
 """File in a folder that says which programs in it are ours: of which each file is, and its hash."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Replaced:
+class FolderChanges:
     """What was done to the files of a folder.
 
     Parameters
@@ -38,7 +38,7 @@ class Replaced:
     removed: tuple[Path, ...] = ()
     edited: tuple[Path, ...] = ()
 
-    __repr__ = told
+    __repr__ = short_repr
 
 
 def replace_program(
@@ -47,7 +47,7 @@ def replace_program(
     program: Sequence[str],
     *,
     only: str | None = None,
-) -> Replaced:
+) -> FolderChanges:
     """Write files into a folder, and remove those of an earlier program that is replaced.
 
     Ours are only files that this function has written and listed in `MANIFEST`; nothing else is
@@ -92,7 +92,7 @@ def replace_program(
         n: {"of": program[0], "sha256": _hash(files[n].encode("utf-8"))} for n in program
     }  # fmt: skip
     _write_list(folder, kept, needed=only is None or len(program) > 1 or bool(ours))
-    return Replaced(
+    return FolderChanges(
         written=tuple(folder / n for n in files),
         removed=tuple(folder / n for n in stale),
         edited=tuple(folder / n for n in edited),

@@ -23,7 +23,7 @@ from kerfpath.post._program import (
     Step,
     Wait,
 )
-from kerfpath.post._settings import Settings
+from kerfpath.post._settings import LanguageSettings
 
 __all__ = ["Formatter", "number", "plain"]
 
@@ -36,7 +36,7 @@ class Formatter(ABC):
     Parameters
     ----------
     program : Program
-    settings : Settings
+    settings : LanguageSettings
         Those of the language.
     """
 
@@ -47,7 +47,7 @@ class Formatter(ABC):
     too_long: Level | None = None
     """What it is that a contour is longer than a file is to be; None where nothing looks at it."""
 
-    def __init__(self, program: Program, settings: Settings) -> None:
+    def __init__(self, program: Program, settings: LanguageSettings) -> None:
         self.program, self.settings = program, settings
 
     @abstractmethod
@@ -142,7 +142,7 @@ class Formatter(ABC):
         return [
             f"Written by kerfpath for {plain(robot.model)} ({plain(robot.id)}).",
             *about,
-            f"Moves through the air have {checked}.",
+            f"Transfer moves have {checked}.",
             *self.program.caveats,
         ]
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 
-from kerfpath._told import told
+from kerfpath._repr import short_repr
 from kerfpath.post._read import ReadHandshake, ReadMove, ReadProgram, ReadStep, ReadWait
 
 __all__ = ["ReadGroup", "groups_of"]
@@ -31,7 +31,7 @@ class ReadGroup:
     waits: list[tuple[int, ReadWait]] = field(default_factory=list)
     handshakes: list[tuple[int, ReadHandshake]] = field(default_factory=list)
 
-    __repr__ = told
+    __repr__ = short_repr
 
 
 def groups_of(read: ReadProgram) -> list[ReadGroup]:

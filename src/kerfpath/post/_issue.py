@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from kerfpath._told import told
+from kerfpath._repr import short_repr
 from kerfpath.auditor import Level
 
 __all__ = ["ProgramIssue"]
@@ -31,7 +31,7 @@ class ProgramIssue:
     message: str
     place: str
 
-    __repr__ = told
+    __repr__ = short_repr
 
     def __str__(self) -> str:
         return f"{self.place}: {self.message}"

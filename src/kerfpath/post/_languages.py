@@ -10,13 +10,13 @@ from importlib.metadata import EntryPoint, entry_points
 from typing import Any
 
 from kerfpath._arrays import Array
-from kerfpath._told import told
+from kerfpath._repr import short_repr
 from kerfpath.errors import InputError
 from kerfpath.post._formatter import Formatter
 from kerfpath.post._issue import ProgramIssue
 from kerfpath.post._program import Program
 from kerfpath.post._read import Reader
-from kerfpath.post._settings import Rules, Settings
+from kerfpath.post._settings import LanguageSettings, Rules
 from kerfpath.robots import AXIS_3, Robot
 
 __all__ = ["ENTRY_POINTS", "Language", "language", "languages"]
@@ -61,7 +61,7 @@ class Language:
         axis 3 that it says measures.
     suffix : str
         Suffix of the file to start, with its dot.
-    settings : type of Settings
+    settings : type of LanguageSettings
     rules : callable
         (settings) to the Rules of programs.
     formatter : type of Formatter
@@ -88,7 +88,7 @@ class Language:
     manufacturers: tuple[str, ...]
     families: tuple[str, ...]
     suffix: str
-    settings: type[Settings]
+    settings: type[LanguageSettings]
     rules: Callable[[Any], Rules]
     formatter: type[Formatter]
     is_reserved: Callable[[str], bool] = _none_is_reserved
@@ -100,9 +100,9 @@ class Language:
     read: Reader | None = None
     axis_3: tuple[str, ...] = AXIS_3
 
-    __repr__ = told
+    __repr__ = short_repr
 
-    def completed(self, settings: Settings | None) -> Settings:
+    def completed(self, settings: LanguageSettings | None) -> LanguageSettings:
         """Return settings, by default the language's defaults, with what is `assumed` of them."""
         settings = self.settings() if settings is None else settings
         lacks = {k: v for k, v in self.assumed.items() if getattr(settings, k, v) is None}
@@ -149,7 +149,7 @@ def languages() -> dict[str, Language]:
     An entry point that cannot be loaded, that is no language, or that has the name of one shipped
     is left out with a warning.
     """
-    found = {name: _shipped(name) for name in SHIPPED}
+    found = {name: _shipped_languages(name) for name in SHIPPED}
     for point in sorted(entry_points(group=ENTRY_POINTS), key=lambda point: point.name):
         try:
             loaded, fault = point.load(), ""
@@ -166,7 +166,7 @@ def languages() -> dict[str, Language]:
     return found
 
 
-def _shipped(name: str) -> Language:
+def _shipped_languages(name: str) -> Language:
     loaded = EntryPoint(name, SHIPPED[name], ENTRY_POINTS).load()
     assert isinstance(loaded, Language)
     return loaded

@@ -10,7 +10,7 @@ from typing import Any, Literal
 from kerfpath.errors import InputError
 from kerfpath.post._program import Await, Handshake, Partner, Request, Signal, Switch
 from kerfpath.post._read import MoveKind, ReadHandshake, ReadMove, ReadStep, ReadWait
-from kerfpath.post._settings import Settings, handshakes
+from kerfpath.post._settings import LanguageSettings, handshakes
 from kerfpath.robots import Robot
 
 __all__ = ["END_OF_FILE", "LineReader", "only", "patterns", "statements"]
@@ -45,7 +45,7 @@ class LineReader:
     file : str
     robot : Robot
         Whose joints the controller's axes are turned into.
-    settings : Settings
+    settings : LanguageSettings
         Those of the language.
     rows : sequence of (int, str)
         Numbers and texts of the lines, for readers that `advance` from one to the next.
@@ -58,7 +58,7 @@ class LineReader:
         self,
         file: str,
         robot: Robot,
-        settings: Settings,
+        settings: LanguageSettings,
         rows: Sequence[tuple[int, str]] = (),
     ) -> None:
         self.file, self.robot, self.settings = file, robot, settings

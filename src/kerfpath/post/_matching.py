@@ -15,7 +15,7 @@ from kerfpath.errors import InputError
 from kerfpath.post._groups import ReadGroup
 from kerfpath.post._read import ReadMove, ReadWait
 
-__all__ = ["Pair", "Stop", "match_groups", "pair_moves"]
+__all__ = ["MovePair", "Stop", "match_groups", "pair_moves"]
 
 NEAR = 5e-3
 """Contours whose paths are farther apart (m) are the same by their names only."""
@@ -33,7 +33,7 @@ class Stop(NamedTuple):
     waits_at: str = ""
 
 
-class Pair(NamedTuple):
+class MovePair(NamedTuple):
     """A move of program A and one of B; None where the other program has one more."""
 
     a: Stop | None
@@ -89,7 +89,7 @@ def _points(moves: Sequence[ReadMove]) -> Array:
     return np.array(ends).reshape(-1, 4, 4)[:, :3, 3]
 
 
-def pair_moves(a: ReadGroup, b: ReadGroup, near: float) -> list[Pair]:
+def pair_moves(a: ReadGroup, b: ReadGroup, near: float) -> list[MovePair]:
     """Return the moves of a contour in A with those in B that end at the same place.
 
     Between moves that do, as many as there are in both belong together in order.
@@ -102,19 +102,21 @@ def pair_moves(a: ReadGroup, b: ReadGroup, near: float) -> list[Pair]:
     """
     joint = min(len(a.joint), len(b.joint))
     ways = [_add_waits(g.joint, [(len(g.joint), w) for k, w in g.waits if k == 0]) for g in (a, b)]
-    pairs = [Pair(stop, None) for stop in ways[0][: len(ways[0]) - joint]]
-    pairs += [Pair(None, stop) for stop in ways[1][: len(ways[1]) - joint]]
-    pairs += [Pair(*both) for both in zip(*(way[len(way) - joint :] for way in ways), strict=True)]
+    pairs = [MovePair(stop, None) for stop in ways[0][: len(ways[0]) - joint]]
+    pairs += [MovePair(None, stop) for stop in ways[1][: len(ways[1]) - joint]]
+    pairs += [
+        MovePair(*both) for both in zip(*(way[len(way) - joint :] for way in ways), strict=True)
+    ]
     one, two = _add_waits(a.path, a.waits), _add_waits(b.path, b.waits)
     keys = _number_places(a.path, b.path, near)
     if len(one) == len(two) and 2 * (keys[0] == keys[1]).sum() >= len(one):
-        return pairs + [Pair(*both) for both in zip(one, two, strict=True)]
+        return pairs + [MovePair(*both) for both in zip(one, two, strict=True)]
     matcher = SequenceMatcher(None, keys[0].tolist(), keys[1].tolist(), autojunk=False)
     for _, i0, i1, j0, j1 in matcher.get_opcodes():
         both = min(i1 - i0, j1 - j0)
-        pairs += [Pair(one[i0 + k], two[j0 + k]) for k in range(both)]
-        pairs += [Pair(stop, None) for stop in one[i0 + both : i1]]
-        pairs += [Pair(None, stop) for stop in two[j0 + both : j1]]
+        pairs += [MovePair(one[i0 + k], two[j0 + k]) for k in range(both)]
+        pairs += [MovePair(stop, None) for stop in one[i0 + both : i1]]
+        pairs += [MovePair(None, stop) for stop in two[j0 + both : j1]]
     return pairs
 
 

@@ -7,7 +7,7 @@ from collections.abc import Iterator, Mapping
 
 from kerfpath.errors import InputError
 
-__all__ = ["Meant"]
+__all__ = ["CheckedTexts"]
 
 LARGEST = 1e10
 """No number of a program is larger: ABB's 9E+09 for an axis that is not there is the largest."""
@@ -19,7 +19,7 @@ REMARK = re.compile(r"\s*(?:\d+:\s*)?(?:!|;|//|'|#) ", re.ASCII)
 """How a person's remark begins in any of the languages; one that gives a frame has no space."""
 
 
-class Meant(Mapping[str, str]):
+class CheckedTexts(Mapping[str, str]):
     """The same texts by name; one with a number that nobody means is refused with its line."""
 
     def __init__(self, files: Mapping[str, str]) -> None:

@@ -25,7 +25,7 @@ from kerfpath.post._program import (
     Wait,
     switches_of,
 )
-from kerfpath.post._settings import Rules, Settings, handshakes
+from kerfpath.post._settings import LanguageSettings, Rules, handshakes
 
 __all__ = ["preflight"]
 
@@ -46,7 +46,7 @@ LIMIT_NOISE = 1e-9
 
 
 def preflight(
-    program: Program, language: str = "rapid", settings: Settings | None = None
+    program: Program, language: str = "rapid", settings: LanguageSettings | None = None
 ) -> list[ProgramIssue]:
     """Return everything that speaks against running `program`; empty = nothing known.
 
@@ -55,7 +55,7 @@ def preflight(
     program : Program
     language : str
         One of `languages()`.
-    settings : Settings, optional
+    settings : LanguageSettings, optional
         Those of the language; default: its defaults.
 
     Raises
@@ -103,7 +103,7 @@ def preflight(
 
 
 def _check_outputs(
-    program: Program, language: Language, settings: Settings
+    program: Program, language: Language, settings: LanguageSettings
 ) -> Iterator[ProgramIssue]:
     """Check that there is an output for everything that is switched, and warn of one assumed."""
     assumed = [key.removesuffix("_output") for key in language.assumed]
@@ -119,7 +119,7 @@ def _check_outputs(
 
 
 def _check_ports(
-    program: Program, language: Language, settings: Settings
+    program: Program, language: Language, settings: LanguageSettings
 ) -> Iterator[ProgramIssue]:
     """Check that every handshake has an input or output of its own."""
     known = handshakes(settings)
@@ -158,7 +158,7 @@ def _check_robot(program: Program, language: Language) -> Iterator[ProgramIssue]
 
 
 def _check_names(
-    program: Program, language: Language, rules: Rules, settings: Settings
+    program: Program, language: Language, rules: Rules, settings: LanguageSettings
 ) -> Iterator[ProgramIssue]:
     seen: dict[str, str] = {}
     for name, what in language.formatter(program, settings).names():

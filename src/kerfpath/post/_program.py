@@ -9,7 +9,7 @@ from typing import Literal, NamedTuple, get_args
 import numpy as np
 
 from kerfpath._arrays import Array, as_pose, floats
-from kerfpath._told import told
+from kerfpath._repr import short_repr
 from kerfpath.errors import InputError
 from kerfpath.robots import Robot
 
@@ -85,7 +85,7 @@ class JointMove:
     duration: float | None = None
     zone: float = 0.0
 
-    __repr__ = told
+    __repr__ = short_repr
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "q", floats(self.q, "q", (None,)))
@@ -118,7 +118,7 @@ class LinearMove:
     zone: float = 0.0
     switches: tuple[Switch, ...] = ()
 
-    __repr__ = told
+    __repr__ = short_repr
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "T_part_tip", as_pose(self.T_part_tip, "T_part_tip"))
@@ -140,7 +140,7 @@ class CircularMove(LinearMove):
     T_part_via: Array
     q_via: Array
 
-    __repr__ = told
+    __repr__ = short_repr
 
     def __post_init__(self) -> None:
         super(CircularMove, self).__post_init__()
@@ -174,7 +174,7 @@ class Request:
     partner: Partner
     on: bool
 
-    __repr__ = told
+    __repr__ = short_repr
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -192,7 +192,7 @@ class Await:
     partner: Partner
     timeout: float
 
-    __repr__ = told
+    __repr__ = short_repr
 
 
 @dataclass(frozen=True, slots=True)
@@ -201,7 +201,7 @@ class Comment:
 
     text: str
 
-    __repr__ = told
+    __repr__ = short_repr
 
 
 class Target(NamedTuple):
@@ -240,7 +240,7 @@ class Section:
     name: str
     steps: tuple[Step, ...]
 
-    __repr__ = told
+    __repr__ = short_repr
 
     @property
     def moves(self) -> tuple[Move, ...]:
@@ -275,7 +275,7 @@ class Program:
     air_checked: bool = False
     caveats: tuple[str, ...] = ()
 
-    __repr__ = told
+    __repr__ = short_repr
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "T_flange_tip", as_pose(self.T_flange_tip, "T_flange_tip"))

@@ -9,7 +9,7 @@ from typing import Any, Literal, Protocol, get_args
 import numpy as np
 
 from kerfpath._arrays import Array, freeze
-from kerfpath._told import told
+from kerfpath._repr import short_repr
 from kerfpath.errors import InputError
 from kerfpath.post._program import Handshake, Switch
 from kerfpath.robots import Robot
@@ -32,7 +32,7 @@ class _InFile:
     file: str
     line: int
 
-    __repr__ = told
+    __repr__ = short_repr
 
     @property
     def place(self) -> str:
@@ -84,7 +84,7 @@ class ReadMove(_InFile):
     switches: tuple[Switch, ...] = ()
     elsewhere: Mapping[str, str] = field(default_factory=dict)
 
-    __repr__ = told
+    __repr__ = short_repr
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -93,7 +93,7 @@ class ReadWait(_InFile):
 
     time: float
 
-    __repr__ = told
+    __repr__ = short_repr
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -102,7 +102,7 @@ class ReadHandshake(_InFile):
 
     what: Handshake
 
-    __repr__ = told
+    __repr__ = short_repr
 
 
 ReadStep = ReadMove | ReadWait | ReadHandshake
@@ -115,7 +115,7 @@ class ReadSection:
     name: str
     steps: tuple[ReadStep, ...]
 
-    __repr__ = told
+    __repr__ = short_repr
 
     @property
     def moves(self) -> tuple[ReadMove, ...]:
@@ -141,7 +141,7 @@ class ReadProgram:
     T_flange_tip: Array | None = None
     T_base_part: Array | None = None
 
-    __repr__ = told
+    __repr__ = short_repr
 
     @property
     def steps(self) -> tuple[ReadStep, ...]:

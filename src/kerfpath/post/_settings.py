@@ -8,11 +8,17 @@ from typing import Annotated, Any
 import numpy as np
 from pydantic import BaseModel, ConfigDict, Field
 
-from kerfpath._told import told
+from kerfpath._repr import short_repr
 from kerfpath.post._program import PARTNERS, Partner
 
 __all__ = [
-    "LinesPerFile", "PortSettings", "Rules", "Settings", "handshakes", "numbered", "outputs",
+    "LanguageSettings",
+    "LinesPerFile",
+    "PortSettings",
+    "Rules",
+    "handshakes",
+    "numbered",
+    "outputs",
     "setting",
 ]  # fmt: skip
 
@@ -32,7 +38,7 @@ LinesPerFile = Annotated[
 ]
 
 
-class Settings(BaseModel):
+class LanguageSettings(BaseModel):
     """The settings of one language; in jobs the table [program.LANGUAGE]."""
 
     model_config = ConfigDict(extra="forbid", strict=True, frozen=True)
@@ -40,7 +46,7 @@ class Settings(BaseModel):
     lines_per_file: LinesPerFile = 5000
 
 
-class PortSettings(Settings):
+class PortSettings(LanguageSettings):
     """Settings that name inputs and outputs: of laser and gas, and of handshakes.
 
     A subclass gives, as keywords, the annotations of what its language calls an output and an
@@ -71,7 +77,7 @@ class PortSettings(Settings):
         cls.__annotations__ = ways | own
 
 
-def handshakes(settings: Settings) -> dict[tuple[Partner, str], Any]:
+def handshakes(settings: LanguageSettings) -> dict[tuple[Partner, str], Any]:
     """Return the inputs and outputs of handshakes that settings can name, by partner and way."""
     fields = (name.rpartition("_") for name in type(settings).model_fields)
     return {
@@ -120,4 +126,4 @@ class Rules:
     point_step: float = 0.0
     angle_step: float = 0.0
 
-    __repr__ = told
+    __repr__ = short_repr

@@ -7,10 +7,10 @@ from itertools import pairwise
 
 import numpy as np
 
-from kerfpath.air import least_time
 from kerfpath.errors import InputError
 from kerfpath.post._issue import ProgramIssue
 from kerfpath.post._program import JointMove, LinearMove, Move, Program, Wait
+from kerfpath.transfer import least_time
 
 __all__ = [
     "SHORTEST_CRUISE", "TICK", "air_times", "check_times", "cruises", "not_whole", "timetable",

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from kerfpath._told import told
+from kerfpath._repr import short_repr
 from kerfpath.errors import InputError
 from kerfpath.plans import Plan
 from kerfpath.post._build import build_program
@@ -15,20 +15,20 @@ from kerfpath.post._compare import deviations
 from kerfpath.post._issue import ProgramIssue
 from kerfpath.post._languages import Language
 from kerfpath.post._languages import language as find_language
-from kerfpath.post._meant import Meant
+from kerfpath.post._meant import CheckedTexts
 from kerfpath.post._preflight import preflight
 from kerfpath.post._program import Program
 from kerfpath.post._read import ReadProgram
-from kerfpath.post._settings import Settings
+from kerfpath.post._settings import LanguageSettings
 from kerfpath.robots import Robot
 
-__all__ = ["Posted", "post", "post_and_read", "read_as_written", "read_program"]
+__all__ = ["ProgramText", "post", "post_and_read", "read_as_written", "read_program"]
 
 
 def post(
     source: Program | Sequence[Plan],
     language: str = "rapid",
-    settings: Settings | None = None,
+    settings: LanguageSettings | None = None,
     *,
     strict: bool = False,
 ) -> dict[str, str]:
@@ -42,7 +42,7 @@ def post(
         Plans become a program with the defaults of `build_program`.
     language : str
         One of `languages()`.
-    settings : Settings, optional
+    settings : LanguageSettings, optional
         Those of the language; default: its defaults.
     strict : bool
         Refuse what is only warned of otherwise.
@@ -63,7 +63,7 @@ def post(
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class Posted:
+class ProgramText:
     """A program as text.
 
     Parameters
@@ -80,16 +80,16 @@ class Posted:
     read: ReadProgram | None
     warnings: tuple[ProgramIssue, ...]
 
-    __repr__ = told
+    __repr__ = short_repr
 
 
 def post_and_read(
     program: Program,
     language: str = "rapid",
-    settings: Settings | None = None,
+    settings: LanguageSettings | None = None,
     *,
     strict: bool = False,
-) -> Posted:
+) -> ProgramText:
     """Return a program as text, what was read back of it, and the warnings of its preflight.
 
     Arguments and refusals are those of `post`.
@@ -108,14 +108,14 @@ def post_and_read(
     if refused:
         more = f" (and {len(refused) - 1} more)" if len(refused) > 1 else ""
         raise InputError(f"program {program.name!r}: {refused[0]}{more}")
-    return Posted(files=files, read=read, warnings=tuple(issues))
+    return ProgramText(files=files, read=read, warnings=tuple(issues))
 
 
 def read_program(
     files: Mapping[str, str],
     language: str,
     robot: Robot,
-    settings: Settings | None = None,
+    settings: LanguageSettings | None = None,
     *,
     main: str | None = None,
 ) -> ReadProgram:
@@ -129,7 +129,7 @@ def read_program(
         One of `languages()`.
     robot : Robot
         Whose joints the controller's axes are turned into.
-    settings : Settings, optional
+    settings : LanguageSettings, optional
         With which it was written; default: the language's defaults.
     main : str, optional
         The file that is started; default: the first.
@@ -147,7 +147,7 @@ def read_program(
     main = next(iter(files)) if main is None else main
     try:
         with np.errstate(over="raise", divide="raise", invalid="raise"):
-            return chosen.read(main, Meant(files), robot, settings)
+            return chosen.read(main, CheckedTexts(files), robot, settings)
     except KeyError as missing:
         raise InputError(f"{main}: the file {missing.args[0]!r} is not there") from None
     except InputError:
@@ -158,7 +158,7 @@ def read_program(
         ) from None
 
 
-def read_as_written(program: Program, chosen: Language, settings: Settings) -> ReadProgram:
+def read_as_written(program: Program, chosen: Language, settings: LanguageSettings) -> ReadProgram:
     """Return what the reader of a language makes of a program that its formatter writes.
 
     Neither refused nor compared: what a text would say, as a measure for another.
@@ -168,7 +168,7 @@ def read_as_written(program: Program, chosen: Language, settings: Settings) -> R
     program : Program
     chosen : Language
         With a reader.
-    settings : Settings
+    settings : LanguageSettings
 
     Raises
     ------

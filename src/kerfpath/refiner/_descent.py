@@ -8,15 +8,15 @@ from typing import NamedTuple
 import numpy as np
 
 from kerfpath._arrays import Array
-from kerfpath._told import told
+from kerfpath._repr import short_repr
 from kerfpath.kernels.turns import JointLimits
 from kerfpath.plans import path_cost
 from kerfpath.refiner._curves import JointCurves
-from kerfpath.refiner._program import MARGIN, PRICE, Model, Target, solve
-from kerfpath.refiner._rates import Rates
+from kerfpath.refiner._program import MARGIN, PRICE, LinearModel, Target, solve
+from kerfpath.refiner._rates import RateLimits
 from kerfpath.search import Metric, ObjectiveKind
 
-__all__ = ["Descent", "Stand"]
+__all__ = ["Descent", "MotionState"]
 
 MOST_PROGRAMS = 60
 """Of one descent; it ends long before where it converges."""
@@ -33,7 +33,7 @@ ENOUGH = 0.1
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class Stand:
+class MotionState:
     """A motion by its true kinematics.
 
     Parameters
@@ -57,7 +57,7 @@ class Stand:
     lost: float
     outside: float
 
-    __repr__ = told
+    __repr__ = short_repr
 
     @property
     def admitted(self) -> bool:
@@ -75,7 +75,7 @@ class Stand:
 class _Step(NamedTuple):
     """Where a step leads, if anywhere admissible; what the model promised; and what it took."""
 
-    to: Stand | None
+    to: MotionState | None
     promised: float
     longest: float
     programs: int
@@ -88,7 +88,7 @@ class Descent:
     Parameters
     ----------
     curves : JointCurves
-    rates : Rates
+    rates : RateLimits
     limits : JointLimits
     rotation : (6,) rad
         How far a joint may turn away from where it begins.
@@ -104,7 +104,7 @@ class Descent:
     """
 
     curves: JointCurves
-    rates: Rates
+    rates: RateLimits
     limits: JointLimits
     rotation: Array
     weight: Array
@@ -114,18 +114,20 @@ class Descent:
     node_cost: Array | None = None
     cap: float = np.inf
 
-    __repr__ = told
+    __repr__ = short_repr
 
-    def stand(self, gamma: Array, near: Array) -> Stand:
+    def stand(self, gamma: Array, near: Array) -> MotionState:
         """Return where `gamma` brings the joints; infinite where it is out of reach."""
         q = self.curves.at(gamma, near)
         if not np.isfinite(q).all():
-            return Stand(gamma=gamma, q=q, cost=np.inf, excess=np.inf, lost=np.inf, outside=np.inf)
+            return MotionState(
+                gamma=gamma, q=q, cost=np.inf, excess=np.inf, lost=np.inf, outside=np.inf
+            )
         excess = self.rates.excess(np.diff(q, axis=0))
         if self.cap < np.inf:
             longest = path_cost(np.diff(q, axis=0), self.weight, self.metric, "max")
             excess = max(excess, longest / self.cap - 1)
-        return Stand(
+        return MotionState(
             gamma=gamma,
             q=q,
             cost=self.cost(q),
@@ -139,22 +141,22 @@ class Descent:
         dq = np.diff(q, axis=0)
         return path_cost(dq, self.weight, self.metric, self.objective, self.node_cost)
 
-    def admitted(self, at: Stand) -> tuple[Stand, int]:
+    def admitted(self, at: MotionState) -> tuple[MotionState, int]:
         """Return the first motion found that keeps every limit, and how many programs it took.
 
         Where none is found, the one that breaks them least.
         """
         return (at, 0) if at.admitted else self._run(at, "excess", enough=0.0)
 
-    def gentlest(self, at: Stand) -> Stand:
+    def gentlest(self, at: MotionState) -> MotionState:
         """Return the motion whose largest share of a limit is least."""
         return self._run(at, "excess")[0]
 
-    def eased(self, at: Stand) -> Stand:
+    def eased(self, at: MotionState) -> MotionState:
         """Return a motion of little cost that asks for little beyond the limits, here and there."""
         return self._run(at, "lost")[0]
 
-    def best(self, at: Stand) -> tuple[Stand, int]:
+    def best(self, at: MotionState) -> tuple[MotionState, int]:
         """Return the best motion found from an admissible one, and how many programs it took.
 
         For a maximum, of those with the same the one with the least sum.
@@ -166,7 +168,9 @@ class Descent:
             found, programs = self.stand(smooth.gamma, smooth.q), programs + more
         return found, programs
 
-    def _run(self, at: Stand, target: Target, enough: float = -np.inf) -> tuple[Stand, int]:
+    def _run(
+        self, at: MotionState, target: Target, enough: float = -np.inf
+    ) -> tuple[MotionState, int]:
         """Go down in steps of at most a radius, which grows and shrinks as the model proves."""
         radius, programs = self.radius, 0
         while radius > SMALLEST_RADIUS and programs < MOST_PROGRAMS:
@@ -184,7 +188,7 @@ class Descent:
                 radius = min(radius, step.longest) / 3
         return at, programs
 
-    def _step(self, at: Stand, radius: float, target: Target) -> _Step:
+    def _step(self, at: MotionState, radius: float, target: Target) -> _Step:
         """Solve the model, and again laid on where it led, until the true motion is admissible."""
         model, promised, longest = self._model(at, radius), 0.0, radius
         for programs in range(1, 2 + CORRECTIONS):
@@ -204,19 +208,19 @@ class Descent:
             model = replace(model, q=there.q - model.slope * delta[:, None])
         return _Step(None, promised, longest, programs)
 
-    def _modelled(self, model: Model, delta: Array, target: Target) -> float:
+    def _modelled(self, model: LinearModel, delta: Array, target: Target) -> float:
         q = model.q + model.slope * delta[:, None]
         dq = np.diff(q, axis=0)
         if target == "excess":
             return self.rates.excess(dq)
         return self.cost(q) + (PRICE * self.rates.lost(dq) if target == "lost" else 0.0)
 
-    def _model(self, at: Stand, radius: float) -> Model:
+    def _model(self, at: MotionState, radius: float) -> LinearModel:
         slope = self.curves.slope(at.gamma, at.q)
         # At the edge of reach a node stays where it is.
         movable = np.asarray(np.isfinite(slope).all(axis=1))
         endless = self.limits.endless
-        return Model(
+        return LinearModel(
             q=at.q,
             slope=np.where(movable[:, None], slope, 0.0),
             radius=np.where(movable, radius, 0.0),

@@ -15,12 +15,12 @@ import numpy as np
 from scipy import sparse
 
 from kerfpath._arrays import Array, Ints
-from kerfpath._told import told
-from kerfpath.refiner._rates import Rates
-from kerfpath.refiner._rows import Rows, Sparse, wide
+from kerfpath._repr import short_repr
+from kerfpath.refiner._rates import RateLimits
+from kerfpath.refiner._rows import ConstraintRows, Sparse, wide
 from kerfpath.search import Metric
 
-__all__ = ["MARGIN", "PRICE", "Model", "Target", "solve"]
+__all__ = ["MARGIN", "PRICE", "LinearModel", "Target", "solve"]
 
 Target = Literal["sum", "max", "excess", "lost"]
 """(14); (15); the largest share of the limits (5) and (6), whatever the distances; or (14) and, at
@@ -34,7 +34,7 @@ MARGIN = 1e-8
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class Model:
+class LinearModel:
     """The joints as linear functions of the change of gamma, and what they are held to.
 
     Parameters
@@ -68,13 +68,13 @@ class Model:
     metric: Metric
     cap: float
 
-    __repr__ = told
+    __repr__ = short_repr
 
 
-def solve(model: Model, rates: Rates, target: Target) -> Array | None:
+def solve(model: LinearModel, rates: RateLimits, target: Target) -> Array | None:
     """Return the best change of gamma (K,) rad by the linear model; None where there is none."""
     K = len(model.q)
-    rows = Rows(K)
+    rows = ConstraintRows(K)
     dq, D = np.diff(model.q, axis=0), _increments(model)
     beyond = None
     if target in ("excess", "lost"):
@@ -110,7 +110,7 @@ def _less(rows: Sparse, one: Sparse) -> Sparse:
     return wide(rows, one.shape[1]) - sparse.csr_array(np.ones((rows.shape[0], 1))) @ one
 
 
-def _increments(model: Model) -> Sparse:
+def _increments(model: LinearModel) -> Sparse:
     """Slopes ((K-1) n, K) of the increments, edge after edge."""
     K, n = model.q.shape
     slope, row = model.slope * model.radius[:, None], np.arange((K - 1) * n)
@@ -119,7 +119,9 @@ def _increments(model: Model) -> Sparse:
     return _matrix(values, np.tile(row, 2), column, (len(row), K))
 
 
-def _limits(rows: Rows, dq: Array, D: Sparse, rates: Rates, beyond: Sparse | None) -> None:
+def _limits(
+    rows: ConstraintRows, dq: Array, D: Sparse, rates: RateLimits, beyond: Sparse | None
+) -> None:
     """Hold (5) and (6), up to a share beyond them where that is unknown.
 
     One unknown for all, or one for each interval and then each node, none of these negative.
@@ -149,7 +151,7 @@ def _limits(rows: Rows, dq: Array, D: Sparse, rates: Rates, beyond: Sparse | Non
                 rows.hold(wide(sign * per_share, rows.variables) - spread, 1 - sign * share)
 
 
-def _ranges(rows: Rows, model: Model) -> None:
+def _ranges(rows: ConstraintRows, model: LinearModel) -> None:
     """Hold the ranges of joints and of couplings."""
     K, n = model.q.shape
     slope = model.slope * model.radius[:, None]
@@ -168,7 +170,7 @@ def _ranges(rows: Rows, model: Model) -> None:
         rows.at_most(-(model.q @ row), -both, -lower)
 
 
-def _cost(rows: Rows, dq: Array, D: Sparse, model: Model, minimax: bool) -> Array:
+def _cost(rows: ConstraintRows, dq: Array, D: Sparse, model: LinearModel, minimax: bool) -> Array:
     """Return the coefficients of what is minimised: the sum of the distances, or the largest."""
     lengths, constant = _lengths(rows, dq, D, model)
     if model.cap < np.inf:
@@ -180,7 +182,9 @@ def _cost(rows: Rows, dq: Array, D: Sparse, model: Model, minimax: bool) -> Arra
     return np.asarray(largest.sum(axis=0))
 
 
-def _lengths(rows: Rows, dq: Array, D: Sparse, model: Model) -> tuple[Sparse, Array]:
+def _lengths(
+    rows: ConstraintRows, dq: Array, D: Sparse, model: LinearModel
+) -> tuple[Sparse, Array]:
     """Return the distances rho from above, as lengths (K-1, any) @ x + constant (K-1,)."""
     edges, n = dq.shape
     value = (model.weight * dq).ravel()
@@ -212,7 +216,7 @@ def _lengths(rows: Rows, dq: Array, D: Sparse, model: Model) -> tuple[Sparse, Ar
     return length, np.zeros(edges)
 
 
-def _absolute(rows: Rows, value: Array, slope: Sparse, above: Sparse) -> None:
+def _absolute(rows: ConstraintRows, value: Array, slope: Sparse, above: Sparse) -> None:
     """Hold |value + slope x| <= above x."""
     rows.hold(wide(slope, rows.variables) - above, -value)
     rows.hold(-wide(slope, rows.variables) - above, value)

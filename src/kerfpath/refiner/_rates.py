@@ -7,14 +7,14 @@ from dataclasses import dataclass
 import numpy as np
 
 from kerfpath._arrays import Array, Ints
-from kerfpath._told import told
+from kerfpath._repr import short_repr
 from kerfpath.limits import Limits, meetings, rates_of
 
-__all__ = ["Rates"]
+__all__ = ["RateLimits"]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class Rates:
+class RateLimits:
     """What the motion is held to, in time.
 
     Parameters
@@ -31,7 +31,7 @@ class Rates:
     limits: Limits
     periodic: bool
 
-    __repr__ = told
+    __repr__ = short_repr
 
     @property
     def meetings(self) -> tuple[Ints, Ints]:

@@ -9,14 +9,14 @@ import numpy as np
 from scipy.interpolate import CubicSpline
 
 from kerfpath._arrays import Array, scalar
-from kerfpath._told import told
+from kerfpath._repr import short_repr
 from kerfpath.contour import Contour
 from kerfpath.errors import InputError
 from kerfpath.kernels.metric import turns_of, wrap
 from kerfpath.plans import Plan, Proof, path_cost
 from kerfpath.refiner._curves import JointCurves
-from kerfpath.refiner._descent import Descent, Stand
-from kerfpath.refiner._rates import Rates
+from kerfpath.refiner._descent import Descent, MotionState
+from kerfpath.refiner._rates import RateLimits
 from kerfpath.search import rotation_limits
 
 __all__ = ["Binding", "Refinement", "ease", "quicken", "refine"]
@@ -65,7 +65,7 @@ class Refinement:
     programs: int
     statement: str
 
-    __repr__ = told
+    __repr__ = short_repr
 
 
 def refine(
@@ -105,7 +105,7 @@ def refine(
         return _unrefined(plan, "the robot leaves no rotation free that could be refined")
     asked = replace(plan, settings=settings)
     if nodes is not None:
-        divided = _divided(asked, nodes)
+        divided = _divide_plan(asked, nodes)
         if isinstance(divided, str):
             return _unrefined(plan, divided)
         asked = divided
@@ -117,7 +117,7 @@ def refine(
     if not begun.admitted:
         return _unrefined(plan, _closest(descent, begun))
     found, programs = descent.best(begun)
-    refined = _moved(asked, found)
+    refined = _plan_with_motion(asked, found)
     broken = comfort and comfort.broken(plan.robot, refined.q, plan.T_flange_tip)
     if broken:
         return _unrefined(plan, f"off the grid it would break the {' and the '.join(broken)}")
@@ -126,7 +126,7 @@ def refine(
         grid_cost = plan.cost
     proof = Proof(
         optimal=plan.proof.optimal and start.admitted and refined.cost <= (grid_cost or 0.0),
-        statement=f"{plan.proof.statement}; {_done(plan, asked, start, refined.cost)}",
+        statement=f"{plan.proof.statement}; {_describe(plan, asked, start, refined.cost)}",
         grid_cost=grid_cost,
     )
     return Refinement(
@@ -145,7 +145,7 @@ def ease(plan: Plan) -> Plan:
     What every interval and every node asks for beyond them has a price; the rest is the cost.
     """
     descent, start = _descent(plan)
-    return _moved(plan, descent.eased(start))
+    return _plan_with_motion(plan, descent.eased(start))
 
 
 def quicken(plan: Plan) -> tuple[Plan, Binding]:
@@ -159,7 +159,7 @@ def quicken(plan: Plan) -> tuple[Plan, Binding]:
         found = descent.gentlest(start)
         fast, sharp = descent.rates.shares(np.diff(found.q, axis=0))
         shorter, binding = _binding(descent, fast, sharp)
-        plan = replace(_moved(plan, found), time=plan.time * shorter)
+        plan = replace(_plan_with_motion(plan, found), time=plan.time * shorter)
         if shorter > 1 - SAME_INTERVAL:
             break
     return plan, binding
@@ -175,7 +175,7 @@ def _binding(descent: Descent, fast: Array, sharp: Array) -> tuple[float, Bindin
     return acceleration, Binding(int(joint), int(descent.rates.meetings[1][change]), "acceleration")
 
 
-def _done(plan: Plan, asked: Plan, start: Stand, cost: float) -> str:
+def _describe(plan: Plan, asked: Plan, start: MotionState, cost: float) -> str:
     """Say what was done, and what it did to the cost."""
     parts = (len(asked.q) - 1) // (len(plan.q) - 1)
     what = "refined off the grid" if parts == 1 else f"held at {parts} parts of every interval"
@@ -195,12 +195,12 @@ def _unrefined(plan: Plan, why: str) -> Refinement:
     )
 
 
-def _descent(plan: Plan) -> tuple[Descent, Stand]:
+def _descent(plan: Plan) -> tuple[Descent, MotionState]:
     """Return the task of refining a plan, and where it stands."""
     settings, comfort = plan.settings, plan.settings.comfort
     descent = Descent(
         curves=JointCurves(plan.robot, plan.frames, plan.T_flange_tip, plan.posture),
-        rates=Rates(
+        rates=RateLimits(
             tau=np.diff(plan.time),
             limits=settings.limits(plan.robot),
             periodic=settings.closure == "periodic",
@@ -215,15 +215,15 @@ def _descent(plan: Plan) -> tuple[Descent, Stand]:
         node_cost=plan.node_cost,
         radius=FIRST_STEPS * settings.gamma_step,
     )
-    return descent, descent.stand(plan.gamma, _unwrapped(plan))
+    return descent, descent.stand(plan.gamma, _unwrap(plan))
 
 
-def _unwrapped(plan: Plan) -> Array:
+def _unwrap(plan: Plan) -> Array:
     """Return the joints (K, 6) with endless joints turned on, not wrapped."""
     return np.vstack([plan.q[:1], plan.q[:1] + np.cumsum(plan.increments, axis=0)])
 
 
-def _moved(plan: Plan, found: Stand) -> Plan:
+def _plan_with_motion(plan: Plan, found: MotionState) -> Plan:
     """Return the plan with the motion found, and what that costs at its own nodes."""
     turn = turns_of(found.q)
     turn[:, plan.robot.endless] = 0
@@ -238,7 +238,7 @@ def _moved(plan: Plan, found: Stand) -> Plan:
     return replace(moved, cost=path_cost(dq, s.weights, s.metric, s.objective, moved.node_cost))
 
 
-def _divided(plan: Plan, nodes: Contour) -> Plan | str:
+def _divide_plan(plan: Plan, nodes: Contour) -> Plan | str:
     """Return the plan on finer nodes, gamma a spline through its own; or why that cannot be."""
     K, parts = len(plan.contour), (len(nodes) - 1) // (len(plan.contour) - 1)
     if len(nodes) != (K - 1) * parts + 1:
@@ -266,9 +266,9 @@ def _divided(plan: Plan, nodes: Contour) -> Plan | str:
     if plan.tilt.any():
         return "the tilts hold at the plan's own nodes, not between them"
     if plan.feed is not None:
-        return "the times of a feed that dips hold at its own nodes, not between them"
+        return "the times of a reduced feed hold at its own nodes, not between them"
     gamma = CubicSpline(coarse, np.unwrap(plan.gamma + twist))(index)
-    near = np.stack([np.interp(index, coarse, q) for q in _unwrapped(plan).T], axis=1)
+    near = np.stack([np.interp(index, coarse, q) for q in _unwrap(plan).T], axis=1)
     return replace(
         plan,
         contour=nodes,
@@ -281,7 +281,7 @@ def _divided(plan: Plan, nodes: Contour) -> Plan | str:
     )
 
 
-def _closest(descent: Descent, at: Stand) -> str:
+def _closest(descent: Descent, at: MotionState) -> str:
     """Say which limit the motion that breaks them least still breaks, and where."""
     if at.outside == np.inf:
         return "the motion leaves the reach of its posture between the nodes"

@@ -10,13 +10,13 @@ from scipy import sparse
 
 from kerfpath._arrays import Array
 
-__all__ = ["Rows", "Sparse", "wide"]
+__all__ = ["ConstraintRows", "Sparse", "wide"]
 
 Sparse = Any  # scipy's stubs tell csr from csc and array from matrix, which nothing here needs
 SOLVED = (clarabel.SolverStatus.Solved, clarabel.SolverStatus.AlmostSolved)
 
 
-class Rows:
+class ConstraintRows:
     """The constraints of a program whose first `boxed` unknowns lie in [-1, 1]."""
 
     def __init__(self, boxed: int) -> None:

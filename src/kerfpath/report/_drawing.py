@@ -11,7 +11,7 @@ import plotly.graph_objects as go
 from numpy.typing import ArrayLike
 
 from kerfpath._arrays import Array, floats
-from kerfpath._told import told
+from kerfpath._repr import short_repr
 from kerfpath.report._html import Figures, header, page
 from kerfpath.report._look import ACCENT, ALERT, FAINT, JOINT_COLOURS, base_layout
 from kerfpath.report._scene import add_part, checked, space_axis, xyz
@@ -50,7 +50,7 @@ class DrawnLoop:
     fault: bool = False
     aside: bool = False
 
-    __repr__ = told
+    __repr__ = short_repr
 
 
 def render_drawing(

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from html import escape
 
-from kerfpath._told import told
+from kerfpath._repr import short_repr
 from kerfpath.errors import InputError
 from kerfpath.report._tables import shown_unit
 
@@ -39,7 +39,7 @@ class FrontAxis:
     unit: str
     sense: float
 
-    __repr__ = told
+    __repr__ = short_repr
 
     def __post_init__(self) -> None:
         """Require a known sense."""
@@ -85,4 +85,4 @@ class FrontPlan:
     values: tuple[float, ...]
     asked: tuple[tuple[str, str], ...]
 
-    __repr__ = told
+    __repr__ = short_repr

@@ -10,7 +10,7 @@ from typing import NamedTuple
 import numpy as np
 
 from kerfpath._arrays import Array
-from kerfpath._told import told
+from kerfpath._repr import short_repr
 from kerfpath.auditor import Check
 from kerfpath.contour import Contour
 from kerfpath.errors import InputError
@@ -19,13 +19,13 @@ from kerfpath.losses import Loss, Reason
 from kerfpath.planner import ClearanceMap
 from kerfpath.plans import Plan
 
-__all__ = ["SPARE", "ContourSection", "Mark", "with_clearance"]
+__all__ = ["SPARE", "ContourSection", "Mark", "add_clearance"]
 
 SPARE = (0.25, 0.5, 1.0)
 """Shares of the band of a clearance map up to which clearances have colours of their own."""
 
 
-def with_clearance(graph: LayeredGraph, found: ClearanceMap) -> LayeredGraph:
+def add_clearance(graph: LayeredGraph, found: ClearanceMap) -> LayeredGraph:
     """Return the graph with the clearances of its candidates among the reasons.
 
     A candidate that is not clear has the reason collision, one whose clearance is less than the
@@ -96,7 +96,7 @@ class ContourSection:
     clearance: ClearanceMap | None = None
     sampling: Sequence[tuple[str, str]] = ()
 
-    __repr__ = told
+    __repr__ = short_repr
 
     def __post_init__(self) -> None:
         nodes = {"graph": len(self.graph.reason), "path": len(self.path)}
@@ -117,7 +117,7 @@ class ContourSection:
     @property
     def mapped(self) -> LayeredGraph:
         """The graph, with the clearance of its vertices among the reasons where it is known."""
-        return self.graph if self.clearance is None else with_clearance(self.graph, self.clearance)
+        return self.graph if self.clearance is None else add_clearance(self.graph, self.clearance)
 
     @property
     def failed(self) -> bool:

@@ -50,7 +50,7 @@ def level(robot: Manipulator) -> tuple[Array, float]:
     """
     row = np.zeros(robot.joints)
     row[1:3] = robot.sign[1:3]
-    shift = float(_turned(-robot.offset[1]) + _turned(-robot.offset[2] - np.pi / 2))
+    shift = float(_wrap_offsets(-robot.offset[1]) + _wrap_offsets(-robot.offset[2] - np.pi / 2))
     way = -1.0 if robot.manufacturer in UPWARDS else 1.0
     return way * row, way * shift
 
@@ -77,10 +77,10 @@ def with_axis_3(robot: A, axis_3: str = "", limits: ArrayLike | None = None) -> 
         return _given(robot, axis_3, limits)
     if limits is not None:
         raise InputError('axis_3_limits=: expected them with axis_3="horizontal", got no axis_3=')
-    return _looked_up(robot)
+    return _look_up_axis_3(robot)
 
 
-def _looked_up(robot: A) -> A:
+def _look_up_axis_3(robot: A) -> A:
     """Return the robot with what the library knows of axis 3 of an arm with its lengths.
 
     Unchanged where no arm of its maker has them, or where those that have them do not agree.
@@ -98,7 +98,7 @@ def _looked_up(robot: A) -> A:
     counted = twins[0].axis_3
     bounds = [_carried_over(c, twin, robot) for twin in twins for c in twin.couplings]
     notes = [f"Axis 3 of the controller is {counted}, as the arm has the lengths of {names}."]
-    turned = float(np.degrees(_turned(robot.offset[5] - twins[0].offset[5])))
+    turned = float(np.degrees(_wrap_offsets(robot.offset[5] - twins[0].offset[5])))
     if round(turned, 3):
         notes.append(
             f"Its tip is turned by {turned:.3f} deg about axis 6 against the flange of "
@@ -115,7 +115,7 @@ def _given(robot: A, axis_3: str, limits: ArrayLike | None) -> A:
             f"axis_3: expected {' or '.join(map(repr, counted))}, as controllers by "
             f"{robot.manufacturer or 'any maker'} count, got {axis_3!r}"
         )
-    found = _looked_up(robot)
+    found = _look_up_axis_3(robot)
     if found.axis_3 not in ("", axis_3):
         raise InputError(
             f"axis_3: expected {found.axis_3!r}, got {axis_3!r}. {found.notes[len(robot.notes)]}"
@@ -152,7 +152,7 @@ def _given(robot: A, axis_3: str, limits: ArrayLike | None) -> A:
 def _carried_over(coupling: Coupling, twin: Manipulator, robot: Manipulator) -> Coupling:
     """Return a bound of a twin in the joints of a robot, which may count them otherwise."""
     row = coupling.row * twin.sign * robot.sign
-    shift = float(coupling.row @ (twin.sign * _turned(twin.offset - robot.offset)))
+    shift = float(coupling.row @ (twin.sign * _wrap_offsets(twin.offset - robot.offset)))
     return Coupling(
         row=row, lower=coupling.lower - shift, upper=coupling.upper - shift, note=coupling.note
     )
@@ -169,7 +169,7 @@ def _tightest(bounds: list[Coupling]) -> tuple[Coupling, ...]:
     return tuple(rows.values())
 
 
-def _turned(angle: ArrayLike) -> Array:
+def _wrap_offsets(angle: ArrayLike) -> Array:
     """Return angles within half a turn: a description has its zero there of what is meant."""
     angle = np.asarray(angle, dtype=float)
     return np.asarray(angle - 2 * np.pi * np.round(angle / (2 * np.pi)))

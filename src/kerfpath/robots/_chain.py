@@ -9,14 +9,14 @@ import numpy as np
 
 from kerfpath.errors import InputError
 from kerfpath.robots._robot import Robot
-from kerfpath.urdf import Chain, turns
+from kerfpath.urdf import KinematicChain, turns
 
 __all__ = ["chain_of", "model_chain"]
 
 X, Y, Z = np.eye(3)
 
 
-def chain_of(robot: Robot) -> Chain:
+def chain_of(robot: Robot) -> KinematicChain:
     """Return the joint frames of a robot; their end is its flange.
 
     Raises
@@ -32,7 +32,7 @@ def chain_of(robot: Robot) -> Chain:
     return model_chain(robot) if robot.chain is None else robot.chain
 
 
-def model_chain(robot: Robot) -> Chain:
+def model_chain(robot: Robot) -> KinematicChain:
     """Return the joint frames of the model of its family, whatever its description says."""
     if robot.kinematics not in _MODELS:
         raise InputError(
@@ -44,14 +44,14 @@ def model_chain(robot: Robot) -> Chain:
     back = [turns(axis, -robot.offset[i : i + 1])[0] for i, axis in enumerate(model.axes)]
     origins = model.origins @ np.array(back)
     origins[0] = robot.T_base_foot @ origins[0]
-    return Chain(
+    return KinematicChain(
         origins=origins,
         axes=robot.sign[:, None] * model.axes,
         end=model.end @ robot.T_end_flange,
     )
 
 
-def _opw(g: Mapping[str, float]) -> Chain:
+def _opw(g: Mapping[str, float]) -> KinematicChain:
     """Return the chain of an OPW arm (Brandstoetter, Angerer and Hofbaur 2014, figure 1).
 
     Shoulder at (a1, b, c1), elbow c2 above it, wrist centre at (a2, 0, c3) from the elbow, flange
@@ -62,22 +62,24 @@ def _opw(g: Mapping[str, float]) -> Chain:
     origins[2, 2, 3] = g["c2"]
     origins[3, :3, 3] = g["a2"], 0.0, g["c3"]
     end[2, 3] = g["c4"]
-    return Chain(origins=origins, axes=np.array([Z, Y, Y, Z, Y, Z]), end=end)
+    return KinematicChain(origins=origins, axes=np.array([Z, Y, Y, Z, Y, Z]), end=end)
 
 
-def _five(g: Mapping[str, float]) -> Chain:
+def _five(g: Mapping[str, float]) -> KinematicChain:
     """Return the chain of an OPW arm without axis 6."""
     whole = _opw(g)
     return replace(whole, origins=whole.origins[:5], axes=whole.axes[:5])
 
 
-def _ur(g: Mapping[str, float]) -> Chain:
+def _ur(g: Mapping[str, float]) -> KinematicChain:
     """Return the chain of a UR arm: its Denavit-Hartenberg frames, alpha = 90, 0, 0, 90, -90, 0."""
     d = (g["d1"], 0.0, 0.0, g["d4"], g["d5"], g["d6"])
     a = (0.0, g["a2"], g["a3"], 0.0, 0.0, 0.0)
     after = turns(X, np.radians([90.0, 0.0, 0.0, 90.0, -90.0, 0.0]))
     after[:, 0, 3], after[:, 2, 3] = a, d
-    return Chain(origins=np.array([np.eye(4), *after[:5]]), axes=np.tile(Z, (6, 1)), end=after[5])
+    return KinematicChain(
+        origins=np.array([np.eye(4), *after[:5]]), axes=np.tile(Z, (6, 1)), end=after[5]
+    )
 
 
 _MODELS = {"opw": _opw, "ur": _ur, "five": _five}

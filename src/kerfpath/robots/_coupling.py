@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from kerfpath._arrays import Array, floats
-from kerfpath._told import told
+from kerfpath._repr import short_repr
 from kerfpath.errors import InputError
 
 __all__ = ["AXIS_3", "Coupling"]
@@ -35,7 +35,7 @@ class Coupling:
     upper: float
     note: str = ""
 
-    __repr__ = told
+    __repr__ = short_repr
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "row", floats(self.row, "coupling row", (None,)))

@@ -15,7 +15,7 @@ from kerfpath.errors import InputError
 from kerfpath.robots._axis_three import with_axis_3
 from kerfpath.robots._manipulator import Manipulator
 from kerfpath.robots._recognise import in_closed_form, recognise
-from kerfpath.urdf import Chain, Description, read_urdf
+from kerfpath.urdf import Description, KinematicChain, read_urdf
 
 __all__ = ["build_robot", "read_description"]
 
@@ -70,12 +70,12 @@ def read_description(
     )
 
 
-def _alike(one: Chain, two: Chain) -> bool:
+def _alike(one: KinematicChain, two: KinematicChain) -> bool:
     """Return whether two chains have the same frames."""
     return np.array_equal(one.origins, two.origins) and np.array_equal(one.end, two.end)
 
 
-def _moved(found: Description, meant: Chain) -> tuple[float, float]:
+def _moved(found: Description, meant: KinematicChain) -> tuple[float, float]:
     """Return how far rounding moves the tip, m, and turns it, rad, over random joint vectors."""
     q = np.random.default_rng(1571).uniform(-np.pi, np.pi, (POSES, 6))
     here, there = found.chain.forward(q), meant.forward(q)

@@ -9,7 +9,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from kerfpath._arrays import Array, floats, freeze, scalar
-from kerfpath._told import told
+from kerfpath._repr import short_repr
 from kerfpath.errors import InputError
 
 __all__ = ["ExternalAxis", "Travel"]
@@ -57,7 +57,7 @@ class ExternalAxis:
     point: Array
     step: float
 
-    __repr__ = told
+    __repr__ = short_repr
 
     def __post_init__(self) -> None:
         axis = floats(self.axis, f"{self.kind} axis", (3,))

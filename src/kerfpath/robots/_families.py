@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from kerfpath._arrays import Array
-from kerfpath._told import told
+from kerfpath._repr import short_repr
 from kerfpath.errors import InputError
 from kerfpath.kernels import five, kinematics, ur
 from kerfpath.robots import _general
@@ -73,12 +73,12 @@ class Family:
     poses_at_once: int = 100_000
     free_rotation: bool = True
 
-    __repr__ = told
+    __repr__ = short_repr
 
 
-def _without_sixth(*, sign: Array, offset: Array, **lengths: float) -> kinematics.Arm:
+def _without_sixth(*, sign: Array, offset: Array, **lengths: float) -> kinematics.OpwArm:
     """Return the OPW arm whose sixth angle is held at zero."""
-    return kinematics.Arm(**lengths, sign=np.append(sign, 1.0), offset=np.append(offset, 0.0))
+    return kinematics.OpwArm(**lengths, sign=np.append(sign, 1.0), offset=np.append(offset, 0.0))
 
 
 FAMILIES = {
@@ -90,7 +90,7 @@ FAMILIES = {
             joints=6,
             lengths=("a1", "a2", "b", "c1", "c2", "c3", "c4"),
             postures=EIGHT,
-            model=kinematics.Arm,
+            model=kinematics.OpwArm,
             forward_all=kinematics.forward_all,
             inverse_all=kinematics.inverse_all,
             inverse_nodes=kinematics.inverse_nodes,
@@ -101,7 +101,7 @@ FAMILIES = {
             joints=6,
             lengths=("d1", "a2", "a3", "d4", "d5", "d6"),
             postures=EIGHT,
-            model=ur.Arm,
+            model=ur.UrArm,
             forward_all=ur.forward_all,
             inverse_all=ur.inverse_all,
         ),

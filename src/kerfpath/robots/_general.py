@@ -15,8 +15,8 @@ import numpy as np
 from kerfpath._arrays import Array, Bools
 from kerfpath.errors import InputError
 from kerfpath.kernels import general
-from kerfpath.robots._ssik import Prepared, prepare, solve
-from kerfpath.urdf import Chain
+from kerfpath.robots._ssik import SsikArm, prepare, solve
+from kerfpath.urdf import KinematicChain
 
 __all__ = ["follow_all", "forward_all", "inverse_all", "model", "require_solver"]
 
@@ -38,7 +38,7 @@ def require_solver() -> None:
         )
 
 
-def model(*, chain: Chain | None, sign: Array, offset: Array) -> general.Arm:
+def model(*, chain: KinematicChain | None, sign: Array, offset: Array) -> general.GeneralArm:
     """Return the axes of a chain at angle zero.
 
     Raises
@@ -62,10 +62,10 @@ def model(*, chain: Chain | None, sign: Array, offset: Array) -> general.Arm:
         if np.linalg.norm(normal) > PARALLEL:
             gap = np.cross(along[i - 1], gap) @ normal / (normal @ normal) * along[i]
         place[i] += (gap @ along[i]) * along[i]
-    return general.Arm(place=place, along=along, tip=T[-1] @ chain.end)
+    return general.GeneralArm(place=place, along=along, tip=T[-1] @ chain.end)
 
 
-def inverse_all(arm: general.Arm, T: Array, out_q: Array, out_reach: Bools) -> None:
+def inverse_all(arm: general.GeneralArm, T: Array, out_q: Array, out_reach: Bools) -> None:
     """Fill all solutions (B, 16, 6) of tip poses (B, 4, 4), each within `EXACT` of its pose.
 
     Raises
@@ -76,17 +76,19 @@ def inverse_all(arm: general.Arm, T: Array, out_q: Array, out_reach: Bools) -> N
     _solve(arm, _prepared(arm), T, out_q, out_reach)
 
 
-def _solve(arm: general.Arm, ready: Prepared, T: Array, out_q: Array, out_reach: Bools) -> None:
+def _solve(
+    arm: general.GeneralArm, ready: SsikArm, T: Array, out_q: Array, out_reach: Bools
+) -> None:
     end = _end(arm)
     q, pose = solve(ready, T @ np.linalg.inv(arm.tip) @ end)
     general.sort_in(arm, T, q, pose, out_q, out_reach)
 
 
-_ready: dict[bytes, Prepared] = {}
+_ready: dict[bytes, SsikArm] = {}
 _preparing = Lock()
 
 
-def _prepared(arm: general.Arm) -> Prepared:
+def _prepared(arm: general.GeneralArm) -> SsikArm:
     """Return the arm as the solver has it; what it prepares is made once and tried."""
     key = b"".join(part.tobytes() for part in arm)
     with _preparing:
@@ -101,7 +103,7 @@ def _prepared(arm: general.Arm) -> Prepared:
         return _ready[key]
 
 
-def _end(arm: general.Arm) -> Array:
+def _end(arm: general.GeneralArm) -> Array:
     """Return an end at zero whose origin and z-axis are the sixth joint's: no length behind it."""
     z = arm.along[5]
     x = np.eye(3)[np.argmin(np.abs(z))]
@@ -112,7 +114,7 @@ def _end(arm: general.Arm) -> Array:
     return end
 
 
-def _require_solved(arm: general.Arm, ready: Prepared) -> None:
+def _require_solved(arm: general.GeneralArm, ready: SsikArm) -> None:
     """Raise InputError unless joint vectors of all kinds are found again from their poses."""
     want = np.random.default_rng(1986).uniform(-np.pi, np.pi, (TRIED, 6))
     T, q = np.empty((TRIED, 4, 4)), np.empty((TRIED, general.POSTURES, 6))

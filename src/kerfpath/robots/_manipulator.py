@@ -16,7 +16,7 @@ from kerfpath.robots._coupling import AXIS_3, Coupling
 from kerfpath.robots._external import ExternalAxis
 from kerfpath.robots._families import FAMILIES, Family
 from kerfpath.robots._solutions import Solutions, all_solutions, solutions_within
-from kerfpath.urdf import Body, Chain
+from kerfpath.urdf import KinematicChain, LinkBody
 
 __all__ = ["Manipulator"]
 
@@ -39,8 +39,8 @@ class Manipulator:
     endless: Bools = field(default_factory=lambda: np.zeros((), bool))
     couplings: tuple[Coupling, ...] = ()
     axis_3: str = ""
-    chain: Chain | None = None
-    bodies: tuple[Body, ...] = ()
+    chain: KinematicChain | None = None
+    bodies: tuple[LinkBody, ...] = ()
     external: ExternalAxis | None = None
     manufacturer: str = ""
     model: str = ""

@@ -18,7 +18,7 @@ from kerfpath.errors import InputError
 from kerfpath.robots._families import FAMILIES
 from kerfpath.robots._general import require_solver
 from kerfpath.robots._manipulator import Manipulator
-from kerfpath.urdf import Chain
+from kerfpath.urdf import KinematicChain
 
 __all__ = ["EXACT", "in_closed_form", "recognise"]
 
@@ -72,22 +72,22 @@ class _Lines:
         return ""
 
 
-def in_closed_form(chain: Chain) -> bool:
+def in_closed_form(chain: KinematicChain) -> bool:
     """Return whether a chain of six joints is of a family with a closed form."""
     lines = _lines(chain)
     return any(
         not isinstance(derived := derive(lines), str)
-        and _miss(chain, _laid(name, lines, *derived)) <= EXACT
+        and _miss(chain, _fit_end(name, lines, *derived)) <= EXACT
         for name, derive in DERIVED
     )
 
 
-def recognise(chain: Chain, *, as_written: bool = False) -> Manipulator:
+def recognise(chain: KinematicChain, *, as_written: bool = False) -> Manipulator:
     """Return family, geometry, joint convention and frames of a chain.
 
     Parameters
     ----------
-    chain : Chain
+    chain : KinematicChain
     as_written : bool
         Take for a general arm what misses a closed form by few digits.
 
@@ -108,7 +108,7 @@ def recognise(chain: Chain, *, as_written: bool = False) -> Manipulator:
         if isinstance(derived, str):
             misfits.append(f"not an {words}, as {derived}")
             continue
-        model = _laid(name, lines, *derived)
+        model = _fit_end(name, lines, *derived)
         miss = _miss(chain, model)
         if miss <= EXACT:
             return model
@@ -127,7 +127,7 @@ def recognise(chain: Chain, *, as_written: bool = False) -> Manipulator:
     return Manipulator(id="", kinematics="general", geometry={}, notes=notes, chain=chain)
 
 
-def _lines(chain: Chain) -> _Lines:
+def _lines(chain: KinematicChain) -> _Lines:
     T = chain.frames(np.zeros((1, 6)))[0, 1:]
     along = np.einsum("nij,nj->ni", T[:, :3, :3], chain.axes)
     place = T[:, :3, 3]
@@ -233,7 +233,7 @@ def _turned(direction: Array, *wanted: Callable[[Array], float]) -> tuple[Array,
     return sign * direction, sign
 
 
-def _laid(
+def _fit_end(
     family: str, at: _Lines, lengths: dict[str, float], signs: list[float], zero: list[float]
 ) -> Manipulator:
     """Return the model with joint 6 and the end turned onto the tip."""
@@ -254,7 +254,7 @@ def _laid(
     return replace(model, T_end_flange=_tidy(left))
 
 
-def _miss(chain: Chain, model: Manipulator) -> float:
+def _miss(chain: KinematicChain, model: Manipulator) -> float:
     """Return the largest entry by which the model's poses differ from the chain's."""
     q = np.random.default_rng(2008).uniform(-np.pi, np.pi, (POSES, 6))
     return float(np.abs(model.forward(q) - chain.forward(q)).max())

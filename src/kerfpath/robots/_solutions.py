@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from kerfpath._arrays import Array, Bools, Ints, freeze
-from kerfpath._told import told
+from kerfpath._repr import short_repr
 from kerfpath.kernels import turns
 
 __all__ = ["Solutions", "all_solutions", "solutions_within"]
@@ -34,7 +34,7 @@ class Solutions:
     posture: Ints
     turn: Ints
 
-    __repr__ = told
+    __repr__ = short_repr
 
     def __len__(self) -> int:
         return len(self.q)

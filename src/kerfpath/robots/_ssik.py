@@ -16,7 +16,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["Prepared", "prepare", "solve"]
+__all__ = ["SsikArm", "prepare", "solve"]
 
 Array = NDArray[np.float64]
 
@@ -25,7 +25,7 @@ A_PROCESS = 4000
 """Poses worth a process: some two seconds of work against half a second to start it."""
 
 
-class Prepared(NamedTuple):
+class SsikArm(NamedTuple):
     """An arm as ssik takes it: its joint frames at angle zero, and an elimination done once."""
 
     trafos: Array
@@ -36,17 +36,17 @@ class Prepared(NamedTuple):
     """Of an arm without intersecting or parallel axes that would spare it."""
 
 
-def prepare(trafos: Array, axes: Array) -> Prepared:
+def prepare(trafos: Array, axes: Array) -> SsikArm:
     """Prepare an arm: seconds to minutes of algebra, which ssik keeps in the user's cache."""
     from ssik import Manipulator
     from ssik._native import native_available, rr_native_geometry
 
     arm = Manipulator.from_transforms(trafos, axes)
     eliminated = arm.solver_name == GENERAL and native_available()
-    return Prepared(trafos, axes, rr_native_geometry(arm.kinbody) if eliminated else None)
+    return SsikArm(trafos, axes, rr_native_geometry(arm.kinbody) if eliminated else None)
 
 
-def solve(arm: Prepared, T: Array) -> tuple[Array, NDArray[np.int64]]:
+def solve(arm: SsikArm, T: Array) -> tuple[Array, NDArray[np.int64]]:
     """Return candidates (N, 6) rad for poses T (B, 4, 4) of the end, and the pose of each (N,)."""
     if len(T) < A_PROCESS:
         return _solve(arm, T)
@@ -60,7 +60,7 @@ def solve(arm: Prepared, T: Array) -> tuple[Array, NDArray[np.int64]]:
     return q, pose
 
 
-def _solve(arm: Prepared, T: Array) -> tuple[Array, NDArray[np.int64]]:
+def _solve(arm: SsikArm, T: Array) -> tuple[Array, NDArray[np.int64]]:
     from ssik import Manipulator
     from ssik._native import try_native_solve
 
@@ -86,4 +86,4 @@ def _solve(arm: Prepared, T: Array) -> tuple[Array, NDArray[np.int64]]:
 
 if __name__ == "__main__":
     *known, poses = pickle.load(sys.stdin.buffer)
-    sys.stdout.buffer.write(pickle.dumps(_solve(Prepared(*known), poses)))
+    sys.stdout.buffer.write(pickle.dumps(_solve(SsikArm(*known), poses)))

@@ -1,7 +1,7 @@
 """The best path through a layered graph: each search takes a `SearchProblem`."""
 
+from kerfpath.search._clear import CheckedEdges as CheckedEdges
 from kerfpath.search._clear import FoundPath as FoundPath
-from kerfpath.search._clear import Known as Known
 from kerfpath.search._clear import find_clear as find_clear
 from kerfpath.search._fastest import LeastInterval as LeastInterval
 from kerfpath.search._fastest import find_least_interval as find_least_interval

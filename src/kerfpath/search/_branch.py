@@ -18,22 +18,22 @@ from kerfpath._arrays import Array, Bools, Ints
 from kerfpath.kernels.limits import LIMIT_TOLERANCE, acceleration_excess
 from kerfpath.kernels.metric import increments, increments_between
 from kerfpath.kernels.search import Aim, SortedLayers
-from kerfpath.search._exact import NO_SEAM, Best, Dead, best_allowed, best_path, dead_end
+from kerfpath.search._exact import NO_SEAM, BestPath, NoPathProof, best_allowed, best_path, dead_end
 
-__all__ = ["best_closed_path", "best_from_its_start"]
+__all__ = ["best_closed_path", "best_near_start"]
 
 
-def best_closed_path(layers: SortedLayers, aim: Aim) -> Best | Dead:
+def best_closed_path(layers: SortedLayers, aim: Aim) -> BestPath | NoPathProof:
     """Return the best path that returns to the vertex it left, with (6) across the seam."""
     if len(layers.start) == 2:
         return best_path(layers, aim)
     free = np.full(len(layers.endless), np.inf)
-    return best_from_its_start(layers, aim, free, closed=True) or dead_end(layers, aim)
+    return best_near_start(layers, aim, free, closed=True) or dead_end(layers, aim)
 
 
-def best_from_its_start(
+def best_near_start(
     layers: SortedLayers, aim: Aim, rotation: Array, *, closed: bool
-) -> Best | None:
+) -> BestPath | None:
     """Return the best path that keeps its distance (n,) rad from its start, K >= 2; None if none.
 
     If `closed`, it returns to the vertex it left, and (6) holds across the seam.
@@ -41,7 +41,7 @@ def best_from_its_start(
     twin = _twins(layers) if closed else None
     within = _Starts(layers=layers, aim=aim, rotation=rotation, twin=twin)
     count = itertools.count()
-    queue: list[tuple[float, float, int, Best, Ints, Ints]] = []
+    queue: list[tuple[float, float, int, BestPath, Ints, Ints]] = []
     every = np.arange(layers.start[1]), np.arange(layers.start[1], layers.start[2])
     parts, floor = [every], 0.0
     while True:
@@ -80,7 +80,7 @@ class _Starts:
     rotation: Array
     twin: Ints | None
 
-    def relaxed(self, starts: Ints, firsts: Ints, floor: float) -> Best | None:
+    def relaxed(self, starts: Ints, firsts: Ints, floor: float) -> BestPath | None:
         """Return the best path of a relaxation; one start and one first edge leave nothing open."""
         start = self.layers.start
         allowed = self.near(starts)

@@ -25,7 +25,7 @@ from kerfpath.search._problem import SearchProblem, offsets
 from kerfpath.search._shortest import LayeredPath
 from kerfpath.search._slowed import SlowedPath
 
-__all__ = ["FoundPath", "Known", "find_clear"]
+__all__ = ["CheckedEdges", "FoundPath", "find_clear"]
 
 Price = Callable[[Ints], Array]
 Passable = Callable[[Ints, Ints], Bools]
@@ -41,7 +41,7 @@ WIDEST = 16
 """Rings around a closed edge that are looked at, at most."""
 
 
-class Known:
+class CheckedEdges:
     """What has been found out about a graph, for one search after another.
 
     Parameters
@@ -253,10 +253,12 @@ class Known:
         message = f"no admissible way to node {there} that is clear; forbidden by {reasons}"
         if elsewhere in ways:
             message = f"{broken}, {elsewhere}: {ways[elsewhere]}"
-        return broken.retold(message, counts)
+        return broken.with_message(message, counts)
 
 
-def find_clear(search: Callable[[SearchProblem], _P], problem: SearchProblem, known: Known) -> _P:
+def find_clear(
+    search: Callable[[SearchProblem], _P], problem: SearchProblem, known: CheckedEdges
+) -> _P:
     """Return the best path of a search through open vertices and passable edges alone, exactly.
 
     Parameters
@@ -264,7 +266,7 @@ def find_clear(search: Callable[[SearchProblem], _P], problem: SearchProblem, kn
     search : callable
         `find_shortest`, `find_slowed`, `find_interrupted` or `find_least_interval`.
     problem : SearchProblem
-    known : Known
+    known : CheckedEdges
         What is known of its graph; it learns more.
 
     Raises

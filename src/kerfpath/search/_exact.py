@@ -7,15 +7,15 @@ from dataclasses import dataclass
 import numpy as np
 
 from kerfpath._arrays import Array, Bools, Ints
-from kerfpath._told import told
+from kerfpath._repr import short_repr
 from kerfpath.kernels import exact, to_go
 from kerfpath.kernels.search import Aim, SortedLayers
 from kerfpath.kernels.states import EVERY
 
 __all__ = [
     "NO_SEAM",
-    "Best",
-    "Dead",
+    "BestPath",
+    "NoPathProof",
     "best_allowed",
     "best_path",
     "dead_end",
@@ -39,7 +39,7 @@ NO_SEAM = np.empty(0)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class Dead:
+class NoPathProof:
     """Proof that no admissible path exists: how far any goes, and what forbids to go on.
 
     Parameters
@@ -60,11 +60,11 @@ class Dead:
     shut: int
     reached: Ints
 
-    __repr__ = told
+    __repr__ = short_repr
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class Best:
+class BestPath:
     """A best path.
 
     Parameters
@@ -81,16 +81,16 @@ class Best:
     cost: float
     total: float
 
-    __repr__ = told
+    __repr__ = short_repr
 
 
-def best_path(layers: SortedLayers, aim: Aim) -> Best | Dead:
+def best_path(layers: SortedLayers, aim: Aim) -> BestPath | NoPathProof:
     """Return the best path, or how far any goes."""
     every = np.ones(len(layers.low), np.bool_)
     return best_allowed(layers, aim, every, NO_SEAM, 0.0) or dead_end(layers, aim)
 
 
-def quickest_path(layers: SortedLayers, aim: Aim, ceiling: float) -> Best | None:
+def quickest_path(layers: SortedLayers, aim: Aim, ceiling: float) -> BestPath | None:
     """Return the path of least node interval, if that is `ceiling` or less (a timed objective)."""
     every = np.ones(len(layers.low), np.bool_)
     found = _grow(layers, aim, every, NO_SEAM, 0.0, ceiling)
@@ -98,12 +98,12 @@ def quickest_path(layers: SortedLayers, aim: Aim, ceiling: float) -> Best | None
     # ceiling may have been left out.
     if found is None or found[1] > ceiling:
         return None
-    return Best(path=found[0], cost=found[1], total=found[1])
+    return BestPath(path=found[0], cost=found[1], total=found[1])
 
 
 def best_allowed(
     layers: SortedLayers, aim: Aim, allowed: Bools, seam: Array, floor: float
-) -> Best | None:
+) -> BestPath | None:
     """Return the best path through allowed vertices, (6) across a seam kept; None if there is none.
 
     Of several with the same maximum, the one with the least sum. `floor` is a cost that none is
@@ -113,12 +113,12 @@ def best_allowed(
     if found is None:
         return None
     if not aim.minimax:
-        return Best(path=found[0], cost=found[1], total=found[1])
+        return BestPath(path=found[0], cost=found[1], total=found[1])
     cap = found[1]
     least_sum = aim._replace(minimax=False, cap=cap)
     again = _grow(layers, least_sum, allowed & (layers.cost <= cap), seam, 0.0)
     assert again is not None, "the path that gave the cap keeps it"
-    return Best(path=again[0], cost=cap, total=again[1])
+    return BestPath(path=again[0], cost=cap, total=again[1])
 
 
 def _grow(
@@ -161,24 +161,24 @@ def _grow(
     return path, float(reached.cost)
 
 
-def dead_end(layers: SortedLayers, aim: Aim) -> Dead:
+def dead_end(layers: SortedLayers, aim: Aim) -> NoPathProof:
     """Go as far as any admissible path goes, and count what forbids to go on."""
-    reached = _as_far_as_any(layers, aim)
+    reached = _reach_farthest(layers, aim)
     K, n = len(layers.start) - 1, len(layers.endless)
     ends = np.unique(reached.last.vertex)
     if reached.layers in (0, K):
         none = np.zeros((2, n), np.int64)
-        return Dead(layers=reached.layers, counts=none, shut=0, reached=ends)
+        return NoPathProof(layers=reached.layers, counts=none, shut=0, reached=ends)
     counts, shut = exact.count_closing(layers, aim, reached.last, reached.layers)
-    return Dead(layers=reached.layers, counts=counts, shut=int(shut), reached=ends)
+    return NoPathProof(layers=reached.layers, counts=counts, shut=int(shut), reached=ends)
 
 
 def layers_reached(layers: SortedLayers, aim: Aim) -> int:
     """Return the number of layers that some admissible path reaches."""
-    return int(_as_far_as_any(layers, aim).layers)
+    return int(_reach_farthest(layers, aim).layers)
 
 
-def _as_far_as_any(layers: SortedLayers, aim: Aim) -> exact.Reached:
+def _reach_farthest(layers: SortedLayers, aim: Aim) -> exact.RecursionResult:
     """Go as far as any admissible path goes, whatever it costs."""
     free = np.zeros(len(layers.low))
     return exact.recursion(layers, aim, free, np.inf, NO_SEAM, 0, EVERY)

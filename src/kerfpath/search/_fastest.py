@@ -8,7 +8,7 @@ from typing import Literal
 import numpy as np
 
 from kerfpath._arrays import Array, Bools, Ints, freeze
-from kerfpath._told import told
+from kerfpath._repr import short_repr
 from kerfpath.errors import InputError
 from kerfpath.kernels.metric import CHEBYCHEV, increments, increments_between
 from kerfpath.kernels.search import Aim
@@ -45,7 +45,7 @@ class LeastInterval:
     node: int
     limit: Literal["velocity", "acceleration"]
 
-    __repr__ = told
+    __repr__ = short_repr
 
 
 def find_least_interval(problem: SearchProblem) -> LeastInterval:

@@ -15,19 +15,19 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from kerfpath._arrays import Array, Bools, Ints, floats, freeze, scalar
-from kerfpath._told import told
+from kerfpath._repr import short_repr
 from kerfpath.errors import InputError, NoFeasiblePath
 from kerfpath.kernels.search import Aim, SortedLayers
 from kerfpath.search._exact import (
     NO_SEAM,
-    Best,
+    BestPath,
     best_allowed,
     best_path,
     dead_end,
     layers_reached,
 )
 from kerfpath.search._layers import Layers, broken_edge, empty_layer, reverse, sort_layers
-from kerfpath.search._long_enough import Lengths, Spans, all_reaches, cheapest, fewest
+from kerfpath.search._long_enough import PieceLengths, PieceSpans, all_reaches, cheapest, fewest
 from kerfpath.search._problem import SearchProblem, refuse_ends
 
 __all__ = ["InterruptedPath", "Piece", "find_interrupted"]
@@ -48,7 +48,7 @@ class Piece:
     first: int
     index: Ints
 
-    __repr__ = told
+    __repr__ = short_repr
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -69,7 +69,7 @@ class InterruptedPath:
     cost: float
     optimal: bool
 
-    __repr__ = told
+    __repr__ = short_repr
 
     @property
     def interruptions(self) -> int:
@@ -118,7 +118,7 @@ def find_interrupted(
     first = np.zeros(1, np.int64) if len(last) == 1 else _first(given, aim)
     layers, nodes = _in_stages(layers, first, last)
     found = best_path(layers, aim)
-    assert isinstance(found, Best), "a plan with this number of interruptions has been found"
+    assert isinstance(found, BestPath), "a plan with this number of interruptions has been found"
     return InterruptedPath(pieces=_pieces(layers, nodes, found.path), cost=found.cost, optimal=True)
 
 
@@ -140,7 +140,7 @@ def _long_enough(
 
     `last` is how far the greedy reach comes with each interruption.
     """
-    K, apart = len(s), Lengths.of(s, least_piece)
+    K, apart = len(s), PieceLengths.of(s, least_piece)
 
     def reach(k: int) -> int:
         return k + layers_reached(layers._replace(start=layers.start[k:]), aim) - 1
@@ -155,7 +155,7 @@ def _long_enough(
             node=int(last[0]),
         )
 
-    def solve(spans: Spans) -> tuple[tuple[float, float], Ints, InterruptedPath] | None:
+    def solve(spans: PieceSpans) -> tuple[tuple[float, float], Ints, InterruptedPath] | None:
         staged, nodes = _in_stages(layers, spans.low[:-1], spans.high[1:])
         every = np.ones(len(staged.low), np.bool_)
         best = best_allowed(staged, aim, every, NO_SEAM, 0.0)

@@ -17,7 +17,7 @@ import numpy as np
 
 from kerfpath._arrays import Array, Bools, Ints
 
-__all__ = ["Lengths", "Spans", "all_reaches", "cheapest", "fewest"]
+__all__ = ["PieceLengths", "PieceSpans", "all_reaches", "cheapest", "fewest"]
 
 ROUNDING = 1e-9
 """Relative slack of a length, so that a piece that is just as long as asked passes."""
@@ -25,7 +25,7 @@ ROUNDING = 1e-9
 _T = TypeVar("_T")
 
 
-class Lengths(NamedTuple):
+class PieceLengths(NamedTuple):
     """Which nodes are far enough apart to bound a piece."""
 
     after: Ints
@@ -34,7 +34,7 @@ class Lengths(NamedTuple):
     """(K,): the last node that a piece to each node may begin at; -1 where there is none."""
 
     @classmethod
-    def of(cls, s: Array, least: float) -> Lengths:
+    def of(cls, s: Array, least: float) -> PieceLengths:
         """Return them for nodes at `s` (K,) m, increasing, and pieces of `least` m or more."""
         least *= 1 - ROUNDING
         return cls(
@@ -43,7 +43,7 @@ class Lengths(NamedTuple):
         )
 
 
-class Spans(NamedTuple):
+class PieceSpans(NamedTuple):
     """First and last node, both (m + 1,), at which each of m pieces may begin, and the last end."""
 
     low: Ints
@@ -69,7 +69,7 @@ def all_reaches(reach: Callable[[int], int], K: int) -> Ints:
     return found
 
 
-def fewest(reach: Ints, apart: Lengths) -> Spans | None:
+def fewest(reach: Ints, apart: PieceLengths) -> PieceSpans | None:
     """Return where the fewest pieces, two or more, may begin; None where no number will do."""
     K = len(reach)
     begun = [np.arange(K) == 0]
@@ -86,7 +86,7 @@ def fewest(reach: Ints, apart: Lengths) -> Spans | None:
             on = np.cumsum(np.append(0, there))
             last = np.minimum(reach + 1, K)
             there = begun[i - 1] & (on[last] > on[np.minimum(apart.after, last)])
-    return Spans(low, high)
+    return PieceSpans(low, high)
 
 
 def _between(nodes: Ints, after: Ints, reach: Ints, K: int) -> Bools:
@@ -100,26 +100,26 @@ def _between(nodes: Ints, after: Ints, reach: Ints, K: int) -> Bools:
 
 
 def cheapest(
-    spans: Spans,
+    spans: PieceSpans,
     reach: Ints,
-    apart: Lengths,
-    solve: Callable[[Spans], tuple[tuple[float, float], Ints, _T] | None],
+    apart: PieceLengths,
+    solve: Callable[[PieceSpans], tuple[tuple[float, float], Ints, _T] | None],
 ) -> _T:
     """Return the cheapest cut within the spans whose pieces are all long enough.
 
     Parameters
     ----------
-    spans : Spans
+    spans : PieceSpans
         Some such cut is within them.
     reach : (K,) int
-    apart : Lengths
+    apart : PieceLengths
     solve : callable
         Returns, for spans, what no cut within them costs less than, the nodes (m + 1,) at which the
         cut with that cost begins its pieces and ends, and that cut; None where there is none.
     """
-    order, heap = count(), list[tuple[tuple[float, float], int, Spans, Ints, _T]]()
+    order, heap = count(), list[tuple[tuple[float, float], int, PieceSpans, Ints, _T]]()
 
-    def look_at(spans: Spans | None) -> None:
+    def look_at(spans: PieceSpans | None) -> None:
         found = None if spans is None else solve(spans)
         if spans is not None and found is not None:
             heappush(heap, (found[0], next(order), spans, *found[1:]))
@@ -139,7 +139,7 @@ def cheapest(
         look_at(_tight(spans._replace(high=high), reach, apart))
 
 
-def _tight(spans: Spans, reach: Ints, apart: Lengths) -> Spans | None:
+def _tight(spans: PieceSpans, reach: Ints, apart: PieceLengths) -> PieceSpans | None:
     """Return the spans without what their neighbours leave no room for; None if nothing is left."""
     low, high = spans.low.copy(), spans.high.copy()
     while True:
@@ -157,7 +157,7 @@ def _tight(spans: Spans, reach: Ints, apart: Lengths) -> Spans | None:
         if not _some(low, high):
             return None
         if (low.sum(), high.sum()) == was:
-            return Spans(low, high)
+            return PieceSpans(low, high)
 
 
 def _some(low: Ints, high: Ints) -> bool:

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from kerfpath._arrays import Array, Bools, Ints, bools, floats, freeze, integers, scalar
-from kerfpath._told import told
+from kerfpath._repr import short_repr
 from kerfpath.errors import InputError
 from kerfpath.kernels import metric as metrics
 from kerfpath.kernels.search import Aim
@@ -78,7 +78,7 @@ class SearchProblem:
     method: Method
     posture: Ints | None
 
-    __repr__ = told
+    __repr__ = short_repr
 
     def __init__(
         self,

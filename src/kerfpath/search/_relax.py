@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from kerfpath._told import told
+from kerfpath._repr import short_repr
 from kerfpath.errors import NoFeasiblePath
 from kerfpath.search._fastest import LeastInterval, aim_at_least_time, find_least_interval, quickest
 from kerfpath.search._problem import SearchProblem
@@ -36,7 +36,7 @@ class Relaxations:
     eta_a: float | None
     slower: LeastInterval
 
-    __repr__ = told
+    __repr__ = short_repr
 
     @property
     def dt(self) -> float:

@@ -14,10 +14,10 @@ from kerfpath.errors import NoFeasiblePath
 from kerfpath.kernels.limits import LIMIT_TOLERANCE
 from kerfpath.kernels.metric import MANHATTAN, increments, wrap
 from kerfpath.kernels.search import Aim
-from kerfpath.search._branch import best_from_its_start
+from kerfpath.search._branch import best_near_start
 from kerfpath.search._layers import Layers, sort_layers
 
-__all__ = ["best_within", "too_far", "why_closed"]
+__all__ = ["best_within_rotation", "too_far", "why_closed"]
 
 
 def too_far(path: Array, endless: Bools, rotation: Array) -> Bools:
@@ -26,7 +26,7 @@ def too_far(path: Array, endless: Bools, rotation: Array) -> Bools:
     return np.asarray((np.abs(turned) > rotation + LIMIT_TOLERANCE).any(axis=0))
 
 
-def best_within(
+def best_within_rotation(
     layers: Layers, aim: Aim, rotation: Array, unroll: Bools, *, closed: bool
 ) -> tuple[Bools, tuple[Ints, float] | None]:
     """Return the joints unrolled in the end, and the best path that keeps `rotation` (n,) rad.
@@ -75,7 +75,9 @@ def _opens(
     """Return whether there is a path once the limit of joint i alone is taken away."""
     others = np.arange(len(rotation)) != i
     unlimited = np.where(others, rotation, np.inf)
-    return best_within(layers, aim, unlimited, closing & others, closed=closed)[1] is not None
+    return (
+        best_within_rotation(layers, aim, unlimited, closing & others, closed=closed)[1] is not None
+    )
 
 
 def _last_node(layers: Layers, aim: Aim, rotation: Array, closing: Bools, *, closed: bool) -> int:
@@ -89,7 +91,7 @@ def _last_node(layers: Layers, aim: Aim, rotation: Array, closing: Bools, *, clo
         node = (reached + beyond) // 2
         N = start[node + 1]
         part = Layers(q[:N], start[: node + 2], endless, cost[:N], shut[shut[:, 1] < N])
-        if best_within(part, aim, rotation, closing, closed=False)[1] is None:
+        if best_within_rotation(part, aim, rotation, closing, closed=False)[1] is None:
             beyond = node
         else:
             reached = node
@@ -107,7 +109,7 @@ def _best(layers: Layers, aim: Aim, rotation: Array, *, closed: bool) -> tuple[I
         return None
     rank = place[graph.rank + np.repeat(unrolled.start[:-1], sizes)]
     aim = aim._replace(velocity=most)
-    found = best_from_its_start(graph._replace(rank=rank), aim, rotation, closed=closed)
+    found = best_near_start(graph._replace(rank=rank), aim, rotation, closed=closed)
     return None if found is None else (rank[found.path], found.cost)
 
 

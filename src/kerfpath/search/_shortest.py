@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from kerfpath._arrays import Array, Bools, Ints, freeze
-from kerfpath._told import told
+from kerfpath._repr import short_repr
 from kerfpath.errors import InputError, NoFeasiblePath
 from kerfpath.kernels import search as kernel
 from kerfpath.kernels.exact import count_closing
@@ -17,10 +17,10 @@ from kerfpath.kernels.search import Aim, SortedLayers
 from kerfpath.kernels.states import States
 from kerfpath.limits import Limits
 from kerfpath.search._branch import best_closed_path
-from kerfpath.search._exact import Best, best_path, dead_end
+from kerfpath.search._exact import BestPath, best_path, dead_end
 from kerfpath.search._layers import Layers, broken_edge, empty_layer, reverse, sort_layers
 from kerfpath.search._problem import Closure, Method, Metric, ObjectiveKind, SearchProblem
-from kerfpath.search._rotation import best_within, too_far, why_closed
+from kerfpath.search._rotation import best_within_rotation, too_far, why_closed
 
 __all__ = ["LayeredPath", "find_shortest", "shortest_path"]
 
@@ -46,7 +46,7 @@ class LayeredPath:
     cost: float
     optimal: bool
 
-    __repr__ = told
+    __repr__ = short_repr
 
 
 def shortest_path(
@@ -186,7 +186,7 @@ def _find_exactly(given: Layers, layers: SortedLayers, aim: Aim, *, closed: bool
         found = best_closed_path(layers, aim)
     else:
         found = best_path(layers._replace(start=layers.start[: filled + 1]), aim)
-    if isinstance(found, Best):
+    if isinstance(found, BestPath):
         if not whole:
             raise empty_layer(given, filled)
         index = layers.rank[found.path]
@@ -208,7 +208,7 @@ def _turn_less(
     given: Layers, aim: Aim, rotation: Array, over: Bools, *, closed: bool
 ) -> LayeredPath:
     """Return the proved optimum within the limits that the joints `over` do not keep without."""
-    unrolled, found = best_within(given, aim, rotation, over, closed=closed)
+    unrolled, found = best_within_rotation(given, aim, rotation, over, closed=closed)
     if found is None:
         raise why_closed(given, aim, rotation, unrolled, closed=closed)
     index, cost = found

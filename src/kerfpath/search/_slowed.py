@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from kerfpath._arrays import Array, Ints, freeze, scalar
-from kerfpath._told import told
+from kerfpath._repr import short_repr
 from kerfpath.errors import InputError
 from kerfpath.kernels import exact, to_go
 from kerfpath.kernels.search import Aim, LostTime, SortedLayers
@@ -45,7 +45,7 @@ class SlowedPath:
     cost: float
     lost: Array
 
-    __repr__ = told
+    __repr__ = short_repr
 
 
 def find_slowed(problem: SearchProblem, *, penalty: float = 100.0) -> SlowedPath:
@@ -139,21 +139,21 @@ def _add_corners(layers: SortedLayers, aim: Aim, h: Array) -> None:
     last, at = len(layers.start) - 2, 0
     prices = []
     while at < last:
-        stuck = at + _through(layers, aim, h, at, last, CORNER * aim.lost.penalty).layers
+        stuck = at + _search_window(layers, aim, h, at, last, CORNER * aim.lost.penalty).layers
         if stuck > last:
             break
         first, at = max(stuck - AROUND, at), min(stuck + AROUND, last)
         gap = CORNER * aim.lost.penalty
-        while (reached := _through(layers, aim, h, first, at, gap)).best[-1] < 0:
+        while (reached := _search_window(layers, aim, h, first, at, gap)).best[-1] < 0:
             gap = max(2 * gap, reached.lowest * (1 + ROUNDING))
         prices.append((layers.start[first + 1], reached.cost))
     for end, price in prices:
         h[:end] += price
 
 
-def _through(
+def _search_window(
     layers: SortedLayers, aim: Aim, h: Array, first: int, last: int, gap: float
-) -> exact.Reached:
+) -> exact.RecursionResult:
     """Go through the layers first..last with all costs measured by h, for `gap` at most."""
     enter, leave = (slice(layers.start[k], layers.start[k + 1]) for k in (first, last))
     cost, rest = layers.cost.copy(), h.copy()

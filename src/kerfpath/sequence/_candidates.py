@@ -6,11 +6,11 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
-from kerfpath.air import End, backed_off, why_not_clear
 from kerfpath.cell import Cell
 from kerfpath.errors import InputError, NoFeasiblePath
 from kerfpath.plans import Plan
 from kerfpath.robots import posture_name
+from kerfpath.transfer import End, back_off, explain_collision
 
 __all__ = ["MorePlans", "more_reachable", "reachable", "unused_postures"]
 
@@ -50,7 +50,7 @@ class MorePlans:
         ]
         if not tried:
             return broken
-        return broken.retold(f"{broken}; tried as well: {', '.join(tried)}")
+        return broken.with_message(f"{broken}; tried as well: {', '.join(tried)}")
 
 
 def reachable(
@@ -59,9 +59,9 @@ def reachable(
     """Return contour and candidate of each plan that the tool can go down to and leave again."""
     places: list[tuple[int, int]] = []
     for i, made in enumerate(every):
-        broken, found = _reached(made, range(len(made)), cell, retract)
+        broken, found = _reachable(made, range(len(made)), cell, retract)
         if broken is not None and not found:
-            _, found = _reached(made, further.of(i), cell, retract)
+            _, found = _reachable(made, further.of(i), cell, retract)
             if not found:
                 raise further.mentioned_in(broken)
         places += [(i, c) for c in found]
@@ -73,10 +73,10 @@ def more_reachable(
     contours: Sequence[int],
 ) -> list[tuple[int, int]]:  # fmt: skip
     """Return contour and candidate of the further plans of contours that the tool can reach."""
-    return [(i, c) for i in contours for c in _reached(every[i], further.of(i), cell, retract)[1]]
+    return [(i, c) for i in contours for c in _reachable(every[i], further.of(i), cell, retract)[1]]
 
 
-def _reached(
+def _reachable(
     made: Sequence[Plan], which: range, cell: Cell | None, retract: float
 ) -> tuple[NoFeasiblePath | None, list[int]]:
     """Return those candidates that the tool can go down to and leave, and why not the first."""
@@ -95,7 +95,7 @@ def _require_clear_ends(made: Plan, cell: Cell | None, retract: float) -> None:
     ends: tuple[tuple[End, int], ...] = (("start", 0), ("end", len(made.q) - 1))
     for end, node in ends:
         try:
-            way = np.array([backed_off(made, end, part * retract) for part in BACK_BY])
+            way = np.array([back_off(made, end, part * retract) for part in BACK_BY])
         except InputError as broken:
             raise NoFeasiblePath(str(broken), proved=True, node=node) from broken
         if cell is None:
@@ -104,7 +104,7 @@ def _require_clear_ends(made: Plan, cell: Cell | None, retract: float) -> None:
             raise NoFeasiblePath(
                 f"contour {made.name!r}: in posture {posture_name(int(made.posture[node]))} the "
                 f"tool is not clear while it backs off node {node} by {retract * 1e3:g} mm: "
-                f"{why_not_clear(cell, way)}",
+                f"{explain_collision(cell, way)}",
                 proved=True,
                 node=node,
             )

@@ -1,4 +1,4 @@
-"""Moves through the air between candidates: the least time of each, and those planned so far."""
+"""Transfer moves between candidates: the least time of each, and those planned so far."""
 
 from __future__ import annotations
 
@@ -9,14 +9,14 @@ from itertools import pairwise
 import numpy as np
 
 from kerfpath._arrays import Array, Bools, Ints, freeze
-from kerfpath.air import AirMove, air_move, backed_off, least_time
 from kerfpath.cell import Cell
 from kerfpath.errors import NoFeasiblePath
 from kerfpath.kernels.metric import increments_between
 from kerfpath.plans import Plan
 from kerfpath.robots import posture_name
+from kerfpath.transfer import TransferMove, back_off, least_time, transfer_move
 
-__all__ = ["HOME", "PATIENCE", "Moves"]
+__all__ = ["HOME", "PATIENCE", "MoveTimes"]
 
 PATIENCE = 12
 """Searches that may end without a way; each takes all its seconds."""
@@ -26,7 +26,7 @@ HOME = -1
 """In place of a candidate."""
 
 
-class Moves:
+class MoveTimes:
     """Times of the moves between candidates: least ones, and those that have been planned.
 
     Attributes
@@ -47,12 +47,12 @@ class Moves:
         self._robot, self._plans, self._cell, self._seconds = plans[0].robot, plans, cell, seconds
         self._retract, self._air_speed = retract, air_speed
         self._eta_v, self._eta_a = plans[0].settings.eta_v, plans[0].settings.eta_a
-        self._starts = np.array([backed_off(p, "start", retract) for p in plans])
-        self._ends = np.array([backed_off(p, "end", retract) for p in plans])
+        self._starts = np.array([back_off(p, "start", retract) for p in plans])
+        self._ends = np.array([back_off(p, "end", retract) for p in plans])
         C = len(plans)
         self.between = np.array([self._least(self._ends[[i] * C], self._starts) for i in range(C)])
         self.between[group[:, None] == group] = np.inf
-        self._moves: dict[tuple[int, int], AirMove] = {}
+        self._moves: dict[tuple[int, int], TransferMove] = {}
         self.failed: dict[tuple[int, int], NoFeasiblePath] = {}
         self._home: Array | None = None
         self.first, self.last = np.zeros(C), np.zeros(C)
@@ -69,12 +69,12 @@ class Moves:
         self.first = self._least(everywhere, self._starts)
         self.last = self._least(self._ends, everywhere)
 
-    def extended(self, plans: Sequence[Plan], group: Ints) -> Moves:
+    def extended(self, plans: Sequence[Plan], group: Ints) -> MoveTimes:
         """Return the moves between these candidates, which go on from those here; so does `failed`.
 
         What is known stays known.
         """
-        more = Moves(plans, group, self._cell, self._retract, self._seconds, self._air_speed)
+        more = MoveTimes(plans, group, self._cell, self._retract, self._seconds, self._air_speed)
         C = len(self._plans)
         more.between[:C, :C] = self.between
         more._moves, more.failed = self._moves, self.failed
@@ -112,7 +112,7 @@ class Moves:
                 took = move.duration
             except NoFeasiblePath as broken:
                 if broken.proved:
-                    raise broken.retold(f"{self.between_which(leg)}: {broken}") from None
+                    raise broken.with_message(f"{self.between_which(leg)}: {broken}") from None
                 self.failed[leg], took = broken, np.inf
                 self._shut(leg)
             times, at = self._place(leg)
@@ -171,7 +171,7 @@ class Moves:
             (self.first, b) if a == HOME else (self.last, a) if b == HOME else (self.between[a], b)
         )
 
-    def unrolled(self, candidates: Ints) -> tuple[tuple[Plan, ...], tuple[AirMove, ...]]:
+    def unrolled(self, candidates: Ints) -> tuple[tuple[Plan, ...], tuple[TransferMove, ...]]:
         """Return the plans and moves of an order, endless joints going on from one to the next."""
         legs = self._legs(candidates)
         here = self._ends[candidates[0]] if self._home is None else self._home
@@ -193,8 +193,8 @@ class Moves:
         around = candidates.tolist() if self._home is None else [HOME, *candidates.tolist(), HOME]
         return list(pairwise(around))
 
-    def _planned(self, one: Array, two: Array) -> AirMove:
-        move = air_move(
+    def _planned(self, one: Array, two: Array) -> TransferMove:
+        move = transfer_move(
             self._robot, one, one + increments_between(one, two, self._robot.endless),
             cell=self._cell, eta_v=self._eta_v, eta_a=self._eta_a, seconds=self._seconds,
         )  # fmt: skip

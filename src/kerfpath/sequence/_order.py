@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from kerfpath._arrays import Array, Bools, Ints, floats, integers
-from kerfpath._told import told
+from kerfpath._repr import short_repr
 from kerfpath.errors import InputError, NoFeasiblePath
 
 __all__ = ["Order", "best_order"]
@@ -41,7 +41,7 @@ class Order:
     duration: float
     at_least: float
 
-    __repr__ = told
+    __repr__ = short_repr
 
     @property
     def optimal(self) -> bool:
@@ -101,10 +101,10 @@ def best_order(
             raise InputError(f"{name}: expected {C} times >= 0, got {time.tolist()}")
         ends.append(time)
     enter, leave = ends
-    return _solved(g, cost, move, enter, leave, before, seconds)
+    return _solve(g, cost, move, enter, leave, before, seconds)
 
 
-def _solved(
+def _solve(
     group: Ints, own: Array, move: Array, enter: Array, leave: Array,
     before: Sequence[tuple[int, int]], seconds: float,
 ) -> Order:  # fmt: skip

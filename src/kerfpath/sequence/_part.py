@@ -1,4 +1,4 @@
-"""A whole part: a plan for every contour, their order, and the moves through the air between."""
+"""A whole part: a plan for every contour, their order, and the transfer moves between."""
 
 from __future__ import annotations
 
@@ -13,12 +13,11 @@ from numpy.typing import ArrayLike
 from scipy.spatial import cKDTree
 
 from kerfpath._arrays import Array, Bools, Ints, floats, not_negative, scalar
-from kerfpath._told import told
-from kerfpath.air import AirMove
+from kerfpath._repr import short_repr
 from kerfpath.cell import Cell
 from kerfpath.contour import Contour
 from kerfpath.errors import InputError, NoFeasiblePath
-from kerfpath.options import PlanKeywords, PlanOptions, chosen
+from kerfpath.options import PlanKeywords, PlanOptions, with_keywords
 from kerfpath.planner import plan
 from kerfpath.plans import Plan
 from kerfpath.robots import Robot
@@ -28,8 +27,9 @@ from kerfpath.sequence._candidates import (
     reachable,
     unused_postures,
 )
-from kerfpath.sequence._moves import HOME, PATIENCE, Moves
+from kerfpath.sequence._moves import HOME, PATIENCE, MoveTimes
 from kerfpath.sequence._order import Order, best_order
+from kerfpath.transfer import TransferMove
 
 __all__ = ["PartPlan", "longest_search", "order_candidates", "order_plans", "plan_part"]
 
@@ -44,7 +44,7 @@ class PartPlan:
     ----------
     plans : tuple of Plan
         In the order of cutting; endless joints unrolled from contour to contour.
-    moves : tuple of AirMove
+    moves : tuple of TransferMove
         One between each plan and the next, from backed off to backed off; with a home one before
         the first and one behind the last, too.
     order : Order
@@ -58,14 +58,14 @@ class PartPlan:
     """
 
     plans: tuple[Plan, ...]
-    moves: tuple[AirMove, ...]
+    moves: tuple[TransferMove, ...]
     order: Order
     chosen: tuple[tuple[int, int], ...]
     retract: float
     approach_speed: float
     pierce_time: float
 
-    __repr__ = told
+    __repr__ = short_repr
 
     @property
     def cutting_time(self) -> float:
@@ -74,7 +74,7 @@ class PartPlan:
 
     @property
     def air_time(self) -> float:
-        """Time of the moves through the air, approach and retract included, s."""
+        """Time of the transfer moves, approach and retract included, s."""
         down_and_up = 2 * len(self.plans) * self.retract / self.approach_speed
         return sum(move.duration for move in self.moves) + down_and_up
 
@@ -154,7 +154,7 @@ def plan_part(
     of_order = keywords.keys() & OrderKeywords.__annotations__.keys()
     order = cast(OrderKeywords, {k: v for k, v in keywords.items() if k in of_order})
     rest = {k: v for k, v in keywords.items() if k not in of_order}
-    wanted = chosen(options, rest, PartKeywords)
+    wanted = with_keywords(options, rest, PartKeywords)
 
     def planned(i: int, contour: Contour, options: PlanOptions) -> Plan:
         return plan(
@@ -292,12 +292,12 @@ def order_plans(
     if given_order:
         before = [*before, *((i, i + 1) for i in range(len(every) - 1))]
     warm = _too_warm([c[0].contour for c in every], heat_spacing)
-    air: Moves | None = None
+    air: MoveTimes | None = None
     while True:
         plans = [every[i][c] for i, c in places]
         group = np.array([i for i, _ in places])
         air = (
-            Moves(plans, group, cell, retract, seconds, air_speed)
+            MoveTimes(plans, group, cell, retract, seconds, air_speed)
             if air is None
             else air.extended(plans, group)
         )
@@ -306,7 +306,7 @@ def order_plans(
             air.home = floats(home, "home", (plans[0].robot.joints,))
         own = np.array([p.time[-1] - p.time[0] for p in plans])
         own += pierce_time + 2 * retract / approach_speed
-        found = _settled(air, group, own, before, seconds)
+        found = _settle_order(air, group, own, before, seconds)
         if not isinstance(found, NoFeasiblePath):
             order = found
             break
@@ -335,8 +335,8 @@ def longest_search(seconds: float) -> float:
     return 2 * PATIENCE * seconds
 
 
-def _settled(
-    air: Moves, group: Ints, own: Array, before: Sequence[tuple[int, int]], seconds: float
+def _settle_order(
+    air: MoveTimes, group: Ints, own: Array, before: Sequence[tuple[int, int]], seconds: float
 ) -> Order | NoFeasiblePath:
     """Return the best order whose moves all have a way, or why none is found."""
     failed = len(air.failed)

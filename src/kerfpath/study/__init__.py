@@ -1,6 +1,6 @@
 """Studies of a job, many tasks each: on the cores of this machine or on a cluster."""
 
-from kerfpath.study._batch import Planned as Planned
+from kerfpath.study._batch import BatchResult as BatchResult
 from kerfpath.study._batch import batch as batch
 from kerfpath.study._job import LoadedJob as LoadedJob
 from kerfpath.study._job import digest as digest

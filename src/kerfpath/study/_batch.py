@@ -11,17 +11,17 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TypedDict
 
-from kerfpath._told import told
+from kerfpath._repr import short_repr
 from kerfpath.errors import InputError
 from kerfpath.job import (
+    FileTexts,
     JobResult,
     ProgramOptions,
-    Texts,
     make_folder,
-    outcome_texts,
     read_job,
     require_folder,
     require_language,
+    result_texts,
     run_job,
     stale_program,
 )
@@ -31,7 +31,7 @@ from kerfpath.report import with_library, without_library
 from kerfpath.study._job import digest, load_job
 from kerfpath.sweep import Result, Sweep
 
-__all__ = ["STORE", "Planned", "batch"]
+__all__ = ["STORE", "BatchResult", "batch"]
 
 STORE = "batch.sqlite"
 """Name of the store in the folder of a batch."""
@@ -40,7 +40,7 @@ PAGE = "report.html"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Planned:
+class BatchResult:
     """What came of one job of a batch.
 
     Parameters
@@ -76,7 +76,7 @@ class Planned:
     notes: tuple[str, ...] = ()
     seconds: float = 0.0
 
-    __repr__ = told
+    __repr__ = short_repr
 
 
 def batch(
@@ -86,7 +86,7 @@ def batch(
     scheduler: str | None = None,
     processes: int | None = None,
     progress: Progress = no_progress,
-) -> list[Planned]:
+) -> list[BatchResult]:
     """Plan, audit and write many jobs, as `kerfpath plan` does each; one that fails stops no other.
 
     Results are kept in `out` as they come: the same call again plans only what is new or has
@@ -117,14 +117,14 @@ def batch(
     paths = [Path(job) for job in jobs]
     folders = _folders(paths, out)
     make_folder(out)
-    found: list[Planned] = []
+    found: list[BatchResult] = []
     with Sweep(
         plan_job, store=out / STORE, scheduler=scheduler, processes=processes, progress=progress
     ) as tasks:
-        asked = [_asked(tasks, path) for path in paths]
+        asked = [_submit(tasks, path) for path in paths]
         for path, folder, given in zip(paths, folders, asked, strict=True):
             if isinstance(given, InputError):
-                found.append(Planned(job=path, folder=folder, passed=False, reason=str(given)))
+                found.append(BatchResult(job=path, folder=folder, passed=False, reason=str(given)))
             else:
                 options, key = given
                 found.append(_written(path, folder, options, tasks.result(key)))
@@ -155,7 +155,7 @@ def _folders(paths: Sequence[Path], out: Path) -> list[Path]:
     return folders
 
 
-def _asked(tasks: Sweep, path: Path) -> tuple[ProgramOptions, str] | InputError:
+def _submit(tasks: Sweep, path: Path) -> tuple[ProgramOptions, str] | InputError:
     """Hand in a job; return its program's options and its key, or what is wrong with it."""
     try:
         key = tasks.submit(path=str(path.resolve()), digest_then=digest(path))
@@ -165,7 +165,7 @@ def _asked(tasks: Sweep, path: Path) -> tuple[ProgramOptions, str] | InputError:
 
 
 class PlannedData(TypedDict):
-    """What came of a job, as JSON holds it: most of a `Planned`, and its files, packed."""
+    """What came of a job, as JSON holds it: most of a `BatchResult`, and its files, packed."""
 
     passed: bool
     contours: int
@@ -188,7 +188,7 @@ def plan_job(*, path: str, digest_then: str) -> PlannedData:
     found = load_job(path, digest_then)
     require_language(found.job)
     outcome = run_job(found.job, found.part)
-    texts = outcome_texts(outcome)
+    texts = result_texts(outcome)
     by_contour: dict[str, bool] = {}
     for cut in outcome.cuts:
         by_contour[cut.contour] = by_contour.get(cut.contour, True) and cut.passed
@@ -201,11 +201,11 @@ def plan_job(*, path: str, digest_then: str) -> PlannedData:
         "program": list(texts.program),
         "reason": _reason(outcome, texts),
         "notes": list(texts.notes),
-        "files": _packed(texts.files),
+        "files": _pack(texts.files),
     }
 
 
-def _reason(outcome: JobResult, texts: Texts) -> str:
+def _reason(outcome: JobResult, texts: FileTexts) -> str:
     """Say why a run has not passed: the first reason, and how many more there are."""
     reasons = [
         f"{cut.name}: {cut.failure or issue}"
@@ -221,30 +221,32 @@ def _reason(outcome: JobResult, texts: Texts) -> str:
     return reasons[0] + more if reasons else ""
 
 
-def _packed(files: dict[str, str]) -> str:
+def _pack(files: dict[str, str]) -> str:
     """Return files as text of a fifth of their size."""
     lean = {name: without_library(t) if name == PAGE else t for name, t in files.items()}
     return base64.b64encode(zlib.compress(json.dumps(lean).encode())).decode()
 
 
-def _unpacked(packed: str) -> dict[str, str]:
+def _unpack(packed: str) -> dict[str, str]:
     files = json.loads(zlib.decompress(base64.b64decode(packed)))
     return {name: with_library(t) if name == PAGE else t for name, t in files.items()}
 
 
-def _written(job: Path, folder: Path, options: ProgramOptions, result: Result) -> Planned:
+def _written(job: Path, folder: Path, options: ProgramOptions, result: Result) -> BatchResult:
     """Write those files of a result that are not there as they are, and return what to tell."""
     if result.failure is not None:
         reason = result.failure.reason
-        return Planned(job=job, folder=folder, passed=False, reason=reason, seconds=result.seconds)
+        return BatchResult(
+            job=job, folder=folder, passed=False, reason=reason, seconds=result.seconds
+        )
     found: PlannedData = result.value
     program = found["program"]
-    replaced = replace_program(folder, _unpacked(found["files"]), program)
+    replaced = replace_program(folder, _unpack(found["files"]), program)
     notes = found["notes"]
     notes += [f"{path.name} is from an earlier run and was removed" for path in replaced.removed]
     if stale := next(iter(replaced.edited), stale_program(options, folder, program)):
         notes.append(f"{stale.name} is from an earlier run and does not belong to this plan")
-    return Planned(
+    return BatchResult(
         job=job,
         folder=folder,
         passed=found["passed"],

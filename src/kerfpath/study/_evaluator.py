@@ -12,9 +12,9 @@ from functools import cached_property
 import numpy as np
 
 from kerfpath._arrays import Ints
-from kerfpath._told import told
+from kerfpath._repr import short_repr
 from kerfpath.cad import Part
-from kerfpath.cell import Cell, Checker
+from kerfpath.cell import Cell, CollisionChecker
 from kerfpath.contour import Contour, FrameKind
 from kerfpath.graph import LayeredGraph
 from kerfpath.job import Job, cell_of_job, fastest_along
@@ -36,7 +36,7 @@ class SampledContour:
     nodes: Contour
     speed: float
 
-    __repr__ = told
+    __repr__ = short_repr
 
     @property
     def interval(self) -> float:
@@ -76,7 +76,7 @@ class Evaluator:
     job: Job
     part: Part
 
-    __repr__ = told
+    __repr__ = short_repr
 
     @cached_property
     def cell(self) -> Cell | None:
@@ -97,7 +97,7 @@ class Evaluator:
         """Yield, of every `step`-th layer, those without a clear pose."""
         if self.cell is None:
             return
-        checker = Checker(self.cell, graph.q)
+        checker = CollisionChecker(self.cell, graph.q)
         for layer in range(0, len(graph.start) - 1, step):
             poses = np.arange(graph.start[layer], graph.start[layer + 1])
             rounds = max(1, len(poses) // TRIED)

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
 
-from kerfpath._told import told
+from kerfpath._repr import short_repr
 from kerfpath.cad import Part
 from kerfpath.cad import read as read_drawing
 from kerfpath.errors import InputError
@@ -25,7 +25,7 @@ class LoadedJob:
     job: Job
     part: Part
 
-    __repr__ = told
+    __repr__ = short_repr
 
 
 def digest(path: Path) -> str:

@@ -10,7 +10,7 @@ from typing import TypedDict
 
 import numpy as np
 
-from kerfpath._told import told
+from kerfpath._repr import short_repr
 from kerfpath.auditor import Check
 from kerfpath.cell import Cell
 from kerfpath.contour import Contour
@@ -56,7 +56,7 @@ class JobFront:
     others: tuple[str, ...]
     front: Front
 
-    __repr__ = told
+    __repr__ = short_repr
 
 
 def pareto_of_job(

@@ -10,7 +10,7 @@ from shlex import quote
 import numpy as np
 
 from kerfpath import __version__
-from kerfpath._told import told
+from kerfpath._repr import short_repr
 from kerfpath.cad import Part
 from kerfpath.errors import InputError
 from kerfpath.front import Front, Subproblem
@@ -154,7 +154,7 @@ class Pick:
     number: int
     run: Subproblem
 
-    __repr__ = told
+    __repr__ = short_repr
 
 
 def read_pick(folder: Path, job_file: Path, which: str) -> Pick:

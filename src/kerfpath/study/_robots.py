@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 
-from kerfpath._told import told
+from kerfpath._repr import short_repr
 from kerfpath.cad import Part
 from kerfpath.errors import InputError, NoFeasiblePath
 from kerfpath.graph import LayeredGraph
@@ -60,7 +60,7 @@ class ContourSpeed:
     limit: str | None = None
     reason: str = ""
 
-    __repr__ = told
+    __repr__ = short_repr
 
     @property
     def margin(self) -> float | None:
@@ -89,7 +89,7 @@ class RobotSpeed:
     contours: tuple[ContourSpeed, ...] = ()
     reason: str = ""
 
-    __repr__ = told
+    __repr__ = short_repr
 
     @property
     def binding(self) -> ContourSpeed | None:
@@ -237,7 +237,9 @@ def contour_speeds(job: Job, part: Part) -> list[ContourSpeed]:
     _ = evaluator.cell  # what is wrong with it is said first
     contours = sample_contours(job, part)
     graphs = [evaluator.graph(contour.nodes) for contour in contours]
-    found = [_reached(contour, graph) for contour, graph in zip(contours, graphs, strict=True)]
+    found = [
+        _share_reached(contour, graph) for contour, graph in zip(contours, graphs, strict=True)
+    ]
     if not any(each.reason for each in found):
         for i, graph in enumerate(graphs):
             if (node := next(evaluator.blocked(graph, EVERY), None)) is not None:
@@ -260,7 +262,7 @@ def contour_speeds(job: Job, part: Part) -> list[ContourSpeed]:
     return found
 
 
-def _reached(contour: SampledContour, graph: LayeredGraph) -> ContourSpeed:
+def _share_reached(contour: SampledContour, graph: LayeredGraph) -> ContourSpeed:
     """Return which share of the nodes has a pose, and what forbids the first that has none."""
     empty, nodes = np.flatnonzero(np.diff(graph.start) == 0), len(contour.nodes)
     reason = ""

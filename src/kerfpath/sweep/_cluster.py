@@ -9,7 +9,7 @@ from typing import Any
 
 from kerfpath import __version__
 from kerfpath.errors import InputError
-from kerfpath.sweep._task import Failure, Outcome, Task, attempt
+from kerfpath.sweep._task import Failure, Task, TaskOutcome, attempt
 
 __all__ = ["on_cluster"]
 
@@ -27,7 +27,7 @@ PATIENCE = 10.0
 
 def on_cluster(
     function: Callable[..., Any], waiting: deque[Task], address: str
-) -> Generator[list[Outcome], None, None]:
+) -> Generator[list[TaskOutcome], None, None]:
     """Do the waiting tasks and yield outcomes as they come, none where nothing is waiting.
 
     The generator never ends; closing it takes the rest back from the scheduler. Dask gives the
@@ -85,7 +85,7 @@ def _check(client: Any, address: str) -> None:
 
 def _gather(
     distributed: Any, client: Any, function: Callable[..., Any], waiting: deque[Task]
-) -> Iterator[list[Outcome]]:
+) -> Iterator[list[TaskOutcome]]:
     call = distributed.protocol.pickle.dumps(function)
     coming = distributed.as_completed(loop=client.loop)
 
@@ -108,13 +108,13 @@ def _gather(
         yield []
 
 
-def _failure_of(distributed: Any, future: Any) -> Outcome:
+def _failure_of(distributed: Any, future: Any) -> TaskOutcome:
     """Return the failure of a task that kills its workers; raise any other error."""
     error = future.exception()
     if isinstance(error, distributed.KilledWorker):
         failure = Failure(kind="WorkerDied", message="the task took several workers with it")
         key = future.key.removeprefix(GROUP)
-        return Outcome(key=key, value=None, failure=failure, seconds=0.0)
+        return TaskOutcome(key=key, value=None, failure=failure, seconds=0.0)
     if isinstance(error, InputError | distributed.CancelledError):
         raise error
     raise InputError(f"a worker cannot do the task: {type(error).__name__}: {error}")

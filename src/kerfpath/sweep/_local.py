@@ -17,7 +17,7 @@ from typing import Any
 
 from kerfpath import __version__
 from kerfpath.errors import InputError
-from kerfpath.sweep._task import Failure, Outcome, Task, attempt
+from kerfpath.sweep._task import Failure, Task, TaskOutcome, attempt
 
 __all__ = ["on_processes"]
 
@@ -29,7 +29,7 @@ ONE_THREAD = dict.fromkeys(("NUMBA_NUM_THREADS", "OMP_NUM_THREADS", "OPENBLAS_NU
 
 def on_processes(
     function: Callable[..., Any], waiting: deque[Task], processes: int
-) -> Generator[list[Outcome], None, None]:
+) -> Generator[list[TaskOutcome], None, None]:
     """Do the waiting tasks and yield outcomes as they come, none where nothing is waiting.
 
     The generator never ends; closing it stops the processes at once. When a process dies, the task
@@ -50,12 +50,12 @@ def on_processes(
         while suspects:
             for task in (yield from _run_pool(call, suspects, 1, 1, lasting=False)):
                 failure = Failure(kind="WorkerDied", message="the task took its process with it")
-                yield [Outcome(key=task.key, value=None, failure=failure, seconds=0.0)]
+                yield [TaskOutcome(key=task.key, value=None, failure=failure, seconds=0.0)]
 
 
 def _run_pool(
     call: bytes, waiting: deque[Task], processes: int, ahead: int, *, lasting: bool = True
-) -> Generator[list[Outcome], None, list[Task]]:
+) -> Generator[list[TaskOutcome], None, list[Task]]:
     """Do the waiting tasks; return, at the first death of a process, the tasks that it interrupted.
 
     A lasting pool stays when nothing is waiting, and yields no outcomes.
@@ -65,7 +65,7 @@ def _run_pool(
     pool = ProcessPoolExecutor(
         processes, mp_context=context, initializer=_set_up, initargs=(theirs, call)
     )
-    flying: dict[Future[Outcome], Task] = {}
+    flying: dict[Future[TaskOutcome], Task] = {}
     broken = False
     try:
         while True:

@@ -10,13 +10,13 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from kerfpath._told import told
+from kerfpath._repr import short_repr
 from kerfpath.errors import InputError
 from kerfpath.progress import Progress, no_progress
 from kerfpath.sweep._cluster import on_cluster
 from kerfpath.sweep._local import on_processes
 from kerfpath.sweep._store import Store
-from kerfpath.sweep._task import Failure, Outcome, Task, name_of, task_of
+from kerfpath.sweep._task import Failure, Task, TaskOutcome, name_of, task_of
 
 __all__ = ["Result", "Sweep", "run"]
 
@@ -41,7 +41,7 @@ class Result:
     failure: Failure | None
     seconds: float
 
-    __repr__ = told
+    __repr__ = short_repr
 
 
 class Sweep:
@@ -83,7 +83,7 @@ class Sweep:
             )
         self._function, self._name = function, name_of(function)
         self._waiting: deque[Task] = deque()
-        self._source: Generator[list[Outcome], None, None]
+        self._source: Generator[list[TaskOutcome], None, None]
         if scheduler is None:
             self._source = on_processes(function, self._waiting, processes or os.cpu_count() or 1)
         else:

@@ -9,7 +9,7 @@ from pathlib import Path
 
 from kerfpath import __version__
 from kerfpath.errors import InputError
-from kerfpath.sweep._task import SCHEMA, Failure, Outcome, Task
+from kerfpath.sweep._task import SCHEMA, Failure, Task, TaskOutcome
 
 __all__ = ["Store"]
 
@@ -103,7 +103,7 @@ class Store:
         with self._explain():
             return {key for (key,) in self._base.execute("SELECT key FROM result")}
 
-    def add(self, function: str, done: Iterable[tuple[Task, Outcome]]) -> None:
+    def add(self, function: str, done: Iterable[tuple[Task, TaskOutcome]]) -> None:
         """Store outcomes, all or none of them; a key that is there already is an error."""
         rows = [
             (
@@ -120,17 +120,17 @@ class Store:
         with self._explain(), self._base:
             self._base.executemany("INSERT INTO result VALUES (?, ?, ?, ?, ?, ?, ?)", rows)
 
-    def outcome(self, key: str) -> Outcome:
+    def outcome(self, key: str) -> TaskOutcome:
         """Return the outcome stored under a key."""
         query = "SELECT value, kind, message, seconds FROM result WHERE key = ?"
         with self._explain():
             row = self._base.execute(query, (key,)).fetchone()
         match row:
             case (str() as value, None, None, float() as seconds):
-                return Outcome(key=key, value=value, failure=None, seconds=seconds)
+                return TaskOutcome(key=key, value=value, failure=None, seconds=seconds)
             case (None, str() as kind, str() as message, float() as seconds):
                 failure = Failure(kind=kind, message=message)
-                return Outcome(key=key, value=None, failure=failure, seconds=seconds)
+                return TaskOutcome(key=key, value=None, failure=failure, seconds=seconds)
         raise self.damaged(key)
 
     def damaged(self, key: str) -> InputError:

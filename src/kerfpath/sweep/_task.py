@@ -14,10 +14,19 @@ from time import perf_counter
 from typing import Any, NamedTuple
 
 from kerfpath import __version__
-from kerfpath._told import told
+from kerfpath._repr import short_repr
 from kerfpath.errors import InputError
 
-__all__ = ["SCHEMA", "Failure", "Outcome", "Task", "UnfitWorker", "attempt", "name_of", "task_of"]
+__all__ = [
+    "SCHEMA",
+    "Failure",
+    "Task",
+    "TaskOutcome",
+    "UnfitWorker",
+    "attempt",
+    "name_of",
+    "task_of",
+]
 
 SCHEMA = 1
 """Version of the store; another number is another store."""
@@ -49,7 +58,7 @@ class Failure:
     kind: str
     message: str
 
-    __repr__ = told
+    __repr__ = short_repr
 
     @property
     def reason(self) -> str:
@@ -59,7 +68,7 @@ class Failure:
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)
-class Outcome:
+class TaskOutcome:
     """The outcome of an attempt: a value as JSON, or a failure, and the time it took, s."""
 
     key: str
@@ -67,7 +76,7 @@ class Outcome:
     failure: Failure | None
     seconds: float
 
-    __repr__ = told
+    __repr__ = short_repr
 
 
 def name_of(function: Callable[..., Any]) -> str:
@@ -116,7 +125,7 @@ def task_of(function: Callable[..., Any], parameters: Mapping[str, Any], where: 
     return Task(hashlib.sha256(whole.encode()).hexdigest(), text)
 
 
-def attempt(version: str, function: bytes, task: Task) -> Outcome:
+def attempt(version: str, function: bytes, task: Task) -> TaskOutcome:
     """Call a pickled function in a worker; an exception becomes part of the outcome.
 
     Raises
@@ -140,4 +149,4 @@ def attempt(version: str, function: bytes, task: Task) -> Outcome:
     except (Exception, SystemExit) as error:  # recorded, not hidden: the other tasks go on
         message = str(error).encode(errors="replace").decode()
         failure = Failure(kind=type(error).__name__, message=message)
-    return Outcome(key=task.key, value=value, failure=failure, seconds=perf_counter() - begun)
+    return TaskOutcome(key=task.key, value=value, failure=failure, seconds=perf_counter() - begun)

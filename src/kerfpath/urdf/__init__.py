@@ -4,8 +4,8 @@ Knows nothing of kinematic families: `kerfpath.Robot.from_urdf` recognises those
 this package lies below `robots` and imports nothing of it.
 """
 
-from kerfpath.urdf._bodies import Body as Body
-from kerfpath.urdf._chain import Chain as Chain
+from kerfpath.urdf._bodies import LinkBody as LinkBody
+from kerfpath.urdf._chain import KinematicChain as KinematicChain
 from kerfpath.urdf._chain import turns as turns
 from kerfpath.urdf._description import Description as Description
 from kerfpath.urdf._description import read_urdf as read_urdf

@@ -10,17 +10,17 @@ from xml.etree import ElementTree
 import numpy as np
 
 from kerfpath._arrays import Array, freeze
-from kerfpath._told import told
+from kerfpath._repr import short_repr
 from kerfpath.errors import InputError
 from kerfpath.urdf._xml import Tree, child, numbers, pose_of
 
-__all__ = ["Body", "bodies_of"]
+__all__ = ["LinkBody", "bodies_of"]
 
 SIZES = {"box": ("size", 3), "cylinder": ("radius length", 1), "sphere": ("radius", 1)}
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class Body:
+class LinkBody:
     """A collision body of a link, rigid on one joint of the chain.
 
     Parameters
@@ -44,12 +44,12 @@ class Body:
     size: Array
     path: Path | None = None
 
-    __repr__ = told
+    __repr__ = short_repr
 
 
 def bodies_of(
     tree: Tree, link: str, joint: int, T_joint_link: Array, packages: Mapping[str, Path]
-) -> list[Body]:
+) -> list[LinkBody]:
     """Return the collision bodies of one link."""
     found = []
     for collision in tree.links[link].findall("collision"):
@@ -62,7 +62,7 @@ def bodies_of(
         shape = shapes[0]
         path = _mesh_file(tree, shape, where, packages) if shape.tag == "mesh" else None
         found.append(
-            Body(
+            LinkBody(
                 link=link,
                 joint=joint,
                 pose=freeze(T_joint_link @ pose_of(collision, where)),

@@ -7,13 +7,13 @@ from dataclasses import dataclass
 import numpy as np
 
 from kerfpath._arrays import Array, floats
-from kerfpath._told import told
+from kerfpath._repr import short_repr
 
-__all__ = ["Chain", "turns"]
+__all__ = ["KinematicChain", "turns"]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class Chain:
+class KinematicChain:
     """Revolute joints one after the other; frame 0 is the base, frame i turns with joint i.
 
     Parameters
@@ -30,7 +30,7 @@ class Chain:
     axes: Array
     end: Array
 
-    __repr__ = told
+    __repr__ = short_repr
 
     def __post_init__(self) -> None:
         n = len(self.origins)

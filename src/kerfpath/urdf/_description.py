@@ -9,10 +9,10 @@ from pathlib import Path
 import numpy as np
 
 from kerfpath._arrays import Array, freeze
-from kerfpath._told import told
+from kerfpath._repr import short_repr
 from kerfpath.errors import InputError
-from kerfpath.urdf._bodies import Body, bodies_of
-from kerfpath.urdf._chain import Chain
+from kerfpath.urdf._bodies import LinkBody, bodies_of
+from kerfpath.urdf._chain import KinematicChain
 from kerfpath.urdf._xml import Joint, Tree, read_tree
 
 __all__ = ["Description", "read_urdf"]
@@ -34,9 +34,9 @@ class Description:
         Links.
     joints : tuple of Joint
         The joints that move, in order, as they are written.
-    chain : Chain
+    chain : KinematicChain
         Their frames, fixed joints merged.
-    bodies : tuple of Body
+    bodies : tuple of LinkBody
         Collision bodies of every link that the chain carries.
     left_out : tuple of str
         Links on moving joints outside the chain: where they are is not known, and no body of
@@ -48,11 +48,11 @@ class Description:
     base: str
     tip: str
     joints: tuple[Joint, ...]
-    chain: Chain
-    bodies: tuple[Body, ...]
+    chain: KinematicChain
+    bodies: tuple[LinkBody, ...]
     left_out: tuple[str, ...]
 
-    __repr__ = told
+    __repr__ = short_repr
 
 
 def read_urdf(
@@ -100,9 +100,11 @@ def read_urdf(
         if joint.kind != "fixed":
             origins.append(T)
             T = np.eye(4)
-    chain = Chain(origins=np.array(origins), axes=np.array([j.axis for j in moving]), end=T)
+    chain = KinematicChain(
+        origins=np.array(origins), axes=np.array([j.axis for j in moving]), end=T
+    )
     _require_lengths(tree, chain, moving)
-    carried = _carried(tree, base, written)
+    carried = _carrier_joints(tree, base, written)
     folders = {name: Path(folder) for name, folder in (packages or {}).items()}
     bodies = (
         [b for link, (i, T) in carried.items() for b in bodies_of(tree, link, i, T, folders)]
@@ -171,7 +173,7 @@ def _require_revolute(tree: Tree, joint: Joint) -> None:
         )
 
 
-def _require_lengths(tree: Tree, chain: Chain, joints: list[Joint]) -> None:
+def _require_lengths(tree: Tree, chain: KinematicChain, joints: list[Joint]) -> None:
     """Raise InputError where a link between two joints has no length and no bend."""
     for i in range(1, len(joints)):
         T = chain.origins[i]
@@ -184,7 +186,7 @@ def _require_lengths(tree: Tree, chain: Chain, joints: list[Joint]) -> None:
             )
 
 
-def _carried(tree: Tree, base: str, written: list[Joint]) -> dict[str, tuple[int, Array]]:
+def _carrier_joints(tree: Tree, base: str, written: list[Joint]) -> dict[str, tuple[int, Array]]:
     """Return each link that is rigid on a joint of the chain: how many joints move it, and where.
 
     The second is its pose (4, 4) in the frame of the last of these joints.

@@ -11,7 +11,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from kerfpath._arrays import Array, freeze
-from kerfpath._told import told
+from kerfpath._repr import short_repr
 from kerfpath.errors import InputError
 
 __all__ = ["Joint", "Tree", "child", "numbers", "pose_of", "read_tree"]
@@ -54,7 +54,7 @@ class Joint:
     velocity: float | None
     mimics: str
 
-    __repr__ = told
+    __repr__ = short_repr
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -68,7 +68,7 @@ class Tree:
     parent: Mapping[str, Joint]
     """The joint above each link that has one."""
 
-    __repr__ = told
+    __repr__ = short_repr
 
 
 class _NoDoctype(ElementTree.TreeBuilder):

@@ -30,7 +30,7 @@ from kerfpath.job import (
     run_job,
 )
 from kerfpath.planner import ClearanceMap
-from kerfpath.report._section import with_clearance
+from kerfpath.report._section import add_clearance
 
 DEMO = Path(str(files("kerfpath") / "demo"))
 SHIPPED = (DEMO / "b_pillar_cell.toml").read_text()
@@ -362,7 +362,7 @@ def test_the_map_tells_collisions_and_what_is_to_spare():
         poses=4,
         queries=0,
     )
-    mapped = with_clearance(graph, found)
+    mapped = add_clearance(graph, found)
     words = np.array(mapped.reasons)[mapped.reason[:, :, 0]]
     assert words.tolist() == [
         ["admitted", "10 to 20 mm to spare", "collision"],

@@ -9,14 +9,14 @@ import numpy as np
 import pytest
 
 from commands import assert_refused, run
-from kerfpath.air import least_time
 from kerfpath.errors import AuditFailed, InputError
-from kerfpath.job import planned_text, program_from_file, read_job, read_plan_file, run_job
+from kerfpath.job import plan_file_text, program_from_file, read_job, read_plan_file, run_job
 from kerfpath.job.programs._audit import audit_program
 from kerfpath.job.programs._read import language_of
 from kerfpath.post import MANIFEST, groups_of, read_program, write_files
 from kerfpath.post import language as find_language
 from kerfpath.post._languages import SHIPPED
+from kerfpath.transfer import least_time
 
 HEAD = """\
 [robot]
@@ -74,7 +74,7 @@ USUAL = {"lines": 5000, "decimals": 4, "unit": "cm/min", "pulses": PULSES}
 
 
 def whole(robot, acceleration, xyz, home):
-    """A job with its moves through the air, for an arm whose accelerations bind."""
+    """A job with its transfer moves, for an arm whose accelerations bind."""
     return (
         HEAD.format(
             robot=robot,
@@ -145,7 +145,7 @@ def planned(tmp_path_factory):
         path.write_text(job + '[program]\nlanguage = "none"\n')
         outcome = run_job(read_job(path))
         assert outcome.passed
-        (folder / "plan.json").write_text(planned_text(outcome))
+        (folder / "plan.json").write_text(plan_file_text(outcome))
     return folders
 
 

@@ -12,7 +12,7 @@ from kerfpath.comfort import Band, Comfort
 from kerfpath.contour import Contour
 from kerfpath.errors import InputError
 from kerfpath.job import read_job
-from kerfpath.job.format._lines import Places
+from kerfpath.job.format._lines import TomlPlaces
 from kerfpath.job.format._poses import heads, pose
 from kerfpath.operations import micro_joints, slow_corners
 from kerfpath.options import PlanOptions
@@ -419,7 +419,7 @@ m = 1
 [[t.inner]]
 "\\u00e9" = {"é1" = 0, n = 0}
 """
-    places = Places(text)
+    places = TomlPlaces(text)
     found = {
         (): (1, 1),
         ("top", "x y", "z", 1, 1): (1, 25),

@@ -2,7 +2,7 @@
 
 from kerfpath.job.format._cell import cell_of_job as cell_of_job
 from kerfpath.job.format._cell import with_map as with_map
-from kerfpath.job.format._contour import ContourTask as ContourTask
+from kerfpath.job.format._contour import ContourSpec as ContourSpec
 from kerfpath.job.format._poses import pose as pose
 from kerfpath.job.format._prepared import Candidate as Candidate
 from kerfpath.job.format._prepared import CutRequest as CutRequest
@@ -15,7 +15,7 @@ from kerfpath.job.format._read import Tolerances as Tolerances
 from kerfpath.job.format._read import program_options as program_options
 from kerfpath.job.format._read import read_job as read_job
 from kerfpath.job.format._read import tolerances_of as tolerances_of
-from kerfpath.job.format._refusals import refused_at as refused_at
+from kerfpath.job.format._refusals import refusal_at as refusal_at
 from kerfpath.job.format.tables import VARIABLES as VARIABLES
 from kerfpath.job.format.tables import AuditTable as AuditTable
 from kerfpath.job.format.tables import ContourTable as ContourTable

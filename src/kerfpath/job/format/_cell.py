@@ -30,7 +30,7 @@ from kerfpath.cell import (
 from kerfpath.errors import InputError
 from kerfpath.job.format._poses import pose
 from kerfpath.job.format._read import Job
-from kerfpath.job.format._refusals import refused_at
+from kerfpath.job.format._refusals import refusal_at
 from kerfpath.job.format.tables import CellTable, FixtureTable, given
 
 __all__ = ["cell_of_job", "with_map"]
@@ -93,7 +93,7 @@ def with_map(job: Job) -> Job:
         It has no [cell].
     """
     if job.cell is None:
-        raise refused_at(
+        raise refusal_at(
             job.path, ("cell",), "expected a [cell] for the collision map, got none; add one"
         )
     return replace(job, cell=job.cell.model_copy(update={"map": True}))
@@ -107,7 +107,7 @@ def _at(job: Job, *where: str | int) -> Iterator[None]:
     except InputError as error:
         said = str(error)
         raise (
-            error if said.startswith(f"{job.path}:") else refused_at(job.path, where, said)
+            error if said.startswith(f"{job.path}:") else refusal_at(job.path, where, said)
         ) from None
 
 
@@ -116,14 +116,14 @@ def _require_known(
 ) -> None:
     for name in names:
         if name not in cell.names:
-            raise refused_at(
+            raise refusal_at(
                 job.path,
                 where,
                 f'expected names of bodies of the cell, got "{name}"; there are '
                 f"{', '.join(cell.names)}",
             )
     if names[0] == names[1]:
-        raise refused_at(job.path, where, f'expected two bodies, got "{names[0]}" twice')
+        raise refusal_at(job.path, where, f'expected two bodies, got "{names[0]}" twice')
 
 
 def _two(names: tuple[str, ...]) -> tuple[str, str]:
@@ -149,7 +149,7 @@ def _head(table: CellTable, folder: Path) -> CuttingHead | MeshHead:
 def _solid(job: Job, table: CellTable, part: Part) -> Mesh:
     """Return the part as a solid, a part drawn as a surface by its thickness."""
     if not part.faces:
-        raise refused_at(
+        raise refusal_at(
             job.path,
             ("cell", "part"),
             f"{job.part_file.name} holds curves and no solid to keep away from; write part = false "
@@ -158,7 +158,7 @@ def _solid(job: Job, table: CellTable, part: Part) -> Mesh:
     vertices, triangles = _triangles(part, table.deviation_mm / 1000)
     is_open = bool(edges_of(triangles)[1].any())
     if is_open and table.sheet_mm is None:
-        raise refused_at(
+        raise refusal_at(
             job.path,
             ("cell", "sheet_mm"),
             f"{job.part_file.name} is drawn as a surface, not as a closed solid: what is inside "
@@ -166,7 +166,7 @@ def _solid(job: Job, table: CellTable, part: Part) -> Mesh:
             "sees it, or part = false to leave it out of the cell",
         )
     if not is_open and table.sheet_mm is not None:
-        raise refused_at(
+        raise refusal_at(
             job.path,
             ("cell", "sheet_mm"),
             f"{job.part_file.name} is a closed solid, which has its thickness; remove sheet_mm",

@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from kerfpath._told import told
+from kerfpath._repr import short_repr
 from kerfpath.cad import Part
 from kerfpath.contour import Contour
 from kerfpath.errors import InputError
@@ -14,11 +14,11 @@ from kerfpath.job.format._operations import shape_contour
 from kerfpath.job.format._values import MOST_NODES
 from kerfpath.job.format.tables import ContourTable
 
-__all__ = ["ContourTask", "task_of"]
+__all__ = ["ContourSpec", "task_of"]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class ContourTask:
+class ContourSpec:
     """One contour to cut: which, how fast, and how it is sampled.
 
     Parameters
@@ -53,9 +53,9 @@ class ContourTask:
     axis_tolerance: float | None = None
     table: ContourTable
 
-    __repr__ = told
+    __repr__ = short_repr
 
-    def expanded(self, part: Part) -> list[ContourTask]:
+    def expanded(self, part: Part) -> list[ContourSpec]:
         """Return a task for each loop of the part that this one picks.
 
         Raises
@@ -130,10 +130,10 @@ class ContourTask:
             )
 
 
-def task_of(table: ContourTable) -> ContourTask:
+def task_of(table: ContourTable) -> ContourSpec:
     """Return what a [[contour]] table asks for, in SI."""
     angle, step = table.axis_tolerance_deg, table.time_step_ms
-    return ContourTask(
+    return ContourSpec(
         pick=table.pick or "",
         name=table.name or table.pick or "",
         speed=table.speed_m_min / 60,

@@ -10,7 +10,7 @@ from typing import NamedTuple
 import tree_sitter_toml
 from tree_sitter import Language, Node, Parser
 
-__all__ = ["Places", "Position"]
+__all__ = ["Position", "TomlPlaces"]
 
 _TOML = Language(tree_sitter_toml.language())
 _HEADERS = ("table", "table_array_element")
@@ -56,7 +56,7 @@ class _Place:
         return self.inside[len(self.inside) - 1] if self.is_array_of_tables else self
 
 
-class Places:
+class TomlPlaces:
     """The places of all keys and values of a TOML document.
 
     Parameters

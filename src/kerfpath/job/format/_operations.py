@@ -79,10 +79,10 @@ def _run(
         contour = round_corners(contour, table.corners.round_mm * MM, surface=surface)
     if table.corners is not None and table.corners.loop_mm is not None:
         contour = loop_corners(contour, table.corners.loop_mm * MM, side=scrap, surface=surface)
-    return [_featured(table, begun, surface, scrap) for begun in _started(table, contour)]
+    return [_add_features(table, begun, surface, scrap) for begun in _start_contour(table, contour)]
 
 
-def _started(table: ContourTable, contour: Contour) -> list[Contour]:
+def _start_contour(table: ContourTable, contour: Contour) -> list[Contour]:
     """Return the contour begun where the table says."""
     if table.start_mm is not None:
         return [start_at(contour, contour.s[0] + table.start_mm * MM)]
@@ -94,7 +94,7 @@ def _started(table: ContourTable, contour: Contour) -> list[Contour]:
     return [contour]
 
 
-def _featured(
+def _add_features(
     table: ContourTable, contour: Contour, surface: Surface | None, scrap: Side
 ) -> Contour:
     """Return the contour with its bevel, joints, slow corners, overlap and leads."""

@@ -13,10 +13,10 @@ from scipy.spatial.transform import Rotation
 
 from kerfpath._arrays import Array, freeze
 
-__all__ = ["Head", "heads", "pose"]
+__all__ = ["HeadPose", "heads", "pose"]
 
 
-class Head(NamedTuple):
+class HeadPose(NamedTuple):
     """Where the tip of a cutting head is in the flange.
 
     Parameters
@@ -32,11 +32,11 @@ class Head(NamedTuple):
 
 
 @cache
-def heads() -> dict[str, Head]:
+def heads() -> dict[str, HeadPose]:
     """Return the shipped cutting heads by name: generic dimensions, not those of any maker."""
     text = (files("kerfpath.job") / "heads.toml").read_text(encoding="utf-8")
     return {
-        name: Head(tuple(values["xyz_mm"]), tuple(values["rpy_deg"]))
+        name: HeadPose(tuple(values["xyz_mm"]), tuple(values["rpy_deg"]))
         for name, values in tomllib.loads(text).items()
     }
 

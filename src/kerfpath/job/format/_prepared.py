@@ -7,14 +7,14 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from kerfpath._told import told
+from kerfpath._repr import short_repr
 from kerfpath.cad import Part
 from kerfpath.cad import read as read_drawing
 from kerfpath.cell import Cell
 from kerfpath.contour import Contour
 from kerfpath.front import Subproblem
 from kerfpath.job.format._cell import cell_of_job
-from kerfpath.job.format._contour import ContourTask
+from kerfpath.job.format._contour import ContourSpec
 from kerfpath.job.format._read import Job
 from kerfpath.options import PlanOptions
 from kerfpath.planner import node_interval
@@ -41,7 +41,7 @@ class Candidate:
     nodes: Contour
     speed: float | None = None
 
-    __repr__ = told
+    __repr__ = short_repr
 
     @classmethod
     def at(cls, speed: float, path: Contour, nodes: Contour) -> Candidate:
@@ -60,7 +60,7 @@ class CutRequest:
 
     Parameters
     ----------
-    task : ContourTask
+    task : ContourSpec
         What the job says of it.
     loop : Contour
         As drawn, part frame.
@@ -73,14 +73,14 @@ class CutRequest:
         Whether targets of the path were moved by hand.
     """
 
-    task: ContourTask
+    task: ContourSpec
     loop: Contour
     candidates: tuple[Candidate, ...]
     options: PlanOptions
     run: Subproblem | None = None
     touched_up: bool = False
 
-    __repr__ = told
+    __repr__ = short_repr
 
     @property
     def leaves_the_loop(self) -> bool:
@@ -114,7 +114,7 @@ class PreparedJob:
     contours: tuple[CutRequest, ...]
     inner_first: tuple[tuple[int, int], ...]
 
-    __repr__ = told
+    __repr__ = short_repr
 
     @classmethod
     def of(
@@ -152,7 +152,7 @@ def prepare(job: Job, part: Part | None = None) -> PreparedJob:
     return PreparedJob.of(job, part, cell, [_request(job, task, part) for task in tasks])
 
 
-def _request(job: Job, task: ContourTask, part: Part) -> CutRequest:
+def _request(job: Job, task: ContourSpec, part: Part) -> CutRequest:
     loop = task.drawn(part)
     candidates = tuple(
         Candidate.at(task.speed, path, task.sample(path)) for path in task.candidates(part, loop)

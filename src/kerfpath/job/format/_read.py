@@ -13,17 +13,16 @@ import numpy as np
 from pydantic import ValidationError
 
 from kerfpath._arrays import Array, Ints
-from kerfpath._told import told
-from kerfpath.air import AirMove
+from kerfpath._repr import short_repr
 from kerfpath.auditor import Check, Rounding, checks
 from kerfpath.cad import Part
 from kerfpath.cell import Cell
 from kerfpath.contour import Contour
 from kerfpath.errors import InputError
 from kerfpath.graph import LayeredGraph
-from kerfpath.job.format._contour import ContourTask, task_of
+from kerfpath.job.format._contour import ContourSpec, task_of
 from kerfpath.job.format._operations import keys_of_closed_loops
-from kerfpath.job.format._refusals import error_at, refusal, refused_at
+from kerfpath.job.format._refusals import error_at, refusal, refusal_at
 from kerfpath.job.format.tables import (
     AuditTable,
     CellTable,
@@ -36,8 +35,9 @@ from kerfpath.job.format.tables._plan import said_in_keys
 from kerfpath.options import OptionConflict, PlanOptions
 from kerfpath.planner import layered_graph
 from kerfpath.plans import Plan
-from kerfpath.post import Handshake, Program, Settings, build_program
+from kerfpath.post import Handshake, LanguageSettings, Program, build_program
 from kerfpath.robots import Robot
+from kerfpath.transfer import TransferMove
 
 __all__ = ["Job", "ProgramOptions", "Tolerances", "program_options", "read_job", "tolerances_of"]
 
@@ -56,7 +56,7 @@ class ProgramOptions:
     ----------
     language : str
         Robot language, or "none".
-    settings : Settings or None
+    settings : LanguageSettings or None
         Those of the language.
     name, retract, zone, lead_time, pierce_time, approach_speed, air_speed, arc_tolerance, gas_lead,
     handshakes
@@ -67,7 +67,7 @@ class ProgramOptions:
     name: str
     retract: float
     zone: float
-    settings: Settings | None
+    settings: LanguageSettings | None
     lead_time: float
     pierce_time: float
     approach_speed: float
@@ -76,9 +76,9 @@ class ProgramOptions:
     gas_lead: float | None
     handshakes: tuple[Handshake, ...] = ()
 
-    __repr__ = told
+    __repr__ = short_repr
 
-    def program(self, plans: Sequence[Plan], moves: Sequence[AirMove] = ()) -> Program:
+    def program(self, plans: Sequence[Plan], moves: Sequence[TransferMove] = ()) -> Program:
         """Return the neutral program that cuts the plans, see `kerfpath.post.build_program`.
 
         Raises
@@ -117,7 +117,7 @@ class Tolerances:
     path: float
     axis: float
 
-    __repr__ = told
+    __repr__ = short_repr
 
     def checks(
         self,
@@ -156,7 +156,7 @@ class Job:
         The CAD file, there when the job was read.
     part_unit : {"mm", "cm", "m", "in"} or None
         Length unit that overrides the CAD file's own.
-    contours : tuple of ContourTask
+    contours : tuple of ContourSpec
         In the order of cutting.
     options : PlanOptions
         How every contour is to be planned.
@@ -180,7 +180,7 @@ class Job:
     placement: Array
     part_file: Path
     part_unit: str | None
-    contours: tuple[ContourTask, ...]
+    contours: tuple[ContourSpec, ...]
     options: PlanOptions
     cell: CellTable | None
     sequence: SequenceTable | None
@@ -189,7 +189,7 @@ class Job:
     program: ProgramOptions
     source: Mapping[str, Any]
 
-    __repr__ = told
+    __repr__ = short_repr
 
     def graph(
         self,
@@ -213,7 +213,7 @@ class Job:
             progress=progress,
         )
 
-    def tasks(self, part: Part) -> tuple[ContourTask, ...]:
+    def tasks(self, part: Part) -> tuple[ContourSpec, ...]:
         """Return the contours to cut of the part that was read.
 
         Raises
@@ -237,14 +237,14 @@ class Job:
                 )
         return tuple(tasks)
 
-    def _require_open(self, task: ContourTask, number: int) -> None:
+    def _require_open(self, task: ContourSpec, number: int) -> None:
         """Raise InputError where a task of table `number` asks of an open line what it has not."""
         line = f"loop {task.pick!r} is an open line, which"
         for key, why in keys_of_closed_loops(task.table).items():
-            raise refused_at(self.path, ("contour", number, key), f"{line} {why}; remove {key}")
+            raise refusal_at(self.path, ("contour", number, key), f"{line} {why}; remove {key}")
         if self.options.closure == "periodic":
             said = f'{line} does not come back to its start; write closure = "free"'
-            raise refused_at(self.path, ("plan", "closure"), said)
+            raise refusal_at(self.path, ("plan", "closure"), said)
 
 
 def read_job(path: str | Path) -> Job:
@@ -266,7 +266,7 @@ def read_job(path: str | Path) -> Job:
     described = file.cell is not None and file.cell.links != "capsules"
     robot = file.robot.resolve(path.parent, bodies=described)
     if file.plan.rotation_deg is not None and not robot.endless.any():
-        raise refused_at(
+        raise refusal_at(
             path,
             ("plan", "rotation_deg"),
             "expected an endless axis to limit, got none; remove it, or say which with endless "
@@ -275,7 +275,7 @@ def read_job(path: str | Path) -> Job:
     try:
         options = file.plan.resolve(robot, file.comfort.resolve())
     except OptionConflict as conflict:
-        raise refused_at(path, *said_in_keys(conflict, file.plan)) from None
+        raise refusal_at(path, *said_in_keys(conflict, file.plan)) from None
     return Job(
         path=path,
         robot=robot,

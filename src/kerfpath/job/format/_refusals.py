@@ -10,11 +10,11 @@ from pydantic import ValidationError
 from pydantic_core import ErrorDetails
 
 from kerfpath.errors import InputError
-from kerfpath.job.format._lines import Places
+from kerfpath.job.format._lines import TomlPlaces
 from kerfpath.job.format._values import FAULT, LARGEST, SMALLEST, nearest
 from kerfpath.job.format.tables import REPEATED, TABLES
 
-__all__ = ["error_at", "refusal", "refused_at"]
+__all__ = ["error_at", "refusal", "refusal_at"]
 
 _LONGEST = 60
 """Characters of a wrong value that a message shows."""
@@ -23,7 +23,7 @@ _LONGEST = 60
 def refusal(path: Path, text: str, error: ValidationError) -> InputError:
     """Return the first problem in the file, said in one line."""
     details = error.errors(include_url=False)
-    locs, places = [d["loc"] for d in details], Places(text)
+    locs, places = [d["loc"] for d in details], TomlPlaces(text)
     problems = []
     for detail in details:
         loc = detail["loc"]
@@ -40,9 +40,9 @@ def refusal(path: Path, text: str, error: ValidationError) -> InputError:
     return error_at(path, position[0], said + more)
 
 
-def refused_at(path: Path, where: Sequence[str | int], said: str) -> InputError:
+def refusal_at(path: Path, where: Sequence[str | int], said: str) -> InputError:
     """Return the error that says what is wrong at a place of a job file that was read before."""
-    line = Places(path.read_text(encoding="utf-8-sig")).locate(where).line
+    line = TomlPlaces(path.read_text(encoding="utf-8-sig")).locate(where).line
     key = ".".join(part for part in where if isinstance(part, str))
     return error_at(path, line, f"{key}: {said}")
 

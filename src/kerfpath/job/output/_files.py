@@ -11,10 +11,9 @@ from typing import Any
 
 import numpy as np
 
-from kerfpath._told import told
-from kerfpath.air import AirMove
+from kerfpath._repr import short_repr
 from kerfpath.errors import AuditFailed, InputError
-from kerfpath.job.format import Job, ProgramOptions, refused_at
+from kerfpath.job.format import Job, ProgramOptions, refusal_at
 from kerfpath.job.output._report import report_text
 from kerfpath.job.plan_file import (
     ContourData,
@@ -29,18 +28,19 @@ from kerfpath.job.run import JobResult
 from kerfpath.plans import Plan
 from kerfpath.post import language, replace_program
 from kerfpath.sequence import PartPlan
+from kerfpath.transfer import TransferMove
 
 __all__ = [
-    "Texts",
-    "Written",
+    "FileTexts",
+    "WrittenFiles",
     "make_folder",
-    "outcome_texts",
-    "planned_text",
+    "plan_file_text",
     "require_folder",
     "require_language",
+    "result_texts",
     "stale_program",
     "trajectory_text",
-    "write_outcome",
+    "write_result",
 ]
 
 SHORT_PIECE = 0.02
@@ -50,7 +50,7 @@ SHORTEST_CUT = 8
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Written:
+class WrittenFiles:
     """The files of a run, and what their reader must know.
 
     Parameters
@@ -70,11 +70,11 @@ class Written:
     stale: Path | None
     notes: tuple[str, ...]
 
-    __repr__ = told
+    __repr__ = short_repr
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Texts:
+class FileTexts:
     """The files of a run as text, not written yet.
 
     Parameters
@@ -97,10 +97,10 @@ class Texts:
     unsafe: bool
     notes: tuple[str, ...]
 
-    __repr__ = told
+    __repr__ = short_repr
 
 
-def write_outcome(outcome: JobResult, folder: Path, *, strict: bool = False) -> Written:
+def write_result(outcome: JobResult, folder: Path, *, strict: bool = False) -> WrittenFiles:
     """Write the files of a run into `folder`; the program only if every audit has passed.
 
     Raises
@@ -111,14 +111,14 @@ def write_outcome(outcome: JobResult, folder: Path, *, strict: bool = False) -> 
     AuditFailed
         The program fails its audit; the other files are written.
     """
-    texts = outcome_texts(outcome, strict=strict)
+    texts = result_texts(outcome, strict=strict)
     make_folder(folder)
     replaced = replace_program(folder, texts.files, texts.program)
     if texts.refused:
         said = f"{texts.refused} ({folder / 'plan.json'} and the report are written)"
         raise AuditFailed(said) if texts.unsafe else InputError(said)
     stale = stale_program(outcome.job.program, folder, texts.program)
-    return Written(
+    return WrittenFiles(
         files=replaced.written,
         removed=replaced.removed,
         stale=next(iter(replaced.edited), stale),
@@ -126,7 +126,7 @@ def write_outcome(outcome: JobResult, folder: Path, *, strict: bool = False) -> 
     )
 
 
-def outcome_texts(outcome: JobResult, *, strict: bool = False) -> Texts:
+def result_texts(outcome: JobResult, *, strict: bool = False) -> FileTexts:
     """Return the files of a run as text; the program only if every audit has passed."""
     job = outcome.job
     part, moves = outcome.part, () if outcome.part is None else outcome.part.moves
@@ -149,17 +149,17 @@ def outcome_texts(outcome: JobResult, *, strict: bool = False) -> Texts:
             faults.append(refused if unsafe else f"no program was written: {error}")
     files = {
         **program,
-        "plan.json": planned_text(outcome),
+        "plan.json": plan_file_text(outcome),
         "trajectory.csv": trajectory_text(outcome.plans, moves),
         "report.html": report_text(outcome, notes, faults),
     }
-    return Texts(
+    return FileTexts(
         files=files, program=tuple(program), refused=refused, unsafe=unsafe,
         notes=(*notes, *faults),
     )  # fmt: skip
 
 
-def planned_text(outcome: JobResult) -> str:
+def plan_file_text(outcome: JobResult) -> str:
     """Return the text of the plan.json of a run."""
     job = outcome.job
     entries: list[ContourData] = []
@@ -266,17 +266,17 @@ def require_language(job: Job) -> None:
     if job.program.language == "none":
         return
     if refusal := language(job.program.language).refusal(job.robot):
-        raise refused_at(
+        raise refusal_at(
             job.path,
             ("program", "language"),
             f'{refusal}; write language = "none" in [program] to plan without a program',
         )
 
 
-def trajectory_text(plans: Sequence[Plan], moves: Sequence[AirMove] = ()) -> str:
+def trajectory_text(plans: Sequence[Plan], moves: Sequence[TransferMove] = ()) -> str:
     """Return the text of trajectory.csv: one row per node, in mm and degrees, base frame.
 
-    Moves through the air stand where they are made, a row per corner; each has a time of its own.
+    Transfer moves stand where they are made, a row per corner; each has a time of its own.
     """
     joints = range(1, (plans[0].robot.joints if plans else 6) + 1)
     header = ["contour", "node", "kind", "t_s", *(f"q{i}_deg" for i in joints)]
@@ -305,7 +305,7 @@ def trajectory_text(plans: Sequence[Plan], moves: Sequence[AirMove] = ()) -> str
     return out.getvalue()
 
 
-def _write_air(writer: Any, move: AirMove, plan: Plan) -> None:
+def _write_air(writer: Any, move: TransferMove, plan: Plan) -> None:
     """Write the corners of a move; gamma and posture are those of contours alone."""
     T = plan.robot.forward(move.q) @ plan.T_flange_tip
     for k, (time, q, tip) in enumerate(zip(move.time, move.q, T, strict=True)):

@@ -7,11 +7,11 @@ from collections.abc import Sequence
 import numpy as np
 
 from kerfpath._arrays import Array
-from kerfpath.air import AirMove
 from kerfpath.cad import Departure
 from kerfpath.job.format import Job
 from kerfpath.job.run import JobResult
 from kerfpath.report import ContourSection, render
+from kerfpath.transfer import TransferMove
 
 __all__ = ["report_text"]
 
@@ -97,7 +97,7 @@ def _sampling(found: Departure) -> list[tuple[str, str]]:
     return rows
 
 
-def _tips(job: Job, move: AirMove) -> Array:
+def _tips(job: Job, move: TransferMove) -> Array:
     """Return where the tool tip is along a move, (m, 3) m, part frame."""
     legs = np.linspace(move.q[:-1], move.q[1:], PER_LEG, axis=1).reshape(-1, move.q.shape[1])
     T = np.linalg.inv(job.placement) @ job.robot.forward(legs) @ job.tool

@@ -8,12 +8,12 @@ from pathlib import Path
 from typing import cast
 
 from kerfpath import __version__
-from kerfpath._told import told
-from kerfpath.auditor import Check, air_checks, worst_of
+from kerfpath._repr import short_repr
+from kerfpath.auditor import Check, transfer_checks, worst_of
 from kerfpath.job.format import AuditTable, PreparedJob, prepare, read_job, tolerances_of
 from kerfpath.job.plan_file._checks import check, count
 from kerfpath.job.plan_file._compare import compare_jobs, compare_values
-from kerfpath.job.plan_file._expected import Expected, expect_plans
+from kerfpath.job.plan_file._expected import ExpectedPlan, expect_plans
 from kerfpath.job.plan_file._layout import NodesData, PlanData
 from kerfpath.job.plan_file._moves import check_moves, expect_sequence
 from kerfpath.job.plan_file._order_checks import check_sequence
@@ -65,7 +65,7 @@ class PlanAudit:
 
     prepared: PreparedJob
 
-    __repr__ = told
+    __repr__ = short_repr
 
     @classmethod
     def of(cls, job_file: Path) -> PlanAudit:
@@ -113,11 +113,11 @@ class PlanAudit:
         return AuditReport(
             tables={name: table for name, table in tables.items() if table},
             missing=file.missing,
-            note=f"{note} {_unverified(file)}".strip(),
+            note=f"{note} {_list_unverified(file)}".strip(),
         )
 
     def _whole(
-        self, file: PlanFile, judged: Sequence[PlanData], expected: Sequence[Expected]
+        self, file: PlanFile, judged: Sequence[PlanData], expected: Sequence[ExpectedPlan]
     ) -> list[Check]:
         """Compare what stands in the file beside its contours: robot, limits, cell, sequence."""
         prepared, job, data = self.prepared, self.prepared.job, file.data
@@ -163,7 +163,7 @@ def _claims(plan: Plan) -> list[Check]:
     return rows
 
 
-def _unverified(file: PlanFile) -> str:
+def _list_unverified(file: PlanFile) -> str:
     """Say what the file claims and nobody has verified."""
     best = [p.name for p in file.plans if p.proof.optimal]
     claims = [f"that {', '.join(best)} is best of its grid"] if best else []
@@ -187,7 +187,7 @@ def _by_itself(file: PlanFile) -> AuditReport:
         tables[file.path.name] = [count("contours", "plans lacking: the file has none", 1)]
     if file.moves and file.plans:
         robot = file.plans[0].robot
-        tables[AIR] = worst_of(air_checks(robot, m.q, m.time) for m in file.moves)
+        tables[AIR] = worst_of(transfer_checks(robot, m.q, m.time) for m in file.moves)
     note = (
         "Limits, tool, placement and speed were taken from the plan itself; give its job with "
         "--job to judge by that."
@@ -198,5 +198,5 @@ def _by_itself(file: PlanFile) -> AuditReport:
         if file.in_cell
         else collision_note(None)
     )
-    note = f"{note} {collisions} {_unverified(file)}".strip()
+    note = f"{note} {collisions} {_list_unverified(file)}".strip()
     return AuditReport(tables=tables, missing=file.missing, note=note)

@@ -18,16 +18,16 @@ from kerfpath.options import PlanOptions
 from kerfpath.plans import Plan
 from kerfpath.retime import feed, retime
 
-__all__ = ["Expected", "expect_plans"]
+__all__ = ["ExpectedPlan", "expect_plans"]
 
 SAME_PLACE = 1e-6
 """m: a node and one of the job's are the same up to this distance."""
 RETIMED = 1e-3
-"""Share of an interval by which times of a feed that dips may differ: they are a local optimum."""
+"""Share of an interval by which times of a reduced feed may differ: they are a local optimum."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class Expected:
+class ExpectedPlan:
     """What is expected of one contour, or piece, of a plan.json.
 
     Parameters
@@ -51,18 +51,18 @@ class Expected:
     checks: tuple[Check, ...] = ()
 
 
-def expect_plans(prepared: PreparedJob, file: PlanFile) -> tuple[list[Expected], list[Check]]:
+def expect_plans(prepared: PreparedJob, file: PlanFile) -> tuple[list[ExpectedPlan], list[Check]]:
     """Return what is expected of each plan of a file, and the checks of which contours it has."""
     names = prepared.names
     members = [[p for p in file.plans if file.contours[p.name] == name] for name in names]
-    found: dict[str, Expected] = {}
+    found: dict[str, ExpectedPlan] = {}
     for number, plans in enumerate(members):
         for each in _of_contour(prepared, number, plans, file.picked):
             found[each.name] = each
     foreign = [p.name for p in file.plans if p.name not in found]
     for name in foreign:
         row = count("contour", "contours that the job does not ask for", 1)
-        found[name] = Expected(name=name, number=-1, checks=(row,))
+        found[name] = ExpectedPlan(name=name, number=-1, checks=(row,))
     missing = [
         name
         for name, plans in zip(names, members, strict=True)
@@ -78,7 +78,7 @@ def expect_plans(prepared: PreparedJob, file: PlanFile) -> tuple[list[Expected],
 
 def _of_contour(
     prepared: PreparedJob, number: int, plans: Sequence[Plan], picked: frozenset[str]
-) -> list[Expected]:
+) -> list[ExpectedPlan]:
     """Return what is expected of the plans of one contour: it alone, or its pieces."""
     if not plans:
         return []
@@ -89,18 +89,18 @@ def _of_contour(
         if candidate is None:
             counts = sorted({len(c.nodes) for c in prepared.contours[number].candidates})
             row = _node_count(made, " or ".join(map(str, counts)))
-            return [Expected(name=name, number=number, checks=(row,))]
+            return [ExpectedPlan(name=name, number=number, checks=(row,))]
         own = _divided(candidate, made, job.options.refine_parts)
         return [_expected(prepared, number, made, candidate, own, picked=made.name in picked)]
     words = [f"{name}, piece {k + 1} of {len(plans)}" for k in range(len(plans))]
     by_name = {p.name: p for p in plans}
     if len(plans) == 1 or job.options.interruptions == "none" or set(by_name) != set(words):
         row = count("once", "plans of a contour that is cut once", len(plans))
-        return [Expected(name=p.name, number=number, checks=(row,)) for p in plans]
+        return [ExpectedPlan(name=p.name, number=number, checks=(row,)) for p in plans]
     return _pieces(prepared, number, [by_name[word] for word in words])
 
 
-def _pieces(prepared: PreparedJob, number: int, plans: Sequence[Plan]) -> list[Expected]:
+def _pieces(prepared: PreparedJob, number: int, plans: Sequence[Plan]) -> list[ExpectedPlan]:
     """Return what is expected of the pieces of a contour, in the order along it."""
     job = prepared.job
 
@@ -118,7 +118,7 @@ def _pieces(prepared: PreparedJob, number: int, plans: Sequence[Plan]) -> list[E
         last = len(whole) - 1 if p is plans[-1] else min(max(last, at + 1), len(whole) - 1)
         if at >= last:
             row = count("pieces", "pieces that do not go on where the one before them ends", 1)
-            found.append(Expected(name=p.name, number=number, checks=(row,)))
+            found.append(ExpectedPlan(name=p.name, number=number, checks=(row,)))
             continue
         part = replace(whole.part(at, last, job.options.frames), name=p.name)
         path = candidate.path.between(float(whole.s[at]), float(whole.s[last]))
@@ -150,7 +150,7 @@ def _divided(candidate: Candidate, made: Plan, parts: int) -> Candidate:
 def _expected(
     prepared: PreparedJob, number: int, made: Plan, whole: Candidate, own: Candidate,
     *, picked: bool,
-) -> Expected:  # fmt: skip
+) -> ExpectedPlan:  # fmt: skip
     """Return the plan that has the joints of a plan and all else of the job.
 
     Its nodes are those of its `own` candidate: a piece of the `whole` one, or its nodes divided.
@@ -158,10 +158,10 @@ def _expected(
     job, nodes = prepared.job, own.nodes
     if len(nodes) != len(made.contour):
         row = _node_count(made, str(len(nodes)))
-        return Expected(name=made.name, number=number, checks=(row,))
+        return ExpectedPlan(name=made.name, number=number, checks=(row,))
     if made.q.shape[1] != job.robot.joints:
         row = count("joints", f"joints, where the robot has {job.robot.joints}", made.q.shape[1])
-        return Expected(name=made.name, number=number, checks=(row,))
+        return ExpectedPlan(name=made.name, number=number, checks=(row,))
     far = np.linalg.norm(made.contour.points - nodes.points, axis=1)
     worst = int(np.argmax(far))
     place = check("place", "nodes, off those of the job", far[worst], SAME_PLACE, "m", worst)
@@ -180,7 +180,7 @@ def _expected(
         plan = _dipping(plan, whole.dt, made.time)
     plan = recompute(plan)
     rows = (place, *_postures(job, plan))
-    return Expected(name=made.name, number=number, plan=plan, path=own.path, checks=rows)
+    return ExpectedPlan(name=made.name, number=number, plan=plan, path=own.path, checks=rows)
 
 
 def _parts(candidate: Candidate, nodes: Contour, parts: int) -> int:
@@ -191,7 +191,7 @@ def _parts(candidate: Candidate, nodes: Contour, parts: int) -> int:
 
 def _options(job: Job, dt: float, said: PlanOptions, *, picked: bool) -> PlanOptions:
     """Return how the job asks for a plan; one that was picked may aim at less than the limits."""
-    options = job.options.of(job.robot, dt)
+    options = job.options.resolve(job.robot, dt)
     if not picked:
         return options
     return replace(

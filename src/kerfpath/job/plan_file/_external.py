@@ -11,7 +11,7 @@ from kerfpath._arrays import Array
 from kerfpath.job.plan_file._layout import ExternalData
 from kerfpath.robots import Robot, Travel
 
-__all__ = ["by_unit", "external_entry", "joints", "with_external"]
+__all__ = ["add_external", "by_unit", "external_entry", "joints"]
 
 
 def by_unit(name: str, values: Array, robot: Robot) -> dict[str, object]:
@@ -50,7 +50,7 @@ def external_entry(robot: Robot) -> ExternalData | None:
     return cast(ExternalData, entry)
 
 
-def with_external(entry: ExternalData | None, robot: Robot) -> Robot:
+def add_external(entry: ExternalData | None, robot: Robot) -> Robot:
     """Return the arm with the external axis of such an entry."""
     if entry is None:
         return robot

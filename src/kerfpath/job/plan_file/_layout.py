@@ -196,7 +196,7 @@ ContourData = PlanData | BrokenData
 
 
 class MoveData(TypedDict):
-    """A move through the air."""
+    """A transfer move."""
 
     clear: bool
     time_s: Row

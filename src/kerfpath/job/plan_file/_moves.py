@@ -1,4 +1,4 @@
-"""The audit of the moves through the air that a plan.json holds: by the job, cut to cut."""
+"""The audit of the transfer moves that a plan.json holds: by the job, cut to cut."""
 
 from __future__ import annotations
 
@@ -8,13 +8,13 @@ from dataclasses import replace
 import numpy as np
 
 from kerfpath._arrays import Array
-from kerfpath.air import AirMove, End, backed_off, least_time
-from kerfpath.auditor import Check, air_checks, worst_of
+from kerfpath.auditor import Check, transfer_checks, worst_of
 from kerfpath.errors import InputError
 from kerfpath.job.format import PreparedJob
 from kerfpath.job.plan_file._checks import check, count
 from kerfpath.plans import Plan
 from kerfpath.sequence import Order, PartPlan
+from kerfpath.transfer import End, TransferMove, back_off, least_time
 
 __all__ = ["check_moves", "expect_sequence"]
 
@@ -27,7 +27,7 @@ SHARES = np.linspace(0.0, 1.0, 9)
 
 
 def check_moves(
-    prepared: PreparedJob, plans: Sequence[Plan], moves: Sequence[AirMove]
+    prepared: PreparedJob, plans: Sequence[Plan], moves: Sequence[TransferMove]
 ) -> list[Check]:
     """Return the worst of each check over all moves; its node is the number of the move.
 
@@ -47,19 +47,19 @@ def check_moves(
     if len(moves) != wanted or odd or far:
         return rows
     try:
-        ways = [(_way(prepared, p, "start"), _way(prepared, p, "end")) for p in plans]
+        ways = [(_approach(prepared, p, "start"), _approach(prepared, p, "end")) for p in plans]
     except InputError as error:
         return [*rows, count("retract", f"ends of cuts that cannot be backed off: {error}", 1)]
     o, cell = prepared.job.options, prepared.cell
     tables = [
-        air_checks(robot, m.q, m.time, cell=cell, eta_v=o.eta_v, eta_a=o.eta_a) for m in moves
+        transfer_checks(robot, m.q, m.time, cell=cell, eta_v=o.eta_v, eta_a=o.eta_a) for m in moves
     ]
     for table, move, ends in zip(tables, moves, _ends(prepared, ways), strict=True):
         table += _fits(prepared, move, ends)
     rows += worst_of(tables)
     if cell is not None:
         ups = [
-            [c for c in air_checks(robot, way, np.arange(len(way)) * 1e3, cell=cell)
+            [c for c in transfer_checks(robot, way, np.arange(len(way)) * 1e3, cell=cell)
              if c.code.startswith("collision")]
             for pair in ways for way in pair
         ]  # fmt: skip
@@ -68,7 +68,7 @@ def check_moves(
 
 
 def expect_sequence(
-    prepared: PreparedJob, plans: Sequence[Plan], moves: Sequence[AirMove], at_least: float
+    prepared: PreparedJob, plans: Sequence[Plan], moves: Sequence[TransferMove], at_least: float
 ) -> PartPlan | None:
     """Return the plans and moves as the job asks for them, in the times that the moves need.
 
@@ -81,7 +81,7 @@ def expect_sequence(
     part = PartPlan(
         plans=tuple(plans),
         moves=tuple(
-            AirMove(q=m.q, time=_times(plans[0], m.q), clear=prepared.cell is not None)
+            TransferMove(q=m.q, time=_times(plans[0], m.q), clear=prepared.cell is not None)
             for m in moves
         ),
         order=Order(candidates=candidates, duration=0.0, at_least=at_least),
@@ -102,10 +102,10 @@ def _times(first: Plan, q: Array) -> Array:
     return np.concatenate([[0.0], np.cumsum(np.maximum(took, 1e-9))])
 
 
-def _way(prepared: PreparedJob, plan: Plan, end: End) -> Array:
+def _approach(prepared: PreparedJob, plan: Plan, end: End) -> Array:
     """Return joints (9, n) rad along the way down to a cut, or back from it, from the cut."""
     retract = prepared.job.program.retract
-    return np.array([backed_off(plan, end, float(share) * retract) for share in SHARES])
+    return np.array([back_off(plan, end, float(share) * retract) for share in SHARES])
 
 
 def _ends(prepared: PreparedJob, ways: Sequence[tuple[Array, Array]]) -> list[tuple[Array, Array]]:
@@ -119,7 +119,7 @@ def _ends(prepared: PreparedJob, ways: Sequence[tuple[Array, Array]]) -> list[tu
     return list(zip(ends[:-1], starts[1:], strict=True))
 
 
-def _fits(prepared: PreparedJob, move: AirMove, ends: tuple[Array, Array]) -> list[Check]:
+def _fits(prepared: PreparedJob, move: TransferMove, ends: tuple[Array, Array]) -> list[Check]:
     """Compare a move with where it has to begin and end, and with the time that it needs.
 
     Home is the same with endless joints turned on by whole turns, as the last move may have them.

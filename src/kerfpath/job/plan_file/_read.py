@@ -10,18 +10,18 @@ from typing import Any, TypeVar, cast
 import numpy as np
 from pydantic import BaseModel, ValidationError
 
-from kerfpath._told import told
-from kerfpath.air import AirMove
+from kerfpath._repr import short_repr
 from kerfpath.contour import KINDS, Contour
 from kerfpath.errors import InputError
-from kerfpath.job.plan_file._external import joints, with_external
+from kerfpath.job.plan_file._external import add_external, joints
 from kerfpath.job.plan_file._layout import PlanData, PlanDocument
 from kerfpath.job.plan_file._schema import read_document
 from kerfpath.job.plan_file._sequence import read_moves
 from kerfpath.options import OptionData, PlanOptions
 from kerfpath.plans import Feed, Plan, Proof
 from kerfpath.robots import Coupling, Robot
-from kerfpath.urdf import Chain
+from kerfpath.transfer import TransferMove
+from kerfpath.urdf import KinematicChain
 
 __all__ = ["PlanFile", "read_plan_file", "table_of"]
 
@@ -44,7 +44,7 @@ class PlanFile:
         Names of the contours that have no plan.
     failed : tuple of str
         Names of the contours whose plan failed its audit when it was made.
-    moves : tuple of AirMove
+    moves : tuple of TransferMove
         Through the air between them; empty when none were planned.
     contours : dict of str to str
         What the job calls the contour of each plan: a plan may be that of a piece.
@@ -62,12 +62,12 @@ class PlanFile:
     missing: tuple[str, ...]
     failed: tuple[str, ...]
     contours: dict[str, str]
-    moves: tuple[AirMove, ...]
+    moves: tuple[TransferMove, ...]
     in_cell: bool
     picked: frozenset[str]
     data: PlanDocument
 
-    __repr__ = told
+    __repr__ = short_repr
 
     @property
     def entries(self) -> dict[str, PlanData]:
@@ -97,7 +97,7 @@ def read_plan_file(path: str | Path) -> PlanFile:
     data = read_document(path)
     try:
         arm = _read_robot(data["robot"], data["limits"])
-        robot = with_external(data["external_axis"], arm)
+        robot = add_external(data["external_axis"], arm)
         entries = planned_entries(data)
         return PlanFile(
             path=path,
@@ -152,7 +152,7 @@ def _read_robot(robot: Mapping[str, Any], limits: Mapping[str, Any]) -> Robot:
         axis_3=robot["axis_3"],
         T_base_foot=robot["T_base_foot"],
         T_end_flange=robot["T_end_flange"],
-        chain=Chain(**robot["chain"]) if robot["chain"] else None,
+        chain=KinematicChain(**robot["chain"]) if robot["chain"] else None,
         lower=limits["lower_rad"],
         upper=limits["upper_rad"],
         endless=limits["endless"],

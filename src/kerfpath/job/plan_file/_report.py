@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 
-from kerfpath._told import told
-from kerfpath.auditor import Check, in_words
+from kerfpath._repr import short_repr
+from kerfpath.auditor import Check, format_value
 from kerfpath.cell import Cell, caveats
 
 __all__ = ["AuditReport", "collision_note"]
@@ -35,7 +35,7 @@ class AuditReport:
     note: str
     places: dict[str, tuple[str, ...]] = field(default_factory=dict)
 
-    __repr__ = told
+    __repr__ = short_repr
 
     @property
     def passed(self) -> bool:
@@ -56,7 +56,7 @@ class AuditReport:
         if check.unit == "count" and check.limit == 0:
             found = f"{check.title}: {check.value:g}, expected none"
         else:
-            value, limit = (in_words(x, check.unit) for x in (check.value, check.limit))
+            value, limit = (format_value(x, check.unit) for x in (check.value, check.limit))
             found = f"{check.title}: {value}, allowed {limit}"
         advice = f"; {check.advice}" if check.advice else ""
         return f"{self.place(name, check)}: {found}{advice}"

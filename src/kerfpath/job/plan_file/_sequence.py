@@ -1,11 +1,11 @@
-"""What plan.json says of the order of cutting and of the moves through the air."""
+"""What plan.json says of the order of cutting and of the transfer moves."""
 
 from __future__ import annotations
 
 from kerfpath._arrays import floats
-from kerfpath.air import AirMove
 from kerfpath.job.plan_file._layout import SequenceData
 from kerfpath.sequence import PartPlan
+from kerfpath.transfer import TransferMove
 
 __all__ = ["read_moves", "sequence_entry"]
 
@@ -28,12 +28,12 @@ def sequence_entry(part: PartPlan) -> SequenceData:
     }
 
 
-def read_moves(entry: SequenceData | None) -> tuple[AirMove, ...]:
+def read_moves(entry: SequenceData | None) -> tuple[TransferMove, ...]:
     """Return the moves of such an entry."""
     if entry is None:
         return ()
     return tuple(
-        AirMove(
+        TransferMove(
             q=floats(move["q_rad"], "q_rad of a move", (None, None)),
             time=floats(move["time_s"], "time_s of a move", (len(move["q_rad"]),)),
             clear=bool(move["clear"]),

@@ -9,16 +9,15 @@ from pathlib import Path
 import numpy as np
 
 from kerfpath._arrays import Array
-from kerfpath._told import told
-from kerfpath.air import least_time
-from kerfpath.auditor import Check, air_checks, worst_of
+from kerfpath._repr import short_repr
+from kerfpath.auditor import Check, transfer_checks, worst_of
 from kerfpath.cell import Cell
 from kerfpath.errors import InputError
 from kerfpath.job.format import Candidate, Job, PreparedJob, prepare, read_job
 from kerfpath.job.plan_file import AuditReport, check, check_order, collision_note, count
 from kerfpath.job.programs._cut_checks import check_cut
 from kerfpath.job.programs._expected import TargetNodes, expect_program
-from kerfpath.job.programs._laser_and_gas import Process, check_laser_and_gas
+from kerfpath.job.programs._laser_and_gas import BeamProcess, check_laser_and_gas
 from kerfpath.job.programs._read import (
     ReadCut,
     add_tips,
@@ -28,7 +27,8 @@ from kerfpath.job.programs._read import (
     read_cuts,
 )
 from kerfpath.plans import Plan
-from kerfpath.post import Language, ReadProgram, Settings, differences
+from kerfpath.post import Language, LanguageSettings, ReadProgram, differences
+from kerfpath.transfer import least_time
 
 __all__ = ["ProgramAudit", "audit_program"]
 
@@ -96,7 +96,7 @@ class ProgramAudit:
     cell: Cell | None
     inner_first: tuple[tuple[int, int], ...] = ()
 
-    __repr__ = told
+    __repr__ = short_repr
 
     @classmethod
     def of(cls, job_file: Path) -> ProgramAudit:
@@ -126,7 +126,7 @@ class ProgramAudit:
         )
 
     def audited(
-        self, read: ReadProgram, chosen: Language, settings: Settings, name: str
+        self, read: ReadProgram, chosen: Language, settings: LanguageSettings, name: str
     ) -> AuditReport:
         """Return what the audit says of every cut of a program that was read."""
         job, contours, cell = self.job, self.contours, self.cell
@@ -138,7 +138,7 @@ class ProgramAudit:
         tool = job.tool if read.T_flange_tip is None else read.T_flange_tip
         placed = job.placement if read.T_base_part is None else read.T_base_part
         off = max(np.abs(tool - job.tool).max(), np.abs(placed - job.placement).max())
-        process = Process.of(job.program, ahead=chosen.ahead)
+        process = BeamProcess.of(job.program, ahead=chosen.ahead)
         tables[name] = [
             check("frames", "tool and part, off the job's", off, SAME_FRAME, "m"),
             *check_laser_and_gas(read, job.robot, process),
@@ -148,7 +148,7 @@ class ProgramAudit:
         followed: list[tuple[ReadCut, TargetNodes, Plan]] = []
         for cut in cuts:
             apart, which, c = _closest(cut, contours)
-            title = _unused(f"{cut.name} ({names[which]})" if apart < NEAR else cut.name, tables)
+            title = _new_title(f"{cut.name} ({names[which]})" if apart < NEAR else cut.name, tables)
             places[title] = tuple(move.place for move in cut.moves)
             if apart >= NEAR:
                 said = "distance from the nearest contour of the job"
@@ -168,7 +168,7 @@ class ProgramAudit:
             for row in check_order(job.sequence, self.inner_first, done)
         ]
         tables[name] += _compared(job, followed, home, read, chosen, settings)
-        tables[_unused("air", tables)] = _air(
+        tables[_new_title("air", tables)] = _air(
             job, cuts, home, cell if job.sequence is not None else None
         )
         missing = tuple(name for i, name in enumerate(names) if i not in done)
@@ -176,14 +176,14 @@ class ProgramAudit:
         return AuditReport(tables=tables, missing=missing, note=note, places=places)
 
 
-def _unused(title: str, tables: Mapping[str, object]) -> str:
+def _new_title(title: str, tables: Mapping[str, object]) -> str:
     """Return a title that no table has yet: a cut that comes again must not hide the first."""
-    return title if title not in tables else _unused(f"{title}, again", tables)
+    return title if title not in tables else _new_title(f"{title}, again", tables)
 
 
 def _compared(
     job: Job, followed: Sequence[tuple[ReadCut, TargetNodes, Plan]], home: Array,
-    read: ReadProgram, chosen: Language, settings: Settings,
+    read: ReadProgram, chosen: Language, settings: LanguageSettings,
 ) -> list[Check]:  # fmt: skip
     """Compare a program with the one that the job would have along the same paths.
 
@@ -248,4 +248,4 @@ def _way_checks(job: Job, q: Array, cell: Cell | None) -> list[Check]:
         return []
     took = np.maximum(least_time(np.diff(q, axis=0), *job.robot.speed_limits()), 1e-9)
     time = np.append(0.0, np.cumsum(took))
-    return [row for row in air_checks(job.robot, q, time, cell=cell) if row.code != "air-time"]
+    return [row for row in transfer_checks(job.robot, q, time, cell=cell) if row.code != "air-time"]

@@ -7,7 +7,6 @@ from dataclasses import replace
 
 import numpy as np
 
-from kerfpath.air import AirMove
 from kerfpath.cell import Cell
 from kerfpath.errors import AuditFailed, InputError
 from kerfpath.job.format import Candidate, Job, ProgramOptions
@@ -16,6 +15,7 @@ from kerfpath.job.programs._audit import ProgramAudit
 from kerfpath.job.run import CutResult
 from kerfpath.plans import Plan
 from kerfpath.post import dry_run, language, post_and_read
+from kerfpath.transfer import TransferMove
 
 __all__ = ["audit_of_cuts", "audit_of_plans", "program_of"]
 
@@ -54,7 +54,7 @@ def audit_of_plans(job: Job, plans: Sequence[Plan]) -> ProgramAudit:
 def program_of(
     plans: Sequence[Plan],
     options: ProgramOptions,
-    moves: Sequence[AirMove] = (),
+    moves: Sequence[TransferMove] = (),
     *,
     audit: ProgramAudit,
     strict: bool = False,

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from kerfpath._told import told
+from kerfpath._repr import short_repr
 from kerfpath.job.format import read_job
 from kerfpath.job.programs._read import add_tips, language_of, program_on_disk
 from kerfpath.post import (
@@ -17,11 +17,11 @@ from kerfpath.post import (
     not_compared,
 )
 
-__all__ = ["Compared", "compare_programs"]
+__all__ = ["ProgramComparison", "compare_programs"]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Compared:
+class ProgramComparison:
     """What differs between two programs, and what could not be compared.
 
     Parameters
@@ -35,10 +35,10 @@ class Compared:
     differences: tuple[Difference, ...]
     not_compared: tuple[str, ...]
 
-    __repr__ = told
+    __repr__ = short_repr
 
 
-def compare_programs(a: Path, b: Path, job_file: Path) -> Compared:
+def compare_programs(a: Path, b: Path, job_file: Path) -> ProgramComparison:
     """Return what differs between two programs of a job, in the same language or in two.
 
     Parameters
@@ -66,7 +66,7 @@ def compare_programs(a: Path, b: Path, job_file: Path) -> Compared:
         reads = [_without_postures(read) for read in reads]
     found, left = differences(*reads, rules=rules), not_compared(*reads)
     left += ["postures"] if said and rules else []
-    return Compared(differences=tuple(found), not_compared=tuple(left))
+    return ProgramComparison(differences=tuple(found), not_compared=tuple(left))
 
 
 def _without_postures(read: ReadProgram) -> ReadProgram:

@@ -16,7 +16,7 @@ from kerfpath.job.plan_file import check, count
 from kerfpath.job.programs._expected import TargetNodes, nodes_at_targets
 from kerfpath.job.programs._read import ReadCut
 from kerfpath.plans import Plan, Proof
-from kerfpath.post import Language, Rules, Settings
+from kerfpath.post import Language, LanguageSettings, Rules
 
 __all__ = ["check_cut"]
 
@@ -30,7 +30,7 @@ CLIMB = 0.05
 
 def check_cut(
     job: Job, candidate: Candidate, cut: ReadCut, cell: Cell | None, chosen: Language,
-    settings: Settings,
+    settings: LanguageSettings,
 ) -> tuple[list[Check], tuple[TargetNodes, Plan] | None]:  # fmt: skip
     """Return the checks of a cut, and its nodes and plan where it can be compared with the job."""
     unreached = np.flatnonzero(np.isnan(cut.q).any(axis=1))
@@ -149,7 +149,7 @@ def _process_checks(
 
 
 def _postures(
-    job: Job, cut: ReadCut, chosen: Language, settings: Settings, left: Array
+    job: Job, cut: ReadCut, chosen: Language, settings: LanguageSettings, left: Array
 ) -> list[Check]:
     """Count targets whose words of posture and turns are not those of the joints there.
 

@@ -8,8 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from kerfpath._arrays import Array, Bools, Ints
-from kerfpath._told import told
-from kerfpath.air import AirMove, backed_off
+from kerfpath._repr import short_repr
 from kerfpath.contour import Contour
 from kerfpath.job.format import Candidate, Job, divide_nodes
 from kerfpath.job.programs._read import ReadCut, branch_of, follow_poses, poses_on_arc
@@ -18,14 +17,15 @@ from kerfpath.post import (
     CircularMove,
     JointMove,
     Language,
+    LanguageSettings,
     LinearMove,
     Program,
     ReadProgram,
     Rules,
-    Settings,
     Step,
     read_as_written,
 )
+from kerfpath.transfer import TransferMove, back_off
 
 __all__ = ["TargetNodes", "expect_program", "nodes_at_targets"]
 
@@ -65,7 +65,7 @@ class TargetNodes:
     off: Array
     alone: Bools
 
-    __repr__ = told
+    __repr__ = short_repr
 
     @property
     def complete(self) -> bool:
@@ -99,7 +99,7 @@ def nodes_at_targets(job: Job, candidate: Candidate, cut: ReadCut, s: Array) -> 
 
 def expect_program(
     job: Job, cuts: Sequence[tuple[ReadCut, TargetNodes, Plan]], home: Array,
-    language: Language, settings: Settings,
+    language: Language, settings: LanguageSettings,
 ) -> ReadProgram:  # fmt: skip
     """Return what the job's program along the paths of these cuts would say, read back.
 
@@ -171,15 +171,17 @@ def _as_fast(cut: ReadCut, s: Array) -> Array:
     return np.append(0.0, np.cumsum(took))
 
 
-def _moves(job: Job, cuts: Sequence[ReadCut], plans: Sequence[Plan], home: Array) -> list[AirMove]:
+def _moves(
+    job: Job, cuts: Sequence[ReadCut], plans: Sequence[Plan], home: Array
+) -> list[TransferMove]:
     """Return the moves between cuts with the corners that were read, and the job's home."""
     if job.sequence is None:
         return []
     corners = [
-        [*cut.approach[:-1], backed_off(plan, "start", job.program.retract)]
+        [*cut.approach[:-1], back_off(plan, "start", job.program.retract)]
         for cut, plan in zip(cuts, plans, strict=True)
     ]
-    backs = [backed_off(plan, "end", job.program.retract) for plan in plans]
+    backs = [back_off(plan, "end", job.program.retract) for plan in plans]
     ways = [[back, *way] for back, way in zip(backs, corners[1:], strict=False)]
     if job.sequence.home_deg is not None:
         there = np.radians(job.sequence.home_deg)
@@ -188,7 +190,8 @@ def _moves(job: Job, cuts: Sequence[ReadCut], plans: Sequence[Plan], home: Array
         turns = np.round((end - there) / (2 * np.pi)) * job.robot.endless
         ways = [[there, *corners[0][1:]], *ways, [backs[-1], *home[:-1], there + 2 * np.pi * turns]]
     return [
-        AirMove(q=np.array(way), time=np.arange(len(way), dtype=float), clear=True) for way in ways
+        TransferMove(q=np.array(way), time=np.arange(len(way), dtype=float), clear=True)
+        for way in ways
     ]
 
 

@@ -34,7 +34,7 @@ from kerfpath.job.plan_file import (
 )
 from kerfpath.job.programs._audit import ProgramAudit
 from kerfpath.job.programs._build import audit_of_plans, program_of
-from kerfpath.placement import MeasuredFrame, placed, placed_moves, planned_again
+from kerfpath.placement import MeasuredFrame, place_moves, placed, planned_again
 from kerfpath.plans import Plan
 from kerfpath.post import language as find_language
 
@@ -109,7 +109,7 @@ def program_from_file(
                 f"{job_file}: the cell of a job says nothing of a part that was measured; give "
                 "one of the two"
             )
-        prepared = _as_planned(prepare(read_job(job_file)), file)
+        prepared = _planned_requirements(prepare(read_job(job_file)), file)
         _require_passed(PlanAudit(prepared=prepared).audited(plan_file))
         if prepared.job.options.interruptions == "none":
             by_job = ProgramAudit.by(prepared)
@@ -183,7 +183,7 @@ def _job_of(file: PlanFile, options: ProgramOptions) -> Job:
     )
 
 
-def _as_planned(prepared: PreparedJob, file: PlanFile) -> PreparedJob:
+def _planned_requirements(prepared: PreparedJob, file: PlanFile) -> PreparedJob:
     """Return a job with the [program] that a plan.json was made with.
 
     Retract, air and pierce times of the plan follow from that one. The program is built with that
@@ -216,13 +216,13 @@ def _at_measured(
             try:
                 moved = planned_again(p, frame.T_base_part)
             except NoFeasiblePath as broken:
-                raise broken.retold(
+                raise broken.with_message(
                     f"contour {p.name!r}: moved to the measured placement {why}, and planned again "
                     f"there: {broken}"
                 ) from None
             notes.append(f"Contour {p.name!r} was planned again there; only moved there {why}.")
         plans.append(moved)
-    moves = placed_moves(file.moves, plans, retract)
+    moves = place_moves(file.moves, plans, retract)
     return replace(file, plans=tuple(plans), moves=moves, in_cell=False), notes
 
 

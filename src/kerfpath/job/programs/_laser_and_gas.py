@@ -15,14 +15,14 @@ from typing import Literal
 
 import numpy as np
 
-from kerfpath.air import least_time
 from kerfpath.auditor import Check, Unit
 from kerfpath.job.format import ProgramOptions
 from kerfpath.job.plan_file import check
 from kerfpath.post import ReadMove, ReadProgram, ReadWait, Signal, groups_of
 from kerfpath.robots import Robot
+from kerfpath.transfer import least_time
 
-__all__ = ["Process", "check_laser_and_gas"]
+__all__ = ["BeamProcess", "check_laser_and_gas"]
 
 SAME_TIME = 2e-3
 """s: controllers round times."""
@@ -31,7 +31,7 @@ ENDLESS = 60.0
 
 What = Literal["air", "approach", "start", "cut", "end", "retract"]
 WORDS: dict[What, str] = {
-    "air": "laser on in a move through the air, or where the robot stands there",
+    "air": "laser on in a transfer move, or where the robot stands there",
     "approach": "laser on on the way down to the part",
     "start": "laser on at the start for longer than the pierce",
     "cut": "laser on where the robot waits in the cut",
@@ -42,7 +42,7 @@ WORDS: dict[What, str] = {
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Process:
+class BeamProcess:
     """What the job asks of beam and gas.
 
     Parameters
@@ -62,7 +62,7 @@ class Process:
     stops: bool
 
     @classmethod
-    def of(cls, options: ProgramOptions, *, ahead: bool) -> Process:
+    def of(cls, options: ProgramOptions, *, ahead: bool) -> BeamProcess:
         """Return what [program] asks for, where the language can switch `ahead` of a target."""
         gas = options.gas_lead
         return cls(
@@ -95,7 +95,7 @@ class _Event:
     step: int
 
 
-def check_laser_and_gas(read: ReadProgram, robot: Robot, process: Process) -> list[Check]:
+def check_laser_and_gas(read: ReadProgram, robot: Robot, process: BeamProcess) -> list[Check]:
     """Return the checks of beam and gas over a whole program; their node is the step of it.
 
     Parameters
@@ -103,7 +103,7 @@ def check_laser_and_gas(read: ReadProgram, robot: Robot, process: Process) -> li
     read : ReadProgram
         With the tip poses of its path.
     robot : Robot
-    process : Process
+    process : BeamProcess
     """
     spans, events = _timeline(read, robot)
     beam = _on(events, "laser", shift=process.lead_time)
@@ -232,7 +232,10 @@ def _overlap(start: float, end: float, on: Sequence[tuple[float, float, int]]) -
 
 
 def _wrongly(
-    spans: Sequence[_Span], beam: Sequence[tuple[float, float, int]], what: What, process: Process
+    spans: Sequence[_Span],
+    beam: Sequence[tuple[float, float, int]],
+    what: What,
+    process: BeamProcess,
 ) -> list[tuple[float, int]]:
     """Return for how long (s) the beam is on where it must not be, and the step there.
 
@@ -297,7 +300,7 @@ def _idle(events: Sequence[_Event]) -> list[tuple[float, int]]:
 
 def _gas(
     spans: Sequence[_Span], events: Sequence[_Event], beam: Sequence[tuple[float, float, int]],
-    process: Process,
+    process: BeamProcess,
 ) -> list[Check]:  # fmt: skip
     """Return whether the gas flows before the beam and for as long, and nowhere else."""
     gas = _on(events, "gas", shift=0.0)

@@ -10,15 +10,15 @@ import numpy as np
 from scipy.spatial.transform import Rotation, Slerp
 
 from kerfpath._arrays import Array, Bools, Ints
-from kerfpath._told import told
+from kerfpath._repr import short_repr
 from kerfpath.errors import InputError
 from kerfpath.job.format import Job, ProgramTable
 from kerfpath.post import (
     Language,
+    LanguageSettings,
     ReadGroup,
     ReadMove,
     ReadProgram,
-    Settings,
     circle_through,
     groups_of,
     languages,
@@ -68,7 +68,7 @@ class _Folder(Mapping[str, str]):
         return sum(1 for _ in self.folder.iterdir())
 
 
-def language_of(path: Path, job: Job) -> tuple[Language, Settings]:
+def language_of(path: Path, job: Job) -> tuple[Language, LanguageSettings]:
     """Return the language of a program by the suffix of its file, and the job's settings for it.
 
     Raises
@@ -89,7 +89,9 @@ def language_of(path: Path, job: Job) -> tuple[Language, Settings]:
     return chosen, settings
 
 
-def program_on_disk(path: Path, chosen: Language, settings: Settings, robot: Robot) -> ReadProgram:
+def program_on_disk(
+    path: Path, chosen: Language, settings: LanguageSettings, robot: Robot
+) -> ReadProgram:
     """Return what the program that starts with the file at `path` says.
 
     Raises
@@ -152,7 +154,7 @@ class ReadCut:
     ends: Ints
     group: ReadGroup
 
-    __repr__ = told
+    __repr__ = short_repr
 
     @property
     def targets(self) -> tuple[ReadMove, ...]:

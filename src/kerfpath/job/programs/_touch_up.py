@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from kerfpath._arrays import Array, Ints
-from kerfpath._told import told
+from kerfpath._repr import short_repr
 from kerfpath.cad import Part
 from kerfpath.cad import read as read_drawing
 from kerfpath.contour import Contour, angle_between
@@ -25,7 +25,7 @@ from kerfpath.plans import Plan
 from kerfpath.post import ReadGroup, ReadMove, differences, groups_of, read_program
 from kerfpath.progress import Progress, no_progress
 
-__all__ = ["Taught", "TouchUp", "touch_up"]
+__all__ = ["MovedTarget", "TouchUp", "touch_up"]
 
 MOVED = 1e-6
 """A target that is nearer (m) to where it was planned was not moved."""
@@ -41,7 +41,7 @@ MEASURE = "a part that stands elsewhere is measured: kerfpath post PLAN.json --m
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Taught:
+class MovedTarget:
     """A target that a person has moved.
 
     Parameters
@@ -62,7 +62,7 @@ class Taught:
     off: float
     turned: float
 
-    __repr__ = told
+    __repr__ = short_repr
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -73,17 +73,17 @@ class TouchUp:
     ----------
     part : Part
     outcome : JobResult
-    targets : tuple of Taught
+    targets : tuple of MovedTarget
     notes : tuple of str
         What else was changed in the program, and is not kept.
     """
 
     part: Part
     outcome: JobResult
-    targets: tuple[Taught, ...]
+    targets: tuple[MovedTarget, ...]
     notes: tuple[str, ...]
 
-    __repr__ = told
+    __repr__ = short_repr
 
 
 def touch_up(
@@ -119,7 +119,7 @@ def touch_up(
     job, file = read_job(job_file), read_plan_file(plan_file)
     _require_kind(job, file)
     part = read_drawing(job.part_file, unit=job.part_unit)
-    groups, notes = _edited(program, job, file)
+    groups, notes = _read_edits(program, job, file)
     targets = [
         _taught(p, group.path[: len(p.contour)])
         for p, group in zip(file.plans, groups, strict=True)
@@ -164,7 +164,7 @@ def _require_kind(job: Job, file: PlanFile) -> None:
         require_same_setup(p, job, file.path)
 
 
-def _edited(program: Path, job: Job, file: PlanFile) -> tuple[list[ReadGroup], list[str]]:
+def _read_edits(program: Path, job: Job, file: PlanFile) -> tuple[list[ReadGroup], list[str]]:
     """Return what an edited program does, a group for each plan, and what else was changed."""
     chosen, settings = language_of(program, job)
     options = replace(job.program, language=chosen.name, settings=settings)
@@ -189,20 +189,22 @@ def _edited(program: Path, job: Job, file: PlanFile) -> tuple[list[ReadGroup], l
     return [group for group in groups_of(edited) if group.path], notes
 
 
-def _taught(p: Plan, moves: Sequence[ReadMove]) -> list[Taught]:
+def _taught(p: Plan, moves: Sequence[ReadMove]) -> list[MovedTarget]:
     """Return the targets of a contour that are not where they were planned."""
     T = np.array([move.T_part_tip for move in moves])
     off = np.linalg.norm(T[:, :3, 3] - p.contour.points, axis=1)
     turned = angle_between(p.contour.axes, T[:, :3, 2])
     return [
-        Taught(
+        MovedTarget(
             contour=p.name, node=k, place=moves[k].place, off=float(off[k]), turned=float(turned[k])
         )
         for k in np.flatnonzero((off > MOVED) | (turned > TURNED)).tolist()
     ]
 
 
-def _require_few(program: Path, targets: Sequence[Sequence[Taught]], plans: Sequence[Plan]) -> None:
+def _require_few(
+    program: Path, targets: Sequence[Sequence[MovedTarget]], plans: Sequence[Plan]
+) -> None:
     moved = [target for each in targets for target in each]
     total = sum(len(p.contour) for p in plans)
     if not moved:
@@ -221,15 +223,15 @@ def _require_few(program: Path, targets: Sequence[Sequence[Taught]], plans: Sequ
 
 
 def _touched_up(
-    asked: CutRequest, p: Plan, moved: Sequence[Taught], moves: Sequence[ReadMove], ease: float
+    asked: CutRequest, p: Plan, moved: Sequence[MovedTarget], moves: Sequence[ReadMove], ease: float
 ) -> CutRequest:
     """Return what is asked for a contour around its moved targets, in the postures of its plan."""
-    planned = _planned_from(p, asked)
+    planned = _path_and_nodes(p, asked)
     if moved:
         k = np.array([target.node for target in moved])
         T = np.array([moves[node].T_part_tip for node in k])
         path, keep = touched_up(planned.path, planned.nodes, k, T[:, :3, 3], T[:, :3, 2], ease=ease)
-        nodes = _sampled(path, planned.nodes, keep, asked.task.speed)
+        nodes = _sample_touched(path, planned.nodes, keep, asked.task.speed)
         planned = Candidate.at(asked.task.speed, path, nodes)
     postures = tuple(np.unique(p.posture).tolist())
     return replace(
@@ -240,28 +242,28 @@ def _touched_up(
     )
 
 
-def _planned_from(p: Plan, asked: CutRequest) -> Candidate:
+def _path_and_nodes(p: Plan, asked: CutRequest) -> Candidate:
     """Return the candidate that a plan is of.
 
     That of a plan that was touched up before has its own nodes, with straight lines between.
     """
     for candidate in asked.candidates:
         fits = len(candidate.nodes) == len(p.contour)
-        if fits and _apart(p.contour, candidate.path) < SAME_PATH:
+        if fits and _distances(p.contour, candidate.path) < SAME_PATH:
             return candidate
     slowed = bool((p.contour.speed_share < 1).any())
     nodes = replace(p.contour, time=p.time if slowed else None)
     return Candidate.at(asked.task.speed, p.contour, nodes)
 
 
-def _sampled(path: Contour, nodes: Contour, keep: Ints, speed: float) -> Contour:
+def _sample_touched(path: Contour, nodes: Contour, keep: Ints, speed: float) -> Contour:
     """Return a touched-up path sampled as finely as the nodes that it replaces."""
     if nodes.time is not None:
         return path.resample(dt=float(np.diff(nodes.time).max()), speed=speed, keep=keep)
     return path.resample(spacing=float(np.diff(nodes.s).max()), keep=keep)
 
 
-def _apart(planned: Contour, path: Contour) -> float:
+def _distances(planned: Contour, path: Contour) -> float:
     """Return how far (m) nodes and axes are from a path at the same arc lengths."""
     points, axes = path.at(planned.s)
     off: Array = np.linalg.norm(planned.points - points, axis=1)

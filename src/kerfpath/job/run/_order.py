@@ -1,4 +1,4 @@
-"""The order in which the contours of a job are cut, and the moves through the air between them."""
+"""The order in which the contours of a job are cut, and the transfer moves between them."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from kerfpath.auditor import air_checks, worst_of
+from kerfpath.auditor import transfer_checks, worst_of
 from kerfpath.errors import NoFeasiblePath
 from kerfpath.job.format import PreparedJob
 from kerfpath.job.run._contour import cut_in_posture
@@ -79,7 +79,7 @@ def order_cuts(
     ]
     o = job.options
     audited = (
-        air_checks(job.robot, m.q, m.time, cell=prepared.cell, eta_v=o.eta_v, eta_a=o.eta_a)
+        transfer_checks(job.robot, m.q, m.time, cell=prepared.cell, eta_v=o.eta_v, eta_a=o.eta_a)
         for m in part.moves
     )
     return replace(result, cuts=tuple(cuts), part=part, air=tuple(worst_of(audited)))

@@ -6,20 +6,20 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from kerfpath._told import told
+from kerfpath._repr import short_repr
 from kerfpath.cad import Part
 from kerfpath.cad import read as read_drawing
 from kerfpath.cell import Cell
 from kerfpath.job.format import Job, cell_of_job
 
-__all__ = ["JobPreview", "Start", "check_job"]
+__all__ = ["ContourStart", "JobPreview", "check_job"]
 
 FAR = 0.05
 """m beyond the near-miss distance: farther off, how far is not said."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Start:
+class ContourStart:
     """How a contour begins.
 
     Parameters
@@ -44,7 +44,7 @@ class Start:
     clearance: float
     pair: tuple[str, str] | None
 
-    __repr__ = told
+    __repr__ = short_repr
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -54,9 +54,9 @@ class JobPreview:
     job: Job
     part: Part
     cell: Cell | None
-    starts: tuple[Start, ...]
+    starts: tuple[ContourStart, ...]
 
-    __repr__ = told
+    __repr__ = short_repr
 
 
 def check_job(job: Job, part: Part | None = None) -> JobPreview:
@@ -79,7 +79,7 @@ def check_job(job: Job, part: Part | None = None) -> JobPreview:
     return JobPreview(job=job, part=part, cell=cell, starts=tuple(starts))
 
 
-def _start(name: str, nodes: int, q: np.ndarray, cell: Cell | None) -> Start:
+def _start(name: str, nodes: int, q: np.ndarray, cell: Cell | None) -> ContourStart:
     clear, clearance, pair = len(q), np.nan, None
     if cell is not None and len(q) and len(cell.pairs):
         apart = cell.distances(q, enough=cell.required + FAR)
@@ -90,4 +90,6 @@ def _start(name: str, nodes: int, q: np.ndarray, cell: Cell | None) -> Start:
             best = int(np.argmax(apart.min(axis=1)))
             nearest = int(np.argmin(apart[best]))
             clearance, pair = float(apart[best, nearest]), cell.pair_names[common[nearest]]
-    return Start(name=name, nodes=nodes, poses=len(q), clear=clear, clearance=clearance, pair=pair)
+    return ContourStart(
+        name=name, nodes=nodes, poses=len(q), clear=clear, clearance=clearance, pair=pair
+    )

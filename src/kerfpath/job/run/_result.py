@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 from kerfpath._arrays import Array, Ints
-from kerfpath._told import told
+from kerfpath._repr import short_repr
 from kerfpath.auditor import Check
 from kerfpath.cad import Departure, Part, departure_from
 from kerfpath.cell import Cell
@@ -58,7 +58,7 @@ class CutResult:
     clearance: ClearanceMap | None = None
     departure: Departure | None = None
 
-    __repr__ = told
+    __repr__ = short_repr
 
     @property
     def contour(self) -> str:
@@ -160,7 +160,7 @@ class JobResult:
     stuck: NoFeasiblePath | None = None
     air: tuple[Check, ...] = ()
 
-    __repr__ = told
+    __repr__ = short_repr
 
     @property
     def passed(self) -> bool:

@@ -9,7 +9,7 @@ from kerfpath.cell import Cell
 from kerfpath.contour import Contour
 from kerfpath.errors import NoFeasiblePath
 from kerfpath.graph import LayeredGraph
-from kerfpath.job.format import ContourTask, Job, cell_of_job
+from kerfpath.job.format import ContourSpec, Job, cell_of_job
 from kerfpath.planner import FastestSpeed, fastest_speed
 from kerfpath.progress import Progress, no_progress
 
@@ -38,7 +38,7 @@ def fastest_along(
 
 def fastest_speeds(
     job: Job, *, progress: Progress = no_progress
-) -> list[tuple[ContourTask, Contour, FastestSpeed | NoFeasiblePath]]:
+) -> list[tuple[ContourSpec, Contour, FastestSpeed | NoFeasiblePath]]:
     """Return, for each contour of a job, its task, its nodes and the fastest constant speed.
 
     The speeds that the job asks for, and shares of them, play no part, nor does what comfort costs.
@@ -50,7 +50,7 @@ def fastest_speeds(
     """
     part = read_drawing(job.part_file, unit=job.part_unit)
     cell = cell_of_job(job, part)
-    answers: list[tuple[ContourTask, Contour, FastestSpeed | NoFeasiblePath]] = []
+    answers: list[tuple[ContourSpec, Contour, FastestSpeed | NoFeasiblePath]] = []
     tasks = job.tasks(part)
     for i, task in enumerate(tasks):
         progress("contours", i, len(tasks))

@@ -23,7 +23,7 @@ from kerfpath.post._program import (
     Wait,
     targets_of,
 )
-from kerfpath.post._settings import LinesPerFile, Rules, Settings
+from kerfpath.post._settings import LanguageSettings, LinesPerFile, Rules
 from kerfpath.post._times import timetable
 
 __all__ = ["Csv", "CsvSettings", "columns", "event", "is_reserved", "rules"]
@@ -31,7 +31,7 @@ __all__ = ["Csv", "CsvSettings", "columns", "event", "is_reserved", "rules"]
 POSE = ("x_mm", "y_mm", "z_mm", "qw", "qx", "qy", "qz")
 
 
-class CsvSettings(Settings):
+class CsvSettings(LanguageSettings):
     """How long a table may be."""
 
     lines_per_file: LinesPerFile = 1_000_000

@@ -8,11 +8,11 @@ import numpy as np
 from scipy.spatial.transform import Rotation, Slerp
 
 from kerfpath._arrays import Array, Bools, Ints, freeze
-from kerfpath._told import told
-from kerfpath.air import least_time
+from kerfpath._repr import short_repr
 from kerfpath.errors import InputError
 from kerfpath.post._program import JointMove, LinearMove, Program, Wait
 from kerfpath.post._times import timetable
+from kerfpath.transfer import least_time
 
 __all__ = ["Trajectory", "rates", "trajectory"]
 
@@ -40,7 +40,7 @@ class Trajectory:
     stops: Bools
     done: Ints
 
-    __repr__ = told
+    __repr__ = short_repr
 
 
 def rates(time: Array, q: Array, stops: Bools) -> tuple[Array, Array]:

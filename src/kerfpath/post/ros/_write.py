@@ -17,7 +17,7 @@ from kerfpath.post._divide import require_one_file
 from kerfpath.post._formatter import Formatter, number
 from kerfpath.post._orientations import quaternions
 from kerfpath.post._program import JointMove, LinearMove, Wait
-from kerfpath.post._settings import LinesPerFile, Rules, Settings, setting
+from kerfpath.post._settings import LanguageSettings, LinesPerFile, Rules, setting
 from kerfpath.post.ros._trajectory import Trajectory, rates, trajectory
 
 __all__ = ["Ros", "RosSettings", "head", "joint_names", "rules"]
@@ -27,7 +27,7 @@ SECOND = 1_000_000_000
 """In ns."""
 
 
-class RosSettings(Settings):
+class RosSettings(LanguageSettings):
     """What the robot's driver calls things, and how densely the way is written."""
 
     lines_per_file: LinesPerFile = 1_000_000

@@ -15,7 +15,7 @@ from kerfpath.post._frames import faceplate, world
 from kerfpath.post._line_reader import LineReader, patterns, statements
 from kerfpath.post._program import PARTNERS, Partner, Switch
 from kerfpath.post._read import MoveKind, ReadMove, ReadProgram, ReadSection, ReadStep
-from kerfpath.post.val3._read_data import Data
+from kerfpath.post.val3._read_data import Val3Data
 from kerfpath.post.val3._settings import Val3Settings
 from kerfpath.post.val3._write import (
     DATA,
@@ -104,7 +104,7 @@ class _Project:
         data.take(file=f"{self.name}.dtx")
         self.libraries = self._libraries(libraries)
         file = str(self.folder / f"{self.name}.dtx")
-        self.data = Data(parse(file, files[file], "Database", DATA), robot, settings)
+        self.data = Val3Data(parse(file, files[file], "Database", DATA), robot, settings)
 
     def _programs(self, programs: Element) -> list[str]:
         names: list[str] = []

@@ -14,7 +14,7 @@ from kerfpath.post.val3._write import ANGLES, FIRST, OUTPUTS, PORTS, TYPES, link
 from kerfpath.post.val3._xml import Element
 from kerfpath.robots import Robot
 
-__all__ = ["Data"]
+__all__ = ["Val3Data"]
 
 _NUMBER = re.compile(r"-?\d+(?:\.\d+)?", re.ASCII)
 _POSE = ("x", "y", "z", "rx", "ry", "rz")
@@ -27,7 +27,7 @@ _JOINTS = tuple(f"j{i}" for i in range(1, 7))
 _BOUNDS = {"accel": "100", "decel": "100", "rmax": "99999"}
 
 
-class Data:
+class Val3Data:
     """What a .dtx declares; each kind of datum has a method.
 
     `frames` by name, `q` (K, 6) rad, `T` (K, 4, 4) m in the part with their `words`, and of
@@ -123,14 +123,14 @@ class Data:
 
 
 _DATA = {
-    "fPart": ("frame", Data._frame),
-    "tLaser": ("tool", Data._frame),
-    **{name: ("dio", Data._output) for name in (*OUTPUTS.values(), *PORTS.values())},
-    FIRST: ("num", Data._first),
-    "jAir": ("jointRx", Data._air_targets),
-    "mAir": ("mdesc", Data._descriptors),
-    "pPath": ("pointRx", Data._points),
-    "mPath": ("mdesc", Data._descriptors),
+    "fPart": ("frame", Val3Data._frame),
+    "tLaser": ("tool", Val3Data._frame),
+    **{name: ("dio", Val3Data._output) for name in (*OUTPUTS.values(), *PORTS.values())},
+    FIRST: ("num", Val3Data._first),
+    "jAir": ("jointRx", Val3Data._air_targets),
+    "mAir": ("mdesc", Val3Data._descriptors),
+    "pPath": ("pointRx", Val3Data._points),
+    "mPath": ("mdesc", Val3Data._descriptors),
 }
 """Type of each datum, and how its values are read."""
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from xml.parsers import expat
 
-from kerfpath._told import told
+from kerfpath._repr import short_repr
 from kerfpath.errors import InputError
 
 __all__ = ["SCHEMA", "Element", "parse"]
@@ -25,7 +25,7 @@ class Element:
     children: list[Element] = field(default_factory=list)
     text: str = ""
 
-    __repr__ = told
+    __repr__ = short_repr
 
     def fault(self, message: str, line: int | None = None) -> InputError:
         """Return the error that something is wrong in this element, or on a line of its text."""

@@ -13,8 +13,8 @@ from kerfpath.job import Job
 from kerfpath.study._evaluator import SampledContour, sample_contours
 from kerfpath.study._job import load_job
 from kerfpath.study.placing._evaluator import PlacementEvaluator
-from kerfpath.study.placing._place import moved, numbers_of
-from kerfpath.study.placing._value import ContourValue, PlacementValue, beats, worst_of
+from kerfpath.study.placing._place import move_job, numbers_of
+from kerfpath.study.placing._value import ContourValue, PlacementValue, is_better, worst_of
 
 __all__ = ["contours_of", "evaluate_placements", "middle_of"]
 
@@ -55,7 +55,7 @@ def evaluate_placements(
     worst: PlacementValue | None = None
     for i, offsets in enumerate(places):
         evaluator = PlacementEvaluator(
-            job=moved(known.job, numbers_of(known.job, offsets, middle)),
+            job=move_job(known.job, numbers_of(known.job, offsets, middle)),
             part=known.part,
             goal=goal,
             contours=contours,
@@ -71,7 +71,11 @@ def evaluate_placements(
         worst = here if worst is None else _worse(goal, worst, here)
         if not worst.feasible:
             break
-        if floor is not None and worst.bound is not None and not beats(goal, worst.bound, floor):
+        if (
+            floor is not None
+            and worst.bound is not None
+            and not is_better(goal, worst.bound, floor)
+        ):
             break
     assert worst is not None
     return asdict(replace(worst, contours=of_contours))

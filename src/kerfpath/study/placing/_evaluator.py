@@ -21,7 +21,7 @@ from functools import cached_property
 import numpy as np
 
 from kerfpath._arrays import Bools
-from kerfpath._told import told
+from kerfpath._repr import short_repr
 from kerfpath.cell import Cell
 from kerfpath.errors import InputError, NoFeasiblePath
 from kerfpath.graph import LayeredGraph
@@ -36,7 +36,7 @@ from kerfpath.study.placing._value import (
     PlacementValue,
     Stage,
     Status,
-    beats,
+    is_better,
     worst_of,
 )
 
@@ -74,7 +74,7 @@ class PlacementEvaluator(Evaluator):
     contours: tuple[SampledContour, ...]
     graphs: list[LayeredGraph] = field(default_factory=list)
 
-    __repr__ = told
+    __repr__ = short_repr
 
     def evaluate(
         self,
@@ -91,7 +91,9 @@ class PlacementEvaluator(Evaluator):
             self._require_poses()
             bound = self._bound(stretches)
             stage = "stretch"
-            beaten = bound is not None and floor is not None and not beats(self.goal, bound, floor)
+            beaten = (
+                bound is not None and floor is not None and not is_better(self.goal, bound, floor)
+            )
             if not exact or (beaten and not whole):
                 return PlacementValue(stage=stage, bound=bound)
             stage = "exact"
@@ -189,7 +191,7 @@ class PlacementEvaluator(Evaluator):
         contour, graph, robot = self.contours[index], self.graphs[index], self.job.robot
         if len(graph.start) < 3:
             return 0.0
-        options = self.job.options.of(robot, contour.interval)
+        options = self.job.options.resolve(robot, contour.interval)
         velocity, _ = robot.speed_limits()
         try:
             return shortest_path(
@@ -231,7 +233,7 @@ class PlacementEvaluator(Evaluator):
                 least = sum(left.values())
             else:
                 least = value if least is None else worst_of(self.goal, [least, value])
-            if floor is not None and not whole and not beats(self.goal, least, floor):
+            if floor is not None and not whole and not is_better(self.goal, least, floor):
                 return _exact(least, None, solved)
         return _exact(least, least, solved)
 

@@ -14,7 +14,7 @@ from kerfpath.post import write_files
 from kerfpath.report import LayoutEntry, render_layout
 from kerfpath.study.placing._layout import Layout
 from kerfpath.study.placing._place import placed_text
-from kerfpath.study.placing._search import Trial
+from kerfpath.study.placing._search import PlacementTrial
 from kerfpath.study.placing._value import PlacementValue
 
 __all__ = ["layout_entry", "write_layout"]
@@ -59,7 +59,7 @@ def layout_entry(found: Layout) -> LayoutEntry:
     return cast(LayoutEntry, entry)
 
 
-def _best(found: Layout, best: Trial) -> dict[str, object]:
+def _best(found: Layout, best: PlacementTrial) -> dict[str, object]:
     value, shipped = best.result.value, found.before.value
     gain = None
     if shipped is not None and value is not None:
@@ -86,7 +86,7 @@ def _contours(before: PlacementValue, after: PlacementValue | None) -> list[dict
     return [{"name": n, "before": sides[0].get(n), "after": sides[1].get(n)} for n in names]
 
 
-def _trial(trial: Trial) -> dict[str, object]:
+def _trial(trial: PlacementTrial) -> dict[str, object]:
     known = trial.result.entry("status", "stage", "bound", "value", *WHY)
     return {"offsets": dict(trial.offsets), **known}
 

@@ -10,14 +10,20 @@ from pathlib import Path
 
 import numpy as np
 
-from kerfpath._told import told
+from kerfpath._repr import short_repr
 from kerfpath.errors import InputError
 from kerfpath.job import Goal, Job, cell_of_job
 from kerfpath.progress import Progress, no_progress
 from kerfpath.study._job import digest, load_job
 from kerfpath.study.placing._evaluate import contours_of, evaluate_placements, middle_of
 from kerfpath.study.placing._place import DEFAULT_RANGES, Numbers, numbers_of
-from kerfpath.study.placing._search import LEAST_EXACT, MOST_EXACT, Map, PlacementSearch, Trial
+from kerfpath.study.placing._search import (
+    LEAST_EXACT,
+    MOST_EXACT,
+    PlacementMap,
+    PlacementSearch,
+    PlacementTrial,
+)
 from kerfpath.study.placing._value import PlacementValue
 from kerfpath.sweep import Sweep
 
@@ -41,11 +47,11 @@ class Layout:
     tolerance : mapping of variable to float
         What each variable may be off, either way; empty where nobody asked.
     seed, evaluations : int
-    tried : tuple of Trial
+    tried : tuple of PlacementTrial
         All placements, in order; the first is that of the job.
     evolved : int
         How many there were before those of the map.
-    best : Trial or None
+    best : PlacementTrial or None
         The best one, unless none is feasible.
     before, after : PlacementValue
         What the job's placement and the best one are worth, contour by contour.
@@ -55,7 +61,7 @@ class Layout:
         What the others can come to at best, where it is not proved.
     numbers : Numbers
         What the best placement changes in the job.
-    map : Map or None
+    map : PlacementMap or None
     """
 
     job: Job
@@ -65,17 +71,17 @@ class Layout:
     tolerance: Mapping[str, float]
     seed: int
     evaluations: int
-    tried: tuple[Trial, ...]
+    tried: tuple[PlacementTrial, ...]
     evolved: int
-    best: Trial | None
+    best: PlacementTrial | None
     before: PlacementValue
     after: PlacementValue | None
     proved: bool
     open_bound: float | None
     numbers: Numbers
-    map: Map | None
+    map: PlacementMap | None
 
-    __repr__ = told
+    __repr__ = short_repr
 
     @property
     def statuses(self) -> dict[str, int]:
@@ -90,7 +96,7 @@ class Layout:
         return {stage: found[stage] for stage in ("reach", "stretch", "exact")}
 
     @property
-    def nearest(self) -> Trial:
+    def nearest(self) -> PlacementTrial:
         """The placement that came nearest to being feasible."""
         return max(
             self.tried,

@@ -17,7 +17,7 @@ from kerfpath.errors import InputError
 from kerfpath.job import VARIABLES, Job, pose
 from kerfpath.placement import xyz_rpy
 
-__all__ = ["DEFAULT_RANGES", "Numbers", "moved", "numbers_of", "placed_text", "ranges_of"]
+__all__ = ["DEFAULT_RANGES", "Numbers", "move_job", "numbers_of", "placed_text", "ranges_of"]
 
 Numbers = dict[tuple[str | int, ...], list[float]]
 """What a placement changes in a job file: values by the keys that lead to them."""
@@ -114,7 +114,7 @@ def _motions(offsets: Mapping[str, float], middle: Array) -> tuple[Array, Array,
     return part, np.asarray(np.linalg.inv(base)), turned("", "", "mount_deg")
 
 
-def moved(job: Job, numbers: Numbers) -> Job:
+def move_job(job: Job, numbers: Numbers) -> Job:
     """Return the job with other numbers, as if its file had them."""
 
     def at(*where: str | int) -> Array | None:

@@ -10,13 +10,13 @@ from scipy.optimize import Bounds, differential_evolution
 from scipy.stats import qmc
 
 from kerfpath._arrays import Array
-from kerfpath._told import told
+from kerfpath._repr import short_repr
 from kerfpath.errors import InputError
 from kerfpath.progress import Progress
-from kerfpath.study.placing._value import SLACK, PlacementValue, beats
+from kerfpath.study.placing._value import SLACK, PlacementValue, is_better
 from kerfpath.sweep import Sweep
 
-__all__ = ["LEAST_EXACT", "MOST_EXACT", "Map", "PlacementSearch", "Trial"]
+__all__ = ["LEAST_EXACT", "MOST_EXACT", "PlacementMap", "PlacementSearch", "PlacementTrial"]
 
 PER_VARIABLE = 4
 """Placements of a generation for each variable."""
@@ -33,7 +33,7 @@ CLOSE = 1.3
 
 
 @dataclass(slots=True, kw_only=True, eq=False)
-class Trial:
+class PlacementTrial:
     """A placement that is tried.
 
     Parameters
@@ -53,26 +53,26 @@ class Trial:
     stretches: int = -1
     searched: bool = False
 
-    __repr__ = told
+    __repr__ = short_repr
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class Map:
+class PlacementMap:
     """Bounds over the first two variables, the others as in the best placement.
 
     Parameters
     ----------
     x, y : (m,)
         Values of the first variable and of the second; `y` is empty where there is only one.
-    trials : tuple of Trial
+    trials : tuple of PlacementTrial
         Row by row of y.
     """
 
     x: Array
     y: Array
-    trials: tuple[Trial, ...]
+    trials: tuple[PlacementTrial, ...]
 
-    __repr__ = told
+    __repr__ = short_repr
 
 
 @dataclass(kw_only=True, eq=False)
@@ -86,18 +86,18 @@ class PlacementSearch:
     most: int
     progress: Progress
     stretches: list[list[int]] = field(default_factory=list)
-    best: Trial | None = None
+    best: PlacementTrial | None = None
     exact: int = 0
-    known: dict[tuple[float, ...], Trial] = field(default_factory=dict)
+    known: dict[tuple[float, ...], PlacementTrial] = field(default_factory=dict)
 
-    __repr__ = told
+    __repr__ = short_repr
 
     @property
     def goal(self) -> str:
         return self.task["goal"]
 
     @property
-    def trials(self) -> list[Trial]:
+    def trials(self) -> list[PlacementTrial]:
         return list(self.known.values())
 
     @property
@@ -113,7 +113,7 @@ class PlacementSearch:
         self._take(trial)
         return trial.result
 
-    def whole(self, trial: Trial) -> PlacementValue:
+    def whole(self, trial: PlacementTrial) -> PlacementValue:
         """Return what a placement is worth, every contour solved to its own optimum."""
         return self._evaluated([trial.offsets], exact=True, whole=True)[0]
 
@@ -181,7 +181,7 @@ class PlacementSearch:
                 self._take(trial)
             self.progress("exact searches", self.exact, self.exact + len(open_) - len(batch))
 
-    def mapped(self, about: Trial, points: int) -> Map:
+    def mapped(self, about: PlacementTrial, points: int) -> PlacementMap:
         """Try a grid over the first two variables about a placement, as all others are tried."""
         names = list(self.ranges)[:2]
         axes = [np.linspace(*self.ranges[name], points) for name in names]
@@ -195,15 +195,17 @@ class PlacementSearch:
         )
         self._refresh(trials)
         y = axes[1] if len(axes) > 1 else np.zeros(0)
-        return Map(x=axes[0], y=y, trials=tuple(trials))
+        return PlacementMap(x=axes[0], y=y, trials=tuple(trials))
 
-    def find_bounds(self, trials: Sequence[Trial], progress: Callable[[int], None]) -> None:
+    def find_bounds(
+        self, trials: Sequence[PlacementTrial], progress: Callable[[int], None]
+    ) -> None:
         """Find the bounds of placements."""
         results = self._evaluated([trial.offsets for trial in trials], progress=progress)
         for trial, result in zip(trials, results, strict=True):
             trial.result, trial.stretches = result, len(self.stretches)
 
-    def _refresh(self, trials: Sequence[Trial]) -> bool:
+    def _refresh(self, trials: Sequence[PlacementTrial]) -> bool:
         """Find bounds again that were found with fewer stretches; return whether there were any."""
         stale = [
             t for t in trials
@@ -212,11 +214,11 @@ class PlacementSearch:
         self.find_bounds(stale, lambda done: None)
         return bool(stale)
 
-    def _take(self, trial: Trial) -> None:
+    def _take(self, trial: PlacementTrial) -> None:
         """Learn from an exact search: the best placement, and the stretches that bind."""
         result, why = trial.result, trial.result.infeasibility
         value = result.value if result.feasible else None
-        if value is not None and beats(self.goal, value, self.floor):
+        if value is not None and is_better(self.goal, value, self.floor):
             self.best = trial
         limit = CLOSE * min((c.value for c in result.contours if c.value is not None), default=0.0)
         for c in result.contours:
@@ -277,24 +279,24 @@ class PlacementSearch:
         ]
         return [dict(offsets), *ends]
 
-    def _trial(self, point: Array) -> Trial:
+    def _trial(self, point: Array) -> PlacementTrial:
         """Return the placement at a point, rounded to 0.01 mm and 0.001 deg; one for one."""
         offsets = {
             name: round(float(value), 2 if name.endswith("_mm") else 3) + 0.0
             for name, value in zip(self.ranges, point, strict=True)
         }
-        return self.known.setdefault(tuple(offsets.values()), Trial(offsets=offsets))
+        return self.known.setdefault(tuple(offsets.values()), PlacementTrial(offsets=offsets))
 
-    def _may_win(self, trial: Trial) -> bool:
+    def _may_win(self, trial: PlacementTrial) -> bool:
         if not trial.result.feasible:
             return False
         bound = trial.result.bound
         if bound is None or self.floor is None:
             return True
         eased = bound * (1 - SLACK) if self.goal == "motion" else bound * (1 + SLACK)
-        return beats(self.goal, eased, self.floor)
+        return is_better(self.goal, eased, self.floor)
 
-    def _energy(self, trial: Trial) -> float:
+    def _energy(self, trial: PlacementTrial) -> float:
         """Return what evolution makes small: any feasible placement below every other."""
         why, bound = trial.result.infeasibility, trial.result.bound
         if why is not None:

@@ -8,7 +8,7 @@ from typing import Literal
 
 from pydantic import TypeAdapter
 
-from kerfpath._told import told
+from kerfpath._repr import short_repr
 
 __all__ = [
     "SLACK",
@@ -17,7 +17,7 @@ __all__ = [
     "PlacementValue",
     "Stage",
     "Status",
-    "beats",
+    "is_better",
     "worst_of",
 ]
 
@@ -47,7 +47,7 @@ class ContourValue:
     limit: Literal["velocity", "acceleration"] | None = None
     node: int | None = None
 
-    __repr__ = told
+    __repr__ = short_repr
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -66,7 +66,7 @@ class Infeasibility:
     nodes: int | None = None
     index: int | None = None
 
-    __repr__ = told
+    __repr__ = short_repr
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -92,7 +92,7 @@ class PlacementValue:
     contours: tuple[ContourValue, ...] = ()
     place: int = 0
 
-    __repr__ = told
+    __repr__ = short_repr
 
     @property
     def feasible(self) -> bool:
@@ -117,7 +117,7 @@ class PlacementValue:
         return {name: known[name] for name in names if name in known}
 
 
-def beats(goal: str, value: float, other: float | None) -> bool:
+def is_better(goal: str, value: float, other: float | None) -> bool:
     """Return whether a value is better than another, by more than rounding."""
     if other is None:
         return True

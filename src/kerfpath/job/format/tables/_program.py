@@ -8,7 +8,7 @@ from pydantic import ConfigDict, ValidationError, field_validator, model_validat
 
 from kerfpath.job.format._values import Identifier, NotNegative, Positive, fault, key, nearest
 from kerfpath.job.format.tables._table import Table
-from kerfpath.post import PARTNERS, Await, Handshake, Partner, Request, Settings, languages
+from kerfpath.post import PARTNERS, Await, Handshake, LanguageSettings, Partner, Request, languages
 
 __all__ = ["AuditTable", "ProgramTable"]
 
@@ -72,14 +72,14 @@ class ProgramTable(Table):
             _settings(name, table)
         return self
 
-    def settings(self) -> Settings | None:
+    def settings(self) -> LanguageSettings | None:
         """Return the settings of the language; None where no program is wanted."""
         if self.language == "none":
             return None
         return _settings(self.language, (self.model_extra or {}).get(self.language, {}))
 
 
-def _settings(name: str, table: Any) -> Settings:
+def _settings(name: str, table: Any) -> LanguageSettings:
     """Return the settings that a table [program.LANGUAGE] holds, or raise at its first fault."""
     model = languages()[name].settings
     try:

@@ -11,12 +11,12 @@ from kerfpath.errors import InputError
 from kerfpath.plans import Plan
 from kerfpath.robots import posture_name
 
-__all__ = ["End", "backed_off"]
+__all__ = ["End", "back_off"]
 
 End = Literal["start", "end"]
 
 
-def backed_off(plan: Plan, end: End, retract: float) -> Array:
+def back_off(plan: Plan, end: End, retract: float) -> Array:
     """Return the joints (n,) rad after backing off an end of a plan along the tool axis.
 
     The posture is kept, and an endless joint stays on its turn.

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-__all__ = ["told"]
+__all__ = ["short_repr"]
 
 LONGEST = 240
 """Characters of a line; what does not fit is left out."""
@@ -19,14 +19,14 @@ SHORT = 40
 """Characters of a text or of several things that are shown."""
 
 
-def told(thing: Any) -> str:
+def short_repr(thing: Any) -> str:
     """Return the class of a dataclass and its fields in few words; arrays by their shapes."""
     said, left = [f"{type(thing).__name__}("], LONGEST
     for field in fields(thing):
         value = getattr(thing, field.name)
         if value is None or not field.repr:
             continue
-        part = f"{field.name}={_few(value)}"
+        part = f"{field.name}={_short(value)}"
         left -= len(part) + 2
         if left < 0:
             said.append("..., ")
@@ -35,10 +35,10 @@ def told(thing: Any) -> str:
     return "".join(said).removesuffix(", ") + ")"
 
 
-def _few(value: Any) -> str:
+def _short(value: Any) -> str:
     if isinstance(value, np.ndarray):
         if value.ndim == 1 and value.size <= FEW and value.dtype != object:
-            return "[" + ", ".join(_few(each) for each in value.tolist()) + "]"
+            return "[" + ", ".join(_short(each) for each in value.tolist()) + "]"
         return f"array {' x '.join(map(str, value.shape))}"
     if isinstance(value, float):
         return f"{value:.6g}"
@@ -61,7 +61,7 @@ def _few(value: Any) -> str:
 
 def _several(values: Collection[Any]) -> str:
     if len(values) <= FEW:
-        all_of_them = ", ".join(_few(value) for value in values)
+        all_of_them = ", ".join(_short(value) for value in values)
         if len(all_of_them) <= SHORT:
             return f"({all_of_them})"
     return f"{len(values)} x {type(next(iter(values))).__name__}"

@@ -8,21 +8,21 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from kerfpath._arrays import Array, floats, freeze
-from kerfpath._told import told
-from kerfpath.air._around import way_around
-from kerfpath.air._near_miss import why_not_clear
+from kerfpath._repr import short_repr
 from kerfpath.cell import Cell
 from kerfpath.errors import InputError, NoFeasiblePath
 from kerfpath.robots import Robot
+from kerfpath.transfer._around import find_way_around
+from kerfpath.transfer._near_miss import explain_collision
 
-__all__ = ["AirMove", "air_move", "least_time", "speed_share"]
+__all__ = ["TransferMove", "least_time", "speed_share", "transfer_move"]
 
 SECONDS = 10.0
 """How long a way around is looked for."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class AirMove:
+class TransferMove:
     """Straight joint motions from corner to corner, with a stop at each.
 
     Parameters
@@ -39,7 +39,7 @@ class AirMove:
     time: Array
     clear: bool
 
-    __repr__ = told
+    __repr__ = short_repr
 
     @property
     def duration(self) -> float:
@@ -79,7 +79,7 @@ def speed_share(dq: ArrayLike, velocity: ArrayLike, acceleration: ArrayLike, tim
     return np.asarray(np.where(cross > 0, cross / np.maximum(even, 1e-300), 1.0))
 
 
-def air_move(
+def transfer_move(
     robot: Robot,
     q0: ArrayLike,
     q1: ArrayLike,
@@ -88,7 +88,7 @@ def air_move(
     eta_v: float = 1.0,
     eta_a: float = 1.0,
     seconds: float = SECONDS,
-) -> AirMove:
+) -> TransferMove:
     """Return a move from q0 to q1 (n,) rad, clear in the cell and within the limits.
 
     The straight joint motion if it is clear; else a way around it by RRT-Connect, shortened. The
@@ -124,7 +124,7 @@ def air_move(
     if cell is not None:
         _require_clear(cell, ends)
         if not cell.clear_through(ends):
-            found = way_around(
+            found = find_way_around(
                 ends, lower, upper, 1 / velocity,
                 clear=lambda q: bool(cell.clear(q).all()), passable=cell.clear_through,
                 seconds=seconds,
@@ -132,13 +132,13 @@ def air_move(
             if found is None:
                 raise NoFeasiblePath(
                     f"no way through the air found in {seconds:g} s, its ends are clear; straight, "
-                    f"{why_not_clear(cell, ends)}",
+                    f"{explain_collision(cell, ends)}",
                     proved=False,
                     node=-1,
                 )
             corners = found
     took = least_time(np.diff(corners, axis=0), eta_v * velocity, eta_a * acceleration)
-    return AirMove(
+    return TransferMove(
         q=freeze(corners),
         time=freeze(np.concatenate([[0.0], np.cumsum(np.maximum(took, 1e-9))])),
         clear=cell is not None,
@@ -163,7 +163,7 @@ def _require_clear(cell: Cell, ends: Array) -> None:
         if gap <= 0:
             one, two = cell.pair_names[int(p)]
             raise NoFeasiblePath(
-                f"the {what} of a move through the air is not clear: {one!r} and {two!r} come "
+                f"the {what} of a transfer move is not clear: {one!r} and {two!r} come "
                 f"{-gap * 1e3:.3g} mm nearer than allowed",
                 proved=True,
                 node=-1,

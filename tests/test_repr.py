@@ -11,7 +11,7 @@ import pytest
 
 import kerfpath
 from jobs import DEMO, SMALL
-from kerfpath._told import LONGEST, told
+from kerfpath._repr import LONGEST, short_repr
 from kerfpath.cad import read
 from kerfpath.cell import Cell
 from kerfpath.job import read_job, run_job
@@ -64,8 +64,8 @@ def test_a_class_with_room_for_much_says_little(name):
             kinds = set(str(field.type).replace("|", " ").replace("np.", "").split())
             assert kinds <= {"float", "int", "bool", "None", "Level", "Signal", "Unit"} or (
                 str(field.type).startswith("Literal")
-            ), f"{name}.{field.name}: {field.type}; write __repr__ = told"
-    elif cls.__repr__ is told:
+            ), f"{name}.{field.name}: {field.type}; write __repr__ = short_repr"
+    elif cls.__repr__ is short_repr:
         assert len(repr(filled(cls))) < MOST
 
 
@@ -86,7 +86,7 @@ def objects_in(thing, seen):
             yield from objects_in(value, seen)
 
 
-def test_what_a_job_comes_to_is_told_in_lines(tmp_path):
+def test_what_a_job_comes_to_is_said_in_lines(tmp_path):
     shutil.copy(DEMO / "b_pillar.step", tmp_path)
     (tmp_path / "job.toml").write_text(SMALL)
     job = read_job(tmp_path / "job.toml")
@@ -123,7 +123,7 @@ def test_few_things_are_shown_and_many_are_counted():
         share: float
         nothing: None = None
 
-        __repr__ = told
+        __repr__ = short_repr
 
     thing = Thing(np.arange(3.0), np.zeros((700, 6)), ("a", "b"), 1 / 3)
     assert (

@@ -7,7 +7,7 @@ import numpy as np
 from kerfpath._arrays import Array
 from kerfpath.cell import Cell
 
-__all__ = ["why_not_clear"]
+__all__ = ["explain_collision"]
 
 SAMPLES = 65
 """Poses of a motion that are looked at."""
@@ -15,7 +15,7 @@ PAIRS = 3
 """Pairs of bodies that are named."""
 
 
-def why_not_clear(cell: Cell, corners: Array) -> str:
+def explain_collision(cell: Cell, corners: Array) -> str:
     """Say which bodies come nearer than allowed on straight motions through corners (m, n) rad.
 
     The pair that is too near at most of the poses comes first, each with its deepest place.

@@ -9,7 +9,7 @@ import numpy as np
 
 from kerfpath._arrays import Array
 
-__all__ = ["way_around"]
+__all__ = ["find_way_around"]
 
 SEED = 1
 """Of the random samples: the same question gives the same way."""
@@ -19,7 +19,7 @@ SHORTCUTS = 60
 """Tries to shorten a way."""
 
 
-def way_around(
+def find_way_around(
     ends: Array,
     lower: Array,
     upper: Array,
