@@ -34,7 +34,7 @@ CLOCKS = {
     "reading the STEP file": ("kerfpath.cli._plan", "drawing_of"),
     "planning and audit": ("kerfpath.job.run._run", "cut_candidate"),
     "order and air moves": ("kerfpath.job.run._run", "order_cuts"),
-    "writing": ("kerfpath.cli._plan", "write_outcome"),
+    "writing": ("kerfpath.cli._plan", "write_result"),
 }
 PARTS = ("import", *CLOCKS, "other")
 

@@ -11,7 +11,7 @@ def test_the_same_content_is_the_same_part_by_its_own_name(tmp_path, monkeypatch
     monkeypatch.setattr(module, "_kept", {})
     first = read(DEMO / "b_pillar.step")
     (tmp_path / "copy.step").write_bytes((DEMO / "b_pillar.step").read_bytes())
-    monkeypatch.setattr(module, "apart", None)  # it is not read again
+    monkeypatch.setattr(module, "call_apart", None)  # it is not read again
     again = read(tmp_path / "copy.step")
     assert again.path == tmp_path / "copy.step"
     assert again.loops is first.loops

@@ -203,7 +203,7 @@ def test_nothing_to_judge_is_clear_and_nonsense_is_refused(dome, circle, arm, to
     assert np.isposinf(found.lower).all()
     with pytest.raises(InputError, match="resolution: expected a number above 0 m, got 0 m"):
         clearance_map(graph, dome, resolution=0.0)
-    with pytest.raises(InputError, match="band: expected a number"):
+    with pytest.raises(InputError, match="band: must not be negative"):
         clearance_map(graph, dome, band=-1e-3)
     with pytest.raises(InputError, match="graph: its vertices have 5 joints, but the cell's robot"):
         clearance_map(replace(graph, q=graph.q[:, :5]), dome)

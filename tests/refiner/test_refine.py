@@ -110,7 +110,7 @@ def test_the_times_of_a_feed_that_dips_are_not_divided(planned, circle):
     assert 0 < coarse.feed.full < 1
     refined = refine(coarse, nodes=circle.resample(count=121))
     assert not refined.done
-    assert "feed that dips" in refined.statement
+    assert "a reduced feed" in refined.statement
 
 
 def test_a_closed_contour_stays_closed(planned):

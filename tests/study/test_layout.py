@@ -395,7 +395,7 @@ def test_a_job_that_cannot_be_cut_where_it_lies_is_led_to_where_it_can(tmp_path)
     star = [worth(job, {"x_mm": x + off}, exact=True).value for off in (-20.0, 0.0, 20.0)]
     assert result.best.result.value == pytest.approx(min(star), rel=1e-12)
     assert result.map is not None
-    assert [a.status for a in result.map.answers][-1] == "unreachable"
+    assert [trial.result.status for trial in result.map.trials][-1] == "unreachable"
 
 
 def test_ranges_on_the_command_line():

@@ -1,4 +1,4 @@
-"""What the digits of a text may add to the rates of a motion: a bounded share, which the audit states."""
+"""What the digits of a text add to the rates of a motion: a bounded share that the audit states."""
 
 from __future__ import annotations
 

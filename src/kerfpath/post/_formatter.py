@@ -142,7 +142,7 @@ class Formatter(ABC):
         return [
             f"Written by kerfpath for {plain(robot.model)} ({plain(robot.id)}).",
             *about,
-            f"Transfer moves have {checked}.",
+            f"Moves through the air have {checked}.",
             *self.program.caveats,
         ]
 
