@@ -9,7 +9,7 @@ demo: .venv/run.stamp
 	$(BIN)/kerfpath demo --out $(DEMO_OUT)
 
 test: .venv/dev.stamp
-	$(BIN)/pytest -n auto
+	$(BIN)/pytest -n auto --dist worksteal
 
 check: .venv/dev.stamp
 	$(BIN)/ruff check

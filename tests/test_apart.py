@@ -3,6 +3,8 @@
 import multiprocessing
 import os
 import signal
+import subprocess
+import sys
 import time
 
 import pytest
@@ -13,13 +15,13 @@ from apart_calls import (
     doubled,
     err,
     hang,
-    interrupted,
     leave,
     refuse,
     swell,
     unpicklable,
     whose,
 )  # fmt: skip
+from conftest import ROOT
 from kerfpath import apart as module
 from kerfpath.apart import call_apart
 from kerfpath.errors import InputError
@@ -92,10 +94,31 @@ def test_a_process_that_has_left_is_replaced(monkeypatch):
     assert module._worker.process is not idle
 
 
-def test_an_interrupt_ends_the_call(monkeypatch):
-    with pytest.raises(KeyboardInterrupt):
-        call_apart(interrupted, size=0)
-    assert call_apart(doubled, 21, size=0) == 42
+INTERRUPTED = """
+import signal
+from apart_calls import doubled, interrupted
+from kerfpath.apart import call_apart
+
+signal.signal(signal.SIGINT, signal.default_int_handler)  # where it was ignored by who started this
+try:
+    call_apart(interrupted, size=0)
+except KeyboardInterrupt:
+    print("interrupted,", call_apart(doubled, 21, size=0))
+"""
+
+
+def test_an_interrupt_ends_the_call():
+    """In a process of its own: the signal would end the one that runs the tests, too."""
+    path = os.pathsep.join([*sys.path, str(ROOT / "tests")])
+    done = subprocess.run(
+        [sys.executable, "-c", INTERRUPTED],
+        env={**os.environ, "PYTHONPATH": path},
+        capture_output=True,
+        text=True,
+        timeout=60,
+        check=True,
+    )
+    assert done.stdout == "interrupted, 42\n"
 
 
 @pytest.mark.filterwarnings("ignore:This process:DeprecationWarning")
