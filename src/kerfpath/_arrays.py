@@ -5,6 +5,7 @@ Every array inside kerfpath is float64 (or an integer type), C-contiguous, finit
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from typing import Any, TypeVar
 
 import numpy as np
@@ -23,6 +24,7 @@ __all__ = [
     "integers",
     "not_negative",
     "positive",
+    "require_one_of",
     "scalar",
 ]
 
@@ -124,6 +126,12 @@ def not_negative(value: float, name: str, *, unit: str = "") -> float:
         unit = f" {unit}" if unit else ""
         raise InputError(f"{name}: must not be negative, got {number:g}{unit}")
     return number
+
+
+def require_one_of(value: object, name: str, known: Collection[str]) -> None:
+    """Raise InputError unless `value` is one of the known words."""
+    if value not in known:
+        raise InputError(f"{name}: expected one of {', '.join(known)}, got {value!r}")
 
 
 def as_pose(value: ArrayLike, name: str) -> Array:

@@ -31,7 +31,7 @@ from functools import partial
 import numpy as np
 from numpy.typing import ArrayLike
 
-from kerfpath._arrays import Array, Bools, as_pose, floats, freeze, not_negative
+from kerfpath._arrays import Array, Bools, as_pose, floats, freeze, not_negative, require_one_of
 from kerfpath._repr import short_repr
 from kerfpath.errors import InputError
 from kerfpath.kernels.turns import JointLimits
@@ -251,8 +251,7 @@ def measure(name: str, robot: Robot, q: ArrayLike, *, tool: ArrayLike | None = N
     """
     q = floats(q, "q", (None, robot.joints), copy=False)[:, : robot.family.joints]
     robot = robot.alone()
-    if name not in MEASURES:
-        raise InputError(f"comfort: expected one of {', '.join(MEASURES)}, got {name!r}")
+    require_one_of(name, "comfort", MEASURES)
     if not MEASURES[name].has(robot):
         raise InputError(
             f"comfort {name}: no {MEASURES[name].words} is defined for this kind of arm "

@@ -9,7 +9,7 @@ from typing import Any, Literal, TypedDict, cast, get_args
 import numpy as np
 from numpy.typing import ArrayLike
 
-from kerfpath._arrays import Array, floats, scalar
+from kerfpath._arrays import Array, floats, require_one_of, scalar
 from kerfpath._repr import short_repr
 from kerfpath.comfort import Band, Comfort
 from kerfpath.contour import FrameKind
@@ -189,8 +189,7 @@ class PlanOptions:
 
     def __post_init__(self) -> None:
         for name, known in _KNOWN.items():
-            if (value := getattr(self, name)) not in known:
-                raise InputError(f"{name}: expected one of {', '.join(known)}, got {value!r}")
+            require_one_of(getattr(self, name), name, known)
         cast: dict[str, object] = {
             "gamma_step": scalar(self.gamma_step, "gamma_step", unit="rad", above=0.0),
             "eta_v": scalar(self.eta_v, "eta_v", above=0.0),

@@ -5,8 +5,9 @@ import re
 import shutil
 
 import pytest
-from tests.cli.test_commands import run
-from tests.job.run.test_part import DEMO
+
+from commands import run
+from jobs import DEMO
 
 JOB = """\
 [robot]

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from kerfpath.errors import InputError
+from kerfpath._arrays import require_one_of
 
 __all__ = ["GAP", "LARGEST", "MM", "UNITS_MM", "require_unit"]
 
@@ -29,5 +29,5 @@ UNITS_MM = {
 
 def require_unit(unit: str | None) -> None:
     """Raise InputError for a unit that is not known; None passes."""
-    if unit is not None and unit not in UNITS_MM:
-        raise InputError(f"unit: expected one of {', '.join(UNITS_MM)}, got {unit!r}")
+    if unit is not None:
+        require_one_of(unit, "unit", UNITS_MM)

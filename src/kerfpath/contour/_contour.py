@@ -8,7 +8,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import ArrayLike
 
-from kerfpath._arrays import Array, Ints, floats, freeze, integers, positive, scalar
+from kerfpath._arrays import Array, Ints, floats, freeze, integers, positive, require_one_of, scalar
 from kerfpath.contour import _sampling
 from kerfpath.contour._vectors import unit
 from kerfpath.errors import InputError
@@ -258,8 +258,7 @@ class Contour:
         InputError
             An unknown kind, or a node where path and tool axis are parallel (with its index).
         """
-        if kind not in FRAME_KINDS:
-            raise InputError(f"frames: expected one of {', '.join(FRAME_KINDS)}, got {kind!r}")
+        require_one_of(kind, "frames", FRAME_KINDS)
         n, x = self.axes, np.empty_like(self.points)
         if self.x is not None:
             x = self.x - (self.x * n).sum(axis=1, keepdims=True) * n

@@ -9,7 +9,7 @@ import moocore
 import numpy as np
 from numpy.typing import ArrayLike
 
-from kerfpath._arrays import Array, floats, freeze
+from kerfpath._arrays import Array, floats, freeze, require_one_of
 from kerfpath._repr import short_repr
 from kerfpath.errors import InputError
 from kerfpath.front._problem import Criterion
@@ -115,8 +115,7 @@ class Front:
         InputError
             Not one of the set's criteria.
         """
-        if criterion not in self.criteria:
-            raise InputError(f"best: expected one of {', '.join(self.criteria)}, got {criterion!r}")
+        require_one_of(criterion, "best", self.criteria)
         return int(self.scaled[:, self.criteria.index(criterion)].argmin())
 
     @property

@@ -9,7 +9,7 @@ from typing import Literal, get_args
 import moocore
 import numpy as np
 
-from kerfpath._arrays import Array, freeze
+from kerfpath._arrays import Array, freeze, require_one_of
 from kerfpath.errors import InputError, NoFeasiblePath
 from kerfpath.front._adaptive import AdaptiveRuns
 from kerfpath.front._front import Front
@@ -50,10 +50,7 @@ class FrontSearch:
     def __init__(
         self, problem: ParetoProblem, *, runs: int, search: SearchKind, seed: int, ahead: int
     ) -> None:
-        if search not in get_args(SearchKind):
-            raise InputError(
-                f"search: expected one of {', '.join(get_args(SearchKind))}, got {search!r}"
-            )
+        require_one_of(search, "search", get_args(SearchKind))
         self.runs, self._ahead = whole_number(runs, "runs"), whole_number(ahead, "ahead")
         self._problem, self._search, self._seed = problem, search, seed
         self._beginning = 1

@@ -8,7 +8,17 @@ from typing import Any, Literal, get_args
 import numpy as np
 from numpy.typing import ArrayLike
 
-from kerfpath._arrays import Array, Bools, Ints, bools, floats, freeze, integers, scalar
+from kerfpath._arrays import (
+    Array,
+    Bools,
+    Ints,
+    bools,
+    floats,
+    freeze,
+    integers,
+    require_one_of,
+    scalar,
+)
 from kerfpath._repr import short_repr
 from kerfpath.errors import InputError
 from kerfpath.kernels import metric as metrics
@@ -104,8 +114,7 @@ class SearchProblem:
             ("metric", metric, tuple(METRIC_CODES)),
             ("objective", objective, get_args(ObjectiveKind)),
         ):
-            if value not in known:
-                raise InputError(f"{name}: expected one of {', '.join(known)}, got {value!r}")
+            require_one_of(value, name, known)
         q = floats(q, "q", (None, None), copy=False)
         N, n = q.shape
         if n == 0:
