@@ -6,6 +6,7 @@ from kerfpath.robots._chain import chain_of as chain_of
 from kerfpath.robots._chain import model_chain as model_chain
 from kerfpath.robots._coupling import AXIS_3 as AXIS_3
 from kerfpath.robots._coupling import Coupling as Coupling
+from kerfpath.robots._enclosure import Enclosure as Enclosure
 from kerfpath.robots._external import ExternalAxis as ExternalAxis
 from kerfpath.robots._external import Travel as Travel
 from kerfpath.robots._families import FAMILIES as FAMILIES

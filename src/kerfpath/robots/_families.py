@@ -12,7 +12,7 @@ import numpy as np
 from kerfpath._arrays import Array
 from kerfpath._repr import short_repr
 from kerfpath.errors import InputError
-from kerfpath.kernels import five, kinematics, ur
+from kerfpath.kernels import enclosure, five, kinematics, ur
 from kerfpath.robots import _general
 
 __all__ = ["FAMILIES", "Family", "posture_name", "postures_named"]
@@ -53,6 +53,10 @@ class Family:
     follow_all : callable, optional
         (model, T (B, 4, 4), q (B, n)): brings each q onto its pose along its own branch, or makes
         it NaN. Of a family where several branches have one posture.
+    enclose_all : callable, optional
+        As `kernels.enclosure.enclose_all`, where a family has proven bounds.
+    wrist : str
+        The length by which its wrist centre is behind the end; "" without `enclose_all`.
     poses_at_once : int
         Poses solved per piece of work: large against the overhead, small against the memory.
     free_rotation : bool
@@ -70,6 +74,8 @@ class Family:
     inverse_all: Callable[..., None]
     inverse_nodes: Callable[..., None] | None = None
     follow_all: Callable[..., None] | None = None
+    enclose_all: Callable[..., None] | None = None
+    wrist: str = ""
     poses_at_once: int = 100_000
     free_rotation: bool = True
 
@@ -94,6 +100,8 @@ FAMILIES = {
             forward_all=kinematics.forward_all,
             inverse_all=kinematics.inverse_all,
             inverse_nodes=kinematics.inverse_nodes,
+            enclose_all=enclosure.enclose_all,
+            wrist="c4",
         ),
         Family(
             name="ur",

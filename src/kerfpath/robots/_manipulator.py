@@ -11,8 +11,10 @@ from numpy.typing import ArrayLike
 from kerfpath._arrays import Array, Bools, Ints, as_pose, bools, floats, freeze, positive
 from kerfpath.errors import InputError
 from kerfpath.kernels import turns
+from kerfpath.kernels.enclosure import Curves
 from kerfpath.losses import Loss, Reason
 from kerfpath.robots._coupling import AXIS_3, Coupling
+from kerfpath.robots._enclosure import Enclosure, ball_frames
 from kerfpath.robots._external import ExternalAxis
 from kerfpath.robots._families import FAMILIES, Family
 from kerfpath.robots._solutions import Solutions, all_solutions, solutions_within
@@ -193,6 +195,45 @@ class Manipulator:
         reach = np.empty(q.shape[:3], np.bool_)
         self.family.inverse_nodes(self.arm(), H, gamma, T_tip_flange, q, reach)
         return q, reach
+
+    @property
+    def encloses(self) -> bool:
+        """Whether `enclose` proves where its joints are: a closed form, no external axis."""
+        return self.family.enclose_all is not None and self.external is None
+
+    def enclose(
+        self, frames: Array, node: Ints, gamma: Array, half: Array, T_flange_tip: Array
+    ) -> Enclosure:
+        """Return where the joints of every posture may be on cells of gamma, proved.
+
+        Parameters
+        ----------
+        frames : (K, 4, 4) m
+            Task frames in the robot base.
+        node : (C,) int
+            Which of them each cell is of.
+        gamma, half : (C,) rad
+            Middle and half-width of each cell.
+        T_flange_tip : (4, 4) m
+            The tool.
+
+        Raises
+        ------
+        InputError
+            A family without proven bounds, or an external axis; see `encloses`.
+        """
+        self._require_alone()
+        if self.family.enclose_all is None:
+            raise InputError(
+                f"robot {self.id!r}: no proven bounds are known for {self.family.words}"
+            )
+        foot, end = self.T_base_foot, self.T_end_flange
+        wrist = float(self.geometry[self.family.wrist])
+        size = (len(node), self.postures)
+        curves = Curves(np.empty(size, np.uint8), *np.zeros((5, *size, self.joints)))
+        balls = ball_frames(frames, T_flange_tip, foot, end, wrist)
+        self.family.enclose_all(self.arm(), balls, node, gamma, half, curves)
+        return Enclosure(**{k: freeze(a) for k, a in curves._asdict().items()})
 
     def arm(self) -> Any:
         """Return the geometry as the family's kernels take it."""
