@@ -152,21 +152,19 @@ def side(rr: Jet, d: Jet, b: float, front: float, h: float) -> Jet:
 
 @jit
 def lean(c2: float, k: float, bend: Jet, reach: Jet, h: float) -> Jet:
-    """Angle atan2(k sin bend, c2 + k cos bend) at the shoulder of links c2 and k.
+    """Angle atan2(k sin bend, c2 + k cos bend) of a link k, bent by 0 to pi, behind a link c2.
 
     Its rate is w bend', w = 1/2 + (k^2 - c2^2) / (2 reach), reach the square of the third side.
     """
     low = (reach.v - reach.rv) * DOWN
-    if low <= TINY:
-        return boxed(-4.0 * EPS, pi * UP)
     x, y = c2 + k * cos(bend.v), k * sin(bend.v)
-    rounding = 16.0 * EPS * (abs(c2) + k)
+    rounding = 16.0 * EPS * (abs(c2) + abs(k))
     size = (sqrt(x * x + y * y) - rounding) * DOWN
-    if size <= TINY:
-        return boxed(-4.0 * EPS, pi * UP)
+    if low <= TINY or size <= TINY:
+        return boxed(-4.0 * EPS, pi * UP) if k > 0.0 else boxed(-pi * UP, 4.0 * EPS)
     v = atan2(y, x)
     off = spread(rounding, size) * UP + 2.0 * LIBM
-    ev = (off + spread(k * bend.ev * UP, size)) * UP
+    ev = (off + spread(abs(k) * bend.ev * UP, size)) * UP
     f, ef = 0.5 * (k * k - c2 * c2), 4.0 * EPS * (k * k + c2 * c2)
     w, ew = over(f, ef, reach.v, reach.ev, low)
     _, rw = over(f, ef, reach.v, reach.rv, low)

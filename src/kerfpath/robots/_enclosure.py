@@ -7,11 +7,12 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from kerfpath._arrays import Array
+from kerfpath._arrays import Array, Ints
 from kerfpath._repr import short_repr
+from kerfpath.errors import InputError
 from kerfpath.kernels import enclosure
 
-__all__ = ["Enclosure", "ball_frames"]
+__all__ = ["Enclosure", "ball_frames", "require_cells"]
 
 ROUNDING = 4.0 * 2.0**-52
 """Error of a sum of four products, as a share of the sum of their sizes; twice what it can be."""
@@ -50,6 +51,25 @@ class Enclosure:
     radius: Array
 
     __repr__ = short_repr
+
+
+def require_cells(frames: int, node: Ints, gamma: Array, half: Array) -> None:
+    """Raise InputError unless each cell is of one of the frames and has a middle and a width."""
+    if not node.shape == gamma.shape == half.shape == (len(node),):
+        raise InputError(
+            f"enclose: expected node, gamma and half of one length, got {node.shape}, "
+            f"{gamma.shape}, {half.shape}"
+        )
+    bad = np.flatnonzero(~((node >= 0) & (node < frames)))
+    if bad.size:
+        raise InputError(f"enclose: cell {bad[0]} is of frame {node[bad[0]]}, of {frames} frames")
+    bad = np.flatnonzero(~(np.isfinite(gamma) & (half >= 0.0) & (half <= 1.0)))
+    if bad.size:
+        i = int(bad[0])
+        raise InputError(
+            f"enclose: expected cells of a half-width from 0 to 1 rad, but cell {i} is "
+            f"{gamma[i]:g} +- {half[i]:g}"
+        )
 
 
 def ball_frames(

@@ -12,7 +12,7 @@ import numpy as np
 from kerfpath._arrays import Array
 from kerfpath._repr import short_repr
 from kerfpath.errors import InputError
-from kerfpath.kernels import enclosure, five, kinematics, ur
+from kerfpath.kernels import enclosure, enclosure_ur, five, kinematics, ur
 from kerfpath.robots import _general
 
 __all__ = ["FAMILIES", "Family", "posture_name", "postures_named"]
@@ -112,6 +112,8 @@ FAMILIES = {
             model=ur.UrArm,
             forward_all=ur.forward_all,
             inverse_all=ur.inverse_all,
+            enclose_all=enclosure_ur.enclose_all,
+            wrist="d6",
         ),
         Family(
             name="five",

@@ -14,7 +14,7 @@ from kerfpath.kernels import turns
 from kerfpath.kernels.enclosure import Curves
 from kerfpath.losses import Loss, Reason
 from kerfpath.robots._coupling import AXIS_3, Coupling
-from kerfpath.robots._enclosure import Enclosure, ball_frames
+from kerfpath.robots._enclosure import Enclosure, ball_frames, require_cells
 from kerfpath.robots._external import ExternalAxis
 from kerfpath.robots._families import FAMILIES, Family
 from kerfpath.robots._solutions import Solutions, all_solutions, solutions_within
@@ -213,24 +213,26 @@ class Manipulator:
         node : (C,) int
             Which of them each cell is of.
         gamma, half : (C,) rad
-            Middle and half-width of each cell.
+            Middle and half-width of each cell, the latter at most 1.
         T_flange_tip : (4, 4) m
             The tool.
 
         Raises
         ------
         InputError
-            A family without proven bounds, or an external axis; see `encloses`.
+            A family without proven bounds, or an external axis, see `encloses`; cells of frames
+            that are not there, or with a half-width that is not a number from 0 to 1.
         """
         self._require_alone()
         if self.family.enclose_all is None:
             raise InputError(
                 f"robot {self.id!r}: no proven bounds are known for {self.family.words}"
             )
+        require_cells(len(frames), node, gamma, half)
         foot, end = self.T_base_foot, self.T_end_flange
         wrist = float(self.geometry[self.family.wrist])
         size = (len(node), self.postures)
-        curves = Curves(np.empty(size, np.uint8), *np.zeros((5, *size, self.joints)))
+        curves = Curves(np.zeros(size, np.uint8), *np.zeros((5, *size, self.joints)))
         balls = ball_frames(frames, T_flange_tip, foot, end, wrist)
         self.family.enclose_all(self.arm(), balls, node, gamma, half, curves)
         return Enclosure(**{k: freeze(a) for k, a in curves._asdict().items()})
