@@ -63,8 +63,8 @@ __all__ = [
 NONE, SMOOTH, BOX = 0, 1, 2
 """Status of a posture on a cell: it has no solution there; curves; boxes."""
 ANGLE_ERROR = 1e-14
-"""What sign, offset and the removal of whole turns add to an error: angles below 16 rad, some
-additions of half a unit each."""
+"""What the offset (of 1 rad) and the removal of whole turns add to an error, rad: the model's
+angles are below 16 rad, and each of three operations errs by half a unit in the last place."""
 
 
 class Frames(NamedTuple):
@@ -200,6 +200,7 @@ def write(
 ) -> None:
     """Write the model's angle f as the robot's joint: sign * (f + offset); the status is set."""
     at = (cell, posture, joint)
+    error = ANGLE_ERROR * (1.0 + abs(offset))
     out.center[at] = _wrap(sign * (f.v + offset))
     if out.status[cell, posture] == SMOOTH:
         out.slope[at] = sign * f.d
@@ -207,12 +208,12 @@ def write(
         wide = (f.rs + EPS * abs(f.s)) * UP
         out.low[at] = middle - wide
         out.high[at] = middle + wide
-        out.radius[at] = (f.ev + h * f.ed) * UP + ANGLE_ERROR
+        out.radius[at] = (f.ev + h * f.ed) * UP + error
     else:
         out.slope[at] = 0.0
         out.low[at] = 0.0
         out.high[at] = 0.0
-        out.radius[at] = smaller(f.rv * UP + ANGLE_ERROR, pi * UP)
+        out.radius[at] = smaller(f.rv * UP + error, pi * UP)
 
 
 @jit
@@ -295,7 +296,7 @@ def _enclose(
     dd = shift(rr, -arm.b * arm.b, EPS * arm.b * arm.b)
     for i in range(8):
         out.status[cell, i] = NONE
-    if (dd.v + dd.rv) * UP < -2.0 * REACH:
+    if dd.v + dd.rv < -2.0 * REACH:
         return
     least = least_norm(px, py)
     ray = angle(py, px, least, h)

@@ -28,7 +28,6 @@ from kerfpath.kernels.intervals import (
     DOWN,
     EPS,
     LIBM,
-    UP,
     Jet,
     add,
     angle,
@@ -109,7 +108,7 @@ def _enclose(
     dd = shift(rr, -square, EPS * square)
     for i in range(8):
         out.status[cell, i] = NONE
-    if (dd.v + dd.rv) * UP < -2.0 * REACH:
+    if dd.v + dd.rv < -2.0 * REACH:
         return
     least = least_norm(px, py)
     ray = angle(py, px, least, h)

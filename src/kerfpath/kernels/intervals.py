@@ -298,7 +298,7 @@ def arc_between(c: Jet, h: float) -> Jet:
     if most >= 1.0:
         return boxed(first, last)
     low = sqrt((1.0 - most) * (1.0 + most)) * DOWN
-    mid = (abs(c.v) + c.ev) * UP
+    mid = min(most, (abs(c.v) + c.ev) * UP)
     sine = sqrt((1.0 - c.v) * (1.0 + c.v))
     es = (c.ev * mid / (sqrt((1.0 - mid) * (1.0 + mid)) * DOWN) + 2.0 * EPS) * UP
     rs = (c.rv * most / low + 2.0 * EPS) * UP
