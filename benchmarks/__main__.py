@@ -67,9 +67,10 @@ def main() -> None:
 def _run(name: str, *, quick: bool) -> list[Report]:
     """Import a benchmark and run it; each brings libraries that the others do without."""
     if name == "kinematics":
-        from benchmarks import _families, kinematics
+        from benchmarks import _enclosures, _families, kinematics
 
-        return [kinematics.run(quick=quick), _families.run(quick=quick)]
+        modules = (kinematics, _families, _enclosures)
+        return [module.run(quick=quick) for module in modules]
     if name == "programs":
         from benchmarks import programs
 

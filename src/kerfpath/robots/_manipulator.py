@@ -229,6 +229,8 @@ class Manipulator:
                 f"robot {self.id!r}: no proven bounds are known for {self.family.words}"
             )
         require_cells(len(frames), node, gamma, half)
+        if len(node) < len(frames):
+            frames, node = frames[node], np.arange(len(node))
         foot, end = self.T_base_foot, self.T_end_flange
         wrist = float(self.geometry[self.family.wrist])
         size = (len(node), self.postures)
