@@ -342,6 +342,26 @@ def test_the_linear_minimum_is_below_every_value_by_exact_arithmetic():
             assert Fraction(float(least[i])) <= value
 
 
+def test_the_linear_minimum_covers_its_own_rounding():
+    # Products that all but cancel, nothing else to hide behind, and cells as wide as they come.
+    rng = np.random.default_rng(15)
+    slope, z = rng.normal(size=(2, 500, 6))
+    z[:, 5] = -(z[:, :5] * slope[:, :5]).sum(1) / slope[:, 5]
+    low, half, none = rng.normal(size=(500, 6)), rng.uniform(0.5, 1, 500), np.zeros((500, 6))
+    low[::2] = 0.0
+    least = linear_minimum(slope, low, low, none, half, z)
+    for i, h in enumerate(half.tolist()):
+        w, s, a = ([Fraction(x) for x in part[i].tolist()] for part in (z, slope, low))
+        steep = sum(x * y for x, y in zip(w, s, strict=True))
+        curve = sum(x * y for x, y in zip(w, a, strict=True))
+        h = Fraction(h)
+        true = (curve * h / 2 - abs(steep)) * h
+        if abs(steep) < curve * h:
+            true = -steep * steep / (2 * curve)
+        assert Fraction(float(least[i])) <= true
+        assert float(true) - least[i] < 1e-13
+
+
 def test_the_linear_minimum_is_no_lower_than_need_be():
     (slope, low, high, radius), half, z = some_enclosures(200)
     least = linear_minimum(slope, low, high, radius, half, z)

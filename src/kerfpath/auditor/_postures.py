@@ -153,8 +153,9 @@ def _opw(lengths: dict[str, float], pose: Pose) -> Postures:
 def _ur(lengths: dict[str, float], pose: Pose) -> Postures:
     """Return the postures of an arm of the Universal Robots type.
 
-    Its links a2 and a3 move in a plane that is d4 aside of axis 1; square to them comes axis 5,
-    d5 down from axis 4 where they all hang, and axis 6 square to axis 5.
+    Its links a2 and a3 move in a plane that is d4 aside of axis 1. The wrist point, where axes 5
+    and 6 meet, is d5 below axis 4 where the angles 2 to 4 add up to zero. Axis 5 is in the plane,
+    so that the wrist is a turn out of it and one about axis 6.
     """
     front = np.copysign(1.0, lengths["a2"]) * SHOULDER
     theta_1, ahead, near = _shoulder(pose, -lengths["d4"], front)
