@@ -1,0 +1,262 @@
+"""Every solution of the inverse kinematics on cells of gamma, enclosed rigorously.
+
+For the lower bound that a plan states on the cost of any motion: what is said here holds for every
+real gamma of a cell, rounding included, without a sample. Nothing is shared with the closed form
+that plans.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from enum import IntEnum
+
+import numpy as np
+
+from kerfpath._arrays import Array, Bools, Ints
+from kerfpath._repr import short_repr
+from kerfpath.auditor._intervals import UNIT, Interval, exact, stack
+from kerfpath.auditor._jets import Jet, angle_from
+from kerfpath.auditor._postures import POSTURES_OF, TO_WRIST, Pose
+from kerfpath.errors import InputError
+from kerfpath.robots import Robot
+
+__all__ = ["Enclosure", "Status", "enclose", "linear_minimum"]
+
+POSTURES = 8
+AT_ONCE = 2048
+"""Cells enclosed together: large against the overhead of an operation, small against the cache."""
+WRAPPED = 4e-15
+"""rad: error of an angle less a few turns of the floating-point 2 pi."""
+ANY = float(np.nextafter(np.pi, 4.0))
+"""rad: radius that holds every angle."""
+
+
+class Status(IntEnum):
+    """What is proved of a posture on a cell."""
+
+    NONE = 0
+    """It has no solution anywhere in the cell."""
+    SMOOTH = 1
+    """It has one everywhere in the cell, which is smooth."""
+    BOX = 2
+    """Its solutions, if any, are in a box."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Enclosure:
+    """The solutions of C cells in each of P postures mu, in the robot's joints (n).
+
+    For all t in [-h, h], up to whole turns, joint i at gamma = m + t is in
+    center + slope t + [low, high] t^2 / 2 +- radius. Where smooth it is one continuous function;
+    in a box slope, low and high are zero, and the radius is just over pi where nothing is known.
+
+    Parameters
+    ----------
+    status : (C, P) int
+        Of `Status`; zeros in all that follows where there is no solution.
+    center : (C, P, n) rad
+        In [-pi, pi].
+    slope : (C, P, n)
+        Per rad of gamma.
+    low, high : (C, P, n) 1/rad
+        Bounds of the second derivative.
+    radius : (C, P, n) rad
+    """
+
+    status: Ints
+    center: Array
+    slope: Array
+    low: Array
+    high: Array
+    radius: Array
+
+    __repr__ = short_repr
+
+
+def enclose(
+    robot: Robot, frames: Array, node: Ints, gamma: Array, half: Array, T_flange_tip: Array
+) -> Enclosure:
+    """Enclose every joint vector that brings the tip to its task frame, turned by any gamma.
+
+    Together the postures hold every joint vector that reaches a pose exactly, at a singularity
+    those of both postures that meet there and all of a continuum. Matrices whose rotations are
+    not exact are widened to hold the nearest that are.
+
+    Parameters
+    ----------
+    robot : Robot
+        Of family "opw" or "ur", without an external axis; its limits do not matter.
+    frames : (K, 4, 4) m
+        Task frames in the robot base.
+    node : (C,) int
+        The task frame of each cell.
+    gamma, half : (C,) rad
+        A cell is [gamma - half, gamma + half].
+    T_flange_tip : (4, 4) m
+
+    Raises
+    ------
+    InputError
+        A robot of another family, or with an external axis.
+    """
+    _require_closed_form(robot)
+    pieces = []
+    before, after = _fixed(robot, frames, T_flange_tip)
+    for i in range(0, max(len(node), 1), AT_ONCE):
+        part = slice(i, i + AT_ONCE)
+        with np.errstate(all="ignore"):
+            turn = angle_from(gamma[part], half[part])
+            pieces.append(_enclose(robot, before[..., node[part]], after, turn))
+    names = Enclosure.__dataclass_fields__
+    return Enclosure(**{name: np.concatenate([getattr(p, name) for p in pieces]) for name in names})
+
+
+def linear_minimum(
+    slope: Array, low: Array, high: Array, radius: Array, half: Array, z: Array
+) -> Array:
+    """Return a lower bound (...) over t in [-h, h] of z . (q(t) - center), rounding included.
+
+    Parameters
+    ----------
+    slope, low, high, radius : (..., n)
+        Of an `Enclosure`.
+    half : (...) rad
+    z : (..., n)
+        What the joints are weighted with, all on their turn of the enclosure.
+    """
+    bend = np.where(z >= 0, z * low, z * high)
+    # A sum of n products is off by less than (n + 1) units of the sum of their sizes.
+    unit = (z.shape[-1] + 2) * UNIT
+    steep = np.abs((z * slope).sum(-1)) + unit * np.abs(z * slope).sum(-1)
+    curve = bend.sum(-1) - unit * np.abs(bend).sum(-1)
+    off = np.abs(z * radius).sum(-1) * (1 + unit)
+    # The least of curve t^2 / 2 - steep t on [0, h]: inside, if it turns upwards before h.
+    end = (0.5 * curve * half - steep) * half
+    inside = (curve > 0) & (steep < curve * half)
+    vertex = -0.5 * steep * steep / np.where(inside, curve, 1.0)
+    least = np.where(inside, vertex, end) - off
+    rounded = 8 * UNIT * ((np.abs(curve) * half + steep) * half + off)
+    return np.asarray(least - rounded)
+
+
+def _require_closed_form(robot: Robot) -> None:
+    if robot.kinematics not in POSTURES_OF:
+        raise InputError(
+            f"robot {robot.id!r}: its solutions are enclosed for the families "
+            f"{', '.join(POSTURES_OF)} only, it is of {robot.kinematics!r}"
+        )
+    if robot.external is not None:
+        raise InputError(
+            f"robot {robot.id!r}: its solutions are enclosed without an external axis only, it "
+            f"has a {robot.external.kind}; hold it with robot.held(x)"
+        )
+
+
+def _fixed(robot: Robot, frames: Array, T_flange_tip: Array) -> tuple[Interval, Interval]:
+    """Return what stands before and after the turn of the tool, rows first.
+
+    Task frames in the model's base (3, 4, K), and the wrist point and axes of the model's end in
+    the tip's frame, as columns x, y, z, point (3, 4).
+    """
+    foot = _inverse(_rigid(robot.T_base_foot[..., None]))
+    before = _product(foot, _rigid(np.moveaxis(frames, 0, -1)))
+    flange = _inverse(_rigid(T_flange_tip[..., None]))
+    after = _product(flange, _inverse(_rigid(robot.T_end_flange[..., None])))
+    axis = after[:, 2]
+    back = axis.scaled(-float(robot.geometry[TO_WRIST[robot.kinematics]]))
+    wrist = after[:, 3] + back
+    columns = stack([after[:, 0], after[:, 1], axis, wrist])
+    return before, Interval(np.swapaxes(columns.lo, 0, 1), np.swapaxes(columns.hi, 0, 1))
+
+
+def _rigid(T: Array) -> Interval:
+    """Return poses (4, 4, ...), rows first, as (3, 4, ...) that hold the nearest exact rotation.
+
+    A matrix R is no farther from a rotation, by the norm of Frobenius, than R^T R is from 1.
+    """
+    R = exact(T[:3, :3])
+    off = np.zeros(T.shape[2:])
+    for i in range(3):
+        for j in range(3):
+            dot = R[0, i] * R[0, j] + R[1, i] * R[1, j] + R[2, i] * R[2, j]
+            off = off + (dot - exact(float(i == j))).magnitude() ** 2
+    off = np.sqrt(off) * (1 + 32 * UNIT)
+    lo, hi = T[:3].copy(), T[:3].copy()
+    lo[:, :3] -= off + UNIT
+    hi[:, :3] += off + UNIT
+    return Interval(lo, hi)
+
+
+def _inverse(T: Interval) -> Interval:
+    """Return the inverse of poses (3, 4, ...)."""
+    turned = [
+        [T[0, i], T[1, i], T[2, i], -(T[0, i] * T[0, 3] + T[1, i] * T[1, 3] + T[2, i] * T[2, 3])]
+        for i in range(3)
+    ]
+    return stack([stack(row) for row in turned])
+
+
+def _product(A: Interval, B: Interval) -> Interval:
+    """Return the product of poses (3, 4, ...)."""
+    rows = []
+    for i in range(3):
+        row = [A[i, 0] * B[0, j] + A[i, 1] * B[1, j] + A[i, 2] * B[2, j] for j in range(4)]
+        rows.append(stack([*row[:3], row[3] + A[i, 3]]))
+    return stack(rows)
+
+
+def _enclose(robot: Robot, before: Interval, after: Interval, turn: Jet) -> Enclosure:
+    """Enclose the solutions of cells with task frames `before` (3, 4, C) turned by `turn` (C,)."""
+    postures = POSTURES_OF[robot.kinematics](robot.geometry, _turned_pose(before, after, turn))
+    joints = [
+        angle.plus(exact(offset)).scaled(sign)
+        for angle, offset, sign in zip(postures.angles, robot.offset, robot.sign, strict=True)
+    ]
+    none, smooth = postures.none, ~postures.none
+    for q in joints:
+        smooth = smooth & q.at.known() & q.slope.known() & q.bend.known()
+    status = np.where(none, Status.NONE, np.where(smooth, Status.SMOOTH, Status.BOX))
+    parts = [_described(q, smooth, none) for q in joints]
+    cells = [
+        np.stack([np.broadcast_to(p, status.shape).reshape(POSTURES, -1).T for p in part], axis=-1)
+        for part in zip(*parts, strict=True)
+    ]
+    return Enclosure(np.ascontiguousarray(status.reshape(POSTURES, -1).T), *cells)
+
+
+def _turned_pose(before: Interval, after: Interval, turn: Jet) -> Pose:
+    """Return the pose of the model's end: before . Rz(gamma) . after."""
+    c, s = turn.cos_sin()
+    columns = []
+    for j in range(4):
+        x, y, z = after[0, j], after[1, j], after[2, j]
+        column = []
+        for i in range(3):
+            along = before[i, 0] * x + before[i, 1] * y
+            across = before[i, 1] * x - before[i, 0] * y
+            rest = before[i, 2] * z
+            if j == 3:
+                rest = rest + before[i, 3]
+            column.append((c.times(along) + s.times(across)).plus(rest))
+        columns.append((column[0], column[1], column[2]))
+    return Pose(x=columns[0], y=columns[1], z=columns[2], point=columns[3])
+
+
+def _described(q: Jet, smooth: Bools, none: Bools) -> tuple[Array, Array, Array, Array, Array]:
+    """Return centre, slope, bounds of the second derivative and radius of one joint (2, 2, 2, C).
+
+    Zeros where there are none, and in a box but for centre and radius.
+    """
+    steep = np.where(smooth, q.slope.middle(), 0.0)
+    middle = np.where(smooth, q.at.middle(), q.value.middle())
+    near = q.at.radius(middle) + q.half * q.slope.radius(steep) * (1 + UNIT)
+    radius = np.where(smooth, near, q.value.radius(middle)) * (1 + 4 * UNIT) + WRAPPED
+    free = ~smooth & ~(radius < ANY)
+    middle, radius = np.where(free | none, 0.0, middle), np.where(free, ANY, radius)
+    return (
+        middle - 2 * np.pi * np.round(middle / (2 * np.pi)),
+        steep,
+        np.where(smooth, q.bend.lo, 0.0),
+        np.where(smooth, q.bend.hi, 0.0),
+        np.where(none, 0.0, radius),
+    )

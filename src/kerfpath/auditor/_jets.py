@@ -1,0 +1,201 @@
+"""Functions of t in [-h, h], enclosed with their first and second derivatives.
+
+A jet holds value and derivative at t = 0, and value and both derivatives over all of [-h, h]. The
+operations are those of second-order automatic differentiation over intervals; after each, what
+Taylor's formula says from t = 0 narrows what the operation says over [-h, h]. A derivative that
+does not exist or is not bounded, such as that of a square root that may reach zero, is NaN: not
+known. So a known second derivative over [-h, h] is at the same time a proof that the function is
+defined and smooth there.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from kerfpath._arrays import Array
+from kerfpath._repr import short_repr
+from kerfpath.auditor._intervals import HALF_TURN, Interval, exact
+
+__all__ = ["Jet", "angle_from", "argument", "constant"]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Jet:
+    """A function of t, elementwise.
+
+    Parameters
+    ----------
+    at, slope : Interval
+        Value and first derivative at t = 0.
+    value, rate, bend : Interval
+        Value, first and second derivative anywhere in [-half, half]. The value holds every one
+        that the function has where it is defined; the derivatives are known only if it is
+        defined everywhere.
+    half : array
+        h, not negative.
+    """
+
+    at: Interval
+    slope: Interval
+    value: Interval
+    rate: Interval
+    bend: Interval
+    half: Array
+
+    __repr__ = short_repr
+
+    def __neg__(self) -> Jet:
+        return Jet(-self.at, -self.slope, -self.value, -self.rate, -self.bend, self.half)
+
+    def __add__(self, other: Jet) -> Jet:
+        return _narrowed(
+            self.at + other.at,
+            self.slope + other.slope,
+            self.value + other.value,
+            self.rate + other.rate,
+            self.bend + other.bend,
+            self.half,
+        )
+
+    def __sub__(self, other: Jet) -> Jet:
+        return self + -other
+
+    def __mul__(self, other: Jet) -> Jet:
+        a, b = self, other
+        return _narrowed(
+            a.at * b.at,
+            a.at * b.slope + a.slope * b.at,
+            a.value * b.value,
+            a.value * b.rate + a.rate * b.value,
+            a.value * b.bend + (a.rate * b.rate).scaled(2.0) + a.bend * b.value,
+            a.half,
+        )
+
+    def times(self, factor: Interval) -> Jet:
+        """Return the product with a number that does not depend on t."""
+        return _narrowed(
+            self.at * factor,
+            self.slope * factor,
+            self.value * factor,
+            self.rate * factor,
+            self.bend * factor,
+            self.half,
+        )
+
+    def scaled(self, factor: ArrayLike) -> Jet:
+        """Return the product with exact numbers."""
+        return Jet(
+            self.at.scaled(factor),
+            self.slope.scaled(factor),
+            self.value.scaled(factor),
+            self.rate.scaled(factor),
+            self.bend.scaled(factor),
+            self.half,
+        )
+
+    def plus(self, number: Interval) -> Jet:
+        """Return the sum with a number that does not depend on t."""
+        return Jet(
+            self.at + number, self.slope, self.value + number, self.rate, self.bend, self.half
+        )
+
+    def square(self) -> Jet:
+        """Return the square."""
+        return _narrowed(
+            self.at.square(),
+            (self.at * self.slope).scaled(2.0),
+            self.value.square(),
+            (self.value * self.rate).scaled(2.0),
+            (self.value * self.bend + self.rate.square()).scaled(2.0),
+            self.half,
+        )
+
+    def sqrt(self) -> Jet:
+        """Return the square root, on the part of [-h, h] where there is one."""
+        at, value = self.at.sqrt(), self.value.sqrt()
+        rate = self.rate / value.scaled(2.0)
+        return _narrowed(
+            at,
+            self.slope / at.scaled(2.0),
+            value,
+            rate,
+            (self.bend.scaled(0.5) - rate.square()) / value,
+            self.half,
+        )
+
+    def cos_sin(self) -> tuple[Jet, Jet]:
+        """Return cosine and sine of an angle; between -1 and 1 even where it is not known."""
+        c0, s0 = self.at.cos_sin()
+        c, s = self.value.cos_sin()
+        square = self.rate.square()
+        cosine = _narrowed(
+            c0, -(s0 * self.slope), c, -(s * self.rate), -(c * square + s * self.bend), self.half
+        )
+        sine = _narrowed(
+            s0, c0 * self.slope, s, c * self.rate, c * self.bend - s * square, self.half
+        )
+        return cosine, sine
+
+
+def constant(number: Interval, like: Jet) -> Jet:
+    """Return a number that does not depend on t as a jet."""
+    zero = exact(0.0)
+    return Jet(number, zero, number, zero, zero, like.half)
+
+
+def angle_from(middle: Array, half: Array) -> Jet:
+    """Return the angles middle + t, rad."""
+    zero, one = exact(np.zeros_like(middle)), exact(np.ones_like(middle))
+    t = Interval(-half, half)
+    return Jet(exact(middle), one, exact(middle) + t, one, zero, half)
+
+
+def argument(x: Jet, y: Jet) -> Jet:
+    """Return the angle from (1, 0) to (x, y), rad.
+
+    It is continuous where the derivatives are known. Where they are not, its value holds that of
+    every (x, y) up to whole turns.
+    """
+    c, s = x.value.middle(), y.value.middle()
+    size = np.hypot(c, s)
+    fine = np.isfinite(size) & (size > 0)
+    size = np.where(fine, size, 1.0)
+    c, s = np.where(fine, c / size, 1.0), np.where(fine, s / size, 0.0)
+    # Seen from a direction near by, the angle is small, and turning changes no derivative.
+    turned = np.arctan2(s, c)
+    base = Interval(turned - ROUNDED, turned + ROUNDED)
+    x, y = x.scaled(c) + y.scaled(s), y.scaled(c) - x.scaled(s)
+    size2 = x.value.square() + y.value.square()
+    rate = (x.value * y.rate - y.value * x.rate) / size2
+    twice = (x.value * x.rate + y.value * y.rate).scaled(2.0)
+    bend = (x.value * y.bend - y.value * x.bend - rate * twice) / size2
+    slope = (x.at * y.slope - y.at * x.slope) / (x.at.square() + y.at.square())
+    out = _narrowed(
+        base + _small_angle(x.at, y.at), slope, base + _small_angle(x.value, y.value), rate, bend,
+        x.half,
+    )  # fmt: skip
+    turn = Interval(base.lo - HALF_TURN.hi, base.hi + HALF_TURN.hi)
+    known = out.value.known()
+    value = Interval(np.where(known, out.value.lo, turn.lo), np.where(known, out.value.hi, turn.hi))
+    return Jet(out.at, out.slope, value, out.rate, out.bend, out.half)
+
+
+ROUNDED = 4e-15
+"""rad: error of an arctangent of two numbers (four units of pi), and of the sum with it."""
+
+
+def _small_angle(x: Interval, y: Interval) -> Interval:
+    """Return the angle of (x, y) ahead, where x is positive; else not known."""
+    ahead = Interval(np.where(x.lo > 0, x.lo, np.nan), np.where(x.lo > 0, x.hi, np.nan))
+    return (y / ahead).atan()
+
+
+def _narrowed(
+    at: Interval, slope: Interval, value: Interval, rate: Interval, bend: Interval, half: Array
+) -> Jet:
+    """Return the jet with value and rate narrowed by Taylor's formula from t = 0."""
+    rate = rate.meet(slope + bend.swept(half))
+    return Jet(at, slope, value.meet(at + rate.swept(half)), rate, bend, half)
