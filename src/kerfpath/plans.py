@@ -12,6 +12,7 @@ from scipy.spatial.transform import Rotation
 
 from kerfpath._arrays import Array, Ints, as_pose, floats, freeze, integers, scalar
 from kerfpath._repr import short_repr
+from kerfpath.certificate import Certificate
 from kerfpath.comfort import measures
 from kerfpath.contour import Contour
 from kerfpath.errors import InputError
@@ -38,11 +39,21 @@ class Proof:
     grid_cost : float or None
         Where the plan is refined: the cost of the path on the graph that it was refined from, if
         that keeps all limits.
+    bound : float or None
+        No motion that keeps (5) and (6) at the nodes costs less, at any gamma, posture and turn;
+        None where nothing of the kind is proved.
+    gap : float or None
+        How far the plan may be from the best motion: (cost - bound) / cost.
+    certificate : Certificate or None
+        What proves the bound, see `kerfpath.certificate`.
     """
 
     optimal: bool
     statement: str
     grid_cost: float | None = None
+    bound: float | None = None
+    gap: float | None = None
+    certificate: Certificate | None = None
 
     __repr__ = short_repr
 
