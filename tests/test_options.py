@@ -10,7 +10,7 @@ import pytest
 
 import kerfpath
 from conftest import ROOT
-from kerfpath import Band, Comfort, InputError, OptionConflict, PlanOptions, Tilt
+from kerfpath import Band, Certify, Comfort, InputError, OptionConflict, PlanOptions, Tilt
 from kerfpath.job.format.tables._plan import PlanTable
 from kerfpath.options import OptionData, PlanKeywords
 
@@ -28,11 +28,15 @@ EVERY = PlanOptions(
     rotation=[np.inf, np.inf, np.inf, 7.0, np.inf, 6.5],
     refine=True,
     comfort=Comfort(wrist=Band(margin=0.1, width=0.2, cost=3.0), limits=Band(margin=0.05)),
+    certify=Certify(gap=0.02, seconds=3.0, in_file=True),
 )
 
 
+PIECES = PlanOptions(interruptions="fewest", least_piece=0.02)
+
+
 def test_options_come_back_from_their_data():
-    for options in (PlanOptions(), EVERY, PlanOptions(interruptions="fewest", least_piece=0.02)):
+    for options in (PlanOptions(), EVERY, PlanOptions(certify=None), PIECES):
         data = json.loads(json.dumps(options.to_data()))
         assert PlanOptions.from_data(data) == options
     assert PlanOptions() != EVERY
@@ -94,11 +98,37 @@ def test_a_length_of_pieces_needs_pieces():
         ("refine_parts", 0),
         ("weights", [[1.0]]),
         ("rotation", [np.nan]),
+        ("certify", True),
+        ("certify", 0.005),
     ],
 )
 def test_a_value_out_of_range_is_refused_by_its_name(name, value):
     with pytest.raises(InputError, match=f"^{name}: "):
         PlanOptions(**{name: value})
+
+
+@pytest.mark.parametrize(
+    ("name", "value", "said"),
+    [
+        ("gap", 0, "expected a number above 0, got 0"),
+        ("gap", -0.1, "expected a number above 0, got -0.1"),
+        ("gap", np.nan, "expected a number above 0, got nan"),
+        ("gap", 1.5, "expected a share of the cost up to 1, got 1.5"),
+        ("gap", "small", "expected a number, got 'small'"),
+        ("seconds", 0, "expected a number above 0 s, got 0 s"),
+        ("seconds", np.inf, "expected a number above 0 s, got inf s"),
+        ("in_file", "yes", "expected True or False, got 'yes'"),
+    ],
+)
+def test_what_is_certified_is_refused_by_its_name(name, value, said):
+    with pytest.raises(InputError, match=f"^certify {name}: {said}$"):
+        Certify(**{name: value})
+
+
+def test_plans_are_certified_unless_they_are_not_to_be():
+    assert PlanOptions().certify == Certify(gap=0.005, seconds=None, in_file=False)
+    assert PlanOptions() != PlanOptions(certify=None)
+    assert PlanOptions(certify=Certify(gap=1)).to_data()["certify"]["gap"] == 1.0
 
 
 def test_two_plain_options_never_conflict():

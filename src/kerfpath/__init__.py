@@ -11,6 +11,7 @@ __version__ = "0.1.0"
 
 if TYPE_CHECKING:
     from kerfpath.auditor import audit as audit
+    from kerfpath.certificate import Certify as Certify
     from kerfpath.comfort import Band as Band
     from kerfpath.comfort import Comfort as Comfort
     from kerfpath.contour import Contour as Contour
@@ -41,6 +42,7 @@ if TYPE_CHECKING:
 _HOME = {
     "AuditFailed": "errors",
     "Band": "comfort",
+    "Certify": "certificate",
     "Comfort": "comfort",
     "Contour": "contour",
     "InputError": "errors",

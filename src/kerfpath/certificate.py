@@ -17,15 +17,27 @@ which every motion costs more than the plan drop out, and the next stage covers 
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
+from typing import TypedDict, cast
 
 import numpy as np
 from numpy.typing import NDArray
 
-from kerfpath._arrays import Array
+from kerfpath._arrays import Array, scalar
 from kerfpath._repr import short_repr
+from kerfpath.errors import InputError
 
-__all__ = ["ALLOWANCE", "BASE", "LIFTS", "Certificate", "Stage", "cell_bounds"]
+__all__ = [
+    "ALLOWANCE",
+    "BASE",
+    "LIFTS",
+    "USUAL",
+    "Certificate",
+    "Certify",
+    "CertifyData",
+    "Stage",
+    "cell_bounds",
+]
 
 BASE = 72
 """Cells that the circle of gamma is divided into at level 0; each level divides them in two."""
@@ -34,6 +46,59 @@ LIFTS = 8
 ALLOWANCE = 2e-4
 """Share of the plan's cost by which the bound that is stated stays below the one computed: another
 enclosure of the same joints may be a little wider."""
+
+
+class CertifyData(TypedDict):
+    """A `Certify` as JSON holds it."""
+
+    gap: float
+    seconds: float | None
+    in_file: bool
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Certify:
+    """How far a plan is certified: the gap to reach, and the time that may go into it.
+
+    Parameters
+    ----------
+    gap : float
+        Share of the plan's cost that may be left between the bound and the cost, from above 0 to
+        1; nothing more is tried once it is reached.
+    seconds : float s, optional
+        Time to spend on each plan; None: no limit but the certifier's own limit on its work, so
+        that the same task has the same bound on every machine.
+    in_file : bool
+        Whether plan.json carries the certificate, for others to check; the bound is there anyhow.
+
+    Raises
+    ------
+    InputError
+        A gap or a time that is not positive, or a gap over 1.
+    """
+
+    gap: float = 0.005
+    seconds: float | None = None
+    in_file: bool = False
+
+    def __post_init__(self) -> None:
+        gap = scalar(self.gap, "certify gap", above=0.0)
+        if gap > 1:
+            raise InputError(f"certify gap: expected a share of the cost up to 1, got {gap:g}")
+        object.__setattr__(self, "gap", gap)
+        if self.seconds is not None:
+            seconds = scalar(self.seconds, "certify seconds", unit="s", above=0.0)
+            object.__setattr__(self, "seconds", seconds)
+        if not isinstance(self.in_file, bool):
+            raise InputError(f"certify in_file: expected True or False, got {self.in_file!r}")
+
+    def to_data(self) -> CertifyData:
+        """Return it as JSON holds it; `Certify(**data)` is the same again."""
+        return cast(CertifyData, asdict(self))
+
+
+USUAL = Certify()
+"""How plans are certified where nothing else is asked for."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)

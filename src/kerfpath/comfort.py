@@ -27,6 +27,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, fields
 from functools import partial
+from typing import TypedDict
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -38,7 +39,7 @@ from kerfpath.kernels.turns import JointLimits
 from kerfpath.losses import Loss, Reason
 from kerfpath.robots import Robot
 
-__all__ = ["MEASURES", "Band", "Comfort", "Measure", "jacobian", "measure", "measures"]
+__all__ = ["MEASURES", "Band", "BandData", "Comfort", "Measure", "jacobian", "measure", "measures"]
 
 AT_ONCE = 100_000
 """Jacobians worked out at a time: large against the overhead, small against the memory."""
@@ -63,6 +64,14 @@ class Measure:
     def has(self, robot: Robot) -> bool:
         """Return whether the arm has it."""
         return self.families is None or robot.kinematics in self.families
+
+
+class BandData(TypedDict):
+    """A `Band` as JSON holds it, in rad, m and m^3."""
+
+    margin: float
+    width: float
+    cost: float
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -11,13 +11,14 @@ from numpy.typing import ArrayLike
 
 from kerfpath._arrays import Array, floats, require_one_of, scalar
 from kerfpath._repr import short_repr
-from kerfpath.comfort import Band, Comfort
+from kerfpath.certificate import USUAL, Certify, CertifyData
+from kerfpath.comfort import Band, BandData, Comfort
 from kerfpath.contour import FrameKind
 from kerfpath.errors import InputError
 from kerfpath.limits import Limits
 from kerfpath.robots import Robot
 from kerfpath.search import Closure, Method, Metric, ObjectiveKind, rotation_limits
-from kerfpath.tilt import Tilt
+from kerfpath.tilt import Tilt, TiltData
 
 __all__ = [
     "FeedKind",
@@ -57,22 +58,7 @@ class PlanKeywords(GraphKeywords, total=False):
     rotation: ArrayLike | None
     feed: FeedKind
     refine: bool
-
-
-class BandData(TypedDict):
-    """A `kerfpath.Band` as JSON holds it, in rad, m and m^3."""
-
-    margin: float
-    width: float
-    cost: float
-
-
-class TiltData(TypedDict):
-    """A `kerfpath.Tilt` as JSON holds it."""
-
-    cone_rad: float
-    steps: int
-    cost_per_rad: float
+    certify: Certify | None
 
 
 class OptionData(TypedDict):
@@ -96,6 +82,7 @@ class OptionData(TypedDict):
     refine_parts: int
     interruptions: Interruptions
     least_piece_m: float | None
+    certify: CertifyData | None
 
 
 class OptionConflict(InputError):
@@ -159,6 +146,8 @@ class PlanOptions:
         Length that every such piece has at least.
     comfort : Comfort, optional
         Margins that the nodes keep from singularities and limits, and penalties beside them.
+    certify : Certify, optional
+        How far it is proved how near the plan is to the best motion; None: not at all.
 
     Raises
     ------
@@ -184,6 +173,7 @@ class PlanOptions:
     interruptions: Interruptions = "none"
     least_piece: float | None = None
     comfort: Comfort | None = None
+    certify: Certify | None = USUAL
 
     __repr__ = short_repr
 
@@ -207,6 +197,8 @@ class PlanOptions:
             raise InputError(
                 f"refine_parts: expected a whole number >= 1, got {self.refine_parts!r}"
             )
+        if not isinstance(self.certify, Certify | None):
+            raise InputError(f"certify: expected kerfpath.Certify or None, got {self.certify!r}")
         for name, value in cast.items():
             object.__setattr__(self, name, value)
         _require_no_conflict(self)
@@ -265,9 +257,9 @@ class PlanOptions:
         every: Mapping[str, Any] = data
         values = {_NAMES.get(key, key): every[key] for key in OptionData.__annotations__}
         if (tilt := data["tilt"]) is not None:
-            values["tilt"] = Tilt(
-                cone=tilt["cone_rad"], steps=tilt["steps"], cost=tilt["cost_per_rad"]
-            )
+            values["tilt"] = Tilt.from_data(tilt)
+        if (certify := data["certify"]) is not None:
+            values["certify"] = Certify(**certify)
         if (comfort := data["comfort"]) is not None:
             values["comfort"] = Comfort(**{name: Band(**band) for name, band in comfort.items()})
         if (rotation := data["rotation_rad"]) is not None:
@@ -287,8 +279,8 @@ _NAMES = {
 
 def _to_json(value: object) -> object:
     """Return the value of an option as JSON holds it, null for infinity."""
-    if isinstance(value, Tilt):
-        return {"cone_rad": value.cone, "steps": value.steps, "cost_per_rad": value.cost}
+    if isinstance(value, Tilt | Certify):
+        return value.to_data()
     if isinstance(value, Comfort):
         return {name: band for name, band in asdict(value).items() if band is not None}
     if isinstance(value, np.ndarray):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import TypedDict
 
 import numpy as np
 from scipy.spatial.transform import Rotation
@@ -10,7 +11,15 @@ from scipy.spatial.transform import Rotation
 from kerfpath._arrays import Array, freeze, not_negative
 from kerfpath.errors import InputError
 
-__all__ = ["Tilt", "tilt_frames"]
+__all__ = ["Tilt", "TiltData", "tilt_frames"]
+
+
+class TiltData(TypedDict):
+    """A `Tilt` as JSON holds it."""
+
+    cone_rad: float
+    steps: int
+    cost_per_rad: float
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -51,6 +60,15 @@ class Tilt:
         if not (isinstance(self.steps, int | np.integer) and self.steps >= 0):
             raise InputError(f"tilt steps: expected a whole number >= 0, got {self.steps!r}")
         object.__setattr__(self, "steps", int(self.steps))
+
+    def to_data(self) -> TiltData:
+        """Return it as JSON holds it; `from_data` reads the same back."""
+        return {"cone_rad": self.cone, "steps": self.steps, "cost_per_rad": self.cost}
+
+    @classmethod
+    def from_data(cls, data: TiltData) -> Tilt:
+        """Return the tilt that `to_data` wrote."""
+        return cls(cone=data["cone_rad"], steps=data["steps"], cost=data["cost_per_rad"])
 
     def samples(self) -> Array:
         """Return lead and lean of every sample (T, 2) rad, the nominal axis first."""

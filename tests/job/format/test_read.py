@@ -8,6 +8,7 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
+from kerfpath.certificate import Certify
 from kerfpath.comfort import Band, Comfort
 from kerfpath.contour import Contour
 from kerfpath.errors import InputError
@@ -562,6 +563,17 @@ def test_a_posture_that_does_not_exist_is_refused_at_its_line(read, words):
         ('closure = "periodic"\nmethod = "known"', 'method = "exact" with closure = "periodic"'),
         ("refine_parts = 0", "refine_parts: expected a whole number of parts from 1 to 100, got 0"),
         ("rotation_deg = -1", "rotation_deg: expected a number not below 0, in deg, got -1"),
+        ("certify = 1", "plan.certify: expected true or false, got 1"),
+        ("certify_gap_percent = 0", "expected a number above 0, at most 100, in per cent, got 0"),
+        ("certify_gap_percent = 101", "at most 100, in per cent, got 101"),
+        ("certify_gap_percent = nan", "plan.certify_gap_percent: expected a number above 0"),
+        ("certify_seconds = -1", "plan.certify_seconds: expected a number above 0, in s, got -1"),
+        ("certify_seconds = inf", "plan.certify_seconds: expected a number above 0, in s, got inf"),
+        (
+            "certify = false\ncertify_seconds = 3",
+            "plan.certify_seconds: expected no certify_seconds with certify = false, got 3",
+        ),
+        ("certify = false\ncertificate = true", "no certificate with certify = false, got true"),
     ],
 )
 def test_keys_of_plan_that_do_not_go_together_are_refused_at_their_line(read, keys, said):
@@ -577,6 +589,17 @@ def test_a_tolerance_of_the_tool_axis_is_read_into_si(read):
     assert (tilt.cone, tilt.steps) == (np.pi / 20, 3)
     # What the rim costs is the angle times the cost, in whichever unit.
     assert tilt.cone * tilt.cost == pytest.approx(9 * 0.01, rel=1e-12)
+
+
+def test_what_is_certified_is_read_from_four_keys(read):
+    def certify(keys):
+        return read(changed("[plan]", f"[plan]\n{keys}")).options.certify
+
+    assert read(JOB).options.certify == Certify(gap=0.005, seconds=None, in_file=False)
+    assert certify("certify = false") is certify("certify = false\ncertificate = false") is None
+    keys = "certify_gap_percent = 2\ncertify_seconds = 3\ncertificate = true"
+    assert certify(keys) == Certify(gap=0.02, seconds=3.0, in_file=True)
+    assert certify("certify = true\ncertify_gap_percent = 100") == Certify(gap=1.0)
 
 
 def test_a_rotation_limit_is_one_for_every_endless_axis(read):

@@ -7,6 +7,7 @@ from typing import Annotated
 import numpy as np
 from pydantic import Field, model_validator
 
+from kerfpath.certificate import USUAL, Certify
 from kerfpath.comfort import Comfort
 from kerfpath.contour import FrameKind
 from kerfpath.job.format._values import JointsNotNegative, NotNegative, Positive, fault, key
@@ -91,6 +92,22 @@ class PlanTable(Table):
         JointsNotNegative | None,
         key("a number not below 0 for every joint, in 1/rad", "[1, 1, 1, 1, 1, 1]"),
     ] = None
+    certify: Annotated[bool, key("true or false", "true")] = True
+    certify_gap_percent: Annotated[
+        Positive | None, key("a number above 0, at most 100, in per cent", "0.5", le=100)
+    ] = None
+    certify_seconds: Annotated[Positive | None, key("a number above 0, in s", "10")] = None
+    certificate: Annotated[bool, key("true or false", "false")] = False
+
+    @model_validator(mode="after")
+    def _what_is_certified_is_asked_for(self) -> PlanTable:
+        more = given(self, "certify_gap_percent", "certify_seconds")
+        if self.certificate:
+            more.append("certificate")
+        if more and not self.certify:
+            expected, got = f"no {more[0]} with certify = false", _toml(getattr(self, more[0]))
+            raise fault(expected, got, "remove one", (more[0],))
+        return self
 
     @model_validator(mode="after")
     def _tilt_is_asked_for(self) -> PlanTable:
@@ -127,6 +144,18 @@ class PlanTable(Table):
             interruptions=self.interruptions,
             least_piece=None if piece is None else piece / 1000,
             comfort=comfort,
+            certify=self.certified(),
+        )
+
+    def certified(self) -> Certify | None:
+        """Return how far plans are certified; None where they are not to be."""
+        if not self.certify:
+            return None
+        percent = self.certify_gap_percent
+        return Certify(
+            gap=USUAL.gap if percent is None else percent / 100,
+            seconds=self.certify_seconds,
+            in_file=self.certificate,
         )
 
     def tilt(self) -> Tilt | None:
