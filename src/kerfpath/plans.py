@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import warnings
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -56,6 +57,16 @@ class Proof:
     certificate: Certificate | None = None
 
     __repr__ = short_repr
+
+    @property
+    def bound_shown(self) -> str:
+        """The bound to two places, never more than it is; "-" where there is none."""
+        return "-" if self.bound is None else f"{math.floor(self.bound * 100) / 100:.2f}"
+
+    @property
+    def gap_shown(self) -> str:
+        """The gap in per cent to two places, never less than it is; "-" where there is none."""
+        return "-" if self.gap is None else f"{max(math.ceil(self.gap * 1e4), 0) / 100:.2f}"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -190,6 +201,8 @@ class Plan:
 
     def __repr__(self) -> str:
         best = ", best of its grid" if self.proof.optimal else ""
+        if self.proof.gap is not None:
+            best += f", gap {self.proof.gap_shown} %"
         return (
             f"Plan({self.name!r}, {len(self.q)} nodes, {self.time[-1] - self.time[0]:.2f} s, cost "
             f"{self.cost:.6g}{best}, {self.robot.id})"

@@ -404,6 +404,22 @@ def test_tables_add_up(section: ContourSection) -> None:
     assert f"{section.path.length * 1e3:.1f}" in row
 
 
+def test_the_table_of_contours_has_bound_and_gap_and_the_page_says_what_they_are(
+    section: ContourSection,
+) -> None:
+    proof = replace(section.plan.proof, bound=None, gap=None)
+    plain = replace(section, plan=replace(section.plan, proof=proof))
+    assert summary_table([plain]).count('<td class="n">-</td>') == 2
+    assert "no motion that keeps" not in render("x", [plain])
+    proof = replace(proof, bound=12.3456, gap=0.00123)
+    bounded = replace(section, plan=replace(section.plan, proof=proof))
+    row = summary_table([bounded])
+    assert "12.34<" in row, "never more than is proved"
+    assert "0.13<" in row, "never less than it may be, in per cent"
+    page = render("x", [plain, bounded])
+    assert "Bound: no motion that keeps the velocity and acceleration limits" in page
+
+
 def test_section_refuses_parts_of_different_length(section: ContourSection) -> None:
     with pytest.raises(
         InputError, match="expected the same nodes throughout, got graph 41, path 11"

@@ -152,6 +152,9 @@ def _cut_entry(cut: CutResult) -> dict[str, object]:
         "cost": cut.plan.cost,
         "grid_cost": cut.plan.proof.grid_cost,
         "optimal": cut.plan.proof.optimal,
+        "bound": cut.plan.proof.bound,
+        "gap": cut.plan.proof.gap,
+        "proof": cut.plan.proof.statement,
         "feed": None if cut.plan.feed is None else asdict(cut.plan.feed),
         "largest_tilt_deg": _largest_tilt(cut),
         "peak_velocity_share": float(criteria.peak_velocity.max()),
@@ -171,7 +174,7 @@ def _show_cuts(cuts: Sequence[CutResult]) -> None:
         ]
         sampling = _sampling(cut)
         if cut.plan is None:
-            rows.append([*row, *"-----", *sampling, "no feasible path"])
+            rows.append([*row, *"-------", *sampling, "no feasible path"])
             continue
         criteria = cut.plan.criteria
         rows.append(
@@ -180,22 +183,29 @@ def _show_cuts(cuts: Sequence[CutResult]) -> None:
                 f"{cut.plan.time[-1]:.2f}",
                 "" if cut.plan.proof.grid_cost is None else f"{cut.plan.proof.grid_cost:.2f}",
                 f"{cut.plan.cost:.2f}",
+                cut.plan.proof.bound_shown,
+                cut.plan.proof.gap_shown,
                 f"{criteria.peak_velocity.max():.0%}",
                 f"{criteria.peak_acceleration.max():.0%}",
                 *sampling,
                 "passed" if cut.passed else "FAILED",
             ]
         )
-    columns = ["contour", "mm", "nodes", "m/min", "s", "grid", "cost", "vel", "acc"]
-    columns += ["chord mm", "step deg", "audit"]
-    spare = ["step deg", "chord mm", "grid", "m/min"]
+    columns = ["contour", "mm", "nodes", "m/min", "s", "grid", "cost"]
+    columns += ["bound", "gap %", "vel", "acc", "chord mm", "step deg", "audit"]
+    spare = ["step deg", "chord mm", "grid", "bound", "m/min"]
     table(columns, rows, numbers=columns[1:-1], whole=["audit"], spare=spare)
     out.print(
         "cost: what is minimised; grid: the best on the gamma grid, before the refinement; "
+        "bound: no motion that keeps the limits at the nodes costs less, at any gamma, posture and "
+        "turn; gap: at most so much of the cost lies above the best motion; "
         "vel, acc: highest share of a joint's velocity and acceleration limit; chord: largest "
         "distance of the CAD curve from the chords between nodes; step: largest turn of the tool "
         "axis from node to node"
     )
+    unbound = [cut.name for cut in cuts if _is_unbound(cut)]
+    if unbound:
+        out.print(f"no bound for {escape(', '.join(unbound))}: the report and --json say why")
     found = [cut.departure for cut in cuts if cut.departure is not None]
     loops = [each.path for each in found if each.path is not None]
     if loops:
@@ -205,6 +215,12 @@ def _show_cuts(cuts: Sequence[CutResult]) -> None:
         )
     if any(each.against == "points of the drawing" for each in found + loops):
         out.print("where the drawing has points, the lines through them stand for the CAD curve")
+
+
+def _is_unbound(cut: CutResult) -> bool:
+    """Return whether a bound was asked for and none could be proved."""
+    plan = cut.plan
+    return plan is not None and plan.settings.certify is not None and plan.proof.bound is None
 
 
 def _sampling(cut: CutResult) -> list[str]:

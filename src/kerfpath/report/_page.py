@@ -75,6 +75,7 @@ def render(
         figures.place(scene(sections, mesh, cell, moves), "scene"),
         "</section>",
         "<section><h2>Contours</h2>",
+        _bound_caption(sections),
         _tables.summary_table(sections),
         "</section>",
         '<section class="contours"><h2>Contour by contour</h2>',
@@ -92,8 +93,20 @@ _SPARE = (
     " Where nothing forbids it, the colour says how much more than the near-miss distances is kept;"
     " pairs with a distance of their own, as nozzle and part, count as collisions alone."
 )
+_BOUND = (
+    "Bound: no motion that keeps the velocity and acceleration limits at the nodes costs less, at "
+    "any gamma, in any posture and turn; this is proved. Gap: at most so much of the cost lies "
+    "above the best motion. Collisions, margins and closure only make the best motion cost more."
+)
 _AIR = " Thin red lines are the moves between contours; the table is in the order of cutting."
 _CELL = " The slider puts robot and head to a few poses; capsules stand in for links."
+
+
+def _bound_caption(sections: Sequence[ContourSection]) -> str:
+    """Return what the bounds in the table say; nothing where it has none."""
+    if all(section.plan is None or section.plan.proof.bound is None for section in sections):
+        return ""
+    return f'<p class="caption">{_BOUND}</p>'
 
 
 def _contour(number: int, section: ContourSection, is_open: bool, figures: Figures) -> str:

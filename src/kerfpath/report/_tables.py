@@ -53,6 +53,8 @@ def summary_table(sections: Sequence[ContourSection]) -> str:
         ("Speed", "m/min"),
         ("Time", "s"),
         ("Cost", ""),
+        ("Bound", ""),
+        ("Gap", "% of cost"),
         ("Proof", ""),
         ("Peak velocity", "% of limit"),
         ("Peak accel.", "% of limit"),
@@ -67,20 +69,22 @@ def summary_table(sections: Sequence[ContourSection]) -> str:
             td(str(len(section.path))),
         ]
         if plan is None:
-            cells.append(f'<td colspan="7">{sign(FAIL, "no feasible path")}</td>')
+            cells.append(f'<td colspan="9">{sign(FAIL, "no feasible path")}</td>')
         else:
             duration, criteria = float(plan.time[-1] - plan.time[0]), plan.criteria
             cells += [
                 td(number(length / duration * 60, 2)),
                 td(number(duration, 2)),
                 td(f"{plan.cost:.5g}"),
+                td(plan.proof.bound_shown),
+                td(plan.proof.gap_shown),
                 f"<td>{_proof(plan)}</td>",
                 td(_peak(criteria.peak_velocity)),
                 td(_peak(criteria.peak_acceleration)),
                 f"<td>{audit_sign(section)}</td>",
             ]
         rows.append(f"<tr>{''.join(cells)}</tr>")
-    return table(heads, rows, text_columns=(0, 6, 9))
+    return table(heads, rows, text_columns=(0, 8, 11))
 
 
 def _proof(plan: Plan) -> str:
