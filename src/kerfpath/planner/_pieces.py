@@ -13,6 +13,7 @@ from kerfpath.contour import Contour
 from kerfpath.errors import NoFeasiblePath
 from kerfpath.graph import LayeredGraph
 from kerfpath.options import PlanKeywords, PlanOptions, with_keywords
+from kerfpath.planner._certified import with_bound
 from kerfpath.planner._clear import ClearSearch
 from kerfpath.planner._refined import refine_plan
 from kerfpath.planner._task import PlanningTask, task_of
@@ -47,7 +48,8 @@ def plan_in_pieces(
 
     At an interruption the laser goes off, the robot takes another pose at the same node, and the
     cut goes on from there. No plan has fewer, and on this graph none with as many costs less, both
-    exactly; each piece is then refined on its own, if that is asked for. The moves between the
+    exactly; each piece is then refined on its own, if that is asked for, and certified on its own:
+    its bound is on motions along that piece. The moves between the
     pieces are not planned here and cost nothing.
 
     Parameters
@@ -99,7 +101,8 @@ def plan_in_pieces(
         part, made = _plan_piece(task, finder, piece, number, len(found.pieces))
         if asked.refine:
             begin(f"refinement of piece {number} of {len(found.pieces)}")
-        plans.append(refine_plan(part, ClearSearch(part, cell), made) if asked.refine else made)
+        best = refine_plan(part, ClearSearch(part, cell), made) if asked.refine else made
+        plans.append(with_bound(best, asked.certify, phase=begin))
     return tuple(plans)
 
 

@@ -12,6 +12,7 @@ from kerfpath.contour import Contour
 from kerfpath.errors import InputError, NoFeasiblePath
 from kerfpath.graph import LayeredGraph
 from kerfpath.options import PlanKeywords, PlanOptions, with_keywords
+from kerfpath.planner._certified import with_bound
 from kerfpath.planner._clear import ClearSearch
 from kerfpath.planner._dip import plan_slowed
 from kerfpath.planner._refined import plan_off_grid, refine_plan
@@ -77,6 +78,9 @@ def plan(
             Margins that the nodes keep from singularities and limits, and what coming near costs;
             see `kerfpath.comfort`. Costs are added at every node visited (objective "max":
             maximised); with closure "periodic" the first node is visited twice.
+        certify : Certify, optional
+            The gap to reach between the plan's cost and what is proved of every other motion, and
+            the time for it; None: nothing is proved beyond the grid. See `Proof.bound`.
     cell : Cell, optional
         The plan is clear in it, at the nodes and on straight joint motions between them: the best
         of all clear ones, though only what the search wants to use is checked. Exact method only.
@@ -85,7 +89,7 @@ def plan(
     progress : callable, optional
         Called with the number of nodes whose poses have been solved since the last call.
     phase : callable, optional
-        Called with what begins once the poses are solved: "search", then "refinement".
+        Called with what begins once the poses are solved: "search", "refinement", "certificate".
 
     Raises
     ------
@@ -113,12 +117,13 @@ def plan(
     try:
         path = finder.find(find_shortest, task.problem)
     except NoFeasiblePath as at_speed:
-        return _otherwise(task, finder, at_speed, begin)
+        made = _otherwise(task, finder, at_speed, begin)
+        return with_bound(made, asked.certify, phase=phase)
     made = task.plan(path.index, path.cost, _proof(asked.method, path.optimal, finder))
-    if not asked.refine:
-        return made
-    begin("refinement")
-    return refine_plan(task, finder, made)
+    if asked.refine:
+        begin("refinement")
+        made = refine_plan(task, finder, made)
+    return with_bound(made, asked.certify, phase=phase)
 
 
 def _otherwise(

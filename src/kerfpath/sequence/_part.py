@@ -18,7 +18,7 @@ from kerfpath.cell import Cell
 from kerfpath.contour import Contour
 from kerfpath.errors import InputError, NoFeasiblePath
 from kerfpath.options import PlanKeywords, PlanOptions, with_keywords
-from kerfpath.planner import plan
+from kerfpath.planner import plan, with_bound
 from kerfpath.plans import Plan
 from kerfpath.robots import Robot
 from kerfpath.sequence._candidates import (
@@ -122,7 +122,8 @@ def plan_part(
     """Return plans for all contours of a part, cut in the order that takes the least time.
 
     Every candidate is planned; then as `order_plans`. Where that finds no way to or from a contour,
-    the first of its candidates is planned in every other of the `postures`, too.
+    the first of its candidates is planned in every other of the `postures`, too. What is chosen is
+    certified.
 
     Parameters
     ----------
@@ -154,7 +155,8 @@ def plan_part(
     of_order = keywords.keys() & OrderKeywords.__annotations__.keys()
     order = cast(OrderKeywords, {k: v for k, v in keywords.items() if k in of_order})
     rest = {k: v for k, v in keywords.items() if k not in of_order}
-    wanted = with_keywords(options, rest, PartKeywords)
+    asked = with_keywords(options, rest, PartKeywords)
+    wanted = replace(asked, certify=None)  # of all candidates one is chosen first
 
     def planned(i: int, contour: Contour, options: PlanOptions) -> Plan:
         return plan(
@@ -180,7 +182,8 @@ def plan_part(
         return planned(i, groups[i][0], replace(wanted, postures=(posture,)))
 
     postures = [wanted.postures] * len(groups)
-    return order_candidates(tried, lambda made: made, in_posture, postures, **order)
+    found = order_candidates(tried, lambda made: made, in_posture, postures, **order)
+    return replace(found, plans=tuple(with_bound(made, asked.certify) for made in found.plans))
 
 
 def order_candidates(

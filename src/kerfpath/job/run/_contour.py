@@ -32,8 +32,12 @@ def cut_candidate(
     candidate: Candidate,
     progress: Progress,
 ) -> tuple[CutResult, ...]:
-    """Return what came of a candidate: one cut, or several where it is interrupted."""
-    job, cell = replace(prepared.job, options=request.options), prepared.cell
+    """Return what came of a candidate: one cut, or several where it is interrupted.
+
+    Nothing is certified yet: of all candidates one is chosen first.
+    """
+    options = replace(request.options, certify=None)
+    job, cell = replace(prepared.job, options=options), prepared.cell
     name, total, done = request.task.name, len(candidate.nodes), 0
 
     def solved(count: int) -> None:
@@ -84,7 +88,7 @@ def cut_in_posture(prepared: PreparedJob, request: CutRequest, posture: int) -> 
         It cannot be cut so.
     """
     candidate = request.candidates[0]
-    job = replace(prepared.job, options=replace(request.options, postures=(posture,)))
+    job = replace(prepared.job, options=replace(request.options, postures=(posture,), certify=None))
     graph = job.graph(candidate.nodes)
     made = plan(
         candidate.nodes, job.robot, tool=job.tool, placement=job.placement, speed=candidate.speed,

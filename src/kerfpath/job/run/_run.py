@@ -8,7 +8,8 @@ from kerfpath.cad import Part
 from kerfpath.job.format import Job, PreparedJob, prepare
 from kerfpath.job.run._contour import cut_candidate
 from kerfpath.job.run._order import order_cuts
-from kerfpath.job.run._result import JobResult
+from kerfpath.job.run._result import CutResult, JobResult
+from kerfpath.planner import with_bound
 from kerfpath.progress import Progress, no_progress
 from kerfpath.sequence import longest_search
 
@@ -43,7 +44,7 @@ def run_prepared(prepared: PreparedJob, *, progress: Progress = no_progress) -> 
     if job.sequence is not None:
         longest = longest_search(job.sequence.seconds)
         progress(f"order and moves, {longest:g} s at most without a way", 0, 0)
-    result = order_cuts(prepared, tried, progress)
+    result = _certified(order_cuts(prepared, tried, progress), progress)
     moved = {
         contour.task.name: part.departure(contour.task.pick, contour.loop)
         for contour in prepared.contours
@@ -51,3 +52,22 @@ def run_prepared(prepared: PreparedJob, *, progress: Progress = no_progress) -> 
     }
     measured = tuple(cut.measured(part, moved.get(cut.contour)) for cut in result.cuts)
     return replace(result, cuts=measured)
+
+
+def _certified(result: JobResult, progress: Progress) -> JobResult:
+    """Return the result with the bounds of its plans, as far as they are asked for."""
+    cuts = tuple(_with_bound(cut, progress) for cut in result.cuts)
+    if result.part is None:
+        return replace(result, cuts=cuts)
+    plans = tuple(cut.plan for cut in cuts if cut.plan is not None)
+    return replace(result, cuts=cuts, part=replace(result.part, plans=plans))
+
+
+def _with_bound(cut: CutResult, progress: Progress) -> CutResult:
+    if cut.plan is None:
+        return cut
+
+    def named(what: str, done: int, total: int, /) -> None:
+        progress(f"{cut.name}: {what}", done, total)
+
+    return replace(cut, plan=with_bound(cut.plan, cut.request.options.certify, progress=named))

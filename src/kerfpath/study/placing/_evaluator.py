@@ -177,6 +177,7 @@ class PlacementEvaluator(Evaluator):
         options = replace(
             self.job.options.without_penalties,
             method="exact", objective="sum", feed="constant", refine=False,
+            certify=None,
         )  # fmt: skip
         if not contour.nodes.closed:
             options = replace(options, closure="free")  # a stretch of a loop that closes need not

@@ -1,0 +1,48 @@
+"""The bound of a plan: how far it is at most from the best motion that there is."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+
+from kerfpath.certificate import Certify
+from kerfpath.certifier import certify
+from kerfpath.plans import Plan
+from kerfpath.progress import Progress, no_progress
+
+__all__ = ["with_bound"]
+
+
+def with_bound(
+    made: Plan,
+    asked: Certify | None,
+    *,
+    phase: Callable[[str], None] | None = None,
+    progress: Progress = no_progress,
+) -> Plan:
+    """Return the plan with the bound that is proved for it, or with why there is none.
+
+    Parameters
+    ----------
+    made : Plan
+    asked : Certify or None
+        How far it is to be certified, which its settings then say; None: it stays without a bound.
+    phase : callable, optional
+        Called with "certificate" where that begins.
+    progress : callable
+        As `kerfpath.certifier.certify` calls it.
+    """
+    settings = replace(made.settings, certify=asked)
+    if asked is None:
+        return replace(made, settings=settings)
+    if phase is not None:
+        phase("certificate")
+    found = certify(made, gap=asked.gap, seconds=asked.seconds, progress=progress)
+    proof = replace(
+        made.proof,
+        statement=f"{made.proof.statement}; {found.statement}",
+        bound=found.bound,
+        gap=found.gap,
+        certificate=found.certificate,
+    )
+    return replace(made, settings=settings, proof=proof)

@@ -1,0 +1,129 @@
+"""The bound of a plan: who asks the certifier for it, for which plans, and how it is shown."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from kerfpath import Certify, Contour, fastest_speed, pareto, plan, plan_in_pieces
+from kerfpath.certifier import Certified
+from kerfpath.planner import _certified, with_bound
+from kerfpath.plans import Proof
+from kerfpath.sequence import plan_part
+
+STEP = np.radians(10)
+
+
+@pytest.fixture
+def asked(monkeypatch):
+    """Stand in for the certifier, which proves 0.9 of every cost: what it is asked for."""
+    calls = []
+
+    def certify(made, *, gap, seconds, progress):
+        calls.append((made, gap, seconds))
+        progress("cells", 1, 2)
+        return Certified(
+            bound=0.9 * made.cost, gap=0.1, certificate=None, statement="a bound is proved"
+        )
+
+    monkeypatch.setattr(_certified, "certify", certify)
+    return calls
+
+
+@pytest.fixture
+def task(circle, arm, tool, placement):
+    return {"tool": tool, "placement": placement, "gamma_step": STEP, "speed": 0.05}
+
+
+@pytest.mark.parametrize("keywords", [{}, {"refine": True}, {"method": "paper"}])
+def test_every_plan_is_certified_as_it_is_asked_for(asked, task, circle, arm, keywords):
+    phases = []
+    made = plan(circle, arm, phase=phases.append, **task, **keywords)
+    ((given, gap, seconds),) = asked
+    assert (gap, seconds) == (0.005, None)
+    assert phases[-1] == "certificate"
+    assert phases.count("certificate") == 1
+    np.testing.assert_array_equal(given.q, made.q)
+    assert (made.proof.bound, made.proof.gap) == (0.9 * made.cost, 0.1)
+    assert made.proof.statement == f"{given.proof.statement}; a bound is proved"
+    assert made.proof.optimal == given.proof.optimal
+    assert made.proof.grid_cost == given.proof.grid_cost
+    own = plan(circle, arm, **task, **keywords, certify=Certify(gap=0.02, seconds=3))
+    assert asked[-1][1:] == (0.02, 3.0)
+    assert own.settings.certify == Certify(gap=0.02, seconds=3)
+
+
+def test_without_the_option_nothing_is_certified(asked, task, circle, arm):
+    phases = []
+    made = plan(circle, arm, phase=phases.append, certify=None, **task)
+    assert not asked
+    assert "certificate" not in phases
+    assert made.settings.certify is None
+    assert (made.proof.bound, made.proof.gap, made.proof.certificate) == (None, None, None)
+
+
+def test_a_bound_can_be_had_afterwards(asked, task, circle, arm):
+    made, seen = plan(circle, arm, certify=None, **task), []
+    bounded = with_bound(
+        made, Certify(gap=0.3), progress=lambda what, done, total: seen.append((what, done, total))
+    )
+    assert seen == [("cells", 1, 2)]
+    assert bounded.proof.gap == 0.1
+    assert bounded.settings == replace(made.settings, certify=Certify(gap=0.3))
+    assert with_bound(bounded, None).settings.certify is None
+
+
+def test_where_nothing_can_be_proved_the_statement_says_why(monkeypatch, task, circle, arm):
+    def nothing(made, **_):
+        return Certified(bound=None, gap=None, certificate=None, statement="no bound: unknown arm")
+
+    monkeypatch.setattr(_certified, "certify", nothing)
+    made = plan(circle, arm, **task)
+    assert made.proof.bound is None
+    assert made.proof.statement.endswith("; no bound: unknown arm")
+    assert made.proof.optimal
+
+
+def test_every_piece_is_certified_on_its_own(asked, task, circle, arm):
+    limits = {"rotation": None, "postures": (0,)}
+    pieces = plan_in_pieces(circle, arm, **task, **limits)
+    assert [given.name for given, _, _ in asked] == [piece.name for piece in pieces]
+    assert all(piece.proof.gap == 0.1 for piece in pieces)
+
+
+def test_of_a_part_only_what_is_chosen_is_certified(asked, task, circle, arm):
+    other = Contour(circle.points[::-1], circle.axes[::-1], closed=True, name="back")
+    made = plan_part([[circle, other.resample(count=61)]], arm, **task)
+    assert len(asked) == len(made.plans) == 1
+    assert made.plans[0].proof.gap == 0.1
+    assert made.plans[0].settings.certify == Certify()
+
+
+def test_plans_that_nobody_sees_are_not_certified(asked, task, circle, arm):
+    front = pareto(circle, arm, runs=3, criteria=("displacement", "velocity"), **task)
+    assert all(made.proof.bound is None for made in front.plans)
+    del task["speed"]
+    fastest_speed(circle, arm, refine=True, **task)
+    assert not asked
+
+
+def test_a_plan_and_its_proof_show_the_bound(asked, task, circle, arm):
+    made = plan(circle, arm, **task)
+    assert ", gap 10.00 %, " in repr(made)
+    assert "gap" not in repr(with_bound(plan(circle, arm, certify=None, **task), None))
+    assert "bound=" in repr(made.proof)
+
+
+@pytest.mark.parametrize(
+    ("bound", "gap", "shown"),
+    [
+        (21.637, 0.00123, ("21.63", "0.13")),
+        (21.0, 0.0, ("21.00", "0.00")),
+        (-0.001, 1.0, ("-0.01", "100.00")),
+        (5.0, -1e-12, ("5.00", "0.00")),
+        (None, None, ("-", "-")),
+    ],
+)
+def test_figures_claim_no_more_than_is_proved(bound, gap, shown):
+    proof = Proof(optimal=False, statement="", bound=bound, gap=gap)
+    assert (proof.bound_shown, proof.gap_shown) == shown
