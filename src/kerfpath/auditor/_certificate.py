@@ -14,8 +14,10 @@ from kerfpath.certificate import BASE, Certificate, Stage
 from kerfpath.errors import InputError
 from kerfpath.plans import Plan
 
-__all__ = ["bound_checks", "certified_bound"]
+__all__ = ["BOUND", "bound_checks", "certified_bound"]
 
+BOUND = "bound"
+"""Code of the check of a bound."""
 LIMIT_TOLERANCE = 1e-9
 """rad: what a motion may exceed (5) and (6) by."""
 EVEN = 1e-6
@@ -54,7 +56,7 @@ def bound_checks(plan: Plan) -> list[Check]:
 
 def _row(title: str, value: float, limit: float) -> Check:
     return Check(
-        code="bound",
+        code=BOUND,
         title=title,
         value=float(value),
         limit=float(limit),

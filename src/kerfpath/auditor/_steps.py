@@ -17,7 +17,6 @@ from kerfpath._arrays import Array, Bools, Ints
 from kerfpath._repr import short_repr
 from kerfpath.auditor._cover import TURN, Places
 from kerfpath.auditor._enclosure import linear_minimum
-from kerfpath.search import Metric
 
 __all__ = ["Rates", "candidates", "least_value", "reduced_costs"]
 
@@ -48,7 +47,7 @@ class Rates:
 
     velocity: Array
     weights: Array
-    metric: Metric
+    metric: str
     endless: Bools
     tilt: Array
 
