@@ -6,6 +6,7 @@ import numpy as np
 
 from kerfpath._arrays import Array, Ints, scalar
 from kerfpath.auditor._between import BetweenNodes, bound_between_nodes
+from kerfpath.auditor._certificate import bound_checks
 from kerfpath.auditor._chain import chain_of
 from kerfpath.auditor._collision import collisions
 from kerfpath.auditor._margins import margins
@@ -122,6 +123,7 @@ def checks(
         *_rates(plan, reached, rounding),
         *margins(plan, chain),
         *([] if cell is None else collisions(cell, motion, chain)),
+        *bound_checks(plan),
     ]
 
 

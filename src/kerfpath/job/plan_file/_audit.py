@@ -145,7 +145,8 @@ def _entry(plan: Plan, said: PlanData, made: Sequence[Check], file: PlanFile) ->
     The record of another version is its own.
     """
     name = said["contour"]
-    entry = plan_entry(plan, name, made, picked=plan.name in file.picked)
+    picked, shown = plan.name in file.picked, "certificate" in said
+    entry = plan_entry(plan, name, made, picked=picked, certificate=shown)
     if file.data["kerfpath"] != __version__:
         entry["audit"]["checks"] = said["audit"]["checks"]
     return entry
@@ -167,6 +168,10 @@ def _list_unverified(file: PlanFile) -> str:
     """Say what the file claims and nobody has verified."""
     best = [p.name for p in file.plans if p.proof.optimal]
     claims = [f"that {', '.join(best)} is best of its grid"] if best else []
+    bounded = [
+        p.name for p in file.plans if p.proof.bound is not None and p.proof.certificate is None
+    ]
+    claims += [f"the bound of {', '.join(bounded)}"] if bounded else []
     if file.data["sequence"] is not None and file.data["sequence"]["optimal"]:
         claims.append("that no order takes less")
     return f"Claimed, not verified: {' and '.join(claims)}." if claims else ""
@@ -179,7 +184,7 @@ def _by_itself(file: PlanFile) -> AuditReport:
     for p in file.plans:
         own, said = recompute(p), file.entries[p.name]
         made = tolerances.checks(own)
-        entry = plan_entry(own, said["contour"], made, picked=p.name in file.picked)
+        entry = _entry(own, said, made, file)
         follow = {key: value for key, value in entry["nodes"].items() if key in OWN_NODES}
         entry["audit"], entry["nodes"] = said["audit"], cast(NodesData, said["nodes"] | follow)
         tables[p.name] = [*made, *_claims(own), *compare_values(entry, said, FILE)]

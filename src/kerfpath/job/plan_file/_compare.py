@@ -20,7 +20,8 @@ __all__ = ["CLAIMS", "compare_jobs", "compare_values"]
 
 CLAIMS = {
     r"kerfpath$": "the version that wrote the file",
-    r"(proof|optimal|grid_cost)$": "what is claimed of motions that are not in the file",
+    r"(proof|optimal|grid_cost|bound|gap)$": "what is claimed of motions that are not in the file",
+    r"certificate(/|$)": "what the audit has a check of its own for",
     r"counts(/|$)": "poses that were dropped in planning",
     r"audit/checks/\d+/(title|advice|node)$": "words and places of the audit made in planning",
     r"sequence/(optimal|at_least_s)$": "what is claimed of orders that are not in the file",

@@ -11,8 +11,9 @@ from kerfpath.auditor import Level, Unit
 from kerfpath.options import OptionData
 
 __all__ = [
-    "AuditData", "BrokenData", "ContourData", "CriteriaData", "ExternalData", "LimitsData",
-    "PlanData", "PlanDocument", "RobotData", "SequenceData",
+    "ArrayData", "AuditData", "BrokenData", "CertificateData", "ContourData", "CriteriaData",
+    "ExternalData", "LimitsData", "PlanData", "PlanDocument", "RobotData", "SequenceData",
+    "StageData",
 ]  # fmt: skip
 
 Row = list[float]
@@ -158,6 +159,34 @@ class NodesData(TypedDict):
     turn: list[list[int]]
 
 
+class ArrayData(TypedDict):
+    """An array: its numbers, its shape, and its bytes row by row, compressed."""
+
+    type: str
+    shape: list[int]
+    zlib_base64: str
+
+
+class StageData(TypedDict):
+    """A stage of a certificate: cells and a potential over them, see `kerfpath.certificate`."""
+
+    node: ArrayData
+    posture: ArrayData
+    level: ArrayData
+    index: ArrayData
+    lift: ArrayData
+    value: ArrayData
+    dual: ArrayData
+    multipliers: ArrayData | None
+
+
+class CertificateData(TypedDict):
+    """What proves a bound, for whoever checks it."""
+
+    bound: float
+    stages: list[StageData]
+
+
 class PlanData(OptionData):
     """A contour, or a piece of one, that has a plan: how it was asked for, and what came of it."""
 
@@ -173,6 +202,9 @@ class PlanData(OptionData):
     optimal: bool
     proof: str
     grid_cost: float | None
+    bound: float | None
+    gap: float | None
+    certificate: NotRequired[CertificateData]
     criteria: CriteriaData
     feed: FeedData | None
     counts: dict[str, int]

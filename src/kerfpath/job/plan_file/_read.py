@@ -13,6 +13,7 @@ from pydantic import BaseModel, ValidationError
 from kerfpath._repr import short_repr
 from kerfpath.contour import KINDS, Contour
 from kerfpath.errors import InputError
+from kerfpath.job.plan_file._certificate import read_certificate
 from kerfpath.job.plan_file._external import add_external, joints
 from kerfpath.job.plan_file._layout import PlanData, PlanDocument
 from kerfpath.job.plan_file._schema import read_document
@@ -168,6 +169,7 @@ def _read_robot(robot: Mapping[str, Any], limits: Mapping[str, Any]) -> Robot:
 
 def _read_plan(entry: PlanData, robot: Robot, tool: Any, placement: Any) -> Plan:
     nodes: Mapping[str, Any] = entry["nodes"]
+    certificate = entry.get("certificate")
     weights = {"weights_per_rad": joints(entry, "weights_per", robot).tolist()}
     return Plan(
         contour=Contour(
@@ -195,6 +197,9 @@ def _read_plan(entry: PlanData, robot: Robot, tool: Any, placement: Any) -> Plan
             optimal=entry["optimal"],
             statement=entry["proof"],
             grid_cost=entry["grid_cost"],
+            bound=entry["bound"],
+            gap=entry["gap"],
+            certificate=None if certificate is None else read_certificate(certificate),
         ),
         counts=entry["counts"],
         feed=None if entry["feed"] is None else Feed(**entry["feed"]),

@@ -12,10 +12,11 @@ import numpy as np
 
 from kerfpath import __version__
 from kerfpath._arrays import Array
-from kerfpath.auditor import Check
+from kerfpath.auditor import BOUND, Check
 from kerfpath.cell import Cell, caveats
 from kerfpath.comfort import MEASURES
 from kerfpath.errors import NoFeasiblePath
+from kerfpath.job.plan_file._certificate import certificate_entry
 from kerfpath.job.plan_file._external import by_unit, external_entry
 from kerfpath.job.plan_file._layout import (
     BrokenData,
@@ -86,13 +87,21 @@ def plan_document(
 
 
 def plan_entry(
-    plan: Plan, contour: str, checks: Sequence[Check], *, picked: bool = False
+    plan: Plan,
+    contour: str,
+    checks: Sequence[Check],
+    *,
+    picked: bool = False,
+    certificate: bool = False,
 ) -> PlanData:
     """Return what plan.json says of a planned and audited contour, or of a piece of it.
 
-    `picked`: from a Pareto set, which then says its objective, weights and eta.
+    `picked`: from a Pareto set, which then says its objective, weights and eta. `certificate`: with
+    what proves its bound, where it has that; without, the audit has no row of it either.
     """
-    criteria, settings = plan.criteria, plan.settings
+    criteria, settings, proof = plan.criteria, plan.settings, plan.proof
+    shown = proof.certificate if certificate else None
+    checks = [c for c in checks if shown is not None or c.code != BOUND]
     entry = {
         "name": plan.name,
         "contour": contour,
@@ -103,9 +112,12 @@ def plan_entry(
         **by_unit("weights_per", settings.weights, plan.robot),
         "dt": plan.dt,
         "cost": plan.cost,
-        "optimal": plan.proof.optimal,
-        "proof": plan.proof.statement,
-        "grid_cost": plan.proof.grid_cost,
+        "optimal": proof.optimal,
+        "proof": proof.statement,
+        "grid_cost": proof.grid_cost,
+        "bound": proof.bound,
+        "gap": proof.gap,
+        **({} if shown is None else {"certificate": certificate_entry(shown)}),
         "criteria": {
             **by_unit("displacement", criteria.displacement, plan.robot),
             **by_unit("largest_increment", criteria.largest_increment, plan.robot),

@@ -1,0 +1,249 @@
+"""The bound of a certificate, proved again by enclosures of the audit's own."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from kerfpath._arrays import Array, Ints
+from kerfpath.auditor._cover import DEEPEST, Places, Reachable, covered, refused
+from kerfpath.auditor._enclosure import POSTURES
+from kerfpath.auditor._intervals import UNIT
+from kerfpath.auditor._steps import Rates, candidates, least_value, reduced_costs
+from kerfpath.auditor._table import Check
+from kerfpath.certificate import BASE, Certificate, Stage
+from kerfpath.errors import InputError
+from kerfpath.plans import Plan
+
+__all__ = ["BOUND", "bound_checks", "certified_bound"]
+
+BOUND = "bound"
+"""Code of the check of a bound."""
+LIMIT_TOLERANCE = 1e-9
+"""rad: what a motion may exceed (5) and (6) by."""
+EVEN = 1e-6
+"""Relative difference of the intervals of a plan at one speed."""
+LARGEST = 1e12
+"""No level or slope of a potential is larger."""
+SAME = 1e-9
+"""Relative: rounding of a cost, a bound and the gap between them."""
+
+
+def bound_checks(plan: Plan) -> list[Check]:
+    """Return the checks of the bound that a plan states, where it has a certificate."""
+    proof = plan.proof
+    if proof.certificate is None:
+        return []
+    title = "certificate that does not hold"
+    try:
+        if proof.bound is None:
+            raise refused("the plan states no bound")
+        proved = certified_bound(proof.certificate, plan)
+    except InputError as error:
+        return [_row(f"{title}: {error}", 1.0, 0.0)]
+    size = max(abs(plan.cost), abs(proof.bound))
+    claims = (
+        ("bound above what its certificate proves", proof.bound, proved),
+        ("bound of the certificate above what it proves", proof.certificate.bound, proved),
+        ("bound above the cost of the plan", proof.bound, plan.cost * (1 + SAME)),
+    )
+    rows = [_row(words, claim, true) for words, claim, true in claims]
+    gap = (plan.cost - proof.bound) / plan.cost if plan.cost else 0.0
+    if proof.gap is None or not abs(proof.gap - gap) <= SAME * max(1.0, size / abs(plan.cost or 1)):
+        rows.append(_row("gap that is not that of cost and bound", 1.0, 0.0))
+    # The row of the worst stands for all.
+    return [max(rows, key=lambda row: row.value - row.limit)]
+
+
+def _row(title: str, value: float, limit: float) -> Check:
+    return Check(
+        code=BOUND,
+        title=title,
+        value=float(value),
+        limit=float(limit),
+        unit="count",
+        node=0,
+        advice="plan again",
+    )
+
+
+def certified_bound(certificate: Certificate, plan: Plan) -> float:
+    """Return what a certificate proves that every motion along a plan's contour costs at least.
+
+    Any motion is meant that keeps (5), (6), the ranges and the couplings at the nodes, at any
+    gamma, in any posture that is allowed and on any turn; a motion that costs more than the plan
+    is known to, so that no more than the plan's cost is returned.
+
+    Parameters
+    ----------
+    certificate : Certificate
+        Of which only cells, potentials and multipliers are used.
+    plan : Plan
+
+    Raises
+    ------
+    InputError
+        The certificate does not fit the plan or leaves motions out; no certificate speaks of such
+        a plan.
+    """
+    where, rates, change = _asked(plan)
+    if not certificate.stages:
+        raise refused("it has no stage")
+    K, n = plan.q.shape
+    proved = -np.inf
+    left: Places | None = None
+    for stage in certificate.stages:
+        tilt, constant = _multipliers(stage, K, n, change, rates.velocity)
+        _require_fit(stage, K, n)
+        at = covered(where, stage, left)
+        rates = Rates(rates.velocity, rates.weights, rates.metric, rates.endless, tilt)
+        bounds = _through(rates, at, stage, K) + constant
+        proved = max(proved, float(bounds.min(initial=np.inf)))
+        if proved >= plan.cost:
+            return plan.cost
+        left = at.take(bounds <= plan.cost)
+    return proved
+
+
+def _asked(plan: Plan) -> tuple[Reachable, Rates, Array]:
+    """Return where the motions of a plan's task may be, what bounds their steps, and A of (6)."""
+    settings, robot = plan.settings, plan.robot
+    tau = np.diff(plan.time)
+    dt = float(tau.max())
+    for known, what in (
+        (settings.objective == "sum", f"the objective {settings.objective!r}"),
+        (settings.tilt is None and not plan.tilt.any(), "a tilt of the tool axis"),
+        (robot.external is None, "an external axis"),
+        (robot.family.free_rotation, "a robot without free rotation"),
+        (plan.feed is None and dt - tau.min() <= EVEN * dt, "a feed that is not constant"),
+    ):
+        if not known:
+            raise refused(f"nothing is proved with {what}")
+    limits, (velocity, acceleration) = robot.joint_limits(), robot.speed_limits()
+    endless = np.asarray(robot.endless, dtype=bool)
+    lower, upper = (np.where(endless, 0.0, end) for end in (limits.lower, limits.upper))
+    if not (np.isfinite(lower) & np.isfinite(upper)).all():
+        raise refused("nothing is proved with joints without ranges that are not endless")
+    # The place of an endless joint is known up to whole turns only: its couplings are left out.
+    bound = ~np.asarray((limits.rows[:, endless] != 0).any(axis=1))
+    where = Reachable(
+        robot,
+        plan.frames,
+        plan.T_flange_tip,
+        np.arange(POSTURES) if settings.postures is None else np.unique(settings.postures),
+        lower,
+        upper,
+        endless,
+        limits.rows[bound],
+        limits.row_lower[bound],
+        limits.row_upper[bound],
+    )
+    if not ((where.postures >= 0) & (where.postures < POSTURES)).all():
+        raise refused("the plan allows postures that are not known")
+    most = settings.eta_v * velocity * dt * (1 + 8 * UNIT) + LIMIT_TOLERANCE
+    most = np.where(endless, np.minimum(most, np.pi + LIMIT_TOLERANCE), most)
+    change = settings.eta_a * acceleration * dt**2 * (1 + EVEN) ** 2 + LIMIT_TOLERANCE
+    K, n = plan.q.shape
+    weights = np.asarray(settings.weights)
+    if not (weights >= 0).all():
+        raise refused("nothing is proved with weights below zero")
+    return where, Rates(most, weights, settings.metric, endless, np.zeros((K - 1, n))), change
+
+
+def _require_fit(stage: Stage, K: int, n: int) -> None:
+    """Raise InputError unless a stage's arrays are of K nodes and n joints."""
+    C = len(stage.node)
+    shapes = {
+        "node": (C,), "posture": (C,), "level": (C,), "index": (C,), "lift": (C, n),
+        "value": (C, 2), "dual": (C, 2, n),
+    }  # fmt: skip
+    for name, shape in shapes.items():
+        part = getattr(stage, name)
+        if part.shape != shape:
+            raise refused(f"{name}: expected shape {shape}, got {part.shape}")
+        if (part.dtype.kind in "iu") != (name not in ("value", "dual")):
+            raise refused(f"{name}: numbers of another kind ({part.dtype})")
+    level = stage.level.astype(np.int64)
+    for name, most in (("node", K), ("posture", POSTURES), ("level", DEEPEST + 1)):
+        part = getattr(stage, name)
+        if not ((part >= 0) & (part < most)).all():
+            raise refused(f"{name}: expected numbers from 0 to {most - 1}")
+    if not ((stage.index >= 0) & (stage.index < BASE << level)).all():
+        raise refused("index: a cell that is not on the circle")
+    if (np.diff(stage.node) < 0).any():
+        raise refused("node: expected cells in the order of nodes")
+    for name in ("value", "dual"):
+        if not (np.abs(getattr(stage, name)) <= LARGEST).all():
+            raise refused(f"{name}: expected numbers up to {LARGEST:g}")
+
+
+def _multipliers(
+    stage: Stage, K: int, n: int, change: Array, velocity: Array
+) -> tuple[Array, float]:
+    """Return what a stage adds to the cost of each step, (K-1, n), and of the whole motion.
+
+    `change` (n,) rad is the bound of (6).
+    """
+    nu = stage.multipliers
+    if nu is None:
+        return np.zeros((K - 1, n)), 0.0
+    if nu.shape != (K, n) or nu.dtype.kind != "f":
+        raise refused(f"multipliers: expected shape {(K, n)}, got {nu.shape}")
+    if not (np.abs(nu) <= LARGEST).all():
+        raise refused(f"multipliers: expected numbers up to {LARGEST:g}")
+    if nu[0].any() or nu[-1].any():
+        raise refused("multipliers: expected zeros at the first node and the last")
+    size = float((np.abs(nu) @ change).sum())
+    rounded = float((np.abs(nu) @ velocity).sum()) + size
+    return nu[:-1] - nu[1:], -size - 4 * UNIT * (K + n) * rounded
+
+
+def _through(rates: Rates, at: Places, stage: Stage, K: int) -> Array:
+    """Return what every motion through each place costs at least, (C,); inf where there is none.
+
+    Nothing is left to pay at the last node, so that the potential there is taken as zero.
+    """
+    ends = (at.node == K - 1)[:, None]
+    value = np.where(ends, 0.0, stage.value[at.cell])
+    dual = np.where(ends[..., None], 0.0, stage.dual[at.cell].astype(float))
+    found = list(candidates(rates, at))
+    none = np.zeros(0, dtype=np.int64)
+    a, b = (np.concatenate([none, *(pair[i] for pair in found)]) for i in (0, 1))
+    parts = [reduced_costs(rates, at, value, dual, *pair) for pair in found]
+    cost = np.concatenate([np.zeros(0), *parts])
+    begun = np.where(at.node == 0, least_value(at, value, dual), np.inf)
+    ended = np.where(at.node == K - 1, 0.0, np.inf)
+    _pass(begun, at.node, a, b, cost)
+    _pass(ended, at.node, b, a, cost)
+    whole = begun + ended
+    return whole - _rounding(rates, at, value, dual, whole, K)
+
+
+def _pass(least: Array, node: Ints, a: Ints, b: Ints, cost: Array) -> None:
+    """Set `least` (C,) at places b to the least of that at a plus the cost of the step between.
+
+    Node after node of places b, away from where they begin.
+    """
+    if not len(b):
+        return
+    onwards = node[b[0]] > node[a[0]]
+    order = np.argsort(b, kind="stable")
+    a, b, cost = a[order], b[order], cost[order]
+    first = np.flatnonzero(np.diff(node[b], prepend=-1))
+    pieces = list(zip(first, [*first[1:], len(b)], strict=True))
+    for i, j in pieces if onwards else reversed(pieces):
+        begin = np.flatnonzero(np.diff(b[i:j], prepend=-1))
+        least[b[i + begin]] = np.minimum.reduceat(least[a[i:j]] + cost[i:j], begin)
+
+
+def _rounding(rates: Rates, at: Places, value: Array, dual: Array, whole: Array, K: int) -> float:
+    """Return what all sums along a motion may be off by.
+
+    A step is a sum of products, by 64 units of all their sizes at most; the sums of K steps are off
+    by K units of theirs.
+    """
+    n = len(rates.weights)
+    joint = 3 * (np.pi + rates.velocity.max() + 2 * at.reach.max(initial=0.0))
+    slope = np.abs(dual).max(initial=0.0) + np.abs(rates.tilt).max() + rates.weights.max()
+    step = 2 * np.abs(value).max(initial=0.0) + 2 * n * slope * joint
+    sums = np.abs(whole[np.isfinite(whole)]).max(initial=0.0)
+    return float(64 * UNIT * K * (step + sums))

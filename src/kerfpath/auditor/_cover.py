@@ -1,0 +1,336 @@
+"""Whether the cells of a certificate hold every motion, by enclosures of the audit's own.
+
+A place is an interval of gamma at a node, in a posture, with every joint on one of its turns. All
+places that a motion may pass are gone through from the coarsest intervals down: a place is a cell
+of the certificate, or has no solution within the ranges, or is divided in two.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, fields
+
+import numpy as np
+from numpy.typing import NDArray
+
+from kerfpath._arrays import Array, Bools, Ints
+from kerfpath._repr import short_repr
+from kerfpath.auditor._enclosure import POSTURES, Enclosure, Status, enclose, linear_minimum
+from kerfpath.certificate import BASE, LIFTS, Stage
+from kerfpath.errors import InputError
+from kerfpath.robots import Robot
+
+__all__ = ["DEEPEST", "Places", "Reachable", "covered", "refused"]
+
+TURN = 2 * np.pi
+DEEPEST = 20
+"""The finest level that cells may have, and down to which places are divided."""
+EDGE = 1e-9
+"""rad: what a motion may leave the ranges by."""
+ON_TURN = 2e-14
+"""rad: rounding of joints on a turn of theirs, up to ten turns."""
+SAME_PLACE = 1e-9
+"""rad: two enclosures of the same interval have the same middle."""
+MOST_PLACES = 2_000_000
+"""Places at a time; a certificate that leaves more is refused."""
+PLACES_AT_ONCE = 1e5
+"""About so many are gone through together, of as many nodes."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Reachable:
+    """Where motions may be: what is needed of a plan's task.
+
+    Parameters
+    ----------
+    robot : Robot
+    frames : (K, 4, 4) m
+        Task frames in the robot base.
+    T_flange_tip : (4, 4) m
+    postures : (P,) int
+        Those that are allowed.
+    lower, upper : (n,) rad
+        Ranges, of the joints that are not endless.
+    endless : (n,) bool
+    rows : (R, n)
+        Couplings of joints that are not endless.
+    row_lower, row_upper : (R,) rad
+    """
+
+    robot: Robot
+    frames: Array
+    T_flange_tip: Array
+    postures: Ints
+    lower: Array
+    upper: Array
+    endless: Bools
+    rows: Array
+    row_lower: Array
+    row_upper: Array
+
+    __repr__ = short_repr
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Places:
+    """Intervals of gamma, each in a posture and with every joint on a turn.
+
+    The joints are in q + slope t + [low, high] t^2 / 2 +- radius, |t| <= half, hence within `reach`
+    of q; of endless joints this is so up to whole turns. `turn` counts from the enclosure's centre.
+
+    Parameters
+    ----------
+    cell : (C,) int
+        Which cell of the stage it is; -1 for none.
+    node, level, index, posture : (C,) int
+    turn : (C, n) int
+    q, slope, low, high, radius, reach : (C, n)
+    half : (C,) rad
+    """
+
+    cell: Ints
+    node: Ints
+    level: Ints
+    index: Ints
+    posture: Ints
+    turn: Ints
+    q: Array
+    slope: Array
+    low: Array
+    high: Array
+    radius: Array
+    reach: Array
+    half: Array
+
+    __repr__ = short_repr
+
+    def __len__(self) -> int:
+        return len(self.node)
+
+    def take(self, which: Ints | Bools | slice) -> Places:
+        """Return some of them."""
+        return Places(*(getattr(self, each.name)[which] for each in fields(self)))
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Wanted:
+    """Intervals of one level that motions may pass with joints within `room` of `near` (W, n)."""
+
+    node: Ints
+    index: Ints
+    posture: Ints
+    near: Array
+    room: Array
+
+
+def refused(why: str) -> InputError:
+    """Return the error that a certificate is refused with."""
+    return InputError(f"certificate: {why}; plan again")
+
+
+def covered(where: Reachable, stage: Stage, before: Places | None) -> Places:
+    """Return the cells of a stage that motions may pass, as places, by node.
+
+    Parameters
+    ----------
+    where : Reachable
+    stage : Stage
+        Of arrays that fit.
+    before : Places or None
+        What it has to cover: what another stage leaves, or everything.
+
+    Raises
+    ------
+    InputError
+        It does not cover that.
+    """
+    K = len(where.frames)
+    turns = np.where(where.endless, 1.0, np.maximum((where.upper - where.lower) / TURN, 1.0)).prod()
+    nodes = max(1, int(PLACES_AT_ONCE / (BASE * len(where.postures) * turns)))
+    parts = []
+    for first in range(0, K, nodes):
+        last = min(first + nodes, K)
+        rows = np.arange(*np.searchsorted(stage.node, [first, last]))
+        some = None
+        if before is not None:
+            some = before.take(slice(*np.searchsorted(before.node, [first, last])))
+        parts += _covered(where, stage, rows, some, np.arange(first, last))
+    found = _joined(parts, len(where.endless))
+    return found.take(np.argsort(found.cell, kind="stable"))
+
+
+def _covered(
+    where: Reachable, stage: Stage, rows: Ints, before: Places | None, nodes: Ints
+) -> list[Places]:
+    """Return the cells (`rows` of the stage) that motions may pass at some nodes."""
+    found: list[Places] = []
+    deepest = int(before.level.max(initial=-1)) if before is not None else 0
+    left: Places | None = None
+    for level in range(DEEPEST + 1):
+        wanted = [] if left is None else [_halves(left)]
+        if before is None and level == 0:
+            wanted.append(_everything(where, nodes))
+        elif before is not None:
+            wanted.append(_again(before.take(before.level == level)))
+        places = _places(where, level, _all(wanted))
+        cells = rows[stage.level[rows] == level]
+        known, listed = _matched(where, stage, cells, places)
+        found.append(known)
+        left = places.take(~listed)
+        if not len(left) and level >= deepest:
+            return found
+    assert left is not None
+    raise refused(
+        f"its cells leave out motions in posture {left.posture[0]} at node {left.node[0]}, gamma "
+        f"{np.degrees(_middle(DEEPEST, left.index[:1])[0]):.4g} deg"
+    )
+
+
+def _middle(level: int, index: Ints) -> Array:
+    return np.asarray(TURN / (BASE << level) * (index + 0.5) - np.pi)
+
+
+def _everything(where: Reachable, nodes: Ints) -> _Wanted:
+    """Return the whole circle of some nodes in every posture that is allowed."""
+    node, index, posture = (
+        grid.ravel() for grid in np.meshgrid(nodes, np.arange(BASE), where.postures, indexing="ij")
+    )
+    shape = (len(node), len(where.endless))
+    near = np.broadcast_to((where.lower + where.upper) / 2, shape)
+    room = np.broadcast_to((where.upper - where.lower) / 2 + 2 * EDGE, shape)
+    return _Wanted(node, index, posture, near, room)
+
+
+def _again(places: Places) -> _Wanted:
+    """Return places of another stage, on their own turns alone."""
+    room = SAME_PLACE - places.reach
+    return _Wanted(places.node, places.index, places.posture, places.q, room)
+
+
+def _halves(places: Places) -> _Wanted:
+    twice = np.repeat(np.arange(len(places)), 2)
+    index = 2 * places.index[twice] + np.arange(len(twice)) % 2
+    return _Wanted(
+        places.node[twice], index, places.posture[twice], places.q[twice], places.reach[twice]
+    )
+
+
+def _all(wanted: list[_Wanted]) -> _Wanted:
+    names = [each.name for each in fields(_Wanted)]
+    return _Wanted(*(np.concatenate([getattr(w, name) for w in wanted]) for name in names))
+
+
+def _places(where: Reachable, level: int, wanted: _Wanted) -> Places:
+    """Return every place of the wanted intervals that a motion may pass."""
+    code = wanted.node * (BASE << level) + wanted.index
+    keys, key = np.unique(code, return_inverse=True)
+    node, index = np.divmod(keys, BASE << level)
+    half = np.full(len(keys), np.pi / (BASE << level) + 4e-15)
+    gamma = _middle(level, index)
+    found = enclose(where.robot, where.frames, node, gamma, half, where.T_flange_tip)
+    some = found.status[key, wanted.posture] != Status.NONE
+    key, posture = key[some], wanted.posture[some]
+    parts = [getattr(found, name)[key, posture] for name in Enclosure.__dataclass_fields__]
+    _, center, slope, low, high, radius = parts
+    bend, width = np.maximum(np.abs(low), np.abs(high)), half[0] if len(half) else 0.0
+    radius = radius + ON_TURN
+    reach = (np.abs(slope) * width + bend * (width * width / 2) + radius) * (1 + 1e-15)
+    row, turns = _turns(wanted.near[some], wanted.room[some] + reach, center, where.endless)
+    whole = Places(
+        np.full(len(row), -1), node[key[row]], np.full(len(row), level), index[key[row]],
+        posture[row], turns, center[row] + TURN * turns, slope[row], low[row], high[row],
+        radius[row], reach[row], half[key[row]],
+    )  # fmt: skip
+    whole = whole.take(_in_range(where, whole))
+    if not len(whole):
+        return whole
+    # Halves of neighbouring turns meet in the same place.
+    code = ((whole.node * (BASE << level) + whole.index) * POSTURES) + whole.posture
+    _, once = np.unique(_coded(code, whole.turn), return_index=True)
+    return whole.take(once)
+
+
+def _coded(code: Ints, turn: Ints) -> Ints:
+    """Return one number for each row of code (C,) and turn (C, n), the same for the same."""
+    digits = np.zeros(len(code), dtype=np.int64)
+    for i in range(turn.shape[1]):
+        digits = digits * 64 + turn[:, i] + 32
+    _, first = np.unique(code, return_inverse=True)
+    other, second = np.unique(digits, return_inverse=True)
+    return np.asarray(first * len(other) + second)
+
+
+def _turns(near: Array, room: Array, center: Array, endless: Bools) -> tuple[Ints, Ints]:
+    """Return rows and turns (T, n) by which center + 2 pi turn is within `room` of `near`.
+
+    Endless joints stay as they are.
+    """
+    low = np.where(endless, 0, np.ceil((near - room - center) / TURN - 1e-14))
+    high = np.where(endless, 0, np.floor((near + room - center) / TURN + 1e-14))
+    count = np.maximum(high - low + 1, 0)
+    total = count.prod(axis=1)
+    if not total.sum() <= MOST_PLACES:
+        raise refused(f"it leaves more than {MOST_PLACES} places to look at")
+    total = total.astype(np.int64)
+    row = np.repeat(np.arange(len(total)), total)
+    place = np.arange(len(row)) - np.repeat(np.cumsum(total) - total, total)
+    turns = low[row].astype(np.int64)
+    for i in range(turns.shape[1]):
+        size = count[row, i].astype(np.int64)
+        turns[:, i] += place % size
+        place //= size
+    return row, turns
+
+
+def _in_range(where: Reachable, at: Places) -> Bools:
+    """Return which places a motion within ranges and couplings may pass, (C,)."""
+    low, high = where.lower - EDGE, where.upper + EDGE
+    inside = ((at.q - at.reach <= high) & (at.q + at.reach >= low)) | where.endless
+    fits = np.asarray(inside.all(axis=1))
+    for row, lower, upper in zip(where.rows, where.row_lower, where.row_upper, strict=True):
+        middle = at.q @ row
+        curve = (at.slope, at.low, at.high, at.radius, at.half)
+        least = middle + linear_minimum(*curve, np.broadcast_to(row, at.q.shape))
+        most = middle - linear_minimum(*curve, np.broadcast_to(-row, at.q.shape))
+        fits &= (least <= upper + 2 * EDGE) & (most >= lower - 2 * EDGE)
+    return fits
+
+
+def _matched(
+    where: Reachable, stage: Stage, cells: Ints, places: Places
+) -> tuple[Places, NDArray[np.bool_]]:
+    """Return the places that are cells of the stage, as such, and which of all places they are."""
+    listed = np.zeros(len(places), dtype=bool)
+    if not len(cells) or not len(places):
+        return places.take(np.zeros(0, dtype=np.int64)), listed
+    level = int(places.level[0])
+
+    def interval(node: Ints, index: Ints, posture: Ints) -> Ints:
+        return np.asarray((node * (BASE << level) + index) * POSTURES + posture)
+
+    own = interval(places.node, places.index, places.posture)
+    given = interval(*(np.asarray(part[cells], dtype=np.int64)
+                       for part in (stage.node, stage.index, stage.posture)))  # fmt: skip
+    # Any place of the interval says where the middle of the joints is, up to whole turns.
+    order = np.argsort(own, kind="stable")
+    at = order[np.minimum(np.searchsorted(own, given, sorter=order), len(own) - 1)]
+    same = own[at] == given
+    cells, given, at = cells[same], given[same], at[same]
+    off = stage.lift[cells] * (np.pi / LIFTS) - places.q[at]
+    off = np.where(where.endless, 0.0, np.round(off / TURN)).astype(np.int64)
+    turn = np.vstack([places.turn, places.turn[at] + off])
+    code = _coded(np.concatenate([own, given]), turn)
+    have, want = code[: len(own)], code[len(own) :]
+    order = np.argsort(have)
+    at = np.minimum(np.searchsorted(have, want, sorter=order), len(have) - 1)
+    fits = have[order[at]] == want
+    row = order[at[fits]]
+    listed[row] = True
+    known = places.take(row)
+    known.cell[:] = cells[fits]
+    return known, listed
+
+
+def _joined(parts: list[Places], n: int) -> Places:
+    return Places(
+        *(np.concatenate([getattr(part, each.name) for part in parts]) for each in fields(Places))
+    )

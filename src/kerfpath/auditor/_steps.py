@@ -1,0 +1,247 @@
+"""What a step of a motion costs at least, with a potential over the places it joins.
+
+The cost of a step u of the joints is rho(u) + mu . u with every |u_i| at most v_i. It is at least
+y . u + the least of (rho(u) + (mu - y) . u), for any y; the step from one place to another is the
+difference of their middles, and of what the joints are off them. So much is y . D, and what is off
+is weighed with y and the slopes of the potential at both ends: a bound on each apart.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+
+from kerfpath._arrays import Array, Bools, Ints
+from kerfpath._repr import short_repr
+from kerfpath.auditor._cover import TURN, Places
+from kerfpath.auditor._enclosure import linear_minimum
+
+__all__ = ["Rates", "candidates", "least_value", "reduced_costs"]
+
+AT_ONCE = 8192
+"""Pairs of places looked at together: their rows stay in the cache."""
+FOUND_AT_ONCE = 1 << 18
+"""Pairs found together, before all joints are compared."""
+NEAR = 1e-9
+"""rad: for the rounding of differences, far above it."""
+ROUNDED = 1 + 2.0**-46
+"""Factor on a norm for its rounding."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Rates:
+    """What bounds and prices the steps of a motion.
+
+    Parameters
+    ----------
+    velocity : (n,) rad
+        Most that a joint moves in a step.
+    weights : (n,) 1/rad
+    metric : {"euclid", "manhattan", "chebychev"}
+    endless : (n,) bool
+    tilt : (K-1, n)
+        mu, what the multipliers of a stage add to the cost of each step.
+    """
+
+    velocity: Array
+    weights: Array
+    metric: str
+    endless: Bools
+    tilt: Array
+
+    __repr__ = short_repr
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Curves:
+    """Joints off their middle: slope t + [low, high] t^2 / 2 +- radius, with a potential (B, ..).
+
+    The potential is the larger of value_m - dual_m . off, m = 0, 1.
+    """
+
+    slope: Array
+    low: Array
+    high: Array
+    radius: Array
+    half: Array
+    value: Array
+    dual: Array
+
+    def least(self, z: Array) -> Array:
+        """Return the least of z . off, (B,)."""
+        return linear_minimum(self.slope, self.low, self.high, self.radius, self.half, z)
+
+    def least_with(self, y: Array) -> Array:
+        """Return the least of y . off + the potential, (B,).
+
+        The larger of two is at least any mean of both; the best mean of two lines is one of them,
+        or level.
+        """
+        run = ((y[:, None] - self.dual) * self.slope[:, None]).sum(-1)
+        ends = self.value - np.abs(run) * self.half[:, None]
+        share = (ends[:, 0] >= ends[:, 1]).astype(float)
+        across = run[:, 1] - run[:, 0]
+        opposed = run[:, 0] * run[:, 1] < 0
+        safe = np.where(opposed, across, 1.0)
+        crossing = np.abs(self.value[:, 0] - self.value[:, 1]) < np.abs(safe) * self.half
+        share = np.where(opposed & crossing, np.clip(run[:, 1] / safe, 0.0, 1.0), share)
+        rest = 1.0 - share
+        z = y - (share[:, None] * self.dual[:, 0] + rest[:, None] * self.dual[:, 1])
+        return np.asarray(share * self.value[:, 0] + rest * self.value[:, 1] + self.least(z))
+
+
+def _curves(at: Places, value: Array, dual: Array, which: Ints | slice) -> _Curves:
+    return _Curves(
+        at.slope[which], at.low[which], at.high[which], at.radius[which], at.half[which],
+        value[which], dual[which],
+    )  # fmt: skip
+
+
+def least_value(at: Places, value: Array, dual: Array) -> Array:
+    """Return the least of the potential at each place, (C,)."""
+    return _curves(at, value, dual, slice(None)).least_with(np.zeros(at.q.shape))
+
+
+def candidates(rates: Rates, at: Places) -> Iterator[tuple[Ints, Ints]]:
+    """Yield the pairs of places at neighbouring nodes that a step may join.
+
+    Of the joint that leaves the fewest, found by sorting; the others are looked at then. Every pair
+    comes once.
+    """
+    wide = at.reach + rates.velocity + NEAR
+    bound = np.flatnonzero(~rates.endless)
+    size = np.abs(at.q).max(initial=0.0) + wide.max(initial=0.0) + 1.0
+    step = 2 * size * at.node
+    best: tuple[float, tuple[Array, ...]] | None = None
+    for i in bound:
+        # Both ends of a step as intervals on one line, a stretch of it for every step.
+        q = at.q[:, i]
+        pad = 1e-14 * (np.abs(step).max(initial=0.0) + size)
+        first = q - wide[:, i] + step - pad, q + wide[:, i] + step + pad
+        to = step - 2 * size
+        second = q - at.reach[:, i] + to - pad, q + at.reach[:, i] + to + pad
+        starts = np.sort(first[0]), np.sort(second[0])
+        number = float(_number(starts[1], *first).sum() + _number(starts[0], *second).sum())
+        if best is None or number < best[0]:
+            best = number, (*first, *second)
+    if best is None:  # every joint turns without end: all pairs, stretch by stretch
+        flat = np.full(len(at), size)
+        best = 0.0, (step - flat / 2, step + flat / 2, step - 2.5 * size, step - 1.5 * size)
+    first_low, first_high, second_low, second_high = best[1]
+    by_second = np.argsort(second_low, kind="stable")
+    for a, place in _inside(second_low[by_second], first_low, first_high, "left"):
+        yield from _possible(rates, at, a, by_second[place])
+    by_first = np.argsort(first_low, kind="stable")
+    for b, place in _inside(first_low[by_first], second_low, second_high, "right"):
+        yield from _possible(rates, at, by_first[place], b)
+
+
+def _number(starts: Array, low: Array, high: Array) -> Ints:
+    return np.asarray(np.searchsorted(starts, high, "right") - np.searchsorted(starts, low))
+
+
+def _inside(starts: Array, low: Array, high: Array, side: str) -> Iterator[tuple[Ints, Ints]]:
+    """Yield rows and places of all starts in [low, high], or in (low, high] with side "right"."""
+    begin = np.searchsorted(starts, low, "left" if side == "left" else "right")
+    number = np.maximum(np.searchsorted(starts, high, "right") - begin, 0)
+    total = np.cumsum(number)
+    row = 0
+    while row < len(number):
+        done = total[row - 1] if row else 0
+        end = max(row + 1, int(np.searchsorted(total, done + FOUND_AT_ONCE, "right")))
+        part = number[row:end]
+        rows = np.repeat(np.arange(row, end), part)
+        place = np.arange(len(rows)) - np.repeat(np.cumsum(part) - part, part)
+        yield rows, begin[rows] + place
+        row = end
+
+
+def _possible(rates: Rates, at: Places, a: Ints, b: Ints) -> Iterator[tuple[Ints, Ints]]:
+    right = at.node[b] == at.node[a] + 1
+    a, b = a[right], b[right]
+    for i, endless in enumerate(rates.endless):
+        off = at.q[b, i] - at.q[a, i]
+        if endless:
+            off -= TURN * np.round(off / TURN)
+        near = np.abs(off) <= rates.velocity[i] + at.reach[a, i] + at.reach[b, i] + NEAR
+        a, b = a[near], b[near]
+    for i in range(0, len(a), AT_ONCE):
+        yield a[i : i + AT_ONCE], b[i : i + AT_ONCE]
+
+
+def reduced_costs(rates: Rates, at: Places, value: Array, dual: Array, a: Ints, b: Ints) -> Array:
+    """Return what a step from places a to places b (B,) costs at least, (B,).
+
+    With the potential (C, 2) and (C, 2, n) at its end, less that at its beginning; up to rounding.
+    """
+    here, there = _curves(at, value, dual, a), _curves(at, value, dual, b)
+    low, high = _differences(rates, at, a, b)
+    mu = rates.tilt[at.node[a]]
+    off = at.reach[a] + at.reach[b] + NEAR
+    u_low = np.maximum(low - off, -rates.velocity)
+    u_high = np.maximum(np.minimum(high + off, rates.velocity), u_low)
+    at_least = np.full((2, len(a)), -np.inf)
+
+    def offer(y: Array, cut: int | None = None) -> None:
+        """Take the bound by y for the potential's `cut` at the beginning, that y is; or both."""
+        apart = np.minimum(y * low, y * high).sum(-1) + _least_step(rates, y - mu, u_low, u_high)
+        apart += there.least_with(y)
+        for m in (0, 1) if cut is None else (cut,):
+            more = apart if cut is not None else apart + here.least(here.dual[:, m] - y)
+            np.maximum(at_least[m], more, out=at_least[m])
+
+    for m in (0, 1):
+        offer(here.dual[:, m], m)
+    offer(mu + _slope(rates, (low + high) / 2))
+    for m in (0, 1):
+        offer(there.dual[:, m])
+    offer(np.zeros(low.shape))
+    return np.asarray((at_least.T - here.value).min(1))
+
+
+def _differences(rates: Rates, at: Places, a: Ints, b: Ints) -> tuple[Array, Array]:
+    """Return between what the middles of two places differ, (B, n) rad twice.
+
+    Of endless joints, by every whole turn with which a step joins the places.
+    """
+    off = at.q[b] - at.q[a]
+    if not rates.endless.any():
+        return off, off
+    off = np.where(rates.endless, off - TURN * np.round(off / TURN), off)
+    room = rates.velocity + at.reach[a] + at.reach[b] + NEAR
+    if not ((np.abs(off) + room > TURN) & rates.endless).any():
+        return off, off
+    low = np.where(rates.endless, np.minimum(np.ceil((-room - off) / TURN), 0), 0)
+    high = np.where(rates.endless, np.maximum(np.floor((room - off) / TURN), 0), 0)
+    return off + TURN * low, off + TURN * high
+
+
+def _least_step(rates: Rates, z: Array, low: Array, high: Array) -> Array:
+    """Return a lower bound of rho(u) - z . u over steps u between low and high (B, n)."""
+    w = rates.weights
+    if rates.metric == "manhattan":
+        middle = np.clip(0.0, low, high)
+        each = np.minimum(w * np.abs(low) - z * low, w * np.abs(high) - z * high)
+        return np.asarray(np.minimum(each, w * np.abs(middle) - z * middle).sum(-1))
+    # rho(u) is at least s . u for any s that is not longer than 1 by the dual norm.
+    scaled = np.where(w > 0, z / np.where(w > 0, w, 1.0), 0.0)
+    if rates.metric == "euclid":
+        size = np.sqrt((scaled * scaled).sum(-1, keepdims=True))
+    else:
+        size = np.abs(scaled).sum(-1, keepdims=True)
+    s = np.where(w > 0, z, 0.0) / np.maximum(1.0, size * ROUNDED)
+    return np.asarray(np.minimum((s - z) * low, (s - z) * high).sum(-1))
+
+
+def _slope(rates: Rates, u: Array) -> Array:
+    """Return the slope of rho at u (B, n)."""
+    w = rates.weights
+    if rates.metric == "manhattan":
+        return np.asarray(w * np.sign(u))
+    if rates.metric == "euclid":
+        size = np.sqrt(((w * u) ** 2).sum(-1, keepdims=True))
+        return np.asarray(w * w * u / np.where(size > 0, size, 1.0))
+    largest = np.argmax(w * np.abs(u), axis=-1)[:, None] == np.arange(len(w))
+    return np.where(largest, w * np.sign(u), 0.0)
