@@ -6,6 +6,7 @@ from kerfpath.auditor._air import transfer_checks as transfer_checks
 from kerfpath.auditor._audit import audit as audit
 from kerfpath.auditor._audit import checks as checks
 from kerfpath.auditor._certificate import BOUND as BOUND
+from kerfpath.auditor._certificate import bound_checks as bound_checks
 from kerfpath.auditor._certificate import certified_bound as certified_bound
 from kerfpath.auditor._chain import JointChain as JointChain
 from kerfpath.auditor._chain import chain_of as chain_of

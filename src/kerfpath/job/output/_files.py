@@ -165,7 +165,11 @@ def plan_file_text(outcome: JobResult) -> str:
     entries: list[ContourData] = []
     for cut in outcome.cuts:
         if cut.plan is not None:
-            entries.append(plan_entry(cut.plan, cut.contour, cut.checks, picked=cut.picked))
+            asked = cut.plan.settings.certify
+            shown = asked is not None and asked.in_file
+            entries.append(
+                plan_entry(cut.plan, cut.contour, cut.checks, picked=cut.picked, certificate=shown)
+            )
         elif cut.broken is not None:
             entries.append(broken_entry(cut.name, cut.broken, cut.fastest))
     return plan_text(

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+from kerfpath.auditor import bound_checks
 from kerfpath.cad import Part
 from kerfpath.job.format import Job, PreparedJob, prepare
 from kerfpath.job.run._contour import cut_candidate
@@ -64,10 +65,16 @@ def _certified(result: JobResult, progress: Progress) -> JobResult:
 
 
 def _with_bound(cut: CutResult, progress: Progress) -> CutResult:
-    if cut.plan is None:
+    """Return the cut with the bound of its plan, audited where plan.json is to carry its proof."""
+    asked = cut.request.options.certify
+    if cut.plan is None or asked is None:
         return cut
 
     def named(what: str, done: int, total: int, /) -> None:
         progress(f"{cut.name}: {what}", done, total)
 
-    return replace(cut, plan=with_bound(cut.plan, cut.request.options.certify, progress=named))
+    made = with_bound(cut.plan, asked, progress=named)
+    if not asked.in_file:
+        return replace(cut, plan=made)
+    named("audit of the certificate", 0, 0)
+    return replace(cut, plan=made, checks=(*cut.checks, *bound_checks(made)))
