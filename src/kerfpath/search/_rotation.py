@@ -17,7 +17,7 @@ from kerfpath.kernels.search import Aim
 from kerfpath.search._branch import best_near_start
 from kerfpath.search._layers import Layers, sort_layers
 
-__all__ = ["best_within_rotation", "too_far", "why_closed"]
+__all__ = ["best_within_rotation", "closed_before", "too_far", "why_closed"]
 
 
 def too_far(path: Array, endless: Bools, rotation: Array) -> Bools:
@@ -45,13 +45,30 @@ def best_within_rotation(
         unroll = unroll | more
 
 
+def closed_before(
+    layers: Layers, aim: Aim, rotation: Array, broken: NoFeasiblePath
+) -> NoFeasiblePath | None:
+    """Return the answer that limits close the way before it breaks without them; else None.
+
+    `broken` is the answer without limits on the rotation.
+    """
+    limited = np.isfinite(rotation)
+    if broken.node < 1 or not limited.any():
+        return None
+    part, none = _until(layers, broken.node), np.zeros(len(limited), np.bool_)
+    least, plain = _turning_least(part, aim, limited)
+    closing, found = best_within_rotation(plain, least, rotation, none, closed=False)
+    if found is not None:
+        return None
+    why = why_closed(part, aim, rotation, closing, closed=False)
+    return why.with_message(f"{why} to node {broken.node}, and there {broken}")
+
+
 def why_closed(
     layers: Layers, aim: Aim, rotation: Array, closing: Bools, *, closed: bool
 ) -> NoFeasiblePath:
     """Return the answer that limits close the way: those of the joints `closing` (n,)."""
-    # Whether there is a path is soonest seen from those that turn least.
-    aim = aim._replace(weight=freeze(closing.astype(float)), metric=MANHATTAN, minimax=False)
-    layers = layers._replace(cost=np.where(layers.cost < np.inf, 0.0, np.inf))
+    aim, layers = _turning_least(layers, aim, closing)
     joints = np.flatnonzero(closing).tolist()
     only = np.isfinite(rotation).sum() == 1
     opening = [
@@ -67,6 +84,22 @@ def why_closed(
         proved=True,
         node=node,
     )
+
+
+def _turning_least(layers: Layers, aim: Aim, joints: Bools) -> tuple[Aim, Layers]:
+    """Return aim and layers of the path whose `joints` (n,) turn least.
+
+    Whether limits leave a path is soonest seen from that one.
+    """
+    aim = aim._replace(weight=freeze(joints.astype(float)), metric=MANHATTAN, minimax=False)
+    return aim, layers._replace(cost=np.where(layers.cost < np.inf, 0.0, np.inf))
+
+
+def _until(layers: Layers, node: int) -> Layers:
+    """Return the layers up to a node and with it."""
+    q, start, endless, cost, shut = layers
+    N = start[node + 1]
+    return Layers(q[:N], start[: node + 2], endless, cost[:N], shut[shut[:, 1] < N])
 
 
 def _opens(
@@ -85,12 +118,10 @@ def _last_node(layers: Layers, aim: Aim, rotation: Array, closing: Bools, *, clo
 
     Without `closed` it is known that none reaches the end.
     """
-    q, start, endless, cost, shut = layers
-    reached, beyond = 0, len(start) - (1 if closed else 2)
+    reached, beyond = 0, len(layers.start) - (1 if closed else 2)
     while beyond - reached > 1:
         node = (reached + beyond) // 2
-        N = start[node + 1]
-        part = Layers(q[:N], start[: node + 2], endless, cost[:N], shut[shut[:, 1] < N])
+        part = _until(layers, node)
         if best_within_rotation(part, aim, rotation, closing, closed=False)[1] is None:
             beyond = node
         else:

@@ -20,7 +20,7 @@ from kerfpath.search._branch import best_closed_path
 from kerfpath.search._exact import BestPath, best_path, dead_end
 from kerfpath.search._layers import Layers, broken_edge, empty_layer, reverse, sort_layers
 from kerfpath.search._problem import Closure, Method, Metric, ObjectiveKind, SearchProblem
-from kerfpath.search._rotation import best_within_rotation, too_far, why_closed
+from kerfpath.search._rotation import best_within_rotation, closed_before, too_far, why_closed
 
 __all__ = ["LayeredPath", "find_shortest", "shortest_path"]
 
@@ -166,7 +166,12 @@ def find_shortest(problem: SearchProblem) -> LayeredPath:
     try:
         found = _find_exactly(given, layers, aim, closed=closed)
     except NoFeasiblePath as broken:
-        broken.back, broken.leaving = _from_the_back(given, aim)
+        if (sooner := closed_before(given, aim, problem.rotation, broken)) is not None:
+            raise sooner from None
+        if np.isinf(problem.rotation).all():
+            broken.back, broken.leaving = _from_the_back(given, aim)
+        else:
+            broken.reached = None  # within the limits it may be fewer
         raise
     over = too_far(given.q[given.start[:-1] + found.index], given.endless, problem.rotation)
     return _turn_less(given, aim, problem.rotation, over, closed=closed) if over.any() else found
