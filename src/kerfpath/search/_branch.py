@@ -43,7 +43,7 @@ def best_near_start(
     count = itertools.count()
     queue: list[tuple[float, float, int, BestPath, Ints, Ints]] = []
     every = np.arange(layers.start[1]), np.arange(layers.start[1], layers.start[2])
-    parts, floor = [every], 0.0
+    parts, floor = [every], -np.inf
     while True:
         for starts, firsts in parts:
             found = within.relaxed(starts, firsts, floor)

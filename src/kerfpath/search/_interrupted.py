@@ -158,7 +158,7 @@ def _long_enough(
     def solve(spans: PieceSpans) -> tuple[tuple[float, float], Ints, InterruptedPath] | None:
         staged, nodes = _in_stages(layers, spans.low[:-1], spans.high[1:])
         every = np.ones(len(staged.low), np.bool_)
-        best = best_allowed(staged, aim, every, NO_SEAM, 0.0)
+        best = best_allowed(staged, aim, every, NO_SEAM)
         if best is None:
             return None
         pieces = _pieces(staged, nodes, best.path)
