@@ -148,6 +148,15 @@ def test_off_the_grid_it_is_faster_and_the_motion_keeps_the_limits(circle, arm, 
     assert found.limit == "acceleration"
 
 
+def test_off_the_grid_a_plan_is_found_up_to_the_fastest_speed(circle, arm, tool, placement):
+    nodes = circle.resample(count=41)
+    cell = {"tool": tool, "placement": placement, "gamma_step": np.radians(5), "refine": True}
+    found = fastest_speed(nodes, arm, **cell)
+    for share in (0.99, 0.999, 0.99999):
+        made = plan(nodes, arm, speed=share * found.speed, **cell)
+        assert audit(made) == []
+
+
 def test_an_interval_found_past_the_ceiling_of_a_search_is_not_believed():
     # The search leaves out edges beyond its ceiling: up to 8 % of these intervals was given away.
     rng = np.random.default_rng(777)
