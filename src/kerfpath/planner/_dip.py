@@ -23,8 +23,8 @@ def plan_slowed(task: PlanningTask, finder: ClearSearch, *, refine: bool) -> Pla
     On the grid two paths are worth their least times under all limits: the one that loses the least
     time, priced above all distances, if each step had to be slow on its own, and the best one
     without acceleration limits, where there is one. With `refine` gamma also moves off the grid
-    from each. Of all these plans it is the quickest that is clear, and of equally quick ones the
-    cheapest.
+    from each to ask for little beyond the limits, and the quicker of the two, or if that is not
+    clear the other, is refined. The plan is the quickest, and of equally quick ones the cheapest.
     """
     slowed, first = _least_lost(task, finder), plan_first_order(task, finder)
     starts = [slowed]
@@ -34,9 +34,11 @@ def plan_slowed(task: PlanningTask, finder: ClearSearch, *, refine: bool) -> Pla
     if not (refine and task.robot.family.free_rotation):
         return on_grid
     why = "take longer"
-    for made in sorted((_off_grid(task, start) for start in starts), key=_time_and_cost):
+    for eased in sorted((_ease(task, start) for start in starts), key=_time_and_cost):
+        again = _with_least_times(task, refiner.refine(eased).plan)
+        made = min(again, eased, key=_time_and_cost)
         if _time_and_cost(made) > _time_and_cost(on_grid):
-            break
+            continue
         broken = _broken(task, finder, made)
         if not broken:
             return made
@@ -45,16 +47,11 @@ def plan_slowed(task: PlanningTask, finder: ClearSearch, *, refine: bool) -> Pla
     return replace(on_grid, proof=replace(on_grid.proof, statement=claim))
 
 
-def _off_grid(task: PlanningTask, start: Plan) -> Plan:
-    """Return the plan off the grid that a path leads to: it asks for little beyond the limits.
-
-    The refinement keeps the times along it, and they are set anew.
-    """
+def _ease(task: PlanningTask, start: Plan) -> Plan:
+    """Return the plan off the grid that asks for little beyond the limits, with its least times."""
     claim = f"{start.proof.statement}; gamma moved off the grid to lose little time"
     eased = replace(refiner.ease(start), proof=Proof(optimal=False, statement=claim))
-    made = _with_least_times(task, eased)
-    again = _with_least_times(task, refiner.refine(made).plan)
-    return min(again, made, key=_time_and_cost)
+    return _with_least_times(task, eased)
 
 
 def _time_and_cost(made: Plan) -> tuple[float, float]:
