@@ -14,8 +14,8 @@ from kerfpath import InputError, NoFeasiblePath, shortest_path
 ONE = {"dt": 1.0, "velocity": [1.0], "acceleration": [1.0]}
 
 
-def instance(rng, closure, below=0.0, **sizes):
-    q, start, options = naive.random_instance(rng, **sizes)
+def instance(rng, closure, below=0.0, make=naive.random_instance, **sizes):
+    q, start, options = make(rng, **sizes)
     options |= {"method": "exact"}
     if below:
         options["vertex_cost"] = options["vertex_cost"] - below * rng.random(len(q))
@@ -93,6 +93,25 @@ def test_costs_below_zero_change_nothing_but_the_optimum(monkeypatch, closure, b
                 **ONE,
             )
             assert path.cost == min(cost)
+
+
+@pytest.mark.parametrize("closure", ["free", "periodic"])
+def test_half_a_turn_goes_the_way_that_the_values_go(closure):
+    rng = np.random.default_rng(27)
+    feasible = sum(agree(rng, closure, make=naive.lattice_instance) for _ in range(1500))
+    assert 200 < feasible < 1450
+
+
+def test_of_half_a_turn_both_ways_are_as_long_but_not_as_even():
+    # On from -90 to 0 the joint goes to 180 as evenly as to -180 it does not: (6) tells them apart.
+    turning = {"dt": 1.0, "velocity": [4.0], "acceleration": [2.0], "endless": [True]}
+    for last, broken in (([np.pi], False), ([-np.pi], True), ([-3 * np.pi], False)):
+        q = [[-np.pi / 2], [0.0], last]
+        if broken:
+            with pytest.raises(NoFeasiblePath, match="acceleration"):
+                shortest_path(q, [0, 1, 2, 3], **turning)
+        else:
+            assert shortest_path(q, [0, 1, 2, 3], **turning).optimal
 
 
 @pytest.mark.slow

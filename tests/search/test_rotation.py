@@ -35,6 +35,19 @@ def instance(rng, closure):
     return q, start, rotation, o
 
 
+def lattice(rng, closure):
+    """An instance of many steps of half a turn, its limits whole steps."""
+    q, start, o = naive.lattice_instance(rng)
+    o |= {"method": "exact"}
+    o["endless"][0] = True
+    if closure == "periodic":
+        q, start = np.vstack([q, q[: start[1]]]), np.append(start, len(q) + start[1])
+        for name in ("posture", "vertex_cost"):
+            o[name] = np.concatenate([o[name], o[name][: start[1]]])
+    limit = np.pi / 2 * rng.integers(1, 6, len(o["endless"])) + 1e-3
+    return q, start, np.where(o["endless"] & (rng.random(q.shape[1]) < 0.8), limit, INF), o
+
+
 def turned(path, endless):
     """Largest angle (n,) that each joint turns away from where the path (K, n) begins."""
     return np.abs(np.cumsum(naive.difference(path[:-1], path[1:], endless), axis=0)).max(axis=0)
@@ -47,9 +60,9 @@ def feasible(q, start, closure, o, rotation=None):
         return None
 
 
-def agree(rng, closure):
+def agree(rng, closure, make=instance):
     """Compare one random instance with the oracle; return what the limits made of it."""
-    q, start, rotation, o = instance(rng, closure)
+    q, start, rotation, o = make(rng, closure)
     want = naive.rotated(q, start, closure, rotation, **o)
     free = feasible(q, start, closure, o)
     if want is None:
@@ -124,6 +137,14 @@ def test_the_optimum_agrees_with_trying_every_path(closure, count):
     kinds = "no path", "closed", "other", "as without"
     assert min(seen.count(kind) for kind in kinds) > count / 50
     assert seen.count("closed sooner") > count / 100
+
+
+@pytest.mark.parametrize("closure", ["free", "periodic"])
+def test_half_a_turn_goes_one_way_within_limits_too(closure):
+    rng = np.random.default_rng(45)
+    seen = [agree(rng, closure, lattice) for _ in range(400)]
+    kinds = "no path", "closed", "other", "as without"
+    assert min(seen.count(kind) for kind in kinds) > 4
 
 
 ONE = {"dt": 1.0, "velocity": [1.0], "acceleration": [9.0], "endless": [True], "weights": [1.0]}

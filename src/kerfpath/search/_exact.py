@@ -115,11 +115,11 @@ def best_allowed(
         return None
     if not aim.minimax:
         return BestPath(path=found[0], cost=found[1], total=found[1])
-    cap = found[1]
+    cap = found[1] + ROUNDING * abs(found[1])
     least_sum = aim._replace(minimax=False, cap=cap)
     again = _grow(layers, least_sum, allowed & (layers.cost <= cap), seam)
     assert again is not None, "the path that gave the cap keeps it"
-    return BestPath(path=again[0], cost=cap, total=again[1])
+    return BestPath(path=again[0], cost=found[1], total=again[1])
 
 
 def lifted(layers: SortedLayers, aim: Aim) -> tuple[SortedLayers, float]:

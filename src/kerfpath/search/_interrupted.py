@@ -225,9 +225,12 @@ def _in_stages(layers: SortedLayers, first: Ints, last: Ints) -> tuple[SortedLay
         # No edge leads from the last layer of a piece to the first of the next.
         seam = slice(start[begin[i] - 1], start[begin[i]])
         low[seam] = high[seam] = 0
+    q = np.ascontiguousarray(layers.q[:, order])
+    given = q if layers.given is layers.q else np.ascontiguousarray(layers.given[:, order])
     shut_from, shut = _shut_in_stages(layers, order, onwards, low != high)
     staged = layers._replace(
-        q=np.ascontiguousarray(layers.q[:, order]),
+        q=q,
+        given=given,
         start=freeze(start),
         cost=freeze(layers.cost[order]),
         rank=layers.rank[order],

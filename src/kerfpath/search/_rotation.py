@@ -12,7 +12,7 @@ import numpy as np
 from kerfpath._arrays import Array, Bools, Ints, freeze
 from kerfpath.errors import NoFeasiblePath
 from kerfpath.kernels.limits import LIMIT_TOLERANCE
-from kerfpath.kernels.metric import MANHATTAN, increments, wrap
+from kerfpath.kernels.metric import MANHATTAN, increments, increments_between, wrap
 from kerfpath.kernels.search import Aim
 from kerfpath.search._branch import best_near_start
 from kerfpath.search._layers import Layers, sort_layers
@@ -131,7 +131,7 @@ def _last_node(layers: Layers, aim: Aim, rotation: Array, closing: Bools, *, clo
 
 def _best(layers: Layers, aim: Aim, rotation: Array, *, closed: bool) -> tuple[Ints, float] | None:
     """Return the best path that keeps `rotation`, all joints that have a limit unrolled."""
-    unrolled, place = _unroll(layers, rotation)
+    unrolled, place = _unroll(layers, rotation, aim.velocity)
     # The other way round would be shorter.
     most = np.where(np.isfinite(rotation), np.minimum(aim.velocity, np.pi), aim.velocity)
     graph = sort_layers(unrolled, freeze(most))
@@ -144,10 +144,11 @@ def _best(layers: Layers, aim: Aim, rotation: Array, *, closed: bool) -> tuple[I
     return None if found is None else (rank[found.path], found.cost)
 
 
-def _unroll(layers: Layers, rotation: Array) -> tuple[Layers, Ints]:
+def _unroll(layers: Layers, rotation: Array, velocity: Array) -> tuple[Layers, Ints]:
     """Return the graph with its limited joints unrolled, and which of its layer each vertex is.
 
-    Vertices that are too far from wherever a path begins are left out.
+    Vertices that are too far from wherever a path begins are left out, and half a turn goes the way
+    that it goes in the graph alone, where `velocity` (n,) rad lets a joint take one.
     """
     q, start, endless, cost, shut = layers
     place = np.arange(len(q)) - np.repeat(start[:-1], np.diff(start))
@@ -164,14 +165,32 @@ def _unroll(layers: Layers, rotation: Array) -> tuple[Layers, Ints]:
         origin, q = np.repeat(origin, copies), np.repeat(q, copies, axis=0)
         q[:, i] += 2 * np.pi * turn
         start = begin[start]
+    shut = _every_copy(shut, origin, len(place))
+    for i in np.flatnonzero(limited & (velocity > np.pi - 2 * LIMIT_TOLERANCE)):
+        shut = np.vstack([shut, _wrong_half_turns(layers.q[origin, i], q[:, i], start)])
     unrolled = Layers(
         q=freeze(q),
         start=freeze(start),
         endless=freeze(endless & ~limited),
         cost=cost[origin],
-        shut=_every_copy(shut, origin, len(place)),
+        shut=shut,
     )
     return unrolled, place[origin]
+
+
+def _wrong_half_turns(given: Array, unrolled: Array, start: Ints) -> Ints:
+    """Return the edges (E, 2) along which a joint unrolled takes half a turn the other way.
+
+    given, unrolled (N,) rad are its angle as it is given and unrolled.
+    """
+    found = [np.empty((0, 2), np.int64)]
+    for k in range(len(start) - 2):
+        a, b, c = start[k : k + 3]
+        way = increments_between(given[a:b, None], given[None, b:c], np.ones(1, np.bool_))
+        step = unrolled[None, b:c] - unrolled[a:b, None]
+        half = np.abs(np.abs(step) - np.pi) < LIMIT_TOLERANCE
+        found.append(np.argwhere(half & (way * step < 0)) + start[k : k + 2])
+    return np.concatenate(found)
 
 
 def _every_copy(shut: Ints, origin: Ints, vertices: int) -> Ints:

@@ -82,7 +82,8 @@ def shortest_path(
     velocity, acceleration : (n,) rad/s, rad/s^2
         Limits of each joint, used in (5) and (6) with `eta_v` and `eta_a`.
     endless : (n,) bool, optional
-        Joints that turn without end, compared modulo 2 pi (13); default none.
+        Joints that turn without end, compared modulo 2 pi (13); default none. Half a turn, as long
+        either way, goes the way that the values in `q` go.
     posture : (N,) int, optional
         Posture of each vertex; the "known" method stays on one.
     vertex_cost : (N,), optional
@@ -264,7 +265,7 @@ def _ends(layers: SortedLayers, dist: Array, before: Ints, k: int) -> States:
     a, b = layers.start[k : k + 2]
     vertex = a + np.flatnonzero(dist[a:b] < np.inf)
     parent = before[vertex]
-    dq = increments_between(layers.q[:, parent].T, layers.q[:, vertex].T, layers.endless)
+    dq = increments_between(layers.given[:, parent].T, layers.given[:, vertex].T, layers.endless)
     first = np.searchsorted(vertex, np.arange(a, b + 1))
     return States(vertex, dist[vertex], np.ascontiguousarray(dq), parent, first)
 
