@@ -1,13 +1,17 @@
 """plan(): the whole way from contour to plan, and its answers when there is none."""
 
 import itertools
+from contextlib import suppress
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 from kerfpath import Contour, InputError, NoFeasiblePath, audit, plan, plan_in_pieces, robot
+from kerfpath.limits import Limits
 from kerfpath.planner import layered_graph, node_interval
+from kerfpath.retime import retime
 
 STEP = np.radians(5)
 IN_LINE = 0.05  # sine of joint 5: nearer than this to its zero the wrist is all but singular
@@ -233,6 +237,24 @@ def test_off_the_grid_the_feed_dips_less(corner, arm, tool, placement):
     options = {"tool": tool, "placement": placement, "gamma_step": STEP, "speed": 0.4}
     grid, off = (plan(corner, arm, feed="dip", refine=r, **options) for r in (False, True))
     assert off.time[-1] < grid.time[-1]
+
+
+@pytest.mark.parametrize("moved", [True, False])
+def test_a_dip_is_never_slower_than_on_the_grid(monkeypatch, corner, arm, tool, placement, moved):
+    if not moved:  # off the grid nothing is gained
+        monkeypatch.setattr("kerfpath.refiner.ease", lambda plan: plan)
+        monkeypatch.setattr("kerfpath.refiner.refine", lambda plan: SimpleNamespace(plan=plan))
+    options = {"tool": tool, "placement": placement, "gamma_step": STEP, "feed": "dip"}
+    for speed in (0.2, 0.4):
+        grid, off = (plan(corner, arm, speed=speed, refine=r, **options) for r in (False, True))
+        assert (off.time[-1], off.cost) <= (grid.time[-1], grid.cost)
+        assert moved == (off.time[-1] < grid.time[-1])
+        # The best path without acceleration limits, slowed down, is a plan on the grid, too.
+        easy = arm.with_limits(acceleration=np.full(6, 1e6))
+        with suppress(NoFeasiblePath):
+            path = plan(corner, easy, speed=speed, tool=tool, placement=placement, gamma_step=STEP)
+            times = retime(path.increments, path.dt, Limits.of(*arm.speed_limits()))
+            assert grid.time[-1] <= times.sum() * (1 + 1e-9)
 
 
 def require_clean(made, **options):
