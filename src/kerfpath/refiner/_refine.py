@@ -74,6 +74,7 @@ def refine(
     nodes: Contour | None = None,
     eta_v: float | None = None,
     eta_a: float | None = None,
+    first: float | None = None,
 ) -> Refinement:
     """Return the plan with gamma moved off its grid: better, or within limits the grid cannot meet.
 
@@ -90,6 +91,9 @@ def refine(
         holds (5) and (6) at the shorter time step.
     eta_v, eta_a : float, optional
         Share of the velocity and acceleration limits; default: the plan's.
+    first : float rad, optional
+        Largest change of gamma in the first iteration, for a motion that is close to the best;
+        default: two steps of the plan's grid.
 
     Raises
     ------
@@ -113,6 +117,7 @@ def refine(
     if comfort is not None and comfort.clearance is not None and comfort.clearance.cost:
         return _unrefined(plan, "what clearance costs is known on the grid only")
     descent, start = _descent(asked)
+    descent = replace(descent, first=first)
     begun, before = descent.admitted(start)
     if not begun.admitted:
         return _unrefined(plan, _closest(descent, begun))
