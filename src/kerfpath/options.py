@@ -20,16 +20,19 @@ from kerfpath.search import Closure, Method, Metric, ObjectiveKind, rotation_lim
 from kerfpath.tilt import Tilt
 
 __all__ = [
+    "EXACT_OR_BETTER",
     "FeedKind",
     "GraphKeywords",
     "Interruptions",
     "OptionConflict",
     "OptionData",
     "PlanKeywords",
+    "PlanMethod",
     "PlanOptions",
     "with_keywords",
 ]
 
+PlanMethod = Literal["continuous", Method]
 FeedKind = Literal["constant", "dip"]
 Interruptions = Literal["none", "fewest"]
 
@@ -47,7 +50,7 @@ class GraphKeywords(TypedDict, total=False):
 class PlanKeywords(GraphKeywords, total=False):
     """The options that `kerfpath.plan` takes as keywords."""
 
-    method: Method
+    method: PlanMethod
     objective: ObjectiveKind
     metric: Metric
     weights: ArrayLike | None
@@ -78,7 +81,7 @@ class TiltData(TypedDict):
 class OptionData(TypedDict):
     """The options as JSON holds them: SI, the unit in the name, null for infinity."""
 
-    method: Method
+    method: PlanMethod
     objective: ObjectiveKind
     metric: Metric
     weights_per_rad: list[float] | None
@@ -106,7 +109,7 @@ class OptionConflict(InputError):
     option : str
         The one that another forbids.
     expected, got : object
-        Its only value beside the other, None for none; and its value.
+        Its only value beside the other (a tuple: any of them), None for none; and its value.
     beside : mapping of str to object
         The options that forbid it, with their values.
     """
@@ -170,7 +173,7 @@ class PlanOptions:
     frames: FrameKind = "rotation-minimising"
     tilt: Tilt | None = None
     postures: tuple[int, ...] | None = None
-    method: Method = "exact"
+    method: PlanMethod = "continuous"
     objective: ObjectiveKind = "sum"
     metric: Metric = "manhattan"
     weights: Array = None  # type: ignore[assignment]  # `resolve` fills in the default
@@ -328,7 +331,7 @@ def with_keywords(
 
 _KNOWN: dict[str, tuple[str, ...]] = {
     "frames": get_args(FrameKind),
-    "method": get_args(Method),
+    "method": ("continuous", *get_args(Method)),
     "objective": get_args(ObjectiveKind),
     "metric": get_args(Metric),
     "closure": get_args(Closure),
@@ -336,6 +339,8 @@ _KNOWN: dict[str, tuple[str, ...]] = {
     "interruptions": get_args(Interruptions),
 }
 
+EXACT_OR_BETTER = ("continuous", "exact")
+"""Methods that hold (5) and (6) throughout."""
 GIVEN = object()
 """Any value but None."""
 CLEARANCE, PENALTIES = "comfort clearance", "comfort costs"
@@ -344,7 +349,7 @@ _RULES: tuple[tuple[dict[str, object], dict[str, object]], ...] = (
     (
         {"feed": "dip"},
         {
-            "method": "exact",
+            "method": EXACT_OR_BETTER,
             "closure": "free",
             "rotation": None,
             "objective": "sum",
@@ -354,10 +359,10 @@ _RULES: tuple[tuple[dict[str, object], dict[str, object]], ...] = (
     ),
     (
         {"interruptions": "fewest"},
-        {"method": "exact", "closure": "free", "rotation": None, "tilt": None},
+        {"method": EXACT_OR_BETTER, "closure": "free", "rotation": None, "tilt": None},
     ),
-    ({"closure": "periodic"}, {"method": "exact"}),
-    ({"rotation": GIVEN}, {"method": "exact"}),
+    ({"closure": "periodic"}, {"method": EXACT_OR_BETTER}),
+    ({"rotation": GIVEN}, {"method": EXACT_OR_BETTER}),
     ({"tilt": GIVEN}, {"refine_parts": 1}),
     ({"least_piece": GIVEN}, {"interruptions": "fewest"}),
     ({CLEARANCE: GIVEN}, {"feed": "constant", "interruptions": "none"}),
@@ -384,6 +389,8 @@ def _require_no_conflict(options: PlanOptions) -> None:
 def _is(fact: object, value: object) -> bool:
     if value is GIVEN or value is None:
         return (fact is None) != (value is GIVEN)
+    if isinstance(value, tuple):
+        return fact in value
     return fact == value
 
 
@@ -391,4 +398,6 @@ def _value(value: object) -> str:
     """Return a value in a message: text in quotes, numbers; nothing for an object."""
     if isinstance(value, str):
         return f'"{value}"'
+    if isinstance(value, tuple):
+        return " or ".join(f'"{one}"' for one in value)
     return f"{value}" if isinstance(value, int | float) and value is not True else ""

@@ -29,7 +29,7 @@ SAME_VALUE = 1e-9
 MOST_TANGENTS = 24
 """Tangents to a step's cost; by the Manhattan and Chebychev metrics it has fewer pieces."""
 RELAXED = (1.0, 1.5, 2.5, 5.0, np.inf)
-"""Multiples of (6) that a step forward is tried with, one after the other."""
+"""Multiples of (6), and of the cap, that a step forward is tried with, one after the other."""
 
 
 class Targets(NamedTuple):
@@ -40,8 +40,6 @@ class Targets(NamedTuple):
 
     q: Array
     """(N, n) rad."""
-    cost: Array
-    """(N,): what visiting a vertex costs, infinite where it is closed."""
     start: Ints
     """(K+1,): layer k is q[start[k]:start[k+1]]."""
     one: Ints
@@ -65,6 +63,8 @@ class Steps(NamedTuple):
     """(n,) 1/rad."""
     metric: int
     minimax: bool
+    cap: float
+    """Largest distance."""
     low: Array
     """(n,) rad"""
     high: Array
@@ -233,6 +233,35 @@ def _least(
 
 
 @jit_inline
+def _part_below(
+    a: Array, d: Array, first: float, last: float, steps: Steps
+) -> tuple[float, float]:
+    """Part of first..last in which the distance is within the cap, by halving; empty if none is."""
+    distances = Steps(steps.weight, steps.metric, False, np.inf, steps.low, steps.high)
+    length, lowest = _least(a, d, first, last, 0.0, 0.0, distances, np.inf)
+    if length > steps.cap:
+        return 1.0, 0.0
+    return _crossing(a, d, lowest, first, steps), _crossing(a, d, lowest, last, steps)
+
+
+@jit_inline
+def _crossing(a: Array, d: Array, inside: float, outside: float, steps: Steps) -> float:
+    """Where from `inside` towards `outside` the distance comes to the cap; the end if it does not.
+
+    Never beyond it.
+    """
+    if _length(a, d, outside, steps.weight, steps.metric)[0] <= steps.cap:
+        return outside
+    for _ in range(MOST_TANGENTS):
+        middle = (inside + outside) / 2
+        if _length(a, d, middle, steps.weight, steps.metric)[0] <= steps.cap:
+            inside = middle
+        else:
+            outside = middle
+    return inside
+
+
+@jit_inline
 def _offered(
     targets: Targets, tail: Array, steps: Steps, x: Array, s: int, ceiling: float,
     a: Array, d: Array,
@@ -251,6 +280,8 @@ def _offered(
         last, end = min(last, 0.0), begin
     elif begin == np.inf:
         first, begin = max(first, 1.0), end
+    if steps.cap < np.inf and first <= last:
+        first, last = _part_below(a, d, first, last, steps)
     if first > last or begin + (end - begin) * (first if end > begin else last) >= ceiling:
         return np.inf, 0.0
     return _least(a, d, first, last, begin, end - begin, steps, ceiling)
@@ -304,11 +335,12 @@ def _joined(minimax: bool, cost: float, to_go: float) -> float:
 
 
 @jit
-def values_to_go(targets: Targets, steps: Steps, out_tail: Array) -> int:
+def values_to_go(targets: Targets, steps: Steps, cost: Array, out_tail: Array) -> int:
     """Fill V (N,): least cost from each vertex to the end, its own included; infinite if no way.
 
-    The last layer is given: what ends there cost, infinite where no path may end. Returns the first
-    layer from which paths reach the end.
+    cost (N,) is what visiting a vertex costs, infinite where it is closed. The last layer is given:
+    what ends there cost, infinite where no path may end. Returns the first layer from which paths
+    reach the end.
     """
     K, n = len(targets.start) - 1, len(steps.low)
     a, d = np.empty(n), np.empty(n)
@@ -316,14 +348,14 @@ def values_to_go(targets: Targets, steps: Steps, out_tail: Array) -> int:
         hint, alive = -1, False
         for p in range(targets.start[k], targets.start[k + 1]):
             out_tail[p] = np.inf
-            if targets.cost[p] == np.inf:
+            if cost[p] == np.inf:
                 continue
             value, at, _ = _best_step(
                 targets, out_tail, steps, k + 1, targets.q[p], hint, a, d
             )
             if at >= 0:
                 hint, alive = at, True
-                out_tail[p] = _joined(steps.minimax, targets.cost[p], value)
+                out_tail[p] = _joined(steps.minimax, cost[p], value)
         if not alive:
             return k + 1
     return 0
@@ -337,7 +369,7 @@ def follow(
     """Go forward from a vertex of the first layer, each time by the best step; (6) where it can be.
 
     out_at (K,) are targets and out_t (K,) where on them, of the first layer the vertex itself and
-    0. A step that no multiple of (6) in `RELAXED` lets through is none: returns the layers reached.
+    0. A step that no multiple in `RELAXED` lets through is none: returns the layers reached.
     """
     K, n = len(targets.start) - 1, len(steps.low)
     a, d, before, x = np.empty(n), np.empty(n), np.empty(n), targets.q[vertex].copy()
@@ -351,7 +383,8 @@ def follow(
                 if k > 1 and relaxed < np.inf:
                     low[i] = max(low[i], before[i] - relaxed * acceleration[i])
                     high[i] = min(high[i], before[i] + relaxed * acceleration[i])
-            boxed = Steps(steps.weight, steps.metric, steps.minimax, low, high)
+            cap = steps.cap * relaxed
+            boxed = Steps(steps.weight, steps.metric, steps.minimax, cap, low, high)
             _, at, t = _best_step(targets, tail, boxed, k, x, -1, a, d)
             if at >= 0:
                 break
