@@ -22,14 +22,16 @@ from kerfpath.kernels._jit import jit, jit_inline
 from kerfpath.kernels.limits import LIMIT_TOLERANCE
 from kerfpath.kernels.metric import EUCLID, MANHATTAN, increment, wrap_angle
 
-__all__ = ["Targets", "follow", "join_samples", "sort_targets", "values_to_go"]
+__all__ = ["OVER_CAP", "Targets", "follow", "join_samples", "sort_targets", "values_to_go"]
 
 SAME_VALUE = 1e-9
 """Relative gap between a value and its bound below which a minimum over t has been found."""
 MOST_TANGENTS = 24
 """Tangents to a step's cost; by the Manhattan and Chebychev metrics it has fewer pieces."""
+OVER_CAP = 20.0
+"""Price of what a distance is over the cap, on top of its own."""
 RELAXED = (1.0, 1.5, 2.5, 5.0, np.inf)
-"""Multiples of (6), and of the cap, that a step forward is tried with, one after the other."""
+"""Multiples of (6) that a step forward is tried with, one after the other."""
 
 
 class Targets(NamedTuple):
@@ -64,7 +66,7 @@ class Steps(NamedTuple):
     metric: int
     minimax: bool
     cap: float
-    """Largest distance."""
+    """Distance from which on a step is dearer, see `OVER_CAP`."""
     low: Array
     """(n,) rad"""
     high: Array
@@ -138,7 +140,7 @@ def sort_targets(targets: Targets) -> None:
 
 
 @jit_inline
-def _fill_course(targets: Targets, x: Array, s: int, out_a: Array, out_d: Array) -> None:
+def fill_course(targets: Targets, x: Array, s: int, out_a: Array, out_d: Array) -> None:
     """Fill the increments a + t d from joints x to target s, endless joints the short way."""
     j, w = targets.one[s], targets.other[s]
     for i in range(len(x)):
@@ -150,7 +152,7 @@ def _fill_course(targets: Targets, x: Array, s: int, out_a: Array, out_d: Array)
 
 
 @jit_inline
-def _part_within(a: Array, d: Array, low: Array, high: Array) -> tuple[float, float]:
+def part_within(a: Array, d: Array, low: Array, high: Array) -> tuple[float, float]:
     """Part of t in [0, 1] with low <= a + t d <= high; empty where it ends before it begins."""
     first, last = 0.0, 1.0
     for i in range(len(a)):
@@ -191,11 +193,13 @@ def _length(a: Array, d: Array, t: float, weight: Array, metric: int) -> tuple[f
 
 
 @jit_inline
-def _value(
+def step_value(
     a: Array, d: Array, t: float, begin: float, rise: float, steps: Steps
 ) -> tuple[float, float]:
     """Cost of the step a + t d with what is still to come, begin + t rise; and a slope by t."""
     length, slope = _length(a, d, t, steps.weight, steps.metric)
+    if length > steps.cap:
+        length, slope = length + OVER_CAP * (length - steps.cap), (1.0 + OVER_CAP) * slope
     to_come = begin + t * rise
     if not steps.minimax:
         return length + to_come, slope + rise
@@ -203,15 +207,15 @@ def _value(
 
 
 @jit_inline
-def _least(
+def least_value(
     a: Array, d: Array, first: float, last: float, begin: float, rise: float,
     steps: Steps, ceiling: float,
 ) -> tuple[float, float]:  # fmt: skip
     """Least value over t in first..last, and that t; any that is no less than `ceiling`, if so."""
-    low, slope_low = _value(a, d, first, begin, rise, steps)
+    low, slope_low = step_value(a, d, first, begin, rise, steps)
     if slope_low >= 0.0 or first == last:
         return low, first
-    high, slope_high = _value(a, d, last, begin, rise, steps)
+    high, slope_high = step_value(a, d, last, begin, rise, steps)
     if slope_high <= 0.0:
         return high, last
     best, at = (low, first) if low <= high else (high, last)
@@ -220,7 +224,7 @@ def _least(
         bound = low + slope_low * (t - first)
         if bound >= ceiling or bound >= best - SAME_VALUE * abs(best) or not first < t < last:
             break
-        value, slope = _value(a, d, t, begin, rise, steps)
+        value, slope = step_value(a, d, t, begin, rise, steps)
         if value < best:
             best, at = value, t
         if slope < 0.0:
@@ -230,35 +234,6 @@ def _least(
         else:
             break
     return best, at
-
-
-@jit_inline
-def _part_below(
-    a: Array, d: Array, first: float, last: float, steps: Steps
-) -> tuple[float, float]:
-    """Part of first..last in which the distance is within the cap, by halving; empty if none is."""
-    distances = Steps(steps.weight, steps.metric, False, np.inf, steps.low, steps.high)
-    length, lowest = _least(a, d, first, last, 0.0, 0.0, distances, np.inf)
-    if length > steps.cap:
-        return 1.0, 0.0
-    return _crossing(a, d, lowest, first, steps), _crossing(a, d, lowest, last, steps)
-
-
-@jit_inline
-def _crossing(a: Array, d: Array, inside: float, outside: float, steps: Steps) -> float:
-    """Where from `inside` towards `outside` the distance comes to the cap; the end if it does not.
-
-    Never beyond it.
-    """
-    if _length(a, d, outside, steps.weight, steps.metric)[0] <= steps.cap:
-        return outside
-    for _ in range(MOST_TANGENTS):
-        middle = (inside + outside) / 2
-        if _length(a, d, middle, steps.weight, steps.metric)[0] <= steps.cap:
-            inside = middle
-        else:
-            outside = middle
-    return inside
 
 
 @jit_inline
@@ -274,21 +249,19 @@ def _offered(
     begin, end = tail[targets.one[s]], tail[targets.other[s]]
     if min(begin, end) >= ceiling:
         return np.inf, 0.0
-    _fill_course(targets, x, s, a, d)
-    first, last = _part_within(a, d, steps.low, steps.high)
+    fill_course(targets, x, s, a, d)
+    first, last = part_within(a, d, steps.low, steps.high)
     if end == np.inf:
         last, end = min(last, 0.0), begin
     elif begin == np.inf:
         first, begin = max(first, 1.0), end
-    if steps.cap < np.inf and first <= last:
-        first, last = _part_below(a, d, first, last, steps)
     if first > last or begin + (end - begin) * (first if end > begin else last) >= ceiling:
         return np.inf, 0.0
-    return _least(a, d, first, last, begin, end - begin, steps, ceiling)
+    return least_value(a, d, first, last, begin, end - begin, steps, ceiling)
 
 
 @jit_inline
-def _first_from(key: Array, a: int, b: int, x: float) -> int:
+def first_from(key: Array, a: int, b: int, x: float) -> int:
     """First of a..b whose key is not below x; b where there is none."""
     while a < b:
         middle = (a + b) // 2
@@ -319,7 +292,7 @@ def _best_step(
     for turn in range(-1, 2):
         if turn != 0 and not turning:
             continue
-        begin = _first_from(targets.key, first, last, low + 2 * pi * turn)
+        begin = first_from(targets.key, first, last, low + 2 * pi * turn)
         s = begin
         while s < last and targets.key[s] <= high + 2 * pi * turn:
             value, t = _offered(targets, tail, steps, x, s, best, a, d)
@@ -369,7 +342,7 @@ def follow(
     """Go forward from a vertex of the first layer, each time by the best step; (6) where it can be.
 
     out_at (K,) are targets and out_t (K,) where on them, of the first layer the vertex itself and
-    0. A step that no multiple in `RELAXED` lets through is none: returns the layers reached.
+    0. A step that no multiple of (6) in `RELAXED` lets through is none: returns the layers reached.
     """
     K, n = len(targets.start) - 1, len(steps.low)
     a, d, before, x = np.empty(n), np.empty(n), np.empty(n), targets.q[vertex].copy()
@@ -383,14 +356,13 @@ def follow(
                 if k > 1 and relaxed < np.inf:
                     low[i] = max(low[i], before[i] - relaxed * acceleration[i])
                     high[i] = min(high[i], before[i] + relaxed * acceleration[i])
-            cap = steps.cap * relaxed
-            boxed = Steps(steps.weight, steps.metric, steps.minimax, cap, low, high)
+            boxed = Steps(steps.weight, steps.metric, steps.minimax, steps.cap, low, high)
             _, at, t = _best_step(targets, tail, boxed, k, x, -1, a, d)
             if at >= 0:
                 break
         if at < 0:
             return k
-        _fill_course(targets, x, at, a, d)
+        fill_course(targets, x, at, a, d)
         for i in range(n):
             before[i] = a[i] + t * d[i]
             x[i] += before[i]

@@ -10,6 +10,7 @@ from kerfpath._arrays import Array, Ints
 from kerfpath._repr import short_repr
 from kerfpath.errors import InputError
 from kerfpath.kernels import continuous as kernel
+from kerfpath.kernels.beam import Beam, advance
 from kerfpath.kernels.continuous import Steps, Targets
 from kerfpath.kernels.metric import increments_between
 from kerfpath.search._problem import SearchProblem
@@ -19,9 +20,6 @@ __all__ = ["ContinuousPath", "GammaSamples", "find_continuous"]
 
 WIDEST, WIDEST_STEPS = 0.5, 6.0
 """rad, and steps of gamma: neighbouring samples are joined where no joint moves further."""
-CAP_SLACK = 1e-2
-"""Relative slack on the largest distance while the sum is brought down: between samples neither is
-exact."""
 MOST_ENDS = 12
 """First vertices that are tried, one by one, where the way depends on which it is."""
 _LAYERS_SAMPLED, _VERTICES_SAMPLED = 12, 16
@@ -150,15 +148,19 @@ class _Field:
         first = V[: self._targets.start[1]]
         if not np.isfinite(first).any():
             return []
-        steps, W = self._steps, V
-        if steps.minimax:
-            # Of all ways with the same maximum, along the one with the least sum.
-            cap = float(first.min()) * (1 + CAP_SLACK)
-            steps = steps._replace(minimax=False, cap=cap)
-            cost = np.where(self.cost <= cap, self.cost, np.inf)
-            W = self.values(cost, cost[self._targets.start[-2] :], steps)
+        steps, W = self._least_sum(first.min()) if self._steps.minimax else (self._steps, V)
         found = (self._follow(p, W, steps) for p in self._valleys(W, most))
         return [path for path in found if path is not None]
+
+    def _least_sum(self, cap: float) -> tuple[Steps, Array]:
+        """Return steps by their sum that are dear beyond a cap, and their value function.
+
+        Of all ways with the same maximum, they lead along the one with the least sum.
+        """
+        steps = self._steps._replace(minimax=False, cap=cap)
+        over = np.maximum(self.cost - cap, 0.0)
+        cost = self.cost + kernel.OVER_CAP * over
+        return steps, self.values(cost, cost[self._targets.start[-2] :], steps)
 
     def tied_paths(self, most: int, *, closed: bool) -> list[ContinuousPath]:
         """Return paths where what is allowed depends on the first vertex, by growing bounds.
@@ -184,6 +186,26 @@ class _Field:
                 found += [] if path is None else [path]
         return sorted(found, key=lambda path: path.value)[:most]
 
+    def beam(self, cost: Array, V: Array, steps: Steps, width: int, most: int) -> list[ContinuousPath]:
+        targets = self._targets
+        K = len(targets.start) - 1
+        first = V[: targets.start[1]]
+        order = np.argsort(first, kind="stable")
+        order = order[np.isfinite(first[order])][:width]
+        size = (K, width)
+        beam = Beam(np.empty(size, np.int64), np.empty(size), np.empty(size, np.int64), np.empty(size), np.zeros(K, np.int64))
+        if advance(targets, steps, cost, V, self._problem.aim.acceleration, order, beam) < K:
+            return []
+        found = []
+        for b in np.argsort(beam.cost[-1, :beam.count[-1]])[:most]:
+            at, share = np.empty(K, np.int64), np.empty(K)
+            value = beam.cost[-1, b]
+            for k in range(K - 1, -1, -1):
+                at[k], share[k] = beam.at[k, b], beam.share[k, b]
+                b = beam.parent[k, b]
+            found.append(self._path(at, share, value))
+        return found
+
     def _valleys(self, V: Array, most: int) -> Ints:
         """Return first vertices that none of their neighbours goes below, the best ones first."""
         targets, m = self._targets, int(self._targets.start[1])
@@ -202,6 +224,10 @@ class _Field:
         acceleration = self._problem.aim.acceleration
         if kernel.follow(targets, steps, V, acceleration, p, at, share) < K:
             return None
+        return self._path(at, share, float(V[p]))
+
+    def _path(self, at: Ints, share: Array, value: float) -> ContinuousPath:
+        targets, p = self._targets, at[0]
         one = np.concatenate([[p], targets.one[at[1:]]])
         other = np.concatenate([[p], targets.other[at[1:]]])
         between = increments_between(targets.q[one], targets.q[other], targets.endless)
@@ -210,7 +236,7 @@ class _Field:
             other=self._origin[other],
             share=share,
             q=targets.q[one] + share[:, None] * between,
-            value=float(V[p]),
+            value=value,
         )
 
 
