@@ -28,10 +28,17 @@ from kerfpath.kernels.continuous import (
 from kerfpath.kernels.limits import LIMIT_TOLERANCE
 from kerfpath.kernels.metric import wrap_angle
 
-__all__ = ["Beam", "advance"]
+__all__ = ["Alike", "Beam", "advance"]
 
-ALIKE = 0.25
-"""Share of what (6) lets an increment change by, up to which two states are alike."""
+
+
+class Alike(NamedTuple):
+    """Up to where two states on the same target are alike, so that the better one will do."""
+
+    share: float
+    """Of the target that they are apart;"""
+    change: float
+    """of what (6) lets the increment change by, by which that of any joint differs."""
 
 
 class Beam(NamedTuple):
@@ -64,7 +71,7 @@ class _Offers(NamedTuple):
 @jit
 def advance(
     targets: Targets, steps: Steps, cost: Array, tail: Array, acceleration: Array, first: Ints,
-    out: Beam,
+    alike: Alike, out: Beam,
 ) -> int:  # fmt: skip
     """Fill the beam from vertices `first` of the first layer; returns the layers reached.
 
@@ -95,7 +102,7 @@ def advance(
                 break
         if made == 0:
             return k
-        _keep(offers, made, acceleration, k, x, before, out)
+        _keep(offers, made, acceleration, k, x, before, alike, out)
     return K
 
 
@@ -147,25 +154,24 @@ def _offer(
 
 @jit
 def _keep(
-    offers: _Offers, made: int, acceleration: Array, k: int, x: Array, before: Array, out: Beam
-) -> None:
+    offers: _Offers, made: int, acceleration: Array, k: int, x: Array, before: Array,
+    alike: Alike, out: Beam,
+) -> None:  # fmt: skip
     """Keep the best offers of those that are not alike as the states of layer k."""
     B, n = x.shape
     from_x, kept = x.copy(), 0
     for o in np.argsort(offers.total[:made]):
-        alike = False
+        known = False
         for b in range(kept):
-            if out.at[k, b] != offers.at[o]:
+            if out.at[k, b] != offers.at[o] or abs(out.share[k, b] - offers.share[o]) > alike.share:
                 continue
             far = 0.0
             for i in range(n):
                 far = max(far, abs(before[b, i] - offers.increment[o, i]) / acceleration[i])
-                move = from_x[offers.parent[o], i] + offers.increment[o, i] - x[b, i]
-                far = max(far, abs(move - 2 * pi * np.rint(move / (2 * pi))) / acceleration[i])
-            if far < ALIKE:
-                alike = True
+            if far < alike.change:
+                known = True
                 break
-        if alike:
+        if known:
             continue
         out.at[k, kept], out.share[k, kept] = offers.at[o], offers.share[o]
         out.parent[k, kept], out.cost[k, kept] = offers.parent[o], offers.cost[o]

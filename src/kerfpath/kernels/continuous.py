@@ -30,7 +30,7 @@ MOST_TANGENTS = 24
 """Tangents to a step's cost; by the Manhattan and Chebychev metrics it has fewer pieces."""
 OVER_CAP = 20.0
 """Price of what a distance is over the cap, on top of its own."""
-RELAXED = (1.0, 1.5, 2.5, 5.0, np.inf)
+RELAXED = (1.0, 1.05, 1.2, 1.5, 2.5, 5.0, np.inf)
 """Multiples of (6) that a step forward is tried with, one after the other."""
 
 

@@ -6,20 +6,28 @@ from collections.abc import Callable
 from dataclasses import replace
 
 from kerfpath import refiner
-from kerfpath.errors import NoFeasiblePath
 from kerfpath.planner._clear import ClearSearch
 from kerfpath.planner._on_grid import plan_on_grid
 from kerfpath.planner._task import PlanningTask
 from kerfpath.plans import Plan, Proof
 from kerfpath.refiner import Refinement
-from kerfpath.search import find_continuous
+from kerfpath.search import ContinuousSearch, Effort
 
 __all__ = ["plan_continuous"]
 
 FIRST_STEP = 5e-3
 """rad: first change of gamma of a refinement that begins from a path between the samples."""
-MOST_PATHS = 2
-"""Paths that are refined."""
+FINE, COARSE = (0.1, 0.25), (1.1, 1.0)
+"""When the states of a beam are alike: for paths that hardly accelerate, and that must."""
+QUICK = (Effort(100, FINE, 2), Effort(400, COARSE, 1))
+"""Paths that are refined at first,"""
+WIDE = (Effort(1600, (1.1, 0.5), 1),)
+"""and those where the values promise better."""
+ENOUGH = 5e-3
+"""Relative gap to what the values promise with which a motion is good."""
+GAIN = 5e-3
+"""What a refinement may take off the cost that a path promises, relative."""
+VERBOSE = False
 
 
 def plan_continuous(
@@ -37,19 +45,40 @@ def plan_continuous(
     if why:
         return _said(plan_on_grid(task, finder, begin, refine=free), why)
     begin("search")
-    paths = find_continuous(task.problem, task.samples, most=MOST_PATHS)
+    search = ContinuousSearch(task.problem, task.samples)
+    found = _refined(task, search, QUICK)
+    if found is None or found.cost_after > (1 + ENOUGH) * search.value:
+        found = _better(found, _refined(task, search, WIDE))
     begin("refinement")
-    claim = Proof(optimal=False, statement="found over continuous rotation")
-    done = [
-        found
-        for path in paths
-        if (found := refiner.refine(task.plan_between(path, claim), first=FIRST_STEP)).done
-    ]
-    if not done:
+    if found is None:
         return _said(plan_on_grid(task, finder, begin, refine=True), "no motion was found off it")
-    best = min(done, key=lambda found: found.cost_after)
-    statement = finder.claimed(f"the best motion found over continuous rotation: cost {best.cost_after:.6g}")
-    return replace(best.plan, proof=Proof(optimal=False, statement=statement))
+    claim = f"the best motion found over continuous rotation: cost {found.cost_after:.6g}"
+    return replace(found.plan, proof=Proof(optimal=False, statement=finder.claimed(claim)))
+
+
+def _refined(
+    task: PlanningTask, search: ContinuousSearch, efforts: tuple[Effort, ...]
+) -> Refinement | None:
+    """Return the best motion that paths of some efforts are refined to; None where none is."""
+    claim = Proof(optimal=False, statement="found over continuous rotation")
+    plans = [
+        task.plan_between(path, claim) for effort in efforts for path in search.paths(effort)
+    ]
+    best: Refinement | None = None
+    for promised, _, made in sorted((refiner.promise(p), i, p) for i, p in enumerate(plans)):
+        if best is not None and promised * (1 - GAIN) >= best.cost_after:
+            break
+        found = refiner.refine(made, first=FIRST_STEP)
+        if VERBOSE: print("    ", promised, made.cost, found.done, found.cost_after, found.programs)
+        best = _better(best, found if found.done else None)
+    return best
+
+
+def _better(one: Refinement | None, other: Refinement | None) -> Refinement | None:
+    """Return the better of two motions, or the one that there is."""
+    if one is None or other is None:
+        return one or other
+    return min(one, other, key=lambda found: found.cost_after)
 
 
 def _grid_reason(task: PlanningTask) -> str:

@@ -19,7 +19,7 @@ from kerfpath.refiner._descent import Descent, MotionState
 from kerfpath.refiner._rates import RateLimits
 from kerfpath.search import rotation_limits
 
-__all__ = ["Binding", "Refinement", "ease", "quicken", "refine"]
+__all__ = ["Binding", "Refinement", "ease", "promise", "quicken", "refine"]
 
 MOST_INTERVALS = 10
 """Times that the interval is shortened; each gets nearer to the least by its square."""
@@ -28,6 +28,8 @@ SAME_INTERVAL = 1e-4
 
 FIRST_STEPS = 2
 """Grid steps that gamma may move by in the first iteration; what is gained sets it from then on."""
+REPAIR = 0.2
+"""Share of the cost by which once a limit beyond the limits is taken to make a motion dearer."""
 SAME_NODE = 1e-6
 """m: a node of a finer contour counts as one of the plan's up to this distance."""
 
@@ -142,6 +144,15 @@ def refine(
         programs=before + programs,
         statement=proof.statement,
     )
+
+
+def promise(plan: Plan) -> float:
+    """Return what the refinement of a plan may come to: its cost, dearer by what limits it breaks.
+
+    By the true kinematics; infinite out of reach and out of a range.
+    """
+    _, start = _descent(plan)
+    return start.cost * (1 + REPAIR * start.lost) if start.outside <= 0 else np.inf
 
 
 def ease(plan: Plan) -> Plan:

@@ -2,21 +2,24 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 
-from kerfpath._arrays import Array, Ints
+from kerfpath._arrays import Array, Bools, Ints
 from kerfpath._repr import short_repr
 from kerfpath.errors import InputError
 from kerfpath.kernels import continuous as kernel
-from kerfpath.kernels.beam import Beam, advance
+from kerfpath.kernels.beam import Alike, Beam, advance
 from kerfpath.kernels.continuous import Steps, Targets
+from kerfpath.kernels.limits import LIMIT_TOLERANCE
 from kerfpath.kernels.metric import increments_between
 from kerfpath.search._problem import SearchProblem
 from kerfpath.search._rotation import unroll
 
-__all__ = ["ContinuousPath", "GammaSamples", "find_continuous"]
+__all__ = ["ContinuousPath", "ContinuousSearch", "Effort", "GammaSamples"]
 
 WIDEST, WIDEST_STEPS = 0.5, 6.0
 """rad, and steps of gamma: neighbouring samples are joined where no joint moves further."""
@@ -68,62 +71,67 @@ class ContinuousPath:
         Where between them, from 0 to 1.
     q : (K, n) rad
         Joints, interpolated.
-    value : float
-        What the value function says of the way from its first vertex.
     """
 
     one: Ints
     other: Ints
     share: Array
     q: Array
-    value: float
 
     __repr__ = short_repr
 
 
-def find_continuous(
-    problem: SearchProblem, samples: GammaSamples, *, most: int
-) -> list[ContinuousPath]:
-    """Return good paths over continuous gamma, from different first vertices, the best one first.
+class Effort(NamedTuple):
+    """How widely paths are looked for."""
 
-    Each keeps (5) between the points of its layers, and (6) where the way forward lets it; closure
-    and rotation limits too. Joints between two samples are interpolated.
+    width: int
+    """States of each layer that are kept."""
+    alike: tuple[float, float]
+    """Apart by which share of a target, and of what (6) lets an increment change by, two are."""
+    ways: int = 1
+    """First vertices that are followed, where the way depends on which it is."""
+
+
+class _Way(NamedTuple):
+    """What guides paths from some first vertices on."""
+
+    value: float
+    first: Ints
+    steps: Steps
+    cost: Array
+    V: Array
+
+
+class ContinuousSearch:
+    """The paths over continuous gamma of a problem, by its value function.
+
+    Each path keeps (5) between the points of its layers, and (6) where the search finds how; the
+    closure and the rotation limits of the problem, too. Joints between two samples are
+    interpolated.
 
     Parameters
     ----------
     problem : SearchProblem
         Without shut edges.
     samples : GammaSamples
-    most : int
-        Largest number of paths.
 
     Raises
     ------
     InputError
         Shut edges.
     """
-    if len(problem.shut):
-        raise InputError("shut: the search over continuous gamma knows closed vertices only")
-    field = _Field(problem, samples)
-    closed = problem.closure == "periodic"
-    if not closed and not np.isfinite(problem.rotation).any():
-        return field.paths(field.values(field.cost, field.open_end()), most)
-    return field.tied_paths(most, closed=closed)
-
-
-class _Field:
-    """A problem with its targets, joints that may not turn on and on unrolled."""
 
     def __init__(self, problem: SearchProblem, samples: GammaSamples) -> None:
+        if len(problem.shut):
+            raise InputError("shut: the search over continuous gamma knows closed vertices only")
         layers, self._origin = problem.layers, np.arange(len(problem.q))
-        velocity = problem.aim.velocity
-        limited = np.isfinite(problem.rotation)
+        velocity, limited = problem.aim.velocity, np.isfinite(problem.rotation)
         if limited.any():
             layers, place = unroll(layers, problem.rotation)
             self._origin = place + np.repeat(problem.start[:-1], np.diff(layers.start))
             samples = samples.of(self._origin)
             velocity = np.where(limited, np.minimum(velocity, np.pi), velocity)
-        self._problem, self.cost = problem, np.ascontiguousarray(layers.cost)
+        self._problem, self._cost = problem, np.ascontiguousarray(layers.cost)
         self._steps = Steps(
             problem.aim.weight, problem.aim.metric, problem.aim.minimax, np.inf,
             np.ascontiguousarray(-velocity), np.ascontiguousarray(velocity),
@@ -131,117 +139,102 @@ class _Field:
         self._targets = _targets(
             np.ascontiguousarray(layers.q), layers.start, layers.endless, samples, velocity
         )
+        closed = problem.closure == "periodic"
+        self._ways = self._tied_ways(closed=closed) if closed or limited.any() else self._one_way()
 
-    def open_end(self) -> Array:
-        """Return what ends cost where a path may end anywhere, the last layer (m,)."""
-        return self.cost[self._targets.start[-2] :]
+    @property
+    def value(self) -> float:
+        """What the value function says of the best path under (5) alone; infinite without one.
 
-    def values(self, cost: Array, ends: Array, steps: Steps | None = None) -> Array:
-        """Return the value function (N,) where vertices cost (N,) and ends (m,)."""
-        V = np.full(len(cost), np.inf)
-        V[self._targets.start[-2] :] = ends
-        kernel.values_to_go(self._targets, steps or self._steps, cost, V)
+        It is interpolated, and no bound.
+        """
+        return min((way.value for way in self._ways), default=np.inf)
+
+    def paths(self, effort: Effort) -> Iterator[ContinuousPath]:
+        """Yield the best paths that so much effort finds; none where it finds none."""
+        for way in self._ways[: effort.ways]:
+            path = self._beam(way, effort)
+            if path is not None:
+                yield path
+
+    def _values(self, steps: Steps, cost: Array, last: Bools | None = None) -> Array:
+        """Return the value function (N,) where vertices cost (N,); ends of the last layer (m,)."""
+        a, V = self._targets.start[-2], np.full(len(cost), np.inf)
+        V[a:] = cost[a:] if last is None else np.where(last, cost[a:], np.inf)
+        kernel.values_to_go(self._targets, steps, cost, V)
         return V
 
-    def paths(self, V: Array, most: int) -> list[ContinuousPath]:
-        """Return the paths from the best first vertices of different valleys of the values."""
-        first = V[: self._targets.start[1]]
-        if not np.isfinite(first).any():
-            return []
-        steps, W = self._least_sum(first.min()) if self._steps.minimax else (self._steps, V)
-        found = (self._follow(p, W, steps) for p in self._valleys(W, most))
-        return [path for path in found if path is not None]
+    def _one_way(self) -> list[_Way]:
+        """Return the way from any first vertex to any last one, if there is one."""
+        way = self._way(np.arange(self._targets.start[1]), self._cost)
+        return [] if way is None else [way]
 
-    def _least_sum(self, cap: float) -> tuple[Steps, Array]:
-        """Return steps by their sum that are dear beyond a cap, and their value function.
+    def _way(self, first: Ints, cost: Array, last: Bools | None = None) -> _Way | None:
+        """Return what guides paths from some first vertices; None where (5) leaves none.
 
-        Of all ways with the same maximum, they lead along the one with the least sum.
+        Of all with the same maximum, along the one with the least sum: the distances and costs
+        beyond the least maximum are dear.
         """
-        steps = self._steps._replace(minimax=False, cap=cap)
-        over = np.maximum(self.cost - cap, 0.0)
-        cost = self.cost + kernel.OVER_CAP * over
-        return steps, self.values(cost, cost[self._targets.start[-2] :], steps)
+        V, steps = self._values(self._steps, cost, last), self._steps
+        best = float(V[first].min())
+        if best == np.inf:
+            return None
+        if steps.minimax:
+            steps = steps._replace(minimax=False, cap=best)
+            cost = cost + kernel.OVER_CAP * np.maximum(cost - best, 0.0)
+            V = self._values(steps, cost, last)
+        return _Way(best, first[np.argsort(V[first], kind="stable")], steps, cost, V)
 
-    def tied_paths(self, most: int, *, closed: bool) -> list[ContinuousPath]:
-        """Return paths where what is allowed depends on the first vertex, by growing bounds.
+    def _tied_ways(self, *, closed: bool) -> list[_Way]:
+        """Return the ways where what is allowed depends on the first vertex, the best ones first.
 
-        A path must end where it began, or may not turn a joint too far from there.
+        A path must end where it began, or may not turn a joint too far from there: one way for each
+        first vertex that may do better than all before.
         """
         start, q = self._targets.start, self._targets.q
-        free = self.values(self.cost, self.open_end())[: start[1]]
-        found: list[ContinuousPath] = []
-        reach = self._problem.rotation + 1e-9
+        free = self._values(self._steps, self._cost)[: start[1]]
+        reach = self._problem.rotation + LIMIT_TOLERANCE
+        ways: list[_Way] = []
         for p in np.argsort(free, kind="stable")[:MOST_ENDS]:
-            if not free[p] < min((path.value for path in found), default=np.inf):
+            if not free[p] < min((way.value for way in ways), default=np.inf):
                 break
-            near = (np.abs(q - q[p]) <= reach).all(axis=1)
-            cost = np.where(near, self.cost, np.inf)
-            ends = cost[start[-2] :].copy()
-            if closed:
-                same = self._origin[start[-2] :] - self._problem.start[-2] == self._origin[p]
-                ends[~same] = np.inf
-            V = self.values(cost, ends)
-            if V[p] < np.inf:
-                path = self._follow(int(p), V, self._steps)
-                found += [] if path is None else [path]
-        return sorted(found, key=lambda path: path.value)[:most]
+            cost = np.where((np.abs(q - q[p]) <= reach).all(axis=1), self._cost, np.inf)
+            place = self._origin[start[-2] :] - self._problem.start[-2]
+            way = self._way(np.array([p]), cost, place == self._origin[p] if closed else None)
+            ways += [] if way is None else [way]
+        return sorted(ways, key=lambda way: way.value)
 
-    def beam(self, cost: Array, V: Array, steps: Steps, width: int, most: int) -> list[ContinuousPath]:
+    def _beam(self, way: _Way, effort: Effort) -> ContinuousPath | None:
+        """Return the best path of a beam along a way."""
         targets = self._targets
+        first = way.first[np.isfinite(way.V[way.first])][: effort.width]
         K = len(targets.start) - 1
-        first = V[: targets.start[1]]
-        order = np.argsort(first, kind="stable")
-        order = order[np.isfinite(first[order])][:width]
-        size = (K, width)
-        beam = Beam(np.empty(size, np.int64), np.empty(size), np.empty(size, np.int64), np.empty(size), np.zeros(K, np.int64))
-        if advance(targets, steps, cost, V, self._problem.aim.acceleration, order, beam) < K:
-            return []
-        found = []
-        for b in np.argsort(beam.cost[-1, :beam.count[-1]])[:most]:
-            at, share = np.empty(K, np.int64), np.empty(K)
-            value = beam.cost[-1, b]
-            for k in range(K - 1, -1, -1):
-                at[k], share[k] = beam.at[k, b], beam.share[k, b]
-                b = beam.parent[k, b]
-            found.append(self._path(at, share, value))
-        return found
-
-    def _valleys(self, V: Array, most: int) -> Ints:
-        """Return first vertices that none of their neighbours goes below, the best ones first."""
-        targets, m = self._targets, int(self._targets.start[1])
-        joined = slice(0, int(targets.begin[1]))
-        one, other = targets.one[joined], targets.other[joined]
-        low = V[:m] < np.inf
-        low[one[V[one] > V[other]]] = False
-        low[other[V[other] > V[one]]] = False
-        every = np.flatnonzero(low)
-        return every[np.argsort(V[every], kind="stable")][:most]
-
-    def _follow(self, p: int, V: Array, steps: Steps) -> ContinuousPath | None:
-        targets = self._targets
-        K = len(targets.start) - 1
-        at, share = np.empty(K, np.int64), np.empty(K)
+        size = K, effort.width
+        beam = Beam(
+            np.empty(size, np.int64), np.empty(size), np.empty(size, np.int64), np.empty(size),
+            np.zeros(K, np.int64),
+        )  # fmt: skip
         acceleration = self._problem.aim.acceleration
-        if kernel.follow(targets, steps, V, acceleration, p, at, share) < K:
+        alike = Alike(*effort.alike)
+        if advance(targets, way.steps, way.cost, way.V, acceleration, first, alike, beam) < K:
             return None
-        return self._path(at, share, float(V[p]))
-
-    def _path(self, at: Ints, share: Array, value: float) -> ContinuousPath:
-        targets, p = self._targets, at[0]
-        one = np.concatenate([[p], targets.one[at[1:]]])
-        other = np.concatenate([[p], targets.other[at[1:]]])
+        b = int(np.argmin(beam.cost[-1, : beam.count[-1]]))
+        at, share = np.empty(K, np.int64), np.empty(K)
+        for k in range(K - 1, -1, -1):
+            at[k], share[k], b = beam.at[k, b], beam.share[k, b], beam.parent[k, b]
+        one = np.concatenate([at[:1], targets.one[at[1:]]])
+        other = np.concatenate([at[:1], targets.other[at[1:]]])
         between = increments_between(targets.q[one], targets.q[other], targets.endless)
         return ContinuousPath(
             one=self._origin[one],
             other=self._origin[other],
             share=share,
             q=targets.q[one] + share[:, None] * between,
-            value=value,
         )
 
 
 def _targets(
-    q: Array, start: Ints, endless: Array, samples: GammaSamples, velocity: Array
+    q: Array, start: Ints, endless: Bools, samples: GammaSamples, velocity: Array
 ) -> Targets:
     """Return where steps may lead, sorted by the joint that leaves the fewest."""
     (N, n), K = q.shape, len(start) - 1
