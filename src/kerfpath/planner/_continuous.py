@@ -5,13 +5,16 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import replace
 
+import numpy as np
+
 from kerfpath import refiner
+from kerfpath.kernels.metric import wrap
 from kerfpath.planner._clear import ClearSearch
 from kerfpath.planner._on_grid import plan_on_grid
 from kerfpath.planner._task import PlanningTask
 from kerfpath.plans import Plan, Proof
 from kerfpath.refiner import Refinement
-from kerfpath.search import ContinuousSearch, Effort
+from kerfpath.search import ContinuousPath, ContinuousSearch, Effort
 
 __all__ = ["plan_continuous"]
 
@@ -21,18 +24,20 @@ FINE, COARSE = (0.1, 0.25), (1.1, 1.0)
 """When the states of a beam are alike: for paths that hardly accelerate, and that must."""
 QUICK = (Effort(100, FINE, 2), Effort(400, COARSE, 1))
 """Paths that are refined at first,"""
-WIDE = (Effort(1600, (1.1, 0.5), 1),)
+WIDE = Effort(1600, (1.1, 0.5), 1)
 """and those where the values promise better."""
+SAME_VALLEY = 0.05
+"""rad of gamma up to which a path leads to the motion that another was refined to."""
 ENOUGH = 5e-3
 """Relative gap to what the values promise with which a motion is good."""
 GAIN = 5e-3
 """What a refinement may take off the cost that a path promises, relative."""
+MOST_ROUNDS = 40
+"""Searches for a clear motion."""
 VERBOSE = False
 
 
-def plan_continuous(
-    task: PlanningTask, finder: ClearSearch, begin: Callable[[str], None]
-) -> Plan:
+def plan_continuous(task: PlanningTask, finder: ClearSearch, begin: Callable[[str], None]) -> Plan:
     """Return the best motion found over continuous gamma; on the grid where that is not the way.
 
     Raises
@@ -40,15 +45,12 @@ def plan_continuous(
     NoFeasiblePath
         None was found, on the grid neither.
     """
-    free = task.robot.family.free_rotation
     why = _grid_reason(task)
     if why:
-        return _said(plan_on_grid(task, finder, begin, refine=free), why)
+        refine = task.robot.family.free_rotation
+        return _said(plan_on_grid(task, finder, begin, refine=refine), why)
     begin("search")
-    search = ContinuousSearch(task.problem, task.samples)
-    found = _refined(task, search, QUICK)
-    if found is None or found.cost_after > (1 + ENOUGH) * search.value:
-        found = _better(found, _refined(task, search, WIDE))
+    found = _clear_motion(task, finder)
     begin("refinement")
     if found is None:
         return _said(plan_on_grid(task, finder, begin, refine=True), "no motion was found off it")
@@ -56,22 +58,56 @@ def plan_continuous(
     return replace(found.plan, proof=Proof(optimal=False, statement=finder.claimed(claim)))
 
 
-def _refined(
-    task: PlanningTask, search: ContinuousSearch, efforts: tuple[Effort, ...]
-) -> Refinement | None:
-    """Return the best motion that paths of some efforts are refined to; None where none is."""
+def _clear_motion(task: PlanningTask, finder: ClearSearch) -> Refinement | None:
+    """Return the best motion found that is clear; None where none is.
+
+    What paths want to use is looked at, as often as some of it collides. A motion that the
+    refinement brings to a collision keeps away from there the next time.
+    """
+    graph, kept = task.graph, np.zeros(len(task.graph.q))
+    for _ in range(MOST_ROUNDS):
+        problem = finder.open_problem(task.problem)
+        problem = replace(problem, vertex_cost=problem.vertex_cost + kept)
+        search = ContinuousSearch(problem, task.samples)
+        quick = [path for effort in QUICK for path in search.paths(effort)]
+        if finder.learn([vertices for path in quick for vertices in (path.one, path.other)]):
+            continue
+        found = _refined(task, quick)
+        if found is None or found.cost_after > (1 + ENOUGH) * search.value:
+            found = _better(found, _refined(task, list(search.paths(WIDE))))
+        if found is None:
+            return None
+        nodes = np.flatnonzero(finder.unclear(found.plan))
+        if not nodes.size:
+            return found
+        for k in nodes:
+            layer = slice(graph.start[k], graph.start[k + 1])
+            off = wrap(graph.gamma[graph.sample[layer]] - found.plan.gamma[k])
+            near = np.abs(off) <= 2 * np.pi / len(graph.gamma)
+            kept[layer][near & (graph.posture[layer] == found.plan.posture[k])] = np.inf
+    return None
+
+
+def _refined(task: PlanningTask, paths: list[ContinuousPath]) -> Refinement | None:
+    """Return the best motion that paths are refined to; None where none is."""
     claim = Proof(optimal=False, statement="found over continuous rotation")
-    plans = [
-        task.plan_between(path, claim) for effort in efforts for path in search.paths(effort)
-    ]
+    plans = [task.plan_between(path, claim) for path in paths]
     best: Refinement | None = None
     for promised, _, made in sorted((refiner.promise(p), i, p) for i, p in enumerate(plans)):
         if best is not None and promised * (1 - GAIN) >= best.cost_after:
             break
+        if best is not None and _close(made, best.plan):
+            continue
         found = refiner.refine(made, first=FIRST_STEP)
         if VERBOSE: print("    ", promised, made.cost, found.done, found.cost_after, found.programs)
         best = _better(best, found if found.done else None)
     return best
+
+
+def _close(made: Plan, other: Plan) -> bool:
+    """Return whether two motions are so alike that they are refined to the same one."""
+    apart = np.abs(wrap(made.gamma - other.gamma)).max()
+    return bool(apart < SAME_VALLEY and np.array_equal(made.posture, other.posture))
 
 
 def _better(one: Refinement | None, other: Refinement | None) -> Refinement | None:

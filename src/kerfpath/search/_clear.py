@@ -129,6 +129,12 @@ class CheckedEdges:
         edges = np.concatenate([np.stack([run[:-1], run[1:]], axis=1) for run in runs])
         return self._look_at_edges(edges, near)
 
+    def learn_vertices(self, vertices: Ints) -> bool:
+        """Ask for what is not known of vertices, and about; True where one of them is closed."""
+        self.searches += 1
+        self._look_at_vertices(vertices)
+        return bool(np.isinf(self.cost[vertices]).any())
+
     def _look_at_vertices(self, vertices: Ints) -> bool:
         """Ask for what is not known of a path's vertices; True where one costs something."""
         dearer = self._ask(vertices)
