@@ -129,10 +129,14 @@ def _offer(
             one, other = targets.one[s], targets.other[s]
             lower, upper = tail[one], tail[other]
             s += 1
-            if lower == np.inf or upper == np.inf:
+            if min(lower, upper) == np.inf:
                 continue
             fill_course(targets, x, s - 1, a, d)
             first, last = part_within(a, d, low, high)
+            if upper == np.inf:
+                last, other, upper = min(last, 0.0), one, lower
+            elif lower == np.inf:
+                first, one, lower = max(first, 1.0), other, upper
             if first > last:
                 continue
             value, best = least_value(a, d, first, last, lower, upper - lower, boxed, np.inf)

@@ -24,6 +24,8 @@ _P = TypeVar("_P", bound=FoundPath)
 
 POSES_MEASURED, PAIRS_NAMED = 100, 3
 """Poses of a node that are measured, and pairs of bodies that are named, where it is closed."""
+SAMPLES_LOOKED_AT = 8
+"""Samples of gamma on either side of a path that the refinement may use if they are clear."""
 POSES_SETTLED = 20_000
 """Poses asked about to find the nodes at which none is clear."""
 RANGES_LISTED = 6
@@ -81,6 +83,16 @@ class ClearSearch:
         if self._cell is None or not vertices:
             return False
         return self._known.learn_vertices(np.concatenate(vertices))
+
+    def corridor(self, one: Ints, other: Ints) -> tuple[Ints, Ints] | None:
+        """Return how many samples before vertices `one`, and after `other`, are clear in a row.
+
+        (K,) each, up to `SAMPLES_LOOKED_AT`; None without a cell.
+        """
+        if self._cell is None:
+            return None
+        back, ahead = (self._known.open_run(end, side, SAMPLES_LOOKED_AT) for side, end in enumerate((one, other)))
+        return back, ahead
 
     def _named(self, broken: NoFeasiblePath) -> NoFeasiblePath:
         """Say of a break by collision where no pose is clear at all, and which bodies collide.

@@ -32,9 +32,10 @@ ENOUGH = 5e-3
 """Relative gap to what the values promise with which a motion is good."""
 GAIN = 5e-3
 """What a refinement may take off the cost that a path promises, relative."""
-MOST_ROUNDS = 40
-"""Searches for a clear motion."""
-VERBOSE = False
+MOST_SEARCHES = 40
+"""Searches for a path that is clear."""
+NARROWED = 6
+"""Times that a refinement is kept nearer to its path where it is not clear."""
 
 
 def plan_continuous(task: PlanningTask, finder: ClearSearch, begin: Callable[[str], None]) -> Plan:
@@ -61,47 +62,59 @@ def plan_continuous(task: PlanningTask, finder: ClearSearch, begin: Callable[[st
 def _clear_motion(task: PlanningTask, finder: ClearSearch) -> Refinement | None:
     """Return the best motion found that is clear; None where none is.
 
-    What paths want to use is looked at, as often as some of it collides. A motion that the
-    refinement brings to a collision keeps away from there the next time.
+    What paths want to use is looked at, and avoided where it collides, until they are clear.
     """
-    graph, kept = task.graph, np.zeros(len(task.graph.q))
-    for _ in range(MOST_ROUNDS):
-        problem = finder.open_problem(task.problem)
-        problem = replace(problem, vertex_cost=problem.vertex_cost + kept)
-        search = ContinuousSearch(problem, task.samples)
+    for _ in range(MOST_SEARCHES):
+        search = ContinuousSearch(finder.open_problem(task.problem), task.samples)
         quick = [path for effort in QUICK for path in search.paths(effort)]
         if finder.learn([vertices for path in quick for vertices in (path.one, path.other)]):
             continue
-        found = _refined(task, quick)
+        found = _refined(task, finder, quick)
         if found is None or found.cost_after > (1 + ENOUGH) * search.value:
-            found = _better(found, _refined(task, list(search.paths(WIDE))))
-        if found is None:
-            return None
-        nodes = np.flatnonzero(finder.unclear(found.plan))
-        if not nodes.size:
-            return found
-        for k in nodes:
-            layer = slice(graph.start[k], graph.start[k + 1])
-            off = wrap(graph.gamma[graph.sample[layer]] - found.plan.gamma[k])
-            near = np.abs(off) <= 2 * np.pi / len(graph.gamma)
-            kept[layer][near & (graph.posture[layer] == found.plan.posture[k])] = np.inf
+            found = _better(found, _refined(task, finder, list(search.paths(WIDE))))
+        return found
     return None
 
 
-def _refined(task: PlanningTask, paths: list[ContinuousPath]) -> Refinement | None:
+def _refined(
+    task: PlanningTask, finder: ClearSearch, paths: list[ContinuousPath]
+) -> Refinement | None:
     """Return the best motion that paths are refined to; None where none is."""
     claim = Proof(optimal=False, statement="found over continuous rotation")
     plans = [task.plan_between(path, claim) for path in paths]
     best: Refinement | None = None
-    for promised, _, made in sorted((refiner.promise(p), i, p) for i, p in enumerate(plans)):
+    for promised, i in sorted((refiner.promise(plan), i) for i, plan in enumerate(plans)):
         if best is not None and promised * (1 - GAIN) >= best.cost_after:
             break
-        if best is not None and _close(made, best.plan):
+        if best is not None and _close(plans[i], best.plan):
             continue
-        found = refiner.refine(made, first=FIRST_STEP)
-        if VERBOSE: print("    ", promised, made.cost, found.done, found.cost_after, found.programs)
-        best = _better(best, found if found.done else None)
+        best = _better(best, _refine_path(task, finder, paths[i], plans[i]))
     return best
+
+
+def _refine_path(
+    task: PlanningTask, finder: ClearSearch, path: ContinuousPath, made: Plan
+) -> Refinement | None:
+    """Return what a path is refined to, clear; None where the limits, or clearance, are not kept.
+
+    In a cell gamma stays between samples that are clear, and nearer to the path where the motion
+    between them is not.
+    """
+    clear = finder.corridor(path.one, path.other)
+    if clear is None:
+        found = refiner.refine(made, first=FIRST_STEP)
+        return found if found.done else None
+    step = 2 * np.pi / len(task.graph.gamma)
+    low = made.gamma - (path.share + clear[0]) * step
+    high = made.gamma + (np.where(path.one == path.other, 0, 1 - path.share) + clear[1]) * step
+    for _ in range(NARROWED):
+        found = refiner.refine(made, first=FIRST_STEP, within=(low, high))
+        unclear = finder.unclear(found.plan)
+        if not (found.done and unclear.any()):
+            break
+        low = np.where(unclear, (low + made.gamma) / 2, low)
+        high = np.where(unclear, (high + made.gamma) / 2, high)
+    return found if found.done and not unclear.any() else None
 
 
 def _close(made: Plan, other: Plan) -> bool:

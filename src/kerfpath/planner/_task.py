@@ -13,7 +13,7 @@ from kerfpath._repr import short_repr
 from kerfpath.contour import Contour
 from kerfpath.errors import InputError
 from kerfpath.graph import LayeredGraph
-from kerfpath.kernels.metric import increments
+from kerfpath.kernels.metric import increments, wrap
 from kerfpath.options import PlanOptions
 from kerfpath.planner._graph import (
     layered_graph,
@@ -105,16 +105,21 @@ class PlanningTask:
         )
 
     def plan_between(self, path: ContinuousPath, proof: Proof) -> Plan:
-        """Return the plan of a path between the samples, its joints interpolated as the path's."""
+        """Return the plan of a path between the samples, its joints interpolated as the path's.
+
+        With a periodic closure gamma is moved along the path so that it ends where it begins.
+        """
         graph, s, near = self.graph, self.settings, path.one
-        step = 2 * np.pi / len(graph.gamma)
+        gamma = graph.gamma[graph.sample[near]] + path.share * 2 * np.pi / len(graph.gamma)
+        if s.closure == "periodic":
+            gamma = gamma - np.linspace(0.0, wrap(gamma[-1] - gamma[0]), len(gamma))
         made = Plan(
             contour=self.contour,
             robot=self.robot,
             T_flange_tip=self.T_flange_tip,
             T_base_part=self.T_base_part,
             q=path.q,
-            gamma=graph.gamma[graph.sample[near]] + step * path.share,
+            gamma=gamma,
             tilt=graph.tilt[graph.variant[near]],
             posture=graph.posture[near],
             turn=graph.turn[near],

@@ -105,6 +105,8 @@ class Descent:
         it counts as converged.
     first : float rad, optional
         Largest change in the first iteration where that is less.
+    gamma_low, gamma_high : (K,) rad, optional
+        Where gamma is kept.
     node_cost : (K,), optional
         What each node costs, taken as fixed; what it comes to once gamma has moved is found after.
     cap : float
@@ -120,6 +122,8 @@ class Descent:
     objective: ObjectiveKind
     radius: float
     first: float | None = None
+    gamma_low: Array | float = -np.inf
+    gamma_high: Array | float = np.inf
     node_cost: Array | None = None
     cap: float = np.inf
 
@@ -255,6 +259,8 @@ class Descent:
             q=at.q,
             slope=np.where(movable[:, None], slope, 0.0),
             radius=np.where(movable, radius, 0.0),
+            least=np.clip((self.gamma_low - at.gamma) / radius, -1.0, 0.0),
+            most=np.clip((self.gamma_high - at.gamma) / radius, 0.0, 1.0),
             lower=np.where(endless, -np.inf, self.limits.lower + MARGIN),
             upper=np.where(endless, np.inf, self.limits.upper - MARGIN),
             rotation=self.rotation - MARGIN,

@@ -77,6 +77,7 @@ def refine(
     eta_v: float | None = None,
     eta_a: float | None = None,
     first: float | None = None,
+    within: tuple[Array, Array] | None = None,
 ) -> Refinement:
     """Return the plan with gamma moved off its grid: better, or within limits the grid cannot meet.
 
@@ -96,6 +97,8 @@ def refine(
     first : float rad, optional
         Largest change of gamma in the first iteration, for a motion that is close to the best;
         default: two steps of the plan's grid.
+    within : two of (K,) rad, optional
+        Least and largest gamma of each node, on the turn of the plan's.
 
     Raises
     ------
@@ -119,7 +122,8 @@ def refine(
     if comfort is not None and comfort.clearance is not None and comfort.clearance.cost:
         return _unrefined(plan, "what clearance costs is known on the grid only")
     descent, start = _descent(asked)
-    descent = replace(descent, first=first)
+    low, high = within or (-np.inf, np.inf)
+    descent = replace(descent, first=first, gamma_low=low, gamma_high=high)
     begun, before = descent.admitted(start)
     if not begun.admitted:
         return _unrefined(plan, _closest(descent, begun))

@@ -25,6 +25,8 @@ WIDEST, WIDEST_STEPS = 0.5, 6.0
 """rad, and steps of gamma: neighbouring samples are joined where no joint moves further."""
 MOST_ENDS = 12
 """First vertices that are tried, one by one, where the way depends on which it is."""
+APART = 0.15
+"""rad by which some joint of two of them differs: the refinement moves them."""
 _LAYERS_SAMPLED, _VERTICES_SAMPLED = 12, 16
 """Layers, and vertices of each, by which the joint that sorts the targets is chosen."""
 
@@ -106,8 +108,8 @@ class ContinuousSearch:
     """The paths over continuous gamma of a problem, by its value function.
 
     Each path keeps (5) between the points of its layers, and (6) where the search finds how; the
-    closure and the rotation limits of the problem, too. Joints between two samples are
-    interpolated.
+    rotation limits of the problem, too; and with its periodic closure ends less than a sample from
+    where it begins. Joints between two samples are interpolated.
 
     Parameters
     ----------
@@ -195,14 +197,29 @@ class ContinuousSearch:
         free = self._values(self._steps, self._cost)[: start[1]]
         reach = self._problem.rotation + LIMIT_TOLERANCE
         ways: list[_Way] = []
-        for p in np.argsort(free, kind="stable")[:MOST_ENDS]:
+        tried: list[int] = []
+        for p in np.argsort(free, kind="stable"):
             if not free[p] < min((way.value for way in ways), default=np.inf):
                 break
+            away = increments_between(q[tried], q[p], self._targets.endless)
+            if (np.abs(away).max(axis=1) < APART).any():
+                continue
+            if len(tried) == MOST_ENDS:
+                break
+            tried.append(int(p))
             cost = np.where((np.abs(q - q[p]) <= reach).all(axis=1), self._cost, np.inf)
-            place = self._origin[start[-2] :] - self._problem.start[-2]
-            way = self._way(np.array([p]), cost, place == self._origin[p] if closed else None)
+            way = self._way(np.array([p]), cost, self._near_end(p) if closed else None)
             ways += [] if way is None else [way]
         return sorted(ways, key=lambda way: way.value)
+
+    def _near_end(self, p: int) -> Bools:
+        """Return which vertices (m,) of the last layer repeat one of the first, or are beside it."""
+        targets = self._targets
+        joined = slice(int(targets.begin[0]), int(targets.begin[1]))
+        one, other = targets.one[joined], targets.other[joined]
+        beside = np.concatenate([[p], other[one == p], one[other == p]])
+        place = self._origin[targets.start[-2] :] - self._problem.start[-2]
+        return np.isin(place, self._origin[beside])
 
     def _beam(self, way: _Way, effort: Effort) -> ContinuousPath | None:
         """Return the best path of a beam along a way."""
