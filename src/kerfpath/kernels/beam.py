@@ -19,10 +19,9 @@ from kerfpath.kernels.continuous import (
     RELAXED,
     Steps,
     Targets,
-    fill_course,
+    course_within,
     first_from,
     least_value,
-    part_within,
     step_value,
 )
 from kerfpath.kernels.limits import LIMIT_TOLERANCE
@@ -131,8 +130,7 @@ def _offer(
             s += 1
             if min(lower, upper) == np.inf:
                 continue
-            fill_course(targets, x, s - 1, a, d)
-            first, last = part_within(a, d, low, high)
+            first, last = course_within(targets, x, s - 1, low, high, a, d)
             if upper == np.inf:
                 last, other, upper = min(last, 0.0), one, lower
             elif lower == np.inf:

@@ -22,7 +22,7 @@ from kerfpath.kernels._jit import jit, jit_inline
 from kerfpath.kernels.limits import LIMIT_TOLERANCE
 from kerfpath.kernels.metric import EUCLID, MANHATTAN, increment, wrap_angle
 
-__all__ = ["OVER_CAP", "Targets", "follow", "join_samples", "sort_targets", "values_to_go"]
+__all__ = ["OVER_CAP", "Targets", "join_samples", "sort_targets", "values_to_go"]
 
 SAME_VALUE = 1e-9
 """Relative gap between a value and its bound below which a minimum over t has been found."""
@@ -140,31 +140,29 @@ def sort_targets(targets: Targets) -> None:
 
 
 @jit_inline
-def fill_course(targets: Targets, x: Array, s: int, out_a: Array, out_d: Array) -> None:
-    """Fill the increments a + t d from joints x to target s, endless joints the short way."""
+def course_within(
+    targets: Targets, x: Array, s: int, low: Array, high: Array, out_a: Array, out_d: Array
+) -> tuple[float, float]:
+    """Part of t in [0, 1] where the increment a + t d from joints x to target s is in low..high.
+
+    Fills a and d (n,), endless joints the short way, as far as the part is not empty: then it ends
+    before it begins.
+    """
     j, w = targets.one[s], targets.other[s]
+    first, last = 0.0, 1.0
     for i in range(len(x)):
         a, d = targets.q[j, i] - x[i], targets.q[w, i] - targets.q[j, i]
         if targets.endless[i]:
             d = increment(d, True)
             a -= 2.0 * pi * np.rint((a + d / 2) / (2.0 * pi))
         out_a[i], out_d[i] = a, d
-
-
-@jit_inline
-def part_within(a: Array, d: Array, low: Array, high: Array) -> tuple[float, float]:
-    """Part of t in [0, 1] with low <= a + t d <= high; empty where it ends before it begins."""
-    first, last = 0.0, 1.0
-    for i in range(len(a)):
-        under = low[i] - LIMIT_TOLERANCE - a[i]
-        over = high[i] + LIMIT_TOLERANCE - a[i]
-        if abs(d[i]) <= LIMIT_TOLERANCE:
-            if under > 0.0 or over < 0.0:
-                return 1.0, 0.0
-        elif d[i] > 0.0:
-            first, last = max(first, under / d[i]), min(last, over / d[i])
-        else:
-            first, last = max(first, over / d[i]), min(last, under / d[i])
+        under, over = low[i] - LIMIT_TOLERANCE - a, high[i] + LIMIT_TOLERANCE - a
+        if max(0.0, d) < under or min(0.0, d) > over:
+            return 1.0, 0.0
+        if d > LIMIT_TOLERANCE:
+            first, last = max(first, under / d), min(last, over / d)
+        elif d < -LIMIT_TOLERANCE:
+            first, last = max(first, over / d), min(last, under / d)
         if first > last:
             return 1.0, 0.0
     return first, last
@@ -249,8 +247,7 @@ def _offered(
     begin, end = tail[targets.one[s]], tail[targets.other[s]]
     if min(begin, end) >= ceiling:
         return np.inf, 0.0
-    fill_course(targets, x, s, a, d)
-    first, last = part_within(a, d, steps.low, steps.high)
+    first, last = course_within(targets, x, s, steps.low, steps.high, a, d)
     if end == np.inf:
         last, end = min(last, 0.0), begin
     elif begin == np.inf:
@@ -332,39 +329,3 @@ def values_to_go(targets: Targets, steps: Steps, cost: Array, out_tail: Array) -
         if not alive:
             return k + 1
     return 0
-
-
-@jit
-def follow(
-    targets: Targets, steps: Steps, tail: Array, acceleration: Array, vertex: int,
-    out_at: Ints, out_t: Array,
-) -> int:  # fmt: skip
-    """Go forward from a vertex of the first layer, each time by the best step; (6) where it can be.
-
-    out_at (K,) are targets and out_t (K,) where on them, of the first layer the vertex itself and
-    0. A step that no multiple of (6) in `RELAXED` lets through is none: returns the layers reached.
-    """
-    K, n = len(targets.start) - 1, len(steps.low)
-    a, d, before, x = np.empty(n), np.empty(n), np.empty(n), targets.q[vertex].copy()
-    low, high = np.empty(n), np.empty(n)
-    out_at[0], out_t[0] = vertex, 0.0
-    for k in range(1, K):
-        at, t = -1, 0.0
-        for relaxed in RELAXED:
-            for i in range(n):
-                low[i], high[i] = steps.low[i], steps.high[i]
-                if k > 1 and relaxed < np.inf:
-                    low[i] = max(low[i], before[i] - relaxed * acceleration[i])
-                    high[i] = min(high[i], before[i] + relaxed * acceleration[i])
-            boxed = Steps(steps.weight, steps.metric, steps.minimax, steps.cap, low, high)
-            _, at, t = _best_step(targets, tail, boxed, k, x, -1, a, d)
-            if at >= 0:
-                break
-        if at < 0:
-            return k
-        fill_course(targets, x, at, a, d)
-        for i in range(n):
-            before[i] = a[i] + t * d[i]
-            x[i] += before[i]
-        out_at[k], out_t[k] = at, t
-    return K
