@@ -22,7 +22,7 @@ FIRST_STEP = 5e-3
 """rad: first change of gamma of a refinement that begins from a path between the samples."""
 FINE, COARSE = (0.1, 0.25), (1.1, 1.0)
 """When the states of a beam are alike: for paths that hardly accelerate, and that must."""
-QUICK = (Effort(100, FINE, 2), Effort(400, COARSE, 1))
+QUICK = (Effort(60, FINE, 2), Effort(200, COARSE, 2))
 """Paths that are refined at first,"""
 WIDE = Effort(1600, (1.1, 0.5), 1)
 """and those where the values promise better."""
