@@ -169,7 +169,7 @@ class PlanOptions:
         A value out of its range or not of its kind; `OptionConflict` where two do not go together.
     """
 
-    gamma_step: float = np.pi / 180
+    gamma_step: float = np.pi / 90
     frames: FrameKind = "rotation-minimising"
     tilt: Tilt | None = None
     postures: tuple[int, ...] | None = None

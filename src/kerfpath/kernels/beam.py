@@ -30,7 +30,6 @@ from kerfpath.kernels.metric import wrap_angle
 __all__ = ["Alike", "Beam", "advance"]
 
 
-
 class Alike(NamedTuple):
     """Up to where two states on the same target are alike, so that the better one will do."""
 
@@ -51,7 +50,7 @@ class Beam(NamedTuple):
     """(K, B): state of the layer before."""
     cost: Array
     """(K, B): of the way there, sorted with the value to come."""
-    count: Ints
+    size: Ints
     """(K,): states of each layer."""
 
 
@@ -83,8 +82,8 @@ def advance(
         np.empty(64 * B), np.empty(64 * B), np.empty(64 * B, np.int64),
         np.empty(64 * B, np.int64), np.empty(64 * B), np.empty((64 * B, n)),
     )  # fmt: skip
-    out.count[0] = min(B, len(first))
-    for b in range(out.count[0]):
+    out.size[0] = min(B, len(first))
+    for b in range(out.size[0]):
         p = first[b]
         out.at[0, b], out.share[0, b], out.parent[0, b], out.cost[0, b] = p, 0.0, -1, cost[p]
         x[b] = targets.q[p]
@@ -92,7 +91,7 @@ def advance(
         made = 0
         for relaxed in RELAXED:
             free = np.inf if k == 1 else relaxed
-            for b in range(out.count[k - 1]):
+            for b in range(out.size[k - 1]):
                 made = _offer(
                     targets, steps, cost, tail, free * acceleration, k, b, x[b], before[b],
                     out.cost[k - 1, b], made, offers,
@@ -102,7 +101,7 @@ def advance(
         if made == 0:
             return k
         _keep(offers, made, acceleration, k, x, before, alike, out)
-    return K
+    return len(out.at)
 
 
 @jit
@@ -137,7 +136,7 @@ def _offer(
                 first, one, lower = max(first, 1.0), other, upper
             if first > last:
                 continue
-            value, best = least_value(a, d, first, last, lower, upper - lower, boxed, np.inf)
+            best = least_value(a, d, first, last, lower, upper - lower, boxed, np.inf)[1]
             for way in range(3):
                 t = best if way == 0 else (first if way == 1 else last)
                 if (way > 0 and t == best) or made == len(offers.total):
@@ -182,4 +181,4 @@ def _keep(
         kept += 1
         if kept == B:
             break
-    out.count[k] = kept
+    out.size[k] = kept

@@ -320,9 +320,7 @@ def values_to_go(targets: Targets, steps: Steps, cost: Array, out_tail: Array) -
             out_tail[p] = np.inf
             if cost[p] == np.inf:
                 continue
-            value, at, _ = _best_step(
-                targets, out_tail, steps, k + 1, targets.q[p], hint, a, d
-            )
+            value, at, _ = _best_step(targets, out_tail, steps, k + 1, targets.q[p], hint, a, d)
             if at >= 0:
                 hint, alive = at, True
                 out_tail[p] = _joined(steps.minimax, cost[p], value)

@@ -91,7 +91,10 @@ class ClearSearch:
         """
         if self._cell is None:
             return None
-        back, ahead = (self._known.open_run(end, side, SAMPLES_LOOKED_AT) for side, end in enumerate((one, other)))
+        back, ahead = (
+            self._known.open_run(end, side, SAMPLES_LOOKED_AT)
+            for side, end in enumerate((one, other))
+        )
         return back, ahead
 
     def _named(self, broken: NoFeasiblePath) -> NoFeasiblePath:

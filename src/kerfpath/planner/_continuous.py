@@ -16,7 +16,7 @@ from kerfpath.plans import Plan, Proof
 from kerfpath.refiner import Refinement
 from kerfpath.search import ContinuousPath, ContinuousSearch, Effort
 
-__all__ = ["plan_continuous"]
+__all__ = ["clear_motion", "grid_reason", "plan_continuous"]
 
 FIRST_STEP = 5e-3
 """rad: first change of gamma of a refinement that begins from a path between the samples."""
@@ -46,20 +46,22 @@ def plan_continuous(task: PlanningTask, finder: ClearSearch, begin: Callable[[st
     NoFeasiblePath
         None was found, on the grid neither.
     """
-    why = _grid_reason(task)
-    if why:
-        refine = task.robot.family.free_rotation
-        return _said(plan_on_grid(task, finder, begin, refine=refine), why)
-    begin("search")
-    found = _clear_motion(task, finder)
-    begin("refinement")
+    why, found = grid_reason(task), None
+    if not why:
+        begin("search")
+        found = clear_motion(task, finder)
+        why = "no motion was found off it"
     if found is None:
-        return _said(plan_on_grid(task, finder, begin, refine=True), "no motion was found off it")
+        comfort = task.settings.comfort
+        # What the nodes of a slower motion cost is known on the grid only.
+        priced = task.settings.feed == "dip" and comfort is not None and comfort.costs
+        refine = task.robot.family.free_rotation and not priced
+        return _said(plan_on_grid(task, finder, begin, refine=refine), why)
     claim = f"the best motion found over continuous rotation: cost {found.cost_after:.6g}"
     return replace(found.plan, proof=Proof(optimal=False, statement=finder.claimed(claim)))
 
 
-def _clear_motion(task: PlanningTask, finder: ClearSearch) -> Refinement | None:
+def clear_motion(task: PlanningTask, finder: ClearSearch) -> Refinement | None:
     """Return the best motion found that is clear; None where none is.
 
     What paths want to use is looked at, and avoided where it collides, until they are clear.
@@ -130,7 +132,7 @@ def _better(one: Refinement | None, other: Refinement | None) -> Refinement | No
     return min(one, other, key=lambda found: found.cost_after)
 
 
-def _grid_reason(task: PlanningTask) -> str:
+def grid_reason(task: PlanningTask) -> str:
     """Return why a task is planned on the grid; "" where it need not be."""
     comfort = task.settings.comfort
     if not task.robot.family.free_rotation:

@@ -213,7 +213,7 @@ class ContinuousSearch:
         return sorted(ways, key=lambda way: way.value)
 
     def _near_end(self, p: int) -> Bools:
-        """Return which vertices (m,) of the last layer repeat one of the first, or are beside it."""
+        """Return which of the last layer (m,) repeat a vertex of the first, or are beside it."""
         targets = self._targets
         joined = slice(int(targets.begin[0]), int(targets.begin[1]))
         one, other = targets.one[joined], targets.other[joined]
@@ -235,7 +235,7 @@ class ContinuousSearch:
         alike = Alike(*effort.alike)
         if advance(targets, way.steps, way.cost, way.V, acceleration, first, alike, beam) < K:
             return None
-        b = int(np.argmin(beam.cost[-1, : beam.count[-1]]))
+        b = int(np.argmin(beam.cost[-1, : beam.size[-1]]))
         at, share = np.empty(K, np.int64), np.empty(K)
         for k in range(K - 1, -1, -1):
             at[k], share[k], b = beam.at[k, b], beam.share[k, b], beam.parent[k, b]

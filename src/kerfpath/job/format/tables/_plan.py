@@ -11,7 +11,14 @@ from kerfpath.comfort import Comfort
 from kerfpath.contour import FrameKind
 from kerfpath.job.format._values import JointsNotNegative, NotNegative, Positive, fault, key
 from kerfpath.job.format.tables._table import Table, given
-from kerfpath.options import EXACT_OR_BETTER, FeedKind, Interruptions, OptionConflict, PlanMethod, PlanOptions
+from kerfpath.options import (
+    EXACT_OR_BETTER,
+    FeedKind,
+    Interruptions,
+    OptionConflict,
+    PlanMethod,
+    PlanOptions,
+)
 from kerfpath.robots import Robot, postures_named
 from kerfpath.search import Closure, Metric, ObjectiveKind
 from kerfpath.tilt import Tilt
@@ -67,7 +74,7 @@ class PlanTable(Table):
 
     gamma_step_deg: Annotated[
         Positive, key("a number above 0, at most 360, in deg", "1", le=360)
-    ] = 1.0
+    ] = 2.0
     objective: ObjectiveKind = "sum"
     metric: Metric = "manhattan"
     method: PlanMethod = "continuous"
