@@ -172,7 +172,7 @@ def small(circle, arm, tool, placement):
     nodes = circle.resample(count=13)
     where = {"tool": tool, "placement": placement, "gamma_step": STEP}
     graph = layered_graph(nodes, arm, postures=(0, 1), **where)
-    return nodes, arm, where | {"graph": graph, "speed": 0.05}
+    return nodes, arm, where | {"graph": graph, "speed": 0.05, "method": "exact"}
 
 
 EVERY = Comfort(

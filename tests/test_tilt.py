@@ -46,7 +46,7 @@ def options(tool, placement):
 
 @pytest.fixture(scope="module")
 def made(arc, arm, options):
-    return plan(arc, arm, tilt=Tilt(cone=CONE, steps=2, cost=0.1), **options)
+    return plan(arc, arm, tilt=Tilt(cone=CONE, steps=2, cost=0.1), method="exact", **options)
 
 
 @pytest.mark.parametrize(("steps", "count"), [(0, 1), (1, 5), (2, 13), (3, 29), (5, 81)])
