@@ -21,8 +21,9 @@ from kerfpath.search._rotation import unroll
 
 __all__ = ["ContinuousPath", "ContinuousSearch", "Effort", "GammaSamples"]
 
-WIDEST, WIDEST_STEPS = 0.5, 6.0
-"""rad, and steps of gamma: neighbouring samples are joined where no joint moves further."""
+WIDEST, WIDEST_STEPS, WIDEST_OF_ALL = 0.5, 6.0, 1.5
+"""rad, steps of gamma, and rad: neighbouring samples are joined where no joint moves further than
+the larger of the first two and the last one."""
 MOST_ENDS = 12
 """First vertices that are tried, one by one, where the way depends on which it is."""
 APART = 0.15
@@ -257,6 +258,7 @@ def _targets(
     (N, n), K = q.shape, len(start) - 1
     one, other, begin = np.empty(N, np.int64), np.empty(N, np.int64), np.empty(K + 1, np.int64)
     widest = max(WIDEST, WIDEST_STEPS * 2 * np.pi / samples.samples)
+    widest = min(widest, WIDEST_OF_ALL)
     kernel.join_samples(
         q, start, samples.sample, samples.variant, samples.posture, samples.samples, endless,
         widest, one, other, begin,
