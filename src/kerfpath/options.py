@@ -139,7 +139,10 @@ class PlanOptions:
         Tolerance of the tool axis, searched too; None: the nominal axis alone.
     postures : tuple of int, optional
         The postures that may be used; None: all. See `kerfpath.robots.postures_named`.
-    method, objective, metric, closure
+    method : {"continuous", "exact", "paper", "known"}
+        "continuous": the best motion found over continuous gamma; the others search the grid, as
+        `kerfpath.shortest_path` does.
+    objective, metric, closure
         As in `kerfpath.shortest_path`.
     weights : (n,) 1/rad, optional
         Weights of the joint-space distance (1/m for a rail); None: 1 / (velocity limit * dt).
@@ -152,7 +155,8 @@ class PlanOptions:
         Where the limits do not let the speed be held: "constant" refuses, "dip" reduces the feed
         there and holds the speed elsewhere, in the least time.
     refine : bool
-        Whether gamma moves off its grid after the search, see `kerfpath.refine`.
+        Whether gamma moves off its grid after a search of the grid, see `kerfpath.refine`; with
+        the method "continuous" it always does.
     refine_parts : int
         Parts into which the refinement divides every interval between nodes. A job does so; `plan`
         keeps the nodes of its contour.
@@ -331,7 +335,7 @@ def with_keywords(
 
 _KNOWN: dict[str, tuple[str, ...]] = {
     "frames": get_args(FrameKind),
-    "method": ("continuous", *get_args(Method)),
+    "method": get_args(PlanMethod),
     "objective": get_args(ObjectiveKind),
     "metric": get_args(Metric),
     "closure": get_args(Closure),
@@ -345,22 +349,13 @@ GIVEN = object()
 """Any value but None."""
 CLEARANCE, PENALTIES = "comfort clearance", "comfort costs"
 """What the rules ask of comfort, beside the options themselves."""
+_ONE_WAY = {"method": EXACT_OR_BETTER, "closure": "free", "rotation": None}
 _RULES: tuple[tuple[dict[str, object], dict[str, object]], ...] = (
     (
         {"feed": "dip"},
-        {
-            "method": EXACT_OR_BETTER,
-            "closure": "free",
-            "rotation": None,
-            "objective": "sum",
-            "interruptions": "none",
-            "refine_parts": 1,
-        },
+        _ONE_WAY | {"objective": "sum", "interruptions": "none", "refine_parts": 1},
     ),
-    (
-        {"interruptions": "fewest"},
-        {"method": EXACT_OR_BETTER, "closure": "free", "rotation": None, "tilt": None},
-    ),
+    ({"interruptions": "fewest"}, _ONE_WAY | {"tilt": None}),
     ({"closure": "periodic"}, {"method": EXACT_OR_BETTER}),
     ({"rotation": GIVEN}, {"method": EXACT_OR_BETTER}),
     ({"tilt": GIVEN}, {"refine_parts": 1}),

@@ -62,22 +62,28 @@ def plan(
             Tolerance of the tool axis, searched too; default: the nominal axis alone.
         postures : sequence of int, optional
             The postures that may be used; default all. See `kerfpath.robots.postures_named`.
-        method, objective, metric, weights, eta_v, eta_a, closure, rotation
+        method : {"continuous", "exact", "paper", "known"}
+            "continuous" (the default): the best motion found over continuous gamma, by a value
+            function between its samples, beams that keep the acceleration limits, and refinement.
+            Where that is not the way, and where it finds nothing, as "exact" with `refine`; the
+            proof says so. The others search the grid, as in `shortest_path`.
+        objective, metric, weights, eta_v, eta_a, closure, rotation
             As in `shortest_path`; "periodic" closure needs a closed contour.
         feed : {"constant", "dip"}
             Where the limits do not let the speed be held: "constant" refuses, "dip" holds it
             wherever they do and slows down elsewhere, in the least time; `Plan.feed` says where.
             Needs objective "sum", closure "free" and no rotation limit.
         refine : bool
-            Move gamma off its grid afterwards, see `kerfpath.refine`. Where the grid has no path
-            (it quantises acceleration), one is looked for off it.
+            After a search of the grid, move gamma off it, see `kerfpath.refine`. Where the grid has
+            no path (it quantises acceleration), one is looked for off it.
         comfort : Comfort, optional
             Margins that the nodes keep from singularities and limits, and what coming near costs;
             see `kerfpath.comfort`. Costs are added at every node visited (objective "max":
             maximised); with closure "periodic" the first node is visited twice.
     cell : Cell, optional
-        The plan is clear in it, at the nodes and on straight joint motions between them: the best
-        of all clear ones, though only what the search wants to use is checked. Exact method only.
+        The plan is clear in it, at the nodes and on straight joint motions between them; only what
+        the search wants to use is checked. Methods "continuous" and "exact" only; the latter finds
+        the best of all clear paths.
     graph : LayeredGraph, optional
         The layered graph of this very task, kept from `layered_graph`.
     progress : callable, optional
