@@ -186,7 +186,17 @@ class ContinuousSearch:
             steps = steps._replace(minimax=False, cap=best)
             cost = cost + kernel.OVER_CAP * np.maximum(cost - best, 0.0)
             V = self._values(steps, cost, last)
-        return _Way(best, first[np.argsort(V[first], kind="stable")], steps, cost, V)
+        return _Way(best, self._by_valleys(first, V), steps, cost, V)
+
+    def _by_valleys(self, first: Ints, V: Array) -> Ints:
+        """Return first vertices from which paths lead, the bottoms of valleys before the others."""
+        targets, bottom = self._targets, np.ones(int(self._targets.start[1]), np.bool_)
+        joined = slice(0, int(targets.begin[1]))
+        one, other = targets.one[joined], targets.other[joined]
+        bottom[one[V[one] > V[other]]] = False
+        bottom[other[V[other] > V[one]]] = False
+        first = first[V[first] < np.inf]
+        return first[np.lexsort((V[first], ~bottom[first]))]
 
     def _tied_ways(self, *, closed: bool) -> list[_Way]:
         """Return the ways where what is allowed depends on the first vertex, the best ones first.
@@ -225,7 +235,7 @@ class ContinuousSearch:
     def _beam(self, way: _Way, effort: Effort) -> ContinuousPath | None:
         """Return the best path of a beam along a way."""
         targets = self._targets
-        first = way.first[np.isfinite(way.V[way.first])][: effort.width]
+        first = way.first[: effort.width]
         K = len(targets.start) - 1
         size = K, effort.width
         beam = Beam(
