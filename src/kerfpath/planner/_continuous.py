@@ -49,7 +49,7 @@ def plan_continuous(task: PlanningTask, finder: ClearSearch, begin: Callable[[st
     why, found = grid_reason(task), None
     if not why:
         begin("search")
-        found = clear_motion(task, finder)
+        found = clear_motion(task, finder, begin)
         why = "no motion was found off it"
     if found is None:
         comfort = task.settings.comfort
@@ -61,7 +61,9 @@ def plan_continuous(task: PlanningTask, finder: ClearSearch, begin: Callable[[st
     return replace(found.plan, proof=Proof(optimal=False, statement=finder.claimed(claim)))
 
 
-def clear_motion(task: PlanningTask, finder: ClearSearch) -> Refinement | None:
+def clear_motion(
+    task: PlanningTask, finder: ClearSearch, begin: Callable[[str], None] = lambda what: None
+) -> Refinement | None:
     """Return the best motion found that is clear; None where none is.
 
     What paths want to use is looked at, and avoided where it collides, until they are clear.
@@ -71,6 +73,7 @@ def clear_motion(task: PlanningTask, finder: ClearSearch) -> Refinement | None:
         quick = [path for effort in QUICK for path in search.paths(effort)]
         if finder.learn([vertices for path in quick for vertices in (path.one, path.other)]):
             continue
+        begin("refinement")
         found = _refined(task, finder, quick)
         if found is None or found.cost_after > (1 + ENOUGH) * search.value:
             found = _better(found, _refined(task, finder, list(search.paths(WIDE))))
