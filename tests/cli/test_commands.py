@@ -212,7 +212,9 @@ def test_a_contour_that_is_too_fast_is_told_how_fast_it_could_be(folder, fastest
 )
 def test_what_a_message_advises_can_be_done(folder, fastest, change, share):
     """A little over the fastest speed: every remedy, as it is printed, is one."""
-    grid = SMALL if "refine" in change else SMALL.replace("[plan]", "[plan]\nrefine = false")
+    method = "" if "method" in change else '\nmethod = "exact"'
+    rest = method if "refine" in change else f"{method}\nrefine = false"
+    grid = SMALL.replace("[plan]", f"[plan]{rest}")
     if change == "time step":
         grid = grid.replace("spacing_mm = 1", "time_step_ms = 20", 1)
     else:
@@ -296,7 +298,9 @@ def test_speed_names_the_fastest_and_what_binds(folder, fastest):
     for share, refine, code in ((0.999, "false", 0), (1.01, "false", 1), (1.01, "true", 0)):
         asked = f"speed_m_min = {fastest['on_grid_m_min'] * share}"
         edge = SMALL.replace("speed_m_min = 3", asked, 1)
-        (folder / "edge.toml").write_text(edge.replace("[plan]", f"[plan]\nrefine = {refine}"))
+        (folder / "edge.toml").write_text(
+            edge.replace("[plan]", f'[plan]\nmethod = "exact"\nrefine = {refine}')
+        )
         assert run("plan", "edge.toml", "--out", "edge", cwd=folder).returncode == code
     (folder / "far.toml").write_text(SMALL.replace("xyz_mm = [1200", "xyz_mm = [3200"))
     far = run("speed", "far.toml", cwd=folder)
@@ -313,7 +317,7 @@ def test_a_job_may_dip_or_be_interrupted_and_is_read_back(folder):
         ('feed = "dip"', "full speed on"),
         ('interruptions = "fewest"', "piece 1 of"),
     ):
-        job = base.replace("[plan]", f"[plan]\nrefine = false\n{key}")
+        job = base.replace("[plan]", f'[plan]\nmethod = "exact"\nrefine = false\n{key}')
         (folder / "over.toml").write_text(job)
         done = run("plan", "over.toml", "--out", "over", cwd=folder)
         assert done.returncode == 0, done.stdout + done.stderr
@@ -330,7 +334,9 @@ def test_a_job_may_dip_or_be_interrupted_and_is_read_back(folder):
 
 def test_short_pieces_are_warned_of_and_a_job_may_ask_for_longer_ones(folder):
     base = SMALL.replace("speed_m_min = 3", "speed_m_min = 3.7", 1).replace("= 50", "= 1", 1)
-    base = base.replace("[plan]", '[plan]\nrefine = false\ninterruptions = "fewest"\nKEY')
+    base = base.replace(
+        "[plan]", '[plan]\nmethod = "exact"\nrefine = false\ninterruptions = "fewest"\nKEY'
+    )
 
     def cut(key):
         (folder / "pieces.toml").write_text(base.replace("KEY", key))

@@ -165,9 +165,7 @@ class CellMaker:
             index.astype(np.int32),
         )
         gamma, half = cell_bounds(level, index)
-        found = self._robot.enclose(
-            self._frames, node.astype(np.int64), gamma, half, self._tool
-        )
+        found = self._robot.enclose(self._frames, node.astype(np.int64), gamma, half, self._tool)
         wanted = np.zeros(found.status.shape[1], np.bool_)
         wanted[self._postures] = True
         cell, posture = np.nonzero((found.status > 0) & wanted)

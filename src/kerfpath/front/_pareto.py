@@ -103,7 +103,9 @@ def pareto(
     InputError
         Unknown criteria or search, fewer than one run, and what `kerfpath.plan` refuses.
     """
-    asked = with_keywords(options, keywords, ParetoKeywords, feed="constant", refine=False)
+    asked = with_keywords(
+        options, keywords, ParetoKeywords, method="exact", feed="constant", refine=False
+    )
     found = criteria_named(criteria, robot, options=asked, cell=cell, home=home)
     workers = whole_number((os.cpu_count() or 1) if workers is None else workers, "workers")
     T_flange_tip, T_base_part = as_pose(tool, "tool"), as_pose(placement, "placement")

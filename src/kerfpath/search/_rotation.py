@@ -17,7 +17,7 @@ from kerfpath.kernels.search import Aim
 from kerfpath.search._branch import best_near_start
 from kerfpath.search._layers import Layers, sort_layers
 
-__all__ = ["best_within_rotation", "closed_before", "too_far", "why_closed"]
+__all__ = ["best_within_rotation", "closed_before", "too_far", "unroll", "why_closed"]
 
 
 def too_far(path: Array, endless: Bools, rotation: Array) -> Bools:
@@ -131,7 +131,7 @@ def _last_node(layers: Layers, aim: Aim, rotation: Array, closing: Bools, *, clo
 
 def _best(layers: Layers, aim: Aim, rotation: Array, *, closed: bool) -> tuple[Ints, float] | None:
     """Return the best path that keeps `rotation`, all joints that have a limit unrolled."""
-    unrolled, place = _unroll(layers, rotation, aim.velocity)
+    unrolled, place = unroll(layers, rotation, aim.velocity)
     # The other way round would be shorter.
     most = np.where(np.isfinite(rotation), np.minimum(aim.velocity, np.pi), aim.velocity)
     graph = sort_layers(unrolled, freeze(most))
@@ -144,7 +144,7 @@ def _best(layers: Layers, aim: Aim, rotation: Array, *, closed: bool) -> tuple[I
     return None if found is None else (rank[found.path], found.cost)
 
 
-def _unroll(layers: Layers, rotation: Array, velocity: Array) -> tuple[Layers, Ints]:
+def unroll(layers: Layers, rotation: Array, velocity: Array) -> tuple[Layers, Ints]:
     """Return the graph with its limited joints unrolled, and which of its layer each vertex is.
 
     Vertices that are too far from wherever a path begins are left out, and half a turn goes the way
