@@ -76,6 +76,7 @@ gamma_step_deg = 8
 tilt_deg = 3
 tilt_cost_per_deg = 0.01
 rotation_deg = 300
+method = "exact"
 refine = false
 [cell]
 part = false

@@ -229,6 +229,20 @@ def random_instance(rng, *, layers=(1, 9), size=(1, 9)):
     return q, start, options
 
 
+def lattice_instance(rng, *, layers=(2, 6), size=(1, 5)):
+    """A graph on a lattice of angles, so that endless joints take many steps of half a turn."""
+    q, start, options = random_instance(rng, layers=layers, size=size)
+    step = np.pi / rng.integers(1, 5)
+    endless = rng.random(q.shape[1]) < 0.7
+    options |= {
+        "endless": endless,
+        "velocity": rng.uniform(1, 2, q.shape[1]) * np.pi / options["dt"] / options["eta_v"],
+        "acceleration": rng.integers(0, 9, q.shape[1]) * np.pi / 4 + 1e-3,
+    }
+    options["acceleration"] /= options["eta_a"] * options["dt"] ** 2
+    return step * rng.integers(-6, 7, q.shape), start, options
+
+
 def slowed(q, start, *, dt, velocity, acceleration, endless, vertex_cost, weights, metric, penalty,
            eta_v, eta_a, passable=None):  # fmt: skip
     """Least cost when time lost has a price: every pair of edges is tried; infinity: no path."""

@@ -56,6 +56,7 @@ speed_m_min = 1.5
 spacing_mm = 8
 [plan]
 gamma_step_deg = 20
+method = "exact"
 refine = false
 {more}
 [program]

@@ -3,6 +3,7 @@
 import json
 import re
 from dataclasses import replace
+from functools import partial
 from types import SimpleNamespace
 
 import numpy as np
@@ -34,6 +35,7 @@ from kerfpath.robots import Robot
 from kerfpath.tilt import Tilt
 
 STEP = np.radians(30)
+on_grid = partial(plan, method="exact")
 FIVE = Robot(
     id="five",
     kinematics="five",
@@ -172,7 +174,7 @@ def small(circle, arm, tool, placement):
     nodes = circle.resample(count=13)
     where = {"tool": tool, "placement": placement, "gamma_step": STEP}
     graph = layered_graph(nodes, arm, postures=(0, 1), **where)
-    return nodes, arm, where | {"graph": graph, "speed": 0.05}
+    return nodes, arm, where | {"graph": graph, "speed": 0.05, "method": "exact"}
 
 
 EVERY = Comfort(
@@ -341,11 +343,11 @@ def fine(circle, arm, tool, placement):
 @pytest.mark.parametrize(("name", "more"), [("wrist", 0.01), ("limits", 0.01), ("shoulder", 2e-5)])
 def test_a_refined_plan_keeps_the_margins(fine, name, more):
     nodes, arm, options = fine
-    plain = plan(nodes, arm, speed=0.1, **options)
+    plain = on_grid(nodes, arm, speed=0.1, **options)
     nearest = plain.criteria.nearest[name][0]
     comfort = Comfort(**{name: Band(margin=nearest + more)})
-    made = plan(nodes, arm, speed=0.1, comfort=comfort, **options)
-    better = plan(nodes, arm, speed=0.1, comfort=comfort, refine=True, **options)
+    made = on_grid(nodes, arm, speed=0.1, comfort=comfort, **options)
+    better = on_grid(nodes, arm, speed=0.1, comfort=comfort, refine=True, **options)
     assert better.cost <= made.cost
     assert better.criteria.nearest[name][0] >= nearest + more
     assert audit(better) == []
@@ -360,8 +362,8 @@ def test_a_refinement_is_taken_only_where_it_costs_no_more_in_all(fine):
     nodes, arm, options = fine
     for cost in (1e-4, 0.05):
         comfort = Comfort(wrist=Band(width=0.8, cost=cost))
-        made = plan(nodes, arm, speed=0.1, comfort=comfort, **options)
-        better = plan(nodes, arm, speed=0.1, comfort=comfort, refine=True, **options)
+        made = on_grid(nodes, arm, speed=0.1, comfort=comfort, **options)
+        better = on_grid(nodes, arm, speed=0.1, comfort=comfort, refine=True, **options)
         path = np.abs(better.increments * better.settings.weights).sum()
         assert better.cost == pytest.approx(path + by_hand(arm, better.q, comfort).sum(), rel=1e-9)
         assert better.cost < made.cost if cost < 1e-3 else better.cost <= made.cost
@@ -383,14 +385,14 @@ def test_pieces_and_dips_keep_comfort(fine):
     nodes, arm, options = fine
     fast = options | {"speed": 1.2 * fastest_speed(nodes, arm, **options).speed}
     comfort = Comfort(wrist=Band(margin=0.1, width=0.5, cost=0.2))
-    dipped = plan(nodes, arm, feed="dip", comfort=comfort, **fast)
+    dipped = on_grid(nodes, arm, feed="dip", comfort=comfort, **fast)
     assert dipped.feed is not None
     assert dipped.criteria.nearest["wrist"][0] >= 0.1
     hard = Comfort(wrist=Band(margin=0.1))
-    assert audit(plan(nodes, arm, feed="dip", comfort=hard, refine=True, **fast)) == []
+    assert audit(on_grid(nodes, arm, feed="dip", comfort=hard, refine=True, **fast)) == []
     with pytest.raises(InputError, match='expected False with feed "dip" and comfort costs'):
-        plan(nodes, arm, feed="dip", comfort=comfort, refine=True, **fast)
-    pieces = plan_in_pieces(nodes, arm, comfort=comfort, **fast)
+        on_grid(nodes, arm, feed="dip", comfort=comfort, refine=True, **fast)
+    pieces = plan_in_pieces(nodes, arm, comfort=comfort, method="exact", **fast)
     assert len(pieces) > 1
     for piece in pieces:
         nodes_cost = by_hand(arm, piece.q, comfort)

@@ -21,16 +21,19 @@ from kerfpath.search import Closure, Method, Metric, ObjectiveKind, rotation_lim
 from kerfpath.tilt import Tilt, TiltData
 
 __all__ = [
+    "EXACT_OR_BETTER",
     "FeedKind",
     "GraphKeywords",
     "Interruptions",
     "OptionConflict",
     "OptionData",
     "PlanKeywords",
+    "PlanMethod",
     "PlanOptions",
     "with_keywords",
 ]
 
+PlanMethod = Literal["continuous", Method]
 FeedKind = Literal["constant", "dip"]
 Interruptions = Literal["none", "fewest"]
 
@@ -48,7 +51,7 @@ class GraphKeywords(TypedDict, total=False):
 class PlanKeywords(GraphKeywords, total=False):
     """The options that `kerfpath.plan` takes as keywords."""
 
-    method: Method
+    method: PlanMethod
     objective: ObjectiveKind
     metric: Metric
     weights: ArrayLike | None
@@ -64,7 +67,7 @@ class PlanKeywords(GraphKeywords, total=False):
 class OptionData(TypedDict):
     """The options as JSON holds them: SI, the unit in the name, null for infinity."""
 
-    method: Method
+    method: PlanMethod
     objective: ObjectiveKind
     metric: Metric
     weights_per_rad: list[float] | None
@@ -93,7 +96,7 @@ class OptionConflict(InputError):
     option : str
         The one that another forbids.
     expected, got : object
-        Its only value beside the other, None for none; and its value.
+        Its only value beside the other (a tuple: any of them), None for none; and its value.
     beside : mapping of str to object
         The options that forbid it, with their values.
     """
@@ -123,7 +126,10 @@ class PlanOptions:
         Tolerance of the tool axis, searched too; None: the nominal axis alone.
     postures : tuple of int, optional
         The postures that may be used; None: all. See `kerfpath.robots.postures_named`.
-    method, objective, metric, closure
+    method : {"continuous", "exact", "paper", "known"}
+        "continuous": the best motion found over continuous gamma; the others search the grid, as
+        `kerfpath.shortest_path` does.
+    objective, metric, closure
         As in `kerfpath.shortest_path`.
     weights : (n,) 1/rad, optional
         Weights of the joint-space distance (1/m for a rail); None: 1 / (velocity limit * dt).
@@ -136,7 +142,8 @@ class PlanOptions:
         Where the limits do not let the speed be held: "constant" refuses, "dip" reduces the feed
         there and holds the speed elsewhere, in the least time.
     refine : bool
-        Whether gamma moves off its grid after the search, see `kerfpath.refine`.
+        Whether gamma moves off its grid after a search of the grid, see `kerfpath.refine`; with
+        the method "continuous" it always does.
     refine_parts : int
         Parts into which the refinement divides every interval between nodes. A job does so; `plan`
         keeps the nodes of its contour.
@@ -155,11 +162,11 @@ class PlanOptions:
         A value out of its range or not of its kind; `OptionConflict` where two do not go together.
     """
 
-    gamma_step: float = np.pi / 180
+    gamma_step: float = np.pi / 90
     frames: FrameKind = "rotation-minimising"
     tilt: Tilt | None = None
     postures: tuple[int, ...] | None = None
-    method: Method = "exact"
+    method: PlanMethod = "continuous"
     objective: ObjectiveKind = "sum"
     metric: Metric = "manhattan"
     weights: Array = None  # type: ignore[assignment]  # `resolve` fills in the default
@@ -320,7 +327,7 @@ def with_keywords(
 
 _KNOWN: dict[str, tuple[str, ...]] = {
     "frames": get_args(FrameKind),
-    "method": get_args(Method),
+    "method": get_args(PlanMethod),
     "objective": get_args(ObjectiveKind),
     "metric": get_args(Metric),
     "closure": get_args(Closure),
@@ -328,28 +335,21 @@ _KNOWN: dict[str, tuple[str, ...]] = {
     "interruptions": get_args(Interruptions),
 }
 
+EXACT_OR_BETTER = ("continuous", "exact")
+"""Methods that hold (5) and (6) throughout."""
 GIVEN = object()
 """Any value but None."""
 CLEARANCE, PENALTIES = "comfort clearance", "comfort costs"
 """What the rules ask of comfort, beside the options themselves."""
+_ONE_WAY = {"method": EXACT_OR_BETTER, "closure": "free", "rotation": None}
 _RULES: tuple[tuple[dict[str, object], dict[str, object]], ...] = (
     (
         {"feed": "dip"},
-        {
-            "method": "exact",
-            "closure": "free",
-            "rotation": None,
-            "objective": "sum",
-            "interruptions": "none",
-            "refine_parts": 1,
-        },
+        _ONE_WAY | {"objective": "sum", "interruptions": "none", "refine_parts": 1},
     ),
-    (
-        {"interruptions": "fewest"},
-        {"method": "exact", "closure": "free", "rotation": None, "tilt": None},
-    ),
-    ({"closure": "periodic"}, {"method": "exact"}),
-    ({"rotation": GIVEN}, {"method": "exact"}),
+    ({"interruptions": "fewest"}, _ONE_WAY | {"tilt": None}),
+    ({"closure": "periodic"}, {"method": EXACT_OR_BETTER}),
+    ({"rotation": GIVEN}, {"method": EXACT_OR_BETTER}),
     ({"tilt": GIVEN}, {"refine_parts": 1}),
     ({"least_piece": GIVEN}, {"interruptions": "fewest"}),
     ({CLEARANCE: GIVEN}, {"feed": "constant", "interruptions": "none"}),
@@ -376,6 +376,8 @@ def _require_no_conflict(options: PlanOptions) -> None:
 def _is(fact: object, value: object) -> bool:
     if value is GIVEN or value is None:
         return (fact is None) != (value is GIVEN)
+    if isinstance(value, tuple):
+        return fact in value
     return fact == value
 
 
@@ -383,4 +385,6 @@ def _value(value: object) -> str:
     """Return a value in a message: text in quotes, numbers; nothing for an object."""
     if isinstance(value, str):
         return f'"{value}"'
+    if isinstance(value, tuple):
+        return " or ".join(f'"{one}"' for one in value)
     return f"{value}" if isinstance(value, int | float) and value is not True else ""

@@ -1,13 +1,16 @@
 """The audit: its kinematics against pinocchio, and every fault it must find."""
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 from tests.robots.test_robot import pinocchio_pose, random_joints
 
+import naive
 from kerfpath import Contour, InputError, audit, plan, robot
 from kerfpath.auditor import chain_of, checks
+from kerfpath.auditor._motion import joint_increments
 from kerfpath.robots import Coupling, robot_ids
 
 STEP = np.radians(5)
@@ -31,6 +34,17 @@ def good(drawn, arm, tool, placement):
 
 def row(table, code):
     return next(check for check in table if check.code == code)
+
+
+def test_half_a_turn_goes_the_way_that_the_values_go():
+    rng = np.random.default_rng(12)
+    for _ in range(200):
+        q = np.pi / rng.integers(1, 5) * rng.integers(-6, 7, (8, 6))
+        endless = rng.random(6) < 0.7
+        moved = SimpleNamespace(q=q, robot=SimpleNamespace(endless=endless))
+        np.testing.assert_allclose(
+            joint_increments(moved), naive.difference(q[:-1], q[1:], endless), atol=1e-12
+        )
 
 
 @pytest.mark.parametrize("name", robot_ids())

@@ -201,23 +201,57 @@ def test_a_contour_that_is_too_fast_is_told_how_fast_it_could_be(folder, fastest
     assert "a path exists up to" in (folder / "fast-plan" / "report.html").read_text()
 
 
-def test_what_a_message_advises_can_be_done(folder, fastest):
-    """A little over the fastest speed of the grid: either remedy, as it is printed, is one."""
-    grid = SMALL.replace("[plan]", "[plan]\nrefine = false")
-    over = fastest["on_grid_m_min"] * 1.0001
+@pytest.mark.parametrize(
+    ("change", "share"),
+    [
+        ("", 1.0001),
+        ('\nmethod = "paper"', 1.0001),
+        ("\nrefine = true", 1.06),
+        ("time step", 1.03),  # the nodes follow from the speed
+    ],
+)
+def test_what_a_message_advises_can_be_done(folder, fastest, change, share):
+    """A little over the fastest speed: every remedy, as it is printed, is one."""
+    method = "" if "method" in change else '\nmethod = "exact"'
+    rest = method if "refine" in change else f"{method}\nrefine = false"
+    grid = SMALL.replace("[plan]", f"[plan]{rest}")
+    if change == "time step":
+        grid = grid.replace("spacing_mm = 1", "time_step_ms = 20", 1)
+    else:
+        grid = grid.replace("[plan]", f"[plan]{change}")
+    over = fastest["fastest_m_min" if "refine" in change else "on_grid_m_min"] * share
     asked = grid.replace("speed_m_min = 3", f"speed_m_min = {over!r}", 1)
     (folder / "over.toml").write_text(asked)
     result = run("plan", "over.toml", "--out", "advised", cwd=folder)
     assert result.returncode == 1
-    told = re.search(r"up to ([\d.]+) m/min.* with eta_acceleration = ([\d.]+); no", result.stdout)
-    assert float(told[1]) < over
-    assert 0.9 < float(told[2]) <= 1
-    for remedy in (
-        grid.replace("speed_m_min = 3", f"speed_m_min = {told[1]}", 1),
-        asked.replace("eta_acceleration = 0.9", f"eta_acceleration = {told[2]}"),
-    ):
+    message = result.stdout
+    speeds = re.findall(r"up to ([\d.]+) m/min", message)
+    shares = re.findall(r"(eta_\w+) = ([\d.]+)", message)
+    assert len(speeds) == (2 if "refine" in change else 1)
+    assert all(float(speed) < over for speed in speeds)
+    assert all(0.9 < float(value) <= 1 for _, value in shares)
+    assert shares or change in ("\nrefine = true", "time step")
+    assert ('with method = "exact"' in message) == ("paper" in change)
+    then = grid.replace('"paper"', '"exact"')
+    remedies = [then.replace("speed_m_min = 3", f"speed_m_min = {speed}", 1) for speed in speeds]
+    then = asked.replace('"paper"', '"exact"')
+    remedies += [re.sub(rf"{key} = [\d.]+", f"{key} = {value}", then) for key, value in shares]
+    for remedy in remedies:
         (folder / "advised.toml").write_text(remedy)
         assert run("plan", "advised.toml", "--out", "advised", cwd=folder).returncode == 0
+
+
+def test_a_method_that_finds_no_path_where_there_is_one_is_told_of_the_other(folder, fastest):
+    paper = SMALL.replace("[plan]", '[plan]\nmethod = "paper"')
+    under = f"speed_m_min = {0.9999 * fastest['on_grid_m_min']!r}"
+    (folder / "paper.toml").write_text(paper.replace("speed_m_min = 3", under, 1))
+    result = run("plan", "paper.toml", cwd=folder)
+    assert result.returncode == 1
+    assert 'a path exists at the speed asked for with method = "exact"' in result.stdout
+    assert not re.search(r"up to [\d.]+ m/min|eta_\w+ =", result.stdout)
+    exact = (folder / "paper.toml").read_text().replace('method = "paper"', "refine = false")
+    (folder / "paper.toml").write_text(exact)
+    assert run("plan", "paper.toml", cwd=folder).returncode == 0
 
 
 @example(1e-5, 4)
@@ -264,7 +298,9 @@ def test_speed_names_the_fastest_and_what_binds(folder, fastest):
     for share, refine, code in ((0.999, "false", 0), (1.01, "false", 1), (1.01, "true", 0)):
         asked = f"speed_m_min = {fastest['on_grid_m_min'] * share}"
         edge = SMALL.replace("speed_m_min = 3", asked, 1)
-        (folder / "edge.toml").write_text(edge.replace("[plan]", f"[plan]\nrefine = {refine}"))
+        (folder / "edge.toml").write_text(
+            edge.replace("[plan]", f'[plan]\nmethod = "exact"\nrefine = {refine}')
+        )
         assert run("plan", "edge.toml", "--out", "edge", cwd=folder).returncode == code
     (folder / "far.toml").write_text(SMALL.replace("xyz_mm = [1200", "xyz_mm = [3200"))
     far = run("speed", "far.toml", cwd=folder)
@@ -281,7 +317,7 @@ def test_a_job_may_dip_or_be_interrupted_and_is_read_back(folder):
         ('feed = "dip"', "full speed on"),
         ('interruptions = "fewest"', "piece 1 of"),
     ):
-        job = base.replace("[plan]", f"[plan]\nrefine = false\n{key}")
+        job = base.replace("[plan]", f'[plan]\nmethod = "exact"\nrefine = false\n{key}')
         (folder / "over.toml").write_text(job)
         done = run("plan", "over.toml", "--out", "over", cwd=folder)
         assert done.returncode == 0, done.stdout + done.stderr
@@ -298,7 +334,9 @@ def test_a_job_may_dip_or_be_interrupted_and_is_read_back(folder):
 
 def test_short_pieces_are_warned_of_and_a_job_may_ask_for_longer_ones(folder):
     base = SMALL.replace("speed_m_min = 3", "speed_m_min = 3.7", 1).replace("= 50", "= 1", 1)
-    base = base.replace("[plan]", '[plan]\nrefine = false\ninterruptions = "fewest"\nKEY')
+    base = base.replace(
+        "[plan]", '[plan]\nmethod = "exact"\nrefine = false\ninterruptions = "fewest"\nKEY'
+    )
 
     def cut(key):
         (folder / "pieces.toml").write_text(base.replace("KEY", key))

@@ -158,9 +158,9 @@ def test_bars_have_their_phases(monkeypatch):
 def test_a_plan_tells_its_phases(circle, arm, tool, placement):
     told = []
     options = {"tool": tool, "placement": placement, "speed": 0.1, "gamma_step": np.radians(6)}
-    plan(circle, arm, phase=told.append, **options)
+    plan(circle, arm, method="exact", phase=told.append, **options)
     assert told == ["search"]
-    plan(circle, arm, phase=told.append, refine=True, **options)
+    plan(circle, arm, phase=told.append, **options)
     assert told == ["search", "search", "refinement"]
 
 

@@ -2,6 +2,7 @@
 
 import re
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 import pytest
@@ -13,6 +14,8 @@ from kerfpath.planner import layered_graph, plan_in_pieces
 from kerfpath.search import CheckedEdges
 
 STEP = np.radians(5)
+
+on_grid = partial(plan, method="exact")
 
 
 def cell(arm, tool, placement, fixtures, **options):
@@ -37,7 +40,7 @@ def task(circle, arm, tool, placement):
 
 @pytest.fixture(scope="module")
 def blind(task):
-    return plan(*task[0], **task[1])
+    return on_grid(*task[0], **task[1])
 
 
 @pytest.fixture(scope="module")
@@ -54,7 +57,7 @@ def posts():
 def test_where_nothing_is_in_the_way_the_plan_is_the_same(task, blind, arm, tool, placement):
     # The thick capsules of forearm and head meet where the wrist is bent that far.
     there = cell(arm, tool, placement, {}, may_touch=[("link 3", "arm")])
-    made = plan(*task[0], **task[1], cell=there)
+    made = on_grid(*task[0], **task[1], cell=there)
     np.testing.assert_array_equal(made.q, blind.q)
     assert made.proof.optimal
     assert "clear in the cell" in made.proof.statement
@@ -65,7 +68,7 @@ def test_where_nothing_is_in_the_way_the_plan_is_the_same(task, blind, arm, tool
 def test_where_something_is_the_plan_goes_around_it(task, blind, arm, tool, placement, posts):
     there = cell(arm, tool, placement, posts)
     assert not there.clear(blind.q).all()
-    made = plan(*task[0], **task[1], cell=there)
+    made = on_grid(*task[0], **task[1], cell=there)
     assert made.cost > blind.cost
     assert made.proof.optimal
     assert there.clear(made.q).all()
@@ -88,7 +91,7 @@ def test_the_audit_s_least_distance_is_the_cell_s(task, blind, arm, tool, placem
 
 def test_a_refined_plan_is_clear_or_stays_on_the_grid(task, arm, tool, placement, posts):
     there = cell(arm, tool, placement, posts)
-    made = plan(*task[0], **task[1], cell=there, refine=True)
+    made = on_grid(*task[0], **task[1], cell=there, refine=True)
     assert there.clear(made.q).all()
     assert there.clear_motion(made.q[:-1], made.q[1:]).all()
 
@@ -99,38 +102,38 @@ def is_clear(there, q):
 
 def test_closed_and_turning_little_the_plan_is_clear_too(task, blind, arm, tool, placement, posts):
     there = cell(arm, tool, placement, posts)
-    closed = plan(*task[0], **task[1], cell=there, closure="periodic")
+    closed = on_grid(*task[0], **task[1], cell=there, closure="periodic")
     assert is_clear(there, closed.q)
     assert closed.proof.optimal
-    assert closed.cost >= plan(*task[0], **task[1], closure="periodic").cost
+    assert closed.cost >= on_grid(*task[0], **task[1], closure="periodic").cost
     rotation = [np.inf, np.inf, np.inf, 1.0, np.inf, 6.5]
-    little = plan(*task[0], **task[1], cell=there, rotation=rotation)
+    little = on_grid(*task[0], **task[1], cell=there, rotation=rotation)
     assert is_clear(there, little.q)
-    assert little.cost >= plan(*task[0], **task[1], cell=there).cost
+    assert little.cost >= on_grid(*task[0], **task[1], cell=there).cost
 
 
 def test_where_the_speed_must_dip_the_plan_is_clear_too(task, arm, tool, placement, posts):
     there = cell(arm, tool, placement, posts)
     fast = task[1] | {"speed": 1.0}
     with pytest.raises(NoFeasiblePath):
-        plan(*task[0], **fast)
+        on_grid(*task[0], **fast)
     for refine in (False, True):
-        made = plan(*task[0], **fast, cell=there, feed="dip", refine=refine)
+        made = on_grid(*task[0], **fast, cell=there, feed="dip", refine=refine)
         assert is_clear(there, made.q)
         assert audit(made, cell=there) == []
 
 
 def test_pieces_and_the_fastest_speed_are_clear_too(task, arm, tool, placement, posts):
     there = cell(arm, tool, placement, posts)
-    pieces = plan_in_pieces(*task[0], **task[1] | {"speed": 0.3}, cell=there, refine=True)
+    pieces = plan_in_pieces(*task[0], **task[1] | {"speed": 0.3}, cell=there)
     assert all(is_clear(there, piece.q) for piece in pieces)
     options = {name: task[1][name] for name in ("tool", "placement", "gamma_step", "graph")}
     free, around = (fastest_speed(*task[0], **options, cell=c) for c in (None, there))
     assert around.speed < free.speed
-    made = plan(*task[0], **task[1] | {"speed": around.speed * (1 - 1e-9)}, cell=there)
+    made = on_grid(*task[0], **task[1] | {"speed": around.speed * (1 - 1e-9)}, cell=there)
     assert is_clear(there, made.q)
     with pytest.raises(NoFeasiblePath):
-        plan(*task[0], **task[1] | {"speed": around.speed * (1 + 1e-6)}, cell=there)
+        on_grid(*task[0], **task[1] | {"speed": around.speed * (1 + 1e-6)}, cell=there)
 
 
 def test_behind_a_cage_no_speed_and_no_interruption_helps(task, arm, tool, placement):
@@ -140,7 +143,7 @@ def test_behind_a_cage_no_speed_and_no_interruption_helps(task, arm, tool, place
     with pytest.raises(
         NoFeasiblePath, match=r"contour .circle.: on this grid .* no pose at node 0"
     ) as no:
-        plan(*task[0], **task[1], cell=caged, feed="dip")
+        on_grid(*task[0], **task[1], cell=caged, feed="dip")
     assert no.value.counts["collision at the node"] > 0
     with pytest.raises(NoFeasiblePath, match="no number of interruptions helps: no pose at node"):
         plan_in_pieces(*task[0], **task[1], cell=caged)
@@ -153,7 +156,7 @@ def test_a_cage_is_no_way_and_says_so(task, arm, tool, placement):
     with pytest.raises(
         NoFeasiblePath, match=r"contour .circle.: on this grid .* no pose at node 0"
     ) as no:
-        plan(*task[0], **task[1], cell=cell(arm, tool, placement, lid))
+        on_grid(*task[0], **task[1], cell=cell(arm, tool, placement, lid))
     # The lid lies between the part and all that is above it: at every node, and by its thickness
     # and more, wherever the search broke.
     said = str(no.value)
@@ -169,14 +172,14 @@ def test_a_cell_of_another_task_is_refused(task, arm, tool, placement):
     moved = placement.copy()
     moved[0, 3] += 0.1
     with pytest.raises(InputError, match="cell: it was built with another placement"):
-        plan(*task[0], **task[1], cell=cell(arm, tool, moved, {}))
+        on_grid(*task[0], **task[1], cell=cell(arm, tool, moved, {}))
     other = tool.copy()
     other[2, 3] += 0.1
     with pytest.raises(InputError, match="cell: it was built with another tool"):
-        plan(*task[0], **task[1], cell=cell(arm, other, placement, {}))
+        on_grid(*task[0], **task[1], cell=cell(arm, other, placement, {}))
     plain = replace(arm, endless=np.zeros(6, bool))
     with pytest.raises(InputError, match="cell: it was built with other endless joints"):
-        plan(*task[0], **task[1], cell=cell(plain, tool, placement, {}))
+        on_grid(*task[0], **task[1], cell=cell(plain, tool, placement, {}))
     with pytest.raises(InputError, match='method: only "exact"'):
         plan(*task[0], **task[1], method="paper", cell=cell(arm, tool, placement, {}))
 
@@ -188,7 +191,7 @@ def test_the_first_node_without_a_clear_pose_is_told_wherever_the_search_breaks(
     half = {"lid": box_between([0.9, 0.05, 0.5], [1.5, 0.3, 0.52])}
     there = cell(arm, tool, placement, half)
     with pytest.raises(NoFeasiblePath) as no:
-        plan(*task[0], **task[1], cell=there)
+        on_grid(*task[0], **task[1], cell=there)
     graph = task[1]["graph"]
     clear = there.clear(graph.q)
     none = [k for k in range(121) if not clear[graph.start[k] : graph.start[k + 1]].any()]

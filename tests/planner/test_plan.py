@@ -1,13 +1,17 @@
 """plan(): the whole way from contour to plan, and its answers when there is none."""
 
 import itertools
+from contextlib import suppress
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 from kerfpath import Contour, InputError, NoFeasiblePath, audit, plan, plan_in_pieces, robot
+from kerfpath.limits import Limits
 from kerfpath.planner import layered_graph, node_interval
+from kerfpath.retime import retime
 
 STEP = np.radians(5)
 IN_LINE = 0.05  # sine of joint 5: nearer than this to its zero the wrist is all but singular
@@ -138,12 +142,16 @@ def test_a_robot_without_accelerations_is_refused(circle, tool, placement):
         plan(circle, robot("abb_irb4600_60_205"), tool=tool, placement=placement, speed=0.1)
 
 
-def test_the_default_is_the_proved_optimum(made, circle, arm, tool, placement):
-    assert made.proof.optimal
-    assert made.settings.method == "exact"
+def test_the_exact_method_is_proved_and_the_default_is_better_still(
+    made, circle, arm, tool, placement
+):
+    assert made.settings.method == "continuous"
     options = {"tool": tool, "placement": placement, "speed": 0.1, "gamma_step": STEP}
+    exact = plan(circle, arm, method="exact", **options)
+    assert exact.proof.optimal
+    assert made.cost < exact.cost
     greedy = plan(circle, arm, method="paper", **options)
-    assert made.cost <= greedy.cost * (1 + 1e-12)
+    assert exact.cost <= greedy.cost * (1 + 1e-12)
     known = plan(circle, arm, method="known", **options)
     assert not known.proof.optimal
     assert "tests neither velocity nor acceleration" in known.proof.statement
@@ -189,16 +197,21 @@ def test_a_change_of_posture_that_no_path_can_make_is_named(circle, arm, tool, p
 def test_where_the_grid_has_no_path_one_is_found_off_it(circle, arm, tool, placement):
     """A coarse grid quantises the acceleration: (6) fails on it and holds beside it."""
     options = {"tool": tool, "placement": placement, "speed": 0.6, "gamma_step": np.radians(4)}
+    exact = options | {"method": "exact"}
     with pytest.raises(NoFeasiblePath) as broken:
-        plan(circle, arm, **options)
+        plan(circle, arm, **exact)
     assert broken.value.proved
-    made = plan(circle, arm, refine=True, **options)
+    made = plan(circle, arm, refine=True, **exact)
     assert np.abs(made.acceleration_share).max() <= 1
     assert not made.proof.optimal
     assert "brought inside limits" in made.proof.statement
     assert audit(made) == []
     with pytest.raises(NoFeasiblePath, match="off the grid not refined: the "):
-        plan(circle, arm, refine=True, **options | {"speed": 0.7, "eta_a": 0.3})
+        plan(circle, arm, refine=True, **exact | {"speed": 0.7, "eta_a": 0.3})
+    # Over continuous gamma it is found at once.
+    found = plan(circle, arm, **options)
+    assert found.cost <= made.cost * (1 + 1e-4)  # both are converged to that
+    assert audit(found) == []
 
 
 @pytest.fixture(scope="module")
@@ -231,8 +244,27 @@ def test_the_feed_dips_where_the_limits_ask_for_it(corner, arm, tool, placement,
 
 def test_off_the_grid_the_feed_dips_less(corner, arm, tool, placement):
     options = {"tool": tool, "placement": placement, "gamma_step": STEP, "speed": 0.4}
+    options |= {"method": "exact"}
     grid, off = (plan(corner, arm, feed="dip", refine=r, **options) for r in (False, True))
     assert off.time[-1] < grid.time[-1]
+
+
+@pytest.mark.parametrize("moved", [True, False])
+def test_a_dip_is_never_slower_than_on_the_grid(monkeypatch, corner, arm, tool, placement, moved):
+    if not moved:  # off the grid nothing is gained
+        monkeypatch.setattr("kerfpath.refiner.ease", lambda plan: plan)
+        monkeypatch.setattr("kerfpath.refiner.refine", lambda plan: SimpleNamespace(plan=plan))
+    options = {"tool": tool, "placement": placement, "gamma_step": STEP, "feed": "dip"}
+    for speed in (0.2, 0.4):
+        grid, off = (plan(corner, arm, speed=speed, refine=r, **options) for r in (False, True))
+        assert (off.time[-1], off.cost) <= (grid.time[-1], grid.cost)
+        assert moved == (off.time[-1] < grid.time[-1])
+        # The best path without acceleration limits, slowed down, is a plan on the grid, too.
+        easy = arm.with_limits(acceleration=np.full(6, 1e6))
+        with suppress(NoFeasiblePath):
+            path = plan(corner, easy, speed=speed, tool=tool, placement=placement, gamma_step=STEP)
+            times = retime(path.increments, path.dt, Limits.of(*arm.speed_limits()))
+            assert grid.time[-1] <= times.sum() * (1 + 1e-9)
 
 
 def require_clean(made, **options):
@@ -243,6 +275,8 @@ def require_clean(made, **options):
 
 def test_the_pieces_of_an_interrupted_cut(corner, arm, tool, placement):
     options = {"tool": tool, "placement": placement, "gamma_step": STEP, "speed": 0.1}
+    freely = plan_in_pieces(corner, arm, **options)
+    options |= {"method": "exact"}
     pieces = plan_in_pieces(corner, arm, **options)
     assert len(pieces) > 1
     assert pieces[0].name == f"corner, piece 1 of {len(pieces)}"
@@ -260,6 +294,11 @@ def test_the_pieces_of_an_interrupted_cut(corner, arm, tool, placement):
     assert pieces[-1].contour.s[-1] == corner.s[-1]
     refined = plan_in_pieces(corner, arm, refine=True, **options)
     assert all(r.cost <= p.cost for r, p in zip(refined, pieces, strict=True))
+    # Over continuous gamma each piece is at least as good, and as long.
+    assert all(f.cost <= r.cost * (1 + 1e-9) for f, r in zip(freely, refined, strict=True))
+    assert [f.name for f in freely] == [p.name for p in pieces]
+    for p in freely:
+        require_clean(p)
     whole = plan_in_pieces(corner, arm, **options | {"speed": 0.05})
     assert [p.name for p in whole] == ["corner"]
     shortest = min(float(np.ptp(p.contour.s)) for p in pieces)
@@ -271,8 +310,8 @@ def test_the_pieces_of_an_interrupted_cut(corner, arm, tool, placement):
         plan_in_pieces(corner, arm, least_piece=0.15, **options)
     with pytest.raises(InputError, match=r"least_piece: expected a number above 0 m"):
         plan_in_pieces(corner, arm, least_piece=0.0, **options)
-    with pytest.raises(InputError, match='method: expected "exact" with interruptions "fewest"'):
-        plan_in_pieces(corner, arm, method="paper", **options)
+    with pytest.raises(InputError, match='method: expected "continuous" or "exact" with inter'):
+        plan_in_pieces(corner, arm, **options | {"method": "paper"})
     turned = np.where(arm.endless, 1.0, np.inf)
     for wrong in ({"closure": "periodic"}, {"rotation": turned}):
         with pytest.raises(InputError, match=r"^(closure|rotation): expected"):

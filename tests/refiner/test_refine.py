@@ -18,7 +18,7 @@ STEP = np.radians(2)
 @pytest.fixture(scope="module")
 def planned(circle, arm, tool, placement):
     def call(contour=circle, speed=0.1, **options):
-        options = {"gamma_step": STEP, "postures": (0, 1)} | options
+        options = {"gamma_step": STEP, "postures": (0, 1), "method": "exact"} | options
         return plan(contour, arm, tool=tool, placement=placement, speed=speed, **options)
 
     return call
@@ -155,6 +155,8 @@ def _random_model(rng, metric, *, cap=np.inf):
         q=q,
         slope=rng.normal(0, 1, (K, n)),
         radius=np.full(K, 0.3),
+        least=np.full(K, -1.0),
+        most=np.full(K, 1.0),
         lower=q.min(0) - 0.05,
         upper=q.max(0) + 0.05,
         rotation=np.array([np.inf, np.abs(q[:, 1] - q[0, 1]).max() + 0.02, np.inf]),

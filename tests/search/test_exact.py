@@ -14,9 +14,11 @@ from kerfpath import InputError, NoFeasiblePath, shortest_path
 ONE = {"dt": 1.0, "velocity": [1.0], "acceleration": [1.0]}
 
 
-def instance(rng, closure, **sizes):
-    q, start, options = naive.random_instance(rng, **sizes)
+def instance(rng, closure, below=0.0, make=naive.random_instance, **sizes):
+    q, start, options = make(rng, **sizes)
     options |= {"method": "exact"}
+    if below:
+        options["vertex_cost"] = options["vertex_cost"] - below * rng.random(len(q))
     if closure == "periodic":
         # The last layer repeats the first, endless joints turned once more.
         first = q[: start[1]] + 2 * np.pi * options["endless"]
@@ -71,6 +73,45 @@ def test_the_optimum_agrees_with_trying_every_pair_of_edges(closure):
     rng = np.random.default_rng(21)
     feasible = sum(agree(rng, closure) for _ in range(1500))
     assert 300 < feasible < 1450
+
+
+@pytest.mark.parametrize("below", [0.3, 20.0])
+@pytest.mark.parametrize("closure", ["free", "periodic"])
+def test_costs_below_zero_change_nothing_but_the_optimum(monkeypatch, closure, below):
+    monkeypatch.setattr("kerfpath.search._exact.ROOM", 30)
+    rng = np.random.default_rng(26)
+    # From one layer back to it all steps are 0 but for rounding, which is no tie to break.
+    assert sum(agree(rng, closure, below=below, layers=(2, 9)) for _ in range(300)) > 60
+    for cost in ([-3.0, -2.0], [3.0, 2.0]):
+        for objective in ("sum", "max"):
+            path = shortest_path(
+                [[0.0], [0.1]],
+                [0, 2],
+                vertex_cost=cost,
+                objective=objective,
+                closure=closure,
+                **ONE,
+            )
+            assert path.cost == min(cost)
+
+
+@pytest.mark.parametrize("closure", ["free", "periodic"])
+def test_half_a_turn_goes_the_way_that_the_values_go(closure):
+    rng = np.random.default_rng(27)
+    feasible = sum(agree(rng, closure, make=naive.lattice_instance) for _ in range(1500))
+    assert 200 < feasible < 1450
+
+
+def test_of_half_a_turn_both_ways_are_as_long_but_not_as_even():
+    # On from -90 to 0 the joint goes to 180 as evenly as to -180 it does not: (6) tells them apart.
+    turning = {"dt": 1.0, "velocity": [4.0], "acceleration": [2.0], "endless": [True]}
+    for last, broken in (([np.pi], False), ([-np.pi], True), ([-3 * np.pi], False)):
+        q = [[-np.pi / 2], [0.0], last]
+        if broken:
+            with pytest.raises(NoFeasiblePath, match="acceleration"):
+                shortest_path(q, [0, 1, 2, 3], **turning)
+        else:
+            assert shortest_path(q, [0, 1, 2, 3], **turning).optimal
 
 
 @pytest.mark.slow

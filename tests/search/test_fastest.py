@@ -7,7 +7,15 @@ import pytest
 from tests.search.posed import least_interval
 
 import naive
-from kerfpath import InputError, NoFeasiblePath, audit, fastest_speed, plan, shortest_path
+from kerfpath import Contour, InputError, NoFeasiblePath, audit, fastest_speed, plan, shortest_path
+
+
+@pytest.fixture(scope="module")
+def uneven(circle):
+    """The circle in steps of two lengths, the longest 5 % longer than the mean."""
+    fine = circle.resample(count=361)
+    kept = np.cumsum([0] + 18 * [6, 7, 7])
+    return Contour(fine.points[kept], fine.axes[kept], closed=True, name="uneven")
 
 
 def interval_of(q, v, a, endless):
@@ -115,6 +123,18 @@ def test_a_contour_is_feasible_at_its_fastest_speed_and_not_above(circle, arm, t
     assert 0 <= found.node < len(circle)
 
 
+@pytest.mark.parametrize("refine", [False, True])
+def test_uneven_nodes_have_one_speed_the_same_for_both(uneven, arm, tool, placement, refine):
+    options = {"tool": tool, "placement": placement, "gamma_step": np.radians(5)}
+    found = fastest_speed(uneven, arm, refine=refine, **options)
+    made = plan(uneven, arm, speed=found.speed * (1 - 1e-6), refine=refine, **options)
+    # The speed is that of the longest step, as it is where a plan is asked for at it.
+    assert np.diff(uneven.s).max() / made.dt == pytest.approx(found.speed, rel=2e-6)
+    on_grid = found.speed if found.on_grid is None else found.on_grid
+    with pytest.raises(NoFeasiblePath):
+        plan(uneven, arm, speed=on_grid * 1.001, **options)
+
+
 def test_off_the_grid_it_is_faster_and_the_motion_keeps_the_limits(circle, arm, tool, placement):
     cell = {"tool": tool, "placement": placement, "gamma_step": np.radians(4)}
     on_grid = fastest_speed(circle, arm, **cell)
@@ -126,6 +146,15 @@ def test_off_the_grid_it_is_faster_and_the_motion_keeps_the_limits(circle, arm, 
     assert np.abs(made.acceleration_share).max() <= 1
     # What binds is used up: at that speed nothing is left of it.
     assert found.limit == "acceleration"
+
+
+def test_off_the_grid_a_plan_is_found_up_to_the_fastest_speed(circle, arm, tool, placement):
+    nodes = circle.resample(count=41)
+    cell = {"tool": tool, "placement": placement, "gamma_step": np.radians(5), "refine": True}
+    found = fastest_speed(nodes, arm, **cell)
+    for share in (0.99, 0.999, 0.99999):
+        made = plan(nodes, arm, speed=share * found.speed, **cell)
+        assert audit(made) == []
 
 
 def test_an_interval_found_past_the_ceiling_of_a_search_is_not_believed():

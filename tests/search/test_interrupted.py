@@ -77,6 +77,19 @@ def test_number_and_cost_agree_with_trying_everything(count):
     assert max(i for i in seen if i is not None) > 4
 
 
+def rewarded(rng, **sizes):
+    """An instance whose vertices cost less than nothing, some of them."""
+    q, start, o = instance(rng, **sizes)
+    return q, start, o | {"vertex_cost": o["vertex_cost"] - 2 * rng.random(len(q))}
+
+
+def test_costs_below_zero_count_at_every_visit():
+    rng = np.random.default_rng(38)
+    seen = [agree(rng, rewarded, layers=(1, 12), size=(1, 9)) for _ in range(200)]
+    seen += [agree(rng, rewarded, long=True, layers=(2, 10), size=(1, 7)) for _ in range(200)]
+    assert min(seen.count(None), *(seen.count(i) for i in range(3))) > 10
+
+
 def tracks(rng):
     """Overlapping stretches that are held without a change: much freedom where to interrupt."""
     K, spans = int(rng.integers(14, 24)), [(0, int(rng.integers(3, 7)))]

@@ -35,6 +35,19 @@ def instance(rng, closure):
     return q, start, rotation, o
 
 
+def lattice(rng, closure):
+    """An instance of many steps of half a turn, its limits whole steps."""
+    q, start, o = naive.lattice_instance(rng)
+    o |= {"method": "exact"}
+    o["endless"][0] = True
+    if closure == "periodic":
+        q, start = np.vstack([q, q[: start[1]]]), np.append(start, len(q) + start[1])
+        for name in ("posture", "vertex_cost"):
+            o[name] = np.concatenate([o[name], o[name][: start[1]]])
+    limit = np.pi / 2 * rng.integers(1, 6, len(o["endless"])) + 1e-3
+    return q, start, np.where(o["endless"] & (rng.random(q.shape[1]) < 0.8), limit, INF), o
+
+
 def turned(path, endless):
     """Largest angle (n,) that each joint turns away from where the path (K, n) begins."""
     return np.abs(np.cumsum(naive.difference(path[:-1], path[1:], endless), axis=0)).max(axis=0)
@@ -47,17 +60,22 @@ def feasible(q, start, closure, o, rotation=None):
         return None
 
 
-def agree(rng, closure):
+def agree(rng, closure, make=instance):
     """Compare one random instance with the oracle; return what the limits made of it."""
-    q, start, rotation, o = instance(rng, closure)
+    q, start, rotation, o = make(rng, closure)
     want = naive.rotated(q, start, closure, rotation, **o)
     free = feasible(q, start, closure, o)
     if want is None:
         with pytest.raises(NoFeasiblePath) as caught:
             shortest_path(q, start, closure=closure, rotation=rotation, **o)
         assert caught.value.proved
+        node_agrees(q, start, rotation, o, caught.value.node)
         if free is None:
-            return "no path"
+            sooner = "rotation limit" in str(caught.value)
+            with pytest.raises(NoFeasiblePath) as unlimited:
+                shortest_path(q, start, closure=closure, **o)
+            assert sooner == (caught.value.node < unlimited.value.node)
+            return "closed sooner" if sooner else "no path"
         assert "rotation limit" in str(caught.value)
         reason_agrees(q, start, closure, rotation, o, caught.value)
         return "closed"
@@ -97,14 +115,18 @@ def reason_agrees(q, start, closure, rotation, o, broken):
     assert named == opening or not (opening or passes(named))
     assert ("without rotation limits" in str(broken)) == (opening == [])
 
+
+def node_agrees(q, start, rotation, o, last):
+    """The last node that a path within the limits reaches, by the oracle."""
+
     def passable(node):
         part = slice(start[node + 1])
         cut = o | {name: o[name][part] for name in ("posture", "vertex_cost")}
         return naive.rotated(q[part], start[: node + 2], "free", rotation, **cut) is not None
 
     K = len(start) - 1
-    assert broken.node == 0 or passable(broken.node)
-    assert broken.node == K - 1 or not passable(broken.node + 1)
+    assert last == 0 or passable(last)
+    assert last == K - 1 or not passable(last + 1)
 
 
 @pytest.mark.parametrize("closure", ["free", "periodic"])
@@ -114,6 +136,15 @@ def test_the_optimum_agrees_with_trying_every_path(closure, count):
     seen = [agree(rng, closure) for _ in range(count)]
     kinds = "no path", "closed", "other", "as without"
     assert min(seen.count(kind) for kind in kinds) > count / 50
+    assert seen.count("closed sooner") > count / 100
+
+
+@pytest.mark.parametrize("closure", ["free", "periodic"])
+def test_half_a_turn_goes_one_way_within_limits_too(closure):
+    rng = np.random.default_rng(45)
+    seen = [agree(rng, closure, lattice) for _ in range(400)]
+    kinds = "no path", "closed", "other", "as without"
+    assert min(seen.count(kind) for kind in kinds) > 4
 
 
 ONE = {"dt": 1.0, "velocity": [1.0], "acceleration": [9.0], "endless": [True], "weights": [1.0]}
@@ -187,6 +218,24 @@ def test_limits_that_close_the_way_only_together_are_both_named():
         shortest_path([[0.0, 0.0], [0.8, 0.8]], [0, 1, 2], rotation=[0.5, 0.5], **two)
     with pytest.raises(NoFeasiblePath, match=r"of joint 2 \(0.5 rad\) closes"):
         shortest_path([[0.0, 0.0], [0.4, 0.8]], [0, 1, 2], rotation=[0.5, 0.5], **two)
+
+
+def test_where_the_limit_ends_all_paths_before_they_break_it_is_named():
+    q = np.append(TURNING, [[99.0]], axis=0)[[*range(12), 15]]  # no step leads to the last node
+    start = np.arange(14)
+    with pytest.raises(NoFeasiblePath, match="no admissible edge from node 11 to") as caught:
+        shortest_path(q, start, **ONE)
+    assert (caught.value.node, caught.value.back) == (11, 12)
+    said = (
+        r"joint 1 \(3 rad\) closes the way from node 3 on; without it there is a path to node 11, "
+        "and there no admissible edge from node 11 to node 12"
+    )
+    with pytest.raises(NoFeasiblePath, match=said) as caught:
+        shortest_path(q, start, rotation=[3.0], **ONE)
+    assert (caught.value.proved, caught.value.node, caught.value.back) == (True, 3, None)
+    with pytest.raises(NoFeasiblePath, match=r"^no admissible edge from node 11 to") as caught:
+        shortest_path(q, start, rotation=[12.0], **ONE)
+    assert (caught.value.node, caught.value.reached) == (11, None)
 
 
 def test_one_layer_turns_nowhere():

@@ -13,8 +13,10 @@ from kerfpath.search import _slowed
 ONE = {"dt": 1.0, "velocity": [1.0], "acceleration": [1.0]}
 
 
-def instance(rng, **sizes):
+def instance(rng, below=0.0, **sizes):
     q, start, o = naive.random_instance(rng, **sizes)
+    if below:
+        o["vertex_cost"] = o["vertex_cost"] - below * rng.random(len(q))
     for name in ("posture", "objective", "method"):
         o.pop(name)
     o["velocity"] = o["velocity"] * rng.choice([1, 0.3])
@@ -60,6 +62,13 @@ def test_where_the_search_begins_does_not_change_the_answer(monkeypatch, stretch
     rng = np.random.default_rng(52)
     for _ in range(400):
         agree(rng, layers=(1, 14), size=(1, 10))
+
+
+def test_costs_below_zero_change_nothing_but_the_optimum(monkeypatch):
+    monkeypatch.setattr(_slowed, "ROOM", 30)
+    rng = np.random.default_rng(56)
+    for _ in range(300):
+        agree(rng, below=rng.choice([0.3, 20.0]), layers=(1, 9), size=(1, 10))
 
 
 def test_the_oracle_itself_agrees_with_enumeration():

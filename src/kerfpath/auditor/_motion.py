@@ -49,10 +49,13 @@ class Motion:
 
 
 def joint_increments(plan: Plan) -> Array:
-    """Return joint increments (K-1, n) rad; an endless joint goes the short way round (13)."""
+    """Return joint increments (K-1, n) rad; an endless joint goes the short way round (13).
+
+    Half a turn is as long either way; it goes the way that the values go.
+    """
     dq = np.diff(plan.q, axis=0)
-    short = np.remainder(dq + np.pi, 2 * np.pi) - np.pi
-    return np.where(plan.robot.endless, short, dq)
+    turns = np.round(dq / (2 * np.pi))
+    return np.where(plan.robot.endless, dq - turns * 2 * np.pi, dq)
 
 
 def motion_of(plan: Plan, chain: JointChain, interpolation: Interpolation, parts: int) -> Motion:

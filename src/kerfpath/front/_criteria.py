@@ -17,6 +17,7 @@ from kerfpath.front._problem import Criterion, Gap, ParetoProblem
 from kerfpath.front._subproblem import Subproblem, counts_as_clearance, is_in_window
 from kerfpath.kernels.metric import increments
 from kerfpath.options import PlanOptions
+from kerfpath.planner import longest_step
 from kerfpath.plans import Plan
 from kerfpath.robots import Robot
 from kerfpath.transfer import least_time
@@ -174,7 +175,7 @@ class Speed(Criterion):
         faster = [asked.eta_v / found.peak_velocity.max()]
         if (sharpest := found.peak_acceleration.max()) > 0:
             faster.append(np.sqrt(asked.eta_a / sharpest))
-        return plan.contour.length / float(plan.time[-1]) * float(min(faster))
+        return longest_step(plan.contour) / plan.dt * float(min(faster))
 
     def anchor(self, problem: ParetoProblem) -> Subproblem:
         return problem.unbounded.quicker(problem.dt / problem.least.slower.dt * (1 - ROUNDING))
@@ -182,9 +183,8 @@ class Speed(Criterion):
     def bound(
         self, run: Subproblem, value: float, gap: Gap, problem: ParetoProblem, *_: object
     ) -> Subproblem:
-        contour, whole = problem.contour, problem.unbounded
-        mean = contour.length / (problem.dt * (len(contour) - 1))
-        return replace(run, eta_v=whole.eta_v, eta_a=whole.eta_a).quicker(value / mean)
+        whole, asked = problem.unbounded, longest_step(problem.contour) / problem.dt
+        return replace(run, eta_v=whole.eta_v, eta_a=whole.eta_a).quicker(value / asked)
 
 
 class Time(Criterion):

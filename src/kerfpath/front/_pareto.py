@@ -104,7 +104,13 @@ def pareto(
         Unknown criteria or search, fewer than one run, and what `kerfpath.plan` refuses.
     """
     asked = with_keywords(
-        options, keywords, ParetoKeywords, feed="constant", refine=False, certify=None
+        options,
+        keywords,
+        ParetoKeywords,
+        method="exact",
+        feed="constant",
+        refine=False,
+        certify=None,
     )
     found = criteria_named(criteria, robot, options=asked, cell=cell, home=home)
     workers = whole_number((os.cpu_count() or 1) if workers is None else workers, "workers")

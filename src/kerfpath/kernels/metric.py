@@ -37,7 +37,11 @@ EUCLID, MANHATTAN, CHEBYCHEV = 0, 1, 2
 
 
 def _short(dq: _X) -> _X:
-    """Return the short way round, of a number or an array."""
+    """Return the short way round, of a number or an array.
+
+    Half a turn is as long either way, but not to (6). It goes the way that the values go, and is
+    then the same in reverse; between values more than a turn apart, the way from the even turn.
+    """
     short: _X = dq - 2.0 * pi * np.rint(dq / (2.0 * pi))
     return short
 

@@ -40,6 +40,8 @@ class SortedLayers(NamedTuple):
 
     q: Array
     """(n, N) rad, endless joints wrapped to (-pi, pi]."""
+    given: Array
+    """(n, N) rad, not wrapped: what increments are taken of; q itself where nothing is wrapped."""
     start: Ints
     """(K+1,): layer k is q[:, start[k]:start[k+1]]."""
     cost: Array
@@ -212,7 +214,7 @@ def late_cost(lost: LostTime, time: float) -> float:
 def fill_increment(layers: SortedLayers, p: int, j: int, out_dq: Array) -> None:
     """Fill the joint increment (n,) from vertex p to vertex j."""
     for i in range(len(layers.endless)):
-        out_dq[i] = increment(layers.q[i, j] - layers.q[i, p], layers.endless[i])
+        out_dq[i] = increment(layers.given[i, j] - layers.given[i, p], layers.endless[i])
 
 
 @jit_inline

@@ -5,6 +5,7 @@ from kerfpath.planner._fastest import FastestSpeed as FastestSpeed
 from kerfpath.planner._fastest import fastest_speed as fastest_speed
 from kerfpath.planner._fastest import relaxations as relaxations
 from kerfpath.planner._graph import layered_graph as layered_graph
+from kerfpath.planner._graph import longest_step as longest_step
 from kerfpath.planner._graph import node_interval as node_interval
 from kerfpath.planner._map import ClearanceMap as ClearanceMap
 from kerfpath.planner._map import clearance_map as clearance_map

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 from typing import TypeVar
 
 import numpy as np
 
-from kerfpath._arrays import Array, Ints
+from kerfpath._arrays import Array, Bools, Ints
 from kerfpath.cell import UNPROVED, Cell, CollisionChecker
 from kerfpath.comfort import Band
 from kerfpath.errors import InputError, NoFeasiblePath
@@ -23,6 +24,8 @@ _P = TypeVar("_P", bound=FoundPath)
 
 POSES_MEASURED, PAIRS_NAMED = 100, 3
 """Poses of a node that are measured, and pairs of bodies that are named, where it is closed."""
+SAMPLES_LOOKED_AT = 8
+"""Samples of gamma on either side of a path that the refinement may use if they are clear."""
 POSES_SETTLED = 20_000
 """Poses asked about to find the nodes at which none is clear."""
 RANGES_LISTED = 6
@@ -62,6 +65,37 @@ class ClearSearch:
             return find_clear(search, problem, self._known)
         except NoFeasiblePath as broken:
             raise self._named(broken) from None
+
+    def open_problem(self, problem: SearchProblem) -> SearchProblem:
+        """Return a problem on the graph of the task without the vertices that are known to collide.
+
+        Those that nothing is known of are open.
+        """
+        if self._cell is None:
+            return problem
+        return replace(problem, vertex_cost=problem.vertex_cost + self._known.cost)
+
+    def learn(self, vertices: list[Ints]) -> bool:
+        """Look at vertices (rows of q) of which nothing is known; True where one of them collides.
+
+        Around those that do, neighbours are looked at, too.
+        """
+        if self._cell is None or not vertices:
+            return False
+        return self._known.learn_vertices(np.concatenate(vertices))
+
+    def corridor(self, one: Ints, other: Ints) -> tuple[Ints, Ints] | None:
+        """Return how many samples before vertices `one`, and after `other`, are clear in a row.
+
+        (K,) each, up to `SAMPLES_LOOKED_AT`; None without a cell.
+        """
+        if self._cell is None:
+            return None
+        back, ahead = (
+            self._known.open_run(end, side, SAMPLES_LOOKED_AT)
+            for side, end in enumerate((one, other))
+        )
+        return back, ahead
 
     def _named(self, broken: NoFeasiblePath) -> NoFeasiblePath:
         """Say of a break by collision where no pose is clear at all, and which bodies collide.
@@ -136,10 +170,19 @@ class ClearSearch:
 
     def is_clear(self, made: Plan) -> bool:
         """Return whether a plan is clear in the cell, if there is one, at and between its nodes."""
-        if self._cell is None:
-            return True
+        return not self.unclear(made).any()
+
+    def unclear(self, made: Plan) -> Bools:
+        """Return the nodes (K,) of a plan that are not clear, and both ends of what is not."""
         q = made.q
-        return bool(self._cell.clear(q).all() and self._cell.clear_motion(q[:-1], q[1:]).all())
+        if self._cell is None:
+            return np.zeros(len(q), np.bool_)
+        at = ~self._cell.clear(q)
+        if not at.any():
+            between = ~self._cell.clear_motion(q[:-1], q[1:])
+            at[:-1] |= between
+            at[1:] |= between
+        return np.asarray(at)
 
 
 def _require_same_cell(task: PlanningTask, cell: Cell) -> None:

@@ -20,33 +20,51 @@ __all__ = ["plan_slowed"]
 def plan_slowed(task: PlanningTask, finder: ClearSearch, *, refine: bool) -> Plan:
     """Return a plan that keeps the speed asked for wherever its path lets it, and dips elsewhere.
 
-    On the grid the path is the one that loses the least time, priced above all distances, if each
-    step had to be slow on its own. With `refine` gamma moves off the grid to ask for little beyond
-    the limits, from the best path without acceleration limits, where there is one. The times along
-    the path are then the least under all limits; the refinement keeps them, and they are set anew.
-    What would not be clear off the grid stays on it.
+    On the grid two paths are worth their least times under all limits: the one that loses the least
+    time, priced above all distances, if each step had to be slow on its own, and the best one
+    without acceleration limits, where there is one. With `refine` gamma also moves off the grid
+    from each to ask for little beyond the limits, and the quicker of the two, or if that is not
+    clear the other, is refined. The plan is the quickest, and of equally quick ones the cheapest.
     """
-    free = refine and task.robot.family.free_rotation
-    start = plan_first_order(task, finder) if free else None
-    start = _least_lost(task, finder) if start is None else start
-    if not free:
-        return _with_least_times(task, start)
-    eased = refiner.ease(start)
+    slowed, first = _least_lost(task, finder), plan_first_order(task, finder)
+    starts = [slowed]
+    if first is not None and not np.array_equal(first.q, slowed.q):
+        starts.append(first)
+    on_grid = min((_with_least_times(task, start) for start in starts), key=_time_and_cost)
+    if not (refine and task.robot.family.free_rotation):
+        return on_grid
+    why = "take longer"
+    for eased in sorted((_ease(task, start) for start in starts), key=_time_and_cost):
+        again = _with_least_times(task, refiner.refine(eased).plan)
+        made = min(again, eased, key=_time_and_cost)
+        if _time_and_cost(made) > _time_and_cost(on_grid):
+            continue
+        broken = _broken(task, finder, made)
+        if not broken:
+            return made
+        why = broken
+    claim = f"{on_grid.proof.statement}; not refined: off the grid it would {why}"
+    return replace(on_grid, proof=replace(on_grid.proof, statement=claim))
+
+
+def _ease(task: PlanningTask, start: Plan) -> Plan:
+    """Return the plan off the grid that asks for little beyond the limits, with its least times."""
     claim = f"{start.proof.statement}; gamma moved off the grid to lose little time"
-    made = _with_least_times(task, replace(eased, proof=Proof(optimal=False, statement=claim)))
-    better = refiner.refine(made)
-    again = _with_least_times(task, better.plan)
-    best = again if again.time[-1] <= made.time[-1] else made
-    comfort, broken = task.settings.comfort, ""
-    if comfort is not None and comfort.broken(task.robot, best.q, task.T_flange_tip):
-        broken = "break a margin of comfort"
-    elif not finder.is_clear(best):
-        broken = "not be clear"
-    if not broken:
-        return best
-    kept = plan_slowed(task, finder, refine=False)
-    claim = f"{kept.proof.statement}; not refined: off the grid it would {broken}"
-    return replace(kept, proof=replace(kept.proof, statement=claim))
+    eased = replace(refiner.ease(start), proof=Proof(optimal=False, statement=claim))
+    return _with_least_times(task, eased)
+
+
+def _time_and_cost(made: Plan) -> tuple[float, float]:
+    """Return the time of a plan, s, without its rounding, and its cost."""
+    return round(float(made.time[-1]), 9), made.cost
+
+
+def _broken(task: PlanningTask, finder: ClearSearch, made: Plan) -> str:
+    """Return what a plan off the grid would break; empty where nothing."""
+    comfort = task.settings.comfort
+    if comfort is not None and comfort.broken(task.robot, made.q, task.T_flange_tip):
+        return "break a margin of comfort"
+    return "" if finder.is_clear(made) else "not be clear"
 
 
 def _least_lost(task: PlanningTask, finder: ClearSearch) -> Plan:

@@ -16,7 +16,7 @@ from kerfpath.graph import LayeredGraph
 from kerfpath.limits import Limits
 from kerfpath.options import GraphKeywords, PlanOptions, with_keywords
 from kerfpath.planner._clear import ClearSearch
-from kerfpath.planner._graph import node_interval, require_even
+from kerfpath.planner._graph import longest_step, node_interval, require_even
 from kerfpath.planner._task import task_of
 from kerfpath.plans import Proof
 from kerfpath.refiner import quicken
@@ -66,8 +66,8 @@ class FastestSpeed:
     @classmethod
     def of(cls, contour: Contour, least: LeastInterval) -> FastestSpeed:
         """Return what a least node interval is as a speed along a contour."""
-        spacing = contour.length / (len(contour) - 1)
-        return cls(speed=spacing / least.dt, joint=least.joint, node=least.node, limit=least.limit)
+        speed = longest_step(contour) / least.dt
+        return cls(speed=speed, joint=least.joint, node=least.node, limit=least.limit)
 
 
 def fastest_speed(
@@ -84,7 +84,8 @@ def fastest_speed(
 ) -> FastestSpeed:
     """Return the largest constant speed at which a path exists on the graph, exactly.
 
-    A second-order minimax problem on the layered graph; arguments as in `plan`, of whose options
+    The speed is the one that `plan` takes: that of the longest step between two nodes. A
+    second-order minimax problem on the layered graph; arguments as in `plan`, of whose options
     gamma_step, frames, tilt, postures, comfort, eta_v, eta_a and refine matter. The grid quantises
     the acceleration: `refine` moves gamma off it, from the fastest path, to what is then faster
     still (the nearest optimum, which is not proved to be the best one), unless it would not be
@@ -124,7 +125,7 @@ def fastest_speed(
     if broken or not finder.is_clear(quick):
         return found
     return FastestSpeed(
-        speed=contour.length / float(quick.time[-1]),
+        speed=longest_step(contour) / quick.dt,
         joint=at.joint,
         node=at.node,
         limit=at.limit,

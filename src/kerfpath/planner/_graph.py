@@ -19,6 +19,7 @@ from kerfpath.tilt import tilt_frames
 
 __all__ = [
     "layered_graph",
+    "longest_step",
     "node_interval",
     "require_even",
     "require_no_empty_layer",
@@ -111,9 +112,13 @@ def node_interval(contour: Contour, speed: float | None) -> float:
             f"speed: contour {contour.name!r} asks for a share of the speed at some nodes; lay it "
             f"on with contour.resample(dt=..., speed={speed:g}) and give no speed"
         )
-    steps = np.diff(contour.s)
-    require_even(contour, steps, "m")
-    return float(steps.max()) / speed
+    require_even(contour, np.diff(contour.s), "m")
+    return longest_step(contour) / speed
+
+
+def longest_step(contour: Contour) -> float:
+    """Return the longest step between neighbouring nodes, m: what a speed takes an interval for."""
+    return float(np.diff(contour.s).max())
 
 
 def require_even(contour: Contour, steps: Array, unit: str) -> None:

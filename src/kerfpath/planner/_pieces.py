@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 from functools import partial
 from typing import Unpack
 
@@ -15,6 +16,7 @@ from kerfpath.graph import LayeredGraph
 from kerfpath.options import PlanKeywords, PlanOptions, with_keywords
 from kerfpath.planner._certified import with_bound
 from kerfpath.planner._clear import ClearSearch
+from kerfpath.planner._continuous import clear_motion, grid_reason
 from kerfpath.planner._refined import refine_plan
 from kerfpath.planner._task import PlanningTask, task_of
 from kerfpath.plans import Plan, Proof
@@ -48,15 +50,17 @@ def plan_in_pieces(
 
     At an interruption the laser goes off, the robot takes another pose at the same node, and the
     cut goes on from there. No plan has fewer, and on this graph none with as many costs less, both
-    exactly; each piece is then refined on its own, if that is asked for, and certified on its own:
-    its bound is on motions along that piece. The moves between the
-    pieces are not planned here and cost nothing.
+    exactly: where it is interrupted is decided on the grid. Each piece is then planned on its own
+    over continuous gamma, or refined where the method is "exact" and that is asked for, and
+    certified on its own: its bound is on motions along that piece. The moves between the pieces are
+    not planned here and cost nothing.
 
     Parameters
     ----------
     contour, robot, tool, placement, speed, options, cell, graph, progress, phase
-        As in `plan`, with method "exact", closure "free" (a closed contour need not return to its
-        first pose), no rotation limit and no tilt. Comfort: a node in two pieces costs in both.
+        As in `plan`, with method "continuous" or "exact", closure "free" (a closed contour need
+        not return to its first pose), no rotation limit and no tilt. Comfort: a node in two pieces
+        costs in both.
     least_piece : float m, optional
         Every piece is at least as long, measured along the nodes; the number of interruptions is
         then the least with which that can be. A cut in one go may be shorter.
@@ -99,11 +103,23 @@ def plan_in_pieces(
     plans = []
     for number, piece in enumerate(found.pieces, 1):
         part, made = _plan_piece(task, finder, piece, number, len(found.pieces))
-        if asked.refine:
+        if asked.refine or asked.method == "continuous":
             begin(f"refinement of piece {number} of {len(found.pieces)}")
-        best = refine_plan(part, ClearSearch(part, cell), made) if asked.refine else made
-        plans.append(with_bound(best, asked.certify, phase=begin))
+            made = _off_grid(part, ClearSearch(part, cell), made)
+        plans.append(with_bound(made, asked.certify, phase=begin))
     return tuple(plans)
+
+
+def _off_grid(part: PlanningTask, finder: ClearSearch, made: Plan) -> Plan:
+    """Return the plan of a piece off its grid: the best motion found over continuous gamma."""
+    refined = refine_plan(part, finder, made)
+    found = None
+    if part.settings.method == "continuous" and not grid_reason(part):
+        found = clear_motion(part, finder)
+    if found is None or found.cost_after >= refined.cost:
+        return refined
+    claim = f"{made.proof.statement}; the best motion found over continuous rotation"
+    return replace(found.plan, proof=Proof(optimal=False, statement=claim))
 
 
 def _plan_piece(

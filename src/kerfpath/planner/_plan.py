@@ -9,18 +9,16 @@ from numpy.typing import ArrayLike
 
 from kerfpath.cell import Cell
 from kerfpath.contour import Contour
-from kerfpath.errors import InputError, NoFeasiblePath
+from kerfpath.errors import InputError
 from kerfpath.graph import LayeredGraph
 from kerfpath.options import PlanKeywords, PlanOptions, with_keywords
 from kerfpath.planner._certified import with_bound
 from kerfpath.planner._clear import ClearSearch
-from kerfpath.planner._dip import plan_slowed
-from kerfpath.planner._refined import plan_off_grid, refine_plan
-from kerfpath.planner._task import PlanningTask, task_of
-from kerfpath.planner._words import ON_THIS_GRID
-from kerfpath.plans import Plan, Proof
-from kerfpath.robots import Robot, posture_name
-from kerfpath.search import Method, find_shortest
+from kerfpath.planner._continuous import plan_continuous
+from kerfpath.planner._on_grid import plan_on_grid
+from kerfpath.planner._task import task_of
+from kerfpath.plans import Plan
+from kerfpath.robots import Robot
 
 __all__ = ["plan"]
 
@@ -65,15 +63,20 @@ def plan(
             Tolerance of the tool axis, searched too; default: the nominal axis alone.
         postures : sequence of int, optional
             The postures that may be used; default all. See `kerfpath.robots.postures_named`.
-        method, objective, metric, weights, eta_v, eta_a, closure, rotation
+        method : {"continuous", "exact", "paper", "known"}
+            "continuous" (the default): the best motion found over continuous gamma, by a value
+            function between its samples, beams that keep the acceleration limits, and refinement.
+            Where that is not the way, and where it finds nothing, as "exact" with `refine`; the
+            proof says so. The others search the grid, as in `shortest_path`.
+        objective, metric, weights, eta_v, eta_a, closure, rotation
             As in `shortest_path`; "periodic" closure needs a closed contour.
         feed : {"constant", "dip"}
             Where the limits do not let the speed be held: "constant" refuses, "dip" holds it
             wherever they do and slows down elsewhere, in the least time; `Plan.feed` says where.
             Needs objective "sum", closure "free" and no rotation limit.
         refine : bool
-            Move gamma off its grid afterwards, see `kerfpath.refine`. Where the grid has no path
-            (it quantises acceleration), one is looked for off it.
+            After a search of the grid, move gamma off it, see `kerfpath.refine`. Where the grid has
+            no path (it quantises acceleration), one is looked for off it.
         comfort : Comfort, optional
             Margins that the nodes keep from singularities and limits, and what coming near costs;
             see `kerfpath.comfort`. Costs are added at every node visited (objective "max":
@@ -82,8 +85,9 @@ def plan(
             The gap to reach between the plan's cost and what is proved of every other motion, and
             the time for it; None: nothing is proved beyond the grid. See `Proof.bound`.
     cell : Cell, optional
-        The plan is clear in it, at the nodes and on straight joint motions between them: the best
-        of all clear ones, though only what the search wants to use is checked. Exact method only.
+        The plan is clear in it, at the nodes and on straight joint motions between them; only what
+        the search wants to use is checked. Methods "continuous" and "exact" only; the latter finds
+        the best of all clear paths.
     graph : LayeredGraph, optional
         The layered graph of this very task, kept from `layered_graph`.
     progress : callable, optional
@@ -113,72 +117,8 @@ def plan(
     )
     finder = ClearSearch(task, cell)
     begin = phase or (lambda what: None)
-    begin("search")
-    try:
-        path = finder.find(find_shortest, task.problem)
-    except NoFeasiblePath as at_speed:
-        made = _otherwise(task, finder, at_speed, begin)
-        return with_bound(made, asked.certify, phase=phase)
-    made = task.plan(path.index, path.cost, _proof(asked.method, path.optimal, finder))
-    if asked.refine:
-        begin("refinement")
-        made = refine_plan(task, finder, made)
-    return with_bound(made, asked.certify, phase=phase)
-
-
-def _otherwise(
-    task: PlanningTask, finder: ClearSearch, broken: NoFeasiblePath, begin: Callable[[str], None]
-) -> Plan:
-    """Return a plan where the graph has none at the speed asked for: slower, or off the grid.
-
-    Raises
-    ------
-    NoFeasiblePath
-        There is none, or it was not asked for.
-    """
-    asked, found = task.settings, None
-    if asked.feed == "dip":
-        try:
-            return plan_slowed(task, finder, refine=asked.refine)
-        except NoFeasiblePath as at_any_speed:
-            broken = at_any_speed
-    elif asked.refine and asked.closure == "free":
-        begin("refinement")
-        found = plan_off_grid(task, finder)
-    if found is not None and found.done:
-        return found.plan
-    tried = "" if found is None else f"; off the grid {found.statement}"
-    where = f"{ON_THIS_GRID} " if task.robot.family.free_rotation else ""
-    raise broken.with_message(
-        f"contour {task.contour.name!r}: {where}{broken}{_bracket(broken, task)}{tried}"
-    ) from None
-
-
-def _bracket(broken: NoFeasiblePath, task: PlanningTask) -> str:
-    """Say from where on paths reach the end, and which change of posture would join the two."""
-    if broken.back is None:
-        return ""
-    said = f"; from the back, paths reach the end from node {broken.back} on"
-    said = said if broken.back > broken.node + 1 else ""
-    if broken.reached is None or broken.leaving is None:
-        return said
-    before, after = (
-        {int(mu) for mu in task.graph.posture[task.graph.start[node] + vertices]}
-        for node, vertices in ((broken.node, broken.reached), (broken.back, broken.leaving))
-    )
-    if before & after:
-        return said
-    names = (", ".join(posture_name(mu) for mu in sorted(group)) for group in (before, after))
-    return f"{said}; the posture would have to change from {' to '.join(names)}"
-
-
-def _proof(method: Method, optimal: bool, finder: ClearSearch) -> Proof:
-    if optimal:
-        claim = finder.claimed(
-            "the best path on this graph under the velocity and acceleration limits"
-        )
-    elif method == "known":
-        claim = "no claim: the known technique tests neither velocity nor acceleration"
+    if asked.method == "continuous":
+        made = plan_continuous(task, finder, begin)
     else:
-        claim = "no claim: the acceleration test of the paper's procedure is greedy"
-    return Proof(optimal=optimal, statement=claim)
+        made = plan_on_grid(task, finder, begin, refine=asked.refine)
+    return with_bound(made, asked.certify, phase=phase)

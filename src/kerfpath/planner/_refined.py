@@ -69,7 +69,14 @@ def plan_off_grid(task: PlanningTask, finder: ClearSearch) -> Refinement | None:
         return found
     claim = Proof(optimal=False, statement="the fastest path on this graph")
     quick = task.plan(least.index, task.cost(least.index), claim)
-    return _keep_if_clear(refiner.refine(quick), finder)
+    found = _keep_if_clear(refiner.refine(quick), finder)
+    if found.done:
+        return found
+    # As `fastest_speed` does: what is faster still keeps the limits at the speed asked for, too.
+    faster, _ = refiner.quicken(replace(quick, time=quick.time * (least.dt / task.dt)))
+    if faster.dt > task.dt:
+        return found
+    return _keep_if_clear(refiner.refine(replace(faster, time=quick.time)), finder)
 
 
 def _keep_if_clear(found: Refinement, finder: ClearSearch) -> Refinement:

@@ -13,7 +13,7 @@ from kerfpath._repr import short_repr
 from kerfpath.contour import Contour
 from kerfpath.errors import InputError
 from kerfpath.graph import LayeredGraph
-from kerfpath.kernels.metric import increments
+from kerfpath.kernels.metric import increments, wrap
 from kerfpath.options import PlanOptions
 from kerfpath.planner._graph import (
     layered_graph,
@@ -23,7 +23,7 @@ from kerfpath.planner._graph import (
 )
 from kerfpath.plans import Plan, Proof, path_cost
 from kerfpath.robots import Robot
-from kerfpath.search import SearchProblem
+from kerfpath.search import ContinuousPath, GammaSamples, SearchProblem
 from kerfpath.tilt import Tilt
 
 __all__ = ["PlanningTask", "task_of"]
@@ -93,6 +93,45 @@ class PlanningTask:
             counts=graph.counts(),
         )
 
+    @property
+    def samples(self) -> GammaSamples:
+        """How the vertices of the graph lie on circles of gamma."""
+        graph = self.graph
+        return GammaSamples(
+            sample=graph.sample.astype(np.int64),
+            variant=graph.variant.astype(np.int64),
+            posture=graph.posture.astype(np.int64),
+            samples=len(graph.gamma),
+        )
+
+    def plan_between(self, path: ContinuousPath, proof: Proof) -> Plan:
+        """Return the plan of a path between the samples, its joints interpolated as the path's.
+
+        With a periodic closure gamma is moved along the path so that it ends where it begins.
+        """
+        graph, s, near = self.graph, self.settings, path.one
+        gamma = graph.gamma[graph.sample[near]] + path.share * 2 * np.pi / len(graph.gamma)
+        if s.closure == "periodic":
+            gamma = gamma - np.linspace(0.0, wrap(gamma[-1] - gamma[0]), len(gamma))
+        made = Plan(
+            contour=self.contour,
+            robot=self.robot,
+            T_flange_tip=self.T_flange_tip,
+            T_base_part=self.T_base_part,
+            q=path.q,
+            gamma=gamma,
+            tilt=graph.tilt[graph.variant[near]],
+            posture=graph.posture[near].astype(np.int64),
+            turn=graph.turn[near].astype(np.int64),
+            time=self.dt * np.arange(len(self.contour), dtype=float),
+            settings=s,
+            cost=0.0,
+            proof=proof,
+            counts=graph.counts(),
+        )
+        dq = made.increments
+        return replace(made, cost=path_cost(dq, s.weights, s.metric, s.objective, made.node_cost))
+
     def part(self, first: int, last: int, name: str) -> PlanningTask:
         """Return the task of nodes first to last alone."""
         part = self.contour.part(first, last, self.settings.frames)
@@ -161,7 +200,7 @@ def task_of(
             objective=options.objective,
             closure=options.closure,
             rotation=options.rotation,
-            method=options.method,
+            method="exact" if options.method == "continuous" else options.method,
             posture=graph.posture if options.method == "known" else None,
         ),
     )

@@ -2,5 +2,6 @@
 
 from kerfpath.refiner._refine import Refinement as Refinement
 from kerfpath.refiner._refine import ease as ease
+from kerfpath.refiner._refine import promise as promise
 from kerfpath.refiner._refine import quicken as quicken
 from kerfpath.refiner._refine import refine as refine

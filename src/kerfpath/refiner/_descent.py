@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from typing import NamedTuple
 
@@ -26,6 +27,10 @@ CONVERGED = 1e-4
 """Relative gain that the model promises below which a descent has converged."""
 SMALLEST_RADIUS = 1e-7
 """rad: no controller resolves a smaller change."""
+NEARBY = (5e-3, 5e-4)
+"""rad: changes of gamma by which a motion that all but keeps the limits is brought inside them."""
+WIDER = 4.0
+"""Factor by which a radius grows that promises little because it is small."""
 AWAY = 1e3
 """1/rad: being out of a range counts for more than any share of a limit."""
 ENOUGH = 0.1
@@ -96,7 +101,12 @@ class Descent:
     metric : str
     objective : {"sum", "max"}
     radius : float rad
-        Largest change of gamma in the first iteration.
+        Largest change of gamma in the first iteration, and that a descent has to have tried before
+        it counts as converged.
+    first : float rad, optional
+        Largest change in the first iteration where that is less.
+    gamma_low, gamma_high : (K,) rad, optional
+        Where gamma is kept.
     node_cost : (K,), optional
         What each node costs, taken as fixed; what it comes to once gamma has moved is found after.
     cap : float
@@ -111,6 +121,9 @@ class Descent:
     metric: Metric
     objective: ObjectiveKind
     radius: float
+    first: float | None = None
+    gamma_low: Array | float = -np.inf
+    gamma_high: Array | float = np.inf
     node_cost: Array | None = None
     cap: float = np.inf
 
@@ -144,9 +157,27 @@ class Descent:
     def admitted(self, at: MotionState) -> tuple[MotionState, int]:
         """Return the first motion found that keeps every limit, and how many programs it took.
 
-        Where none is found, the one that breaks them least.
+        At little cost where that can be: at once; or once little is asked for beyond the limits;
+        else whatever it costs. Where none is found, the one that breaks them least.
         """
-        return (at, 0) if at.admitted else self._run(at, "excess", enough=0.0)
+        programs = 0
+        if at.admitted:
+            return at, 0
+        for near in self._nearer(at):
+            for radius in NEARBY:
+                step = self._step(near, radius, self.objective)
+                programs += step.programs
+                if step.to is not None:
+                    return step.to, programs
+        found, more = self._run(at, "excess", enough=0.0)
+        return found, programs + more
+
+    def _nearer(self, at: MotionState) -> Iterator[MotionState]:
+        """Yield where to bring a motion inside the limits from: as it is, then eased."""
+        yield at
+        eased = self.eased(at)
+        if eased.outside <= 0:
+            yield eased
 
     def gentlest(self, at: MotionState) -> MotionState:
         """Return the motion whose largest share of a limit is least."""
@@ -172,20 +203,24 @@ class Descent:
         self, at: MotionState, target: Target, enough: float = -np.inf
     ) -> tuple[MotionState, int]:
         """Go down in steps of at most a radius, which grows and shrinks as the model proves."""
-        radius, programs = self.radius, 0
+        radius, programs, failed = self.first or self.radius, 0, np.inf
         while radius > SMALLEST_RADIUS and programs < MOST_PROGRAMS:
             step = self._step(at, radius, target)
             programs += step.programs
-            if step.to is not None and step.promised <= CONVERGED * abs(at.value(target)):
-                break
             gained = 0.0 if step.to is None else at.value(target) - step.to.value(target)
+            if step.to is not None and step.promised <= CONVERGED * abs(at.value(target)):
+                if WIDER * radius > min(self.radius, failed):
+                    break
+                at, radius = step.to if gained > 0 else at, WIDER * radius
+                continue
             if step.to is not None and gained > ENOUGH * step.promised:
                 at = step.to
                 if at.value(target) <= enough:
                     break
                 radius *= 2 if step.programs == 1 else 1
             else:
-                radius = min(radius, step.longest) / 3
+                failed = min(radius, step.longest)
+                radius = failed / 3
         return at, programs
 
     def _step(self, at: MotionState, radius: float, target: Target) -> _Step:
@@ -224,6 +259,8 @@ class Descent:
             q=at.q,
             slope=np.where(movable[:, None], slope, 0.0),
             radius=np.where(movable, radius, 0.0),
+            least=np.clip((self.gamma_low - at.gamma) / radius, -1.0, 0.0),
+            most=np.clip((self.gamma_high - at.gamma) / radius, 0.0, 1.0),
             lower=np.where(endless, -np.inf, self.limits.lower + MARGIN),
             upper=np.where(endless, np.inf, self.limits.upper - MARGIN),
             rotation=self.rotation - MARGIN,

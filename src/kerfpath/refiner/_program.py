@@ -43,6 +43,8 @@ class LinearModel:
         Joints at no change, not wrapped, and their derivatives by gamma.
     radius : (K,) rad
         Largest change of gamma at each node.
+    least, most : (K,)
+        Share of it that the change is held to, from -1 to 1.
     lower, upper : (n,) rad
         Ranges of the joints; infinite where there is none.
     rotation : (n,) rad
@@ -58,6 +60,8 @@ class LinearModel:
     q: Array
     slope: Array
     radius: Array
+    least: Array
+    most: Array
     lower: Array
     upper: Array
     rotation: Array
@@ -81,8 +85,8 @@ def solve(model: LinearModel, rates: RateLimits, target: Target) -> Array | None
         beyond = rows.new(1 if target == "excess" else len(rates.tau) + len(rates.meetings[0]))
     _limits(rows, dq, D, rates, beyond)
     _ranges(rows, model)
-    for sign in (1.0, -1.0):
-        rows.hold(sign * sparse.eye_array(K, format="csr"), np.ones(K))
+    for sign, bound in ((1.0, model.most), (-1.0, -model.least)):
+        rows.hold(sign * sparse.eye_array(K, format="csr"), bound)
     cost = np.zeros(K) if target == "excess" else _cost(rows, dq, D, model, minimax=target == "max")
     if beyond is not None:
         price = (1.0 if target == "excess" else PRICE) * beyond.sum(axis=0)
@@ -93,7 +97,7 @@ def solve(model: LinearModel, rates: RateLimits, target: Target) -> Array | None
         ends = [0, K - 1]
         equal = _matrix(model.radius[ends] * (1, -1), np.zeros(2, np.int64), np.array(ends), (1, K))
     x = rows.solve(cost, equal)
-    return None if x is None else np.clip(x[:K], -1, 1) * model.radius
+    return None if x is None else np.clip(x[:K], model.least, model.most) * model.radius
 
 
 def _matrix(values: Array, row: Ints, column: Ints, shape: tuple[int, int]) -> Sparse:

@@ -19,7 +19,7 @@ from kerfpath.refiner._descent import Descent, MotionState
 from kerfpath.refiner._rates import RateLimits
 from kerfpath.search import rotation_limits
 
-__all__ = ["Binding", "Refinement", "ease", "quicken", "refine"]
+__all__ = ["Binding", "Refinement", "ease", "promise", "quicken", "refine"]
 
 MOST_INTERVALS = 10
 """Times that the interval is shortened; each gets nearer to the least by its square."""
@@ -28,6 +28,8 @@ SAME_INTERVAL = 1e-4
 
 FIRST_STEPS = 2
 """Grid steps that gamma may move by in the first iteration; what is gained sets it from then on."""
+REPAIR = 0.2
+"""Share of the cost by which once a limit beyond the limits is taken to make a motion dearer."""
 SAME_NODE = 1e-6
 """m: a node of a finer contour counts as one of the plan's up to this distance."""
 
@@ -74,6 +76,8 @@ def refine(
     nodes: Contour | None = None,
     eta_v: float | None = None,
     eta_a: float | None = None,
+    first: float | None = None,
+    within: tuple[Array, Array] | None = None,
 ) -> Refinement:
     """Return the plan with gamma moved off its grid: better, or within limits the grid cannot meet.
 
@@ -90,6 +94,11 @@ def refine(
         holds (5) and (6) at the shorter time step.
     eta_v, eta_a : float, optional
         Share of the velocity and acceleration limits; default: the plan's.
+    first : float rad, optional
+        Largest change of gamma in the first iteration, for a motion that is close to the best;
+        default: two steps of the plan's grid.
+    within : two of (K,) rad, optional
+        Least and largest gamma of each node, on the turn of the plan's.
 
     Raises
     ------
@@ -113,6 +122,8 @@ def refine(
     if comfort is not None and comfort.clearance is not None and comfort.clearance.cost:
         return _unrefined(plan, "what clearance costs is known on the grid only")
     descent, start = _descent(asked)
+    low, high = within or (-np.inf, np.inf)
+    descent = replace(descent, first=first, gamma_low=low, gamma_high=high)
     begun, before = descent.admitted(start)
     if not begun.admitted:
         return _unrefined(plan, _closest(descent, begun))
@@ -137,6 +148,15 @@ def refine(
         programs=before + programs,
         statement=proof.statement,
     )
+
+
+def promise(plan: Plan) -> float:
+    """Return what the refinement of a plan may come to: its cost, dearer by what limits it breaks.
+
+    By the true kinematics; infinite out of reach and out of a range.
+    """
+    _, start = _descent(plan)
+    return start.cost * (1 + REPAIR * start.lost) if start.outside <= 0 else np.inf
 
 
 def ease(plan: Plan) -> Plan:

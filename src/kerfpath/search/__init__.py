@@ -3,6 +3,10 @@
 from kerfpath.search._clear import CheckedEdges as CheckedEdges
 from kerfpath.search._clear import FoundPath as FoundPath
 from kerfpath.search._clear import find_clear as find_clear
+from kerfpath.search._continuous import ContinuousPath as ContinuousPath
+from kerfpath.search._continuous import ContinuousSearch as ContinuousSearch
+from kerfpath.search._continuous import Effort as Effort
+from kerfpath.search._continuous import GammaSamples as GammaSamples
 from kerfpath.search._fastest import LeastInterval as LeastInterval
 from kerfpath.search._fastest import find_least_interval as find_least_interval
 from kerfpath.search._interrupted import InterruptedPath as InterruptedPath

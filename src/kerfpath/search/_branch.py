@@ -43,16 +43,19 @@ def best_near_start(
     count = itertools.count()
     queue: list[tuple[float, float, int, BestPath, Ints, Ints]] = []
     every = np.arange(layers.start[1]), np.arange(layers.start[1], layers.start[2])
-    parts, floor = [every], 0.0
+    parts, floor = [every], -np.inf
     while True:
         for starts, firsts in parts:
             found = within.relaxed(starts, firsts, floor)
             if found is not None:
-                entry = (found.cost, found.total, next(count), found, starts, firsts)
+                # Maxima that are the same but for rounding tie, and sums say which is first.
+                cost = float(f"{found.cost:.12g}") if aim.minimax else found.cost
+                entry = (cost, found.total, next(count), found, starts, firsts)
                 heapq.heappush(queue, entry)
         if not queue:
             return None
-        floor, _, _, found, starts, firsts = heapq.heappop(queue)
+        *_, found, starts, firsts = heapq.heappop(queue)
+        floor = found.cost
         parts = within.parted(starts, firsts, found.path)
         if not parts:
             return found
@@ -149,7 +152,7 @@ def _twins(layers: SortedLayers) -> Ints:
 
 
 def _increments(layers: SortedLayers, path: Ints) -> Array:
-    return np.ascontiguousarray(increments(layers.q[:, path].T, layers.endless))
+    return np.ascontiguousarray(increments(layers.given[:, path].T, layers.endless))
 
 
 def _passes_seam(layers: SortedLayers, aim: Aim, path: Ints) -> bool:

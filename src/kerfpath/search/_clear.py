@@ -129,6 +129,27 @@ class CheckedEdges:
         edges = np.concatenate([np.stack([run[:-1], run[1:]], axis=1) for run in runs])
         return self._look_at_edges(edges, near)
 
+    def learn_vertices(self, vertices: Ints) -> bool:
+        """Ask for what is not known of vertices, and about; True where one of them is closed."""
+        self.searches += 1
+        self._look_at_vertices(vertices)
+        return bool(np.isinf(self.cost[vertices]).any())
+
+    def open_run(self, vertices: Ints, side: int, most: int) -> Ints:
+        """Return how many neighbours of vertices (B,) on a side are open in a row, `most` at most.
+
+        side: column of `around`; what is not known of them is asked for.
+        """
+        assert self._around is not None
+        run, front = np.zeros(len(vertices), np.int64), vertices
+        for _ in range(most):
+            front = np.where(front >= 0, self._around[front, side], -1)
+            there = np.flatnonzero(front >= 0)
+            self._ask(front[there])
+            front[there[np.isinf(self.cost[front[there]])]] = -1
+            run += front >= 0
+        return run
+
     def _look_at_vertices(self, vertices: Ints) -> bool:
         """Ask for what is not known of a path's vertices; True where one costs something."""
         dearer = self._ask(vertices)

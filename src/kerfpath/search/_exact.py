@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from kerfpath._arrays import Array, Bools, Ints
+from kerfpath._arrays import Array, Bools, Ints, freeze
 from kerfpath._repr import short_repr
 from kerfpath.kernels import exact, to_go
 from kerfpath.kernels.search import Aim, SortedLayers
@@ -20,6 +20,7 @@ __all__ = [
     "best_path",
     "dead_end",
     "layers_reached",
+    "lifted",
     "quickest_path",
 ]
 
@@ -87,13 +88,13 @@ class BestPath:
 def best_path(layers: SortedLayers, aim: Aim) -> BestPath | NoPathProof:
     """Return the best path, or how far any goes."""
     every = np.ones(len(layers.low), np.bool_)
-    return best_allowed(layers, aim, every, NO_SEAM, 0.0) or dead_end(layers, aim)
+    return best_allowed(layers, aim, every, NO_SEAM) or dead_end(layers, aim)
 
 
 def quickest_path(layers: SortedLayers, aim: Aim, ceiling: float) -> BestPath | None:
     """Return the path of least node interval, if that is `ceiling` or less (a timed objective)."""
     every = np.ones(len(layers.low), np.bool_)
-    found = _grow(layers, aim, every, NO_SEAM, 0.0, ceiling)
+    found = _grow(layers, aim, every, NO_SEAM, ceiling=ceiling)
     # A bound that grew past the ceiling can let a path through, but not prove it: edges beyond the
     # ceiling may have been left out.
     if found is None or found[1] > ceiling:
@@ -102,23 +103,38 @@ def quickest_path(layers: SortedLayers, aim: Aim, ceiling: float) -> BestPath | 
 
 
 def best_allowed(
-    layers: SortedLayers, aim: Aim, allowed: Bools, seam: Array, floor: float
+    layers: SortedLayers, aim: Aim, allowed: Bools, seam: Array, floor: float = -np.inf
 ) -> BestPath | None:
     """Return the best path through allowed vertices, (6) across a seam kept; None if there is none.
 
     Of several with the same maximum, the one with the least sum. `floor` is a cost that none is
-    below.
+    below, where one is known.
     """
     found = _grow(layers, aim, allowed, seam, floor)
     if found is None:
         return None
     if not aim.minimax:
         return BestPath(path=found[0], cost=found[1], total=found[1])
-    cap = found[1]
+    cap = found[1] + ROUNDING * abs(found[1])
     least_sum = aim._replace(minimax=False, cap=cap)
-    again = _grow(layers, least_sum, allowed & (layers.cost <= cap), seam, 0.0)
+    again = _grow(layers, least_sum, allowed & (layers.cost <= cap), seam)
     assert again is not None, "the path that gave the cap keeps it"
-    return BestPath(path=again[0], cost=cap, total=again[1])
+    return BestPath(path=again[0], cost=found[1], total=again[1])
+
+
+def lifted(layers: SortedLayers, aim: Aim) -> tuple[SortedLayers, float]:
+    """Return the graph with no cost of a vertex below 0, and by how much all are raised.
+
+    Bounds grow by shares of themselves, so that none may be negative. Every path visits as many
+    vertices, and its sum grows by as many times the rise. A maximum over a step, which costs 0 at
+    least, does not see costs below 0.
+    """
+    below = -float(layers.cost.min(initial=0.0))
+    if below <= 0:
+        return layers, 0.0
+    if aim.minimax and len(layers.start) > 2:
+        return layers._replace(cost=freeze(np.maximum(layers.cost, 0.0))), 0.0
+    return layers._replace(cost=freeze(layers.cost + below)), below
 
 
 def _grow(
@@ -126,21 +142,23 @@ def _grow(
     aim: Aim,
     allowed: Bools,
     seam: Array,
-    floor: float,
+    floor: float = -np.inf,
     ceiling: float = np.inf,
 ) -> tuple[Ints, float] | None:
     """Raise the bound until the recursion comes through, or drops nothing for its cost.
 
     No path dearer than `ceiling` is looked for.
     """
-    h = np.empty(len(layers.low))
+    layers, rise = lifted(layers, aim)
+    h, K = np.empty(len(layers.low)), len(layers.start) - 1
     to_go.cost_to_go(layers, aim, allowed, h)
     entry = h[: layers.start[1]]
     enter = layers.cost[: layers.start[1]]
     least = float((np.maximum(enter, entry) if aim.minimax else enter + entry).min(initial=np.inf))
     if least == np.inf:
         return None
-    bound, good, sought = max(least, floor) * (1 + ROUNDING), np.inf, False
+    bound, good, sought = max(least, floor + K * rise) * (1 + ROUNDING), np.inf, False
+    first_gap = FIRST_GAP * abs(least - K * rise)
     while True:
         reached = exact.recursion(layers, aim, h, bound, seam, ROOM, EVERY)
         if reached.best[-1] >= 0:
@@ -150,15 +168,15 @@ def _grow(
         if not sought and reached.offset.max() > WORTH_A_CEILING * len(layers.low):
             good = exact.recursion(layers, aim, h, np.inf, seam, 0, NARROW).cost * (1 + ROUNDING)
             sought = True
-        grown = good if good < np.inf else least + max(2 * (bound - least), FIRST_GAP * least)
+        grown = good if good < np.inf else least + max(2 * (bound - least), first_gap)
         bound = max(min(grown, ceiling), reached.lowest * (1 + ROUNDING))
     if not reached.recorded:
         # Once more at the tightest bound: few states are left to remember.
         bound = reached.cost * (1 + ROUNDING)
         reached = exact.recursion(layers, aim, h, bound, seam, UNLIMITED, EVERY)
-    path = np.empty(len(layers.start) - 1, np.int64)
+    path = np.empty(K, np.int64)
     exact.trace(layers, reached, path)
-    return path, float(reached.cost)
+    return path, float(reached.cost) - rise * int((path >= 0).sum())
 
 
 def dead_end(layers: SortedLayers, aim: Aim) -> NoPathProof:

@@ -158,7 +158,7 @@ def _long_enough(
     def solve(spans: PieceSpans) -> tuple[tuple[float, float], Ints, InterruptedPath] | None:
         staged, nodes = _in_stages(layers, spans.low[:-1], spans.high[1:])
         every = np.ones(len(staged.low), np.bool_)
-        best = best_allowed(staged, aim, every, NO_SEAM, 0.0)
+        best = best_allowed(staged, aim, every, NO_SEAM)
         if best is None:
             return None
         pieces = _pieces(staged, nodes, best.path)
@@ -225,9 +225,12 @@ def _in_stages(layers: SortedLayers, first: Ints, last: Ints) -> tuple[SortedLay
         # No edge leads from the last layer of a piece to the first of the next.
         seam = slice(start[begin[i] - 1], start[begin[i]])
         low[seam] = high[seam] = 0
+    q = np.ascontiguousarray(layers.q[:, order])
+    given = q if layers.given is layers.q else np.ascontiguousarray(layers.given[:, order])
     shut_from, shut = _shut_in_stages(layers, order, onwards, low != high)
     staged = layers._replace(
-        q=np.ascontiguousarray(layers.q[:, order]),
+        q=q,
+        given=given,
         start=freeze(start),
         cost=freeze(layers.cost[order]),
         rank=layers.rank[order],

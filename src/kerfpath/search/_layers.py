@@ -10,6 +10,7 @@ from kerfpath._arrays import Array, Bools, Ints, freeze
 from kerfpath.errors import NoFeasiblePath
 from kerfpath.kernels import search as kernel
 from kerfpath.kernels.limits import LIMIT_TOLERANCE
+from kerfpath.kernels.metric import wrap
 from kerfpath.kernels.search import SortedLayers
 from kerfpath.losses import Loss, Reason
 
@@ -75,6 +76,7 @@ def sort_layers(
     shut_from, shut = _by_vertex(shut, order, len(layers.q))
     return SortedLayers(
         q=columns,
+        given=columns if _is_wrapped(layers) else np.ascontiguousarray(layers.q[order].T),
         start=freeze(start),
         cost=freeze(cost[order] if cost.any() else cost),
         rank=rank,
@@ -85,6 +87,13 @@ def sort_layers(
         after=np.full(len(start) - 1, -1),
         shut_from=shut_from,
         shut=shut,
+    )
+
+
+def _is_wrapped(layers: Layers) -> bool:
+    """Return whether every endless joint is given within (-pi, pi]."""
+    return all(
+        np.array_equal(wrap(layers.q[:, i]), layers.q[:, i]) for i in np.flatnonzero(layers.endless)
     )
 
 

@@ -12,12 +12,12 @@ import numpy as np
 from kerfpath._arrays import Array, Bools, Ints, freeze
 from kerfpath.errors import NoFeasiblePath
 from kerfpath.kernels.limits import LIMIT_TOLERANCE
-from kerfpath.kernels.metric import MANHATTAN, increments, wrap
+from kerfpath.kernels.metric import MANHATTAN, increments, increments_between, wrap
 from kerfpath.kernels.search import Aim
 from kerfpath.search._branch import best_near_start
 from kerfpath.search._layers import Layers, sort_layers
 
-__all__ = ["best_within_rotation", "too_far", "why_closed"]
+__all__ = ["best_within_rotation", "closed_before", "too_far", "unroll", "why_closed"]
 
 
 def too_far(path: Array, endless: Bools, rotation: Array) -> Bools:
@@ -45,13 +45,30 @@ def best_within_rotation(
         unroll = unroll | more
 
 
+def closed_before(
+    layers: Layers, aim: Aim, rotation: Array, broken: NoFeasiblePath
+) -> NoFeasiblePath | None:
+    """Return the answer that limits close the way before it breaks without them; else None.
+
+    `broken` is the answer without limits on the rotation.
+    """
+    limited = np.isfinite(rotation)
+    if broken.node < 1 or not limited.any():
+        return None
+    part, none = _until(layers, broken.node), np.zeros(len(limited), np.bool_)
+    least, plain = _turning_least(part, aim, limited)
+    closing, found = best_within_rotation(plain, least, rotation, none, closed=False)
+    if found is not None:
+        return None
+    why = why_closed(part, aim, rotation, closing, closed=False)
+    return why.with_message(f"{why} to node {broken.node}, and there {broken}")
+
+
 def why_closed(
     layers: Layers, aim: Aim, rotation: Array, closing: Bools, *, closed: bool
 ) -> NoFeasiblePath:
     """Return the answer that limits close the way: those of the joints `closing` (n,)."""
-    # Whether there is a path is soonest seen from those that turn least.
-    aim = aim._replace(weight=freeze(closing.astype(float)), metric=MANHATTAN, minimax=False)
-    layers = layers._replace(cost=np.where(layers.cost < np.inf, 0.0, np.inf))
+    aim, layers = _turning_least(layers, aim, closing)
     joints = np.flatnonzero(closing).tolist()
     only = np.isfinite(rotation).sum() == 1
     opening = [
@@ -67,6 +84,22 @@ def why_closed(
         proved=True,
         node=node,
     )
+
+
+def _turning_least(layers: Layers, aim: Aim, joints: Bools) -> tuple[Aim, Layers]:
+    """Return aim and layers of the path whose `joints` (n,) turn least.
+
+    Whether limits leave a path is soonest seen from that one.
+    """
+    aim = aim._replace(weight=freeze(joints.astype(float)), metric=MANHATTAN, minimax=False)
+    return aim, layers._replace(cost=np.where(layers.cost < np.inf, 0.0, np.inf))
+
+
+def _until(layers: Layers, node: int) -> Layers:
+    """Return the layers up to a node and with it."""
+    q, start, endless, cost, shut = layers
+    N = start[node + 1]
+    return Layers(q[:N], start[: node + 2], endless, cost[:N], shut[shut[:, 1] < N])
 
 
 def _opens(
@@ -85,12 +118,10 @@ def _last_node(layers: Layers, aim: Aim, rotation: Array, closing: Bools, *, clo
 
     Without `closed` it is known that none reaches the end.
     """
-    q, start, endless, cost, shut = layers
-    reached, beyond = 0, len(start) - (1 if closed else 2)
+    reached, beyond = 0, len(layers.start) - (1 if closed else 2)
     while beyond - reached > 1:
         node = (reached + beyond) // 2
-        N = start[node + 1]
-        part = Layers(q[:N], start[: node + 2], endless, cost[:N], shut[shut[:, 1] < N])
+        part = _until(layers, node)
         if best_within_rotation(part, aim, rotation, closing, closed=False)[1] is None:
             beyond = node
         else:
@@ -100,7 +131,7 @@ def _last_node(layers: Layers, aim: Aim, rotation: Array, closing: Bools, *, clo
 
 def _best(layers: Layers, aim: Aim, rotation: Array, *, closed: bool) -> tuple[Ints, float] | None:
     """Return the best path that keeps `rotation`, all joints that have a limit unrolled."""
-    unrolled, place = _unroll(layers, rotation)
+    unrolled, place = unroll(layers, rotation, aim.velocity)
     # The other way round would be shorter.
     most = np.where(np.isfinite(rotation), np.minimum(aim.velocity, np.pi), aim.velocity)
     graph = sort_layers(unrolled, freeze(most))
@@ -113,10 +144,11 @@ def _best(layers: Layers, aim: Aim, rotation: Array, *, closed: bool) -> tuple[I
     return None if found is None else (rank[found.path], found.cost)
 
 
-def _unroll(layers: Layers, rotation: Array) -> tuple[Layers, Ints]:
+def unroll(layers: Layers, rotation: Array, velocity: Array) -> tuple[Layers, Ints]:
     """Return the graph with its limited joints unrolled, and which of its layer each vertex is.
 
-    Vertices that are too far from wherever a path begins are left out.
+    Vertices that are too far from wherever a path begins are left out, and half a turn goes the way
+    that it goes in the graph alone, where `velocity` (n,) rad lets a joint take one.
     """
     q, start, endless, cost, shut = layers
     place = np.arange(len(q)) - np.repeat(start[:-1], np.diff(start))
@@ -133,14 +165,32 @@ def _unroll(layers: Layers, rotation: Array) -> tuple[Layers, Ints]:
         origin, q = np.repeat(origin, copies), np.repeat(q, copies, axis=0)
         q[:, i] += 2 * np.pi * turn
         start = begin[start]
+    shut = _every_copy(shut, origin, len(place))
+    for i in np.flatnonzero(limited & (velocity > np.pi - 2 * LIMIT_TOLERANCE)):
+        shut = np.vstack([shut, _wrong_half_turns(layers.q[origin, i], q[:, i], start)])
     unrolled = Layers(
         q=freeze(q),
         start=freeze(start),
         endless=freeze(endless & ~limited),
         cost=cost[origin],
-        shut=_every_copy(shut, origin, len(place)),
+        shut=shut,
     )
     return unrolled, place[origin]
+
+
+def _wrong_half_turns(given: Array, unrolled: Array, start: Ints) -> Ints:
+    """Return the edges (E, 2) along which a joint unrolled takes half a turn the other way.
+
+    given, unrolled (N,) rad are its angle as it is given and unrolled.
+    """
+    found = [np.empty((0, 2), np.int64)]
+    for k in range(len(start) - 2):
+        a, b, c = start[k : k + 3]
+        way = increments_between(given[a:b, None], given[None, b:c], np.ones(1, np.bool_))
+        step = unrolled[None, b:c] - unrolled[a:b, None]
+        half = np.abs(np.abs(step) - np.pi) < LIMIT_TOLERANCE
+        found.append(np.argwhere(half & (way * step < 0)) + start[k : k + 2])
+    return np.concatenate(found)
 
 
 def _every_copy(shut: Ints, origin: Ints, vertices: int) -> Ints:

@@ -20,7 +20,7 @@ from kerfpath.search._branch import best_closed_path
 from kerfpath.search._exact import BestPath, best_path, dead_end
 from kerfpath.search._layers import Layers, broken_edge, empty_layer, reverse, sort_layers
 from kerfpath.search._problem import Closure, Method, Metric, ObjectiveKind, SearchProblem
-from kerfpath.search._rotation import best_within_rotation, too_far, why_closed
+from kerfpath.search._rotation import best_within_rotation, closed_before, too_far, why_closed
 
 __all__ = ["LayeredPath", "find_shortest", "shortest_path"]
 
@@ -82,7 +82,8 @@ def shortest_path(
     velocity, acceleration : (n,) rad/s, rad/s^2
         Limits of each joint, used in (5) and (6) with `eta_v` and `eta_a`.
     endless : (n,) bool, optional
-        Joints that turn without end, compared modulo 2 pi (13); default none.
+        Joints that turn without end, compared modulo 2 pi (13); default none. Half a turn, as long
+        either way, goes the way that the values in `q` go.
     posture : (N,) int, optional
         Posture of each vertex; the "known" method stays on one.
     vertex_cost : (N,), optional
@@ -166,7 +167,12 @@ def find_shortest(problem: SearchProblem) -> LayeredPath:
     try:
         found = _find_exactly(given, layers, aim, closed=closed)
     except NoFeasiblePath as broken:
-        broken.back, broken.leaving = _from_the_back(given, aim)
+        if (sooner := closed_before(given, aim, problem.rotation, broken)) is not None:
+            raise sooner from None
+        if np.isinf(problem.rotation).all():
+            broken.back, broken.leaving = _from_the_back(given, aim)
+        else:
+            broken.reached = None  # within the limits it may be fewer
         raise
     over = too_far(given.q[given.start[:-1] + found.index], given.endless, problem.rotation)
     return _turn_less(given, aim, problem.rotation, over, closed=closed) if over.any() else found
@@ -259,7 +265,7 @@ def _ends(layers: SortedLayers, dist: Array, before: Ints, k: int) -> States:
     a, b = layers.start[k : k + 2]
     vertex = a + np.flatnonzero(dist[a:b] < np.inf)
     parent = before[vertex]
-    dq = increments_between(layers.q[:, parent].T, layers.q[:, vertex].T, layers.endless)
+    dq = increments_between(layers.given[:, parent].T, layers.given[:, vertex].T, layers.endless)
     first = np.searchsorted(vertex, np.arange(a, b + 1))
     return States(vertex, dist[vertex], np.ascontiguousarray(dq), parent, first)
 

@@ -12,7 +12,7 @@ from kerfpath.errors import InputError
 from kerfpath.kernels import exact, to_go
 from kerfpath.kernels.search import Aim, LostTime, SortedLayers
 from kerfpath.kernels.states import EVERY
-from kerfpath.search._exact import FIRST_GAP, NO_SEAM, ROOM, ROUNDING, UNLIMITED
+from kerfpath.search._exact import FIRST_GAP, NO_SEAM, ROOM, ROUNDING, UNLIMITED, lifted
 from kerfpath.search._fastest import times_asked
 from kerfpath.search._layers import Layers, require_joined, sort_layers
 from kerfpath.search._problem import SearchProblem, refuse_ends
@@ -112,6 +112,7 @@ def _least(layers: Layers, aim: Aim, penalty: float) -> tuple[Ints, float]:
 
 def _best(layers: SortedLayers, aim: Aim) -> tuple[Ints, float]:
     """Let the bound grow until the recursion comes through; return the path and its cost."""
+    layers, rise = lifted(layers, aim)
     K, h = len(layers.start) - 1, np.empty(len(layers.low))
     to_go.cost_to_go(layers, aim, np.ones(len(h), np.bool_), h)
     _add_corners(layers, aim, h)
@@ -125,7 +126,7 @@ def _best(layers: SortedLayers, aim: Aim) -> tuple[Ints, float]:
         reached = exact.recursion(layers, aim, h, bound, NO_SEAM, UNLIMITED, EVERY)
     path = np.empty(K, np.int64)
     exact.trace(layers, reached, path)
-    return path, float(reached.cost)
+    return path, float(reached.cost) - K * rise
 
 
 def _add_corners(layers: SortedLayers, aim: Aim, h: Array) -> None:

@@ -18,7 +18,7 @@ from kerfpath.cell import Cell, CollisionChecker
 from kerfpath.contour import Contour, FrameKind
 from kerfpath.graph import LayeredGraph
 from kerfpath.job import Job, cell_of_job, fastest_along
-from kerfpath.planner import FastestSpeed, node_interval
+from kerfpath.planner import FastestSpeed, longest_step, node_interval
 
 __all__ = ["EVERY", "Evaluator", "SampledContour", "sample_contours"]
 
@@ -47,13 +47,13 @@ class SampledContour:
         """Return some of its nodes, each step to take as long as a step of the contour does.
 
         With `timed` as long as one takes at the speed asked for; else its steps count as long as
-        they are on the average, so that its speeds are those of the contour.
+        the longest of the contour, so that its speeds are those of the contour.
         """
         run = self.nodes.part(first, last, frames)
         run = replace(run, time=None, speed_share=np.ones(len(run)))
         if timed:
             return replace(self, nodes=run, speed=float(np.diff(run.s).max()) / self.interval)
-        step = self.nodes.length / (len(self.nodes) - 1)
+        step = longest_step(self.nodes)
         return replace(self, nodes=replace(run, s=np.arange(len(run), dtype=float) * step))
 
 

@@ -161,7 +161,9 @@ def test_the_fastest_speed_in_a_cell_is_clear_and_no_higher(folder):
 
 @pytest.mark.parametrize("key", ['feed = "dip"', 'interruptions = "fewest"'])
 def test_over_the_fastest_speed_a_cut_in_a_cell_dips_or_is_interrupted(folder, key):
-    over = with_keys("[plan]", "refine = false", key).replace("spacing_mm = 1", "spacing_mm = 2")
+    over = with_keys("[plan]", 'method = "exact"', "refine = false", key).replace(
+        "spacing_mm = 1", "spacing_mm = 2"
+    )
     over = over.replace("speed_m_min = 3", "speed_m_min = 4.5")
     outcome = run_job(read_job(job(folder, over)))
     assert outcome.passed
@@ -174,7 +176,8 @@ def test_over_the_fastest_speed_a_cut_in_a_cell_dips_or_is_interrupted(folder, k
 
 
 def test_a_tilted_cut_in_a_cell_stays_out_of_the_band_of_clearance(folder):
-    keys = ("refine = false", "tilt_deg = 4", "tilt_cost_per_deg = 0.001", "rotation_deg = 10")
+    keys = ("tilt_deg = 4", "tilt_cost_per_deg = 0.001", "rotation_deg = 10")
+    keys = ('method = "exact"', "refine = false", *keys)
     tilted = with_keys("[plan]", *keys).replace("[cell]", f"{NEAR}[cell]", 1)
     path = job(folder, tilted.replace("spacing_mm = 1", "spacing_mm = 2"), "tilted.toml")
     result = run("plan", path, cwd=folder)
@@ -412,7 +415,11 @@ def test_a_described_robot_plans_what_the_library_s_own_does(folder, arm, cell):
     rest = rest.replace("[cell]", "[cell]\npart = false")
     costs = []
     for name, robot in (("urdf.toml", table + limits), ("library.toml", ROBOT + limits)):
-        path = job(folder, free(robot, rest).replace("[plan]", "[plan]\nrefine = false"), name)
+        path = job(
+            folder,
+            free(robot, rest).replace("[plan]", '[plan]\nmethod = "exact"\nrefine = false'),
+            name,
+        )
         result = run("plan", path, "--out", name.removesuffix(".toml"), "--json", cwd=folder)
         assert result.returncode == 0, result.stderr or result.stdout
         costs.append(json.loads(result.stdout)["contours"][0]["cost"])

@@ -104,7 +104,7 @@ SMALL = HEAD.format(
     limits="acceleration_deg_s2 = [300, 300, 300, 600, 600, 600]",
     tool="xyz_mm = [0, 0, 150]\nrpy_deg = [0, 30, 0]",
     xyz="[700, -100, 100]",
-    plan="refine = false",
+    plan='method = "exact"\nrefine = false',
 ) + CONTOURS.format(slot=3, hole=3)
 TURNS = HEAD.format(
     robot="yaskawa_gp25",

@@ -89,7 +89,9 @@ class CutRequest:
 
     def picked(self, run: Subproblem, *, refine: bool) -> CutRequest:
         """Return the request for the first candidate, planned as a run of a Pareto set."""
-        options = replace(run.applied_to(self.options), feed="constant", refine=refine)
+        options = replace(
+            run.applied_to(self.options), method="exact", feed="constant", refine=refine
+        )
         return replace(self, candidates=self.candidates[:1], options=options, run=run)
 
 

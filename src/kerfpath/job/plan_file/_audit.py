@@ -21,6 +21,7 @@ from kerfpath.job.plan_file._read import PlanFile, read_plan_file, table_of
 from kerfpath.job.plan_file._recompute import SAME, recompute
 from kerfpath.job.plan_file._report import AuditReport, collision_note
 from kerfpath.job.plan_file._write import plan_document, plan_entry
+from kerfpath.options import EXACT_OR_BETTER
 from kerfpath.plans import Plan
 
 __all__ = ["PlanAudit", "audit_file"]
@@ -158,7 +159,7 @@ def _claims(plan: Plan) -> list[Check]:
     if before is not None:
         title = "cost above that of the path it was refined from"
         rows.append(check("grid-cost", title, plan.cost - before * (1 + SAME), SAME, "count"))
-    if plan.settings.method != "exact":
+    if plan.settings.method not in EXACT_OR_BETTER:
         title = "claims to be best that its method cannot prove"
         rows.append(count("optimal", title, plan.proof.optimal))
     return rows

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from contextlib import suppress
 from dataclasses import replace
 from typing import TypeVar
 
@@ -14,9 +13,9 @@ from kerfpath.contour import Contour
 from kerfpath.errors import NoFeasiblePath
 from kerfpath.graph import LayeredGraph
 from kerfpath.job.format import Candidate, CutRequest, Job, PreparedJob, divide_nodes
+from kerfpath.job.run._remedy import find_remedy
 from kerfpath.job.run._result import CutResult
-from kerfpath.job.run._speeds import fastest_along
-from kerfpath.planner import FastestSpeed, clearance_map, plan, plan_in_pieces, relaxations
+from kerfpath.planner import clearance_map, plan, plan_in_pieces
 from kerfpath.plans import Plan
 from kerfpath.progress import Progress
 from kerfpath.refiner import refine
@@ -74,7 +73,7 @@ def cut_candidate(
             plans = planned(plan_in_pieces)
     except NoFeasiblePath as broken:
         without = replace(whole, broken=broken)
-        return (_with_remedy(without, job, prepared.cell, graph, begin),)
+        return (_with_remedy(without, job, kept, graph, begin),)
     begin("audit")
     return tuple(_audited(prepared, whole, made) for made in plans)
 
@@ -107,30 +106,14 @@ def _with_remedy(
     With poses everywhere slower would do; for a loop that cannot close, or an axis that may not
     turn as far, it need not, and a reduced feed has tried.
     """
-    options, nodes = job.options, without.candidate.nodes
+    options = job.options
     plain = options.closure == "free" and options.rotation is None
-    constant = options.feed == "constant" and nodes.time is None
+    constant = options.feed == "constant" and without.candidate.nodes.time is None
     if not (np.diff(graph.start).all() and plain and constant):
         return without
-    begin("fastest speed")
-    if cell is not None:
-        # Shares of the limits at which a clear path exists are not looked for.
-        with suppress(NoFeasiblePath):
-            slower = fastest_along(job, nodes, cell, refine=options.refine, graph=graph)
-            return replace(without, fastest=slower)
-        return without
-    least = relaxations(
-        nodes,
-        job.robot,
-        graph,
-        without.request.task.speed,
-        eta_v=options.eta_v,
-        eta_a=options.eta_a,
-    )
-    fastest = FastestSpeed.of(nodes, least.slower)
-    if options.refine:
-        fastest = fastest_along(job, nodes, None, refine=True, graph=graph)
-    return replace(without, fastest=fastest, relaxations=least)
+    begin("what would open the way")
+    found = find_remedy(job, without.request, without.candidate, graph, cell)
+    return without if found is None else replace(without, advice=found[0], fastest=found[1])
 
 
 def _audited(prepared: PreparedJob, whole: CutResult, made: Plan) -> CutResult:

@@ -12,9 +12,9 @@ from kerfpath.cell import Cell
 from kerfpath.errors import NoFeasiblePath
 from kerfpath.graph import LayeredGraph
 from kerfpath.job.format import Candidate, CutRequest, Job
-from kerfpath.planner import FINER, ON_THIS_GRID, ClearanceMap, FastestSpeed, at_least, at_most
+from kerfpath.job.run._remedy import Remedy
+from kerfpath.planner import ClearanceMap, FastestSpeed
 from kerfpath.plans import Plan
-from kerfpath.search import Relaxations
 from kerfpath.sequence import PartPlan
 
 __all__ = ["CutResult", "JobResult"]
@@ -37,8 +37,8 @@ class CutResult:
         Why there is no plan.
     fastest : FastestSpeed or None
         Where there is no plan but a slower one exists: up to which speed.
-    relaxations : Relaxations or None
-        With it: the least change of each limit that would do at the speed asked.
+    advice : Remedy or None
+        With it: speeds and shares of the limits that open the way.
     checks : tuple of Check
         The audit's table; empty without a plan.
     clearance : ClearanceMap or None
@@ -53,7 +53,7 @@ class CutResult:
     plan: Plan | None = None
     broken: NoFeasiblePath | None = None
     fastest: FastestSpeed | None = None
-    relaxations: Relaxations | None = None
+    advice: Remedy | None = None
     checks: tuple[Check, ...] = ()
     clearance: ClearanceMap | None = None
     departure: Departure | None = None
@@ -109,40 +109,8 @@ class CutResult:
 
     @property
     def remedy(self) -> str:
-        """Which speeds and which shares of the limits have a path; empty where none is known."""
-        if self.fastest is None:
-            return ""
-        return f"{self._speeds(self.fastest)}{self._shares()}; {FINER}"
-
-    def _speeds(self, found: FastestSpeed) -> str:
-        """Say up to which speed a path exists on the grid, and which one is known off it."""
-        point = self.candidate.nodes.points[found.node] * 1000
-        binds = (
-            f", where the {found.limit} of joint {found.joint + 1} binds at node {found.node}, "
-            f"{' '.join(f'{v:.1f}' for v in point)} mm"
-        )
-        if found.on_grid is None:
-            return f"{ON_THIS_GRID} a path exists up to {at_most(found.speed * 60)} m/min{binds}"
-        on_grid = f"{ON_THIS_GRID} a path exists up to {at_most(found.on_grid * 60)} m/min"
-        if found.speed < self.request.task.speed:
-            return f"{on_grid}, refined up to {at_most(found.speed * 60)} m/min{binds}"
-        return (
-            f"{on_grid}; a refined one was found at {at_most(found.speed * 60)} m/min, but none at "
-            "the speed asked for"
-        )
-
-    def _shares(self) -> str:
-        """Say which larger share of one limit would open the way on the grid, or that none does."""
-        if self.relaxations is None:
-            return ""
-        shares = {
-            "eta_velocity": self.relaxations.eta_v,
-            "eta_acceleration": self.relaxations.eta_a,
-        }
-        ways = [f"{k} = {at_least(v)}" for k, v in shares.items() if v is not None and v <= 1]
-        closed = [k for k, v in shares.items() if v is None or v > 1]
-        said = f"; at the speed asked for with {' or '.join(ways)}" if ways else ""
-        return said + (f"; no {' and no '.join(closed)} up to 1 is enough there" if closed else "")
+        """What would open the way, in words; empty where nothing is known to."""
+        return "" if self.advice is None else str(self.advice)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)

@@ -26,6 +26,7 @@ from kerfpath.job.format.tables._robot import RobotTable
 from kerfpath.job.format.tables._sequence import SequenceTable
 from kerfpath.job.format.tables._table import Table, require_distinct
 from kerfpath.job.format.tables._tool import ToolTable
+from kerfpath.options import EXACT_OR_BETTER
 from kerfpath.robots import postures_named
 
 __all__ = ["REPEATED", "TABLES", "JobFile"]
@@ -94,8 +95,8 @@ class JobFile(Table):
         """Refuse what cannot be planned or known in a cell, at its key."""
         if self.cell is None:
             return self
-        if (method := self.plan.method) != "exact":
-            expected = 'method = "exact" with [cell]'
+        if (method := self.plan.method) not in EXACT_OR_BETTER:
+            expected = 'method = "continuous" or "exact" with [cell]'
             raise fault(expected, f'"{method}"', "change one", ("plan", "method"))
         if self.cell.links == "description" and self.robot.urdf is None:
             raise fault(

@@ -12,9 +12,16 @@ from kerfpath.comfort import Comfort
 from kerfpath.contour import FrameKind
 from kerfpath.job.format._values import JointsNotNegative, NotNegative, Positive, fault, key
 from kerfpath.job.format.tables._table import Table, given
-from kerfpath.options import FeedKind, Interruptions, OptionConflict, PlanOptions
+from kerfpath.options import (
+    EXACT_OR_BETTER,
+    FeedKind,
+    Interruptions,
+    OptionConflict,
+    PlanMethod,
+    PlanOptions,
+)
 from kerfpath.robots import Robot, postures_named
-from kerfpath.search import Closure, Method, Metric, ObjectiveKind
+from kerfpath.search import Closure, Metric, ObjectiveKind
 from kerfpath.tilt import Tilt
 
 __all__ = ["PlanTable"]
@@ -58,6 +65,8 @@ def _toml(value: object) -> str:
         return "none"
     if isinstance(value, bool):
         return str(value).lower()
+    if isinstance(value, tuple):
+        return " or ".join(map(_toml, value))
     return f'"{value}"' if isinstance(value, str) else f"{value}"
 
 
@@ -66,10 +75,10 @@ class PlanTable(Table):
 
     gamma_step_deg: Annotated[
         Positive, key("a number above 0, at most 360, in deg", "1", le=360)
-    ] = 1.0
+    ] = 2.0
     objective: ObjectiveKind = "sum"
     metric: Metric = "manhattan"
-    method: Method = "exact"
+    method: PlanMethod = "continuous"
     closure: Closure = "free"
     rotation_deg: Annotated[NotNegative | None, key("a number not below 0, in deg", "360")] = None
     interruptions: Interruptions = "none"
@@ -139,7 +148,7 @@ class PlanTable(Table):
             closure=self.closure,
             rotation=None if angle is None else np.where(robot.endless, np.radians(angle), np.inf),
             feed=self.feed,
-            refine=self.method == "exact" if self.refine is None else self.refine,
+            refine=self.method in EXACT_OR_BETTER if self.refine is None else self.refine,
             refine_parts=self.refine_parts,
             interruptions=self.interruptions,
             least_piece=None if piece is None else piece / 1000,

@@ -1,0 +1,221 @@
+"""Cells of gamma: where the joints may be on them, and how they are divided."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, fields
+from itertools import product
+
+import numpy as np
+from numpy.typing import NDArray
+
+from kerfpath._arrays import Array, Bools, Ints
+from kerfpath._repr import short_repr
+from kerfpath.certificate import BASE, LIFTS, cell_bounds
+from kerfpath.kernels.turns import JointLimits
+from kerfpath.robots import Robot
+
+__all__ = ["CellMaker", "CellSet"]
+
+TURN = 2 * np.pi
+AT_ONCE = 50_000
+"""Cells enclosed in one piece: what all their postures take stays below 100 MB."""
+FREE = 1.0
+"""rad: a joint known no better than this may be on more than one turn."""
+ROUNDED = 1e-14
+"""What a joint may be off by rounding, in rad per rad and in rad."""
+EDGE = 1e-8
+"""rad: joints this far out of their range still count as inside, as in the graph and the audit."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class CellSet:
+    """Cells of gamma, each in one posture and on one turn of every joint, with their enclosures.
+
+    Parameters
+    ----------
+    node, posture, level, index : (C,)
+        See `kerfpath.certificate.Stage`.
+    half : (C,) rad
+        Half the width.
+    center, slope, bend, spread : (C, n)
+        The joints are center + slope t + bend t^2 / 2 +- spread on the cell, in rad.
+    """
+
+    node: NDArray[np.int32]
+    posture: NDArray[np.int8]
+    level: NDArray[np.int8]
+    index: NDArray[np.int32]
+    half: Array
+    center: Array
+    slope: Array
+    bend: Array
+    spread: Array
+
+    __repr__ = short_repr
+
+    def __len__(self) -> int:
+        return len(self.node)
+
+    @property
+    def box(self) -> Array:
+        """How far a joint may be from its centre anywhere on the cell, (C, n) rad."""
+        h = self.half[:, None]
+        return np.asarray(np.abs(self.slope) * h + np.abs(self.bend) * h**2 / 2 + self.spread)
+
+    @property
+    def lift(self) -> NDArray[np.int8]:
+        """About where the joints are, (C, n), in parts of half a turn."""
+        return np.rint(self.center * (LIFTS / np.pi)).astype(np.int8)
+
+    def take(self, which: Bools | Ints) -> CellSet:
+        """Return some of the cells."""
+        return CellSet(**{f.name: getattr(self, f.name)[which] for f in fields(self)})
+
+    @staticmethod
+    def join(sets: Sequence[CellSet]) -> CellSet:
+        """Return the cells of several sets in one."""
+        names = [f.name for f in fields(CellSet)]
+        return CellSet(**{name: np.concatenate([getattr(s, name) for s in sets]) for name in names})
+
+
+class CellMaker:
+    """Makes the cells of a contour.
+
+    Parameters
+    ----------
+    robot : Robot
+        One that `encloses`.
+    frames : (K, 4, 4) m
+        Task frames in the robot base.
+    T_flange_tip : (4, 4) m
+    limits : JointLimits
+    postures : sequence of int
+        The postures that may be used.
+    """
+
+    def __init__(
+        self,
+        robot: Robot,
+        frames: Array,
+        T_flange_tip: Array,
+        limits: JointLimits,
+        postures: Iterable[int],
+    ) -> None:
+        self._robot, self._frames, self._tool = robot, frames, T_flange_tip
+        self._limits, self._postures = limits, np.array(sorted(postures), np.int8)
+
+    def coarsest(self) -> CellSet:
+        """Return the cells of level 0 of all nodes: postures and turns that ranges admit."""
+        node = np.repeat(np.arange(len(self._frames), dtype=np.int32), BASE)
+        index = np.tile(np.arange(BASE, dtype=np.int32), len(self._frames))
+        level = np.zeros(len(node), np.int8)
+        sets = []
+        for first in range(0, len(node), AT_ONCE):
+            part = slice(first, first + AT_ONCE)
+            sets.append(self._lifted(self._enclosed(node[part], level[part], index[part])))
+        return CellSet.join(sets)
+
+    def halves(self, cells: CellSet) -> CellSet:
+        """Return both halves of the cells, on the turns of their own."""
+        sets = [
+            self._halves(cells.take(slice(first, first + AT_ONCE // 2)))
+            for first in range(0, len(cells), AT_ONCE // 2)
+        ]
+        return CellSet.join(sets) if sets else cells
+
+    def _halves(self, cells: CellSet) -> CellSet:
+        parent = np.repeat(np.arange(len(cells)), 2)
+        right = np.tile([0, 1], len(cells))
+        node, level = cells.node[parent], (cells.level[parent] + 1).astype(np.int8)
+        index = (2 * cells.index[parent] + right).astype(np.int32)
+        key = np.stack([node, level, index], axis=1)
+        alone, which = np.unique(key, axis=0, return_inverse=True)
+        which = which.ravel()
+        made, place = self._enclosed_all(*alone.T)
+        row = place[which, cells.posture[parent]]
+        real = row >= 0
+        parent, right, row = parent[real], right[real], row[real]
+        child = made.take(row)
+        middle = ((2 * right - 1) * child.half)[:, None]
+        there = cells.center[parent] + cells.slope[parent] * middle
+        there = there + cells.bend[parent] * middle**2 / 2
+        shift = TURN * np.rint((there - child.center) / TURN)
+        moved = self._moved(child, np.where(self._limits.endless, 0.0, shift))
+        free = (cells.spread[parent] > FREE).any(axis=1)
+        kept = [moved.take(self._inside(moved) & ~free)]
+        if free.any():
+            again, first = np.unique(row[free], return_index=True)
+            kept.append(self._lifted(made.take(again)))
+        return CellSet.join(kept)
+
+    def _enclosed(
+        self, node: NDArray[np.int32], level: NDArray[np.int8], index: NDArray[np.int32]
+    ) -> CellSet:
+        """Return the cells with a solution, of every posture that may be used."""
+        return self._enclosed_all(node, level, index)[0]
+
+    def _enclosed_all(
+        self, node: NDArray[np.int32], level: NDArray[np.int8], index: NDArray[np.int32]
+    ) -> tuple[CellSet, Ints]:
+        """Return the cells with a solution, and the row of each posture (B, P), -1 for none."""
+        node, level, index = (
+            node.astype(np.int32),
+            level.astype(np.int8),
+            index.astype(np.int32),
+        )
+        gamma, half = cell_bounds(level, index)
+        found = self._robot.enclose(self._frames, node.astype(np.int64), gamma, half, self._tool)
+        wanted = np.zeros(found.status.shape[1], np.bool_)
+        wanted[self._postures] = True
+        cell, posture = np.nonzero((found.status > 0) & wanted)
+        place = np.full(found.status.shape, -1, np.int64)
+        place[cell, posture] = np.arange(len(cell))
+        at, h = (cell, posture), half[cell, None]
+        center = found.center[at]
+        spread = found.radius[at] + (found.high[at] - found.low[at]) * h**2 / 4
+        made = CellSet(
+            node=node[cell],
+            posture=posture.astype(np.int8),
+            level=level[cell],
+            index=index[cell],
+            half=half[cell],
+            center=center,
+            slope=found.slope[at],
+            bend=(found.high[at] + found.low[at]) / 2,
+            spread=spread * (1 + ROUNDED) + ROUNDED * (1 + np.abs(found.slope[at]) * h),
+        )
+        return made, place
+
+    def _lifted(self, cells: CellSet) -> CellSet:
+        """Return the cells on all turns that the ranges admit."""
+        limits, box = self._limits, cells.box
+        shifts = []
+        for i in range(cells.center.shape[1]):
+            if limits.endless[i] or not len(cells):
+                shifts.append([0])
+                continue
+            low = (limits.lower[i] - EDGE - (cells.center[:, i] + box[:, i]).max()) / TURN
+            high = (limits.upper[i] + EDGE - (cells.center[:, i] - box[:, i]).min()) / TURN
+            shifts.append(list(range(int(np.ceil(low)), int(np.floor(high)) + 1)))
+        sets = []
+        for shift in product(*shifts):
+            moved = self._moved(cells, TURN * np.array(shift, float))
+            sets.append(moved.take(self._inside(moved)))
+        return CellSet.join(sets)
+
+    @staticmethod
+    def _moved(cells: CellSet, shift: Array) -> CellSet:
+        center = cells.center + shift
+        spread = cells.spread + ROUNDED * np.abs(center)
+        values = {f.name: getattr(cells, f.name) for f in fields(cells)}
+        return CellSet(**values | {"center": center, "spread": spread})
+
+    def _inside(self, cells: CellSet) -> Bools:
+        """Return which cells may hold joints within the ranges and couplings, (C,)."""
+        limits, box = self._limits, cells.box + EDGE
+        within = (cells.center - box <= limits.upper) & (cells.center + box >= limits.lower)
+        inside = (within | limits.endless).all(axis=1)
+        value, over = cells.center @ limits.rows.T, box @ np.abs(limits.rows).T + EDGE
+        held = (value - over <= limits.row_upper) & (value + over >= limits.row_lower)
+        return np.asarray(inside & held.all(axis=1))

@@ -1,0 +1,221 @@
+"""One stage: a potential over cells, and what every motion through each of them costs at least."""
+
+from __future__ import annotations
+
+import os
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
+
+import numpy as np
+
+from kerfpath._arrays import Array, Bools, Ints
+from kerfpath._repr import short_repr
+from kerfpath.certificate import Stage
+from kerfpath.certifier._cells import CellSet
+from kerfpath.kernels.potentials import cross_cells, lay_potential, reach_cells
+from kerfpath.kernels.reduced import Cells, Potential, Step
+
+__all__ = ["Steps", "StageResult", "solve_stage"]
+
+IN_ONE = 64
+"""Cells of a layer below which a second thread costs more than it brings."""
+ROUNDED = 1e-14
+"""Share of the largest term that a sum of one more may cost."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Steps:
+    """What the steps of a motion cost and may be.
+
+    Parameters
+    ----------
+    weight : (n,) 1/rad
+    velocity, acceleration : (n,) rad
+        Bounds (5) and (6) on an increment and on its change, tolerance included.
+    metric : int
+    endless : (n,) bool
+    """
+
+    weight: Array
+    velocity: Array
+    acceleration: Array
+    metric: int
+    endless: Bools
+
+    __repr__ = short_repr
+
+    def tilted(self, multipliers: Array | None, k: int) -> Step:
+        """Return the step from node k on, tilted by the multipliers (K, n) of (6)."""
+        tilt = np.zeros_like(self.weight)
+        if multipliers is not None:
+            tilt = multipliers[k] - multipliers[k + 1]
+        return Step(self.weight, tilt, self.velocity, self.metric, self.endless)
+
+    def price(self, multipliers: Array | None) -> float:
+        """Return what the multipliers (K, n) take off: the most that they add where (6) holds."""
+        if multipliers is None:
+            return 0.0
+        return float((np.abs(multipliers) @ self.acceleration).sum()) * (1 + ROUNDED)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class StageResult:
+    """What a stage proves.
+
+    Parameters
+    ----------
+    cells : CellSet
+        Sorted.
+    through : (C,)
+        Least cost of a motion through each cell; infinite where no motion passes.
+    level, dual : (C, 2), (C, 2, n)
+        The potential.
+    multipliers : (K, n), optional
+    pairs : int
+        Steps from cell to cell that were looked at.
+    """
+
+    cells: CellSet
+    through: Array
+    level: Array
+    dual: Array
+    multipliers: Array | None
+    pairs: int
+
+    __repr__ = short_repr
+
+    @property
+    def bound(self) -> float:
+        """The least that any motion costs."""
+        return float(self.through.min(initial=np.inf))
+
+    def stage(self) -> Stage:
+        """Return the stage as a certificate holds it."""
+        cells = self.cells
+        return Stage(
+            node=cells.node,
+            posture=cells.posture,
+            level=cells.level,
+            index=cells.index,
+            lift=cells.lift,
+            value=np.where(np.isfinite(self.level), self.level, 0.0),
+            dual=self.dual.astype(np.float32),
+            multipliers=self.multipliers,
+        )
+
+
+def solve_stage(
+    cells: CellSet, nodes: int, steps: Steps, multipliers: Array | None, care: float
+) -> StageResult:
+    """Return what the cells prove of every motion through them.
+
+    Parameters
+    ----------
+    cells : CellSet
+    nodes : int
+        K.
+    steps : Steps
+    multipliers : (K, n), optional
+        Of (6), zero at the first node and the last.
+    care : float
+        Cost beyond the cheapest step of a cell up to which steps are bounded with care.
+    """
+    box = cells.box
+    key = _key(cells, box, steps)
+    order = np.lexsort((cells.center[:, key], cells.node))
+    cells, box = cells.take(order), box[order]
+    start = np.searchsorted(cells.node, np.arange(nodes + 1))
+    sizes = np.diff(start)
+    widest = np.zeros(nodes)
+    filled = np.flatnonzero(sizes)
+    if len(filled):
+        widest[filled] = np.maximum.reduceat(box[:, key], start[filled])
+    C, n = cells.center.shape
+    packed = Cells(
+        start, cells.center, cells.slope, cells.bend, cells.spread, box, cells.half, key, widest
+    )
+    potential = Potential(
+        np.full((C, 2), np.inf), np.zeros((C, 2, n)), np.zeros((C, 2)), np.zeros((C, 2))
+    )
+    potential.level[start[nodes - 1] :] = 0.0
+    begin, to, cost = _lay(packed, potential, steps, multipliers, care)
+    ahead, behind = np.zeros(C), np.full(C, np.inf)
+    first = slice(start[0], start[1])
+    behind[first] = _least_at_first(cells.take(first), potential, first)
+    cross_cells(start, begin, to, cost, ahead, behind)
+    through = ahead + behind - steps.price(multipliers)
+    finite = np.isfinite(through)
+    largest = np.abs(potential.level[np.isfinite(potential.level)]).max(initial=0.0)
+    through[finite] -= ROUNDED * nodes * (largest + np.abs(through[finite]))
+    return StageResult(
+        cells=cells,
+        through=through,
+        level=potential.level,
+        dual=potential.dual,
+        multipliers=multipliers,
+        pairs=len(to),
+    )
+
+
+def _key(cells: CellSet, box: Array, steps: Steps) -> int:
+    """Return the joint by which the windows of (5) leave the least of a layer."""
+    if not len(cells):
+        return 0
+    spread = np.where(steps.endless, np.pi / np.sqrt(3), cells.center.std(axis=0))
+    return int(np.argmax(spread / (steps.velocity + 2 * np.median(box, axis=0))))
+
+
+def _lay(
+    packed: Cells, potential: Potential, steps: Steps, multipliers: Array | None, care: float
+) -> tuple[Ints, Ints, Array]:
+    """Lay the potential from the last layer to the first; return the steps and reduced costs.
+
+    The steps of cell a are begin[a]..begin[a+1]-1, each to a cell and at a cost.
+    """
+    start, C = packed.start, len(packed.half)
+    count = np.zeros(C, np.int64)
+    layers: list[tuple[Ints, Array]] = []
+    threads = int(os.environ.get("NUMBA_NUM_THREADS") or os.cpu_count() or 1)
+    with ThreadPoolExecutor(threads) as pool:
+        for k in range(len(start) - 3, -1, -1):
+            first, last = int(start[k]), int(start[k + 1])
+            step = steps.tilted(multipliers, k)
+            reach_cells(packed, step, k, first, last, potential.level, count)
+            begin = np.zeros(last - first + 1, np.int64)
+            np.cumsum(count[first:last], out=begin[1:])
+            to, cost = np.empty(begin[-1], np.int64), np.empty(begin[-1])
+            shifted = np.zeros(last + 1, np.int64)
+            shifted[first:] = begin
+            parts = threads if last - first >= IN_ONE else 1
+            middle = np.searchsorted(begin, np.linspace(0, begin[-1], parts + 1)[1:-1])
+            ends = [first, *(first + middle).tolist(), last]
+            runs = [
+                pool.submit(
+                    lay_potential, packed, potential, step, k, a, b, care, shifted, to, cost
+                )
+                for a, b in zip(ends[:-1], ends[1:], strict=True)
+            ]
+            for run in runs:
+                run.result()
+            layers.append((to, cost))
+    layers.reverse()
+    begin = np.concatenate([[0], np.cumsum(count)])
+    if not layers:
+        return begin, np.zeros(0, np.int64), np.zeros(0)
+    return (
+        begin,
+        np.concatenate([to for to, _ in layers]),
+        np.concatenate([cost for _, cost in layers]),
+    )
+
+
+def _least_at_first(cells: CellSet, potential: Potential, first: slice) -> Array:
+    """Return the least of the potential over each cell of the first layer, by either cut."""
+    h, best = cells.half, np.full(len(cells), -np.inf)
+    for m in range(2):
+        y = potential.dual[first, m]
+        slope = np.abs((y * cells.slope).sum(axis=1))
+        bend = np.maximum((y * cells.bend).sum(axis=1), 0.0)
+        less = slope * h + bend * h**2 / 2 + (np.abs(y) * cells.spread).sum(axis=1)
+        best = np.maximum(best, potential.level[first, m] - less * (1 + ROUNDED))
+    return np.asarray(best)

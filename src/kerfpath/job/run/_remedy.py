@@ -1,0 +1,208 @@
+"""What would open a closed way: speeds and shares of the limits, each tried as it is printed."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass, field, replace
+
+from kerfpath._repr import short_repr
+from kerfpath.cell import Cell
+from kerfpath.errors import NoFeasiblePath
+from kerfpath.graph import LayeredGraph
+from kerfpath.job.format import Candidate, CutRequest, Job
+from kerfpath.job.run._speeds import fastest_along
+from kerfpath.options import PlanOptions
+from kerfpath.planner import (
+    FINER,
+    ON_THIS_GRID,
+    FastestSpeed,
+    at_least,
+    at_most,
+    plan,
+    relaxations,
+)
+
+__all__ = ["Remedy", "find_remedy"]
+
+GIVE = (0.0, 2e-3, 1e-2, 3e-2)
+"""Relative amounts by which a value gives way until a plan is found with it."""
+ETA_OF = {"eta_velocity": "eta_v", "eta_acceleration": "eta_a"}
+"""Keys of a job, and the options that they stand for."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Remedy:
+    """What opens the way, in figures that a job takes; each alone has led to a plan.
+
+    Parameters
+    ----------
+    other_method : bool
+        All that is said holds for method "exact", and the job asks for another one.
+    speed : str or None
+        Speed below the one asked for, m/min; None: the way is open at that.
+    binds : str
+        Which limit binds at the higher of both speeds, and where; "" where that is not known.
+    refined : str or None
+        Higher speed, m/min, at which a motion off the grid was found.
+    shares : mapping of str to str
+        Keys of the shares of a limit above those asked for, and their values.
+    closed : tuple of str
+        Keys whose shares up to 1 all leave the way closed.
+    """
+
+    other_method: bool
+    speed: str | None = None
+    binds: str = ""
+    refined: str | None = None
+    shares: Mapping[str, str] = field(default_factory=dict)
+    closed: tuple[str, ...] = ()
+
+    __repr__ = short_repr
+
+    def __str__(self) -> str:
+        """Say it in one line."""
+        how = ' with method = "exact"' if self.other_method else ""
+        if self.speed is None:
+            return f"{ON_THIS_GRID} a path exists at the speed asked for{how}"
+        said = f"{ON_THIS_GRID} a path exists up to {self.speed} m/min{how}"
+        if self.refined is not None:
+            said += f", refined up to {self.refined} m/min"
+        said += self.binds and f", {self.binds}"
+        if self.shares:
+            ways = " or ".join(f"{key} = {value}" for key, value in self.shares.items())
+            said += f"; at the speed asked for with {ways}"
+        if self.closed:
+            said += f"; no {' and no '.join(self.closed)} up to 1 is enough there"
+        return f"{said}; {FINER}"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class _Trial:
+    """A cut without a plan, to be tried at other speeds and shares of the limits."""
+
+    job: Job
+    request: CutRequest
+    candidate: Candidate
+    graph: LayeredGraph
+    cell: Cell | None
+
+    __repr__ = short_repr
+
+    @property
+    def asked(self) -> float:
+        """Speed asked for, m/s."""
+        return self.request.task.speed
+
+    @property
+    def on_grid(self) -> PlanOptions:
+        """The options of the exact search on the grid alone."""
+        return replace(self.job.options, method="exact", refine=False, refine_parts=1)
+
+    def opens(self, options: PlanOptions, speed: float) -> bool:
+        """Return whether there is a plan at a speed (m/s), its nodes as a job would have them."""
+        nodes, graph, task = self.candidate.nodes, self.graph, self.request.task
+        if task.time_step is not None and speed != task.speed:
+            nodes = replace(task, speed=speed).sample(self.candidate.path)
+            graph = self.job.graph(nodes)
+        try:
+            plan(
+                nodes, self.job.robot, tool=self.job.tool, placement=self.job.placement,
+                speed=speed, options=options, cell=self.cell, graph=graph,
+            )  # fmt: skip
+        except NoFeasiblePath:
+            return False
+        return True
+
+    def speed(self, options: PlanOptions, most: float, above: float = 0.0) -> str | None:
+        """Return a speed of `most` m/s or hardly less, in m/min, that has a plan; None if none has.
+
+        It is more than `above` and less than what is asked for.
+        """
+
+        def fits(figure: str) -> bool:
+            return above < float(figure) / 60 < self.asked
+
+        values = (at_most(min(most, self.asked) * 60 * (1 - give)) for give in GIVE)
+        return _first(values, lambda v: fits(v) and self.opens(options, float(v) / 60))
+
+    def share(self, key: str, least: float) -> str | None:
+        """Return a share of a limit of `least` or hardly more that has a plan; None if none has."""
+        name, options = ETA_OF[key], self.on_grid
+
+        def fits(figure: str) -> bool:
+            return bool(getattr(options, name) < float(figure) <= 1)
+
+        def found(figure: str) -> bool:
+            return self.opens(replace(options, **{name: float(figure)}), self.asked)  # type: ignore[arg-type]
+
+        return _first(
+            (at_least(least * (1 + give)) for give in GIVE), lambda v: fits(v) and found(v)
+        )
+
+
+def _first(values: Iterator[str], passes: Callable[[str], bool]) -> str | None:
+    return next((value for value in values if passes(value)), None)
+
+
+def find_remedy(
+    job: Job,
+    request: CutRequest,
+    candidate: Candidate,
+    graph: LayeredGraph,
+    cell: Cell | None,
+) -> tuple[Remedy, FastestSpeed | None] | None:
+    """Return what opens the way of a cut without a plan, and the fastest speed; None if unknown.
+
+    The graph has poses at every node, and the cut is one at constant speed.
+    """
+    trial = _Trial(job=job, request=request, candidate=candidate, graph=graph, cell=cell)
+    other = job.options.method != "exact"
+    if other and trial.opens(trial.on_grid, trial.asked):
+        return Remedy(other_method=True), None
+    try:
+        fastest = fastest_along(job, candidate.nodes, cell, refine=job.options.refine, graph=graph)
+    except NoFeasiblePath:
+        return None
+    grid = fastest.speed if fastest.on_grid is None else fastest.on_grid
+    speed = trial.speed(trial.on_grid, grid)
+    if speed is None:
+        return None
+    refined = None
+    if fastest.on_grid is not None:
+        refined = trial.speed(job.options, fastest.speed, above=float(speed) / 60)
+    # Shares of the limits at which a clear path exists are not looked for.
+    shares, closed = ({}, ()) if cell is not None else _shares(trial)
+    made = Remedy(
+        other_method=other,
+        speed=speed,
+        binds=_binds(candidate, fastest) if refined or fastest.on_grid is None else "",
+        refined=refined,
+        shares=shares,
+        closed=closed,
+    )
+    return made, fastest
+
+
+def _shares(trial: _Trial) -> tuple[dict[str, str], tuple[str, ...]]:
+    """Return the shares of one limit that open the way, and the limits of which none does."""
+    options = trial.on_grid
+    least = relaxations(
+        trial.candidate.nodes,
+        trial.job.robot,
+        trial.graph,
+        trial.asked,
+        eta_v=options.eta_v,
+        eta_a=options.eta_a,
+    )
+    shares, closed = dict[str, str](), list[str]()
+    for key, value in (("eta_velocity", least.eta_v), ("eta_acceleration", least.eta_a)):
+        if value is None or value > 1:
+            closed.append(key)
+        elif (found := trial.share(key, value)) is not None:
+            shares[key] = found
+    return shares, tuple(closed)
+
+
+def _binds(candidate: Candidate, found: FastestSpeed) -> str:
+    at = " ".join(f"{v:.1f}" for v in candidate.nodes.points[found.node] * 1000)
+    return f"where the {found.limit} of joint {found.joint + 1} binds at node {found.node}, {at} mm"

@@ -1,0 +1,184 @@
+"""Paths over continuous gamma under (5) and (6), found by keeping a few of each layer.
+
+A state is a point between two samples and the increment that led there. From each state steps lead,
+on every target within its box of (5) and (6), to where cost and value are least, and to both ends
+of what the box admits: as slow down and as speed up as may be. Of all, those of least cost so far
+and value to come are kept, and of those alike one.
+"""
+
+from __future__ import annotations
+
+from math import pi
+from typing import NamedTuple
+
+import numpy as np
+
+from kerfpath._arrays import Array, Ints
+from kerfpath.kernels._jit import jit
+from kerfpath.kernels.continuous import (
+    RELAXED,
+    Steps,
+    Targets,
+    course_within,
+    first_from,
+    least_value,
+    step_value,
+)
+from kerfpath.kernels.limits import LIMIT_TOLERANCE
+from kerfpath.kernels.metric import wrap_angle
+
+__all__ = ["Alike", "Beam", "advance"]
+
+
+class Alike(NamedTuple):
+    """Up to where two states on the same target are alike, so that the better one will do."""
+
+    share: float
+    """Of the target that they are apart;"""
+    change: float
+    """of what (6) lets the increment change by, by which that of any joint differs."""
+
+
+class Beam(NamedTuple):
+    """The states kept of every layer."""
+
+    at: Ints
+    """(K, B): target; of the first layer the vertex."""
+    share: Array
+    """(K, B): where on it."""
+    parent: Ints
+    """(K, B): state of the layer before."""
+    cost: Array
+    """(K, B): of the way there, sorted with the value to come."""
+    size: Ints
+    """(K,): states of each layer."""
+
+
+class _Offers(NamedTuple):
+    """Steps that the states of a layer offer: what all come to, and where they lead."""
+
+    total: Array
+    cost: Array
+    parent: Ints
+    at: Ints
+    share: Array
+    increment: Array
+    """(m, n)"""
+
+
+@jit
+def advance(
+    targets: Targets, steps: Steps, cost: Array, tail: Array, acceleration: Array, first: Ints,
+    alike: Alike, out: Beam,
+) -> int:  # fmt: skip
+    """Fill the beam from vertices `first` of the first layer; returns the layers reached.
+
+    cost (N,) is what visiting a vertex costs, tail (N,) the value function, its own included.
+    Where no step keeps (6), those that keep the least multiple of it in `RELAXED` are taken.
+    """
+    (K, B), n = out.at.shape, len(acceleration)
+    x, before = np.empty((B, n)), np.zeros((B, n))
+    offers = _Offers(
+        np.empty(64 * B), np.empty(64 * B), np.empty(64 * B, np.int64),
+        np.empty(64 * B, np.int64), np.empty(64 * B), np.empty((64 * B, n)),
+    )  # fmt: skip
+    out.size[0] = min(B, len(first))
+    for b in range(out.size[0]):
+        p = first[b]
+        out.at[0, b], out.share[0, b], out.parent[0, b], out.cost[0, b] = p, 0.0, -1, cost[p]
+        x[b] = targets.q[p]
+    for k in range(1, K):
+        made = 0
+        for relaxed in RELAXED:
+            free = np.inf if k == 1 else relaxed
+            for b in range(out.size[k - 1]):
+                made = _offer(
+                    targets, steps, cost, tail, free * acceleration, k, b, x[b], before[b],
+                    out.cost[k - 1, b], made, offers,
+                )  # fmt: skip
+            if made > 0:
+                break
+        if made == 0:
+            return k
+        _keep(offers, made, acceleration, k, x, before, alike, out)
+    return len(out.at)
+
+
+@jit
+def _offer(
+    targets: Targets, steps: Steps, cost: Array, tail: Array, change: Array, k: int, b: int,
+    x: Array, before: Array, so_far: float, made: int, offers: _Offers,
+) -> int:  # fmt: skip
+    """Add the steps of one state into layer k to the offers; returns how many there are."""
+    n, joint = len(x), targets.joint
+    a, d = np.empty(n), np.empty(n)
+    low, high = np.maximum(steps.low, before - change), np.minimum(steps.high, before + change)
+    boxed = Steps(steps.weight, steps.metric, steps.minimax, steps.cap, low, high)
+    begin, end = targets.begin[k], targets.begin[k + 1]
+    margin, turning = targets.half[k] + 2 * LIMIT_TOLERANCE, targets.endless[joint]
+    middle = wrap_angle(x[joint]) if turning else x[joint]
+    for turn in range(-1, 2):
+        if turn != 0 and not turning:
+            continue
+        least = middle + low[joint] - margin + 2 * pi * turn
+        most = middle + high[joint] + margin + 2 * pi * turn
+        s = first_from(targets.key, begin, end, least)
+        while s < end and targets.key[s] <= most:
+            one, other = targets.one[s], targets.other[s]
+            lower, upper = tail[one], tail[other]
+            s += 1
+            if min(lower, upper) == np.inf:
+                continue
+            first, last = course_within(targets, x, s - 1, low, high, a, d)
+            if upper == np.inf:
+                last, other, upper = min(last, 0.0), one, lower
+            elif lower == np.inf:
+                first, one, lower = max(first, 1.0), other, upper
+            if first > last:
+                continue
+            best = least_value(a, d, first, last, lower, upper - lower, boxed, np.inf)[1]
+            for way in range(3):
+                t = best if way == 0 else (first if way == 1 else last)
+                if (way > 0 and t == best) or made == len(offers.total):
+                    continue
+                to_come = lower + t * (upper - lower)
+                length = step_value(a, d, t, 0.0, 0.0, boxed)[0]
+                here = cost[one] + t * (cost[other] - cost[one])
+                offers.total[made] = so_far + length + to_come
+                offers.cost[made] = so_far + length + here
+                offers.parent[made], offers.at[made], offers.share[made] = b, s - 1, t
+                for i in range(n):
+                    offers.increment[made, i] = a[i] + t * d[i]
+                made += 1
+    return made
+
+
+@jit
+def _keep(
+    offers: _Offers, made: int, acceleration: Array, k: int, x: Array, before: Array,
+    alike: Alike, out: Beam,
+) -> None:  # fmt: skip
+    """Keep the best offers of those that are not alike as the states of layer k."""
+    B, n = x.shape
+    from_x, kept = x.copy(), 0
+    for o in np.argsort(offers.total[:made]):
+        known = False
+        for b in range(kept):
+            if out.at[k, b] != offers.at[o] or abs(out.share[k, b] - offers.share[o]) > alike.share:
+                continue
+            far = 0.0
+            for i in range(n):
+                far = max(far, abs(before[b, i] - offers.increment[o, i]) / acceleration[i])
+            if far < alike.change:
+                known = True
+                break
+        if known:
+            continue
+        out.at[k, kept], out.share[k, kept] = offers.at[o], offers.share[o]
+        out.parent[k, kept], out.cost[k, kept] = offers.parent[o], offers.cost[o]
+        before[kept] = offers.increment[o]
+        x[kept] = from_x[offers.parent[o]] + offers.increment[o]
+        kept += 1
+        if kept == B:
+            break
+    out.size[k] = kept

@@ -1,0 +1,407 @@
+"""The potential of a stage, backwards: what a motion still costs at least, by cells of gamma.
+
+The slopes of a cut come from the step that seems best from one end of the cell (a guess, which
+may be wrong); its level is what is then proved, the least over all cells that a step can lead to.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from kerfpath._arrays import Array, Ints
+from kerfpath.kernels._jit import jit, jit_inline
+from kerfpath.kernels.metric import MANHATTAN, extend, finish
+from kerfpath.kernels.reduced import (
+    SLACK,
+    Cells,
+    Potential,
+    Step,
+    beyond,
+    lean,
+    least_ahead,
+    near,
+    tangent,
+)
+
+__all__ = ["close_cut", "cross_cells", "lay_potential", "reach_cells"]
+
+PENALTY = 10.0
+"""Price of an increment beyond (5), in weights: a guess looks for the way back."""
+STILL = 1e-10
+"""rad: a joint that moves less stands still."""
+HALVINGS = 30
+"""Steps of the search along a cell for metrics that are not linear."""
+
+
+@jit_inline
+def _price(
+    D: Array, cells: Cells, potential: Potential, step: Step, b: int, t: float, penalty: float
+) -> float:
+    """Return what a step by D, and on to t in cell b, is guessed to cost from there to the end."""
+    total, tilted, over = 0.0, 0.0, 0.0
+    for i in range(len(D)):
+        u = D[i] + cells.slope[b, i] * t
+        x = abs(u)
+        total = extend(total, step.weight[i] * x, step.metric)
+        tilted += step.tilt[i] * u
+        over += step.weight[i] * max(0.0, x - step.velocity[i])
+    ahead = max(
+        potential.level[b, 0] - potential.along[b, 0] * t,
+        potential.level[b, 1] - potential.along[b, 1] * t,
+    )
+    return finish(total, step.metric) + tilted + penalty * over + ahead
+
+
+@jit_inline
+def _best_along(
+    D: Array, cells: Cells, potential: Potential, step: Step, b: int
+) -> tuple[float, float]:
+    """Return where in cell b a step is guessed to cost least, and what."""
+    h = cells.half[b]
+    if step.metric != MANHATTAN:
+        low, high = -h, h
+        for _ in range(HALVINGS):
+            third = (high - low) / 3.0
+            one, two = low + third, high - third
+            if _price(D, cells, potential, step, b, one, PENALTY) < _price(
+                D, cells, potential, step, b, two, PENALTY
+            ):
+                high = two
+            else:
+                low = one
+        t = (low + high) / 2.0
+        return t, _price(D, cells, potential, step, b, t, PENALTY)
+    best, at = _price(D, cells, potential, step, b, -h, PENALTY), -h
+    price = _price(D, cells, potential, step, b, h, PENALTY)
+    if price < best:
+        best, at = price, h
+    slope = potential.along[b, 0] - potential.along[b, 1]
+    if slope != 0.0:
+        t = (potential.level[b, 0] - potential.level[b, 1]) / slope
+        if abs(t) < h:
+            price = _price(D, cells, potential, step, b, t, PENALTY)
+            if price < best:
+                best, at = price, t
+    for i in range(len(D)):
+        s, v = cells.slope[b, i], step.velocity[i]
+        if s == 0.0 or abs(D[i]) > abs(s) * h + v:
+            continue
+        for kink in range(3):
+            t = ((kink - 1) * v - D[i]) / s
+            if abs(t) < h:
+                price = _price(D, cells, potential, step, b, t, PENALTY)
+                if price < best:
+                    best, at = price, t
+    return at, best
+
+
+@jit_inline
+def _balance(
+    D: Array, cells: Cells, potential: Potential, step: Step, b: int, t: float, out_y: Array
+) -> None:
+    """Fill slopes (n,) of the cost of the step to t in cell b that balance those of V there.
+
+    Where a joint stands still, or is at its velocity limit, its slope may be any in a range.
+    """
+    level0 = potential.level[b, 0] - potential.along[b, 0] * t
+    level1 = potential.level[b, 1] - potential.along[b, 1] * t
+    least = potential.along[b, 0] if level0 >= level1 else potential.along[b, 1]
+    most = least
+    if abs(level0 - level1) <= 1e-9:
+        least = min(potential.along[b, 0], potential.along[b, 1])
+        most = max(potential.along[b, 0], potential.along[b, 1])
+    for i in range(len(D)):
+        D[i] += cells.slope[b, i] * t
+    tangent(D, step, out_y)
+    slope = 0.0
+    for i in range(len(D)):
+        if abs(D[i]) > step.velocity[i] + STILL:
+            out_y[i] += PENALTY * step.weight[i] * (1.0 if D[i] > 0 else -1.0)
+        slope += out_y[i] * cells.slope[b, i]
+    if step.metric != MANHATTAN or least <= slope <= most:
+        return
+    wanted = least if slope < least else most
+    for i in range(len(D)):
+        s, w, x = cells.slope[b, i], step.weight[i], abs(D[i])
+        if s == 0.0:
+            continue
+        if x < STILL:
+            low, high = -w, w
+        elif abs(x - step.velocity[i]) < STILL:
+            low, high = w, w * (1.0 + PENALTY)
+            if D[i] < 0:
+                low, high = -high, -low
+        else:
+            continue
+        y = out_y[i] + (wanted - slope) / s
+        y = min(max(y, step.tilt[i] + low), step.tilt[i] + high)
+        slope += (y - out_y[i]) * s
+        out_y[i] = y
+
+
+@jit_inline
+def _guess(
+    cells: Cells,
+    potential: Potential,
+    step: Step,
+    a: int,
+    t: float,
+    ahead: Ints,
+    D: Array,
+    here: Array,
+    floor: Array,
+    out_y: Array,
+) -> None:
+    """Fill the slopes of the step that seems best from t in cell a to one of the cells ahead."""
+    first, least = -1, np.inf
+    for p in range(len(ahead)):
+        b, reach = ahead[p], 0.0
+        for i in range(len(here)):
+            here[i] = D[p, i] - (cells.slope[a, i] + cells.bend[a, i] * t / 2.0) * t
+            reach += (step.weight[i] + abs(step.tilt[i])) * abs(cells.slope[b, i])
+        reach += max(abs(potential.along[b, 0]), abs(potential.along[b, 1]))
+        price = _price(here, cells, potential, step, b, 0.0, 0.0)
+        floor[p] = price - reach * cells.half[b]
+        if price < least:
+            first, least = p, price
+    best, at, to = np.inf, 0.0, -1
+    for turn in range(-1, len(ahead)):
+        p = first if turn < 0 else turn
+        if floor[p] >= best or (turn >= 0 and p == first):
+            continue
+        for i in range(len(here)):
+            here[i] = D[p, i] - (cells.slope[a, i] + cells.bend[a, i] * t / 2.0) * t
+        where, price = _best_along(here, cells, potential, step, ahead[p])
+        if price < best:
+            best, at, to = price, where, p
+    for i in range(len(here)):
+        here[i] = D[to, i] - (cells.slope[a, i] + cells.bend[a, i] * t / 2.0) * t
+    _balance(here, cells, potential, step, ahead[to], at, out_y)
+
+
+@jit_inline
+def _proved(
+    cells: Cells,
+    potential: Potential,
+    step: Step,
+    a: int,
+    b: int,
+    way: int,
+    D: Array,
+    y: Array,
+    price: float,
+    enough: float,
+    other: Array,
+) -> float:
+    """Return what a step from cell a to b costs at least, with V there and the slopes y here.
+
+    By the slopes y alone if that is enough; else the best of what other slopes prove as well.
+    """
+    best = -np.inf
+    if way == 1:
+        best = _along(D, y) - price + least_ahead(cells, potential, b, y)
+        if best > enough:
+            return best
+        tangent(D, step, other)
+        best = max(best, _turned(cells, potential, step, a, b, D, y, other))
+        for m in range(2):
+            for i in range(len(y)):
+                other[i] = potential.dual[b, m, i]
+            best = max(best, _turned(cells, potential, step, a, b, D, y, other))
+    for i in range(len(y)):
+        other[i] = 0.0
+    return max(best, _turned(cells, potential, step, a, b, D, y, other))
+
+
+@jit_inline
+def _along(D: Array, y: Array) -> float:
+    """Return y . D, rounded towards less."""
+    total, size = 0.0, 0.0
+    for i in range(len(y)):
+        x = y[i] * D[i]
+        total += x
+        size += abs(x)
+    return total - SLACK * size
+
+
+@jit_inline
+def _turned(
+    cells: Cells, potential: Potential, step: Step, a: int, b: int, D: Array, y: Array, z: Array
+) -> float:
+    """Return what slopes z prove of the step, the cut at cell a having slopes y."""
+    still = True
+    for i in range(len(z)):
+        still = still and z[i] == 0.0
+    moved = 0.0 if still else _along(D, z)
+    ahead = least_ahead(cells, potential, b, z)
+    return moved - beyond(z, step) + ahead + lean(cells, a, z, y)
+
+
+@jit_inline
+def _window(cells: Cells, step: Step, a: int, k: int, out_run: Ints) -> None:
+    """Fill the run of layer k + 1 in which all cells lie that a step from cell a may lead to."""
+    first, last = cells.start[k + 1], cells.start[k + 2]
+    key, x = cells.key, cells.center[a, cells.key]
+    wide = step.velocity[key] + cells.box[a, key] + cells.widest[k + 1]
+    out_run[0], out_run[1] = last, first
+    for turn in range(-1, 2):
+        if turn != 0 and not step.endless[key]:
+            continue
+        low, high = x - wide + 2.0 * np.pi * turn, x + wide + 2.0 * np.pi * turn
+        out_run[0] = min(out_run[0], _place(cells, first, last, low))
+        out_run[1] = max(out_run[1], _place(cells, first, last, high))
+
+
+@jit_inline
+def _place(cells: Cells, first: int, last: int, x: float) -> int:
+    """Return the first cell of a layer whose key is at least x."""
+    while first < last:
+        middle = (first + last) // 2
+        if cells.center[middle, cells.key] < x:
+            first = middle + 1
+        else:
+            last = middle
+    return first
+
+
+@jit_inline
+def _level(
+    cells: Cells,
+    potential: Potential,
+    step: Step,
+    a: int,
+    ahead: Ints,
+    way: Ints,
+    D: Array,
+    y: Array,
+    care: float,
+    other: Array,
+    out_proved: Array,
+) -> float:
+    """Return the level of a cut of cell a with slopes y; fill what each step from it costs."""
+    least, price = np.inf, beyond(y, step)
+    for p in range(len(ahead)):
+        b = ahead[p]
+        proved = _proved(cells, potential, step, a, b, way[p], D[p], y, price, least + care, other)
+        out_proved[p] = proved
+        least = min(least, proved)
+    return least
+
+
+@jit_inline
+def _flat_level(cells: Cells, potential: Potential, step: Step, ahead: Ints, other: Array) -> float:
+    """Return the level of a cut without slopes: the least of what is ahead."""
+    for i in range(len(other)):
+        other[i] = 0.0
+    least = np.inf
+    for p in range(len(ahead)):
+        least = min(least, least_ahead(cells, potential, ahead[p], other))
+    return least - beyond(other, step)
+
+
+@jit_inline
+def close_cut(cells: Cells, potential: Potential, a: int) -> None:
+    """Fill what the slopes of the cuts of cell a come to along its curve."""
+    for m in range(2):
+        along, bent = 0.0, 0.0
+        for i in range(cells.slope.shape[1]):
+            along += potential.dual[a, m, i] * cells.slope[a, i]
+            bent += potential.dual[a, m, i] * cells.bend[a, i]
+        potential.along[a, m], potential.bent[a, m] = along, bent
+
+
+@jit
+def reach_cells(
+    cells: Cells, step: Step, k: int, first: int, last: int, level: Array, out_count: Ints
+) -> None:
+    """Count the live cells of layer k + 1 that a step from cells first..last-1 of layer k reaches.
+
+    A cell is live where its level (C, 2) is finite: from others no motion goes on to the end.
+    """
+    run, D = np.empty(2, np.int64), np.empty(len(step.velocity))
+    for a in range(first, last):
+        _window(cells, step, a, k, run)
+        count = 0
+        for b in range(run[0], run[1]):
+            if level[b, 0] < np.inf and near(cells, step, a, b, D) > 0:
+                count += 1
+        out_count[a] = count
+
+
+@jit
+def lay_potential(
+    cells: Cells,
+    potential: Potential,
+    step: Step,
+    k: int,
+    first: int,
+    last: int,
+    care: float,
+    begin: Ints,
+    out_to: Ints,
+    out_cost: Array,
+) -> None:
+    """Lay the potential over cells first..last-1 of layer k; fill the reduced costs of their steps.
+
+    The steps of cell a are begin[a]..begin[a+1]-1: out_to says which cell each leads to. Those that
+    cost more than `care` beyond the cheapest may be given less than could be proved of them.
+    """
+    n, most = len(step.velocity), 0
+    for a in range(first, last):
+        most = max(most, begin[a + 1] - begin[a])
+    D, way, proved = np.empty((most, n)), np.empty(most, np.int64), np.empty((2, most))
+    floor, here, y, other = np.empty(most), np.empty(n), np.empty(n), np.empty(n)
+    run = np.empty(2, np.int64)
+    for a in range(first, last):
+        count = begin[a + 1] - begin[a]
+        potential.level[a, 0] = potential.level[a, 1] = np.inf
+        if count == 0:
+            continue
+        ahead = out_to[begin[a] : begin[a + 1]]
+        _window(cells, step, a, k, run)
+        p = 0
+        for b in range(run[0], run[1]):
+            if potential.level[b, 0] < np.inf:
+                way[p] = near(cells, step, a, b, D[p])
+                if way[p] > 0:
+                    ahead[p] = b
+                    p += 1
+                    if p == count:
+                        break
+        for m in range(2):
+            t = (2 * m - 1) * cells.half[a]
+            _guess(cells, potential, step, a, t, ahead, D, here, floor, y)
+            level = _level(cells, potential, step, a, ahead, way, D, y, care, other, proved[m])
+            if level < _flat_level(cells, potential, step, ahead, other):
+                for i in range(n):
+                    y[i] = 0.0
+                level = _level(cells, potential, step, a, ahead, way, D, y, care, other, proved[m])
+            potential.level[a, m] = level
+            for i in range(n):
+                potential.dual[a, m, i] = y[i]
+        for p in range(count):
+            to_first = proved[0, p] - potential.level[a, 0]
+            out_cost[begin[a] + p] = min(to_first, proved[1, p] - potential.level[a, 1])
+        close_cut(cells, potential, a)
+
+
+@jit
+def cross_cells(
+    start: Ints, begin: Ints, to: Ints, cost: Array, out_ahead: Array, out_behind: Array
+) -> None:
+    """Fill the least of the reduced costs up to each cell and from it on, (C,) each.
+
+    ``out_behind`` holds, for the cells of the first layer, what the potential is there at least;
+    ``out_ahead`` is zero at the last layer. Cells that no motion passes get infinity.
+    """
+    last = len(start) - 2
+    for a in range(start[last]):
+        out_ahead[a] = np.inf
+    for a in range(start[1], start[last + 1]):
+        out_behind[a] = np.inf
+    for a in range(start[last]):
+        for p in range(begin[a], begin[a + 1]):
+            out_behind[to[p]] = min(out_behind[to[p]], out_behind[a] + cost[p])
+    for a in range(start[last] - 1, -1, -1):
+        for p in range(begin[a], begin[a + 1]):
+            out_ahead[a] = min(out_ahead[a], cost[p] + out_ahead[to[p]])

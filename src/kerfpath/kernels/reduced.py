@@ -1,0 +1,177 @@
+"""Reduced costs: the least that a step from cell to cell costs, measured by a potential.
+
+Over a cell the joints are q(t) = c + s t + [k] t^2 / 2 +- r, |t| <= h (`kernels.enclosure`). A
+potential V has two cuts a cell, V(q) = max_m level_m - y_m . (q - c). For a step u = q' - q with
+|u| <= v, and any vector y,
+
+    rho(u) + mu . u >= y . u - P(y),    P(y) the most by which y . u can exceed it,
+
+so that the step from cell c to c' costs, with V' at its end and V at its beginning, at least
+
+    y . D - P(y) + min_t' [y . (q' - c') + V'(q')] + min_t [(y_m - y) . (q - c)] - level_m,
+
+D = c' - c: the two minima are over one cell each. All sums are rounded towards less.
+"""
+
+from __future__ import annotations
+
+from math import pi, sqrt
+from typing import NamedTuple
+
+import numpy as np
+
+from kerfpath._arrays import Array, Bools, Ints
+from kerfpath.kernels._jit import jit_inline
+from kerfpath.kernels.metric import CHEBYCHEV, MANHATTAN
+
+__all__ = ["Cells", "Potential", "Step", "beyond", "lean", "least_ahead", "near", "tangent"]
+
+SLACK = 1e-14
+"""Share of the terms of a sum of a few dozen that rounding may cost, with room."""
+
+
+class Cells(NamedTuple):
+    """Cells of gamma, node after node; within a node by the joint `key`.
+
+    ``start`` (K+1,); ``center``, ``slope``, ``bend`` (middle of the curvature), ``spread`` (what
+    is not known of the joint, rad) and ``box`` (how far a joint may be from its centre) (C, n);
+    ``half`` (C,) rad; ``widest`` (K,) the largest box of the joint ``key`` in each layer.
+    """
+
+    start: Ints
+    center: Array
+    slope: Array
+    bend: Array
+    spread: Array
+    box: Array
+    half: Array
+    key: int
+    widest: Array
+
+
+class Potential(NamedTuple):
+    """Levels (C, 2) and slopes (C, 2, n) of the cuts, and the slopes along s and k, (C, 2)."""
+
+    level: Array
+    dual: Array
+    along: Array
+    bent: Array
+
+
+class Step(NamedTuple):
+    """What a step costs and may be: weights, tilt mu, velocity bound v (n,), metric, endless."""
+
+    weight: Array
+    tilt: Array
+    velocity: Array
+    metric: int
+    endless: Bools
+
+
+@jit_inline
+def near(cells: Cells, step: Step, a: int, b: int, out_D: Array) -> int:
+    """Fill D = c_b - c_a, endless joints the short way; 0 where no step within (5) joins the cells.
+
+    1 where the increments are the ones of D, 2 where an endless joint may go either way round.
+    """
+    status = 1
+    for i in range(len(out_D)):
+        d = cells.center[b, i] - cells.center[a, i]
+        wide = cells.box[a, i] + cells.box[b, i]
+        if step.endless[i]:
+            d -= 2.0 * pi * np.rint(d / (2.0 * pi))
+            if abs(d) + wide > pi:
+                status = 2
+        if abs(d) > step.velocity[i] + wide:
+            return 0
+        out_D[i] = d
+    return status
+
+
+@jit_inline
+def tangent(D: Array, step: Step, out_y: Array) -> None:
+    """Fill a slope of the cost of a step (n,) at the increment D, tilt included."""
+    n = len(D)
+    total, largest = 0.0, 0
+    for i in range(n):
+        x = step.weight[i] * abs(D[i])
+        total += x * x
+        if x > step.weight[largest] * abs(D[largest]):
+            largest = i
+    total = sqrt(total)
+    for i in range(n):
+        sign = 1.0 if D[i] > 0 else -1.0
+        if step.metric == MANHATTAN:
+            y = sign * step.weight[i]
+        elif step.metric == CHEBYCHEV:
+            y = sign * step.weight[i] if i == largest else 0.0
+        else:
+            y = step.weight[i] * step.weight[i] * D[i] / total if total > 0 else 0.0
+        out_y[i] = y + step.tilt[i]
+
+
+@jit_inline
+def beyond(y: Array, step: Step) -> float:
+    """Return P(y): the most by which y . u exceeds rho(u) + mu . u over |u| <= v."""
+    n = len(y)
+    if step.metric == MANHATTAN:
+        most = 0.0
+        for i in range(n):
+            most += max(0.0, abs(y[i] - step.tilt[i]) - step.weight[i]) * step.velocity[i]
+        return most * (1.0 + SLACK)
+    norm, size = 0.0, 0.0
+    for i in range(n):
+        z = abs(y[i] - step.tilt[i])
+        size += z * step.velocity[i]
+        x = z / step.weight[i]
+        norm += x if step.metric == CHEBYCHEV else x * x
+    if step.metric != CHEBYCHEV:
+        norm = sqrt(norm)
+    return size * (max(0.0, 1.0 - 1.0 / norm) + SLACK) if norm > 0 else 0.0
+
+
+@jit_inline
+def lean(cells: Cells, a: int, y: Array, z: Array) -> float:
+    """Return a lower bound of (z - y) . (q - c) over cell a."""
+    slope, bend, spread = 0.0, 0.0, 0.0
+    for i in range(len(y)):
+        d = z[i] - y[i]
+        slope += d * cells.slope[a, i]
+        bend += d * cells.bend[a, i]
+        spread += abs(d) * cells.spread[a, i]
+    h = cells.half[a]
+    slope = abs(slope)
+    if bend > 0 and slope < bend * h:
+        least = -slope * slope / (2.0 * bend)
+    else:
+        least = -slope * h + bend * h * h / 2.0
+    return least * (1.0 + SLACK) - spread - SLACK * h * h * abs(bend) if least < 0 else -spread
+
+
+@jit_inline
+def least_ahead(cells: Cells, potential: Potential, b: int, y: Array) -> float:
+    """Return a lower bound of y . (q - c) + V(q) over cell b: the larger of two lines, bent."""
+    slope, bend, off0, off1 = 0.0, 0.0, 0.0, 0.0
+    for i in range(len(y)):
+        slope += y[i] * cells.slope[b, i]
+        bend += y[i] * cells.bend[b, i]
+        off0 += abs(y[i] - potential.dual[b, 0, i]) * cells.spread[b, i]
+        off1 += abs(y[i] - potential.dual[b, 1, i]) * cells.spread[b, i]
+    h = cells.half[b]
+    slope0, slope1 = slope - potential.along[b, 0], slope - potential.along[b, 1]
+    level0, level1 = potential.level[b, 0] - off0, potential.level[b, 1] - off1
+    least = min(
+        max(level0 - slope0 * h, level1 - slope1 * h), max(level0 + slope0 * h, level1 + slope1 * h)
+    )
+    if slope0 != slope1:
+        t = (level1 - level0) / (slope0 - slope1)
+        if abs(t) < h:
+            least = min(least, max(level0 + slope0 * t, level1 + slope1 * t))
+    bent = min(bend - potential.bent[b, 0], bend - potential.bent[b, 1])
+    sizes = abs(slope) + abs(potential.along[b, 0]) + abs(potential.along[b, 1])
+    curved = abs(bend) + abs(potential.bent[b, 0]) + abs(potential.bent[b, 1])
+    return (
+        least
+        + min(bent, 0.0) * h * h / 2.0
+        - SLACK * (abs(level0) + abs(level1) + sizes * h + curved * h * h)
+    )

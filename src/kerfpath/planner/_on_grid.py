@@ -1,0 +1,103 @@
+"""A plan on the grid of gamma: the exact search, slower or off the grid where it has no path."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+from kerfpath.errors import NoFeasiblePath
+from kerfpath.planner._clear import ClearSearch
+from kerfpath.planner._dip import plan_slowed
+from kerfpath.planner._refined import plan_off_grid, refine_plan
+from kerfpath.planner._task import PlanningTask
+from kerfpath.planner._words import ON_THIS_GRID
+from kerfpath.plans import Plan, Proof
+from kerfpath.robots import posture_name
+from kerfpath.search import Method, find_shortest
+
+__all__ = ["plan_on_grid"]
+
+
+def plan_on_grid(
+    task: PlanningTask, finder: ClearSearch, begin: Callable[[str], None], *, refine: bool
+) -> Plan:
+    """Return the best path on the graph of a task, refined if that is asked for.
+
+    Raises
+    ------
+    NoFeasiblePath
+        There is none, slower or off the grid neither where that is asked for.
+    """
+    begin("search")
+    try:
+        path = finder.find(find_shortest, task.problem)
+    except NoFeasiblePath as at_speed:
+        return _otherwise(task, finder, at_speed, begin, refine=refine)
+    proof = _proof(task.problem.method, path.optimal, finder)
+    made = task.plan(path.index, path.cost, proof)
+    if not refine:
+        return made
+    begin("refinement")
+    return refine_plan(task, finder, made)
+
+
+def _otherwise(
+    task: PlanningTask,
+    finder: ClearSearch,
+    broken: NoFeasiblePath,
+    begin: Callable[[str], None],
+    *,
+    refine: bool,
+) -> Plan:
+    """Return a plan where the graph has none at the speed asked for: slower, or off the grid.
+
+    Raises
+    ------
+    NoFeasiblePath
+        There is none, or it was not asked for.
+    """
+    asked, found = task.settings, None
+    if asked.feed == "dip":
+        try:
+            return plan_slowed(task, finder, refine=refine)
+        except NoFeasiblePath as at_any_speed:
+            broken = at_any_speed
+    elif refine and asked.closure == "free":
+        begin("refinement")
+        found = plan_off_grid(task, finder)
+    if found is not None and found.done:
+        return found.plan
+    tried = "" if found is None else f"; off the grid {found.statement}"
+    where = f"{ON_THIS_GRID} " if task.robot.family.free_rotation else ""
+    raise broken.with_message(
+        f"contour {task.contour.name!r}: {where}{broken}{_bracket(broken, task)}{tried}"
+    ) from None
+
+
+def _bracket(broken: NoFeasiblePath, task: PlanningTask) -> str:
+    """Say from where on paths reach the end, and which change of posture would join the two."""
+    if broken.back is None:
+        return ""
+    said = f"; from the back, paths reach the end from node {broken.back} on"
+    said = said if broken.back > broken.node + 1 else ""
+    if broken.reached is None or broken.leaving is None:
+        return said
+    before, after = (
+        {int(mu) for mu in task.graph.posture[task.graph.start[node] + vertices]}
+        for node, vertices in ((broken.node, broken.reached), (broken.back, broken.leaving))
+    )
+    if before & after:
+        return said
+    names = (", ".join(posture_name(mu) for mu in sorted(group)) for group in (before, after))
+    return f"{said}; the posture would have to change from {' to '.join(names)}"
+
+
+def _proof(method: Method, optimal: bool, finder: ClearSearch) -> Proof:
+    if optimal:
+        claim = finder.claimed(
+            "the best path on this graph under the velocity and acceleration limits"
+        )
+    elif method == "known":
+        claim = "no claim: the known technique tests neither velocity nor acceleration"
+    else:
+        claim = "no claim: the acceleration test of the paper's procedure is greedy"
+    return Proof(optimal=optimal, statement=claim)

@@ -1,0 +1,291 @@
+"""The first-order search over continuous gamma: values between the samples, and paths by them."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from typing import NamedTuple
+
+import numpy as np
+
+from kerfpath._arrays import Array, Bools, Ints
+from kerfpath._repr import short_repr
+from kerfpath.errors import InputError
+from kerfpath.kernels import continuous as kernel
+from kerfpath.kernels.beam import Alike, Beam, advance
+from kerfpath.kernels.continuous import Steps, Targets
+from kerfpath.kernels.limits import LIMIT_TOLERANCE
+from kerfpath.kernels.metric import increments_between
+from kerfpath.search._problem import SearchProblem
+from kerfpath.search._rotation import unroll
+
+__all__ = ["ContinuousPath", "ContinuousSearch", "Effort", "GammaSamples"]
+
+WIDEST, WIDEST_STEPS, WIDEST_OF_ALL = 0.5, 6.0, 1.5
+"""rad, steps of gamma, and rad: neighbouring samples are joined where no joint moves further than
+the larger of the first two and the last one."""
+MOST_ENDS = 12
+"""First vertices that are tried, one by one, where the way depends on which it is."""
+APART = 0.15
+"""rad by which some joint of two of them differs: the refinement moves them."""
+_LAYERS_SAMPLED, _VERTICES_SAMPLED = 12, 16
+"""Layers, and vertices of each, by which the joint that sorts the targets is chosen."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class GammaSamples:
+    """How the vertices of a problem lie on circles of gamma.
+
+    Parameters
+    ----------
+    sample, variant, posture : (N,) int
+        Sample of gamma, variant (tilt, external axis) and posture of each vertex; every layer is
+        ordered by variant and sample.
+    samples : int
+        Number of samples on the circle.
+    """
+
+    sample: Ints
+    variant: Ints
+    posture: Ints
+    samples: int
+
+    __repr__ = short_repr
+
+    def of(self, vertices: Ints) -> GammaSamples:
+        """Return the samples of other vertices, each one of these."""
+        return replace(
+            self,
+            sample=self.sample[vertices],
+            variant=self.variant[vertices],
+            posture=self.posture[vertices],
+        )
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class ContinuousPath:
+    """One point of each layer, at a vertex or between two of neighbouring samples.
+
+    Parameters
+    ----------
+    one, other : (K,) int
+        Rows of q that each point is between; the same at a vertex.
+    share : (K,)
+        Where between them, from 0 to 1.
+    q : (K, n) rad
+        Joints, interpolated.
+    """
+
+    one: Ints
+    other: Ints
+    share: Array
+    q: Array
+
+    __repr__ = short_repr
+
+
+class Effort(NamedTuple):
+    """How widely paths are looked for."""
+
+    width: int
+    """States of each layer that are kept."""
+    alike: tuple[float, float]
+    """Apart by which share of a target, and of what (6) lets an increment change by, two are."""
+    ways: int = 1
+    """First vertices that are followed, where the way depends on which it is."""
+
+
+class _Way(NamedTuple):
+    """What guides paths from some first vertices on."""
+
+    value: float
+    first: Ints
+    steps: Steps
+    cost: Array
+    V: Array
+
+
+class ContinuousSearch:
+    """The paths over continuous gamma of a problem, by its value function.
+
+    Each path keeps (5) between the points of its layers, and (6) where the search finds how; the
+    rotation limits of the problem, too; and with its periodic closure ends less than a sample from
+    where it begins. Joints between two samples are interpolated.
+
+    Parameters
+    ----------
+    problem : SearchProblem
+        Without shut edges.
+    samples : GammaSamples
+
+    Raises
+    ------
+    InputError
+        Shut edges.
+    """
+
+    def __init__(self, problem: SearchProblem, samples: GammaSamples) -> None:
+        if len(problem.shut):
+            raise InputError("shut: the search over continuous gamma knows closed vertices only")
+        layers, self._origin = problem.layers, np.arange(len(problem.q))
+        velocity, limited = problem.aim.velocity, np.isfinite(problem.rotation)
+        if limited.any():
+            layers, place = unroll(
+                layers, problem.rotation, problem.limits.velocity.per_interval(problem.dt)
+            )
+            self._origin = place + np.repeat(problem.start[:-1], np.diff(layers.start))
+            samples = samples.of(self._origin)
+            velocity = np.where(limited, np.minimum(velocity, np.pi), velocity)
+        self._problem, self._cost = problem, np.ascontiguousarray(layers.cost)
+        self._steps = Steps(
+            problem.aim.weight, problem.aim.metric, problem.aim.minimax, np.inf,
+            np.ascontiguousarray(-velocity), np.ascontiguousarray(velocity),
+        )  # fmt: skip
+        self._targets = _targets(
+            np.ascontiguousarray(layers.q), layers.start, layers.endless, samples, velocity
+        )
+        closed = problem.closure == "periodic"
+        self._ways = self._tied_ways(closed=closed) if closed or limited.any() else self._one_way()
+
+    @property
+    def value(self) -> float:
+        """What the value function says of the best path under (5) alone; infinite without one.
+
+        It is interpolated, and no bound.
+        """
+        return min((way.value for way in self._ways), default=np.inf)
+
+    def paths(self, effort: Effort) -> Iterator[ContinuousPath]:
+        """Yield the best paths that so much effort finds; none where it finds none."""
+        for way in self._ways[: effort.ways]:
+            path = self._beam(way, effort)
+            if path is not None:
+                yield path
+
+    def _values(self, steps: Steps, cost: Array, last: Bools | None = None) -> Array:
+        """Return the value function (N,) where vertices cost (N,); ends of the last layer (m,)."""
+        a, V = self._targets.start[-2], np.full(len(cost), np.inf)
+        V[a:] = cost[a:] if last is None else np.where(last, cost[a:], np.inf)
+        kernel.values_to_go(self._targets, steps, cost, V)
+        return V
+
+    def _one_way(self) -> list[_Way]:
+        """Return the way from any first vertex to any last one, if there is one."""
+        way = self._way(np.arange(self._targets.start[1]), self._cost)
+        return [] if way is None else [way]
+
+    def _way(self, first: Ints, cost: Array, last: Bools | None = None) -> _Way | None:
+        """Return what guides paths from some first vertices; None where (5) leaves none.
+
+        Of all with the same maximum, along the one with the least sum: the distances and costs
+        beyond the least maximum are dear.
+        """
+        V, steps = self._values(self._steps, cost, last), self._steps
+        best = float(V[first].min())
+        if best == np.inf:
+            return None
+        if steps.minimax:
+            steps = steps._replace(minimax=False, cap=best)
+            cost = cost + kernel.OVER_CAP * np.maximum(cost - best, 0.0)
+            V = self._values(steps, cost, last)
+        return _Way(best, self._by_valleys(first, V), steps, cost, V)
+
+    def _by_valleys(self, first: Ints, V: Array) -> Ints:
+        """Return first vertices from which paths lead, the bottoms of valleys before the others."""
+        targets, bottom = self._targets, np.ones(int(self._targets.start[1]), np.bool_)
+        joined = slice(0, int(targets.begin[1]))
+        one, other = targets.one[joined], targets.other[joined]
+        bottom[one[V[one] > V[other]]] = False
+        bottom[other[V[other] > V[one]]] = False
+        first = first[V[first] < np.inf]
+        return first[np.lexsort((V[first], ~bottom[first]))]
+
+    def _tied_ways(self, *, closed: bool) -> list[_Way]:
+        """Return the ways where what is allowed depends on the first vertex, the best ones first.
+
+        A path must end where it began, or may not turn a joint too far from there: one way for each
+        first vertex that may do better than all before.
+        """
+        start, q = self._targets.start, self._targets.q
+        free = self._values(self._steps, self._cost)[: start[1]]
+        reach = self._problem.rotation + LIMIT_TOLERANCE
+        ways: list[_Way] = []
+        tried: list[int] = []
+        for p in np.argsort(free, kind="stable"):
+            if not free[p] < min((way.value for way in ways), default=np.inf):
+                break
+            away = increments_between(q[tried], q[p], self._targets.endless)
+            if (np.abs(away).max(axis=1) < APART).any():
+                continue
+            if len(tried) == MOST_ENDS:
+                break
+            tried.append(int(p))
+            cost = np.where((np.abs(q - q[p]) <= reach).all(axis=1), self._cost, np.inf)
+            way = self._way(np.array([p]), cost, self._near_end(p) if closed else None)
+            ways += [] if way is None else [way]
+        return sorted(ways, key=lambda way: way.value)
+
+    def _near_end(self, p: int) -> Bools:
+        """Return which of the last layer (m,) repeat a vertex of the first, or are beside it."""
+        targets = self._targets
+        joined = slice(int(targets.begin[0]), int(targets.begin[1]))
+        one, other = targets.one[joined], targets.other[joined]
+        beside = np.concatenate([[p], other[one == p], one[other == p]])
+        place = self._origin[targets.start[-2] :] - self._problem.start[-2]
+        return np.isin(place, self._origin[beside])
+
+    def _beam(self, way: _Way, effort: Effort) -> ContinuousPath | None:
+        """Return the best path of a beam along a way."""
+        targets = self._targets
+        first = way.first[: effort.width]
+        K = len(targets.start) - 1
+        size = K, effort.width
+        beam = Beam(
+            np.empty(size, np.int64), np.empty(size), np.empty(size, np.int64), np.empty(size),
+            np.zeros(K, np.int64),
+        )  # fmt: skip
+        acceleration = self._problem.aim.acceleration
+        alike = Alike(*effort.alike)
+        if advance(targets, way.steps, way.cost, way.V, acceleration, first, alike, beam) < K:
+            return None
+        b = int(np.argmin(beam.cost[-1, : beam.size[-1]]))
+        at, share = np.empty(K, np.int64), np.empty(K)
+        for k in range(K - 1, -1, -1):
+            at[k], share[k], b = beam.at[k, b], beam.share[k, b], beam.parent[k, b]
+        one = np.concatenate([at[:1], targets.one[at[1:]]])
+        other = np.concatenate([at[:1], targets.other[at[1:]]])
+        between = increments_between(targets.q[one], targets.q[other], targets.endless)
+        return ContinuousPath(
+            one=self._origin[one],
+            other=self._origin[other],
+            share=share,
+            q=targets.q[one] + share[:, None] * between,
+        )
+
+
+def _targets(
+    q: Array, start: Ints, endless: Bools, samples: GammaSamples, velocity: Array
+) -> Targets:
+    """Return where steps may lead, sorted by the joint that leaves the fewest."""
+    (N, n), K = q.shape, len(start) - 1
+    one, other, begin = np.empty(N, np.int64), np.empty(N, np.int64), np.empty(K + 1, np.int64)
+    widest = max(WIDEST, WIDEST_STEPS * 2 * np.pi / samples.samples)
+    widest = min(widest, WIDEST_OF_ALL)
+    kernel.join_samples(
+        q, start, samples.sample, samples.variant, samples.posture, samples.samples, endless,
+        widest, one, other, begin,
+    )  # fmt: skip
+    T = int(begin[-1])
+    targets = Targets(q, start, one[:T], other[:T], begin, np.empty(T), np.empty(K), 0, endless)
+    pairs = np.zeros(n, np.int64)
+    for k in np.unique(np.linspace(1, K - 1, _LAYERS_SAMPLED).astype(int)):
+        here = q[start[k - 1] : start[k]]
+        here = here[:: len(here) // _VERTICES_SAMPLED + 1]
+        a, b = (q[ends[begin[k] : begin[k + 1]]] for ends in (one, other))
+        across = increments_between(a, b, endless)
+        away = increments_between(here[:, None], (a + across / 2)[None], endless)
+        half = np.abs(across).max(axis=0, initial=0.0) / 2
+        pairs += (np.abs(away) <= velocity + half).sum(axis=(0, 1))
+    targets = targets._replace(joint=int(np.argmin(pairs)))
+    kernel.sort_targets(targets)
+    return targets

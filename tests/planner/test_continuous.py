@@ -1,0 +1,178 @@
+"""plan() over continuous gamma: never worse than the refined grid, and every limit kept."""
+
+import numpy as np
+import pytest
+
+from kerfpath import (
+    Band,
+    Comfort,
+    NoFeasiblePath,
+    Tilt,
+    audit,
+    fastest_speed,
+    plan,
+    plan_in_pieces,
+    refine,
+)
+from kerfpath.cell import box_between, cell_of
+from kerfpath.contour import Contour
+from kerfpath.planner import layered_graph
+
+STEP = np.radians(4)
+SAME = 1e-3
+"""Relative: refinements stop where the model promises less than 1e-4 a step, from either side."""
+TURN_LITTLE = [np.inf, np.inf, np.inf, 2.5, np.inf, 2.5]
+TASKS = {
+    "plain": {},
+    "euclid": {"metric": "euclid"},
+    "chebychev": {"metric": "chebychev"},
+    "max": {"objective": "max"},
+    "euclid max": {"metric": "euclid", "objective": "max"},
+    "weights": {"weights": [1, 2, 3, 1, 1, 0]},
+    "periodic": {"closure": "periodic"},
+    "rotation": {"rotation": TURN_LITTLE},
+    "both": {"closure": "periodic", "rotation": TURN_LITTLE},
+    "tangent": {"frames": "tangent"},
+    "wrist": {"comfort": Comfort(wrist=Band(margin=0.2, width=0.5, cost=0.2))},
+    "limits": {"comfort": Comfort(limits=Band(margin=0.1, width=0.6, cost=0.1))},
+    "tilt": {"tilt": Tilt(cone=0.1, steps=1, cost=0.1)},
+}
+
+
+@pytest.fixture(scope="module")
+def nodes(circle):
+    return circle.resample(count=61)
+
+
+@pytest.fixture(scope="module")
+def task(nodes, arm, tool, placement):
+    where = {"tool": tool, "placement": placement, "gamma_step": STEP, "postures": (0, 1)}
+    return (nodes, arm), where | {"speed": 0.1}
+
+
+@pytest.mark.parametrize("name", TASKS)
+def test_it_is_no_worse_than_the_refined_grid(task, name):
+    options = task[1] | TASKS[name]
+    grid = plan(*task[0], method="exact", refine=True, **options)
+    made = plan(*task[0], **options)
+    assert made.cost <= grid.cost * (1 + SAME)
+    assert not made.proof.optimal
+    assert made.proof.statement.startswith("the best motion found over continuous rotation: cost ")
+    assert audit(made) == []
+    if name == "rotation":
+        turned = np.abs(np.cumsum(made.increments, axis=0)).max(axis=0)
+        assert (turned <= np.array(TURN_LITTLE) + 1e-9).all()
+    if made.settings.closure == "periodic":
+        gap = (made.q[-1] - made.q[0]) / (2 * np.pi)
+        np.testing.assert_allclose(gap, np.round(gap) * made.robot.endless, atol=1e-9)
+
+
+def test_the_step_of_gamma_hardly_matters(task):
+    costs = [
+        plan(*task[0], **task[1] | {"gamma_step": np.radians(step)}).cost for step in (2, 5, 10)
+    ]
+    assert max(costs) <= min(costs) * (1 + 2e-3)
+
+
+def test_the_cost_is_that_of_the_motion(task):
+    made = plan(*task[0], **task[1])
+    assert made.cost == pytest.approx(np.abs(made.increments * made.settings.weights).sum())
+    again = plan(*task[0], **task[1])
+    np.testing.assert_array_equal(again.q, made.q)
+
+
+def test_where_the_grid_is_proved_to_have_no_path_there_may_be_one(task):
+    """At 1.2 times the fastest speed of the grid gamma may not step, but glide."""
+    where = {name: task[1][name] for name in ("tool", "placement", "postures")}
+    where["gamma_step"] = np.radians(10)
+    fast = 1.05 * fastest_speed(*task[0], **where).speed
+    with pytest.raises(NoFeasiblePath) as no:
+        plan(*task[0], speed=fast, method="exact", **where)
+    assert no.value.proved
+    made = plan(*task[0], speed=fast, **where)
+    assert audit(made) == []
+
+
+def test_where_nothing_is_found_the_grid_says_why(task):
+    with pytest.raises(NoFeasiblePath, match="on this grid of the rotation no admissible") as no:
+        plan(*task[0], **task[1] | {"speed": 20.0})
+    assert any(reason.startswith("velocity, joint") for reason in no.value.counts)
+
+
+def posts(arm, tool, placement, count):
+    turn = 2 * np.pi * np.arange(count) / count + 0.2
+    places = np.c_[1.2 + 0.27 * np.cos(turn), 0.27 * np.sin(turn)]
+    fixtures = {
+        f"post {i}": box_between([x, y, 0.45], [x + 0.01, y + 0.01, 0.9])
+        for i, (x, y) in enumerate(places)
+    }
+    return cell_of(arm, tool=tool, placement=placement, fixtures=fixtures, near_miss=2e-3)
+
+
+@pytest.mark.parametrize("closure", ["free", "periodic"])
+def test_it_goes_around_what_is_in_the_way(task, arm, tool, placement, closure):
+    there = posts(arm, tool, placement, 6)
+    options = task[1] | {"closure": closure}
+    blind = plan(*task[0], **options)
+    assert not there.clear(blind.q).all()
+    made = plan(*task[0], cell=there, **options)
+    assert there.clear(made.q).all()
+    assert there.clear_motion(made.q[:-1], made.q[1:]).all()
+    assert audit(made, cell=there) == []
+    assert made.cost > blind.cost
+    assert "clear in the cell" in made.proof.statement
+    grid = plan(*task[0], cell=there, method="exact", refine=True, **options)
+    # The motion is kept between clear samples about its path, the grid's is not.
+    assert made.cost <= grid.cost * (1 + 5 * SAME)
+
+
+def test_what_clearance_costs_is_planned_on_the_grid_and_said(task, arm, tool, placement):
+    there = posts(arm, tool, placement, 6)
+    comfort = Comfort(clearance=Band(width=0.1, cost=1))
+    made = plan(*task[0], cell=there, comfort=comfort, **task[1])
+    assert made.proof.statement.startswith("planned on the grid: what clearance costs is known")
+    exact = plan(*task[0], cell=there, comfort=comfort, method="exact", **task[1])
+    assert made.cost <= exact.cost
+
+
+def test_a_graph_without_neighbours_is_planned_on_the_grid(task):
+    """With one sample of gamma there is nothing between the samples; the answer stands."""
+    options = task[1] | {"gamma_step": 2 * np.pi, "speed": 0.02}
+    exact = plan(*task[0], method="exact", refine=True, **options)
+    made = plan(*task[0], **options)
+    assert made.cost <= exact.cost * (1 + SAME)
+
+
+def test_feed_and_pieces_go_on_from_it(task, arm, tool, placement):
+    along = np.linspace(0, 0.16, 81)
+    points = np.stack([np.minimum(along, 0.08), np.maximum(along - 0.08, 0), 0 * along], axis=1)
+    lean = 0.3 / (1 + np.exp((0.08 - along) / 0.004))
+    corner = Contour(points, np.c_[lean, 0 * along, -np.ones(81)], name="corner")
+    options = {"tool": tool, "placement": placement, "gamma_step": np.radians(5)}
+    dipped = plan(corner, arm, feed="dip", speed=0.4, **options)
+    grid = plan(corner, arm, feed="dip", speed=0.4, method="exact", refine=True, **options)
+    assert dipped.feed is not None
+    assert dipped.time[-1] <= grid.time[-1] * (1 + SAME)
+    pieces = plan_in_pieces(corner, arm, speed=0.1, **options)
+    refined = plan_in_pieces(corner, arm, speed=0.1, method="exact", refine=True, **options)
+    assert all(a.cost <= b.cost for a, b in zip(pieces, refined, strict=True))
+    assert any("continuous rotation" in piece.proof.statement for piece in pieces)
+
+
+def test_a_refinement_stays_within_what_it_is_given(task):
+    made = plan(*task[0], method="exact", **task[1])
+    free = refine(made)
+    low, high = made.gamma - 0.02, made.gamma + 0.02
+    held = refine(made, within=(low, high), first=0.005)
+    assert held.done
+    away = np.angle(np.exp(1j * (held.plan.gamma - made.gamma)))
+    assert np.abs(away).max() <= 0.02 + 1e-9
+    assert free.cost_after <= held.cost_after < made.cost
+
+
+def test_a_kept_graph_gives_the_same_plan(task):
+    space = {name: task[1][name] for name in ("tool", "placement", "gamma_step", "postures")}
+    graph = layered_graph(*task[0], **space)
+    np.testing.assert_array_equal(
+        plan(*task[0], graph=graph, **task[1]).q, plan(*task[0], **task[1]).q
+    )
