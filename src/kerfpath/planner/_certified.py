@@ -38,11 +38,5 @@ def with_bound(
     if phase is not None:
         phase("certificate")
     found = certify(made, gap=asked.gap, seconds=asked.seconds, progress=progress)
-    proof = replace(
-        made.proof,
-        statement=f"{made.proof.statement}; {found.statement}",
-        bound=found.bound,
-        gap=found.gap,
-        certificate=found.certificate,
-    )
-    return replace(made, settings=settings, proof=proof)
+    proof = replace(found.plan.proof, statement=f"{made.proof.statement}; {found.statement}")
+    return replace(found.plan, settings=settings, proof=proof)

@@ -71,7 +71,8 @@ def _with_bound(cut: CutResult, progress: Progress) -> CutResult:
         return cut
 
     def named(what: str, done: int, total: int, /) -> None:
-        progress(f"{cut.name}: {what}", done, total)
+        share = f", {100 * done // total} %" if total else ""
+        progress(f"{cut.name}: {what}{share}", 0, 0)
 
     made = with_bound(cut.plan, asked, progress=named)
     if not asked.in_file:
