@@ -105,10 +105,10 @@ class CellMaker:
         self._robot, self._frames, self._tool = robot, frames, T_flange_tip
         self._limits, self._postures = limits, np.array(sorted(postures), np.int8)
 
-    def coarsest(self) -> CellSet:
-        """Return the cells of level 0 of all nodes: postures and turns that ranges admit."""
-        node = np.repeat(np.arange(len(self._frames), dtype=np.int32), BASE)
-        index = np.tile(np.arange(BASE, dtype=np.int32), len(self._frames))
+    def coarsest(self, nodes: Ints) -> CellSet:
+        """Return the cells of level 0 at some nodes: postures and turns that ranges admit."""
+        node = np.repeat(nodes.astype(np.int32), BASE)
+        index = np.tile(np.arange(BASE, dtype=np.int32), len(nodes))
         level = np.zeros(len(node), np.int8)
         sets = []
         for first in range(0, len(node), AT_ONCE):

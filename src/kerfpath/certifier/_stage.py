@@ -12,10 +12,10 @@ from kerfpath._arrays import Array, Bools, Ints
 from kerfpath._repr import short_repr
 from kerfpath.certificate import Stage
 from kerfpath.certifier._cells import CellSet
-from kerfpath.kernels.potentials import cross_cells, lay_potential, reach_cells
+from kerfpath.kernels.potentials import cross_cells, lay_potential, link_cells, reach_cells
 from kerfpath.kernels.reduced import Cells, Potential, Step
 
-__all__ = ["Steps", "StageResult", "solve_stage"]
+__all__ = ["StageResult", "Steps", "linked", "solve_stage"]
 
 IN_ONE = 64
 """Cells of a layer below which a second thread costs more than it brings."""
@@ -44,12 +44,17 @@ class Steps:
 
     __repr__ = short_repr
 
+    def over(self, intervals: int) -> Step:
+        """Return the step over several intervals: no shorter than all of them together (14)."""
+        velocity = intervals * self.velocity
+        return Step(self.weight, np.zeros_like(velocity), velocity, self.metric, self.endless)
+
     def tilted(self, multipliers: Array | None, k: int) -> Step:
-        """Return the step from node k on, tilted by the multipliers (K, n) of (6)."""
-        tilt = np.zeros_like(self.weight)
-        if multipliers is not None:
-            tilt = multipliers[k] - multipliers[k + 1]
-        return Step(self.weight, tilt, self.velocity, self.metric, self.endless)
+        """Return the step from node k to the next, tilted by the multipliers (K, n) of (6)."""
+        step = self.over(1)
+        if multipliers is None:
+            return step
+        return step._replace(tilt=multipliers[k] - multipliers[k + 1])
 
     def price(self, multipliers: Array | None) -> float:
         """Return what the multipliers (K, n) take off: the most that they add where (6) holds."""
@@ -105,18 +110,17 @@ class StageResult:
 
 
 def solve_stage(
-    cells: CellSet, nodes: int, steps: Steps, multipliers: Array | None, care: float
+    cells: CellSet, steps: Steps, multipliers: Array | None = None, care: float = np.inf
 ) -> StageResult:
     """Return what the cells prove of every motion through them.
 
     Parameters
     ----------
     cells : CellSet
-    nodes : int
-        K.
+        The nodes that they are of make the layers; of those between, the motion is any.
     steps : Steps
     multipliers : (K, n), optional
-        Of (6), zero at the first node and the last.
+        Of (6), zero at the first node and the last; the cells are of all nodes then.
     care : float
         Cost beyond the cheapest step of a cell up to which steps are bounded with care.
     """
@@ -124,21 +128,14 @@ def solve_stage(
     key = _key(cells, box, steps)
     order = np.lexsort((cells.center[:, key], cells.node))
     cells, box = cells.take(order), box[order]
-    start = np.searchsorted(cells.node, np.arange(nodes + 1))
-    sizes = np.diff(start)
-    widest = np.zeros(nodes)
-    filled = np.flatnonzero(sizes)
-    if len(filled):
-        widest[filled] = np.maximum.reduceat(box[:, key], start[filled])
+    packed, nodes = pack(cells, box, key)
+    start = packed.start
     C, n = cells.center.shape
-    packed = Cells(
-        start, cells.center, cells.slope, cells.bend, cells.spread, box, cells.half, key, widest
-    )
     potential = Potential(
         np.full((C, 2), np.inf), np.zeros((C, 2, n)), np.zeros((C, 2)), np.zeros((C, 2))
     )
-    potential.level[start[nodes - 1] :] = 0.0
-    begin, to, cost = _lay(packed, potential, steps, multipliers, care)
+    potential.level[start[-2] :] = 0.0
+    begin, to, cost = _lay(packed, nodes, potential, steps, multipliers, care)
     ahead, behind = np.zeros(C), np.full(C, np.inf)
     first = slice(start[0], start[1])
     behind[first] = _least_at_first(cells.take(first), potential, first)
@@ -146,7 +143,7 @@ def solve_stage(
     through = ahead + behind - steps.price(multipliers)
     finite = np.isfinite(through)
     largest = np.abs(potential.level[np.isfinite(potential.level)]).max(initial=0.0)
-    through[finite] -= ROUNDED * nodes * (largest + np.abs(through[finite]))
+    through[finite] -= ROUNDED * len(nodes) * (largest + np.abs(through[finite]))
     return StageResult(
         cells=cells,
         through=through,
@@ -155,6 +152,30 @@ def solve_stage(
         multipliers=multipliers,
         pairs=len(to),
     )
+
+
+def pack(cells: CellSet, box: Array, key: int) -> tuple[Cells, Ints]:
+    """Return sorted cells as the kernels take them, and the nodes (M,) that are their layers."""
+    nodes, start = np.unique(cells.node, return_index=True)
+    widest = np.maximum.reduceat(box[:, key], start) if len(start) else np.zeros(0)
+    start = np.append(start, len(cells))
+    curves = cells.center, cells.slope, cells.bend, cells.spread, box, cells.half
+    return Cells(start, *curves, key, widest), nodes.astype(np.int64)
+
+
+def linked(cells: CellSet, steps: Steps) -> Bools:
+    """Return which cells (C,) steps within (5) lead to, and lead on from."""
+    box = cells.box
+    key = _key(cells, box, steps)
+    order = np.lexsort((cells.center[:, key], cells.node))
+    packed, nodes = pack(cells.take(order), box[order], key)
+    after, before = np.zeros((2, len(cells)), np.bool_)
+    after[packed.start[-2] :] = before[: packed.start[1]] = True
+    for k in range(len(nodes) - 1):
+        link_cells(packed, steps.over(int(nodes[k + 1] - nodes[k])), k, after, before)
+    found = np.empty(len(cells), np.bool_)
+    found[order] = after & before
+    return found
 
 
 def _key(cells: CellSet, box: Array, steps: Steps) -> int:
@@ -166,7 +187,12 @@ def _key(cells: CellSet, box: Array, steps: Steps) -> int:
 
 
 def _lay(
-    packed: Cells, potential: Potential, steps: Steps, multipliers: Array | None, care: float
+    packed: Cells,
+    nodes: Ints,
+    potential: Potential,
+    steps: Steps,
+    multipliers: Array | None,
+    care: float,
 ) -> tuple[Ints, Ints, Array]:
     """Lay the potential from the last layer to the first; return the steps and reduced costs.
 
@@ -179,7 +205,8 @@ def _lay(
     with ThreadPoolExecutor(threads) as pool:
         for k in range(len(start) - 3, -1, -1):
             first, last = int(start[k]), int(start[k + 1])
-            step = steps.tilted(multipliers, k)
+            stride = int(nodes[k + 1] - nodes[k])
+            step = steps.over(stride) if stride > 1 else steps.tilted(multipliers, int(nodes[k]))
             reach_cells(packed, step, k, first, last, potential.level, count)
             begin = np.zeros(last - first + 1, np.int64)
             np.cumsum(count[first:last], out=begin[1:])

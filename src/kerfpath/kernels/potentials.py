@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from kerfpath._arrays import Array, Ints
+from kerfpath._arrays import Array, Bools, Ints
 from kerfpath.kernels._jit import jit, jit_inline
 from kerfpath.kernels.metric import MANHATTAN, extend, finish
 from kerfpath.kernels.reduced import (
@@ -23,7 +23,7 @@ from kerfpath.kernels.reduced import (
     tangent,
 )
 
-__all__ = ["close_cut", "cross_cells", "lay_potential", "reach_cells"]
+__all__ = ["close_cut", "cross_cells", "lay_potential", "link_cells", "reach_cells"]
 
 PENALTY = 10.0
 """Price of an increment beyond (5), in weights: a guess looks for the way back."""
@@ -71,27 +71,21 @@ def _best_along(
                 low = one
         t = (low + high) / 2.0
         return t, _price(D, cells, potential, step, b, t, PENALTY)
-    best, at = _price(D, cells, potential, step, b, -h, PENALTY), -h
-    price = _price(D, cells, potential, step, b, h, PENALTY)
-    if price < best:
-        best, at = price, h
-    slope = potential.along[b, 0] - potential.along[b, 1]
-    if slope != 0.0:
-        t = (potential.level[b, 0] - potential.level[b, 1]) / slope
-        if abs(t) < h:
+    best, at = np.inf, 0.0
+    turn = potential.along[b, 0] - potential.along[b, 1]
+    for kink in range(-3, 3 * len(D)):
+        if kink == -3:
+            t = (potential.level[b, 0] - potential.level[b, 1]) / turn if turn != 0.0 else h
+        elif kink < 0:
+            t = (2 * kink + 3) * h
+        else:
+            i, v = kink // 3, (kink % 3 - 1) * step.velocity[kink // 3]
+            s = cells.slope[b, i]
+            t = (v - D[i]) / s if s != 0.0 else 2.0 * h
+        if abs(t) <= h:
             price = _price(D, cells, potential, step, b, t, PENALTY)
             if price < best:
                 best, at = price, t
-    for i in range(len(D)):
-        s, v = cells.slope[b, i], step.velocity[i]
-        if s == 0.0 or abs(D[i]) > abs(s) * h + v:
-            continue
-        for kink in range(3):
-            t = ((kink - 1) * v - D[i]) / s
-            if abs(t) < h:
-                price = _price(D, cells, potential, step, b, t, PENALTY)
-                if price < best:
-                    best, at = price, t
     return at, best
 
 
@@ -202,15 +196,18 @@ def _proved(
         best = _along(D, y) - price + least_ahead(cells, potential, b, y)
         if best > enough:
             return best
-        tangent(D, step, other)
+    for kind in range(-1 if way == 1 else 2, 3):
+        if kind < 0:
+            tangent(D, step, other)
+        for i in range(len(y)):
+            if kind == 2:
+                other[i] = 0.0
+            elif kind >= 0:
+                other[i] = potential.dual[b, kind, i]
         best = max(best, _turned(cells, potential, step, a, b, D, y, other))
-        for m in range(2):
-            for i in range(len(y)):
-                other[i] = potential.dual[b, m, i]
-            best = max(best, _turned(cells, potential, step, a, b, D, y, other))
-    for i in range(len(y)):
-        other[i] = 0.0
-    return max(best, _turned(cells, potential, step, a, b, D, y, other))
+        if best > enough:
+            break
+    return best
 
 
 @jit_inline
@@ -329,6 +326,17 @@ def reach_cells(
 
 
 @jit
+def link_cells(cells: Cells, step: Step, k: int, out_after: Bools, out_before: Bools) -> None:
+    """Mark the cells of layer k that a step leads on from, and those of layer k + 1 it leads to."""
+    run, D = np.empty(2, np.int64), np.empty(len(step.velocity))
+    for a in range(cells.start[k], cells.start[k + 1]):
+        _window(cells, step, a, k, run)
+        for b in range(run[0], run[1]):
+            if not (out_after[a] and out_before[b]) and near(cells, step, a, b, D) > 0:
+                out_after[a] = out_before[b] = True
+
+
+@jit
 def lay_potential(
     cells: Cells,
     potential: Potential,
@@ -368,14 +376,19 @@ def lay_potential(
                     p += 1
                     if p == count:
                         break
+        flat = _flat_level(cells, potential, step, ahead, other)
         for m in range(2):
             t = (2 * m - 1) * cells.half[a]
             _guess(cells, potential, step, a, t, ahead, D, here, floor, y)
-            level = _level(cells, potential, step, a, ahead, way, D, y, care, other, proved[m])
-            if level < _flat_level(cells, potential, step, ahead, other):
-                for i in range(n):
-                    y[i] = 0.0
-                level = _level(cells, potential, step, a, ahead, way, D, y, care, other, proved[m])
+            level = -np.inf
+            for attempt in range(2):
+                if attempt == 1 and level < flat:
+                    for i in range(n):
+                        y[i] = 0.0
+                if attempt == 0 or level < flat:
+                    level = _level(
+                        cells, potential, step, a, ahead, way, D, y, care, other, proved[m]
+                    )
             potential.level[a, m] = level
             for i in range(n):
                 potential.dual[a, m, i] = y[i]

@@ -1,0 +1,226 @@
+"""certify(): a lower bound on the cost of every motion along the contour of a plan."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from time import monotonic
+
+import numpy as np
+
+from kerfpath._arrays import Bools, Ints, scalar
+from kerfpath._repr import short_repr
+from kerfpath.certificate import ALLOWANCE, Certificate, Stage
+from kerfpath.certifier._cells import CellMaker, CellSet
+from kerfpath.certifier._stage import StageResult, Steps, linked, solve_stage
+from kerfpath.kernels.limits import LIMIT_TOLERANCE
+from kerfpath.plans import Plan, Proof
+from kerfpath.progress import Progress, no_progress
+from kerfpath.search import METRIC_CODES
+
+__all__ = ["Certified", "certify"]
+
+FIRST_LAYERS, LONGEST = 16, 3.0
+"""Layers that the first stage has at least, and how far a joint may turn from one to the next, rad:
+from node to node of the coarsest stage."""
+DROPPED = 0.25
+"""Share of its cells that a stage must rule out to be kept in the certificate."""
+STALLED = 0.3
+"""Share of the gap that a stage must close; less, and nodes come in between instead."""
+CARE = 0.05
+"""Share of the cost beyond the cheapest step up to which steps are bounded with care."""
+HALF = 0.5
+"""Share of what is wanted below which the cells are too coarse to judge by."""
+DEEPEST = 12
+"""Levels at most: cells of 0.001 deg."""
+MOST_CELLS, MOST_PAIRS = 2_000_000, 60_000_000
+"""Cells of a stage, and steps from cell to cell of all stages, after which it is left at that."""
+SAME = 1e-9
+"""Share of its cost by which a motion may be dearer than the plan and still not be ruled out."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Certified:
+    """What came of certifying a plan.
+
+    Parameters
+    ----------
+    plan : Plan
+        With `proof.bound`, `gap` and `certificate` where something is proved.
+    done : bool
+        The gap asked for is reached.
+    statement : str
+        What is proved, or why nothing can be.
+    stages, pairs : int
+        Stages, and steps from cell to cell looked at in all of them.
+    """
+
+    plan: Plan
+    done: bool
+    statement: str
+    stages: int = 0
+    pairs: int = 0
+
+    __repr__ = short_repr
+
+
+def certify(
+    plan: Plan,
+    *,
+    gap: float = 0.005,
+    seconds: float | None = None,
+    progress: Progress = no_progress,
+) -> Certified:
+    """Return the plan with a proved lower bound on the cost of any motion along its contour.
+
+    Any motion that keeps (5) and (6) at the nodes, the ranges of the joints and their couplings, at
+    any gamma, in the postures that the plan may use, on any turn. What else the plan keeps (a cell,
+    comfort, a periodic closure, a limit on the rotation) only makes the best motion dearer.
+
+    Parameters
+    ----------
+    plan : Plan
+    gap : float
+        (cost - bound) / cost at which to stop.
+    seconds : float s, optional
+        Time after which no further stage is begun; default: a limit on the work, which does not
+        depend on the machine.
+    progress : Progress
+
+    Raises
+    ------
+    InputError
+        A gap or a time that is not positive.
+    """
+    gap = scalar(gap, "gap", above=0.0)
+    until = np.inf
+    if seconds is not None:
+        until = monotonic() + scalar(seconds, "seconds", unit="s", above=0.0)
+    why = _why_not(plan)
+    if why:
+        return Certified(plan=plan, done=False, statement=f"no bound is proved: {why}")
+    course = _Course(plan, gap, until, progress)
+    course.run()
+    bound = max(course.best - ALLOWANCE * plan.cost, 0.0)
+    reached = (plan.cost - bound) / plan.cost
+    claim = (
+        f"no motion within the limits costs less than {bound:.6g}, {100 * reached:.2g} % below this "
+        "plan, at any gamma, posture and turn"
+    )
+    proof = replace(
+        plan.proof,
+        bound=bound,
+        gap=reached,
+        certificate=Certificate(bound=bound, stages=tuple(course.stages)),
+    )
+    return Certified(
+        plan=replace(plan, proof=proof),
+        done=reached <= gap,
+        statement=claim,
+        stages=course.count,
+        pairs=course.pairs,
+    )
+
+
+def _why_not(plan: Plan) -> str:
+    """Say why nothing can be proved of a plan; "" where it can."""
+    robot, asked = plan.robot, plan.settings
+    if not robot.encloses:
+        return f"the joints of a robot of the kind {robot.kinematics!r} are not enclosed"
+    if asked.tilt is not None:
+        return "the tool axis may tilt"
+    if plan.feed is not None:
+        return "the feed is reduced"
+    if asked.objective != "sum":
+        return f'the objective is "{asked.objective}"'
+    if not plan.cost > 0:
+        return "its cost is not above 0"
+    return ""
+
+
+class _Course:
+    """The stages of one certificate, from coarse cells at a few nodes to fine ones at more."""
+
+    def __init__(self, plan: Plan, gap: float, until: float, progress: Progress) -> None:
+        robot, asked, dt = plan.robot, plan.settings, float(np.diff(plan.time).max())
+        limits = asked.limits(robot)
+        self.steps = Steps(
+            weight=asked.weights,
+            velocity=limits.velocity.per_interval(dt) + 2 * LIMIT_TOLERANCE,
+            acceleration=limits.acceleration.per_interval(dt) + 2 * LIMIT_TOLERANCE,
+            metric=METRIC_CODES[asked.metric],
+            endless=robot.endless,
+        )
+        postures = range(robot.postures) if asked.postures is None else asked.postures
+        self.maker = CellMaker(
+            robot, plan.frames, plan.T_flange_tip, robot.joint_limits(), postures
+        )
+        self.cost, self.until, self.progress = plan.cost, until, progress
+        self.target = plan.cost * min(1.0, 1 - gap + ALLOWANCE)
+        self.last = len(plan.q) - 1
+        self.best, self.pairs, self.count = 0.0, 0, 0
+        self.stages: list[Stage] = []
+
+    def run(self) -> None:
+        """Go from stage to stage until the gap is reached or it is enough."""
+        stride = self._first_stride()
+        cells = self.maker.coarsest(self._nodes(stride))
+        fresh = True  # cells that the certificate has to show
+        while True:
+            result = solve_stage(cells, self.steps, care=CARE * self.cost)
+            gained = self._take(result)
+            live = result.through <= self.cost * (1 + SAME)
+            low = result.through < self.target
+            if not low.any() or self._enough(result):
+                self.stages.append(result.stage())
+                return
+            if fresh or 1 - live.mean() > DROPPED:
+                self.stages.append(result.stage())
+                fresh, kept = False, live
+            else:
+                kept = np.ones(len(live), np.bool_)
+            cells = result.cells
+            deep = bool((cells.level[low] >= DEEPEST).any())
+            slow = gained < STALLED and self.best > HALF * self.target
+            if stride > 1 and (slow or deep):
+                stride, fresh = max(stride // 2, 1), True
+                cells = self._with_nodes(cells.take(kept), self._nodes(stride))
+            elif deep:
+                self.stages.append(result.stage())
+                return
+            else:
+                rest = cells.take(kept & ~low)
+                cells = CellSet.join([rest, self.maker.halves(cells.take(kept & low))])
+
+    def _first_stride(self) -> int:
+        stride = 1
+        while (
+            self.last // (2 * stride) >= FIRST_LAYERS
+            and 2 * stride * float(self.steps.velocity.max()) <= LONGEST
+        ):
+            stride *= 2
+        return stride
+
+    def _nodes(self, stride: int) -> Ints:
+        return np.unique(np.append(np.arange(0, self.last, stride), self.last))
+
+    def _take(self, result: StageResult) -> float:
+        """Take what a stage proves; return the share of the gap that it closes."""
+        before, self.best = self.best, max(self.best, min(result.bound, self.cost))
+        self.pairs, self.count = self.pairs + result.pairs, self.count + 1
+        short = max(self.target - self.best, 0.0)
+        self.progress("certificate", int(1000 * (1 - short / self.target)), 1000)
+        return (self.best - before) / max(self.target - before, 1e-300)
+
+    def _enough(self, result: StageResult) -> bool:
+        return self.pairs > MOST_PAIRS or len(result.cells) > MOST_CELLS or monotonic() > self.until
+
+    def _with_nodes(self, cells: CellSet, nodes: Ints) -> CellSet:
+        """Return the cells with those of further nodes, about as fine where motions may pass."""
+        level = int(np.median(cells.level)) if len(cells) else 0
+        new = self.maker.coarsest(np.setdiff1d(nodes, cells.node))
+        while True:
+            passed = linked(CellSet.join([cells, new]), self.steps)[len(cells) :]
+            coarse = passed & (new.level < level)
+            if not coarse.any():
+                return CellSet.join([cells, new])
+            new = CellSet.join([new.take(~coarse), self.maker.halves(new.take(coarse))])
