@@ -62,6 +62,9 @@ def test_a_plan_says_what_it_did(planned, folder):
     for contour in planned["contours"]:
         assert 0 < contour["peak_velocity_share"] <= 0.95
         assert contour["issues"] == []
+        assert 0 < contour["bound"] <= contour["cost"]
+        assert contour["gap"] <= 0.005  # what is asked for where the job says nothing
+        assert "no motion within the limits costs less than" in contour["proof"]
 
 
 def test_the_trajectory_is_the_plan_in_degrees_and_millimetres(planned, folder):
