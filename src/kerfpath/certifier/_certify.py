@@ -25,11 +25,11 @@ LONGEST, TURNED = 3.0, 3e-4
 share of its cost that the plan may lose if it went straight from step to step."""
 DROPPED = 0.25
 """Share of its cells that a stage must rule out to be kept in the certificate."""
-STALLED = 0.3
+STALLED = 0.5
 """Share of the gap that a stage must close; less, and nodes come in between instead."""
 CARE = 0.05
 """Share of the cost beyond the cheapest step up to which steps are bounded with care."""
-NEAR, FINE = 0.9, 4
+NEAR, FINE = 0.9, 3
 """Share of what is wanted, and levels, below which cells are too coarse to tell what nodes lack."""
 DEEPEST = 12
 """Levels at most: cells of 0.001 deg."""
