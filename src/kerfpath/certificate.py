@@ -11,6 +11,12 @@ two cells of the step (the sum telescopes): so does the shortest path through th
 reduced costs. Whoever checks it computes the enclosures of the joints, hence the reduced costs, on
 his own; a potential that is wrong makes the bound weaker, not untrue.
 
+The layers of a stage are the nodes that its cells are of; it need not have them all. A step from
+node k to node k' > k + 1 spans k' - k intervals: its velocity bound is that many times the one of
+(5), and rho of the whole is no more than the sum over its parts. An endless joint may turn further
+in it than the short way: where another representative of the difference is within reach, either
+counts.
+
 A stage may carry multipliers nu of (6): they tilt the cost of a step (see `Stage`). Cells through
 which every motion costs more than the plan drop out, and the next stage covers those that remain.
 """
@@ -108,7 +114,7 @@ class Stage:
     Parameters
     ----------
     node : (C,) int32
-        Node of each cell; ascending.
+        Node of each cell; ascending. The nodes that occur are the layers.
     posture : (C,) int8
     level : (C,) int8
         Times that a cell of the coarsest grid (`BASE`) was divided in two.
@@ -126,7 +132,8 @@ class Stage:
     multipliers : (K, n) float64, optional
         nu at each node, zero at the first and the last: to the cost of a motion they add
         nu_k . (u_k - u_{k-1}) - |nu_k| . A, which is never above zero where (6) holds; u_k is the
-        increment from node k to k + 1, A the bound of (6) on its change.
+        increment from node k to k + 1, A the bound of (6) on its change. Only where the cells are
+        of all nodes.
     """
 
     node: NDArray[np.int32]

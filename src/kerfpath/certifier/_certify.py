@@ -7,29 +7,30 @@ from time import monotonic
 
 import numpy as np
 
-from kerfpath._arrays import Bools, Ints, scalar
+from kerfpath._arrays import scalar
 from kerfpath._repr import short_repr
 from kerfpath.certificate import ALLOWANCE, Certificate, Stage
 from kerfpath.certifier._cells import CellMaker, CellSet
+from kerfpath.certifier._nodes import between, turning_nodes
 from kerfpath.certifier._stage import StageResult, Steps, linked, solve_stage
 from kerfpath.kernels.limits import LIMIT_TOLERANCE
-from kerfpath.plans import Plan, Proof
+from kerfpath.plans import Plan
 from kerfpath.progress import Progress, no_progress
 from kerfpath.search import METRIC_CODES
 
 __all__ = ["Certified", "certify"]
 
-FIRST_LAYERS, LONGEST = 16, 3.0
-"""Layers that the first stage has at least, and how far a joint may turn from one to the next, rad:
-from node to node of the coarsest stage."""
+LONGEST, TURNED = 3.0, 3e-4
+"""How far a joint may turn in one step of the first stage, rad: less than half a turn; and the
+share of its cost that the plan may lose if it went straight from step to step."""
 DROPPED = 0.25
 """Share of its cells that a stage must rule out to be kept in the certificate."""
-STALLED = 0.3
+STALLED = 0.5
 """Share of the gap that a stage must close; less, and nodes come in between instead."""
 CARE = 0.05
 """Share of the cost beyond the cheapest step up to which steps are bounded with care."""
-HALF = 0.5
-"""Share of what is wanted below which the cells are too coarse to judge by."""
+NEAR, FINE = 0.9, 3
+"""Share of what is wanted, and levels, below which cells are too coarse to tell what nodes lack."""
 DEEPEST = 12
 """Levels at most: cells of 0.001 deg."""
 MOST_CELLS, MOST_PAIRS = 2_000_000, 60_000_000
@@ -157,13 +158,14 @@ class _Course:
         self.cost, self.until, self.progress = plan.cost, until, progress
         self.target = plan.cost * min(1.0, 1 - gap + ALLOWANCE)
         self.last = len(plan.q) - 1
+        longest = max(1, int(LONGEST / self.steps.velocity.max()))
+        self.nodes = turning_nodes(plan, TURNED, longest)
         self.best, self.pairs, self.count = 0.0, 0, 0
         self.stages: list[Stage] = []
 
     def run(self) -> None:
         """Go from stage to stage until the gap is reached or it is enough."""
-        stride = self._first_stride()
-        cells = self.maker.coarsest(self._nodes(stride))
+        cells = self.maker.coarsest(self.nodes)
         fresh = True  # cells that the certificate has to show
         while True:
             result = solve_stage(cells, self.steps, care=CARE * self.cost)
@@ -180,28 +182,17 @@ class _Course:
                 kept = np.ones(len(live), np.bool_)
             cells = result.cells
             deep = bool((cells.level[low] >= DEEPEST).any())
-            slow = gained < STALLED and self.best > HALF * self.target
-            if stride > 1 and (slow or deep):
-                stride, fresh = max(stride // 2, 1), True
-                cells = self._with_nodes(cells.take(kept), self._nodes(stride))
+            fine = self.best > NEAR * self.target or cells.level.max() >= FINE
+            slow = fine and gained < STALLED
+            if len(self.nodes) <= self.last and (slow or deep):
+                self.nodes, fresh = between(self.nodes), True
+                cells = self._with_nodes(cells.take(kept))
             elif deep:
                 self.stages.append(result.stage())
                 return
             else:
                 rest = cells.take(kept & ~low)
                 cells = CellSet.join([rest, self.maker.halves(cells.take(kept & low))])
-
-    def _first_stride(self) -> int:
-        stride = 1
-        while (
-            self.last // (2 * stride) >= FIRST_LAYERS
-            and 2 * stride * float(self.steps.velocity.max()) <= LONGEST
-        ):
-            stride *= 2
-        return stride
-
-    def _nodes(self, stride: int) -> Ints:
-        return np.unique(np.append(np.arange(0, self.last, stride), self.last))
 
     def _take(self, result: StageResult) -> float:
         """Take what a stage proves; return the share of the gap that it closes."""
@@ -214,10 +205,10 @@ class _Course:
     def _enough(self, result: StageResult) -> bool:
         return self.pairs > MOST_PAIRS or len(result.cells) > MOST_CELLS or monotonic() > self.until
 
-    def _with_nodes(self, cells: CellSet, nodes: Ints) -> CellSet:
+    def _with_nodes(self, cells: CellSet) -> CellSet:
         """Return the cells with those of further nodes, about as fine where motions may pass."""
         level = int(np.median(cells.level)) if len(cells) else 0
-        new = self.maker.coarsest(np.setdiff1d(nodes, cells.node))
+        new = self.maker.coarsest(np.setdiff1d(self.nodes, cells.node))
         while True:
             passed = linked(CellSet.join([cells, new]), self.steps)[len(cells) :]
             coarse = passed & (new.level < level)

@@ -1,0 +1,55 @@
+"""Which nodes a stage needs: those where the plan turns."""
+
+from __future__ import annotations
+
+from heapq import heapify, heappush, heapreplace
+
+import numpy as np
+
+from kerfpath._arrays import Ints
+from kerfpath.kernels.metric import rho
+from kerfpath.plans import Plan, path_cost
+from kerfpath.search import METRIC_CODES
+
+__all__ = ["between", "turning_nodes"]
+
+
+def turning_nodes(plan: Plan, share: float, longest: int) -> Ints:
+    """Return nodes (M,) such that steps straight from one to the next cost about what the plan does.
+
+    Parameters
+    ----------
+    plan : Plan
+    share : float
+        Share of the plan's cost that the way between them may cost more.
+    longest : int
+        Intervals that a step spans at most.
+    """
+    asked, dq = plan.settings, plan.increments
+    metric, last = METRIC_CODES[asked.metric], len(dq)
+    q = np.vstack([np.zeros(dq.shape[1]), np.cumsum(dq, axis=0)])
+    each = [path_cost(step[None], asked.weights, asked.metric, "sum") for step in dq]
+    upto = np.concatenate([[0.0], np.cumsum(each)])
+
+    def lost(a: int, b: int) -> float:
+        """What a straight step from node a to b leaves out."""
+        return float(upto[b] - upto[a] - rho(q[b] - q[a], asked.weights, metric))
+
+    ends = np.unique(np.append(np.arange(0, last, longest), last)).tolist()
+    steps = [(-lost(a, b), a, b) for a, b in zip(ends[:-1], ends[1:], strict=True)]
+    heapify(steps)
+    left = -sum(step[0] for step in steps)
+    while left > share * upto[-1]:
+        loss, a, b = steps[0]
+        if b - a < 2:
+            break
+        middle = max(range(a + 1, b), key=lambda m: (-lost(a, m) - lost(m, b), -abs(2 * m - a - b)))
+        heapreplace(steps, (-lost(a, middle), a, middle))
+        heappush(steps, (-lost(middle, b), middle, b))
+        left += loss + lost(a, middle) + lost(middle, b)
+    return np.array(sorted({node for _, a, b in steps for node in (a, b)}))
+
+
+def between(nodes: Ints) -> Ints:
+    """Return the nodes with one more in the middle of each step that spans several intervals."""
+    return np.unique(np.append(nodes, (nodes[:-1] + nodes[1:]) // 2))
