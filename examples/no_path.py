@@ -34,7 +34,10 @@ def main() -> None:
     print(f"fastest constant speed: {fastest.on_grid:.3f} m/s on the grid, {fastest.speed:.3f} off")
     print(f"  there the {fastest.limit} of joint {fastest.joint + 1} binds at node {fastest.node}")
     try:
-        kerfpath.plan(contour, robot, tool=tool, placement=placement, gamma_step=step, speed=0.15)
+        kerfpath.plan(
+            contour, robot, tool=tool, placement=placement, gamma_step=step, speed=0.15,
+            method="exact",
+        )  # fmt: skip
     except kerfpath.NoFeasiblePath as broken:
         print(f"constant, on the grid: none, proved: {broken.proved}; {broken}")
     for refine in (False, True):
@@ -46,6 +49,7 @@ def main() -> None:
             gamma_step=step,
             speed=0.15,
             feed="dip",
+            method="exact",
             refine=refine,
         )
         where = "off the grid" if refine else "on the grid"
@@ -54,7 +58,7 @@ def main() -> None:
             assert issue.level == "warning", issue
             print(f"  {issue}")
     pieces = kerfpath.plan_in_pieces(
-        contour, robot, tool=tool, placement=placement, gamma_step=step, speed=0.15
+        contour, robot, tool=tool, placement=placement, gamma_step=step, speed=0.15, method="exact"
     )
     print(f"interrupted: {len(pieces)} pieces of {[len(p.q) for p in pieces]} nodes")
 

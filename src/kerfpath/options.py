@@ -341,7 +341,7 @@ GIVEN = object()
 """Any value but None."""
 CLEARANCE, PENALTIES = "comfort clearance", "comfort costs"
 """What the rules ask of comfort, beside the options themselves."""
-_ONE_WAY = {"method": EXACT_OR_BETTER, "closure": "free", "rotation": None}
+_ONE_WAY: dict[str, object] = {"method": EXACT_OR_BETTER, "closure": "free", "rotation": None}
 _RULES: tuple[tuple[dict[str, object], dict[str, object]], ...] = (
     (
         {"feed": "dip"},

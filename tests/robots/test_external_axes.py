@@ -70,8 +70,9 @@ def test_a_range_of_one_point_is_the_plain_robot_moved_there(kind, objective, ar
         R = Rotation.from_rotvec([0, 0, 0.3]).as_matrix()
         T, point = np.eye(4), np.array([1.2, 0, 0])
         placement = pose(point - R @ point, R) @ options["placement"]
-    made = plan(short, one, objective=objective, **options)
-    plain = plan(short, moved(arm, T), objective=objective, **options | {"placement": placement})
+    on_grid = options | {"objective": objective, "method": "exact"}
+    made = plan(short, one, **on_grid)
+    plain = plan(short, moved(arm, T), **on_grid | {"placement": placement})
     assert made.cost == pytest.approx(plain.cost, rel=1e-9)  # two ways to the same frames
     # Both turns of the wrist cost the same, so that the paths may differ; their graphs may not.
     space = {name: options[name] for name in ("tool", "placement", "gamma_step")}
@@ -119,7 +120,7 @@ def test_a_cut_beyond_the_reach_needs_the_rail(arm, railed, tool, placement):
     options = {"tool": tool, "placement": placement, "gamma_step": np.radians(15), "speed": 0.05}
     with pytest.raises(NoFeasiblePath, match="no admissible pose"):
         plan(long, arm, **options)
-    made = plan(long, railed, **options)
+    made = plan(long, railed, method="exact", **options)
     assert made.proof.optimal
     assert made.q.shape == (97, 7)
     assert np.ptp(made.q[:, 6]) > 0.5
@@ -127,7 +128,7 @@ def test_a_cut_beyond_the_reach_needs_the_rail(arm, railed, tool, placement):
         table = {c.code: c for c in checks(made, interpolation=interpolation, path_tolerance=0.02)}
         assert table["external-limits"].unit == "m"
         assert all(c.ok for c in table.values())
-    refined = plan(long, railed, refine=True, **options)
+    refined = plan(long, railed, **options)
     assert refined.cost < made.cost
     assert np.isin(refined.q[:, 6], railed.external.samples(-1.0, 1.0)).all()
     assert not refined.turn[:, 6].any()
@@ -185,7 +186,7 @@ def test_the_plan_is_the_best_of_all_positions_tilts_gammas_and_postures(
         acceleration=acceleration, eta_v=1.0, eta_a=1.0, endless=robot.endless,
         weights=1 / (velocity * dt), metric="manhattan", objective=objective,
     )  # fmt: skip
-    made = plan(bent, robot, speed=speed, tilt=tilt, objective=objective, **space)
+    made = plan(bent, robot, speed=speed, tilt=tilt, objective=objective, method="exact", **space)
     assert made.cost == pytest.approx(want, rel=1e-9)  # two ways to the same poses
 
 

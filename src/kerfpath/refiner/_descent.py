@@ -255,14 +255,16 @@ class Descent:
         # At the edge of reach a node stays where it is.
         movable = np.asarray(np.isfinite(slope).all(axis=1))
         endless = self.limits.endless
+        # A range may be a single point.
+        room = np.minimum(MARGIN, (self.limits.upper - self.limits.lower) / 2)
         return LinearModel(
             q=at.q,
             slope=np.where(movable[:, None], slope, 0.0),
             radius=np.where(movable, radius, 0.0),
             least=np.clip((self.gamma_low - at.gamma) / radius, -1.0, 0.0),
             most=np.clip((self.gamma_high - at.gamma) / radius, 0.0, 1.0),
-            lower=np.where(endless, -np.inf, self.limits.lower + MARGIN),
-            upper=np.where(endless, np.inf, self.limits.upper - MARGIN),
+            lower=np.where(endless, -np.inf, self.limits.lower + room),
+            upper=np.where(endless, np.inf, self.limits.upper - room),
             rotation=self.rotation - MARGIN,
             rows=self.limits.rows,
             row_lower=self.limits.row_lower + MARGIN,

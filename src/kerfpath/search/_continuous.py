@@ -26,6 +26,8 @@ WIDEST, WIDEST_STEPS, WIDEST_OF_ALL = 0.5, 6.0, 1.5
 the larger of the first two and the last one."""
 MOST_ENDS = 12
 """First vertices that are tried, one by one, where the way depends on which it is."""
+SAME_COST, MOST_TURNS = 1e-9, 16
+"""Relative difference of paths that cost the same, and how many of them are looked at."""
 APART = 0.15
 """rad by which some joint of two of them differs: the refinement moves them."""
 _LAYERS_SAMPLED, _VERTICES_SAMPLED = 12, 16
@@ -248,7 +250,15 @@ class ContinuousSearch:
         alike = Alike(*effort.alike)
         if advance(targets, way.steps, way.cost, way.V, acceleration, first, alike, beam) < K:
             return None
-        b = int(np.argmin(beam.cost[-1, : beam.size[-1]]))
+        cost = beam.cost[-1, : beam.size[-1]]
+        ends = np.flatnonzero(cost <= cost.min() + SAME_COST * abs(cost.min()))
+        # Turns of a joint cost the same: of such paths, the one that is nowhere far from zero.
+        ways = [self._traced(beam, int(b)) for b in ends[np.argsort(cost[ends])][:MOST_TURNS]]
+        return min(ways, key=lambda path: float(np.abs(path.q).max()))
+
+    def _traced(self, beam: Beam, b: int) -> ContinuousPath:
+        """Return the path that ends in state b of a beam."""
+        targets, K = self._targets, len(beam.at)
         at, share = np.empty(K, np.int64), np.empty(K)
         for k in range(K - 1, -1, -1):
             at[k], share[k], b = beam.at[k, b], beam.share[k, b], beam.parent[k, b]

@@ -276,7 +276,11 @@ FAULTS = [
         "head.file = 'lump.stl'\nhead.unit = 'mm'",
         "cell: head lump.stl: .*stand-off point",
     ),
-    ("[plan]", '[plan]\nmethod = "known"', 'plan.method: expected method = "exact" with .cell.'),
+    (
+        "[plan]",
+        '[plan]\nmethod = "known"',
+        'plan.method: expected method = "continuous" or "exact" with .cell.',
+    ),
     ('posture = "front/up"', 'posture = "third"', "plan.posture: .*plus.minus, such .*got 'third'"),
     (
         "[plan]",

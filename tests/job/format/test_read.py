@@ -88,7 +88,8 @@ def test_the_example_is_read_into_si(read, folder):
     (task,) = job.contours
     assert (task.pick, task.name, task.speed, task.spacing) == ("trim", "trim", 0.15, 0.002)
     assert (task.count, task.tolerance, task.axis_tolerance) == (None, None, None)
-    assert job.options == PlanOptions(eta_v=0.95, eta_a=0.9, refine=True)
+    step = float(np.radians(1))
+    assert job.options == PlanOptions(gamma_step=step, eta_v=0.95, eta_a=0.9, refine=True)
     assert json.loads(json.dumps(job.source)) == job.source
     assert job.source["contour"][0] == {"pick": "trim", "speed_m_min": 9, "spacing_mm": 2}
 
@@ -547,10 +548,13 @@ def test_a_posture_that_does_not_exist_is_refused_at_its_line(read, words):
         ('feed = "dip"\nclosure = "periodic"', 'plan.closure: expected closure = "free"'),
         ('feed = "dip"\nrefine_parts = 3', 'expected refine_parts = 1 with feed = "dip", got 3'),
         ('feed = "dip"\nrotation_deg = 90', 'expected no rotation_deg with feed = "dip", got 90'),
-        ('interruptions = "fewest"\nmethod = "paper"', 'plan.method: expected method = "exact"'),
+        (
+            'interruptions = "fewest"\nmethod = "paper"',
+            'plan.method: expected method = "continuous" or "exact"',
+        ),
         ("least_piece_mm = 5", 'expected interruptions = "fewest" with least_piece_mm, got "none"'),
         ("least_piece_mm = 0", "plan.least_piece_mm: expected a number above 0, in mm, got 0"),
-        ('rotation_deg = 90\nmethod = "known"', 'method = "exact" with rotation_deg, got "known"'),
+        ('rotation_deg = 90\nmethod = "known"', '"continuous" or "exact" with rotation_deg, got'),
         (
             'tilt_deg = 3\ninterruptions = "fewest"',
             'plan.tilt_deg: expected no tilt_deg with interruptions = "fewest", got 3',
@@ -560,7 +564,10 @@ def test_a_posture_that_does_not_exist_is_refused_at_its_line(read, words):
         ("tilt_cost_per_deg = 0", "expected tilt_deg with tilt_cost_per_deg, got none"),
         ("tilt_deg = 90", "plan.tilt_deg: expected a number above 0, below 90, in deg, got 90"),
         ("tilt_deg = 3\ntilt_steps = 0", "tilt_steps: expected a whole number from 1 to 10, got 0"),
-        ('closure = "periodic"\nmethod = "known"', 'method = "exact" with closure = "periodic"'),
+        (
+            'closure = "periodic"\nmethod = "known"',
+            '"continuous" or "exact" with closure = "periodic"',
+        ),
         ("refine_parts = 0", "refine_parts: expected a whole number of parts from 1 to 100, got 0"),
         ("rotation_deg = -1", "rotation_deg: expected a number not below 0, in deg, got -1"),
         ("certify = 1", "plan.certify: expected true or false, got 1"),
