@@ -12,7 +12,7 @@ def every_cell(plan, level=0):
 
     On every turn that the ranges let any joint of the cell have.
     """
-    K, n = plan.q.shape
+    K = len(plan.q)
     arm, count = plan.robot, BASE << level
     node = np.repeat(np.arange(K), count)
     index = np.tile(np.arange(count), K)
@@ -31,9 +31,7 @@ def every_cell(plan, level=0):
         q = center + TURN * np.where(limits.endless, 0, np.array(turn) - 2)
         fits = (q - reach <= limits.upper) & (q + reach >= limits.lower)
         keep = (fits | limits.endless).all(1)
-        for row, lower, upper in zip(
-            limits.rows, limits.row_lower, limits.row_upper, strict=True
-        ):
+        for row, lower, upper in zip(limits.rows, limits.row_lower, limits.row_upper, strict=True):
             off = reach @ np.abs(row)
             keep &= (q @ row - off <= upper) & (q @ row + off >= lower)
         parts.append((cell[keep], posture[keep], q[keep], slope[keep], reach[keep]))
