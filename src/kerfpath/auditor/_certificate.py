@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+from functools import partial
+
 import numpy as np
 
-from kerfpath._arrays import Array, Ints
+from kerfpath._arrays import Array
 from kerfpath.auditor._cover import DEEPEST, Places, Reachable, covered, refused
 from kerfpath.auditor._enclosure import POSTURES
 from kerfpath.auditor._intervals import UNIT
-from kerfpath.auditor._steps import Rates, candidates, least_value, reduced_costs
+from kerfpath.auditor._steps import Rates, candidates, cheapest, least_value, linked, reduced_costs
 from kerfpath.auditor._table import Check
 from kerfpath.certificate import BASE, Certificate, Stage
 from kerfpath.errors import InputError
@@ -85,18 +88,17 @@ def certified_bound(certificate: Certificate, plan: Plan) -> float:
         The certificate does not fit the plan or leaves motions out; no certificate speaks of such
         a plan.
     """
-    where, rates, change = _asked(plan)
+    where, every, change = _asked(plan)
     if not certificate.stages:
         raise refused("it has no stage")
     K, n = plan.q.shape
     proved = -np.inf
     left: Places | None = None
     for stage in certificate.stages:
-        tilt, constant = _multipliers(stage, K, n, change, rates.velocity)
         _require_fit(stage, K, n)
-        at = covered(where, stage, left)
-        rates = Rates(rates.velocity, rates.weights, rates.metric, rates.endless, tilt)
-        bounds = _through(rates, at, stage, K) + constant
+        rates, constant = _rates(stage, every, change)
+        at = covered(where, stage, left, partial(linked, rates))
+        bounds = _through(rates, at, stage) + constant
         proved = max(proved, float(bounds.min(initial=np.inf)))
         if proved >= plan.cost:
             return plan.cost
@@ -143,10 +145,15 @@ def _asked(plan: Plan) -> tuple[Reachable, Rates, Array]:
     most = np.where(endless, np.minimum(most, np.pi + LIMIT_TOLERANCE), most)
     change = settings.eta_a * acceleration * dt**2 * (1 + EVEN) ** 2 + LIMIT_TOLERANCE
     K, n = plan.q.shape
+    most = np.tile(most, (K - 1, 1))
     weights = np.asarray(settings.weights)
     if not (weights >= 0).all():
         raise refused("nothing is proved with weights below zero")
-    return where, Rates(most, weights, settings.metric, endless, np.zeros((K - 1, n))), change
+    return (
+        where,
+        Rates(np.arange(K), most, weights, settings.metric, endless, np.zeros((K - 1, n))),
+        change,
+    )
 
 
 def _require_fit(stage: Stage, K: int, n: int) -> None:
@@ -176,33 +183,47 @@ def _require_fit(stage: Stage, K: int, n: int) -> None:
             raise refused(f"{name}: expected numbers up to {LARGEST:g}")
 
 
-def _multipliers(
-    stage: Stage, K: int, n: int, change: Array, velocity: Array
-) -> tuple[Array, float]:
-    """Return what a stage adds to the cost of each step, (K-1, n), and of the whole motion.
+def _rates(stage: Stage, every: Rates, change: Array) -> tuple[Rates, float]:
+    """Return the steps between the nodes of a stage, and what it adds to a whole motion.
 
-    `change` (n,) rad is the bound of (6).
+    Parameters
+    ----------
+    stage : Stage
+    every : Rates
+        Of the steps between all nodes.
+    change : (n,) rad
+        Bound of (6).
     """
+    nodes = np.unique(stage.node).astype(np.int64)
+    K, n = len(every.nodes), len(every.weights)
+    if len(nodes) < 2 or nodes[0] != 0 or nodes[-1] != K - 1:
+        raise refused("its cells leave out motions at the first node or the last")
+    # Each interval once: the bounds of a step over several are summed.
+    velocity = np.add.reduceat(every.velocity, nodes[:-1], axis=0) * (1 + K * UNIT)
+    rates = replace(every, nodes=nodes, velocity=velocity, tilt=np.zeros(velocity.shape))
     nu = stage.multipliers
     if nu is None:
-        return np.zeros((K - 1, n)), 0.0
+        return rates, 0.0
     if nu.shape != (K, n) or nu.dtype.kind != "f":
         raise refused(f"multipliers: expected shape {(K, n)}, got {nu.shape}")
     if not (np.abs(nu) <= LARGEST).all():
         raise refused(f"multipliers: expected numbers up to {LARGEST:g}")
     if nu[0].any() or nu[-1].any():
         raise refused("multipliers: expected zeros at the first node and the last")
+    if len(nodes) < K:
+        raise refused("multipliers: expected cells at every node")
     size = float((np.abs(nu) @ change).sum())
-    rounded = float((np.abs(nu) @ velocity).sum()) + size
-    return nu[:-1] - nu[1:], -size - 4 * UNIT * (K + n) * rounded
+    rounded = 2 * float(np.abs(nu).sum(axis=0) @ velocity.max(axis=0)) + size
+    return replace(rates, tilt=nu[:-1] - nu[1:]), -size - 4 * UNIT * (K + n) * rounded
 
 
-def _through(rates: Rates, at: Places, stage: Stage, K: int) -> Array:
+def _through(rates: Rates, at: Places, stage: Stage) -> Array:
     """Return what every motion through each place costs at least, (C,); inf where there is none.
 
     Nothing is left to pay at the last node, so that the potential there is taken as zero.
     """
-    ends = (at.node == K - 1)[:, None]
+    layer, last = rates.layer(at), len(rates.nodes) - 1
+    ends = (layer == last)[:, None]
     value = np.where(ends, 0.0, stage.value[at.cell])
     dual = np.where(ends[..., None], 0.0, stage.dual[at.cell].astype(float))
     found = list(candidates(rates, at))
@@ -210,32 +231,15 @@ def _through(rates: Rates, at: Places, stage: Stage, K: int) -> Array:
     a, b = (np.concatenate([none, *(pair[i] for pair in found)]) for i in (0, 1))
     parts = [reduced_costs(rates, at, value, dual, *pair) for pair in found]
     cost = np.concatenate([np.zeros(0), *parts])
-    begun = np.where(at.node == 0, least_value(at, value, dual), np.inf)
-    ended = np.where(at.node == K - 1, 0.0, np.inf)
-    _pass(begun, at.node, a, b, cost)
-    _pass(ended, at.node, b, a, cost)
+    begun = np.where(layer == 0, least_value(at, value, dual), np.inf)
+    ended = np.where(layer == last, 0.0, np.inf)
+    cheapest(begun, layer, a, b, cost)
+    cheapest(ended, layer, b, a, cost)
     whole = begun + ended
-    return whole - _rounding(rates, at, value, dual, whole, K)
+    return whole - _rounding(rates, at, value, dual, whole)
 
 
-def _pass(least: Array, node: Ints, a: Ints, b: Ints, cost: Array) -> None:
-    """Set `least` (C,) at places b to the least of that at a plus the cost of the step between.
-
-    Node after node of places b, away from where they begin.
-    """
-    if not len(b):
-        return
-    onwards = node[b[0]] > node[a[0]]
-    order = np.argsort(b, kind="stable")
-    a, b, cost = a[order], b[order], cost[order]
-    first = np.flatnonzero(np.diff(node[b], prepend=-1))
-    pieces = list(zip(first, [*first[1:], len(b)], strict=True))
-    for i, j in pieces if onwards else reversed(pieces):
-        begin = np.flatnonzero(np.diff(b[i:j], prepend=-1))
-        least[b[i + begin]] = np.minimum.reduceat(least[a[i:j]] + cost[i:j], begin)
-
-
-def _rounding(rates: Rates, at: Places, value: Array, dual: Array, whole: Array, K: int) -> float:
+def _rounding(rates: Rates, at: Places, value: Array, dual: Array, whole: Array) -> float:
     """Return what all sums along a motion may be off by.
 
     A step is a sum of products, by 64 units of all their sizes at most; the sums of K steps are off
@@ -246,4 +250,4 @@ def _rounding(rates: Rates, at: Places, value: Array, dual: Array, whole: Array,
     slope = np.abs(dual).max(initial=0.0) + np.abs(rates.tilt).max() + rates.weights.max()
     step = 2 * np.abs(value).max(initial=0.0) + 2 * n * slope * joint
     sums = np.abs(whole[np.isfinite(whole)]).max(initial=0.0)
-    return float(64 * UNIT * K * (step + sums))
+    return float(64 * UNIT * len(rates.nodes) * (step + sums))

@@ -7,6 +7,7 @@ of the certificate, or has no solution within the ranges, or is divided in two.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, fields
 
 import numpy as np
@@ -21,15 +22,20 @@ from kerfpath.robots import Robot
 
 __all__ = ["DEEPEST", "Places", "Reachable", "covered", "refused"]
 
+Linked = Callable[["Places"], Bools]
 TURN = 2 * np.pi
 DEEPEST = 20
 """The finest level that cells may have, and down to which places are divided."""
+HALF_TURN = np.pi + 1e-9
+"""rad: what every angle is within, up to whole turns, with room for rounding."""
 EDGE = 1e-9
 """rad: what a motion may leave the ranges by."""
 ON_TURN = 2e-14
 """rad: rounding of joints on a turn of theirs, up to ten turns."""
 SAME_PLACE = 1e-9
 """rad: two enclosures of the same interval have the same middle."""
+EVERYWHERE, IN_MIDDLE, SAME = range(3)
+"""Where joints are known that places are wanted for, see `_Wanted`."""
 MOST_PLACES = 2_000_000
 """Places at a time; a certificate that leaves more is refused."""
 PLACES_AT_ONCE = 1e5
@@ -83,6 +89,7 @@ class Places:
         Which cell of the stage it is; -1 for none.
     node, level, index, posture : (C,) int
     turn : (C, n) int
+    smooth : (C,) bool
     q, slope, low, high, radius, reach : (C, n)
     half : (C,) rad
     """
@@ -93,6 +100,7 @@ class Places:
     index: Ints
     posture: Ints
     turn: Ints
+    smooth: Bools
     q: Array
     slope: Array
     low: Array
@@ -113,13 +121,17 @@ class Places:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Wanted:
-    """Intervals of one level that motions may pass with joints within `room` of `near` (W, n)."""
+    """Intervals of one level that motions may pass with joints within `room` of `near` (W, n).
+
+    `known` says where of the interval: everywhere, in its middle, or that the place is the same.
+    """
 
     node: Ints
     index: Ints
     posture: Ints
     near: Array
     room: Array
+    known: Ints
 
 
 def refused(why: str) -> InputError:
@@ -127,7 +139,7 @@ def refused(why: str) -> InputError:
     return InputError(f"certificate: {why}; plan again")
 
 
-def covered(where: Reachable, stage: Stage, before: Places | None) -> Places:
+def covered(where: Reachable, stage: Stage, before: Places | None, linked: Linked) -> Places:
     """Return the cells of a stage that motions may pass, as places, by node.
 
     Parameters
@@ -136,30 +148,55 @@ def covered(where: Reachable, stage: Stage, before: Places | None) -> Places:
     stage : Stage
         Of arrays that fit.
     before : Places or None
-        What it has to cover: what another stage leaves, or everything.
+        What it has to cover: what another stage leaves; at nodes that are not in there everything,
+        but for what no step joins to that.
+    linked : callable
+        Which of some places (C,) steps join to others, from the first node to the last.
 
     Raises
     ------
     InputError
         It does not cover that.
     """
-    K = len(where.frames)
+    nodes = np.unique(stage.node).astype(np.int64)
+    old = nodes if before is None else np.intersect1d(nodes, before.node)
     turns = np.where(where.endless, 1.0, np.maximum((where.upper - where.lower) / TURN, 1.0)).prod()
-    nodes = max(1, int(PLACES_AT_ONCE / (BASE * len(where.postures) * turns)))
-    parts = []
-    for first in range(0, K, nodes):
-        last = min(first + nodes, K)
-        rows = np.arange(*np.searchsorted(stage.node, [first, last]))
-        some = None
-        if before is not None:
-            some = before.take(slice(*np.searchsorted(before.node, [first, last])))
-        parts += _covered(where, stage, rows, some, np.arange(first, last))
-    found = _joined(parts, len(where.endless))
-    return found.take(np.argsort(found.cell, kind="stable"))
+    at_once = max(1, int(PLACES_AT_ONCE / (BASE * len(where.postures) * turns)))
+    parts: list[Places] = []
+    for i in range(0, len(old), at_once):
+        part = old[i : i + at_once]
+        rows = np.flatnonzero((stage.node >= part[0]) & (stage.node <= part[-1]))
+        rows = rows[np.isin(stage.node[rows], part)]
+        some = None if before is None else before.take(np.isin(before.node, part))
+        parts += _covered(where, stage, rows, part, some)
+    new = np.setdiff1d(nodes, old)
+    if len(new):
+        beside = joined(parts)
+        rows = np.flatnonzero(np.isin(stage.node, new))
+
+        def joins(found: list[Places], left: Places) -> Bools:
+            """Return which places steps join to places all the way along."""
+            return linked(joined([beside, *found, left]))[-len(left) :]
+
+        parts += _covered(where, stage, rows, new, None, joins)
+    found = joined(parts)
+    found = found.take(np.argsort(found.cell, kind="stable"))
+    # Up to whole turns every angle is within half a turn.
+    anywhere = found.reach > HALF_TURN
+    for curve in (found.slope, found.low, found.high):
+        curve[anywhere] = 0.0
+    for size in (found.radius, found.reach):
+        size[anywhere] = HALF_TURN
+    return found
 
 
 def _covered(
-    where: Reachable, stage: Stage, rows: Ints, before: Places | None, nodes: Ints
+    where: Reachable,
+    stage: Stage,
+    rows: Ints,
+    nodes: Ints,
+    before: Places | None,
+    joins: Callable[[list[Places], Places], Bools] | None = None,
 ) -> list[Places]:
     """Return the cells (`rows` of the stage) that motions may pass at some nodes."""
     found: list[Places] = []
@@ -167,15 +204,17 @@ def _covered(
     left: Places | None = None
     for level in range(DEEPEST + 1):
         wanted = [] if left is None else [_halves(left)]
-        if before is None and level == 0:
-            wanted.append(_everything(where, nodes))
-        elif before is not None:
+        if before is not None:
             wanted.append(_again(before.take(before.level == level)))
+        elif level == 0:
+            wanted.append(_everything(where, nodes))
         places = _places(where, level, _all(wanted))
         cells = rows[stage.level[rows] == level]
         known, listed = _matched(where, stage, cells, places)
         found.append(known)
         left = places.take(~listed)
+        if joins is not None and len(left):
+            left = left.take(joins(found, left))
         if not len(left) and level >= deepest:
             return found
     assert left is not None
@@ -197,20 +236,35 @@ def _everything(where: Reachable, nodes: Ints) -> _Wanted:
     shape = (len(node), len(where.endless))
     near = np.broadcast_to((where.lower + where.upper) / 2, shape)
     room = np.broadcast_to((where.upper - where.lower) / 2 + 2 * EDGE, shape)
-    return _Wanted(node, index, posture, near, room)
+    return _Wanted(node, index, posture, near, room, np.full(len(node), EVERYWHERE))
 
 
 def _again(places: Places) -> _Wanted:
     """Return places of another stage, on their own turns alone."""
-    room = SAME_PLACE - places.reach
-    return _Wanted(places.node, places.index, places.posture, places.q, room)
+    room, known = np.full(places.q.shape, SAME_PLACE), np.full(len(places), SAME)
+    return _Wanted(places.node, places.index, places.posture, places.q, room, known)
 
 
 def _halves(places: Places) -> _Wanted:
+    """Return both halves of places.
+
+    Where the joints are one smooth function of gamma, its value in the middle says the turn.
+    """
     twice = np.repeat(np.arange(len(places)), 2)
-    index = 2 * places.index[twice] + np.arange(len(twice)) % 2
+    right = np.arange(len(twice)) % 2
+    at = places.take(twice)
+    t = ((right - 0.5) * at.half)[:, None]
+    smooth = at.smooth[:, None]
+    near = at.q + at.slope * t + (at.low + at.high) * (t * t / 4)
+    room = at.radius + (at.high - at.low) * (t * t / 4) + SAME_PLACE
+    near, room = np.where(smooth, near, at.q), np.where(smooth, room, at.reach)
     return _Wanted(
-        places.node[twice], index, places.posture[twice], places.q[twice], places.reach[twice]
+        at.node,
+        2 * at.index + right,
+        at.posture,
+        near,
+        room,
+        np.where(at.smooth, IN_MIDDLE, EVERYWHERE),
     )
 
 
@@ -230,15 +284,19 @@ def _places(where: Reachable, level: int, wanted: _Wanted) -> Places:
     some = found.status[key, wanted.posture] != Status.NONE
     key, posture = key[some], wanted.posture[some]
     parts = [getattr(found, name)[key, posture] for name in Enclosure.__dataclass_fields__]
-    _, center, slope, low, high, radius = parts
+    status, center, slope, low, high, radius = parts
+    smooth = status == Status.SMOOTH
     bend, width = np.maximum(np.abs(low), np.abs(high)), half[0] if len(half) else 0.0
     radius = radius + ON_TURN
     reach = (np.abs(slope) * width + bend * (width * width / 2) + radius) * (1 + 1e-15)
-    row, turns = _turns(wanted.near[some], wanted.room[some] + reach, center, where.endless)
+    known = wanted.known[some][:, None]
+    size = np.where(smooth[:, None] & (known == IN_MIDDLE), radius, np.minimum(reach, HALF_TURN))
+    size = np.where(known == SAME, 0.0, size)
+    row, turns = _turns(wanted.near[some], wanted.room[some] + size, center, where.endless)
     whole = Places(
         np.full(len(row), -1), node[key[row]], np.full(len(row), level), index[key[row]],
-        posture[row], turns, center[row] + TURN * turns, slope[row], low[row], high[row],
-        radius[row], reach[row], half[key[row]],
+        posture[row], turns, smooth[row], center[row] + TURN * turns, slope[row], low[row],
+        high[row], radius[row], reach[row], half[key[row]],
     )  # fmt: skip
     whole = whole.take(_in_range(where, whole))
     if not len(whole):
@@ -330,7 +388,8 @@ def _matched(
     return known, listed
 
 
-def _joined(parts: list[Places], n: int) -> Places:
+def joined(parts: list[Places]) -> Places:
+    """Return places as one, in their order."""
     return Places(
         *(np.concatenate([getattr(part, each.name) for part in parts]) for each in fields(Places))
     )

@@ -18,7 +18,7 @@ from kerfpath._repr import short_repr
 from kerfpath.auditor._cover import TURN, Places
 from kerfpath.auditor._enclosure import linear_minimum
 
-__all__ = ["Rates", "candidates", "least_value", "reduced_costs"]
+__all__ = ["Rates", "candidates", "cheapest", "least_value", "linked", "reduced_costs"]
 
 AT_ONCE = 8192
 """Pairs of places looked at together: their rows stay in the cache."""
@@ -32,19 +32,24 @@ ROUNDED = 1 + 2.0**-46
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Rates:
-    """What bounds and prices the steps of a motion.
+    """What bounds and prices the steps of a motion, from each of M nodes to the next.
+
+    A step over several intervals is no dearer than all of them together.
 
     Parameters
     ----------
-    velocity : (n,) rad
+    nodes : (M,) int
+        Ascending.
+    velocity : (M-1, n) rad
         Most that a joint moves in a step.
     weights : (n,) 1/rad
     metric : {"euclid", "manhattan", "chebychev"}
     endless : (n,) bool
-    tilt : (K-1, n)
+    tilt : (M-1, n)
         mu, what the multipliers of a stage add to the cost of each step.
     """
 
+    nodes: Ints
     velocity: Array
     weights: Array
     metric: str
@@ -52,6 +57,14 @@ class Rates:
     tilt: Array
 
     __repr__ = short_repr
+
+    def layer(self, at: Places) -> Ints:
+        """Return which of the nodes each place is at, (C,)."""
+        return np.searchsorted(self.nodes, at.node)
+
+    def most(self, layer: Ints) -> Array:
+        """Return what joints move at most in the step from some of the nodes, (B, n)."""
+        return np.asarray(self.velocity[np.minimum(layer, len(self.velocity) - 1)])
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -110,10 +123,11 @@ def candidates(rates: Rates, at: Places) -> Iterator[tuple[Ints, Ints]]:
     Of the joint that leaves the fewest, found by sorting; the others are looked at then. Every pair
     comes once.
     """
-    wide = at.reach + rates.velocity + NEAR
+    layer = rates.layer(at)
+    wide = at.reach + rates.most(layer) + NEAR
     bound = np.flatnonzero(~rates.endless)
     size = np.abs(at.q).max(initial=0.0) + wide.max(initial=0.0) + 1.0
-    step = 2 * size * at.node
+    step = 2 * size * layer
     best: tuple[float, tuple[Array, ...]] | None = None
     for i in bound:
         # Both ends of a step as intervals on one line, a stretch of it for every step.
@@ -132,10 +146,10 @@ def candidates(rates: Rates, at: Places) -> Iterator[tuple[Ints, Ints]]:
     first_low, first_high, second_low, second_high = best[1]
     by_second = np.argsort(second_low, kind="stable")
     for a, place in _inside(second_low[by_second], first_low, first_high, "left"):
-        yield from _possible(rates, at, a, by_second[place])
+        yield from _possible(rates, at, layer, a, by_second[place])
     by_first = np.argsort(first_low, kind="stable")
     for b, place in _inside(first_low[by_first], second_low, second_high, "right"):
-        yield from _possible(rates, at, by_first[place], b)
+        yield from _possible(rates, at, layer, by_first[place], b)
 
 
 def _number(starts: Array, low: Array, high: Array) -> Ints:
@@ -158,17 +172,50 @@ def _inside(starts: Array, low: Array, high: Array, side: str) -> Iterator[tuple
         row = end
 
 
-def _possible(rates: Rates, at: Places, a: Ints, b: Ints) -> Iterator[tuple[Ints, Ints]]:
-    right = at.node[b] == at.node[a] + 1
+def _possible(
+    rates: Rates, at: Places, layer: Ints, a: Ints, b: Ints
+) -> Iterator[tuple[Ints, Ints]]:
+    right = layer[b] == layer[a] + 1
     a, b = a[right], b[right]
     for i, endless in enumerate(rates.endless):
         off = at.q[b, i] - at.q[a, i]
         if endless:
             off -= TURN * np.round(off / TURN)
-        near = np.abs(off) <= rates.velocity[i] + at.reach[a, i] + at.reach[b, i] + NEAR
+        most = rates.velocity[layer[a], i] + at.reach[a, i] + at.reach[b, i] + NEAR
+        near = np.abs(off) <= most
         a, b = a[near], b[near]
     for i in range(0, len(a), AT_ONCE):
         yield a[i : i + AT_ONCE], b[i : i + AT_ONCE]
+
+
+def cheapest(least: Array, layer: Ints, a: Ints, b: Ints, cost: Array) -> None:
+    """Set `least` (C,) at places b to the least of that at a plus the cost of the step between.
+
+    Layer after layer of places b, away from where they begin.
+    """
+    if not len(b):
+        return
+    onwards = layer[b[0]] > layer[a[0]]
+    order = np.lexsort((b, layer[b]))
+    a, b, cost = a[order], b[order], cost[order]
+    first = np.flatnonzero(np.diff(layer[b], prepend=-1))
+    pieces = list(zip(first, [*first[1:], len(b)], strict=True))
+    for i, j in pieces if onwards else reversed(pieces):
+        begin = np.flatnonzero(np.diff(b[i:j], prepend=-1))
+        least[b[i + begin]] = np.minimum.reduceat(least[a[i:j]] + cost[i:j], begin)
+
+
+def linked(rates: Rates, at: Places) -> Bools:
+    """Return which places (C,) steps join to others, from the first node to the last."""
+    none = np.zeros(0, dtype=np.int64)
+    found = list(candidates(rates, at))
+    a, b = (np.concatenate([none, *(pair[i] for pair in found)]) for i in (0, 1))
+    layer, free = rates.layer(at), np.zeros(len(a))
+    begun = np.where(layer == 0, 0.0, np.inf)
+    ended = np.where(layer == len(rates.nodes) - 1, 0.0, np.inf)
+    cheapest(begun, layer, a, b, free)
+    cheapest(ended, layer, b, a, free)
+    return np.asarray(np.isfinite(begun + ended))
 
 
 def reduced_costs(rates: Rates, at: Places, value: Array, dual: Array, a: Ints, b: Ints) -> Array:
@@ -177,11 +224,12 @@ def reduced_costs(rates: Rates, at: Places, value: Array, dual: Array, a: Ints, 
     With the potential (C, 2) and (C, 2, n) at its end, less that at its beginning; up to rounding.
     """
     here, there = _curves(at, value, dual, a), _curves(at, value, dual, b)
-    low, high = _differences(rates, at, a, b)
-    mu = rates.tilt[at.node[a]]
+    layer = rates.layer(at)[a]
+    mu, most = rates.tilt[layer], rates.velocity[layer]
+    low, high = _differences(rates, most, at, a, b)
     off = at.reach[a] + at.reach[b] + NEAR
-    u_low = np.maximum(low - off, -rates.velocity)
-    u_high = np.maximum(np.minimum(high + off, rates.velocity), u_low)
+    u_low = np.maximum(low - off, -most)
+    u_high = np.maximum(np.minimum(high + off, most), u_low)
     at_least = np.full((2, len(a)), -np.inf)
 
     def offer(y: Array, cut: int | None = None) -> None:
@@ -201,7 +249,7 @@ def reduced_costs(rates: Rates, at: Places, value: Array, dual: Array, a: Ints, 
     return np.asarray((at_least.T - here.value).min(1))
 
 
-def _differences(rates: Rates, at: Places, a: Ints, b: Ints) -> tuple[Array, Array]:
+def _differences(rates: Rates, most: Array, at: Places, a: Ints, b: Ints) -> tuple[Array, Array]:
     """Return between what the middles of two places differ, (B, n) rad twice.
 
     Of endless joints, by every whole turn with which a step joins the places.
@@ -210,7 +258,7 @@ def _differences(rates: Rates, at: Places, a: Ints, b: Ints) -> tuple[Array, Arr
     if not rates.endless.any():
         return off, off
     off = np.where(rates.endless, off - TURN * np.round(off / TURN), off)
-    room = rates.velocity + at.reach[a] + at.reach[b] + NEAR
+    room = most + at.reach[a] + at.reach[b] + NEAR
     if not ((np.abs(off) + room > TURN) & rates.endless).any():
         return off, off
     low = np.where(rates.endless, np.minimum(np.ceil((-room - off) / TURN), 0), 0)
