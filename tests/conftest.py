@@ -14,6 +14,7 @@ from hypothesis import settings
 
 from kerfpath import apart
 from kerfpath.contour import Contour
+from kerfpath.options import PlanOptions
 from kerfpath.robots import robot
 
 # The same examples in every run, without a deadline that a busy machine could miss.
@@ -30,6 +31,11 @@ def pose(xyz, rotation=None):
     if rotation is not None:
         T[:3, :3] = rotation
     return T
+
+
+# A plan states a bound by default, which takes a second or so. Tests ask for it where they are about
+# it; the processes that they start (the command line) state it as a user sees it.
+PlanOptions.__init__.__kwdefaults__["certify"] = None
 
 
 @pytest.fixture(scope="session", autouse=True)

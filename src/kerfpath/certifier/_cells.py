@@ -68,7 +68,7 @@ class CellSet:
         """About where the joints are, (C, n), in parts of half a turn."""
         return np.rint(self.center * (LIFTS / np.pi)).astype(np.int8)
 
-    def take(self, which: Bools | Ints) -> CellSet:
+    def take(self, which: Bools | Ints | slice) -> CellSet:
         """Return some of the cells."""
         return CellSet(**{f.name: getattr(self, f.name)[which] for f in fields(self)})
 
@@ -103,7 +103,14 @@ class CellMaker:
         postures: Iterable[int],
     ) -> None:
         self._robot, self._frames, self._tool = robot, frames, T_flange_tip
-        self._limits, self._postures = limits, np.array(sorted(postures), np.int8)
+        # A coupling of an endless joint holds on one of its turns, which cells do not know.
+        plain = ~(limits.rows[:, limits.endless] != 0).any(axis=1)
+        self._limits = limits._replace(
+            rows=limits.rows[plain],
+            row_lower=limits.row_lower[plain],
+            row_upper=limits.row_upper[plain],
+        )
+        self._postures = np.array(sorted(postures), np.int8)
 
     def coarsest(self, nodes: Ints) -> CellSet:
         """Return the cells of level 0 at some nodes: postures and turns that ranges admit."""
@@ -145,8 +152,7 @@ class CellMaker:
         free = (cells.spread[parent] > FREE).any(axis=1)
         kept = [moved.take(self._inside(moved) & ~free)]
         if free.any():
-            again, first = np.unique(row[free], return_index=True)
-            kept.append(self._lifted(made.take(again)))
+            kept.append(self._lifted(made.take(np.unique(row[free]))))
         return CellSet.join(kept)
 
     def _enclosed(

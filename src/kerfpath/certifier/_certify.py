@@ -33,8 +33,10 @@ NEAR, FINE = 0.9, 3
 """Share of what is wanted, and levels, below which cells are too coarse to tell what nodes lack."""
 DEEPEST = 12
 """Levels at most: cells of 0.001 deg."""
-MOST_CELLS, MOST_PAIRS = 2_000_000, 60_000_000
-"""Cells of a stage, and steps from cell to cell of all stages, after which it is left at that."""
+MOST_PAIRS = 65_000
+"""Steps from cell to cell that are looked at for each node, unless a time is given."""
+MOST_CELLS = 2_000_000
+"""Cells of a stage after which it is left at that: some 2 GB."""
 SAME = 1e-9
 """Share of its cost by which a motion may be dearer than the plan and still not be ruled out."""
 
@@ -104,8 +106,8 @@ def certify(
     bound = max(course.best - ALLOWANCE * plan.cost, 0.0)
     reached = (plan.cost - bound) / plan.cost
     claim = (
-        f"no motion within the limits costs less than {bound:.6g}, {100 * reached:.2g} % below this "
-        "plan, at any gamma, posture and turn"
+        "no motion within the limits costs less than {}, {} % below this plan, at any gamma, "
+        "posture and turn"
     )
     proof = replace(
         plan.proof,
@@ -116,7 +118,7 @@ def certify(
     return Certified(
         plan=replace(plan, proof=proof),
         done=reached <= gap,
-        statement=claim,
+        statement=claim.format(proof.bound_shown, proof.gap_shown),
         stages=course.count,
         pairs=course.pairs,
     )
@@ -172,7 +174,7 @@ class _Course:
             gained = self._take(result)
             live = result.through <= self.cost * (1 + SAME)
             low = result.through < self.target
-            if not low.any() or self._enough(result):
+            if not low.any() or self._enough(result, float(low.mean())):
                 self.stages.append(result.stage())
                 return
             if fresh or 1 - live.mean() > DROPPED:
@@ -202,8 +204,13 @@ class _Course:
         self.progress("certificate", int(1000 * (1 - short / self.target)), 1000)
         return (self.best - before) / max(self.target - before, 1e-300)
 
-    def _enough(self, result: StageResult) -> bool:
-        return self.pairs > MOST_PAIRS or len(result.cells) > MOST_CELLS or monotonic() > self.until
+    def _enough(self, result: StageResult, low: float) -> bool:
+        """Return whether the next stage, a share `low` of the cells halved, would be too much."""
+        if len(result.cells) * (1 + low) > MOST_CELLS:
+            return True
+        if self.until < np.inf:
+            return monotonic() > self.until
+        return self.pairs + result.pairs * (1 + low) ** 2 > MOST_PAIRS * (self.last + 1)
 
     def _with_nodes(self, cells: CellSet) -> CellSet:
         """Return the cells with those of further nodes, about as fine where motions may pass."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from heapq import heapify, heappush, heapreplace
+from itertools import pairwise
 
 import numpy as np
 
@@ -15,7 +16,7 @@ __all__ = ["between", "turning_nodes"]
 
 
 def turning_nodes(plan: Plan, share: float, longest: int) -> Ints:
-    """Return nodes (M,) such that steps straight from one to the next cost about what the plan does.
+    """Return nodes (M,) such that straight steps between them cost about what the plan does.
 
     Parameters
     ----------
@@ -32,11 +33,11 @@ def turning_nodes(plan: Plan, share: float, longest: int) -> Ints:
     upto = np.concatenate([[0.0], np.cumsum(each)])
 
     def lost(a: int, b: int) -> float:
-        """What a straight step from node a to b leaves out."""
+        """Return what a straight step from node a to b leaves out."""
         return float(upto[b] - upto[a] - rho(q[b] - q[a], asked.weights, metric))
 
     ends = np.unique(np.append(np.arange(0, last, longest), last)).tolist()
-    steps = [(-lost(a, b), a, b) for a, b in zip(ends[:-1], ends[1:], strict=True)]
+    steps = [(-lost(a, b), a, b) for a, b in pairwise(ends)]
     heapify(steps)
     left = -sum(step[0] for step in steps)
     while left > share * upto[-1]:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 
@@ -132,7 +133,11 @@ def solve_stage(
     start = packed.start
     C, n = cells.center.shape
     potential = Potential(
-        np.full((C, 2), np.inf), np.zeros((C, 2, n)), np.zeros((C, 2)), np.zeros((C, 2))
+        np.full((C, 2), np.inf),
+        np.zeros((C, 2, n)),
+        np.zeros((C, 2)),
+        np.zeros((C, 2)),
+        np.zeros(C),
     )
     potential.level[start[-2] :] = 0.0
     begin, to, cost = _lay(packed, nodes, potential, steps, multipliers, care)
@@ -220,7 +225,7 @@ def _lay(
                 pool.submit(
                     lay_potential, packed, potential, step, k, a, b, care, shifted, to, cost
                 )
-                for a, b in zip(ends[:-1], ends[1:], strict=True)
+                for a, b in pairwise(ends)
             ]
             for run in runs:
                 run.result()

@@ -10,7 +10,7 @@ import numpy as np
 
 from kerfpath._arrays import Array, Bools, Ints
 from kerfpath.kernels._jit import jit, jit_inline
-from kerfpath.kernels.metric import MANHATTAN, extend, finish
+from kerfpath.kernels.metric import extend, finish
 from kerfpath.kernels.reduced import (
     SLACK,
     Cells,
@@ -22,155 +22,9 @@ from kerfpath.kernels.reduced import (
     near,
     tangent,
 )
+from kerfpath.kernels.slopes import guess_slopes
 
 __all__ = ["close_cut", "cross_cells", "lay_potential", "link_cells", "reach_cells"]
-
-PENALTY = 10.0
-"""Price of an increment beyond (5), in weights: a guess looks for the way back."""
-STILL = 1e-10
-"""rad: a joint that moves less stands still."""
-HALVINGS = 30
-"""Steps of the search along a cell for metrics that are not linear."""
-
-
-@jit_inline
-def _price(
-    D: Array, cells: Cells, potential: Potential, step: Step, b: int, t: float, penalty: float
-) -> float:
-    """Return what a step by D, and on to t in cell b, is guessed to cost from there to the end."""
-    total, tilted, over = 0.0, 0.0, 0.0
-    for i in range(len(D)):
-        u = D[i] + cells.slope[b, i] * t
-        x = abs(u)
-        total = extend(total, step.weight[i] * x, step.metric)
-        tilted += step.tilt[i] * u
-        over += step.weight[i] * max(0.0, x - step.velocity[i])
-    ahead = max(
-        potential.level[b, 0] - potential.along[b, 0] * t,
-        potential.level[b, 1] - potential.along[b, 1] * t,
-    )
-    return finish(total, step.metric) + tilted + penalty * over + ahead
-
-
-@jit_inline
-def _best_along(
-    D: Array, cells: Cells, potential: Potential, step: Step, b: int
-) -> tuple[float, float]:
-    """Return where in cell b a step is guessed to cost least, and what."""
-    h = cells.half[b]
-    if step.metric != MANHATTAN:
-        low, high = -h, h
-        for _ in range(HALVINGS):
-            third = (high - low) / 3.0
-            one, two = low + third, high - third
-            if _price(D, cells, potential, step, b, one, PENALTY) < _price(
-                D, cells, potential, step, b, two, PENALTY
-            ):
-                high = two
-            else:
-                low = one
-        t = (low + high) / 2.0
-        return t, _price(D, cells, potential, step, b, t, PENALTY)
-    best, at = np.inf, 0.0
-    turn = potential.along[b, 0] - potential.along[b, 1]
-    for kink in range(-3, 3 * len(D)):
-        if kink == -3:
-            t = (potential.level[b, 0] - potential.level[b, 1]) / turn if turn != 0.0 else h
-        elif kink < 0:
-            t = (2 * kink + 3) * h
-        else:
-            i, v = kink // 3, (kink % 3 - 1) * step.velocity[kink // 3]
-            s = cells.slope[b, i]
-            t = (v - D[i]) / s if s != 0.0 else 2.0 * h
-        if abs(t) <= h:
-            price = _price(D, cells, potential, step, b, t, PENALTY)
-            if price < best:
-                best, at = price, t
-    return at, best
-
-
-@jit_inline
-def _balance(
-    D: Array, cells: Cells, potential: Potential, step: Step, b: int, t: float, out_y: Array
-) -> None:
-    """Fill slopes (n,) of the cost of the step to t in cell b that balance those of V there.
-
-    Where a joint stands still, or is at its velocity limit, its slope may be any in a range.
-    """
-    level0 = potential.level[b, 0] - potential.along[b, 0] * t
-    level1 = potential.level[b, 1] - potential.along[b, 1] * t
-    least = potential.along[b, 0] if level0 >= level1 else potential.along[b, 1]
-    most = least
-    if abs(level0 - level1) <= 1e-9:
-        least = min(potential.along[b, 0], potential.along[b, 1])
-        most = max(potential.along[b, 0], potential.along[b, 1])
-    for i in range(len(D)):
-        D[i] += cells.slope[b, i] * t
-    tangent(D, step, out_y)
-    slope = 0.0
-    for i in range(len(D)):
-        if abs(D[i]) > step.velocity[i] + STILL:
-            out_y[i] += PENALTY * step.weight[i] * (1.0 if D[i] > 0 else -1.0)
-        slope += out_y[i] * cells.slope[b, i]
-    if step.metric != MANHATTAN or least <= slope <= most:
-        return
-    wanted = least if slope < least else most
-    for i in range(len(D)):
-        s, w, x = cells.slope[b, i], step.weight[i], abs(D[i])
-        if s == 0.0:
-            continue
-        if x < STILL:
-            low, high = -w, w
-        elif abs(x - step.velocity[i]) < STILL:
-            low, high = w, w * (1.0 + PENALTY)
-            if D[i] < 0:
-                low, high = -high, -low
-        else:
-            continue
-        y = out_y[i] + (wanted - slope) / s
-        y = min(max(y, step.tilt[i] + low), step.tilt[i] + high)
-        slope += (y - out_y[i]) * s
-        out_y[i] = y
-
-
-@jit_inline
-def _guess(
-    cells: Cells,
-    potential: Potential,
-    step: Step,
-    a: int,
-    t: float,
-    ahead: Ints,
-    D: Array,
-    here: Array,
-    floor: Array,
-    out_y: Array,
-) -> None:
-    """Fill the slopes of the step that seems best from t in cell a to one of the cells ahead."""
-    first, least = -1, np.inf
-    for p in range(len(ahead)):
-        b, reach = ahead[p], 0.0
-        for i in range(len(here)):
-            here[i] = D[p, i] - (cells.slope[a, i] + cells.bend[a, i] * t / 2.0) * t
-            reach += (step.weight[i] + abs(step.tilt[i])) * abs(cells.slope[b, i])
-        reach += max(abs(potential.along[b, 0]), abs(potential.along[b, 1]))
-        price = _price(here, cells, potential, step, b, 0.0, 0.0)
-        floor[p] = price - reach * cells.half[b]
-        if price < least:
-            first, least = p, price
-    best, at, to = np.inf, 0.0, -1
-    for turn in range(-1, len(ahead)):
-        p = first if turn < 0 else turn
-        if floor[p] >= best or (turn >= 0 and p == first):
-            continue
-        for i in range(len(here)):
-            here[i] = D[p, i] - (cells.slope[a, i] + cells.bend[a, i] * t / 2.0) * t
-        where, price = _best_along(here, cells, potential, step, ahead[p])
-        if price < best:
-            best, at, to = price, where, p
-    for i in range(len(here)):
-        here[i] = D[to, i] - (cells.slope[a, i] + cells.bend[a, i] * t / 2.0) * t
-    _balance(here, cells, potential, step, ahead[to], at, out_y)
 
 
 @jit_inline
@@ -272,13 +126,28 @@ def _level(
     D: Array,
     y: Array,
     care: float,
+    first: int,
     other: Array,
     out_proved: Array,
 ) -> float:
-    """Return the level of a cut of cell a with slopes y; fill what each step from it costs."""
+    """Return the level of a cut of cell a with slopes y; fill what each step from it costs.
+
+    The step that seems best goes first, so that of most others a glance is enough.
+    """
     least, price = np.inf, beyond(y, step)
-    for p in range(len(ahead)):
+    for i in range(len(y)):
+        other[i] = 0.0
+    lean_here = lean(cells, a, other, y)
+    for turn in range(-1, len(ahead)):
+        p = first if turn < 0 else turn
+        if turn == first:
+            continue
         b = ahead[p]
+        if way[p] == 1:
+            far = potential.least[b] + lean_here + _apart(cells, step, a, b, D[p])
+            if far > least + care:
+                out_proved[p] = far
+                continue
         proved = _proved(cells, potential, step, a, b, way[p], D[p], y, price, least + care, other)
         out_proved[p] = proved
         least = min(least, proved)
@@ -286,25 +155,41 @@ def _level(
 
 
 @jit_inline
-def _flat_level(cells: Cells, potential: Potential, step: Step, ahead: Ints, other: Array) -> float:
+def _apart(cells: Cells, step: Step, a: int, b: int, D: Array) -> float:
+    """Return the least distance of cell a from cell b, and what its tilt may take off it."""
+    total, tilted = 0.0, 0.0
+    for i in range(len(D)):
+        wide = cells.box[a, i] + cells.box[b, i]
+        x = max(0.0, abs(D[i]) - wide)
+        total = extend(total, step.weight[i] * x, step.metric)
+        tilted += step.tilt[i] * D[i] - abs(step.tilt[i]) * wide
+    away = finish(total, step.metric)
+    return away + tilted - SLACK * (away + abs(tilted))
+
+
+@jit_inline
+def _flat_level(potential: Potential, step: Step, ahead: Ints, other: Array) -> float:
     """Return the level of a cut without slopes: the least of what is ahead."""
     for i in range(len(other)):
         other[i] = 0.0
     least = np.inf
     for p in range(len(ahead)):
-        least = min(least, least_ahead(cells, potential, ahead[p], other))
+        least = min(least, potential.least[ahead[p]])
     return least - beyond(other, step)
 
 
 @jit_inline
-def close_cut(cells: Cells, potential: Potential, a: int) -> None:
-    """Fill what the slopes of the cuts of cell a come to along its curve."""
+def close_cut(cells: Cells, potential: Potential, a: int, none: Array) -> None:
+    """Fill what the cuts of cell a come to along its curve, and the least of them on it."""
     for m in range(2):
         along, bent = 0.0, 0.0
         for i in range(cells.slope.shape[1]):
             along += potential.dual[a, m, i] * cells.slope[a, i]
             bent += potential.dual[a, m, i] * cells.bend[a, i]
         potential.along[a, m], potential.bent[a, m] = along, bent
+    for i in range(len(none)):
+        none[i] = 0.0
+    potential.least[a] = least_ahead(cells, potential, a, none)
 
 
 @jit
@@ -376,10 +261,10 @@ def lay_potential(
                     p += 1
                     if p == count:
                         break
-        flat = _flat_level(cells, potential, step, ahead, other)
+        flat = _flat_level(potential, step, ahead, other)
         for m in range(2):
             t = (2 * m - 1) * cells.half[a]
-            _guess(cells, potential, step, a, t, ahead, D, here, floor, y)
+            best = guess_slopes(cells, potential, step, a, t, ahead, D, here, floor, y)
             level = -np.inf
             for attempt in range(2):
                 if attempt == 1 and level < flat:
@@ -387,7 +272,7 @@ def lay_potential(
                         y[i] = 0.0
                 if attempt == 0 or level < flat:
                     level = _level(
-                        cells, potential, step, a, ahead, way, D, y, care, other, proved[m]
+                        cells, potential, step, a, ahead, way, D, y, care, best, other, proved[m]
                     )
             potential.level[a, m] = level
             for i in range(n):
@@ -395,7 +280,7 @@ def lay_potential(
         for p in range(count):
             to_first = proved[0, p] - potential.level[a, 0]
             out_cost[begin[a] + p] = min(to_first, proved[1, p] - potential.level[a, 1])
-        close_cut(cells, potential, a)
+        close_cut(cells, potential, a, other)
 
 
 @jit

@@ -50,12 +50,16 @@ class Cells(NamedTuple):
 
 
 class Potential(NamedTuple):
-    """Levels (C, 2) and slopes (C, 2, n) of the cuts, and the slopes along s and k, (C, 2)."""
+    """Levels (C, 2) and slopes (C, 2, n) of the cuts, and the slopes along s and k, (C, 2).
+
+    ``least`` (C,): no more than V is anywhere on the cell.
+    """
 
     level: Array
     dual: Array
     along: Array
     bent: Array
+    least: Array
 
 
 class Step(NamedTuple):
@@ -170,8 +174,6 @@ def least_ahead(cells: Cells, potential: Potential, b: int, y: Array) -> float:
     bent = min(bend - potential.bent[b, 0], bend - potential.bent[b, 1])
     sizes = abs(slope) + abs(potential.along[b, 0]) + abs(potential.along[b, 1])
     curved = abs(bend) + abs(potential.bent[b, 0]) + abs(potential.bent[b, 1])
-    return (
-        least
-        + min(bent, 0.0) * h * h / 2.0
-        - SLACK * (abs(level0) + abs(level1) + sizes * h + curved * h * h)
-    )
+    rounded = SLACK * (abs(level0) + abs(level1) + sizes * h + curved * h * h)
+    lower: float = least + min(bent, 0.0) * h * h / 2.0 - rounded
+    return lower

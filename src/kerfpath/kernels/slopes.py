@@ -1,0 +1,164 @@
+"""Slopes of a potential, guessed: from the step that seems best from one end of a cell.
+
+A guess may be wrong: what it is worth is proved after (`kernels.potentials`).
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from kerfpath._arrays import Array, Ints
+from kerfpath.kernels._jit import jit_inline
+from kerfpath.kernels.metric import MANHATTAN, extend, finish
+from kerfpath.kernels.reduced import Cells, Potential, Step, tangent
+
+__all__ = ["guess_slopes"]
+
+PENALTY = 10.0
+"""Price of an increment beyond (5), in weights: a guess looks for the way back."""
+STILL = 1e-10
+"""rad: a joint that moves less stands still."""
+HALVINGS = 30
+"""Steps of the search along a cell for metrics that are not linear."""
+
+
+@jit_inline
+def _price(
+    D: Array, cells: Cells, potential: Potential, step: Step, b: int, t: float, penalty: float
+) -> float:
+    """Return what a step by D, and on to t in cell b, is guessed to cost from there to the end."""
+    total, tilted, over = 0.0, 0.0, 0.0
+    for i in range(len(D)):
+        u = D[i] + cells.slope[b, i] * t
+        x = abs(u)
+        total = extend(total, step.weight[i] * x, step.metric)
+        tilted += step.tilt[i] * u
+        over += step.weight[i] * max(0.0, x - step.velocity[i])
+    ahead = max(
+        potential.level[b, 0] - potential.along[b, 0] * t,
+        potential.level[b, 1] - potential.along[b, 1] * t,
+    )
+    price: float = finish(total, step.metric) + tilted + penalty * over + ahead
+    return price
+
+
+@jit_inline
+def _best_along(
+    D: Array, cells: Cells, potential: Potential, step: Step, b: int
+) -> tuple[float, float]:
+    """Return where in cell b a step is guessed to cost least, and what."""
+    h = cells.half[b]
+    if step.metric != MANHATTAN:
+        low, high = -h, h
+        for _ in range(HALVINGS):
+            third = (high - low) / 3.0
+            one, two = low + third, high - third
+            if _price(D, cells, potential, step, b, one, PENALTY) < _price(
+                D, cells, potential, step, b, two, PENALTY
+            ):
+                high = two
+            else:
+                low = one
+        t = (low + high) / 2.0
+        return t, _price(D, cells, potential, step, b, t, PENALTY)
+    best, at = np.inf, 0.0
+    turn = potential.along[b, 0] - potential.along[b, 1]
+    for kink in range(-3, 3 * len(D)):
+        if kink == -3:
+            t = (potential.level[b, 0] - potential.level[b, 1]) / turn if turn != 0.0 else h
+        elif kink < 0:
+            t = (2 * kink + 3) * h
+        else:
+            i, v = kink // 3, (kink % 3 - 1) * step.velocity[kink // 3]
+            s = cells.slope[b, i]
+            t = (v - D[i]) / s if s != 0.0 else 2.0 * h
+        if abs(t) <= h:
+            price = _price(D, cells, potential, step, b, t, PENALTY)
+            if price < best:
+                best, at = price, t
+    return at, best
+
+
+@jit_inline
+def _balance(
+    D: Array, cells: Cells, potential: Potential, step: Step, b: int, t: float, out_y: Array
+) -> None:
+    """Fill slopes (n,) of the cost of the step to t in cell b that balance those of V there.
+
+    Where a joint stands still, or is at its velocity limit, its slope may be any in a range.
+    """
+    level0 = potential.level[b, 0] - potential.along[b, 0] * t
+    level1 = potential.level[b, 1] - potential.along[b, 1] * t
+    least = potential.along[b, 0] if level0 >= level1 else potential.along[b, 1]
+    most = least
+    if abs(level0 - level1) <= 1e-9:
+        least = min(potential.along[b, 0], potential.along[b, 1])
+        most = max(potential.along[b, 0], potential.along[b, 1])
+    for i in range(len(D)):
+        D[i] += cells.slope[b, i] * t
+    tangent(D, step, out_y)
+    slope = 0.0
+    for i in range(len(D)):
+        if abs(D[i]) > step.velocity[i] + STILL:
+            out_y[i] += PENALTY * step.weight[i] * (1.0 if D[i] > 0 else -1.0)
+        slope += out_y[i] * cells.slope[b, i]
+    if step.metric != MANHATTAN or least <= slope <= most:
+        return
+    wanted = least if slope < least else most
+    for i in range(len(D)):
+        s, w, x = cells.slope[b, i], step.weight[i], abs(D[i])
+        if s == 0.0:
+            continue
+        if x < STILL:
+            low, high = -w, w
+        elif abs(x - step.velocity[i]) < STILL:
+            low, high = w, w * (1.0 + PENALTY)
+            if D[i] < 0:
+                low, high = -high, -low
+        else:
+            continue
+        y = out_y[i] + (wanted - slope) / s
+        y = min(max(y, step.tilt[i] + low), step.tilt[i] + high)
+        slope += (y - out_y[i]) * s
+        out_y[i] = y
+
+
+@jit_inline
+def guess_slopes(
+    cells: Cells,
+    potential: Potential,
+    step: Step,
+    a: int,
+    t: float,
+    ahead: Ints,
+    D: Array,
+    here: Array,
+    floor: Array,
+    out_y: Array,
+) -> int:
+    """Fill the slopes of the step that seems best from t in cell a; return which of the ahead."""
+    first, least = -1, np.inf
+    for p in range(len(ahead)):
+        b, reach = ahead[p], 0.0
+        for i in range(len(here)):
+            here[i] = D[p, i] - (cells.slope[a, i] + cells.bend[a, i] * t / 2.0) * t
+            reach += (step.weight[i] + abs(step.tilt[i])) * abs(cells.slope[b, i])
+        reach += max(abs(potential.along[b, 0]), abs(potential.along[b, 1]))
+        price = _price(here, cells, potential, step, b, 0.0, 0.0)
+        floor[p] = price - reach * cells.half[b]
+        if price < least:
+            first, least = p, price
+    best, at, to = np.inf, 0.0, -1
+    for turn in range(-1, len(ahead)):
+        p = first if turn < 0 else turn
+        if floor[p] >= best or (turn >= 0 and p == first):
+            continue
+        for i in range(len(here)):
+            here[i] = D[p, i] - (cells.slope[a, i] + cells.bend[a, i] * t / 2.0) * t
+        where, price = _best_along(here, cells, potential, step, ahead[p])
+        if price < best:
+            best, at, to = price, where, p
+    for i in range(len(here)):
+        here[i] = D[to, i] - (cells.slope[a, i] + cells.bend[a, i] * t / 2.0) * t
+    _balance(here, cells, potential, step, ahead[to], at, out_y)
+    return to
