@@ -33,7 +33,7 @@ NEAR, FINE = 0.9, 3
 """Share of what is wanted, and levels, below which cells are too coarse to tell what nodes lack."""
 DEEPEST = 12
 """Levels at most: cells of 0.001 deg."""
-MOST_PAIRS = 65_000
+MOST_PAIRS = 200_000
 """Steps from cell to cell that are looked at for each node, unless a time is given."""
 MOST_CELLS = 2_000_000
 """Cells of a stage after which it is left at that: some 2 GB."""
