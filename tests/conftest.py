@@ -33,8 +33,8 @@ def pose(xyz, rotation=None):
     return T
 
 
-# A plan states a bound by default, which takes a second or so. Tests ask for it where they are about
-# it; the processes that they start (the command line) state it as a user sees it.
+# A plan states a bound by default, which takes a second or so. Tests ask for it where they are
+# about it; the processes that they start (the command line) state it as a user sees it.
 PlanOptions.__init__.__kwdefaults__["certify"] = None
 
 

@@ -28,7 +28,7 @@ EVERY = PlanOptions(
     rotation=[np.inf, np.inf, np.inf, 7.0, np.inf, 6.5],
     refine=True,
     comfort=Comfort(wrist=Band(margin=0.1, width=0.2, cost=3.0), limits=Band(margin=0.05)),
-    certify=Certify(gap=0.02, seconds=3.0, in_file=True),
+    certify=Certify(gap=0.02, seconds=3.0, keep=True),
 )
 
 
@@ -117,7 +117,7 @@ def test_a_value_out_of_range_is_refused_by_its_name(name, value):
         ("gap", "small", "expected a number, got 'small'"),
         ("seconds", 0, "expected a number above 0 s, got 0 s"),
         ("seconds", np.inf, "expected a number above 0 s, got inf s"),
-        ("in_file", "yes", "expected True or False, got 'yes'"),
+        ("keep", "yes", "expected True or False, got 'yes'"),
     ],
 )
 def test_what_is_certified_is_refused_by_its_name(name, value, said):
@@ -126,7 +126,7 @@ def test_what_is_certified_is_refused_by_its_name(name, value, said):
 
 
 def test_plans_are_certified_unless_they_are_not_to_be():
-    assert PlanOptions().certify == Certify(gap=0.005, seconds=None, in_file=False)
+    assert PlanOptions().certify == Certify(gap=0.005, seconds=None, keep=False)
     assert PlanOptions() != PlanOptions(certify=None)
     assert PlanOptions(certify=Certify(gap=1)).to_data()["certify"]["gap"] == 1.0
 

@@ -59,7 +59,7 @@ class CertifyData(TypedDict):
 
     gap: float
     seconds: float | None
-    in_file: bool
+    keep: bool
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -74,7 +74,7 @@ class Certify:
     seconds : float s, optional
         Time to spend on each plan; None: no limit but the certifier's own limit on its work, so
         that the same task has the same bound on every machine.
-    in_file : bool
+    keep : bool
         Whether plan.json carries the certificate, for others to check; the bound is there anyhow.
 
     Raises
@@ -85,7 +85,7 @@ class Certify:
 
     gap: float = 0.005
     seconds: float | None = None
-    in_file: bool = False
+    keep: bool = False
 
     def __post_init__(self) -> None:
         gap = scalar(self.gap, "certify gap", above=0.0)
@@ -95,8 +95,8 @@ class Certify:
         if self.seconds is not None:
             seconds = scalar(self.seconds, "certify seconds", unit="s", above=0.0)
             object.__setattr__(self, "seconds", seconds)
-        if not isinstance(self.in_file, bool):
-            raise InputError(f"certify in_file: expected True or False, got {self.in_file!r}")
+        if not isinstance(self.keep, bool):
+            raise InputError(f"certify keep: expected True or False, got {self.keep!r}")
 
     def to_data(self) -> CertifyData:
         """Return it as JSON holds it; `Certify(**data)` is the same again."""

@@ -22,6 +22,8 @@ def with_bound(
 ) -> Plan:
     """Return the plan with the bound that is proved for it, or with why there is none.
 
+    What proves it is large: the plan keeps it only where that is asked for.
+
     Parameters
     ----------
     made : Plan
@@ -37,6 +39,12 @@ def with_bound(
         return replace(made, settings=settings)
     if phase is not None:
         phase("certificate")
-    found = certify(made, gap=asked.gap, seconds=asked.seconds, progress=progress)
-    proof = replace(found.plan.proof, statement=f"{made.proof.statement}; {found.statement}")
+    found = certify(
+        made, gap=asked.gap, seconds=asked.seconds, checkable=asked.keep, progress=progress
+    )
+    proof = replace(
+        found.plan.proof,
+        statement=f"{made.proof.statement}; {found.statement}",
+        certificate=found.plan.proof.certificate if asked.keep else None,
+    )
     return replace(found.plan, settings=settings, proof=proof)

@@ -602,10 +602,10 @@ def test_what_is_certified_is_read_from_four_keys(read):
     def certify(keys):
         return read(changed("[plan]", f"[plan]\n{keys}")).options.certify
 
-    assert read(JOB).options.certify == Certify(gap=0.005, seconds=None, in_file=False)
+    assert read(JOB).options.certify == Certify(gap=0.005, seconds=None, keep=False)
     assert certify("certify = false") is certify("certify = false\ncertificate = false") is None
     keys = "certify_gap_percent = 2\ncertify_seconds = 3\ncertificate = true"
-    assert certify(keys) == Certify(gap=0.02, seconds=3.0, in_file=True)
+    assert certify(keys) == Certify(gap=0.02, seconds=3.0, keep=True)
     assert certify("certify = true\ncertify_gap_percent = 100") == Certify(gap=1.0)
 
 

@@ -166,7 +166,7 @@ def plan_file_text(outcome: JobResult) -> str:
     for cut in outcome.cuts:
         if cut.plan is not None:
             asked = cut.plan.settings.certify
-            shown = asked is not None and asked.in_file
+            shown = asked is not None and asked.keep
             entries.append(
                 plan_entry(cut.plan, cut.contour, cut.checks, picked=cut.picked, certificate=shown)
             )

@@ -75,7 +75,7 @@ def _with_bound(cut: CutResult, progress: Progress) -> CutResult:
         progress(f"{cut.name}: {what}{share}", 0, 0)
 
     made = with_bound(cut.plan, asked, progress=named)
-    if not asked.in_file:
+    if not asked.keep:
         return replace(cut, plan=made)
     named("audit of the certificate", 0, 0)
     return replace(cut, plan=made, checks=(*cut.checks, *bound_checks(made)))

@@ -164,7 +164,7 @@ class PlanTable(Table):
         return Certify(
             gap=USUAL.gap if percent is None else percent / 100,
             seconds=self.certify_seconds,
-            in_file=self.certificate,
+            keep=self.certificate,
         )
 
     def tilt(self) -> Tilt | None:
