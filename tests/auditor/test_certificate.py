@@ -266,7 +266,7 @@ FIELDS = ("node", "posture", "level", "index", "lift", "value", "dual")
     [
         (lambda s: {"node": s.node + 1}, "node: expected numbers from 0 to 8"),
         (lambda s: {"node": s.node[::-1]}, "in the order of nodes"),
-        (lambda s: {"posture": s.posture + np.int8(1)}, "posture: expected numbers from 0 to 7"),
+        (lambda s: {"posture": s.posture + np.int8(8)}, "posture: expected numbers from 0 to 7"),
         (lambda s: {"level": s.level - np.int8(1)}, "level: expected numbers from 0"),
         (lambda s: {"index": s.index + 1}, "not on the circle"),
         (lambda s: {"lift": s.lift[:, :5]}, "lift: expected shape"),

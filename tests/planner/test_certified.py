@@ -6,7 +6,9 @@ import numpy as np
 import pytest
 
 from kerfpath import Certify, Contour, fastest_speed, pareto, plan, plan_in_pieces
+from kerfpath.certificate import USUAL
 from kerfpath.certifier import Certified
+from kerfpath.options import PlanOptions
 from kerfpath.planner import _certified, with_bound
 from kerfpath.plans import Proof
 from kerfpath.sequence import plan_part
@@ -14,12 +16,18 @@ from kerfpath.sequence import plan_part
 STEP = np.radians(10)
 
 
+@pytest.fixture(autouse=True)
+def as_users_have_it(monkeypatch):
+    """Plans are certified by default, as outside the tests."""
+    monkeypatch.setitem(PlanOptions.__init__.__kwdefaults__, "certify", USUAL)
+
+
 @pytest.fixture
 def asked(monkeypatch):
     """Stand in for the certifier, which proves 0.9 of every cost: what it is asked for."""
     calls = []
 
-    def certify(made, *, gap, seconds, progress):
+    def certify(made, *, gap, seconds, checkable, progress):
         calls.append((made, gap, seconds))
         progress("cells", 1, 2)
         proof = replace(made.proof, bound=0.9 * made.cost, gap=0.1)

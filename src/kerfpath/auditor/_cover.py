@@ -36,7 +36,9 @@ SAME_PLACE = 1e-9
 """rad: two enclosures of the same interval have the same middle."""
 EVERYWHERE, IN_MIDDLE, SAME = range(3)
 """Where joints are known that places are wanted for, see `_Wanted`."""
-MOST_PLACES = 2_000_000
+BEYOND = 6
+"""Levels finer than any cell of a stage down to which an interval must prove to be empty."""
+MOST_PLACES = 500_000
 """Places at a time; a certificate that leaves more is refused."""
 PLACES_AT_ONCE = 1e5
 """About so many are gone through together, of as many nodes."""
@@ -202,7 +204,8 @@ def _covered(
     found: list[Places] = []
     deepest = int(before.level.max(initial=-1)) if before is not None else 0
     left: Places | None = None
-    for level in range(DEEPEST + 1):
+    finest = max(int(stage.level.max(initial=0)), deepest) + BEYOND
+    for level in range(min(finest, DEEPEST) + 1):
         wanted = [] if left is None else [_halves(left)]
         if before is not None:
             wanted.append(_again(before.take(before.level == level)))
@@ -220,7 +223,7 @@ def _covered(
     assert left is not None
     raise refused(
         f"its cells leave out motions in posture {left.posture[0]} at node {left.node[0]}, gamma "
-        f"{np.degrees(_middle(DEEPEST, left.index[:1])[0]):.4g} deg"
+        f"{np.degrees(_middle(left.level[0], left.index[:1])[0]):.4g} deg"
     )
 
 

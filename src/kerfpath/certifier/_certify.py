@@ -33,8 +33,8 @@ NEAR, FINE = 0.9, 3
 """Share of what is wanted, and levels, below which cells are too coarse to tell what nodes lack."""
 DEEPEST = 12
 """Levels at most: cells of 0.001 deg."""
-MOST_PAIRS = 200_000
-"""Steps from cell to cell that are looked at for each node, unless a time is given."""
+MOST_PAIRS, MOST_PER_NODE = 10_000_000, 60_000
+"""Steps from cell to cell that are looked at, and for each node, unless a time is given."""
 MOST_CELLS = 2_000_000
 """Cells of a stage after which it is left at that: some 2 GB."""
 CLEARLY = 0.02
@@ -221,7 +221,7 @@ class _Course:
             return True
         if self.until < np.inf:
             return monotonic() > self.until
-        return self.pairs + result.pairs * (1 + low) ** 2 > MOST_PAIRS * (self.last + 1)
+        return self.pairs + result.pairs * (1 + low) ** 2 > MOST_PAIRS + MOST_PER_NODE * self.last
 
     def _with_nodes(self, cells: CellSet) -> CellSet:
         """Return the cells with those of further nodes, about as fine where motions may pass."""

@@ -1,0 +1,199 @@
+"""The certifier: bounds that no motion beats, on cells that say nothing untrue."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from kerfpath import InputError, plan
+from kerfpath.auditor import certified_bound
+from kerfpath.certificate import BASE
+from kerfpath.certifier import _certify as course
+from kerfpath.certifier import _stage as stages
+from kerfpath.certifier import certify
+from kerfpath.certifier._cells import CellMaker
+from kerfpath.certifier._nodes import between, turning_nodes
+from kerfpath.contour import Contour
+from kerfpath.kernels.metric import rho
+from kerfpath.refiner._curves import JointCurves
+from kerfpath.tilt import Tilt
+
+METRICS = ("manhattan", "euclid", "chebychev")
+
+
+@pytest.fixture(scope="module")
+def arc():
+    """A third of a circle on a dome, 31 nodes."""
+    t = np.linspace(0, 2.1, 2001)
+    points = np.c_[0.15 * np.cos(t), 0.15 * np.sin(t), 0.02 * np.cos(2 * t)]
+    axes = np.c_[-0.2 * np.cos(t), -0.2 * np.sin(t), -np.ones_like(t)]
+    return Contour(points, axes, closed=False, name="arc").resample(count=31)
+
+
+@pytest.fixture(scope="module")
+def made(arc, arm, tool, placement):
+    """Give the plan of the arc in a metric; each is made once."""
+    kept = {}
+
+    def of(metric):
+        if metric not in kept:
+            kept[metric] = plan(
+                arc, arm, tool=tool, placement=placement, speed=0.3, metric=metric, certify=None
+            )
+        return kept[metric]
+
+    return of
+
+
+def steps_of(one):
+    limits, dt = one.settings.limits(one.robot), one.dt
+    return stages.Steps(
+        weight=one.settings.weights,
+        velocity=limits.velocity.per_interval(dt) + 1e-9,
+        acceleration=limits.acceleration.per_interval(dt) + 1e-9,
+        metric=course.METRIC_CODES[one.settings.metric],
+        endless=one.robot.endless,
+    )
+
+
+def maker_of(one, postures=(0, 1)):
+    return CellMaker(one.robot, one.frames, one.T_flange_tip, one.robot.joint_limits(), postures)
+
+
+@pytest.mark.parametrize("metric", METRICS)
+def test_the_bound_is_close_below_the_plan_and_every_other_motion(
+    made, metric, arc, arm, tool, placement
+):
+    best = made(metric)
+    found = certify(best, gap=0.01)
+    proof = found.plan.proof
+    assert proof.bound <= best.cost
+    assert proof.gap == pytest.approx((best.cost - proof.bound) / best.cost, abs=1e-15)
+    assert found.done == (proof.gap <= 0.01)
+    # The Manhattan metric is bounded by linear functions, the others only near by.
+    assert proof.gap < (0.01 if metric == "manhattan" else 0.2)
+    for asked in (
+        {"method": "exact", "gamma_step": np.radians(1.0)},
+        {"method": "exact", "refine": True, "gamma_step": np.radians(2.0)},
+        {"gamma_step": np.radians(7.0)},
+    ):
+        other = plan(arc, arm, tool=tool, placement=placement, speed=0.3, metric=metric, **asked)
+        assert proof.bound <= other.cost
+
+
+def test_the_audit_proves_the_bound_again(made):
+    found = certify(made("manhattan"), gap=0.01)
+    again = certified_bound(found.plan.proof.certificate, found.plan)
+    assert found.plan.proof.bound <= again <= found.plan.cost
+
+
+@pytest.mark.parametrize("metric", METRICS)
+@pytest.mark.parametrize("tilted", [False, True])
+def test_no_step_costs_less_than_its_cells_say(made, metric, tilted):
+    """Of steps drawn at random, with the true joints: rho + mu u + V' - V is no less."""
+    one, rng = made(metric), np.random.default_rng(3)
+    steps, maker = steps_of(one), maker_of(one)
+    nodes = np.arange(len(one.q)) if tilted else np.arange(0, len(one.q), 3)
+    cells = maker.halves(maker.coarsest(nodes))
+    nu = np.zeros_like(one.q)
+    if tilted:
+        nu[1:-1] = rng.normal(size=nu[1:-1].shape) * one.settings.weights
+    result = stages.solve_stage(cells, steps, nu if tilted else None, care=one.cost)
+    cells = result.cells
+    # Which cells a curve passes, node by node: through points of every cell.
+    t = rng.uniform(-1, 1, len(cells)) * cells.half
+    gamma = -np.pi + 2 * np.pi / (BASE * 2.0**cells.level) * (cells.index + 0.5) + t
+    about = cells.center + (cells.slope + cells.bend * t[:, None] / 2) * t[:, None]
+    curves = JointCurves(one.robot, one.frames[cells.node], one.T_flange_tip, cells.posture)
+    q = curves.at(gamma, about)
+    good = np.isfinite(q).all(axis=1) & np.isfinite(result.level[:, 0])
+    # Rounding of the kinematics in floats.
+    assert (np.abs(q - about) <= cells.spread + 1e-9)[good].all()
+    off = q - cells.center
+    value = (result.level - np.einsum("cmi,ci->cm", result.dual, off)).max(axis=1)
+    cheapest = np.full(len(nodes), np.inf)
+    tried = 0
+    for k in range(len(nodes) - 1):
+        here, there = (np.flatnonzero(good & (cells.node == nodes[k + i])) for i in (0, 1))
+        if k == len(nodes) - 2:
+            value[there] = 0.0
+        u = q[there][None] - q[here][:, None]
+        u = np.where(steps.endless, u - 2 * np.pi * np.round(u / (2 * np.pi)), u)
+        step = steps.tilted(nu, k) if tilted else steps.over(int(nodes[k + 1] - nodes[k]))
+        a, b = np.nonzero((np.abs(u) <= step.velocity).all(axis=-1))
+        for i, j in zip(a, b, strict=True):
+            cost = rho(u[i, j], steps.weight, steps.metric) + step.tilt @ u[i, j]
+            reduced = cost + value[there[j]] - value[here[i]]
+            cheapest[k] = min(cheapest[k], reduced)
+            tried += 1
+    assert tried > 1000
+    # The cheapest way on from any cell costs nothing beyond its potential, and no step less.
+    assert cheapest[:-1].min() >= -1e-9
+
+
+@pytest.mark.parametrize("metric", METRICS)
+def test_the_plan_itself_passes_cells_that_let_it(made, metric):
+    one = made(metric)
+    steps, cells = steps_of(one), maker_of(one).coarsest(np.arange(len(one.q)))
+    for _ in range(3):
+        result = stages.solve_stage(cells, steps, care=one.cost)
+        cells = result.cells
+        for k, (q, gamma) in enumerate(zip(one.q, one.gamma, strict=True)):
+            middle = -np.pi + 2 * np.pi / (BASE * 2.0**cells.level) * (cells.index + 0.5)
+            away = np.abs((gamma - middle + np.pi) % (2 * np.pi) - np.pi)
+            off = q - cells.center
+            off = np.where(steps.endless, off - 2 * np.pi * np.round(off / (2 * np.pi)), off)
+            on = (cells.node == k) & (cells.posture == one.posture[k]) & (away <= cells.half)
+            on &= (np.abs(off) <= cells.box + 1e-9).all(axis=1)
+            assert on.any()
+            assert result.through[on].min() <= one.cost
+        cells = maker_of(one).halves(cells)
+
+
+def test_more_work_never_lowers_the_bound(made):
+    bounds = [certify(made("manhattan"), gap=gap).plan.proof.bound for gap in (0.5, 0.05, 0.005)]
+    assert bounds == sorted(bounds)
+
+
+def test_the_same_plan_has_the_same_certificate(made):
+    one, two = (certify(made("manhattan"), gap=0.02).plan.proof.certificate for _ in range(2))
+    assert one.bound == two.bound
+    for a, b in zip(one.stages, two.stages, strict=True):
+        np.testing.assert_array_equal(a.value, b.value)
+        np.testing.assert_array_equal(a.dual, b.dual)
+
+
+def test_nodes_where_a_plan_turns(made):
+    one = made("manhattan")
+    nodes = turning_nodes(one, 1e-3, longest=8)
+    assert nodes[0] == 0
+    assert nodes[-1] == len(one.q) - 1
+    assert np.diff(nodes).max() <= 8
+    q = np.vstack([np.zeros(6), np.cumsum(one.increments, axis=0)])
+    straight = sum(rho(u, one.settings.weights, 1) for u in np.diff(q[nodes], axis=0))
+    assert straight >= one.cost * (1 - 1e-3) - 1e-12
+    more = between(nodes)
+    assert set(nodes) <= set(more)
+    assert np.diff(more).max() <= 4
+
+
+@pytest.mark.parametrize(
+    ("changed", "why"),
+    [
+        ({"objective": "max"}, 'the objective is "max"'),
+        ({"tilt": Tilt(cone=0.05, steps=1)}, "the tool axis may tilt"),
+    ],
+)
+def test_what_is_not_proved_says_why(made, changed, why):
+    one = made("manhattan")
+    found = certify(replace(one, settings=replace(one.settings, **changed)))
+    assert not found.done
+    assert found.plan.proof.bound is None
+    assert found.statement == f"no bound is proved: {why}"
+
+
+@pytest.mark.parametrize("bad", [{"gap": 0.0}, {"gap": -1.0}, {"seconds": 0.0}, {"gap": np.nan}])
+def test_a_gap_and_a_time_are_positive(made, bad):
+    (name,) = bad
+    with pytest.raises(InputError, match=name):
+        certify(made("manhattan"), **bad)
