@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
@@ -29,8 +29,10 @@ __all__ = ["MotionTest"]
 
 DEEPEST = 12
 """Levels at most: cells of 0.001 deg."""
-MOST_STEPS, MOST_PAIRS = 4_000_000, 60_000_000
+MOST_STEPS, MOST_PAIRS = 2_000_000, 30_000_000
 """Steps between cells in one round, and pairs of steps in all, after which it is left at that."""
+ABOUT = 12
+"""Nodes on either side of one about which a part is looked at."""
 EACH_PAIRS = 1_000_000
 """Pairs of steps over one node up to which (6) is tested in a round."""
 
@@ -71,12 +73,14 @@ class MotionTest:
         self._count = len(frames)
         self._coarsest = self._maker.coarsest(np.arange(self._count))
 
-    def closed(self, limits: Limits, dt: float) -> Closed | None:
+    def closed(self, limits: Limits, dt: float, around: int | None = None) -> Closed | None:
         """Return where no motion passes, nodes dt s apart; None where that is not proved.
 
-        Of any motion that keeps (5) and (6) at the nodes, ranges and couplings, none passes a cell
-        from which no step, or pair of steps, leads on, or to which none leads. Cells that may be
-        passed are halved until a node has none, or until it is enough work.
+        With `around` only the part of the contour about that node is looked at, with finer cells:
+        what cannot pass a part cannot pass the whole. Of any motion that keeps (5) and (6) at the
+        nodes, ranges and couplings, none passes a cell from which no step, or pair of steps, leads
+        on, or to which none leads. Cells that may be passed are halved until a node has none, or
+        until it is enough work.
         """
         steps = Steps(
             weight=freeze(np.ones(len(self._endless))),
@@ -85,16 +89,19 @@ class MotionTest:
             metric=MANHATTAN,
             endless=self._endless,
         )
+        first, last = 0, self._count - 1
+        if around is not None:
+            first, last = max(first, around - ABOUT), min(last, around + ABOUT)
         cells, work = self._coarsest, 0
+        cells = cells.take((cells.node >= first) & (cells.node <= last))
         for _ in range(DEEPEST):
-            present = np.bincount(cells.node, minlength=self._count) > 0
+            present = np.bincount(cells.node - first, minlength=last - first + 1) > 0
             if not present.all():
-                node = int(np.argmin(present))
-                return Closed(node=node - 1, joint=None, limit="pose")
+                return Closed(node=first + int(np.argmin(present)) - 1, joint=None, limit="pose")
             one = _Round(cells, steps)
             found = one.forward()
             if found is not None:
-                return found
+                return replace(found, node=first + found.node)
             work += one.pairs
             if one.left or work > MOST_PAIRS:
                 return None

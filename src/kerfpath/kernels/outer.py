@@ -33,8 +33,8 @@ def _wide(cells: Cells, a: int, i: int, r: int, f: float) -> float:
     h = cells.half[a]
     slope = abs(cells.slope[a, i] - f * cells.slope[a, r])
     bend = abs(cells.bend[a, i] - f * cells.bend[a, r])
-    spread: float = cells.spread[a, i] + abs(f) * cells.spread[a, r]
-    return slope * h + bend * h * h / 2.0 + spread
+    wide: float = slope * h + bend * h * h / 2.0 + cells.spread[a, i] + abs(f) * cells.spread[a, r]
+    return wide
 
 
 @jit_inline
