@@ -3,10 +3,11 @@
 import numpy as np
 import pytest
 
-from kerfpath import NoFeasiblePath, audit, plan
+from kerfpath import NoFeasiblePath, audit, fastest_speed, plan
 from kerfpath.certifier import MotionTest
 from kerfpath.contour import Contour
 from kerfpath.limits import Limits
+from kerfpath.tilt import Tilt
 
 STEP = np.radians(10)
 SEEDS = range(3)
@@ -132,3 +133,37 @@ def test_no_motion_is_ruled_out_by_limits_that_it_keeps(arm, tool, placement, wi
         assert test_of(nodes, arm, tool, placement).closed(limits, 1.0) is None
         done += 1
     assert done >= 5
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_no_plan_reaches_the_ceiling_of_the_speed(seed, arm, tool, placement):
+    nodes = drawn(seed)
+    options = {"tool": tool, "placement": placement, "gamma_step": STEP}
+    told = fastest_speed(nodes, arm, refine=True, ceiling=True, **options)
+    assert told.ceiling is not None
+    # On a finer grid a path may be faster; none is as fast as what is impossible.
+    fine = fastest_speed(nodes, arm, refine=True, **options | {"gamma_step": np.radians(2)})
+    assert fine.ceiling is None
+    assert max(told.speed, fine.speed) < told.ceiling
+    with pytest.raises(NoFeasiblePath):
+        plan(nodes, arm, speed=told.ceiling, **options)
+
+
+def test_without_an_enclosure_nothing_is_said_of_other_gammas(circle, arm, tool, placement):
+    options = {"tool": tool, "placement": placement, "gamma_step": STEP}
+    tilt = Tilt(cone=0.05, steps=1)
+    nodes = circle.resample(count=15)
+    told = fastest_speed(nodes, arm, ceiling=True, tilt=tilt, **options)
+    assert told.ceiling is None
+    with pytest.raises(NoFeasiblePath) as caught:
+        plan(nodes, arm, speed=20.0, tilt=tilt, **options)
+    assert caught.value.scope == "grid"
+    assert "rotation: no motion" not in str(caught.value)
+
+
+def test_what_is_undecided_is_said_to_be(circle, arm, tool, placement):
+    nodes = circle.resample(count=31)
+    options = {"tool": tool, "placement": placement, "gamma_step": STEP}
+    told = fastest_speed(nodes, arm, refine=True, ceiling=True, **options)
+    with pytest.raises(NoFeasiblePath, match="whether there is a motion off the grid is undecided"):
+        plan(nodes, arm, speed=0.97 * told.ceiling, **options)
