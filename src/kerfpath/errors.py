@@ -4,14 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
+from dataclasses import dataclass
 from pathlib import Path
+from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
 from kerfpath.losses import Loss, Reason
 
-__all__ = ["AuditFailed", "InputError", "KerfpathError", "NoFeasiblePath", "about"]
+__all__ = ["AuditFailed", "Closed", "InputError", "KerfpathError", "NoFeasiblePath", "about"]
 
 LONGEST, BEGINNING = 600, 420
 """Characters of a message about bad input; of a longer one its beginning and its end are kept."""
@@ -44,6 +46,34 @@ def about(path: Path) -> Iterator[None]:
         raise (error if path.name in said else InputError(f"{path}: {said}")) from None
 
 
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Closed:
+    """Where it is proved that no motion passes, whatever its gamma, postures and turns.
+
+    Parameters
+    ----------
+    node : int
+        No motion that keeps the limits up to this node goes on from it and reaches the end.
+    joint : int or None
+        The joint that stops most of what is left there, 0-based; None with "pose".
+    limit : {"velocity", "acceleration", "pose"}
+        Which of its limits does; "pose" where the next node has no pose within the ranges.
+    """
+
+    node: int
+    joint: int | None
+    limit: Literal["velocity", "acceleration", "pose"]
+
+    def __str__(self) -> str:
+        """Say it in words."""
+        if self.joint is None:
+            return f"node {self.node + 1} has no pose within the ranges of the joints"
+        return (
+            f"no motion goes on from node {self.node}, where the {self.limit} of joint "
+            f"{self.joint + 1} stops most"
+        )
+
+
 class NoFeasiblePath(KerfpathError):
     """No admissible path was found: an answer with a reason, not a fault of the input.
 
@@ -66,6 +96,8 @@ class NoFeasiblePath(KerfpathError):
         What each test removed where the path breaks: candidates of the empty layer or edges into
         the unreached one, by `kerfpath.losses.Reason`, which is its words; of a Pareto set without
         plans the runs by what became of them.
+    closed : Closed, optional
+        Where no motion passes at any gamma, if that is proved.
     """
 
     def __init__(
@@ -78,6 +110,7 @@ class NoFeasiblePath(KerfpathError):
         reached: NDArray[np.int64] | None = None,
         leaving: NDArray[np.int64] | None = None,
         counts: Mapping[str, int] | None = None,
+        closed: Closed | None = None,
     ) -> None:
         super().__init__(message)
         self.proved = proved
@@ -86,13 +119,29 @@ class NoFeasiblePath(KerfpathError):
         self.reached = reached
         self.leaving = leaving
         self.counts = dict(counts or {})
+        self.closed = closed
+
+    @property
+    def scope(self) -> Literal["every gamma", "grid", "undecided"]:
+        """Of what it is proved that there is no path: of every gamma, or of this grid of it alone.
+
+        "undecided" where a path may even be on the grid.
+        """
+        if self.closed is not None:
+            return "every gamma"
+        return "grid" if self.proved else "undecided"
 
     def lost_by(self, loss: Loss) -> list[Reason]:
         """Return the reasons of one kind among the counts."""
         return [why for why in self.counts if isinstance(why, Reason) and why.loss is loss]
 
-    def with_message(self, message: str, counts: Mapping[str, int] | None = None) -> NoFeasiblePath:
-        """Return the same answer in other words, and with other counts if they are given."""
+    def with_message(
+        self,
+        message: str,
+        counts: Mapping[str, int] | None = None,
+        closed: Closed | None = None,
+    ) -> NoFeasiblePath:
+        """Return the same answer in other words, with other counts or more proof if given."""
         return NoFeasiblePath(
             message,
             proved=self.proved,
@@ -101,6 +150,7 @@ class NoFeasiblePath(KerfpathError):
             reached=self.reached,
             leaving=self.leaving,
             counts=self.counts if counts is None else counts,
+            closed=self.closed if closed is None else closed,
         )
 
 

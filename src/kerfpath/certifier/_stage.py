@@ -16,7 +16,7 @@ from kerfpath.certifier._cells import CellSet
 from kerfpath.kernels.potentials import cross_cells, lay_potential, link_cells, reach_cells
 from kerfpath.kernels.reduced import Cells, Potential, Step
 
-__all__ = ["StageResult", "Steps", "linked", "solve_stage"]
+__all__ = ["StageResult", "Steps", "linked", "pack", "solve_stage", "widest_apart"]
 
 IN_ONE = 64
 """Cells of a layer below which a second thread costs more than it brings."""
@@ -126,7 +126,7 @@ def solve_stage(
         Cost beyond the cheapest step of a cell up to which steps are bounded with care.
     """
     box = cells.box
-    key = _key(cells, box, steps)
+    key = widest_apart(cells, box, steps)
     order = np.lexsort((cells.center[:, key], cells.node))
     cells, box = cells.take(order), box[order]
     packed, nodes = pack(cells, box, key)
@@ -171,7 +171,7 @@ def pack(cells: CellSet, box: Array, key: int) -> tuple[Cells, Ints]:
 def linked(cells: CellSet, steps: Steps) -> Bools:
     """Return which cells (C,) steps within (5) lead to, and lead on from."""
     box = cells.box
-    key = _key(cells, box, steps)
+    key = widest_apart(cells, box, steps)
     order = np.lexsort((cells.center[:, key], cells.node))
     packed, nodes = pack(cells.take(order), box[order], key)
     after, before = np.zeros((2, len(cells)), np.bool_)
@@ -183,7 +183,7 @@ def linked(cells: CellSet, steps: Steps) -> Bools:
     return found
 
 
-def _key(cells: CellSet, box: Array, steps: Steps) -> int:
+def widest_apart(cells: CellSet, box: Array, steps: Steps) -> int:
     """Return the joint by which the windows of (5) leave the least of a layer."""
     if not len(cells):
         return 0

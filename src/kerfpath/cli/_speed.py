@@ -10,7 +10,7 @@ from kerfpath.cli._show import out, print_json, table
 from kerfpath.contour import Contour
 from kerfpath.errors import NoFeasiblePath
 from kerfpath.job import ContourSpec
-from kerfpath.planner import FastestSpeed, at_most
+from kerfpath.planner import FastestSpeed, at_least, at_most
 
 __all__ = ["show_speeds"]
 
@@ -29,6 +29,7 @@ def show_speeds(
             entry |= {
                 "fastest_m_min": found.speed * 60,
                 "on_grid_m_min": None if found.on_grid is None else found.on_grid * 60,
+                "impossible_from_m_min": None if found.ceiling is None else found.ceiling * 60,
                 "joint": found.joint + 1,
                 "limit": found.limit,
                 "node": found.node,
@@ -38,19 +39,29 @@ def show_speeds(
             at = " ".join(f"{v:g}" for v in place)
             on_grid = found.speed if found.on_grid is None else found.on_grid
             off_grid = "-" if found.on_grid is None else at_most(found.speed * 60)
-            rows.append([*row, at_most(on_grid * 60), off_grid, str(found.node), what, at])
+            never = "-" if found.ceiling is None else at_least(found.ceiling * 60)
+            rows.append([*row, at_most(on_grid * 60), off_grid, never, str(found.node), what, at])
         else:
             entry |= {"fastest_m_min": None, "reason": str(found)}
-            rows.append([*row, "-", "-", str(found.node + 1), "no admissible pose", ""])
+            rows.append([*row, "-", "-", "-", str(found.node + 1), "no admissible pose", ""])
         entries.append(entry)
     if as_json:
         print_json({"contours": entries})
     else:
-        columns = ["contour", "asked m/min", "on the grid", "refined", "node", "what binds"]
+        columns = [
+            "contour",
+            "asked m/min",
+            "on the grid",
+            "refined",
+            "impossible from",
+            "node",
+            "what binds",
+        ]
         at = "at x y z mm"
-        table([*columns, at], rows, numbers=columns[1:5], spare=[at])
+        table([*columns, at], rows, numbers=columns[1:6], spare=[at])
         out.print(
             "on the grid: the fastest constant speed there, exactly; refined: the nearest optimum "
-            "that is found from that path off the grid, not proved to be the fastest"
+            "that is found from that path off the grid, not proved to be the fastest; impossible "
+            "from: proved that at this speed and above there is no motion, at any rotation"
         )
     return all(entry["fastest_m_min"] is not None for entry in entries)

@@ -21,6 +21,7 @@ from kerfpath.kernels.reduced import (
     least_ahead,
     near,
     tangent,
+    window,
 )
 from kerfpath.kernels.slopes import guess_slopes
 
@@ -86,33 +87,6 @@ def _turned(
     moved = 0.0 if still else _along(D, z)
     ahead = least_ahead(cells, potential, b, z)
     return moved - beyond(z, step) + ahead + lean(cells, a, z, y)
-
-
-@jit_inline
-def _window(cells: Cells, step: Step, a: int, k: int, out_run: Ints) -> None:
-    """Fill the run of layer k + 1 in which all cells lie that a step from cell a may lead to."""
-    first, last = cells.start[k + 1], cells.start[k + 2]
-    key, x = cells.key, cells.center[a, cells.key]
-    wide = step.velocity[key] + cells.box[a, key] + cells.widest[k + 1]
-    out_run[0], out_run[1] = last, first
-    for turn in range(-1, 2):
-        if turn != 0 and not step.endless[key]:
-            continue
-        low, high = x - wide + 2.0 * np.pi * turn, x + wide + 2.0 * np.pi * turn
-        out_run[0] = min(out_run[0], _place(cells, first, last, low))
-        out_run[1] = max(out_run[1], _place(cells, first, last, high))
-
-
-@jit_inline
-def _place(cells: Cells, first: int, last: int, x: float) -> int:
-    """Return the first cell of a layer whose key is at least x."""
-    while first < last:
-        middle = (first + last) // 2
-        if cells.center[middle, cells.key] < x:
-            first = middle + 1
-        else:
-            last = middle
-    return first
 
 
 @jit_inline
@@ -202,7 +176,7 @@ def reach_cells(
     """
     run, D = np.empty(2, np.int64), np.empty(len(step.velocity))
     for a in range(first, last):
-        _window(cells, step, a, k, run)
+        window(cells, step, a, k, run)
         count = 0
         for b in range(run[0], run[1]):
             if level[b, 0] < np.inf and near(cells, step, a, b, D) > 0:
@@ -215,7 +189,7 @@ def link_cells(cells: Cells, step: Step, k: int, out_after: Bools, out_before: B
     """Mark the cells of layer k that a step leads on from, and those of layer k + 1 it leads to."""
     run, D = np.empty(2, np.int64), np.empty(len(step.velocity))
     for a in range(cells.start[k], cells.start[k + 1]):
-        _window(cells, step, a, k, run)
+        window(cells, step, a, k, run)
         for b in range(run[0], run[1]):
             if not (out_after[a] and out_before[b]) and near(cells, step, a, b, D) > 0:
                 out_after[a] = out_before[b] = True
@@ -251,7 +225,7 @@ def lay_potential(
         if count == 0:
             continue
         ahead = out_to[begin[a] : begin[a + 1]]
-        _window(cells, step, a, k, run)
+        window(cells, step, a, k, run)
         p = 0
         for b in range(run[0], run[1]):
             if potential.level[b, 0] < np.inf:

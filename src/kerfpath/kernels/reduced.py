@@ -24,7 +24,17 @@ from kerfpath._arrays import Array, Bools, Ints
 from kerfpath.kernels._jit import jit_inline
 from kerfpath.kernels.metric import CHEBYCHEV, MANHATTAN
 
-__all__ = ["Cells", "Potential", "Step", "beyond", "lean", "least_ahead", "near", "tangent"]
+__all__ = [
+    "Cells",
+    "Potential",
+    "Step",
+    "beyond",
+    "lean",
+    "least_ahead",
+    "near",
+    "tangent",
+    "window",
+]
 
 SLACK = 1e-14
 """Share of the terms of a sum of a few dozen that rounding may cost, with room."""
@@ -90,6 +100,33 @@ def near(cells: Cells, step: Step, a: int, b: int, out_D: Array) -> int:
             return 0
         out_D[i] = d
     return status
+
+
+@jit_inline
+def window(cells: Cells, step: Step, a: int, k: int, out_run: Ints) -> None:
+    """Fill the run of layer k + 1 in which all cells lie that a step from cell a may lead to."""
+    first, last = cells.start[k + 1], cells.start[k + 2]
+    key, x = cells.key, cells.center[a, cells.key]
+    wide = step.velocity[key] + cells.box[a, key] + cells.widest[k + 1]
+    out_run[0], out_run[1] = last, first
+    for turn in range(-1, 2):
+        if turn != 0 and not step.endless[key]:
+            continue
+        low, high = x - wide + 2.0 * np.pi * turn, x + wide + 2.0 * np.pi * turn
+        out_run[0] = min(out_run[0], _place(cells, first, last, low))
+        out_run[1] = max(out_run[1], _place(cells, first, last, high))
+
+
+@jit_inline
+def _place(cells: Cells, first: int, last: int, x: float) -> int:
+    """Return the first cell of a layer whose key is at least x."""
+    while first < last:
+        middle = (first + last) // 2
+        if cells.center[middle, cells.key] < x:
+            first = middle + 1
+        else:
+            last = middle
+    return first
 
 
 @jit_inline

@@ -8,8 +8,10 @@ from dataclasses import replace
 import numpy as np
 
 from kerfpath import refiner
+from kerfpath.errors import NoFeasiblePath
 from kerfpath.kernels.metric import wrap
 from kerfpath.planner._clear import ClearSearch
+from kerfpath.planner._closed import at_any_gamma
 from kerfpath.planner._on_grid import plan_on_grid
 from kerfpath.planner._task import PlanningTask
 from kerfpath.plans import Plan, Proof
@@ -56,7 +58,11 @@ def plan_continuous(task: PlanningTask, finder: ClearSearch, begin: Callable[[st
         # What the nodes of a slower motion cost is known on the grid only.
         priced = task.settings.feed == "dip" and comfort is not None and comfort.costs
         refine = task.robot.family.free_rotation and not priced
-        return _said(plan_on_grid(task, finder, begin, refine=refine), why)
+        try:
+            return _said(plan_on_grid(task, finder, begin, refine=refine), why)
+        except NoFeasiblePath as broken:
+            begin("search for a proof that there is none")
+            raise at_any_gamma(broken, task) from None
     claim = f"the best motion found over continuous rotation: cost {found.cost_after:.6g}"
     return replace(found.plan, proof=Proof(optimal=False, statement=finder.claimed(claim)))
 

@@ -16,8 +16,9 @@ from kerfpath.graph import LayeredGraph
 from kerfpath.limits import Limits
 from kerfpath.options import GraphKeywords, PlanOptions, with_keywords
 from kerfpath.planner._clear import ClearSearch
+from kerfpath.planner._closed import impossible_share
 from kerfpath.planner._graph import longest_step, node_interval, require_even
-from kerfpath.planner._task import task_of
+from kerfpath.planner._task import PlanningTask, task_of
 from kerfpath.plans import Proof
 from kerfpath.refiner import quicken
 from kerfpath.robots import Robot
@@ -55,6 +56,9 @@ class FastestSpeed:
         Which of its limits binds there.
     on_grid : float m/s, optional
         Where gamma was moved off its grid: the largest speed on it.
+    ceiling : float m/s, optional
+        Where that is proved: at this constant speed, and at any higher one, no motion keeps the
+        limits at the nodes, at any gamma, posture and turn.
     """
 
     speed: float
@@ -62,6 +66,7 @@ class FastestSpeed:
     node: int
     limit: Literal["velocity", "acceleration"]
     on_grid: float | None = None
+    ceiling: float | None = None
 
     @classmethod
     def of(cls, contour: Contour, least: LeastInterval) -> FastestSpeed:
@@ -80,6 +85,7 @@ def fastest_speed(
     cell: Cell | None = None,
     graph: LayeredGraph | None = None,
     progress: Callable[[int], None] | None = None,
+    ceiling: bool = False,
     **keywords: Unpack[SpeedKeywords],
 ) -> FastestSpeed:
     """Return the largest constant speed at which a path exists on the graph, exactly.
@@ -89,7 +95,9 @@ def fastest_speed(
     gamma_step, frames, tilt, postures, comfort, eta_v, eta_a and refine matter. The grid quantises
     the acceleration: `refine` moves gamma off it, from the fastest path, to what is then faster
     still (the nearest optimum, which is not proved to be the best one), unless it would not be
-    clear or would break a margin of `comfort`, which may have no costs here.
+    clear or would break a margin of `comfort`, which may have no costs here. With `ceiling` it is
+    also proved, as far as a limited amount of work does, above which speed there is no motion at
+    all, on the grid or off it, see `FastestSpeed.ceiling`.
 
     Raises
     ------
@@ -113,10 +121,20 @@ def fastest_speed(
         graph=graph,
         progress=progress,
     )
-    finder = ClearSearch(task, cell)
+    found = _fastest(task, ClearSearch(task, cell))
+    if not ceiling:
+        return found
+    interval = longest_step(contour) / found.speed
+    share = impossible_share(task, interval, found.node)
+    return found if share is None else replace(found, ceiling=found.speed / share)
+
+
+def _fastest(task: PlanningTask, finder: ClearSearch) -> FastestSpeed:
+    """Return the largest speed reached, on the grid or, where that is asked for, off it."""
+    comfort, robot = task.settings.comfort, task.robot
     least = finder.find(find_least_interval, task.problem.free())
-    found = FastestSpeed.of(contour, least)
-    if not (asked.refine and robot.family.free_rotation):
+    found = FastestSpeed.of(task.contour, least)
+    if not (task.settings.refine and robot.family.free_rotation):
         return found
     claim = Proof(optimal=False, statement="the fastest path on this graph")
     task = replace(task, problem=replace(task.problem, dt=least.dt))
@@ -125,7 +143,7 @@ def fastest_speed(
     if broken or not finder.is_clear(quick):
         return found
     return FastestSpeed(
-        speed=longest_step(contour) / quick.dt,
+        speed=longest_step(task.contour) / quick.dt,
         joint=at.joint,
         node=at.node,
         limit=at.limit,

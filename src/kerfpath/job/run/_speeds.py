@@ -23,8 +23,12 @@ def fastest_along(
     *,
     refine: bool,
     graph: LayeredGraph | None = None,
+    ceiling: bool = False,
 ) -> FastestSpeed:
-    """Return the fastest constant speed of a contour, clear in the cell where there is one."""
+    """Return the fastest constant speed of a contour, clear in the cell where there is one.
+
+    With `ceiling` also the speed from which on none is possible, where that is proved.
+    """
     return fastest_speed(
         nodes,
         job.robot,
@@ -33,6 +37,7 @@ def fastest_along(
         options=replace(job.options.without_penalties, refine=refine),
         cell=cell,
         graph=graph,
+        ceiling=ceiling,
     )
 
 
@@ -58,7 +63,11 @@ def fastest_speeds(
         nodes = task.evenly_fast(part)
         try:
             answers.append(
-                (task, nodes, fastest_along(job, nodes, cell, refine=job.options.refine))
+                (
+                    task,
+                    nodes,
+                    fastest_along(job, nodes, cell, refine=job.options.refine, ceiling=True),
+                )
             )
         except NoFeasiblePath as broken:
             answers.append((task, nodes, broken))

@@ -1,0 +1,206 @@
+"""Whether any motion exists: cells of gamma that no motion can pass, until a node has none left."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import Literal
+
+import numpy as np
+
+from kerfpath._arrays import Array, Bools, Ints, freeze
+from kerfpath.certifier._cells import CellMaker, CellSet
+from kerfpath.certifier._stage import Steps, pack, widest_apart
+from kerfpath.errors import Closed
+from kerfpath.kernels.limits import LIMIT_TOLERANCE
+from kerfpath.kernels.metric import MANHATTAN
+from kerfpath.kernels.outer import (
+    blame_bends,
+    blame_steps,
+    count_steps,
+    keep_back,
+    keep_on,
+    list_steps,
+)
+from kerfpath.kernels.reduced import Cells
+from kerfpath.limits import Limits
+from kerfpath.robots import Robot
+
+__all__ = ["MotionTest"]
+
+DEEPEST = 12
+"""Levels at most: cells of 0.001 deg."""
+MOST_STEPS, MOST_PAIRS = 2_000_000, 30_000_000
+"""Steps between cells in one round, and pairs of steps in all, after which it is left at that."""
+ABOUT = 12
+"""Nodes on either side of one about which a part is looked at."""
+EACH_PAIRS = 1_000_000
+"""Pairs of steps over one node up to which (6) is tested in a round."""
+
+
+@dataclass(slots=True)
+class _Layer:
+    """The steps from the cells of one layer: begin (C_k + 1,), to (E,), and which are kept (E,)."""
+
+    begin: Ints
+    to: Ints
+    kept: Bools
+
+
+class MotionTest:
+    """Tests for limits whether any motion along a contour keeps them, by an outer approximation.
+
+    Parameters
+    ----------
+    robot : Robot
+        One that `encloses`.
+    frames : (K, 4, 4) m
+        Task frames in the robot base.
+    T_flange_tip : (4, 4) m
+    postures : sequence of int, optional
+        The postures that may be used; default all.
+    """
+
+    def __init__(
+        self,
+        robot: Robot,
+        frames: Array,
+        T_flange_tip: Array,
+        postures: tuple[int, ...] | None = None,
+    ) -> None:
+        used = range(robot.postures) if postures is None else postures
+        self._endless = robot.endless
+        self._maker = CellMaker(robot, frames, T_flange_tip, robot.joint_limits(), used)
+        self._count = len(frames)
+        self._coarsest = self._maker.coarsest(np.arange(self._count))
+
+    def closed(self, limits: Limits, dt: float, around: int | None = None) -> Closed | None:
+        """Return where no motion passes, nodes dt s apart; None where that is not proved.
+
+        With `around` only the part of the contour about that node is looked at, with finer cells:
+        what cannot pass a part cannot pass the whole. Of any motion that keeps (5) and (6) at the
+        nodes, ranges and couplings, none passes a cell from which no step, or pair of steps, leads
+        on, or to which none leads. Cells that may be passed are halved until a node has none, or
+        until it is enough work.
+        """
+        steps = Steps(
+            weight=freeze(np.ones(len(self._endless))),
+            velocity=limits.velocity.per_interval(dt) + 2 * LIMIT_TOLERANCE,
+            acceleration=limits.acceleration.per_interval(dt) + 4 * LIMIT_TOLERANCE,
+            metric=MANHATTAN,
+            endless=self._endless,
+        )
+        first, last = 0, self._count - 1
+        if around is not None:
+            first, last = max(first, around - ABOUT), min(last, around + ABOUT)
+        cells, work = self._coarsest, 0
+        cells = cells.take((cells.node >= first) & (cells.node <= last))
+        for _ in range(DEEPEST):
+            present = np.bincount(cells.node - first, minlength=last - first + 1) > 0
+            if not present.all():
+                return Closed(node=first + int(np.argmin(present)) - 1, joint=None, limit="pose")
+            one = _Round(cells, steps)
+            found = one.forward()
+            if found is not None:
+                return replace(found, node=first + found.node)
+            work += one.pairs
+            if one.left or work > MOST_PAIRS:
+                return None
+            cells = self._maker.halves(one.cells.take(one.backward()))
+        return None
+
+
+class _Round:
+    """One sweep on and one back over cells of all nodes."""
+
+    def __init__(self, cells: CellSet, steps: Steps) -> None:
+        box = cells.box
+        key = widest_apart(cells, box, steps)
+        order = np.lexsort((cells.center[:, key], cells.node))
+        self.cells = cells.take(order)
+        self._packed: Cells = pack(self.cells, box[order], key)[0]
+        self._step, self._bound = steps.over(1), steps.acceleration
+        moved = np.abs(self.cells.slope)
+        self._lead_v = np.argmax(moved / steps.velocity, axis=1)
+        self._lead_a = np.argmax(moved / steps.acceleration, axis=1)
+        self._layers: list[_Layer] = []
+        self.pairs, self.left, self._steps = 0, False, 0
+
+    def forward(self) -> Closed | None:
+        """Keep the steps that motions from the first node may make; return where they end."""
+        start = self._packed.start
+        live = np.ones(len(self.cells), np.bool_)
+        for k in range(len(start) - 2):
+            layer = self._steps_from(k, live)
+            if layer is None:
+                return None
+            if not len(layer.to):
+                return self._closed(k, "velocity", live)
+            if k and self._few(self._layers[-1], layer, k):
+                before = self._layers[-1]
+                layer.kept[:] = False
+                self.pairs += keep_on(
+                    self._packed, self._step, self._bound, self._lead_a, k - 1,
+                    before.begin, before.to, before.kept, layer.begin, layer.to, layer.kept,
+                )  # fmt: skip
+                if not layer.kept.any():
+                    self._layers.append(layer)
+                    return self._closed(k, "acceleration", live)
+            self._layers.append(layer)
+            live[start[k + 1] : start[k + 2]] = False
+            live[layer.to[layer.kept]] = True
+        return None
+
+    def backward(self) -> Bools:
+        """Keep the steps from which motions may reach the end; return the cells (C,) they pass."""
+        start = self._packed.start
+        live = np.zeros(len(self.cells), np.bool_)
+        last = self._layers[-1]
+        live[last.to[last.kept]] = True
+        for k in range(len(self._layers) - 1, -1, -1):
+            layer = self._layers[k]
+            layer.kept &= live[layer.to]
+            if k + 1 < len(self._layers) and self._few(layer, self._layers[k + 1], k + 1):
+                ahead = self._layers[k + 1]
+                self.pairs += keep_back(
+                    self._packed, self._step, self._bound, self._lead_a, k,
+                    layer.begin, layer.to, ahead.begin, ahead.to, ahead.kept, layer.kept,
+                )  # fmt: skip
+            # Cells of the next layer stay only where a kept step leads to them, too.
+            reached = np.zeros(start[k + 2] - start[k + 1], np.bool_)
+            reached[layer.to[layer.kept] - start[k + 1]] = True
+            live[start[k + 1] : start[k + 2]] &= reached
+            cell = np.repeat(np.arange(start[k], start[k + 1]), np.diff(layer.begin))
+            live[cell[layer.kept]] = True
+        return live
+
+    def _steps_from(self, k: int, live: Bools) -> _Layer | None:
+        """Return the steps from the live cells of layer k; None where they are too many."""
+        start = self._packed.start
+        count = np.zeros(start[k + 1] - start[k], np.int64)
+        count_steps(self._packed, self._step, self._lead_v, k, live, count)
+        begin = np.concatenate([[0], np.cumsum(count)])
+        self._steps += int(begin[-1])
+        if self._steps > MOST_STEPS:
+            self.left = True
+            return None
+        to = np.empty(begin[-1], np.int64)
+        list_steps(self._packed, self._step, self._lead_v, k, live, begin, to)
+        return _Layer(begin, to, np.ones(len(to), np.bool_))
+
+    def _few(self, layer: _Layer, ahead: _Layer, k: int) -> bool:
+        """Return whether the pairs of steps over layer k are few enough to be tested."""
+        onward = np.diff(ahead.begin)[layer.to[layer.kept] - self._packed.start[k]]
+        return bool(onward.sum() <= EACH_PAIRS)
+
+    def _closed(self, k: int, limit: Literal["velocity", "acceleration"], live: Bools) -> Closed:
+        """Return where it is closed: from node k no step leads on."""
+        blame = np.zeros(len(self._bound), np.int64)
+        if limit == "velocity":
+            blame_steps(self._packed, self._step, k, live, blame)
+        else:
+            before, layer = self._layers[-2:]
+            blame_bends(
+                self._packed, self._step, self._bound, self._lead_a, k - 1,
+                before.begin, before.to, before.kept, layer.begin, layer.to, blame,
+            )  # fmt: skip
+        return Closed(node=k, joint=int(np.argmax(blame)), limit=limit)

@@ -1,0 +1,217 @@
+"""An outer approximation of all motions: which steps, and pairs of steps, cells of gamma admit.
+
+On a cell the joints are q(t) = c + s t + [k] t^2 / 2 +- r (`kernels.reduced`). A step from cell
+a to b keeps (5) only if, for any factor f and joints i and r,
+
+    |D_i - f D_r| <= v_i + |f| v_r + w(a) + w(b),    D = c_b - c_a,
+
+w the most by which q_i - f q_r may differ from its value in the middle of the cell; two steps from
+a over b to c keep (6) only if
+
+    |B_i - f B_r| <= a_i + |f| a_r + w(a) + 2 w(b) + w(c),    B = D_bc - D_ab.
+
+With f = 0 both are tests of one joint. With f = s_i / s_r, r the joint that gamma moves most, what
+is not known of gamma drops out but for curvature: they tell what no choice of gamma can mend.
+"""
+
+from __future__ import annotations
+
+from math import pi
+
+import numpy as np
+
+from kerfpath._arrays import Array, Bools, Ints
+from kerfpath.kernels._jit import jit, jit_inline
+from kerfpath.kernels.reduced import SLACK, Cells, Step, near, window
+
+__all__ = ["blame_bends", "blame_steps", "count_steps", "keep_back", "keep_on", "list_steps"]
+
+
+@jit_inline
+def _wide(cells: Cells, a: int, i: int, r: int, f: float) -> float:
+    """Return the most by which q_i - f q_r differs on cell a from its value in the middle."""
+    h = cells.half[a]
+    slope = abs(cells.slope[a, i] - f * cells.slope[a, r])
+    bend = abs(cells.bend[a, i] - f * cells.bend[a, r])
+    wide: float = slope * h + bend * h * h / 2.0 + cells.spread[a, i] + abs(f) * cells.spread[a, r]
+    return wide
+
+
+@jit_inline
+def _factor(cells: Cells, b: int, i: int, r: int) -> float:
+    """Return the factor f with which gamma drops out of q_i - f q_r on cell b."""
+    s = cells.slope[b, r]
+    return cells.slope[b, i] / s if s != 0.0 and i != r else 0.0
+
+
+@jit_inline
+def _steps(cells: Cells, step: Step, lead: Ints, a: int, b: int, out_D: Array) -> bool:
+    """Fill D; return whether a step from cell a to b may keep (5)."""
+    status = near(cells, step, a, b, out_D)
+    if status != 1:
+        return status > 0
+    r = lead[b]
+    for i in range(len(out_D)):
+        f = _factor(cells, b, i, r)
+        if f != 0.0:
+            d = out_D[i] - f * out_D[r]
+            wide = step.velocity[i] + abs(f) * step.velocity[r]
+            wide += _wide(cells, a, i, r, f) + _wide(cells, b, i, r, f)
+            if abs(d) > wide + SLACK * (abs(out_D[i]) + abs(f * out_D[r]) + wide):
+                return False
+    return True
+
+
+@jit_inline
+def _increment(cells: Cells, step: Step, a: int, b: int, i: int) -> tuple[float, bool]:
+    """Return D_i from cell a to b, endless joints the short way, and whether that is the way."""
+    d = cells.center[b, i] - cells.center[a, i]
+    if not step.endless[i]:
+        return d, True
+    d -= 2.0 * pi * np.rint(d / (2.0 * pi))
+    return d, abs(d) + cells.box[a, i] + cells.box[b, i] <= pi
+
+
+@jit_inline
+def _bent_by(
+    cells: Cells, step: Step, bound: Array, lead: Ints, a: int, b: int, c: int, D: Array
+) -> int:
+    """Return a joint that keeps two steps from cell a over b to c from (6); -1 where none does.
+
+    ``D`` (2, n) is room for the bends and for whether they are the ones meant.
+    """
+    n = len(bound)
+    for i in range(n):
+        d, one = _increment(cells, step, a, b, i)
+        e, two = _increment(cells, step, b, c, i)
+        D[0, i], D[1, i] = e - d, 1.0 if one and two else 0.0
+        wide = bound[i] + cells.box[a, i] + 2.0 * cells.box[b, i] + cells.box[c, i]
+        if one and two and abs(e - d) > wide * (1.0 + SLACK):
+            return i
+    r = lead[b]
+    if D[1, r] == 0.0:
+        return -1
+    for i in range(n):
+        f = _factor(cells, b, i, r)
+        if f != 0.0 and D[1, i] > 0.0:
+            wide = bound[i] + abs(f) * bound[r] + _wide(cells, a, i, r, f)
+            wide += 2.0 * _wide(cells, b, i, r, f) + _wide(cells, c, i, r, f)
+            size = abs(D[0, i]) + abs(f * D[0, r]) + wide
+            if abs(D[0, i] - f * D[0, r]) > wide + SLACK * size:
+                return i
+    return -1
+
+
+@jit
+def count_steps(cells: Cells, step: Step, lead: Ints, k: int, live: Bools, out_count: Ints) -> None:
+    """Count the steps (5) from each live cell of layer k to live cells of layer k + 1."""
+    run, D = np.empty(2, np.int64), np.empty(len(step.velocity))
+    for a in range(cells.start[k], cells.start[k + 1]):
+        count = 0
+        if live[a]:
+            window(cells, step, a, k, run)
+            for b in range(run[0], run[1]):
+                if live[b] and _steps(cells, step, lead, a, b, D):
+                    count += 1
+        out_count[a - cells.start[k]] = count
+
+
+@jit
+def list_steps(
+    cells: Cells, step: Step, lead: Ints, k: int, live: Bools, begin: Ints, out_to: Ints
+) -> None:
+    """Fill the cells that the steps counted by `count_steps` lead to, begin (C_k + 1,) by cell."""
+    run, D = np.empty(2, np.int64), np.empty(len(step.velocity))
+    first = cells.start[k]
+    for a in range(first, cells.start[k + 1]):
+        p, last = begin[a - first], begin[a - first + 1]
+        if p == last:
+            continue
+        window(cells, step, a, k, run)
+        for b in range(run[0], run[1]):
+            if p < last and live[b] and _steps(cells, step, lead, a, b, D):
+                out_to[p] = b
+                p += 1
+
+
+@jit
+def keep_on(
+    cells: Cells, step: Step, bound: Array, lead: Ints, k: int,
+    begin: Ints, to: Ints, kept: Bools, begin_on: Ints, to_on: Ints, out_kept: Bools,
+) -> int:  # fmt: skip
+    """Mark the steps from layer k + 1 that keep (6) after some kept step from k; return the tests.
+
+    ``begin``, ``to``, ``kept`` are of the steps from layer k, ``begin_on``, ``to_on`` of those on.
+    """
+    first, second, tests = cells.start[k], cells.start[k + 1], 0
+    D, missing = np.empty((2, len(bound))), np.diff(begin_on)
+    for a in range(first, second):
+        for p in range(begin[a - first], begin[a - first + 1]):
+            b = to[p]
+            if not kept[p] or missing[b - second] == 0:
+                continue
+            for e in range(begin_on[b - second], begin_on[b - second + 1]):
+                if not out_kept[e]:
+                    tests += 1
+                    if _bent_by(cells, step, bound, lead, a, b, to_on[e], D) < 0:
+                        out_kept[e] = True
+                        missing[b - second] -= 1
+    return tests
+
+
+@jit
+def keep_back(
+    cells: Cells, step: Step, bound: Array, lead: Ints, k: int,
+    begin: Ints, to: Ints, begin_on: Ints, to_on: Ints, kept_on: Bools, out_kept: Bools,
+) -> int:  # fmt: skip
+    """Drop the steps from layer k that keep (6) before no kept step on; return the tests."""
+    first, second, tests = cells.start[k], cells.start[k + 1], 0
+    D = np.empty((2, len(bound)))
+    for a in range(first, second):
+        for p in range(begin[a - first], begin[a - first + 1]):
+            if not out_kept[p]:
+                continue
+            b, goes = to[p], False
+            for e in range(begin_on[b - second], begin_on[b - second + 1]):
+                if kept_on[e]:
+                    tests += 1
+                    if _bent_by(cells, step, bound, lead, a, b, to_on[e], D) < 0:
+                        goes = True
+                        break
+            out_kept[p] = goes
+    return tests
+
+
+@jit
+def blame_steps(cells: Cells, step: Step, k: int, live: Bools, out_blame: Ints) -> None:
+    """Count the steps from live cells of layer k that break (5), by the joint most over."""
+    for a in range(cells.start[k], cells.start[k + 1]):
+        if not live[a]:
+            continue
+        for b in range(cells.start[k + 1], cells.start[k + 2]):
+            worst, most = 0, -1.0
+            for i in range(len(out_blame)):
+                d = _increment(cells, step, a, b, i)[0]
+                over = (abs(d) - cells.box[a, i] - cells.box[b, i]) / step.velocity[i]
+                if over > most:
+                    worst, most = i, over
+            if live[b]:
+                out_blame[worst] += 1
+
+
+@jit
+def blame_bends(
+    cells: Cells, step: Step, bound: Array, lead: Ints, k: int,
+    begin: Ints, to: Ints, kept: Bools, begin_on: Ints, to_on: Ints, out_blame: Ints,
+) -> None:  # fmt: skip
+    """Count, by joint, the pairs of steps over layer k + 1 that break (6)."""
+    first, second = cells.start[k], cells.start[k + 1]
+    D = np.empty((2, len(bound)))
+    for a in range(first, second):
+        for p in range(begin[a - first], begin[a - first + 1]):
+            if kept[p]:
+                b = to[p]
+                for e in range(begin_on[b - second], begin_on[b - second + 1]):
+                    joint = _bent_by(cells, step, bound, lead, a, b, to_on[e], D)
+                    if joint >= 0:
+                        out_blame[joint] += 1

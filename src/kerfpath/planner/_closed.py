@@ -1,0 +1,70 @@
+"""Whether a task has a motion at all, at any gamma, posture and turn."""
+
+from __future__ import annotations
+
+from math import sqrt
+
+from kerfpath.certifier import MotionTest
+from kerfpath.errors import NoFeasiblePath
+from kerfpath.planner._task import PlanningTask
+
+__all__ = ["at_any_gamma", "impossible_share", "motion_test"]
+
+MOST_NODES = 5_000
+"""Nodes up to which cells of all of them are held at once: some 200 MB."""
+FAR, CLOSE = 300.0, 1.02
+"""Multiples of a speed: up to which one that is impossible is looked for, and how close to the
+fastest that may be possible."""
+
+
+def motion_test(task: PlanningTask) -> MotionTest | None:
+    """Return the test of a task for motions at any gamma; None where nothing can be proved.
+
+    What else a plan keeps (a cell, comfort, a closure, a limit on the rotation) only leaves fewer.
+    """
+    asked = task.settings
+    if not task.robot.encloses or asked.tilt is not None or len(task.contour) > MOST_NODES:
+        return None
+    frames = task.T_base_part @ task.contour.frames(asked.frames)
+    return MotionTest(task.robot, frames, task.T_flange_tip, asked.postures)
+
+
+def at_any_gamma(broken: NoFeasiblePath, task: PlanningTask) -> NoFeasiblePath:
+    """Return what a search found to be broken, and whether it is so at every gamma."""
+    test = motion_test(task)
+    if test is None or task.settings.feed == "dip":
+        return broken
+    limits = task.problem.limits
+    closed = test.closed(limits, task.dt) or test.closed(limits, task.dt, broken.node + 1)
+    if closed is None:
+        return broken.with_message(f"{broken}; whether there is a motion off the grid is undecided")
+    return broken.with_message(f"{broken}; proved for every rotation: {closed}", closed=closed)
+
+
+def impossible_share(task: PlanningTask, reached: float, node: int) -> float | None:
+    """Return an interval, as a share of `reached` s, too short for any motion at any gamma.
+
+    Proved for it and so for every shorter one; `node` is where a limit binds a motion that takes
+    `reached`. None where nothing is proved.
+    """
+    test = motion_test(task)
+    if test is None:
+        return None
+    limits = task.problem.limits
+
+    def impossible(times: float) -> bool:
+        """Return whether no motion is so many times as fast, first by what is about the node."""
+        return any(test.closed(limits, reached / times, at) is not None for at in (node, None))
+
+    low, high = 1.0, 2.0
+    while not impossible(high):
+        low, high = high, high * high
+        if high > FAR:
+            return None
+    while high > CLOSE * low:
+        middle = sqrt(low * high)
+        if test.closed(limits, reached / middle, node) is not None:
+            high = middle
+        else:
+            low = middle
+    return 1 / high
