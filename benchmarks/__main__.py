@@ -28,6 +28,9 @@ NAMES = (
     "pareto",
     "sweeps",
     "layout",
+    "continuum",
+    "continuum_random",
+    "continuum_bounds",
 )
 
 
@@ -115,6 +118,18 @@ def _run(name: str, *, quick: bool) -> list[Report]:
         from benchmarks import refinement
 
         return refinement.run(quick=quick)
+    if name == "continuum":
+        from benchmarks import continuum
+
+        return continuum.run(quick=quick)
+    if name == "continuum_random":
+        from benchmarks import continuum_random
+
+        return continuum_random.run(quick=quick)
+    if name == "continuum_bounds":
+        from benchmarks import continuum_bounds
+
+        return continuum_bounds.run(quick=quick)
     if name == "collision":
         from benchmarks import collision
 
