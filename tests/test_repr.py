@@ -102,7 +102,7 @@ def test_what_a_job_comes_to_is_said_in_lines(tmp_path):
     assert all("\n" not in line for said in kinds.values() for line in said)
     (plan, *_) = outcome.plans
     assert repr(plan).startswith(f"Plan({plan.name!r}, {len(plan.q)} nodes, ")
-    assert "best of its grid" in repr(plan)
+    assert f", gap {plan.proof.gap_shown} %, " in repr(plan)
     assert repr(plan.robot).startswith("Robot('abb_irb4600_60_205', ABB IRB 4600")
     assert repr(part) == "Part('b_pillar.step', 54 faces, 122 loops, 1200.0 x 325.2 x 116.8 mm)"
 
