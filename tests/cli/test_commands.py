@@ -291,6 +291,18 @@ def test_an_older_program_in_the_folder_is_pointed_out(folder):
     assert "is from an earlier run and does not belong to this plan" in result.stderr
 
 
+def test_a_refusal_says_that_no_rotation_would_do(folder, fastest):
+    asked = f"speed_m_min = {1.3 * fastest['impossible_from_m_min']}"
+    (folder / "never.toml").write_text(SMALL.replace("speed_m_min = 3", asked, 1))
+    result = run("plan", "never.toml", "--out", "never", "--json", cwd=folder)
+    assert result.returncode == 1
+    entry = json.loads(result.stdout)["contours"][0]
+    assert entry["proved_for"] == "every gamma"
+    assert "proved for every rotation: no motion goes on from node" in entry["reason"]
+    said = re.search(r"impossible at any rotation from ([\d.]+) m/min on", entry["reason"])
+    assert float(said[1]) == pytest.approx(fastest["impossible_from_m_min"], rel=0.05)
+
+
 def test_speed_names_the_fastest_and_what_binds(folder, fastest):
     result = run("speed", "small.toml", cwd=folder)
     assert result.returncode == 0, result.stderr

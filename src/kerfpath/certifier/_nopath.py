@@ -8,6 +8,7 @@ from typing import Literal
 import numpy as np
 
 from kerfpath._arrays import Array, Bools, Ints, freeze
+from kerfpath._repr import short_repr
 from kerfpath.certifier._cells import CellMaker, CellSet
 from kerfpath.certifier._stage import Steps, pack, widest_apart
 from kerfpath.errors import Closed
@@ -37,13 +38,15 @@ EACH_PAIRS = 1_000_000
 """Pairs of steps over one node up to which (6) is tested in a round."""
 
 
-@dataclass(slots=True)
+@dataclass(slots=True, eq=False)
 class _Layer:
     """The steps from the cells of one layer: begin (C_k + 1,), to (E,), and which are kept (E,)."""
 
     begin: Ints
     to: Ints
     kept: Bools
+
+    __repr__ = short_repr
 
 
 class MotionTest:

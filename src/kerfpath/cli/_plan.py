@@ -144,6 +144,7 @@ def _cut_entry(cut: CutResult) -> dict[str, object]:
             "reason": cut.failure,
             "last_node_reached": cut.broken.node,
             "proved": cut.broken.proved,
+            "proved_for": cut.broken.scope,
             "fastest_speed_m_s": fastest,
         }
     criteria = cut.plan.criteria

@@ -48,6 +48,8 @@ class Remedy:
         Keys of the shares of a limit above those asked for, and their values.
     closed : tuple of str
         Keys whose shares up to 1 all leave the way closed.
+    never : str or None
+        Speed, m/min, from which on no motion is possible at any rotation, where that is proved.
     """
 
     other_method: bool
@@ -56,6 +58,7 @@ class Remedy:
     refined: str | None = None
     shares: Mapping[str, str] = field(default_factory=dict)
     closed: tuple[str, ...] = ()
+    never: str | None = None
 
     __repr__ = short_repr
 
@@ -73,6 +76,8 @@ class Remedy:
             said += f"; at the speed asked for with {ways}"
         if self.closed:
             said += f"; no {' and no '.join(self.closed)} up to 1 is enough there"
+        if self.never is not None:
+            said += f"; proved impossible at any rotation from {self.never} m/min on"
         return f"{said}; {FINER}"
 
 
@@ -159,8 +164,12 @@ def find_remedy(
     other = job.options.method != "exact"
     if other and trial.opens(trial.on_grid, trial.asked):
         return Remedy(other_method=True), None
+    # At another speed other nodes follow from a time step: of them nothing would be proved.
+    ceiling = job.options.method == "continuous" and request.task.time_step is None
     try:
-        fastest = fastest_along(job, candidate.nodes, cell, refine=job.options.refine, graph=graph)
+        fastest = fastest_along(
+            job, candidate.nodes, cell, refine=job.options.refine, graph=graph, ceiling=ceiling
+        )
     except NoFeasiblePath:
         return None
     grid = fastest.speed if fastest.on_grid is None else fastest.on_grid
@@ -179,6 +188,7 @@ def find_remedy(
         refined=refined,
         shares=shares,
         closed=closed,
+        never=None if fastest.ceiling is None else at_least(fastest.ceiling * 60),
     )
     return made, fastest
 
