@@ -164,8 +164,10 @@ class Weighed:
         )
 
 
-def weigh(name: str, index: int, task: Task, gap: float = GAP) -> Weighed:
-    """Plan a task by both methods, and certify the continuous plan."""
+def weigh(
+    name: str, index: int, task: Task, *, gap: float = GAP, seconds: float | None = None
+) -> Weighed:
+    """Plan a task by both methods, and certify the continuous plan (arguments as `certify`)."""
     here, there = task.made(), task.on_grid().made()
     weighed = Weighed(
         name=name,
@@ -181,7 +183,7 @@ def weigh(name: str, index: int, task: Task, gap: float = GAP) -> Weighed:
     if here.plan is None:
         return weighed
     start = perf_counter()
-    proved = certify(here.plan, gap=gap)
+    proved = certify(here.plan, gap=gap, seconds=seconds)
     taken = perf_counter() - start
     proof, share = proved.plan.proof, np.abs(here.plan.acceleration_share)
     limit = AT_LIMIT * task.options.eta_a

@@ -127,7 +127,7 @@ def _words(value: float | None, pattern: str) -> str:
 
 def _step_row(job: Job, nodes: Contour, speed: float, step: float) -> _Row:
     """Plan a contour of the job on a grid of this step, deg, and refine the plan."""
-    options = replace(job.options, gamma_step=np.radians(step), refine=False)
+    options = replace(job.options, method="exact", gamma_step=np.radians(step), refine=False)
     space: dict[str, Any] = {"tool": job.tool, "placement": job.placement}
     start = perf_counter()
     graph = job.graph(nodes, options)
@@ -190,7 +190,15 @@ class _Wave:
         return layered_graph(self.contour, self.robot, **self.space)
 
     def plan(self, graph: LayeredGraph | None = None, *, refine: bool = True) -> Plan:
-        return plan(self.contour, self.robot, speed=SPEED, graph=graph, refine=refine, **self.space)
+        return plan(
+            self.contour,
+            self.robot,
+            speed=SPEED,
+            graph=graph,
+            method="exact",
+            refine=refine,
+            **self.space,
+        )
 
 
 def _whole(*, quick: bool) -> Report:
