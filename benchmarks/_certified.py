@@ -10,6 +10,7 @@ from multiprocessing import get_context
 from os import environ
 from time import perf_counter
 from typing import TypeVar
+from unittest.mock import patch
 
 import numpy as np
 
@@ -200,17 +201,16 @@ def weigh(
 
 def in_processes(call: Callable[[_K], _R], keys: Sequence[_K], processes: int) -> list[_R]:
     """Return what a call makes of each key, in processes of one thread, kernels compiled before."""
-    environ["NUMBA_NUM_THREADS"] = "1"
-    try:
-        with ProcessPoolExecutor(
+    with (
+        patch.dict(environ, NUMBA_NUM_THREADS="1"),
+        ProcessPoolExecutor(
             processes,
             mp_context=get_context("spawn"),
             initializer=_begin,
             initargs=(call, keys[0]),
-        ) as pool:
-            return list(pool.map(call, keys))
-    finally:
-        del environ["NUMBA_NUM_THREADS"]
+        ) as pool,
+    ):
+        return list(pool.map(call, keys))
 
 
 def _begin(call: Callable[[_K], object], key: _K) -> None:

@@ -121,10 +121,11 @@ def _near_fastest(count: int) -> Report:
     gaps = [100 * w.gap for w in planned if w.gap is not None]
     missed = [w for w in made if w.cost is None and w.best is not None]
     near = sum(e <= 100 * NEAR for e in excess)
+    above = sum(_is_above(w.bound, w.cost, w.grid_cost, w.best) for w in made)
     findings = [
         f"{len(planned)} of {len(made)} planned; {near} within {100 * NEAR:g} % of the best known",
         f"no plan where a start finds one: {len(missed)}" + "".join(f"; {w}" for w in missed),
-        f"bounds above a cost: {sum(_is_above(w.bound, w.cost, w.best) for w in made)}",
+        f"bounds above a cost: {above}",
     ]
     if excess and gaps:
         findings.append(
