@@ -51,7 +51,7 @@ class Case:
         """Return the plan, in a cell or without, on a graph kept or built anew."""
         return plan(
             self.contour, self.robot, speed=self.speed, graph=graph, cell=cell, tool=self.tool,
-            placement=self.placement, gamma_step=self.gamma_step,
+            placement=self.placement, gamma_step=self.gamma_step, method="exact",
         )  # fmt: skip
 
 

@@ -10,6 +10,7 @@ from multiprocessing import get_context
 from os import environ
 from time import perf_counter
 from typing import TypeVar
+from unittest.mock import patch
 
 import numpy as np
 
@@ -164,8 +165,10 @@ class Weighed:
         )
 
 
-def weigh(name: str, index: int, task: Task, gap: float = GAP) -> Weighed:
-    """Plan a task by both methods, and certify the continuous plan."""
+def weigh(
+    name: str, index: int, task: Task, *, gap: float = GAP, seconds: float | None = None
+) -> Weighed:
+    """Plan a task by both methods, and certify the continuous plan (arguments as `certify`)."""
     here, there = task.made(), task.on_grid().made()
     weighed = Weighed(
         name=name,
@@ -181,7 +184,7 @@ def weigh(name: str, index: int, task: Task, gap: float = GAP) -> Weighed:
     if here.plan is None:
         return weighed
     start = perf_counter()
-    proved = certify(here.plan, gap=gap)
+    proved = certify(here.plan, gap=gap, seconds=seconds)
     taken = perf_counter() - start
     proof, share = proved.plan.proof, np.abs(here.plan.acceleration_share)
     limit = AT_LIMIT * task.options.eta_a
@@ -198,17 +201,16 @@ def weigh(name: str, index: int, task: Task, gap: float = GAP) -> Weighed:
 
 def in_processes(call: Callable[[_K], _R], keys: Sequence[_K], processes: int) -> list[_R]:
     """Return what a call makes of each key, in processes of one thread, kernels compiled before."""
-    environ["NUMBA_NUM_THREADS"] = "1"
-    try:
-        with ProcessPoolExecutor(
+    with (
+        patch.dict(environ, NUMBA_NUM_THREADS="1"),
+        ProcessPoolExecutor(
             processes,
             mp_context=get_context("spawn"),
             initializer=_begin,
             initargs=(call, keys[0]),
-        ) as pool:
-            return list(pool.map(call, keys))
-    finally:
-        del environ["NUMBA_NUM_THREADS"]
+        ) as pool,
+    ):
+        return list(pool.map(call, keys))
 
 
 def _begin(call: Callable[[_K], object], key: _K) -> None:

@@ -33,13 +33,13 @@ joint vector with all judged pairs: "all distances" finds each exactly, "clear o
 bounds tell."""
 
 LAZY = """\
-`plan(cell=)`, vertices and motions between them checked, second-order limits on; with the layered
-graph given, and building it. Looked at: vertices that the search asked about; measured: those at
-which any distance was computed. Every vertex: `Cell.clear` on a random sample of the graph, its
-time scaled up to all of it; every edge: `Cell.clear_motion` on a random sample of edges between
-clear vertices that keep the velocity limit, scaled up likewise. A task of 200 nodes x 10 degrees
-has taken Tesseract's Descartes 581 s with its edge checks on (one run, in a scene of its own).
-Exhaustive: a smaller wave with every vertex and every edge checked and the brute second-order
+`plan(cell=)` by method "exact", vertices and motions between them checked, second-order limits on;
+with the layered graph given, and building it. Looked at: vertices that the search asked about;
+measured: those at which any distance was computed. Every vertex: `Cell.clear` on a random sample of
+the graph, its time scaled up to all of it; every edge: `Cell.clear_motion` on a random sample of
+edges between clear vertices that keep the velocity limit, scaled up likewise. A task of 200 nodes x
+10 degrees has taken Tesseract's Descartes 581 s with its edge checks on (one run, in a scene of its
+own). Exhaustive: a smaller wave with every vertex and every edge checked and the brute second-order
 recursion over what is clear. One run each."""
 
 MAPS = """\

@@ -45,9 +45,9 @@ second. Bound: what `certify` proves that no motion can fall below, asked for a 
 cores."""
 
 HOW_STEPS = """\
-Contours of the demo job, and their first ones of the random contours, planned over continuous gamma
-whose value function is sampled in coarse and in fine steps; and, in the same run, on grids of these
-steps, refined. Spread: the dearest over the cheapest of the same method, less one."""
+Contours of the demo job, planned over continuous gamma whose value function is sampled in coarse
+and in fine steps; and, in the same run, on grids of these steps, refined. Spread: the dearest over
+the cheapest of the same method, less one. One run each, the graph in the seconds of a plan."""
 
 
 def run(*, quick: bool) -> list[Report]:

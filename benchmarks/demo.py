@@ -23,8 +23,7 @@ CLOCKS = {
     "compile (cold only)": ("kerfpath.job", "warm_up"),
     "read STEP": ("kerfpath.cli._plan", "drawing_of"),
     "graph": ("kerfpath.job.format._read", "layered_graph"),
-    "search": ("kerfpath.planner._plan", "find_shortest"),
-    "refinement": ("kerfpath.planner._plan", "refine_plan"),
+    "search and refinement": ("kerfpath.planner._continuous", "clear_motion"),
     "audit": ("kerfpath.job.format._read", "checks"),
     "report": ("kerfpath.job.output._files", "report_text"),
 }

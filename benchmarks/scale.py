@@ -35,13 +35,14 @@ times include the preparation of the arrays, and its search yields the path. The
 there is, the fewer edges the brute recursion has to keep."""
 
 HOW_AGAIN = """\
-`plan` on a graph that is kept, after a change of weights, eta_v or eta_a: what a slider of the
-studio or a task of a sweep asks for."""
+`plan(method="exact")` on a graph that is kept, after a change of weights, eta_v or eta_a: what a
+slider of the studio or a task of a sweep asks for."""
 
 HOW_FAR = """\
-`plan` end to end, from the contour to the plan, gamma every 2 degrees, in a fresh process whose
-kernels a plan of 100 nodes has loaded. The same contour with more nodes. Time per node is that of
-all cores together; memory is the peak of the whole process, interpreter and libraries with it."""
+`plan(method="exact")` end to end, from the contour to the plan, gamma every 2 degrees, in a fresh
+process whose kernels a plan of 100 nodes has loaded. The same contour with more nodes. Time per
+node is that of all cores together; memory is the peak of the whole process, interpreter and
+libraries with it."""
 
 
 def run(*, quick: bool) -> list[Report]:
@@ -134,6 +135,7 @@ def _again(nodes: int, samples: int, runs: int) -> Report:
             weights=np.array([1, 1, 1, scale, scale, scale]) / (velocity * dt),
             eta_v=eta_v,
             eta_a=eta_a,
+            method="exact",
             graph=graph,
         ).cost
 
@@ -181,6 +183,7 @@ def _whole_plan(nodes: int) -> tuple[float, float, float, int]:
         placement=_arm.placement(),
         speed=SPEED,
         gamma_step=np.radians(2),
+        method="exact",
     )
     task(_arm.wave(100))
     contour = _arm.wave(nodes)

@@ -7,12 +7,16 @@ import numpy as np
 import pytest
 from benchmarks import (
     _arm,
+    _certified,
     _dense,
     _figures,
     _following,
+    _narrow,
     _process,
     _random_contours,
+    _starts,
     _tally,
+    continuum_random,
     part,
 )
 
@@ -96,7 +100,12 @@ def cut():
         task = _random_contours.cut(name, index)
         try:
             made = kerfpath.plan(
-                task.contour, task.robot, speed=task.speed, graph=task.graph, **task.options
+                task.contour,
+                task.robot,
+                speed=task.speed,
+                graph=task.graph,
+                method="exact",
+                **task.options,
             )
         except kerfpath.NoFeasiblePath:
             continue
@@ -226,3 +235,80 @@ def test_the_nearest_order_goes_on_to_the_nearest_that_may_come():
     nearest = part.nearest_first
     assert nearest(between, []) == [0, 1, 2, 3]
     assert nearest(between, [(3, 0), (1, 0)]) == [2, 1, 3, 0]
+
+
+def test_both_methods_are_weighed_on_the_same_task(cut):
+    task, made = cut
+    asked = _certified.Task(
+        contour=task.contour,
+        robot=task.robot,
+        tool=task.tool,
+        placement=np.eye(4),
+        speed=task.speed,
+        options=kerfpath.PlanOptions(),
+    )
+    weighed = _certified.weigh("cut", 0, asked, gap=0.05)
+    assert weighed.grid_cost <= made.cost  # refined from this very path, among others
+    assert weighed.bound <= min(weighed.cost, weighed.grid_cost)
+    assert weighed.gap == pytest.approx(1 - weighed.bound / weighed.cost)
+    assert asked.on_grid().options.method == "exact"
+    assert asked.on_grid(gamma_step=0.1).options.gamma_step == 0.1
+
+
+def test_a_plan_that_is_shaken_only_becomes_better(cut):
+    _, made = cut
+    found = list(_starts.shaken(made, np.random.default_rng(3)))
+    costs = [made.cost, *(one.cost for one in found)]
+    assert found
+    assert costs == sorted(costs, reverse=True)
+
+
+def test_samples_of_gamma_are_moved_with_the_tool(cut):
+    task, made = cut
+    moved = np.radians(0.3)
+    tool = task.tool @ _starts._about_beam(moved)
+    T = np.asarray(made.robot.forward(made.q)) @ tool
+    points = task.contour.points
+    # Turning about the beam leaves tip and axis where they are; a chain of products near one metre.
+    np.testing.assert_allclose(T[:, :3, 3], points, atol=1e-9)
+    np.testing.assert_allclose(T[:, :3, 2], task.contour.axes, atol=1e-9)
+
+
+def test_a_narrow_task_leaves_the_joints_little_room():
+    task = _narrow.narrow_task(np.random.default_rng([17, 1]))
+    again = _narrow.narrow_task(np.random.default_rng([17, 1]))
+    made = task.made().plan
+    assert 10 <= len(task.contour) <= 20
+    assert np.array_equal(task.robot.lower, again.robot.lower)
+    assert (made.q >= task.robot.lower - 1e-8).all()
+    assert (made.q <= task.robot.upper + 1e-8).all()
+
+
+def test_the_findings_name_what_asks_for_a_look():
+    def weighed(index, cost, grid_cost, bound, seconds=1.0):
+        gap = None if cost is None else 1 - bound / cost
+        return _certified.Weighed(
+            name="r",
+            index=index,
+            nodes=9,
+            cost=cost,
+            grid_cost=grid_cost,
+            bound=bound,
+            gap=gap,
+            seconds=1.0,
+            graph_seconds=1.0,
+            grid_seconds=1.0,
+            grid_graph_seconds=1.0,
+            certificate_seconds=seconds,
+        )
+
+    made = [
+        weighed(0, 10.0, 9.0, 8.0),
+        weighed(1, 10.0, None, 10.0, seconds=99.0),
+        weighed(2, None, 10.0, None),
+        weighed(3, 10.0, 9.8, 9.9),
+    ]
+    counts = [text.split(": ")[1].split(";")[0] for text in continuum_random._findings(made)]
+    assert counts == ["1", "2", "1", "1", "1"]
+    row = continuum_random._row("all", made)
+    assert row[1:7] == ("4", "3", "3", "1", "1", "2")
