@@ -13,6 +13,7 @@ import pytest
 from hypothesis import settings
 
 from kerfpath import apart
+from kerfpath.certifier import _certify
 from kerfpath.contour import Contour
 from kerfpath.options import PlanOptions
 from kerfpath.robots import robot
@@ -33,9 +34,18 @@ def pose(xyz, rotation=None):
     return T
 
 
-# A plan states a bound by default, which takes a second or so. Tests ask for it where they are
-# about it; the processes that they start (the command line) state it as a user sees it.
+# A plan states a bound by default, which takes seconds. Tests ask for it where they are about it,
+# and jobs get a little of it; the processes that tests start state it as a user sees it.
 PlanOptions.__init__.__kwdefaults__["certify"] = None
+USUAL_WORK = _certify.MOST_PAIRS, _certify.MOST_PER_NODE
+_certify.MOST_PAIRS, _certify.MOST_PER_NODE = 1_500_000, 0
+
+
+@pytest.fixture
+def certifier_at_work(monkeypatch):
+    """Let the certifier work as much as outside the tests."""
+    monkeypatch.setattr(_certify, "MOST_PAIRS", USUAL_WORK[0])
+    monkeypatch.setattr(_certify, "MOST_PER_NODE", USUAL_WORK[1])
 
 
 @pytest.fixture(scope="session", autouse=True)

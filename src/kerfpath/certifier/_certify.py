@@ -37,7 +37,7 @@ MOST_PAIRS, MOST_PER_NODE = 10_000_000, 60_000
 """Steps from cell to cell that are looked at, and for each node, unless a time is given."""
 MOST_CELLS = 2_000_000
 """Cells of a stage after which it is left at that: some 2 GB."""
-CLEARLY = 0.02
+CLEARLY = 0.1
 """Share of its cost by which the motions through a cell of level `FINE` are dearer than the plan
 where it drops out, four times as much a level coarser: whoever checks the certificate has
 enclosures of his own, and may find less. `SAME` where nobody does: rounding."""
