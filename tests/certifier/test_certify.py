@@ -5,8 +5,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from jobs import DEMO
 from kerfpath import InputError, plan
 from kerfpath.auditor import certified_bound
+from kerfpath.cad import read
 from kerfpath.certificate import BASE
 from kerfpath.certifier import _certify as course
 from kerfpath.certifier import _stage as stages
@@ -14,6 +16,7 @@ from kerfpath.certifier import certify
 from kerfpath.certifier._cells import CellMaker
 from kerfpath.certifier._nodes import between, turning_nodes
 from kerfpath.contour import Contour
+from kerfpath.job import read_job
 from kerfpath.kernels.metric import rho
 from kerfpath.refiner._curves import JointCurves
 from kerfpath.tilt import Tilt
@@ -82,8 +85,17 @@ def test_the_bound_is_close_below_the_plan_and_every_other_motion(
         assert proof.bound <= other.cost
 
 
-def test_the_audit_proves_the_bound_again(made):
-    found = certify(made("manhattan"), gap=0.05)
+@pytest.mark.parametrize("name", ["hole 10", "hole 30 left"])
+def test_the_audit_proves_the_bound_again(name):
+    """A hole of the demo's part: by enclosures and sums of its own."""
+    job = read_job(DEMO / "b_pillar.toml")
+    part = read(job.part_file, unit=job.part_unit)
+    task = next(task for task in job.contours if task.name == name)
+    nodes = task.sample(part.contour(task.pick))
+    space = {"tool": job.tool, "placement": job.placement, "speed": task.speed}
+    options = replace(job.options, certify=None)
+    found = certify(plan(nodes, job.robot, options=options, **space), gap=0.01)
+    assert found.done
     again = certified_bound(found.plan.proof.certificate, found.plan)
     assert found.plan.proof.bound <= again <= found.plan.cost
 

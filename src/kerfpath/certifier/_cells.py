@@ -92,6 +92,8 @@ class CellMaker:
     limits : JointLimits
     postures : sequence of int
         The postures that may be used.
+    width : float
+        How much wider the curvature is taken than it is proved to be.
     """
 
     def __init__(
@@ -101,6 +103,7 @@ class CellMaker:
         T_flange_tip: Array,
         limits: JointLimits,
         postures: Iterable[int],
+        width: float = 1.0,
     ) -> None:
         self._robot, self._frames, self._tool = robot, frames, T_flange_tip
         # A coupling of an endless joint holds on one of its turns, which cells do not know.
@@ -110,7 +113,7 @@ class CellMaker:
             row_lower=limits.row_lower[plain],
             row_upper=limits.row_upper[plain],
         )
-        self._postures = np.array(sorted(postures), np.int8)
+        self._postures, self._width = np.array(sorted(postures), np.int8), width
 
     def coarsest(self, nodes: Ints) -> CellSet:
         """Return the cells of level 0 at some nodes: postures and turns that ranges admit."""
@@ -179,7 +182,8 @@ class CellMaker:
         place[cell, posture] = np.arange(len(cell))
         at, h = (cell, posture), half[cell, None]
         center = found.center[at]
-        spread = found.radius[at] + (found.high[at] - found.low[at]) * h**2 / 4
+        unsure = (found.high[at] - found.low[at]) * h**2 / 4
+        spread = found.radius[at] + self._width * unsure
         made = CellSet(
             node=node[cell],
             posture=posture.astype(np.int8),

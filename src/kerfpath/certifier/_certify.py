@@ -37,10 +37,11 @@ MOST_PAIRS, MOST_PER_NODE = 10_000_000, 60_000
 """Steps from cell to cell that are looked at, and for each node, unless a time is given."""
 MOST_CELLS = 2_000_000
 """Cells of a stage after which it is left at that: some 2 GB."""
-CLEARLY = 0.1
+CLEARLY, WIDER = 0.02, 2.0
 """Share of its cost by which the motions through a cell of level `FINE` are dearer than the plan
 where it drops out, four times as much a level coarser: whoever checks the certificate has
-enclosures of his own, and may find less. `SAME` where nobody does: rounding."""
+enclosures of his own, and may find less. The curvature is taken so much wider, too. Where nobody
+does: `SAME`, rounding."""
 SAME = 1e-9
 
 
@@ -108,7 +109,7 @@ def certify(
     why = _why_not(plan)
     if why:
         return Certified(plan=plan, done=False, statement=f"no bound is proved: {why}")
-    course = _Course(plan, gap, until, CLEARLY if checkable else SAME, progress)
+    course = _Course(plan, gap, until, checkable, progress)
     course.run()
     bound = max(course.best - ALLOWANCE * plan.cost, 0.0)
     reached = (plan.cost - bound) / plan.cost
@@ -151,7 +152,7 @@ class _Course:
     """The stages of one certificate, from coarse cells at a few nodes to fine ones at more."""
 
     def __init__(
-        self, plan: Plan, gap: float, until: float, margin: float, progress: Progress
+        self, plan: Plan, gap: float, until: float, checkable: bool, progress: Progress
     ) -> None:
         robot, asked, dt = plan.robot, plan.settings, float(np.diff(plan.time).max())
         limits = asked.limits(robot)
@@ -162,12 +163,12 @@ class _Course:
             metric=METRIC_CODES[asked.metric],
             endless=robot.endless,
         )
+        self.margin, width = (CLEARLY, WIDER) if checkable else (SAME, 1.0)
         postures = range(robot.postures) if asked.postures is None else asked.postures
         self.maker = CellMaker(
-            robot, plan.frames, plan.T_flange_tip, robot.joint_limits(), postures
+            robot, plan.frames, plan.T_flange_tip, robot.joint_limits(), postures, width
         )
         self.cost, self.until, self.progress = plan.cost, until, progress
-        self.margin = margin
         self.target = plan.cost * min(1.0, 1 - gap + ALLOWANCE)
         self.last = len(plan.q) - 1
         longest = max(1, int(LONGEST / self.steps.velocity.max()))
