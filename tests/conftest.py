@@ -13,6 +13,7 @@ import pytest
 from hypothesis import settings
 
 from kerfpath import apart
+from kerfpath.certificate import USUAL
 from kerfpath.certifier import _certify
 from kerfpath.contour import Contour
 from kerfpath.options import PlanOptions
@@ -39,6 +40,12 @@ def pose(xyz, rotation=None):
 PlanOptions.__init__.__kwdefaults__["certify"] = None
 USUAL_WORK = _certify.MOST_PAIRS, _certify.MOST_PER_NODE
 _certify.MOST_PAIRS, _certify.MOST_PER_NODE = 1_500_000, 0
+
+
+@pytest.fixture
+def certified_by_default(monkeypatch):
+    """Let plans be certified unless they are not to be, as outside the tests."""
+    monkeypatch.setitem(PlanOptions.__init__.__kwdefaults__, "certify", USUAL)
 
 
 @pytest.fixture

@@ -125,6 +125,7 @@ def test_what_is_certified_is_refused_by_its_name(name, value, said):
         Certify(**{name: value})
 
 
+@pytest.mark.usefixtures("certified_by_default")
 def test_plans_are_certified_unless_they_are_not_to_be():
     assert PlanOptions().certify == Certify(gap=0.005, seconds=None, keep=False)
     assert PlanOptions() != PlanOptions(certify=None)

@@ -189,8 +189,8 @@ def test_a_contour_that_is_too_fast_is_told_how_fast_it_could_be(folder, fastest
     result = run("plan", "fast.toml", cwd=folder)
     assert result.returncode == 1
     told = re.search(
-        r"on this grid of the rotation a path exists up to ([\d.]+) m/min(?: with .*)?, refined up to "
-        r"([\d.]+) m/min, where the acceleration", result.stdout,
+        r"on this grid of the rotation a path exists up to ([\d.]+) m/min(?: with .*)?, refined up "
+        r"to ([\d.]+) m/min, where the acceleration", result.stdout,
     )  # fmt: skip
     assert 3 < float(told[1]) < float(told[2]) < 30
     # As `speed` has it, and the limits of a robot cannot be raised.

@@ -6,20 +6,13 @@ import numpy as np
 import pytest
 
 from kerfpath import Certify, Contour, fastest_speed, pareto, plan, plan_in_pieces
-from kerfpath.certificate import USUAL
 from kerfpath.certifier import Certified
-from kerfpath.options import PlanOptions
 from kerfpath.planner import _certified, with_bound
 from kerfpath.plans import Proof
 from kerfpath.sequence import plan_part
 
+pytestmark = pytest.mark.usefixtures("certified_by_default")
 STEP = np.radians(10)
-
-
-@pytest.fixture(autouse=True)
-def as_users_have_it(monkeypatch):
-    """Plans are certified by default, as outside the tests."""
-    monkeypatch.setitem(PlanOptions.__init__.__kwdefaults__, "certify", USUAL)
 
 
 @pytest.fixture

@@ -255,6 +255,7 @@ def test_a_dip_is_never_slower_than_on_the_grid(monkeypatch, corner, arm, tool, 
         monkeypatch.setattr("kerfpath.refiner.ease", lambda plan: plan)
         monkeypatch.setattr("kerfpath.refiner.refine", lambda plan: SimpleNamespace(plan=plan))
     options = {"tool": tool, "placement": placement, "gamma_step": STEP, "feed": "dip"}
+    options["method"] = "exact"
     for speed in (0.2, 0.4):
         grid, off = (plan(corner, arm, speed=speed, refine=r, **options) for r in (False, True))
         assert (off.time[-1], off.cost) <= (grid.time[-1], grid.cost)
@@ -262,7 +263,7 @@ def test_a_dip_is_never_slower_than_on_the_grid(monkeypatch, corner, arm, tool, 
         # The best path without acceleration limits, slowed down, is a plan on the grid, too.
         easy = arm.with_limits(acceleration=np.full(6, 1e6))
         with suppress(NoFeasiblePath):
-            path = plan(corner, easy, speed=speed, tool=tool, placement=placement, gamma_step=STEP)
+            path = plan(corner, easy, speed=speed, **{**options, "feed": "constant"})
             times = retime(path.increments, path.dt, Limits.of(*arm.speed_limits()))
             assert grid.time[-1] <= times.sum() * (1 + 1e-9)
 

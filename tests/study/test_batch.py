@@ -17,15 +17,17 @@ from kerfpath.study import batch
 from kerfpath.sweep import _cluster, _local
 from kerfpath.sweep._store import Store
 
-FAST = SLIT_JOB.replace("speed_m_min = 2", "speed_m_min = 900", 1)
+# Paths of the grid, which turn as far as the comments say.
+SLIT = SLIT_JOB.replace("[plan]", '[plan]\nmethod = "exact"\ncertify = false')
+FAST = SLIT.replace("speed_m_min = 2", "speed_m_min = 900", 1)
 JOBS = {
-    "good": SLIT_JOB,
+    "good": SLIT,
     "fast": FAST,
-    "misspelt": SLIT_JOB.replace("gamma_step", "gama_step"),
-    "unknown": SLIT_JOB.replace('pick = "b"', 'pick = "c"'),
-    "mute": SLIT_JOB + '[program]\nlanguage = "krl"\n',  # whose Status and Turn say no 360 deg
-    "foreign": SLIT_JOB + '[program]\nlanguage = "urscript"\n',
-    "dry": SLIT_JOB + '[program]\nlanguage = "none"\n',
+    "misspelt": SLIT.replace("gamma_step", "gama_step"),
+    "unknown": SLIT.replace('pick = "b"', 'pick = "c"'),
+    "mute": SLIT + '[program]\nlanguage = "krl"\n',  # whose Status and Turn say no 360 deg
+    "foreign": SLIT + '[program]\nlanguage = "urscript"\n',
+    "dry": SLIT + '[program]\nlanguage = "none"\n',
 }
 FILES = {"good.mod", "plan.json", "trajectory.csv", "report.html"}
 

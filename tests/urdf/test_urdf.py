@@ -237,6 +237,7 @@ def test_a_described_robot_is_planned_and_audited(tmp_path, circle, tool, placem
         placement=r.T_base_foot @ placement,
         speed=0.05,
         gamma_step=np.radians(5),
+        method="exact",
     )
     assert audit(made) == []
     # The plan file keeps what the audit needs: where the model stands, and the chain.

@@ -72,6 +72,7 @@ def changed(old, new):
     return JOB.replace(old, new, 1)
 
 
+@pytest.mark.usefixtures("certified_by_default")
 def test_the_example_is_read_into_si(read, folder):
     job = read(JOB)
     assert job.path == folder / "job.toml"
@@ -94,6 +95,7 @@ def test_the_example_is_read_into_si(read, folder):
     assert job.source["contour"][0] == {"pick": "trim", "speed_m_min": 9, "spacing_mm": 2}
 
 
+@pytest.mark.usefixtures("certified_by_default")
 def test_plan_and_program_may_be_left_out(read):
     job = read(JOB[: JOB.index("[plan]")], "9 side-panel.toml")
     assert job.options == PlanOptions(refine=True)

@@ -80,7 +80,7 @@ def test_a_finding_says_contour_node_what_was_expected_and_what_was_found(made, 
 def test_what_is_only_claimed_is_said_to_be(made):
     job, plan = made["part"]
     note = audit_file(plan, job).note
-    assert "Claimed, not verified: that hole, trim is best of its grid and that no order" in note
+    assert "Claimed, not verified: the bound of hole, trim and that no order" in note
 
 
 @pytest.mark.parametrize(

@@ -32,7 +32,7 @@ JOB = WHOLE.replace("0.005", "0.01") + SETTINGS
 def folder(tmp_path_factory):
     folder = tmp_path_factory.mktemp("program")
     shutil.copy(DEMO / "b_pillar.step", folder)
-    (folder / "job.toml").write_text(JOB)
+    (folder / "job.toml").write_text(JOB.replace("[plan]", '[plan]\nmethod = "exact"'))
     result = run("plan", str(folder / "job.toml"), "--out", str(folder / "out"), "--json")
     assert result.returncode == 0, result.stderr
     return folder
@@ -327,7 +327,7 @@ def test_a_measured_part_that_is_none_or_out_of_reach_gives_no_program(folder):
 
 def test_a_plan_on_its_limits_is_planned_again_around_a_part_that_was_measured(folder):
     """Refined, a plan uses all of eta: a part a little off asks for a little more."""
-    (folder / "edge.toml").write_text(SMALL)
+    (folder / "edge.toml").write_text(SMALL.replace("[plan]", '[plan]\nmethod = "exact"'))
     assert run("plan", folder / "edge.toml", "--out", folder / "edge").returncode == 0
     plans = read_plan_file(folder / "edge" / "plan.json").plans
     assert [np.abs(p.acceleration_share).max() > 0.899 for p in plans] == [True, True]
@@ -350,7 +350,7 @@ def test_planning_again_keeps_speed_postures_and_limits(folder, circle, arm, too
     speed = 0.3 if feed == "constant" else 0.8
     made = plan(
         circle, arm, tool=tool, placement=placement, speed=speed, gamma_step=np.radians(4),
-        feed=feed, refine=feed == "constant", postures=[0],
+        feed=feed, refine=feed == "constant", postures=[0], method="exact",
     )  # fmt: skip
     assert (made.feed is None) == (feed == "constant")
     T = placement.copy()
