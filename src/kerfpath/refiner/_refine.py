@@ -133,7 +133,7 @@ def refine(
     if broken:
         return _unrefined(plan, f"off the grid it would break the {' and the '.join(broken)}")
     grid_cost = plan.proof.grid_cost
-    if grid_cost is None and start.admitted:
+    if grid_cost is None and start.admitted and plan.settings.method != "continuous":
         grid_cost = plan.cost
     proof = Proof(
         optimal=plan.proof.optimal and start.admitted and refined.cost <= (grid_cost or 0.0),
