@@ -186,7 +186,7 @@ class _Course:
             clearly = self.margin * np.exp2(2.0 * (FINE - result.cells.level))
             live = result.through <= self.cost * (1 + clearly)
             low = result.through < self.target
-            if not low.any() or self._enough(result, float(low.mean())):
+            if not low.any() or self._enough(result, float(live.mean() + low.mean())):
                 self.stages.append(result.stage())
                 return
             if fresh or 1 - live.mean() > DROPPED:
@@ -216,13 +216,13 @@ class _Course:
         self.progress("certificate", int(1000 * (1 - short / self.target)), 1000)
         return (self.best - before) / max(self.target - before, 1e-300)
 
-    def _enough(self, result: StageResult, low: float) -> bool:
-        """Return whether the next stage, a share `low` of the cells halved, would be too much."""
-        if len(result.cells) * (1 + low) > MOST_CELLS:
+    def _enough(self, result: StageResult, left: float) -> bool:
+        """Return whether the next stage, of a share `left` of the cells, would be too much."""
+        if len(result.cells) * left > MOST_CELLS:
             return True
         if self.until < np.inf:
             return monotonic() > self.until
-        return self.pairs + result.pairs * (1 + low) ** 2 > MOST_PAIRS + MOST_PER_NODE * self.last
+        return self.pairs + result.pairs * left**2 > MOST_PAIRS + MOST_PER_NODE * self.last
 
     def _with_nodes(self, cells: CellSet) -> CellSet:
         """Return the cells with those of further nodes, about as fine where motions may pass."""
