@@ -145,6 +145,21 @@ def test_no_step_costs_less_than_its_cells_say(made, metric, tilted):
 
 
 @pytest.mark.parametrize("metric", METRICS)
+def test_a_joint_may_cost_nothing(arc, arm, tool, placement, metric):
+    """A weight of zero: the bound is there, below the plan and below the best of a grid."""
+    made = plan(
+        arc, arm, tool=tool, placement=placement, speed=0.6, metric=metric,
+        weights=[25, 25, 25, 15, 15, 0], gamma_step=np.radians(6), certify=None,
+    )  # fmt: skip
+    proof = certify(made, gap=0.2).plan.proof
+    assert 0 < proof.bound <= made.cost
+    exact = plan(arc, arm, tool=tool, placement=placement, speed=0.6, options=replace(
+        made.settings, method="exact", gamma_step=np.radians(2)
+    ))  # fmt: skip
+    assert proof.bound <= exact.cost
+
+
+@pytest.mark.parametrize("metric", METRICS)
 def test_the_plan_itself_passes_cells_that_let_it(made, metric):
     one = made(metric)
     steps, cells = steps_of(one), maker_of(one).coarsest(np.arange(len(one.q)))

@@ -160,15 +160,19 @@ def beyond(y: Array, step: Step) -> float:
         for i in range(n):
             most += max(0.0, abs(y[i] - step.tilt[i]) - step.weight[i]) * step.velocity[i]
         return most * (1.0 + SLACK)
-    norm, size = 0.0, 0.0
+    norm, size, free = 0.0, 0.0, 0.0
     for i in range(n):
         z = abs(y[i] - step.tilt[i])
+        if step.weight[i] == 0.0:  # its motion costs nothing that y could be set against
+            free += z * step.velocity[i]
+            continue
         size += z * step.velocity[i]
         x = z / step.weight[i]
         norm += x if step.metric == CHEBYCHEV else x * x
     if step.metric != CHEBYCHEV:
         norm = sqrt(norm)
-    return size * (max(0.0, 1.0 - 1.0 / norm) + SLACK) if norm > 0 else 0.0
+    share = max(0.0, 1.0 - 1.0 / norm) if norm > 0 else 0.0
+    return size * (share + SLACK) + free * (1.0 + SLACK)
 
 
 @jit_inline
