@@ -51,13 +51,12 @@ __all__ = [
     "Curves",
     "Frames",
     "enclose_all",
-    "known",
     "lean",
     "side",
     "turned",
     "turned_point",
     "wrist_sine",
-    "write",
+    "write_posture",
 ]
 
 NONE, SMOOTH, BOX = 0, 1, 2
@@ -188,14 +187,14 @@ def _wrap(angle: float) -> float:
 
 
 @jit_inline
-def known(f: Jet, h: float) -> bool:
+def _known(f: Jet, h: float) -> bool:
     """Whether curve and curvature of an angle say more than its box."""
     reach = h * (abs(f.d) + f.ed + 0.5 * h * (abs(f.s) + f.rs))
     return reach <= 2.0 * f.rv + ANGLE_ERROR
 
 
 @jit_inline
-def write(
+def _write(
     out: Curves, cell: int, posture: int, joint: int, f: Jet, sign: float, offset: float, h: float
 ) -> None:
     """Write the model's angle f as the robot's joint: sign * (f + offset); the status is set."""
@@ -214,6 +213,25 @@ def write(
         out.low[at] = 0.0
         out.high[at] = 0.0
         out.radius[at] = smaller(f.rv * UP + error, pi * UP)
+
+
+@jit
+def write_posture(
+    out: Curves,
+    cell: int,
+    posture: int,
+    angles: tuple[Jet, Jet, Jet, Jet, Jet, Jet],
+    sign: Array,
+    offset: Array,
+    h: float,
+) -> None:
+    """Write the model's six angles of a posture: as curves if all of them are known, else boxes."""
+    smooth = True
+    for joint in range(6):
+        smooth = smooth and _known(angles[joint], h)
+    out.status[cell, posture] = SMOOTH if smooth else BOX
+    for joint in range(6):
+        _write(out, cell, posture, joint, angles[joint], sign[joint], offset[joint], h)
 
 
 @jit
@@ -264,19 +282,18 @@ def _postures(
     q4 = angle(across, x, square, h)
     q5 = arc(z, sine, es, rs, low, h)
     q6 = angle(e, scale(g, -1.0, 0.0), square, h)
-    smooth = known(q1, h) and known(q2, h) and known(q3, h)
-    smooth = smooth and known(q4, h) and known(q5, h) and known(q6, h)
     for wrist in range(2):
-        i = first + wrist
-        out.status[cell, i] = SMOOTH if smooth else BOX
-        write(out, cell, i, 0, q1, arm.sign[0], arm.offset[0], h)
-        write(out, cell, i, 1, q2, arm.sign[1], arm.offset[1], h)
-        write(out, cell, i, 2, q3, arm.sign[2], arm.offset[2], h)
         flip = 1.0 if wrist == 0 else -1.0
         half_turn = 0.0 if wrist == 0 else pi
-        write(out, cell, i, 3, shift(q4, half_turn, LIBM), arm.sign[3], arm.offset[3], h)
-        write(out, cell, i, 4, scale(q5, flip, 0.0), arm.sign[4], arm.offset[4], h)
-        write(out, cell, i, 5, shift(q6, half_turn, LIBM), arm.sign[5], arm.offset[5], h)
+        angles = (
+            q1,
+            q2,
+            q3,
+            shift(q4, half_turn, LIBM),
+            scale(q5, flip, 0.0),
+            shift(q6, half_turn, LIBM),
+        )
+        write_posture(out, cell, first + wrist, angles, arm.sign, arm.offset, h)
 
 
 @jit

@@ -11,18 +11,15 @@ from math import copysign, cos, pi, sin
 from kerfpath._arrays import Array, Ints
 from kerfpath.kernels._jit import jit
 from kerfpath.kernels.enclosure import (
-    BOX,
     NONE,
-    SMOOTH,
     Curves,
     Frames,
-    known,
     lean,
     side,
     turned,
     turned_point,
     wrist_sine,
-    write,
+    write_posture,
 )
 from kerfpath.kernels.intervals import (
     DOWN,
@@ -79,16 +76,8 @@ def _elbows(
         q3 = scale(bend, turn, 0.0)
         q2 = add(phi, scale(leant, -turn, 0.0))
         q4 = add(theta, scale(add(q2, q3), -1.0, 0.0))
-        smooth = known(q1, h) and known(q2, h) and known(q3, h)
-        smooth = smooth and known(q4, h) and known(q5, h) and known(q6, h)
-        i = first + 2 * elbow
-        out.status[cell, i] = SMOOTH if smooth else BOX
-        write(out, cell, i, 0, q1, arm.sign[0], arm.offset[0], h)
-        write(out, cell, i, 1, q2, arm.sign[1], arm.offset[1], h)
-        write(out, cell, i, 2, q3, arm.sign[2], arm.offset[2], h)
-        write(out, cell, i, 3, q4, arm.sign[3], arm.offset[3], h)
-        write(out, cell, i, 4, q5, arm.sign[4], arm.offset[4], h)
-        write(out, cell, i, 5, q6, arm.sign[5], arm.offset[5], h)
+        angles = (q1, q2, q3, q4, q5, q6)
+        write_posture(out, cell, first + 2 * elbow, angles, arm.sign, arm.offset, h)
 
 
 @jit
