@@ -13,7 +13,15 @@ from numpy.typing import NDArray
 
 from kerfpath.losses import Loss, Reason
 
-__all__ = ["AuditFailed", "Closed", "InputError", "KerfpathError", "NoFeasiblePath", "about"]
+__all__ = [
+    "AuditFailed",
+    "Closed",
+    "InputError",
+    "KerfpathError",
+    "NoFeasiblePath",
+    "Relaxation",
+    "about",
+]
 
 LONGEST, BEGINNING = 600, 420
 """Characters of a message about bad input; of a longer one its beginning and its end are kept."""
@@ -74,6 +82,24 @@ class Closed:
         )
 
 
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Relaxation:
+    """What a motion that was found asks for beyond what was asked: less speed, or more limits.
+
+    Parameters
+    ----------
+    speed : float
+        Share of the speed asked for at which it keeps every limit, below 1.
+    velocity, acceleration : float
+        At the speed asked for: the multiples of the velocities and of the accelerations that may be
+        used with both of which it keeps them; 1 where they are enough as they are.
+    """
+
+    speed: float
+    velocity: float
+    acceleration: float
+
+
 class NoFeasiblePath(KerfpathError):
     """No admissible path was found: an answer with a reason, not a fault of the input.
 
@@ -98,6 +124,8 @@ class NoFeasiblePath(KerfpathError):
         plans the runs by what became of them.
     closed : Closed, optional
         Where no motion passes at any gamma, if that is proved.
+    relaxation : Relaxation, optional
+        With what a motion was found, where one was looked for.
     """
 
     def __init__(
@@ -111,6 +139,7 @@ class NoFeasiblePath(KerfpathError):
         leaving: NDArray[np.int64] | None = None,
         counts: Mapping[str, int] | None = None,
         closed: Closed | None = None,
+        relaxation: Relaxation | None = None,
     ) -> None:
         super().__init__(message)
         self.proved = proved
@@ -120,6 +149,7 @@ class NoFeasiblePath(KerfpathError):
         self.leaving = leaving
         self.counts = dict(counts or {})
         self.closed = closed
+        self.relaxation = relaxation
 
     @property
     def scope(self) -> Literal["every gamma", "grid", "undecided"]:
@@ -140,8 +170,9 @@ class NoFeasiblePath(KerfpathError):
         message: str,
         counts: Mapping[str, int] | None = None,
         closed: Closed | None = None,
+        relaxation: Relaxation | None = None,
     ) -> NoFeasiblePath:
-        """Return the same answer in other words, with other counts or more proof if given."""
+        """Return the same answer in other words, with what else is given."""
         return NoFeasiblePath(
             message,
             proved=self.proved,
@@ -151,6 +182,7 @@ class NoFeasiblePath(KerfpathError):
             leaving=self.leaving,
             counts=self.counts if counts is None else counts,
             closed=self.closed if closed is None else closed,
+            relaxation=self.relaxation if relaxation is None else relaxation,
         )
 
 

@@ -3,3 +3,4 @@
 from kerfpath.certifier._certify import Certified as Certified
 from kerfpath.certifier._certify import certify as certify
 from kerfpath.certifier._nopath import MotionTest as MotionTest
+from kerfpath.certifier._nopath import closed_node as closed_node

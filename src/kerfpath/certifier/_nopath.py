@@ -26,7 +26,7 @@ from kerfpath.kernels.reduced import Cells
 from kerfpath.limits import Limits
 from kerfpath.robots import Robot
 
-__all__ = ["MotionTest"]
+__all__ = ["MotionTest", "closed_node"]
 
 DEEPEST = 12
 """Levels at most: cells of 0.001 deg."""
@@ -34,8 +34,35 @@ MOST_STEPS, MOST_PAIRS = 2_000_000, 30_000_000
 """Steps between cells in one round, and pairs of steps in all, after which it is left at that."""
 ABOUT = 12
 """Nodes on either side of one about which a part is looked at."""
+MOST_CELLS = 2_000
+"""Cells of one node that may have a pose, after which it is left at that."""
 EACH_PAIRS = 1_000_000
 """Pairs of steps over one node up to which (6) is tested in a round."""
+
+
+def closed_node(
+    robot: Robot,
+    frames: Array,
+    T_flange_tip: Array,
+    nodes: Ints,
+    postures: tuple[int, ...] | None = None,
+) -> Closed | None:
+    """Return the first of some nodes proved to have no pose within the ranges, at any gamma.
+
+    Arguments as for `MotionTest`; None where that is proved of none of them. Cells of gamma without
+    a solution within ranges and couplings drop out, the others are halved.
+    """
+    used = range(robot.postures) if postures is None else postures
+    maker = CellMaker(robot, frames, T_flange_tip, robot.joint_limits(), used)
+    for node in nodes:
+        cells = maker.coarsest(np.array([node]))
+        for _ in range(DEEPEST):
+            if not 0 < len(cells) <= MOST_CELLS:
+                break
+            cells = maker.halves(cells)
+        if not len(cells):
+            return Closed(node=int(node) - 1, joint=None, limit="pose")
+    return None
 
 
 @dataclass(slots=True, eq=False)

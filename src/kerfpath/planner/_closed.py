@@ -4,14 +4,21 @@ from __future__ import annotations
 
 from math import sqrt
 
-from kerfpath.certifier import MotionTest
-from kerfpath.errors import NoFeasiblePath
-from kerfpath.planner._task import PlanningTask
+import numpy as np
 
-__all__ = ["at_any_gamma", "impossible_share", "motion_test"]
+from kerfpath.certifier import MotionTest
+from kerfpath.errors import NoFeasiblePath, Relaxation
+from kerfpath.limits import rates_of
+from kerfpath.planner._quickest import QuickMotion
+from kerfpath.planner._task import PlanningTask
+from kerfpath.planner._words import at_least, at_most
+
+__all__ = ["at_any_gamma", "impossible_share", "motion_test", "with_relaxation"]
 
 MOST_NODES = 5_000
 """Nodes up to which cells of all of them are held at once: some 200 MB."""
+SLACK = 1e-6
+"""Share of a limit that is left free against rounding."""
 FAR, CLOSE = 300.0, 1.02
 """Multiples of a speed: up to which one that is impossible is looked for, and how close to the
 fastest that may be possible."""
@@ -39,6 +46,30 @@ def at_any_gamma(broken: NoFeasiblePath, task: PlanningTask) -> NoFeasiblePath:
     if closed is None:
         return broken.with_message(f"{broken}; whether there is a motion off the grid is undecided")
     return broken.with_message(f"{broken}; proved for every rotation: {closed}", closed=closed)
+
+
+def with_relaxation(
+    broken: NoFeasiblePath, task: PlanningTask, quick: QuickMotion
+) -> NoFeasiblePath:
+    """Return what is broken, and how much less speed or how much more of the limits would do.
+
+    Of the quickest motion found, slower than asked for: figures that keep what they say.
+    """
+    limits = task.problem.limits
+    v, a = rates_of(quick.plan.increments, np.full(len(task.contour) - 1, task.dt))
+    shares = (
+        float((np.abs(rates) / limit.usable).max(initial=0.0))
+        for rates, limit in ((v, limits.velocity), (a, limits.acceleration))
+    )
+    fast, sharp = (float(at_least(max(1.0, share * (1 + SLACK)))) for share in shares)
+    needed = Relaxation(speed=float(at_most(task.dt / quick.dt)), velocity=fast, acceleration=sharp)
+    limits_said = " and ".join(
+        f"{value:g} times the {what}"
+        for value, what in ((fast, "velocities"), (sharp, "accelerations"))
+        if value > 1
+    )
+    said = f"a motion was found at {needed.speed:g} of the speed, and at the speed asked for with "
+    return broken.with_message(f"{broken}; {said}{limits_said}", relaxation=needed)
 
 
 def impossible_share(task: PlanningTask, reached: float, node: int) -> float | None:

@@ -8,15 +8,13 @@ from dataclasses import replace
 import numpy as np
 
 from kerfpath import refiner
-from kerfpath.errors import NoFeasiblePath
-from kerfpath.kernels.metric import wrap
 from kerfpath.planner._clear import ClearSearch
-from kerfpath.planner._closed import at_any_gamma
 from kerfpath.planner._on_grid import plan_on_grid
+from kerfpath.planner._quickest import alike, clear_paths, wide
 from kerfpath.planner._task import PlanningTask
 from kerfpath.plans import Plan, Proof
 from kerfpath.refiner import Refinement
-from kerfpath.search import ContinuousPath, ContinuousSearch, Effort
+from kerfpath.search import ContinuousPath, Effort
 
 __all__ = ["clear_motion", "grid_reason", "plan_continuous"]
 
@@ -25,17 +23,11 @@ FIRST_STEP = 5e-3
 FINE, COARSE = (0.1, 0.25), (1.1, 1.0)
 """When the states of a beam are alike: for paths that hardly accelerate, and that must."""
 QUICK = (Effort(60, FINE, 2), Effort(200, COARSE, 2))
-"""Paths that are refined at first,"""
-WIDE = Effort(1600, (1.1, 0.5), 1)
-"""and those where the values promise better."""
-SAME_VALLEY = 0.05
-"""rad of gamma up to which a path leads to the motion that another was refined to."""
+"""Paths that are refined at first; wide ones where the values promise better."""
 ENOUGH = 5e-3
 """Relative gap to what the values promise with which a motion is good."""
 GAIN = 5e-3
 """What a refinement may take off the cost that a path promises, relative."""
-MOST_SEARCHES = 40
-"""Searches for a path that is clear."""
 NARROWED = 6
 """Times that a refinement is kept nearer to its path where it is not clear."""
 
@@ -48,21 +40,18 @@ def plan_continuous(task: PlanningTask, finder: ClearSearch, begin: Callable[[st
     NoFeasiblePath
         None was found, on the grid neither.
     """
-    why, found = grid_reason(task), None
-    if not why:
+    reason, found = grid_reason(task), None
+    why = f"planned on the grid: {reason}"
+    if not reason:
         begin("search")
         found = clear_motion(task, finder, begin)
-        why = "no motion was found off it"
+        why = "begun from the grid: the search between its samples found no motion"
     if found is None:
         comfort = task.settings.comfort
         # What the nodes of a slower motion cost is known on the grid only.
         priced = task.settings.feed == "dip" and comfort is not None and comfort.costs
         refine = task.robot.family.free_rotation and not priced
-        try:
-            return _said(plan_on_grid(task, finder, begin, refine=refine), why)
-        except NoFeasiblePath as broken:
-            begin("search for a proof that there is none")
-            raise at_any_gamma(broken, task) from None
+        return _said(plan_on_grid(task, finder, begin, refine=refine), why)
     claim = f"the best motion found over continuous rotation: cost {found.cost_after:.6g}"
     return replace(found.plan, proof=Proof(optimal=False, statement=finder.claimed(claim)))
 
@@ -72,19 +61,17 @@ def clear_motion(
 ) -> Refinement | None:
     """Return the best motion found that is clear; None where none is.
 
-    What paths want to use is looked at, and avoided where it collides, until they are clear.
+    The values tell whether a wider search may find a better one.
     """
-    for _ in range(MOST_SEARCHES):
-        search = ContinuousSearch(finder.open_problem(task.problem), task.samples)
-        quick = [path for effort in QUICK for path in search.paths(effort)]
-        if finder.learn([vertices for path in quick for vertices in (path.one, path.other)]):
-            continue
-        begin("refinement")
-        found = _refined(task, finder, quick)
-        if found is None or found.cost_after > (1 + ENOUGH) * search.value:
-            found = _better(found, _refined(task, finder, list(search.paths(WIDE))))
-        return found
-    return None
+    searched = clear_paths(task, finder, QUICK)
+    if searched is None:
+        return None
+    search, paths = searched
+    begin("refinement")
+    found = _refined(task, finder, paths)
+    if found is None or found.cost_after > (1 + ENOUGH) * search.value:
+        found = _better(found, _refined(task, finder, list(search.paths(wide(task)))))
+    return found
 
 
 def _refined(
@@ -97,7 +84,7 @@ def _refined(
     for promised, i in sorted((refiner.promise(plan), i) for i, plan in enumerate(plans)):
         if best is not None and promised * (1 - GAIN) >= best.cost_after:
             break
-        if best is not None and _close(plans[i], best.plan):
+        if best is not None and alike(plans[i], best.plan):
             continue
         best = _better(best, _refine_path(task, finder, paths[i], plans[i]))
     return best
@@ -128,12 +115,6 @@ def _refine_path(
     return found if found.done and not unclear.any() else None
 
 
-def _close(made: Plan, other: Plan) -> bool:
-    """Return whether two motions are so alike that they are refined to the same one."""
-    apart = np.abs(wrap(made.gamma - other.gamma)).max()
-    return bool(apart < SAME_VALLEY and np.array_equal(made.posture, other.posture))
-
-
 def _better(one: Refinement | None, other: Refinement | None) -> Refinement | None:
     """Return the better of two motions, or the one that there is."""
     if one is None or other is None:
@@ -152,6 +133,5 @@ def grid_reason(task: PlanningTask) -> str:
 
 
 def _said(made: Plan, why: str) -> Plan:
-    """Return a plan on the grid that says so."""
-    statement = f"planned on the grid: {why}; {made.proof.statement}"
-    return replace(made, proof=replace(made.proof, statement=statement))
+    """Return a plan on the grid, or from it, that says so."""
+    return replace(made, proof=replace(made.proof, statement=f"{why}; {made.proof.statement}"))

@@ -18,9 +18,8 @@ from kerfpath.options import GraphKeywords, PlanOptions, with_keywords
 from kerfpath.planner._clear import ClearSearch
 from kerfpath.planner._closed import impossible_share
 from kerfpath.planner._graph import longest_step, node_interval, require_even
+from kerfpath.planner._quickest import quickest_motion
 from kerfpath.planner._task import PlanningTask, task_of
-from kerfpath.plans import Proof
-from kerfpath.refiner import quicken
 from kerfpath.robots import Robot
 from kerfpath.search import (
     LeastInterval,
@@ -88,16 +87,16 @@ def fastest_speed(
     ceiling: bool = False,
     **keywords: Unpack[SpeedKeywords],
 ) -> FastestSpeed:
-    """Return the largest constant speed at which a path exists on the graph, exactly.
+    """Return the largest constant speed at which a path exists: exactly on the graph, or off it.
 
     The speed is the one that `plan` takes: that of the longest step between two nodes. A
     second-order minimax problem on the layered graph; arguments as in `plan`, of whose options
     gamma_step, frames, tilt, postures, comfort, eta_v, eta_a and refine matter. The grid quantises
-    the acceleration: `refine` moves gamma off it, from the fastest path, to what is then faster
-    still (the nearest optimum, which is not proved to be the best one), unless it would not be
-    clear or would break a margin of `comfort`, which may have no costs here. With `ceiling` it is
-    also proved, as far as a limited amount of work does, above which speed there is no motion at
-    all, on the grid or off it, see `FastestSpeed.ceiling`.
+    the acceleration: `refine` moves gamma off it, from the fastest path and from others, to what is
+    faster still (the best found, which is not proved to be the best there is), where that is clear
+    and keeps the margins of `comfort`, which may have no costs here. `plan` finds a motion at the
+    speed returned, too. With `ceiling` it is also proved, as far as a limited amount of work does,
+    above which speed there is no motion at all, on the grid or off it, see `FastestSpeed.ceiling`.
 
     Raises
     ------
@@ -131,23 +130,15 @@ def fastest_speed(
 
 def _fastest(task: PlanningTask, finder: ClearSearch) -> FastestSpeed:
     """Return the largest speed reached, on the grid or, where that is asked for, off it."""
-    comfort, robot = task.settings.comfort, task.robot
-    least = finder.find(find_least_interval, task.problem.free())
-    found = FastestSpeed.of(task.contour, least)
-    if not (task.settings.refine and robot.family.free_rotation):
-        return found
-    claim = Proof(optimal=False, statement="the fastest path on this graph")
-    task = replace(task, problem=replace(task.problem, dt=least.dt))
-    quick, at = quicken(task.plan(least.index, 0.0, claim))
-    broken = comfort is not None and comfort.broken(robot, quick.q, task.T_flange_tip)
-    if broken or not finder.is_clear(quick):
-        return found
+    if not (task.settings.refine and task.robot.family.free_rotation):
+        return FastestSpeed.of(task.contour, finder.find(find_least_interval, task.problem.free()))
+    quick, step = quickest_motion(task, finder), longest_step(task.contour)
     return FastestSpeed(
-        speed=longest_step(task.contour) / quick.dt,
-        joint=at.joint,
-        node=at.node,
-        limit=at.limit,
-        on_grid=found.speed,
+        speed=step / quick.dt,
+        joint=quick.at.joint,
+        node=quick.at.node,
+        limit=quick.at.limit,
+        on_grid=step / quick.on_grid if quick.dt < quick.on_grid else None,
     )
 
 

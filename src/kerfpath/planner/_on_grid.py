@@ -6,8 +6,10 @@ from collections.abc import Callable
 
 from kerfpath.errors import NoFeasiblePath
 from kerfpath.planner._clear import ClearSearch
+from kerfpath.planner._closed import at_any_gamma, with_relaxation
 from kerfpath.planner._dip import plan_slowed
-from kerfpath.planner._refined import plan_off_grid, refine_plan
+from kerfpath.planner._quickest import quick_motions
+from kerfpath.planner._refined import plan_off_grid, plan_slowly, refine_plan
 from kerfpath.planner._task import PlanningTask
 from kerfpath.planner._words import ON_THIS_GRID
 from kerfpath.plans import Plan, Proof
@@ -15,6 +17,10 @@ from kerfpath.robots import posture_name
 from kerfpath.search import Method, find_shortest
 
 __all__ = ["plan_on_grid"]
+
+TOO_SLOW, NEARLY = 2.0, 1.15
+"""Multiples of the node interval from which a proof that there is no motion is tried before the
+next one: of the fastest path on the grid, and of quicker motions."""
 
 
 def plan_on_grid(
@@ -64,13 +70,63 @@ def _otherwise(
     elif refine and asked.closure == "free":
         begin("refinement")
         found = plan_off_grid(task, finder)
-    if found is not None and found.done:
-        return found.plan
+        if found is not None and found.done:
+            return found.plan
     tried = "" if found is None else f"; off the grid {found.statement}"
     where = f"{ON_THIS_GRID} " if task.robot.family.free_rotation else ""
-    raise broken.with_message(
+    broken = broken.with_message(
         f"contour {task.contour.name!r}: {where}{broken}{_bracket(broken, task)}{tried}"
-    ) from None
+    )
+    if not refine or asked.feed == "dip":
+        raise broken from None
+    return _from_quickest(task, finder, broken, begin)
+
+
+def _from_quickest(
+    task: PlanningTask, finder: ClearSearch, broken: NoFeasiblePath, begin: Callable[[str], None]
+) -> Plan:
+    """Return the plan that a motion as quick as asked for is refined to.
+
+    Unless motions close by are nearly as quick, it is first proved, if it can be, that there is
+    none at all.
+
+    Raises
+    ------
+    NoFeasiblePath
+        None was found; says of what that is proved, and what the quickest one found would take.
+    """
+    asked = task.settings
+    clearance = None if asked.comfort is None else asked.comfort.clearance
+    # What clearance costs is known on the grid only.
+    if asked.closure == "periodic" or (clearance is not None and clearance.cost):
+        raise _judged(broken, task, begin) from None
+    judged, best = None, None
+    begin("search for the quickest motion")
+    try:
+        for tried, best in enumerate(quick_motions(task, finder)):
+            made = plan_slowly(task, best, finder) if best.dt <= task.dt else None
+            if made is not None:
+                return made
+            far = best.dt > (TOO_SLOW, NEARLY)[tried > 0] * task.dt
+            if judged is None and far:
+                judged = _judged(broken, task, begin)
+                if judged.closed is not None:
+                    break
+    except NoFeasiblePath:  # not at any speed
+        best = None
+    if judged is None:
+        judged = _judged(broken, task, begin)
+    if best is None or asked.rotation is not None:
+        raise judged
+    raise with_relaxation(judged, task, best)
+
+
+def _judged(
+    broken: NoFeasiblePath, task: PlanningTask, begin: Callable[[str], None]
+) -> NoFeasiblePath:
+    """Return what is broken, and whether it is so at every gamma."""
+    begin("search for a proof that there is none")
+    return at_any_gamma(broken, task)
 
 
 def _bracket(broken: NoFeasiblePath, task: PlanningTask) -> str:

@@ -9,15 +9,13 @@ import numpy as np
 from kerfpath import refiner
 from kerfpath.errors import NoFeasiblePath
 from kerfpath.planner._clear import ClearSearch
+from kerfpath.planner._quickest import QuickMotion
 from kerfpath.planner._task import PlanningTask
-from kerfpath.plans import Plan, Proof
+from kerfpath.plans import Plan, Proof, path_cost
 from kerfpath.refiner import Refinement
-from kerfpath.search import find_least_interval, find_shortest
+from kerfpath.search import find_shortest
 
-__all__ = ["plan_first_order", "plan_off_grid", "refine_plan"]
-
-TOO_SLOW = 2.0
-"""Multiple of the node interval up to which the fastest path is worth an attempt off the grid."""
+__all__ = ["plan_first_order", "plan_off_grid", "plan_slowly", "refine_plan"]
 
 
 def refine_plan(task: PlanningTask, finder: ClearSearch, made: Plan) -> Plan:
@@ -49,34 +47,32 @@ def refine_plan(task: PlanningTask, finder: ClearSearch, made: Plan) -> Plan:
 
 
 def plan_off_grid(task: PlanningTask, finder: ClearSearch) -> Refinement | None:
-    """Look for a motion where the graph has no path; None where that is hopeless.
+    """Look for a motion where the graph has no path: close by the best path without (6).
 
-    Of a path that breaks (6) because gamma can only step, the motion close by may not. Begun from
-    the best path without (6), and from the one that asks for the least time. What is found is clear
-    in the cell.
+    Of a path that breaks (6) because gamma can only step, the motion close by may not. What is
+    found is clear in the cell; None where (5) alone closes the way.
     """
     first = plan_first_order(task, finder)
-    found = None if first is None else _keep_if_clear(refiner.refine(first), finder)
-    comfort = task.settings.comfort
-    priced = comfort is not None and comfort.clearance is not None and comfort.clearance.cost
-    if priced or (found is not None and found.done):
-        return found  # what clearance costs is known on the grid only
-    try:
-        least = finder.find(find_least_interval, task.problem.free())
-    except NoFeasiblePath:
-        return found
-    if least.dt > TOO_SLOW * task.dt:
-        return found
-    claim = Proof(optimal=False, statement="the fastest path on this graph")
-    quick = task.plan(least.index, task.cost(least.index), claim)
-    found = _keep_if_clear(refiner.refine(quick), finder)
-    if found.done:
-        return found
-    # As `fastest_speed` does: what is faster still keeps the limits at the speed asked for, too.
-    faster, _ = refiner.quicken(replace(quick, time=quick.time * (least.dt / task.dt)))
-    if faster.dt > task.dt:
-        return found
-    return _keep_if_clear(refiner.refine(replace(faster, time=quick.time)), finder)
+    return None if first is None else _keep_if_clear(refiner.refine(first), finder)
+
+
+def plan_slowly(task: PlanningTask, quick: QuickMotion, finder: ClearSearch) -> Plan | None:
+    """Return the plan at the speed asked for that a motion at least as quick is refined to.
+
+    A slower motion asks for less of every limit, so that it keeps them, too. None where a limit on
+    the rotation is not kept.
+    """
+    asked = task.settings
+    begun = replace(quick.plan, settings=asked, time=task.times)
+    claim = "the quickest motions led to it"
+    cost = path_cost(
+        begun.increments, asked.weights, asked.metric, asked.objective, begun.node_cost
+    )
+    begun = replace(begun, cost=cost, proof=Proof(optimal=False, statement=claim))
+    found = refiner.refine(begun)
+    if found.done and finder.is_clear(found.plan):
+        return found.plan
+    return begun if asked.rotation is None else None
 
 
 def _keep_if_clear(found: Refinement, finder: ClearSearch) -> Refinement:

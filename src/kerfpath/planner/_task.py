@@ -10,8 +10,9 @@ from numpy.typing import ArrayLike
 
 from kerfpath._arrays import Array, Ints, as_pose, freeze
 from kerfpath._repr import short_repr
+from kerfpath.certifier import closed_node
 from kerfpath.contour import Contour
-from kerfpath.errors import InputError
+from kerfpath.errors import InputError, NoFeasiblePath
 from kerfpath.graph import LayeredGraph
 from kerfpath.kernels.metric import increments, wrap
 from kerfpath.options import PlanOptions
@@ -27,6 +28,9 @@ from kerfpath.search import ContinuousPath, GammaSamples, SearchProblem
 from kerfpath.tilt import Tilt
 
 __all__ = ["PlanningTask", "task_of"]
+
+MOST_EMPTY = 8
+"""Nodes without a pose that are looked at for a proof that they have none at any gamma."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -61,6 +65,11 @@ class PlanningTask:
         """Time from node to node at the speed asked for, s."""
         return self.problem.dt
 
+    @property
+    def times(self) -> Array:
+        """Times (K,) of the nodes at the speed asked for, s."""
+        return self.dt * np.arange(len(self.contour), dtype=float)
+
     def cost(self, index: Ints) -> float:
         """Return the objective (14) or (15) of a path through the graph, vertex costs included."""
         s, vertex = self.settings, self.graph.start[:-1] + index
@@ -86,7 +95,7 @@ class PlanningTask:
             tilt=graph.tilt[graph.variant[vertex]],
             posture=graph.posture[vertex],
             turn=graph.turn[vertex],
-            time=self.dt * np.arange(len(self.contour), dtype=float),
+            time=self.times,
             settings=self.settings,
             cost=cost,
             proof=proof,
@@ -123,7 +132,7 @@ class PlanningTask:
             tilt=graph.tilt[graph.variant[near]],
             posture=graph.posture[near].astype(np.int64),
             turn=graph.turn[near].astype(np.int64),
-            time=self.dt * np.arange(len(self.contour), dtype=float),
+            time=self.times,
             settings=s,
             cost=0.0,
             proof=proof,
@@ -180,7 +189,11 @@ def task_of(
     if options.comfort is not None:
         periodic = options.closure == "periodic"
         graph = within_margins(graph, robot, options.comfort, T_flange_tip, periodic=periodic)
-    require_no_empty_layer(contour, graph)
+    try:
+        require_no_empty_layer(contour, graph)
+    except NoFeasiblePath as empty:
+        frames = T_base_part @ contour.frames(options.frames)
+        raise _at_any_gamma(empty, graph, robot, frames, T_flange_tip, options) from None
     return PlanningTask(
         contour=contour,
         robot=robot,
@@ -204,6 +217,24 @@ def task_of(
             posture=graph.posture if options.method == "known" else None,
         ),
     )
+
+
+def _at_any_gamma(
+    empty: NoFeasiblePath,
+    graph: LayeredGraph,
+    robot: Robot,
+    frames: Array,
+    tool: Array,
+    options: PlanOptions,
+) -> NoFeasiblePath:
+    """Return that nodes are without a pose, and whether one of them is so at every gamma."""
+    if not robot.encloses or options.tilt is not None:
+        return empty
+    nodes = np.flatnonzero(np.diff(graph.start) == 0)[:MOST_EMPTY]
+    closed = closed_node(robot, frames, tool, nodes, options.postures)
+    if closed is None:
+        return empty.with_message(f"{empty}; whether it has one off the grid is undecided")
+    return empty.with_message(f"{empty}; proved for every rotation: {closed}", closed=closed)
 
 
 def _require_fitting(

@@ -1,0 +1,170 @@
+"""The quickest motion: off the grid from its fastest path, and from beams at higher speeds."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from kerfpath._repr import short_repr
+from kerfpath.kernels.metric import wrap
+from kerfpath.planner._clear import ClearSearch
+from kerfpath.planner._task import PlanningTask
+from kerfpath.plans import Plan, Proof
+from kerfpath.refiner import Binding, quicken
+from kerfpath.search import ContinuousPath, ContinuousSearch, Effort, find_least_interval
+
+__all__ = ["QuickMotion", "alike", "clear_paths", "quick_motions", "quickest_motion", "wide"]
+
+RUNGS = (1.06, 1.0, 1.1)
+"""Multiples of the speed reached at which beams look for a motion that is quicker still. Where no
+motion is as quick, they keep (6) as far as they can, and end in another valley."""
+GAIN = 2e-3
+"""Relative gain of speed below which a rung has brought nothing."""
+WIDE, MOST_STATES = 1600, 5_000_000
+"""States of each layer that are kept in a wide search, and of all layers."""
+ALIKE = (1.1, 0.5)
+"""When two of them are alike."""
+SLACK = 1e-6
+"""Share of the interval that is left free, so that the motion keeps the limits after rounding."""
+SAME_VALLEY = 0.05
+"""rad of gamma up to which a path leads to the motion that another was refined to."""
+MOST_SEARCHES = 40
+"""Searches for paths that are clear."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class QuickMotion:
+    """A motion with the least interval between its nodes, and what binds it.
+
+    Parameters
+    ----------
+    plan : Plan
+        Its times are those of that interval; as it is, not refined for its cost.
+    at : Binding
+    on_grid : float s
+        The least interval of the paths on the grid.
+    """
+
+    plan: Plan
+    at: Binding
+    on_grid: float
+
+    __repr__ = short_repr
+
+    @property
+    def dt(self) -> float:
+        """Interval between its nodes, s."""
+        return self.plan.dt
+
+
+def quickest_motion(task: PlanningTask, finder: ClearSearch) -> QuickMotion:
+    """Return the last and quickest of the `quick_motions`; arguments and errors as there."""
+    *_, best = quick_motions(task, finder)
+    return best
+
+
+def quick_motions(task: PlanningTask, finder: ClearSearch) -> Iterator[QuickMotion]:
+    """Yield ever quicker motions along the contour of a task, clear and within its margins.
+
+    First the fastest path on the grid; second, if the robot leaves a rotation free, what gamma off
+    the grid makes of it, or the same again; then what beams over continuous gamma at the speed
+    reached and above lead to, whatever they cost, as long as that gains. The speed, closure and
+    costs that the task asks for play no part: two tasks that differ in them alone have the same
+    motions, in the same order.
+
+    Raises
+    ------
+    NoFeasiblePath
+        No path on the grid is clear at any speed.
+    """
+    task = _without_aim(task)
+    least = finder.find(find_least_interval, task.problem)
+    path = _at(task, least.dt).plan(least.index, 0.0, _claim())
+    at = Binding(least.joint, least.node, least.limit)
+    best = QuickMotion(plan=path, at=at, on_grid=least.dt)
+    yield best
+    if not task.robot.family.free_rotation:
+        return
+    best = _quicker(task, finder, path, best)
+    yield best
+    rung, tried = 0, [path]
+    while rung < len(RUNGS):
+        before, faster = best.dt, _at(task, best.dt / RUNGS[rung])
+        found = clear_paths(faster, finder, (wide(task),))
+        for between in () if found is None else found[1]:
+            made = faster.plan_between(between, _claim())
+            if not any(alike(made, other) for other in tried):
+                tried.append(made)
+                quicker = _quicker(task, finder, made, best)
+                if quicker is not best:
+                    best = quicker
+                    yield best
+        rung = 0 if best.dt < (1 - GAIN) * before else rung + 1
+
+
+def _without_aim(task: PlanningTask) -> PlanningTask:
+    """Return the task as that of the fastest speed: no costs, no closure, the usual distances."""
+    velocity, _ = task.robot.speed_limits()
+    settings = replace(
+        task.settings.without_penalties,
+        metric="manhattan",
+        objective="sum",
+        closure="free",
+        rotation=None,
+        weights=1 / velocity,
+    )
+    problem = replace(
+        task.problem.free(), metric="manhattan", objective="sum", weights=settings.weights
+    )
+    return replace(task, settings=settings, problem=problem)
+
+
+def _at(task: PlanningTask, dt: float) -> PlanningTask:
+    return replace(task, problem=replace(task.problem, dt=dt))
+
+
+def _claim() -> Proof:
+    return Proof(optimal=False, statement="the quickest motion found")
+
+
+def _quicker(
+    task: PlanningTask, finder: ClearSearch, start: Plan, best: QuickMotion
+) -> QuickMotion:
+    """Return the better of the best motion so far and the one that a start is quickened to."""
+    made, at = quicken(start)
+    made = replace(made, time=made.time * (1 + SLACK))
+    comfort = task.settings.comfort
+    if made.dt >= best.dt:
+        return best
+    if comfort is not None and comfort.broken(task.robot, made.q, task.T_flange_tip):
+        return best
+    return replace(best, plan=made, at=at) if finder.is_clear(made) else best
+
+
+def wide(task: PlanningTask) -> Effort:
+    """Return the effort of a wide search, less wide over very many nodes."""
+    return Effort(min(WIDE, MOST_STATES // len(task.contour) + 1), ALIKE, 1)
+
+
+def clear_paths(
+    task: PlanningTask, finder: ClearSearch, efforts: tuple[Effort, ...]
+) -> tuple[ContinuousSearch, list[ContinuousPath]] | None:
+    """Return a search over continuous gamma and its paths, clear at the samples that they use.
+
+    What paths want to use is looked at, and avoided where it collides, until they are clear; None
+    where they do not become so.
+    """
+    for _ in range(MOST_SEARCHES):
+        search = ContinuousSearch(finder.open_problem(task.problem), task.samples)
+        paths = [path for effort in efforts for path in search.paths(effort)]
+        if not finder.learn([ends for path in paths for ends in (path.one, path.other)]):
+            return search, paths
+    return None
+
+
+def alike(made: Plan, other: Plan) -> bool:
+    """Return whether two motions are so alike that they are refined to the same one."""
+    apart = np.abs(wrap(made.gamma - other.gamma)).max()
+    return bool(apart < SAME_VALLEY and np.array_equal(made.posture, other.posture))
