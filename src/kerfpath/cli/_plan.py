@@ -145,6 +145,8 @@ def _cut_entry(cut: CutResult) -> dict[str, object]:
             "last_node_reached": cut.broken.node,
             "proved": cut.broken.proved,
             "proved_for": cut.broken.scope,
+            "closed": None if cut.broken.closed is None else asdict(cut.broken.closed),
+            "relaxation": None if cut.broken.relaxation is None else asdict(cut.broken.relaxation),
             "fastest_speed_m_s": fastest,
         }
     criteria = cut.plan.criteria

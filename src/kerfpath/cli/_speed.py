@@ -42,7 +42,7 @@ def show_speeds(
             never = "-" if found.ceiling is None else at_least(found.ceiling * 60)
             rows.append([*row, at_most(on_grid * 60), off_grid, never, str(found.node), what, at])
         else:
-            entry |= {"fastest_m_min": None, "reason": str(found)}
+            entry |= {"fastest_m_min": None, "reason": str(found), "proved_for": found.scope}
             rows.append([*row, "-", "-", "-", str(found.node + 1), "no admissible pose", ""])
         entries.append(entry)
     if as_json:
@@ -60,8 +60,8 @@ def show_speeds(
         at = "at x y z mm"
         table([*columns, at], rows, numbers=columns[1:6], spare=[at])
         out.print(
-            "on the grid: the fastest constant speed there, exactly; refined: the nearest optimum "
-            "that is found from that path off the grid, not proved to be the fastest; impossible "
-            "from: proved that at this speed and above there is no motion, at any rotation"
+            "on the grid: the fastest constant speed there, exactly; refined: the fastest that is "
+            "found off the grid, not proved to be the fastest there is; impossible from: proved "
+            "that at this speed and above there is no motion, at any rotation"
         )
     return all(entry["fastest_m_min"] is not None for entry in entries)

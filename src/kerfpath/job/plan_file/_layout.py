@@ -212,6 +212,22 @@ class PlanData(OptionData):
     nodes: NodesData
 
 
+class ClosedData(TypedDict):
+    """Where no motion passes at any gamma: node and joint from 0, and the limit of the joint."""
+
+    node: int
+    joint: int | None
+    limit: Literal["velocity", "acceleration", "pose"]
+
+
+class RelaxationData(TypedDict):
+    """Shares of what was asked for with which a motion was found: less speed, or more limits."""
+
+    speed: float
+    velocity: float
+    acceleration: float
+
+
 class BrokenData(TypedDict):
     """A contour without a plan, and why."""
 
@@ -219,6 +235,9 @@ class BrokenData(TypedDict):
     feasible: bool
     reason: str
     proved: bool
+    proved_for: NotRequired[Literal["every gamma", "grid", "undecided"]]
+    closed: NotRequired[ClosedData | None]
+    relaxation: NotRequired[RelaxationData | None]
     last_node_reached: int
     counts: dict[str, int]
     fastest_speed_m_s: float | None

@@ -156,11 +156,23 @@ def plan_entry(
 
 def broken_entry(name: str, broken: NoFeasiblePath, fastest: FastestSpeed | None) -> BrokenData:
     """Return what plan.json says of a contour without a feasible path."""
+    closed, needed = broken.closed, broken.relaxation
     return {
         "name": name,
         "feasible": False,
         "reason": str(broken),
         "proved": broken.proved,
+        "proved_for": broken.scope,
+        "closed": None
+        if closed is None
+        else {"node": closed.node, "joint": closed.joint, "limit": closed.limit},
+        "relaxation": None
+        if needed is None
+        else {
+            "speed": needed.speed,
+            "velocity": needed.velocity,
+            "acceleration": needed.acceleration,
+        },
         "last_node_reached": broken.node,
         "counts": broken.counts,
         "fastest_speed_m_s": None if fastest is None else fastest.speed,
