@@ -112,7 +112,8 @@ def _with_remedy(
     if not (np.diff(graph.start).all() and plain and constant):
         return without
     begin("what would open the way")
-    found = find_remedy(job, without.request, without.candidate, graph, cell)
+    needed = None if without.broken is None else without.broken.relaxation
+    found = find_remedy(job, without.request, without.candidate, graph, cell, needed)
     return without if found is None else replace(without, advice=found[0], fastest=found[1])
 
 

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
+from typing import Literal
 
 from kerfpath._repr import short_repr
 from kerfpath.cell import Cell
-from kerfpath.errors import NoFeasiblePath
+from kerfpath.errors import NoFeasiblePath, Relaxation
 from kerfpath.graph import LayeredGraph
 from kerfpath.job.format import Candidate, CutRequest, Job
-from kerfpath.job.run._speeds import fastest_along
+from kerfpath.job.run._speeds import fastest_along, leaves_grid
 from kerfpath.options import PlanOptions
 from kerfpath.planner import (
     FINER,
@@ -26,8 +27,8 @@ __all__ = ["Remedy", "find_remedy"]
 
 GIVE = (0.0, 2e-3, 1e-2, 3e-2)
 """Relative amounts by which a value gives way until a plan is found with it."""
-ETA_OF = {"eta_velocity": "eta_v", "eta_acceleration": "eta_a"}
-"""Keys of a job, and the options that they stand for."""
+Share = Literal["eta_velocity", "eta_acceleration"]
+"""Keys of a job for the share of a limit that may be used."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -130,19 +131,20 @@ class _Trial:
         values = (at_most(min(most, self.asked) * 60 * (1 - give)) for give in GIVE)
         return _first(values, lambda v: fits(v) and self.opens(options, float(v) / 60))
 
-    def share(self, key: str, least: float) -> str | None:
+    def share(self, options: PlanOptions, key: Share, least: float) -> str | None:
         """Return a share of a limit of `least` or hardly more that has a plan; None if none has."""
-        name, options = ETA_OF[key], self.on_grid
-
-        def fits(figure: str) -> bool:
-            return bool(getattr(options, name) < float(figure) <= 1)
+        used = options.eta_v if key == "eta_velocity" else options.eta_a
 
         def found(figure: str) -> bool:
-            return self.opens(replace(options, **{name: float(figure)}), self.asked)  # type: ignore[arg-type]
+            value = float(figure)
+            if key == "eta_velocity":
+                raised = replace(options, eta_v=value)
+            else:
+                raised = replace(options, eta_a=value)
+            return self.opens(raised, self.asked)
 
-        return _first(
-            (at_least(least * (1 + give)) for give in GIVE), lambda v: fits(v) and found(v)
-        )
+        values = (at_least(least * (1 + give)) for give in GIVE)
+        return _first(values, lambda v: used < float(v) <= 1 and found(v))
 
 
 def _first(values: Iterator[str], passes: Callable[[str], bool]) -> str | None:
@@ -155,20 +157,24 @@ def find_remedy(
     candidate: Candidate,
     graph: LayeredGraph,
     cell: Cell | None,
+    relaxation: Relaxation | None = None,
 ) -> tuple[Remedy, FastestSpeed | None] | None:
     """Return what opens the way of a cut without a plan, and the fastest speed; None if unknown.
 
-    The graph has poses at every node, and the cut is one at constant speed.
+    The graph has poses at every node, and the cut is one at constant speed; `relaxation` is what
+    the refusal says of a motion off the grid.
     """
     trial = _Trial(job=job, request=request, candidate=candidate, graph=graph, cell=cell)
-    other = job.options.method != "exact"
+    continuous = job.options.method == "continuous"
+    # Where the continuous search finds nothing it goes on on the grid, too.
+    other = not continuous and job.options.method != "exact"
     if other and trial.opens(trial.on_grid, trial.asked):
         return Remedy(other_method=True), None
     # At another speed other nodes follow from a time step: of them nothing would be proved.
-    ceiling = job.options.method == "continuous" and request.task.time_step is None
+    ceiling = continuous and request.task.time_step is None
     try:
         fastest = fastest_along(
-            job, candidate.nodes, cell, refine=job.options.refine, graph=graph, ceiling=ceiling
+            job, candidate.nodes, cell, refine=leaves_grid(job), graph=graph, ceiling=ceiling
         )
     except NoFeasiblePath:
         return None
@@ -180,7 +186,7 @@ def find_remedy(
     if fastest.on_grid is not None:
         refined = trial.speed(job.options, fastest.speed, above=float(speed) / 60)
     # Shares of the limits at which a clear path exists are not looked for.
-    shares, closed = ({}, ()) if cell is not None else _shares(trial)
+    shares, closed = ({}, ()) if cell is not None else _shares(trial, relaxation)
     made = Remedy(
         other_method=other,
         speed=speed,
@@ -193,8 +199,11 @@ def find_remedy(
     return made, fastest
 
 
-def _shares(trial: _Trial) -> tuple[dict[str, str], tuple[str, ...]]:
-    """Return the shares of one limit that open the way, and the limits of which none does."""
+def _shares(trial: _Trial, relaxation: Relaxation | None) -> tuple[dict[str, str], tuple[str, ...]]:
+    """Return the shares of one limit that open the way, and the limits of which none does.
+
+    Those of the grid, and of the accelerations less where a motion off it does with less.
+    """
     options = trial.on_grid
     least = relaxations(
         trial.candidate.nodes,
@@ -205,11 +214,22 @@ def _shares(trial: _Trial) -> tuple[dict[str, str], tuple[str, ...]]:
         eta_a=options.eta_a,
     )
     shares, closed = dict[str, str](), list[str]()
-    for key, value in (("eta_velocity", least.eta_v), ("eta_acceleration", least.eta_a)):
-        if value is None or value > 1:
-            closed.append(key)
-        elif (found := trial.share(key, value)) is not None:
+    keys: tuple[tuple[Share, float | None], ...] = (
+        ("eta_velocity", least.eta_v),
+        ("eta_acceleration", least.eta_a),
+    )
+    for key, value in keys:
+        found = None
+        if key == "eta_acceleration" and relaxation is not None and relaxation.velocity == 1:
+            off_grid = options.eta_a * relaxation.acceleration
+            if value is None or off_grid < value:
+                found = trial.share(trial.job.options, key, off_grid)
+        if found is None and value is not None and value <= 1:
+            found = trial.share(options, key, value)
+        if found is not None:
             shares[key] = found
+        elif value is None or value > 1:
+            closed.append(key)
     return shares, tuple(closed)
 
 

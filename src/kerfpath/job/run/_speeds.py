@@ -13,7 +13,7 @@ from kerfpath.job.format import ContourSpec, Job, cell_of_job
 from kerfpath.planner import FastestSpeed, fastest_speed
 from kerfpath.progress import Progress, no_progress
 
-__all__ = ["fastest_along", "fastest_speeds"]
+__all__ = ["fastest_along", "fastest_speeds", "leaves_grid"]
 
 
 def fastest_along(
@@ -41,6 +41,11 @@ def fastest_along(
     )
 
 
+def leaves_grid(job: Job) -> bool:
+    """Return whether plans of a job may leave the grid of gamma."""
+    return job.options.refine or job.options.method == "continuous"
+
+
 def fastest_speeds(
     job: Job, *, progress: Progress = no_progress
 ) -> list[tuple[ContourSpec, Contour, FastestSpeed | NoFeasiblePath]]:
@@ -66,7 +71,7 @@ def fastest_speeds(
                 (
                     task,
                     nodes,
-                    fastest_along(job, nodes, cell, refine=job.options.refine, ceiling=True),
+                    fastest_along(job, nodes, cell, refine=leaves_grid(job), ceiling=True),
                 )
             )
         except NoFeasiblePath as broken:
