@@ -11,6 +11,7 @@ from kerfpath import refiner
 from kerfpath.planner._clear import ClearSearch
 from kerfpath.planner._on_grid import plan_on_grid
 from kerfpath.planner._quickest import alike, clear_paths, wide
+from kerfpath.planner._shaken import shaken
 from kerfpath.planner._task import PlanningTask
 from kerfpath.plans import Plan, Proof
 from kerfpath.refiner import Refinement
@@ -24,8 +25,11 @@ FINE, COARSE = (0.1, 0.25), (1.1, 1.0)
 """When the states of a beam are alike: for paths that hardly accelerate, and that must."""
 QUICK = (Effort(60, FINE, 2), Effort(200, COARSE, 2))
 """Paths that are refined at first; wide ones where the values promise better."""
-ENOUGH = 5e-3
-"""Relative gap to what the values promise with which a motion is good."""
+OTHERWISE = (0.5, 0.5)
+"""When the states of a wide search are alike that is to end in other valleys than the first."""
+ENOUGH, POOR = 5e-3, 1e-2
+"""Relative gap to what the values promise with which a motion is good; and beyond which (6) binds
+so much that what a path promises says little, and all of them are refined."""
 GAIN = 5e-3
 """What a refinement may take off the cost that a path promises, relative."""
 NARROWED = 6
@@ -51,7 +55,10 @@ def plan_continuous(task: PlanningTask, finder: ClearSearch, begin: Callable[[st
         # What the nodes of a slower motion cost is known on the grid only.
         priced = task.settings.feed == "dip" and comfort is not None and comfort.costs
         refine = task.robot.family.free_rotation and not priced
-        return _said(plan_on_grid(task, finder, begin, refine=refine), why)
+        made = plan_on_grid(task, finder, begin, refine=refine)
+        if not reason and made.feed is None:
+            made = shaken(made, finder)
+        return replace(made, proof=replace(made.proof, statement=f"{why}; {made.proof.statement}"))
     claim = f"the best motion found over continuous rotation: cost {found.cost_after:.6g}"
     return replace(found.plan, proof=Proof(optimal=False, statement=finder.claimed(claim)))
 
@@ -68,26 +75,50 @@ def clear_motion(
         return None
     search, paths = searched
     begin("refinement")
-    found = _refined(task, finder, paths)
-    if found is None or found.cost_after > (1 + ENOUGH) * search.value:
-        found = _better(found, _refined(task, finder, list(search.paths(wide(task)))))
-    return found
+    starts = _Starts(task, finder)
+    starts.refine(paths)
+    if starts.above(search.value, ENOUGH):
+        paths += search.paths(wide(task))
+        starts.refine(paths)
+    if starts.best is not None and starts.above(search.value, POOR):
+        width, _, ways = wide(task)
+        paths += search.paths(Effort(width, OTHERWISE, ways))
+        starts.refine(paths, unpromising=True)
+        made = shaken(starts.best.plan, finder)
+        return replace(starts.best, plan=made, cost_after=made.cost)
+    return starts.best
 
 
-def _refined(
-    task: PlanningTask, finder: ClearSearch, paths: list[ContinuousPath]
-) -> Refinement | None:
-    """Return the best motion that paths are refined to; None where none is."""
-    claim = Proof(optimal=False, statement="found over continuous rotation")
-    plans = [task.plan_between(path, claim) for path in paths]
-    best: Refinement | None = None
-    for promised, i in sorted((refiner.promise(plan), i) for i, plan in enumerate(plans)):
-        if best is not None and promised * (1 - GAIN) >= best.cost_after:
-            break
-        if best is not None and alike(plans[i], best.plan):
-            continue
-        best = _better(best, _refine_path(task, finder, paths[i], plans[i]))
-    return best
+class _Starts:
+    """Paths to begin a refinement from, and the best motion that they are refined to."""
+
+    def __init__(self, task: PlanningTask, finder: ClearSearch) -> None:
+        self._task, self._finder = task, finder
+        self._tried: list[Plan] = []
+        self.best: Refinement | None = None
+
+    def above(self, value: float, share: float) -> bool:
+        """Return whether the best motion costs more than a value by more than a share of it."""
+        return self.best is None or self.best.cost_after > (1 + share) * value
+
+    def refine(self, paths: list[ContinuousPath], *, unpromising: bool = False) -> None:
+        """Refine paths, the most promising first, of those alike one.
+
+        Those that do not promise to be better only where that is asked for: what bringing a path
+        inside the limits costs is a guess.
+        """
+        claim = Proof(optimal=False, statement="found over continuous rotation")
+        plans = [self._task.plan_between(path, claim) for path in paths]
+        for promised, i in sorted((refiner.promise(plan), i) for i, plan in enumerate(plans)):
+            best, made = self.best, plans[i]
+            hopeless = best is not None and promised * (1 - GAIN) >= best.cost_after
+            if hopeless and not unpromising:
+                break
+            known = self._tried if best is None else [*self._tried, best.plan]
+            if not any(alike(made, other) for other in known):
+                self._tried.append(made)
+                found = _refine_path(self._task, self._finder, paths[i], made)
+                self.best = _better(best, found)
 
 
 def _refine_path(
@@ -130,8 +161,3 @@ def grid_reason(task: PlanningTask) -> str:
     if comfort is not None and comfort.clearance is not None:
         return "what clearance costs is known there only"
     return ""
-
-
-def _said(made: Plan, why: str) -> Plan:
-    """Return a plan on the grid, or from it, that says so."""
-    return replace(made, proof=replace(made.proof, statement=f"{why}; {made.proof.statement}"))

@@ -104,7 +104,7 @@ def _from_quickest(
     begin("search for the quickest motion")
     try:
         for tried, best in enumerate(quick_motions(task, finder)):
-            made = plan_slowly(task, best, finder) if best.dt <= task.dt else None
+            made = plan_slowly(task, best, finder) if best.is_enough(task.dt) else None
             if made is not None:
                 return made
             far = best.dt > (TOO_SLOW, NEARLY)[tried > 0] * task.dt

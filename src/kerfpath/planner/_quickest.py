@@ -58,6 +58,10 @@ class QuickMotion:
         """Interval between its nodes, s."""
         return self.plan.dt
 
+    def is_enough(self, dt: float) -> bool:
+        """Return whether it keeps every limit with dt s between its nodes, whatever is rounded."""
+        return self.dt * (1 - SLACK / 2) <= dt
+
 
 def quickest_motion(task: PlanningTask, finder: ClearSearch) -> QuickMotion:
     """Return the last and quickest of the `quick_motions`; arguments and errors as there."""

@@ -1,0 +1,164 @@
+"""The fastest motion: what is reached a plan finds, and a refusal says what would open the way."""
+
+from itertools import islice
+
+import numpy as np
+import pytest
+
+from kerfpath import NoFeasiblePath, audit, fastest_speed, plan
+from kerfpath.contour import Contour
+from kerfpath.options import PlanOptions
+from kerfpath.planner._clear import ClearSearch
+from kerfpath.planner._quickest import quick_motions, quickest_motion
+from kerfpath.planner._task import task_of
+from kerfpath.plans import path_cost
+
+STEP = np.radians(6)
+
+
+def drawn(seed, nodes=21):
+    """Return a random short open contour in front of the robot, on a curved surface."""
+    rng = np.random.default_rng([23, seed])
+    t = np.linspace(0, 2 * np.pi * rng.uniform(0.5, 0.8), 400)
+    r = 0.06 + 0.02 * rng.uniform(-1, 1) * np.cos(2 * t + rng.uniform(0, 6))
+    points = np.stack([r * np.cos(t), r * np.sin(t), 0.02 * np.cos(3 * t)], axis=1)
+    points[:, 1] += rng.uniform(-0.2, 0.2)
+    lean = 0.3 * np.stack([np.cos(t + rng.uniform(0, 6)), np.sin(t + rng.uniform(0, 6))], axis=1)
+    return Contour(points, np.column_stack([lean, -np.ones(400)]), closed=False).resample(
+        count=nodes
+    )
+
+
+def errors(made):
+    """Return what the audit refuses at the nodes: between nodes as far apart nothing is held."""
+    issues = [issue for issue in audit(made) if issue.level == "error"]
+    return [issue for issue in issues if not issue.code.endswith("-between")]
+
+
+@pytest.fixture
+def space(tool, placement):
+    return {"tool": tool, "placement": placement, "gamma_step": STEP}
+
+
+def task(nodes, arm, tool, placement, speed=0.5, **options):
+    asked = PlanOptions(gamma_step=STEP, **options)
+    return task_of(nodes, arm, asked, tool=tool, placement=placement, speed=speed)
+
+
+@pytest.mark.parametrize("method", ["continuous", "exact"])
+@pytest.mark.parametrize("seed", range(3))
+def test_at_the_fastest_speed_and_below_there_is_a_plan(seed, method, arm, space):
+    nodes = drawn(seed)
+    fastest = fastest_speed(nodes, arm, refine=True, **space)
+    for share in (1.0, 0.97):
+        made = plan(
+            nodes,
+            arm,
+            speed=share * fastest.speed,
+            method=method,
+            refine=method == "exact",
+            **space,
+        )
+        assert errors(made) == []
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_motions_grow_quicker_and_keep_every_limit_at_their_own_speed(seed, arm, tool, placement):
+    posed = task(drawn(seed), arm, tool, placement)
+    found = list(quick_motions(posed, ClearSearch(posed, None)))
+    assert len(found) >= 2
+    steps = [motion.dt for motion in found]
+    assert steps == sorted(steps, reverse=True)
+    assert found[0].dt == found[0].on_grid
+    for motion in found[1:]:
+        assert errors(motion.plan) == []
+        # What binds is used up, but for what is left free against rounding.
+        criteria = motion.plan.criteria
+        peak = getattr(criteria, f"peak_{motion.at.limit}")
+        assert peak[motion.at.joint] == pytest.approx(1.0, rel=1e-4)
+
+
+def test_what_a_plan_aims_at_plays_no_part(arm, tool, placement):
+    nodes, steps = drawn(0), []
+    for aim in (
+        {},
+        {"metric": "euclid", "weights": [3, 1, 1, 0.1, 0.1, 2]},
+        {"objective": "max", "speed": 0.1},
+    ):
+        posed = task(nodes, arm, tool, placement, **aim)
+        finder = ClearSearch(posed, None)
+        steps.append([motion.dt for motion in islice(quick_motions(posed, finder), 3)])
+    assert steps[0] == steps[1] == steps[2]
+
+
+def test_the_fastest_speed_is_that_of_the_quickest_motion(arm, tool, placement, space):
+    nodes = drawn(1)
+    posed = task(nodes, arm, tool, placement)
+    best = quickest_motion(posed, ClearSearch(posed, None))
+    told = fastest_speed(nodes, arm, refine=True, **space)
+    # dt is a mean of differences of times.
+    assert told.speed == pytest.approx(np.diff(nodes.s).max() / best.dt, rel=1e-12)
+    assert (told.joint, told.node, told.limit) == tuple(best.at)
+    assert told.on_grid == fastest_speed(nodes, arm, **space).speed
+
+
+@pytest.mark.parametrize("seed", range(3))
+@pytest.mark.parametrize("share", [1.02, 3.0])
+def test_a_refusal_says_with_what_a_motion_was_found(seed, share, arm, space):
+    nodes = drawn(seed)
+    fastest = fastest_speed(nodes, arm, refine=True, **space)
+    speed = share * fastest.speed
+    with pytest.raises(NoFeasiblePath) as caught:
+        plan(nodes, arm, speed=speed, **space)
+    none, needed = caught.value, caught.value.relaxation
+    assert 0 < needed.speed < 1
+    assert max(needed.velocity, needed.acceleration) > 1
+    assert f"found at {needed.speed:g} of the speed" in str(none)
+    assert (f"{needed.acceleration:g} times the accelerations" in str(none)) == (
+        needed.acceleration > 1
+    )
+    if none.closed is None:
+        # All that fastest_speed tries was tried, and the figures are rounded to 4 digits.
+        assert needed.speed * share == pytest.approx(1, rel=2e-3)
+    assert errors(plan(nodes, arm, speed=needed.speed * speed, **space)) == []
+
+
+def test_a_node_out_of_reach_has_no_pose_at_any_gamma(arm, space):
+    points = np.array([[0.0, 0.0, 0.0], [4.5, 0.0, 0.0], [9.0, 0.0, 0.0]])
+    line = Contour(points, np.tile([0.0, 0.0, -1.0], (3, 1)), closed=False)
+    with pytest.raises(NoFeasiblePath, match="rotation: node 1 has no pose within") as caught:
+        plan(line, arm, speed=0.1, **space)
+    none = caught.value
+    assert none.scope == "every gamma"
+    assert (none.closed.node, none.closed.joint, none.closed.limit) == (0, None, "pose")
+    assert none.node == 0
+
+
+def test_a_node_whose_poses_lie_between_the_samples_has_some_off_the_grid(arm, space):
+    nodes = drawn(0)
+    made = plan(nodes, arm, speed=0.05, **space | {"gamma_step": np.radians(2)})
+    # Only what is about that motion, and no sample of a quarter turn is.
+    room = np.radians(0.1)
+    narrow = arm.with_limits(
+        lower=made.q.min(axis=0) - room, upper=made.q.max(axis=0) + room, endless=[0] * 6
+    )
+    with pytest.raises(NoFeasiblePath, match="no admissible pose at node") as caught:
+        plan(nodes, narrow, speed=0.05, **space | {"gamma_step": np.radians(90)})
+    assert caught.value.scope == "grid"
+    assert caught.value.closed is None
+    assert "whether it has one off the grid is undecided" in str(caught.value)
+
+
+def test_what_is_asked_for_stays_in_the_plan_that_a_quick_motion_leads_to(arm, space):
+    nodes = drawn(2)
+    fastest = fastest_speed(nodes, arm, refine=True, **space)
+    options = PlanOptions(metric="euclid", gamma_step=STEP)
+    at = {"tool": space["tool"], "placement": space["placement"], "speed": fastest.speed}
+    made = plan(nodes, arm, options=options, **at)
+    assert made.settings.metric == "euclid"
+    assert made.dt == pytest.approx(np.diff(nodes.s).max() / fastest.speed)
+    asked = made.settings
+    # Rounding: the cost is summed over the unwrapped motion.
+    assert made.cost == pytest.approx(
+        path_cost(made.increments, asked.weights, "euclid", "sum"), rel=1e-9
+    )
