@@ -111,7 +111,7 @@ def fastest_speed(
     if comfort is not None and comfort.costs:
         raise InputError("comfort: what is fastest knows no costs; give margins alone")
     task = task_of(
-        replace(contour, time=None),
+        contour if contour.time is None else replace(contour, time=None),
         robot,
         PlanOptions(**{name: getattr(asked, name) for name in SpeedKeywords.__annotations__}),
         tool=tool,
