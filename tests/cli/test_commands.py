@@ -180,6 +180,9 @@ def test_a_part_out_of_reach_is_reported_without_a_program(folder):
     data = json.loads((folder / "far-plan" / "plan.json").read_text())
     assert not data["contours"][0]["feasible"]
     assert data["contours"][0]["proved"]
+    assert data["contours"][0]["proved_for"] == "every gamma"
+    assert data["contours"][0]["closed"] == {"node": -1, "joint": None, "limit": "pose"}
+    assert data["contours"][0]["relaxation"] is None
     assert run("audit", "far-plan/plan.json", cwd=folder).returncode == 1
     assert run("post", "far-plan/plan.json", cwd=folder).returncode == 1
 
@@ -211,6 +214,7 @@ def test_a_contour_that_is_too_fast_is_told_how_fast_it_could_be(folder, fastest
         ('\nmethod = "paper"', 1.0001),
         ("\nrefine = true", 1.06),
         ("time step", 1.03),  # the nodes follow from the speed
+        ('\nmethod = "continuous"', 1.02),
     ],
 )
 def test_what_a_message_advises_can_be_done(folder, fastest, change, share):
@@ -222,7 +226,8 @@ def test_what_a_message_advises_can_be_done(folder, fastest, change, share):
         grid = grid.replace("spacing_mm = 1", "time_step_ms = 20", 1)
     else:
         grid = grid.replace("[plan]", f"[plan]{change}")
-    over = fastest["fastest_m_min" if "refine" in change else "on_grid_m_min"] * share
+    off_grid = "refine" in change or "continuous" in change
+    over = fastest["fastest_m_min" if off_grid else "on_grid_m_min"] * share
     asked = grid.replace("speed_m_min = 3", f"speed_m_min = {over!r}", 1)
     (folder / "over.toml").write_text(asked)
     result = run("plan", "over.toml", "--out", "advised", cwd=folder)
@@ -230,7 +235,7 @@ def test_what_a_message_advises_can_be_done(folder, fastest, change, share):
     message = result.stdout
     speeds = re.findall(r"up to ([\d.]+) m/min", message)
     shares = re.findall(r"(eta_\w+) = ([\d.]+)", message)
-    assert len(speeds) == (2 if "refine" in change else 1)
+    assert len(speeds) == (2 if off_grid else 1)
     assert all(float(speed) < over for speed in speeds)
     assert all(0.9 < float(value) <= 1 for _, value in shares)
     assert shares or change in ("\nrefine = true", "time step")
@@ -298,6 +303,8 @@ def test_a_refusal_says_that_no_rotation_would_do(folder, fastest):
     assert result.returncode == 1
     entry = json.loads(result.stdout)["contours"][0]
     assert entry["proved_for"] == "every gamma"
+    assert set(entry["closed"]) == {"node", "joint", "limit"}
+    assert 0 < entry["relaxation"]["speed"] < 1
     assert "proved for every rotation: no motion goes on from node" in entry["reason"]
     said = re.search(r"impossible at any rotation from ([\d.]+) m/min on", entry["reason"])
     assert float(said[1]) == pytest.approx(fastest["impossible_from_m_min"], rel=0.05)

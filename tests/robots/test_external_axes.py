@@ -12,6 +12,7 @@ from conftest import pose
 from kerfpath import Contour, InputError, NoFeasiblePath, Tilt, audit, plan
 from kerfpath.auditor import chain_of, checks, transfer_checks
 from kerfpath.cell import cell_of
+from kerfpath.certifier import certify
 from kerfpath.comfort import Band, Comfort, measure, measures
 from kerfpath.graph import gamma_grid
 from kerfpath.job import read_plan_file
@@ -131,6 +132,7 @@ def test_a_cut_beyond_the_reach_needs_the_rail(arm, railed, tool, placement):
     refined = plan(long, railed, **options)
     assert refined.cost < made.cost
     assert np.isin(refined.q[:, 6], railed.external.samples(-1.0, 1.0)).all()
+    assert "no bound is proved: the joints of an external axis" in certify(refined).statement
     assert not refined.turn[:, 6].any()
     assert audit(refined, path_tolerance=0.02) == []
 
