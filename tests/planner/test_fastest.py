@@ -9,7 +9,7 @@ from kerfpath import NoFeasiblePath, audit, fastest_speed, plan
 from kerfpath.contour import Contour
 from kerfpath.options import PlanOptions
 from kerfpath.planner._clear import ClearSearch
-from kerfpath.planner._quickest import quick_motions, quickest_motion
+from kerfpath.planner._quickest import quick_motions
 from kerfpath.planner._task import task_of
 from kerfpath.plans import path_cost
 
@@ -94,7 +94,7 @@ def test_what_a_plan_aims_at_plays_no_part(arm, tool, placement):
 def test_the_fastest_speed_is_that_of_the_quickest_motion(arm, tool, placement, space):
     nodes = drawn(1)
     posed = task(nodes, arm, tool, placement)
-    best = quickest_motion(posed, ClearSearch(posed, None))
+    *_, best = quick_motions(posed, ClearSearch(posed, None))
     told = fastest_speed(nodes, arm, refine=True, **space)
     # dt is a mean of differences of times.
     assert told.speed == pytest.approx(np.diff(nodes.s).max() / best.dt, rel=1e-12)

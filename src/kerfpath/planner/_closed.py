@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from math import sqrt
 
 import numpy as np
@@ -13,10 +14,19 @@ from kerfpath.planner._quickest import QuickMotion
 from kerfpath.planner._task import PlanningTask
 from kerfpath.planner._words import at_least, at_most
 
-__all__ = ["at_any_gamma", "impossible_share", "motion_test", "with_relaxation"]
+__all__ = [
+    "at_any_gamma",
+    "binding_nodes",
+    "impossible_share",
+    "motion_test",
+    "with_relaxation",
+]
 
 MOST_NODES = 5_000
 """Nodes up to which cells of all of them are held at once: some 200 MB."""
+BINDS, APART, MOST_BINDING = 0.9, 3, 12
+"""Share of the limits, in speed, from which they bind at a node; how many nodes apart others are;
+and how many are looked at."""
 SLACK = 1e-6
 """Share of a limit that is left free against rounding."""
 FAR, CLOSE = 300.0, 1.02
@@ -72,30 +82,57 @@ def with_relaxation(
     return broken.with_message(f"{broken}; {said}{limits_said}", relaxation=needed)
 
 
-def impossible_share(task: PlanningTask, reached: float, node: int) -> float | None:
+def impossible_share(task: PlanningTask, reached: float, nodes: Sequence[int]) -> float | None:
     """Return an interval, as a share of `reached` s, too short for any motion at any gamma.
 
-    Proved for it and so for every shorter one; `node` is where a limit binds a motion that takes
-    `reached`. None where nothing is proved.
+    Proved for it and so for every shorter one; `nodes` are where limits bind a motion that takes
+    `reached`, most of all at the first. None where nothing is proved.
     """
     test = motion_test(task)
     if test is None:
         return None
     limits = task.problem.limits
 
-    def impossible(times: float) -> bool:
-        """Return whether no motion is so many times as fast, first by what is about the node."""
-        return any(test.closed(limits, reached / times, at) is not None for at in (node, None))
+    def impossible(times: float, around: int | None) -> bool:
+        """Return whether no motion is so many times as fast, by what is about a node or by all."""
+        return test.closed(limits, reached / times, around) is not None
 
     low, high = 1.0, 2.0
-    while not impossible(high):
+    while not any(impossible(high, around) for around in (*nodes[:1], None)):
         low, high = high, high * high
         if high > FAR:
             return None
-    while high > CLOSE * low:
-        middle = sqrt(low * high)
-        if test.closed(limits, reached / middle, node) is not None:
-            high = middle
-        else:
-            low = middle
+    for node in nodes:
+        # What is about another node may be closed at a lower speed, too.
+        least = low if node == nodes[0] else 1.0
+        if not impossible(high / CLOSE, node):
+            continue
+        high /= CLOSE
+        while high > CLOSE * least:
+            middle = sqrt(least * high)
+            if impossible(middle, node):
+                high = middle
+            else:
+                least = middle
     return 1 / high
+
+
+def binding_nodes(motions: Sequence[QuickMotion]) -> list[int]:
+    """Return the nodes where limits bind ever quicker motions, that of the quickest first.
+
+    Where a limit binds each, and where limits nearly bind the quickest: some of them, not close to
+    each other.
+    """
+    plan = motions[-1].plan
+    velocity = np.abs(plan.velocity_share).max(axis=1) / plan.settings.eta_v
+    acceleration = np.abs(plan.acceleration_share).max(axis=1) / plan.settings.eta_a
+    used = np.zeros(len(plan.q))
+    used[1:] = velocity
+    used[1:-1] = np.maximum(used[1:-1], np.sqrt(acceleration))
+    used[used < BINDS * used.max()] = 0.0
+    near = np.argsort(-used, kind="stable")[: np.count_nonzero(used)]
+    nodes: list[int] = []
+    for node in [*(motion.at.node for motion in reversed(motions)), *near.tolist()]:
+        if all(abs(node - other) > APART for other in nodes):
+            nodes.append(node)
+    return nodes[:MOST_BINDING]

@@ -16,9 +16,9 @@ from kerfpath.graph import LayeredGraph
 from kerfpath.limits import Limits
 from kerfpath.options import GraphKeywords, PlanOptions, with_keywords
 from kerfpath.planner._clear import ClearSearch
-from kerfpath.planner._closed import impossible_share
+from kerfpath.planner._closed import binding_nodes, impossible_share
 from kerfpath.planner._graph import longest_step, node_interval, require_even
-from kerfpath.planner._quickest import quickest_motion
+from kerfpath.planner._quickest import quick_motions
 from kerfpath.planner._task import PlanningTask, task_of
 from kerfpath.robots import Robot
 from kerfpath.search import (
@@ -120,26 +120,32 @@ def fastest_speed(
         graph=graph,
         progress=progress,
     )
-    found = _fastest(task, ClearSearch(task, cell))
+    found, nodes = _fastest(task, ClearSearch(task, cell))
     if not ceiling:
         return found
     interval = longest_step(contour) / found.speed
-    share = impossible_share(task, interval, found.node)
+    share = impossible_share(task, interval, nodes)
     return found if share is None else replace(found, ceiling=found.speed / share)
 
 
-def _fastest(task: PlanningTask, finder: ClearSearch) -> FastestSpeed:
-    """Return the largest speed reached, on the grid or, where that is asked for, off it."""
+def _fastest(task: PlanningTask, finder: ClearSearch) -> tuple[FastestSpeed, list[int]]:
+    """Return the largest speed reached, on the grid or, where that is asked for, off it.
+
+    And the nodes where a limit binds, the first that of the speed.
+    """
     if not (task.settings.refine and task.robot.family.free_rotation):
-        return FastestSpeed.of(task.contour, finder.find(find_least_interval, task.problem.free()))
-    quick, step = quickest_motion(task, finder), longest_step(task.contour)
-    return FastestSpeed(
+        found = FastestSpeed.of(task.contour, finder.find(find_least_interval, task.problem.free()))
+        return found, [found.node]
+    motions, step = list(quick_motions(task, finder)), longest_step(task.contour)
+    quick = motions[-1]
+    found = FastestSpeed(
         speed=step / quick.dt,
         joint=quick.at.joint,
         node=quick.at.node,
         limit=quick.at.limit,
         on_grid=step / quick.on_grid if quick.dt < quick.on_grid else None,
     )
+    return found, binding_nodes(motions)
 
 
 def relaxations(

@@ -15,7 +15,7 @@ from kerfpath.plans import Plan, Proof
 from kerfpath.refiner import Binding, quicken
 from kerfpath.search import ContinuousPath, ContinuousSearch, Effort, find_least_interval
 
-__all__ = ["QuickMotion", "alike", "clear_paths", "quick_motions", "quickest_motion", "wide"]
+__all__ = ["QuickMotion", "alike", "clear_paths", "quick_motions", "wide"]
 
 RUNGS = (1.06, 1.0, 1.1)
 """Multiples of the speed reached at which beams look for a motion that is quicker still. Where no
@@ -61,12 +61,6 @@ class QuickMotion:
     def is_enough(self, dt: float) -> bool:
         """Return whether it keeps every limit with dt s between its nodes, whatever is rounded."""
         return self.dt * (1 - SLACK / 2) <= dt
-
-
-def quickest_motion(task: PlanningTask, finder: ClearSearch) -> QuickMotion:
-    """Return the last and quickest of the `quick_motions`; arguments and errors as there."""
-    *_, best = quick_motions(task, finder)
-    return best
 
 
 def quick_motions(task: PlanningTask, finder: ClearSearch) -> Iterator[QuickMotion]:
