@@ -256,7 +256,7 @@ FAULTS = [
     ("b_pillar.step", "a\\u0000b", 8, "part.file: .*it is not in"),
     ("b_pillar.step", "x" * 5000, 8, "part.file: .*it is not in"),
     ("b_pillar.step", "", 8, "part.file: .*the path of the part's CAD file"),
-    ("xyz_mm", 'unit = "foot"\nxyz_mm', 9, "part.unit: expected 'mm', 'cm', 'm' or 'in'"),
+    ("xyz_mm", 'unit = "foot"\nxyz_mm', 9, "part.unit: expected a length unit .um, mm, cm"),
     ("[0, 0, 90]", "{ yaw = 90 }", 10, "part.rpy_deg: .*got a table"),
     # contour
     ('"trim"', "3", 12, "contour.pick: .*got 3"),

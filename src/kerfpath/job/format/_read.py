@@ -15,7 +15,8 @@ from pydantic import ValidationError
 from kerfpath._arrays import Array, Ints
 from kerfpath._repr import short_repr
 from kerfpath.auditor import Check, Rounding, checks
-from kerfpath.cad import Part
+from kerfpath.cad import GAP, Part
+from kerfpath.cad import read as read_drawing
 from kerfpath.cell import Cell
 from kerfpath.contour import Contour
 from kerfpath.errors import InputError
@@ -154,8 +155,12 @@ class Job:
         T_base_part.
     part_file : Path
         The CAD file, there when the job was read.
-    part_unit : {"mm", "cm", "m", "in"} or None
+    part_unit : str or None
         Length unit that overrides the CAD file's own.
+    part_gap : float m
+        Distance between the ends of two curves that a loop of the drawing bridges.
+    outer_towards : (3,) or None
+        Where the outer sides of its sheets face, see `kerfpath.cad.read`.
     contours : tuple of ContourSpec
         In the order of cutting.
     options : PlanOptions
@@ -180,6 +185,8 @@ class Job:
     placement: Array
     part_file: Path
     part_unit: str | None
+    part_gap: float = GAP
+    outer_towards: Array | None = None
     contours: tuple[ContourSpec, ...]
     options: PlanOptions
     cell: CellTable | None
@@ -190,6 +197,21 @@ class Job:
     source: Mapping[str, Any]
 
     __repr__ = short_repr
+
+    def read_part(self) -> Part:
+        """Return the part that the CAD file holds.
+
+        Raises
+        ------
+        InputError
+            It cannot be read.
+        """
+        return read_drawing(
+            self.part_file,
+            unit=self.part_unit,
+            gap=self.part_gap,
+            outer_towards=self.outer_towards,
+        )
 
     def graph(
         self,
@@ -283,6 +305,8 @@ def read_job(path: str | Path) -> Job:
         placement=file.part.resolve(),
         part_file=path.parent / file.part.file,
         part_unit=file.part.unit,
+        part_gap=file.part.gap,
+        outer_towards=file.part.towards,
         contours=tuple(task_of(table) for table in file.contour),
         options=options,
         cell=file.cell,

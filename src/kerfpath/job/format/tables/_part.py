@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Literal
+from typing import Annotated
 
+import numpy as np
 from pydantic import AfterValidator
 
 from kerfpath._arrays import Array
+from kerfpath.cad import GAP, UNITS_MM
 from kerfpath.job.format._poses import pose
-from kerfpath.job.format._values import Text, Three, existing, key
+from kerfpath.job.format._values import Positive, Text, Three, existing, key, one_of
 from kerfpath.job.format.tables._table import Table
 
 __all__ = ["PartTable"]
@@ -22,7 +24,18 @@ class PartTable(Table):
         AfterValidator(existing("the part's CAD file")),
         key("the path of the part's CAD file", '"b_pillar.step"'),
     ]
-    unit: Literal["mm", "cm", "m", "in"] | None = None
+    unit: Annotated[
+        str | None,
+        one_of(f"a length unit ({', '.join(UNITS_MM)})", lambda: UNITS_MM),
+        key("a length unit", '"mm"'),
+    ] = None
+    gap_mm: Annotated[
+        Positive, key("the largest distance between two ends that a loop bridges, mm", "0.05")
+    ] = GAP * 1000
+    outer_towards: Annotated[
+        Three | None,
+        key("3 numbers, where the outer sides of its sheets face, in the part", "[0, 0, 1]"),
+    ] = None
     xyz_mm: Annotated[
         Three, key("3 numbers, the part's position in the robot base in mm", "[1450, -600, 450]")
     ]
@@ -30,6 +43,16 @@ class PartTable(Table):
         Three,
         key("3 numbers, the part's roll, pitch and yaw in the robot base in deg", "[0, 0, 90]"),
     ]
+
+    @property
+    def gap(self) -> float:
+        """Largest distance that a loop bridges, m."""
+        return self.gap_mm / 1000
+
+    @property
+    def towards(self) -> Array | None:
+        """Where the outer sides of sheets face, (3,)."""
+        return None if self.outer_towards is None else np.array(self.outer_towards, dtype=float)
 
     def resolve(self) -> Array:
         """Return T_base_part, (4, 4), m."""
