@@ -119,5 +119,5 @@ def test_a_job_says_it_too(tmp_path: Path) -> None:
         '[[contour]]\npick = "skin1/outer"\nspeed_m_min = 2\nspacing_mm = 2\n'
     )
     job = read_job(tmp_path / "job.toml")
-    assert job.part_gap == pytest.approx(2e-5)
+    assert job.drawing.gap == pytest.approx(2e-5)
     assert distance(job.read_part(), "outer", rim_point(profile, "right")) < ON

@@ -77,7 +77,7 @@ def test_the_example_is_read_into_si(read, folder):
     job = read(JOB)
     assert job.path == folder / "job.toml"
     assert job.part_file == folder / "b_pillar.step"
-    assert job.part_unit is None
+    assert job.drawing.unit is None
     assert job.robot.id == "abb_irb4600_60_205"
     assert job.robot.endless.tolist() == [False, False, False, True, False, True]
     np.testing.assert_allclose(

@@ -15,13 +15,13 @@ from pydantic import ValidationError
 from kerfpath._arrays import Array, Ints
 from kerfpath._repr import short_repr
 from kerfpath.auditor import Check, Rounding, checks
-from kerfpath.cad import GAP, Part
-from kerfpath.cad import read as read_drawing
+from kerfpath.cad import Part
 from kerfpath.cell import Cell
 from kerfpath.contour import Contour
 from kerfpath.errors import InputError
 from kerfpath.graph import LayeredGraph
 from kerfpath.job.format._contour import ContourSpec, task_of
+from kerfpath.job.format._drawing import Drawing
 from kerfpath.job.format._operations import keys_of_closed_loops
 from kerfpath.job.format._refusals import error_at, refusal, refusal_at
 from kerfpath.job.format.tables import (
@@ -153,14 +153,8 @@ class Job:
         T_flange_tip.
     placement : (4, 4) m
         T_base_part.
-    part_file : Path
-        The CAD file, there when the job was read.
-    part_unit : str or None
-        Length unit that overrides the CAD file's own.
-    part_gap : float m
-        Distance between the ends of two curves that a loop of the drawing bridges.
-    outer_towards : (3,) or None
-        Where the outer sides of its sheets face, see `kerfpath.cad.read`.
+    drawing : Drawing
+        The CAD file, and how it is read.
     contours : tuple of ContourSpec
         In the order of cutting.
     options : PlanOptions
@@ -183,10 +177,7 @@ class Job:
     robot: Robot
     tool: Array
     placement: Array
-    part_file: Path
-    part_unit: str | None
-    part_gap: float = GAP
-    outer_towards: Array | None = None
+    drawing: Drawing
     contours: tuple[ContourSpec, ...]
     options: PlanOptions
     cell: CellTable | None
@@ -198,20 +189,28 @@ class Job:
 
     __repr__ = short_repr
 
+    @property
+    def part_file(self) -> Path:
+        """The CAD file, there when the job was read."""
+        return self.drawing.file
+
     def read_part(self) -> Part:
         """Return the part that the CAD file holds.
 
         Raises
         ------
         InputError
-            It cannot be read.
+            It cannot be read, or not all of it that may have been to cut.
         """
-        return read_drawing(
-            self.part_file,
-            unit=self.part_unit,
-            gap=self.part_gap,
-            outer_towards=self.outer_towards,
-        )
+        part = self.drawing.read()
+        doubtful = [str(one) for one in part.left_out if one.may_cut]
+        if doubtful and not self.drawing.accept_left_out:
+            said = (
+                f"expected a drawing that is read whole; {'; '.join(doubtful)}; repair "
+                f'{self.part_file.name}, or write left_out = "accept"'
+            )
+            raise refusal_at(self.path, ("part", "file"), said)
+        return part
 
     def graph(
         self,
@@ -303,10 +302,7 @@ def read_job(path: str | Path) -> Job:
         robot=robot,
         tool=file.tool.resolve(),
         placement=file.part.resolve(),
-        part_file=path.parent / file.part.file,
-        part_unit=file.part.unit,
-        part_gap=file.part.gap,
-        outer_towards=file.part.towards,
+        drawing=file.part.drawing(path.parent),
         contours=tuple(task_of(table) for table in file.contour),
         options=options,
         cell=file.cell,

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
-from typing import Annotated
+from pathlib import Path
+from typing import Annotated, Literal
 
 import numpy as np
 from pydantic import AfterValidator
 
 from kerfpath._arrays import Array
 from kerfpath.cad import GAP, UNITS_MM
+from kerfpath.job.format._drawing import Drawing
 from kerfpath.job.format._poses import pose
 from kerfpath.job.format._values import Positive, Text, Three, existing, key, one_of
 from kerfpath.job.format.tables._table import Table
@@ -36,6 +38,10 @@ class PartTable(Table):
         Three | None,
         key("3 numbers, where the outer sides of its sheets face, in the part", "[0, 0, 1]"),
     ] = None
+    left_out: Annotated[
+        Literal["refuse", "accept"],
+        key("what becomes of a drawing of which something to cut may be left out", '"accept"'),
+    ] = "refuse"
     xyz_mm: Annotated[
         Three, key("3 numbers, the part's position in the robot base in mm", "[1450, -600, 450]")
     ]
@@ -44,15 +50,16 @@ class PartTable(Table):
         key("3 numbers, the part's roll, pitch and yaw in the robot base in deg", "[0, 0, 90]"),
     ]
 
-    @property
-    def gap(self) -> float:
-        """Largest distance that a loop bridges, m."""
-        return self.gap_mm / 1000
-
-    @property
-    def towards(self) -> Array | None:
-        """Where the outer sides of sheets face, (3,)."""
-        return None if self.outer_towards is None else np.array(self.outer_towards, dtype=float)
+    def drawing(self, folder: Path) -> Drawing:
+        """Return the drawing, its path taken from a folder."""
+        towards = self.outer_towards
+        return Drawing(
+            file=folder / self.file,
+            unit=self.unit,
+            gap=self.gap_mm / 1000,
+            outer_towards=None if towards is None else np.array(towards, dtype=float),
+            accept_left_out=self.left_out == "accept",
+        )
 
     def resolve(self) -> Array:
         """Return T_base_part, (4, 4), m."""
