@@ -21,6 +21,7 @@ NAMES = (
     "refinement",
     "collision",
     "cad",
+    "kerf",
     "part",
     "programs",
     "program_edits",
@@ -74,6 +75,10 @@ def _run(name: str, *, quick: bool) -> list[Report]:
 
         modules = (kinematics, _families, _enclosures)
         return [module.run(quick=quick) for module in modules]
+    if name == "kerf":
+        from benchmarks import kerf
+
+        return [kerf.run(quick=quick)]
     if name == "programs":
         from benchmarks import programs
 

@@ -12,7 +12,6 @@ from benchmarks import _long_contours
 from benchmarks._certified import GAP, Task, Weighed, weigh
 from benchmarks._figures import Report, Sheet
 from kerfpath import Contour
-from kerfpath.cad import read as read_drawing
 from kerfpath.job import Job, read_job
 
 __all__ = ["run"]
@@ -63,7 +62,7 @@ def run(*, quick: bool) -> list[Report]:
 
 def demo_tasks(job: Job) -> dict[str, Task]:
     """Return the tasks of a job by the names of their contours."""
-    part = read_drawing(job.part_file, unit=job.part_unit)
+    part = job.read_part()
 
     def task(nodes: Contour, speed: float) -> Task:
         return Task(

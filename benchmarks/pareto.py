@@ -16,7 +16,6 @@ import numpy as np
 from benchmarks._figures import Figure, Report, Sheet, in_turn
 from benchmarks._nsga import by_nsga
 from kerfpath import Contour, ParetoSet, pareto
-from kerfpath.cad import read as read_drawing
 from kerfpath.front import ParetoProblem, SearchKind, criteria_named, hypervolume
 from kerfpath.job import read_job
 from kerfpath.options import PlanOptions
@@ -115,7 +114,7 @@ def _swept(runs: int, processes: int) -> float:
 def _task() -> tuple[Contour, dict[str, Any]]:
     """Return the demo's trim line, and how it is planned, its graph and all."""
     job = read_job(JOB)
-    part = read_drawing(job.part_file, unit=job.part_unit)
+    part = job.read_part()
     task = next(task for task in job.contours if task.name == "trim")
     nodes = task.sample(part.contour(task.pick))
     options: dict[str, Any] = {"tool": job.tool, "placement": job.placement, "robot": job.robot}

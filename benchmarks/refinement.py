@@ -16,7 +16,6 @@ from benchmarks._descartes import NotRun, Task, solve
 from benchmarks._figures import Figure, Report, Sheet, in_turn, peak_megabytes
 from kerfpath import Contour, NoFeasiblePath, Robot, plan
 from kerfpath._arrays import Array
-from kerfpath.cad import read as read_drawing
 from kerfpath.graph import LayeredGraph
 from kerfpath.job import Job, read_job
 from kerfpath.planner import layered_graph
@@ -76,7 +75,7 @@ def run(*, quick: bool) -> list[Report]:
 
 def _steps(*, quick: bool) -> Report:
     job = read_job(Path(str(files("kerfpath.demo") / "b_pillar.toml")))
-    part = read_drawing(job.part_file, unit=job.part_unit)
+    part = job.read_part()
     steps = STEPS[:2] if quick else STEPS
     rows, findings = [], []
     for name in PARTS[1:] if quick else PARTS:

@@ -33,7 +33,6 @@ import moocore
 import numpy as np
 
 from kerfpath import Contour, NoFeasiblePath, Plan, audit, pareto, plan
-from kerfpath.cad import read as read_drawing
 from kerfpath.front import hypervolume
 from kerfpath.job import read_job
 from kerfpath.planner import fastest_speed, layered_graph, node_interval, relaxations
@@ -95,7 +94,7 @@ RADII = {"known": 5.5, "paper": 4.4, "exact": 3.3, "ours": 2.2}
 def of_job(file: Path, name: str) -> Made:
     """Return a contour of a job as the job shapes and samples it, without its cell."""
     job = read_job(file)
-    part = read_drawing(job.part_file, unit=job.part_unit)
+    part = job.read_part()
     task = next(task for task in job.tasks(part) if task.name == name)
     shaped = task.candidates(part)[0]
     nodes = task.sample(replace(shaped, speed_share=np.ones(len(shaped))))

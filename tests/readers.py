@@ -213,7 +213,7 @@ def tables(folder: Path) -> list[Whole]:
 
 def read_drawing(path: Path) -> None:
     unit = "mm" if path.suffix == ".dxf" else None
-    list_contours(path, unit, None, everything=True, as_json=True)
+    list_contours(read(path, unit), None, everything=True, as_json=True)
     part = read(path, unit)
     part.mesh()
     for loop in part.loops[:LOOPS]:
@@ -340,7 +340,7 @@ def jobs(folder: Path) -> list[Whole]:
 
 def read_a_job(path: Path) -> None:
     job = read_job(path)
-    part = read(job.part_file, unit=job.part_unit)
+    part = job.read_part()
     for task in job.tasks(part):
         task.candidates(part)
     cell_of_job(job, part)

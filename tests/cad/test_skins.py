@@ -183,6 +183,43 @@ def test_loose_faces_of_a_step_are_sewn_and_gaps_over_the_tolerance_stay(tmp_pat
     assert "widest gap" in note
 
 
+def with_global(raw: bytes, values: dict[int, str]) -> bytes:
+    """Return an IGES file with other values of its global section, by their number in IGES 5.3."""
+    lines = raw.splitlines()
+    section = b"".join(line[:72] for line in lines if line[72:73] == b"G").decode()
+    fields = section.rstrip().rstrip(";").split(",")  # the first two say what separates: , and ;
+    fields = [*fields[:2], *(field.strip() for field in fields[2:])]
+    for number, value in values.items():
+        fields[number - 1] = value
+    text = (",".join(fields) + ";").encode()
+    made = [text[k : k + 72].ljust(72) + b"G%7d" % (k // 72 + 1) for k in range(0, len(text), 72)]
+    head = [line for line in lines if line[72:73] == b"S"]
+    rest = [line for line in lines if line[72:73] in (b"D", b"P")]
+    last = re.sub(rb"G\s*\d+", b"G%7d" % len(made), lines[-1])
+    return b"\n".join([*head, *made, *rest, last]) + b"\n"
+
+
+@pytest.mark.parametrize(
+    "values",
+    [
+        {18: ""}, {18: "6H040101"}, {18: "15H2004-01-01 1000"}, {18: "13H1040101.10000"}, {25: ""},
+        {25: "3H%d."}, {17: ""}, {19: ""}, {20: ""}, {16: "0"}, {15: ""}, {4: "4H%d.i"},
+        {4: "5Ha$b.i"}, {21: "2H%s"}, {23: "99"}, {24: "9"}, {17: "", 18: "", 19: "", 25: ""},
+    ],
+)  # fmt: skip
+def test_what_the_head_of_an_iges_file_says_beside_its_unit_does_not_matter(
+    tmp_path: Path, examples: object, values: dict[int, str]
+) -> None:
+    path = tmp_path / "box.igs"
+    examples.write_iges(path, box(10, 20, 30), "IN")
+    whole = read(path)
+    path.write_bytes(with_global(path.read_bytes(), values))
+    part = read(path)
+    assert part.unit == "in"
+    np.testing.assert_allclose(part.bounding_box, whole.bounding_box, atol=EXACT)
+    assert [loop.name for loop in part.loops] == [loop.name for loop in whole.loops]
+
+
 def swapped(raw: bytes, i: int, k: int) -> bytes:
     """Return a file with two of its lines in each other's place."""
     lines = raw.splitlines()

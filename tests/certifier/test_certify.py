@@ -8,7 +8,6 @@ import pytest
 from jobs import DEMO
 from kerfpath import InputError, plan
 from kerfpath.auditor import certified_bound
-from kerfpath.cad import read
 from kerfpath.certificate import BASE
 from kerfpath.certifier import _certify as course
 from kerfpath.certifier import _stage as stages
@@ -89,7 +88,7 @@ def test_the_bound_is_close_below_the_plan_and_every_other_motion(
 def test_the_audit_proves_the_bound_again(name):
     """A hole of the demo's part: by enclosures and sums of its own."""
     job = read_job(DEMO / "b_pillar.toml")
-    part = read(job.part_file, unit=job.part_unit)
+    part = job.read_part()
     task = next(task for task in job.contours if task.name == name)
     nodes = task.sample(part.contour(task.pick))
     space = {"tool": job.tool, "placement": job.placement, "speed": task.speed}

@@ -14,12 +14,16 @@ if TYPE_CHECKING:
     from kerfpath.cad._part import Loop as Loop
     from kerfpath.cad._part import Part as Part
     from kerfpath.cad._read import read as read
+    from kerfpath.cad._units import GAP as GAP
+    from kerfpath.cad._units import UNITS_MM as UNITS_MM
 
 _HOME = {
     "Departure": "_departure",
+    "GAP": "_units",
     "LeftOut": "_left_out",
     "Loop": "_part",
     "Part": "_part",
+    "UNITS_MM": "_units",
     "departure_from": "_departure",
     "read": "_read",
     "read_measured": "_measured",

@@ -49,8 +49,11 @@ NEVER_CUT = frozenset([
     "TEXT", "MTEXT", "ATTDEF", "ATTRIB", "DIMENSION", "ARC_DIMENSION", "LARGE_RADIAL_DIMENSION",
     "LEADER", "MLEADER", "MULTILEADER", "TOLERANCE", "POINT", "VIEWPORT", "IMAGE", "WIPEOUT",
     "PDFUNDERLAY", "DWFUNDERLAY", "DGNUNDERLAY", "RAY", "XLINE", "ACAD_TABLE", "LIGHT", "SUN",
+    "HATCH", "MPOLYGON",
 ])  # fmt: skip
 """Kinds of entities that say something about a part, and are no line of it; others may be."""
+HIDDEN, ON_PAPER = "on hidden layer", "on the sheet"
+"""What the drawing itself puts aside is not to cut, whatever its kind."""
 
 
 def read_dxf(path: Path, content: bytes, unit: str | None, gap: float) -> Part:
@@ -116,7 +119,12 @@ class _Sheet:
     def summed(self) -> tuple[LeftOut, ...]:
         """Return what was left out by kind and reason, first what may have been cut."""
         found = [
-            LeftOut(kind=kind, reason=reason, count=count, may_cut=kind not in NEVER_CUT)
+            LeftOut(
+                kind=kind,
+                reason=reason,
+                count=count,
+                may_cut=kind not in NEVER_CUT and not reason.startswith((HIDDEN, ON_PAPER)),
+            )
             for (kind, reason), count in self.left_out.items()
         ]
         return tuple(sorted(found, key=lambda one: not one.may_cut))
@@ -126,7 +134,7 @@ class _Sheet:
         for layout in self.document.layouts:
             if not layout.is_modelspace:
                 for entity in layout:
-                    self.left_out[entity.dxftype(), f"on the sheet {layout.name}"] += 1
+                    self.left_out[entity.dxftype(), f"{ON_PAPER} {layout.name}"] += 1
 
     def add(
         self, entities: Iterable[DXFGraphic], T: Array, inside: Look = LOOSE, depth: int = 0
@@ -151,7 +159,7 @@ class _Sheet:
         if self.document.layers.has_entry(look[0]):
             drawn = self.document.layers.get(look[0])
             if drawn.is_off() or drawn.is_frozen():
-                self.left_out[kind, f"on hidden layer {look[0]}"] += 1
+                self.left_out[kind, f"{HIDDEN} {look[0]}"] += 1
                 return
         if isinstance(entity, Insert):
             self._insert(entity, T, look, depth)

@@ -30,6 +30,18 @@ LINES = ("LINE", "ARC", "CIRCLE", "ELLIPSE", "LWPOLYLINE", "POLYLINE", "SPLINE",
 STANDS = re.compile(
     rf"^[ \t]*0[ \t]*\r?\n[ \t]*({'|'.join(LINES)})[ \t]*\r?$".encode(), re.MULTILINE
 )
+MARKERS = {b"LWPOLYLINE": b"AcDbPolyline", b"SPLINE": b"AcDbSpline"}
+"""Kinds that ezdxf reads only behind the marker of their class, which some writers leave out."""
+MARKED = re.compile(
+    rb"^([ \t]*0[ \t]*\r?\n[ \t]*(%s)[ \t]*\r?\n)(.*?)(?=^[ \t]*0[ \t]*\r?\n[ \t]*[A-Z])"
+    % b"|".join(MARKERS),
+    re.MULTILINE | re.DOTALL,
+)
+COMMON = frozenset(map(str, (
+    5, 6, 8, 48, 60, 62, 67, 92, 100, 102, 160, 284, 310, 330, 347, 348, 360, 370, 390, 410, 420,
+    430, 440,
+)))  # fmt: skip
+"""Codes that stand in front of the marker, the same for all kinds (DXF reference, common codes)."""
 DROPPED = re.compile(
     r"(?:Removed|Deleted) (?:[a-zDXF]+ )*([A-Z][A-Z0-9_]+)(?:\(#\w+\))? (?:entity )?(.*)"
 )
@@ -52,10 +64,27 @@ def document_of(content: bytes) -> tuple[Drawing, list[str], Counter[tuple[str, 
             document = Drawing.load(binary_tags_loader(content))
             auditor: Auditor = document.audit()
         else:
-            document, auditor = recover.read(BytesIO(content))
+            document, auditor = recover.read(BytesIO(MARKED.sub(_with_markers, content)))
     faults = [*said, *(fault.message for fault in (*auditor.fixes, *auditor.errors))]
     faults = [" ".join(fault.split())[:200] for fault in faults]
     return document, faults, _lost(document, content, faults)
+
+
+def _with_markers(entity: re.Match[bytes]) -> bytes:
+    """Return an entity with the markers of its classes, put in where they are missing."""
+    head, kind, body = entity.groups()
+    if MARKERS[kind] in body:
+        return entity[0]
+    lines = body.splitlines(keepends=True)
+    pairs = [b"".join(lines[k : k + 2]) for k in range(0, len(lines), 2)]
+    codes = [pair.split(b"\n", 1)[0].strip().decode("ascii", "replace") for pair in pairs]
+    end = b"\r\n" if head.endswith(b"\r\n") else b"\n"
+    own = next((k for k, code in enumerate(codes) if code not in COMMON), len(pairs))
+    pairs.insert(own, b"100" + end + MARKERS[kind] + end)
+    if b"AcDbEntity" not in body:
+        common = codes.index("8") if "8" in codes[:own] else own
+        pairs.insert(common, b"100" + end + b"AcDbEntity" + end)
+    return head + b"".join(pairs)
 
 
 def _lost(document: Drawing, content: bytes, faults: list[str]) -> Counter[tuple[str, str]]:

@@ -7,6 +7,7 @@ from dataclasses import replace
 from functools import lru_cache, partial
 from pathlib import Path
 
+import numpy as np
 from OCP.BRepAdaptor import BRepAdaptor_Surface
 from OCP.GeomAbs import GeomAbs_SurfaceType
 
@@ -39,11 +40,17 @@ SURFACES = {
 }
 
 
-def part_of(path: Path, drawn: NamedShape, gap: float) -> Part:
+def part_of(
+    path: Path,
+    drawn: NamedShape,
+    gap: float,
+    outer_towards: tuple[float, float, float] | None = None,
+) -> Part:
     """Return the part that is drawn, every face, skin and loop given its name; `gap` in m."""
     faces = drawn.faces
     found = [loops_of(named.face) for named in faces]
-    skins = skins_of([named.face for named in faces], found)
+    towards = None if outer_towards is None else np.array(outer_towards)
+    skins = skins_of([named.face for named in faces], found, towards)
     names = _names(faces)
     skin_names = _skin_names(skins, set(names))
     piece_of = {f: name for skin, name in zip(skins, skin_names, strict=True) for f in skin.faces}
@@ -63,10 +70,20 @@ def part_of(path: Path, drawn: NamedShape, gap: float) -> Part:
         bounding_box=freeze(bounds_of(drawn.shape) * MM),
         faces=len(faces),
         loops=tuple(loops),
-        notes=tuple(drawn.notes),
+        notes=(*drawn.notes, *_doubts(skins, skin_names, names)),
         _gap=gap,
         _triangulate=lru_cache(MESHES)(partial(triangulate, drawn.shape)),
     )
+
+
+def _doubts(skins: Sequence[Skin], skin_names: Sequence[str], names: Sequence[str]) -> list[str]:
+    """Return a note for each sheet whose outer side is not certain."""
+    return [
+        f"{name or names[skin.faces[0]]}: which side of its sheet is the outer one is not certain: "
+        f"{skin.doubt}; look at it, and say it with outer_towards where it is the other"
+        for skin, name in zip(skins, skin_names, strict=True)
+        if skin.doubt
+    ]
 
 
 def _named(

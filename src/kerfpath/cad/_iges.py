@@ -22,6 +22,8 @@ __all__ = ["read_iges"]
 
 FLAGS = {1: "in", 2: "mm", 4: "ft", 6: "m", 7: "km", 8: "mil", 9: "um", 10: "cm"}
 """Units by the flag of the global section (IGES 5.3, table 2)."""
+GLOBAL = "Global Section"
+"""How OCCT begins what it says of the global section, whose number is that of the whole file."""
 WIDTH = 80
 """Columns of a line; the 73rd names its section, the rest number it there."""
 
@@ -109,8 +111,14 @@ def _read(path: Path, unit: str | None, gap: float) -> NamedShape:
 
 
 def _require_sound(reader: IGESControl_Reader) -> None:
-    """Raise InputError for broken entities, on which OCCT's transfer may crash the process."""
+    """Raise InputError for broken entities, on which OCCT's transfer may crash the process.
+
+    Of the global section only the unit is used, and looked at: dates, names and sizes that are odd
+    say nothing about the part.
+    """
     for _, reason in failures(reader.WS().ModelCheckList()):
+        if reason.startswith(GLOBAL):
+            continue
         raise InputError(f"the file is damaged ({reason}); copy or export it again")
 
 

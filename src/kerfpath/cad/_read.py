@@ -6,7 +6,9 @@ from dataclasses import replace
 from hashlib import sha256
 from pathlib import Path
 
-from kerfpath._arrays import scalar
+from numpy.typing import ArrayLike
+
+from kerfpath._arrays import floats, scalar
 from kerfpath.apart import call_apart, stand_by
 from kerfpath.cad._part import Part
 from kerfpath.cad._units import GAP, require_unit
@@ -18,7 +20,13 @@ KEPT = 4
 """Parts that are kept for when a file of the same content is read again, those read last."""
 
 
-def read(path: str | Path, unit: str | None = None, *, gap: float = GAP) -> Part:
+def read(
+    path: str | Path,
+    unit: str | None = None,
+    *,
+    gap: float = GAP,
+    outer_towards: ArrayLike | None = None,
+) -> Part:
     """Return the part that a drawing holds: STEP, IGES, DXF, or a table of points.
 
     Parameters
@@ -31,23 +39,36 @@ def read(path: str | Path, unit: str | None = None, *, gap: float = GAP) -> Part
     gap : float m
         Distance between the ends of two curves that a loop bridges; loose faces (IGES) are sewn
         together over it.
+    outer_towards : (3,), optional
+        Where the outer sides of sheets face, on the whole, in the part. Without it the outer side
+        is the one that lies less deep in the part, of a flat sheet the one that faces up.
 
     Raises
     ------
     InputError
-        No such file, another format than its suffix says, a damaged one, nothing to cut in it, or
-        no length unit known.
+        No such file, another format than its suffix says, a damaged one, nothing to cut in it,
+        no length unit known, or a direction that is none.
     """
     path = Path(path)
     require_unit(unit)
     scalar(gap, "gap", unit="m", above=0.0)
+    towards = None if outer_towards is None else _direction(outer_towards)
     content = content_of(path, _EXPECTED)
     kind = _KINDS.get(path.suffix.lower())
     if kind is None:
         raise InputError(f"{path}: expected {_EXPECTED} by its suffix, got {path.suffix!r}")
     if not content.strip():
         raise InputError(f"{path}: the file is empty; expected {_EXPECTED}")
-    return _drawn(kind, path, content, unit, gap)
+    if towards is not None and kind in ("table", "DXF"):
+        raise InputError(f"{path}: outer_towards: expected a drawing of sheets, got a {kind}")
+    return _drawn(kind, path, content, unit, gap, towards)
+
+
+def _direction(value: ArrayLike) -> tuple[float, float, float]:
+    x, y, z = floats(value, "outer_towards", (3,)).tolist()
+    if not x * x + y * y + z * z > 0:
+        raise InputError("outer_towards: expected a direction, got a vector of length 0")
+    return x, y, z
 
 
 def content_of(path: Path, expected: str) -> bytes:
@@ -67,7 +88,14 @@ def content_of(path: Path, expected: str) -> bytes:
         raise InputError(f"{path}: cannot be read ({why}); expected {expected}") from None
 
 
-def _drawn(kind: str, path: Path, content: bytes, unit: str | None, gap: float) -> Part:
+def _drawn(
+    kind: str,
+    path: Path,
+    content: bytes,
+    unit: str | None,
+    gap: float,
+    towards: tuple[float, float, float] | None,
+) -> Part:
     """Return the part; each reader is loaded when a file asks for it, as OCCT takes over a second.
 
     OCCT may crash, so STEP and IGES are translated apart from this process.
@@ -86,14 +114,14 @@ def _drawn(kind: str, path: Path, content: bytes, unit: str | None, gap: float) 
     from kerfpath.cad._shape import occt
     from kerfpath.cad._step import read_step
 
-    key = (kind, sha256(content).digest(), unit, gap)
+    key = (kind, sha256(content).digest(), unit, gap, towards)
     part = _kept.pop(key, None)
     if part is None:
         translate = read_step if kind == "STEP" else read_iges
         try:
             drawn = call_apart(translate, path.absolute(), unit, gap, size=len(content))
             with occt():
-                part = part_of(path, drawn, gap)
+                part = part_of(path, drawn, gap, towards)
         except InputError as error:
             raise InputError(f"{path}: {error}") from None
     _kept[key] = part
@@ -102,7 +130,7 @@ def _drawn(kind: str, path: Path, content: bytes, unit: str | None, gap: float) 
     return replace(part, path=path)
 
 
-_kept: dict[tuple[str, bytes, str | None, float], Part] = {}
+_kept: dict[tuple[object, ...], Part] = {}
 _KINDS = {
     ".step": "STEP",
     ".stp": "STEP",

@@ -6,15 +6,14 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from OCP.BRepGProp import BRepGProp
 from OCP.collections import IndexedMap_TopoDS_Shape_TopTools_ShapeMapHasher as ShapeMap
-from OCP.GProp import GProp_GProps
 from OCP.TopoDS import TopoDS_Face
 from scipy.spatial import cKDTree
 
 from kerfpath._arrays import Array, Ints
 from kerfpath._repr import short_repr
 from kerfpath.cad._connected import label_connected
+from kerfpath.cad._depth import Patches, depth_of, patches_of
 from kerfpath.cad._loops import FaceLoop, OrientedEdge, join_runs
 from kerfpath.cad._part import Side
 from kerfpath.cad._sample import EdgeChain, vector_area
@@ -23,15 +22,20 @@ __all__ = ["SMOOTH", "Skin", "skins_of"]
 
 SMOOTH = float(np.radians(2.0))
 """Faces whose normals differ by less (rad) all along their shared edge belong to one skin."""
-ACCURACY = 1e-2
-"""Relative accuracy of areas: they tell sheets from blocks, and are not shown."""
 OPPOSITE = 0.2
 """How far the vector areas of a sheet's two sides may be from cancelling, as a part of an area;
 by how much the areas may differ."""
 THIN = 0.2
 """A sheet is thinner than this part of the square root of its area."""
-EVEN = 1e-4
-"""Sides whose rims differ by less in length, as a part, are told apart by where they face."""
+EVEN, UNSURE = 0.01, 0.1
+"""By how much two sides differ in depth, as a share of both together: below the first, they are
+told apart by where they face; below the second, a note says that it is not certain."""
+FLATNESS = 1e-3
+"""Sides that lie less deep in a sheet than this part of the square root of its area are flat."""
+LEANING = 0.05
+"""Share of its area that a side must show to where the outer one is said to face."""
+LEVEL = 1e-4
+"""Share of a vector area below which one of its coordinates is none."""
 NOWHERE = 1e9
 """Place (mm) of what has no loops, far from all that has."""
 HOLE = -0.25
@@ -51,11 +55,14 @@ class Skin:
         Of a sheet; "" if it is none.
     inside : set of (int, int, int)
         Face, loop and edge numbers of what lies inside the skin, and is no cut.
+    doubt : str
+        Why `side` might be the other one; "" where it is sure.
     """
 
     faces: tuple[int, ...]
     side: Side
     inside: frozenset[tuple[int, int, int]]
+    doubt: str = ""
 
     __repr__ = short_repr
 
@@ -78,7 +85,11 @@ class Skin:
         return [("inner" if hole else "outer", loop) for hole, loop in loops]
 
 
-def skins_of(faces: Sequence[TopoDS_Face], found: Sequence[list[FaceLoop]]) -> list[Skin]:
+def skins_of(
+    faces: Sequence[TopoDS_Face],
+    found: Sequence[list[FaceLoop]],
+    outer_towards: Array | None = None,
+) -> list[Skin]:
     """Return the skins of a part, in the order of their first faces.
 
     Parameters
@@ -86,6 +97,8 @@ def skins_of(faces: Sequence[TopoDS_Face], found: Sequence[list[FaceLoop]]) -> l
     faces : sequence of TopoDS_Face
     found : sequence of list of FaceLoop
         The loops of each.
+    outer_towards : (3,), optional
+        Where the outer sides of sheets face, on the whole, instead of what their shape says.
     """
     uses = _uses(found)
     pairs = [(a, b) for at in uses if len(at) == 2 for a, b in [at] if a[0] != b[0]]
@@ -99,10 +112,10 @@ def skins_of(faces: Sequence[TopoDS_Face], found: Sequence[list[FaceLoop]]) -> l
         inside.setdefault(int(group[pair[0][0]]), set()).update(pair)
     members = [tuple(np.flatnonzero(group == g).tolist()) for g in range(group.max(initial=-1) + 1)]
     insides = [frozenset(inside.get(g, ())) for g in range(len(members))]
-    sides = _sides(faces, found, members, insides, whole)
+    sides = _sides(faces, found, members, whole, outer_towards)
     return [
-        Skin(faces=m, side=side, inside=edges)
-        for m, side, edges in zip(members, sides, insides, strict=True)
+        Skin(faces=m, side=side, inside=edges, doubt=doubt)
+        for m, (side, doubt), edges in zip(members, sides, insides, strict=True)
     ]
 
 
@@ -161,29 +174,31 @@ def _sides(
     faces: Sequence[TopoDS_Face],
     found: Sequence[list[FaceLoop]],
     members: Sequence[tuple[int, ...]],
-    inside: Sequence[frozenset[tuple[int, int, int]]],
     whole: Ints,
-) -> list[Side]:
-    """Return which side of a sheet each skin is: opposite ones, large and close, are a sheet's."""
-    areas, rims = np.zeros(len(members)), np.zeros(len(members))
+    outer_towards: Array | None,
+) -> list[tuple[Side, str]]:
+    """Return which side of a sheet each skin is: opposite ones, large and close, are a sheet's.
+
+    With it goes why it might be the other one, "" where that is sure.
+    """
+    areas, patches = np.zeros(len(members)), list[Patches]()
     vector = np.zeros((len(members), 3))
     low, high = np.full((len(members), 3), NOWHERE), np.full((len(members), 3), -NOWHERE)
     points: list[Array] = []
     for g, numbers in enumerate(members):
         around = [np.empty((0, 3))]
+        made = [patches_of(faces[f]) for f in numbers]
+        patches.append(Patches(*map(np.concatenate, zip(*made, strict=True))))
+        areas[g] = patches[g].area.sum()
         for f in numbers:
-            props = GProp_GProps()
-            BRepGProp.SurfaceProperties_s(faces[f], props, ACCURACY)
-            areas[g] += abs(props.Mass())  # a damaged face may count as less than nothing
-            for k, (_, loop) in enumerate(found[f]):
+            for _, loop in found[f]:
                 vector[g] += vector_area(loop.around)
                 around.append(loop.around)
-                outside = [(f, k, e) not in inside[g] for e in _numbers(loop)]
-                rims[g] += loop.lengths[outside].sum()
         points.append(np.vstack(around))
         if len(points[g]):
             low[g], high[g] = points[g].min(axis=0), points[g].max(axis=0)
     sides: list[Side] = [""] * len(members)
+    doubts = [""] * len(members)
     body = whole[[numbers[0] for numbers in members]]
     for g in np.argsort(-areas, kind="stable").tolist():
         alike = np.flatnonzero(body == body[g])
@@ -198,11 +213,39 @@ def _sides(
         away = {h: _usual_distance(points[g], points[h]) for h in near if h != g and not sides[h]}
         h = min(away, key=away.__getitem__, default=g)
         if h != g and away[h] < THIN * np.sqrt(areas[g]):
-            even = abs(rims[g] - rims[h]) <= EVEN * rims[g]
-            is_outer = _faces_up(vector[g]) if even else rims[g] > rims[h]
+            ends = np.vstack([points[g], points[h], patches[g].middle, patches[h].middle])
+            depths = [depth_of(patches[skin], ends) for skin in (g, h)]
+            is_outer, doubts[g] = _is_outer(depths, vector[g], areas[g], outer_towards)
             sides[g], sides[h] = ("outer", "inner") if is_outer else ("inner", "outer")
     sheets = {body[g] for g, side in enumerate(sides) if side}
-    return [side or ("edge" if body[g] in sheets else "") for g, side in enumerate(sides)]
+    rest: list[Side] = [
+        side or ("edge" if body[g] in sheets else "") for g, side in enumerate(sides)
+    ]
+    return list(zip(rest, doubts, strict=True))
+
+
+def _is_outer(
+    depths: Sequence[float], vector: Array, area: float, outer_towards: Array | None
+) -> tuple[bool, str]:
+    """Return whether a side of a sheet is its outer one, and why that is not certain.
+
+    ``depths`` (mm) are its own and the other's, ``vector`` (3,) mm^2 and ``area`` mm^2 its own.
+    """
+    if outer_towards is not None:
+        along = float(vector @ outer_towards)
+        if abs(along) > LEANING * area * np.linalg.norm(outer_towards):
+            return along > 0, ""
+    mine, other = depths
+    if mine + other <= FLATNESS * np.sqrt(area):
+        return _faces_up(vector), ""
+    share = (other - mine) / (other + mine)
+    is_even = abs(share) < EVEN
+    chosen = "the one that faces up" if is_even else "the one that lies less deep"
+    doubt = (
+        f"its sides lie {min(depths):.1f} and {max(depths):.1f} mm deep in it, on the mean; "
+        f"taken is {chosen}"
+    )
+    return (_faces_up(vector) if is_even else share > 0), doubt if abs(share) < UNSURE else ""
 
 
 def _usual_distance(a: Array, b: Array) -> float:
@@ -214,5 +257,5 @@ def _usual_distance(a: Array, b: Array) -> float:
 
 def _faces_up(vector: Array) -> bool:
     """Return whether a vector area points up, along +z; if it is level, along +y, then +x."""
-    level = EVEN * np.linalg.norm(vector)
+    level = LEVEL * np.linalg.norm(vector)
     return bool(next((v > 0 for v in vector[::-1] if abs(v) > level), True))

@@ -7,7 +7,6 @@ from pathlib import Path
 from rich.markup import escape
 
 from kerfpath.cad import Loop, Part
-from kerfpath.cad import read as read_drawing
 from kerfpath.cli._drawing import drawing_entry, show_drawing, summary
 from kerfpath.cli._show import busy, out, print_json, table
 from kerfpath.post import write_program
@@ -16,12 +15,8 @@ from kerfpath.report import DrawnLoop, render_drawing
 __all__ = ["list_contours"]
 
 
-def list_contours(
-    file: Path, unit: str | None, html: Path | None, *, everything: bool, as_json: bool
-) -> None:
+def list_contours(part: Part, html: Path | None, *, everything: bool, as_json: bool) -> None:
     """Print the size of a part, and the name, surface, length, edges and place of every loop."""
-    with busy(f"reading {file.name}"):
-        part = read_drawing(file, unit=unit)
     main = [loop for loop in part.loops if not loop.skin and loop.side != "edge"]
     if html is not None:
         with busy(f"drawing {html.name}"):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import asdict
+from pathlib import Path
 
 from rich.markup import escape
 
@@ -11,7 +12,25 @@ from kerfpath.cad import read as read_drawing
 from kerfpath.cli._show import busy, out
 from kerfpath.job import Job
 
-__all__ = ["drawing_entry", "drawing_of", "show_drawing", "summary"]
+__all__ = ["drawing_entry", "drawing_in", "drawing_of", "show_drawing", "summary"]
+
+
+def drawing_in(
+    file: Path,
+    *,
+    unit: str | None,
+    gap: float,
+    outer_towards: tuple[float, float, float] | None,
+) -> Part:
+    """Return the part that a file holds, `gap` in m.
+
+    Raises
+    ------
+    InputError
+        As `kerfpath.cad.read`.
+    """
+    with busy(f"reading {file.name}"):
+        return read_drawing(file, unit=unit, gap=gap, outer_towards=outer_towards)
 
 
 def drawing_of(job: Job) -> Part:
@@ -23,7 +42,7 @@ def drawing_of(job: Job) -> Part:
         It cannot be read, or has not the loops that the job picks.
     """
     with busy(f"reading {job.part_file.name}"):
-        part = read_drawing(job.part_file, unit=job.part_unit)
+        part = job.read_part()
     job.tasks(part)
     return part
 

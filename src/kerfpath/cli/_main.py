@@ -324,6 +324,16 @@ def contours(
         str | None,
         typer.Option(help="Length unit, if the file has none or a wrong one: mm, cm, m, in."),
     ] = None,
+    gap_mm: Annotated[
+        float, typer.Option(help="Largest distance between two ends that a loop bridges, mm.")
+    ] = 0.05,
+    outer_towards: Annotated[
+        tuple[float, float, float] | None,
+        typer.Option(
+            help="Where the outer sides of sheets face, in the part. Default: the side that "
+            "lies less deep in the part; of a flat sheet the one that faces up."
+        ),
+    ] = None,
     html: Annotated[
         Path | None,
         typer.Option(help="HTML page to write: the part with its loops by name."),
@@ -342,8 +352,10 @@ def contours(
     Example: kerfpath contours door.step --html door.html
     """
     from kerfpath.cli._contours import list_contours
+    from kerfpath.cli._drawing import drawing_in
 
-    list_contours(file, unit, html, everything=everything, as_json=as_json)
+    part = drawing_in(file, unit=unit, gap=gap_mm / 1000, outer_towards=outer_towards)
+    list_contours(part, html, everything=everything, as_json=as_json)
 
 
 @app.command()

@@ -15,6 +15,9 @@ ARC_STEP = np.radians(10)
 """Turn between the nodes of an arc around an outer corner; a smaller turn needs no arc."""
 ENOUGH = 0.98
 """Least share of the distance that is kept; the chords of an arc keep 0.996 of it."""
+FITS = 0.99
+"""Share of the distance that the image keeps with which a chain may begin: those of inner corners,
+which are cut off later, keep 0.985 of it at most, the cosine of `ARC_STEP`."""
 LOOK = 20.0
 """How many distances of path an inner corner may take."""
 SLOT = np.radians(165)
@@ -22,6 +25,8 @@ SLOT = np.radians(165)
 and of an outer one from which on its sides meet too far off."""
 PARALLEL = 1e-9
 """Sine of the angle of two segments that have no one crossing."""
+STRAIGHT = np.radians(0.01)
+"""Turn at a node below which the path goes straight on there."""
 SAME_PLACE = 1e-9
 """m: two nodes nearer than this are one."""
 
@@ -58,6 +63,7 @@ def offset(
             f"offset: contour {contour.name!r} has leads, joints, loops or slow corners already; "
             "offset it before"
         )
+    contour = _with_middles(contour)
     points, axes, source = _move_nodes(contour, distance, side, sharp)
     if contour.closed:
         k = _amid_what_fits(contour, points, distance)
@@ -78,6 +84,30 @@ def offset(
         k = int(np.argmin(np.linalg.norm(points[:-1] - contour.points[0], axis=1)))
         points, axes = np.roll(points[:-1], -k, axis=0), np.roll(axes[:-1], -k, axis=0)
     return Contour(points, axes, closed=contour.closed, name=contour.name)
+
+
+def _with_middles(contour: Contour) -> Contour:
+    """Return the contour with a node amid each side between two corners, where the beam may fit."""
+    steps = np.diff(contour.points, axis=0)
+    turn = _turn_at(contour)
+    amid = np.flatnonzero((turn[:-1] > ARC_STEP) & (turn[1:] > ARC_STEP))
+    if not len(amid):
+        return contour
+    middles = contour.points[amid] + steps[amid] / 2
+    axes = slerp(contour.axes[amid], contour.axes[amid + 1], np.full((len(amid), 1), 0.5))
+    return Contour(
+        np.insert(contour.points, amid + 1, middles, axis=0),
+        np.insert(contour.axes, amid + 1, axes, axis=0),
+        closed=contour.closed,
+        name=contour.name,
+    )
+
+
+def _turn_at(contour: Contour) -> Array:
+    """Return how far the path turns at each node, (K,) rad; 0 at the ends of an open one."""
+    along = unit(np.diff(contour.points, axis=0))
+    ends = (along[-1], along[0]) if contour.closed else (along[0], along[-1])
+    return angle_between(np.vstack([ends[:1], along]), np.vstack([along, ends[1:]]))
 
 
 def _move_nodes(
@@ -109,7 +139,7 @@ def _move_nodes(
 def _amid_what_fits(contour: Contour, points: Array, distance: float) -> int:
     """Return the middle of the longest run of images (M, 3) m that keep the distance."""
     gap = np.linalg.norm(points - nearest(contour, points)[0], axis=1)
-    tight = np.flatnonzero(gap < ENOUGH * distance)
+    tight = np.flatnonzero(gap < FITS * distance)
     if len(tight) == len(points):
         raise _too_tight(contour, contour.points[0], distance, "is too small")
     if not len(tight):
@@ -168,8 +198,7 @@ def _require_corner(contour: Contour, nodes: Ints, distance: float, side: Side) 
     along = unit(steps)
     before, after = along[nodes - 1], along[nodes % len(along)]
     turn = angle_between(before, after)
-    if turn.max() < CORNER:
-        radius = np.linalg.norm(steps[nodes % len(along)], axis=1).mean() / max(turn.max(), 1e-12)
+    if turn.max() < CORNER and (radius := _radius(contour, nodes)) < distance:
         raise _too_tight(
             contour, contour.points[nodes[len(nodes) // 2]], distance,
             f"has a radius of about {radius * 1e3:.3g} mm",
@@ -178,6 +207,23 @@ def _require_corner(contour: Contour, nodes: Ints, distance: float, side: Side) 
     if turn[inwards].sum() > SLOT:
         worst = contour.points[nodes[np.argmax(turn)]]
         raise _too_tight(contour, worst, distance, "has a slot or neck too narrow")
+
+
+def _radius(contour: Contour, nodes: Ints) -> float:
+    """Return the least radius, m, of a curve that the path may follow with its turns at some nodes.
+
+    That is the way to the nearer of the turns before and after over the turn: of a polygon the
+    radius of the circle that its sides touch.
+    """
+    turn, count = _turn_at(contour), len(contour) - 1
+    bent = np.flatnonzero(turn[:count] > STRAIGHT)
+    place = np.concatenate(
+        [[0.0], np.cumsum(np.linalg.norm(np.diff(contour.points, axis=0), axis=1))]
+    )
+    apart = np.diff(place[bent], append=place[bent[:1]] + place[-1])
+    nearer = np.minimum(apart, np.roll(apart, 1))
+    is_here = np.isin(bent, nodes % count)
+    return float((nearer[is_here] / turn[bent[is_here]]).min(initial=np.inf))
 
 
 def _too_tight(contour: Contour, place: Array, distance: float, what: str) -> InputError:

@@ -10,7 +10,6 @@ from pathlib import Path
 
 from kerfpath._repr import short_repr
 from kerfpath.cad import Part
-from kerfpath.cad import read as read_drawing
 from kerfpath.errors import InputError
 from kerfpath.job import Job, read_job
 from kerfpath.sweep import UnfitWorker
@@ -90,4 +89,4 @@ def load_job(path: str, digest_then: str) -> LoadedJob:
             "worker; start the study again"
         )
     job = read_job(path)
-    return LoadedJob(job=job, part=read_drawing(job.part_file, unit=job.part_unit))
+    return LoadedJob(job=job, part=job.read_part())

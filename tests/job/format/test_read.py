@@ -77,7 +77,7 @@ def test_the_example_is_read_into_si(read, folder):
     job = read(JOB)
     assert job.path == folder / "job.toml"
     assert job.part_file == folder / "b_pillar.step"
-    assert job.part_unit is None
+    assert job.drawing.unit is None
     assert job.robot.id == "abb_irb4600_60_205"
     assert job.robot.endless.tolist() == [False, False, False, True, False, True]
     np.testing.assert_allclose(
@@ -256,7 +256,7 @@ FAULTS = [
     ("b_pillar.step", "a\\u0000b", 8, "part.file: .*it is not in"),
     ("b_pillar.step", "x" * 5000, 8, "part.file: .*it is not in"),
     ("b_pillar.step", "", 8, "part.file: .*the path of the part's CAD file"),
-    ("xyz_mm", 'unit = "foot"\nxyz_mm', 9, "part.unit: expected 'mm', 'cm', 'm' or 'in'"),
+    ("xyz_mm", 'unit = "foot"\nxyz_mm', 9, "part.unit: expected a length unit .um, mm, cm"),
     ("[0, 0, 90]", "{ yaw = 90 }", 10, "part.rpy_deg: .*got a table"),
     # contour
     ('"trim"', "3", 12, "contour.pick: .*got 3"),

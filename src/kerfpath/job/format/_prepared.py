@@ -9,7 +9,6 @@ import numpy as np
 
 from kerfpath._repr import short_repr
 from kerfpath.cad import Part
-from kerfpath.cad import read as read_drawing
 from kerfpath.cell import Cell
 from kerfpath.contour import Contour
 from kerfpath.front import Subproblem
@@ -148,7 +147,7 @@ def prepare(job: Job, part: Part | None = None) -> PreparedJob:
     InputError
         The drawing or the cell cannot be read, a loop does not exist, a contour cannot be sampled.
     """
-    part = part or read_drawing(job.part_file, unit=job.part_unit)
+    part = part or job.read_part()
     tasks = job.tasks(part)  # a misspelt name shall not wait for the cell
     cell = cell_of_job(job, part)
     return PreparedJob.of(job, part, cell, [_request(job, task, part) for task in tasks])

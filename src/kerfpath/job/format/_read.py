@@ -21,6 +21,7 @@ from kerfpath.contour import Contour
 from kerfpath.errors import InputError
 from kerfpath.graph import LayeredGraph
 from kerfpath.job.format._contour import ContourSpec, task_of
+from kerfpath.job.format._drawing import Drawing
 from kerfpath.job.format._operations import keys_of_closed_loops
 from kerfpath.job.format._refusals import error_at, refusal, refusal_at
 from kerfpath.job.format.tables import (
@@ -152,10 +153,8 @@ class Job:
         T_flange_tip.
     placement : (4, 4) m
         T_base_part.
-    part_file : Path
-        The CAD file, there when the job was read.
-    part_unit : {"mm", "cm", "m", "in"} or None
-        Length unit that overrides the CAD file's own.
+    drawing : Drawing
+        The CAD file, and how it is read.
     contours : tuple of ContourSpec
         In the order of cutting.
     options : PlanOptions
@@ -178,8 +177,7 @@ class Job:
     robot: Robot
     tool: Array
     placement: Array
-    part_file: Path
-    part_unit: str | None
+    drawing: Drawing
     contours: tuple[ContourSpec, ...]
     options: PlanOptions
     cell: CellTable | None
@@ -190,6 +188,29 @@ class Job:
     source: Mapping[str, Any]
 
     __repr__ = short_repr
+
+    @property
+    def part_file(self) -> Path:
+        """The CAD file, there when the job was read."""
+        return self.drawing.file
+
+    def read_part(self) -> Part:
+        """Return the part that the CAD file holds.
+
+        Raises
+        ------
+        InputError
+            It cannot be read, or not all of it that may have been to cut.
+        """
+        part = self.drawing.read()
+        doubtful = [str(one) for one in part.left_out if one.may_cut]
+        if doubtful and not self.drawing.accept_left_out:
+            said = (
+                f"expected a drawing that is read whole; {'; '.join(doubtful)}; repair "
+                f'{self.part_file.name}, or write left_out = "accept"'
+            )
+            raise refusal_at(self.path, ("part", "file"), said)
+        return part
 
     def graph(
         self,
@@ -281,8 +302,7 @@ def read_job(path: str | Path) -> Job:
         robot=robot,
         tool=file.tool.resolve(),
         placement=file.part.resolve(),
-        part_file=path.parent / file.part.file,
-        part_unit=file.part.unit,
+        drawing=file.part.drawing(path.parent),
         contours=tuple(task_of(table) for table in file.contour),
         options=options,
         cell=file.cell,

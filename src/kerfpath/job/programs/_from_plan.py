@@ -13,6 +13,7 @@ from kerfpath.auditor import Check
 from kerfpath.errors import AuditFailed, InputError, NoFeasiblePath
 from kerfpath.job.format import (
     AuditTable,
+    Drawing,
     Job,
     LayoutTable,
     PreparedJob,
@@ -168,8 +169,7 @@ def _job_of(file: PlanFile, options: ProgramOptions) -> Job:
         robot=first.robot,
         tool=first.T_flange_tip,
         placement=first.T_base_part,
-        part_file=file.path,
-        part_unit=None,
+        drawing=Drawing(file=file.path),
         contours=(),
         options=replace(first.settings, refine_parts=1, interruptions="none", least_piece=None),
         cell=None,

@@ -11,7 +11,6 @@ import numpy as np
 from kerfpath._arrays import Array, Ints
 from kerfpath._repr import short_repr
 from kerfpath.cad import Part
-from kerfpath.cad import read as read_drawing
 from kerfpath.contour import Contour, angle_between
 from kerfpath.errors import InputError
 from kerfpath.job.format import Candidate, CutRequest, Job, prepare, read_job
@@ -118,7 +117,7 @@ def touch_up(
     """
     job, file = read_job(job_file), read_plan_file(plan_file)
     _require_kind(job, file)
-    part = read_drawing(job.part_file, unit=job.part_unit)
+    part = job.read_part()
     groups, notes = _read_edits(program, job, file)
     targets = [
         _taught(p, group.path[: len(p.contour)])

@@ -8,7 +8,6 @@ import numpy as np
 
 from kerfpath._repr import short_repr
 from kerfpath.cad import Part
-from kerfpath.cad import read as read_drawing
 from kerfpath.cell import Cell
 from kerfpath.job.format import Job, cell_of_job
 
@@ -67,7 +66,7 @@ def check_job(job: Job, part: Part | None = None) -> JobPreview:
     InputError
         As `run_job`.
     """
-    part = part or read_drawing(job.part_file, unit=job.part_unit)
+    part = part or job.read_part()
     cell = cell_of_job(job, part)
     starts = []
     for task in job.tasks(part):

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from kerfpath.cad import read as read_drawing
 from kerfpath.cell import Cell
 from kerfpath.contour import Contour
 from kerfpath.errors import NoFeasiblePath
@@ -58,7 +57,7 @@ def fastest_speeds(
     InputError
         As `run_job`.
     """
-    part = read_drawing(job.part_file, unit=job.part_unit)
+    part = job.read_part()
     cell = cell_of_job(job, part)
     answers: list[tuple[ContourSpec, Contour, FastestSpeed | NoFeasiblePath]] = []
     tasks = job.tasks(part)

@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import Annotated, Literal
 
+import numpy as np
 from pydantic import AfterValidator
 
 from kerfpath._arrays import Array
+from kerfpath.cad import GAP, UNITS_MM
+from kerfpath.job.format._drawing import Drawing
 from kerfpath.job.format._poses import pose
-from kerfpath.job.format._values import Text, Three, existing, key
+from kerfpath.job.format._values import Positive, Text, Three, existing, key, one_of
 from kerfpath.job.format.tables._table import Table
 
 __all__ = ["PartTable"]
@@ -22,7 +26,22 @@ class PartTable(Table):
         AfterValidator(existing("the part's CAD file")),
         key("the path of the part's CAD file", '"b_pillar.step"'),
     ]
-    unit: Literal["mm", "cm", "m", "in"] | None = None
+    unit: Annotated[
+        str | None,
+        one_of(f"a length unit ({', '.join(UNITS_MM)})", lambda: UNITS_MM),
+        key("a length unit", '"mm"'),
+    ] = None
+    gap_mm: Annotated[
+        Positive, key("the largest distance between two ends that a loop bridges, mm", "0.05")
+    ] = GAP * 1000
+    outer_towards: Annotated[
+        Three | None,
+        key("3 numbers, where the outer sides of its sheets face, in the part", "[0, 0, 1]"),
+    ] = None
+    left_out: Annotated[
+        Literal["refuse", "accept"],
+        key("what becomes of a drawing of which something to cut may be left out", '"accept"'),
+    ] = "refuse"
     xyz_mm: Annotated[
         Three, key("3 numbers, the part's position in the robot base in mm", "[1450, -600, 450]")
     ]
@@ -30,6 +49,17 @@ class PartTable(Table):
         Three,
         key("3 numbers, the part's roll, pitch and yaw in the robot base in deg", "[0, 0, 90]"),
     ]
+
+    def drawing(self, folder: Path) -> Drawing:
+        """Return the drawing, its path taken from a folder."""
+        towards = self.outer_towards
+        return Drawing(
+            file=folder / self.file,
+            unit=self.unit,
+            gap=self.gap_mm / 1000,
+            outer_towards=None if towards is None else np.array(towards, dtype=float),
+            accept_left_out=self.left_out == "accept",
+        )
 
     def resolve(self) -> Array:
         """Return T_base_part, (4, 4), m."""

@@ -1,0 +1,96 @@
+"""How deep a side of a sheet lies inside it: what tells its outer side from its inner one.
+
+Seen along the outward normal, nothing of a channel lies beyond its outside, and all of the channel
+beyond its inside. Holes, countersinks and flanges change that little, unlike the length of the rims
+or the areas.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from OCP.BRepAdaptor import BRepAdaptor_Surface
+from OCP.BRepGProp import BRepGProp
+from OCP.BRepTools import BRepTools
+from OCP.GeomAbs import GeomAbs_SurfaceType
+from OCP.gp import gp_Pnt, gp_Pnt2d, gp_Vec
+from OCP.GProp import GProp_GProps
+from OCP.IntTools import IntTools_FClass2d
+from OCP.TopAbs import TopAbs_Orientation, TopAbs_State
+from OCP.TopoDS import TopoDS_Face
+
+from kerfpath._arrays import Array
+
+__all__ = ["Patches", "depth_of", "patches_of"]
+
+GRID = 5
+"""Patches in either direction of a face that is not plane."""
+ACCURACY = 1e-2
+"""Relative accuracy of areas: they tell sheets from blocks, and are not shown."""
+EDGE = 1e-9
+"""What lies this close to an edge, in the surface's own parameters, lies on it."""
+DIRECTIONS = 512
+"""Directions in which the ends of a sheet are looked for: within 5 deg of any."""
+
+
+class Patches(NamedTuple):
+    """What a face is made of: areas (K,) mm^2, middles (K, 3) mm, outward unit normals (K, 3)."""
+
+    area: Array
+    middle: Array
+    normal: Array
+
+
+def patches_of(face: TopoDS_Face) -> Patches:
+    """Return the patches of a face: one of a plane, else a grid's."""
+    props = GProp_GProps()
+    BRepGProp.SurfaceProperties_s(face, props, ACCURACY)
+    area = abs(props.Mass())  # a damaged face may count as less than nothing
+    surface = BRepAdaptor_Surface(face)
+    out = -1.0 if face.Orientation() == TopAbs_Orientation.TopAbs_REVERSED else 1.0
+    if surface.GetType() == GeomAbs_SurfaceType.GeomAbs_Plane:
+        middle, normal = props.CentreOfMass(), surface.Plane().Axis().Direction()
+        if not surface.Plane().Direct():
+            out = -out
+        return Patches(
+            np.array([area]),
+            np.array([[middle.X(), middle.Y(), middle.Z()]]),
+            out * np.array([[normal.X(), normal.Y(), normal.Z()]]),
+        )
+    u0, u1, v0, v1 = BRepTools.UVBounds_s(face)
+    part, within = (np.arange(GRID) + 0.5) / GRID, IntTools_FClass2d(face, EDGE)
+    middles, normals, inside = [], [], []
+    point, du, dv = gp_Pnt(), gp_Vec(), gp_Vec()
+    for u in (u0 + (u1 - u0) * part).tolist():
+        for v in (v0 + (v1 - v0) * part).tolist():
+            surface.D1(u, v, point, du, dv)
+            across = du.Crossed(dv)
+            middles.append((point.X(), point.Y(), point.Z()))
+            normals.append((across.X(), across.Y(), across.Z()))
+            inside.append(within.Perform(gp_Pnt2d(u, v)) != TopAbs_State.TopAbs_OUT)
+    normal = np.array(normals)
+    size = np.linalg.norm(normal, axis=1)
+    kept = (size > 0) & (inside if any(inside) else True)  # a narrow strip may miss the grid
+    size = size[kept]
+    return Patches(
+        size * (area / max(size.sum(), np.finfo(float).tiny)),
+        np.array(middles)[kept],
+        out * normal[kept] / size[:, None],
+    )
+
+
+def depth_of(patches: Patches, points: Array) -> float:
+    """Return how far points (K, 3) mm reach beyond each patch along its normal, on the mean, mm."""
+    around = _directions()
+    ends = points[np.unique(np.argmax(points @ around.T, axis=0))]
+    beyond = (patches.normal @ ends.T).max(axis=1) - (patches.normal * patches.middle).sum(axis=1)
+    return float(patches.area @ np.maximum(beyond, 0.0) / patches.area.sum())
+
+
+def _directions() -> Array:
+    """Return unit vectors (D, 3) that are spread evenly, on a spiral."""
+    z = 1 - (2 * np.arange(DIRECTIONS) + 1) / DIRECTIONS
+    turn = np.pi * (3 - np.sqrt(5)) * np.arange(DIRECTIONS)
+    r = np.sqrt(1 - z * z)
+    return np.stack([r * np.cos(turn), r * np.sin(turn), z], axis=1)

@@ -1,0 +1,72 @@
+"""The drawing of a job: what may have been to cut and is left out stops the job, unless it says."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+from ezdxf.filemanagement import new
+
+from kerfpath.errors import InputError
+from kerfpath.job import check_job, read_job
+
+JOB = """\
+[robot]
+model = "abb_irb4600_60_205"
+acceleration_ratio = "iontec_20_to_70kg"
+[tool]
+head = "laser-head-45"
+[part]
+file = "blank.dxf"
+xyz_mm = [1200, 0, 400]
+rpy_deg = [0, 0, 0]
+{more}
+[[contour]]
+pick = "0/outer"
+speed_m_min = 2
+spacing_mm = 2
+"""
+
+
+def blank(path: Path, kind: str) -> None:
+    document = new(units=4)
+    space = document.modelspace()
+    space.add_circle((0, 0), 20)
+    if kind == "spline":
+        space.add_open_spline([(30, 0), (35, 5), (40, 0), (42, 3)]).dxf.degree = 9
+    elif kind == "xref":
+        document.blocks.new("OTHER").block.dxf.flags = 4
+        space.add_blockref("OTHER", (0, 0))
+    elif kind == "text":
+        space.add_text("10 pieces")
+    else:
+        document.layers.add("HELP").off()
+        space.add_circle((0, 0), 5, dxfattribs={"layer": "HELP"})
+    document.saveas(path)
+
+
+@pytest.mark.parametrize(("kind", "name"), [("spline", "SPLINE"), ("xref", "INSERT")])
+def test_a_drawing_that_is_not_read_whole_is_refused(tmp_path: Path, kind: str, name: str) -> None:
+    blank(tmp_path / "blank.dxf", kind)
+    path = tmp_path / "job.toml"
+    path.write_text(JOB.format(more=""))
+    with pytest.raises(InputError) as refused:
+        check_job(read_job(path))
+    said = str(refused.value)
+    assert said.startswith(f"{path}:7: part.file: expected a drawing that is read whole")
+    assert f"1 {name}" in said
+    assert 'left_out = "accept"' in said
+    path.write_text(JOB.format(more='left_out = "accept"'))
+    part = read_job(path).read_part()
+    assert [loop.name for loop in part.loops] == ["0/outer"]
+    assert part.left_out[0].kind == name
+
+
+@pytest.mark.parametrize("kind", ["text", "hidden"])
+def test_what_is_not_to_cut_stops_no_job(tmp_path: Path, kind: str) -> None:
+    blank(tmp_path / "blank.dxf", kind)
+    path = tmp_path / "job.toml"
+    path.write_text(JOB.format(more=""))
+    part = read_job(path).read_part()
+    assert len(part.loops) == 1
+    assert len(part.left_out) == 1
