@@ -371,7 +371,7 @@ def test_off_the_grid_no_plan_is_dominated_and_every_one_passes_its_audit(off_gr
 def test_the_front_of_the_grid_is_beaten_off_it(task, off_grid):
     # On steps of 8 deg, no path of the grid is near the best motion.
     assert off_grid.left_behind.all()
-    assert "beaten off it" in str(off_grid)
+    assert "beaten off the grid" in str(off_grid)
     on_grid = pareto(**task, criteria=NAMES, runs=22)
     assert off_grid.coverage(on_grid) == 1.0
     assert not on_grid.left_behind.any()

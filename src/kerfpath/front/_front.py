@@ -106,8 +106,8 @@ class Front:
     def beyond_the_grid(self) -> str:
         """What became of the plans of the grid, in words."""
         return (
-            f"{int(self.left_behind.sum())} of {len(self.on_grid)} plans that no other on the grid "
-            "of gamma beats are beaten off it"
+            f"{int(self.left_behind.sum())} of the {len(self.on_grid)} plans of the front that the "
+            "grid of gamma has are beaten off the grid"
         )
 
     def coverage(self, other: Front) -> float:
