@@ -14,6 +14,9 @@ when the peak velocity and acceleration shares are at most 1 and the audit finds
 heading is its direction in the plane of the sheet, free of the task frames; it oscillates when it
 turns back by `TURN_BACK` or more, and its shake is the sum of all changes of its node-to-node step.
 
+With full shares every choice is planned a third time, over continuous gamma, with the bound that is
+proved for it: what both techniques leave to be had, and how near to the best motion that is.
+
 Run: python examples/known_against_proposed.py [--out DIR] [--html] [--quick]
 """
 
@@ -32,11 +35,12 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from kerfpath import Contour, NoFeasiblePath, Plan, audit, plan, robot
+from kerfpath import Certify, Contour, NoFeasiblePath, Plan, audit, plan, robot
 from kerfpath.contour import FrameKind
+from kerfpath.options import PlanMethod
 from kerfpath.planner import layered_graph, node_interval
 from kerfpath.robots import postures_named
-from kerfpath.search import Method, ObjectiveKind
+from kerfpath.search import ObjectiveKind
 
 Array = NDArray[np.float64]
 Eta = tuple[float, float]
@@ -49,6 +53,10 @@ CORNER_RADIUS = 0.025
 TURN_BACK = 2.0
 """deg: the heading turns back when it returns by so much; more than one or two grid steps."""
 TECHNIQUES = ("known", "proposed")
+CONTINUOUS = "continuous"
+METHODS: dict[str, PlanMethod] = {"known": "known", "proposed": "paper", CONTINUOUS: "continuous"}
+CERTIFY = Certify(gap=0.01, seconds=10.0)
+"""How far plans over continuous gamma are certified."""
 OBJECTIVES: tuple[ObjectiveKind, ...] = ("sum", "max")
 ETAS: tuple[Eta, ...] = tuple((v, a) for v in (1.0, 0.3) for a in (1.0, 0.9, 0.8, 0.7))
 COLOURS = ("#0061cc", "#f4a918", "#0ea069", "#df5ac2", "#f05d16", "#55bdff", "#1d2530")
@@ -164,20 +172,21 @@ def setting(task: Task) -> tuple[Contour, dict[str, Any]]:
 def runs_of(
     task: Task, factors: Mapping[str, Array], etas: Sequence[Eta]
 ) -> Iterator[tuple[Row, Plan | None]]:
-    """Plan a task with every weight vector: known once, proposed with every eta, on one graph."""
+    """Plan a task with every weight vector: known and continuous once, proposed with every eta."""
     contour, options = setting(task)
     graph = layered_graph(contour, **options)
     velocity, dt = options["robot"].speed_limits()[0], node_interval(contour, task.speed)
     ask = partial(plan, contour, **options, speed=task.speed, graph=graph)
-    for objective, (name, factor), eta in product(OBJECTIVES, factors.items(), (None, *etas)):
-        method: Method = "paper" if eta else "known"
-        weights, (eta_v, eta_a) = factor / (velocity * dt), eta or (1.0, 1.0)
-        choice = partial(ask, method=method, objective=objective, weights=weights)
+    runs = [("known", (1.0, 1.0)), *(("proposed", eta) for eta in etas), (CONTINUOUS, (1.0, 1.0))]
+    for objective, (name, factor), (technique, eta) in product(OBJECTIVES, factors.items(), runs):
+        weights, (eta_v, eta_a) = factor / (velocity * dt), eta
+        choice = partial(ask, method=METHODS[technique], objective=objective, weights=weights)
+        certify = CERTIFY if technique == CONTINUOUS else None
         try:
-            found = choice(eta_v=eta_v, eta_a=eta_a)
+            found = choice(eta_v=eta_v, eta_a=eta_a, certify=certify)
         except NoFeasiblePath:
             found = None
-        words = task.name, TECHNIQUES[eta is not None], objective, name, f"{eta_v:g}", f"{eta_a:g}"
+        words = task.name, technique, objective, name, f"{eta_v:g}", f"{eta_a:g}"
         yield dict(zip(KEYS, words, strict=True)) | measures(found), found
 
 
@@ -228,6 +237,8 @@ def measures(p: Plan | None) -> dict[str, str]:
     table = [*angles, c.peak_velocity, c.peak_acceleration]
     for name, values in zip(PER_JOINT, table, strict=True):
         row |= {name.format(i): f"{value:.3f}" for i, value in enumerate(values, 1)}
+    if p.proof.bound is not None:
+        row |= {"bound": f"{p.proof.bound:.4f}", "gap_percent": p.proof.gap_shown}
     return row
 
 
@@ -343,7 +354,7 @@ def verdict(rows: Sequence[Row], task: Task) -> Iterator[str]:
 def readme(tasks: Sequence[Task], rows: Sequence[Row]) -> str:
     """Return the account of the experiment; every number in it comes from the rows."""
     verdicts = [line for t in tasks if t.name in ("main", "coarse") for line in verdict(rows, t)]
-    compared, etas, pairs = [], [], []
+    compared, best, etas, pairs = [], [], [], []
     for task in tasks:
         sides = [_some(rows, task.name, technique) for technique in TECHNIQUES]
         cells = [f"{_count(side, 'acceptable')} of {len(side)}" for side in sides]
@@ -353,6 +364,7 @@ def readme(tasks: Sequence[Task], rows: Sequence[Row]) -> str:
         shake = [np.sign(float(n[SHAKE]) - float(k[SHAKE])) for k, n in both]
         cells.append(" / ".join(str(shake.count(sign)) for sign in (-1, 0, 1)))
         compared.append(table_line(f"{task.name} ({task})", *cells))
+        best.append(beyond_the_grid(task, sides[1], _some(rows, task.name, CONTINUOUS)))
     for eta in dict.fromkeys((r["eta_v"], r["eta_a"]) for r in rows):
         new = _some(rows, "main", "proposed", *eta)
         counts = (f"{_count(new, column)} of {len(new)}" for column in ("found", "acceptable"))
@@ -367,9 +379,26 @@ def readme(tasks: Sequence[Task], rows: Sequence[Row]) -> str:
         ]
         titles = "; ".join(title(rows[k]) for k in places)
         pairs.append(PAIR.format(why=why, titles=titles, file=file, lines="\n".join(lines)))
-    parts = {"verdicts": verdicts, "tasks": compared, "etas": etas, "pairs": pairs}
+    parts = {"verdicts": verdicts, "tasks": compared, "best": best, "etas": etas}
+    parts["pairs"] = pairs
     text = (HERE / "template.md").read_text(encoding="utf-8")
     return text.format(**{name: "\n".join(lines).strip() for name, lines in parts.items()})
+
+
+def beyond_the_grid(task: Task, proposed: Sequence[Row], best: Sequence[Row]) -> str:
+    """Return the line of a task that says what continuous gamma saves, and how near that is."""
+    cells = [task.name, f"{_count(best, 'acceptable')} of {len(best)}"]
+    for objective in OBJECTIVES:
+        more = [
+            100 * (float(p["cost"]) / float(c["cost"]) - 1)
+            for p, c in zip(proposed, best, strict=True)
+            if p["objective"] == objective and p["found"] == c["found"] == "yes"
+        ]
+        spread = (min(more), median(more), max(more)) if more else ()
+        cells.append(" / ".join(f"{value:.1f}" for value in spread) or "no path")
+    gaps = [float(row["gap_percent"]) for row in best if row.get("gap_percent")]
+    cells.append(f"{median(gaps):.2f} to {max(gaps):.2f}" if gaps else "none")
+    return table_line(*cells, _spread(best, SHAKE), _spread(best, "imbalance"))
 
 
 def title(row: Row) -> str:

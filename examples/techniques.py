@@ -6,12 +6,13 @@ planar task; here are whole fronts of three tasks: that sheet, and the trim line
 parts as their jobs have them, in the open. Each is cut at shares of the fastest constant speed
 at which its grid has a path at all, so that limits bind and there is something to find.
 
-Every technique has as many runs. Known (one posture, limits untested), paper (the procedure,
-greedy on acceleration) and exact (the optimum) have the same grid of objective, metric and weights;
-paper and exact have the same eta_v and eta_a, too: 1 or halfway to the least with which there is a
-path. Ours is `kerfpath.pareto`: exact as well, but its runs are placed where the front is sparse,
-with windows. A plan is acceptable when its peak velocity and acceleration shares are at most 1 and
-the audit finds nothing. README.md and the figure are made from table.csv.
+Every technique has as many runs. Known (one posture, limits untested), paper (the procedure, greedy
+on acceleration) and exact (the optimum) have the same grid of objective, metric and weights; paper
+and exact have the same eta_v and eta_a, too: 1 or halfway to the least with which there is a path.
+Ours is `kerfpath.pareto`: exact as well, but its runs are placed where the front is sparse, with
+windows; all of them on the grid of gamma. A plan is acceptable when its peak velocity and
+acceleration shares are at most 1 and the audit finds nothing. README.md and the figure are made
+from table.csv.
 
 Run: python examples/techniques.py [--out DIR] [--quick]
 """
@@ -142,6 +143,7 @@ def runs_of(task: str, made: Made, factors: Mapping[str, Array]) -> Iterator[Row
                 **options,
                 speed=speed,
                 graph=graph,
+                method="exact",
                 criteria=tuple(CRITERIA),
                 runs=len(choices),
                 audit=partial(_audited, ours),

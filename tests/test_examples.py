@@ -36,7 +36,7 @@ def test_the_reduced_example_writes_a_table_an_account_and_pictures(written):
         "figure-worst.svg",
     }
     rows = rows_of(written)
-    assert {row["technique"] for row in rows} == {"known", "proposed"}
+    assert {row["technique"] for row in rows} == {"known", "proposed", "continuous"}
     for name in ("figure.svg", "figure-worst.svg"):
         lines = ET.parse(written / name).getroot().iter("{http://www.w3.org/2000/svg}polyline")
         # Left and right: six joints, the heading, six velocities and six accelerations.
@@ -63,6 +63,45 @@ def test_a_plan_over_a_limit_is_never_called_acceptable(written, place):
     for row in rows_of(written if place == "new" else KEPT):
         if row["acceptable"] == "yes":
             assert max(float(row["peak_velocity"]), float(row["peak_acceleration"])) <= 1.0
+
+
+@pytest.mark.parametrize("place", ["new", "kept"])
+def test_plans_over_continuous_gamma_keep_the_limits_and_lie_above_their_bounds(written, place):
+    rows = rows_of(written if place == "new" else KEPT)
+    found = [row for row in rows if row["technique"] == "continuous"]
+    assert found
+    for row in found:
+        assert row["found"] == "yes"
+        assert max(float(row["peak_velocity"]), float(row["peak_acceleration"])) <= 1.0
+        # A bound is stated of sums, and the gap is what lies above it.
+        assert bool(row["bound"]) == (row["objective"] == "sum")
+        if row["bound"]:
+            gap = 100 * (1 - float(row["bound"]) / float(row["cost"]))
+            # Cost and bound have four places, the gap has two and is rounded up.
+            assert gap - 0.01 <= float(row["gap_percent"]) <= gap + 0.02
+    best = {tuple(row[key] for key in example.KEYS if key != "technique"): row for row in found}
+    for row in rows:
+        choice = tuple(row[key] for key in example.KEYS if key != "technique")
+        if row["technique"] == "proposed" and row["found"] == "yes" and choice in best:
+            bound = best[choice]["bound"]
+            assert not bound or float(row["cost"]) >= float(bound)
+
+
+def test_what_is_said_of_continuous_gamma_is_what_the_table_says():
+    rows = rows_of(KEPT)
+    choice = ("task", "objective", "weights")
+    best = {tuple(r[k] for k in choice): r for r in rows if r["technique"] == "continuous"}
+    proposed = [
+        r for r in rows if (r["technique"], r["eta_v"], r["eta_a"]) == ("proposed", "1", "1")
+    ]
+    more = {"sum": [], "max": []}
+    for row in proposed:
+        if row["found"] == "yes":
+            cost = float(best[tuple(row[k] for k in choice)]["cost"])
+            more[row["objective"]].append(float(row["cost"]) / cost - 1)
+    assert min(more["sum"]) > 0
+    assert sum(value < 0 for value in more["max"]) == 1
+    assert sum(row["objective"] == "max" for row in best.values()) == 136
 
 
 def test_the_kept_account_states_the_figures_of_the_kept_table():
@@ -102,9 +141,9 @@ def test_every_choice_is_planned_by_both_techniques():
                 for row in rows
                 if (row["task"], row["technique"]) == (task.name, technique)
             }
-            for technique in ("known", "proposed")
+            for technique in ("known", "proposed", "continuous")
         ]
-        assert choices[0] == choices[1]
+        assert choices[0] == choices[1] == choices[2]
         assert len(choices[0]) == 2 * len(example.weight_factors())
 
 

@@ -9,10 +9,29 @@ import numpy as np
 import pytest
 
 from conftest import ROOT
-from kerfpath import Contour, InputError, NoFeasiblePath, audit, fastest_speed, pareto, plan
+from kerfpath import (
+    Contour,
+    InputError,
+    NoFeasiblePath,
+    PlanOptions,
+    audit,
+    fastest_speed,
+    pareto,
+    plan,
+)
 from kerfpath.cell import Mesh, box_between, cell_of
 from kerfpath.comfort import MEASURES, Band, Comfort
-from kerfpath.front import CRITERIA, JOINT_CRITERIA, Criterion, Subproblem, hypervolume
+from kerfpath.front import (
+    CRITERIA,
+    JOINT_CRITERIA,
+    Criterion,
+    ParetoProblem,
+    Subproblem,
+    criteria_named,
+    hypervolume,
+    plan_run,
+)
+from kerfpath.front._problem import Solution
 from kerfpath.front._subproblem import grid
 from kerfpath.planner import layered_graph
 from kerfpath.transfer import least_time
@@ -30,7 +49,8 @@ def task(arm, tool, placement):
     arc = Contour(points, axes, name="arc").resample(count=31)
     where = {"tool": tool, "placement": placement, "gamma_step": STEP, "postures": (0, 1)}
     graph = layered_graph(arc, arm, **where)
-    return {"contour": arc, "robot": arm, "speed": 0.05, "graph": graph, **where}
+    task = {"contour": arc, "robot": arm, "speed": 0.05, "graph": graph, **where}
+    return task | {"method": "exact"}
 
 
 @pytest.fixture(scope="module")
@@ -116,7 +136,7 @@ def test_the_plan_of_one_criterion_alone_is_as_good_in_it_as_any_other(task, cri
 
 
 def test_the_first_plan_is_that_of_the_planner(task, found):
-    usual = plan(method="exact", **task)
+    usual = plan(**task)
     assert found.values[0, 0] == pytest.approx(usual.cost * usual.dt, rel=1e-12)
 
 
@@ -152,6 +172,7 @@ def test_a_closed_contour_may_end_as_it_began(circle, arm, tool, placement):
     where = {"tool": tool, "placement": placement, "speed": 0.1, "gamma_step": STEP}
     options = where | {"criteria": ("displacement", "range_6"), "runs": 16, "postures": (0,)}
     made = pareto(circle, arm, closure="periodic", **options)
+    assert any(run.continuous for run in made.runs)
     assert made.feasible > 4
     for closed in made.plans:
         turned = (closed.q[-1] - closed.q[0]) % (2 * np.pi)
@@ -166,7 +187,8 @@ def few(circle, arm, tool, placement):
     contour = circle.resample(count=6)
     graph = layered_graph(contour, arm, gamma_step=np.radians(52), postures=(0,), **where)
     assert 50_000 < np.prod(np.diff(graph.start)) < 500_000
-    return {"contour": contour, "robot": arm, "speed": 0.6, "graph": graph, **where}
+    few = {"contour": contour, "robot": arm, "speed": 0.6, "graph": graph, **where}
+    return few | {"method": "exact"}
 
 
 @pytest.mark.parametrize(
@@ -334,10 +356,90 @@ def test_the_time_is_that_from_home_and_back(task):
         assert time == pytest.approx(plan_.time[-1] + least_time(ways, *arm.speed_limits()).sum())
 
 
-def test_the_same_run_comes_back_from_its_data(found):
-    for run in found.runs:
+@pytest.fixture(scope="module")
+def off_grid(task):
+    return pareto(**task | {"method": "continuous"}, criteria=NAMES, runs=40)
+
+
+def test_off_the_grid_no_plan_is_dominated_and_every_one_passes_its_audit(off_grid):
+    assert len(off_grid.plans) > 3
+    assert not dominated(off_grid.values).any()
+    assert all(audit(made) == [] for made in off_grid.plans)
+    assert off_grid.feasible + sum(off_grid.failures.values()) == off_grid.tried == 40
+
+
+def test_the_front_of_the_grid_is_beaten_off_it(task, off_grid):
+    # On steps of 8 deg, no path of the grid is near the best motion.
+    assert off_grid.left_behind.all()
+    assert "beaten off the grid" in str(off_grid)
+    on_grid = pareto(**task, criteria=NAMES, runs=22)
+    assert off_grid.coverage(on_grid) == 1.0
+    assert not on_grid.left_behind.any()
+    assert len(on_grid.on_grid) == len(on_grid.plans)
+    assert "beaten" not in str(on_grid)
+
+
+def test_what_is_beaten_is_what_some_plan_dominates(off_grid):
+    pairs = zip(off_grid.on_grid, off_grid.left_behind, strict=True)
+    for values, beaten in pairs:
+        both = np.vstack([values, off_grid.values])
+        assert dominated(both)[0].any() == beaten
+
+
+def test_plans_over_continuous_gamma_keep_what_their_runs_were_asked_for(off_grid):
+    windows = 0
+    for made, run in zip(off_grid.plans, off_grid.runs, strict=True):
+        assert run.continuous
+        assert made.settings.method == "continuous"
+        assert np.abs(made.velocity_share).max() <= run.eta_v * (1 + 1e-6)
+        assert np.abs(made.acceleration_share).max() <= run.eta_a * (1 + 1e-6)
+        for joint in run.windowed(made.robot.endless):
+            # At all nodes, by the true kinematics: the windows are as wide as rounding needs.
+            turned = np.cumsum(np.pad(made.increments[:, joint], (1, 0)))
+            assert np.ptp(turned) <= np.ptp(run.window[joint]) + 1e-9
+            windows += 1
+    assert windows > 0
+
+
+def test_a_plan_of_the_grid_is_held_to_in_what_can_be_held(task, found):
+    problem = ParetoProblem(
+        contour=task["contour"], robot=task["robot"], tool=task["tool"],
+        placement=task["placement"], speed=task["speed"], options=PlanOptions(),
+        graph=task["graph"], criteria=criteria_named(
+            ("displacement", "velocity", "range_6"), task["robot"], options=PlanOptions(),
+            cell=None, home=None,
+        ),
+    )  # fmt: skip
+    made = found.plans[0]
+    known = problem.evaluate(made)
+    solution = Solution(losses=known.losses, spans=known.spans, number=0, run=found.runs[0])
+    run = problem.as_good(solution)
+    assert (run.objective, run.metric) == ("sum", "manhattan")
+    assert run.eta_v == pytest.approx(np.abs(made.velocity_share).max())
+    assert run.eta_a == 1.0
+    assert run.windowed(made.robot.endless) == [5]
+    better = problem.solve(replace(run, continuous=True))
+    values = problem.evaluate(better).losses
+    # The refinement keeps 1e-8 of each limit free, and the window is 1e-9 rad wider.
+    assert (values <= known.losses + 2e-9).all()
+    assert values[0] < known.losses[0]
+
+
+def test_windows_beside_a_limit_on_the_same_rotation_stay_on_the_grid(task, found):
+    window = found.runs[0].window.copy()
+    window[5] = -0.5, 0.5
+    run = replace(found.runs[0], window=window, continuous=True)
+    options = PlanOptions(rotation=[np.inf] * 5 + [1.0], gamma_step=STEP)
+    where = {key: task[key] for key in ("tool", "placement", "speed", "graph")}
+    with pytest.raises(NoFeasiblePath, match="on the grid only: the rotation"):
+        plan_run(run, task["contour"], task["robot"], options=options, cell=None, **where)
+
+
+def test_the_same_run_comes_back_from_its_data(found, off_grid):
+    for run in (*found.runs, *off_grid.runs):
         again = Subproblem.from_data(json.loads(json.dumps(run.to_data())))
         assert again.to_data() == run.to_data()
+        assert again.continuous == run.continuous
         np.testing.assert_array_equal(again.window, run.window)
 
 
@@ -373,7 +475,7 @@ def test_a_new_criterion_is_one_object(task, monkeypatch):
 
 
 def test_in_a_cell_every_plan_is_clear(task, tool, placement):
-    blind, arm = plan(method="exact", **task), task["robot"]
+    blind, arm = plan(**task), task["robot"]
     slab = box_between([-0.3, -0.3, -0.09], [0.3, 0.3, -0.06])
     x, y, z = arm.forward(blind.q[15])[:3, 3]  # where the flange of a plan without a cell would be
     room = cell_of(

@@ -16,7 +16,7 @@ from kerfpath import (
 )
 from kerfpath.cell import box_between, cell_of
 from kerfpath.contour import Contour
-from kerfpath.planner import layered_graph
+from kerfpath.planner import _dip, layered_graph
 
 STEP = np.radians(4)
 SAME = 1e-3
@@ -153,10 +153,30 @@ def test_feed_and_pieces_go_on_from_it(task, arm, tool, placement):
     grid = plan(corner, arm, feed="dip", speed=0.4, method="exact", refine=True, **options)
     assert dipped.feed is not None
     assert dipped.time[-1] <= grid.time[-1] * (1 + SAME)
+    assert audit(dipped) == []
     pieces = plan_in_pieces(corner, arm, speed=0.1, **options)
     refined = plan_in_pieces(corner, arm, speed=0.1, method="exact", refine=True, **options)
     assert all(a.cost <= b.cost for a, b in zip(pieces, refined, strict=True))
     assert any("continuous rotation" in piece.proof.statement for piece in pieces)
+
+
+@pytest.mark.parametrize("speed", [0.2, 0.4])
+def test_a_feed_reduction_is_no_slower_for_paths_between_the_samples(
+    monkeypatch, arm, tool, placement, speed
+):
+    along = np.linspace(0, 0.16, 81)
+    points = np.stack([np.minimum(along, 0.08), np.maximum(along - 0.08, 0), 0 * along], axis=1)
+    lean = 0.3 / (1 + np.exp((0.08 - along) / 0.004))
+    corner = Contour(points, np.c_[lean, 0 * along, -np.ones(81)], name="corner")
+    options = {"tool": tool, "placement": placement, "gamma_step": np.radians(5), "feed": "dip"}
+    made = plan(corner, arm, speed=speed, **options)
+    monkeypatch.setattr(_dip, "_between_the_samples", lambda task, finder: [])
+    without = plan(corner, arm, speed=speed, **options)
+    assert made.time[-1] <= without.time[-1]
+    if speed == 0.4:
+        # Measured: 0.529 s instead of 0.563, of which 0.4 s are those of the speed asked for.
+        assert made.time[-1] < 0.95 * without.time[-1]
+        assert "slowed down from a path over continuous gamma" in made.proof.statement
 
 
 def test_a_refinement_stays_within_what_it_is_given(task):

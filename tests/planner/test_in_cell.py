@@ -117,8 +117,8 @@ def test_where_the_speed_must_dip_the_plan_is_clear_too(task, arm, tool, placeme
     fast = task[1] | {"speed": 1.0}
     with pytest.raises(NoFeasiblePath):
         on_grid(*task[0], **fast)
-    for refine in (False, True):
-        made = on_grid(*task[0], **fast, cell=there, feed="dip", refine=refine)
+    for how in ({}, {"method": "exact"}, {"method": "exact", "refine": True}):
+        made = plan(*task[0], **fast, cell=there, feed="dip", **how)
         assert is_clear(there, made.q)
         assert audit(made, cell=there) == []
 

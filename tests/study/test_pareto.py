@@ -170,15 +170,23 @@ def test_a_plan_that_is_picked_has_the_criteria_of_the_front(job, studied, tmp_p
             criteria.peak_velocity.max(),
             criteria.range[5],
         ] == pytest.approx(studied.front.values[row], rel=1e-12)
-        assert cut.plan.proof.optimal
+        run = studied.front.runs[row]
+        assert cut.plan.settings.method == ("continuous" if run.continuous else "exact")
+        assert cut.plan.proof.optimal == (not run.continuous)
         said = other.plan.proof.statement
         assert "continuous rotation" in said, "the others are planned as the job says"
 
 
-def test_refined_from_there_it_is_no_worse_by_what_it_minimised(job, studied, tmp_path):
+def test_on_the_grid_where_that_is_asked_for_and_refined_from_there(job, tmp_path):
+    exact = tmp_path / "exact.toml"
+    shutil.copy(job.parent / "b_pillar.step", tmp_path)
+    exact.write_text(TABLES.replace("gamma_step_deg", 'method = "exact"\ngamma_step_deg'))
+    store = tmp_path / "s"
+    studied = pareto_of_job(exact, store=store, criteria=CRITERIA, runs=8, processes=1)
+    assert not any(run.continuous for run in studied.front.runs)
     write_pareto(studied, tmp_path)
-    pick = read_pick(tmp_path, job, "displacement")
-    _, outcome = plan_picked(job, pick, refine=True)
+    pick = read_pick(tmp_path, exact, "displacement")
+    _, outcome = plan_picked(exact, pick, refine=True)
     (cut,) = [cut for cut in outcome.cuts if cut.name == "large"]
     assert outcome.passed
     assert cut.plan.cost < cut.plan.proof.grid_cost

@@ -73,6 +73,8 @@ def show_front(
         f"largest gap {front.gap:.3f}"
     )
     _show_plans(front)
+    if any(run.continuous for run in front.runs):
+        out.print(front.beyond_the_grid)
     for why, number in front.failures.items():
         out.print(f"no plan in {number} runs: {escape(why)}")
     show_files(written)
@@ -112,6 +114,8 @@ def _entry(found: JobFront, written: Sequence[Path]) -> dict[str, object]:
         "failures": dict(front.failures),
         "hypervolume": front.hypervolume,
         "gap": front.gap,
+        "on_grid": len(front.on_grid),
+        "left_behind": int(front.left_behind.sum()),
         "files": [str(path) for path in written],
     }
 

@@ -51,7 +51,7 @@ def pareto(
         ),
     ] = None,
     refine: Annotated[
-        bool, typer.Option("--refine", help="Refine the picked plan: move gamma off its grid.")
+        bool, typer.Option("--refine", help="Refine a picked plan of the grid: move gamma off it.")
     ] = False,
     strict: Strict = False,
     scheduler: Scheduler = None,
@@ -62,9 +62,10 @@ def pareto(
 
     The criteria are displacement, range, velocity, acceleration, speed, time (from home_deg in
     [sequence]), clearance (in the cell), wrist, elbow, shoulder, limits, manipulability,
-    and displacement_J, increment_J, range_J of joint J. Every plan is the proved optimum of its
-    run on the grid, and audited. pareto.json and pareto.html go to the folder JOB-pareto in the
-    current one unless --out names another. After a stop, even kill -9, the same command continues.
+    and displacement_J, increment_J, range_J of joint J. Every second run is over continuous
+    rotation, the others find the proved optimum on its grid, all of them with method = "exact".
+    Every plan is audited. pareto.json and pareto.html go to the folder JOB-pareto in the current
+    one unless --out names another. After a stop, even kill -9, the same command continues.
 
     Example: kerfpath pareto door.toml --criteria displacement,velocity,range_6 --runs 200
 

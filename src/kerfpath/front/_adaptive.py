@@ -32,13 +32,20 @@ class AdaptiveRuns:
     and some of the way to the other's is allowed, by eta, windows or clearance, and the rest
     is as one of the two was asked for, or minimises what one of the first runs did. Where there is
     no such bound, as on displacements, the weights go between. Each attempt at a gap halves
-    its claim to the next.
+    its claim to the next. Over continuous gamma what only the grid's first runs are exact in may be
+    bettered, too.
     """
 
     def __init__(
-        self, problem: ParetoProblem, first: Sequence[Subproblem], rng: np.random.Generator
+        self,
+        problem: ParetoProblem,
+        first: Sequence[Subproblem],
+        rng: np.random.Generator,
+        *,
+        continuous: bool = False,
     ) -> None:
         self._problem, self._first, self._rng = problem, first, rng
+        self._continuous = continuous
         self._attempts: Counter[tuple[int, int, int]] = Counter()
         self._proposed = 0
 
@@ -54,12 +61,13 @@ class AdaptiveRuns:
     def _gaps(self, front: Sequence[Solution], scale: Array) -> Iterator[tuple[float, Gap]]:
         """Yield every gap after its claim to the next run."""
         for c, criterion in enumerate(self._problem.criteria):
+            exact = criterion.aimed if self._continuous else criterion.exact_anchor
             ordered = sorted(front, key=lambda solution: (solution.losses[c], solution.number))
             before: list[Solution | None] = [None, *ordered[:-1]]
             for a, b in zip(before, ordered, strict=True):
                 if a is not None:
                     width = float(b.losses[c] - a.losses[c]) / scale[c]
-                elif criterion.exact_anchor or not criterion.bounded:
+                elif exact or not criterion.bounded:
                     width = 0.0
                 else:
                     width = abs(float(b.losses[c])) / scale[c]

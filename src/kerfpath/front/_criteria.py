@@ -58,14 +58,14 @@ class Displacement(PerJoint):
     """Total displacement (7); the unbounded run is best in that of all joints."""
 
     field = "displacement"
-    exact_anchor = True
+    exact_anchor = aimed = True
 
 
 class Increment(PerJoint):
     """Largest increment (8)."""
 
     field = "largest_increment"
-    exact_anchor = True
+    exact_anchor = aimed = True
 
     def anchor(self, problem: ParetoProblem) -> Subproblem | None:
         alone = PerJoint.anchor(self, problem)
@@ -117,6 +117,14 @@ class Range(PerJoint):
         window[joints] = np.stack([low - ROOM, low + width + ROOM], axis=1)[joints]
         return replace(run, window=freeze(window))
 
+    def hold(
+        self, run: Subproblem, value: float, spans: Array, problem: ParetoProblem
+    ) -> Subproblem:
+        window = run.window.copy()
+        joints = slice(None) if self.joint is None else [self.joint]
+        window[joints] = (spans + np.array([-ROOM, ROOM]))[joints]
+        return replace(run, window=freeze(window))
+
     def _elsewhere(
         self, problem: ParetoProblem, width: float, otherwise: float, rng: np.random.Generator
     ) -> float:
@@ -137,7 +145,7 @@ class Range(PerJoint):
 class Velocity(Criterion):
     """Largest increment (8) of any joint, as a share of its velocity limit."""
 
-    exact_anchor = bounded = True
+    exact_anchor = bounded = aimed = True
 
     def value(self, plan: Plan, problem: ParetoProblem) -> float:
         return float(plan.criteria.peak_velocity.max())
@@ -147,6 +155,9 @@ class Velocity(Criterion):
 
     def bound(self, run: Subproblem, value: float, *_: object) -> Subproblem:
         return replace(run, eta_v=value)
+
+    def hold(self, run: Subproblem, value: float, *_: object) -> Subproblem:
+        return replace(run, eta_v=min(run.eta_v, value))
 
 
 class Acceleration(Criterion):
@@ -163,6 +174,9 @@ class Acceleration(Criterion):
 
     def bound(self, run: Subproblem, value: float, *_: object) -> Subproblem:
         return replace(run, eta_a=value)
+
+    def hold(self, run: Subproblem, value: float, *_: object) -> Subproblem:
+        return replace(run, eta_a=min(run.eta_a, value))
 
 
 class Speed(Criterion):
@@ -185,6 +199,12 @@ class Speed(Criterion):
     ) -> Subproblem:
         whole, asked = problem.unbounded, longest_step(problem.contour) / problem.dt
         return replace(run, eta_v=whole.eta_v, eta_a=whole.eta_a).quicker(value / asked)
+
+    def hold(
+        self, run: Subproblem, value: float, spans: Array, problem: ParetoProblem
+    ) -> Subproblem:
+        fast = problem.unbounded.quicker(value * problem.dt / longest_step(problem.contour))
+        return replace(run, eta_v=min(run.eta_v, fast.eta_v), eta_a=min(run.eta_a, fast.eta_a))
 
 
 class Time(Criterion):
@@ -231,6 +251,9 @@ class Clearance(Criterion):
 
     def bound(self, run: Subproblem, value: float, *_: object) -> Subproblem:
         return replace(run, clearance=value)
+
+    def hold(self, run: Subproblem, value: float, *_: object) -> Subproblem:
+        return replace(run, clearance=max(0.0, value * (1 - ROUNDING)))
 
 
 class LeastMeasure(Criterion):

@@ -9,7 +9,7 @@ import moocore
 import numpy as np
 from numpy.typing import ArrayLike
 
-from kerfpath._arrays import Array, floats, freeze, require_one_of
+from kerfpath._arrays import Array, Bools, floats, freeze, require_one_of
 from kerfpath._repr import short_repr
 from kerfpath.errors import InputError
 from kerfpath.front._problem import Criterion
@@ -35,6 +35,8 @@ class Front:
         Criteria of each plan, in their units; each plan has passed its audit.
     beaten : (B, C)
         Those of the plans that others beat.
+    on_grid : (G, C)
+        Those of the plans that no other on the grid of gamma beats.
     ideal, reference : (C,)
         Best values of the first runs, and a point beyond the worst of them: what criteria are
         scaled by.
@@ -51,6 +53,7 @@ class Front:
     runs: tuple[Subproblem, ...]
     values: Array
     beaten: Array
+    on_grid: Array
     ideal: Array
     reference: Array
     tried: int
@@ -92,6 +95,21 @@ class Front:
         """Largest distance of neighbours in any one criterion, scaled: how well it is covered."""
         return float(np.diff(np.sort(self.scaled, axis=0), axis=0).max(initial=0.0))
 
+    @property
+    def left_behind(self) -> Bools:
+        """Which plans of `on_grid` (G,) a plan over continuous gamma beats."""
+        here, there = self.values * self.sense, self.on_grid * self.sense
+        as_good = (here[:, None] <= there).all(axis=2)
+        return np.asarray((as_good & (here[:, None] < there).any(axis=2)).any(axis=0))
+
+    @property
+    def beyond_the_grid(self) -> str:
+        """What became of the plans of the grid, in words."""
+        return (
+            f"{int(self.left_behind.sum())} of the {len(self.on_grid)} plans of the front that the "
+            "grid of gamma has are beaten off the grid"
+        )
+
     def coverage(self, other: Front) -> float:
         """Return the share of another set's plans that some plan here is as good as or better.
 
@@ -129,6 +147,8 @@ class Front:
             f"{len(self.runs)} plans of {self.feasible} feasible runs of {self.tried}; "
             f"hypervolume {self.hypervolume:.4f}, largest gap {self.gap:.3f}"
         ]
+        if len(self.left_behind) and any(run.continuous for run in self.runs):
+            lines[0] += f"; {self.beyond_the_grid}"
         for axis, values in zip(self.axes, self.values.T, strict=True):
             lines.append(f"  {axis.name}: {values.min():.4g} to {values.max():.4g} {axis.unit}")
         lines += [f"  no plan in {number} runs: {why}" for why, number in self.failures.items()]

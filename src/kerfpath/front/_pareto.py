@@ -19,7 +19,7 @@ from kerfpath.front._problem import Evaluation, ParetoProblem
 from kerfpath.front._search import AHEAD, FrontSearch, SearchKind, whole_number
 from kerfpath.front._subproblem import Subproblem
 from kerfpath.graph import LayeredGraph
-from kerfpath.options import GraphKeywords, PlanOptions, with_keywords
+from kerfpath.options import GraphKeywords, PlanMethod, PlanOptions, with_keywords
 from kerfpath.planner import layered_graph
 from kerfpath.plans import Plan
 from kerfpath.robots import Robot
@@ -31,6 +31,7 @@ __all__ = ["pareto"]
 class ParetoKeywords(GraphKeywords, total=False):
     """The options that `pareto` takes as keywords."""
 
+    method: PlanMethod
     eta_v: float
     eta_a: float
     closure: Closure
@@ -62,8 +63,10 @@ def pareto(
 
     The designer's collection of section 3.2: the layered graph is built once, and the planner run
     over it with other objectives, metrics, weights and eta, and with windows on the joints, which
-    are the epsilon constraint for the range (9). Every plan is the proved optimum of what its run
-    asked for.
+    are the epsilon constraint for the range (9). Every second run is over continuous gamma, where
+    it is looked for how the plans of the grid can be bettered in one criterion and as good in those
+    that can be held, and then between the neighbours on the front. A plan of the grid is the proved
+    optimum of what its run asked for, one over continuous gamma the best motion found.
 
     Parameters
     ----------
@@ -71,8 +74,9 @@ def pareto(
         As in `kerfpath.plan`; in a cell runs go one after another.
     options
         As in `kerfpath.plan`, or as keywords gamma_step, frames, tilt, postures, closure, rotation,
-        comfort, eta_v and eta_a: the largest share of the velocity and acceleration limits that any
-        run may use. Runs say objective, metric and weights; the speed is constant.
+        comfort, method, eta_v and eta_a: the largest share of the velocity and acceleration limits
+        that any run may use. Runs say objective, metric and weights; the speed is constant. Any
+        method but "continuous" keeps all runs on the grid.
     criteria : sequence of str
         Names in `kerfpath.front.CRITERIA`, or in `JOINT_CRITERIA` with a joint from 1, as
         "range_6"; docs/pareto.md says what each measures. "clearance" needs a cell.
@@ -107,7 +111,6 @@ def pareto(
         options,
         keywords,
         ParetoKeywords,
-        method="exact",
         feed="constant",
         refine=False,
         certify=None,

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import ClassVar
 
@@ -16,11 +16,12 @@ from kerfpath.auditor import audit as full_audit
 from kerfpath.cell import Cell
 from kerfpath.contour import Contour
 from kerfpath.errors import NoFeasiblePath
+from kerfpath.front._planned import plan_run
 from kerfpath.front._subproblem import Subproblem
 from kerfpath.graph import LayeredGraph
 from kerfpath.losses import Loss
 from kerfpath.options import PlanOptions
-from kerfpath.planner import node_interval, plan, relaxations
+from kerfpath.planner import node_interval, relaxations
 from kerfpath.plans import Plan
 from kerfpath.robots import Robot
 from kerfpath.search import Relaxations
@@ -55,7 +56,9 @@ class Criterion:
     exact_anchor: ClassVar[bool] = False
     """Whether the plan of the first runs that is best in it is the best on the graph."""
     bounded: ClassVar[bool] = False
-    """Whether `bound` can hold a run to a value of it."""
+    """Whether `bound` and `hold` can hold a run to a value of it."""
+    aimed: ClassVar[bool] = False
+    """Whether its anchor minimises it, and nothing else but to decide between equals."""
 
     __repr__ = short_repr
 
@@ -81,6 +84,15 @@ class Criterion:
     ) -> Subproblem:  # fmt: skip
         """Return a subproblem with the epsilon constraint that it be as good as a value."""
         raise NotImplementedError
+
+    def hold(
+        self, run: Subproblem, value: float, spans: Array, problem: ParetoProblem
+    ) -> Subproblem:
+        """Return a subproblem held to be as good in it as a plan; as it is where none can be.
+
+        The plan has the value, and its joints the spans (n, 2); it keeps what is held.
+        """
+        return run
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -176,6 +188,33 @@ class ParetoProblem:
         anchors = [criterion.anchor(self) for criterion in self.criteria]
         return [self.unbounded, *(run for run in anchors if run is not None)]
 
+    @property
+    def continuous(self) -> bool:
+        """Whether there are runs over continuous gamma, too."""
+        return self.options.method == "continuous" and self.robot.family.free_rotation
+
+    def as_good(self, solution: Solution) -> Subproblem:
+        """Return a run held to be as good as a plan in all criteria that can be held."""
+        aim = self._aim or solution.run
+        run = replace(
+            self.unbounded, objective=aim.objective, metric=aim.metric, weights=aim.weights
+        )
+        for criterion, loss in zip(self.criteria, solution.losses, strict=True):
+            run = criterion.hold(run, float(loss) * criterion.sense, solution.spans, self)
+        return run
+
+    @cached_property
+    def _aim(self) -> Subproblem | None:
+        """The run that minimises the one criterion that cannot be held, if there is but one.
+
+        If there is none, that of the first that a run minimises; None: each its own.
+        """
+        free = [criterion for criterion in self.criteria if not criterion.bounded]
+        if len(free) > 1:
+            return None
+        aimed = [each for each in free or self.criteria if each.aimed]
+        return (aimed[0].anchor(self) or self.unbounded) if aimed else None
+
     def solve(self, run: Subproblem, *, first: bool = False) -> Plan | str:
         """Return the plan of a run, which has passed its audit, or in a few words why not.
 
@@ -185,15 +224,16 @@ class ParetoProblem:
             The `first` run, which has all that is allowed, has no path, so that none can have one.
         """
         try:
-            made = plan(
+            made = plan_run(
+                run,
                 self.contour,
                 self.robot,
                 tool=self.tool,
                 placement=self.placement,
                 speed=self.speed,
-                options=run.applied_to(self.options),
-                graph=run.graph(self.graph, self.robot.endless),
-                cell=run.cell(self.cell),
+                options=self.options,
+                graph=self.graph,
+                cell=self.cell,
             )
         except NoFeasiblePath as broken:
             if first:
@@ -204,6 +244,8 @@ class ParetoProblem:
                 )
                 raise broken.with_message(said) from None
             counts = broken.counts
+            if run.continuous and not counts:
+                return "no motion found off the grid"
             if windows := broken.lost_by(Loss.WINDOW):
                 return f"no pose in the {windows[0]}"
             return f"no edge within {max(counts, key=counts.__getitem__, default='the seam')}"

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections import Counter, deque
 from collections.abc import Callable, Iterator
+from dataclasses import replace
 from typing import Literal, get_args
 
 import moocore
@@ -54,24 +55,43 @@ class FrontSearch:
         self.runs, self._ahead = whole_number(runs, "runs"), whole_number(ahead, "ahead")
         self._problem, self._search, self._seed = problem, search, seed
         self._beginning = 1
+        self._tried: set[int] = set()
         self._found: list[Solution] = []
         self._failures: Counter[str] = Counter()
 
     def _proposed(self) -> Iterator[Subproblem]:
-        """Yield the runs: the first, those for the best of each criterion, and then the search."""
-        yield self._problem.unbounded
-        first = self._problem.first_runs()
-        self._beginning = len(first)
-        yield from first[1:]
-        rng = np.random.default_rng(self._seed)
-        plain = grid(first[0], rng)
-        adaptive = AdaptiveRuns(self._problem, first, rng)
+        """Yield the runs: the first, those for the best of each criterion, and then the search.
+
+        Where gamma is continuous, all of it on the grid and off it in turn: what the grid finds in
+        little time says where to look.
+        """
+        problem, rng = self._problem, np.random.default_rng(self._seed)
+        yield problem.unbounded
+        first = problem.first_runs()
+        beyond = [replace(run, continuous=True) for run in first] if problem.continuous else []
+        self._beginning = len(first) + len(beyond)
+        yield from [*first[1:], *beyond]
+        plain, search = grid(first[0], rng), AdaptiveRuns(problem, first, rng)
+        other = np.random.default_rng([self._seed, 1])
+        off_grid = AdaptiveRuns(problem, beyond, other, continuous=True)
         while True:
-            if self._search == "adaptive" and self._found:
-                ideal, reference = self._box()
-                yield adaptive.propose(self._front(), reference - ideal)
-            else:
-                yield next(plain)
+            on_grid = [each for each in self._found if not each.run.continuous]
+            adaptive = self._search == "adaptive"
+            run = search.propose(_front(on_grid), self._scale) if adaptive and on_grid else None
+            run = run or next(plain)
+            yield run
+            if problem.continuous:
+                if adaptive and self._found:
+                    run = self._held() or off_grid.propose(_front(self._found), self._scale)
+                yield replace(run, continuous=True)
+
+    def _held(self) -> Subproblem | None:
+        """Return the run that is to beat a plan of the grid which none has beaten or tried to."""
+        for solution in _front(self._found):
+            if not solution.run.continuous and solution.number not in self._tried:
+                self._tried.add(solution.number)
+                return self._problem.as_good(solution)
+        return None
 
     def run(self, submit: Callable[[int, Subproblem], Callable[[], Evaluation | str]]) -> Front:
         """Do all runs, up to `ahead` of them under way, and return the front.
@@ -102,11 +122,6 @@ class FrontSearch:
                 )
         return self._result()
 
-    def _front(self) -> list[Solution]:
-        """Return those that none dominates, of equal ones the first."""
-        kept = moocore.is_nondominated(np.array([each.losses for each in self._found]))
-        return [each for each, keep in zip(self._found, kept, strict=True) if keep]
-
     def _box(self) -> tuple[Array, Array]:
         """Return the ideal and the reference (C,) that the first runs leave, less being better.
 
@@ -117,6 +132,11 @@ class FrontSearch:
         values = np.array([each.losses for each in some])
         ideal, worst = values.min(axis=0), values.max(axis=0)
         return ideal, worst + np.maximum(worst - ideal, LEAST_ROOM * np.abs(ideal) + TINY)
+
+    @property
+    def _scale(self) -> Array:
+        ideal, reference = self._box()
+        return reference - ideal
 
     def _result(self) -> Front:
         failures = dict(self._failures.most_common())
@@ -129,9 +149,10 @@ class FrontSearch:
                 node=-1,
                 counts=failures,
             )
-        front = sorted(self._front(), key=lambda each: (*each.losses,))
+        front = sorted(_front(self._found), key=lambda each: (*each.losses,))
         numbers = {each.number for each in front}
         beaten = [each.losses for each in self._found if each.number not in numbers]
+        on_grid = _front([each for each in self._found if not each.run.continuous])
         sense = np.array([criterion.sense for criterion in self._problem.criteria])
         ideal, reference = self._box()
         return Front(
@@ -140,12 +161,23 @@ class FrontSearch:
             runs=tuple(each.run for each in front),
             values=freeze(sense * np.array([each.losses for each in front])),
             beaten=freeze(sense * np.array(beaten).reshape(-1, len(sense))),
+            on_grid=freeze(
+                sense * np.array([each.losses for each in on_grid]).reshape(-1, len(sense))
+            ),
             ideal=freeze(sense * ideal),
             reference=freeze(sense * reference),
             tried=self.runs,
             feasible=len(self._found),
             failures=failures,
         )
+
+
+def _front(found: list[Solution]) -> list[Solution]:
+    """Return those that none dominates, of equal ones the first."""
+    if not found:
+        return []
+    kept = moocore.is_nondominated(np.array([each.losses for each in found]))
+    return [each for each, keep in zip(found, kept, strict=True) if keep]
 
 
 def whole_number(value: int, name: str) -> int:

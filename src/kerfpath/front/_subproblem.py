@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from itertools import product
-from typing import TypedDict, get_args
+from typing import NotRequired, TypedDict, get_args
 
 import numpy as np
 
@@ -26,7 +26,10 @@ SHARES = (1.0, 0.9, 0.8)
 
 
 class SubproblemData(TypedDict):
-    """A subproblem as JSON holds it; null where a joint has no window."""
+    """A subproblem as JSON holds it; null where a joint has no window.
+
+    On the grid of gamma where it does not say that it is `continuous`.
+    """
 
     objective: ObjectiveKind
     metric: Metric
@@ -35,6 +38,7 @@ class SubproblemData(TypedDict):
     eta_a: float
     window: list[list[float] | None]
     clearance: float
+    continuous: NotRequired[bool]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -52,6 +56,8 @@ class Subproblem:
         free.
     clearance : float m
         What robot and head are to keep from what stands around beyond the near-miss distance.
+    continuous : bool
+        Whether gamma is continuous, and not on its grid.
     """
 
     objective: ObjectiveKind
@@ -61,6 +67,7 @@ class Subproblem:
     eta_a: float
     window: Array
     clearance: float = 0.0
+    continuous: bool = False
 
     __repr__ = short_repr
 
@@ -80,6 +87,7 @@ class Subproblem:
         """Return the options with what this subproblem says in their place."""
         return replace(
             options,
+            method="continuous" if self.continuous else "exact",
             objective=self.objective,
             metric=self.metric,
             weights=self.weights,
@@ -90,13 +98,17 @@ class Subproblem:
     def graph(self, graph: LayeredGraph, endless: Bools) -> LayeredGraph:
         """Return the layered graph without the vertices outside the window, counted by joint."""
         outside = {}
-        for joint, (low, high) in enumerate(self.window):
-            if np.isfinite(high - low) and not (endless[joint] and high - low >= 2 * np.pi):
-                inside = is_in_window(
-                    graph.q[:, joint], low, high - low, endless=bool(endless[joint])
-                )
-                outside[Reason(Loss.WINDOW, joint + 1)] = ~inside
+        for joint in self.windowed(endless):
+            low, high = self.window[joint]
+            inside = is_in_window(graph.q[:, joint], low, high - low, endless=bool(endless[joint]))
+            outside[Reason(Loss.WINDOW, joint + 1)] = ~inside
         return graph.without(outside) if outside else graph
+
+    def windowed(self, endless: Bools) -> list[int]:
+        """Return the joints whose window says something: less than a turn where one is endless."""
+        width = np.diff(self.window)[:, 0]
+        said = np.isfinite(width) & ~(endless & (width >= 2 * np.pi))
+        return [int(joint) for joint in np.flatnonzero(said)]
 
     def cell(self, cell: Cell | None) -> Cell | None:
         """Return the cell in which the clearance is kept beyond its near-miss distance."""
@@ -112,7 +124,7 @@ class Subproblem:
 
     def to_data(self) -> SubproblemData:
         """Return it as JSON holds it; `from_data` reads the very same back."""
-        return {
+        data: SubproblemData = {
             "objective": self.objective,
             "metric": self.metric,
             "weights": self.weights.tolist(),
@@ -121,6 +133,7 @@ class Subproblem:
             "window": [p if np.isfinite(p).all() else None for p in self.window.tolist()],
             "clearance": self.clearance,
         }
+        return {**data, "continuous": True} if self.continuous else data
 
     @classmethod
     def from_data(cls, data: SubproblemData) -> Subproblem:
@@ -136,6 +149,7 @@ class Subproblem:
             eta_a=data["eta_a"],
             window=freeze(np.array(window)),
             clearance=data["clearance"],
+            continuous=data.get("continuous", False),
         )
 
 

@@ -1,5 +1,6 @@
 """plan(): layers, search and refinement in one; the fastest speed; what opens a closed way."""
 
+from kerfpath.planner._best import best_motion as best_motion
 from kerfpath.planner._certified import with_bound as with_bound
 from kerfpath.planner._fastest import FastestSpeed as FastestSpeed
 from kerfpath.planner._fastest import fastest_speed as fastest_speed

@@ -1,4 +1,4 @@
-"""feed="dip": the path to slow down, the least time it takes, and where the speed dips."""
+"""feed="dip": the paths to slow down, the least time one takes, and where the speed dips."""
 
 from __future__ import annotations
 
@@ -12,9 +12,16 @@ from kerfpath.planner._refined import plan_first_order
 from kerfpath.planner._task import PlanningTask
 from kerfpath.plans import Plan, Proof
 from kerfpath.retime import feed, retime
-from kerfpath.search import find_slowed
+from kerfpath.search import ContinuousSearch, Effort, SearchProblem, find_slowed
 
 __all__ = ["plan_slowed"]
+
+EFFORT = Effort(60, (1.1, 1.0))
+"""What a path over continuous gamma is looked for with."""
+SLOWER = (1.0, 1.15, 1.4, 2.0)
+"""Node intervals, as multiples of the one asked for, at which (6) is to hold throughout."""
+MOST_LOOKS = 20
+"""Searches for a path whose samples are clear in the cell."""
 
 
 def plan_slowed(task: PlanningTask, finder: ClearSearch, *, refine: bool) -> Plan:
@@ -23,8 +30,10 @@ def plan_slowed(task: PlanningTask, finder: ClearSearch, *, refine: bool) -> Pla
     On the grid two paths are worth their least times under all limits: the one that loses the least
     time, priced above all distances, if each step had to be slow on its own, and the best one
     without acceleration limits, where there is one. With `refine` gamma also moves off the grid
-    from each to ask for little beyond the limits, and the quicker of the two, or if that is not
-    clear the other, is refined. The plan is the quickest, and of equally quick ones the cheapest.
+    from each to ask for little beyond the limits, and each is refined; with the method "continuous"
+    so are paths over continuous gamma: the best one without acceleration limits, and the one that
+    keeps all of them at the least constant interval that has one. The plan is the quickest that is
+    clear, and of equally quick ones the cheapest.
     """
     slowed, first = _least_lost(task, finder), plan_first_order(task, finder)
     starts = [slowed]
@@ -33,18 +42,51 @@ def plan_slowed(task: PlanningTask, finder: ClearSearch, *, refine: bool) -> Pla
     on_grid = min((_with_least_times(task, start) for start in starts), key=_time_and_cost)
     if not (refine and task.robot.family.free_rotation):
         return on_grid
+    if task.settings.method == "continuous":
+        starts += _between_the_samples(task, finder)
     why = "take longer"
-    for eased in sorted((_ease(task, start) for start in starts), key=_time_and_cost):
-        again = _with_least_times(task, refiner.refine(eased).plan)
-        made = min(again, eased, key=_time_and_cost)
+    for made in sorted((_off_grid(task, start) for start in starts), key=_time_and_cost):
         if _time_and_cost(made) > _time_and_cost(on_grid):
-            continue
+            break
         broken = _broken(task, finder, made)
         if not broken:
             return made
         why = broken
     claim = f"{on_grid.proof.statement}; not refined: off the grid it would {why}"
     return replace(on_grid, proof=replace(on_grid.proof, statement=claim))
+
+
+def _off_grid(task: PlanningTask, start: Plan) -> Plan:
+    """Return the quicker of a path eased and that refined, with its least times."""
+    eased = _ease(task, start)
+    return min(eased, _with_least_times(task, refiner.refine(eased).plan), key=_time_and_cost)
+
+
+def _between_the_samples(task: PlanningTask, finder: ClearSearch) -> list[Plan]:
+    """Return the paths over continuous gamma that are worth slowing down; none where none is found.
+
+    Each at a constant interval: the one asked for without (6), and the least of `SLOWER` with it.
+    """
+    free = replace(task.problem, limits=task.problem.limits.without_acceleration())
+    found = [_between(task, finder, free)]
+    for times in SLOWER:
+        slow = _between(task, finder, replace(task.problem, dt=times * task.dt))
+        if slow is not None:
+            found.append(slow)
+            break
+    return [path for path in found if path is not None]
+
+
+def _between(task: PlanningTask, finder: ClearSearch, problem: SearchProblem) -> Plan | None:
+    """Return the best path over continuous gamma of a problem; None where none is found."""
+    claim = "no motion was found at constant speed; slowed down from a path over continuous gamma"
+    for _ in range(MOST_LOOKS):
+        search = ContinuousSearch(finder.open_problem(problem), task.samples)
+        paths = list(search.paths(EFFORT))
+        if not finder.learn([ends for path in paths for ends in (path.one, path.other)]):
+            proof = Proof(optimal=False, statement=finder.claimed(claim))
+            return task.plan_between(paths[0], proof) if paths else None
+    return None
 
 
 def _ease(task: PlanningTask, start: Plan) -> Plan:

@@ -179,7 +179,7 @@ def _problem(path: str, digest_then: str, contour: str, criteria: tuple[str, ...
     drawn = task.candidates(part)[0]
     nodes = task.sample(drawn)
     cell = cell_of_job(job, part)
-    options = replace(job.options, method="exact", feed="constant", refine=False, certify=None)
+    options = replace(job.options, feed="constant", refine=False, certify=None)
     home = None if job.sequence is None else job.sequence.home_deg
     home_rad = None if home is None else np.radians(home)
     return ParetoProblem(

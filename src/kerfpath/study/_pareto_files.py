@@ -64,6 +64,7 @@ def _entries(found: JobFront) -> dict[str, object]:
         "reference": front.reference.tolist(),
         "hypervolume": front.hypervolume,
         "gap": front.gap,
+        "on_grid": front.on_grid.tolist(),
         "tried": front.tried,
         "feasible": front.feasible,
         "failures": dict(front.failures),
@@ -101,6 +102,9 @@ def _page(found: JobFront, folder: Path) -> str:
         ("Hypervolume", f"{front.hypervolume:.4f} of the box from the ideal to the reference"),
         ("Largest gap", f"{front.gap:.3f} of that box, between neighbours in one criterion"),
     ]
+    off_grid = any(run.continuous for run in front.runs)
+    if off_grid:
+        facts.append(("Off the grid", front.beyond_the_grid))
     facts += [(f"{number} runs without a plan", why) for why, number in front.failures.items()]
     many = len(found.others)
     others = [f"The front is of one contour; the job has {many} more."] if many else []
@@ -113,15 +117,22 @@ def _page(found: JobFront, folder: Path) -> str:
         dominated=front.beaten.tolist(),
         marks={titles[name]: number for name, number in marks(front).items()},
         facts=facts,
-        notes=[
-            "Every plan is the proved optimum of its run on the grid of the rotation, and is not "
-            "refined: off the grid others may be better or faster; "
-            "the set is a sample of the front.",
-            *others,
-        ],
+        notes=[_note(off_grid=off_grid), *others],
         command=f"kerfpath pareto {quote(str(job.path))} --out {where} --pick {{number}}",
         job_text=job.path.read_text(encoding="utf-8-sig"),
     )
+
+
+def _note(*, off_grid: bool) -> str:
+    """Say what is known of the plans."""
+    known = (
+        "A plan over continuous rotation is the best motion that was found for its run, one on the "
+        "grid the proved optimum there; none is certified before it is picked; "
+        if off_grid
+        else "Every plan is the proved optimum of its run on the grid of the rotation, and is not "
+        "refined: off the grid others may be better or faster; "
+    )
+    return f"{known}the set is a sample of the front."
 
 
 def rows_of_run(run: Subproblem, robot: Robot) -> list[tuple[str, str]]:
@@ -133,6 +144,7 @@ def rows_of_run(run: Subproblem, robot: Robot) -> list[tuple[str, str]]:
         units[-1] = robot.external.unit
     rows = [
         ("minimise", f"{run.objective} of {run.metric} distances"),
+        ("rotation", "continuous" if run.continuous else "on its grid"),
         ("limits", f"{run.eta_v:.1%} of velocity, {run.eta_a:.1%} of acceleration"),
         ("joints weigh", " ".join(f"{weight:.3g}" for weight in relative)),
     ]

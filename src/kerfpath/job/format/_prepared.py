@@ -88,9 +88,10 @@ class CutRequest:
 
     def picked(self, run: Subproblem, *, refine: bool) -> CutRequest:
         """Return the request for the first candidate, planned as a run of a Pareto set."""
-        options = replace(
-            run.applied_to(self.options), method="exact", feed="constant", refine=refine
-        )
+        mine = self.options
+        options = run.applied_to(replace(mine, feed="constant", refine=refine))
+        if run.continuous:  # it keeps its own shares of the limits, and all else the job's
+            options = replace(options, eta_v=mine.eta_v, eta_a=mine.eta_a)
         return replace(self, candidates=self.candidates[:1], options=options, run=run)
 
 

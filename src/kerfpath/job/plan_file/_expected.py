@@ -201,7 +201,7 @@ def _options(job: Job, dt: float, said: PlanOptions, *, picked: bool) -> PlanOpt
         weights=said.weights,
         eta_v=min(options.eta_v, said.eta_v),
         eta_a=min(options.eta_a, said.eta_a),
-        method="exact",
+        method="continuous" if said.method == "continuous" else "exact",
         feed="constant",
         refine=said.refine,
     )

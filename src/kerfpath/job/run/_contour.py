@@ -11,6 +11,7 @@ import numpy as np
 from kerfpath.cell import Cell
 from kerfpath.contour import Contour
 from kerfpath.errors import NoFeasiblePath
+from kerfpath.front import Subproblem, plan_run
 from kerfpath.graph import LayeredGraph
 from kerfpath.job.format import Candidate, CutRequest, Job, PreparedJob, divide_nodes
 from kerfpath.job.run._remedy import find_remedy
@@ -54,9 +55,9 @@ def cut_candidate(
         begin("map of the cell")
         clearance = clearance_map(graph, cell)
     whole = CutResult(request=request, candidate=candidate, graph=graph, clearance=clearance)
-    kept = cell
-    if request.run is not None:
-        graph, kept = request.run.graph(graph, job.robot.endless), request.run.cell(cell)
+    run, every, kept = request.run, graph, cell
+    if run is not None:
+        graph, kept = run.graph(graph, job.robot.endless), run.cell(cell)
 
     def planned(by: Callable[..., _T]) -> _T:
         return by(
@@ -64,9 +65,15 @@ def cut_candidate(
             speed=candidate.speed, options=job.options, cell=kept, graph=graph, phase=begin,
         )  # fmt: skip
 
+    def follow(run: Subproblem) -> Plan:
+        return plan_run(
+            run, candidate.nodes, job.robot, tool=job.tool, placement=job.placement,
+            speed=candidate.speed, options=job.options, cell=cell, graph=every, phase=begin,
+        )  # fmt: skip
+
     try:
         try:
-            plans: tuple[Plan, ...] = (planned(plan),)
+            plans: tuple[Plan, ...] = (planned(plan) if run is None else follow(run),)
         except NoFeasiblePath:
             if job.options.interruptions == "none" or not np.diff(graph.start).all():
                 raise

@@ -1,0 +1,115 @@
+"""One run of the planner: on the grid of gamma, or over continuous gamma in the same windows."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+
+from kerfpath._arrays import Array, freeze
+from kerfpath.cell import Cell
+from kerfpath.contour import Contour
+from kerfpath.errors import NoFeasiblePath
+from kerfpath.front._subproblem import Subproblem
+from kerfpath.graph import LayeredGraph
+from kerfpath.kernels.metric import turns_of, wrap
+from kerfpath.options import PlanOptions
+from kerfpath.planner import best_motion, plan
+from kerfpath.plans import Plan
+from kerfpath.robots import Robot
+
+__all__ = ["plan_run"]
+
+
+def plan_run(
+    run: Subproblem,
+    contour: Contour,
+    robot: Robot,
+    *,
+    tool: Array,
+    placement: Array,
+    speed: float | None,
+    options: PlanOptions,
+    graph: LayeredGraph,
+    cell: Cell | None,
+    phase: Callable[[str], None] | None = None,
+) -> Plan:
+    """Return the plan of a run.
+
+    On the grid its windows leave out vertices; over continuous gamma they are ranges of the joints,
+    too, so that nothing between the samples leaves them. Its shares of the limits are then what it
+    is held to; the plan says those of the options, which bound what else moves, and its proof.
+
+    Parameters
+    ----------
+    run : Subproblem
+    contour, robot, tool, placement, speed, cell, phase
+        As in `kerfpath.plan`.
+    options : PlanOptions
+        Of which the run changes some.
+    graph : LayeredGraph
+        That of the contour, with all of its vertices.
+
+    Raises
+    ------
+    NoFeasiblePath
+        As `kerfpath.plan`; over continuous gamma none was found, or a window cannot be a range.
+    InputError
+        As `kerfpath.plan`.
+    """
+    asked, graph = run.applied_to(options), run.graph(graph, robot.endless)
+    cell, arm = run.cell(cell), robot
+    windowed = run.windowed(robot.endless) if run.continuous else []
+    if windowed:
+        _require_ranges(asked, windowed)
+        arm, graph = _narrowed(robot, graph, run.window, windowed)
+        cell = cell and replace(cell, endless=arm.endless)
+    made = (best_motion if run.continuous else plan)(
+        contour, arm, tool=tool, placement=placement, speed=speed, options=asked, cell=cell,
+        graph=graph, phase=phase,
+    )  # fmt: skip
+    if not run.continuous:
+        return made
+    limits = replace(made.settings, eta_v=options.eta_v, eta_a=options.eta_a)
+    return replace(_widened(made, robot) if windowed else made, settings=limits)
+
+
+def _require_ranges(options: PlanOptions, windowed: list[int]) -> None:
+    """Raise NoFeasiblePath where windows cannot be ranges of joints, as else more would change."""
+    why = ""
+    if options.comfort is not None and options.comfort.limits is not None:
+        why = "margins are kept from the limits of joints, which a window would narrow"
+    elif options.rotation is not None and np.isfinite(options.rotation[windowed]).any():
+        why = "the rotation of a joint with a window is limited"
+    if why:
+        raise NoFeasiblePath(f"windows hold on the grid only: {why}", proved=False, node=-1)
+
+
+def _narrowed(
+    robot: Robot, graph: LayeredGraph, window: Array, windowed: list[int]
+) -> tuple[Robot, LayeredGraph]:
+    """Return the robot whose joints end where their windows do, and the graph on its turns."""
+    limits = robot.joint_limits()
+    lower, upper, endless = limits.lower.copy(), limits.upper.copy(), robot.endless.copy()
+    q, turn = graph.q.copy(), graph.turn.copy()
+    for joint in windowed:
+        low, high = window[joint]
+        if endless[joint]:
+            q[:, joint] = low + (q[:, joint] - low) % (2 * np.pi)
+            turn[:, joint] = turns_of(q[:, joint])
+            lower[joint], upper[joint], endless[joint] = low, high, False
+        else:
+            lower[joint], upper[joint] = max(lower[joint], low), min(upper[joint], high)
+    arm = robot.with_limits(lower=lower, upper=upper, endless=endless)
+    return arm, replace(graph, q=freeze(q), turn=freeze(turn))
+
+
+def _widened(made: Plan, robot: Robot) -> Plan:
+    """Return the plan of a robot with narrowed joints as one of the robot itself."""
+    return replace(
+        made,
+        robot=robot,
+        q=np.where(robot.endless, wrap(made.q), made.q),
+        turn=np.where(robot.endless, 0, made.turn),
+    )
