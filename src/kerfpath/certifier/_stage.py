@@ -78,8 +78,8 @@ class StageResult:
     level, dual : (C, 2), (C, 2, n)
         The potential.
     multipliers : (K, n), optional
-    pairs : int
-        Steps from cell to cell that were looked at.
+    begin, to : (C + 1,), (E,)
+        The steps of cell a are begin[a]..begin[a+1]-1, each to a cell.
     """
 
     cells: CellSet
@@ -87,9 +87,15 @@ class StageResult:
     level: Array
     dual: Array
     multipliers: Array | None
-    pairs: int
+    begin: Ints
+    to: Ints
 
     __repr__ = short_repr
+
+    @property
+    def pairs(self) -> int:
+        """Steps from cell to cell that were looked at."""
+        return len(self.to)
 
     @property
     def bound(self) -> float:
@@ -127,6 +133,8 @@ def solve_stage(
         Cost beyond the cheapest step of a cell up to which steps are bounded with care.
     """
     cells, packed, nodes, _ = arranged(cells, steps)
+    if multipliers is not None and len(nodes) < len(multipliers):
+        raise ValueError("multipliers of (6) ask for cells at every node")
     start = packed.start
     C, n = cells.center.shape
     potential = Potential(
@@ -152,7 +160,8 @@ def solve_stage(
         level=potential.level,
         dual=potential.dual,
         multipliers=multipliers,
-        pairs=len(to),
+        begin=begin,
+        to=to,
     )
 
 
