@@ -16,6 +16,7 @@ from kerfpath.certifier._parts import Parts
 from kerfpath.certifier._prices import limit_prices
 from kerfpath.certifier._stage import StageResult, Steps, linked, solve_stage
 from kerfpath.kernels.limits import LIMIT_TOLERANCE
+from kerfpath.kernels.metric import CHEBYCHEV
 from kerfpath.plans import Plan
 from kerfpath.progress import Progress, no_progress
 from kerfpath.search import METRIC_CODES
@@ -226,6 +227,8 @@ class _Course:
     def _binds(self) -> bool:
         """Return whether (6) is worth more to the plan than the gap that may be left."""
         share = np.abs(self.plan.acceleration_share)
+        if self.steps.metric == CHEBYCHEV:  # its potentials are too loose for prices to tell
+            return False
         if not (share > AT_LIMIT * self.plan.settings.eta_a).any():
             return False
         prices = self._prices(int(np.bincount(self.plan.posture).argmax()))
