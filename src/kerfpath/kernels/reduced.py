@@ -22,7 +22,7 @@ import numpy as np
 
 from kerfpath._arrays import Array, Bools, Ints
 from kerfpath.kernels._jit import jit_inline
-from kerfpath.kernels.metric import CHEBYCHEV, MANHATTAN
+from kerfpath.kernels.metric import CHEBYCHEV, MANHATTAN, increment
 
 __all__ = [
     "Cells",
@@ -90,12 +90,10 @@ def near(cells: Cells, step: Step, a: int, b: int, out_D: Array) -> int:
     """
     status = 1
     for i in range(len(out_D)):
-        d = cells.center[b, i] - cells.center[a, i]
+        d = increment(cells.center[b, i] - cells.center[a, i], step.endless[i])
         wide = cells.box[a, i] + cells.box[b, i]
-        if step.endless[i]:
-            d -= 2.0 * pi * np.rint(d / (2.0 * pi))
-            if abs(d) + wide > pi:
-                status = 2
+        if step.endless[i] and abs(d) + wide > pi:
+            status = 2
         if abs(d) > step.velocity[i] + wide:
             return 0
         out_D[i] = d
