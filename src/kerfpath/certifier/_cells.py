@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 from itertools import product
 
 import numpy as np
@@ -24,6 +24,10 @@ FREE = 1.0
 """rad: a joint known no better than this may be on more than one turn."""
 ROUNDED = 1e-14
 """What a joint may be off by rounding, in rad per rad and in rad."""
+SLIGHT = 1e-9
+"""rad: half the width of a cell that stands for its middle."""
+WORST = 1 / 16
+"""Share of what the worst cell leaves open from which cells are divided with it."""
 EDGE = 1e-8
 """rad: joints this far out of their range still count as inside, as in the graph and the audit."""
 
@@ -40,6 +44,8 @@ class CellSet:
         Half the width.
     center, slope, bend, spread : (C, n)
         The joints are center + slope t + bend t^2 / 2 +- spread on the cell, in rad.
+    floor : (C,)
+        What motions through each cell are already known to cost at least; minus infinity: nothing.
     """
 
     node: NDArray[np.int32]
@@ -51,6 +57,7 @@ class CellSet:
     slope: Array
     bend: Array
     spread: Array
+    floor: Array
 
     __repr__ = short_repr
 
@@ -126,6 +133,24 @@ class CellMaker:
             sets.append(self._lifted(self._enclosed(node[part], level[part], index[part])))
         return CellSet.join(sets)
 
+    def motion(self, gamma: Array, posture: int) -> tuple[Array, Array] | None:
+        """Return the joints of the motion with gamma (K,) in a posture, and their slopes; about.
+
+        Both (K, n), rad and rad/rad; None where the posture does not reach some node.
+        """
+        node, half = np.arange(len(gamma)), np.full(len(gamma), SLIGHT)
+        found = self._robot.enclose(self._frames, node, gamma, half, self._tool)
+        if not (found.status[:, posture] > 0).all():
+            return None
+        return found.center[:, posture], found.slope[:, posture]
+
+    def finer(self, cells: CellSet, which: Bools, weight: Array) -> CellSet:
+        """Return the cells with those halved, of some, on which the joints are known least."""
+        off = cells.spread + np.abs(cells.bend) * cells.half[:, None] ** 2 / 2
+        unsure = off @ weight
+        which = which & (unsure >= WORST * unsure[which].max(initial=0.0))
+        return CellSet.join([cells.take(~which), self.halves(cells.take(which))])
+
     def halves(self, cells: CellSet) -> CellSet:
         """Return both halves of the cells, on the turns of their own."""
         sets = [
@@ -152,10 +177,13 @@ class CellMaker:
         there = there + cells.bend[parent] * middle**2 / 2
         shift = TURN * np.rint((there - child.center) / TURN)
         moved = self._moved(child, np.where(self._limits.endless, 0.0, shift))
+        moved = replace(moved, floor=cells.floor[parent])
         free = (cells.spread[parent] > FREE).any(axis=1)
         kept = [moved.take(self._inside(moved) & ~free)]
         if free.any():
-            kept.append(self._lifted(made.take(np.unique(row[free]))))
+            lifted = self._lifted(made.take(np.unique(row[free])))
+            least = cells.floor[parent[free]].min()
+            kept.append(replace(lifted, floor=np.full(len(lifted), least)))
         return CellSet.join(kept)
 
     def _enclosed(
@@ -194,6 +222,7 @@ class CellMaker:
             slope=found.slope[at],
             bend=(found.high[at] + found.low[at]) / 2,
             spread=spread * (1 + ROUNDED) + ROUNDED * (1 + np.abs(found.slope[at]) * h),
+            floor=np.full(len(cell), -np.inf),
         )
         return made, place
 
@@ -218,8 +247,7 @@ class CellMaker:
     def _moved(cells: CellSet, shift: Array) -> CellSet:
         center = cells.center + shift
         spread = cells.spread + ROUNDED * np.abs(center)
-        values = {f.name: getattr(cells, f.name) for f in fields(cells)}
-        return CellSet(**values | {"center": center, "spread": spread})
+        return replace(cells, center=center, spread=spread)
 
     def _inside(self, cells: CellSet) -> Bools:
         """Return which cells may hold joints within the ranges and couplings, (C,)."""

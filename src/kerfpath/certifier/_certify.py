@@ -7,13 +7,16 @@ from time import monotonic
 
 import numpy as np
 
-from kerfpath._arrays import scalar
+from kerfpath._arrays import Array, scalar
 from kerfpath._repr import short_repr
 from kerfpath.certificate import ALLOWANCE, Certificate, Stage
 from kerfpath.certifier._cells import CellMaker, CellSet
 from kerfpath.certifier._nodes import between, turning_nodes
+from kerfpath.certifier._parts import Parts
+from kerfpath.certifier._prices import limit_prices
 from kerfpath.certifier._stage import StageResult, Steps, linked, solve_stage
 from kerfpath.kernels.limits import LIMIT_TOLERANCE
+from kerfpath.kernels.metric import CHEBYCHEV
 from kerfpath.plans import Plan
 from kerfpath.progress import Progress, no_progress
 from kerfpath.search import METRIC_CODES
@@ -43,6 +46,13 @@ where it drops out, four times as much a level coarser: whoever checks the certi
 enclosures of his own, and may find less. The curvature is taken so much wider, too. Where nobody
 does: `SAME`, rounding."""
 SAME = 1e-9
+AT_LIMIT = 0.98
+"""Share of what (6) allows from which it may be what keeps the plan from costing less."""
+EARLY, COARSE = 0.3, 1
+"""Share of the work after which motions are bounded in parts in any case where (6) binds the plan;
+and the level of the cells that this begins with at further nodes."""
+REACH, DEAREST = 0.017, (5.0, 20.0)
+"""How far gamma may go where multipliers are found, rad; and the largest of them, in weights."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -93,8 +103,9 @@ def certify(
         Time after which no further stage is begun; default: a limit on the work, which does not
         depend on the machine.
     checkable : bool
-        Whether the certificate is for others to check, with enclosures that may be wider: cells
-        drop out where motions are clearly too dear only, which is more work.
+        Whether the plan is to have a certificate for others to check, with enclosures that may be
+        wider: cells drop out where motions are clearly too dear only, which is more work, and (6)
+        is left out, as the multipliers of parts do not fit into a certificate.
     progress : Progress
 
     Raises
@@ -121,7 +132,7 @@ def certify(
         plan.proof,
         bound=bound,
         gap=reached,
-        certificate=Certificate(bound=bound, stages=tuple(course.stages)),
+        certificate=Certificate(bound=bound, stages=tuple(course.stages)) if checkable else None,
     )
     return Certified(
         plan=replace(plan, proof=proof),
@@ -177,6 +188,8 @@ class _Course:
         self.nodes = turning_nodes(plan, TURNED, longest)
         self.best, self.pairs, self.count = 0.0, 0, 0
         self.stages: list[Stage] = []
+        self.plan = plan
+        self.priced = not checkable and self._binds()
 
     def run(self) -> None:
         """Go from stage to stage until the gap is reached or it is enough."""
@@ -188,6 +201,9 @@ class _Course:
             clearly = self.margin * np.exp2(2.0 * (FINE - result.cells.level))
             live = result.through <= self.cost * (1 + clearly)
             low = result.through < self.target
+            if low.any() and self.priced and self._late(gained):
+                self._divide(result.cells.take(live))
+                return
             if not low.any() or self._enough(result, float(live.mean() + low.mean())):
                 self.stages.append(result.stage())
                 return
@@ -210,6 +226,50 @@ class _Course:
                 rest = cells.take(kept & ~low)
                 cells = CellSet.join([rest, self.maker.halves(cells.take(kept & low))])
 
+    def _binds(self) -> bool:
+        """Return whether (6) is worth more to the plan than the gap that may be left."""
+        share = np.abs(self.plan.acceleration_share)
+        if self.steps.metric == CHEBYCHEV:  # its potentials are too loose for prices to tell
+            return False
+        if not (share > AT_LIMIT * self.plan.settings.eta_a).any():
+            return False
+        prices = self._prices(int(np.bincount(self.plan.posture).argmax()))
+        worth = max((self.steps.price(each) for each in prices), default=0.0)
+        return worth > self.cost - self.target
+
+    def _prices(self, posture: int) -> list[Array]:
+        """Return multipliers of (6) about the motion that turns gamma as the plan, in a posture."""
+        motion = self.maker.motion(self.plan.gamma, posture)
+        if motion is None:
+            return []
+        q, slope = motion
+        u = np.diff(q, axis=0)
+        u -= 2 * np.pi * np.rint(u / (2 * np.pi))
+        found = (limit_prices(u, slope, self.steps, REACH, most) for most in DEAREST)
+        return [prices for prices in found if prices is not None]
+
+    def _divide(self, cells: CellSet) -> None:
+        """Go on at all nodes, with multipliers of (6), part by part."""
+        self.nodes = np.arange(self.last + 1)
+        cells = self._with_nodes(cells, COARSE)
+        before = self.pairs
+
+        def enough(pairs: int, held: int) -> bool:
+            short = max(self.target - self.best, 0.0)
+            self.progress("certificate", int(1000 * (1 - short / self.target)), 1000)
+            return held > MOST_CELLS or self._spent(before + pairs)
+
+        parts = Parts(
+            self.maker,
+            self.steps,
+            self._prices,
+            cost=self.cost,
+            target=self.target,
+            enough=enough,
+        )
+        self.best = max(self.best, min(parts.bound(cells, self.best), self.cost))
+        self.pairs, self.count = before + parts.pairs, self.count + parts.count
+
     def _take(self, result: StageResult) -> float:
         """Take what a stage proves; return the share of the gap that it closes."""
         before, self.best = self.best, max(self.best, min(result.bound, self.cost))
@@ -218,18 +278,30 @@ class _Course:
         self.progress("certificate", int(1000 * (1 - short / self.target)), 1000)
         return (self.best - before) / max(self.target - before, 1e-300)
 
+    def _late(self, gained: float) -> bool:
+        """Return whether (6) is to be told by multipliers from here on."""
+        close = self.best > NEAR * self.target and gained < STALLED
+        return close or self.pairs > EARLY * (MOST_PAIRS + MOST_PER_NODE * self.last)
+
     def _enough(self, result: StageResult, left: float) -> bool:
         """Return whether the next stage, of a share `left` of the cells, would be too much."""
         if len(result.cells) * left > MOST_CELLS:
             return True
+        return self._spent(self.pairs + result.pairs * left**2)
+
+    def _spent(self, pairs: float) -> bool:
+        """Return whether so many steps, or the time, are all that may go into it."""
         if self.until < np.inf:
             return monotonic() > self.until
-        return self.pairs + result.pairs * left**2 > MOST_PAIRS + MOST_PER_NODE * self.last
+        return pairs > MOST_PAIRS + MOST_PER_NODE * self.last
 
-    def _with_nodes(self, cells: CellSet) -> CellSet:
+    def _with_nodes(self, cells: CellSet, most: int = DEEPEST) -> CellSet:
         """Return the cells with those of further nodes, about as fine where motions may pass."""
-        level = int(np.median(cells.level)) if len(cells) else 0
-        new = self.maker.coarsest(np.setdiff1d(self.nodes, cells.node))
+        level = min(most, int(np.median(cells.level))) if len(cells) else 0
+        missing = np.setdiff1d(self.nodes, cells.node)
+        if not len(missing):
+            return cells
+        new = self.maker.coarsest(missing)
         while True:
             passed = linked(CellSet.join([cells, new]), self.steps)[len(cells) :]
             coarse = passed & (new.level < level)

@@ -10,7 +10,7 @@ import numpy as np
 from kerfpath._arrays import Array, Bools, Ints, freeze
 from kerfpath._repr import short_repr
 from kerfpath.certifier._cells import CellMaker, CellSet
-from kerfpath.certifier._stage import Steps, pack, widest_apart
+from kerfpath.certifier._stage import Steps, arranged
 from kerfpath.errors import Closed
 from kerfpath.kernels.limits import LIMIT_TOLERANCE
 from kerfpath.kernels.metric import MANHATTAN
@@ -22,7 +22,6 @@ from kerfpath.kernels.outer import (
     keep_on,
     list_steps,
 )
-from kerfpath.kernels.reduced import Cells
 from kerfpath.limits import Limits
 from kerfpath.robots import Robot
 
@@ -143,11 +142,7 @@ class _Round:
     """One sweep on and one back over cells of all nodes."""
 
     def __init__(self, cells: CellSet, steps: Steps) -> None:
-        box = cells.box
-        key = widest_apart(cells, box, steps)
-        order = np.lexsort((cells.center[:, key], cells.node))
-        self.cells = cells.take(order)
-        self._packed: Cells = pack(self.cells, box[order], key)[0]
+        self.cells, self._packed, _, _ = arranged(cells, steps)
         self._step, self._bound = steps.over(1), steps.acceleration
         moved = np.abs(self.cells.slope)
         self._lead_v = np.argmax(moved / steps.velocity, axis=1)

@@ -6,6 +6,7 @@ import os
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from itertools import pairwise
+from typing import NamedTuple
 
 import numpy as np
 
@@ -16,7 +17,7 @@ from kerfpath.certifier._cells import CellSet
 from kerfpath.kernels.potentials import cross_cells, lay_potential, link_cells, reach_cells
 from kerfpath.kernels.reduced import Cells, Potential, Step
 
-__all__ = ["StageResult", "Steps", "linked", "pack", "solve_stage", "widest_apart"]
+__all__ = ["StageResult", "Steps", "arranged", "linked", "solve_stage"]
 
 IN_ONE = 64
 """Cells of a layer below which a second thread costs more than it brings."""
@@ -77,8 +78,8 @@ class StageResult:
     level, dual : (C, 2), (C, 2, n)
         The potential.
     multipliers : (K, n), optional
-    pairs : int
-        Steps from cell to cell that were looked at.
+    begin, to : (C + 1,), (E,)
+        The steps of cell a are begin[a]..begin[a+1]-1, each to a cell.
     """
 
     cells: CellSet
@@ -86,9 +87,15 @@ class StageResult:
     level: Array
     dual: Array
     multipliers: Array | None
-    pairs: int
+    begin: Ints
+    to: Ints
 
     __repr__ = short_repr
+
+    @property
+    def pairs(self) -> int:
+        """Steps from cell to cell that were looked at."""
+        return len(self.to)
 
     @property
     def bound(self) -> float:
@@ -125,11 +132,9 @@ def solve_stage(
     care : float
         Cost beyond the cheapest step of a cell up to which steps are bounded with care.
     """
-    box = cells.box
-    key = widest_apart(cells, box, steps)
-    order = np.lexsort((cells.center[:, key], cells.node))
-    cells, box = cells.take(order), box[order]
-    packed, nodes = pack(cells, box, key)
+    cells, packed, nodes, _ = arranged(cells, steps)
+    if multipliers is not None and len(nodes) < len(multipliers):
+        raise ValueError("multipliers of (6) ask for cells at every node")
     start = packed.start
     C, n = cells.center.shape
     potential = Potential(
@@ -155,25 +160,40 @@ def solve_stage(
         level=potential.level,
         dual=potential.dual,
         multipliers=multipliers,
-        pairs=len(to),
+        begin=begin,
+        to=to,
     )
 
 
-def pack(cells: CellSet, box: Array, key: int) -> tuple[Cells, Ints]:
-    """Return sorted cells as the kernels take them, and the nodes (M,) that are their layers."""
+class Arranged(NamedTuple):
+    """Cells in the order of the kernels, and as those take them.
+
+    ``cells`` sorted by node and then by the joint whose windows of (5) leave the least; ``nodes``
+    (M,) are their layers; ``order`` (C,) is where each cell was before.
+    """
+
+    cells: CellSet
+    packed: Cells
+    nodes: Ints
+    order: Ints
+
+
+def arranged(cells: CellSet, steps: Steps) -> Arranged:
+    """Return the cells sorted and packed."""
+    box = cells.box
+    key = _widest_apart(cells, box, steps)
+    order = np.lexsort((cells.center[:, key], cells.node))
+    cells, box = cells.take(order), box[order]
     nodes, start = np.unique(cells.node, return_index=True)
     widest = np.maximum.reduceat(box[:, key], start) if len(start) else np.zeros(0)
-    start = np.append(start, len(cells))
     curves = cells.center, cells.slope, cells.bend, cells.spread, box, cells.half
-    return Cells(start, *curves, key, widest), nodes.astype(np.int64)
+    packed = Cells(np.append(start, len(cells)), *curves, key, widest)
+    return Arranged(cells, packed, nodes.astype(np.int64), order)
 
 
 def linked(cells: CellSet, steps: Steps) -> Bools:
     """Return which cells (C,) steps within (5) lead to, and lead on from."""
-    box = cells.box
-    key = widest_apart(cells, box, steps)
-    order = np.lexsort((cells.center[:, key], cells.node))
-    packed, nodes = pack(cells.take(order), box[order], key)
+    _, packed, nodes, order = arranged(cells, steps)
     after, before = np.zeros((2, len(cells)), np.bool_)
     after[packed.start[-2] :] = before[: packed.start[1]] = True
     for k in range(len(nodes) - 1):
@@ -183,7 +203,7 @@ def linked(cells: CellSet, steps: Steps) -> Bools:
     return found
 
 
-def widest_apart(cells: CellSet, box: Array, steps: Steps) -> int:
+def _widest_apart(cells: CellSet, box: Array, steps: Steps) -> int:
     """Return the joint by which the windows of (5) leave the least of a layer."""
     if not len(cells):
         return 0

@@ -20,12 +20,12 @@ from kerfpath.kernels.continuous import (
     Steps,
     Targets,
     course_within,
-    first_from,
     least_value,
     step_value,
 )
 from kerfpath.kernels.limits import LIMIT_TOLERANCE
 from kerfpath.kernels.metric import wrap_angle
+from kerfpath.kernels.search import first_from
 
 __all__ = ["Alike", "Beam", "advance"]
 

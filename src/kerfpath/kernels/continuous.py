@@ -21,6 +21,7 @@ from kerfpath._arrays import Array, Bools, Ints
 from kerfpath.kernels._jit import jit, jit_inline
 from kerfpath.kernels.limits import LIMIT_TOLERANCE
 from kerfpath.kernels.metric import EUCLID, MANHATTAN, increment, wrap_angle
+from kerfpath.kernels.search import first_from
 
 __all__ = ["OVER_CAP", "Targets", "join_samples", "sort_targets", "values_to_go"]
 
@@ -255,18 +256,6 @@ def _offered(
     if first > last or begin + (end - begin) * (first if end > begin else last) >= ceiling:
         return np.inf, 0.0
     return least_value(a, d, first, last, begin, end - begin, steps, ceiling)
-
-
-@jit_inline
-def first_from(key: Array, a: int, b: int, x: float) -> int:
-    """First of a..b whose key is not below x; b where there is none."""
-    while a < b:
-        middle = (a + b) // 2
-        if key[middle] < x:
-            a = middle + 1
-        else:
-            b = middle
-    return a
 
 
 @jit_inline

@@ -22,6 +22,7 @@ import numpy as np
 
 from kerfpath._arrays import Array, Bools, Ints
 from kerfpath.kernels._jit import jit, jit_inline
+from kerfpath.kernels.metric import increment
 from kerfpath.kernels.reduced import SLACK, Cells, Step, near, window
 
 __all__ = ["blame_bends", "blame_steps", "count_steps", "keep_back", "keep_on", "list_steps"]
@@ -65,11 +66,8 @@ def _steps(cells: Cells, step: Step, lead: Ints, a: int, b: int, out_D: Array) -
 @jit_inline
 def _increment(cells: Cells, step: Step, a: int, b: int, i: int) -> tuple[float, bool]:
     """Return D_i from cell a to b, endless joints the short way, and whether that is the way."""
-    d = cells.center[b, i] - cells.center[a, i]
-    if not step.endless[i]:
-        return d, True
-    d -= 2.0 * pi * np.rint(d / (2.0 * pi))
-    return d, abs(d) + cells.box[a, i] + cells.box[b, i] <= pi
+    d = increment(cells.center[b, i] - cells.center[a, i], step.endless[i])
+    return d, not step.endless[i] or abs(d) + cells.box[a, i] + cells.box[b, i] <= pi
 
 
 @jit_inline

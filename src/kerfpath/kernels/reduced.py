@@ -22,7 +22,8 @@ import numpy as np
 
 from kerfpath._arrays import Array, Bools, Ints
 from kerfpath.kernels._jit import jit_inline
-from kerfpath.kernels.metric import CHEBYCHEV, MANHATTAN
+from kerfpath.kernels.metric import CHEBYCHEV, MANHATTAN, increment
+from kerfpath.kernels.search import first_from
 
 __all__ = [
     "Cells",
@@ -90,12 +91,10 @@ def near(cells: Cells, step: Step, a: int, b: int, out_D: Array) -> int:
     """
     status = 1
     for i in range(len(out_D)):
-        d = cells.center[b, i] - cells.center[a, i]
+        d = increment(cells.center[b, i] - cells.center[a, i], step.endless[i])
         wide = cells.box[a, i] + cells.box[b, i]
-        if step.endless[i]:
-            d -= 2.0 * pi * np.rint(d / (2.0 * pi))
-            if abs(d) + wide > pi:
-                status = 2
+        if step.endless[i] and abs(d) + wide > pi:
+            status = 2
         if abs(d) > step.velocity[i] + wide:
             return 0
         out_D[i] = d
@@ -106,27 +105,15 @@ def near(cells: Cells, step: Step, a: int, b: int, out_D: Array) -> int:
 def window(cells: Cells, step: Step, a: int, k: int, out_run: Ints) -> None:
     """Fill the run of layer k + 1 in which all cells lie that a step from cell a may lead to."""
     first, last = cells.start[k + 1], cells.start[k + 2]
-    key, x = cells.key, cells.center[a, cells.key]
+    key, keys, x = cells.key, cells.center[:, cells.key], cells.center[a, cells.key]
     wide = step.velocity[key] + cells.box[a, key] + cells.widest[k + 1]
     out_run[0], out_run[1] = last, first
     for turn in range(-1, 2):
         if turn != 0 and not step.endless[key]:
             continue
         low, high = x - wide + 2.0 * np.pi * turn, x + wide + 2.0 * np.pi * turn
-        out_run[0] = min(out_run[0], _place(cells, first, last, low))
-        out_run[1] = max(out_run[1], _place(cells, first, last, high))
-
-
-@jit_inline
-def _place(cells: Cells, first: int, last: int, x: float) -> int:
-    """Return the first cell of a layer whose key is at least x."""
-    while first < last:
-        middle = (first + last) // 2
-        if cells.center[middle, cells.key] < x:
-            first = middle + 1
-        else:
-            last = middle
-    return first
+        out_run[0] = min(out_run[0], first_from(keys, first, last, low))
+        out_run[1] = max(out_run[1], first_from(keys, first, last, high))
 
 
 @jit_inline

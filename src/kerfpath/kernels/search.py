@@ -26,6 +26,7 @@ __all__ = [
     "distance",
     "fill_increment",
     "fill_key",
+    "first_from",
     "is_shut",
     "late_cost",
     "path_planning",
@@ -173,16 +174,22 @@ def shut_edges(layers: SortedLayers, p: int) -> tuple[int, int]:
 
 
 @jit_inline
-def is_shut(shut: Ints, a: int, b: int, j: int) -> bool:
-    """Return whether vertex j is among a..b of `shut`, by halving."""
-    end = b
+def first_from(key: Array | Ints, a: int, b: int, x: float) -> int:
+    """First of a..b whose key is not below x, keys ascending; b where there is none."""
     while a < b:
         middle = (a + b) // 2
-        if shut[middle] < j:
+        if key[middle] < x:
             a = middle + 1
         else:
             b = middle
-    return a < end and shut[a] == j
+    return a
+
+
+@jit_inline
+def is_shut(shut: Ints, a: int, b: int, j: int) -> bool:
+    """Return whether vertex j is among a..b of `shut`."""
+    at = first_from(shut, a, b, j)
+    return at < b and shut[at] == j
 
 
 @jit_inline

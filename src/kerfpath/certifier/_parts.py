@@ -1,0 +1,162 @@
+"""Parts of the motions, each with a bound of its own, divided until all reach what is wanted.
+
+Where (6) decides, two things stand in the way of a close bound. The multipliers that bound the
+motions about the plan closely make those elsewhere look cheap, in another posture above all; and
+however fine the cells, a bound with multipliers stays below the best motion as long as its cells
+are far apart. So the motions are divided: into those that no step joins, and by where they pass a
+node. Each part is bounded by all multipliers of its posture, and by what is known of its cells.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from functools import cache
+from heapq import heappop, heappush
+from itertools import count
+
+import numpy as np
+from scipy import sparse
+from scipy.sparse.csgraph import connected_components
+
+from kerfpath._arrays import Array, Bools
+from kerfpath._repr import short_repr
+from kerfpath.certifier._cells import CellMaker, CellSet
+from kerfpath.certifier._stage import StageResult, Steps, solve_stage
+
+__all__ = ["Parts"]
+
+SAME = 1e-9
+"""Share of the cost by which motions are dearer than the plan where they drop out: rounding."""
+CARE = 0.05
+"""Share of the cost beyond the cheapest step up to which steps are bounded with care."""
+STALLED, AGAIN = 0.1, 1
+"""Share of what a part lacks that finer cells must gain, and how often they may not."""
+DEEPEST = 16
+"""Levels at most: cells of 1e-4 deg."""
+
+
+@dataclass(slots=True, eq=False)
+class _Part:
+    """Cells, and how often in a row finer ones gained little."""
+
+    cells: CellSet
+    stalled: int
+
+    __repr__ = short_repr
+
+
+class Parts:
+    """Divides motions, those first that may be the cheapest, and bounds each part.
+
+    Parameters
+    ----------
+    maker : CellMaker
+    steps : Steps
+    prices : callable
+        Gives multipliers (K, n) of (6) to bound the motions in a posture with; any are valid.
+    cost, target : float
+        Of the plan; and what is wanted of the bound.
+    enough : callable
+        Says of the steps looked at and of the cells held whether they are enough.
+    """
+
+    def __init__(
+        self,
+        maker: CellMaker,
+        steps: Steps,
+        prices: Callable[[int], list[Array]],
+        *,
+        cost: float,
+        target: float,
+        enough: Callable[[int, int], bool],
+    ) -> None:
+        self._maker, self._steps, self._prices = maker, steps, cache(prices)
+        self._cost, self._target, self._enough = cost, target, enough
+        self._number, self._held = count(), 0
+        self._open: list[tuple[float, int, _Part]] = []
+        self._closed = cost
+        self.pairs, self.count = 0, 0
+
+    def bound(self, cells: CellSet, known: float) -> float:
+        """Return what motions through the cells cost at least, or the plan's cost if that is less.
+
+        The cells are of all nodes; `known` is what the motions are known to cost at least.
+        """
+        self._wait(known, _Part(cells, 0))
+        while self._open and self._open[0][0] < min(self._target, self._closed):
+            if self._enough(self.pairs, self._held):
+                break
+            known, _, part = heappop(self._open)
+            self._held -= len(part.cells)
+            self._divide(part, known)
+        return min(self._closed, self._open[0][0]) if self._open else self._closed
+
+    def _wait(self, known: float, part: _Part) -> None:
+        heappush(self._open, (known, next(self._number), part))
+        self._held += len(part.cells)
+
+    def _divide(self, part: _Part, known: float) -> None:
+        """Bound a part, and wait with what may be cheaper than is wanted in smaller parts."""
+        self.count += 1
+        through, result = self._solved(part.cells)
+        kept = through <= self._cost * (1 + SAME)
+        if not kept.any():
+            return
+        cells = replace(result.cells, floor=through)
+        layers = len(np.unique(cells.node))
+        for one in _joined(result, kept):
+            rest = cells.take(one)
+            if len(np.unique(rest.node)) < layers:
+                continue  # no motion all the way along
+            least = max(known, float(rest.floor.min()))
+            gained = (least - known) / (self._target - known)
+            stalled = part.stalled + 1 if gained < STALLED else 0
+            smaller = [] if least >= self._target else self._smaller(rest, stalled)
+            if not smaller:
+                self._closed = min(self._closed, least)
+            for each in smaller:
+                self._wait(least, each)
+
+    def _solved(self, cells: CellSet) -> tuple[Array, StageResult]:
+        """Return the most that is proved through each cell, and a result, which has their order."""
+        posture = int(np.bincount(cells.posture).argmax())
+        result = solve_stage(cells, self._steps, care=CARE * self._cost)
+        self.pairs += result.pairs
+        through = np.maximum(result.through, result.cells.floor)
+        for prices in self._prices(posture):
+            priced = solve_stage(cells, self._steps, prices, care=CARE * self._cost)
+            self.pairs += priced.pairs
+            through = np.maximum(through, priced.through)
+        return through, result
+
+    def _smaller(self, cells: CellSet, stalled: int) -> list[_Part]:
+        """Return the parts that a part divides into; none where it cannot be divided.
+
+        Finer cells; where these gain little, both sides of the middle of the node at which the
+        joints are farthest apart.
+        """
+        low = cells.floor < self._target
+        coarse = low & (cells.level < DEEPEST)
+        if stalled <= AGAIN and coarse.any():
+            return [_Part(self._maker.finer(cells, coarse, self._steps.weight), stalled)]
+        nodes = np.unique(cells.node[low])
+        start = np.searchsorted(cells.node, nodes), np.searchsorted(cells.node, nodes, "right")
+        joints = [cells.center[a:b] * self._steps.weight for a, b in zip(*start, strict=True)]
+        apart = np.array([np.ptp(at, axis=0) for at in joints])
+        place, joint = np.unravel_index(np.argmax(apart), apart.shape)
+        if not apart[place, joint] > 0:
+            return []
+        inside, q = cells.node == nodes[place], cells.center[:, joint]
+        middle = (q[inside].min() + q[inside].max()) / 2
+        return [_Part(cells.take(~inside | side), 0) for side in (q <= middle, q > middle)]
+
+
+def _joined(result: StageResult, kept: Bools) -> list[Bools]:
+    """Return the cells that are kept in groups that no step joins, (C,) each."""
+    cell = np.repeat(np.arange(len(kept)), np.diff(result.begin))
+    both = kept[cell] & kept[result.to]
+    size = (len(kept),) * 2
+    steps = sparse.csr_array((np.ones(both.sum()), (cell[both], result.to[both])), shape=size)
+    group = connected_components(steps, directed=False)[1]
+    return [kept & (group == one) for one in np.unique(group[kept])]

@@ -1,0 +1,127 @@
+"""Bounds with multipliers of (6): true whatever the multipliers, and close where (6) binds."""
+
+import numpy as np
+import pytest
+
+from kerfpath import plan
+from kerfpath.certifier import _certify as course
+from kerfpath.certifier import certify
+from kerfpath.certifier._prices import limit_prices
+from kerfpath.certifier._stage import Steps, solve_stage
+from kerfpath.contour import Contour
+from kerfpath.kernels.metric import MANHATTAN
+
+METRICS = ("manhattan", "euclid", "chebychev")
+SPEED = 0.96
+"""m/s: 0.8 of the fastest at which the arc has a plan; (6) binds at nearly all of its nodes."""
+
+
+@pytest.fixture(scope="module")
+def arc():
+    """A third of a circle on a dome, 31 nodes."""
+    t = np.linspace(0, 2.1, 2001)
+    points = np.c_[0.15 * np.cos(t), 0.15 * np.sin(t), 0.02 * np.cos(2 * t)]
+    axes = np.c_[-0.2 * np.cos(t), -0.2 * np.sin(t), -np.ones_like(t)]
+    return Contour(points, axes, closed=False, name="arc").resample(count=31)
+
+
+@pytest.fixture(scope="module")
+def planned(arc, arm, tool, placement):
+    """Plan the arc; options on top."""
+
+    def of(**asked):
+        asked = {"speed": SPEED, "certify": None} | asked
+        return plan(arc, arm, tool=tool, placement=placement, **asked)
+
+    return of
+
+
+@pytest.fixture(scope="module")
+def others(planned):
+    """Costs of other motions, each found once."""
+    return {
+        m: [planned(metric=m, gamma_step=np.radians(step)).cost for step in (1.0, 3.0, 7.0)]
+        for m in METRICS
+    }
+
+
+@pytest.mark.parametrize("metric", METRICS)
+@pytest.mark.parametrize("size", [0.0, 1.0, 30.0])
+def test_any_multipliers_bound_no_motion_too_high(metric, size, planned, others, monkeypatch):
+    """Drawn at random, of either sign: the bound stays below every motion that is known."""
+    best = planned(metric=metric)
+    rng = np.random.default_rng(int(size))
+
+    def drawn(self, posture):
+        prices = np.zeros_like(best.q)
+        prices[1:-1] = size * rng.normal(size=prices[1:-1].shape) * best.settings.weights
+        return [prices]
+
+    monkeypatch.setattr(course._Course, "_prices", drawn)
+    monkeypatch.setattr(course._Course, "_binds", lambda self: True)
+    bound = certify(best, checkable=False).plan.proof.bound
+    assert 0 <= bound <= min(best.cost, *others[metric])
+
+
+@pytest.mark.parametrize("metric", ["manhattan", "euclid"])
+def test_the_multipliers_of_a_plan_bound_it_closer(metric, planned, others, monkeypatch):
+    best = planned(metric=metric)
+    with_them = certify(best, checkable=False).plan.proof
+    monkeypatch.setattr(course._Course, "_binds", lambda self: False)
+    without = certify(best, checkable=False).plan.proof
+    assert with_them.bound <= min(best.cost, *others[metric])
+    assert with_them.gap < without.gap
+
+
+def test_a_certificate_is_there_for_those_who_check_it_only(planned):
+    best = planned(speed=0.3)
+    assert certify(best, gap=0.3).plan.proof.certificate is not None
+    assert certify(best, gap=0.3, checkable=False).plan.proof.certificate is None
+
+
+def test_multipliers_ask_for_cells_at_every_node(planned):
+    one = course._Course(planned(speed=0.3), 0.1, np.inf, False, lambda *_: None)
+    cells = one.maker.coarsest(one.nodes)
+    with pytest.raises(ValueError, match="every node"):
+        solve_stage(cells, one.steps, np.zeros((one.last + 1, 6)))
+
+
+def steps(metric=MANHATTAN, acceleration=1.0):
+    return Steps(
+        weight=np.array([2.0, 1.0]),
+        velocity=np.full(2, 10.0),
+        acceleration=np.full(2, acceleration),
+        metric=metric,
+        endless=np.zeros(2, np.bool_),
+    )
+
+
+@pytest.mark.parametrize(("most", "price"), [(5.0, 1.0), (0.5, 0.5)])
+def test_the_price_of_a_limit_that_binds(most, price):
+    """Worked by hand: the second increment d of joint 2 costs d, and (6) asks for |d - 1| <= 0.8.
+
+    A limit wider by e saves e: the price is the weight 1 of the joint, or the most that is allowed,
+    and its sign that of the change d - 1.
+    """
+    u = np.array([[0.0, 1.0], [0.0, 0.0]])
+    slope = np.array([[0.0, 0.0], [0.0, 0.0], [0.0, 1.0]])
+    prices = limit_prices(u, slope, steps(acceleration=0.8), reach=0.5, most=most)
+    assert not prices[[0, -1]].any()
+    # The solver's own tolerance.
+    np.testing.assert_allclose(prices[1], [0.0, -price], atol=1e-5)
+
+
+def test_no_prices_where_nothing_near_breaks_the_limit():
+    u = np.array([[0.0, 1.0], [0.0, 0.5], [0.0, 0.2]])
+    slope = np.tile([0.0, 1.0], (4, 1))
+    assert limit_prices(u, slope, steps(acceleration=100.0), reach=0.5, most=5.0) is None
+
+
+@pytest.mark.parametrize("metric", ["manhattan", "euclid"])
+def test_a_plan_at_the_limit_has_prices(metric, planned):
+    one = course._Course(planned(metric=metric), 0.005, np.inf, False, lambda *_: None)
+    posture = int(one.plan.posture[0])
+    assert one._binds()
+    for prices, most in zip(one._prices(posture), course.DEAREST, strict=True):
+        assert one.steps.price(prices) > 0
+        assert (np.abs(prices) <= most * one.steps.weight * (1 + 1e-6)).all()
