@@ -273,14 +273,17 @@ def _least_step(rates: Rates, z: Array, low: Array, high: Array) -> Array:
         middle = np.clip(0.0, low, high)
         each = np.minimum(w * np.abs(low) - z * low, w * np.abs(high) - z * high)
         return np.asarray(np.minimum(each, w * np.abs(middle) - z * middle).sum(-1))
-    # rho(u) is at least s . u for any s that is not longer than 1 by the dual norm.
+    # rho(u) is at least s . u for any s that is not longer than 1 by the dual norm: z, made so short,
+    # and the slope at the nearest of all steps, by which rho(u) is at least rho there.
     scaled = np.where(w > 0, z / np.where(w > 0, w, 1.0), 0.0)
     if rates.metric == "euclid":
         size = np.sqrt((scaled * scaled).sum(-1, keepdims=True))
     else:
         size = np.abs(scaled).sum(-1, keepdims=True)
-    s = np.where(w > 0, z, 0.0) / np.maximum(1.0, size * ROUNDED)
-    return np.asarray(np.minimum((s - z) * low, (s - z) * high).sum(-1))
+    short = np.where(w > 0, z, 0.0) / np.maximum(1.0, size * ROUNDED)
+    nearest = _slope(rates, np.clip(0.0, low, high)) / ROUNDED
+    each = (np.minimum((s - z) * low, (s - z) * high).sum(-1) for s in (short, nearest))
+    return np.asarray(np.maximum(*each))
 
 
 def _slope(rates: Rates, u: Array) -> Array:
