@@ -175,6 +175,8 @@ class _Course:
         self.nodes = turning_nodes(plan, TURNED, longest)
         self.best, self.pairs, self.count = 0.0, 0, 0
         self.stages: list[Stage] = []
+        self.proved = 0.0  # by the stages that are kept
+        self.loose: tuple[int, StageResult] | None = None  # the best that is not, and its place
 
     def run(self) -> None:
         """Go from stage to stage until the gap is reached or it is enough."""
@@ -187,12 +189,14 @@ class _Course:
             live = result.through <= self.cost * (1 + clearly)
             low = result.through < self.target
             if not low.any() or self._enough(result, float(live.mean() + low.mean())):
-                self.stages.append(result.stage())
+                self._finish(result)
                 return
             if fresh or 1 - live.mean() > DROPPED:
-                self.stages.append(result.stage())
+                self._keep(result)
                 fresh, kept = False, live
             else:
+                if result.bound >= self.best:
+                    self.loose = len(self.stages), result
                 kept = np.ones(len(live), np.bool_)
             cells = result.cells
             deep = bool((cells.level[low] >= DEEPEST).any())
@@ -202,11 +206,27 @@ class _Course:
                 self.nodes, fresh = between(self.nodes), True
                 cells = self._with_nodes(cells.take(kept))
             elif deep:
-                self.stages.append(result.stage())
+                self._finish(result)
                 return
             else:
                 rest = cells.take(kept & ~low)
                 cells = CellSet.join([rest, self.maker.halves(cells.take(kept & low))])
+
+    def _keep(self, result: StageResult) -> None:
+        """Take a stage into the certificate."""
+        self.stages.append(result.stage())
+        self.proved = max(self.proved, result.bound)
+
+    def _finish(self, result: StageResult) -> None:
+        """Take the last stage, and where none that is kept proves the bound the one that does.
+
+        Further nodes and other potentials may prove less. What a stage that was left out covers,
+        those after it cover, too: it ruled nothing out.
+        """
+        self._keep(result)
+        if self.loose is not None and self.proved < self.best:
+            place, best = self.loose
+            self.stages.insert(place, best.stage())
 
     def _take(self, result: StageResult) -> float:
         """Take what a stage proves; return the share of the gap that it closes."""
