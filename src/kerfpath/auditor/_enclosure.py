@@ -114,7 +114,7 @@ def enclose(
 
 
 def linear_minimum(
-    slope: Array, low: Array, high: Array, radius: Array, half: Array, z: Array
+    slope: Array, low: Array, high: Array, radius: Array, half: Array, z: Array, axis: int = -1
 ) -> Array:
     """Return a lower bound (...) over t in [-h, h] of z . (q(t) - center), rounding included.
 
@@ -125,13 +125,16 @@ def linear_minimum(
     half : (...) rad
     z : (..., n)
         What the joints are weighted with, all on their turn of the enclosure.
+    axis : int
+        The axis of the joints: the last, or the first, by which sums are faster.
     """
-    bend = np.where(z >= 0, z * low, z * high)
+    run = z * slope
+    bend = z * np.where(z >= 0, low, high)
     # A sum of n products is off by less than (n + 1) units of the sum of their sizes.
-    unit = (z.shape[-1] + 2) * UNIT
-    steep = np.abs((z * slope).sum(-1)) + unit * np.abs(z * slope).sum(-1)
-    curve = bend.sum(-1) - unit * np.abs(bend).sum(-1)
-    off = np.abs(z * radius).sum(-1) * (1 + unit)
+    unit = (z.shape[axis] + 2) * UNIT
+    steep = np.abs(run.sum(axis)) + unit * np.abs(run).sum(axis)
+    curve = bend.sum(axis) - unit * np.abs(bend).sum(axis)
+    off = (np.abs(z) * radius).sum(axis) * (1 + unit)
     # The least of curve t^2 / 2 - steep t on [0, h]: inside, if it turns upwards before h.
     end = (0.5 * curve * half - steep) * half
     inside = (curve > 0) & (steep < curve * half)
