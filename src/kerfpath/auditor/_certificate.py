@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kerfpath._arrays import Array
-from kerfpath.auditor._cover import DEEPEST, Places, Reachable, covered, refused
+from kerfpath.auditor._cover import DEEPEST, REFUSED, Places, Reachable, covered, refused
 from kerfpath.auditor._enclosure import POSTURES
 from kerfpath.auditor._intervals import UNIT
 from kerfpath.auditor._steps import (
@@ -54,7 +54,8 @@ def bound_checks(plan: Plan) -> list[Check]:
             raise refused("the plan states no bound")
         proved = certified_bound(proof.certificate, plan)
     except InputError as error:
-        return [_row(f"{title}: {error}", 1.0, 0.0)]
+        why = str(error).removeprefix(REFUSED[0]).removesuffix(REFUSED[1])
+        return [_row(f"{title}: {why}", 1.0, 0.0)]
     size = max(abs(plan.cost), abs(proof.bound))
     claims = (
         ("bound above what its certificate proves", proof.bound, proved),

@@ -113,10 +113,6 @@ def certify(
     course.run()
     bound = max(course.best - ALLOWANCE * plan.cost, 0.0)
     reached = (plan.cost - bound) / plan.cost
-    claim = (
-        "no motion within the limits costs less than {}, {} % below this plan, at any gamma, "
-        "posture and turn"
-    )
     proof = replace(
         plan.proof,
         bound=bound,
@@ -126,7 +122,7 @@ def certify(
     return Certified(
         plan=replace(plan, proof=proof),
         done=reached <= gap,
-        statement=claim.format(proof.bound_shown, proof.gap_shown),
+        statement=proof.bound_claim,
         stages=course.count,
         pairs=course.pairs,
     )
