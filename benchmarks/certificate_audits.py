@@ -30,6 +30,7 @@ from kerfpath._arrays import Array
 from kerfpath.auditor import certified_bound
 from kerfpath.cell import Mesh, box_between, cell_of
 from kerfpath.certifier import certify
+from kerfpath.search import Metric
 
 __all__ = ["run"]
 
@@ -39,7 +40,7 @@ STEP = np.radians(4.0)
 """Step of gamma; the plans are refined off it."""
 SHARES = (0.2, 0.97)
 """Of the fastest speed: wide windows of (5) and narrow ones."""
-METRICS = ("manhattan", "manhattan", "euclid", "manhattan", "chebychev")
+METRICS: tuple[Metric, ...] = ("manhattan", "manhattan", "euclid", "manhattan", "chebychev")
 KINDS = ("arc", "arc", "random", "random", "cobot")
 COLUMNS = (
     "plans",
@@ -196,7 +197,7 @@ def _drawn(kind: str, rng: np.random.Generator) -> _Task:
             upper=np.radians([170] * 5 + [360]),
             acceleration=np.full(6, 15.0),
         )
-        tool[:3, :3] = [[1, 0, 0], [0, 0.8, 0.6], [0, -0.6, 0.8]]
+        tool[:3, :3] = [[1.0, 0.0, 0.0], [0.0, 0.8, 0.6], [0.0, -0.6, 0.8]]
         tool[:3, 3] = [0, 0.05, 0.1]
         placement[:3, 3] = [0.6, 0.2, 0.2]
         nodes = _arc(rng, rng.uniform(1.0, 3.0), (0.05, 0.12), 0.0, (15, 30))
