@@ -32,6 +32,7 @@ NAMES = (
     "continuum",
     "continuum_random",
     "continuum_bounds",
+    "certificate_audits",
 )
 
 
@@ -135,6 +136,10 @@ def _run(name: str, *, quick: bool) -> list[Report]:
         from benchmarks import continuum_bounds
 
         return continuum_bounds.run(quick=quick)
+    if name == "certificate_audits":
+        from benchmarks import certificate_audits
+
+        return certificate_audits.run(quick=quick)
     if name == "collision":
         from benchmarks import collision
 

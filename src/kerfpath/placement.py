@@ -156,12 +156,13 @@ def placed(plan: Plan, T_base_part: ArrayLike) -> Plan:
         )
     # Nearest turn at the first node, and no jump of a turn from the old joints after it.
     q = plan.q + np.unwrap(q - plan.q, axis=0)
+    before = plan.proof.without_bound().statement
     there = replace(
         plan,
         T_base_part=T_base_part,
         q=q,
         turn=turns_of(q).astype(np.int64),
-        proof=Proof(optimal=False, statement=f"{plan.proof.statement}; moved to another placement"),
+        proof=Proof(optimal=False, statement=f"{before}; moved to another placement"),
     )
     s = plan.settings
     cost = path_cost(there.increments, s.weights, s.metric, s.objective, there.node_cost)

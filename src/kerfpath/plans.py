@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import warnings
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, Literal
 
 import numpy as np
@@ -57,6 +57,21 @@ class Proof:
     certificate: Certificate | None = None
 
     __repr__ = short_repr
+
+    @property
+    def bound_claim(self) -> str:
+        """The bound in words, as the statement has it; "" where there is none."""
+        if self.bound is None:
+            return ""
+        return (
+            f"no motion within the limits costs less than {self.bound_shown}, {self.gap_shown} % "
+            "below this plan, at any gamma, posture and turn"
+        )
+
+    def without_bound(self) -> Proof:
+        """Return what it says beside its bound: of another motion the bound and its gap do not."""
+        rest = [part for part in self.statement.split("; ") if part != self.bound_claim]
+        return replace(self, statement="; ".join(rest), bound=None, gap=None, certificate=None)
 
     @property
     def bound_shown(self) -> str:

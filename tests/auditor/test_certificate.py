@@ -8,7 +8,7 @@ import pytest
 from certificates import every_cell, flat, grid_values, increments, stage_of
 from conftest import pose
 from kerfpath import Contour, InputError, plan, robot
-from kerfpath.auditor import certified_bound, checks
+from kerfpath.auditor import _certificate, _steps, certified_bound, checks
 from kerfpath.auditor._certificate import _asked, _rates
 from kerfpath.auditor._cover import covered
 from kerfpath.auditor._steps import candidates, reduced_costs
@@ -155,6 +155,45 @@ def test_the_pairs_are_those_that_a_step_may_join(which, request):
         wanted |= {(here[i], there[j]) for i, j in np.argwhere((np.abs(u) <= room).all(-1))}
     assert len(found) == len(set(found))
     assert set(found) == wanted
+
+
+@pytest.mark.parametrize("metric", ["manhattan", "euclid", "chebychev"])
+@pytest.mark.parametrize("which", ["made", "turning"])
+def test_a_step_costs_at_least_the_distance_of_its_cells(which, metric, request):
+    # Without a potential: of every two boxes of joints, as far apart as they are.
+    of = request.getfixturevalue(which)
+    of = replace(of, settings=replace(of.settings, metric=metric))
+    where, rates, _ = _asked(of)
+    # No joint goes so far that it could come round the other way.
+    rates = replace(rates, velocity=np.minimum(rates.velocity * 20, 2.0))
+    node, posture, index, q, *_ = every_cell(of)
+    at = covered(where, stage_of(node, posture, 0, index, q), None, None)
+    at = at.take(at.node < 2)
+    at = at.take((at.reach < 0.5).all(1))
+    pairs = list(candidates(rates, at))
+    a, b = (np.concatenate([pair[i] for pair in pairs]) for i in (0, 1))
+    value, dual = np.zeros((len(at), 2)), np.zeros((len(at), 2, q.shape[1]))
+    least = reduced_costs(rates, at, value, dual, a, b)
+    u = np.abs(at.q[b] - at.q[a])
+    u = np.where(rates.endless, np.minimum(u % (2 * np.pi), -u % (2 * np.pi)), u)
+    apart = rates.weights * np.maximum(u - at.reach[a] - at.reach[b], 0.0)
+    rho = {
+        "manhattan": apart.sum(1), "euclid": np.sqrt((apart**2).sum(1)), "chebychev": apart.max(1),
+    }[metric]  # fmt: skip
+    # The steps between them are taken 1e-9 rad wider, times weights of about 10.
+    assert (least - rho).min() >= -1e-7
+    assert (rho > 1).sum() > 100
+
+
+@pytest.mark.parametrize("which", ["made", "turning"])
+def test_costs_that_are_not_held_are_worked_out_again(which, request, monkeypatch):
+    of = request.getfixturevalue(which)
+    certificate = potential(of) if which == "made" else flat(of)
+    bound = certified_bound(certificate, of)
+    monkeypatch.setattr(_certificate, "MOST_HELD", 1000)
+    monkeypatch.setattr(_steps, "FOUND_AT_ONCE", 700)
+    monkeypatch.setattr(_steps, "AT_ONCE", 300)
+    assert certified_bound(certificate, of) == bound
 
 
 def test_one_step_is_bounded_by_the_nearest_pair_of_poses(arm, tool, placement):

@@ -177,6 +177,33 @@ def test_the_plan_itself_passes_cells_that_let_it(made, metric):
         cells = maker_of(one).halves(cells)
 
 
+@pytest.mark.parametrize("dropped", [0.02, 1.0])
+@pytest.mark.parametrize("metric", METRICS)
+def test_the_certificate_has_what_proves_its_bound(made, metric, dropped, monkeypatch):
+    """Of stages that are left out one may be the best: the next may prove less."""
+    one, bounds = made(metric), []
+    solve = course.solve_stage
+
+    def noted(*given, **named):
+        result = solve(*given, **named)
+        # Every third stage proves more than those around it.
+        if len(bounds) % 3 == 1:
+            result = replace(result, through=result.through + 1e-4 * one.cost)
+        bounds.append(result)
+        return result
+
+    monkeypatch.setattr(course, "solve_stage", noted)
+    monkeypatch.setattr(course, "DROPPED", dropped)
+    found = certify(one, gap=0.004)
+    best = max(bounds, key=lambda result: result.bound)
+    stages = found.plan.proof.certificate.stages
+    assert any(np.array_equal(best.stage().value, stage.value) for stage in stages)
+    # In the order in which they were found.
+    values = [result.stage().value for result in bounds]
+    order = [next(i for i, v in enumerate(values) if np.array_equal(v, s.value)) for s in stages]
+    assert order == sorted(order)
+
+
 def test_more_work_never_lowers_the_bound(made):
     bounds = [certify(made("manhattan"), gap=gap).plan.proof.bound for gap in (0.5, 0.05, 0.005)]
     assert bounds == sorted(bounds)

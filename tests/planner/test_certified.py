@@ -5,8 +5,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from kerfpath import Certify, Contour, fastest_speed, pareto, plan, plan_in_pieces
+from kerfpath import Certify, Contour, fastest_speed, pareto, plan, plan_in_pieces, refine, refiner
 from kerfpath.certifier import Certified
+from kerfpath.placement import placed
 from kerfpath.planner import _certified, with_bound
 from kerfpath.plans import Proof
 from kerfpath.sequence import plan_part
@@ -72,6 +73,58 @@ def test_a_bound_can_be_had_afterwards(asked, task, circle, arm):
     assert bounded.proof.gap == 0.1
     assert bounded.settings == replace(made.settings, certify=Certify(gap=0.3))
     assert with_bound(bounded, None).settings.certify is None
+
+
+@pytest.fixture(scope="module")
+def bounded(circle, arm, tool, placement):
+    """A plan on a grid that says of itself that at most a fifth could be saved."""
+    made = plan(
+        circle, arm, tool=tool, placement=placement, gamma_step=STEP, speed=0.05, method="exact",
+        certify=None,
+    )  # fmt: skip
+    proof = replace(made.proof, bound=0.8 * made.cost, gap=0.2)
+    claim = f"{made.proof.statement}; {proof.bound_claim}"
+    return made.proof.statement, replace(made, proof=replace(proof, statement=claim))
+
+
+def nudged(made):
+    T = made.T_base_part.copy()
+    T[:3, 3] += [0.01, -0.02, 0.005]
+    return T
+
+
+@pytest.mark.parametrize(
+    "changed",
+    [
+        lambda made: placed(made, nudged(made)),
+        lambda made: refine(made).plan,
+        lambda made: refine(made, eta_v=0.9).plan,
+        lambda made: refiner.quicken(made)[0],
+        lambda made: refiner.ease(made),
+    ],
+    ids=["moved", "refined", "within other limits", "quickened", "eased"],
+)
+def test_another_motion_does_not_quote_the_bound(bounded, changed):
+    found, made = bounded
+    proof = changed(made).proof
+    assert (proof.bound, proof.gap, proof.certificate) == (None, None, None)
+    assert proof.statement.startswith(found)
+    assert "no motion" not in proof.statement
+
+
+def test_a_bound_that_is_proved_again_is_said_once(bounded, asked):
+    found, made = bounded
+    again = with_bound(made, Certify())
+    assert again.proof.statement == f"{found}; a bound is proved"
+    assert made.proof.without_bound().statement == found
+    assert made.proof.without_bound().without_bound() == made.proof.without_bound()
+
+
+def test_what_is_not_refined_keeps_its_bound(bounded):
+    _, made = bounded
+    left = refine(replace(made, settings=replace(made.settings, eta_a=1e-6)))
+    assert not left.done
+    assert left.plan.proof == made.proof
 
 
 def test_where_nothing_can_be_proved_the_statement_says_why(monkeypatch, task, circle, arm):

@@ -2,16 +2,25 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import replace
 from functools import partial
 
 import numpy as np
+from numpy.typing import NDArray
 
 from kerfpath._arrays import Array
-from kerfpath.auditor._cover import DEEPEST, Places, Reachable, covered, refused
+from kerfpath.auditor._cover import DEEPEST, REFUSED, Places, Reachable, covered, refused
 from kerfpath.auditor._enclosure import POSTURES
 from kerfpath.auditor._intervals import UNIT
-from kerfpath.auditor._steps import Rates, candidates, cheapest, least_value, linked, reduced_costs
+from kerfpath.auditor._steps import (
+    Rates,
+    candidates,
+    least_value,
+    linked,
+    reduced_costs,
+    steps_on,
+)
 from kerfpath.auditor._table import Check
 from kerfpath.certificate import BASE, Certificate, Stage
 from kerfpath.errors import InputError
@@ -25,6 +34,9 @@ LIMIT_TOLERANCE = 1e-9
 """rad: what a motion may exceed (5) and (6) by."""
 EVEN = 1e-6
 """Relative difference of the intervals of a plan at one speed."""
+MOST_HELD = 16_000_000
+"""Steps whose costs are held, 16 bytes each; of others they are worked out twice."""
+Costs = tuple[NDArray[np.int32], NDArray[np.int32], Array]
 LARGEST = 1e12
 """No level or slope of a potential is larger."""
 SAME = 1e-9
@@ -42,7 +54,8 @@ def bound_checks(plan: Plan) -> list[Check]:
             raise refused("the plan states no bound")
         proved = certified_bound(proof.certificate, plan)
     except InputError as error:
-        return [_row(f"{title}: {error}", 1.0, 0.0)]
+        why = str(error).removeprefix(REFUSED[0]).removesuffix(REFUSED[1])
+        return [_row(f"{title}: {why}", 1.0, 0.0)]
     size = max(abs(plan.cost), abs(proof.bound))
     claims = (
         ("bound above what its certificate proves", proof.bound, proved),
@@ -53,8 +66,9 @@ def bound_checks(plan: Plan) -> list[Check]:
     gap = (plan.cost - proof.bound) / plan.cost if plan.cost else 0.0
     if proof.gap is None or not abs(proof.gap - gap) <= SAME * max(1.0, size / abs(plan.cost or 1)):
         rows.append(_row("gap that is not that of cost and bound", 1.0, 0.0))
-    # The row of the worst stands for all.
-    return [max(rows, key=lambda row: row.value - row.limit)]
+    # The row of the worst stands for all; what is no number is none that is kept.
+    broken = [row for row in rows if not row.ok]
+    return [max(broken or rows, key=lambda row: row.value - row.limit)]
 
 
 def _row(title: str, value: float, limit: float) -> Check:
@@ -226,17 +240,32 @@ def _through(rates: Rates, at: Places, stage: Stage) -> Array:
     ends = (layer == last)[:, None]
     value = np.where(ends, 0.0, stage.value[at.cell])
     dual = np.where(ends[..., None], 0.0, stage.dual[at.cell].astype(float))
-    found = list(candidates(rates, at))
-    none = np.zeros(0, dtype=np.int64)
-    a, b = (np.concatenate([none, *(pair[i] for pair in found)]) for i in (0, 1))
-    parts = [reduced_costs(rates, at, value, dual, *pair) for pair in found]
-    cost = np.concatenate([np.zeros(0), *parts])
     begun = np.where(layer == 0, least_value(at, value, dual), np.inf)
     ended = np.where(layer == last, 0.0, np.inf)
-    cheapest(begun, layer, a, b, cost)
-    cheapest(ended, layer, b, a, cost)
+    steps, held = list(steps_on(rates, at)), 0
+    kept: list[list[Costs] | None] = []
+    for both, places in steps:
+        parts: list[Costs] | None = []
+        for a, b, cost in _costs(rates, places, value[both], dual[both]):
+            np.minimum.at(begun[both], b, begun[both][a] + cost)
+            held += len(a)
+            if parts is not None:
+                parts.append((a, b, cost))
+            if held > MOST_HELD:  # this and what follows is worked out again
+                parts = None
+        kept.append(parts)
+    for (both, places), known in zip(reversed(steps), reversed(kept), strict=True):
+        for a, b, cost in known or _costs(rates, places, value[both], dual[both]):
+            np.minimum.at(ended[both], a, ended[both][b] + cost)
     whole = begun + ended
     return whole - _rounding(rates, at, value, dual, whole)
+
+
+def _costs(rates: Rates, at: Places, value: Array, dual: Array) -> Iterator[Costs]:
+    """Yield the steps between the places of two nodes, and what each costs at least."""
+    for a, b in candidates(rates, at):
+        cost = reduced_costs(rates, at, value, dual, a, b)
+        yield a.astype(np.int32), b.astype(np.int32), cost
 
 
 def _rounding(rates: Rates, at: Places, value: Array, dual: Array, whole: Array) -> float:

@@ -20,7 +20,7 @@ from kerfpath.certificate import BASE, LIFTS, Stage
 from kerfpath.errors import InputError
 from kerfpath.robots import Robot
 
-__all__ = ["DEEPEST", "Places", "Reachable", "covered", "refused"]
+__all__ = ["DEEPEST", "REFUSED", "Places", "Reachable", "covered", "refused"]
 
 Linked = Callable[["Places"], Bools]
 TURN = 2 * np.pi
@@ -40,6 +40,8 @@ BEYOND = 6
 """Levels finer than any cell of a stage down to which an interval must prove to be empty."""
 MOST_PLACES = 500_000
 """Places at a time; a certificate that leaves more is refused."""
+REFUSED = "certificate: ", "; plan again"
+"""What stands before and after the reason why a certificate is refused."""
 PLACES_AT_ONCE = 1e5
 """About so many are gone through together, of as many nodes."""
 
@@ -138,7 +140,7 @@ class _Wanted:
 
 def refused(why: str) -> InputError:
     """Return the error that a certificate is refused with."""
-    return InputError(f"certificate: {why}; plan again")
+    return InputError(f"{REFUSED[0]}{why}{REFUSED[1]}")
 
 
 def covered(where: Reachable, stage: Stage, before: Places | None, linked: Linked) -> Places:

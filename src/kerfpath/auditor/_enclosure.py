@@ -27,6 +27,8 @@ AT_ONCE = 2048
 """Cells enclosed together: large against the overhead of an operation, small against the cache."""
 WRAPPED = 4e-15
 """rad: error of an angle less a few turns of the floating-point 2 pi."""
+CURVED = 2.0
+"""How much farther a curve may go than the joint is known to: else a box says more."""
 ANY = float(np.nextafter(np.pi, 4.0))
 """rad: radius that holds every angle."""
 
@@ -112,7 +114,7 @@ def enclose(
 
 
 def linear_minimum(
-    slope: Array, low: Array, high: Array, radius: Array, half: Array, z: Array
+    slope: Array, low: Array, high: Array, radius: Array, half: Array, z: Array, axis: int = -1
 ) -> Array:
     """Return a lower bound (...) over t in [-h, h] of z . (q(t) - center), rounding included.
 
@@ -123,13 +125,16 @@ def linear_minimum(
     half : (...) rad
     z : (..., n)
         What the joints are weighted with, all on their turn of the enclosure.
+    axis : int
+        The axis of the joints: the last, or the first, by which sums are faster.
     """
-    bend = np.where(z >= 0, z * low, z * high)
+    run = z * slope
+    bend = z * np.where(z >= 0, low, high)
     # A sum of n products is off by less than (n + 1) units of the sum of their sizes.
-    unit = (z.shape[-1] + 2) * UNIT
-    steep = np.abs((z * slope).sum(-1)) + unit * np.abs(z * slope).sum(-1)
-    curve = bend.sum(-1) - unit * np.abs(bend).sum(-1)
-    off = np.abs(z * radius).sum(-1) * (1 + unit)
+    unit = (z.shape[axis] + 2) * UNIT
+    steep = np.abs(run.sum(axis)) + unit * np.abs(run).sum(axis)
+    curve = bend.sum(axis) - unit * np.abs(bend).sum(axis)
+    off = (np.abs(z) * radius).sum(axis) * (1 + unit)
     # The least of curve t^2 / 2 - steep t on [0, h]: inside, if it turns upwards before h.
     end = (0.5 * curve * half - steep) * half
     inside = (curve > 0) & (steep < curve * half)
@@ -245,18 +250,22 @@ def _turned_pose(before: Interval, after: Interval, turn: Jet) -> Pose:
 def _described(q: Jet, smooth: Bools, none: Bools) -> tuple[Array, Array, Array, Array, Array]:
     """Return centre, slope, bounds of the second derivative and radius of one joint (2, 2, 2, C).
 
-    Zeros where there are none, and in a box but for centre and radius.
+    Zeros where there are none, and in a box but for centre and radius. Close to a singularity the
+    second derivative is hardly bounded while the joint is: what is said then is how far it goes.
     """
-    steep = np.where(smooth, q.slope.middle(), 0.0)
     middle = np.where(smooth, q.at.middle(), q.value.middle())
+    box = q.value.radius(middle)
+    steep = np.where(smooth, q.slope.middle(), 0.0)
     near = q.at.radius(middle) + q.half * q.slope.radius(steep) * (1 + UNIT)
-    radius = np.where(smooth, near, q.value.radius(middle)) * (1 + 4 * UNIT) + WRAPPED
+    far = near + (np.abs(steep) + q.bend.magnitude() * q.half / 2) * q.half
+    curved = smooth & ~(far > CURVED * box)
+    radius = np.where(curved, near, box) * (1 + 4 * UNIT) + WRAPPED
     free = ~smooth & ~(radius < ANY)
     middle, radius = np.where(free | none, 0.0, middle), np.where(free, ANY, radius)
     return (
         middle - 2 * np.pi * np.round(middle / (2 * np.pi)),
-        steep,
-        np.where(smooth, q.bend.lo, 0.0),
-        np.where(smooth, q.bend.hi, 0.0),
+        np.where(curved, steep, 0.0),
+        np.where(curved, q.bend.lo, 0.0),
+        np.where(curved, q.bend.hi, 0.0),
         np.where(none, 0.0, radius),
     )

@@ -9,7 +9,7 @@ is weighed with y and the slopes of the potential at both ends: a bound on each 
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 
 import numpy as np
 
@@ -18,7 +18,7 @@ from kerfpath._repr import short_repr
 from kerfpath.auditor._cover import TURN, Places
 from kerfpath.auditor._enclosure import linear_minimum
 
-__all__ = ["Rates", "candidates", "cheapest", "least_value", "linked", "reduced_costs"]
+__all__ = ["Rates", "candidates", "least_value", "linked", "reduced_costs", "steps_on"]
 
 AT_ONCE = 8192
 """Pairs of places looked at together: their rows stay in the cache."""
@@ -69,11 +69,14 @@ class Rates:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Curves:
-    """Joints off their middle: slope t + [low, high] t^2 / 2 +- radius, with a potential (B, ..).
+    """Joints off their middle: slope t + [low, high] t^2 / 2 +- radius, with a potential.
 
-    The potential is the larger of value_m - dual_m . off, m = 0, 1.
+    The joints are on the first axis, (n, B), by which numpy adds several times faster. The
+    potential is the larger of value_m - dual_m . off, m = 0, 1, value (2, B) and dual (2, n, B).
     """
 
+    q: Array
+    reach: Array
     slope: Array
     low: Array
     high: Array
@@ -82,39 +85,45 @@ class _Curves:
     value: Array
     dual: Array
 
+    __repr__ = short_repr
+
+    @classmethod
+    def of(cls, at: Places, value: Array, dual: Array) -> _Curves:
+        """Return those of places (C,) with their potential (C, 2) and (C, 2, n)."""
+        joints = (at.q, at.reach, at.slope, at.low, at.high, at.radius, at.half)
+        potential = value, dual.transpose(0, 2, 1)
+        return cls(*(np.ascontiguousarray(part.T) for part in joints + potential))
+
+    def take(self, which: Ints) -> _Curves:
+        """Return some of them."""
+        return _Curves(*(getattr(self, each.name).take(which, axis=-1) for each in fields(self)))
+
     def least(self, z: Array) -> Array:
-        """Return the least of z . off, (B,)."""
-        return linear_minimum(self.slope, self.low, self.high, self.radius, self.half, z)
+        """Return the least of z . off, (B,), z (n, B)."""
+        return linear_minimum(self.slope, self.low, self.high, self.radius, self.half, z, axis=0)
 
     def least_with(self, y: Array) -> Array:
-        """Return the least of y . off + the potential, (B,).
+        """Return the least of y . off + the potential, (B,), y (n, B).
 
         The larger of two is at least any mean of both; the best mean of two lines is one of them,
         or level.
         """
-        run = ((y[:, None] - self.dual) * self.slope[:, None]).sum(-1)
-        ends = self.value - np.abs(run) * self.half[:, None]
-        share = (ends[:, 0] >= ends[:, 1]).astype(float)
-        across = run[:, 1] - run[:, 0]
-        opposed = run[:, 0] * run[:, 1] < 0
+        run = ((y - self.dual) * self.slope).sum(1)
+        ends = self.value - np.abs(run) * self.half
+        share = (ends[0] >= ends[1]).astype(float)
+        across = run[1] - run[0]
+        opposed = run[0] * run[1] < 0
         safe = np.where(opposed, across, 1.0)
-        crossing = np.abs(self.value[:, 0] - self.value[:, 1]) < np.abs(safe) * self.half
-        share = np.where(opposed & crossing, np.clip(run[:, 1] / safe, 0.0, 1.0), share)
+        crossing = np.abs(self.value[0] - self.value[1]) < np.abs(safe) * self.half
+        share = np.where(opposed & crossing, np.clip(run[1] / safe, 0.0, 1.0), share)
         rest = 1.0 - share
-        z = y - (share[:, None] * self.dual[:, 0] + rest[:, None] * self.dual[:, 1])
-        return np.asarray(share * self.value[:, 0] + rest * self.value[:, 1] + self.least(z))
-
-
-def _curves(at: Places, value: Array, dual: Array, which: Ints | slice) -> _Curves:
-    return _Curves(
-        at.slope[which], at.low[which], at.high[which], at.radius[which], at.half[which],
-        value[which], dual[which],
-    )  # fmt: skip
+        z = y - (share * self.dual[0] + rest * self.dual[1])
+        return np.asarray(share * self.value[0] + rest * self.value[1] + self.least(z))
 
 
 def least_value(at: Places, value: Array, dual: Array) -> Array:
     """Return the least of the potential at each place, (C,)."""
-    return _curves(at, value, dual, slice(None)).least_with(np.zeros(at.q.shape))
+    return _Curves.of(at, value, dual).least_with(np.zeros(at.q.T.shape))
 
 
 def candidates(rates: Rates, at: Places) -> Iterator[tuple[Ints, Ints]]:
@@ -184,38 +193,37 @@ def _possible(
         most = rates.velocity[layer[a], i] + at.reach[a, i] + at.reach[b, i] + NEAR
         near = np.abs(off) <= most
         a, b = a[near], b[near]
-    for i in range(0, len(a), AT_ONCE):
-        yield a[i : i + AT_ONCE], b[i : i + AT_ONCE]
+    if len(a):
+        yield a, b
 
 
-def cheapest(least: Array, layer: Ints, a: Ints, b: Ints, cost: Array) -> None:
-    """Set `least` (C,) at places b to the least of that at a plus the cost of the step between.
+def steps_on(rates: Rates, at: Places) -> Iterator[tuple[slice, Places]]:
+    """Yield the places of each two neighbouring nodes, and where among all they are.
 
-    Layer after layer of places b, away from where they begin.
+    Places are in the order of nodes.
     """
-    if not len(b):
-        return
-    onwards = layer[b[0]] > layer[a[0]]
-    order = np.lexsort((b, layer[b]))
-    a, b, cost = a[order], b[order], cost[order]
-    first = np.flatnonzero(np.diff(layer[b], prepend=-1))
-    pieces = list(zip(first, [*first[1:], len(b)], strict=True))
-    for i, j in pieces if onwards else reversed(pieces):
-        begin = np.flatnonzero(np.diff(b[i:j], prepend=-1))
-        least[b[i + begin]] = np.minimum.reduceat(least[a[i:j]] + cost[i:j], begin)
+    start = np.searchsorted(at.node, rates.nodes)
+    ends = [*start[2:], len(at)]
+    for first, last in zip(start, ends, strict=False):
+        both = slice(int(first), int(last))
+        yield both, at.take(both)
 
 
 def linked(rates: Rates, at: Places) -> Bools:
     """Return which places (C,) steps join to others, from the first node to the last."""
-    none = np.zeros(0, dtype=np.int64)
-    found = list(candidates(rates, at))
-    a, b = (np.concatenate([none, *(pair[i] for pair in found)]) for i in (0, 1))
-    layer, free = rates.layer(at), np.zeros(len(a))
-    begun = np.where(layer == 0, 0.0, np.inf)
-    ended = np.where(layer == len(rates.nodes) - 1, 0.0, np.inf)
-    cheapest(begun, layer, a, b, free)
-    cheapest(ended, layer, b, a, free)
-    return np.asarray(np.isfinite(begun + ended))
+    order = np.argsort(at.node, kind="stable")
+    at = at.take(order)
+    begun, ended = at.node == rates.nodes[0], at.node == rates.nodes[-1]
+    steps = list(steps_on(rates, at))
+    for both, places in steps:
+        for a, b in candidates(rates, places):
+            begun[both.start + b[begun[both.start + a]]] = True
+    for both, places in reversed(steps):
+        for a, b in candidates(rates, places):
+            ended[both.start + a[ended[both.start + b]]] = True
+    found = np.empty(len(at), dtype=bool)
+    found[order] = begun & ended
+    return found
 
 
 def reduced_costs(rates: Rates, at: Places, value: Array, dual: Array, a: Ints, b: Ints) -> Array:
@@ -223,73 +231,83 @@ def reduced_costs(rates: Rates, at: Places, value: Array, dual: Array, a: Ints, 
 
     With the potential (C, 2) and (C, 2, n) at its end, less that at its beginning; up to rounding.
     """
-    here, there = _curves(at, value, dual, a), _curves(at, value, dual, b)
-    layer = rates.layer(at)[a]
-    mu, most = rates.tilt[layer], rates.velocity[layer]
-    low, high = _differences(rates, most, at, a, b)
-    off = at.reach[a] + at.reach[b] + NEAR
+    curves, layer, least = _Curves.of(at, value, dual), rates.layer(at), np.empty(len(a))
+    for i in range(0, len(a), AT_ONCE):
+        part = slice(i, i + AT_ONCE)
+        here, there = curves.take(a[part]), curves.take(b[part])
+        k = layer[a[part]]
+        mu, most = (np.ascontiguousarray(each[k].T) for each in (rates.tilt, rates.velocity))
+        least[part] = _reduced_costs(rates, here, there, mu, most)
+    return least
+
+
+def _reduced_costs(rates: Rates, here: _Curves, there: _Curves, mu: Array, most: Array) -> Array:
+    low, high = _differences(rates, most, here, there)
+    off = here.reach + there.reach + NEAR
     u_low = np.maximum(low - off, -most)
     u_high = np.maximum(np.minimum(high + off, most), u_low)
-    at_least = np.full((2, len(a)), -np.inf)
+    at_least = np.full((2, len(here.half)), -np.inf)
 
     def offer(y: Array, cut: int | None = None) -> None:
         """Take the bound by y for the potential's `cut` at the beginning, that y is; or both."""
-        apart = np.minimum(y * low, y * high).sum(-1) + _least_step(rates, y - mu, u_low, u_high)
+        apart = np.minimum(y * low, y * high).sum(0) + _least_step(rates, y - mu, u_low, u_high)
         apart += there.least_with(y)
         for m in (0, 1) if cut is None else (cut,):
-            more = apart if cut is not None else apart + here.least(here.dual[:, m] - y)
+            more = apart if cut is not None else apart + here.least(here.dual[m] - y)
             np.maximum(at_least[m], more, out=at_least[m])
 
     for m in (0, 1):
-        offer(here.dual[:, m], m)
+        offer(here.dual[m], m)
     offer(mu + _slope(rates, (low + high) / 2))
     for m in (0, 1):
-        offer(there.dual[:, m])
+        offer(there.dual[m])
     offer(np.zeros(low.shape))
-    return np.asarray((at_least.T - here.value).min(1))
+    return np.asarray((at_least - here.value).min(0))
 
 
-def _differences(rates: Rates, most: Array, at: Places, a: Ints, b: Ints) -> tuple[Array, Array]:
-    """Return between what the middles of two places differ, (B, n) rad twice.
+def _differences(rates: Rates, most: Array, here: _Curves, there: _Curves) -> tuple[Array, Array]:
+    """Return between what the middles of two places differ, (n, B) rad twice.
 
     Of endless joints, by every whole turn with which a step joins the places.
     """
-    off = at.q[b] - at.q[a]
+    off = there.q - here.q
     if not rates.endless.any():
         return off, off
-    off = np.where(rates.endless, off - TURN * np.round(off / TURN), off)
-    room = most + at.reach[a] + at.reach[b] + NEAR
-    if not ((np.abs(off) + room > TURN) & rates.endless).any():
+    endless = rates.endless[:, None]
+    off = np.where(endless, off - TURN * np.round(off / TURN), off)
+    room = most + here.reach + there.reach + NEAR
+    if not ((np.abs(off) + room > TURN) & endless).any():
         return off, off
-    low = np.where(rates.endless, np.minimum(np.ceil((-room - off) / TURN), 0), 0)
-    high = np.where(rates.endless, np.maximum(np.floor((room - off) / TURN), 0), 0)
+    low = np.where(endless, np.minimum(np.ceil((-room - off) / TURN), 0), 0)
+    high = np.where(endless, np.maximum(np.floor((room - off) / TURN), 0), 0)
     return off + TURN * low, off + TURN * high
 
 
 def _least_step(rates: Rates, z: Array, low: Array, high: Array) -> Array:
-    """Return a lower bound of rho(u) - z . u over steps u between low and high (B, n)."""
-    w = rates.weights
+    """Return a lower bound of rho(u) - z . u over steps u between low and high (n, B)."""
+    w = rates.weights[:, None]
+    nearest = np.clip(0.0, low, high)
     if rates.metric == "manhattan":
-        middle = np.clip(0.0, low, high)
-        each = np.minimum(w * np.abs(low) - z * low, w * np.abs(high) - z * high)
-        return np.asarray(np.minimum(each, w * np.abs(middle) - z * middle).sum(-1))
-    # rho(u) is at least s . u for any s that is not longer than 1 by the dual norm.
+        ends = np.minimum(w * np.abs(low) - z * low, w * np.abs(high) - z * high)
+        return np.asarray(np.minimum(ends, w * np.abs(nearest) - z * nearest).sum(0))
+    # rho(u) is at least s . u for any s no longer than 1 by the dual norm: z made as short, and the
+    # slope at the nearest of all steps, by which rho(u) is at least rho there.
     scaled = np.where(w > 0, z / np.where(w > 0, w, 1.0), 0.0)
-    if rates.metric == "euclid":
-        size = np.sqrt((scaled * scaled).sum(-1, keepdims=True))
-    else:
-        size = np.abs(scaled).sum(-1, keepdims=True)
-    s = np.where(w > 0, z, 0.0) / np.maximum(1.0, size * ROUNDED)
-    return np.asarray(np.minimum((s - z) * low, (s - z) * high).sum(-1))
+    euclid = rates.metric == "euclid"
+    size = np.sqrt((scaled * scaled).sum(0)) if euclid else np.abs(scaled).sum(0)
+    short = np.where(w > 0, z, 0.0) / np.maximum(1.0, size * ROUNDED)
+    towards = _slope(rates, nearest) / ROUNDED
+    each = (np.minimum((s - z) * low, (s - z) * high).sum(0) for s in (short, towards))
+    return np.asarray(np.maximum(*each))
 
 
 def _slope(rates: Rates, u: Array) -> Array:
-    """Return the slope of rho at u (B, n)."""
-    w = rates.weights
+    """Return the slope of rho at u (n, B)."""
+    w = rates.weights[:, None]
     if rates.metric == "manhattan":
         return np.asarray(w * np.sign(u))
     if rates.metric == "euclid":
-        size = np.sqrt(((w * u) ** 2).sum(-1, keepdims=True))
+        size = np.sqrt(((w * u) ** 2).sum(0))
         return np.asarray(w * w * u / np.where(size > 0, size, 1.0))
-    largest = np.argmax(w * np.abs(u), axis=-1)[:, None] == np.arange(len(w))
+    largest = np.argmax(w * np.abs(u), axis=0) == np.arange(len(w))[:, None]
     return np.where(largest, w * np.sign(u), 0.0)

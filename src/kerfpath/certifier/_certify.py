@@ -124,10 +124,6 @@ def certify(
     course.run()
     bound = max(course.best - ALLOWANCE * plan.cost, 0.0)
     reached = (plan.cost - bound) / plan.cost
-    claim = (
-        "no motion within the limits costs less than {}, {} % below this plan, at any gamma, "
-        "posture and turn"
-    )
     proof = replace(
         plan.proof,
         bound=bound,
@@ -137,7 +133,7 @@ def certify(
     return Certified(
         plan=replace(plan, proof=proof),
         done=reached <= gap,
-        statement=claim.format(proof.bound_shown, proof.gap_shown),
+        statement=proof.bound_claim,
         stages=course.count,
         pairs=course.pairs,
     )
@@ -190,6 +186,8 @@ class _Course:
         self.stages: list[Stage] = []
         self.plan = plan
         self.priced = not checkable and self._binds()
+        self.proved = 0.0  # by the stages that are kept
+        self.loose: tuple[int, StageResult] | None = None  # the best that is not, and its place
 
     def run(self) -> None:
         """Go from stage to stage until the gap is reached or it is enough."""
@@ -205,12 +203,14 @@ class _Course:
                 self._divide(result.cells.take(live))
                 return
             if not low.any() or self._enough(result, float(live.mean() + low.mean())):
-                self.stages.append(result.stage())
+                self._finish(result)
                 return
             if fresh or 1 - live.mean() > DROPPED:
-                self.stages.append(result.stage())
+                self._keep(result)
                 fresh, kept = False, live
             else:
+                if result.bound >= self.best:
+                    self.loose = len(self.stages), result
                 kept = np.ones(len(live), np.bool_)
             cells = result.cells
             deep = bool((cells.level[low] >= DEEPEST).any())
@@ -220,7 +220,7 @@ class _Course:
                 self.nodes, fresh = between(self.nodes), True
                 cells = self._with_nodes(cells.take(kept))
             elif deep:
-                self.stages.append(result.stage())
+                self._finish(result)
                 return
             else:
                 rest = cells.take(kept & ~low)
@@ -269,6 +269,22 @@ class _Course:
         )
         self.best = max(self.best, min(parts.bound(cells, self.best), self.cost))
         self.pairs, self.count = before + parts.pairs, self.count + parts.count
+
+    def _keep(self, result: StageResult) -> None:
+        """Take a stage into the certificate."""
+        self.stages.append(result.stage())
+        self.proved = max(self.proved, result.bound)
+
+    def _finish(self, result: StageResult) -> None:
+        """Take the last stage, and where none that is kept proves the bound the one that does.
+
+        Further nodes and other potentials may prove less. What a stage that was left out covers,
+        those after it cover, too: it ruled nothing out.
+        """
+        self._keep(result)
+        if self.loose is not None and self.proved < self.best:
+            place, best = self.loose
+            self.stages.insert(place, best.stage())
 
     def _take(self, result: StageResult) -> float:
         """Take what a stage proves; return the share of the gap that it closes."""

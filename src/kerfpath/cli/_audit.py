@@ -52,9 +52,12 @@ def show_audit(file: Path, job: Path | None, *, as_json: bool) -> bool:
                 numbers=["worst", "allowed", "node"],
                 whole=["verdict"],
             )
-            for c in checks if name in found.places else ():
+            for c in checks:
                 if not c.ok:
-                    out.print(escape(found.sentence(name, c)), soft_wrap=True)
+                    said = f"{name}: {c.issue()}"
+                    if name in found.places:
+                        said = found.sentence(name, c)
+                    out.print(escape(said), soft_wrap=True)
         for name in found.missing:
             out.print(f"{escape(name)}: {'not cut' if found.places else 'no plan'}")
         out.print(f"note: {escape(found.note)}")

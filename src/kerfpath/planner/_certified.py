@@ -44,7 +44,7 @@ def with_bound(
     )
     proof = replace(
         found.plan.proof,
-        statement=f"{made.proof.statement}; {found.statement}",
+        statement=f"{made.proof.without_bound().statement}; {found.statement}",
         certificate=found.plan.proof.certificate if asked.keep else None,
     )
     return replace(found.plan, settings=settings, proof=proof)

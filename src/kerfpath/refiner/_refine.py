@@ -137,7 +137,7 @@ def refine(
         grid_cost = plan.cost
     proof = Proof(
         optimal=plan.proof.optimal and start.admitted and refined.cost <= (grid_cost or 0.0),
-        statement=f"{plan.proof.statement}; {_describe(plan, asked, start, refined.cost)}",
+        statement=f"{refined.proof.statement}; {_describe(plan, asked, start, refined.cost)}",
         grid_cost=grid_cost,
     )
     return Refinement(
@@ -244,7 +244,10 @@ def _unwrap(plan: Plan) -> Array:
 
 
 def _plan_with_motion(plan: Plan, found: MotionState) -> Plan:
-    """Return the plan with the motion found, and what that costs at its own nodes."""
+    """Return the plan with the motion found, and what that costs at its own nodes.
+
+    The bound of the plan is not taken over: its gap is that of another motion.
+    """
     turn = turns_of(found.q)
     turn[:, plan.robot.endless] = 0
     turn[:, plan.robot.family.joints :] = 0
@@ -253,6 +256,7 @@ def _plan_with_motion(plan: Plan, found: MotionState) -> Plan:
         q=np.where(plan.robot.endless, wrap(found.q), found.q),
         gamma=wrap(found.gamma),
         turn=turn.astype(np.int64),
+        proof=plan.proof.without_bound(),
     )
     s, dq = plan.settings, np.diff(found.q, axis=0)
     return replace(moved, cost=path_cost(dq, s.weights, s.metric, s.objective, moved.node_cost))

@@ -9,7 +9,7 @@ from typing import cast
 
 from kerfpath import __version__
 from kerfpath._repr import short_repr
-from kerfpath.auditor import Check, transfer_checks, worst_of
+from kerfpath.auditor import BOUND, Check, transfer_checks, worst_of
 from kerfpath.job.format import AuditTable, PreparedJob, prepare, read_job, tolerances_of
 from kerfpath.job.plan_file._checks import check, count
 from kerfpath.job.plan_file._compare import compare_jobs, compare_values
@@ -114,7 +114,7 @@ class PlanAudit:
         return AuditReport(
             tables={name: table for name, table in tables.items() if table},
             missing=file.missing,
-            note=f"{note} {_list_unverified(file)}".strip(),
+            note=f"{note} {_list_claims(file, tables)}".strip(),
         )
 
     def _whole(
@@ -165,8 +165,12 @@ def _claims(plan: Plan) -> list[Check]:
     return rows
 
 
-def _list_unverified(file: PlanFile) -> str:
-    """Say what the file claims and nobody has verified."""
+def _list_claims(file: PlanFile, tables: Mapping[str, Sequence[Check]]) -> str:
+    """Say which bounds are proved again, and what the file claims that nobody has verified."""
+    proved = [
+        name for name, table in tables.items() if any(c.code == BOUND and c.ok for c in table)
+    ]
+    said = [f"Proved again: the bound of {', '.join(proved)}."] if proved else []
     best = [p.name for p in file.plans if p.proof.optimal]
     claims = [f"that {', '.join(best)} is best of its grid"] if best else []
     bounded = [
@@ -175,7 +179,11 @@ def _list_unverified(file: PlanFile) -> str:
     claims += [f"the bound of {', '.join(bounded)}"] if bounded else []
     if file.data["sequence"] is not None and file.data["sequence"]["optimal"]:
         claims.append("that no order takes less")
-    return f"Claimed, not verified: {' and '.join(claims)}." if claims else ""
+    if claims:
+        said.append(f"Claimed, not verified: {' and '.join(claims)}.")
+    if bounded:
+        said.append("plan.json keeps what proves a bound with certificate = true in [plan].")
+    return " ".join(said)
 
 
 def _by_itself(file: PlanFile) -> AuditReport:
@@ -204,5 +212,5 @@ def _by_itself(file: PlanFile) -> AuditReport:
         if file.in_cell
         else collision_note(None)
     )
-    note = f"{note} {collisions} {_list_unverified(file)}".strip()
+    note = f"{note} {collisions} {_list_claims(file, tables)}".strip()
     return AuditReport(tables=tables, missing=file.missing, note=note)
