@@ -17,6 +17,7 @@ from kerfpath.certificate import USUAL
 from kerfpath.certifier import _certify
 from kerfpath.contour import Contour
 from kerfpath.options import PlanOptions
+from kerfpath.planner import _closed, _quickest
 from kerfpath.robots import robot
 
 # The same examples in every run, without a deadline that a busy machine could miss.
@@ -40,6 +41,17 @@ def pose(xyz, rotation=None):
 PlanOptions.__init__.__kwdefaults__["certify"] = None
 USUAL_WORK = _certify.MOST_PAIRS, _certify.MOST_PER_NODE
 _certify.MOST_PAIRS, _certify.MOST_PER_NODE = 1_500_000, 0
+
+
+# So does the search for the quickest motion, which takes seconds a contour, and its ceiling.
+USUAL_RUNGS, _quickest.RUNGS = _quickest.RUNGS, ()
+_closed.MOST_BINDING = 2
+
+
+@pytest.fixture
+def quickest_at_work(monkeypatch):
+    """Look for the quickest motion as far as outside the tests."""
+    monkeypatch.setattr(_quickest, "RUNGS", USUAL_RUNGS)
 
 
 @pytest.fixture

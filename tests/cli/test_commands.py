@@ -238,7 +238,8 @@ def test_what_a_message_advises_can_be_done(folder, fastest, change, share):
     assert len(speeds) == (2 if off_grid else 1)
     assert all(float(speed) < over for speed in speeds)
     assert all(0.9 < float(value) <= 1 for _, value in shares)
-    assert shares or change in ("\nrefine = true", "time step")
+    # Off the grid no share may be found that opens; then none is said.
+    assert shares or off_grid or change == "time step"
     assert ('with method = "exact"' in message) == ("paper" in change)
     then = grid.replace('"paper"', '"exact"')
     remedies = [then.replace("speed_m_min = 3", f"speed_m_min = {speed}", 1) for speed in speeds]

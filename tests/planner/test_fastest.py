@@ -14,6 +14,7 @@ from kerfpath.planner._task import task_of
 from kerfpath.plans import path_cost
 
 STEP = np.radians(6)
+pytestmark = pytest.mark.usefixtures("quickest_at_work")
 
 
 def drawn(seed, nodes=21):

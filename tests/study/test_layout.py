@@ -251,8 +251,10 @@ def test_the_file_that_is_written_has_the_very_placement_that_was_looked_at(
     found = worth(in_cell, offsets, exact=True, whole=True)
     speeds = [s for _, _, s in fastest_speeds(again)]
     if found.status == "feasible":
-        # The same graph and search twice.
-        assert min(s.speed for s in speeds) * 60 == pytest.approx(found.value, rel=1e-12)
+        # The same graph and search twice; off the grid it may be faster still.
+        assert min(s.on_grid or s.speed for s in speeds) * 60 == pytest.approx(
+            found.value, rel=1e-12
+        )
     else:
         assert any(isinstance(s, Exception) for s in speeds)
 
@@ -460,8 +462,8 @@ def test_the_command_leaves_a_page_its_data_and_a_job_that_plans(coarse, tmp_pat
     assert len(data["map"]["cells"]) == 9
     assert max(bounds) <= data["best"]["value"] * (1 + 1e-9)
     placed = read_job(tmp_path / "out" / "placed.toml")
-    speeds = [found.speed * 60 for _, _, found in fastest_speeds(placed)]
-    # The same graph and search twice.
+    speeds = [(found.on_grid or found.speed) * 60 for _, _, found in fastest_speeds(placed)]
+    # The same graph and search twice; off the grid it may be faster still.
     assert min(speeds) == pytest.approx(data["best"]["value"], rel=1e-12)
     # Again, from the store: the same files, and words for people.
     before = kept(tmp_path / "out" / "layout.sqlite")

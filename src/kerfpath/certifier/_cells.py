@@ -237,7 +237,7 @@ class CellMaker:
             low = (limits.lower[i] - EDGE - (cells.center[:, i] + box[:, i]).max()) / TURN
             high = (limits.upper[i] + EDGE - (cells.center[:, i] - box[:, i]).min()) / TURN
             shifts.append(list(range(int(np.ceil(low)), int(np.floor(high)) + 1)))
-        sets = []
+        sets = [cells.take(slice(0))]  # there may be no turn at all
         for shift in product(*shifts):
             moved = self._moved(cells, TURN * np.array(shift, float))
             sets.append(moved.take(self._inside(moved)))

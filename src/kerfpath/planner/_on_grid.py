@@ -97,8 +97,9 @@ def _from_quickest(
     """
     asked = task.settings
     clearance = None if asked.comfort is None else asked.comfort.clearance
-    # What clearance costs is known on the grid only.
-    if asked.closure == "periodic" or (clearance is not None and clearance.cost):
+    # What clearance costs is known on the grid only; beams know no external axis.
+    on_grid = task.robot.external is not None or (clearance is not None and clearance.cost)
+    if asked.closure == "periodic" or on_grid:
         raise _judged(broken, task, begin) from None
     judged, best = None, None
     begin("search for the quickest motion")

@@ -87,6 +87,8 @@ def quick_motions(task: PlanningTask, finder: ClearSearch) -> Iterator[QuickMoti
         return
     best = _quicker(task, finder, path, best)
     yield best
+    if task.robot.external is not None:  # beams know no external axis
+        return
     rung, tried = 0, [path]
     while rung < len(RUNGS):
         before, faster = best.dt, _at(task, best.dt / RUNGS[rung])

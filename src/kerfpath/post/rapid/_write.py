@@ -309,8 +309,9 @@ def linear_speed_data(speed: float) -> str:
 @cache
 def air_speed_data(share: float) -> str:
     """Return the speed data of joint moves at a share of the full speed."""
-    speed_mm_s = share * FULL_AIR_SPEED * 1e3
-    turning_deg_s = share * np.degrees(TURNING_SPEED)
+    speed_mm_s = round(share * FULL_AIR_SPEED * 1e3, 2)
+    # Of the speed as it is written: who reads it knows no other.
+    turning_deg_s = speed_mm_s / (FULL_AIR_SPEED * 1e3) * np.degrees(TURNING_SPEED)
     return f"[{number(speed_mm_s, 2)},{number(turning_deg_s, 0)},{EXTERNAL_SPEEDS}]"
 
 
