@@ -4,6 +4,10 @@ import re
 from importlib.resources import files
 from pathlib import Path
 
+from kerfpath.errors import NoFeasiblePath
+from kerfpath.job import cell_of_job
+from kerfpath.job.run._speeds import fastest_along
+
 DEMO = Path(str(files("kerfpath") / "demo"))
 
 _BEFORE, *_CONTOURS, _AFTER = re.split(
@@ -123,3 +127,15 @@ def write_slit_jobs(folder, jobs):
     for name, text in jobs.items():
         (folder / f"{name}.toml").write_text(text)
     return [f"{name}.toml" for name in jobs]
+
+
+def speeds_on_grid(job):
+    """Return the fastest speed of each contour on the grid alone, or why there is none."""
+    part = job.read_part()
+    cell, found = cell_of_job(job, part), []
+    for task in job.tasks(part):
+        try:
+            found.append(fastest_along(job, task.evenly_fast(part), cell, refine=False))
+        except NoFeasiblePath as broken:
+            found.append(broken)
+    return found

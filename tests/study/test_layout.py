@@ -14,9 +14,10 @@ from scipy.spatial.distance import cdist
 from browser import CHROMIUM, dom_of
 from commands import assert_refused, run
 from conftest import ROOT
+from jobs import speeds_on_grid
 from kerfpath.cad import read as read_drawing
 from kerfpath.errors import InputError
-from kerfpath.job import cell_of_job, fastest_speeds, pose, read_job
+from kerfpath.job import cell_of_job, pose, read_job
 from kerfpath.study import digest, layout, ranges_of
 from kerfpath.study._evaluator import EVERY
 from kerfpath.study.placing._evaluate import contours_of, evaluate_placements, middle_of
@@ -249,12 +250,10 @@ def test_the_file_that_is_written_has_the_very_placement_that_was_looked_at(
     distances = [cell_of_job(j, part).distances(q) for j in (again, there)]
     assert np.array_equal(*distances)
     found = worth(in_cell, offsets, exact=True, whole=True)
-    speeds = [s for _, _, s in fastest_speeds(again)]
+    speeds = speeds_on_grid(again)
     if found.status == "feasible":
-        # The same graph and search twice; off the grid it may be faster still.
-        assert min(s.on_grid or s.speed for s in speeds) * 60 == pytest.approx(
-            found.value, rel=1e-12
-        )
+        # The same graph and search twice.
+        assert min(s.speed for s in speeds) * 60 == pytest.approx(found.value, rel=1e-12)
     else:
         assert any(isinstance(s, Exception) for s in speeds)
 
@@ -462,8 +461,8 @@ def test_the_command_leaves_a_page_its_data_and_a_job_that_plans(coarse, tmp_pat
     assert len(data["map"]["cells"]) == 9
     assert max(bounds) <= data["best"]["value"] * (1 + 1e-9)
     placed = read_job(tmp_path / "out" / "placed.toml")
-    speeds = [(found.on_grid or found.speed) * 60 for _, _, found in fastest_speeds(placed)]
-    # The same graph and search twice; off the grid it may be faster still.
+    speeds = [found.speed * 60 for found in speeds_on_grid(placed)]
+    # The same graph and search twice.
     assert min(speeds) == pytest.approx(data["best"]["value"], rel=1e-12)
     # Again, from the store: the same files, and words for people.
     before = kept(tmp_path / "out" / "layout.sqlite")

@@ -10,11 +10,11 @@ import numpy as np
 import pytest
 
 from commands import assert_refused, run
-from jobs import SLIT_JOB, write_slit_jobs
+from jobs import SLIT_JOB, speeds_on_grid, write_slit_jobs
 from kerfpath.cad import read
 from kerfpath.errors import InputError
 from kerfpath.graph import gamma_grid
-from kerfpath.job import fastest_speeds, read_job
+from kerfpath.job import read_job
 from kerfpath.robots import robot
 from kerfpath.study import (
     NEAREST,
@@ -70,20 +70,16 @@ def test_those_that_can_come_first_and_the_others_say_why_not(found):
     assert by_id[SMALL].reached == 0.0
 
 
-GRID = 'method = "exact"\nrefine = false\n'
-"""The table of robots knows the grid alone."""
-
-
 def test_speeds_are_those_of_a_job_with_that_robot(found, folder):
     text = KNOWN.replace(OWN, STATED)
     text = "".join(
         line for line in text.splitlines(True) if not line.startswith(("accel", "endless"))
     )
-    (folder / "other.toml").write_text(text + GRID)
-    (folder / "own.toml").write_text(KNOWN + GRID)
+    (folder / "other.toml").write_text(text + "refine = false\n")
+    (folder / "own.toml").write_text(KNOWN + "refine = false\n")
     for each, name in ((found[0], found[0].robot.id), (found[1], found[1].robot.id)):
         job = read_job(folder / ("own.toml" if name == OWN else "other.toml"))
-        speeds = [best.on_grid or best.speed for _, _, best in fastest_speeds(job)]
+        speeds = [best.speed for best in speeds_on_grid(job)]
         assert [contour.fastest for contour in each.contours] == speeds
         margins = [speed / asked for speed, asked in zip(speeds, (2 / 60, 400 / 60), strict=True)]
         assert each.binding.margin == pytest.approx(min(margins), rel=1e-12)
