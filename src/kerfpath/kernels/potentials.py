@@ -6,6 +6,8 @@ may be wrong); its level is what is then proved, the least over all cells that a
 
 from __future__ import annotations
 
+from math import pi
+
 import numpy as np
 
 from kerfpath._arrays import Array, Bools, Ints
@@ -44,25 +46,35 @@ def _proved(
 ) -> float:
     """Return what a step from cell a to b costs at least, with V there and the slopes y here.
 
-    By the slopes y alone if that is enough; else the best of what other slopes prove as well.
+    By the slopes y alone if that is enough; else the best of what other slopes prove as well. A
+    joint that may go either way round has no increment that a slope could be set against: 0 then.
     """
     best = -np.inf
     if way == 1:
         best = _along(D, y) - price + least_ahead(cells, potential, b, y)
         if best > enough:
             return best
-    for kind in range(-1 if way == 1 else 2, 3):
-        if kind < 0:
+    for kind in range(-1 if way == 1 else -2, 3):
+        if kind == -1:
             tangent(D, step, other)
         for i in range(len(y)):
-            if kind == 2:
+            if kind == 2 or (way == 2 and _either_way(cells, step, a, b, i, D[i])):
                 other[i] = 0.0
             elif kind >= 0:
                 other[i] = potential.dual[b, kind, i]
+            elif kind == -2:
+                other[i] = y[i]
         best = max(best, _turned(cells, potential, step, a, b, D, y, other))
         if best > enough:
             break
     return best
+
+
+@jit_inline
+def _either_way(cells: Cells, step: Step, a: int, b: int, i: int, d: float) -> bool:
+    """Return whether joint i may go either way round from cell a to b, the short way being d."""
+    wide: float = abs(d) + cells.box[a, i] + cells.box[b, i]
+    return bool(step.endless[i]) and wide > pi
 
 
 @jit_inline
