@@ -89,7 +89,7 @@ def offset(
 def _with_middles(contour: Contour) -> Contour:
     """Return the contour with a node amid each side between two corners, where the beam may fit."""
     steps = np.diff(contour.points, axis=0)
-    turn = _turn_at(contour)
+    turn = angle_between(*_ways_at(contour))
     amid = np.flatnonzero((turn[:-1] > ARC_STEP) & (turn[1:] > ARC_STEP))
     if not len(amid):
         return contour
@@ -103,20 +103,21 @@ def _with_middles(contour: Contour) -> Contour:
     )
 
 
-def _turn_at(contour: Contour) -> Array:
-    """Return how far the path turns at each node, (K,) rad; 0 at the ends of an open one."""
+def _ways_at(contour: Contour) -> tuple[Array, Array]:
+    """Return the unit directions (K, 3) of the path before and after each node.
+
+    At the ends of an open one they are the same.
+    """
     along = unit(np.diff(contour.points, axis=0))
     ends = (along[-1], along[0]) if contour.closed else (along[0], along[-1])
-    return angle_between(np.vstack([ends[:1], along]), np.vstack([along, ends[1:]]))
+    return np.vstack([ends[:1], along]), np.vstack([along, ends[1:]])
 
 
 def _move_nodes(
     contour: Contour, distance: float, side: Side, sharp: bool
 ) -> tuple[Array, Array, Ints]:
     """Return the images of all nodes, their axes, and the node of each; corners make several."""
-    along = unit(np.diff(contour.points, axis=0))
-    ends = (along[-1], along[0]) if contour.closed else (along[0], along[-1])
-    before, after = np.vstack([ends[:1], along]), np.vstack([along, ends[1:]])
+    before, after = _ways_at(contour)
     across = [lateral(contour.axes, t, side) for t in (before, after)]
     turn = angle_between(*across)
     outer = (after * across[0]).sum(1) < 0
@@ -194,9 +195,7 @@ def _crossings(points: Array, axes: Array, far: float) -> list[tuple[int, float,
 
 def _require_corner(contour: Contour, nodes: Ints, distance: float, side: Side) -> None:
     """Raise InputError where what is left out is no corner but a curve or a slot too tight."""
-    steps = np.diff(contour.points, axis=0)
-    along = unit(steps)
-    before, after = along[nodes - 1], along[nodes % len(along)]
+    before, after = (ways[nodes] for ways in _ways_at(contour))
     turn = angle_between(before, after)
     if turn.max() < CORNER and (radius := _radius(contour, nodes)) < distance:
         raise _too_tight(
@@ -215,7 +214,7 @@ def _radius(contour: Contour, nodes: Ints) -> float:
     That is the way to the nearer of the turns before and after over the turn: of a polygon the
     radius of the circle that its sides touch.
     """
-    turn, count = _turn_at(contour), len(contour) - 1
+    turn, count = angle_between(*_ways_at(contour)), len(contour) - 1
     bent = np.flatnonzero(turn[:count] > STRAIGHT)
     place = np.concatenate(
         [[0.0], np.cumsum(np.linalg.norm(np.diff(contour.points, axis=0), axis=1))]
