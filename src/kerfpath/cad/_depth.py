@@ -7,6 +7,7 @@ or the areas.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -17,12 +18,13 @@ from OCP.GeomAbs import GeomAbs_SurfaceType
 from OCP.gp import gp_Pnt, gp_Pnt2d, gp_Vec
 from OCP.GProp import GProp_GProps
 from OCP.IntTools import IntTools_FClass2d
-from OCP.TopAbs import TopAbs_Orientation, TopAbs_State
+from OCP.TopAbs import TopAbs_State
 from OCP.TopoDS import TopoDS_Face
 
 from kerfpath._arrays import Array
+from kerfpath.cad._loops import REVERSED
 
-__all__ = ["Patches", "depth_of", "patches_of"]
+__all__ = ["depth_of", "joined", "patches_of", "weighed"]
 
 GRID = 5
 """Patches in either direction of a face that is not plane."""
@@ -42,15 +44,19 @@ class Patches(NamedTuple):
     normal: Array
 
 
-def patches_of(face: TopoDS_Face) -> Patches:
-    """Return the patches of a face: one of a plane, else a grid's."""
+def weighed(face: TopoDS_Face) -> tuple[float, gp_Pnt]:
+    """Return the area of a face, mm^2, and its centre of mass."""
     props = GProp_GProps()
     BRepGProp.SurfaceProperties_s(face, props, ACCURACY)
-    area = abs(props.Mass())  # a damaged face may count as less than nothing
+    return abs(props.Mass()), props.CentreOfMass()  # damaged, it may count as less than nothing
+
+
+def patches_of(face: TopoDS_Face, area: float, middle: gp_Pnt) -> Patches:
+    """Return the patches of a face of known area and centre: one of a plane, else a grid's."""
     surface = BRepAdaptor_Surface(face)
-    out = -1.0 if face.Orientation() == TopAbs_Orientation.TopAbs_REVERSED else 1.0
+    out = -1.0 if face.Orientation() == REVERSED else 1.0
     if surface.GetType() == GeomAbs_SurfaceType.GeomAbs_Plane:
-        middle, normal = props.CentreOfMass(), surface.Plane().Axis().Direction()
+        normal = surface.Plane().Axis().Direction()
         if not surface.Plane().Direct():
             out = -out
         return Patches(
@@ -80,10 +86,14 @@ def patches_of(face: TopoDS_Face) -> Patches:
     )
 
 
+def joined(parts: Sequence[Patches]) -> Patches:
+    """Return the patches of several faces in one."""
+    return Patches(*map(np.concatenate, zip(*parts, strict=True)))
+
+
 def depth_of(patches: Patches, points: Array) -> float:
     """Return how far points (K, 3) mm reach beyond each patch along its normal, on the mean, mm."""
-    around = _directions()
-    ends = points[np.unique(np.argmax(points @ around.T, axis=0))]
+    ends = points[np.unique(np.argmax(points @ _directions().T, axis=0))]
     beyond = (patches.normal @ ends.T).max(axis=1) - (patches.normal * patches.middle).sum(axis=1)
     return float(patches.area @ np.maximum(beyond, 0.0) / patches.area.sum())
 

@@ -52,8 +52,6 @@ NEVER_CUT = frozenset([
     "HATCH", "MPOLYGON",
 ])  # fmt: skip
 """Kinds of entities that say something about a part, and are no line of it; others may be."""
-HIDDEN, ON_PAPER = "on hidden layer", "on the sheet"
-"""What the drawing itself puts aside is not to cut, whatever its kind."""
 
 
 def read_dxf(path: Path, content: bytes, unit: str | None, gap: float) -> Part:
@@ -114,18 +112,17 @@ class _Sheet:
     document: Drawing
     curves: dict[Look, list[Curve]] = field(default_factory=dict)
     left_out: Counter[tuple[str, str]] = field(default_factory=Counter)
+    put_aside: Counter[tuple[str, str]] = field(default_factory=Counter)
     count: int = 0
 
     def summed(self) -> tuple[LeftOut, ...]:
         """Return what was left out by kind and reason, first what may have been cut."""
         found = [
             LeftOut(
-                kind=kind,
-                reason=reason,
-                count=count,
-                may_cut=kind not in NEVER_CUT and not reason.startswith((HIDDEN, ON_PAPER)),
+                kind=kind, reason=reason, count=count, may_cut=doubtful and kind not in NEVER_CUT
             )
-            for (kind, reason), count in self.left_out.items()
+            for what, doubtful in ((self.left_out, True), (self.put_aside, False))
+            for (kind, reason), count in what.items()
         ]
         return tuple(sorted(found, key=lambda one: not one.may_cut))
 
@@ -134,7 +131,7 @@ class _Sheet:
         for layout in self.document.layouts:
             if not layout.is_modelspace:
                 for entity in layout:
-                    self.left_out[entity.dxftype(), f"{ON_PAPER} {layout.name}"] += 1
+                    self.put_aside[entity.dxftype(), f"on the sheet {layout.name}"] += 1
 
     def add(
         self, entities: Iterable[DXFGraphic], T: Array, inside: Look = LOOSE, depth: int = 0
@@ -159,7 +156,7 @@ class _Sheet:
         if self.document.layers.has_entry(look[0]):
             drawn = self.document.layers.get(look[0])
             if drawn.is_off() or drawn.is_frozen():
-                self.left_out[kind, f"{HIDDEN} {look[0]}"] += 1
+                self.put_aside[kind, f"on hidden layer {look[0]}"] += 1
                 return
         if isinstance(entity, Insert):
             self._insert(entity, T, look, depth)

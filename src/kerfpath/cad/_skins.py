@@ -13,7 +13,7 @@ from scipy.spatial import cKDTree
 from kerfpath._arrays import Array, Ints
 from kerfpath._repr import short_repr
 from kerfpath.cad._connected import label_connected
-from kerfpath.cad._depth import Patches, depth_of, patches_of
+from kerfpath.cad._depth import depth_of, joined, patches_of, weighed
 from kerfpath.cad._loops import FaceLoop, OrientedEdge, join_runs
 from kerfpath.cad._part import Side
 from kerfpath.cad._sample import EdgeChain, vector_area
@@ -181,15 +181,13 @@ def _sides(
 
     With it goes why it might be the other one, "" where that is sure.
     """
-    areas, patches = np.zeros(len(members)), list[Patches]()
+    weights = [weighed(face) for face in faces]
+    areas = np.array([sum(weights[f][0] for f in numbers) for numbers in members])
     vector = np.zeros((len(members), 3))
     low, high = np.full((len(members), 3), NOWHERE), np.full((len(members), 3), -NOWHERE)
     points: list[Array] = []
     for g, numbers in enumerate(members):
         around = [np.empty((0, 3))]
-        made = [patches_of(faces[f]) for f in numbers]
-        patches.append(Patches(*map(np.concatenate, zip(*made, strict=True))))
-        areas[g] = patches[g].area.sum()
         for f in numbers:
             for _, loop in found[f]:
                 vector[g] += vector_area(loop.around)
@@ -213,8 +211,12 @@ def _sides(
         away = {h: _usual_distance(points[g], points[h]) for h in near if h != g and not sides[h]}
         h = min(away, key=away.__getitem__, default=g)
         if h != g and away[h] < THIN * np.sqrt(areas[g]):
-            ends = np.vstack([points[g], points[h], patches[g].middle, patches[h].middle])
-            depths = [depth_of(patches[skin], ends) for skin in (g, h)]
+            both = [
+                joined([patches_of(faces[f], *weights[f]) for f in members[skin]])
+                for skin in (g, h)
+            ]
+            ends = np.vstack([points[g], points[h], *(patches.middle for patches in both)])
+            depths = [depth_of(patches, ends) for patches in both]
             is_outer, doubts[g] = _is_outer(depths, vector[g], areas[g], outer_towards)
             sides[g], sides[h] = ("outer", "inner") if is_outer else ("inner", "outer")
     sheets = {body[g] for g, side in enumerate(sides) if side}
