@@ -20,25 +20,27 @@ def every_cell(plan, level=0):
     half = np.full(len(node), width / 2 + 4e-15)
     found = arm.enclose(plan.frames, node, -np.pi + width * (index + 0.5), half, plan.T_flange_tip)
     cell, posture = np.nonzero(found.status)
-    center, slope, low, high, radius = (
+    q, slope, low, high, radius = (
         getattr(found, name)[cell, posture] for name in ("center", "slope", "low", "high", "radius")
     )
     h = width / 2
     reach = np.abs(slope) * h + np.maximum(np.abs(low), np.abs(high)) * h * h / 2 + radius
     limits = arm.joint_limits()
-    parts = []
-    for turn in np.ndindex(*(1 if e else 5 for e in limits.endless)):
-        q = center + TURN * np.where(limits.endless, 0, np.array(turn) - 2)
-        fits = (q - reach <= limits.upper) & (q + reach >= limits.lower)
-        keep = (fits | limits.endless).all(1)
-        for row, lower, upper in zip(limits.rows, limits.row_lower, limits.row_upper, strict=True):
-            off = reach @ np.abs(row)
-            keep &= (q @ row - off <= upper) & (q @ row + off >= lower)
-        parts.append((cell[keep], posture[keep], q[keep], slope[keep], reach[keep]))
-    cell, posture, q, slope, reach = (np.concatenate(part) for part in zip(*parts, strict=True))
-    order = np.argsort(cell, kind="stable")
-    cell = cell[order]
-    return node[cell], posture[order], index[cell], q[order], slope[order], reach[order]
+    for i in np.flatnonzero(~limits.endless):
+        turns = np.tile(TURN * np.arange(-2, 3), len(cell))
+        cell, posture, q, slope, reach = (
+            np.repeat(of, 5, axis=0) for of in (cell, posture, q, slope, reach)
+        )
+        q[:, i] += turns
+        fits = (q[:, i] - reach[:, i] <= limits.upper[i]) & (
+            q[:, i] + reach[:, i] >= limits.lower[i]
+        )
+        cell, posture, q, slope, reach = (of[fits] for of in (cell, posture, q, slope, reach))
+    keep = np.ones(len(cell), bool)
+    for row, lower, upper in zip(limits.rows, limits.row_lower, limits.row_upper, strict=True):
+        off = reach @ np.abs(row)
+        keep &= (q @ row - off <= upper) & (q @ row + off >= lower)
+    return tuple(of[keep] for of in (node[cell], posture, index[cell], q, slope, reach))
 
 
 def stage_of(node, posture, level, index, q, value=None, dual=None, multipliers=None):
