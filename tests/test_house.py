@@ -127,6 +127,11 @@ def test_asking_for_help_does_not_load_the_kernels():
     assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0
 
 
+def test_jobs_load_what_only_models_and_cells_need_when_they_have_them():
+    code = "import kerfpath.job, sys; sys.exit(bool({'OCP', 'scipy.stats'} & set(sys.modules)))"
+    assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0
+
+
 def test_every_public_name_loads():
     import kerfpath
 

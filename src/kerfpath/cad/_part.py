@@ -15,9 +15,7 @@ from kerfpath._arrays import Array, Ints, floats, freeze, scalar
 from kerfpath._repr import short_repr
 from kerfpath.cad._crossing import find_crossing
 from kerfpath.cad._departure import ON_CURVE, Departure, departure
-from kerfpath.cad._healed import HealedSurface
 from kerfpath.cad._left_out import LeftOut
-from kerfpath.cad._loops import OrientedEdge
 from kerfpath.cad._sample import EdgeChain, Trace, distance
 from kerfpath.cad._units import MM
 from kerfpath.contour import Contour
@@ -322,8 +320,13 @@ class Part:
             No such loop.
         """
         trace = self.loop(name)._trace
-        if isinstance(trace, EdgeChain) and all(isinstance(e, OrientedEdge) for e in trace.edges):
-            return HealedSurface(trace.edges)
+        if isinstance(trace, EdgeChain):
+            # OCP takes half a second to load, and drawings of points are read without it.
+            from kerfpath.cad._healed import HealedSurface
+            from kerfpath.cad._loops import OrientedEdge
+
+            if all(isinstance(edge, OrientedEdge) for edge in trace.edges):
+                return HealedSurface(trace.edges)
         return Ribbon(self.contour(name, closed=False))
 
     def mesh(self, deflection: float = 5e-4) -> tuple[Array, Ints]:

@@ -16,7 +16,6 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.stats import qmc
 
 from kerfpath._arrays import Array
 from kerfpath.cell._bodies import Body
@@ -186,6 +185,8 @@ def shaved_pair(bodies: Sequence[Body], pair: Places, design: DesignClearance) -
 
 def _poses(joints: int) -> Array:
     """Return joint vectors (POSES, joints) rad, spread evenly over whole turns; zero is one."""
+    from scipy.stats import qmc  # a quarter of a second to load, and not every job has a cell
+
     spread = qmc.Sobol(joints, scramble=False).random(POSES)
     return np.asarray(2 * np.pi * spread - np.pi, dtype=np.float64)
 
