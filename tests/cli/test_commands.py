@@ -221,7 +221,7 @@ def test_what_a_message_advises_can_be_done(folder, fastest, change, share):
     """A little over the fastest speed: every remedy, as it is printed, is one."""
     method = "" if "method" in change else '\nmethod = "exact"'
     rest = method if "refine" in change else f"{method}\nrefine = false"
-    grid = SMALL.replace("[plan]", f"[plan]{rest}")
+    grid = SMALL.replace("[plan]", f"[plan]\ncertify = false{rest}")
     if change == "time step":
         grid = grid.replace("spacing_mm = 1", "time_step_ms = 20", 1)
     else:
@@ -251,7 +251,7 @@ def test_what_a_message_advises_can_be_done(folder, fastest, change, share):
 
 
 def test_a_method_that_finds_no_path_where_there_is_one_is_told_of_the_other(folder, fastest):
-    paper = SMALL.replace("[plan]", '[plan]\nmethod = "paper"')
+    paper = SMALL.replace("[plan]", '[plan]\ncertify = false\nmethod = "paper"')
     under = f"speed_m_min = {0.9999 * fastest['on_grid_m_min']!r}"
     (folder / "paper.toml").write_text(paper.replace("speed_m_min = 3", under, 1))
     result = run("plan", "paper.toml", cwd=folder)
@@ -325,7 +325,7 @@ def test_speed_names_the_fastest_and_what_binds(folder, fastest):
         asked = f"speed_m_min = {fastest['on_grid_m_min'] * share}"
         edge = SMALL.replace("speed_m_min = 3", asked, 1)
         (folder / "edge.toml").write_text(
-            edge.replace("[plan]", f'[plan]\nmethod = "exact"\nrefine = {refine}')
+            edge.replace("[plan]", f'[plan]\ncertify = false\nmethod = "exact"\nrefine = {refine}')
         )
         assert run("plan", "edge.toml", "--out", "edge", cwd=folder).returncode == code
     (folder / "far.toml").write_text(SMALL.replace("xyz_mm = [1200", "xyz_mm = [3200"))
@@ -343,7 +343,9 @@ def test_a_job_may_dip_or_be_interrupted_and_is_read_back(folder):
         ('feed = "dip"', "full speed on"),
         ('interruptions = "fewest"', "piece 1 of"),
     ):
-        job = base.replace("[plan]", f'[plan]\nmethod = "exact"\nrefine = false\n{key}')
+        job = base.replace(
+            "[plan]", f'[plan]\ncertify = false\nmethod = "exact"\nrefine = false\n{key}'
+        )
         (folder / "over.toml").write_text(job)
         done = run("plan", "over.toml", "--out", "over", cwd=folder)
         assert done.returncode == 0, done.stdout + done.stderr
@@ -361,7 +363,8 @@ def test_a_job_may_dip_or_be_interrupted_and_is_read_back(folder):
 def test_short_pieces_are_warned_of_and_a_job_may_ask_for_longer_ones(folder):
     base = SMALL.replace("speed_m_min = 3", "speed_m_min = 3.7", 1).replace("= 50", "= 1", 1)
     base = base.replace(
-        "[plan]", '[plan]\nmethod = "exact"\nrefine = false\ninterruptions = "fewest"\nKEY'
+        "[plan]",
+        '[plan]\ncertify = false\nmethod = "exact"\nrefine = false\ninterruptions = "fewest"\nKEY',
     )
 
     def cut(key):
@@ -481,6 +484,7 @@ def test_a_program_with_a_folder_of_its_own_is_written_audited_and_removed(folde
     text = SMALL.replace('model = "abb_irb4600_60_205"', 'model = "staubli_tx2_160l"')
     text = text.replace('"rapid"', '"val3"\nname = "a_very_long_program_name"')
     text = text.replace("lead_time_s = 0.01", "lead_time_s = 0")
+    text = text.replace("[plan]", '[plan]\ncertify = false\nmethod = "exact"\nrefine = false')
     text += "\n[program.val3]\nlaser_output = 'BasicIO-1\\%Q0'\nlines_per_file = 100\n"
     (folder / "val3.toml").write_text(text)
     result = run("plan", "val3.toml", "--out", "val3", cwd=folder)

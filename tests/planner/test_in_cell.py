@@ -7,7 +7,7 @@ from functools import partial
 import numpy as np
 import pytest
 
-from kerfpath import InputError, NoFeasiblePath, audit, fastest_speed, plan
+from kerfpath import Contour, InputError, NoFeasiblePath, audit, fastest_speed, plan
 from kerfpath.auditor import checks
 from kerfpath.cell import Mesh, box_between, cell_of
 from kerfpath.planner import layered_graph, plan_in_pieces
@@ -36,6 +36,14 @@ def task(circle, arm, tool, placement):
     options = {"tool": tool, "placement": placement, "gamma_step": STEP}
     graph = layered_graph(circle, arm, **options)
     return (circle, arm), options | {"speed": 0.1, "graph": graph}
+
+
+@pytest.fixture(scope="module")
+def half(circle, arm, tool, placement):
+    """Half of the circle, for what takes many searches."""
+    nodes = Contour(circle.points[:61], circle.axes[:61], name="circle")
+    options = {"tool": tool, "placement": placement, "gamma_step": STEP}
+    return (nodes, arm), options | {"speed": 0.1, "graph": layered_graph(nodes, arm, **options)}
 
 
 @pytest.fixture(scope="module")
@@ -112,43 +120,43 @@ def test_closed_and_turning_little_the_plan_is_clear_too(task, blind, arm, tool,
     assert little.cost >= on_grid(*task[0], **task[1], cell=there).cost
 
 
-def test_where_the_speed_must_dip_the_plan_is_clear_too(task, arm, tool, placement, posts):
+def test_where_the_speed_must_dip_the_plan_is_clear_too(half, arm, tool, placement, posts):
     there = cell(arm, tool, placement, posts)
-    fast = task[1] | {"speed": 1.0}
+    fast = half[1] | {"speed": 1.0}
     with pytest.raises(NoFeasiblePath):
-        on_grid(*task[0], **fast)
+        on_grid(*half[0], **fast)
     for how in ({}, {"method": "exact"}, {"method": "exact", "refine": True}):
-        made = plan(*task[0], **fast, cell=there, feed="dip", **how)
+        made = plan(*half[0], **fast, cell=there, feed="dip", **how)
         assert is_clear(there, made.q)
         assert audit(made, cell=there) == []
 
 
-def test_pieces_and_the_fastest_speed_are_clear_too(task, arm, tool, placement, posts):
+def test_pieces_and_the_fastest_speed_are_clear_too(half, arm, tool, placement, posts):
     there = cell(arm, tool, placement, posts)
-    pieces = plan_in_pieces(*task[0], **task[1] | {"speed": 0.3}, cell=there)
+    pieces = plan_in_pieces(*half[0], **half[1] | {"speed": 0.3}, cell=there)
     assert all(is_clear(there, piece.q) for piece in pieces)
-    options = {name: task[1][name] for name in ("tool", "placement", "gamma_step", "graph")}
-    free, around = (fastest_speed(*task[0], **options, cell=c) for c in (None, there))
+    options = {name: half[1][name] for name in ("tool", "placement", "gamma_step", "graph")}
+    free, around = (fastest_speed(*half[0], **options, cell=c) for c in (None, there))
     assert around.speed < free.speed
-    made = on_grid(*task[0], **task[1] | {"speed": around.speed * (1 - 1e-9)}, cell=there)
+    made = on_grid(*half[0], **half[1] | {"speed": around.speed * (1 - 1e-9)}, cell=there)
     assert is_clear(there, made.q)
     with pytest.raises(NoFeasiblePath):
-        on_grid(*task[0], **task[1] | {"speed": around.speed * (1 + 1e-6)}, cell=there)
+        on_grid(*half[0], **half[1] | {"speed": around.speed * (1 + 1e-6)}, cell=there)
 
 
-def test_behind_a_cage_no_speed_and_no_interruption_helps(task, arm, tool, placement):
+def test_behind_a_cage_no_speed_and_no_interruption_helps(half, arm, tool, placement):
     lid = {"lid": box_between([0.9, -0.3, 0.5], [1.5, 0.3, 0.52])}
     caged = cell(arm, tool, placement, lid)
-    options = {name: task[1][name] for name in ("tool", "placement", "gamma_step", "graph")}
+    options = {name: half[1][name] for name in ("tool", "placement", "gamma_step", "graph")}
     with pytest.raises(
         NoFeasiblePath, match=r"contour .circle.: on this grid .* no pose at node 0"
     ) as no:
-        on_grid(*task[0], **task[1], cell=caged, feed="dip")
+        on_grid(*half[0], **half[1], cell=caged, feed="dip")
     assert no.value.counts["collision at the node"] > 0
     with pytest.raises(NoFeasiblePath, match="no number of interruptions helps: no pose at node"):
-        plan_in_pieces(*task[0], **task[1], cell=caged)
+        plan_in_pieces(*half[0], **half[1], cell=caged)
     with pytest.raises(NoFeasiblePath, match="collision at the node"):
-        fastest_speed(*task[0], **options, cell=caged)
+        fastest_speed(*half[0], **options, cell=caged)
 
 
 def test_a_cage_is_no_way_and_says_so(task, arm, tool, placement):

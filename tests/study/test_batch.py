@@ -124,8 +124,8 @@ def test_a_job_that_was_refused_is_tried_again_once_it_has_changed(tmp_path):
     names = write_slit_jobs(tmp_path, {n: JOBS[n] for n in ("dry", "misspelt", "unknown")})
     command = ["batch", *names, "--out", "out", "--processes", 1, "--json"]
     first = rows_of(json.loads(run(*command, cwd=tmp_path).stdout))
-    (tmp_path / "unknown.toml").write_text(SLIT_JOB)
-    (tmp_path / "misspelt.toml").write_text(SLIT_JOB)
+    (tmp_path / "unknown.toml").write_text(SLIT)
+    (tmp_path / "misspelt.toml").write_text(SLIT)
     result = run(*command, cwd=tmp_path)
     assert result.returncode == 0
     again = rows_of(json.loads(result.stdout))
@@ -165,7 +165,7 @@ def test_bad_input_of_the_command_is_one_line(tmp_path, monkeypatch, idle):
         assert_refused(result)
         return result.stderr
 
-    write_slit_jobs(tmp_path, {"good": SLIT_JOB})
+    write_slit_jobs(tmp_path, {"good": SLIT})
     (tmp_path / "file").write_text("")
     (tmp_path / "other").mkdir()
     (tmp_path / "out").mkdir()
@@ -217,11 +217,11 @@ def test_no_jobs_at_all_is_bad_input(tmp_path):
 
 
 def test_a_job_that_changes_meanwhile_ends_the_batch(tmp_path):
-    write_slit_jobs(tmp_path, {"good": SLIT_JOB})
+    write_slit_jobs(tmp_path, {"good": SLIT})
     job, out = tmp_path / "good.toml", tmp_path / "out"
 
     def edit(what, done, total):
-        job.write_text(SLIT_JOB + "\n# a remark\n")
+        job.write_text(SLIT + "\n# a remark\n")
 
     with pytest.raises(InputError, match=r"good\.toml: .*has changed.*start the study again"):
         batch([job], out, processes=1, progress=edit)
@@ -234,11 +234,11 @@ def test_workers_of_a_cluster_need_the_job_folder_alone_and_that_they_need(
     workers(1)
     shared, out = tmp_path / "shared", tmp_path / "out"
     shared.mkdir()
-    write_slit_jobs(shared, {"good": SLIT_JOB})
+    write_slit_jobs(shared, {"good": SLIT})
     (row,) = batch([shared / "good.toml"], out, scheduler=scheduler)
     assert row.passed
     assert {path.name for path in row.folder.iterdir()} == FILES | {MANIFEST}
-    (other,) = write_slit_jobs(shared, {"other": SLIT_JOB})
+    (other,) = write_slit_jobs(shared, {"other": SLIT})
 
     def lost(what, done, total):
         (shared / other).unlink()
