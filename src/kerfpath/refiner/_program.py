@@ -17,7 +17,7 @@ from scipy import sparse
 from kerfpath._arrays import Array, Ints
 from kerfpath._repr import short_repr
 from kerfpath.refiner._rates import RateLimits
-from kerfpath.refiner._rows import ConstraintRows, Sparse, wide
+from kerfpath.refiner._rows import ConstraintRows, Sparse, span_of, wide
 from kerfpath.search import Metric
 
 __all__ = ["MARGIN", "PRICE", "LinearModel", "Target", "solve"]
@@ -106,7 +106,8 @@ def _matrix(values: Array, row: Ints, column: Ints, shape: tuple[int, int]) -> S
 
 def _scaled(factors: Array, matrix: Sparse) -> Sparse:
     """Multiply the rows of a matrix by factors."""
-    return (sparse.diags_array(factors) @ matrix).tocsr()
+    data = matrix.data * np.repeat(factors, np.diff(matrix.indptr))
+    return sparse.csr_array((data, matrix.indices, matrix.indptr), matrix.shape)
 
 
 def _less(rows: Sparse, one: Sparse) -> Sparse:
@@ -169,7 +170,7 @@ def _ranges(rows: ConstraintRows, model: LinearModel) -> None:
             turned = sign * (model.q - model.q[0]).ravel()
             rows.at_most(turned, sign * away, np.tile(model.rotation, K))
     for row, lower, upper in zip(model.rows, model.row_lower, model.row_upper, strict=True):
-        both = sparse.diags_array(slope @ row).tocsr()
+        both = _scaled(slope @ row, sparse.eye_array(K, format="csr"))
         rows.at_most(model.q @ row, both, upper)
         rows.at_most(-(model.q @ row), -both, -lower)
 
@@ -193,7 +194,7 @@ def _lengths(
     edges, n = dq.shape
     value = (model.weight * dq).ravel()
     slope, edge = _scaled(np.tile(model.weight, edges), D), np.repeat(np.arange(edges), n)
-    reach = abs(slope).sum(axis=1)
+    reach = span_of(slope)
     if model.metric == "manhattan":
         # Where no step turns a joint round, its absolute value is linear.
         turns = np.flatnonzero(np.abs(value) <= reach)

@@ -10,7 +10,7 @@ from scipy import sparse
 
 from kerfpath._arrays import Array
 
-__all__ = ["ConstraintRows", "Sparse", "wide"]
+__all__ = ["ConstraintRows", "Sparse", "span_of", "wide"]
 
 Sparse = Any  # scipy's stubs tell csr from csc and array from matrix, which nothing here needs
 SOLVED = (clarabel.SolverStatus.Solved, clarabel.SolverStatus.AlmostSolved)
@@ -36,8 +36,9 @@ class ConstraintRows:
 
     def at_most(self, value: Array, slope: Sparse, bound: Array | float) -> None:
         """Add value + slope x <= bound over boxed unknowns, without the rows that always hold."""
-        kept = np.flatnonzero(value + abs(slope).sum(axis=1) > bound)
-        self.hold(slope[kept], (bound - value)[kept])
+        kept = np.flatnonzero(value + span_of(slope) > bound)
+        if len(kept):
+            self.hold(slope[kept], (bound - value)[kept])
 
     def cone(self, slope: Sparse, value: Array, size: int) -> None:
         """Hold, of every `size` rows of slope x + value, the first above the length of the rest."""
@@ -64,6 +65,12 @@ class ConstraintRows:
         )
         found = solver.solve()
         return np.array(found.x) if found.status in SOLVED else None
+
+
+def span_of(rows: Sparse) -> Array:
+    """Return the most that each of the rows (m,) can be over unknowns in [-1, 1]."""
+    row = np.repeat(np.arange(rows.shape[0]), np.diff(rows.indptr))
+    return np.bincount(row, np.abs(rows.data), rows.shape[0]).astype(np.float64, copy=False)
 
 
 def wide(rows: Sparse, variables: int) -> Sparse:

@@ -30,6 +30,7 @@ xyz_mm = {xyz}
 rpy_deg = [0, 0, 30]
 [plan]
 gamma_step_deg = 10
+certify = false
 {plan}
 """
 CONTOURS = """\
