@@ -49,6 +49,26 @@ _closed.MOST_BINDING = 2
 _nopath.MOST_STEPS, _nopath.MOST_PAIRS = 200_000, 3_000_000
 
 
+WITHOUT_KERNELS = {"cad", "sweep", "urdf", "test_apart.py"}
+
+
+def pytest_collection_modifyitems(items):
+    """Order modules for two workers that start with a half each, and with no kernel compiled.
+
+    Those with long tests come first, so that none is left to wait for at the end. The second half
+    begins with what needs no kernels: while one worker compiles them, the other need not.
+    """
+    long = {item.path for item in items if item.get_closest_marker("slow")}
+    items.sort(key=lambda item: item.path not in long)
+    light = [i for i in items if i.path.relative_to(ROOT / "tests").parts[0] in WITHOUT_KERNELS]
+    kept = set(light)
+    others = [item for item in items if item not in kept]
+    half = min(len(items) // 2, len(others))
+    while 0 < half < len(others) and others[half].path == others[half - 1].path:
+        half -= 1
+    items[:] = [*others[:half], *light, *others[half:]]
+
+
 @pytest.fixture
 def quickest_at_work(monkeypatch):
     """Look for the quickest motion as far as outside the tests."""
