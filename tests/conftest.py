@@ -46,6 +46,7 @@ _certify.MOST_PAIRS, _certify.MOST_PER_NODE = 1_500_000, 0
 # So does the search for the quickest motion, which takes seconds a contour, and its ceiling.
 USUAL_RUNGS, _quickest.RUNGS = _quickest.RUNGS, ()
 _closed.MOST_BINDING = 2
+USUAL_CEILING = _nopath.MOST_STEPS, _nopath.MOST_PAIRS
 _nopath.MOST_STEPS, _nopath.MOST_PAIRS = 200_000, 3_000_000
 
 
@@ -73,6 +74,13 @@ def pytest_collection_modifyitems(items):
 def quickest_at_work(monkeypatch):
     """Look for the quickest motion as far as outside the tests."""
     monkeypatch.setattr(_quickest, "RUNGS", USUAL_RUNGS)
+
+
+@pytest.fixture
+def ceiling_at_work(monkeypatch):
+    """Let the search for what is impossible work as much as outside the tests."""
+    monkeypatch.setattr(_nopath, "MOST_STEPS", USUAL_CEILING[0])
+    monkeypatch.setattr(_nopath, "MOST_PAIRS", USUAL_CEILING[1])
 
 
 @pytest.fixture
