@@ -50,8 +50,8 @@ def joint_positions(plan: Plan) -> go.Figure:
     height = TOP + BOTTOM + 3 * ROW + 2 * GAP
     figure = go.Figure(layout=base_layout(height, hovermode="x unified", showlegend=False))
     figure.update_layout(margin={"l": 54, "r": 16, "t": TOP, "b": BOTTOM})
-    _add_posture_bands(figure, plan, panels=plan.robot.joints, labelled=range(2))
-    figure.update_layout(meta={"nodes": np.round(plan.time, 4).tolist()})
+    shapes, annotations = _posture_bands(plan, panels=plan.robot.joints, labelled=range(2))
+    axes: dict[str, object] = {}
     limits = plan.robot.joint_limits()
     continuous = np.degrees(plan.q[0] + np.vstack([0 * plan.q[:1], plan.increments.cumsum(axis=0)]))
     for joint in range(plan.robot.joints):
@@ -61,25 +61,23 @@ def joint_positions(plan: Plan) -> go.Figure:
         low, high = np.degrees(limits.lower[joint]), np.degrees(limits.upper[joint])
         q, endless = continuous[:, joint], bool(limits.endless[joint])
         middle, half = (q.max() + q.min()) / 2, 0.58 * max(float(np.ptp(q)), LEAST_SPAN)
-        figure.update_layout(
-            {
-                _axis("xaxis", joint): axis(
-                    anchor=y,
-                    domain=[0, 0.46] if column == 0 else [0.54, 1],
-                    matches=None if joint == 0 else "x",
-                    showticklabels=row == 2,
-                    title=axis_title("time, s") if row == 2 else None,
-                    unifiedhovertitle={"text": "%{x:.3f} s"},
-                ),
-                _axis("yaxis", joint): axis(
-                    anchor=x,
-                    domain=[max(0.0, top - ROW / (height - TOP - BOTTOM)), min(1.0, top)],
-                    ticksuffix="°",
-                    range=[float(middle - half), float(middle + half)],
-                    nticks=6,
-                ),
-            }
-        )
+        axes |= {
+            _axis("xaxis", joint): axis(
+                anchor=y,
+                domain=[0, 0.46] if column == 0 else [0.54, 1],
+                matches=None if joint == 0 else "x",
+                showticklabels=row == 2,
+                title=axis_title("time, s") if row == 2 else None,
+                unifiedhovertitle={"text": "%{x:.3f} s"},
+            ),
+            _axis("yaxis", joint): axis(
+                anchor=x,
+                domain=[max(0.0, top - ROW / (height - TOP - BOTTOM)), min(1.0, top)],
+                ticksuffix="°",
+                range=[float(middle - half), float(middle + half)],
+                nticks=6,
+            ),
+        }
         figure.add_scatter(
             x=_short(plan.time),
             y=_short(q),
@@ -94,19 +92,22 @@ def joint_positions(plan: Plan) -> go.Figure:
         if not endless:
             spare = min(float(q.min()) - low, high - float(q.max()))
             span = f"limits {_deg(low)} to {_deg(high)}, {_deg(spare)} to spare"
-        figure.add_annotation(
-            text=f"joint {joint + 1} <span style='color:{QUIET}'>· {span}</span>",
-            font={"size": 12, "color": INK},
-            x=0,
-            xref=f"{x} domain",
-            xanchor="left",
-            y=1,
-            yref=f"{y} domain",
-            yanchor="bottom",
-            showarrow=False,
+        annotations.append(
+            {
+                "text": f"joint {joint + 1} <span style='color:{QUIET}'>· {span}</span>",
+                "font": {"size": 12, "color": INK},
+                "x": 0,
+                "xref": f"{x} domain",
+                "xanchor": "left",
+                "y": 1,
+                "yref": f"{y} domain",
+                "yanchor": "bottom",
+                "showarrow": False,
+            }
         )
-        for bound in () if endless else (low, high):
-            figure.add_shape(_level(float(bound), x, y, QUIET, "solid"))
+        if not endless:
+            shapes += [_level(float(bound), x, y, QUIET, "solid") for bound in (low, high)]
+    _lay_out(figure, plan.time, axes, shapes, annotations)
     return figure
 
 
@@ -139,8 +140,8 @@ def limit_shares(plan: Plan) -> go.Figure:
         margin={"l": 62, "r": 44, "t": SHARE_TOP, "b": BOTTOM},
         legend={"orientation": "h", "x": 0, "y": 1.03, "yanchor": "bottom", "font": {"size": 12}},
     )
-    figure.update_layout(meta={"nodes": np.round(plan.time, 4).tolist()})
-    _add_posture_bands(figure, plan, panels=2, labelled=())
+    shapes, annotations = _posture_bands(plan, panels=2, labelled=())
+    axes: dict[str, object] = {}
     middle = (plan.time[:-1] + plan.time[1:]) / 2
     panels = (
         ("velocity", middle, plan.velocity_share, plan.settings.eta_v),
@@ -149,24 +150,22 @@ def limit_shares(plan: Plan) -> go.Figure:
     for row, (what, time, share, eta) in enumerate(panels):
         x, y = _axis("x", row), _axis("y", row)
         bottom = 0.0 if row else (SHARE_ROW + GAP) / (2 * SHARE_ROW + GAP)
-        figure.update_layout(
-            {
-                _axis("xaxis", row): axis(
-                    anchor=y,
-                    matches=None if row == 0 else "x",
-                    showticklabels=row == 1,
-                    title=axis_title("time, s") if row else None,
-                    unifiedhovertitle={"text": "%{x:.3f} s"},
-                ),
-                _axis("yaxis", row): axis(
-                    anchor=x,
-                    domain=[bottom, bottom + SHARE_ROW / (2 * SHARE_ROW + GAP)],
-                    ticksuffix=" %",
-                    title=axis_title(f"{what}, % of limit"),
-                    range=_share_range(share),
-                ),
-            }
-        )
+        axes |= {
+            _axis("xaxis", row): axis(
+                anchor=y,
+                matches=None if row == 0 else "x",
+                showticklabels=row == 1,
+                title=axis_title("time, s") if row else None,
+                unifiedhovertitle={"text": "%{x:.3f} s"},
+            ),
+            _axis("yaxis", row): axis(
+                anchor=x,
+                domain=[bottom, bottom + SHARE_ROW / (2 * SHARE_ROW + GAP)],
+                ticksuffix=" %",
+                title=axis_title(f"{what}, % of limit"),
+                range=_share_range(share),
+            ),
+        }
         for joint in range(plan.robot.joints):
             figure.add_scatter(
                 x=_short(time),
@@ -181,31 +180,50 @@ def limit_shares(plan: Plan) -> go.Figure:
                 yaxis=y,
             )
         for sign in (-1, 1):
-            figure.add_shape(_level(100.0 * sign, x, y, INK, "solid"))
+            shapes.append(_level(100.0 * sign, x, y, INK, "solid"))
             if eta != 1:
-                figure.add_shape(_level(100.0 * eta * sign, x, y, QUIET, "dash"))
+                shapes.append(_level(100.0 * eta * sign, x, y, QUIET, "dash"))
         if eta != 1:
-            figure.add_annotation(
-                text=f"η {eta * 100:g} %",
-                font={"size": 11, "color": QUIET},
-                x=1,
-                xref=f"{x} domain",
-                xanchor="left",
-                y=100 * eta,
-                yref=y,
-                showarrow=False,
+            annotations.append(
+                {
+                    "text": f"η {eta * 100:g} %",
+                    "font": {"size": 11, "color": QUIET},
+                    "x": 1,
+                    "xref": f"{x} domain",
+                    "xanchor": "left",
+                    "y": 100 * eta,
+                    "yref": y,
+                    "showarrow": False,
+                }
             )
+    _lay_out(figure, plan.time, axes, shapes, annotations)
     return figure
 
 
-def _add_posture_bands(figure: go.Figure, plan: Plan, *, panels: int, labelled: Any) -> None:
-    """Shade every second run of one posture, and name the runs that are wide enough to read.
+def _lay_out(
+    figure: go.Figure,
+    nodes: Array,
+    axes: dict[str, object],
+    shapes: list[dict[str, object]],
+    annotations: list[dict[str, object]],
+) -> None:
+    """Give a figure all of its layout at once: piece by piece plotly takes three times as long."""
+    layout = {"meta": {"nodes": np.round(nodes, 4).tolist()}, **axes}
+    figure.update_layout(layout | {"shapes": shapes, "annotations": annotations}, overwrite=True)
 
-    To be called before other shapes are added: later ones lie on top.
+
+def _posture_bands(
+    plan: Plan, *, panels: int, labelled: Any
+) -> tuple[list[dict[str, object]], list[dict[str, object]]]:
+    """Return shapes that shade every second run of one posture, and names of the wide runs.
+
+    Other shapes come after them: later ones lie on top.
     """
+    shapes: list[dict[str, object]] = []
+    annotations: list[dict[str, object]] = []
     runs = posture_runs(plan)
     if len(runs) == 1:
-        return
+        return shapes, annotations
     whole = plan.time[-1] - plan.time[0]
     for number, (mu, first, last) in enumerate(runs):
         t0 = (plan.time[max(first - 1, 0)] + plan.time[first]) / 2
@@ -213,18 +231,21 @@ def _add_posture_bands(figure: go.Figure, plan: Plan, *, panels: int, labelled: 
         for panel in range(panels):
             x, y = _axis("x", panel), _axis("y", panel)
             if number % 2:
-                figure.add_shape(band(t0, t1, xref=x, yref=f"{y} domain"))
+                shapes.append(band(t0, t1, xref=x, yref=f"{y} domain"))
             if panel in labelled and t1 - t0 > 0.18 * whole:
-                figure.add_annotation(
-                    text=posture_name(mu),
-                    font={"size": 10, "color": QUIET},
-                    x=(t0 + t1) / 2,
-                    xref=x,
-                    y=0.1,
-                    yref=f"{y} domain",
-                    yanchor="bottom",
-                    showarrow=False,
+                annotations.append(
+                    {
+                        "text": posture_name(mu),
+                        "font": {"size": 10, "color": QUIET},
+                        "x": (t0 + t1) / 2,
+                        "xref": x,
+                        "y": 0.1,
+                        "yref": f"{y} domain",
+                        "yanchor": "bottom",
+                        "showarrow": False,
+                    }
                 )
+    return shapes, annotations
 
 
 def _share_range(share: Array) -> list[float]:
