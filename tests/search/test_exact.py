@@ -71,8 +71,8 @@ def agree(rng, closure, **sizes):
 @pytest.mark.parametrize("closure", ["free", "periodic"])
 def test_the_optimum_agrees_with_trying_every_pair_of_edges(closure):
     rng = np.random.default_rng(21)
-    feasible = sum(agree(rng, closure) for _ in range(1500))
-    assert 300 < feasible < 1450
+    feasible = sum(agree(rng, closure) for _ in range(500))
+    assert 100 < feasible < 480
 
 
 @pytest.mark.parametrize("below", [0.3, 20.0])

@@ -2,6 +2,7 @@
 
 import json
 import shutil
+from functools import lru_cache, partial
 
 import numpy as np
 import pytest
@@ -23,12 +24,13 @@ def folder(tmp_path_factory):
 
 @pytest.fixture(scope="module")
 def made(folder):
-    return {name: _plan_jobs.planned(folder, name) for name in _plan_jobs.JOBS}
+    """Give job file and plan of a name, planned when first asked for: workers share the tests."""
+    return lru_cache(partial(_plan_jobs.planned, folder))
 
 
 def test_no_harmful_edit_of_a_plan_passes(made):
     tally = plan_edits.Tally()
-    for job, plan in made.values():
+    for job, plan in map(made, _plan_jobs.JOBS):
         audit = PlanAudit.of(job)
         plan_edits.edited_plans(tally, lambda p, a=audit: a.audited(p).passed, plan, EDITS, seed=1)
     assert tally.passed == []
@@ -40,7 +42,7 @@ def test_no_harmful_edit_of_a_plan_passes(made):
 
 @pytest.mark.parametrize("name", ["part", "cell", "dip", "pieces"])
 def test_no_job_edited_since_passes(made, name):
-    job, plan = made[name]
+    job, plan = made(name)
     assert audit_file(plan, job).passed
     found = [
         (what, plan_edits.judged(lambda p, o=other: audit_file(p, o).passed, plan))
@@ -52,7 +54,7 @@ def test_no_job_edited_since_passes(made, name):
 
 
 def test_without_its_job_a_plan_says_what_was_taken_from_it(made, folder):
-    _, plan = made["part"]
+    _, plan = made("part")
     found = audit_file(plan)
     assert found.passed
     assert "Limits, tool, placement and speed were taken from the plan itself" in found.note
@@ -65,7 +67,7 @@ def test_without_its_job_a_plan_says_what_was_taken_from_it(made, folder):
 
 
 def test_a_finding_says_contour_node_what_was_expected_and_what_was_found(made, folder):
-    job, plan = made["part"]
+    job, plan = made("part")
     data = json.loads(plan.read_text())
     trim = next(entry for entry in data["contours"] if entry["name"] == "trim")
     trim["nodes"]["kind"][7] = "micro joint"
@@ -78,7 +80,7 @@ def test_a_finding_says_contour_node_what_was_expected_and_what_was_found(made, 
 
 
 def test_what_is_only_claimed_is_said_to_be(made):
-    job, plan = made["part"]
+    job, plan = made("part")
     note = audit_file(plan, job).note
     assert "Claimed, not verified: the bound of hole, trim and that no order" in note
 
@@ -96,7 +98,7 @@ def test_what_is_only_claimed_is_said_to_be(made):
     ],
 )
 def test_a_plan_is_read_strictly(made, folder, old, new, said):
-    _, plan = made["dip"]
+    _, plan = made("dip")
     bad = folder / "bad.json"
     bad.write_text(plan.read_text().replace(old, new, 1))
     with pytest.raises(InputError) as error:
@@ -106,14 +108,14 @@ def test_a_plan_is_read_strictly(made, folder, old, new, said):
 
 
 def test_the_plans_of_a_file_are_public(made):
-    _, plan = made["part"]
+    _, plan = made("part")
     plans = kerfpath.read_plan_file(plan).plans
     assert [p.name for p in plans] == ["hole", "trim"]
     assert np.isfinite(plans[0].q).all()
 
 
 def test_a_move_through_a_fixture_is_found(made, folder, tmp_path):
-    job, plan = made["part"]
+    job, plan = made("part")
     shutil.copy(job.with_name("plate.dxf"), tmp_path)
     moves = kerfpath.read_plan_file(plan).moves
     robot = kerfpath.read_plan_file(plan).plans[0].robot
@@ -129,7 +131,7 @@ def test_a_move_through_a_fixture_is_found(made, folder, tmp_path):
 
 
 def test_contours_in_another_order_know_which_of_them_lie_in_which(made):
-    prepared = prepare(read_job(made["part"][0]))
+    prepared = prepare(read_job(made("part")[0]))
     assert prepared.names == ["hole", "trim"]
     assert prepared.inner_first == ((0, 1),)
     turned = prepared.with_contours(prepared.contours[::-1])
