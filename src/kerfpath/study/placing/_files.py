@@ -50,7 +50,7 @@ def layout_entry(found: Layout) -> LayoutEntry:
         "open_bound": found.open_bound,
         "statuses": found.statuses,
         "stages": found.stages,
-        "exact_searches": sum(trial.searched for trial in found.tried),
+        "exact_searches": found.solved,
         "estimated": found.estimated,
         "estimate_error": None if found.estimate_error is None else list(found.estimate_error),
         "reasons": _reasons(found),

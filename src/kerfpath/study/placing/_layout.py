@@ -104,6 +104,11 @@ class Layout:
         return {stage: found[stage] for stage in (OFF_GRID if self.off_grid else ON_GRID)}
 
     @property
+    def solved(self) -> int:
+        """How many placements were solved exactly on the grid, or planned over continuous gamma."""
+        return sum(t.searched and t.result.stage != "proved" for t in self.tried)
+
+    @property
     def estimated(self) -> int:
         """How many placements are neither planned nor proved to be no better, but estimated."""
         return sum(is_estimated(trial.result) for trial in self.tried)

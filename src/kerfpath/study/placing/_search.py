@@ -28,14 +28,16 @@ PER_VARIABLE = 4
 """Placements of a generation for each variable."""
 AT_ONCE = 4
 """Placements that are solved exactly at once, however many processes there are."""
+PROVED_AT_ONCE = 16
+"""Placements that are proved to be no better at once; where none of them is, none is any more."""
 MOST_EXACT = 0.25
 """Share of the evaluations that may be solved exactly."""
 LEAST_EXACT = 16
 """Exact searches that there may be at least."""
 HALF = 24
 """Nodes to each side of a node that binds, which make a stretch with it."""
-EASE = 0.02
-"""Share by which an estimate may at least fall short of the plan, beyond what was seen so far."""
+EASE = 0.05
+"""Share by which estimates are taken to fall short of plans, or else the most seen so far."""
 CLOSE = 1.3
 """Contours up to this much faster than the slowest give stretches, too."""
 
@@ -186,8 +188,13 @@ class PlacementSearch:
                 continue
             what = "placements planned" if self.off_grid else "exact searches"
             self.progress(what, self.exact, self.exact + len(open_))
-            results = self._evaluated([t.offsets for t in batch], exact=True, floor=self.floor)
-            self.exact += len(batch)
+            results = self._evaluated(
+                [t.offsets for t in batch],
+                stretches=[self._slowest_first(t) for t in batch],
+                exact=True,
+                floor=self.floor,
+            )
+            self.exact += sum(result.stage != "proved" for result in results)
             for trial, result in zip(batch, results, strict=True):
                 trial.searched = True
                 trial.result = replace(result, estimate=trial.result.estimate)
@@ -197,27 +204,34 @@ class PlacementSearch:
     def settle(self) -> tuple[bool, float | None]:
         """Prove of the placements that were not planned that none is better, as far as can be.
 
-        Returns whether that is proved of all, or the best estimate of the others. It can be proved
-        of speeds and margins alone.
+        The worst estimate first, until nothing more is proved. Returns whether that is proved of
+        all, or the best estimate of the others. It can be proved of speeds and margins alone.
         """
         left = [trial for trial in self.trials if is_estimated(trial.result)]
-        floor = self.floor
-        if floor is not None and self.goal != "motion":
-            some = [trial for trial in left if trial.result.slowest is not None]
-            results = self._evaluated(
-                [trial.offsets for trial in some],
-                stretches=[[self.stretches[trial.result.slowest or 0]] for trial in some],
-                prove=True,
-                floor=floor,
-                progress=lambda done: self.progress("proofs", done, len(some)),
-            )
-            for trial, result in zip(some, results, strict=True):
-                if result.bound is not None:
-                    trial.result = replace(trial.result, stage="proved", bound=result.bound)
+        some = [trial for trial in left if trial.result.slowest is not None]
+        some.sort(key=self._energy, reverse=True)
+        if self.floor is not None and self.goal != "motion":
+            for done in range(0, len(some), PROVED_AT_ONCE):
+                self.progress("proofs", done, len(some))
+                if not self._prove(some[done : done + PROVED_AT_ONCE]):
+                    break
             left = [trial for trial in left if is_estimated(trial.result)]
         promises = [p for trial in left if (p := trial.result.promise) is not None]
         best = (min if self.goal == "motion" else max)(promises, default=None)
         return not left, best
+
+    def _prove(self, trials: Sequence[PlacementTrial]) -> bool:
+        """Prove that placements are no better than the best; return whether that is so of any."""
+        results = self._evaluated(
+            [trial.offsets for trial in trials],
+            stretches=[self._slowest_first(trial)[:1] for trial in trials],
+            prove=True,
+            floor=self.floor,
+        )
+        for trial, result in zip(trials, results, strict=True):
+            if result.bound is not None:
+                trial.result = replace(trial.result, stage="proved", bound=result.bound)
+        return any(result.bound is not None for result in results)
 
     def mapped(self, about: PlacementTrial, points: int) -> PlacementMap:
         """Try a grid over the first two variables about a placement, as all others are tried."""
@@ -285,7 +299,7 @@ class PlacementSearch:
         self,
         offsets: Sequence[Mapping[str, float]],
         *,
-        stretches: Sequence[list[list[int]]] | None = None,
+        stretches: Sequence[Sequence[Sequence[int]]] | None = None,
         exact: bool = False,
         whole: bool = False,
         prove: bool = False,
@@ -330,6 +344,14 @@ class PlacementSearch:
             for name, value in zip(self.ranges, point, strict=True)
         }
         return self.known.setdefault(tuple(offsets.values()), PlacementTrial(offsets=offsets))
+
+    def _slowest_first(self, trial: PlacementTrial) -> list[list[int]]:
+        """Return the stretches, that of the estimate first if there is one."""
+        first = trial.result.slowest
+        if first is None:
+            return self.stretches
+        others = [each for number, each in enumerate(self.stretches) if number != first]
+        return [self.stretches[first], *others]
 
     def _may_win(self, trial: PlacementTrial) -> bool:
         if not trial.result.feasible:
