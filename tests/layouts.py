@@ -68,11 +68,11 @@ rpy_deg = [0, 0, 0]
 [[contour]]
 pick = "small"
 speed_m_min = 2
-count = 41
+count = {small}
 [[contour]]
 pick = "large"
 speed_m_min = 2
-count = 61
+count = {large}
 [plan]
 method = "{method}"
 gamma_step_deg = 10
@@ -81,7 +81,7 @@ refine = false
 """
 
 
-def rings(folder, x, method="exact"):
+def rings(folder, x, method="exact", small=41, large=61):
     """A job of two rings from a table of points, which workers are quick to read."""
     rows = ["contour,x_mm,y_mm,z_mm,nx,ny,nz"]
     for name, radius, middle in (("small", 8, -40), ("large", 20, 40)):
@@ -89,7 +89,7 @@ def rings(folder, x, method="exact"):
             x_mm, y_mm = radius * np.cos(angle), middle + radius * np.sin(angle)
             rows.append(f"{name},{x_mm:.4f},{y_mm:.4f},0,0,0,1")
     job_file(folder, "\n".join(rows), "rings.csv")
-    return job_file(folder, TABLE.format(x=x, method=method))
+    return job_file(folder, TABLE.format(x=x, method=method, small=small, large=large))
 
 
 def worth(job, *places, goal="speed", stretches=(), **options):
