@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import resource
 import tempfile
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 from time import perf_counter
@@ -118,15 +118,19 @@ def _both(case: Case, figures: list[Figure], findings: list[str]) -> Layout:
         )  # fmt: skip
         seconds.append(_busy() - begun)
     off, on = found
-    assert on.best is not None
-    worth = [_planned(case, placed.best.offsets) for placed in found if placed.best is not None]
+    worth = [_planned(case, placed) for placed in found]
     unit = "" if case.goal == "motion" else "m/min"
     rows: list[tuple[str, float | None, str]] = [
         ("as shipped, planned", off.before.value, unit),
         ("best placement, planned", worth[0], unit),
         ("best placement of the grid, planned", worth[1], unit),
-        ("best placement of the grid, on the grid", on.best.result.value, unit),
+        (
+            "best placement of the grid, on the grid",
+            None if on.best is None else on.best.result.value,
+            unit,
+        ),
         ("placements planned", off.solved, f"of {len(off.tried)}"),
+        ("proved to be no faster", off.stages["proved"], f"of {len(off.tried)}"),
         ("judged by an estimate alone", off.estimated, f"of {len(off.tried)}"),
         ("time", seconds[0], "s"),
         ("time of the grid", seconds[1], "s"),
@@ -153,10 +157,11 @@ def _busy() -> float:
     return sum(each.ru_utime + each.ru_stime for each in spent)
 
 
-def _planned(case: Case, offsets: Mapping[str, float]) -> float:
-    """Return what a placement is worth over continuous gamma."""
+def _planned(case: Case, placed: Layout) -> float:
+    """Return what the best placement is worth over continuous gamma, or that of the job."""
+    offsets = {} if placed.best is None else dict(placed.best.offsets)
     data = evaluate_placements(
-        job=str(case.job), digest=digest(case.job), goal=case.goal, places=[dict(offsets)],
+        job=str(case.job), digest=digest(case.job), goal=case.goal, places=[offsets],
         stretches=[], exact=True,
     )  # fmt: skip
     value = PlacementValue.from_data(data).value
