@@ -163,3 +163,13 @@ def test_what_is_asked_for_stays_in_the_plan_that_a_quick_motion_leads_to(arm, s
     assert made.cost == pytest.approx(
         path_cost(made.increments, asked.weights, "euclid", "sum"), rel=1e-9
     )
+
+
+def test_a_speed_that_is_enough_ends_the_search(arm, space, quickest_at_work):
+    nodes = drawn(1)
+    fastest = fastest_speed(nodes, arm, refine=True, **space)
+    assert fastest.on_grid is not None
+    middle = (fastest.on_grid + fastest.speed) / 2
+    for enough in (fastest.on_grid, middle, 2 * fastest.speed):
+        found = fastest_speed(nodes, arm, refine=True, enough=enough, **space)
+        assert min(enough, fastest.speed) <= found.speed <= fastest.speed

@@ -1,4 +1,4 @@
-"""The best placement: bounds that hold, moves that are right, a search that is repeatable."""
+"""The best placement on the grid: bounds that hold, moves that are right, a repeatable search."""
 
 import json
 import re
@@ -13,50 +13,16 @@ from scipy.spatial.distance import cdist
 
 from browser import CHROMIUM, dom_of
 from commands import assert_refused, run
-from conftest import ROOT
 from jobs import speeds_on_grid
 from kerfpath.cad import read as read_drawing
 from kerfpath.errors import InputError
 from kerfpath.job import cell_of_job, pose, read_job
 from kerfpath.study import digest, layout, ranges_of
 from kerfpath.study._evaluator import EVERY
-from kerfpath.study.placing._evaluate import contours_of, evaluate_placements, middle_of
+from kerfpath.study.placing._evaluate import contours_of, middle_of
 from kerfpath.study.placing._place import move_job, numbers_of, placed_text
-from kerfpath.study.placing._value import PlacementValue
+from layouts import HEAD, contours, job_file, rings, worth
 
-DEMO = ROOT / "src" / "kerfpath" / "demo"
-HEAD = f"""
-[robot]
-model = "abb_irb4600_60_205"
-endless = [4, 6]
-acceleration_deg_s2 = [320, 270, 420, 1300, 1400, 2000]
-
-[tool]
-head = "laser-head-45"
-
-[part]
-file = '{DEMO / "b_pillar.step"}'
-xyz_mm = [1200, -600, 500]     # where it lies now
-rpy_deg = [0, 0, 90]
-"""
-CONTOURS = """
-[[contour]]
-pick = "skin/hole11"
-name = "slot"
-speed_m_min = {speed}
-spacing_mm = 2
-
-[[contour]]
-pick = "skin/hole13"
-name = "hole 20"
-speed_m_min = {speed}
-spacing_mm = 2
-
-[plan]
-gamma_step_deg = {step}
-posture = "front/up"
-refine = false
-"""
 CELL = """
 [cell]
 near_miss_mm = 10
@@ -84,58 +50,16 @@ SOME = [
 ]
 
 
-def job_file(folder, text, name="job.toml"):
-    path = folder / name
-    path.write_text(text)
-    return path
-
-
 @pytest.fixture(scope="module")
 def plain(tmp_path_factory):
     """Two openings at 2 m/min."""
-    return job_file(tmp_path_factory.mktemp("a"), HEAD + CONTOURS.format(speed=2, step=5))
+    return job_file(tmp_path_factory.mktemp("a"), HEAD + contours(speed=2, step=5))
 
 
 @pytest.fixture(scope="module")
 def slow(tmp_path_factory):
     """The same so slow that over eight nodes an endless axis may turn more than half a turn."""
-    return job_file(tmp_path_factory.mktemp("b"), HEAD + CONTOURS.format(speed=0.2, step=10))
-
-
-TABLE = """
-[robot]
-model = "abb_irb4600_60_205"
-acceleration_ratio = "iontec_20_to_70kg"
-[tool]
-head = "laser-head-45"
-[part]
-file = "rings.csv"
-xyz_mm = [{x}, 0, 500]
-rpy_deg = [0, 0, 0]
-[[contour]]
-pick = "small"
-speed_m_min = 2
-count = 41
-[[contour]]
-pick = "large"
-speed_m_min = 2
-count = 61
-[plan]
-gamma_step_deg = 10
-posture = "front/up"
-refine = false
-"""
-
-
-def rings(folder, x):
-    """A job of two rings from a table of points, which workers are quick to read."""
-    rows = ["contour,x_mm,y_mm,z_mm,nx,ny,nz"]
-    for name, radius, middle in (("small", 8, -40), ("large", 20, 40)):
-        for angle in np.linspace(0, 2 * np.pi, 73)[:-1]:
-            x_mm, y_mm = radius * np.cos(angle), middle + radius * np.sin(angle)
-            rows.append(f"{name},{x_mm:.4f},{y_mm:.4f},0,0,0,1")
-    job_file(folder, "\n".join(rows), "rings.csv")
-    return job_file(folder, TABLE.format(x=x))
+    return job_file(tmp_path_factory.mktemp("b"), HEAD + contours(speed=0.2, step=10))
 
 
 @pytest.fixture(scope="module")
@@ -145,19 +69,10 @@ def coarse(tmp_path_factory):
 
 @pytest.fixture(scope="module")
 def in_cell(tmp_path_factory):
-    return job_file(tmp_path_factory.mktemp("c"), HEAD + CONTOURS.format(speed=2, step=10) + CELL)
-
-
-def worth(job, *places, goal="speed", stretches=(), **options):
-    data = evaluate_placements(
-        job=str(job),
-        digest=digest(job),
-        goal=goal,
-        places=list(places) or [{}],
-        stretches=[list(s) for s in stretches],
-        **options,
+    return job_file(
+        tmp_path_factory.mktemp("c"),
+        HEAD + contours(speed=2, step=10) + CELL,
     )
-    return PlacementValue.from_data(json.loads(json.dumps(data)))
 
 
 def middle(path, goal="speed"):
@@ -282,7 +197,7 @@ def test_a_head_from_a_file_turns_with_its_mount(tmp_path):
     text = HEAD.replace('head = "laser-head-45"', "xyz_mm = [40, 0, 200]\nrpy_deg = [0, 0, 0]")
     file = f'[cell.head]\nfile = "{cone}"\nunit = "mm"\nxyz_mm = [40, 0, 100]\n'
     cell = CELL.replace("[[cell.fixture]]", f"{file}nozzle_length_mm = 40\n\n[[cell.fixture]]", 1)
-    job = read_job(job_file(tmp_path, text + CONTOURS.format(speed=2, step=10) + cell))
+    job = read_job(job_file(tmp_path, text + contours(speed=2, step=10) + cell))
     there = move_job(job, numbers_of(job, {"mount_deg": 50.0}, np.zeros(3)))
     drawing = read_drawing(job.part_file)
     before, after = ({b.name: b for b in cell_of_job(j, drawing).bodies} for j in (job, there))
@@ -431,7 +346,7 @@ def test_ranges_on_the_command_line():
     ],
 )
 def test_a_layout_table_is_refused_at_its_line(tmp_path, line, said):
-    text = HEAD + CONTOURS.format(speed=2, step=10) + f"\n[layout]\n{line}\n"
+    text = HEAD + contours(speed=2, step=10) + f"\n[layout]\n{line}\n"
     path = job_file(tmp_path, text)
     with pytest.raises(InputError, match=re.escape(said)) as refused:
         read_job(path)

@@ -118,14 +118,28 @@ def _show_best(entry: LayoutEntry) -> None:
     was = f"{shipped['value']:.3f}{unit}" if shipped["value"] is not None else shipped["status"]
     gain = "" if best["gain"] is None else f", {100 * best['gain']:+.1f} %"
     out.print(f"{entry['goal']}: {best['value']:.3f}{unit}, as the job has it {was}{gain}")
-    proved = (
-        "no other of them is better there, proved"
-        if entry["proved"]
-        else f"others of them may come to {entry['open_bound']:.3f}{unit}"
-    )
     count = entry["statuses"].get("feasible", 0)
-    out.print(f"{tried} placements tried, {count} feasible, {solved} solved exactly; {proved}")
+    said = f"{tried} placements tried, {count} feasible, {solved}"
+    if entry["off_grid"]:
+        out.print(f"{said} planned over continuous rotation, this one the best of them")
+        out.print(_claim(entry, unit))
+        return
+    others = "better" if entry["open_bound"] is None else f"{entry['open_bound']:.3f}{unit}"
+    proved = "no other of them is better there, proved"
+    still = f"others of them may come to {others}"
+    out.print(f"{said} solved exactly; {proved if entry['proved'] else still}")
     out.print(f"speeds and displacements are those {ON_THIS_GRID}; {FINER}: see kerfpath speed")
+
+
+def _claim(entry: LayoutEntry, unit: str) -> str:
+    """Say of the placements that were not planned what is proved of them."""
+    said = []
+    if count := entry["stages"].get("proved", 0):
+        said.append(f"{count} proved to be no faster at any rotation")
+    if count := entry["estimated"]:
+        best = "" if entry["open_bound"] is None else f" (at best {entry['open_bound']:.3f}{unit})"
+        said.append(f"{count} judged by an estimate alone{best}, which proves nothing")
+    return f"of the others {'; '.join(said)}" if said else "no other is left to be better"
 
 
 def _show_why(entry: LayoutEntry) -> None:
@@ -137,9 +151,10 @@ def _show_why(entry: LayoutEntry) -> None:
         at = f" ({why['contour']}, node {why['node']})" if why["contour"] else ""
         parts.append(f"{why['count']} {why['status']}{at}")
     worst = max(REMEDIES, key=lambda status: entry["statuses"].get(status, 0))
+    among = "by samples of the rotation" if entry["off_grid"] else ON_THIS_GRID
     out.print(
         escape(
-            f"no placement is feasible {ON_THIS_GRID}: of {len(entry['tried'])} tried "
+            f"no placement is feasible {among}: of {len(entry['tried'])} tried "
             f"{', '.join(parts)}: {REMEDIES[worst]}; {FINER}"
         )
     )

@@ -168,6 +168,10 @@ def layout(
     of a fastest speed to the speed in the job; motion is the least total displacement of the joints
     at the speeds in the job. Placements that cannot cut every contour come after all that can.
 
+    An estimate over continuous rotation orders the placements. Those that come near the best are
+    planned; others are proved to be no faster, where that can be proved, or left to their estimate:
+    the command prints how many. With method = "exact" in the job all of it is on its grid.
+
     The variables are offsets in the robot base: x_mm, y_mm, z_mm, yaw_deg, tilt_x_deg, tilt_y_deg
     of the part with its fixtures; base_x_mm, base_y_mm, base_z_mm, base_yaw_deg of the robot's
     base; mount_deg, the turn of the head about the flange. Their ranges come from --vary, or else

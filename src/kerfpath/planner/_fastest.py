@@ -18,7 +18,7 @@ from kerfpath.options import GraphKeywords, PlanOptions, with_keywords
 from kerfpath.planner._clear import ClearSearch
 from kerfpath.planner._closed import binding_nodes, impossible_share
 from kerfpath.planner._graph import longest_step, node_interval, require_even
-from kerfpath.planner._quickest import quick_motions
+from kerfpath.planner._quickest import QuickMotion, quick_motions
 from kerfpath.planner._task import PlanningTask, task_of
 from kerfpath.robots import Robot
 from kerfpath.search import (
@@ -85,6 +85,7 @@ def fastest_speed(
     graph: LayeredGraph | None = None,
     progress: Callable[[int], None] | None = None,
     ceiling: bool = False,
+    enough: float | None = None,
     **keywords: Unpack[SpeedKeywords],
 ) -> FastestSpeed:
     """Return the largest constant speed at which a path exists: exactly on the graph, or off it.
@@ -97,6 +98,7 @@ def fastest_speed(
     and keeps the margins of `comfort`, which may have no costs here. `plan` finds a motion at the
     speed returned, too. With `ceiling` it is also proved, as far as a limited amount of work does,
     above which speed there is no motion at all, on the grid or off it, see `FastestSpeed.ceiling`.
+    Off the grid a speed that is `enough`, m/s, may be returned although there are faster ones.
 
     Raises
     ------
@@ -120,7 +122,7 @@ def fastest_speed(
         graph=graph,
         progress=progress,
     )
-    found, nodes = _fastest(task, ClearSearch(task, cell))
+    found, nodes = _fastest(task, ClearSearch(task, cell), enough)
     if not ceiling:
         return found
     interval = longest_step(contour) / found.speed
@@ -128,7 +130,9 @@ def fastest_speed(
     return found if share is None else replace(found, ceiling=found.speed / share)
 
 
-def _fastest(task: PlanningTask, finder: ClearSearch) -> tuple[FastestSpeed, list[int]]:
+def _fastest(
+    task: PlanningTask, finder: ClearSearch, enough: float | None
+) -> tuple[FastestSpeed, list[int]]:
     """Return the largest speed reached, on the grid or, where that is asked for, off it.
 
     And the nodes where a limit binds, the first that of the speed.
@@ -136,8 +140,11 @@ def _fastest(task: PlanningTask, finder: ClearSearch) -> tuple[FastestSpeed, lis
     if not (task.settings.refine and task.robot.family.free_rotation):
         found = FastestSpeed.of(task.contour, finder.find(find_least_interval, task.problem.free()))
         return found, [found.node]
-    motions, step = list(quick_motions(task, finder)), longest_step(task.contour)
-    quick = motions[-1]
+    motions, step = list[QuickMotion](), longest_step(task.contour)
+    for quick in quick_motions(task, finder):
+        motions.append(quick)
+        if enough is not None and step / quick.dt >= enough:
+            break
     found = FastestSpeed(
         speed=step / quick.dt,
         joint=quick.at.joint,

@@ -26,6 +26,9 @@ STAGES = {
     "reach": "reach: poses of every eighth node",
     "stretch": "stretches that bind, solved exactly",
     "exact": "all contours, solved exactly",
+    "estimate": "an estimate alone",
+    "proved": "a proof that no motion is faster than at the best one",
+    "planned": "planned over continuous gamma",
 }
 
 DOTS = " Small dots are the placements tried, wherever the other variables were then."
@@ -53,9 +56,8 @@ def render_layout(entry: LayoutEntry, *, job_text: str = "") -> str:
         *_contours(entry),
         *_map(entry, figures),
         "<section><h2>Search</h2>",
-        '<p class="caption">Each dot is a placement, in the order in which they were tried: what '
-        "it can come to at best, as far as was found out. Filled ones were solved exactly; the "
-        f"line is the best so far. {_foot(entry)}</p>",
+        f'<p class="caption">Each dot is a placement, in the order in which they were tried: '
+        f"{_dots(entry)}; the line is the best so far. {_foot(entry)}</p>",
         figures.place(convergence(entry), "convergence"),
         _tallies(entry),
         "</section>",
@@ -63,6 +65,12 @@ def render_layout(entry: LayoutEntry, *, job_text: str = "") -> str:
         f"<footer>kerfpath {escape(entry['kerfpath'])} · seed {entry['seed']}</footer>",
     ]
     return page(f"{entry['job']}: placement", body, figures)
+
+
+def _dots(entry: LayoutEntry) -> str:
+    if entry["off_grid"]:
+        return "what it comes to by an estimate. Filled ones were planned"
+    return "what it can come to at best, as far as was found out. Filled ones were solved exactly"
 
 
 def _foot(entry: LayoutEntry) -> str:
@@ -96,19 +104,29 @@ def _facts(entry: LayoutEntry) -> list[tuple[str, str]]:
     facts = [
         ("Goal", GOALS[entry["goal"]]),
         ("Placements tried", f"{tried}, {entry['statuses'].get('feasible', 0)} of them feasible"),
-        ("Solved exactly", f"{exact} of {tried}"),
+        ("Planned" if entry["off_grid"] else "Solved exactly", f"{exact} of {tried}"),
     ]
     if entry["best"] is not None:
         facts.append(("As the job has it", _value(entry, entry["shipped"]["value"])))
-        proved = "the best of those tried, proved"
-        still = f"others may come to {_value(entry, entry['open_bound'])}"
-        facts.append(("Claim", proved if entry["proved"] else still))
+        facts.append(("Claim", _claim(entry)))
     if entry["tolerance"]:
         spans = ", ".join(f"{name} ±{size:g}" for name, size in entry["tolerance"].items())
         facts.append(("The worst within", f"{spans}, one at a time"))
     if entry["standing"]:
         facts.append(("Standing", ", ".join(entry["standing"])))
     return facts
+
+
+def _claim(entry: LayoutEntry) -> str:
+    if entry["proved"]:
+        return "the best of those tried, proved"
+    others = _value(entry, entry["open_bound"])
+    if not entry["off_grid"]:
+        return f"others may come to {others}"
+    return (
+        f"the best of those planned; {entry['estimated']} others are judged by an estimate alone, "
+        f"at best {others}, which proves nothing"
+    )
 
 
 def _notes(entry: LayoutEntry) -> list[str]:
@@ -183,11 +201,16 @@ def _contours(entry: LayoutEntry) -> list[str]:
         rows.append(f'<tr><th scope="row">{escape(contour["name"])}</th>{cells}{binds}</tr>')
     return [
         "<section><h2>Contours</h2>",
-        '<p class="caption">On the job\'s own grid, each solved to its own optimum'
-        f"{'' if motion else ': the fastest constant speed'}.</p>",
+        f'<p class="caption">{_how(entry)}{"" if motion else ": the fastest constant speed"}.</p>',
         table(heads, rows, text_columns=(0, 4, 5)),
         "</section>",
     ]
+
+
+def _how(entry: LayoutEntry) -> str:
+    if entry["off_grid"]:
+        return "Over continuous gamma, the best motion found of each"
+    return "On the job's own grid, each solved to its own optimum"
 
 
 def _binds(side: ContourSide | None) -> str:
@@ -203,9 +226,10 @@ def _map(entry: LayoutEntry, figures: Figures) -> list[str]:
     others = [name for name in entry["ranges"] if name not in drawn["variables"]]
     held = f", {' and '.join(others)} as in the best placement" if others else ""
     over = f"{' and '.join(drawn['variables'])}{held}"
+    comes = "comes to, mostly by estimates," if entry["off_grid"] else "can come to at best"
     return [
         "<section><h2>Map</h2>",
-        f'<p class="caption">What the goal can come to at best over {over}; elsewhere why nothing '
+        f'<p class="caption">What the goal {comes} over {over}; elsewhere why nothing '
         f"can be cut there.{DOTS if drawn['y'] else ''}</p>",
         figures.place(placement_map(entry, drawn), "placements"),
         "</section>",

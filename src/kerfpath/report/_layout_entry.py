@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from typing import Literal, TypedDict
 
-__all__ = ["ContourSide", "LayoutEntry", "LayoutMap", "MapSquare"]
+__all__ = ["ContourSide", "LayoutEntry", "LayoutMap", "MapSquare", "TriedPlacement", "promise"]
 
 Goal = Literal["speed", "margin", "motion"]
 
@@ -39,14 +39,19 @@ class _Best(TypedDict):
     numbers: dict[str, object]
 
 
-class _Tried(_Reason):
-    """A placement that was tried; `bound` is the best that it may still come to."""
+class TriedPlacement(_Reason):
+    """A placement that was tried.
+
+    `bound` is the best that it may still come to, `estimate` about what it comes to over continuous
+    gamma.
+    """
 
     offsets: dict[str, float]
     status: str
     stage: str
     bound: float | None
     value: float | None
+    estimate: float | None
 
 
 class ContourSide(TypedDict, total=False):
@@ -83,6 +88,8 @@ class MapSquare(_Reason):
 
     status: str
     bound: float | None
+    value: float | None
+    estimate: float | None
 
 
 class LayoutMap(TypedDict):
@@ -95,12 +102,18 @@ class LayoutMap(TypedDict):
 
 
 class LayoutEntry(TypedDict):
-    """All of layout.json."""
+    """All of layout.json.
+
+    With `off_grid` values are those of plans over continuous gamma, of as many placements as there
+    were `exact_searches`, and `open_bound` is the best estimate of those that are only `estimated`;
+    `estimate_error` are the least and the largest share of its estimate that a plan came to.
+    """
 
     schema: int
     kerfpath: str
     job: str
     goal: Goal
+    off_grid: bool
     unit: str
     ranges: dict[str, tuple[float, float]]
     default_ranges: bool
@@ -113,12 +126,22 @@ class LayoutEntry(TypedDict):
     best: _Best | None
     contours: list[_Contour]
     proved: bool
-    open_bound: float
+    open_bound: float | None
     statuses: dict[str, int]
     stages: dict[str, int]
     exact_searches: int
+    estimated: int
+    estimate_error: list[float] | None
     reasons: list[_Tally]
-    nearest: _Tried | None
+    nearest: TriedPlacement | None
     evolved: int
-    tried: list[_Tried]
+    tried: list[TriedPlacement]
     map: LayoutMap | None
+
+
+def promise(goal: Goal, placement: TriedPlacement | MapSquare) -> float | None:
+    """Return what a placement is worth as far as is known: value, or bound or estimate."""
+    if placement["value"] is not None:
+        return placement["value"]
+    known = [v for v in (placement["bound"], placement["estimate"]) if v is not None]
+    return (max if goal == "motion" else min)(known, default=None)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import plotly.graph_objects as go
 
-from kerfpath.report._layout_entry import LayoutEntry, LayoutMap, MapSquare
+from kerfpath.report._layout_entry import LayoutEntry, LayoutMap, MapSquare, promise
 from kerfpath.report._look import (
     ACCENT,
     ALERT,
@@ -27,7 +27,7 @@ WORDS = {"speed": "m/min", "margin": "times asked", "motion": "displacement"}
 
 
 def placement_map(entry: LayoutEntry, drawn: LayoutMap) -> go.Figure:
-    """Return the bounds over the first two variables, or over the only one, and those tried."""
+    """Return what is known over the first two variables, or the only one, and those tried."""
     return _plane(entry, drawn) if drawn["y"] else _line(entry, drawn)
 
 
@@ -40,17 +40,26 @@ def _hover(entry: LayoutEntry, square: MapSquare) -> str:
     if square["status"] != "feasible":
         where = f"{square['contour']}, node {square['node']}: " if "contour" in square else ""
         return f"{square['status']}<br>{where}{square.get('reason', '')[:90]}"
-    if square["bound"] is None:
+    known = promise(entry["goal"], square)
+    if known is None:
         return "feasible as far as is known"
-    least = "at least" if entry["goal"] == "motion" else "at most"
-    return f"{least} {square['bound']:.3f} {WORDS[entry['goal']]}"
+    how = "at least" if entry["goal"] == "motion" else "at most"
+    if square["value"] is not None:
+        how = "planned:" if entry["off_grid"] else "exactly"
+    elif known == square["estimate"]:
+        how = "estimated:"
+    return f"{how} {known:.3f} {WORDS[entry['goal']]}"
+
+
+def _shown(entry: LayoutEntry, square: MapSquare) -> float | None:
+    return promise(entry["goal"], square) if square["status"] == "feasible" else None
 
 
 def _plane(entry: LayoutEntry, drawn: LayoutMap) -> go.Figure:
     first, second = drawn["variables"]
     shape = len(drawn["y"]), len(drawn["x"])
     cells = np.array(drawn["cells"], dtype=object).reshape(shape)
-    bound = [[c["bound"] if c["status"] == "feasible" else None for c in row] for row in cells]
+    bound = [[_shown(entry, c) for c in row] for row in cells]
     figure = go.Figure(layout=base_layout(HEIGHT, legend={"orientation": "h", "y": 1.09}))
     grid = {"x": drawn["x"], "y": drawn["y"]}
     for status, colour in WHY.items():
@@ -111,9 +120,9 @@ def _mark(
 def _line(entry: LayoutEntry, drawn: LayoutMap) -> go.Figure:
     name = drawn["variables"][0]
     figure = go.Figure(layout=base_layout(380, legend={"orientation": "h", "y": 1.12}))
-    bounds = [c["bound"] if c["status"] == "feasible" else None for c in drawn["cells"]]
+    bounds = [_shown(entry, c) for c in drawn["cells"]]
     figure.add_scatter(
-        x=drawn["x"], y=bounds, mode="lines+markers", line={"color": ACCENT}, name="bound",
+        x=drawn["x"], y=bounds, mode="lines+markers", line={"color": ACCENT}, name=_known(entry),
         text=[_hover(entry, c) for c in drawn["cells"]], hovertemplate="%{text}<extra></extra>",
     )  # fmt: skip
     half = _half(drawn["x"])
@@ -136,27 +145,33 @@ def _line(entry: LayoutEntry, drawn: LayoutMap) -> go.Figure:
     return figure
 
 
+def _known(entry: LayoutEntry) -> str:
+    return "estimate" if entry["off_grid"] else "bound"
+
+
 def convergence(entry: LayoutEntry) -> go.Figure:
-    """Return the bound of each placement tried, in order, and the best bound so far."""
+    """Return the bound or estimate of each placement tried, in order, and the best one so far."""
     tried, less = entry["tried"], entry["goal"] == "motion"
+    worth = [promise(entry["goal"], placement) for placement in tried]
     figure = go.Figure(layout=base_layout(360, legend={"orientation": "h", "y": 1.12}))
-    feasible = [i for i, t in enumerate(tried) if t["status"] == "feasible" and t["bound"]]
-    bounds = np.array([tried[i]["bound"] for i in feasible], dtype=float)
+    feasible = [i for i, t in enumerate(tried) if t["status"] == "feasible" and worth[i]]
+    bounds = np.array([worth[i] for i in feasible], dtype=float)
     solved = [i for i in feasible if tried[i]["value"] is not None]
     open_ = {"size": 6, "color": "white", "line": {"width": 1.2, "color": ACCENT}}
     hover = "placement %{x}: %{y:.3f}<extra></extra>"
     figure.add_scatter(
-        x=feasible, y=bounds.tolist(), mode="markers", marker=open_, name="bound",
+        x=feasible, y=bounds.tolist(), mode="markers", marker=open_, name=_known(entry),
         hovertemplate=hover,
     )  # fmt: skip
     figure.add_scatter(
-        x=solved, y=[tried[i]["value"] for i in solved], mode="markers", name="solved exactly",
+        x=solved, y=[tried[i]["value"] for i in solved], mode="markers",
+        name="planned" if entry["off_grid"] else "solved exactly",
         marker={"size": 8, "color": ACCENT}, hovertemplate=hover,
     )  # fmt: skip
     if len(feasible):
         so_far = np.minimum.accumulate(bounds) if less else np.maximum.accumulate(bounds)
         figure.add_scatter(
-            x=feasible, y=so_far.tolist(), mode="lines", name="best bound so far",
+            x=feasible, y=so_far.tolist(), mode="lines", name=f"best {_known(entry)} so far",
             line={"color": FAINT, "width": 1.5, "shape": "hv"}, hoverinfo="skip",
         )  # fmt: skip
     lost = [i for i, t in enumerate(tried) if t["status"] != "feasible"]

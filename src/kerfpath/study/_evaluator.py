@@ -106,12 +106,23 @@ class Evaluator:
             if not any(np.isfinite(checker.price(part)).any() for part in parts):
                 yield layer
 
-    def fastest(self, nodes: Contour, graph: LayeredGraph) -> FastestSpeed:
-        """Return the fastest constant speed on the grid, clear in the cell.
+    def fastest(
+        self,
+        nodes: Contour,
+        graph: LayeredGraph,
+        *,
+        off_grid: bool = False,
+        enough: float | None = None,
+    ) -> FastestSpeed:
+        """Return the fastest constant speed on the grid or off it, clear in the cell.
+
+        Off the grid one that is `enough`, m/s, may be returned although there are faster ones.
 
         Raises
         ------
         NoFeasiblePath
-            No speed has a path.
+            No speed has a path on the grid.
         """
-        return fastest_along(self.job, nodes, self.cell, refine=False, graph=graph)
+        return fastest_along(
+            self.job, nodes, self.cell, refine=off_grid, graph=graph, enough=enough
+        )

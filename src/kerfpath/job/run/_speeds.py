@@ -23,10 +23,12 @@ def fastest_along(
     refine: bool,
     graph: LayeredGraph | None = None,
     ceiling: bool = False,
+    enough: float | None = None,
 ) -> FastestSpeed:
     """Return the fastest constant speed of a contour, clear in the cell where there is one.
 
-    With `ceiling` also the speed from which on none is possible, where that is proved.
+    With `ceiling` also the speed from which on none is possible, where that is proved; off the grid
+    one that is `enough`, m/s, may be returned although there are faster ones.
     """
     return fastest_speed(
         nodes,
@@ -37,6 +39,7 @@ def fastest_along(
         cell=cell,
         graph=graph,
         ceiling=ceiling,
+        enough=enough,
     )
 
 

@@ -13,6 +13,7 @@ from kerfpath.job import Job
 from kerfpath.study._evaluator import SampledContour, sample_contours
 from kerfpath.study._job import load_job
 from kerfpath.study.placing._evaluator import PlacementEvaluator
+from kerfpath.study.placing._off_grid import OffGridEvaluator, leaves_grid
 from kerfpath.study.placing._place import move_job, numbers_of
 from kerfpath.study.placing._value import ContourValue, PlacementValue, is_better, worst_of
 
@@ -28,9 +29,12 @@ def evaluate_placements(
     stretches: list[list[int]],
     exact: bool = False,
     whole: bool = False,
+    prove: bool = False,
     floor: float | None = None,
 ) -> dict[str, object]:
     """Return the `PlacementValue` of the worst of some placements: a task of a sweep.
+
+    They are judged over continuous gamma if the job's method is "continuous", else on its grid.
 
     Parameters
     ----------
@@ -40,11 +44,14 @@ def evaluate_placements(
     places : list of mapping
         Offsets by variable; the first is the nominal placement, others are its errors.
     stretches : list of (contour, first node, last node)
-        Solved for the bound.
+        Solved for the bound or the estimate.
     exact : bool
         Also solve the contours, unless they are infeasible before.
     whole : bool
         Solve every contour of the nominal placement to its own optimum.
+    prove : bool
+        Over continuous gamma: only prove by the stretches, if that can be, that no motion is faster
+        than the floor.
     floor : float, optional
         Values that do not beat it are of no interest.
     """
@@ -54,19 +61,23 @@ def evaluate_placements(
     of_contours: tuple[ContourValue, ...] = ()
     worst: PlacementValue | None = None
     for i, offsets in enumerate(places):
-        evaluator = PlacementEvaluator(
+        kind = OffGridEvaluator if leaves_grid(known.job) else PlacementEvaluator
+        evaluator = kind(
             job=move_job(known.job, numbers_of(known.job, offsets, middle)),
             part=known.part,
             goal=goal,
             contours=contours,
         )
-        here = evaluator.evaluate(
-            stretches,
-            exact=exact,
-            whole=whole and i == 0,
-            floor=floor,
-            least=None if worst is None else worst.value,
-        )
+        if prove and floor is not None and isinstance(evaluator, OffGridEvaluator):
+            here = evaluator.disproved(stretches, floor)
+        else:
+            here = evaluator.evaluate(
+                stretches,
+                exact=exact,
+                whole=whole and i == 0,
+                floor=floor,
+                least=None if worst is None else worst.value,
+            )
         of_contours, here = of_contours or here.contours, replace(here, place=i)
         worst = here if worst is None else _worse(goal, worst, here)
         if not worst.feasible:
@@ -85,14 +96,19 @@ def _worse(goal: str, one: PlacementValue, two: PlacementValue) -> PlacementValu
     """Return what two placements are worth together."""
     if not two.feasible:
         return two
-    bounds = [bound for bound in (one.bound, two.bound) if bound is not None]
-    bound = worst_of(goal, bounds) if bounds else None
+    bound, estimate = (
+        worst_of(goal, known) if (known := [v for v in pair if v is not None]) else None
+        for pair in ((one.bound, two.bound), (one.estimate, two.estimate))
+    )
+    first = (one.bound, one.estimate) == (bound, estimate)
     exact = None if one.value is None or two.value is None else [one.value, two.value]
     return replace(
         two,
         bound=bound,
         value=None if exact is None else worst_of(goal, exact),
-        place=one.place if bound == one.bound else two.place,
+        estimate=estimate,
+        slowest=one.slowest if first else two.slowest,
+        place=one.place if first else two.place,
     )
 
 

@@ -1,4 +1,4 @@
-"""Tests of a placement that grow dearer: each but the last gives a bound, all proved.
+"""Tests of a placement on the grid that grow dearer: each but the last gives a bound, all proved.
 
 - Reach: the layers of every `EVERY`-th node alone, with all their poses. A node without a pose, or
   in a cell without a clear one, ends it: every path visits every node.
@@ -17,6 +17,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
+from typing import ClassVar
 
 import numpy as np
 
@@ -40,7 +41,7 @@ from kerfpath.study.placing._value import (
     worst_of,
 )
 
-__all__ = ["PlacementEvaluator"]
+__all__ = ["InfeasiblePlacement", "PlacementEvaluator"]
 
 THIN = 4
 """Steps of gamma between the samples of a path that is good enough."""
@@ -62,7 +63,7 @@ class InfeasiblePlacement(Exception):
 
 @dataclass(kw_only=True, eq=False)
 class PlacementEvaluator(Evaluator):
-    """One placement, a job moved there, and the tests of it.
+    """One placement, a job moved there, and the tests of it on the grid.
 
     Parameters
     ----------
@@ -73,6 +74,11 @@ class PlacementEvaluator(Evaluator):
     goal: str
     contours: tuple[SampledContour, ...]
     graphs: list[LayeredGraph] = field(default_factory=list)
+
+    off_grid: ClassVar[bool] = False
+    """Whether gamma is continuous, and not on its grid."""
+    last: ClassVar[Stage] = "exact"
+    """The test that finds the value."""
 
     __repr__ = short_repr
 
@@ -96,7 +102,7 @@ class PlacementEvaluator(Evaluator):
             )
             if not exact or (beaten and not whole):
                 return PlacementValue(stage=stage, bound=bound)
-            stage = "exact"
+            stage = self.last
             order = dict.fromkeys([*(s[0] for s in stretches), *range(len(self.contours))])
             return self._solve(list(order), floor, least, whole=whole)
         except InfeasiblePlacement as found:
@@ -155,14 +161,23 @@ class PlacementEvaluator(Evaluator):
         return worst_of(self.goal, values) if values else None
 
     def _value(
-        self, index: int, contour: SampledContour, graph: LayeredGraph
+        self,
+        index: int,
+        contour: SampledContour,
+        graph: LayeredGraph,
+        enough: float | None = None,
     ) -> tuple[float, ContourValue]:
-        """Return the value of a contour on a graph, alone and with what binds."""
+        """Return the value of a contour on a graph, alone and with what binds.
+
+        Off the grid a speed or margin that is `enough` may be returned although more is possible.
+        """
         known = ContourValue(index=index, name=contour.name, nodes=len(contour.nodes))
         if self.goal == "motion":
             cost = self._plan_cost(contour, graph)
             return cost, replace(known, value=cost)
-        found = self.fastest(contour.nodes, graph)
+        if enough is not None:
+            enough *= contour.speed if self.goal == "margin" else 1 / 60
+        found = self.fastest(contour.nodes, graph, off_grid=self.off_grid, enough=enough)
         value = found.speed / contour.speed if self.goal == "margin" else found.speed * 60
         return value, replace(
             known,
@@ -176,8 +191,8 @@ class PlacementEvaluator(Evaluator):
     def _plan_cost(self, contour: SampledContour, graph: LayeredGraph) -> float:
         options = replace(
             self.job.options.without_penalties,
-            method="exact", objective="sum", feed="constant", refine=False,
-            certify=None,
+            method="continuous" if self.off_grid else "exact",
+            objective="sum", feed="constant", refine=False, certify=None,
         )  # fmt: skip
         if not contour.nodes.closed:
             options = replace(options, closure="free")  # a stretch of a loop that closes need not
@@ -221,12 +236,8 @@ class PlacementEvaluator(Evaluator):
         left = {c: self._least_displacement(c) for c in order} if motion else {}
         for c in order:
             graph = self.graph(self.contours[c].nodes)
-            enough = None if motion or whole or least is None else self._enough(c, graph, least)
-            if enough is not None:
-                solved[c] = enough
-                continue
             try:
-                value, solved[c] = self._value(c, self.contours[c], graph)
+                value, solved[c] = self._solved(c, graph, None if motion or whole else least)
             except NoFeasiblePath as broken:
                 raise self._infeasible(c, graph, broken, 2 + len(solved) / len(order)) from None
             if motion:
@@ -235,8 +246,24 @@ class PlacementEvaluator(Evaluator):
             else:
                 least = value if least is None else worst_of(self.goal, [least, value])
             if floor is not None and not whole and not is_better(self.goal, least, floor):
-                return _exact(least, None, solved)
-        return _exact(least, least, solved)
+                return self._known(least, None, solved)
+        return self._known(least, least, solved)
+
+    def _known(
+        self, bound: float | None, value: float | None, solved: Mapping[int, ContourValue]
+    ) -> PlacementValue:
+        """Return what came of the last test, the contours as the job has them."""
+        contours = tuple(solved[c] for c in sorted(solved))
+        return PlacementValue(stage=self.last, bound=bound, value=value, contours=contours)
+
+    def _solved(
+        self, index: int, graph: LayeredGraph, least: float | None
+    ) -> tuple[float, ContourValue]:
+        """Return the value of a contour, or `least` where it is at least that."""
+        enough = None if least is None else self._enough(index, graph, least)
+        if least is not None and enough is not None:
+            return least, enough
+        return self._value(index, self.contours[index], graph)
 
     def _enough(self, index: int, graph: LayeredGraph, least: float) -> ContourValue | None:
         """Return a value that is reached on a part of the graph, if it is `least` or more."""
@@ -282,11 +309,3 @@ class PlacementEvaluator(Evaluator):
                 index=index if searched else None,
             )
         )
-
-
-def _exact(
-    bound: float | None, value: float | None, solved: Mapping[int, ContourValue]
-) -> PlacementValue:
-    """Return what came of the exact test, the contours as the job has them."""
-    contours = tuple(solved[c] for c in sorted(solved))
-    return PlacementValue(stage="exact", bound=bound, value=value, contours=contours)

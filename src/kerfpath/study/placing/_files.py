@@ -19,7 +19,7 @@ from kerfpath.study.placing._value import PlacementValue
 
 __all__ = ["layout_entry", "write_layout"]
 
-SCHEMA = 1
+SCHEMA = 2
 """Counts the ways in which layout.json was written."""
 UNITS = {"speed": "m/min", "margin": "times the speed asked for", "motion": ""}
 OF_CONTOUR = ("value", "at_least", "fastest_m_min", "joint", "limit", "node")
@@ -34,6 +34,7 @@ def layout_entry(found: Layout) -> LayoutEntry:
         "kerfpath": __version__,
         "job": found.job.path.name,
         "goal": found.goal,
+        "off_grid": found.off_grid,
         "unit": UNITS[found.goal],
         "ranges": {name: list(span) for name, span in found.ranges.items()},
         "default_ranges": found.by_default,
@@ -49,7 +50,9 @@ def layout_entry(found: Layout) -> LayoutEntry:
         "open_bound": found.open_bound,
         "statuses": found.statuses,
         "stages": found.stages,
-        "exact_searches": sum(trial.searched for trial in found.tried),
+        "exact_searches": found.solved,
+        "estimated": found.estimated,
+        "estimate_error": None if found.estimate_error is None else list(found.estimate_error),
         "reasons": _reasons(found),
         "nearest": None if best is not None else _trial(found.nearest),
         "evolved": found.evolved,
@@ -87,7 +90,7 @@ def _contours(before: PlacementValue, after: PlacementValue | None) -> list[dict
 
 
 def _trial(trial: PlacementTrial) -> dict[str, object]:
-    known = trial.result.entry("status", "stage", "bound", "value", *WHY)
+    known = trial.result.entry("status", "stage", "bound", "value", "estimate", *WHY)
     return {"offsets": dict(trial.offsets), **known}
 
 
@@ -118,7 +121,7 @@ def _map(found: Layout) -> dict[str, object] | None:
         "x": found.map.x.tolist(),
         "y": found.map.y.tolist(),
         "cells": [
-            each.result.entry("status", "bound", "reason", "contour", "node")
+            each.result.entry("status", "bound", "value", "estimate", "reason", "contour", "node")
             for each in found.map.trials
         ],
     }

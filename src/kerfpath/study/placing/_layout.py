@@ -1,4 +1,4 @@
-"""The best placement: a global search on bounds, then exact searches from the best bound down."""
+"""The best placement: a global search on bounds or estimates, then values, the best first."""
 
 from __future__ import annotations
 
@@ -16,6 +16,7 @@ from kerfpath.job import Goal, Job, cell_of_job
 from kerfpath.progress import Progress, no_progress
 from kerfpath.study._job import digest, load_job
 from kerfpath.study.placing._evaluate import contours_of, evaluate_placements, middle_of
+from kerfpath.study.placing._off_grid import leaves_grid
 from kerfpath.study.placing._place import DEFAULT_RANGES, Numbers, numbers_of
 from kerfpath.study.placing._search import (
     LEAST_EXACT,
@@ -24,11 +25,14 @@ from kerfpath.study.placing._search import (
     PlacementSearch,
     PlacementTrial,
 )
-from kerfpath.study.placing._value import PlacementValue
+from kerfpath.study.placing._value import PlacementValue, Stage, is_estimated
 from kerfpath.sweep import Sweep
 
 __all__ = ["STATUSES", "Layout", "layout"]
 
+ON_GRID: tuple[Stage, ...] = ("reach", "stretch", "exact")
+OFF_GRID: tuple[Stage, ...] = ("reach", "estimate", "proved", "planned")
+"""The tests that decide, in their order."""
 STATUSES = ("feasible", "speed", "collision", "unreachable")
 """What may become of a placement, the best first."""
 
@@ -41,6 +45,8 @@ class Layout:
     ----------
     job : Job
     goal : {"speed", "margin", "motion"}
+    off_grid : bool
+        Whether placements are judged over continuous gamma, by plans, or by paths of the grid.
     ranges : mapping of variable to (low, high)
     by_default : bool
         Whether nobody said what varies.
@@ -56,9 +62,10 @@ class Layout:
     before, after : PlacementValue
         What the job's placement and the best one are worth, contour by contour.
     proved : bool
-        Whether no other of those tried is better.
+        Whether it is proved that no other of those tried is better.
     open_bound : float or None
-        What the others can come to at best, where it is not proved.
+        What the others can come to at best, where it is not proved; over continuous gamma, the best
+        estimate of those that were neither planned nor proved to be no better.
     numbers : Numbers
         What the best placement changes in the job.
     map : PlacementMap or None
@@ -66,6 +73,7 @@ class Layout:
 
     job: Job
     goal: Goal
+    off_grid: bool
     ranges: Mapping[str, tuple[float, float]]
     by_default: bool
     tolerance: Mapping[str, float]
@@ -93,7 +101,24 @@ class Layout:
     def stages(self) -> dict[str, int]:
         """How many placements each test decided."""
         found = Counter(trial.result.stage for trial in self.tried)
-        return {stage: found[stage] for stage in ("reach", "stretch", "exact")}
+        return {stage: found[stage] for stage in (OFF_GRID if self.off_grid else ON_GRID)}
+
+    @property
+    def solved(self) -> int:
+        """How many placements were solved exactly on the grid, or planned over continuous gamma."""
+        return sum(t.searched and t.result.stage != "proved" for t in self.tried)
+
+    @property
+    def estimated(self) -> int:
+        """How many placements are neither planned nor proved to be no better, but estimated."""
+        return sum(is_estimated(trial.result) for trial in self.tried)
+
+    @property
+    def estimate_error(self) -> tuple[float, float] | None:
+        """The least and the largest share of their estimates that planned placements came to."""
+        both = [(trial.result.value, trial.result.estimate) for trial in self.tried]
+        shares = [value / about for value, about in both if value is not None and about]
+        return (min(shares), max(shares)) if shares else None
 
     @property
     def nearest(self) -> PlacementTrial:
@@ -127,6 +152,11 @@ def layout(
     Where an exact search shows a stretch that binds and was not in the bound, the bounds are found
     again with it. The points of the map about the best are tried in the same way. The same seed
     gives the same answer, whatever the number of processes.
+
+    Over continuous gamma, which the job's method asks for by default, values are those of plans,
+    and estimates stand in the place of bounds: placements whose estimates come near the best value
+    are planned, and of the others it is proved, as far as can be, that no motion there is faster,
+    see `Layout.proved` and `Layout.estimated`.
 
     Parameters
     ----------
@@ -176,6 +206,7 @@ def layout(
         search = PlacementSearch(
             sweep=sweep,
             task={"job": path, "digest": then, "goal": table.goal},
+            off_grid=leaves_grid(at.job),
             ranges=spans,
             tolerance=tolerance,
             most=max(LEAST_EXACT, int(MOST_EXACT * table.evaluations)),
@@ -188,6 +219,8 @@ def layout(
         if table.map_points:
             drawn = search.mapped(search.best or search.trials[0], table.map_points)
             proved, open_bound = search.climb()  # what the map shows to be better is taken
+        if search.off_grid:
+            proved, open_bound = search.settle()
         best = search.best
         after = None if best is None else search.whole(best)
     numbers: Numbers = {}
@@ -197,6 +230,7 @@ def layout(
     return Layout(
         job=at.job,
         goal=table.goal,
+        off_grid=search.off_grid,
         ranges=spans,
         by_default=not (ranges or table.ranges),
         tolerance=tolerance,

@@ -1,9 +1,15 @@
-"""The search for the best placement: bounds guide it, exact searches end it."""
+"""The search for the best placement: bounds guide it on the grid, and exact searches end it.
+
+Over continuous gamma estimates guide it, and plans end it: placements whose estimate is nearly as
+good as the best are planned, too, where nearly is by what estimates have fallen short of plans. Of
+the others it is proved in the end, where that can be, that they are no better.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
+from itertools import repeat
 
 import numpy as np
 from scipy.optimize import Bounds, differential_evolution
@@ -13,7 +19,7 @@ from kerfpath._arrays import Array
 from kerfpath._repr import short_repr
 from kerfpath.errors import InputError
 from kerfpath.progress import Progress
-from kerfpath.study.placing._value import SLACK, PlacementValue, is_better
+from kerfpath.study.placing._value import SLACK, PlacementValue, is_better, is_estimated
 from kerfpath.sweep import Sweep
 
 __all__ = ["LEAST_EXACT", "MOST_EXACT", "PlacementMap", "PlacementSearch", "PlacementTrial"]
@@ -22,12 +28,16 @@ PER_VARIABLE = 4
 """Placements of a generation for each variable."""
 AT_ONCE = 4
 """Placements that are solved exactly at once, however many processes there are."""
+PROVED_AT_ONCE = 16
+"""Placements that are proved to be no better at once; where none of them is, none is any more."""
 MOST_EXACT = 0.25
 """Share of the evaluations that may be solved exactly."""
 LEAST_EXACT = 16
 """Exact searches that there may be at least."""
 HALF = 24
 """Nodes to each side of a node that binds, which make a stretch with it."""
+EASE = 0.05
+"""Share by which estimates are taken to fall short of plans, or else the most seen so far."""
 CLOSE = 1.3
 """Contours up to this much faster than the slowest give stretches, too."""
 
@@ -43,9 +53,9 @@ class PlacementTrial:
     result : PlacementValue
         What is known of it.
     stretches : int
-        How many stretches its bound was found with; -1 before there is one.
+        How many stretches its bound, or estimate, was found with; -1 before there is one.
     searched : bool
-        Whether its exact value was searched for.
+        Whether its value was searched for, exactly on the grid, or by plans.
     """
 
     offsets: Mapping[str, float]
@@ -58,7 +68,7 @@ class PlacementTrial:
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class PlacementMap:
-    """Bounds over the first two variables, the others as in the best placement.
+    """Bounds or estimates over the first two variables, the others as in the best placement.
 
     Parameters
     ----------
@@ -81,6 +91,7 @@ class PlacementSearch:
 
     sweep: Sweep
     task: Mapping[str, str]
+    off_grid: bool
     ranges: Mapping[str, tuple[float, float]]
     tolerance: Mapping[str, float]
     most: int
@@ -88,6 +99,7 @@ class PlacementSearch:
     stretches: list[list[int]] = field(default_factory=list)
     best: PlacementTrial | None = None
     exact: int = 0
+    ease: float = EASE
     known: dict[tuple[float, ...], PlacementTrial] = field(default_factory=dict)
 
     __repr__ = short_repr
@@ -118,7 +130,7 @@ class PlacementSearch:
         return self._evaluated([trial.offsets], exact=True, whole=True)[0]
 
     def evolve(self, evaluations: int, seed: int) -> None:
-        """Search the ranges by differential evolution on the bounds."""
+        """Search the ranges by differential evolution on the bounds or estimates."""
         low, high = np.array(list(self.ranges.values())).T
         size = 2 ** int(np.ceil(np.log2(PER_VARIABLE * len(low))))
         size = max(5, min(max(size, 8), evaluations // 2))
@@ -159,9 +171,10 @@ class PlacementSearch:
         )
 
     def climb(self, *, until_found: bool = False) -> tuple[bool, float | None]:
-        """Solve placements exactly, the best bound first, until none can beat the best.
+        """Solve placements, the best bound or estimate first, until none can beat the best.
 
-        Returns whether that was so, or what the others could still come to.
+        Returns whether that was so, or what the others could still come to: by estimates that is no
+        proof, see `settle`.
         """
         while True:
             open_ = [t for t in self.trials if not t.searched and self._may_win(t)]
@@ -169,17 +182,56 @@ class PlacementSearch:
                 return not open_, None
             open_.sort(key=self._energy)
             if self.exact >= self.most:
-                return False, open_[0].result.bound
+                return False, open_[0].result.promise
             batch = open_[:AT_ONCE]
             if self._refresh(batch):
                 continue
-            self.progress("exact searches", self.exact, self.exact + len(open_))
-            results = self._evaluated([t.offsets for t in batch], exact=True, floor=self.floor)
-            self.exact += len(batch)
+            what = "placements planned" if self.off_grid else "exact searches"
+            self.progress(what, self.exact, self.exact + len(open_))
+            results = self._evaluated(
+                [t.offsets for t in batch],
+                stretches=[self._slowest_first(t) for t in batch],
+                exact=True,
+                floor=self.floor,
+            )
+            self.exact += sum(result.stage != "proved" for result in results)
             for trial, result in zip(batch, results, strict=True):
-                trial.searched, trial.result = True, result
+                trial.searched = True
+                trial.result = replace(result, estimate=trial.result.estimate)
                 self._take(trial)
-            self.progress("exact searches", self.exact, self.exact + len(open_) - len(batch))
+            self.progress(what, self.exact, self.exact + len(open_) - len(batch))
+
+    def settle(self) -> tuple[bool, float | None]:
+        """Prove of the placements that were not planned that none is better, as far as can be.
+
+        The worst estimate first, until nothing more is proved. Returns whether that is proved of
+        all, or the best estimate of the others. It can be proved of speeds and margins alone.
+        """
+        left = [trial for trial in self.trials if is_estimated(trial.result)]
+        some = [trial for trial in left if trial.result.slowest is not None]
+        some.sort(key=self._energy, reverse=True)
+        if self.floor is not None and self.goal != "motion":
+            for done in range(0, len(some), PROVED_AT_ONCE):
+                self.progress("proofs", done, len(some))
+                if not self._prove(some[done : done + PROVED_AT_ONCE]):
+                    break
+            left = [trial for trial in left if is_estimated(trial.result)]
+        promises = [p for trial in left if (p := trial.result.promise) is not None]
+        best = (min if self.goal == "motion" else max)(promises, default=None)
+        return not left, best
+
+    def _prove(self, trials: Sequence[PlacementTrial]) -> bool:
+        """Prove that placements are no better than the best; return whether that is so of any."""
+        results = self._evaluated(
+            [trial.offsets for trial in trials],
+            stretches=[self._slowest_first(trial)[:1] for trial in trials],
+            prove=True,
+            floor=self.floor,
+        )
+        for trial, result in zip(trials, results, strict=True):
+            if result.bound is not None:
+                trial.result = replace(trial.result, stage="proved", bound=result.bound)
+        return any(result.bound is not None for result in results)
 
     def mapped(self, about: PlacementTrial, points: int) -> PlacementMap:
         """Try a grid over the first two variables about a placement, as all others are tried."""
@@ -215,9 +267,12 @@ class PlacementSearch:
         return bool(stale)
 
     def _take(self, trial: PlacementTrial) -> None:
-        """Learn from an exact search: the best placement, and the stretches that bind."""
+        """Learn from a value: the best placement, the stretches that bind, how estimates err."""
         result, why = trial.result, trial.result.infeasibility
         value = result.value if result.feasible else None
+        if value is not None and result.estimate is not None:
+            over = result.estimate / value if self.goal == "motion" else value / result.estimate
+            self.ease = max(self.ease, over - 1)
         if value is not None and is_better(self.goal, value, self.floor):
             self.best = trial
         limit = CLOSE * min((c.value for c in result.contours if c.value is not None), default=0.0)
@@ -244,22 +299,25 @@ class PlacementSearch:
         self,
         offsets: Sequence[Mapping[str, float]],
         *,
+        stretches: Sequence[Sequence[Sequence[int]]] | None = None,
         exact: bool = False,
         whole: bool = False,
+        prove: bool = False,
         floor: float | None = None,
         progress: Callable[[int], None] = lambda done: None,
     ) -> list[PlacementValue]:
-        """Return what placements are worth."""
+        """Return what placements are worth, by all stretches or by those given for each."""
         keys = [
             self.sweep.submit(
                 **self.task,
                 places=self._places(at),
-                stretches=self.stretches,
+                stretches=about,
                 exact=exact,
                 whole=whole,
+                prove=prove,
                 floor=floor,
             )
-            for at in offsets
+            for at, about in zip(offsets, stretches or repeat(self.stretches), strict=False)
         ]
         found: list[PlacementValue] = []
         for key in keys:
@@ -287,18 +345,28 @@ class PlacementSearch:
         }
         return self.known.setdefault(tuple(offsets.values()), PlacementTrial(offsets=offsets))
 
+    def _slowest_first(self, trial: PlacementTrial) -> list[list[int]]:
+        """Return the stretches, that of the estimate first if there is one."""
+        first = trial.result.slowest
+        if first is None:
+            return self.stretches
+        others = [each for number, each in enumerate(self.stretches) if number != first]
+        return [self.stretches[first], *others]
+
     def _may_win(self, trial: PlacementTrial) -> bool:
         if not trial.result.feasible:
             return False
-        bound = trial.result.bound
+        bound, slack = trial.result.bound, SLACK
+        if bound is None:  # estimates are not proved
+            bound, slack = trial.result.estimate, self.ease
         if bound is None or self.floor is None:
             return True
-        eased = bound * (1 - SLACK) if self.goal == "motion" else bound * (1 + SLACK)
+        eased = bound * (1 - slack) if self.goal == "motion" else bound * (1 + slack)
         return is_better(self.goal, eased, self.floor)
 
     def _energy(self, trial: PlacementTrial) -> float:
         """Return what evolution makes small: any feasible placement below every other."""
-        why, bound = trial.result.infeasibility, trial.result.bound
+        why, bound = trial.result.infeasibility, trial.result.promise
         if why is not None:
             return 10.0 - why.progress
         if bound is None:

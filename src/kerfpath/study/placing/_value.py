@@ -18,13 +18,16 @@ __all__ = [
     "Stage",
     "Status",
     "is_better",
+    "is_estimated",
     "worst_of",
 ]
 
 SLACK = 1e-9
 """Relative: by how much rounding may lift a value over its bound."""
 
-Stage = Literal["reach", "stretch", "exact"]
+Stage = Literal["reach", "stretch", "exact", "estimate", "proved", "planned"]
+"""Tests on the grid: reach, stretch, exact; over continuous gamma: reach, estimate, and planned or
+proved to be no better than another."""
 Status = Literal["unreachable", "collision", "speed"]
 """Why a placement is infeasible."""
 
@@ -75,11 +78,16 @@ class PlacementValue:
 
     Parameters
     ----------
-    stage : {"reach", "stretch", "exact"}
+    stage : Stage
         The test that decided.
     bound, value : float, optional
-        What the value cannot beat, and the exact value: m/min of the slowest contour, least share
-        of the asked speeds, or displacement (14); None where that is not known.
+        What the value cannot beat, and the value, exact on the grid or that of plans over
+        continuous gamma: m/min of the slowest contour, least share of the asked speeds, or
+        displacement (14); None where that is not known.
+    estimate : float, optional
+        About what the value is over continuous gamma; it may be better or worse.
+    slowest : int, optional
+        The stretch that the estimate is of, by its number.
     infeasibility : Infeasibility, optional
     contours : tuple of ContourValue
         Of the first placement.
@@ -88,6 +96,8 @@ class PlacementValue:
     stage: Stage
     bound: float | None = None
     value: float | None = None
+    estimate: float | None = None
+    slowest: int | None = None
     infeasibility: Infeasibility | None = None
     contours: tuple[ContourValue, ...] = ()
     place: int = 0
@@ -98,6 +108,12 @@ class PlacementValue:
     def feasible(self) -> bool:
         """Whether nothing forbids it, as far as is known."""
         return self.infeasibility is None
+
+    @property
+    def promise(self) -> float | None:
+        """What it is worth as far as is known: its value, or else its bound, or its estimate."""
+        known = (self.value, self.bound, self.estimate)
+        return next((number for number in known if number is not None), None)
 
     @property
     def status(self) -> str:
@@ -111,7 +127,9 @@ class PlacementValue:
 
     def entry(self, *names: str) -> dict[str, object]:
         """Return some of what is known, with why it is infeasible, as JSON holds it."""
-        known = {name: getattr(self, name) for name in ("status", "stage", "bound", "value")}
+        known = {
+            name: getattr(self, name) for name in ("status", "stage", "bound", "value", "estimate")
+        }
         if self.infeasibility is not None:
             known |= {k: v for k, v in asdict(self.infeasibility).items() if v is not None}
         return {name: known[name] for name in names if name in known}
@@ -124,6 +142,16 @@ def is_better(goal: str, value: float, other: float | None) -> bool:
     if goal == "motion":
         return value < other * (1 - SLACK)
     return value > other * (1 + SLACK)
+
+
+def is_estimated(value: PlacementValue) -> bool:
+    """Return whether all that says that a placement is not the best is an estimate.
+
+    For a displacement, too, where no motion was found along a stretch or by the value function.
+    """
+    return value.stage == "estimate" and (
+        value.infeasibility is None or value.infeasibility.status == "speed"
+    )
 
 
 def worst_of(goal: str, values: Sequence[float]) -> float:

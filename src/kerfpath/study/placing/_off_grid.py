@@ -1,0 +1,226 @@
+"""Tests of a placement over continuous gamma: an estimate, the value of plans, and a proof.
+
+- Reach: as on the grid. It holds for plans, too, which begin from the samples of gamma: a node
+  without a pose, or a clear one, at any of them has no plan.
+- Estimate of a speed: the fastest one that beams keep along stretches about nodes that bind, from
+  few samples of gamma, their joints interpolated. A stretch may be cut at least as fast as the
+  whole, but what is found there is neither the fastest nor quite a motion.
+- Estimate of a displacement: the value function, which is interpolated between the samples, knows
+  no accelerations, and leaves closures and limits of rotation out; and a motion is to be found
+  along stretches that could not be cut elsewhere.
+- Proved: no motion passes the nodes about one that binds as fast as at another placement, at any
+  gamma, posture and turn. It says of the placement that it is not better, and nothing else.
+- Planned: the fastest speed as `kerfpath speed` finds it, or the cost as `kerfpath plan` does. A
+  contour that is known to be as fast as the slowest one is left at that.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import ClassVar
+
+import numpy as np
+
+from kerfpath._arrays import Ints
+from kerfpath._repr import short_repr
+from kerfpath.cell import CollisionChecker
+from kerfpath.certifier import MotionTest
+from kerfpath.errors import NoFeasiblePath
+from kerfpath.graph import LayeredGraph
+from kerfpath.job import Job
+from kerfpath.planner import best_motion, longest_step
+from kerfpath.search import ContinuousSearch, SearchProblem, find_shortest
+from kerfpath.study._evaluator import SampledContour
+from kerfpath.study.placing._beams import Beams, samples_of
+from kerfpath.study.placing._evaluator import InfeasiblePlacement, PlacementEvaluator
+from kerfpath.study.placing._value import ContourValue, PlacementValue, Stage
+
+__all__ = ["OffGridEvaluator", "leaves_grid"]
+
+STEP = np.radians(5.0)
+"""Least step of gamma of the samples of an estimate."""
+
+
+def leaves_grid(job: Job) -> bool:
+    """Return whether the placements of a job are judged over continuous gamma."""
+    return job.options.method == "continuous" and job.robot.family.free_rotation
+
+
+@dataclass(kw_only=True, eq=False)
+class OffGridEvaluator(PlacementEvaluator):
+    """One placement, a job moved there, and the tests of it over continuous gamma."""
+
+    off_grid: ClassVar[bool] = True
+    last: ClassVar[Stage] = "planned"
+
+    __repr__ = short_repr
+
+    def evaluate(
+        self,
+        stretches: Sequence[Sequence[int]],
+        *,
+        exact: bool,
+        whole: bool,
+        floor: float | None,
+        least: float | None,
+    ) -> PlacementValue:
+        """Return what this placement is worth: planned where that is asked for, else estimated.
+
+        It is not planned where the first stretch proves that it is no better than the floor.
+        """
+        if exact and not whole and floor is not None:
+            known = self.disproved(stretches[:1], floor)
+            if known.bound is not None:
+                return known
+        if exact:
+            return super().evaluate(stretches, exact=True, whole=whole, floor=floor, least=least)
+        stage: Stage = "reach"
+        try:
+            self._require_poses()
+            stage = "estimate"
+            if self.goal == "motion":
+                return PlacementValue(stage=stage, estimate=self._displacement(stretches))
+            return self._slowest(stretches)
+        except InfeasiblePlacement as found:
+            return PlacementValue(stage=stage, infeasibility=found.why)
+
+    def disproved(self, stretches: Sequence[Sequence[int]], floor: float) -> PlacementValue:
+        """Return the floor as a bound, if a stretch proves that no motion is as fast as that."""
+        if self.goal == "motion":
+            return PlacementValue(stage="estimate")
+        for c, first, last in stretches:
+            if self._is_closed(c, first, last, floor):
+                return PlacementValue(stage="proved", bound=floor)
+        return PlacementValue(stage="estimate")
+
+    def _bound(self, stretches: Sequence[Sequence[int]]) -> float | None:
+        """Return None: nothing is known before it is planned that its value cannot beat."""
+        return None
+
+    def _least_displacement(self, index: int) -> float:
+        """Return 0: nothing more is proved of a contour before it is planned."""
+        return 0.0
+
+    def _solved(
+        self, index: int, graph: LayeredGraph, least: float | None
+    ) -> tuple[float, ContourValue]:
+        """Return the value of a contour, or one that is found to be reached and `least` or more."""
+        value, known = self._value(index, self.contours[index], graph, least)
+        if least is None or value < least:
+            return value, known
+        return value, ContourValue(index=index, name=known.name, nodes=known.nodes, at_least=value)
+
+    def _slowest(self, stretches: Sequence[Sequence[int]]) -> PlacementValue:
+        """Return the estimate by the stretch that is cut the slowest, which the others may end."""
+        least, slowest = None, None
+        for number, (c, first, last) in enumerate(stretches):
+            value = self._quickest(c, first, last, least)
+            if least is None or value < least:
+                least, slowest = value, number
+        return PlacementValue(stage="estimate", estimate=least, slowest=slowest)
+
+    def _quickest(self, index: int, first: int, last: int, least: float | None) -> float:
+        """Return about what nodes first to last may be worth; no more than `least` matters."""
+        contour, job = self.contours[index], self.job
+        nodes, unit = np.arange(first, last + 1), self._unit(index)
+        graph = self._thin_graph(contour, nodes)
+        run = contour.stretch(first, last, job.options.frames, timed=False)
+        try:
+            on_grid = self.fastest(run.nodes, graph).speed
+        except NoFeasiblePath as broken:
+            raise self._infeasible(index, graph, broken, 2.0, first) from None
+        enough = None if least is None else least * unit
+        if job.robot.external is not None or (enough is not None and on_grid >= enough):
+            return on_grid / unit  # beams know no external axis
+        step = longest_step(contour.nodes)
+        beams = Beams(
+            graph=graph,
+            limits=job.options.limits(job.robot),
+            endless=job.robot.endless,
+            checker=None if self.cell is None else CollisionChecker(self.cell, graph.q),
+        )
+        interval = beams.least_interval(step / on_grid, None if enough is None else step / enough)
+        return step / interval / unit
+
+    def _unit(self, index: int) -> float:
+        """Return the speed of a contour, m/s, that counts as one."""
+        return self.contours[index].speed if self.goal == "margin" else 1 / 60
+
+    def _thin_graph(self, contour: SampledContour, nodes: Ints) -> LayeredGraph:
+        """Return the graph of some nodes on as few samples as do for an estimate."""
+        options = self.job.options.without_penalties
+        if options.gamma_step < STEP:
+            coarse = replace(options, gamma_step=STEP)
+            graph = self.job.graph(contour.nodes, coarse, only=nodes)
+            if np.diff(graph.start).all():
+                return graph
+        return self.graph(contour.nodes, nodes)
+
+    def _displacement(self, stretches: Sequence[Sequence[int]]) -> float:
+        """Return the sum of the value functions; stretches must have a motion."""
+        comfort = self.job.options.without_penalties.comfort
+        if comfort is None or comfort.clearance is None:  # known on the grid only
+            for c, first, last in stretches:
+                self._require_motion(c, first, last)
+        return sum(map(self._value_function, range(len(self.contours))))
+
+    def _require_motion(self, index: int, first: int, last: int) -> None:
+        """Refuse the placement where no motion is found along a stretch at the speed asked for."""
+        contour, job = self.contours[index], self.job
+        graph = self.graph(contour.nodes, np.arange(first, last + 1))
+        run = contour.stretch(first, last, job.options.frames, timed=True)
+        options = replace(
+            job.options.without_penalties,
+            objective="sum", closure="free", feed="constant", rotation=None, certify=None,
+        )  # fmt: skip
+        try:
+            best_motion(
+                run.nodes, job.robot, tool=job.tool, placement=job.placement, speed=run.speed,
+                options=options, cell=self.cell, graph=graph,
+            )  # fmt: skip
+        except NoFeasiblePath as broken:
+            raise self._infeasible(index, graph, broken, 2.0, first) from None
+
+    def _value_function(self, index: int) -> float:
+        """Return the value function of a contour; where it finds no way, neither does the grid."""
+        contour, robot = self.contours[index], self.job.robot
+        graph = self.graph(contour.nodes)
+        options = self.job.options.resolve(robot, contour.interval)
+        empty = np.diff(graph.start) == 0
+        if empty.any():
+            node = int(np.argmax(empty))
+            reason = f"no pose, most often {graph.main_loss(node)}"
+            raise self._why("unreachable", 2.0, reason, index, node, searched=True)
+        problem = SearchProblem(
+            q=graph.q,
+            start=graph.start,
+            dt=contour.interval,
+            limits=options.limits(robot),
+            endless=robot.endless,
+            weights=options.weights,
+            metric=options.metric,
+        )
+        value = ContinuousSearch(problem, samples_of(graph)).value
+        if value < np.inf:
+            return value
+        try:  # which says where it breaks
+            return find_shortest(
+                replace(problem, limits=problem.limits.without_acceleration())
+            ).cost
+        except NoFeasiblePath as broken:
+            raise self._infeasible(index, graph, broken, 2.0) from None
+
+    def _is_closed(self, index: int, first: int, last: int, value: float) -> bool:
+        """Return whether it is proved that nodes first to last pass no motion of such a value."""
+        job, nodes = self.job, self.contours[index].nodes
+        options = job.options
+        if not job.robot.encloses or options.tilt is not None:
+            return False
+        frames = job.placement @ nodes.frames(options.frames)[first : last + 1]
+        test = MotionTest(job.robot, frames, job.tool, options.postures)
+        limits, middle = options.limits(job.robot), (last - first) // 2
+        return (
+            test.closed(limits, longest_step(nodes) / (value * self._unit(index)), middle)
+            is not None
+        )
