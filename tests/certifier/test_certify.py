@@ -14,7 +14,6 @@ from kerfpath.certifier import _stage as stages
 from kerfpath.certifier import certify
 from kerfpath.certifier._cells import CellMaker
 from kerfpath.certifier._nodes import between, turning_nodes
-from kerfpath.contour import Contour
 from kerfpath.job import read_job
 from kerfpath.kernels.metric import rho
 from kerfpath.refiner._curves import JointCurves
@@ -22,15 +21,6 @@ from kerfpath.tilt import Tilt
 
 pytestmark = pytest.mark.usefixtures("certifier_at_work")
 METRICS = ("manhattan", "euclid", "chebychev")
-
-
-@pytest.fixture(scope="module")
-def arc():
-    """A third of a circle on a dome, 31 nodes."""
-    t = np.linspace(0, 2.1, 2001)
-    points = np.c_[0.15 * np.cos(t), 0.15 * np.sin(t), 0.02 * np.cos(2 * t)]
-    axes = np.c_[-0.2 * np.cos(t), -0.2 * np.sin(t), -np.ones_like(t)]
-    return Contour(points, axes, closed=False, name="arc").resample(count=31)
 
 
 @pytest.fixture(scope="module")

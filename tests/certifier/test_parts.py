@@ -8,21 +8,11 @@ from kerfpath.certifier import _certify as course
 from kerfpath.certifier import certify
 from kerfpath.certifier._prices import limit_prices
 from kerfpath.certifier._stage import Steps, solve_stage
-from kerfpath.contour import Contour
 from kerfpath.kernels.metric import MANHATTAN
 
 METRICS = ("manhattan", "euclid", "chebychev")
 SPEED = 0.96
 """m/s: 0.8 of the fastest at which the arc has a plan; (6) binds at nearly all of its nodes."""
-
-
-@pytest.fixture(scope="module")
-def arc():
-    """A third of a circle on a dome, 31 nodes."""
-    t = np.linspace(0, 2.1, 2001)
-    points = np.c_[0.15 * np.cos(t), 0.15 * np.sin(t), 0.02 * np.cos(2 * t)]
-    axes = np.c_[-0.2 * np.cos(t), -0.2 * np.sin(t), -np.ones_like(t)]
-    return Contour(points, axes, closed=False, name="arc").resample(count=31)
 
 
 @pytest.fixture(scope="module")

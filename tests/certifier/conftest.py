@@ -1,0 +1,15 @@
+"""What the tests of the certifier share: a short contour."""
+
+import numpy as np
+import pytest
+
+from kerfpath.contour import Contour
+
+
+@pytest.fixture(scope="module")
+def arc():
+    """A third of a circle on a dome, 31 nodes."""
+    t = np.linspace(0, 2.1, 2001)
+    points = np.c_[0.15 * np.cos(t), 0.15 * np.sin(t), 0.02 * np.cos(2 * t)]
+    axes = np.c_[-0.2 * np.cos(t), -0.2 * np.sin(t), -np.ones_like(t)]
+    return Contour(points, axes, closed=False, name="arc").resample(count=31)
