@@ -90,6 +90,15 @@ lead_time_s = 0.005
 WHOLE = HEAD + CONTOURS + PLAN + SEQUENCE
 """A whole part: lead-ins, micro-joints, corners, a bevel, and transfer moves."""
 
+ROBOT_AND_HEAD = """\
+[robot]
+model = "abb_irb4600_60_205"
+acceleration_ratio = "iontec_20_to_70kg"
+[tool]
+head = "laser-head-45"
+"""
+"""The first tables of a small job, which goes on with its part."""
+
 SLITS = """\
 contour,x_mm,y_mm,z_mm,nx,ny,nz
 a,0,0,0,0,0,1
@@ -97,13 +106,8 @@ a,30,0,0,0,0,1
 b,0,20,0,0,0,1
 b,30,20,0,0,0,1
 """
-SLIT_JOB = """\
-[robot]
-model = "abb_irb4600_60_205"
-acceleration_ratio = "iontec_20_to_70kg"
-[tool]
-head = "laser-head-45"
-[part]
+SLIT_JOB = f"""\
+{ROBOT_AND_HEAD}[part]
 file = "slits.csv"
 xyz_mm = [1200, 0, 500]
 rpy_deg = [0, 0, 0]

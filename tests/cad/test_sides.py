@@ -12,6 +12,7 @@ from OCP.TopoDS import TopoDS_Shape
 from tests.cad.sheets import OUTER, PROFILES, rim_point, sheet, sunk
 from tests.cad.test_part import write_step
 
+from jobs import ROBOT_AND_HEAD
 from kerfpath.cad import Part, read
 from kerfpath.errors import InputError
 from kerfpath.job import read_job
@@ -112,9 +113,7 @@ def test_a_job_says_it_too(tmp_path: Path) -> None:
     profile = (40.0, 90.0, 40.0, -90.0, 40.0)
     write_step(tmp_path / "z.step", sheet(profile))
     (tmp_path / "job.toml").write_text(
-        '[robot]\nmodel = "abb_irb4600_60_205"\nacceleration_ratio = "iontec_20_to_70kg"\n'
-        '[tool]\nhead = "laser-head-45"\n'
-        '[part]\nfile = "z.step"\nxyz_mm = [1200, 0, 400]\nrpy_deg = [0, 0, 0]\n'
+        ROBOT_AND_HEAD + '[part]\nfile = "z.step"\nxyz_mm = [1200, 0, 400]\nrpy_deg = [0, 0, 0]\n'
         "outer_towards = [0, 0, -1]\ngap_mm = 0.02\n"
         '[[contour]]\npick = "skin1/outer"\nspeed_m_min = 2\nspacing_mm = 2\n'
     )

@@ -7,20 +7,16 @@ from pathlib import Path
 import pytest
 from ezdxf.filemanagement import new
 
+from jobs import ROBOT_AND_HEAD
 from kerfpath.errors import InputError
 from kerfpath.job import check_job, read_job
 
-JOB = """\
-[robot]
-model = "abb_irb4600_60_205"
-acceleration_ratio = "iontec_20_to_70kg"
-[tool]
-head = "laser-head-45"
-[part]
+JOB = f"""\
+{ROBOT_AND_HEAD}[part]
 file = "blank.dxf"
 xyz_mm = [1200, 0, 400]
 rpy_deg = [0, 0, 0]
-{more}
+{{more}}
 [[contour]]
 pick = "0/outer"
 speed_m_min = 2

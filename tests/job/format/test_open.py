@@ -9,19 +9,14 @@ import pytest
 
 from commands import assert_refused, run
 from conftest import ROOT
-from jobs import speeds_on_grid
+from jobs import ROBOT_AND_HEAD, speeds_on_grid
 from kerfpath.cad import read
 from kerfpath.errors import InputError
 from kerfpath.job import audit_file, check_job, fastest_speeds, read_job
 
 PARTS = ROOT / "examples" / "parts"
-HEAD = """\
-[robot]
-model = "abb_irb4600_60_205"
-acceleration_ratio = "iontec_20_to_70kg"
-[tool]
-head = "laser-head-45"
-[part]
+HEAD = f"""\
+{ROBOT_AND_HEAD}[part]
 file = "blank.dxf"
 xyz_mm = [1100, -50, 500]
 rpy_deg = [0, 0, 0]
