@@ -15,6 +15,7 @@ from kerfpath.losses import Loss, Reason
 
 __all__ = [
     "AuditFailed",
+    "CertificateRefused",
     "Closed",
     "InputError",
     "KerfpathError",
@@ -42,6 +43,20 @@ class InputError(KerfpathError, ValueError):
         if len(line) > LONGEST:
             line = f"{line[:BEGINNING]} ... {line[BEGINNING + 5 - LONGEST :]}"
         super().__init__(line)
+
+
+class CertificateRefused(InputError):
+    """A certificate that proves no bound of its plan.
+
+    Parameters
+    ----------
+    why : str
+        Part of the message.
+    """
+
+    def __init__(self, why: str) -> None:
+        super().__init__(f"certificate: {why}; plan again")
+        self.why = why
 
 
 @contextmanager

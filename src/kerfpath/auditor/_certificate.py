@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kerfpath._arrays import Array
-from kerfpath.auditor._cover import DEEPEST, REFUSED, Places, Reachable, covered, refused
+from kerfpath.auditor._cover import DEEPEST, Places, Reachable, covered
 from kerfpath.auditor._enclosure import POSTURES
 from kerfpath.auditor._intervals import UNIT
 from kerfpath.auditor._steps import (
@@ -23,7 +23,7 @@ from kerfpath.auditor._steps import (
 )
 from kerfpath.auditor._table import Check
 from kerfpath.certificate import BASE, Certificate, Stage
-from kerfpath.errors import InputError
+from kerfpath.errors import CertificateRefused, InputError
 from kerfpath.plans import Plan
 
 __all__ = ["BOUND", "bound_checks", "certified_bound"]
@@ -51,11 +51,12 @@ def bound_checks(plan: Plan) -> list[Check]:
     title = "certificate that does not hold"
     try:
         if proof.bound is None:
-            raise refused("the plan states no bound")
+            raise CertificateRefused("the plan states no bound")
         proved = certified_bound(proof.certificate, plan)
-    except InputError as error:
-        why = str(error).removeprefix(REFUSED[0]).removesuffix(REFUSED[1])
-        return [_row(f"{title}: {why}", 1.0, 0.0)]
+    except CertificateRefused as error:
+        return [_row(f"{title}: {error.why}", 1.0, 0.0)]
+    except InputError as error:  # there are no enclosures of such a robot
+        return [_row(f"{title}: {error}", 1.0, 0.0)]
     size = max(abs(plan.cost), abs(proof.bound))
     claims = (
         ("bound above what its certificate proves", proof.bound, proved),
@@ -104,7 +105,7 @@ def certified_bound(certificate: Certificate, plan: Plan) -> float:
     """
     where, every, change = _asked(plan)
     if not certificate.stages:
-        raise refused("it has no stage")
+        raise CertificateRefused("it has no stage")
     K, n = plan.q.shape
     proved = -np.inf
     left: Places | None = None
@@ -133,12 +134,14 @@ def _asked(plan: Plan) -> tuple[Reachable, Rates, Array]:
         (plan.feed is None and dt - tau.min() <= EVEN * dt, "a feed that is not constant"),
     ):
         if not known:
-            raise refused(f"nothing is proved with {what}")
+            raise CertificateRefused(f"nothing is proved with {what}")
     limits, (velocity, acceleration) = robot.joint_limits(), robot.speed_limits()
     endless = np.asarray(robot.endless, dtype=bool)
     lower, upper = (np.where(endless, 0.0, end) for end in (limits.lower, limits.upper))
     if not (np.isfinite(lower) & np.isfinite(upper)).all():
-        raise refused("nothing is proved with joints without ranges that are not endless")
+        raise CertificateRefused(
+            "nothing is proved with joints without ranges that are not endless"
+        )
     # The place of an endless joint is known up to whole turns only: its couplings are left out.
     bound = ~np.asarray((limits.rows[:, endless] != 0).any(axis=1))
     where = Reachable(
@@ -154,7 +157,7 @@ def _asked(plan: Plan) -> tuple[Reachable, Rates, Array]:
         limits.row_upper[bound],
     )
     if not ((where.postures >= 0) & (where.postures < POSTURES)).all():
-        raise refused("the plan allows postures that are not known")
+        raise CertificateRefused("the plan allows postures that are not known")
     most = settings.eta_v * velocity * dt * (1 + 8 * UNIT) + LIMIT_TOLERANCE
     most = np.where(endless, np.minimum(most, np.pi + LIMIT_TOLERANCE), most)
     change = settings.eta_a * acceleration * dt**2 * (1 + EVEN) ** 2 + LIMIT_TOLERANCE
@@ -162,7 +165,7 @@ def _asked(plan: Plan) -> tuple[Reachable, Rates, Array]:
     most = np.tile(most, (K - 1, 1))
     weights = np.asarray(settings.weights)
     if not (weights >= 0).all():
-        raise refused("nothing is proved with weights below zero")
+        raise CertificateRefused("nothing is proved with weights below zero")
     return (
         where,
         Rates(np.arange(K), most, weights, settings.metric, endless, np.zeros((K - 1, n))),
@@ -171,7 +174,7 @@ def _asked(plan: Plan) -> tuple[Reachable, Rates, Array]:
 
 
 def _require_fit(stage: Stage, K: int, n: int) -> None:
-    """Raise InputError unless a stage's arrays are of K nodes and n joints."""
+    """Raise CertificateRefused unless a stage's arrays are of K nodes and n joints."""
     C = len(stage.node)
     shapes = {
         "node": (C,), "posture": (C,), "level": (C,), "index": (C,), "lift": (C, n),
@@ -180,21 +183,21 @@ def _require_fit(stage: Stage, K: int, n: int) -> None:
     for name, shape in shapes.items():
         part = getattr(stage, name)
         if part.shape != shape:
-            raise refused(f"{name}: expected shape {shape}, got {part.shape}")
+            raise CertificateRefused(f"{name}: expected shape {shape}, got {part.shape}")
         if (part.dtype.kind in "iu") != (name not in ("value", "dual")):
-            raise refused(f"{name}: numbers of another kind ({part.dtype})")
+            raise CertificateRefused(f"{name}: numbers of another kind ({part.dtype})")
     level = stage.level.astype(np.int64)
     for name, most in (("node", K), ("posture", POSTURES), ("level", DEEPEST + 1)):
         part = getattr(stage, name)
         if not ((part >= 0) & (part < most)).all():
-            raise refused(f"{name}: expected numbers from 0 to {most - 1}")
+            raise CertificateRefused(f"{name}: expected numbers from 0 to {most - 1}")
     if not ((stage.index >= 0) & (stage.index < BASE << level)).all():
-        raise refused("index: a cell that is not on the circle")
+        raise CertificateRefused("index: a cell that is not on the circle")
     if (np.diff(stage.node) < 0).any():
-        raise refused("node: expected cells in the order of nodes")
+        raise CertificateRefused("node: expected cells in the order of nodes")
     for name in ("value", "dual"):
         if not (np.abs(getattr(stage, name)) <= LARGEST).all():
-            raise refused(f"{name}: expected numbers up to {LARGEST:g}")
+            raise CertificateRefused(f"{name}: expected numbers up to {LARGEST:g}")
 
 
 def _rates(stage: Stage, every: Rates, change: Array) -> tuple[Rates, float]:
@@ -211,7 +214,7 @@ def _rates(stage: Stage, every: Rates, change: Array) -> tuple[Rates, float]:
     nodes = np.unique(stage.node).astype(np.int64)
     K, n = len(every.nodes), len(every.weights)
     if len(nodes) < 2 or nodes[0] != 0 or nodes[-1] != K - 1:
-        raise refused("its cells leave out motions at the first node or the last")
+        raise CertificateRefused("its cells leave out motions at the first node or the last")
     # Each interval once: the bounds of a step over several are summed.
     velocity = np.add.reduceat(every.velocity, nodes[:-1], axis=0) * (1 + K * UNIT)
     rates = replace(every, nodes=nodes, velocity=velocity, tilt=np.zeros(velocity.shape))
@@ -219,13 +222,13 @@ def _rates(stage: Stage, every: Rates, change: Array) -> tuple[Rates, float]:
     if nu is None:
         return rates, 0.0
     if nu.shape != (K, n) or nu.dtype.kind != "f":
-        raise refused(f"multipliers: expected shape {(K, n)}, got {nu.shape}")
+        raise CertificateRefused(f"multipliers: expected shape {(K, n)}, got {nu.shape}")
     if not (np.abs(nu) <= LARGEST).all():
-        raise refused(f"multipliers: expected numbers up to {LARGEST:g}")
+        raise CertificateRefused(f"multipliers: expected numbers up to {LARGEST:g}")
     if nu[0].any() or nu[-1].any():
-        raise refused("multipliers: expected zeros at the first node and the last")
+        raise CertificateRefused("multipliers: expected zeros at the first node and the last")
     if len(nodes) < K:
-        raise refused("multipliers: expected cells at every node")
+        raise CertificateRefused("multipliers: expected cells at every node")
     size = float((np.abs(nu) @ change).sum())
     rounded = 2 * float(np.abs(nu).sum(axis=0) @ velocity.max(axis=0)) + size
     return replace(rates, tilt=nu[:-1] - nu[1:]), -size - 4 * UNIT * (K + n) * rounded

@@ -17,10 +17,10 @@ from kerfpath._arrays import Array, Bools, Ints
 from kerfpath._repr import short_repr
 from kerfpath.auditor._enclosure import POSTURES, Enclosure, Status, enclose, linear_minimum
 from kerfpath.certificate import BASE, LIFTS, Stage
-from kerfpath.errors import InputError
+from kerfpath.errors import CertificateRefused
 from kerfpath.robots import Robot
 
-__all__ = ["DEEPEST", "REFUSED", "Places", "Reachable", "covered", "refused"]
+__all__ = ["DEEPEST", "Places", "Reachable", "covered"]
 
 Linked = Callable[["Places"], Bools]
 TURN = 2 * np.pi
@@ -40,8 +40,6 @@ BEYOND = 6
 """Levels finer than any cell of a stage down to which an interval must prove to be empty."""
 MOST_PLACES = 500_000
 """Places at a time; a certificate that leaves more is refused."""
-REFUSED = "certificate: ", "; plan again"
-"""What stands before and after the reason why a certificate is refused."""
 PLACES_AT_ONCE = 1e5
 """About so many are gone through together, of as many nodes."""
 
@@ -138,11 +136,6 @@ class _Wanted:
     known: Ints
 
 
-def refused(why: str) -> InputError:
-    """Return the error that a certificate is refused with."""
-    return InputError(f"{REFUSED[0]}{why}{REFUSED[1]}")
-
-
 def covered(where: Reachable, stage: Stage, before: Places | None, linked: Linked) -> Places:
     """Return the cells of a stage that motions may pass, as places, by node.
 
@@ -159,7 +152,7 @@ def covered(where: Reachable, stage: Stage, before: Places | None, linked: Linke
 
     Raises
     ------
-    InputError
+    CertificateRefused
         It does not cover that.
     """
     nodes = np.unique(stage.node).astype(np.int64)
@@ -223,7 +216,7 @@ def _covered(
         if not len(left) and level >= deepest:
             return found
     assert left is not None
-    raise refused(
+    raise CertificateRefused(
         f"its cells leave out motions in posture {left.posture[0]} at node {left.node[0]}, gamma "
         f"{np.degrees(_middle(left.level[0], left.index[:1])[0]):.4g} deg"
     )
@@ -332,7 +325,7 @@ def _turns(near: Array, room: Array, center: Array, endless: Bools) -> tuple[Int
     count = np.maximum(high - low + 1, 0)
     total = count.prod(axis=1)
     if not total.sum() <= MOST_PLACES:
-        raise refused(f"it leaves more than {MOST_PLACES} places to look at")
+        raise CertificateRefused(f"it leaves more than {MOST_PLACES} places to look at")
     total = total.astype(np.int64)
     row = np.repeat(np.arange(len(total)), total)
     place = np.arange(len(row)) - np.repeat(np.cumsum(total) - total, total)
