@@ -166,6 +166,11 @@ class Comfort:
         return any(b.cost for b in (*self.bands.values(), *filter(None, [self.clearance])))
 
     @property
+    def prices_clearance(self) -> bool:
+        """Whether coming near a body costs: how much is known at the vertices of a graph only."""
+        return self.clearance is not None and self.clearance.cost > 0
+
+    @property
     def hard(self) -> Comfort:
         """The margins alone, without costs."""
         return Comfort(**{name: Band(margin=band.margin) for name, band in self.bands.items()})

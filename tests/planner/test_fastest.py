@@ -1,11 +1,12 @@
 """The fastest motion: what is reached a plan finds, and a refusal says what would open the way."""
 
+from dataclasses import replace
 from itertools import islice
 
 import numpy as np
 import pytest
 
-from kerfpath import NoFeasiblePath, audit, fastest_speed, plan
+from kerfpath import NoFeasiblePath, audit, fastest_speed, plan, refiner
 from kerfpath.contour import Contour
 from kerfpath.options import PlanOptions
 from kerfpath.planner._clear import ClearSearch
@@ -122,6 +123,29 @@ def test_a_refusal_says_with_what_a_motion_was_found(seed, share, arm, space):
         # All that fastest_speed tries was tried, and the figures are rounded to 4 digits.
         assert needed.speed * share == pytest.approx(1, rel=2e-3)
     assert errors(plan(nodes, arm, speed=needed.speed * speed, **space)) == []
+
+
+@pytest.mark.parametrize("kind", ["rail", "positioner"])
+def test_with_an_external_axis_motions_grow_quicker_too(kind, arm, tool, placement):
+    limits = {"lower": -1.0, "upper": 1.0, "velocity": 2.0, "acceleration": 4.0, "step": 0.25}
+    if kind == "rail":
+        robot = arm.on_rail([0, 2, 0], **limits)
+    else:
+        robot = arm.with_positioner([0, 0, 1], [1.2, 0, 0], **limits)
+    posed = task(drawn(0, nodes=11), robot, tool, placement)
+    found = list(quick_motions(posed, ClearSearch(posed, None)))
+    assert found[-1].dt < found[1].dt  # what the fastest path on the grid is quickened to
+    for motion in found[1:]:
+        assert np.abs(motion.plan.velocity_share).max() <= 1
+        assert np.abs(motion.plan.acceleration_share).max() <= 1
+        assert errors(motion.plan) == []
+
+
+def test_what_is_out_of_reach_is_not_quickened(arm, space):
+    made = plan(drawn(0), arm, speed=0.2, **space)
+    away = made.T_base_part.copy()
+    away[0, 3] += 10.0
+    assert refiner.quicken(replace(made, T_base_part=away)) is None
 
 
 def test_a_node_out_of_reach_has_no_pose_at_any_gamma(arm, space):

@@ -158,6 +158,6 @@ def grid_reason(task: PlanningTask) -> str:
     comfort = task.settings.comfort
     if not task.robot.family.free_rotation:
         return "the robot leaves no rotation free"
-    if comfort is not None and comfort.clearance is not None:
+    if comfort is not None and comfort.prices_clearance:
         return "what clearance costs is known there only"
     return ""

@@ -96,10 +96,11 @@ def _from_quickest(
         None was found; says of what that is proved, and what the quickest one found would take.
     """
     asked = task.settings
-    clearance = None if asked.comfort is None else asked.comfort.clearance
-    # What clearance costs is known on the grid only; beams know no external axis.
-    on_grid = task.robot.external is not None or (clearance is not None and clearance.cost)
-    if asked.closure == "periodic" or on_grid:
+    # The quickest motions know neither a closure nor what clearance costs. With an external axis
+    # they may take minutes to begin: the long steps between its samples leave the arm nearly every
+    # edge, and the exact search for the fastest path on the grid keeps each as a state.
+    priced = asked.comfort is not None and asked.comfort.prices_clearance
+    if asked.closure == "periodic" or priced or task.robot.external is not None:
         raise _judged(broken, task, begin) from None
     judged, best = None, None
     begin("search for the quickest motion")

@@ -87,8 +87,6 @@ def quick_motions(task: PlanningTask, finder: ClearSearch) -> Iterator[QuickMoti
         return
     best = _quicker(task, finder, path, best)
     yield best
-    if task.robot.external is not None:  # beams know no external axis
-        return
     rung, tried = 0, [path]
     while rung < len(RUNGS):
         before, faster = best.dt, _at(task, best.dt / RUNGS[rung])
@@ -133,7 +131,10 @@ def _quicker(
     task: PlanningTask, finder: ClearSearch, start: Plan, best: QuickMotion
 ) -> QuickMotion:
     """Return the better of the best motion so far and the one that a start is quickened to."""
-    made, at = quicken(start)
+    quickened = quicken(start)
+    if quickened is None:
+        return best
+    made, at = quickened
     made = replace(made, time=made.time * (1 + SLACK))
     comfort = task.settings.comfort
     if made.dt >= best.dt:

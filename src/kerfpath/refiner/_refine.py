@@ -119,7 +119,7 @@ def refine(
             return _unrefined(plan, divided)
         asked = divided
     comfort = plan.settings.comfort
-    if comfort is not None and comfort.clearance is not None and comfort.clearance.cost:
+    if comfort is not None and comfort.prices_clearance:
         return _unrefined(plan, "what clearance costs is known on the grid only")
     descent, start = _descent(asked)
     low, high = within or (-np.inf, np.inf)
@@ -168,14 +168,17 @@ def ease(plan: Plan) -> Plan:
     return _plan_with_motion(plan, descent.eased(start))
 
 
-def quicken(plan: Plan) -> tuple[Plan, Binding]:
+def quicken(plan: Plan) -> tuple[Plan, Binding] | None:
     """Return the plan with gamma moved so that the interval between its nodes is the least.
 
     All intervals change alike; also says where a limit is then used up. The cost is what it comes
-    to.
+    to. None where a node of the plan is out of the reach of its posture, as one between two samples
+    may be.
     """
     for _ in range(MOST_INTERVALS):
         descent, start = _descent(plan)
+        if start.outside == np.inf:
+            return None
         found = descent.gentlest(start)
         fast, sharp = descent.rates.shares(np.diff(found.q, axis=0))
         shorter, binding = _binding(descent, fast, sharp)
