@@ -24,7 +24,7 @@ from kerfpath.robots import Robot
 from kerfpath.search import METRIC_CODES, Metric, ObjectiveKind
 from kerfpath.tilt import tilt_frames
 
-__all__ = ["Criteria", "Feed", "Plan", "Proof", "path_cost"]
+__all__ = ["Criteria", "Feed", "Plan", "Proof", "on_turns", "path_cost"]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -331,6 +331,17 @@ class Plan:
             peak_acceleration=np.abs(self.acceleration_share).max(axis=0, initial=0.0),
             nearest={name: (float(of.min()), int(of.argmin())) for name, of in measured.items()},
         )
+
+
+def on_turns(robot: Robot, q: Array) -> tuple[Array, Ints]:
+    """Return joints q (K, n) rad as a plan has them, endless ones wrapped, and their turns (K, n).
+
+    The turns of endless joints, and of an external axis, are 0.
+    """
+    turning = ~robot.endless
+    turning[robot.family.joints :] = False
+    turn = np.where(turning, metric.turns_of(q), 0).astype(np.int64)
+    return np.where(robot.endless, metric.wrap(q), q), turn
 
 
 def _mean_step(time: Array) -> float:

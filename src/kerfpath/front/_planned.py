@@ -13,10 +13,10 @@ from kerfpath.contour import Contour
 from kerfpath.errors import NoFeasiblePath
 from kerfpath.front._subproblem import Subproblem
 from kerfpath.graph import LayeredGraph
-from kerfpath.kernels.metric import turns_of, wrap
+from kerfpath.kernels.metric import turns_of
 from kerfpath.options import PlanOptions
 from kerfpath.planner import best_motion, plan
-from kerfpath.plans import Plan
+from kerfpath.plans import Plan, on_turns
 from kerfpath.robots import Robot
 
 __all__ = ["plan_run"]
@@ -107,9 +107,5 @@ def _narrowed(
 
 def _widened(made: Plan, robot: Robot) -> Plan:
     """Return the plan of a robot with narrowed joints as one of the robot itself."""
-    return replace(
-        made,
-        robot=robot,
-        q=np.where(robot.endless, wrap(made.q), made.q),
-        turn=np.where(robot.endless, 0, made.turn),
-    )
+    q, turn = on_turns(robot, made.q)
+    return replace(made, robot=robot, q=q, turn=turn)

@@ -12,8 +12,8 @@ from kerfpath._arrays import Array, scalar
 from kerfpath._repr import short_repr
 from kerfpath.contour import Contour
 from kerfpath.errors import InputError
-from kerfpath.kernels.metric import turns_of, wrap
-from kerfpath.plans import Plan, Proof, path_cost
+from kerfpath.kernels.metric import wrap
+from kerfpath.plans import Plan, Proof, on_turns, path_cost
 from kerfpath.refiner._curves import JointCurves
 from kerfpath.refiner._descent import Descent, MotionState
 from kerfpath.refiner._rates import RateLimits
@@ -251,16 +251,9 @@ def _plan_with_motion(plan: Plan, found: MotionState) -> Plan:
 
     The bound of the plan is not taken over: its gap is that of another motion.
     """
-    turn = turns_of(found.q)
-    turn[:, plan.robot.endless] = 0
-    turn[:, plan.robot.family.joints :] = 0
-    moved = replace(
-        plan,
-        q=np.where(plan.robot.endless, wrap(found.q), found.q),
-        gamma=wrap(found.gamma),
-        turn=turn.astype(np.int64),
-        proof=plan.proof.without_bound(),
-    )
+    q, turn = on_turns(plan.robot, found.q)
+    proof = plan.proof.without_bound()
+    moved = replace(plan, q=q, gamma=wrap(found.gamma), turn=turn, proof=proof)
     s, dq = plan.settings, np.diff(found.q, axis=0)
     return replace(moved, cost=path_cost(dq, s.weights, s.metric, s.objective, moved.node_cost))
 
