@@ -22,6 +22,7 @@ from scipy.sparse.csgraph import connected_components
 from kerfpath._arrays import Array, Bools
 from kerfpath._repr import short_repr
 from kerfpath.certifier._cells import CellMaker, CellSet
+from kerfpath.certifier._finer import cells_to_divide
 from kerfpath.certifier._stage import StageResult, Steps, solve_stage
 
 __all__ = ["Parts"]
@@ -38,9 +39,10 @@ DEEPEST = 16
 
 @dataclass(slots=True, eq=False)
 class _Part:
-    """Cells, and how often in a row finer ones gained little."""
+    """Cells, what they prove of themselves, and how often in a row finer ones gained little."""
 
     cells: CellSet
+    own: float
     stalled: int
 
     __repr__ = short_repr
@@ -83,7 +85,7 @@ class Parts:
 
         The cells are of all nodes; `known` is what the motions are known to cost at least.
         """
-        self._wait(known, _Part(cells, 0))
+        self._wait(known, _Part(cells, -np.inf, 0))
         while self._open and self._open[0][0] < min(self._target, self._closed):
             if self._enough(self.pairs, self._held):
                 break
@@ -109,10 +111,11 @@ class Parts:
             rest = cells.take(one)
             if len(np.unique(rest.node)) < layers:
                 continue  # no motion all the way along
-            least = max(known, float(rest.floor.min()))
-            gained = (least - known) / (self._target - known)
-            stalled = part.stalled + 1 if gained < STALLED else 0
-            smaller = [] if least >= self._target else self._smaller(rest, stalled)
+            own = float(rest.floor.min())
+            least = max(known, own)
+            slow = part.own > -np.inf and own - part.own < STALLED * (self._target - part.own)
+            stalled = part.stalled + 1 if slow else 0
+            smaller = [] if least >= self._target else self._smaller(rest, own, stalled)
             if not smaller:
                 self._closed = min(self._closed, least)
             for each in smaller:
@@ -130,16 +133,18 @@ class Parts:
             through = np.maximum(through, priced.through)
         return through, result
 
-    def _smaller(self, cells: CellSet, stalled: int) -> list[_Part]:
+    def _smaller(self, cells: CellSet, own: float, stalled: int) -> list[_Part]:
         """Return the parts that a part divides into; none where it cannot be divided.
 
         Finer cells; where these gain little, both sides of the middle of the node at which the
         joints are farthest apart.
         """
         low = cells.floor < self._target
-        coarse = low & (cells.level < DEEPEST)
-        if stalled <= AGAIN and coarse.any():
-            return [_Part(self._maker.finer(cells, coarse, self._steps.weight), stalled)]
+        which, singular = cells_to_divide(cells, cells.floor, self._target, self._steps.weight)
+        which &= cells.level < DEEPEST
+        if which.any() and (singular or stalled <= AGAIN):
+            finer = CellSet.join([cells.take(~which), self._maker.halves(cells.take(which))])
+            return [_Part(finer, own, 0 if singular else stalled)]
         nodes = np.unique(cells.node[low])
         start = np.searchsorted(cells.node, nodes), np.searchsorted(cells.node, nodes, "right")
         joints = [cells.center[a:b] * self._steps.weight for a, b in zip(*start, strict=True)]
@@ -149,7 +154,7 @@ class Parts:
             return []
         inside, q = cells.node == nodes[place], cells.center[:, joint]
         middle = (q[inside].min() + q[inside].max()) / 2
-        return [_Part(cells.take(~inside | side), 0) for side in (q <= middle, q > middle)]
+        return [_Part(cells.take(~inside | side), own, 0) for side in (q <= middle, q > middle)]
 
 
 def _joined(result: StageResult, kept: Bools) -> list[Bools]:
