@@ -4,8 +4,8 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-
 from benchmarks._random_contours import cut
+
 from kerfpath import PlanOptions, plan
 from kerfpath.certifier import certify
 from kerfpath.certifier._cells import CellSet
@@ -58,6 +58,7 @@ def test_cells_without_any_bound_are_divided():
     assert which.all()
 
 
+@pytest.mark.usefixtures("certifier_at_work")
 @pytest.mark.parametrize("checkable", [False, True])
 def test_motions_past_a_wrist_singularity_are_bounded_closely(checkable):
     """At gamma of some 25 deg joint 5 passes zero: joint 4 may be anywhere in cells of 0.6 deg."""

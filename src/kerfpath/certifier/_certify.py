@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import cached_property
 from time import monotonic
 
 import numpy as np
@@ -13,7 +14,7 @@ from kerfpath.certificate import ALLOWANCE, Certificate, Stage
 from kerfpath.certifier._cells import CellMaker, CellSet
 from kerfpath.certifier._finer import cells_to_divide
 from kerfpath.certifier._nodes import between, turning_nodes
-from kerfpath.certifier._parts import Parts
+from kerfpath.certifier._parts import DEAREST, Parts
 from kerfpath.certifier._prices import limit_prices
 from kerfpath.certifier._stage import StageResult, Steps, linked, solve_stage
 from kerfpath.kernels.limits import LIMIT_TOLERANCE
@@ -54,8 +55,8 @@ AT_LIMIT = 0.98
 EARLY, COARSE = 0.3, 1
 """Share of the work after which motions are bounded in parts in any case where (6) binds the plan;
 and the level of the cells that this begins with at further nodes."""
-REACH, DEAREST = 0.017, (5.0, 20.0)
-"""How far gamma may go where multipliers are found, rad; and the largest of them, in weights."""
+REACH = 0.2
+"""How far gamma may go where multipliers are found, rad."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -184,8 +185,7 @@ class _Course:
         self.nodes = turning_nodes(plan, TURNED, longest)
         self.best, self.pairs, self.count = 0.0, 0, 0
         self.stages: list[Stage] = []
-        self.plan = plan
-        self.priced = not checkable and self._binds()
+        self.plan, self.checkable = plan, checkable
         self.proved = 0.0  # by the stages that are kept
         self.loose: tuple[int, StageResult] | None = None  # the best that is not, and its place
 
@@ -203,7 +203,7 @@ class _Course:
             which &= cells.level < DEEPEST
             fine = not singular and low.any() and np.median(cells.level[low]) >= FINE
             slow = bool(fine) and gained < STALLED
-            if fine and self.priced and self._late(slow):
+            if fine and self._late(slow) and self._priced:
                 self._divide(cells.take(live))
                 return
             if not low.any() or self._enough(result, float(live.mean() + which.mean())):
@@ -227,27 +227,29 @@ class _Course:
                 rest = cells.take(kept & ~which)
                 cells = CellSet.join([rest, self.maker.halves(cells.take(which))])
 
-    def _binds(self) -> bool:
-        """Return whether (6) is worth more to the plan than the gap that may be left."""
+    @cached_property
+    def _priced(self) -> bool:
+        """Whether (6) is worth more to the plan than the gap that may be left."""
+        if self.checkable:
+            return False
         share = np.abs(self.plan.acceleration_share)
         if self.steps.metric == CHEBYCHEV:  # its potentials are too loose for prices to tell
             return False
         if not (share > AT_LIMIT * self.plan.settings.eta_a).any():
             return False
-        prices = self._prices(int(np.bincount(self.plan.posture).argmax()))
-        worth = max((self.steps.price(each) for each in prices), default=0.0)
-        return worth > self.cost - self.target
+        posture = int(np.bincount(self.plan.posture).argmax())
+        prices = (self._prices(self.plan.gamma, posture, most) for most in DEAREST)
+        return max(map(self.steps.price, prices)) > self.cost - self.target
 
-    def _prices(self, posture: int) -> list[Array]:
-        """Return multipliers of (6) about the motion that turns gamma as the plan, in a posture."""
-        motion = self.maker.motion(self.plan.gamma, posture)
+    def _prices(self, gamma: Array, posture: int, most: float) -> Array | None:
+        """Return multipliers of (6) about the motion with gamma (K,) in a posture."""
+        motion = self.maker.motion(gamma, posture)
         if motion is None:
-            return []
+            return None
         q, slope = motion
         u = np.diff(q, axis=0)
         u -= 2 * np.pi * np.rint(u / (2 * np.pi))
-        found = (limit_prices(u, slope, self.steps, REACH, most) for most in DEAREST)
-        return [prices for prices in found if prices is not None]
+        return limit_prices(u, slope, self.steps, REACH, most)
 
     def _divide(self, cells: CellSet) -> None:
         """Go on at all nodes, with multipliers of (6), part by part."""
@@ -264,6 +266,7 @@ class _Course:
             self.maker,
             self.steps,
             self._prices,
+            self.plan.gamma,
             cost=self.cost,
             target=self.target,
             enough=enough,
