@@ -50,7 +50,7 @@ def steps_of(one):
 
 
 def maker_of(one, postures=(0, 1)):
-    return CellMaker(one.robot, one.frames, one.T_flange_tip, one.robot.joint_limits(), postures)
+    return CellMaker(one.robot, one.frames, one.T_flange_tip, postures)
 
 
 @pytest.mark.parametrize("metric", METRICS)

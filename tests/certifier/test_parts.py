@@ -1,5 +1,7 @@
 """Bounds with multipliers of (6): true whatever the multipliers, and close where (6) binds."""
 
+from itertools import pairwise
+
 import numpy as np
 import pytest
 
@@ -42,13 +44,13 @@ def test_any_multipliers_bound_no_motion_too_high(metric, size, planned, others,
     best = planned(metric=metric)
     rng = np.random.default_rng(int(size))
 
-    def drawn(self, posture):
+    def drawn(self, gamma, posture, most):
         prices = np.zeros_like(best.q)
         prices[1:-1] = size * rng.normal(size=prices[1:-1].shape) * best.settings.weights
-        return [prices]
+        return prices
 
     monkeypatch.setattr(course._Course, "_prices", drawn)
-    monkeypatch.setattr(course._Course, "_binds", lambda self: True)
+    monkeypatch.setattr(course._Course, "_priced", True)
     bound = certify(best, checkable=False).plan.proof.bound
     assert 0 <= bound <= min(best.cost, *others[metric])
 
@@ -57,10 +59,22 @@ def test_any_multipliers_bound_no_motion_too_high(metric, size, planned, others,
 def test_the_multipliers_of_a_plan_bound_it_closer(metric, planned, others, monkeypatch):
     best = planned(metric=metric)
     with_them = certify(best, checkable=False).plan.proof
-    monkeypatch.setattr(course._Course, "_binds", lambda self: False)
+    monkeypatch.setattr(course._Course, "_priced", False)
     without = certify(best, checkable=False).plan.proof
     assert with_them.bound <= min(best.cost, *others[metric])
     assert with_them.gap < without.gap
+
+
+def test_the_cheapest_cells_are_joined_by_steps(planned):
+    """They stand for a motion: prices about it show where it breaks (6)."""
+    one = course._Course(planned(), 0.1, np.inf, False, lambda *_: None)
+    result = solve_stage(one.maker.coarsest(np.arange(one.last + 1)), one.steps)
+    motion = result.cheapest()
+    assert result.cells.node[motion].tolist() == list(range(one.last + 1))
+    for a, b in pairwise(motion):
+        assert b in result.to[result.begin[a] : result.begin[a + 1]]
+    # Rounding apart, each is on a motion that costs the least.
+    assert result.through[motion] == pytest.approx(result.bound, rel=1e-9)
 
 
 def test_a_certificate_is_there_for_those_who_check_it_only(planned):
@@ -111,7 +125,8 @@ def test_no_prices_where_nothing_near_breaks_the_limit():
 def test_a_plan_at_the_limit_has_prices(metric, planned):
     one = course._Course(planned(metric=metric), 0.005, np.inf, False, lambda *_: None)
     posture = int(one.plan.posture[0])
-    assert one._binds()
-    for prices, most in zip(one._prices(posture), course.DEAREST, strict=True):
+    assert one._priced
+    for most in course.DEAREST:
+        prices = one._prices(one.plan.gamma, posture, most)
         assert one.steps.price(prices) > 0
         assert (np.abs(prices) <= most * one.steps.weight * (1 + 1e-6)).all()

@@ -12,7 +12,6 @@ from numpy.typing import NDArray
 from kerfpath._arrays import Array, Bools, Ints
 from kerfpath._repr import short_repr
 from kerfpath.certificate import BASE, LIFTS, cell_bounds
-from kerfpath.kernels.turns import JointLimits
 from kerfpath.robots import Robot
 
 __all__ = ["CellMaker", "CellSet"]
@@ -26,8 +25,6 @@ ROUNDED = 1e-14
 """What a joint may be off by rounding, in rad per rad and in rad."""
 SLIGHT = 1e-9
 """rad: half the width of a cell that stands for its middle."""
-WORST = 1 / 16
-"""Share of what the worst cell leaves open from which cells are divided with it."""
 EDGE = 1e-8
 """rad: joints this far out of their range still count as inside, as in the graph and the audit."""
 
@@ -67,8 +64,12 @@ class CellSet:
     @property
     def box(self) -> Array:
         """How far a joint may be from its centre anywhere on the cell, (C, n) rad."""
-        h = self.half[:, None]
-        return np.asarray(np.abs(self.slope) * h + np.abs(self.bend) * h**2 / 2 + self.spread)
+        return np.asarray(np.abs(self.slope) * self.half[:, None] + self.unsure)
+
+    @property
+    def unsure(self) -> Array:
+        """How far a joint may be from a straight line over the cell, (C, n) rad."""
+        return np.asarray(np.abs(self.bend) * self.half[:, None] ** 2 / 2 + self.spread)
 
     @property
     def lift(self) -> NDArray[np.int8]:
@@ -96,9 +97,8 @@ class CellMaker:
     frames : (K, 4, 4) m
         Task frames in the robot base.
     T_flange_tip : (4, 4) m
-    limits : JointLimits
-    postures : sequence of int
-        The postures that may be used.
+    postures : sequence of int, optional
+        The postures that may be used; default all.
     width : float
         How much wider the curvature is taken than it is proved to be.
     """
@@ -108,11 +108,11 @@ class CellMaker:
         robot: Robot,
         frames: Array,
         T_flange_tip: Array,
-        limits: JointLimits,
-        postures: Iterable[int],
+        postures: Iterable[int] | None = None,
         width: float = 1.0,
     ) -> None:
         self._robot, self._frames, self._tool = robot, frames, T_flange_tip
+        limits = robot.joint_limits()
         # A coupling of an endless joint holds on one of its turns, which cells do not know.
         plain = ~(limits.rows[:, limits.endless] != 0).any(axis=1)
         self._limits = limits._replace(
@@ -120,7 +120,8 @@ class CellMaker:
             row_lower=limits.row_lower[plain],
             row_upper=limits.row_upper[plain],
         )
-        self._postures, self._width = np.array(sorted(postures), np.int8), width
+        used = range(robot.postures) if postures is None else sorted(postures)
+        self._postures, self._width = np.array(used, np.int8), width
 
     def coarsest(self, nodes: Ints) -> CellSet:
         """Return the cells of level 0 at some nodes: postures and turns that ranges admit."""
@@ -143,13 +144,6 @@ class CellMaker:
         if not (found.status[:, posture] > 0).all():
             return None
         return found.center[:, posture], found.slope[:, posture]
-
-    def finer(self, cells: CellSet, which: Bools, weight: Array) -> CellSet:
-        """Return the cells with those halved, of some, on which the joints are known least."""
-        off = cells.spread + np.abs(cells.bend) * cells.half[:, None] ** 2 / 2
-        unsure = off @ weight
-        which = which & (unsure >= WORST * unsure[which].max(initial=0.0))
-        return CellSet.join([cells.take(~which), self.halves(cells.take(which))])
 
     def halves(self, cells: CellSet) -> CellSet:
         """Return both halves of the cells, on the turns of their own."""

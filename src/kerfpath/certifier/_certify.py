@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import cached_property
 from time import monotonic
 
 import numpy as np
@@ -11,8 +12,9 @@ from kerfpath._arrays import Array, scalar
 from kerfpath._repr import short_repr
 from kerfpath.certificate import ALLOWANCE, Certificate, Stage
 from kerfpath.certifier._cells import CellMaker, CellSet
+from kerfpath.certifier._finer import cells_to_divide
 from kerfpath.certifier._nodes import between, turning_nodes
-from kerfpath.certifier._parts import Parts
+from kerfpath.certifier._parts import DEAREST, Parts
 from kerfpath.certifier._prices import limit_prices
 from kerfpath.certifier._stage import StageResult, Steps, linked, solve_stage
 from kerfpath.kernels.limits import LIMIT_TOLERANCE
@@ -32,16 +34,18 @@ STALLED = 0.5
 """Share of the gap that a stage must close; less, and nodes come in between instead."""
 CARE = 0.05
 """Share of the cost beyond the cheapest step up to which steps are bounded with care."""
-NEAR, FINE = 0.9, 3
-"""Share of what is wanted, and levels, below which cells are too coarse to tell what nodes lack."""
+FINE = 2
+"""Level below which cells are too coarse to tell whether it is further nodes, or (6), they lack."""
+NEAR = 0.9
+"""Share of what is wanted from which (6) may be what is left."""
 DEEPEST = 12
 """Levels at most: cells of 0.001 deg."""
 MOST_PAIRS, MOST_PER_NODE = 10_000_000, 60_000
 """Steps from cell to cell that are looked at, and for each node, unless a time is given."""
 MOST_CELLS = 2_000_000
 """Cells of a stage after which it is left at that: some 2 GB."""
-CLEARLY, WIDER = 0.02, 2.0
-"""Share of its cost by which the motions through a cell of level `FINE` are dearer than the plan
+CLEARLY, USUAL_LEVEL, WIDER = 0.02, 3, 2.0
+"""Share of its cost by which the motions through a cell of that level are dearer than the plan
 where it drops out, four times as much a level coarser: whoever checks the certificate has
 enclosures of his own, and may find less. The curvature is taken so much wider, too. Where nobody
 does: `SAME`, rounding."""
@@ -51,8 +55,8 @@ AT_LIMIT = 0.98
 EARLY, COARSE = 0.3, 1
 """Share of the work after which motions are bounded in parts in any case where (6) binds the plan;
 and the level of the cells that this begins with at further nodes."""
-REACH, DEAREST = 0.017, (5.0, 20.0)
-"""How far gamma may go where multipliers are found, rad; and the largest of them, in weights."""
+REACH = 0.2
+"""How far gamma may go where multipliers are found, rad."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -173,10 +177,7 @@ class _Course:
             endless=robot.endless,
         )
         self.margin, width = (CLEARLY, WIDER) if checkable else (SAME, 1.0)
-        postures = range(robot.postures) if asked.postures is None else asked.postures
-        self.maker = CellMaker(
-            robot, plan.frames, plan.T_flange_tip, robot.joint_limits(), postures, width
-        )
+        self.maker = CellMaker(robot, plan.frames, plan.T_flange_tip, asked.postures, width)
         self.cost, self.until, self.progress = plan.cost, until, progress
         self.target = plan.cost * min(1.0, 1 - gap + ALLOWANCE)
         self.last = len(plan.q) - 1
@@ -184,8 +185,7 @@ class _Course:
         self.nodes = turning_nodes(plan, TURNED, longest)
         self.best, self.pairs, self.count = 0.0, 0, 0
         self.stages: list[Stage] = []
-        self.plan = plan
-        self.priced = not checkable and self._binds()
+        self.plan, self.checkable = plan, checkable
         self.proved = 0.0  # by the stages that are kept
         self.loose: tuple[int, StageResult] | None = None  # the best that is not, and its place
 
@@ -195,14 +195,18 @@ class _Course:
         fresh = True  # cells that the certificate has to show
         while True:
             result = solve_stage(cells, self.steps, care=CARE * self.cost)
-            gained = self._take(result)
-            clearly = self.margin * np.exp2(2.0 * (FINE - result.cells.level))
+            gained, cells = self._take(result), result.cells
+            clearly = self.margin * np.exp2(2.0 * (USUAL_LEVEL - cells.level))
             live = result.through <= self.cost * (1 + clearly)
             low = result.through < self.target
-            if low.any() and self.priced and self._late(gained):
-                self._divide(result.cells.take(live))
+            which, singular = cells_to_divide(cells, result.through, self.target, self.steps.weight)
+            which &= cells.level < DEEPEST
+            fine = not singular and low.any() and np.median(cells.level[low]) >= FINE
+            slow = bool(fine) and gained < STALLED
+            if fine and self._late(slow) and self._priced:
+                self._divide(cells.take(live))
                 return
-            if not low.any() or self._enough(result, float(live.mean() + low.mean())):
+            if not low.any() or self._enough(result, float(live.mean() + which.mean())):
                 self._finish(result)
                 return
             if fresh or 1 - live.mean() > DROPPED:
@@ -212,41 +216,40 @@ class _Course:
                 if result.bound >= self.best:
                     self.loose = len(self.stages), result
                 kept = np.ones(len(live), np.bool_)
-            cells = result.cells
-            deep = bool((cells.level[low] >= DEEPEST).any())
-            fine = self.best > NEAR * self.target or cells.level.max() >= FINE
-            slow = fine and gained < STALLED
-            if len(self.nodes) <= self.last and (slow or deep):
+            which &= kept
+            if len(self.nodes) <= self.last and (slow or not which.any()):
                 self.nodes, fresh = between(self.nodes), True
                 cells = self._with_nodes(cells.take(kept))
-            elif deep:
+            elif not which.any():
                 self._finish(result)
                 return
             else:
-                rest = cells.take(kept & ~low)
-                cells = CellSet.join([rest, self.maker.halves(cells.take(kept & low))])
+                rest = cells.take(kept & ~which)
+                cells = CellSet.join([rest, self.maker.halves(cells.take(which))])
 
-    def _binds(self) -> bool:
-        """Return whether (6) is worth more to the plan than the gap that may be left."""
+    @cached_property
+    def _priced(self) -> bool:
+        """Whether (6) is worth more to the plan than the gap that may be left."""
+        if self.checkable:
+            return False
         share = np.abs(self.plan.acceleration_share)
         if self.steps.metric == CHEBYCHEV:  # its potentials are too loose for prices to tell
             return False
         if not (share > AT_LIMIT * self.plan.settings.eta_a).any():
             return False
-        prices = self._prices(int(np.bincount(self.plan.posture).argmax()))
-        worth = max((self.steps.price(each) for each in prices), default=0.0)
-        return worth > self.cost - self.target
+        posture = int(np.bincount(self.plan.posture).argmax())
+        prices = (self._prices(self.plan.gamma, posture, most) for most in DEAREST)
+        return max(map(self.steps.price, prices)) > self.cost - self.target
 
-    def _prices(self, posture: int) -> list[Array]:
-        """Return multipliers of (6) about the motion that turns gamma as the plan, in a posture."""
-        motion = self.maker.motion(self.plan.gamma, posture)
+    def _prices(self, gamma: Array, posture: int, most: float) -> Array | None:
+        """Return multipliers of (6) about the motion with gamma (K,) in a posture."""
+        motion = self.maker.motion(gamma, posture)
         if motion is None:
-            return []
+            return None
         q, slope = motion
         u = np.diff(q, axis=0)
         u -= 2 * np.pi * np.rint(u / (2 * np.pi))
-        found = (limit_prices(u, slope, self.steps, REACH, most) for most in DEAREST)
-        return [prices for prices in found if prices is not None]
+        return limit_prices(u, slope, self.steps, REACH, most)
 
     def _divide(self, cells: CellSet) -> None:
         """Go on at all nodes, with multipliers of (6), part by part."""
@@ -263,6 +266,7 @@ class _Course:
             self.maker,
             self.steps,
             self._prices,
+            self.plan.gamma,
             cost=self.cost,
             target=self.target,
             enough=enough,
@@ -294,9 +298,9 @@ class _Course:
         self.progress("certificate", int(1000 * (1 - short / self.target)), 1000)
         return (self.best - before) / max(self.target - before, 1e-300)
 
-    def _late(self, gained: float) -> bool:
+    def _late(self, slow: bool) -> bool:
         """Return whether (6) is to be told by multipliers from here on."""
-        close = self.best > NEAR * self.target and gained < STALLED
+        close = slow and self.best > NEAR * self.target
         return close or self.pairs > EARLY * (MOST_PAIRS + MOST_PER_NODE * self.last)
 
     def _enough(self, result: StageResult, left: float) -> bool:

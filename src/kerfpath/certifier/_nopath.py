@@ -51,8 +51,7 @@ def closed_node(
     Arguments as for `MotionTest`; None where that is proved of none of them. Cells of gamma without
     a solution within ranges and couplings drop out, the others are halved.
     """
-    used = range(robot.postures) if postures is None else postures
-    maker = CellMaker(robot, frames, T_flange_tip, robot.joint_limits(), used)
+    maker = CellMaker(robot, frames, T_flange_tip, postures)
     for node in nodes:
         cells = maker.coarsest(np.array([node]))
         for _ in range(DEEPEST):
@@ -96,9 +95,8 @@ class MotionTest:
         T_flange_tip: Array,
         postures: tuple[int, ...] | None = None,
     ) -> None:
-        used = range(robot.postures) if postures is None else postures
         self._endless = robot.endless
-        self._maker = CellMaker(robot, frames, T_flange_tip, robot.joint_limits(), used)
+        self._maker = CellMaker(robot, frames, T_flange_tip, postures)
         self._count = len(frames)
         self._coarsest = self._maker.coarsest(np.arange(self._count))
 

@@ -4,14 +4,15 @@ Where (6) decides, two things stand in the way of a close bound. The multipliers
 motions about the plan closely make those elsewhere look cheap, in another posture above all; and
 however fine the cells, a bound with multipliers stays below the best motion as long as its cells
 are far apart. So the motions are divided: into those that no step joins, and by where they pass a
-node. Each part is bounded by all multipliers of its posture, and by what is known of its cells.
+node. Each part is bounded without multipliers, with those about the plan or about a motion that
+looked cheap before, and with those about the one that then looks cheapest: a motion that breaks (6)
+shows where in the part prices are missing. What is known of its cells holds on.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from functools import cache
 from heapq import heappop, heappush
 from itertools import count
 
@@ -21,10 +22,12 @@ from scipy.sparse.csgraph import connected_components
 
 from kerfpath._arrays import Array, Bools
 from kerfpath._repr import short_repr
+from kerfpath.certificate import cell_bounds
 from kerfpath.certifier._cells import CellMaker, CellSet
+from kerfpath.certifier._finer import cells_to_divide
 from kerfpath.certifier._stage import StageResult, Steps, solve_stage
 
-__all__ = ["Parts"]
+__all__ = ["DEAREST", "Parts"]
 
 SAME = 1e-9
 """Share of the cost by which motions are dearer than the plan where they drop out: rounding."""
@@ -32,16 +35,24 @@ CARE = 0.05
 """Share of the cost beyond the cheapest step up to which steps are bounded with care."""
 STALLED, AGAIN = 0.1, 1
 """Share of what a part lacks that finer cells must gain, and how often they may not."""
+DEAREST = 5.0, 20.0
+"""The largest multipliers, in weights: far from the motion that they are about small ones prove
+more."""
 DEEPEST = 16
 """Levels at most: cells of 1e-4 deg."""
 
 
 @dataclass(slots=True, eq=False)
 class _Part:
-    """Cells, and how often in a row finer ones gained little."""
+    """Cells, what they prove of themselves, and how often in a row finer ones gained little.
+
+    `prices` (K, n) are the multipliers that proved most; None where none did better than none.
+    """
 
     cells: CellSet
-    stalled: int
+    own: float = -np.inf
+    stalled: int = 0
+    prices: Array | None = None
 
     __repr__ = short_repr
 
@@ -54,7 +65,10 @@ class Parts:
     maker : CellMaker
     steps : Steps
     prices : callable
-        Gives multipliers (K, n) of (6) to bound the motions in a posture with; any are valid.
+        Gives multipliers (K, n) of (6) about the motion with gamma (K,) in a posture, up to a
+        largest one in weights; None where there are none. Any are valid.
+    gamma : (K,) rad
+        Of the plan.
     cost, target : float
         Of the plan; and what is wanted of the bound.
     enough : callable
@@ -65,13 +79,14 @@ class Parts:
         self,
         maker: CellMaker,
         steps: Steps,
-        prices: Callable[[int], list[Array]],
+        prices: Callable[[Array, int, float], Array | None],
+        gamma: Array,
         *,
         cost: float,
         target: float,
         enough: Callable[[int, int], bool],
     ) -> None:
-        self._maker, self._steps, self._prices = maker, steps, cache(prices)
+        self._maker, self._steps, self._prices, self._gamma = maker, steps, prices, gamma
         self._cost, self._target, self._enough = cost, target, enough
         self._number, self._held = count(), 0
         self._open: list[tuple[float, int, _Part]] = []
@@ -83,7 +98,7 @@ class Parts:
 
         The cells are of all nodes; `known` is what the motions are known to cost at least.
         """
-        self._wait(known, _Part(cells, 0))
+        self._wait(known, _Part(cells))
         while self._open and self._open[0][0] < min(self._target, self._closed):
             if self._enough(self.pairs, self._held):
                 break
@@ -99,7 +114,7 @@ class Parts:
     def _divide(self, part: _Part, known: float) -> None:
         """Bound a part, and wait with what may be cheaper than is wanted in smaller parts."""
         self.count += 1
-        through, result = self._solved(part.cells)
+        through, result, prices = self._solved(part)
         kept = through <= self._cost * (1 + SAME)
         if not kept.any():
             return
@@ -109,37 +124,67 @@ class Parts:
             rest = cells.take(one)
             if len(np.unique(rest.node)) < layers:
                 continue  # no motion all the way along
-            least = max(known, float(rest.floor.min()))
-            gained = (least - known) / (self._target - known)
-            stalled = part.stalled + 1 if gained < STALLED else 0
-            smaller = [] if least >= self._target else self._smaller(rest, stalled)
+            own = float(rest.floor.min())
+            least = max(known, own)
+            slow = part.own > -np.inf and own - part.own < STALLED * (self._target - part.own)
+            left = _Part(rest, own, part.stalled + 1 if slow else 0, prices)
+            smaller = [] if least >= self._target else self._smaller(left)
             if not smaller:
                 self._closed = min(self._closed, least)
             for each in smaller:
                 self._wait(least, each)
 
-    def _solved(self, cells: CellSet) -> tuple[Array, StageResult]:
-        """Return the most that is proved through each cell, and a result, which has their order."""
-        posture = int(np.bincount(cells.posture).argmax())
-        result = solve_stage(cells, self._steps, care=CARE * self._cost)
-        self.pairs += result.pairs
-        through = np.maximum(result.through, result.cells.floor)
-        for prices in self._prices(posture):
-            priced = solve_stage(cells, self._steps, prices, care=CARE * self._cost)
-            self.pairs += priced.pairs
-            through = np.maximum(through, priced.through)
-        return through, result
+    def _solved(self, part: _Part) -> tuple[Array, StageResult, Array | None]:
+        """Return the most that is proved through each cell, a result, and what proved most.
 
-    def _smaller(self, cells: CellSet, stalled: int) -> list[_Part]:
+        The result has the order of the cells.
+        """
+        result = best = self._stage(part.cells, None)
+        through = np.maximum(result.through, result.cells.floor)
+
+        def tried(prices: Array | None) -> bool:
+            nonlocal best, through
+            if prices is None:
+                return False
+            priced = self._stage(part.cells, prices)
+            through = np.maximum(through, priced.through)
+            better = priced.bound > best.bound
+            best = priced if better else best
+            return better
+
+        if part.prices is not None:
+            tried(part.prices)
+        else:
+            posture = int(np.bincount(part.cells.posture).argmax())
+            for most in DEAREST:
+                tried(self._prices(self._gamma, posture, most))
+        motion = best.cells.take(best.cheapest())
+        if len(motion) == len(self._gamma):
+            posture = int(np.bincount(motion.posture).argmax())
+            gamma, _ = cell_bounds(motion.level, motion.index)
+            for most in DEAREST:
+                if not tried(self._prices(gamma, posture, most)):
+                    break
+        return through, result, best.multipliers
+
+    def _stage(self, cells: CellSet, prices: Array | None) -> StageResult:
+        result = solve_stage(cells, self._steps, prices, care=CARE * self._cost)
+        self.pairs += result.pairs
+        return result
+
+    def _smaller(self, part: _Part) -> list[_Part]:
         """Return the parts that a part divides into; none where it cannot be divided.
 
         Finer cells; where these gain little, both sides of the middle of the node at which the
         joints are farthest apart.
         """
+        cells = part.cells
         low = cells.floor < self._target
-        coarse = low & (cells.level < DEEPEST)
-        if stalled <= AGAIN and coarse.any():
-            return [_Part(self._maker.finer(cells, coarse, self._steps.weight), stalled)]
+        which, singular = cells_to_divide(cells, cells.floor, self._target, self._steps.weight)
+        which &= cells.level < DEEPEST
+        if which.any() and (singular or part.stalled <= AGAIN):
+            finer = CellSet.join([cells.take(~which), self._maker.halves(cells.take(which))])
+            return [replace(part, cells=finer, stalled=0 if singular else part.stalled)]
         nodes = np.unique(cells.node[low])
         start = np.searchsorted(cells.node, nodes), np.searchsorted(cells.node, nodes, "right")
         joints = [cells.center[a:b] * self._steps.weight for a, b in zip(*start, strict=True)]
@@ -149,7 +194,8 @@ class Parts:
             return []
         inside, q = cells.node == nodes[place], cells.center[:, joint]
         middle = (q[inside].min() + q[inside].max()) / 2
-        return [_Part(cells.take(~inside | side), 0) for side in (q <= middle, q > middle)]
+        sides = (~inside | (q <= middle), ~inside | (q > middle))
+        return [replace(part, cells=cells.take(side), stalled=0) for side in sides]
 
 
 def _joined(result: StageResult, kept: Bools) -> list[Bools]:

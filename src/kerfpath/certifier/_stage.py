@@ -102,6 +102,16 @@ class StageResult:
         """The least that any motion costs."""
         return float(self.through.min(initial=np.inf))
 
+    def cheapest(self) -> Ints:
+        """Return the cells of a motion that may be the cheapest, one of each layer."""
+        cell = int(self.through[: int((self.cells.node == self.cells.node[0]).sum())].argmin())
+        motion = [cell]
+        while self.begin[cell] < self.begin[cell + 1]:
+            ahead = self.to[self.begin[cell] : self.begin[cell + 1]]
+            cell = int(ahead[self.through[ahead].argmin()])
+            motion.append(cell)
+        return np.array(motion)
+
     def stage(self) -> Stage:
         """Return the stage as a certificate holds it."""
         cells = self.cells

@@ -1,0 +1,71 @@
+"""Cells to divide: those near a singularity first, while they decide."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from benchmarks._random_contours import cut
+
+from kerfpath import PlanOptions, plan
+from kerfpath.certifier import certify
+from kerfpath.certifier._cells import CellSet
+from kerfpath.certifier._finer import cells_to_divide
+
+WEIGHT = np.array([1.0, 2.0])
+
+
+def cells(spread):
+    """Return two cells at each of three nodes, on which joint 1 is known so far, (6,) rad."""
+    spread = np.asarray(spread, float)
+    C, nothing = len(spread), np.zeros((len(spread), 2))
+    return CellSet(
+        node=np.repeat(np.arange(3, dtype=np.int32), 2),
+        posture=np.zeros(C, np.int8),
+        level=np.zeros(C, np.int8),
+        index=np.arange(C, dtype=np.int32),
+        half=np.full(C, 0.04),
+        center=nothing,
+        slope=nothing,
+        bend=nothing,
+        spread=np.c_[spread, nothing[:, 0]],
+        floor=np.full(C, -np.inf),
+    )
+
+
+def test_a_cell_that_decides_is_divided_alone():
+    through = np.array([0.0, 5.0, 0.0, 5.0, 0.0, 5.0])
+    which, singular = cells_to_divide(cells([0, 0, 3, 0, 0, 0]), through, 4.0, WEIGHT)
+    assert singular
+    assert which.tolist() == [False, False, True, False, False, False]
+
+
+def test_where_little_is_unknown_all_that_lack_something_are_divided():
+    through = np.array([0.0, 5.0, 1.0, 5.0, 0.0, 3.9])
+    which, singular = cells_to_divide(cells([0, 0, 0.5, 9, 0, 0]), through, 4.0, WEIGHT)
+    assert not singular  # the cell known to 9 rad is on no cheap motion
+    assert which.tolist() == [True, False, True, False, True, True]
+
+
+def test_nothing_is_divided_where_nothing_lacks():
+    which, singular = cells_to_divide(cells([9.0] * 6), np.full(6, 4.0), 4.0, WEIGHT)
+    assert not which.any()
+    assert not singular
+
+
+def test_cells_without_any_bound_are_divided():
+    """Minus infinity is what a part begins with."""
+    which, _ = cells_to_divide(cells([1.0] * 6), np.full(6, -np.inf), 4.0, WEIGHT)
+    assert which.all()
+
+
+@pytest.mark.usefixtures("certifier_at_work")
+@pytest.mark.parametrize("checkable", [False, True])
+def test_motions_past_a_wrist_singularity_are_bounded_closely(checkable):
+    """At gamma of some 25 deg joint 5 passes zero: joint 4 may be anywhere in cells of 0.6 deg."""
+    drawn = cut("abb_irb2400_155", 12)
+    space = {"tool": drawn.tool, "placement": np.eye(4), "speed": drawn.speed}
+    asked = replace(PlanOptions(), certify=None)
+    made = plan(drawn.contour, drawn.robot, options=asked, **space)
+    found = certify(made, gap=0.02, checkable=checkable)
+    assert found.done
+    assert found.plan.proof.gap <= 0.02
