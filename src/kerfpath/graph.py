@@ -119,6 +119,13 @@ class LayeredGraph:
         start = self.start[first : last + 2] - self.start[first]
         return self._of(vertices, start, self.reason[first : last + 1], self.reasons)
 
+    def at_nodes(self, nodes: Ints) -> LayeredGraph:
+        """Return the layers of some nodes (M,), ascending."""
+        sizes, kept = np.diff(self.start), np.zeros(len(self.start) - 1, np.bool_)
+        kept[nodes] = True
+        start = np.concatenate([[0], np.cumsum(sizes[nodes])])
+        return self._of(np.repeat(kept, sizes), start, self.reason[nodes], self.reasons)
+
     def _of(
         self,
         vertices: Bools | slice,

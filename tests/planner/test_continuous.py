@@ -1,5 +1,7 @@
 """plan() over continuous gamma: never worse than the refined grid, and every limit kept."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -16,7 +18,10 @@ from kerfpath import (
 )
 from kerfpath.cell import box_between, cell_of
 from kerfpath.contour import Contour
-from kerfpath.planner import _dip, layered_graph
+from kerfpath.options import PlanOptions
+from kerfpath.planner import _dip, _thinned, layered_graph
+from kerfpath.planner._task import task_of
+from kerfpath.plans import Proof
 
 STEP = np.radians(4)
 SAME = 1e-3
@@ -72,6 +77,61 @@ def test_the_step_of_gamma_hardly_matters(task):
         plan(*task[0], **task[1] | {"gamma_step": np.radians(step)}).cost for step in (2, 5, 10)
     ]
     assert max(costs) <= min(costs) * (1 + 2e-3)
+
+
+@pytest.mark.parametrize("name", ["plain", "max", "periodic", "rotation", "tangent", "wrist"])
+def test_very_many_nodes_are_planned_from_every_few_of_them(
+    circle, arm, tool, placement, name, monkeypatch
+):
+    """As 121 nodes are here, and 25 of them; the cost may differ by what refinements leave."""
+    options = {"tool": tool, "placement": placement, "gamma_step": STEP, "postures": (0, 1)}
+    options = options | {"speed": 0.1} | TASKS[name]
+    plain = plan(circle, arm, **options)
+    lifted, lift = [], _thinned.ThinTask.lifted
+    monkeypatch.setattr(
+        _thinned.ThinTask, "lifted", lambda *of: lifted.append(lift(*of)) or lifted[-1]
+    )
+    monkeypatch.setattr(_thinned, "MANY", 100)
+    made = plan(circle, arm, **options)
+    assert len(lifted) == 1
+    assert made.cost <= plain.cost * (1 + SAME)
+    assert audit(made) == []
+
+
+def test_every_few_nodes_are_those_of_the_whole(circle, arm, tool, placement, monkeypatch):
+    monkeypatch.setattr(_thinned, "MANY", 100)
+    asked = PlanOptions(gamma_step=STEP, frames="rotation-minimising")
+    whole = task_of(circle, arm, asked, tool=tool, placement=placement, speed=0.1)
+    thin = _thinned.thinned(whole)
+    graph, nodes = thin.task.graph, [*range(0, 120, 5), 120]
+    assert thin.nodes.tolist() == nodes
+    assert thin.task.dt == 5 * whole.dt
+    for k, node in enumerate(nodes):
+        own, there = (g.part(i, i).q for g, i in ((graph, k), (whole.graph, node)))
+        np.testing.assert_array_equal(own, there)
+    index = np.zeros(len(nodes), dtype=int)
+    some = thin.task.plan(index, 0.0, Proof(optimal=False, statement=""))
+    # Gamma counts from the same directions.
+    at = some.frames[:, :3, :3], (placement @ circle.frames(asked.frames))[nodes, :3, :3]
+    np.testing.assert_allclose(*at, atol=1e-12)
+    assert thin.lifted(replace(some, posture=np.arange(25) % 2)) is None
+
+
+def test_with_fewer_nodes_a_tilt_or_another_axis_no_node_is_left_out(
+    circle, arm, tool, placement, monkeypatch
+):
+    def thin(robot=arm, **options):
+        asked = PlanOptions(gamma_step=np.radians(30), **options)
+        return _thinned.thinned(
+            task_of(circle, robot, asked, tool=tool, placement=placement, speed=0.1)
+        )
+
+    assert thin() is None
+    monkeypatch.setattr(_thinned, "MANY", 100)
+    assert thin() is not None
+    assert thin(tilt=Tilt(cone=0.1, steps=1)) is None
+    rail = {"lower": 0.0, "upper": 0.1, "velocity": 1.0, "acceleration": 1.0, "step": 0.1}
+    assert thin(arm.on_rail([0, 1, 0], **rail)) is None
 
 
 def test_the_cost_is_that_of_the_motion(task):

@@ -57,6 +57,10 @@ class ClearSearch:
             around=_gamma_neighbours(task.graph),
         )
 
+    def of(self, task: PlanningTask) -> ClearSearch:
+        """Return how the searches of another task run in the same cell."""
+        return ClearSearch(task, self._cell)
+
     def find(self, search: Callable[[SearchProblem], _P], problem: SearchProblem) -> _P:
         """Return what a search finds for a problem on the graph of the task."""
         if self._cell is None:

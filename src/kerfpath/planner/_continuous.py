@@ -13,6 +13,7 @@ from kerfpath.planner._on_grid import plan_on_grid
 from kerfpath.planner._quickest import alike, clear_paths, wide
 from kerfpath.planner._shaken import shaken
 from kerfpath.planner._task import PlanningTask
+from kerfpath.planner._thinned import thinned
 from kerfpath.plans import Plan, Proof
 from kerfpath.refiner import Refinement
 from kerfpath.search import ContinuousPath, Effort
@@ -70,12 +71,18 @@ def clear_motion(
 
     The values tell whether a wider search may find a better one.
     """
-    searched = clear_paths(task, finder, QUICK)
-    if searched is None:
-        return None
-    search, paths = searched
-    begin("refinement")
     starts = _Starts(task, finder)
+    thin = thinned(task)
+    if thin is not None:
+        before = clear_motion(thin.task, finder.of(thin.task))
+        starts.start_from(None if before is None else thin.lifted(before.plan))
+    searched = clear_paths(task, finder, QUICK if starts.best is None else ())
+    if searched is None:
+        return starts.best
+    search, paths = searched
+    if starts.best is not None and starts.above(search.value, ENOUGH):
+        paths = [path for effort in QUICK for path in search.paths(effort)]
+    begin("refinement")
     starts.refine(paths)
     if starts.above(search.value, ENOUGH):
         paths += search.paths(wide(task))
@@ -100,6 +107,13 @@ class _Starts:
     def above(self, value: float, share: float) -> bool:
         """Return whether the best motion costs more than a value by more than a share of it."""
         return self.best is None or self.best.cost_after > (1 + share) * value
+
+    def start_from(self, made: Plan | None) -> None:
+        """Refine a motion, if there is one, that is close to the best."""
+        if made is not None:
+            self._tried.append(made)
+            found = refiner.refine(made, first=FIRST_STEP)
+            self.best = found if found.done and self._finder.is_clear(found.plan) else None
 
     def refine(self, paths: list[ContinuousPath], *, unpromising: bool = False) -> None:
         """Refine paths, the most promising first, of those alike one.

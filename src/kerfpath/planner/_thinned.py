@@ -1,0 +1,103 @@
+"""Very many nodes: the motion at every few of them says where that at all of them begins."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy.interpolate import CubicSpline
+
+from kerfpath._arrays import Ints
+from kerfpath._repr import short_repr
+from kerfpath.contour import Contour
+from kerfpath.planner._task import PlanningTask
+from kerfpath.plans import Plan, Proof, on_turns
+
+__all__ = ["ThinTask", "thinned"]
+
+MANY, EVERY = 2000, 5
+"""Nodes from which on a task is thinned, and of how many of its nodes it then has one.
+
+The closer the nodes, the less an increment may change by (6) against the samples of gamma: paths
+through these grow poor, and what they are refined to takes long and may end in another valley."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class ThinTask:
+    """A task of every few nodes of another one, at the same speed.
+
+    Parameters
+    ----------
+    task : PlanningTask
+        The last of its intervals may be shorter than the others, and is taken as one of them.
+    whole : PlanningTask
+        The other one.
+    nodes : (M,) int
+        Which of its nodes.
+    """
+
+    task: PlanningTask
+    whole: PlanningTask
+    nodes: Ints
+
+    __repr__ = short_repr
+
+    def lifted(self, made: Plan) -> Plan | None:
+        """Return the motion at all nodes, gamma a spline through that at some of them.
+
+        It need not keep the limits. None where the posture changes on the way.
+        """
+        task, at = self.whole, np.arange(len(self.whole.contour))
+        if np.ptp(made.posture):
+            return None
+        gamma = CubicSpline(self.nodes, np.unwrap(made.gamma))(at)
+        steps = np.cumsum(made.increments, axis=0)
+        rough = np.vstack([made.q[:1], made.q[:1] + steps])
+        q = np.stack([np.interp(at, self.nodes, joint) for joint in rough.T], axis=1)
+        claim = Proof(optimal=False, statement="found over continuous rotation")
+        return Plan(
+            contour=task.contour,
+            robot=task.robot,
+            T_flange_tip=task.T_flange_tip,
+            T_base_part=task.T_base_part,
+            q=q,
+            gamma=gamma,
+            posture=np.repeat(made.posture[:1], len(at)),
+            turn=on_turns(task.robot, q)[1],
+            time=task.times,
+            settings=task.settings,
+            cost=made.cost,
+            proof=claim,
+            counts=task.graph.counts(),
+        )
+
+
+def thinned(task: PlanningTask) -> ThinTask | None:
+    """Return the task of every few nodes of one with very many; None of one with fewer.
+
+    None, too, where gamma is not all that varies: with a tilt, or an external axis.
+    """
+    last = len(task.contour) - 1
+    if last < MANY or task.settings.tilt is not None or task.robot.external is not None:
+        return None
+    nodes = np.unique(np.append(np.arange(0, last, EVERY), last))
+    whole, graph, kept = task.contour, task.graph.at_nodes(nodes), np.zeros(last + 1, np.bool_)
+    kept[nodes] = True
+    contour = Contour(
+        whole.points[nodes],
+        whole.axes[nodes],
+        closed=whole.closed,
+        s=whole.s[nodes],
+        x=whole.frames(task.settings.frames)[nodes, :3, 0],
+        name=whole.name,
+    )
+    vertices = np.repeat(kept, np.diff(task.graph.start))
+    problem = replace(
+        task.problem,
+        q=graph.q,
+        start=graph.start,
+        dt=EVERY * task.problem.dt,
+        vertex_cost=task.problem.vertex_cost[vertices],
+    )
+    thin = replace(task, contour=contour, graph=graph, problem=problem)
+    return ThinTask(task=thin, whole=task, nodes=nodes)
