@@ -117,6 +117,25 @@ def test_every_few_nodes_are_those_of_the_whole(circle, arm, tool, placement, mo
     assert thin.lifted(replace(some, posture=np.arange(25) % 2)) is None
 
 
+@pytest.mark.parametrize(("intervals", "every"), [(104, 4), (105, 5), (111, 3), (103, 5)])
+def test_a_motion_along_some_nodes_is_one_along_all(
+    circle, arm, tool, placement, monkeypatch, intervals, every
+):
+    monkeypatch.setattr(_thinned, "MANY", 100)
+    asked, nodes = PlanOptions(gamma_step=STEP), circle.resample(count=intervals + 1)
+    whole = task_of(nodes, arm, asked, tool=tool, placement=placement, speed=0.1)
+    thin = _thinned.thinned(whole)
+    assert (np.diff(thin.nodes) == every).all()
+    assert intervals - every < thin.nodes[-1] <= intervals
+    some = thin.task.plan(np.zeros(len(thin.nodes), int), 0.0, Proof(optimal=False, statement=""))
+    along = 0.3 * thin.nodes / intervals  # gamma turns evenly, and so it does along all
+    made = thin.lifted(replace(some, gamma=along, posture=np.zeros(len(along), int)))
+    np.testing.assert_allclose(made.gamma, 0.3 * np.arange(intervals + 1) / intervals, atol=1e-12)
+    assert made.time[-1] == whole.times[-1]
+    periodic = replace(whole, settings=replace(whole.settings, closure="periodic"))
+    assert (_thinned.thinned(periodic) is None) == (intervals == 103)
+
+
 def test_with_fewer_nodes_a_tilt_or_another_axis_no_node_is_left_out(
     circle, arm, tool, placement, monkeypatch
 ):

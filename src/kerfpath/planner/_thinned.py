@@ -15,11 +15,13 @@ from kerfpath.plans import Plan, Proof, on_turns
 
 __all__ = ["ThinTask", "thinned"]
 
-MANY, EVERY = 2000, 5
-"""Nodes from which on a task is thinned, and of how many of its nodes it then has one.
+MANY = 800
+"""Intervals from which on a task is thinned.
 
 The closer the nodes, the less an increment may change by (6) against the samples of gamma: paths
 through these grow poor, and what they are refined to takes long and may end in another valley."""
+EVERY = 5, 4, 6, 3, 7
+"""Of how many nodes one is kept: the first that divides the intervals, or else the first."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -29,7 +31,7 @@ class ThinTask:
     Parameters
     ----------
     task : PlanningTask
-        The last of its intervals may be shorter than the others, and is taken as one of them.
+        It ends before a few nodes of the other one where its intervals do not come out even.
     whole : PlanningTask
         The other one.
     nodes : (M,) int
@@ -45,12 +47,14 @@ class ThinTask:
     def lifted(self, made: Plan) -> Plan | None:
         """Return the motion at all nodes, gamma a spline through that at some of them.
 
-        It need not keep the limits. None where the posture changes on the way.
+        It need not keep the limits; beyond the last of some it goes on as it is. None where the
+        posture changes on the way.
         """
         task, at = self.whole, np.arange(len(self.whole.contour))
         if np.ptp(made.posture):
             return None
-        gamma = CubicSpline(self.nodes, np.unwrap(made.gamma))(at)
+        spline, end = CubicSpline(self.nodes, np.unwrap(made.gamma)), self.nodes[-1]
+        gamma = spline(np.minimum(at, end)) + spline(end, 1) * np.maximum(at - end, 0)
         steps = np.cumsum(made.increments, axis=0)
         rough = np.vstack([made.q[:1], made.q[:1] + steps])
         q = np.stack([np.interp(at, self.nodes, joint) for joint in rough.T], axis=1)
@@ -75,18 +79,23 @@ class ThinTask:
 def thinned(task: PlanningTask) -> ThinTask | None:
     """Return the task of every few nodes of one with very many; None of one with fewer.
 
-    None, too, where gamma is not all that varies: with a tilt, or an external axis.
+    None, too, where gamma is not all that varies: with a tilt, or an external axis; and with a
+    periodic closure whose intervals do not come out even.
     """
     last = len(task.contour) - 1
     if last < MANY or task.settings.tilt is not None or task.robot.external is not None:
         return None
-    nodes = np.unique(np.append(np.arange(0, last, EVERY), last))
+    even = [every for every in EVERY if last % every == 0]
+    if task.settings.closure == "periodic" and not even:
+        return None
+    every = (even or EVERY)[0]
+    nodes = np.arange(0, last + 1, every)
     whole, graph, kept = task.contour, task.graph.at_nodes(nodes), np.zeros(last + 1, np.bool_)
     kept[nodes] = True
     contour = Contour(
         whole.points[nodes],
         whole.axes[nodes],
-        closed=whole.closed,
+        closed=whole.closed and bool(even),
         s=whole.s[nodes],
         x=whole.frames(task.settings.frames)[nodes, :3, 0],
         name=whole.name,
@@ -96,7 +105,7 @@ def thinned(task: PlanningTask) -> ThinTask | None:
         task.problem,
         q=graph.q,
         start=graph.start,
-        dt=EVERY * task.problem.dt,
+        dt=every * task.problem.dt,
         vertex_cost=task.problem.vertex_cost[vertices],
     )
     thin = replace(task, contour=contour, graph=graph, problem=problem)
