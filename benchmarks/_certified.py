@@ -92,7 +92,7 @@ class Task:
         )
 
     def planned(self, graph: LayeredGraph) -> Plan | None:
-        """Return the plan on its graph; None where none is found."""
+        """Return the plan on its graph, not certified; None where none is found."""
         with suppress(NoFeasiblePath):
             return plan(
                 self.contour,
@@ -100,7 +100,7 @@ class Task:
                 tool=self.tool,
                 placement=self.placement,
                 speed=self.speed,
-                options=self.options,
+                options=replace(self.options, certify=None),
                 graph=graph,
             )
         return None
