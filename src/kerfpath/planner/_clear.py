@@ -164,10 +164,11 @@ class ClearSearch:
         """Return a claim and, in a cell, that it holds for what is clear, after how many checks."""
         if self._cell is None:
             return claim
-        seen = self._checker
+        seen, clear = self._checker, f"{claim}, clear in the cell{self._but}"
+        if not seen.asked:  # what some of the nodes led to is looked at as it is
+            return clear
         return (
-            f"{claim}, clear in the cell{self._but}: "
-            f"{seen.asked} of {len(self._known.cost)} poses and "
+            f"{clear}: {seen.asked} of {len(self._known.cost)} poses and "
             f"{seen.motions_asked} motions looked at in {self._known.searches} searches, "
             f"distances found at {seen.measured} poses and on {seen.motions_measured} motions"
         )
