@@ -131,8 +131,8 @@ class OffGridEvaluator(PlacementEvaluator):
         except NoFeasiblePath as broken:
             raise self._infeasible(index, graph, broken, 2.0, first) from None
         enough = None if least is None else least * unit
-        if job.robot.external is not None or (enough is not None and on_grid >= enough):
-            return on_grid / unit  # beams know no external axis
+        if enough is not None and on_grid >= enough:
+            return on_grid / unit
         step = longest_step(contour.nodes)
         beams = Beams(
             graph=graph,
