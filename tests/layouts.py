@@ -5,6 +5,7 @@ import json
 import numpy as np
 
 from conftest import ROOT
+from jobs import ROBOT_AND_HEAD
 from kerfpath.study import digest
 from kerfpath.study.placing._evaluate import evaluate_placements
 from kerfpath.study.placing._value import PlacementValue
@@ -23,6 +24,22 @@ head = "laser-head-45"
 file = '{DEMO / "b_pillar.step"}'
 xyz_mm = [1200, -600, 500]     # where it lies now
 rpy_deg = [0, 0, 90]
+"""
+CELL = """
+[cell]
+near_miss_mm = 10
+part = false
+
+[[cell.fixture]]
+name = "nest"
+size_mm = [120, 60, 200]
+xyz_mm = [1210, -450, 300]
+
+[[cell.fixture]]
+name = "column"
+size_mm = [60, 60, 600]
+xyz_mm = [1390, -210, 600]
+rpy_deg = [0, 0, 20]
 """
 CONTOURS = """
 [[contour]]
@@ -55,12 +72,9 @@ def job_file(folder, text, name="job.toml"):
     return path
 
 
-TABLE = """
-[robot]
-model = "abb_irb4600_60_205"
-acceleration_ratio = "iontec_20_to_70kg"
-[tool]
-head = "laser-head-45"
+TABLE = (
+    ROBOT_AND_HEAD
+    + """
 [part]
 file = "rings.csv"
 xyz_mm = [{x}, 0, 500]
@@ -79,6 +93,7 @@ gamma_step_deg = 10
 posture = "front/up"
 refine = false
 """
+)
 
 
 def rings(folder, x, method="exact", small=41, large=61):

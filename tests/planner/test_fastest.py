@@ -6,7 +6,7 @@ from itertools import islice
 import numpy as np
 import pytest
 
-from kerfpath import NoFeasiblePath, audit, fastest_speed, plan, refiner
+from kerfpath import InputError, NoFeasiblePath, audit, fastest_speed, plan, refiner
 from kerfpath.contour import Contour
 from kerfpath.options import PlanOptions
 from kerfpath.planner._clear import ClearSearch
@@ -197,3 +197,5 @@ def test_a_speed_that_is_enough_ends_the_search(arm, space, quickest_at_work):
     for enough in (fastest.on_grid, middle, 2 * fastest.speed):
         found = fastest_speed(nodes, arm, refine=True, enough=enough, **space)
         assert min(enough, fastest.speed) <= found.speed <= fastest.speed
+    with pytest.raises(InputError, match=r"enough: expected .*, got 0"):
+        fastest_speed(nodes, arm, refine=True, enough=0.0, **space)

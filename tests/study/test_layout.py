@@ -21,24 +21,9 @@ from kerfpath.study import digest, layout, ranges_of
 from kerfpath.study._evaluator import EVERY
 from kerfpath.study.placing._evaluate import contours_of, middle_of
 from kerfpath.study.placing._place import move_job, numbers_of, placed_text
-from layouts import HEAD, contours, job_file, rings, worth
+from layouts import CELL, HEAD, contours, job_file, rings, worth
 
-CELL = """
-[cell]
-near_miss_mm = 10
-part = false
-
-[[cell.fixture]]
-name = "nest"
-size_mm = [120, 60, 200]
-xyz_mm = [1210, -450, 300]
-
-[[cell.fixture]]
-name = "column"
-size_mm = [60, 60, 600]
-xyz_mm = [1390, -210, 600]
-rpy_deg = [0, 0, 20]
-
+STANDING = """
 [layout]
 standing = ["column"]
 """
@@ -71,7 +56,7 @@ def coarse(tmp_path_factory):
 def in_cell(tmp_path_factory):
     return job_file(
         tmp_path_factory.mktemp("c"),
-        HEAD + contours(speed=2, step=10) + CELL,
+        HEAD + contours(speed=2, step=10) + CELL + STANDING,
     )
 
 
@@ -196,7 +181,9 @@ def test_a_head_from_a_file_turns_with_its_mount(tmp_path):
     cone = stl_cone(tmp_path / "cone.stl")
     text = HEAD.replace('head = "laser-head-45"', "xyz_mm = [40, 0, 200]\nrpy_deg = [0, 0, 0]")
     file = f'[cell.head]\nfile = "{cone}"\nunit = "mm"\nxyz_mm = [40, 0, 100]\n'
-    cell = CELL.replace("[[cell.fixture]]", f"{file}nozzle_length_mm = 40\n\n[[cell.fixture]]", 1)
+    cell = (CELL + STANDING).replace(
+        "[[cell.fixture]]", f"{file}nozzle_length_mm = 40\n\n[[cell.fixture]]", 1
+    )
     job = read_job(job_file(tmp_path, text + contours(speed=2, step=10) + cell))
     there = move_job(job, numbers_of(job, {"mount_deg": 50.0}, np.zeros(3)))
     drawing = read_drawing(job.part_file)

@@ -15,24 +15,8 @@ from kerfpath.study.placing._evaluate import contours_of, middle_of
 from kerfpath.study.placing._off_grid import leaves_grid
 from kerfpath.study.placing._place import move_job, numbers_of
 from kerfpath.study.placing._value import is_estimated
-from layouts import HEAD, contours, job_file, rings, worth
+from layouts import CELL, HEAD, contours, job_file, rings, worth
 
-CELL = """
-[cell]
-near_miss_mm = 10
-part = false
-
-[[cell.fixture]]
-name = "nest"
-size_mm = [120, 60, 200]
-xyz_mm = [1210, -450, 300]
-
-[[cell.fixture]]
-name = "column"
-size_mm = [60, 60, 600]
-xyz_mm = [1390, -210, 600]
-rpy_deg = [0, 0, 20]
-"""
 RANGES = {"x_mm": (-150.0, 150.0), "yaw_deg": (-30.0, 30.0)}
 SOME = [
     {"x_mm": 120.0, "y_mm": -80.0, "yaw_deg": 25.0, "tilt_x_deg": 12.0},

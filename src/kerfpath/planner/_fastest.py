@@ -9,6 +9,7 @@ from typing import Literal, Unpack
 import numpy as np
 from numpy.typing import ArrayLike
 
+from kerfpath._arrays import scalar
 from kerfpath.cell import Cell
 from kerfpath.contour import Contour
 from kerfpath.errors import InputError
@@ -110,6 +111,8 @@ def fastest_speed(
     """
     require_even(contour, np.diff(contour.s), "m")
     asked = with_keywords(options, keywords, SpeedKeywords)
+    if enough is not None:
+        enough = scalar(enough, "enough", unit="m/s", above=0.0)
     comfort = asked.comfort
     if comfort is not None and comfort.costs:
         raise InputError("comfort: what is fastest knows no costs; give margins alone")
