@@ -187,7 +187,7 @@ class PlacementSearch:
             if self._refresh(batch):
                 continue
             what = "placements planned" if self.off_grid else "exact searches"
-            self.progress(what, self.exact, self.exact + len(open_))
+            self.progress(what, self.exact, min(self.exact + len(open_), self.most))
             results = self._evaluated(
                 [t.offsets for t in batch],
                 stretches=[self._slowest_first(t) for t in batch],
@@ -199,7 +199,8 @@ class PlacementSearch:
                 trial.searched = True
                 trial.result = replace(result, estimate=trial.result.estimate)
                 self._take(trial)
-            self.progress(what, self.exact, self.exact + len(open_) - len(batch))
+            left = self.exact + len(open_) - len(batch)
+            self.progress(what, self.exact, max(self.exact, min(left, self.most)))
 
     def settle(self) -> tuple[bool, float | None]:
         """Prove of the placements that were not planned that none is better, as far as can be.
