@@ -55,8 +55,9 @@ AT_LIMIT = 0.98
 EARLY, COARSE = 0.3, 1
 """Share of the work after which motions are bounded in parts in any case where (6) binds the plan;
 and the level of the cells that this begins with at further nodes."""
-REACH = 0.2
-"""How far gamma may go where multipliers are found, rad."""
+NARROW, REACH = 0.017, 0.2
+"""How far gamma may go where multipliers are found, rad: about the plan, which keeps (6), and about
+a motion that does not."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -249,7 +250,8 @@ class _Course:
         q, slope = motion
         u = np.diff(q, axis=0)
         u -= 2 * np.pi * np.rint(u / (2 * np.pi))
-        return limit_prices(u, slope, self.steps, REACH, most)
+        reach = NARROW if gamma is self.plan.gamma else REACH
+        return limit_prices(u, slope, self.steps, reach, most)
 
     def _divide(self, cells: CellSet) -> None:
         """Go on at all nodes, with multipliers of (6), part by part."""

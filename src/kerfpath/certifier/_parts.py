@@ -137,7 +137,8 @@ class Parts:
     def _solved(self, part: _Part) -> tuple[Array, StageResult, Array | None]:
         """Return the most that is proved through each cell, a result, and what proved most.
 
-        The result has the order of the cells.
+        The result has the order of the cells. Prices about another motion are asked for where
+        those at hand prove nothing more, or no longer do.
         """
         result = best = self._stage(part.cells, None)
         through = np.maximum(result.through, result.cells.floor)
@@ -158,6 +159,8 @@ class Parts:
             posture = int(np.bincount(part.cells.posture).argmax())
             for most in DEAREST:
                 tried(self._prices(self._gamma, posture, most))
+        if best.multipliers is not None and not part.stalled:
+            return through, result, best.multipliers
         motion = best.cells.take(best.cheapest())
         if len(motion) == len(self._gamma):
             posture = int(np.bincount(motion.posture).argmax())
