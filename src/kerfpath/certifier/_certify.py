@@ -34,7 +34,7 @@ STALLED = 0.5
 """Share of the gap that a stage must close; less, and nodes come in between instead."""
 CARE = 0.05
 """Share of the cost beyond the cheapest step up to which steps are bounded with care."""
-FINE = 2
+FINE = 3
 """Level below which cells are too coarse to tell whether it is further nodes, or (6), they lack."""
 NEAR = 0.9
 """Share of what is wanted from which (6) may be what is left."""
