@@ -23,14 +23,18 @@ SMALL = "".join(
 )
 """Two small contours of the demo at a coarse step: everything that it does, in a second."""
 
-HEAD = """\
+ENDLESS_AND_HEAD = """\
 [robot]
 model = "abb_irb4600_60_205"
 endless = [4, 6]
 acceleration_deg_s2 = [320, 270, 420, 1300, 1400, 2000]
 [tool]
 head = "laser-head-45"
-[part]
+"""
+"""The first tables of a job with the robot of the demo, axes 4 and 6 endless."""
+
+HEAD = f"""\
+{ENDLESS_AND_HEAD}[part]
 file = "b_pillar.step"
 xyz_mm = [1200, -600, 500]
 rpy_deg = [0, 0, 90]

@@ -5,21 +5,14 @@ import json
 import numpy as np
 
 from conftest import ROOT
-from jobs import ROBOT_AND_HEAD
+from jobs import ENDLESS_AND_HEAD, ROBOT_AND_HEAD
 from kerfpath.study import digest
 from kerfpath.study.placing._evaluate import evaluate_placements
 from kerfpath.study.placing._value import PlacementValue
 
 DEMO = ROOT / "src" / "kerfpath" / "demo"
 HEAD = f"""
-[robot]
-model = "abb_irb4600_60_205"
-endless = [4, 6]
-acceleration_deg_s2 = [320, 270, 420, 1300, 1400, 2000]
-
-[tool]
-head = "laser-head-45"
-
+{ENDLESS_AND_HEAD}
 [part]
 file = '{DEMO / "b_pillar.step"}'
 xyz_mm = [1200, -600, 500]     # where it lies now

@@ -305,6 +305,11 @@ class Plan:
         return freeze(metric.increments(self.q, self.robot.endless))
 
     @property
+    def unwrapped(self) -> Array:
+        """The joints (K, n) rad with endless joints turned on, not wrapped."""
+        return np.vstack([self.q[:1], self.q[:1] + np.cumsum(self.increments, axis=0)])
+
+    @property
     def _rates(self) -> tuple[Array, Array]:
         return rates_of(self.increments, np.diff(self.time))
 

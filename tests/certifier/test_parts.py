@@ -44,7 +44,7 @@ def test_any_multipliers_bound_no_motion_too_high(metric, size, planned, others,
     best = planned(metric=metric)
     rng = np.random.default_rng(int(size))
 
-    def drawn(self, gamma, posture, most):
+    def drawn(self, gamma, posture, reach, most):
         prices = np.zeros_like(best.q)
         prices[1:-1] = size * rng.normal(size=prices[1:-1].shape) * best.settings.weights
         return prices
@@ -127,6 +127,6 @@ def test_a_plan_at_the_limit_has_prices(metric, planned):
     posture = int(one.plan.posture[0])
     assert one._priced
     for most in course.DEAREST:
-        prices = one._prices(one.plan.gamma, posture, most)
+        prices = one._prices(one.plan.gamma, posture, course.NARROW, most)
         assert one.steps.price(prices) > 0
         assert (np.abs(prices) <= most * one.steps.weight * (1 + 1e-6)).all()

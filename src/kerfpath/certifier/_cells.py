@@ -145,6 +145,10 @@ class CellMaker:
             return None
         return found.center[:, posture], found.slope[:, posture]
 
+    def divided(self, cells: CellSet, which: Bools) -> CellSet:
+        """Return the cells with some of them (C,) halved."""
+        return CellSet.join([cells.take(~which), self.halves(cells.take(which))])
+
     def halves(self, cells: CellSet) -> CellSet:
         """Return both halves of the cells, on the turns of their own."""
         sets = [

@@ -14,7 +14,7 @@ from kerfpath.certificate import ALLOWANCE, Certificate, Stage
 from kerfpath.certifier._cells import CellMaker, CellSet
 from kerfpath.certifier._finer import cells_to_divide
 from kerfpath.certifier._nodes import between, turning_nodes
-from kerfpath.certifier._parts import DEAREST, Parts
+from kerfpath.certifier._parts import DEAREST, NARROW, Parts
 from kerfpath.certifier._prices import limit_prices
 from kerfpath.certifier._stage import StageResult, Steps, linked, solve_stage
 from kerfpath.kernels.limits import LIMIT_TOLERANCE
@@ -55,9 +55,6 @@ AT_LIMIT = 0.98
 EARLY, COARSE = 0.3, 1
 """Share of the work after which motions are bounded in parts in any case where (6) binds the plan;
 and the level of the cells that this begins with at further nodes."""
-NARROW, REACH = 0.017, 0.2
-"""How far gamma may go where multipliers are found, rad: about the plan, which keeps (6), and about
-a motion that does not."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -225,8 +222,7 @@ class _Course:
                 self._finish(result)
                 return
             else:
-                rest = cells.take(kept & ~which)
-                cells = CellSet.join([rest, self.maker.halves(cells.take(which))])
+                cells = self.maker.divided(cells.take(kept), which[kept])
 
     @cached_property
     def _priced(self) -> bool:
@@ -239,10 +235,10 @@ class _Course:
         if not (share > AT_LIMIT * self.plan.settings.eta_a).any():
             return False
         posture = int(np.bincount(self.plan.posture).argmax())
-        prices = (self._prices(self.plan.gamma, posture, most) for most in DEAREST)
+        prices = (self._prices(self.plan.gamma, posture, NARROW, most) for most in DEAREST)
         return max(map(self.steps.price, prices)) > self.cost - self.target
 
-    def _prices(self, gamma: Array, posture: int, most: float) -> Array | None:
+    def _prices(self, gamma: Array, posture: int, reach: float, most: float) -> Array | None:
         """Return multipliers of (6) about the motion with gamma (K,) in a posture."""
         motion = self.maker.motion(gamma, posture)
         if motion is None:
@@ -250,7 +246,6 @@ class _Course:
         q, slope = motion
         u = np.diff(q, axis=0)
         u -= 2 * np.pi * np.rint(u / (2 * np.pi))
-        reach = NARROW if gamma is self.plan.gamma else REACH
         return limit_prices(u, slope, self.steps, reach, most)
 
     def _divide(self, cells: CellSet) -> None:
@@ -329,4 +324,4 @@ class _Course:
             coarse = passed & (new.level < level)
             if not coarse.any():
                 return CellSet.join([cells, new])
-            new = CellSet.join([new.take(~coarse), self.maker.halves(new.take(coarse))])
+            new = self.maker.divided(new, coarse)

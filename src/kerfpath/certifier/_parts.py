@@ -27,7 +27,7 @@ from kerfpath.certifier._cells import CellMaker, CellSet
 from kerfpath.certifier._finer import cells_to_divide
 from kerfpath.certifier._stage import StageResult, Steps, solve_stage
 
-__all__ = ["DEAREST", "Parts"]
+__all__ = ["DEAREST", "NARROW", "Parts"]
 
 SAME = 1e-9
 """Share of the cost by which motions are dearer than the plan where they drop out: rounding."""
@@ -35,6 +35,9 @@ CARE = 0.05
 """Share of the cost beyond the cheapest step up to which steps are bounded with care."""
 STALLED, AGAIN = 0.1, 1
 """Share of what a part lacks that finer cells must gain, and how often they may not."""
+NARROW, WIDE = 0.017, 0.2
+"""How far gamma may go where multipliers are found, rad: about the plan, which keeps (6), and about
+a motion that does not."""
 DEAREST = 5.0, 20.0
 """The largest multipliers, in weights: far from the motion that they are about small ones prove
 more."""
@@ -65,8 +68,9 @@ class Parts:
     maker : CellMaker
     steps : Steps
     prices : callable
-        Gives multipliers (K, n) of (6) about the motion with gamma (K,) in a posture, up to a
-        largest one in weights; None where there are none. Any are valid.
+        Gives multipliers (K, n) of (6) about the motion with gamma (K,) in a posture, which may
+        change by so many rad, up to a largest one in weights; None where there are none. Any are
+        valid.
     gamma : (K,) rad
         Of the plan.
     cost, target : float
@@ -79,7 +83,7 @@ class Parts:
         self,
         maker: CellMaker,
         steps: Steps,
-        prices: Callable[[Array, int, float], Array | None],
+        prices: Callable[[Array, int, float, float], Array | None],
         gamma: Array,
         *,
         cost: float,
@@ -158,7 +162,7 @@ class Parts:
         else:
             posture = int(np.bincount(part.cells.posture).argmax())
             for most in DEAREST:
-                tried(self._prices(self._gamma, posture, most))
+                tried(self._prices(self._gamma, posture, NARROW, most))
         if best.multipliers is not None and not part.stalled:
             return through, result, best.multipliers
         motion = best.cells.take(best.cheapest())
@@ -166,7 +170,7 @@ class Parts:
             posture = int(np.bincount(motion.posture).argmax())
             gamma, _ = cell_bounds(motion.level, motion.index)
             for most in DEAREST:
-                if not tried(self._prices(gamma, posture, most)):
+                if not tried(self._prices(gamma, posture, WIDE, most)):
                     break
         return through, result, best.multipliers
 
@@ -186,7 +190,7 @@ class Parts:
         which, singular = cells_to_divide(cells, cells.floor, self._target, self._steps.weight)
         which &= cells.level < DEEPEST
         if which.any() and (singular or part.stalled <= AGAIN):
-            finer = CellSet.join([cells.take(~which), self._maker.halves(cells.take(which))])
+            finer = self._maker.divided(cells, which)
             return [replace(part, cells=finer, stalled=0 if singular else part.stalled)]
         nodes = np.unique(cells.node[low])
         start = np.searchsorted(cells.node, nodes), np.searchsorted(cells.node, nodes, "right")

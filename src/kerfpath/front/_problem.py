@@ -72,7 +72,7 @@ class Criterion:
 
     def value(self, plan: Plan, problem: ParetoProblem) -> float:
         """Return its value of a plan, in its unit."""
-        raise NotImplementedError
+        raise NotImplementedError  # every quantity has its own
 
     def anchor(self, problem: ParetoProblem) -> Subproblem | None:
         """Return the subproblem that is to find its best value, or to come near; None for none."""
@@ -83,7 +83,7 @@ class Criterion:
         rng: np.random.Generator,
     ) -> Subproblem:  # fmt: skip
         """Return a subproblem with the epsilon constraint that it be as good as a value."""
-        raise NotImplementedError
+        raise NotImplementedError  # asked of none that is not `bounded`
 
     def hold(
         self, run: Subproblem, value: float, spans: Array, problem: ParetoProblem

@@ -8,6 +8,7 @@ from kerfpath.planner._fastest import relaxations as relaxations
 from kerfpath.planner._graph import layered_graph as layered_graph
 from kerfpath.planner._graph import longest_step as longest_step
 from kerfpath.planner._graph import node_interval as node_interval
+from kerfpath.planner._graph import samples_of as samples_of
 from kerfpath.planner._map import ClearanceMap as ClearanceMap
 from kerfpath.planner._map import clearance_map as clearance_map
 from kerfpath.planner._pieces import plan_in_pieces as plan_in_pieces

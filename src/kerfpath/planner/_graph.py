@@ -15,6 +15,7 @@ from kerfpath.errors import InputError, NoFeasiblePath
 from kerfpath.graph import LayeredGraph, build, gamma_grid
 from kerfpath.options import GraphKeywords, PlanOptions, with_keywords
 from kerfpath.robots import Robot
+from kerfpath.search import GammaSamples
 from kerfpath.tilt import tilt_frames
 
 __all__ = [
@@ -23,6 +24,7 @@ __all__ = [
     "node_interval",
     "require_even",
     "require_no_empty_layer",
+    "samples_of",
     "within_margins",
 ]
 
@@ -84,6 +86,16 @@ def within_margins(
             here[first] |= here[last]
             here[last] = here[first]
     return graph.without(near) if near else graph
+
+
+def samples_of(graph: LayeredGraph) -> GammaSamples:
+    """Return how the vertices of a graph lie on circles of gamma."""
+    return GammaSamples(
+        sample=graph.sample.astype(np.int64),
+        variant=graph.variant.astype(np.int64),
+        posture=graph.posture.astype(np.int64),
+        samples=len(graph.gamma),
+    )
 
 
 def node_interval(contour: Contour, speed: float | None) -> float:

@@ -20,6 +20,7 @@ from kerfpath.planner._graph import (
     layered_graph,
     node_interval,
     require_no_empty_layer,
+    samples_of,
     within_margins,
 )
 from kerfpath.plans import Plan, Proof, path_cost
@@ -105,13 +106,7 @@ class PlanningTask:
     @property
     def samples(self) -> GammaSamples:
         """How the vertices of the graph lie on circles of gamma."""
-        graph = self.graph
-        return GammaSamples(
-            sample=graph.sample.astype(np.int64),
-            variant=graph.variant.astype(np.int64),
-            posture=graph.posture.astype(np.int64),
-            samples=len(graph.gamma),
-        )
+        return samples_of(self.graph)
 
     def plan_between(self, path: ContinuousPath, proof: Proof) -> Plan:
         """Return the plan of a path between the samples, its joints interpolated as the path's.

@@ -55,9 +55,7 @@ class ThinTask:
             return None
         spline, end = CubicSpline(self.nodes, np.unwrap(made.gamma)), self.nodes[-1]
         gamma = spline(np.minimum(at, end)) + spline(end, 1) * np.maximum(at - end, 0)
-        steps = np.cumsum(made.increments, axis=0)
-        rough = np.vstack([made.q[:1], made.q[:1] + steps])
-        q = np.stack([np.interp(at, self.nodes, joint) for joint in rough.T], axis=1)
+        q = np.stack([np.interp(at, self.nodes, joint) for joint in made.unwrapped.T], axis=1)
         claim = Proof(optimal=False, statement="found over continuous rotation")
         return Plan(
             contour=task.contour,

@@ -167,7 +167,7 @@ class _Process:
         """Yield the steps of a contour, `way` leading to where the tool has backed off."""
         _require_on_contour(plan)
         T = plan.T_part_tip
-        q = plan.q[0] + np.vstack([np.zeros_like(plan.q[0]), np.cumsum(plan.increments, axis=0)])
+        q = plan.unwrapped
         starts: tuple[Switch, ...] = (self._laser(on=True),)
         if self.gas_lead is not None:
             starts = (Switch(signal="gas", on=True, lead_time=self.gas_lead), *starts)

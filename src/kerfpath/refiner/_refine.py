@@ -238,12 +238,7 @@ def _descent(plan: Plan) -> tuple[Descent, MotionState]:
         node_cost=plan.node_cost,
         radius=FIRST_STEPS * settings.gamma_step,
     )
-    return descent, descent.stand(plan.gamma, _unwrap(plan))
-
-
-def _unwrap(plan: Plan) -> Array:
-    """Return the joints (K, 6) with endless joints turned on, not wrapped."""
-    return np.vstack([plan.q[:1], plan.q[:1] + np.cumsum(plan.increments, axis=0)])
+    return descent, descent.stand(plan.gamma, plan.unwrapped)
 
 
 def _plan_with_motion(plan: Plan, found: MotionState) -> Plan:
@@ -288,7 +283,7 @@ def _divide_plan(plan: Plan, nodes: Contour) -> Plan | str:
     if plan.feed is not None:
         return "the times of a reduced feed hold at its own nodes, not between them"
     gamma = CubicSpline(coarse, np.unwrap(plan.gamma + twist))(index)
-    near = np.stack([np.interp(index, coarse, q) for q in _unwrap(plan).T], axis=1)
+    near = np.stack([np.interp(index, coarse, q) for q in plan.unwrapped.T], axis=1)
     return replace(
         plan,
         contour=nodes,

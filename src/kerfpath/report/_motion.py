@@ -53,7 +53,7 @@ def joint_positions(plan: Plan) -> go.Figure:
     shapes, annotations = _posture_bands(plan, panels=plan.robot.joints, labelled=range(2))
     axes: dict[str, object] = {}
     limits = plan.robot.joint_limits()
-    continuous = np.degrees(plan.q[0] + np.vstack([0 * plan.q[:1], plan.increments.cumsum(axis=0)]))
+    continuous = np.degrees(plan.unwrapped)
     for joint in range(plan.robot.joints):
         row, column = divmod(joint, 2)
         x, y = _axis("x", joint), _axis("y", joint)

@@ -63,7 +63,7 @@ def _stage(number: int, data: StageData) -> Stage:
     where = f"certificate, stage {number}"
     arrays: dict[str, NDArray[np.generic] | None] = {}
     for name, kind in TYPES.items():
-        packed = cast(ArrayData | None, data[name])  # type: ignore[literal-required]
+        packed = cast(ArrayData | None, data[name])  # type: ignore[literal-required]  # one of TYPES
         arrays[name] = None if packed is None else _unpacked(packed, kind, f"{where}: {name}")
     C = arrays["node"].shape[:1] if arrays["node"] is not None else ()
     for name, part in arrays.items():

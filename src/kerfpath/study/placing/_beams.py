@@ -12,15 +12,15 @@ from kerfpath.cell import CollisionChecker
 from kerfpath.graph import LayeredGraph
 from kerfpath.kernels.metric import increments
 from kerfpath.limits import Limits, rates_of
+from kerfpath.planner import samples_of
 from kerfpath.search import (
     ContinuousPath,
     ContinuousSearch,
     Effort,
-    GammaSamples,
     SearchProblem,
 )
 
-__all__ = ["Beams", "samples_of"]
+__all__ = ["Beams"]
 
 EFFORT = Effort(200, (0.5, 0.5))
 """States of each layer that are kept: on nine placements of two contours of the demo paths were 0
@@ -31,16 +31,6 @@ HELD = 1e-3
 """Share by which a path may be slower than the speed that it is to keep."""
 MOST_SEARCHES = 10
 """Searches for a path that is clear at the samples that it is between."""
-
-
-def samples_of(graph: LayeredGraph) -> GammaSamples:
-    """Return how the vertices of a graph lie on circles of gamma."""
-    return GammaSamples(
-        sample=graph.sample.astype(np.int64),
-        variant=graph.variant.astype(np.int64),
-        posture=graph.posture.astype(np.int64),
-        samples=len(graph.gamma),
-    )
 
 
 @dataclass(kw_only=True, eq=False)
@@ -86,7 +76,7 @@ class Beams:
             best = min(best, self._interval(enough))
             if best <= enough * (1 + HELD):
                 return best
-        missed = None if enough is None else enough
+        missed = enough
         while missed is None or best > CLOSE * missed:
             tried = best / LONGER if missed is None else np.sqrt(best * missed)
             found = self._interval(tried)

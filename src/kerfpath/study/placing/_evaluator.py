@@ -176,7 +176,7 @@ class PlacementEvaluator(Evaluator):
             cost = self._plan_cost(contour, graph)
             return cost, replace(known, value=cost)
         if enough is not None:
-            enough *= contour.speed if self.goal == "margin" else 1 / 60
+            enough *= self._unit(contour)
         found = self.fastest(contour.nodes, graph, off_grid=self.off_grid, enough=enough)
         value = found.speed / contour.speed if self.goal == "margin" else found.speed * 60
         return value, replace(
@@ -187,6 +187,10 @@ class PlacementEvaluator(Evaluator):
             limit=found.limit,
             node=found.node,
         )
+
+    def _unit(self, contour: SampledContour) -> float:
+        """Return the speed of a contour, m/s, that counts as one."""
+        return contour.speed if self.goal == "margin" else 1 / 60
 
     def _plan_cost(self, contour: SampledContour, graph: LayeredGraph) -> float:
         options = replace(

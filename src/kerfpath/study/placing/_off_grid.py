@@ -29,10 +29,10 @@ from kerfpath.certifier import MotionTest
 from kerfpath.errors import NoFeasiblePath
 from kerfpath.graph import LayeredGraph
 from kerfpath.job import Job
-from kerfpath.planner import best_motion, longest_step
+from kerfpath.planner import best_motion, longest_step, samples_of
 from kerfpath.search import ContinuousSearch, SearchProblem, find_shortest
 from kerfpath.study._evaluator import SampledContour
-from kerfpath.study.placing._beams import Beams, samples_of
+from kerfpath.study.placing._beams import Beams
 from kerfpath.study.placing._evaluator import InfeasiblePlacement, PlacementEvaluator
 from kerfpath.study.placing._value import ContourValue, PlacementValue, Stage
 
@@ -123,7 +123,7 @@ class OffGridEvaluator(PlacementEvaluator):
     def _quickest(self, index: int, first: int, last: int, least: float | None) -> float:
         """Return about what nodes first to last may be worth; no more than `least` matters."""
         contour, job = self.contours[index], self.job
-        nodes, unit = np.arange(first, last + 1), self._unit(index)
+        nodes, unit = np.arange(first, last + 1), self._unit(contour)
         graph = self._thin_graph(contour, nodes)
         run = contour.stretch(first, last, job.options.frames, timed=False)
         try:
@@ -142,10 +142,6 @@ class OffGridEvaluator(PlacementEvaluator):
         )
         interval = beams.least_interval(step / on_grid, None if enough is None else step / enough)
         return step / interval / unit
-
-    def _unit(self, index: int) -> float:
-        """Return the speed of a contour, m/s, that counts as one."""
-        return self.contours[index].speed if self.goal == "margin" else 1 / 60
 
     def _thin_graph(self, contour: SampledContour, nodes: Ints) -> LayeredGraph:
         """Return the graph of some nodes on as few samples as do for an estimate."""
@@ -213,14 +209,12 @@ class OffGridEvaluator(PlacementEvaluator):
 
     def _is_closed(self, index: int, first: int, last: int, value: float) -> bool:
         """Return whether it is proved that nodes first to last pass no motion of such a value."""
-        job, nodes = self.job, self.contours[index].nodes
+        job, contour = self.job, self.contours[index]
         options = job.options
         if not job.robot.encloses or options.tilt is not None:
             return False
-        frames = job.placement @ nodes.frames(options.frames)[first : last + 1]
+        frames = job.placement @ contour.nodes.frames(options.frames)[first : last + 1]
         test = MotionTest(job.robot, frames, job.tool, options.postures)
         limits, middle = options.limits(job.robot), (last - first) // 2
-        return (
-            test.closed(limits, longest_step(nodes) / (value * self._unit(index)), middle)
-            is not None
-        )
+        interval = longest_step(contour.nodes) / (value * self._unit(contour))
+        return test.closed(limits, interval, middle) is not None
