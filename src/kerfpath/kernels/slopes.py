@@ -171,8 +171,8 @@ def guess_slopes(
 def flatten(cells: Cells, a: int, out_y: Array) -> None:
     """Take the slopes (n,) of joints out that are hardly known on cell a.
 
-    Beside a singularity a joint may be almost anywhere on a cell, and a cut that slopes with it lies
-    far below its level somewhere: steps that cannot follow the slope look cheap by as much.
+    Beside a singularity a joint may be almost anywhere on a cell, and a cut that slopes with it
+    lies far below its level somewhere: steps that cannot follow the slope look cheap by as much.
     """
     for i in range(len(out_y)):
         if cells.spread[a, i] > UNSURE:

@@ -70,13 +70,19 @@ def clear_motion(
     """Return the best motion found that is clear; None where none is.
 
     The values tell whether a wider search may find a better one; of very many nodes, the motion
-    along some of them does.
+    along some of them does, and the graph of all is built only where that is not enough.
+
+    Raises
+    ------
+    NoFeasiblePath
+        A node has no pose.
     """
     starts = _Starts(task, finder)
     made, least = _from_fewer_nodes(task, finder)
     starts.start_from(made)
     if starts.best is not None and not starts.above(least, ENOUGH):
         return starts.best
+    task = task.whole()
     searched = clear_paths(task, finder, QUICK if starts.best is None else ())
     if searched is None:
         return starts.best
