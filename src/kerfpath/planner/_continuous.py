@@ -79,7 +79,7 @@ def clear_motion(
     """
     starts = _Starts(task, finder)
     made, least = _from_fewer_nodes(task, finder)
-    starts.start_from(made)
+    starts.start_from(made, least)
     if starts.best is not None and not starts.above(least, ENOUGH):
         return starts.best
     task = task.whole()
@@ -130,11 +130,11 @@ class _Starts:
         """Return whether the best motion costs more than a value by more than a share of it."""
         return self.best is None or self.best.cost_after > (1 + share) * value
 
-    def start_from(self, made: Plan | None) -> None:
-        """Refine a motion, if there is one, that is close to the best."""
+    def start_from(self, made: Plan | None, least: float) -> None:
+        """Refine a motion, if there is one, that is close to the best, which costs at least so."""
         if made is not None:
             self._tried.append(made)
-            found = refiner.refine(made, first=FIRST_STEP)
+            found = refiner.refine(made, first=FIRST_STEP, least=least)
             self.best = found if found.done and self._finder.is_clear(found.plan) else None
 
     def refine(self, paths: list[ContinuousPath], *, unpromising: bool = False) -> None:
