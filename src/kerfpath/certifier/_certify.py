@@ -13,6 +13,7 @@ from kerfpath._repr import short_repr
 from kerfpath.certificate import ALLOWANCE, Certificate, Stage
 from kerfpath.certifier._cells import CellMaker, CellSet
 from kerfpath.certifier._finer import cells_to_divide
+from kerfpath.certifier._groups import distinct_groups
 from kerfpath.certifier._nodes import between, turning_nodes
 from kerfpath.certifier._parts import DEAREST, NARROW, Parts
 from kerfpath.certifier._prices import limit_prices
@@ -196,6 +197,8 @@ class _Course:
             gained, cells = self._take(result), result.cells
             clearly = self.margin * np.exp2(2.0 * (USUAL_LEVEL - cells.level))
             live = result.through <= self.cost * (1 + clearly)
+            if not self.checkable:
+                live = np.logical_or.reduce(distinct_groups(result, live, self.maker))
             low = result.through < self.target
             which, singular = cells_to_divide(cells, result.through, self.target, self.steps.weight)
             which &= cells.level < DEEPEST
