@@ -14,7 +14,8 @@ from OCP.IGESData import IGESData_IGESEntity
 from OCP.TopAbs import TopAbs_ShapeEnum
 from OCP.TopoDS import TopoDS, TopoDS_Shape
 
-from kerfpath.cad._shape import NamedFace, NamedShape, drawn_of, failures, list_shapes, occt
+from kerfpath.cad._sewn import drawn_of
+from kerfpath.cad._shape import NamedFace, NamedShape, failures, list_shapes, occt
 from kerfpath.cad._units import UNITS_MM
 from kerfpath.errors import InputError
 

@@ -1,4 +1,4 @@
-"""The content of STEP and IGES files: a shape and its named faces, sewn where they are loose.
+"""The content of STEP and IGES files: a shape and its named faces.
 
 OCCT crashes on some damaged files, so they are read in a process of its own (`kerfpath.apart`), and
 what was read comes from there as OCCT's own binary text. This module and those that translate are
@@ -9,15 +9,12 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from io import BytesIO
 from typing import Any
 
-import numpy as np
 from OCP.BinTools import BinTools
-from OCP.BRep import BRep_Builder, BRep_Tool
-from OCP.BRepBuilderAPI import BRepBuilderAPI_MakeSolid, BRepBuilderAPI_Sewing
-from OCP.BRepLib import BRepLib
+from OCP.BRep import BRep_Builder
 from OCP.Interface import Interface_CheckIterator
 from OCP.Message import Message
 from OCP.Standard import Standard_Failure
@@ -26,14 +23,12 @@ from OCP.TopExp import TopExp_Explorer
 from OCP.TopoDS import TopoDS, TopoDS_Compound, TopoDS_Face, TopoDS_Iterator, TopoDS_Shape
 
 from kerfpath._repr import short_repr
-from kerfpath.cad._units import MM
 from kerfpath.errors import InputError
 
 __all__ = [
     "NamedFace",
     "NamedShape",
     "children",
-    "drawn_of",
     "failures",
     "list_shapes",
     "occt",
@@ -136,24 +131,6 @@ def occt() -> Iterator[None]:
             messenger.AddPrinter(printer)
 
 
-def drawn_of(
-    unit: str,
-    shape: TopoDS_Shape,
-    faces: Sequence[NamedFace],
-    *,
-    gap: float,
-    notes: Sequence[str] = (),
-) -> NamedShape:
-    """Return a shape and its faces, sewn within `gap` (m) where there is no solid."""
-    if not faces:
-        raise InputError("the file holds no face; export the part as a solid or a surface")
-    solids = list_shapes(shape, TopAbs_ShapeEnum.TopAbs_SOLID)
-    if not solids and len(faces) > 1:
-        shape, faces, note = _sewn(faces, gap)
-        notes = [*notes, note]
-    return NamedShape(unit=unit, shape=shape, faces=faces, notes=notes)
-
-
 def list_shapes(shape: TopoDS_Shape, kind: TopAbs_ShapeEnum) -> list[TopoDS_Shape]:
     """Return the faces, edges, ... of a shape."""
     return list(_each(TopExp_Explorer(shape, kind)))
@@ -173,38 +150,6 @@ def _each(shapes: TopExp_Explorer | TopoDS_Iterator) -> Iterator[TopoDS_Shape]:
     while shapes.More():
         yield shapes.Value()
         shapes.Next()
-
-
-def _sewn(faces: Sequence[NamedFace], gap: float) -> tuple[TopoDS_Shape, list[NamedFace], str]:
-    """Return the faces with edges shared where they lie within `gap`, and what was done."""
-    sewing = BRepBuilderAPI_Sewing(gap / MM)
-    for named in faces:
-        sewing.Add(named.face)
-    sewing.Perform()
-    shape = sewing.SewedShape()
-    if not sewing.NbFreeEdges() and shape.ShapeType() == TopAbs_ShapeEnum.TopAbs_SHELL:
-        solid = BRepBuilderAPI_MakeSolid(TopoDS.Shell(shape)).Solid()
-        BRepLib.OrientClosedSolid_s(solid)
-        shape = solid
-    # Sewing turns faces round so that neighbours agree: each is taken as it lies in the result.
-    sewn = list_shapes(shape, TopAbs_ShapeEnum.TopAbs_FACE)
-    lying = []
-    for named in faces:
-        made = sewing.ModifiedSubShape(named.face)
-        lies = [face for face in sewn if face.IsSame(made)]
-        lying += [replace(named, face=TopoDS.Face(face)) for face in lies[:1]]
-    if len(lying) != len(faces):
-        raise InputError(
-            f"{len(faces) - len(lying)} of {len(faces)} loose faces vanish when sewn over "
-            f"{gap / MM:g} mm; give a smaller gap"
-        )
-    edges = list_shapes(shape, TopAbs_ShapeEnum.TopAbs_EDGE)
-    widest = max((BRep_Tool.Tolerance_s(TopoDS.Edge(edge)) for edge in edges), default=0.0)
-    note = (
-        f"{len(faces)} loose faces sewn within {gap / MM:g} mm: {sewing.NbContigousEdges()} edges "
-        f"joined, the widest gap {np.round(widest, 4):g} mm; {sewing.NbFreeEdges()} edges are free"
-    )
-    return shape, lying, note
 
 
 def unique(names: list[str]) -> list[str]:

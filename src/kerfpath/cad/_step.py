@@ -17,7 +17,8 @@ from OCP.TopoDS import TopoDS, TopoDS_Shape
 
 from kerfpath._arrays import Array
 from kerfpath.cad._part21 import points_in, sound_data
-from kerfpath.cad._shape import NamedFace, NamedShape, children, drawn_of, failures, occt, unique
+from kerfpath.cad._sewn import drawn_of
+from kerfpath.cad._shape import NamedFace, NamedShape, children, failures, occt, unique
 from kerfpath.cad._styles import styles_in
 from kerfpath.cad._units import LARGEST, UNITS_MM
 from kerfpath.errors import InputError

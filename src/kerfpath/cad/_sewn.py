@@ -1,0 +1,84 @@
+"""Loose faces sewn together, body by body."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+from OCP.BRep import BRep_Builder, BRep_Tool
+from OCP.BRepBuilderAPI import BRepBuilderAPI_MakeSolid, BRepBuilderAPI_Sewing
+from OCP.BRepLib import BRepLib
+from OCP.collections import IndexedMap_TopoDS_Shape_TopTools_ShapeMapHasher as ShapeMap
+from OCP.TopAbs import TopAbs_ShapeEnum
+from OCP.TopoDS import TopoDS, TopoDS_Compound, TopoDS_Shape
+
+from kerfpath.cad._bodies import bodies_of
+from kerfpath.cad._shape import NamedFace, NamedShape, list_shapes
+from kerfpath.cad._units import MM
+from kerfpath.errors import InputError
+
+__all__ = ["drawn_of"]
+
+
+def drawn_of(
+    unit: str,
+    shape: TopoDS_Shape,
+    faces: Sequence[NamedFace],
+    *,
+    gap: float,
+    notes: Sequence[str] = (),
+) -> NamedShape:
+    """Return a shape and its faces, sewn within `gap` (m) where there is no solid."""
+    if not faces:
+        raise InputError("the file holds no face; export the part as a solid or a surface")
+    solids = list_shapes(shape, TopAbs_ShapeEnum.TopAbs_SOLID)
+    if not solids and len(faces) > 1:
+        shape, faces, note = _sewn(faces, gap)
+        notes = [*notes, note]
+    return NamedShape(unit=unit, shape=shape, faces=faces, notes=notes)
+
+
+def _sewn(faces: Sequence[NamedFace], gap: float) -> tuple[TopoDS_Shape, list[NamedFace], str]:
+    """Return the faces with edges shared where they lie within `gap`, and what was done.
+
+    Each body is sewn by itself: bodies that touch stay apart.
+    """
+    bodies = bodies_of([named.face for named in faces], gap / MM)
+    whole, builder = TopoDS_Compound(), BRep_Builder()
+    builder.MakeCompound(whole)
+    lying: dict[int, NamedFace] = {}
+    joined = free = 0
+    for body in bodies:
+        sewing = BRepBuilderAPI_Sewing(gap / MM)
+        for f in body:
+            sewing.Add(faces[f].face)
+        sewing.Perform()
+        shape = sewing.SewedShape()
+        if not sewing.NbFreeEdges() and shape.ShapeType() == TopAbs_ShapeEnum.TopAbs_SHELL:
+            solid = BRepBuilderAPI_MakeSolid(TopoDS.Shell(shape)).Solid()
+            BRepLib.OrientClosedSolid_s(solid)
+            shape = solid
+        builder.Add(whole, shape)
+        joined, free = joined + sewing.NbContigousEdges(), free + sewing.NbFreeEdges()
+        # Sewing turns faces round so that neighbours agree: each is taken as it lies in the result.
+        sewn = ShapeMap()
+        for face in list_shapes(shape, TopAbs_ShapeEnum.TopAbs_FACE):
+            sewn.Add(face)
+        for f in body:
+            if place := sewn.FindIndex(sewing.ModifiedSubShape(faces[f].face)):
+                lying[f] = replace(faces[f], face=TopoDS.Face(sewn.FindKey(place)))
+    if len(lying) != len(faces):
+        raise InputError(
+            f"{len(faces) - len(lying)} of {len(faces)} loose faces vanish when sewn over "
+            f"{gap / MM:g} mm; give a smaller gap"
+        )
+    edges = list_shapes(whole, TopAbs_ShapeEnum.TopAbs_EDGE)
+    widest = max((BRep_Tool.Tolerance_s(TopoDS.Edge(edge)) for edge in edges), default=0.0)
+    apart = f" to {len(bodies)} bodies" if len(bodies) > 1 else ""
+    note = (
+        f"{len(faces)} loose faces sewn{apart} within {gap / MM:g} mm: {joined} edges "
+        f"joined, the widest gap {np.round(widest, 4):g} mm; {free} edges are free"
+    )
+    shape = shape if len(bodies) == 1 else whole
+    return shape, [lying[f] for f in range(len(faces))], note
