@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 
@@ -12,7 +13,9 @@ from kerfpath._arrays import Array, Ints
 from kerfpath.cad._build import named_loops, part_without_faces
 from kerfpath.cad._connected import label_connected
 from kerfpath.cad._curves import Curve, backwards
+from kerfpath.cad._junctions import encloses, inner_point, partners
 from kerfpath.cad._left_out import LeftOut
+from kerfpath.cad._overlap import SAME, same_lines
 from kerfpath.cad._part import Kind, Loop, Part
 from kerfpath.cad._sample import EdgeChain, vector_area
 from kerfpath.cad._units import MM
@@ -22,37 +25,44 @@ __all__ = ["loops_in"]
 
 NOTHING = 1e-6
 """Curves shorter than this, mm, are none; those that lie closer are the same."""
+SAID = 3
+"""Open lines whose ends are said where they hang, those with the next end nearest."""
+LARGER = 1.05
+"""Times the area of another: a loop in the same box that is larger lies around it."""
 Look = tuple[str, str]
 """Layer and colour: curves that are not drawn alike are not chained."""
+Mark = tuple[float, ...]
+Stroke = tuple[Curve, ...]
+"""The curves of one entity, each of which ends where the next starts."""
+Chain = EdgeChain[Curve]
 
 
 def loops_in(
     path: Path,
     unit: str,
-    drawn: Mapping[Look, Sequence[Curve]],
+    drawn: Mapping[Look, Sequence[Stroke]],
     *,
     gap: float,
     notes: Sequence[str],
     left_out: Sequence[LeftOut] = (),
 ) -> Part:
-    """Return the part that flat curves make up, by layer and colour; `gap` in m.
+    """Return the part that flat strokes make up, by layer and colour; `gap` in m.
 
     Closed loops run counter-clockwise about what they enclose, or clockwise about a hole: one that
     lies within an odd number of others.
     """
-    chains: list[tuple[Look, EdgeChain[Curve]]] = []
+    chains: list[tuple[Look, Chain]] = []
     notes = [*notes, *map(str, left_out)]
-    for look, curves in drawn.items():
-        kept, repaired = _repair_curves(curves)
+    for look, strokes in drawn.items():
+        found, repaired = _chains(strokes, gap / MM)
         notes += [f"layer {look[0]}, {look[1]}: {what}" for what in repaired]
-        chains += [(look, chain) for chain in _chains(kept, gap / MM)]
+        chains += [(look, chain) for chain in found]
     if not chains:
         why = f"; {left_out[0]}" if left_out else ""
         raise InputError(
             f"{path}: holds nothing to cut: no line, arc, polyline, ellipse or spline{why}"
         )
-    polygons = [chain.around for _, chain in chains if chain.is_closed]
-    depth = iter(_depths(polygons))
+    depth = iter(_depths([chain for _, chain in chains if chain.is_closed]))
     kinds: list[Kind] = []
     for k, (look, chain) in enumerate(chains):
         kind: Kind = "open"
@@ -70,24 +80,106 @@ def loops_in(
             if look[0] == layer
         ]
         loops += named_loops(drawn_here, face=layer, surface="plane", gap=gap, layer=layer)
+    notes += [*_cut_twice(loops), *_hanging(loops)]
     return part_without_faces(path, unit, loops, gap=gap, notes=notes, left_out=left_out)
 
 
-def _repair_curves(curves: Sequence[Curve]) -> tuple[list[Curve], list[str]]:
-    """Return the curves without those that have no length or lie on another, and what was done."""
-    long = [curve for curve in curves if curve.length > NOTHING]
-    marks = [_mark(curve) for curve in long]
-    first = {mark: k for k, mark in reversed(list(enumerate(marks)))}
-    kept = [curve for k, curve in enumerate(long) if first[marks[k]] == k]
+def _cut_twice(loops: Sequence[Loop]) -> Iterator[str]:
+    """Yield a note for each loop that lies on one of another layer or colour."""
+    for i, j in same_lines([loop._trace for loop in loops]):
+        yield f"{loops[i].name} and {loops[j].name} lie on each other: picked both, cut twice"
+
+
+def _hanging(loops: Sequence[Loop]) -> Iterator[str]:
+    """Yield notes of where open lines end."""
+    chains = [(loop.name, loop._trace) for loop in loops if loop.kind == "open"]
+    hanging = [(c.next_away, name, c.next_end) for name, c in chains if isinstance(c, EdgeChain)]
+    for _, name, where in sorted(hanging)[:SAID]:
+        yield f"open line: {name} {where}"
+    if len(hanging) > SAID:
+        yield f"open lines: {len(hanging) - SAID} more"
+
+
+def _chains(strokes: Sequence[Stroke], gap: float) -> tuple[list[Chain], list[str]]:
+    """Return the chains of strokes whose ends meet within `gap` (mm), and what was repaired.
+
+    A stroke that lies on another is left out, unless it is a side that two loops share.
+    """
+    drawn = [stroke for given in strokes if (stroke := _in_line(given))]
+    kept, spare, left = _doubles(drawn)
+    chains = [EdgeChain(edges=stroke) for stroke in kept if _is_closed(stroke)]
+    loose = [stroke for stroke in kept if not _is_closed(stroke)]
+    next_end = _NextEnd(loose, gap)
+    for own, on_others in _hanging_together(loose, spare, gap):
+        if _is_even(own, gap):
+            chains += _linked(own, gap, next_end)
+            for _, together in _hanging_together([], on_others, gap):
+                if _is_even(together, gap):
+                    chains += _linked(together, gap, next_end)
+                else:
+                    left += together
+        elif _is_even([*own, *on_others], gap):
+            chains += _linked([*own, *on_others], gap, next_end)
+        else:
+            left += on_others
+            chains += _linked(own, gap, next_end)
+    again = {j for _, j in same_lines(chains)}
     repaired = []
-    if count := len(curves) - len(long):
+    if count := _count(strokes) - _count(drawn):
         repaired.append(f"{count} curves without length left out")
-    if count := len(long) - len(kept):
+    if count := _count(left) + _count([chains[j].edges for j in again]):
         repaired.append(f"{count} curves drawn twice left out")
-    return kept, repaired
+    chains = [chain for k, chain in enumerate(chains) if k not in again]
+    marks = Counter(_mark(curve) for chain in chains for curve in chain.edges)
+    if count := sum(times > 1 for times in marks.values()):
+        repaired.append(f"{count} sides shared by two loops, which are cut twice")
+    return chains, repaired
 
 
-def _mark(curve: Curve) -> tuple[float, ...]:
+def _count(strokes: Sequence[Sequence[Curve]]) -> int:
+    return sum(map(len, strokes))
+
+
+def _in_line(stroke: Stroke) -> Stroke:
+    """Return the curves that have a length, each turned to go on where the one before ends."""
+    left = [curve for curve in stroke if curve.length > NOTHING]
+    if len(left) > 1 and _far(left[0].ends[1], left[1]) > _far(left[0].ends[0], left[1]):
+        left[0] = backwards(left[0])
+    for k in range(1, len(left)):
+        end = left[k - 1].ends[1]
+        if np.linalg.norm(left[k].ends[1] - end) < np.linalg.norm(left[k].ends[0] - end):
+            left[k] = backwards(left[k])
+    return tuple(left)
+
+
+def _far(point: Array, curve: Curve) -> float:
+    """Return how far a point (3,) is from the nearer end of a curve, mm."""
+    return float(np.linalg.norm(curve.ends - point, axis=1).min())
+
+
+def _is_closed(stroke: Stroke) -> bool:
+    return bool(np.linalg.norm(stroke[0].ends[0] - stroke[-1].ends[1]) <= NOTHING)
+
+
+def _doubles(strokes: Sequence[Stroke]) -> tuple[list[Stroke], list[Stroke], list[Stroke]]:
+    """Return the strokes of which none lies on another, open ones that do, and what is too much."""
+    marks = [tuple(_mark(curve) for curve in stroke) for stroke in strokes]
+    within = {mark for each in marks if len(each) > 1 for mark in each}
+    times: Counter[tuple[Mark, ...]] = Counter()
+    kept, spare, left = list[Stroke](), list[Stroke](), list[Stroke]()
+    for stroke, own in zip(strokes, marks, strict=True):
+        same = tuple(sorted(own))
+        if len(same) == 1 and same[0] in within:
+            times[same] = max(times[same], 1)
+        times[same] += 1
+        if times[same] == 1:
+            kept.append(stroke)
+        else:
+            (spare if times[same] == 2 and not _is_closed(stroke) else left).append(stroke)
+    return kept, spare, left
+
+
+def _mark(curve: Curve) -> Mark:
     """Return numbers that two curves share when they lie on each other, whichever way they run."""
     three = curve.at(np.linspace(curve.start, curve.end, 5)[1:4])
     rounded = (np.round(np.vstack([curve.ends, three]) / (10 * NOTHING)) + 0.0).tolist()
@@ -95,41 +187,88 @@ def _mark(curve: Curve) -> tuple[float, ...]:
     return tuple(v for point in (*ends, *inner) for v in point)
 
 
-def _chains(curves: Sequence[Curve], gap: float) -> Iterator[EdgeChain[Curve]]:
-    """Yield the chains of curves whose ends meet within `gap` (mm), two at a place."""
-    loose = list(curves)
-    if not loose:
-        return
-    ends = np.array([curve.ends for curve in loose]).reshape(-1, 3)
-    place = _places(ends, gap)
-    crowd = np.bincount(place)
-    at: dict[int, list[int]] = {}
-    for end, where in enumerate(place.tolist()):
-        at.setdefault(where, []).append(end)
-    used = np.zeros(len(loose), dtype=bool)
+def _ends(strokes: Sequence[Stroke]) -> Array:
+    """Return the first and the last point of each stroke (2 K, 3) mm."""
+    ends = [(stroke[0].ends[0], stroke[-1].ends[1]) for stroke in strokes]
+    return np.array(ends).reshape(-1, 3)
 
-    def walk(end: int) -> list[Curve]:
-        """Return the curves from `end` (2 k: start of curve k, 2 k + 1: its end) to a stop."""
-        chain: list[Curve] = []
+
+def _hanging_together(
+    loose: Sequence[Stroke], spare: Sequence[Stroke], gap: float
+) -> Iterator[tuple[list[Stroke], list[Stroke]]]:
+    """Yield the strokes that hang together, and the spare ones that end where they do."""
+    places = [_places(_ends(strokes), gap) for strokes in (loose, spare)]
+    first = len(loose) + len(spare)  # of the numbers that places have
+    links = [[end // 2, first + at] for end, at in enumerate(places[0].tolist())]
+    first += len(places[0])
+    links += [[len(loose) + end // 2, first + at] for end, at in enumerate(places[1].tolist())]
+    if loose and spare:
+        pairs = cKDTree(_ends(spare)).query_ball_tree(cKDTree(_ends(loose)), gap)
+        links += [[len(loose) + k // 2, end // 2] for k, near in enumerate(pairs) for end in near]
+    group = label_connected(np.array(links, dtype=np.int64), first + len(places[1])).tolist()
+    together: dict[int, tuple[list[Stroke], list[Stroke]]] = {}
+    for k, stroke in enumerate([*loose, *spare]):
+        together.setdefault(group[k], ([], []))[k >= len(loose)].append(stroke)
+    yield from together.values()
+
+
+def _is_even(strokes: Sequence[Stroke], gap: float) -> bool:
+    """Return whether an even number of ends meet wherever one is."""
+    return not (np.bincount(_places(_ends(strokes), gap)) % 2).any()
+
+
+def _linked(strokes: Sequence[Stroke], gap: float, next_end: _NextEnd) -> Iterator[Chain]:
+    """Yield the chains of open strokes that hang together."""
+    place = _places(_ends(strokes), gap)
+    marks: dict[tuple[Mark, ...], int] = {}
+    alike = [marks.setdefault(tuple(sorted(map(_mark, s))), len(marks)) for s in strokes]
+    partner = partners(strokes, alike, place)
+    used = np.zeros(len(strokes), dtype=bool)
+
+    def walk(end: int) -> list[int]:
+        """Return the ends, from `end` on, at which strokes are entered, to a stop."""
+        entered: list[int] = []
         while not used[end // 2]:
             used[end // 2] = True
-            curve = loose[end // 2]
-            chain.append(backwards(curve) if end % 2 else curve)
-            there = at[int(place[end ^ 1])]
-            if len(there) != 2:
+            entered.append(end)
+            if end ^ 1 not in partner:
                 break
-            end = there[0] if there[1] == end ^ 1 else there[1]
-        return chain
+            end = partner[end ^ 1]
+        return entered
 
     # From the places where a chain must end, then around what is closed.
-    for end in np.flatnonzero(crowd[place] != 2).tolist():
-        if chain := walk(end):
-            yield EdgeChain(
-                edges=chain, is_closed=False, next_end=_next_end(chain, ends, crowd[place])
-            )
-    for k in range(len(loose)):
-        if chain := walk(2 * k):
-            yield EdgeChain(edges=chain)
+    for end in range(len(place)):
+        if end not in partner and (entered := walk(end)):
+            edges = _edges(strokes, entered)
+            away, words = next_end.of(edges)
+            yield EdgeChain(edges=edges, is_closed=False, next_end=words, next_away=away)
+    for k in range(len(strokes)):
+        if entered := walk(2 * k):
+            for loop in _parted(entered, place):
+                yield EdgeChain(edges=_edges(strokes, loop))
+
+
+def _edges(strokes: Sequence[Stroke], entered: Sequence[int]) -> list[Curve]:
+    """Return the curves of strokes, each entered at an end of it."""
+    edges: list[Curve] = []
+    for end in entered:
+        stroke = strokes[end // 2]
+        edges += [backwards(curve) for curve in stroke[::-1]] if end % 2 else stroke
+    return edges
+
+
+def _parted(entered: Sequence[int], place: Ints) -> Iterator[list[int]]:
+    """Yield the loops of one that comes to a place more than once."""
+    path: list[int] = []
+    since: dict[int, int] = {}
+    for end in entered:
+        since[int(place[end])] = len(path)
+        path.append(end)
+        if (first := since.get(int(place[end ^ 1]), -1)) >= 0:
+            yield path[first:]
+            for gone in path[first:]:
+                since.pop(int(place[gone]), None)
+            del path[first:]
 
 
 def _places(ends: Array, gap: float) -> Ints:
@@ -138,6 +277,8 @@ def _places(ends: Array, gap: float) -> Ints:
     Ends that lie on another meet it; only ends left alone look within `gap`, or the two ends of a
     curve shorter than it would meet.
     """
+    if not len(ends):
+        return np.empty(0, dtype=np.int64)
     touching = cKDTree(ends).query_pairs(NOTHING, output_type="ndarray")
     alone = np.setdiff1d(np.arange(len(ends)), touching)
     if alone.size:
@@ -146,39 +287,53 @@ def _places(ends: Array, gap: float) -> Ints:
     return label_connected(touching, len(ends))
 
 
-def _next_end(chain: Sequence[Curve], ends: Array, crowd: Ints) -> str:
-    """Return why an open chain does not go on, at that of its two ends that comes closer to it."""
-    mine = [chain[0].ends[0], chain[-1].ends[1]]
-    breaks = []
-    for end in mine:
-        off = np.linalg.norm(ends - end, axis=1)
-        here = int(np.argmin(off))
-        place = f"at {end.round(3).tolist()} mm"
-        if crowd[here] > 2:
-            breaks.append((0.0, f"ends {place}, where {crowd[here]} curves meet"))
-            continue
-        others = off[np.arange(len(off)) != here]
-        nearest = float(others.min(initial=np.inf))
-        breaks.append((nearest, f"is open {place}: the next end is {nearest:.3f} mm away"))
-    return min(breaks)[1]
+class _NextEnd:
+    """Why open chains do not go on.
+
+    Parameters
+    ----------
+    loose : sequence of Stroke
+        All that are not closed.
+    gap : float mm
+    """
+
+    def __init__(self, loose: Sequence[Stroke], gap: float) -> None:
+        ends = _ends(loose)
+        place = _places(ends, gap)
+        self._crowd, self._tree = np.bincount(place)[place], cKDTree(ends)
+
+    def of(self, chain: Sequence[Curve]) -> tuple[float, str]:
+        """Return how far (mm) the next end is from the end of a chain that it is nearer to.
+
+        With it goes what is there, in words.
+        """
+        breaks = []
+        for end in (chain[0].ends[0], chain[-1].ends[1]):
+            away, near = (np.asarray(found) for found in self._tree.query(end, k=2))
+            where, crowd = f"at {end.round(3).tolist()} mm", self._crowd[near[0]]
+            if crowd > 2:
+                breaks.append((0.0, f"ends {where}, where {crowd} curves meet"))
+            else:
+                words = f"is open {where}: the next end is {away[1]:.3f} mm away"
+                breaks.append((float(away[1]), words))
+        return min(breaks)
 
 
-def _depths(polygons: Sequence[Array]) -> list[int]:
-    """Return within how many of the others each closed polygon (K, 3) lies."""
-    boxes = np.array([[p.min(axis=0), p.max(axis=0)] for p in polygons]).reshape(-1, 2, 3)
+def _depths(chains: Sequence[Chain]) -> list[int]:
+    """Return within how many of the others each closed chain lies.
+
+    Chains may touch, or lie on each other: it is a point inside that is looked at.
+    """
+    boxes = np.array([chain.bounds() for chain in chains]).reshape(-1, 2, 3)
+    areas = np.array([abs(vector_area(chain.around)[2]) for chain in chains])
     depths = []
-    for k, polygon in enumerate(polygons):
-        point = polygon[0]
-        around = (boxes[:, 0] <= boxes[k, 0]).all(axis=1) & (boxes[:, 1] >= boxes[k, 1]).all(axis=1)
-        around[k] = False
-        depths.append(sum(_encloses(polygons[j], point) for j in np.flatnonzero(around).tolist()))
+    for k, chain in enumerate(chains):
+        point = inner_point(chain.around)
+        larger = np.stack([boxes[k, 0] - boxes[:, 0], boxes[:, 1] - boxes[k, 1]])
+        is_around = (larger > -SAME).all(axis=(0, 2))
+        # Of two in one box, as a circle and what is inscribed, one is clearly larger; or neither.
+        is_around &= (larger > SAME).any(axis=(0, 2)) | (areas > LARGER * areas[k])
+        is_around[k] = False
+        around = np.flatnonzero(is_around).tolist()
+        depths.append(sum(encloses(chains[j].around, point) for j in around))
     return depths
-
-
-def _encloses(polygon: Array, point: Array) -> bool:
-    """Return whether a point lies within a polygon: a ray from it crosses the polygon oddly."""
-    x, y = polygon[:, 0] - point[0], polygon[:, 1] - point[1]
-    x1, y1 = np.roll(x, -1), np.roll(y, -1)
-    crosses = (y > 0) != (y1 > 0)
-    at = x[crosses] - y[crosses] * (x1[crosses] - x[crosses]) / (y1[crosses] - y[crosses])
-    return bool(np.count_nonzero(at > 0) % 2)

@@ -20,7 +20,7 @@ from ezdxf.math import Vec3
 from ezdxf.xclip import XClip
 
 from kerfpath._arrays import Array
-from kerfpath.cad._chains import Look, loops_in
+from kerfpath.cad._chains import Look, Stroke, loops_in
 from kerfpath.cad._curves import Curve
 from kerfpath.cad._dxf_document import DAMAGED, document_of
 from kerfpath.cad._dxf_entities import curves_of
@@ -96,7 +96,7 @@ def read_dxf(path: Path, content: bytes, unit: str | None, gap: float) -> Part:
         raise InputError(f"{path}: damaged ({_reason(error)}); repair it in CAD") from None
     sheet.left_out.update(lost)
     return loops_in(
-        path, unit or declared, sheet.curves, gap=gap, notes=notes, left_out=sheet.summed()
+        path, unit or declared, sheet.strokes, gap=gap, notes=notes, left_out=sheet.summed()
     )
 
 
@@ -107,10 +107,10 @@ def _reason(error: Exception) -> str:
 
 @dataclass
 class _Sheet:
-    """Curves gathered from the entities of a drawing, in mm, by (layer, colour)."""
+    """Strokes gathered from the entities of a drawing, in mm, by (layer, colour)."""
 
     document: Drawing
-    curves: dict[Look, list[Curve]] = field(default_factory=dict)
+    strokes: dict[Look, list[Stroke]] = field(default_factory=dict)
     left_out: Counter[tuple[str, str]] = field(default_factory=Counter)
     put_aside: Counter[tuple[str, str]] = field(default_factory=Counter)
     count: int = 0
@@ -167,7 +167,8 @@ class _Sheet:
         self._counted(len(curves))
         for curve in curves:
             self._require_flat(curve, kind, look[0])
-        self.curves.setdefault(look, []).extend(curves)
+        if curves:
+            self.strokes.setdefault(look, []).append(tuple(curves))
 
     def _insert(self, insert: Insert, T: Array, look: Look, depth: int) -> None:
         """Add a block wherever it is inserted: once, or in rows and columns."""

@@ -127,11 +127,14 @@ class EdgeChain(Generic[E]):
     is_closed : bool
     next_end : str
         Of an open chain: how far it is to what could follow, and where, for messages.
+    next_away : float mm
+        Of an open chain: how far that is.
     """
 
     edges: Sequence[E]
     is_closed: bool = True
     next_end: str = ""
+    next_away: float = 0.0
 
     __repr__ = short_repr
 
