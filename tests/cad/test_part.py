@@ -458,10 +458,6 @@ BAD: dict[str, tuple[Callable[[str], str], str]] = {
         lambda text: text.replace("EDGE_LOOP('',(#", "EDGE_LOOP('',(#99", 1),
         r"damaged .*Unresolved Reference",
     ),
-    "not a number": (
-        lambda text: text.replace("CARTESIAN_POINT('',(0.,0.,", "CARTESIAN_POINT('',(0.,$,", 1),
-        r"damaged \(CartesianPoint: .*coordinates",
-    ),
     "astray": (
         lambda text: text.replace("CARTESIAN_POINT('',(100.,", "CARTESIAN_POINT('',(1.E+200,"),
         "a point lies at .* further than 10 km",

@@ -11,6 +11,7 @@ from scipy.interpolate import BSpline
 
 from kerfpath._arrays import Array
 from kerfpath._repr import short_repr
+from kerfpath.cad._sample import AROUND
 
 __all__ = ["Arc", "Curve", "Line", "Spline", "backwards"]
 
@@ -30,6 +31,10 @@ class _Flat(ABC):
     @cached_property
     def ends(self) -> Array:
         return self.at(np.array([self.start, self.end]))
+
+    @cached_property
+    def around(self) -> Array:
+        return self.at(np.linspace(self.start, self.end, AROUND, endpoint=False))
 
     @cached_property
     def length(self) -> float:

@@ -21,7 +21,7 @@ from OCP.IntTools import IntTools_FClass2d
 from OCP.TopAbs import TopAbs_State
 from OCP.TopoDS import TopoDS_Face
 
-from kerfpath._arrays import Array
+from kerfpath._arrays import Array, Ints
 from kerfpath.cad._loops import REVERSED
 
 __all__ = ["depth_of", "joined", "patches_of", "weighed"]
@@ -32,6 +32,8 @@ ACCURACY = 1e-2
 """Relative accuracy of areas: they tell sheets from blocks, and are not shown."""
 EDGE = 1e-9
 """What lies this close to an edge, in the surface's own parameters, lies on it."""
+CHUNK = 256
+"""Points at once: memory does not grow with the part, and BLAS starts no threads for so few."""
 DIRECTIONS = 512
 """Directions in which the ends of a sheet are looked for: within 5 deg of any."""
 
@@ -93,9 +95,22 @@ def joined(parts: Sequence[Patches]) -> Patches:
 
 def depth_of(patches: Patches, points: Array) -> float:
     """Return how far points (K, 3) mm reach beyond each patch along its normal, on the mean, mm."""
-    ends = points[np.unique(np.argmax(points @ _directions().T, axis=0))]
+    ends = points[_farthest(points)]
     beyond = (patches.normal @ ends.T).max(axis=1) - (patches.normal * patches.middle).sum(axis=1)
     return float(patches.area @ np.maximum(beyond, 0.0) / patches.area.sum())
+
+
+def _farthest(points: Array) -> Ints:
+    """Return which of points (K, 3) lie farthest in any of many directions."""
+    directions = _directions()
+    best, which = np.full(len(directions), -np.inf), np.zeros(len(directions), dtype=np.int64)
+    for first in range(0, len(points), CHUNK):
+        along = directions @ points[first : first + CHUNK].T
+        here = np.argmax(along, axis=1)
+        farther = along[np.arange(len(directions)), here] > best
+        which[farther] = here[farther] + first
+        best[farther] = along[farther, here[farther]]
+    return np.unique(which)
 
 
 def _directions() -> Array:

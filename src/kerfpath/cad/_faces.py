@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Sequence
 from dataclasses import replace
 from functools import lru_cache, partial
@@ -10,15 +11,18 @@ from pathlib import Path
 import numpy as np
 from OCP.BRepAdaptor import BRepAdaptor_Surface
 from OCP.GeomAbs import GeomAbs_SurfaceType
+from OCP.Standard import Standard_Failure
 
 from kerfpath._arrays import freeze
 from kerfpath.cad._build import named_loops
+from kerfpath.cad._left_out import LeftOut, counted, nothing_drawn
 from kerfpath.cad._loops import FaceLoop, bounds_of, loops_of
 from kerfpath.cad._mesh import triangulate
 from kerfpath.cad._part import Loop, Part
 from kerfpath.cad._shape import NamedFace, NamedShape, unique
 from kerfpath.cad._skins import Skin, skins_of
 from kerfpath.cad._units import MM
+from kerfpath.errors import InputError
 
 __all__ = ["part_of"]
 
@@ -47,8 +51,7 @@ def part_of(
     outer_towards: tuple[float, float, float] | None = None,
 ) -> Part:
     """Return the part that is drawn, every face, skin and loop given its name; `gap` in m."""
-    faces = drawn.faces
-    found = [loops_of(named.face) for named in faces]
+    faces, found, unread = _readable(drawn.faces)
     towards = None if outer_towards is None else np.array(outer_towards)
     skins = skins_of([named.face for named in faces], found, towards)
     names = _names(faces)
@@ -64,16 +67,39 @@ def part_of(
         surface = SURFACES[BRepAdaptor_Surface(named.face).GetType()]
         around = _named(name, surface, found[f], gap, [named])
         loops += [replace(loop, side=side_of[f], skin=piece_of[f]) for loop in around]
+    left_out = tuple(sorted([*drawn.left_out, *unread], key=lambda each: not each.may_cut))
     return Part(
         path=path,
         unit=drawn.unit,
         bounding_box=freeze(bounds_of(drawn.shape) * MM),
         faces=len(faces),
         loops=tuple(loops),
-        notes=(*drawn.notes, *_doubts(skins, skin_names, names)),
+        notes=(*drawn.notes, *map(str, left_out), *_doubts(skins, skin_names, names)),
+        left_out=left_out,
         _gap=gap,
         _triangulate=lru_cache(MESHES)(partial(triangulate, drawn.shape)),
     )
+
+
+def _readable(
+    faces: Sequence[NamedFace],
+) -> tuple[list[NamedFace], list[list[FaceLoop]], list[LeftOut]]:
+    """Return the faces whose loops can be read, their loops, and what is left out for it."""
+    kept: list[NamedFace] = []
+    loops: list[list[FaceLoop]] = []
+    left_out: Counter[tuple[str, str, bool]] = Counter()
+    for named in faces:
+        try:
+            found = loops_of(named.face)
+        except (InputError, Standard_Failure, RuntimeError) as error:
+            reason = " ".join(str(error).split())[:120] or type(error).__name__
+            left_out["face", reason, True] += 1
+        else:
+            kept.append(named)
+            loops.append(found)
+    if faces and not kept:
+        raise nothing_drawn(counted(left_out))
+    return kept, loops, counted(left_out)
 
 
 def _doubts(skins: Sequence[Skin], skin_names: Sequence[str], names: Sequence[str]) -> list[str]:

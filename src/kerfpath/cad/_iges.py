@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import re
+from collections import Counter
+from collections.abc import Iterator
 from itertools import groupby, zip_longest
 from pathlib import Path
 
@@ -14,6 +16,7 @@ from OCP.IGESData import IGESData_IGESEntity
 from OCP.TopAbs import TopAbs_ShapeEnum
 from OCP.TopoDS import TopoDS, TopoDS_Shape
 
+from kerfpath.cad._left_out import LOST, LeftOut, counted, kind_of
 from kerfpath.cad._sewn import drawn_of
 from kerfpath.cad._shape import NamedFace, NamedShape, failures, list_shapes, occt
 from kerfpath.cad._units import UNITS_MM
@@ -25,6 +28,10 @@ FLAGS = {1: "in", 2: "mm", 4: "ft", 6: "m", 7: "km", 8: "mil", 9: "um", 10: "cm"
 """Units by the flag of the global section (IGES 5.3, table 2)."""
 GLOBAL = "Global Section"
 """How OCCT begins what it says of the global section, whose number is that of the whole file."""
+FACES = (143, 144, 510)
+"""Types of entities that faces are made of: bounded and trimmed surfaces, and faces of solids."""
+SAID = ("IGESDimen", "IGESDraw", "IGESGraph", "IGESDefs", "IGESAppli")
+"""How the names of OCCT's classes begin for what says something about a part."""
 WIDTH = 80
 """Columns of a line; the 73rd names its section, the rest number it there."""
 
@@ -84,7 +91,7 @@ def _read(path: Path, unit: str | None, gap: float) -> NamedShape:
     reader = IGESControl_Reader()
     if reader.ReadFile(str(path)) != IFSelect_ReturnStatus.IFSelect_RetDone:
         raise InputError("the file cannot be parsed; export the part as IGES again")
-    _require_sound(reader)
+    left_out = _damaged(reader)
     flag = reader.IGESModel().GlobalSection().UnitFlag()
     header = FLAGS.get(flag, "")
     if unit is None and not header:
@@ -94,8 +101,13 @@ def _read(path: Path, unit: str | None, gap: float) -> NamedShape:
         )
     reader.TransferRoots()
     shape = reader.OneShape()
+    left_out += _lost_faces(reader)
     loose = [] if shape is None else list_shapes(shape, TopAbs_ShapeEnum.TopAbs_FACE)
-    faces = [NamedFace(face=TopoDS.Face(face), name=_name(reader, face)) for face in loose]
+    has_names = any(entity.HasName() for entity in _faces(reader))
+    faces = [
+        NamedFace(face=TopoDS.Face(face), name=_name(reader, face) if has_names else "")
+        for face in loose
+    ]
     notes = []
     if unit is not None and unit != header:
         # OCCT has converted the header's unit to mm.
@@ -108,19 +120,50 @@ def _read(path: Path, unit: str | None, gap: float) -> NamedShape:
             for named in faces
         ]
         notes.append(f"unit {unit} as asked; the header says {header or 'nothing'}")
-    return drawn_of(unit or header, shape, faces, gap=gap, notes=notes)
+    return drawn_of(unit or header, shape, faces, gap=gap, notes=notes, left_out=left_out)
 
 
-def _require_sound(reader: IGESControl_Reader) -> None:
-    """Raise InputError for broken entities, on which OCCT's transfer may crash the process.
+def _damaged(reader: IGESControl_Reader) -> list[LeftOut]:
+    """Return what fails OCCT's checks.
 
     Of the global section only the unit is used, and looked at: dates, names and sizes that are odd
     say nothing about the part.
+
+    Raises
+    ------
+    InputError
+        The file as a whole fails them.
     """
-    for _, reason in failures(reader.WS().ModelCheckList()):
+    found: Counter[tuple[str, str, bool]] = Counter()
+    for number, reason in failures(reader.WS().ModelCheckList()):
         if reason.startswith(GLOBAL):
             continue
-        raise InputError(f"the file is damaged ({reason}); copy or export it again")
+        if not number:
+            raise InputError(f"the file is damaged ({reason}); copy or export it again")
+        entity = reader.IGESModel().Entity(number)
+        may_cut = not type(entity).__name__.startswith(SAID)
+        found[kind_of(entity), f"damaged: {reason}", may_cut] += 1
+    return counted(found)
+
+
+def _faces(reader: IGESControl_Reader) -> Iterator[IGESData_IGESEntity]:
+    """Yield the entities that faces are made of."""
+    model = reader.IGESModel()
+    for number in range(1, model.NbEntities() + 1):
+        entity = model.Entity(number)
+        if entity.TypeNumber() in FACES:
+            yield entity
+
+
+def _lost_faces(reader: IGESControl_Reader) -> list[LeftOut]:
+    """Return the faces of the file of which no shape was made."""
+    process = reader.WS().TransferReader().TransientProcess()
+    found: Counter[tuple[str, str, bool]] = Counter()
+    for entity in _faces(reader):
+        made = process.Find(entity)
+        if made is None or not made.HasResult():
+            found[kind_of(entity), LOST, True] += 1
+    return counted(found)
 
 
 def _name(reader: IGESControl_Reader, face: TopoDS_Shape) -> str:

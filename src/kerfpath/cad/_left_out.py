@@ -2,9 +2,16 @@
 
 from __future__ import annotations
 
+from collections import Counter
+from collections.abc import Sequence
 from dataclasses import dataclass
 
-__all__ = ["LeftOut"]
+from kerfpath.errors import InputError
+
+__all__ = ["LOST", "LeftOut", "counted", "kind_of", "nothing_drawn"]
+
+LOST = "no face is made of it"
+"""Why a face of a file is left out that OCCT makes nothing of."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -29,3 +36,22 @@ class LeftOut:
     def __str__(self) -> str:
         doubt = "; this may have been to cut" if self.may_cut else ""
         return f"left out: {self.count} {self.kind} ({self.reason}){doubt}"
+
+
+def counted(found: Counter[tuple[str, str, bool]]) -> list[LeftOut]:
+    """Return what is left out, of how many there are of each kind, reason and `may_cut`."""
+    return [
+        LeftOut(kind=kind, reason=reason, count=count, may_cut=may_cut)
+        for (kind, reason, may_cut), count in found.items()
+    ]
+
+
+def kind_of(entity: object) -> str:
+    """Return what OCCT calls the kind of an entity: without its package."""
+    return type(entity).__name__.partition("_")[2]
+
+
+def nothing_drawn(left_out: Sequence[LeftOut]) -> InputError:
+    """Return the error of a file without faces, with what was left out of it."""
+    why = f" ({'; '.join(map(str, left_out[:2]))})" if left_out else ""
+    return InputError(f"the file holds no face{why}; export the part as a solid or a surface")

@@ -19,7 +19,8 @@ from OCP.TopAbs import TopAbs_Orientation, TopAbs_ShapeEnum
 from OCP.TopoDS import TopoDS, TopoDS_Edge, TopoDS_Face, TopoDS_Shape, TopoDS_Wire
 
 from kerfpath._arrays import Array
-from kerfpath.cad._sample import EdgeChain
+from kerfpath.cad._elementary import ElementarySurface, parameters_on
+from kerfpath.cad._sample import AROUND, EdgeChain
 from kerfpath.cad._shape import children, list_shapes
 from kerfpath.cad._units import LARGEST
 from kerfpath.errors import InputError
@@ -35,6 +36,19 @@ NUDGE = 1e-4
 """How far from such a point the normal is taken, as a part of the edge."""
 
 
+class FaceSurface:
+    """The surface of a face.
+
+    Parameters
+    ----------
+    face : TopoDS_Face
+    """
+
+    def __init__(self, face: TopoDS_Face) -> None:
+        self.adaptor = BRepAdaptor_Surface(face)
+        self.elementary = ElementarySurface.of(self.adaptor)
+
+
 class OrientedEdge:
     """An edge of a face in the direction of travel, evaluated on the face.
 
@@ -46,12 +60,13 @@ class OrientedEdge:
         As it lies in the face taken FORWARD.
     face : TopoDS_Face
         The face in its own orientation.
-    surface : BRepAdaptor_Surface
+    surface : FaceSurface
         Of the face; one for all its edges, since making it looks at every edge.
     """
 
-    def __init__(self, edge: TopoDS_Edge, face: TopoDS_Face, surface: BRepAdaptor_Surface) -> None:
-        self.edge, self.face, self.surface = edge, face, surface
+    def __init__(self, edge: TopoDS_Edge, face: TopoDS_Face, surface: FaceSurface) -> None:
+        self.edge, self.face, self._on = edge, face, surface
+        self.surface = surface.adaptor
         self.outward = -1.0 if face.Orientation() == REVERSED else 1.0
         first, last = BRep_Tool.Range_s(edge, face)
         # A REVERSED face shows its other side, about which its wires run the other way round.
@@ -60,10 +75,18 @@ class OrientedEdge:
         self._curve = BRep_Tool.CurveOnSurface_s(edge, face, first, last)
         if self._curve is None:
             raise InputError("an edge has no curve on its face; repair the part in CAD")
-        self.ends = self.evaluate(np.array([self.start, self.end]))[0]
+        points, normals = self.evaluate(np.linspace(self.start, self.end, AROUND + 1))
+        self.around, self.ends = points[:-1], points[[0, -1]]
+        self.end_normals = {self.start: normals[0], self.end: normals[-1]}
 
     def evaluate(self, t: Array) -> tuple[Array, Array]:
         """Return points (K, 3) mm and outward unit normals (K, 3) of the face at `t` (K,)."""
+        if self._on.elementary is not None:
+            points, across = self._on.elementary.at(parameters_on(self._curve, t))
+            size = np.linalg.norm(across, axis=1, keepdims=True)
+            if (size > SINGULAR * max(1.0, float(np.abs(points).max()))).all():
+                self._require_near(points)
+                return points, across * (self.outward / size)
         points, normals = np.empty((len(t), 3)), np.empty((len(t), 3))
         for k, parameter in enumerate(t.tolist()):
             point, normal = self._at(parameter)
@@ -73,12 +96,16 @@ class OrientedEdge:
             if normal is None:
                 raise InputError(f"a face has no normal at {point} mm; repair the part in CAD")
             points[k], normals[k] = point, normal
+        self._require_near(points)
+        return points, normals
+
+    @staticmethod
+    def _require_near(points: Array) -> None:
         if not (np.abs(points) <= LARGEST).all():
             raise InputError(
                 f"an edge strays further than {LARGEST / 1e6:g} km from the origin; the file is "
                 "damaged, or its unit is wrong"
             )
-        return points, normals
 
     @property
     def length(self) -> float:
@@ -133,7 +160,7 @@ def loops_of(face: TopoDS_Face) -> list[FaceLoop]:
     """
     forward = TopoDS.Face(face.Oriented(FORWARD))
     outer_wire = BRepTools.OuterWire_s(forward)
-    surface = BRepAdaptor_Surface(face)
+    surface = FaceSurface(face)
     loops: list[FaceLoop] = []
     for found in list_shapes(forward, TopAbs_ShapeEnum.TopAbs_WIRE):
         wire = TopoDS.Wire(found)
@@ -145,7 +172,7 @@ def loops_of(face: TopoDS_Face) -> list[FaceLoop]:
 
 
 def _runs(
-    wire: TopoDS_Wire, forward: TopoDS_Face, face: TopoDS_Face, surface: BRepAdaptor_Surface
+    wire: TopoDS_Wire, forward: TopoDS_Face, face: TopoDS_Face, surface: FaceSurface
 ) -> tuple[list[list[OrientedEdge]], bool]:
     """Return the edges of `wire` as travelled, broken at each seam, and whether it has a seam."""
     turned = (FORWARD, REVERSED)

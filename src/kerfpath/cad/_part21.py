@@ -1,16 +1,13 @@
-"""The grammar of STEP files (ISO 10303-21), checked first: OCCT may crash on what breaks it."""
+"""The grammar of STEP files (ISO 10303-21): what breaks it, in words, where OCCT gives none."""
 
 from __future__ import annotations
 
 import re
 from collections import Counter
 
-import numpy as np
-
-from kerfpath._arrays import Array
 from kerfpath.errors import InputError
 
-__all__ = ["points_in", "sound_data"]
+__all__ = ["require_grammar"]
 
 BLANKS = re.compile(rb"'[^']*'|/\*.*?\*/|\s+", re.DOTALL)
 SECTION = re.compile(rb";DATA(?:\([^;]*\))?;(.*?)ENDSEC;", re.DOTALL | re.IGNORECASE)
@@ -19,15 +16,14 @@ ITEM = rb"(?:\$++|\*|#\d++|%s|\.\w++\.|\"[0-9A-Fa-f]*+\")" % NUMBER
 LIST = re.compile(rb"!?(?:[A-Za-z_]\w*+)?\((?:%s(?:,%s)*+)?\)" % (ITEM, ITEM))
 """A list without lists in it; with its type in front, an entity."""
 ENTITY = re.compile(rb"#\d+=\$+")
-POINT = re.compile(rb"=CARTESIAN_POINT\(\$+,\(([^,()]+,[^,()]+,[^,()]+)\)\)", re.IGNORECASE)
 DEEPEST = 32
 """Lists inside lists; files have about six."""
 LARGEST = 2**31 - 1
 """OCCT keeps the numbers of entities in 32 bits."""
 
 
-def sound_data(content: bytes) -> bytes:
-    """Return the data of a STEP file without blanks and comments, each text replaced by $.
+def require_grammar(content: bytes) -> None:
+    """Check the grammar of a STEP file.
 
     Raises
     ------
@@ -55,13 +51,6 @@ def sound_data(content: bytes) -> bytes:
         raise _damaged(f"#{largest} is more than {LARGEST}")
     if missing := set(map(int, re.findall(rb"#(\d+)(?![\d=])", data))) - made.keys():
         raise _damaged(f"Unresolved Reference to #{min(missing)}")
-    return data
-
-
-def points_in(data: bytes) -> Array:
-    """Return the coordinates (K, 3) of all points in space, in the file's unit."""
-    numbers = b",".join(POINT.findall(data)).replace(b"$", b"nan")
-    return np.array(numbers.split(b",") if numbers else [], dtype=np.float64).reshape(-1, 3)
 
 
 def _line(content: bytes, statement: bytes) -> str:

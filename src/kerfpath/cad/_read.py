@@ -123,11 +123,23 @@ def _drawn(
             with occt():
                 part = part_of(path, drawn, gap, towards)
         except InputError as error:
-            raise InputError(f"{path}: {error}") from None
+            raise InputError(f"{path}: {_in_words(kind, content, error)}") from None
     _kept[key] = part
     while len(_kept) > KEPT:
         _kept.pop(next(iter(_kept)), None)
     return replace(part, path=path)
+
+
+def _in_words(kind: str, content: bytes, error: InputError) -> InputError:
+    """Return what breaks the grammar of a STEP file that cannot be read, else the error itself."""
+    from kerfpath.cad._part21 import require_grammar
+
+    try:
+        if kind == "STEP" and b"END-ISO-10303-21;" in content:
+            require_grammar(content)
+    except InputError as broken:
+        return broken
+    return error
 
 
 _kept: dict[tuple[object, ...], Part] = {}

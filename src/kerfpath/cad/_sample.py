@@ -16,6 +16,7 @@ from kerfpath.contour import Contour
 from kerfpath.errors import InputError
 
 __all__ = [
+    "AROUND",
     "Curve",
     "Edge",
     "EdgeChain",
@@ -64,6 +65,10 @@ class Edge(Curve, Protocol):
     @property
     def ends(self) -> Array:
         """First and last point (2, 3) mm."""
+
+    @property
+    def around(self) -> Array:
+        """Points (AROUND, 3) mm from its start on, evenly in the parameter, without its end."""
 
     @property
     def length(self) -> float:
@@ -156,12 +161,7 @@ class EdgeChain(Generic[E]):
     @cached_property
     def around(self) -> Array:
         """Points (K, 3) mm all along, as many on each edge."""
-        return np.vstack(
-            [
-                edge.evaluate(np.linspace(edge.start, edge.end, AROUND, endpoint=False))[0]
-                for edge in self.edges
-            ]
-        )
+        return np.vstack([edge.around for edge in self.edges])
 
     def bounds(self) -> Array:
         boxes = np.array([edge.bounds() for edge in self.edges])
@@ -321,4 +321,12 @@ def distance(trace: Trace, point: Array) -> float:
 
 def vector_area(points: Array) -> Array:
     """Return the vector area (3,) that a closed polygon (K, 3) encloses."""
-    return np.asarray(np.cross(points, np.roll(points, -1, axis=0)).sum(axis=0) / 2)
+    middle = points.mean(axis=0)  # about which little is lost of small loops far off
+    x, y, z = (points - middle).T
+    after = [np.concatenate([values[1:], values[:1]]) for values in (x, y, z)]
+    return (
+        np.array(
+            [y @ after[2] - z @ after[1], z @ after[0] - x @ after[2], x @ after[1] - y @ after[0]]
+        )
+        / 2
+    )

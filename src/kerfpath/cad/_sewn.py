@@ -14,11 +14,13 @@ from OCP.TopAbs import TopAbs_ShapeEnum
 from OCP.TopoDS import TopoDS, TopoDS_Compound, TopoDS_Shape
 
 from kerfpath.cad._bodies import bodies_of
+from kerfpath.cad._left_out import LeftOut, nothing_drawn
 from kerfpath.cad._shape import NamedFace, NamedShape, list_shapes
 from kerfpath.cad._units import MM
-from kerfpath.errors import InputError
 
 __all__ = ["drawn_of"]
+
+EDGE, FACE = TopAbs_ShapeEnum.TopAbs_EDGE, TopAbs_ShapeEnum.TopAbs_FACE
 
 
 def drawn_of(
@@ -28,15 +30,26 @@ def drawn_of(
     *,
     gap: float,
     notes: Sequence[str] = (),
+    left_out: Sequence[LeftOut] = (),
 ) -> NamedShape:
     """Return a shape and its faces, sewn within `gap` (m) where there is no solid."""
     if not faces:
-        raise InputError("the file holds no face; export the part as a solid or a surface")
+        raise nothing_drawn(left_out)
+    if lines := len(list_shapes(shape, EDGE, avoid=FACE)):
+        lost = LeftOut(kind="curve", reason="it bounds no face", count=lines, may_cut=True)
+        left_out = [*left_out, lost]
     solids = list_shapes(shape, TopAbs_ShapeEnum.TopAbs_SOLID)
     if not solids and len(faces) > 1:
+        loose = len(faces)
         shape, faces, note = _sewn(faces, gap)
         notes = [*notes, note]
-    return NamedShape(unit=unit, shape=shape, faces=faces, notes=notes)
+        if gone := loose - len(faces):
+            reason = f"it vanishes when sewn over {gap / MM:g} mm: try a smaller gap"
+            vanished = LeftOut(kind="face", reason=reason, count=gone, may_cut=True)
+            left_out = [*left_out, vanished]
+        if not faces:
+            raise nothing_drawn(left_out)
+    return NamedShape(unit=unit, shape=shape, faces=faces, notes=notes, left_out=left_out)
 
 
 def _sewn(faces: Sequence[NamedFace], gap: float) -> tuple[TopoDS_Shape, list[NamedFace], str]:
@@ -63,17 +76,12 @@ def _sewn(faces: Sequence[NamedFace], gap: float) -> tuple[TopoDS_Shape, list[Na
         joined, free = joined + sewing.NbContigousEdges(), free + sewing.NbFreeEdges()
         # Sewing turns faces round so that neighbours agree: each is taken as it lies in the result.
         sewn = ShapeMap()
-        for face in list_shapes(shape, TopAbs_ShapeEnum.TopAbs_FACE):
+        for face in list_shapes(shape, FACE):
             sewn.Add(face)
         for f in body:
             if place := sewn.FindIndex(sewing.ModifiedSubShape(faces[f].face)):
                 lying[f] = replace(faces[f], face=TopoDS.Face(sewn.FindKey(place)))
-    if len(lying) != len(faces):
-        raise InputError(
-            f"{len(faces) - len(lying)} of {len(faces)} loose faces vanish when sewn over "
-            f"{gap / MM:g} mm; give a smaller gap"
-        )
-    edges = list_shapes(whole, TopAbs_ShapeEnum.TopAbs_EDGE)
+    edges = list_shapes(whole, EDGE)
     widest = max((BRep_Tool.Tolerance_s(TopoDS.Edge(edge)) for edge in edges), default=0.0)
     apart = f" to {len(bodies)} bodies" if len(bodies) > 1 else ""
     note = (
@@ -81,4 +89,4 @@ def _sewn(faces: Sequence[NamedFace], gap: float) -> tuple[TopoDS_Shape, list[Na
         f"joined, the widest gap {np.round(widest, 4):g} mm; {free} edges are free"
     )
     shape = shape if len(bodies) == 1 else whole
-    return shape, [lying[f] for f in range(len(faces))], note
+    return shape, [lying[f] for f in sorted(lying)], note

@@ -23,6 +23,7 @@ from OCP.TopExp import TopExp_Explorer
 from OCP.TopoDS import TopoDS, TopoDS_Compound, TopoDS_Face, TopoDS_Iterator, TopoDS_Shape
 
 from kerfpath._repr import short_repr
+from kerfpath.cad._left_out import LeftOut
 from kerfpath.errors import InputError
 
 __all__ = [
@@ -71,12 +72,15 @@ class NamedShape:
     shape : TopoDS_Shape
     faces : sequence of NamedFace
     notes : sequence of str
+    left_out : sequence of LeftOut
+        What is in the file and not in the shape.
     """
 
     unit: str
     shape: TopoDS_Shape
     faces: Sequence[NamedFace]
     notes: Sequence[str]
+    left_out: Sequence[LeftOut] = ()
 
     def __reduce__(self) -> tuple[Any, ...]:
         """Return what to make it of again, in another process."""
@@ -90,11 +94,16 @@ class NamedShape:
         stream = BytesIO()
         BinTools.Write_s(both, stream)
         names = [(n.name, n.component, n.layer, n.colour) for n in self.faces]
-        return _copy_with_names, (self.unit, stream.getvalue(), names, tuple(self.notes))
+        said = tuple(self.notes), tuple(self.left_out)
+        return _copy_with_names, (self.unit, stream.getvalue(), names, *said)
 
 
 def _copy_with_names(
-    unit: str, stream: bytes, names: Sequence[tuple[str, str, str, str]], notes: Sequence[str]
+    unit: str,
+    stream: bytes,
+    names: Sequence[tuple[str, str, str, str]],
+    notes: Sequence[str],
+    left_out: Sequence[LeftOut],
 ) -> NamedShape:
     both = TopoDS_Shape()
     BinTools.Read_s(both, BytesIO(stream))
@@ -105,7 +114,7 @@ def _copy_with_names(
         )
         for face, (name, component, layer, colour) in zip(children(faces), names, strict=True)
     ]
-    return NamedShape(unit=unit, shape=shape, faces=named, notes=notes)
+    return NamedShape(unit=unit, shape=shape, faces=named, notes=notes, left_out=left_out)
 
 
 def children(shape: TopoDS_Shape) -> list[TopoDS_Shape]:
@@ -131,9 +140,13 @@ def occt() -> Iterator[None]:
             messenger.AddPrinter(printer)
 
 
-def list_shapes(shape: TopoDS_Shape, kind: TopAbs_ShapeEnum) -> list[TopoDS_Shape]:
-    """Return the faces, edges, ... of a shape."""
-    return list(_each(TopExp_Explorer(shape, kind)))
+def list_shapes(
+    shape: TopoDS_Shape,
+    kind: TopAbs_ShapeEnum,
+    avoid: TopAbs_ShapeEnum = TopAbs_ShapeEnum.TopAbs_SHAPE,
+) -> list[TopoDS_Shape]:
+    """Return the faces, edges, ... of a shape, without those in what is to `avoid`."""
+    return list(_each(TopExp_Explorer(shape, kind, avoid)))
 
 
 def failures(checks: Interface_CheckIterator) -> Iterator[tuple[int, str]]:

@@ -137,9 +137,13 @@ def _numbers(loop: EdgeChain[OrientedEdge]) -> range:
 
 
 def _is_smooth(a: OrientedEdge, b: OrientedEdge) -> bool:
+    most = 2 * np.sin(SMOOTH / 2)
+    for end, normal in a.end_normals.items():  # most edges are sharp, and so where they end
+        if end in b.end_normals and np.linalg.norm(normal - b.end_normals[end]) > most:
+            return False
     t = np.linspace(a.start, a.end, 5)
     turned = np.linalg.norm(a.evaluate(t)[1] - b.evaluate(t)[1], axis=1)
-    return bool(turned.max() <= 2 * np.sin(SMOOTH / 2))
+    return bool(turned.max() <= most)
 
 
 def _outside(edges: Sequence[OrientedEdge], inside: list[bool]) -> list[list[OrientedEdge]]:
@@ -198,16 +202,17 @@ def _sides(
     sides: list[Side] = [""] * len(members)
     doubts = [""] * len(members)
     body = whole[[numbers[0] for numbers in members]]
+    is_alone = np.bincount(body)[body] == 1
+    beside = _beside(low, high, areas)
     for g in np.argsort(-areas, kind="stable").tolist():
-        alike = np.flatnonzero(body == body[g])
-        if len(alike) == 1:
+        if is_alone[g]:
             sides[g] = "outer"
         if sides[g]:
             continue
+        alike = beside[g][body[beside[g]] == body[g]]
         apart = np.maximum(low[alike] - high[g], low[g] - high[alike]).max(axis=1)
         opposite = np.linalg.norm(vector[alike] + vector[g], axis=1) <= OPPOSITE * areas[g]
-        large = areas[alike] > (1 - OPPOSITE) * areas[g]
-        near = alike[(apart < THIN * np.sqrt(areas[g])) & opposite & large].tolist()
+        near = alike[(apart < THIN * np.sqrt(areas[g])) & opposite].tolist()
         away = {h: _usual_distance(points[g], points[h]) for h in near if h != g and not sides[h]}
         h = min(away, key=away.__getitem__, default=g)
         if h != g and away[h] < THIN * np.sqrt(areas[g]):
@@ -224,6 +229,29 @@ def _sides(
         side or ("edge" if body[g] in sheets else "") for g, side in enumerate(sides)
     ]
     return list(zip(rest, doubts, strict=True))
+
+
+def _beside(low: Array, high: Array, areas: Array) -> list[Ints]:
+    """Return for each skin those of at least nearly its area that may be as close as a sheet's.
+
+    Skins of about one size are looked up together, by the middles of their boxes (K, 3).
+    """
+    has_loops = (low <= high).all(axis=1)
+    middle = np.where(has_loops[:, None], (low + high) / 2, NOWHERE)
+    half = np.where(has_loops, np.linalg.norm(high - low, axis=1) / 2, 0.0)
+    reach = half + THIN * np.sqrt(areas)
+    found: list[list[Ints]] = [[] for _ in range(len(areas))]
+    size = np.floor(np.log2(np.maximum(areas, np.finfo(float).tiny)))
+    for one in np.unique(size):
+        those = np.flatnonzero(size == one)
+        largest = areas[those].max()
+        asking = np.flatnonzero(largest > (1 - OPPOSITE) * areas)
+        tree = cKDTree(middle[those])
+        near = tree.query_ball_point(middle[asking], reach[asking] + half[those].max())
+        for g, places in zip(asking.tolist(), near, strict=True):
+            here = those[np.array(places, dtype=np.int64)]
+            found[g].append(here[areas[here] > (1 - OPPOSITE) * areas[g]])
+    return [np.sort(np.concatenate(each)) for each in found]
 
 
 def _is_outer(

@@ -2,25 +2,31 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+import re
+from collections.abc import Iterator, Mapping
 from dataclasses import replace
 from pathlib import Path
 
-import numpy as np
 from OCP.collections import Sequence_TCollection_AsciiString
 from OCP.IFSelect import IFSelect_ReturnStatus
 from OCP.STEPControl import STEPControl_Reader
-from OCP.StepGeom import StepGeom_Curve, StepGeom_Pcurve
 from OCP.StepRepr import StepRepr_NextAssemblyUsageOccurrence, StepRepr_RepresentationItem
 from OCP.TopAbs import TopAbs_ShapeEnum
 from OCP.TopoDS import TopoDS, TopoDS_Shape
 
-from kerfpath._arrays import Array
-from kerfpath.cad._part21 import points_in, sound_data
+from kerfpath.cad._left_out import nothing_drawn
+from kerfpath.cad._part21 import require_grammar
 from kerfpath.cad._sewn import drawn_of
-from kerfpath.cad._shape import NamedFace, NamedShape, children, failures, occt, unique
+from kerfpath.cad._shape import NamedFace, NamedShape, children, occt, unique
+from kerfpath.cad._step_model import (
+    Entities,
+    Origins,
+    damaged,
+    lost_faces,
+    require_drawable,
+)
 from kerfpath.cad._styles import styles_in
-from kerfpath.cad._units import LARGEST, UNITS_MM
+from kerfpath.cad._units import UNITS_MM
 from kerfpath.errors import InputError
 
 __all__ = ["read_step"]
@@ -38,6 +44,8 @@ HEADER_UNITS = {
 }
 """The same units as STEP headers spell them, in lower case."""
 
+STARTS = re.compile(rb"#\d+\s*=")
+"""How entities start."""
 UNNAMED = ("", "none")
 """What CAD systems write for a face without a name, in lower case."""
 
@@ -54,7 +62,7 @@ def read_step(path: Path, unit: str | None, gap: float) -> NamedShape:
     content = path.read_bytes()
     _require_whole(content)
     with occt():
-        return _read(path, sound_data(content), unit, gap)
+        return _read(path, content, unit, gap)
 
 
 def _require_whole(text: bytes) -> None:
@@ -70,18 +78,23 @@ def _require_whole(text: bytes) -> None:
         )
 
 
-def _read(path: Path, data: bytes, unit: str | None, gap: float) -> NamedShape:
+def _read(path: Path, content: bytes, unit: str | None, gap: float) -> NamedShape:
     reader = STEPControl_Reader()
     if reader.ReadFile(str(path)) != IFSelect_ReturnStatus.IFSelect_RetDone:
         raise InputError("the file cannot be parsed; export the part as STEP again")
-    has_styles = _require_sound(reader)
+    model = reader.WS().Model()
+    if model.NbEntities() != len(STARTS.findall(content)):
+        require_grammar(content)  # which says what OCCT has passed over, if anything
+    del content
+    entities = Entities(model)
+    left_out, has_styles = damaged(reader)
     header = _header_unit(reader)
     if unit is None and header not in UNITS_MM:
         raise InputError(
             f"the header declares {header or 'no length unit'}, expected one of "
             f"{', '.join(UNITS_MM)}; say what the numbers mean with unit="
         )
-    _require_near(points_in(data) * UNITS_MM[unit or header])
+    require_drawable(entities, UNITS_MM[unit or header])
     notes = [] if has_styles else ["colours and layers are damaged and not read"]
     if unit is not None and unit != header:
         # OCCT scales by the header's unit over this one: what it takes for mm is then `unit`.
@@ -89,26 +102,29 @@ def _read(path: Path, data: bytes, unit: str | None, gap: float) -> NamedShape:
         notes.append(f"unit {unit} as asked; the header says {header or 'nothing'}")
     reader.TransferRoots()
     shape = reader.OneShape()
+    left_out += lost_faces(reader, entities)
     if shape is None or shape.IsNull():
-        raise InputError("the file holds no face; export the part as a solid or a surface")
-    faces = list(_faces(reader, shape, has_styles=has_styles))
-    return drawn_of(unit or header, shape, faces, gap=gap, notes=notes)
+        raise nothing_drawn(left_out)
+    styles = styles_in(entities) if has_styles else ({}, {})
+    faces = list(_faces(Origins(reader, entities), shape, *styles))
+    return drawn_of(unit or header, shape, faces, gap=gap, notes=notes, left_out=left_out)
 
 
 def _faces(
-    reader: STEPControl_Reader, shape: TopoDS_Shape, *, has_styles: bool
+    origins: Origins,
+    shape: TopoDS_Shape,
+    layers: Mapping[object, str],
+    colours: Mapping[object, str],
 ) -> Iterator[NamedFace]:
     """Yield every face with its name; in an assembly with that of its component, numbered.
 
     A face has the layer and the colour that it is given, else those of its shell, solid or
     component.
     """
-    transferred = reader.WS().TransferReader()
-    layers, colours = styles_in(reader.WS().Model()) if has_styles else ({}, {})
     components: list[tuple[str, list[NamedFace]]] = [("", [])]
 
     def walk(shape: TopoDS_Shape, into: list[NamedFace], layer: str, colour: str) -> None:
-        entity = transferred.EntityFromShapeResult(shape, -1)
+        entity = origins.of(shape)
         layer, colour = layers.get(entity, layer), colours.get(entity, colour)
         if shape.ShapeType() == TopAbs_ShapeEnum.TopAbs_FACE:
             face, name = TopoDS.Face(shape), _name(entity)
@@ -135,40 +151,6 @@ def _product(used: StepRepr_NextAssemblyUsageOccurrence) -> str:
     product = None if formation is None else formation.OfProduct()
     name = None if product is None else product.Name()
     return (name.ToCString().strip() if name is not None else "") or "component"
-
-
-def _require_sound(reader: STEPControl_Reader) -> bool:
-    """Return whether styles are sound; raise InputError for what OCCT may crash on."""
-    has_styles = True
-    model = reader.WS().Model()
-    for number, reason in failures(reader.WS().ModelCheckList()):
-        where = ""
-        if number:
-            package, _, entity = type(model.Value(number)).__name__.partition("_")
-            has_styles &= package != "StepVisual"
-            if package not in ("StepGeom", "StepShape") and entity != "DefinitionalRepresentation":
-                continue
-            where = f"{entity}: "
-        raise InputError(f"the file is damaged ({where}{reason}); copy or export it again")
-    for number in range(1, model.NbEntities() + 1):
-        drawn = model.Value(number)
-        if isinstance(drawn, StepGeom_Pcurve):
-            items = drawn.ReferenceToCurve()
-            if not (items and items.NbItems() and isinstance(items.ItemsValue(1), StepGeom_Curve)):
-                raise InputError(
-                    "the file is damaged (Pcurve: expected a curve); copy or export it again"
-                )
-    return has_styles
-
-
-def _require_near(points: Array) -> None:
-    """Raise InputError for points (K, 3) mm so far off that OCCT would spend minutes on them."""
-    far = points[~(np.abs(points) <= LARGEST).all(axis=1)]
-    if len(far):
-        raise InputError(
-            f"a point lies at {far[0].tolist()} mm, further than {LARGEST / 1e6:g} km from the "
-            "origin; the file is damaged, or its unit is wrong"
-        )
 
 
 def _header_unit(reader: STEPControl_Reader) -> str:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from OCP.Interface import Interface_InterfaceModel
 from OCP.Quantity import Quantity_Color
 from OCP.STEPConstruct import STEPConstruct_Styles
 from OCP.StepVisual import (
@@ -13,6 +12,8 @@ from OCP.StepVisual import (
     StepVisual_StyledItem,
     StepVisual_SurfaceSideStyle,
 )
+
+from kerfpath.cad._step_model import Entities
 
 __all__ = ["styles_in"]
 
@@ -28,24 +29,22 @@ COLOURS = {
 """Those that DXF drawings name, too."""
 
 
-def styles_in(model: Interface_InterfaceModel) -> tuple[dict[object, str], dict[object, str]]:
+def styles_in(entities: Entities) -> tuple[dict[object, str], dict[object, str]]:
     """Return the layer and the colour that entities are given.
 
     An entity is the same object wherever OCCT gives it, as long as one of these holds it.
     """
     layers: dict[object, str] = {}
     colours: dict[object, str] = {}
-    for number in range(1, model.NbEntities() + 1):
-        entity = model.Value(number)
-        if isinstance(entity, StepVisual_PresentationLayerAssignment):
-            name = entity.Name()
-            for k in range(1, entity.NbAssignedItems() + 1):
-                layers[entity.AssignedItemsValue(k).Value()] = (
-                    "" if name is None else name.ToCString().strip()
-                )
-        elif isinstance(entity, StepVisual_StyledItem):
-            for colour in _fills(entity):
-                colours[entity.Item()] = _named(colour)
+    for layer in entities.of(StepVisual_PresentationLayerAssignment):
+        name = layer.Name()
+        for k in range(1, layer.NbAssignedItems() + 1):
+            layers[layer.AssignedItemsValue(k).Value()] = (
+                "" if name is None else name.ToCString().strip()
+            )
+    for styled in entities.of(StepVisual_StyledItem):
+        for colour in _fills(styled):
+            colours[styled.Item()] = _named(colour)
     return layers, colours
 
 

@@ -1,0 +1,87 @@
+"""Points and normals along curves on planes, cylinders and cones, many at once.
+
+Most edges of drawn parts lie on these; OCCT evaluates one point at a time.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from OCP.BRepAdaptor import BRepAdaptor_Surface
+from OCP.Geom2d import Geom2d_Curve
+from OCP.Geom2dAdaptor import Geom2dAdaptor_Curve
+from OCP.GeomAbs import GeomAbs_CurveType, GeomAbs_SurfaceType
+from OCP.gp import gp_Ax3, gp_XYZ
+
+from kerfpath._arrays import Array
+
+__all__ = ["ElementarySurface", "parameters_on"]
+
+LINE, CIRCLE = GeomAbs_CurveType.GeomAbs_Line, GeomAbs_CurveType.GeomAbs_Circle
+PLANE = GeomAbs_SurfaceType.GeomAbs_Plane
+CYLINDER, CONE = GeomAbs_SurfaceType.GeomAbs_Cylinder, GeomAbs_SurfaceType.GeomAbs_Cone
+
+
+def parameters_on(curve: Geom2d_Curve, t: Array) -> Array:
+    """Return the parameters (K, 2) of a surface at those (K,) of a curve on it."""
+    adaptor = Geom2dAdaptor_Curve(curve)
+    if adaptor.GetType() == LINE:
+        line = adaptor.Line()
+        at, way = line.Location(), line.Direction()
+        return np.asarray(np.array([at.X(), at.Y()]) + np.outer(t, [way.X(), way.Y()]))
+    if adaptor.GetType() == CIRCLE:
+        circle = adaptor.Circle()
+        at, x, y = circle.Location(), circle.XAxis().Direction(), circle.YAxis().Direction()
+        around = np.outer(np.cos(t), [x.X(), x.Y()]) + np.outer(np.sin(t), [y.X(), y.Y()])
+        return np.asarray(np.array([at.X(), at.Y()]) + circle.Radius() * around)
+    found = [curve.Value(one) for one in t.tolist()]
+    return np.array([[p.X(), p.Y()] for p in found])
+
+
+class ElementarySurface:
+    """A plane, a cylinder or a cone: origin + (radius + slope v) e(u) + rise v z, or u x + v y.
+
+    Parameters
+    ----------
+    position : gp_Ax3
+    radius, slope, rise : float
+        Of a cylinder or cone, mm and 1; all 0 of a plane.
+    """
+
+    def __init__(self, position: gp_Ax3, radius: float, slope: float, rise: float) -> None:
+        self._origin = _vector(position.Location().XYZ())
+        self._x = _vector(position.XDirection().XYZ())
+        self._y = _vector(position.YDirection().XYZ())
+        self._z = _vector(position.Direction().XYZ())
+        self._xy, self._yz = np.cross(self._x, self._y), np.cross(self._y, self._z)
+        self._xz = np.cross(self._x, self._z)
+        self._radius, self._slope, self._rise = radius, slope, rise
+
+    @classmethod
+    def of(cls, surface: BRepAdaptor_Surface) -> ElementarySurface | None:
+        """Return the surface as one of these, None if it is another."""
+        kind = surface.GetType()
+        if kind == PLANE:
+            return cls(surface.Plane().Position(), 0.0, 0.0, 0.0)
+        if kind == CYLINDER:
+            cylinder = surface.Cylinder()
+            return cls(cylinder.Position(), cylinder.Radius(), 0.0, 1.0)
+        if kind == CONE:
+            cone = surface.Cone()
+            half = cone.SemiAngle()
+            return cls(cone.Position(), cone.RefRadius(), float(np.sin(half)), float(np.cos(half)))
+        return None
+
+    def at(self, uv: Array) -> tuple[Array, Array]:
+        """Return points (K, 3) mm and du x dv (K, 3) at parameters (K, 2), of any length."""
+        u, v = uv[:, :1], uv[:, 1:]
+        if not self._rise:
+            return self._origin + u * self._x + v * self._y, np.tile(self._xy, (len(uv), 1))
+        cos, sin = np.cos(u), np.sin(u)
+        reach = self._radius + self._slope * v
+        points = self._origin + reach * (cos * self._x + sin * self._y) + self._rise * v * self._z
+        across = self._rise * (cos * self._yz - sin * self._xz) - self._slope * self._xy
+        return points, reach * across
+
+
+def _vector(at: gp_XYZ) -> Array:
+    return np.array([at.X(), at.Y(), at.Z()])

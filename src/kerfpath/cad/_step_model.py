@@ -1,0 +1,158 @@
+"""The entities of a STEP file as OCCT holds them: which are damaged, and what became of them.
+
+OCCT makes shapes of most entities, also of some that fail its own checks. What fails, and each
+face that no shape was made of, is counted, so that nothing is left out without a word.
+"""
+
+from __future__ import annotations
+
+from collections import Counter, defaultdict
+from collections.abc import Iterator
+from typing import TypeVar, cast
+
+from OCP.collections import IndexedMap_TopoDS_Shape_TopTools_ShapeMapHasher as ShapeMap
+from OCP.Interface import Interface_InterfaceModel
+from OCP.Standard import Standard_Transient
+from OCP.STEPConstruct import STEPConstruct
+from OCP.STEPControl import STEPControl_Reader
+from OCP.StepGeom import StepGeom_CartesianPoint, StepGeom_Curve, StepGeom_Pcurve
+from OCP.StepRepr import StepRepr_NextAssemblyUsageOccurrence, StepRepr_RepresentationItem
+from OCP.StepShape import StepShape_FaceSurface
+from OCP.TopAbs import TopAbs_ShapeEnum
+from OCP.TopLoc import TopLoc_Location
+from OCP.TopoDS import TopoDS_Shape
+
+from kerfpath.cad._left_out import LOST, LeftOut, counted, kind_of
+from kerfpath.cad._shape import failures
+from kerfpath.cad._units import LARGEST
+from kerfpath.errors import InputError
+
+__all__ = ["Entities", "Origins", "damaged", "lost_faces", "require_drawable"]
+
+ALONE = (TopAbs_ShapeEnum.TopAbs_FACE, TopAbs_ShapeEnum.TopAbs_SHELL)
+"""What no component of an assembly is."""
+STYLES = "StepVisual"
+DRAWN = ("StepGeom", "StepShape")
+"""How the names of OCCT's classes begin, by what entities are for."""
+E = TypeVar("E", bound=Standard_Transient)
+
+
+class Entities:
+    """The entities of a model by their kind, looked through once.
+
+    Parameters
+    ----------
+    model : Interface_InterfaceModel
+    """
+
+    def __init__(self, model: Interface_InterfaceModel) -> None:
+        self._of: dict[type, list[Standard_Transient]] = defaultdict(list)
+        for number in range(1, model.NbEntities() + 1):
+            entity = model.Value(number)
+            self._of[type(entity)].append(entity)
+
+    def of(self, kind: type[E]) -> Iterator[E]:
+        """Yield the entities of a kind."""
+        for own, entities in self._of.items():
+            if issubclass(own, kind):
+                yield from cast(list[E], entities)
+
+
+def require_drawable(entities: Entities, mm: float) -> None:
+    """Raise InputError for what OCCT crashes on, or spends minutes on.
+
+    Parameters
+    ----------
+    entities : Entities
+    mm : float
+        Of the unit that coordinates have.
+    """
+    for point in entities.of(StepGeom_CartesianPoint):
+        here = [point.CoordinatesValue(k) * mm for k in range(1, point.NbCoordinates() + 1)]
+        if len(here) == 3 and not all(abs(x) <= LARGEST for x in here):
+            raise InputError(
+                f"a point lies at {here} mm, further than {LARGEST / 1e6:g} km from the origin; "
+                "the file is damaged, or its unit is wrong"
+            )
+    for drawn in entities.of(StepGeom_Pcurve):
+        items = drawn.ReferenceToCurve()
+        if not (items and items.NbItems() and isinstance(items.ItemsValue(1), StepGeom_Curve)):
+            raise InputError(
+                "the file is damaged (Pcurve: expected a curve); copy or export it again"
+            )
+
+
+def damaged(reader: STEPControl_Reader) -> tuple[list[LeftOut], bool]:
+    """Return what fails OCCT's checks, and whether styles do not.
+
+    Raises
+    ------
+    InputError
+        The file as a whole fails them.
+    """
+    model = reader.WS().Model()
+    found: Counter[tuple[str, str, bool]] = Counter()
+    has_styles = True
+    for number, reason in failures(reader.WS().ModelCheckList()):
+        if not number:
+            raise InputError(f"the file is damaged ({reason}); copy or export it again")
+        package, kind = type(model.Value(number)).__name__.split("_", 1)
+        has_styles &= package != STYLES
+        if package != STYLES:
+            may_cut = package in DRAWN or kind == "DefinitionalRepresentation"
+            found[kind, f"damaged: {reason}", may_cut] += 1
+    return counted(found), has_styles
+
+
+def lost_faces(reader: STEPControl_Reader, entities: Entities) -> list[LeftOut]:
+    """Return the faces of the file of which no shape was made."""
+    process = reader.WS().TransferReader().TransientProcess()
+    found: Counter[tuple[str, str, bool]] = Counter()
+    for face in entities.of(StepShape_FaceSurface):
+        shape = STEPConstruct.FindShape_s(process, face)
+        if shape is None or shape.IsNull():
+            found[kind_of(face), LOST, True] += 1
+    return counted(found)
+
+
+class Origins:
+    """Which entity each shape was made of.
+
+    Parameters
+    ----------
+    reader : STEPControl_Reader
+        That has made the shapes.
+    entities : Entities
+    """
+
+    def __init__(self, reader: STEPControl_Reader, entities: Entities) -> None:
+        self._reader = reader.WS().TransferReader()
+        process = self._reader.TransientProcess()
+        self._shapes, self._entities = ShapeMap(), list[Standard_Transient]()
+        self._asked, self._answers = ShapeMap(), list[Standard_Transient | None]()
+        self._is_assembly = any(True for _ in entities.of(StepRepr_NextAssemblyUsageOccurrence))
+        for number in range(1, process.NbMapped() + 1):
+            entity = process.Mapped(number)
+            if not isinstance(entity, StepRepr_RepresentationItem):
+                continue
+            shape = STEPConstruct.FindShape_s(process, entity)
+            if shape is None or shape.IsNull():
+                continue
+            if self._shapes.Add(_unplaced(shape)) > len(self._entities):
+                self._entities.append(entity)
+
+    def of(self, shape: TopoDS_Shape) -> Standard_Transient | None:
+        """Return the entity that a shape was made of, wherever it is placed; None if of none."""
+        here = _unplaced(shape)
+        if shape.ShapeType() in ALONE or not self._is_assembly:
+            number = self._shapes.FindIndex(here)
+            return self._entities[number - 1] if number else None
+        # OCCT looks through all that it has made: it is asked once for each part.
+        number = self._asked.Add(here)
+        if number > len(self._answers):
+            self._answers.append(self._reader.EntityFromShapeResult(shape, -1))
+        return self._answers[number - 1]
+
+
+def _unplaced(shape: TopoDS_Shape) -> TopoDS_Shape:
+    return shape.Located(TopLoc_Location())
