@@ -21,6 +21,7 @@ NAMES = (
     "refinement",
     "collision",
     "cad",
+    "large_drawings",
     "kerf",
     "part",
     "programs",
@@ -76,6 +77,10 @@ def _run(name: str, *, quick: bool) -> list[Report]:
 
         modules = (kinematics, _families, _enclosures)
         return [module.run(quick=quick) for module in modules]
+    if name == "large_drawings":
+        from benchmarks import large_drawings
+
+        return [large_drawings.run(quick=quick)]
     if name == "kerf":
         from benchmarks import kerf
 

@@ -10,7 +10,7 @@ import numpy as np
 from kerfpath._arrays import freeze
 from kerfpath.cad._left_out import LeftOut
 from kerfpath.cad._part import Kind, Loop, Part
-from kerfpath.cad._round import diameter
+from kerfpath.cad._round import diameter, may_be_round
 from kerfpath.cad._sample import Trace
 from kerfpath.cad._units import LARGEST, MM
 from kerfpath.errors import InputError
@@ -45,6 +45,7 @@ def loop_of(
             f"loop {name!r} reaches further than {LARGEST / 1e6:g} km; the file is damaged, or its "
             "unit is wrong"
         )
+    is_round = kind != "open" and may_be_round(length, float(np.linalg.norm(trace.area)))
     return Loop(
         name=name,
         face=face,
@@ -56,7 +57,7 @@ def loop_of(
         shortest_edge=float(trace.lengths.min()) * MM,
         largest_gap=float(widest) * MM,
         closed=kind != "open" and float(widest) * MM <= gap,
-        diameter=None if kind == "open" else diameter(trace.around * MM),
+        diameter=diameter(trace.around * MM) if is_round else None,
         layer=layer,
         colour=colour,
         _trace=trace,

@@ -17,7 +17,7 @@ from kerfpath.cad._junctions import encloses, inner_point, partners
 from kerfpath.cad._left_out import LeftOut
 from kerfpath.cad._overlap import SAME, same_lines
 from kerfpath.cad._part import Kind, Loop, Part
-from kerfpath.cad._sample import EdgeChain, vector_area
+from kerfpath.cad._sample import EdgeChain
 from kerfpath.cad._units import MM
 from kerfpath.errors import InputError
 
@@ -68,7 +68,7 @@ def loops_in(
         kind: Kind = "open"
         if chain.is_closed:
             kind = "inner" if next(depth) % 2 else "outer"
-            if (vector_area(chain.around)[2] > 0) != (kind == "outer"):
+            if (chain.area[2] > 0) != (kind == "outer"):
                 turned = tuple(backwards(curve) for curve in chain.edges[::-1])
                 chains[k] = look, EdgeChain(edges=turned)
         kinds.append(kind)
@@ -325,7 +325,7 @@ def _depths(chains: Sequence[Chain]) -> list[int]:
     Chains may touch, or lie on each other: it is a point inside that is looked at.
     """
     boxes = np.array([chain.bounds() for chain in chains]).reshape(-1, 2, 3)
-    areas = np.array([abs(vector_area(chain.around)[2]) for chain in chains])
+    areas = np.array([abs(chain.area[2]) for chain in chains])
     depths = []
     for k, chain in enumerate(chains):
         point = inner_point(chain.around)

@@ -27,11 +27,11 @@ def parameters_on(curve: Geom2d_Curve, t: Array) -> Array:
     if adaptor.GetType() == LINE:
         line = adaptor.Line()
         at, way = line.Location(), line.Direction()
-        return np.asarray(np.array([at.X(), at.Y()]) + np.outer(t, [way.X(), way.Y()]))
+        return np.asarray(np.array([at.X(), at.Y()]) + t[:, None] * (way.X(), way.Y()))
     if adaptor.GetType() == CIRCLE:
         circle = adaptor.Circle()
         at, x, y = circle.Location(), circle.XAxis().Direction(), circle.YAxis().Direction()
-        around = np.outer(np.cos(t), [x.X(), x.Y()]) + np.outer(np.sin(t), [y.X(), y.Y()])
+        around = np.cos(t)[:, None] * (x.X(), x.Y()) + np.sin(t)[:, None] * (y.X(), y.Y())
         return np.asarray(np.array([at.X(), at.Y()]) + circle.Radius() * around)
     found = [curve.Value(one) for one in t.tolist()]
     return np.array([[p.X(), p.Y()] for p in found])
@@ -48,12 +48,12 @@ class ElementarySurface:
     """
 
     def __init__(self, position: gp_Ax3, radius: float, slope: float, rise: float) -> None:
+        x, y, z = position.XDirection(), position.YDirection(), position.Direction()
         self._origin = _vector(position.Location().XYZ())
-        self._x = _vector(position.XDirection().XYZ())
-        self._y = _vector(position.YDirection().XYZ())
-        self._z = _vector(position.Direction().XYZ())
-        self._xy, self._yz = np.cross(self._x, self._y), np.cross(self._y, self._z)
-        self._xz = np.cross(self._x, self._z)
+        self._x, self._y, self._z = (_vector(axis.XYZ()) for axis in (x, y, z))
+        self._xy, self._yz, self._xz = (
+            _vector(a.XYZ().Crossed(b.XYZ())) for a, b in ((x, y), (y, z), (x, z))
+        )
         self._radius, self._slope, self._rise = radius, slope, rise
 
     @classmethod
@@ -75,7 +75,9 @@ class ElementarySurface:
         """Return points (K, 3) mm and du x dv (K, 3) at parameters (K, 2), of any length."""
         u, v = uv[:, :1], uv[:, 1:]
         if not self._rise:
-            return self._origin + u * self._x + v * self._y, np.tile(self._xy, (len(uv), 1))
+            normals = np.empty((len(uv), 3))
+            normals[:] = self._xy
+            return self._origin + u * self._x + v * self._y, normals
         cos, sin = np.cos(u), np.sin(u)
         reach = self._radius + self._slope * v
         points = self._origin + reach * (cos * self._x + sin * self._y) + self._rise * v * self._z

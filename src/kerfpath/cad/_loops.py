@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from functools import cached_property
 from typing import Literal
 
 import numpy as np
@@ -13,7 +14,7 @@ from OCP.BRepBndLib import BRepBndLib
 from OCP.BRepTools import BRepTools, BRepTools_WireExplorer
 from OCP.collections import Array1_double
 from OCP.GCPnts import GCPnts_AbscissaPoint
-from OCP.GeomAbs import GeomAbs_Shape
+from OCP.GeomAbs import GeomAbs_CurveType, GeomAbs_Shape, GeomAbs_SurfaceType
 from OCP.gp import gp_Pnt, gp_Vec
 from OCP.TopAbs import TopAbs_Orientation, TopAbs_ShapeEnum
 from OCP.TopoDS import TopoDS, TopoDS_Edge, TopoDS_Face, TopoDS_Shape, TopoDS_Wire
@@ -28,10 +29,13 @@ from kerfpath.errors import InputError
 __all__ = ["FaceLoop", "OrientedEdge", "bounds_of", "join_runs", "loops_of"]
 
 FORWARD, REVERSED = TopAbs_Orientation.TopAbs_FORWARD, TopAbs_Orientation.TopAbs_REVERSED
+LINE, PLANE = GeomAbs_CurveType.GeomAbs_Line, GeomAbs_SurfaceType.GeomAbs_Plane
 
 SINGULAR = 1e-9
 """Sine of the angle between the surface's two directions below which they leave no normal, as at
 a pole or the tip of a cone."""
+EVENLY = np.linspace(0.0, 1.0, AROUND + 1)
+"""Where an edge is looked at, from its start to its end."""
 NUDGE = 1e-4
 """How far from such a point the normal is taken, as a part of the edge."""
 
@@ -75,7 +79,9 @@ class OrientedEdge:
         self._curve = BRep_Tool.CurveOnSurface_s(edge, face, first, last)
         if self._curve is None:
             raise InputError("an edge has no curve on its face; repair the part in CAD")
-        points, normals = self.evaluate(np.linspace(self.start, self.end, AROUND + 1))
+        t = self.start + (self.end - self.start) * EVENLY
+        t[-1] = self.end
+        points, normals = self.evaluate(t)
         self.around, self.ends = points[:-1], points[[0, -1]]
         self.end_normals = {self.start: normals[0], self.end: normals[-1]}
 
@@ -83,8 +89,8 @@ class OrientedEdge:
         """Return points (K, 3) mm and outward unit normals (K, 3) of the face at `t` (K,)."""
         if self._on.elementary is not None:
             points, across = self._on.elementary.at(parameters_on(self._curve, t))
-            size = np.linalg.norm(across, axis=1, keepdims=True)
-            if (size > SINGULAR * max(1.0, float(np.abs(points).max()))).all():
+            size = np.sqrt((across * across).sum(axis=1, keepdims=True))
+            if size.min() > SINGULAR * max(1.0, float(np.abs(points).max())):
                 self._require_near(points)
                 return points, across * (self.outward / size)
         points, normals = np.empty((len(t), 3)), np.empty((len(t), 3))
@@ -109,9 +115,15 @@ class OrientedEdge:
 
     @property
     def length(self) -> float:
-        return GCPnts_AbscissaPoint.Length_s(BRepAdaptor_Curve(self.edge))
+        return GCPnts_AbscissaPoint.Length_s(self._curve_in_space)
+
+    @cached_property
+    def _curve_in_space(self) -> BRepAdaptor_Curve:
+        return BRepAdaptor_Curve(self.edge)
 
     def bounds(self) -> Array:
+        if self._curve_in_space.GetType() == LINE:
+            return np.stack([self.ends.min(axis=0), self.ends.max(axis=0)])
         return bounds_of(self.edge)
 
     def breaks(self) -> Array:
@@ -203,6 +215,9 @@ def _in_order(wire: TopoDS_Wire, face: TopoDS_Face) -> Iterator[TopoDS_Edge]:
 
 def join_runs(runs: list[list[OrientedEdge]]) -> Iterator[list[OrientedEdge]]:
     """Join runs into closed chains: each end goes on at the nearest start, its own included."""
+    if len(runs) == 1:
+        yield runs[0]
+        return
     starts = np.array([run[0].ends[0] for run in runs]).reshape(-1, 3)
     left = np.ones(len(runs), dtype=bool)
     while left.any():
@@ -223,6 +238,8 @@ def join_runs(runs: list[list[OrientedEdge]]) -> Iterator[list[OrientedEdge]]:
 def _winds(edges: list[OrientedEdge]) -> bool:
     """Return whether the loop goes around its surface, as the rim of a tube does."""
     surface = edges[0].surface
+    if surface.GetType() == PLANE:
+        return False
     around = np.sum([edge.in_parameters() for edge in edges], axis=0)
     u = surface.UPeriod() if surface.IsUPeriodic() else _width(surface, "U")
     v = surface.VPeriod() if surface.IsVPeriodic() else _width(surface, "V")

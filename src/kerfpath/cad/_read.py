@@ -111,7 +111,7 @@ def _drawn(
     stand_by()
     from kerfpath.cad._faces import part_of
     from kerfpath.cad._iges import read_iges
-    from kerfpath.cad._shape import occt
+    from kerfpath.cad._shape import occt, uncollected
     from kerfpath.cad._step import read_step
 
     key = (kind, sha256(content).digest(), unit, gap, towards)
@@ -120,7 +120,7 @@ def _drawn(
         translate = read_step if kind == "STEP" else read_iges
         try:
             drawn = call_apart(translate, path.absolute(), unit, gap, size=len(content))
-            with occt():
+            with occt(), uncollected():
                 part = part_of(path, drawn, gap, towards)
         except InputError as error:
             raise InputError(f"{path}: {_in_words(kind, content, error)}") from None

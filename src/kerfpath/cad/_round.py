@@ -6,13 +6,22 @@ import numpy as np
 
 from kerfpath._arrays import Array
 
-__all__ = ["diameter"]
+__all__ = ["diameter", "may_be_round"]
 
 ROUND = 5e-5
 """How far (m) a loop may stray from a circle and still be a round hole."""
 FLAT = 0.1
 """How far a round hole may stray from its mean plane, as a part of its diameter: one drilled into a
 curved sheet does."""
+
+
+LONG = 1.2
+"""Ratio of what a circle as long as a loop encloses to what the loop does: 1.27 of a square."""
+
+
+def may_be_round(length: float, area: float) -> bool:
+    """Return whether a loop of some length encloses as much, nearly, as a circle of that length."""
+    return length * length <= LONG * 4 * np.pi * area
 
 
 def diameter(points: Array) -> float | None:

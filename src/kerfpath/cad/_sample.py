@@ -104,6 +104,10 @@ class Trace(Protocol):
     def around(self) -> Array:
         """Some points (K, 3) mm all along."""
 
+    @property
+    def area(self) -> Array:
+        """Vector area (3,) mm^2 that the polygon around encloses, if it is closed."""
+
     def bounds(self) -> Array:
         """Return the least and greatest coordinates (2, 3) mm."""
 
@@ -155,13 +159,19 @@ class EdgeChain(Generic[E]):
     @cached_property
     def gaps(self) -> Array:
         ends = np.array([edge.ends for edge in self.edges])
-        gaps = np.linalg.norm(np.roll(ends[:, 0], -1, axis=0) - ends[:, 1], axis=1)
+        apart = np.concatenate([ends[1:, 0], ends[:1, 0]]) - ends[:, 1]
+        gaps = np.sqrt((apart * apart).sum(axis=1))
         return np.asarray(gaps if self.is_closed else gaps[:-1])
 
     @cached_property
     def around(self) -> Array:
         """Points (K, 3) mm all along, as many on each edge."""
         return np.vstack([edge.around for edge in self.edges])
+
+    @cached_property
+    def area(self) -> Array:
+        """Vector area (3,) mm^2 that a closed chain encloses, of the polygon around it."""
+        return vector_area(self.around)
 
     def bounds(self) -> Array:
         boxes = np.array([edge.bounds() for edge in self.edges])
@@ -246,6 +256,11 @@ class Points:
         following = np.roll(self.points, -1, axis=0)
         both = np.stack([self.points, (self.points + following) / 2], axis=1).reshape(-1, 3)
         return both if self.is_closed else both[:-1]
+
+    @cached_property
+    def area(self) -> Array:
+        """Vector area (3,) mm^2 of the polygon."""
+        return vector_area(self.points)
 
     def bounds(self) -> Array:
         return np.stack([self.points.min(axis=0), self.points.max(axis=0)])

@@ -7,6 +7,7 @@ all that the process has to import.
 
 from __future__ import annotations
 
+import gc
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -33,6 +34,7 @@ __all__ = [
     "failures",
     "list_shapes",
     "occt",
+    "uncollected",
     "unique",
 ]
 
@@ -120,6 +122,18 @@ def _copy_with_names(
 def children(shape: TopoDS_Shape) -> list[TopoDS_Shape]:
     """Return what a shape is directly made of."""
     return list(_each(TopoDS_Iterator(shape)))
+
+
+@contextmanager
+def uncollected() -> Iterator[None]:
+    """Keep Python from looking for cycles while very many things are made that have none."""
+    was_on = gc.isenabled()
+    gc.disable()
+    try:
+        yield
+    finally:
+        if was_on:
+            gc.enable()
 
 
 @contextmanager

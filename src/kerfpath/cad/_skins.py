@@ -16,7 +16,7 @@ from kerfpath.cad._connected import label_connected
 from kerfpath.cad._depth import depth_of, joined, patches_of, weighed
 from kerfpath.cad._loops import FaceLoop, OrientedEdge, join_runs
 from kerfpath.cad._part import Side
-from kerfpath.cad._sample import EdgeChain, vector_area
+from kerfpath.cad._sample import EdgeChain
 
 __all__ = ["SMOOTH", "Skin", "skins_of"]
 
@@ -167,7 +167,7 @@ def _outside(edges: Sequence[OrientedEdge], inside: list[bool]) -> list[list[Ori
 
 def _is_hole(loop: EdgeChain[OrientedEdge]) -> bool:
     """Return whether a closed chain runs about a hole of its skin, by its normals."""
-    area = vector_area(loop.around)
+    area = loop.area
     middles = [(edge.start + edge.end) / 2 for edge in loop.edges]
     normals = [e.evaluate(np.array([t]))[1][0] for e, t in zip(loop.edges, middles, strict=True)]
     facing = loop.lengths @ np.array(normals) / loop.lengths.sum()
@@ -194,7 +194,7 @@ def _sides(
         around = [np.empty((0, 3))]
         for f in numbers:
             for _, loop in found[f]:
-                vector[g] += vector_area(loop.around)
+                vector[g] += loop.area
                 around.append(loop.around)
         points.append(np.vstack(around))
         if len(points[g]):
@@ -236,7 +236,7 @@ def _beside(low: Array, high: Array, areas: Array) -> list[Ints]:
 
     Skins of about one size are looked up together, by the middles of their boxes (K, 3).
     """
-    has_loops = (low <= high).all(axis=1)
+    has_loops = np.asarray((low <= high).all(axis=1))
     middle = np.where(has_loops[:, None], (low + high) / 2, NOWHERE)
     half = np.where(has_loops, np.linalg.norm(high - low, axis=1) / 2, 0.0)
     reach = half + THIN * np.sqrt(areas)
@@ -247,7 +247,7 @@ def _beside(low: Array, high: Array, areas: Array) -> list[Ints]:
         largest = areas[those].max()
         asking = np.flatnonzero(largest > (1 - OPPOSITE) * areas)
         tree = cKDTree(middle[those])
-        near = tree.query_ball_point(middle[asking], reach[asking] + half[those].max())
+        near = tree.query_ball_point(middle[asking], reach[asking] + float(half[those].max()))
         for g, places in zip(asking.tolist(), near, strict=True):
             here = those[np.array(places, dtype=np.int64)]
             found[g].append(here[areas[here] > (1 - OPPOSITE) * areas[g]])

@@ -9,15 +9,16 @@ from pathlib import Path
 
 from OCP.collections import Sequence_TCollection_AsciiString
 from OCP.IFSelect import IFSelect_ReturnStatus
+from OCP.StepBasic import StepBasic_ProductDefinition
 from OCP.STEPControl import STEPControl_Reader
-from OCP.StepRepr import StepRepr_NextAssemblyUsageOccurrence, StepRepr_RepresentationItem
+from OCP.StepRepr import StepRepr_RepresentationItem
 from OCP.TopAbs import TopAbs_ShapeEnum
 from OCP.TopoDS import TopoDS, TopoDS_Shape
 
 from kerfpath.cad._left_out import nothing_drawn
 from kerfpath.cad._part21 import require_grammar
 from kerfpath.cad._sewn import drawn_of
-from kerfpath.cad._shape import NamedFace, NamedShape, children, occt, unique
+from kerfpath.cad._shape import NamedFace, NamedShape, children, occt, uncollected, unique
 from kerfpath.cad._step_model import (
     Entities,
     Origins,
@@ -61,7 +62,7 @@ def read_step(path: Path, unit: str | None, gap: float) -> NamedShape:
     """
     content = path.read_bytes()
     _require_whole(content)
-    with occt():
+    with occt(), uncollected():
         return _read(path, content, unit, gap)
 
 
@@ -130,9 +131,9 @@ def _faces(
             face, name = TopoDS.Face(shape), _name(entity)
             into.append(NamedFace(face=face, name=name, layer=layer, colour=colour))
             return
-        if isinstance(entity, StepRepr_NextAssemblyUsageOccurrence):
+        if (product := origins.product_of(shape)) is not None:
             into = []
-            components.append((_product(entity), into))
+            components.append((_product(product), into))
         for child in children(shape):
             walk(child, into, layer, colour)
 
@@ -144,10 +145,9 @@ def _faces(
             yield replace(face, component=name if len(components) > 1 else "")
 
 
-def _product(used: StepRepr_NextAssemblyUsageOccurrence) -> str:
-    """Return the name of the product that an assembly uses there."""
-    definition = used.RelatedProductDefinition()
-    formation = None if definition is None else definition.Formation()
+def _product(definition: StepBasic_ProductDefinition) -> str:
+    """Return the name of a product that an assembly uses."""
+    formation = definition.Formation()
     product = None if formation is None else formation.OfProduct()
     name = None if product is None else product.Name()
     return (name.ToCString().strip() if name is not None else "") or "component"

@@ -13,11 +13,26 @@ from typing import TypeVar, cast
 from OCP.collections import IndexedMap_TopoDS_Shape_TopTools_ShapeMapHasher as ShapeMap
 from OCP.Interface import Interface_InterfaceModel
 from OCP.Standard import Standard_Transient
+from OCP.StepBasic import StepBasic_ProductDefinition
 from OCP.STEPConstruct import STEPConstruct
 from OCP.STEPControl import STEPControl_Reader
-from OCP.StepGeom import StepGeom_CartesianPoint, StepGeom_Curve, StepGeom_Pcurve
-from OCP.StepRepr import StepRepr_NextAssemblyUsageOccurrence, StepRepr_RepresentationItem
-from OCP.StepShape import StepShape_FaceSurface
+from OCP.StepGeom import (
+    StepGeom_Axis2Placement3d,
+    StepGeom_CartesianPoint,
+    StepGeom_Curve,
+    StepGeom_Pcurve,
+)
+from OCP.StepRepr import (
+    StepRepr_NextAssemblyUsageOccurrence,
+    StepRepr_Representation,
+    StepRepr_RepresentationItem,
+    StepRepr_ShapeRepresentationRelationship,
+)
+from OCP.StepShape import (
+    StepShape_FaceSurface,
+    StepShape_ShapeDefinitionRepresentation,
+    StepShape_SolidModel,
+)
 from OCP.TopAbs import TopAbs_ShapeEnum
 from OCP.TopLoc import TopLoc_Location
 from OCP.TopoDS import TopoDS_Shape
@@ -129,8 +144,9 @@ class Origins:
         self._reader = reader.WS().TransferReader()
         process = self._reader.TransientProcess()
         self._shapes, self._entities = ShapeMap(), list[Standard_Transient]()
-        self._asked, self._answers = ShapeMap(), list[Standard_Transient | None]()
+        self._asked, self._answers = ShapeMap(), list[StepBasic_ProductDefinition | None]()
         self._is_assembly = any(True for _ in entities.of(StepRepr_NextAssemblyUsageOccurrence))
+        self._products = _products(entities) if self._is_assembly else {}
         for number in range(1, process.NbMapped() + 1):
             entity = process.Mapped(number)
             if not isinstance(entity, StepRepr_RepresentationItem):
@@ -142,16 +158,53 @@ class Origins:
                 self._entities.append(entity)
 
     def of(self, shape: TopoDS_Shape) -> Standard_Transient | None:
-        """Return the entity that a shape was made of, wherever it is placed; None if of none."""
-        here = _unplaced(shape)
-        if shape.ShapeType() in ALONE or not self._is_assembly:
-            number = self._shapes.FindIndex(here)
-            return self._entities[number - 1] if number else None
-        # OCCT looks through all that it has made: it is asked once for each part.
-        number = self._asked.Add(here)
-        if number > len(self._answers):
-            self._answers.append(self._reader.EntityFromShapeResult(shape, -1))
-        return self._answers[number - 1]
+        """Return what a shape was drawn as, wherever it is placed; None if as nothing by itself."""
+        number = self._shapes.FindIndex(_unplaced(shape))
+        return self._entities[number - 1] if number else None
+
+    def product_of(self, shape: TopoDS_Shape) -> StepBasic_ProductDefinition | None:
+        """Return the product of which a shape is all, in an assembly; None if it is of none."""
+        if not self._is_assembly or shape.ShapeType() in ALONE:
+            return None
+        product = self._products.get(self.of(shape))
+        if product is None:
+            # OCCT looks through all that it has made: it is asked once for each assembly.
+            number = self._asked.Add(_unplaced(shape))
+            if number > len(self._answers):
+                used = self._reader.EntityFromShapeResult(shape, -1)
+                if isinstance(used, StepRepr_NextAssemblyUsageOccurrence):
+                    product = used.RelatedProductDefinition()
+                self._answers.append(product)
+            product = self._answers[number - 1]
+        return product
+
+
+def _products(
+    entities: Entities,
+) -> dict[Standard_Transient | None, StepBasic_ProductDefinition]:
+    """Return the products of an assembly by what alone makes up the shape of each."""
+    drawn: dict[StepRepr_Representation, StepBasic_ProductDefinition] = {}
+    for shape in entities.of(StepShape_ShapeDefinitionRepresentation):
+        defined = shape.Definition().PropertyDefinition()
+        product = None if defined is None else defined.Definition().ProductDefinition()
+        if product is not None and shape.UsedRepresentation() is not None:
+            drawn[shape.UsedRepresentation()] = product
+    for same in entities.of(StepRepr_ShapeRepresentationRelationship):
+        if type(same) is not StepRepr_ShapeRepresentationRelationship:
+            continue  # one that places the one in the other
+        for one, other in ((same.Rep1(), same.Rep2()), (same.Rep2(), same.Rep1())):
+            if one in drawn and other is not None:
+                drawn.setdefault(other, drawn[one])
+    found: dict[Standard_Transient | None, StepBasic_ProductDefinition] = {}
+    for representation, product in drawn.items():
+        numbers = range(1, representation.NbItems() + 1)
+        items = [representation.ItemsValue(k) for k in numbers]
+        solids = [item for item in items if isinstance(item, StepShape_SolidModel)]
+        if len(solids) == 1 and all(
+            isinstance(i, (StepShape_SolidModel, StepGeom_Axis2Placement3d)) for i in items
+        ):
+            found[solids[0]] = product
+    return found
 
 
 def _unplaced(shape: TopoDS_Shape) -> TopoDS_Shape:

@@ -1,0 +1,123 @@
+"""Large STEP files: how long reading takes beside OCCT's own, and how much memory."""
+
+from __future__ import annotations
+
+import math
+import tempfile
+from functools import partial
+from pathlib import Path
+from statistics import median
+
+from OCP.BRep import BRep_Builder
+from OCP.BRepBuilderAPI import (
+    BRepBuilderAPI_MakeEdge,
+    BRepBuilderAPI_MakeFace,
+    BRepBuilderAPI_MakePolygon,
+    BRepBuilderAPI_MakeWire,
+)
+from OCP.BRepPrimAPI import BRepPrimAPI_MakePrism
+from OCP.gp import gp_Ax2, gp_Circ, gp_Dir, gp_Pln, gp_Pnt, gp_Vec
+from OCP.Message import Message
+from OCP.STEPControl import STEPControl_Reader, STEPControl_StepModelType, STEPControl_Writer
+from OCP.TopoDS import TopoDS, TopoDS_Compound, TopoDS_Shape
+
+from benchmarks._figures import Figure, Report, in_turn
+from kerfpath import apart
+from kerfpath.cad import _read, read
+
+__all__ = ["run"]
+
+PITCH = 20.0
+"""Between the holes, mm."""
+SIDE = 7
+"""Holes along a side of a plate: every other is round, the rest are hexagons."""
+PLATES = (8, 32, 116)
+"""In the assembly; the last make 82 MB."""
+RATIO, GIGABYTES = 2.0, 3.0
+"""What reading may take: times OCCT's own, and of memory."""
+
+HOW = """\
+An assembly of plates of 180 faces, each with {holes} holes, round ones and hexagons, written by OCCT
+as STEP. "OCCT" reads the file and makes its shapes, no more, in this process; "kerfpath" is
+`cad.read`: OCCT in a process of its own, which is started before, then the loops of all faces,
+skins and sides of sheets. In turn, in one run. The memory is the larger of both processes at its peak."""
+
+
+def run(*, quick: bool = False) -> Report:
+    """Return the figures of reading assemblies of several sizes."""
+    Message.DefaultMessenger_s().ChangePrinters().Clear()
+    report = Report(title="Large drawings", how=HOW.format(holes=SIDE * SIDE))
+    with tempfile.TemporaryDirectory() as folder:
+        for plates in PLATES[:1] if quick else PLATES:
+            path = Path(folder) / f"{plates}.step"
+            _write(path, plates)
+            megabytes = path.stat().st_size * 1e-6
+            seconds = in_turn(
+                {"OCCT": partial(_bare, path), "kerfpath": partial(_ours, path)},
+                runs=1 if quick else 3,
+            )
+            part = read(path)
+            peak = max(_peak("self"), _peak(str(_worker())))
+            of = f"{megabytes:.0f} MB, {part.faces} faces"
+            report.figures.extend(
+                Figure(what=f"{of}: {name}", values=values) for name, values in seconds.items()
+            )
+            ratio = median(seconds["kerfpath"]) / median(seconds["OCCT"])
+            verdict = "within" if ratio <= RATIO and peak <= GIGABYTES else "over"
+            report.findings.append(
+                f"{of}: {ratio:.2f} times as long as OCCT alone, {peak:.1f} GB: {verdict} "
+                f"{RATIO:g} times and {GIGABYTES:g} GB"
+            )
+    return report
+
+
+def _bare(path: Path) -> None:
+    reader = STEPControl_Reader()
+    reader.ReadFile(str(path))
+    reader.TransferRoots()
+    reader.OneShape()
+
+
+def _ours(path: Path) -> None:
+    _read._kept.clear()
+    read(path)
+
+
+def _worker() -> int:
+    assert apart._worker is not None
+    return apart._worker.process.pid
+
+
+def _peak(process: str) -> float:
+    """Return the gigabytes that a process has held at most."""
+    lines = Path(f"/proc/{process}/status").read_text(encoding="ascii").splitlines()
+    return next(float(line.split()[1]) for line in lines if line.startswith("VmHWM")) * 1e-6
+
+
+def _plate(z: float) -> TopoDS_Shape:
+    up, size = gp_Dir(0, 0, 1), (SIDE + 1) * PITCH
+    face = BRepBuilderAPI_MakeFace(gp_Pln(gp_Pnt(0, 0, z), up), 0, size, 0, size)
+    for k in range(SIDE * SIDE):
+        x, y = (k % SIDE + 1) * PITCH, (k // SIDE + 1) * PITCH
+        if k % 2:
+            circle = gp_Circ(gp_Ax2(gp_Pnt(x, y, z), up), 3.0 + 0.01 * k)
+            wire = BRepBuilderAPI_MakeWire(BRepBuilderAPI_MakeEdge(circle).Edge()).Wire()
+        else:
+            corners = BRepBuilderAPI_MakePolygon()
+            for turn in range(6):
+                at = math.pi / 3 * turn
+                corners.Add(gp_Pnt(x + 4 * math.cos(at), y + 4 * math.sin(at), z))
+            corners.Close()
+            wire = corners.Wire()
+        face.Add(TopoDS.Wire(wire.Reversed()))
+    return BRepPrimAPI_MakePrism(face.Face(), gp_Vec(0, 0, 2)).Shape()
+
+
+def _write(path: Path, plates: int) -> None:
+    whole, builder = TopoDS_Compound(), BRep_Builder()
+    builder.MakeCompound(whole)
+    for k in range(plates):
+        builder.Add(whole, _plate(10.0 * k))
+    writer = STEPControl_Writer()
+    writer.Transfer(whole, STEPControl_StepModelType.STEPControl_AsIs)
+    writer.Write(str(path))
