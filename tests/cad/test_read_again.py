@@ -36,4 +36,4 @@ def test_no_more_parts_are_kept_than_that(tmp_path, monkeypatch):
     monkeypatch.setattr(module, "KEPT", 1)
     for unit in (None, "in"):
         read(DEMO / "b_pillar.step", unit)
-    assert [unit for _, _, unit, _, _ in module._kept] == ["in"]
+    assert [key[2] for key in module._kept] == ["in"]

@@ -20,6 +20,7 @@ from OCP.TDocStd import TDocStd_Document
 from OCP.TopAbs import TopAbs_ShapeEnum
 from OCP.TopLoc import TopLoc_Location
 from OCP.XCAFDoc import XCAFDoc_ColorType, XCAFDoc_DocumentTool
+from tests.cad.test_part import box, compound
 
 from kerfpath.cad import Part, read
 from kerfpath.cad._shape import list_shapes
@@ -178,3 +179,26 @@ def test_a_curve_on_a_face_that_is_none_is_refused(tmp_path: Path) -> None:
     assert path.read_text() != text
     with pytest.raises(InputError, match=r"damaged .Pcurve: expected a curve"):
         read(path)
+
+
+def test_parts_of_several_products_keep_their_names(tmp_path: Path) -> None:
+    """Whatever is made of one solid or of several, once or more often, at any depth."""
+    model = Model()
+    plate, rod = (
+        named(model.shapes.AddShape(BRepPrimAPI_MakeBox(*size).Shape(), False), name)
+        for size, name in (((10.0, 20.0, 1.0), "plate 1.5"), ((5.0, 5.0, 50.0), "Stab ü"))
+    )
+    pair = named(model.shapes.AddShape(compound(box(1, 2, 3), box(4, 5, 6)), False), "pair")
+    inner = model.assembly("inner", (plate, gp_Trsf()), (rod, QUARTER), (rod, ALONG))
+    model.assembly("outer", (inner, gp_Trsf()), (pair, ALONG), (plate, QUARTER))
+    part = read(model.write(tmp_path / "several.step"))
+    counts: dict[str, int] = {}
+    for loop in part.loops:
+        name = loop.face.rsplit("/", 1)[0]
+        counts[name] = counts.get(name, 0) + 1
+    assert part.faces == 36
+    assert sum(counts.values()) == 36
+    assert counts["plate 1.5"] == counts["plate 1.5-2"] == 6
+    rods = [name for name in counts if name.startswith("Stab")]
+    assert len(rods) == 2
+    assert sum(n for name, n in counts.items() if name.startswith("pair")) == 12

@@ -37,6 +37,14 @@ class TableCells:
             return False
         return True
 
+    def is_number(self, row: int, column: int) -> bool:
+        """Return whether a cell is a number."""
+        try:
+            _number(self.rows[row][column], self.has_decimal_comma)
+        except (ValueError, IndexError):
+            return False
+        return True
+
     def without_header(self) -> TableCells:
         """Return the rows behind the first."""
         return TableCells(
@@ -82,7 +90,7 @@ def cells_of(content: bytes, expected: str) -> TableCells:
     ]
     if not numbered:
         raise InputError(f"holds no rows; expected columns {expected}")
-    delimiter = next((d for d in (";", "\t", ",") if d in numbered[0][1]), None)
+    delimiter = next((d for d in (";", "\t", "|", ",") if d in numbered[0][1]), None)
     lines = [number for number, _ in numbered]
     if delimiter is None:
         rows = [line.split() for _, line in numbered]
@@ -96,7 +104,7 @@ def cells_of(content: bytes, expected: str) -> TableCells:
             raise InputError(f"cannot be split into columns ({error})") from None
         if len(rows) != len(lines):
             raise InputError("a quoted cell runs over several lines; remove its quotes")
-    return TableCells(lines=lines, rows=rows, has_decimal_comma=delimiter in (";", "\t"))
+    return TableCells(lines=lines, rows=rows, has_decimal_comma=delimiter in (";", "\t", "|"))
 
 
 def _text(content: bytes) -> str:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -12,7 +13,7 @@ from scipy.spatial import cKDTree
 from kerfpath._arrays import Array, Ints
 from kerfpath.cad._build import named_loops, part_without_faces
 from kerfpath.cad._connected import label_connected
-from kerfpath.cad._curves import Curve, backwards
+from kerfpath.cad._curves import UP, Curve, backwards, turned
 from kerfpath.cad._junctions import encloses, inner_point, partners
 from kerfpath.cad._left_out import LeftOut
 from kerfpath.cad._overlap import SAME, same_lines
@@ -45,16 +46,20 @@ def loops_in(
     gap: float,
     notes: Sequence[str],
     left_out: Sequence[LeftOut] = (),
+    axis: Array | None = None,
 ) -> Part:
-    """Return the part that flat strokes make up, by layer and colour; `gap` in m.
+    """Return the part that strokes make up, by layer and colour; `gap` in m.
 
     Closed loops run counter-clockwise about what they enclose, or clockwise about a hole: one that
-    lies within an odd number of others.
+    lies within an odd number of others. They are seen against the tool axis (3,): from above.
     """
+    R = np.eye(3) if axis is None else _against(axis)
     chains: list[tuple[Look, Chain]] = []
     notes = [*notes, *map(str, left_out)]
     for look, strokes in drawn.items():
-        found, repaired = _chains(strokes, gap / MM)
+        if axis is not None:
+            strokes = [tuple(turned(curve, R, UP) for curve in stroke) for stroke in strokes]
+        found, repaired = _chains(strokes, gap / MM, R)
         notes += [f"layer {look[0]}, {look[1]}: {what}" for what in repaired]
         chains += [(look, chain) for chain in found]
     if not chains:
@@ -69,9 +74,11 @@ def loops_in(
         if chain.is_closed:
             kind = "inner" if next(depth) % 2 else "outer"
             if (chain.area[2] > 0) != (kind == "outer"):
-                turned = tuple(backwards(curve) for curve in chain.edges[::-1])
-                chains[k] = look, EdgeChain(edges=turned)
+                other_way = tuple(backwards(curve) for curve in chain.edges[::-1])
+                chains[k] = look, EdgeChain(edges=other_way)
         kinds.append(kind)
+    if axis is not None:
+        chains = [(look, _turned_back(chain, R)) for look, chain in chains]
     loops: list[Loop] = []
     for layer in dict.fromkeys(look[0] for look, _ in chains):
         drawn_here = [
@@ -82,6 +89,20 @@ def loops_in(
         loops += named_loops(drawn_here, face=layer, surface="plane", gap=gap, layer=layer)
     notes += [*_cut_twice(loops), *_hanging(loops)]
     return part_without_faces(path, unit, loops, gap=gap, notes=notes, left_out=left_out)
+
+
+def _against(axis: Array) -> Array:
+    """Return the rotation (3, 3) that makes a tool axis point along -z."""
+    z = -axis / np.linalg.norm(axis)
+    x = np.eye(3)[0 if abs(z[0]) < 0.9 else 1]
+    x = x - (x @ z) * z
+    x /= np.linalg.norm(x)
+    return np.stack([x, np.cross(z, x), z])
+
+
+def _turned_back(chain: Chain, R: Array) -> Chain:
+    up = tuple(R[2].tolist())
+    return replace(chain, edges=[turned(curve, R.T, up) for curve in chain.edges])
 
 
 def _cut_twice(loops: Sequence[Loop]) -> Iterator[str]:
@@ -100,7 +121,7 @@ def _hanging(loops: Sequence[Loop]) -> Iterator[str]:
         yield f"open lines: {len(hanging) - SAID} more"
 
 
-def _chains(strokes: Sequence[Stroke], gap: float) -> tuple[list[Chain], list[str]]:
+def _chains(strokes: Sequence[Stroke], gap: float, R: Array) -> tuple[list[Chain], list[str]]:
     """Return the chains of strokes whose ends meet within `gap` (mm), and what was repaired.
 
     A stroke that lies on another is left out, unless it is a side that two loops share.
@@ -109,7 +130,7 @@ def _chains(strokes: Sequence[Stroke], gap: float) -> tuple[list[Chain], list[st
     kept, spare, left = _doubles(drawn)
     chains = [EdgeChain(edges=stroke) for stroke in kept if _is_closed(stroke)]
     loose = [stroke for stroke in kept if not _is_closed(stroke)]
-    next_end = _NextEnd(loose, gap)
+    next_end = _NextEnd(loose, gap, R)
     for own, on_others in _hanging_together(loose, spare, gap):
         if _is_even(own, gap):
             chains += _linked(own, gap, next_end)
@@ -295,9 +316,12 @@ class _NextEnd:
     loose : sequence of Stroke
         All that are not closed.
     gap : float mm
+    R : (3, 3)
+        The rotation by which they were turned.
     """
 
-    def __init__(self, loose: Sequence[Stroke], gap: float) -> None:
+    def __init__(self, loose: Sequence[Stroke], gap: float, R: Array) -> None:
+        self._R = R
         ends = _ends(loose)
         place = _places(ends, gap)
         self._crowd, self._tree = np.bincount(place)[place], cKDTree(ends)
@@ -310,7 +334,8 @@ class _NextEnd:
         breaks = []
         for end in (chain[0].ends[0], chain[-1].ends[1]):
             away, near = (np.asarray(found) for found in self._tree.query(end, k=2))
-            where, crowd = f"at {end.round(3).tolist()} mm", self._crowd[near[0]]
+            place = (end @ self._R).round(3) + 0.0
+            where, crowd = f"at {place.tolist()} mm", self._crowd[near[0]]
             if crowd > 2:
                 breaks.append((0.0, f"ends {where}, where {crowd} curves meet"))
             else:

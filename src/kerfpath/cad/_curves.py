@@ -1,4 +1,4 @@
-"""Lines, arcs and splines of flat drawings; the drawing plane faces up, along +z."""
+"""Lines, arcs and splines; the plane of a flat drawing faces up, along +z."""
 
 from __future__ import annotations
 
@@ -13,9 +13,10 @@ from kerfpath._arrays import Array
 from kerfpath._repr import short_repr
 from kerfpath.cad._sample import AROUND
 
-__all__ = ["Arc", "Curve", "Line", "Spline", "backwards"]
+__all__ = ["UP", "Arc", "Curve", "Line", "Spline", "backwards", "turned"]
 
-UP = np.array([0.0, 0.0, 1.0])
+UP = (0.0, 0.0, 1.0)
+"""The normal of a flat drawing."""
 GAUSS = np.polynomial.legendre.leggauss(12)
 """Nodes and weights on (-1, 1); 12 per smooth stretch give the length of drawn curves to 1e-9."""
 LOOK = 64
@@ -23,10 +24,11 @@ LOOK = 64
 
 
 class _Flat(ABC):
-    """The base of flat curves, see `Edge`; each gives start, end, `at` and `speed`."""
+    """The base of curves, see `Edge`; each gives start, end, normal `up`, `at` and `speed`."""
 
     start: float
     end: float
+    up: tuple[float, ...]
 
     @cached_property
     def ends(self) -> Array:
@@ -55,8 +57,8 @@ class _Flat(ABC):
         return self.breaks()
 
     def evaluate(self, t: Array) -> tuple[Array, Array]:
-        """Return points (K, 3) mm and normals (K, 3), all up."""
-        return self.at(t), np.tile(UP, (len(t), 1))
+        """Return points (K, 3) mm and normals (K, 3), all the same."""
+        return self.at(t), np.tile(self.up, (len(t), 1))
 
     @abstractmethod
     def at(self, t: Array) -> Array:
@@ -75,6 +77,7 @@ class Line(_Flat):
     q: Array
     start: float = 0.0
     end: float = 1.0
+    up: tuple[float, ...] = UP
 
     __repr__ = short_repr
 
@@ -94,6 +97,7 @@ class Arc(_Flat):
     minor: Array
     start: float
     end: float
+    up: tuple[float, ...] = UP
 
     __repr__ = short_repr
 
@@ -127,6 +131,7 @@ class Spline(_Flat):
     homogeneous: BSpline
     start: float
     end: float
+    up: tuple[float, ...] = UP
 
     def at(self, t: Array) -> Array:
         p = self.homogeneous(t)
@@ -159,3 +164,15 @@ Curve = Line | Arc | Spline
 def backwards(curve: Curve) -> Curve:
     """Return the curve travelled the other way."""
     return replace(curve, start=curve.end, end=curve.start)
+
+
+def turned(curve: Curve, R: Array, up: tuple[float, ...]) -> Curve:
+    """Return the curve turned by a rotation (3, 3), with a normal."""
+    if isinstance(curve, Line):
+        return replace(curve, p=R @ curve.p, q=R @ curve.q, up=up)
+    if isinstance(curve, Arc):
+        centre, major, minor = R @ curve.centre, R @ curve.major, R @ curve.minor
+        return replace(curve, centre=centre, major=major, minor=minor, up=up)
+    spline = curve.homogeneous
+    net = np.column_stack([spline.c[:, :3] @ R.T, spline.c[:, 3]])
+    return replace(curve, homogeneous=BSpline(spline.t, net, spline.k), up=up)

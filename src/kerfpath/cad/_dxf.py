@@ -54,8 +54,10 @@ NEVER_CUT = frozenset([
 """Kinds of entities that say something about a part, and are no line of it; others may be."""
 
 
-def read_dxf(path: Path, content: bytes, unit: str | None, gap: float) -> Part:
-    """Return the loops of a DXF drawing; the tool axis is -z of its plane.
+def read_dxf(
+    path: Path, content: bytes, unit: str | None, gap: float, axis: Array | None = None
+) -> Part:
+    """Return the loops of a DXF drawing; the tool axis is -z of its plane, or the one asked for.
 
     Raises
     ------
@@ -84,7 +86,7 @@ def read_dxf(path: Path, content: bytes, unit: str | None, gap: float) -> Part:
         notes.append(f"unit {unit} as asked; $INSUNITS says {declared}")
     if repairs:
         notes.append(f"{len(repairs)} faults of the file repaired, the first: {repairs[0]}")
-    sheet = _Sheet(document)
+    sheet = _Sheet(document, is_flat=axis is None)
     scale = UNITS_MM[unit or declared]
     try:
         with np.errstate(all="ignore"):  # ezdxf divides by lengths that may be 0
@@ -96,8 +98,9 @@ def read_dxf(path: Path, content: bytes, unit: str | None, gap: float) -> Part:
         raise InputError(f"{path}: damaged ({_reason(error)}); repair it in CAD") from None
     sheet.left_out.update(lost)
     return loops_in(
-        path, unit or declared, sheet.strokes, gap=gap, notes=notes, left_out=sheet.summed()
-    )
+        path, unit or declared, sheet.strokes, gap=gap, notes=notes, left_out=sheet.summed(),
+        axis=axis,
+    )  # fmt: skip
 
 
 def _reason(error: Exception) -> str:
@@ -110,6 +113,7 @@ class _Sheet:
     """Strokes gathered from the entities of a drawing, in mm, by (layer, colour)."""
 
     document: Drawing
+    is_flat: bool = True
     strokes: dict[Look, list[Stroke]] = field(default_factory=dict)
     left_out: Counter[tuple[str, str]] = field(default_factory=Counter)
     put_aside: Counter[tuple[str, str]] = field(default_factory=Counter)
@@ -220,8 +224,9 @@ class _Sheet:
                 f"a {kind} on layer {layer} reaches further than {LARGEST / 1e6:g} km; its numbers "
                 "are damaged, or the unit is wrong"
             )
-        if box[1, 2] - box[0, 2] > FLAT:
+        if self.is_flat and box[1, 2] - box[0, 2] > FLAT:
             raise InputError(
                 f"a {kind} on layer {layer} leaves the drawing plane, z from {box[0, 2]:g} to "
-                f"{box[1, 2]:g} mm; a DXF is read as a flat drawing: project it to one plane"
+                f"{box[1, 2]:g} mm; expected a flat drawing: project it to one plane, or say the "
+                "tool axis with axis"
             )

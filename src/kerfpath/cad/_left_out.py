@@ -54,4 +54,7 @@ def kind_of(entity: object) -> str:
 def nothing_drawn(left_out: Sequence[LeftOut]) -> InputError:
     """Return the error of a file without faces, with what was left out of it."""
     why = f" ({'; '.join(map(str, left_out[:2]))})" if left_out else ""
-    return InputError(f"the file holds no face{why}; export the part as a solid or a surface")
+    return InputError(
+        f"the file holds no face{why}; export the part as a solid or a "
+        "surface, or, if it is drawn by lines, say the tool axis with axis"
+    )

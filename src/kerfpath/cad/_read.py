@@ -2,20 +2,26 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
 from hashlib import sha256
 from pathlib import Path
 
+import numpy as np
 from numpy.typing import ArrayLike
 
 from kerfpath._arrays import floats, scalar
+from kerfpath._repr import short_repr
 from kerfpath.apart import call_apart, stand_by
+from kerfpath.cad._left_out import nothing_drawn
 from kerfpath.cad._part import Part
 from kerfpath.cad._units import GAP, require_unit
 from kerfpath.errors import InputError
 
 __all__ = ["content_of", "read"]
 
+Columns = Mapping[str, str] | Sequence[str]
+Direction = tuple[float, float, float]
 KEPT = 4
 """Parts that are kept for when a file of the same content is read again, those read last."""
 
@@ -26,6 +32,8 @@ def read(
     *,
     gap: float = GAP,
     outer_towards: ArrayLike | None = None,
+    axis: ArrayLike | None = None,
+    columns: Columns | None = None,
 ) -> Part:
     """Return the part that a drawing holds: STEP, IGES, DXF, or a table of points.
 
@@ -42,32 +50,61 @@ def read(
     outer_towards : (3,), optional
         Where the outer sides of sheets face, on the whole, in the part. Without it the outer side
         is the one that lies less deep in the part, of a flat sheet the one that faces up.
+    axis : (3,), optional
+        The tool axis of drawings that have none: lines in space of a DXF, STEP or IGES file, or a
+        table without axes.
+    columns : mapping of str to str or sequence of str, optional
+        Of a table: how its header names x, y, z, nx, ...; or, without a header, what its columns
+        are, in their order, "-" for one that is not used.
 
     Raises
     ------
     InputError
         No such file, another format than its suffix says, a damaged one, nothing to cut in it,
-        no length unit known, or a direction that is none.
+        no length unit known, a direction that is none, or something that does not go with it.
     """
     path = Path(path)
     require_unit(unit)
     scalar(gap, "gap", unit="m", above=0.0)
-    towards = None if outer_towards is None else _direction(outer_towards)
+    asked = _Asked(
+        unit=unit,
+        gap=gap,
+        outer_towards=_direction(outer_towards, "outer_towards"),
+        axis=_direction(axis, "axis"),
+        columns=columns,
+    )
     content = content_of(path, _EXPECTED)
     kind = _KINDS.get(path.suffix.lower())
     if kind is None:
         raise InputError(f"{path}: expected {_EXPECTED} by its suffix, got {path.suffix!r}")
     if not content.strip():
         raise InputError(f"{path}: the file is empty; expected {_EXPECTED}")
-    if towards is not None and kind in ("table", "DXF"):
+    if outer_towards is not None and kind in ("table", "DXF"):
         raise InputError(f"{path}: outer_towards: expected a drawing of sheets, got a {kind}")
-    return _drawn(kind, path, content, unit, gap, towards)
+    if columns is not None and kind != "table":
+        raise InputError(f"{path}: columns: expected a table, got a drawing in {kind}")
+    return _drawn(kind, path, content, asked)
 
 
-def _direction(value: ArrayLike) -> tuple[float, float, float]:
-    x, y, z = floats(value, "outer_towards", (3,)).tolist()
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _Asked:
+    """How a drawing is to be read: `read` says of each what it is, the gap in m."""
+
+    unit: str | None
+    gap: float
+    outer_towards: Direction | None
+    axis: Direction | None
+    columns: Columns | None
+
+    __repr__ = short_repr
+
+
+def _direction(value: ArrayLike | None, name: str) -> Direction | None:
+    if value is None:
+        return None
+    x, y, z = floats(value, name, (3,)).tolist()
     if not x * x + y * y + z * z > 0:
-        raise InputError("outer_towards: expected a direction, got a vector of length 0")
+        raise InputError(f"{name}: expected a direction, got a vector of length 0")
     return x, y, z
 
 
@@ -88,40 +125,43 @@ def content_of(path: Path, expected: str) -> bytes:
         raise InputError(f"{path}: cannot be read ({why}); expected {expected}") from None
 
 
-def _drawn(
-    kind: str,
-    path: Path,
-    content: bytes,
-    unit: str | None,
-    gap: float,
-    towards: tuple[float, float, float] | None,
-) -> Part:
+def _drawn(kind: str, path: Path, content: bytes, asked: _Asked) -> Part:
     """Return the part; each reader is loaded when a file asks for it, as OCCT takes over a second.
 
     OCCT may crash, so STEP and IGES are translated apart from this process.
     """
+    unit, gap = asked.unit, asked.gap
+    axis = None if asked.axis is None else np.array(asked.axis)
     if kind == "table":
         from kerfpath.cad._table import read_table
 
-        return read_table(path, content, unit, gap)
+        return read_table(path, content, unit, gap, axis=axis, columns=asked.columns)
     if kind == "DXF":
         from kerfpath.cad._dxf import read_dxf
 
-        return read_dxf(path, content, unit, gap)
+        return read_dxf(path, content, unit, gap, axis)
     stand_by()
     from kerfpath.cad._faces import part_of
     from kerfpath.cad._iges import read_iges
     from kerfpath.cad._shape import occt, uncollected
     from kerfpath.cad._step import read_step
+    from kerfpath.cad._wires import part_of_wires
 
-    key = (kind, sha256(content).digest(), unit, gap, towards)
+    key = (kind, sha256(content).digest(), unit, gap, asked.outer_towards, asked.axis)
     part = _kept.pop(key, None)
     if part is None:
         translate = read_step if kind == "STEP" else read_iges
         try:
             drawn = call_apart(translate, path.absolute(), unit, gap, size=len(content))
             with occt(), uncollected():
-                part = part_of(path, drawn, gap, towards)
+                if drawn.faces and axis is not None:
+                    raise InputError("axis: expected a drawing of lines, got one of faces")
+                if drawn.faces:
+                    part = part_of(path, drawn, gap, asked.outer_towards)
+                elif axis is not None:
+                    part = part_of_wires(path, drawn, gap, axis)
+                else:
+                    raise nothing_drawn(drawn.left_out)
         except InputError as error:
             raise InputError(f"{path}: {_in_words(kind, content, error)}") from None
     _kept[key] = part

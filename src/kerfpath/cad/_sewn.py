@@ -32,10 +32,14 @@ def drawn_of(
     notes: Sequence[str] = (),
     left_out: Sequence[LeftOut] = (),
 ) -> NamedShape:
-    """Return a shape and its faces, sewn within `gap` (m) where there is no solid."""
-    if not faces:
+    """Return a shape and its faces, sewn within `gap` (m) where there is no solid.
+
+    It may have lines instead of faces.
+    """
+    lines = len(list_shapes(shape, EDGE, avoid=FACE))
+    if not (faces or lines):
         raise nothing_drawn(left_out)
-    if lines := len(list_shapes(shape, EDGE, avoid=FACE)):
+    if lines and faces:
         lost = LeftOut(kind="curve", reason="it bounds no face", count=lines, may_cut=True)
         left_out = [*left_out, lost]
     solids = list_shapes(shape, TopAbs_ShapeEnum.TopAbs_SOLID)

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
 from itertools import groupby
 from pathlib import Path
 
@@ -25,6 +26,11 @@ NORMAL = ("nx", "ny", "nz")
 AXIS = ("axis_x", "axis_y", "axis_z")
 QUATERNION = ("qx", "qy", "qz", "qw")
 NAME = "contour"
+KNOWN = (*POSITION, *NORMAL, *AXIS, *QUATERNION, NAME)
+UNUSED = "-"
+"""What stands for a column that is not used."""
+UNIT = re.compile(r"[_\[( ]\s*([a-z]+)\s*[\])]?$")
+"""The unit at the end of the name of a column."""
 UNNAMED = {6: POSITION + NORMAL, 7: POSITION + QUATERNION}
 """What the columns are where no header says, by their number."""
 EXPECTED = (
@@ -41,8 +47,18 @@ UNIT_QUATERNION = 1e-2
 """How far a quaternion's length may be from one: rounded digits pass, other columns fail."""
 
 
-def read_table(path: Path, content: bytes, unit: str | None, gap: float) -> Part:
+def read_table(
+    path: Path,
+    content: bytes,
+    unit: str | None,
+    gap: float,
+    *,
+    axis: Array | None = None,
+    columns: Mapping[str, str] | Sequence[str] | None = None,
+) -> Part:
     """Return the contours of a table of points, one per name in its column `contour`.
+
+    The tool axis (3,) is that of points whose columns have none; `columns` as in `cad.read`.
 
     Raises
     ------
@@ -50,7 +66,7 @@ def read_table(path: Path, content: bytes, unit: str | None, gap: float) -> Part
         Anything wrong with a row (its line is named), columns that are not known, no unit known.
     """
     try:
-        columns, declared, table = _rows(cells_of(content, EXPECTED))
+        names, declared, table = _rows(cells_of(content, EXPECTED), columns, axis is not None)
         if not (unit or declared):
             raise InputError(
                 f"states no length unit; say it with unit= one of {', '.join(UNITS_MM)}, "
@@ -59,12 +75,11 @@ def read_table(path: Path, content: bytes, unit: str | None, gap: float) -> Part
         notes = []
         if unit and declared and unit != declared:
             notes.append(f"unit {unit} as asked; the header says {declared}")
-        known = (*POSITION, *NORMAL, *AXIS, *QUATERNION, NAME)
-        if unknown := [name for name in columns if name not in known]:
+        if unknown := [name for name in names if name not in (*KNOWN, UNUSED)]:
             notes.append(f"columns not used: {', '.join(unknown)}")
-        points, normals = _numbers(columns, table, UNITS_MM[unit or declared])
+        points, normals = _numbers(names, table, UNITS_MM[unit or declared], axis)
         loops = []
-        for name, chosen in _contours(columns, table):
+        for name, chosen in _contours(names, table):
             lines = np.array(table.lines)[chosen]
             trace, repaired = _trace(points[chosen], normals[chosen], lines, gap / MM)
             notes += [f"contour {name!r}: {what}" for what in repaired]
@@ -77,17 +92,23 @@ def read_table(path: Path, content: bytes, unit: str | None, gap: float) -> Part
     return part_without_faces(path, unit or declared, loops, gap=gap, notes=notes)
 
 
-def _rows(table: TableCells) -> tuple[tuple[str, ...], str, TableCells]:
+def _rows(
+    table: TableCells, given: Mapping[str, str] | Sequence[str] | None, has_axis: bool
+) -> tuple[tuple[str, ...], str, TableCells]:
     """Return the names of the columns, the unit that they state, and the rows under them."""
-    columns, unit = _header(table)
+    if isinstance(given, Mapping):
+        table = _renamed(table, given)
+    elif given is not None:
+        return _in_order(table, [str(name) for name in given], has_axis)
+    columns, unit = _header(table, has_axis)
     if columns:
         table = table.without_header()
-    elif (count := len(table.rows[0])) in UNNAMED:
-        columns = UNNAMED[count]
+    elif (count := len(table.rows[0])) in UNNAMED or (has_axis and count == len(POSITION)):
+        columns = UNNAMED.get(count, POSITION)
     else:
         raise InputError(
             f"line {table.lines[0]}: without a header expected 6 columns (x y z nx ny nz) or 7 "
-            f"(x y z qx qy qz qw), got {count}"
+            f"(x y z qx qy qz qw), got {count}; say what they are with columns"
         )
     if not table.rows:
         raise InputError("holds a header but no rows of points")
@@ -95,7 +116,62 @@ def _rows(table: TableCells) -> tuple[tuple[str, ...], str, TableCells]:
     return columns, unit, table
 
 
-def _header(table: TableCells) -> tuple[tuple[str, ...], str]:
+def _renamed(table: TableCells, given: Mapping[str, str]) -> TableCells:
+    """Return the table with the columns of its header called as they are here."""
+    header = [cell.strip("\"' ") for cell in table.rows[0]]
+    chosen: dict[int, str] = {}
+    for name, theirs in given.items():
+        if name not in KNOWN:
+            raise InputError(f"columns: expected names of {' '.join(KNOWN)}, got {name!r}")
+        places = [k for k, cell in enumerate(header) if cell.lower() == str(theirs).lower()]
+        if len(places) != 1:
+            raise InputError(
+                f"line {table.lines[0]}: expected one column {theirs!r} for {name}, "
+                f"got {' '.join(header)}"
+            )
+        chosen[places[0]] = name
+    row = []
+    for k, cell in enumerate(header):
+        unit = UNIT.search(cell.lower())
+        if k not in chosen:
+            row.append(f"{cell} ({UNUSED})" if cell.lower() in KNOWN else cell)
+        elif unit and unit[1] in UNITS_MM and chosen[k] in POSITION:
+            row.append(f"{chosen[k]}_{unit[1]}")
+        else:
+            row.append(chosen[k])
+    return replace(table, rows=[row, *table.rows[1:]])
+
+
+def _in_order(
+    table: TableCells, names: Sequence[str], has_axis: bool
+) -> tuple[tuple[str, ...], str, TableCells]:
+    """Return the columns as they are named in order, no unit, and the rows, without a header."""
+    if unknown := [name for name in names if name not in (*KNOWN, UNUSED)]:
+        raise InputError(
+            f"columns: expected names of {' '.join(KNOWN)}, or {UNUSED}, got {unknown[0]!r}"
+        )
+    _require_columns([name for name in names if name != UNUSED], has_axis)
+    if not table.is_number(0, names.index("x")):
+        table = table.without_header()
+    if not table.rows:
+        raise InputError("holds a header but no rows of points")
+    table.require_width(len(names))
+    return tuple(names), "", table
+
+
+def _require_columns(columns: Sequence[str], has_axis: bool) -> None:
+    for name in columns:
+        if columns.count(name) > 1:
+            raise InputError(f"the header names the column {name!r} twice")
+    has_axes = has_axis or any(set(axes) <= set(columns) for axes in (NORMAL, AXIS, QUATERNION))
+    if not (set(POSITION) <= set(columns) and has_axes):
+        raise InputError(
+            f"expected columns {EXPECTED}; got {' '.join(columns)}; say with columns which of "
+            "them are these, and with axis the tool axis where there is none"
+        )
+
+
+def _header(table: TableCells, has_axis: bool) -> tuple[tuple[str, ...], str]:
     """Return the names of the columns and their unit, nothing if the first row is numbers."""
     if table.is_numbers(0):
         return (), ""
@@ -105,12 +181,7 @@ def _header(table: TableCells) -> tuple[tuple[str, ...], str]:
         parts = re.fullmatch(r"([xyz])\s*[_\[( ]\s*([a-z]+)\s*[\])]?", name)
         columns.append(parts[1] if parts else name)
         units += [parts[2]] if parts else []
-    for name in columns:
-        if columns.count(name) > 1:
-            raise InputError(f"the header names the column {name!r} twice")
-    has_axes = any(set(axes) <= set(columns) for axes in (NORMAL, AXIS, QUATERNION))
-    if not (set(POSITION) <= set(columns) and has_axes):
-        raise InputError(f"expected columns {EXPECTED}; got {' '.join(columns)}")
+    _require_columns(columns, has_axis)
     if len(set(units)) > 1 or (units and (len(units) != 3 or units[0] not in UNITS_MM)):
         raise InputError(
             f"the header's units are {', '.join(units)}; expected one for x, y and z, "
@@ -119,10 +190,12 @@ def _header(table: TableCells) -> tuple[tuple[str, ...], str]:
     return tuple(columns), units[0] if units else ""
 
 
-def _numbers(columns: Sequence[str], table: TableCells, mm: float) -> tuple[Array, Array]:
-    """Return points (K, 3) mm and outward unit normals (K, 3)."""
+def _numbers(
+    columns: Sequence[str], table: TableCells, mm: float, axis: Array | None
+) -> tuple[Array, Array]:
+    """Return points (K, 3) mm and outward unit normals (K, 3); an axis where no columns say it."""
     at = {name: k for k, name in enumerate(columns)}
-    axes = next(a for a in (AXIS, NORMAL, QUATERNION) if set(a) <= set(at))
+    axes = next((a for a in (AXIS, NORMAL, QUATERNION) if set(a) <= set(at)), ())
     wanted = [at[name] for name in (*POSITION, *axes)]
     values = np.array(
         [
@@ -136,6 +209,9 @@ def _numbers(columns: Sequence[str], table: TableCells, mm: float) -> tuple[Arra
             f"line {table.lines[far[0]]}: a point further than {LARGEST / 1e6:g} km from the "
             "origin; check the unit"
         )
+    if not axes:
+        assert axis is not None
+        return points, np.tile(-axis / np.linalg.norm(axis), (len(points), 1))
     size = np.abs(directions).max(axis=1)
     if (zero := np.flatnonzero(size == 0)).size:
         raise InputError(f"line {table.lines[zero[0]]}: {' '.join(axes)} are all 0; no direction")

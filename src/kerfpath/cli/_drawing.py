@@ -21,8 +21,10 @@ def drawing_in(
     unit: str | None,
     gap: float,
     outer_towards: tuple[float, float, float] | None,
+    axis: tuple[float, float, float] | None,
+    columns: str | None,
 ) -> Part:
-    """Return the part that a file holds, `gap` in m.
+    """Return the part that a file holds, `gap` in m; `columns` as x,y,z,... or x=NAME,y=NAME,...
 
     Raises
     ------
@@ -30,7 +32,21 @@ def drawing_in(
         As `kerfpath.cad.read`.
     """
     with busy(f"reading {file.name}"):
-        return read_drawing(file, unit=unit, gap=gap, outer_towards=outer_towards)
+        return read_drawing(
+            file,
+            unit=unit,
+            gap=gap,
+            outer_towards=outer_towards,
+            axis=axis,
+            columns=None if columns is None else _columns(columns),
+        )
+
+
+def _columns(text: str) -> dict[str, str] | list[str]:
+    parts = [part.strip() for part in text.split(",")]
+    if not any("=" in part for part in parts):
+        return parts
+    return {name.strip(): own.strip() for name, _, own in (part.partition("=") for part in parts)}
 
 
 def drawing_of(job: Job) -> Part:

@@ -334,6 +334,14 @@ def contours(
             "lies less deep in the part; of a flat sheet the one that faces up."
         ),
     ] = None,
+    axis: Annotated[
+        tuple[float, float, float] | None,
+        typer.Option(help="Tool axis of lines in space, and of points that have none."),
+    ] = None,
+    columns: Annotated[
+        str | None,
+        typer.Option(help="Columns of a table: x,y,z,-,nx,ny,nz in order, or x=NAME,y=NAME,..."),
+    ] = None,
     html: Annotated[
         Path | None,
         typer.Option(help="HTML page to write: the part with its loops by name."),
@@ -354,7 +362,14 @@ def contours(
     from kerfpath.cli._contours import list_contours
     from kerfpath.cli._drawing import drawing_in
 
-    part = drawing_in(file, unit=unit, gap=gap_mm / 1000, outer_towards=outer_towards)
+    part = drawing_in(
+        file,
+        unit=unit,
+        gap=gap_mm / 1000,
+        outer_towards=outer_towards,
+        axis=axis,
+        columns=columns,
+    )
     list_contours(part, html, everything=everything, as_json=as_json)
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import numpy as np
 import pytest
 from ezdxf.filemanagement import new
 
@@ -66,3 +67,33 @@ def test_what_is_not_to_cut_stops_no_job(tmp_path: Path, kind: str) -> None:
     part = read_job(path).read_part()
     assert len(part.loops) == 1
     assert len(part.left_out) == 1
+
+
+def test_a_part_is_placed_by_its_centre(tmp_path: Path) -> None:
+    document = new(units=4)
+    document.modelspace().add_circle((70, -30), 20)
+    document.saveas(tmp_path / "blank.dxf")
+    path = tmp_path / "job.toml"
+    text = JOB.replace("rpy_deg = [0, 0, 0]\n{more}", "rpy_deg = [10, 20, 30]\n{more}")
+    path.write_text(text.format(more='placed_by = "centre"'))
+    job = read_job(path)
+    centre = job.placement @ [0.07, -0.03, 0, 1]
+    np.testing.assert_allclose(centre[:3], [1.2, 0, 0.4], atol=1e-12)
+    path.write_text(text.format(more=""))
+    np.testing.assert_array_equal(read_job(path).placement[:3, 3], [1.2, 0, 0.4])
+    np.testing.assert_array_equal(read_job(path).placement[:3, :3], job.placement[:3, :3])
+
+
+def test_a_job_says_axis_and_columns_where_the_drawing_does_not(tmp_path: Path) -> None:
+    (tmp_path / "line.csv").write_text("Pos X,Pos Y,Pos Z\n0,0,0\n30,0,0\n30,5,1\n")
+    path = tmp_path / "job.toml"
+    more = 'unit = "mm"\naxis = [0, 0, -1]\ncolumns = { x = "pos x", y = "pos y", z = "pos z" }'
+    text = JOB.replace("blank.dxf", "line.csv").replace("0/outer", "contour")
+    path.write_text(text.format(more=more))
+    part = read_job(path).read_part()
+    assert [loop.kind for loop in part.loops] == ["open"]
+    contour = part.contour("contour", closed=False)
+    np.testing.assert_array_equal(contour.axes, [[0, 0, -1]] * 3)
+    (tmp_path / "line.csv").write_text("0,0,0\n30,0,0\n30,5,1\n")
+    path.write_text(text.format(more='unit = "mm"\naxis = [0, 0, -1]\ncolumns = ["x", "y", "z"]'))
+    np.testing.assert_array_equal(read_job(path).read_part().bounding_box, part.bounding_box)

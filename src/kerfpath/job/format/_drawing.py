@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -27,6 +28,10 @@ class Drawing:
         Distance between the ends of two curves that a loop bridges.
     outer_towards : (3,) or None
         Where the outer sides of its sheets face, see `kerfpath.cad.read`.
+    axis : (3,) or None
+        The tool axis of a drawing that has none, in the part.
+    columns : mapping or sequence of str, or None
+        What the columns of a table are, see `kerfpath.cad.read`.
     accept_left_out : bool
         Whether something that may have been to cut may be left out.
     """
@@ -35,6 +40,8 @@ class Drawing:
     unit: str | None = None
     gap: float = GAP
     outer_towards: Array | None = None
+    axis: Array | None = None
+    columns: Mapping[str, str] | Sequence[str] | None = None
     accept_left_out: bool = False
 
     __repr__ = short_repr
@@ -48,5 +55,10 @@ class Drawing:
             It cannot be read.
         """
         return read_drawing(
-            self.file, unit=self.unit, gap=self.gap, outer_towards=self.outer_towards
+            self.file,
+            unit=self.unit,
+            gap=self.gap,
+            outer_towards=self.outer_towards,
+            axis=self.axis,
+            columns=self.columns,
         )

@@ -297,12 +297,13 @@ def read_job(path: str | Path) -> Job:
         options = file.plan.resolve(robot, file.comfort.resolve())
     except OptionConflict as conflict:
         raise refusal_at(path, *said_in_keys(conflict, file.plan)) from None
+    drawing = file.part.drawing(path.parent)
     return Job(
         path=path,
         robot=robot,
         tool=file.tool.resolve(),
-        placement=file.part.resolve(),
-        drawing=file.part.drawing(path.parent),
+        placement=file.part.resolve(drawing),
+        drawing=drawing,
         contours=tuple(task_of(table) for table in file.contour),
         options=options,
         cell=file.cell,

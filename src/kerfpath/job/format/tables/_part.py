@@ -8,7 +8,7 @@ from typing import Annotated, Literal
 import numpy as np
 from pydantic import AfterValidator
 
-from kerfpath._arrays import Array
+from kerfpath._arrays import Array, freeze
 from kerfpath.cad import GAP, UNITS_MM
 from kerfpath.job.format._drawing import Drawing
 from kerfpath.job.format._poses import pose
@@ -38,10 +38,25 @@ class PartTable(Table):
         Three | None,
         key("3 numbers, where the outer sides of its sheets face, in the part", "[0, 0, 1]"),
     ] = None
+    axis: Annotated[
+        Three | None,
+        key("3 numbers, the tool axis of a drawing that has none, in the part", "[0, 0, -1]"),
+    ] = None
+    columns: Annotated[
+        dict[str, Text] | list[Text] | None,
+        key(
+            "what the columns of a table of points are: names by its own, or a list in order",
+            '{ x = "Pos X", y = "Pos Y", z = "Pos Z" }',
+        ),
+    ] = None
     left_out: Annotated[
         Literal["refuse", "accept"],
         key("what becomes of a drawing of which something to cut may be left out", '"accept"'),
     ] = "refuse"
+    placed_by: Annotated[
+        Literal["origin", "centre"],
+        key("what of the part xyz_mm says: its origin, or the middle of its box", '"centre"'),
+    ] = "origin"
     xyz_mm: Annotated[
         Three, key("3 numbers, the part's position in the robot base in mm", "[1450, -600, 450]")
     ]
@@ -52,15 +67,31 @@ class PartTable(Table):
 
     def drawing(self, folder: Path) -> Drawing:
         """Return the drawing, its path taken from a folder."""
-        towards = self.outer_towards
         return Drawing(
             file=folder / self.file,
             unit=self.unit,
             gap=self.gap_mm / 1000,
-            outer_towards=None if towards is None else np.array(towards, dtype=float),
+            outer_towards=_direction(self.outer_towards),
+            axis=_direction(self.axis),
+            columns=self.columns,
             accept_left_out=self.left_out == "accept",
         )
 
-    def resolve(self) -> Array:
-        """Return T_base_part, (4, 4), m."""
-        return pose(self.xyz_mm, self.rpy_deg)
+    def resolve(self, drawing: Drawing) -> Array:
+        """Return T_base_part, (4, 4), m; the drawing is read where its middle is placed.
+
+        Raises
+        ------
+        InputError
+            The drawing cannot be read.
+        """
+        T_base_part = pose(self.xyz_mm, self.rpy_deg)
+        if self.placed_by == "origin":
+            return T_base_part
+        T_centre_part = np.eye(4)
+        T_centre_part[:3, 3] = -drawing.read().bounding_box.mean(axis=0)
+        return freeze(T_base_part @ T_centre_part)
+
+
+def _direction(value: tuple[float, ...] | None) -> Array | None:
+    return None if value is None else np.array(value, dtype=float)
