@@ -21,6 +21,7 @@ NAMES = (
     "refinement",
     "collision",
     "cad",
+    "corpus",
     "large_drawings",
     "kerf",
     "part",
@@ -77,6 +78,10 @@ def _run(name: str, *, quick: bool) -> list[Report]:
 
         modules = (kinematics, _families, _enclosures)
         return [module.run(quick=quick) for module in modules]
+    if name == "corpus":
+        from benchmarks import corpus
+
+        return [corpus.run(quick=quick)]
     if name == "large_drawings":
         from benchmarks import large_drawings
 

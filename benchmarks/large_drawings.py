@@ -37,10 +37,11 @@ RATIO, GIGABYTES = 2.0, 3.0
 """What reading may take: times OCCT's own, and of memory."""
 
 HOW = """\
-An assembly of plates of 180 faces, each with {holes} holes, round ones and hexagons, written by OCCT
-as STEP. "OCCT" reads the file and makes its shapes, no more, in this process; "kerfpath" is
-`cad.read`: OCCT in a process of its own, which is started before, then the loops of all faces,
-skins and sides of sheets. In turn, in one run. The memory is the larger of both processes at its peak."""
+An assembly of plates of 180 faces, each with {holes} holes, round ones and hexagons, written by
+OCCT as STEP. "OCCT" reads the file and makes its shapes, no more, in this process; "kerfpath"
+is `cad.read`: OCCT in a process of its own, which is started before, then the loops of all
+faces, skins and sides of sheets. In turn, in one run. The memory is the larger of both
+processes at its peak."""
 
 
 def run(*, quick: bool = False) -> Report:

@@ -94,6 +94,7 @@ def test_touching_bodies_stay_apart(tmp_path: Path, case: str, seed: int) -> Non
     whole = read(write_step(tmp_path / "whole.step", compound(*shapes)))
     loose = read(write_faces(tmp_path / "loose.iges", shapes, seed))
     assert loose.faces == whole.faces
+    assert loose.left_out == whole.left_out == ()
     assert loose.largest_gap <= EXACT
     assert facts(loose) == facts(whole)
     count = len(shapes)

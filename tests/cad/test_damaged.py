@@ -116,5 +116,7 @@ def test_a_damaged_surface_of_an_iges_file_is_one_face_less(tmp_path: Path) -> N
     part = read(path)
     assert part.faces == 7
     assert all(each.may_cut for each in part.left_out)
+    lost = [each.count for each in part.left_out if each.reason == "no face is made of it"]
+    assert lost == [1]
     # Of the surface and what bounds it, which belong to nothing any more.
     assert {each.kind for each in part.left_out} == {"TrimmedSurface", "curve"}

@@ -158,10 +158,14 @@ def _faces(reader: IGESControl_Reader) -> Iterator[IGESData_IGESEntity]:
 def _lost_faces(reader: IGESControl_Reader) -> list[LeftOut]:
     """Return the faces of the file of which no shape was made."""
     process = reader.WS().TransferReader().TransientProcess()
+    made = {
+        process.Mapped(number)
+        for number in range(1, process.NbMapped() + 1)
+        if process.MapItem(number) is not None and process.MapItem(number).HasResult()
+    }
     found: Counter[tuple[str, str, bool]] = Counter()
     for entity in _faces(reader):
-        made = process.Find(entity)
-        if made is None or not made.HasResult():
+        if entity not in made:
             found[kind_of(entity), LOST, True] += 1
     return counted(found)
 
