@@ -23,6 +23,7 @@ from kerfpath.cad._shape import NamedFace, NamedShape, unique
 from kerfpath.cad._skins import Skin, skins_of
 from kerfpath.cad._units import MM
 from kerfpath.errors import InputError
+from kerfpath.progress import Progress, no_progress
 
 __all__ = ["part_of"]
 
@@ -49,9 +50,10 @@ def part_of(
     drawn: NamedShape,
     gap: float,
     outer_towards: tuple[float, float, float] | None = None,
+    progress: Progress = no_progress,
 ) -> Part:
     """Return the part that is drawn, every face, skin and loop given its name; `gap` in m."""
-    faces, found, unread = _readable(drawn.faces)
+    faces, found, unread = _readable(drawn.faces, progress)
     towards = None if outer_towards is None else np.array(outer_towards)
     skins = skins_of([named.face for named in faces], found, towards)
     names = _names(faces)
@@ -82,13 +84,14 @@ def part_of(
 
 
 def _readable(
-    faces: Sequence[NamedFace],
+    faces: Sequence[NamedFace], progress: Progress
 ) -> tuple[list[NamedFace], list[list[FaceLoop]], list[LeftOut]]:
     """Return the faces whose loops can be read, their loops, and what is left out for it."""
     kept: list[NamedFace] = []
     loops: list[list[FaceLoop]] = []
     left_out: Counter[tuple[str, str, bool]] = Counter()
-    for named in faces:
+    for number, named in enumerate(faces, start=1):
+        progress("looking for loops", number, len(faces))
         try:
             found = loops_of(named.face)
         except (InputError, Standard_Failure, RuntimeError) as error:

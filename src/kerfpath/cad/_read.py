@@ -17,6 +17,7 @@ from kerfpath.cad._left_out import nothing_drawn
 from kerfpath.cad._part import Part
 from kerfpath.cad._units import GAP, require_unit
 from kerfpath.errors import InputError
+from kerfpath.progress import Progress, no_progress
 
 __all__ = ["content_of", "read"]
 
@@ -34,6 +35,7 @@ def read(
     outer_towards: ArrayLike | None = None,
     axis: ArrayLike | None = None,
     columns: Columns | None = None,
+    progress: Progress = no_progress,
 ) -> Part:
     """Return the part that a drawing holds: STEP, IGES, DXF, or a table of points.
 
@@ -56,6 +58,8 @@ def read(
     columns : mapping of str to str or sequence of str, optional
         Of a table: how its header names x, y, z, nx, ...; or, without a header, what its columns
         are, in their order, "-" for one that is not used.
+    progress : callable
+        Takes what is being done, and of how many faces; see `kerfpath.progress`.
 
     Raises
     ------
@@ -83,7 +87,7 @@ def read(
         raise InputError(f"{path}: outer_towards: expected a drawing of sheets, got a {kind}")
     if columns is not None and kind != "table":
         raise InputError(f"{path}: columns: expected a table, got a drawing in {kind}")
-    return _drawn(kind, path, content, asked)
+    return _drawn(kind, path, content, asked, progress)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -125,11 +129,12 @@ def content_of(path: Path, expected: str) -> bytes:
         raise InputError(f"{path}: cannot be read ({why}); expected {expected}") from None
 
 
-def _drawn(kind: str, path: Path, content: bytes, asked: _Asked) -> Part:
+def _drawn(kind: str, path: Path, content: bytes, asked: _Asked, progress: Progress) -> Part:
     """Return the part; each reader is loaded when a file asks for it, as OCCT takes over a second.
 
     OCCT may crash, so STEP and IGES are translated apart from this process.
     """
+    progress(f"reading {path.name}", 0, 0)
     unit, gap = asked.unit, asked.gap
     axis = None if asked.axis is None else np.array(asked.axis)
     if kind == "table":
@@ -157,7 +162,7 @@ def _drawn(kind: str, path: Path, content: bytes, asked: _Asked) -> Part:
                 if drawn.faces and axis is not None:
                     raise InputError("axis: expected a drawing of lines, got one of faces")
                 if drawn.faces:
-                    part = part_of(path, drawn, gap, asked.outer_towards)
+                    part = part_of(path, drawn, gap, asked.outer_towards, progress)
                 elif axis is not None:
                     part = part_of_wires(path, drawn, gap, axis)
                 else:

@@ -9,7 +9,7 @@ from rich.markup import escape
 
 from kerfpath.cad import Part
 from kerfpath.cad import read as read_drawing
-from kerfpath.cli._show import busy, out
+from kerfpath.cli._show import busy, out, progress_bars
 from kerfpath.job import Job
 
 __all__ = ["drawing_entry", "drawing_in", "drawing_of", "show_drawing", "summary"]
@@ -31,7 +31,7 @@ def drawing_in(
     InputError
         As `kerfpath.cad.read`.
     """
-    with busy(f"reading {file.name}"):
+    with progress_bars("faces") as progress:
         return read_drawing(
             file,
             unit=unit,
@@ -39,6 +39,7 @@ def drawing_in(
             outer_towards=outer_towards,
             axis=axis,
             columns=None if columns is None else _columns(columns),
+            progress=progress,
         )
 
 
