@@ -13,7 +13,7 @@ from scipy.spatial import cKDTree
 from kerfpath._arrays import Array, Ints
 from kerfpath.cad._build import named_loops, part_without_faces
 from kerfpath.cad._connected import label_connected
-from kerfpath.cad._curves import UP, Curve, backwards, turned
+from kerfpath.cad._curves import NOTHING, UP, Curve, Mark, backwards, turned
 from kerfpath.cad._junctions import encloses, inner_point, partners
 from kerfpath.cad._left_out import LeftOut
 from kerfpath.cad._overlap import SAME, same_lines
@@ -24,15 +24,12 @@ from kerfpath.errors import InputError
 
 __all__ = ["loops_in"]
 
-NOTHING = 1e-6
-"""Curves shorter than this, mm, are none; those that lie closer are the same."""
 SAID = 3
 """Open lines whose ends are said where they hang, those with the next end nearest."""
 LARGER = 1.05
 """Times the area of another: a loop in the same box that is larger lies around it."""
 Look = tuple[str, str]
 """Layer and colour: curves that are not drawn alike are not chained."""
-Mark = tuple[float, ...]
 Stroke = tuple[Curve, ...]
 """The curves of one entity, each of which ends where the next starts."""
 Chain = EdgeChain[Curve]
@@ -151,7 +148,7 @@ def _chains(strokes: Sequence[Stroke], gap: float, R: Array) -> tuple[list[Chain
     if count := _count(left) + _count([chains[j].edges for j in again]):
         repaired.append(f"{count} curves drawn twice left out")
     chains = [chain for k, chain in enumerate(chains) if k not in again]
-    marks = Counter(_mark(curve) for chain in chains for curve in chain.edges)
+    marks = Counter(curve.mark for chain in chains for curve in chain.edges)
     if count := sum(times > 1 for times in marks.values()):
         repaired.append(f"{count} sides shared by two loops, which are cut twice")
     return chains, repaired
@@ -184,7 +181,7 @@ def _is_closed(stroke: Stroke) -> bool:
 
 def _doubles(strokes: Sequence[Stroke]) -> tuple[list[Stroke], list[Stroke], list[Stroke]]:
     """Return the strokes of which none lies on another, open ones that do, and what is too much."""
-    marks = [tuple(_mark(curve) for curve in stroke) for stroke in strokes]
+    marks = [tuple(curve.mark for curve in stroke) for stroke in strokes]
     within = {mark for each in marks if len(each) > 1 for mark in each}
     times: Counter[tuple[Mark, ...]] = Counter()
     kept, spare, left = list[Stroke](), list[Stroke](), list[Stroke]()
@@ -198,14 +195,6 @@ def _doubles(strokes: Sequence[Stroke]) -> tuple[list[Stroke], list[Stroke], lis
         else:
             (spare if times[same] == 2 and not _is_closed(stroke) else left).append(stroke)
     return kept, spare, left
-
-
-def _mark(curve: Curve) -> Mark:
-    """Return numbers that two curves share when they lie on each other, whichever way they run."""
-    three = curve.at(np.linspace(curve.start, curve.end, 5)[1:4])
-    rounded = (np.round(np.vstack([curve.ends, three]) / (10 * NOTHING)) + 0.0).tolist()
-    ends, inner = sorted(rounded[:2]), sorted(rounded[2:])
-    return tuple(v for point in (*ends, *inner) for v in point)
 
 
 def _ends(strokes: Sequence[Stroke]) -> Array:
@@ -242,7 +231,9 @@ def _linked(strokes: Sequence[Stroke], gap: float, next_end: _NextEnd) -> Iterat
     """Yield the chains of open strokes that hang together."""
     place = _places(_ends(strokes), gap)
     marks: dict[tuple[Mark, ...], int] = {}
-    alike = [marks.setdefault(tuple(sorted(map(_mark, s))), len(marks)) for s in strokes]
+    alike = [
+        marks.setdefault(tuple(sorted(curve.mark for curve in s)), len(marks)) for s in strokes
+    ]
     partner = partners(strokes, alike, place)
     used = np.zeros(len(strokes), dtype=bool)
 

@@ -13,8 +13,11 @@ from kerfpath._arrays import Array
 from kerfpath._repr import short_repr
 from kerfpath.cad._sample import AROUND
 
-__all__ = ["UP", "Arc", "Curve", "Line", "Spline", "backwards", "turned"]
+__all__ = ["NOTHING", "UP", "Arc", "Curve", "Line", "Mark", "Spline", "backwards", "turned"]
 
+Mark = tuple[float, ...]
+NOTHING = 1e-6
+"""Curves shorter than this, mm, are none; those that lie closer are the same."""
 UP = (0.0, 0.0, 1.0)
 """The normal of a flat drawing."""
 GAUSS = np.polynomial.legendre.leggauss(12)
@@ -33,6 +36,14 @@ class _Flat(ABC):
     @cached_property
     def ends(self) -> Array:
         return self.at(np.array([self.start, self.end]))
+
+    @cached_property
+    def mark(self) -> Mark:
+        """Numbers that two curves share when they lie on each other, whichever way they run."""
+        points = self.at(np.linspace(self.start, self.end, 5))
+        rounded = (np.round(points / (10 * NOTHING)) + 0.0).tolist()
+        ends, inner = sorted(rounded[::4]), sorted(rounded[1:4])
+        return tuple(v for point in (*ends, *inner) for v in point)
 
     @cached_property
     def around(self) -> Array:

@@ -46,19 +46,33 @@ def partners(
     for end, where in enumerate(place.tolist()):
         at.setdefault(where, []).append(end)
     is_even = all(len(ends) % 2 == 0 for ends in at.values())
+    crowded = is_even and any(len(ends) > 2 for ends in at.values())
+    chords = _chords(strokes) if crowded else (np.empty((0, 3)), np.empty((0, 3)))
     found: dict[int, int] = {}
     for ends in at.values():
         if len(ends) == 2:
             pairs = [(ends[0], ends[1])]
         else:
-            pairs = _across(strokes, alike, place, ends) if is_even else []
+            pairs = _across(strokes, alike, place, ends, chords) if is_even else []
         for a, b in pairs:
             found[a], found[b] = b, a
     return found
 
 
+def _chords(strokes: Sequence[Sequence[Curve]]) -> tuple[Array, Array]:
+    """Return the chords of all curves, from (K, 3) to (K, 3), for what they enclose."""
+    curves = [curve for stroke in strokes for curve in stroke]
+    chord = SAMPLED * NEAR * min(curve.length for curve in curves)
+    lines = [sample_curve(curve, chord, np.pi)[1] for curve in curves]
+    return np.vstack([line[:-1] for line in lines]), np.vstack([line[1:] for line in lines])
+
+
 def _across(
-    strokes: Sequence[Sequence[Curve]], alike: Sequence[int], place: Ints, ends: Sequence[int]
+    strokes: Sequence[Sequence[Curve]],
+    alike: Sequence[int],
+    place: Ints,
+    ends: Sequence[int],
+    chords: tuple[Array, Array],
 ) -> list[tuple[int, int]]:
     """Return the pairs of ends at a place that have a filled region between them."""
     curves = {end: strokes[end // 2][-1 if end % 2 else 0] for end in ends}
@@ -78,7 +92,8 @@ def _across(
     widest, count = int(np.argmax(wide)), len(around)
     middle = angles[widest] + wide[widest] / 2
     point = at + near * np.array([np.cos(middle), np.sin(middle), 0.0])
-    first = widest if _is_filled(strokes, point, SAMPLED * near) else widest + 1
+    is_filled = _crossings(chords[0] - point, chords[1] - point) % 2 == 1
+    first = widest if is_filled else widest + 1
     return [(around[k % count], around[(k + 1) % count]) for k in range(first, first + count, 2)]
 
 
@@ -91,15 +106,6 @@ def _angle(curve: Curve, is_end: int, at: Array, near: float) -> float:
     part = np.clip((near - away[k - 1]) / max(away[k] - away[k - 1], 1e-300), 0.0, 1.0)
     x, y, _ = points[k - 1] + part * (points[k] - points[k - 1])
     return float(np.arctan2(y, x))
-
-
-def _is_filled(strokes: Sequence[Sequence[Curve]], point: Array, chord: float) -> bool:
-    """Return whether an odd number of curves lie between a point and the far end of a ray."""
-    crossed = 0
-    for curve in (curve for stroke in strokes for curve in stroke):
-        points = sample_curve(curve, chord, np.pi)[1]
-        crossed += _crossings(points[:-1] - point, points[1:] - point)
-    return crossed % 2 == 1
 
 
 def encloses(polygon: Array, point: Array) -> bool:
