@@ -83,7 +83,8 @@ def loops_in(
             for (look, chain), kind in zip(chains, kinds, strict=True)
             if look[0] == layer
         ]
-        loops += named_loops(drawn_here, face=layer, surface="plane", gap=gap, layer=layer)
+        surface = "plane" if axis is None else "lines"
+        loops += named_loops(drawn_here, face=layer, surface=surface, gap=gap, layer=layer)
     notes += [*_cut_twice(loops), *_hanging(loops)]
     return part_without_faces(path, unit, loops, gap=gap, notes=notes, left_out=left_out)
 

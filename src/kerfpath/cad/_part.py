@@ -46,7 +46,7 @@ class Loop:
         that was drawn open.
     surface : str
         plane, cylinder, cone, sphere, torus, bspline, ...; skin where it is made of several;
-        points.
+        points; lines in space.
     length : float m
     bounding_box : (2, 3) m
         Least and greatest coordinates.
