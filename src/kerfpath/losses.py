@@ -35,6 +35,7 @@ class Loss(IntEnum):
     SHUT = 11, "shut edges"
     VELOCITY = 12, "velocity, joint {}"
     ACCELERATION = 13, "acceleration, joint {}"
+    NO_ROOM = 14, "no room to back off by {}"
 
 
 class Reason(str):

@@ -46,6 +46,7 @@ class GraphKeywords(TypedDict, total=False):
     tilt: Tilt | None
     postures: Sequence[int] | None
     comfort: Comfort | None
+    retract: float | None
 
 
 class PlanKeywords(GraphKeywords, total=False):
@@ -85,6 +86,7 @@ class OptionData(TypedDict):
     refine_parts: int
     interruptions: Interruptions
     least_piece_m: float | None
+    retract_m: float | None
     certify: CertifyData | None
 
 
@@ -153,6 +155,9 @@ class PlanOptions:
         Length that every such piece has at least.
     comfort : Comfort, optional
         Margins that the nodes keep from singularities and limits, and penalties beside them.
+    retract : float m, optional
+        The tool can back off by so much along its axis at both ends, by the joints' limits and the
+        margin from them; None: not asked for.
     certify : Certify, optional
         How far it is proved how near the plan is to the best motion; None: not at all.
 
@@ -180,6 +185,7 @@ class PlanOptions:
     interruptions: Interruptions = "none"
     least_piece: float | None = None
     comfort: Comfort | None = None
+    retract: float | None = None
     certify: Certify | None = USUAL
 
     __repr__ = short_repr
@@ -198,8 +204,9 @@ class PlanOptions:
             cast["weights"] = floats(self.weights, "weights", (None,))
         if self.rotation is not None:
             cast["rotation"] = floats(self.rotation, "rotation", (None,), infinite=True)
-        if self.least_piece is not None:
-            cast["least_piece"] = scalar(self.least_piece, "least_piece", unit="m", above=0.0)
+        for name in ("least_piece", "retract"):
+            if (length := getattr(self, name)) is not None:
+                cast[name] = scalar(length, name, unit="m", above=0.0)
         if not (isinstance(self.refine_parts, int) and self.refine_parts >= 1):
             raise InputError(
                 f"refine_parts: expected a whole number >= 1, got {self.refine_parts!r}"
@@ -280,6 +287,7 @@ _NAMES = {
     "gamma_step_rad": "gamma_step",
     "feed_kind": "feed",
     "least_piece_m": "least_piece",
+    "retract_m": "retract",
 }
 """Options whose key in JSON has another name, by that key."""
 

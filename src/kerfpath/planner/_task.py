@@ -177,13 +177,12 @@ def task_of(
             robot,
             tool=T_flange_tip,
             placement=T_base_part,
-            options=replace(options, comfort=None),
+            options=replace(options, comfort=None, retract=None),
             progress=progress,
         )
     _require_fitting(graph, contour, robot, options.tilt)
-    if options.comfort is not None:
-        periodic = options.closure == "periodic"
-        graph = within_margins(graph, robot, options.comfort, T_flange_tip, periodic=periodic)
+    periodic = options.closure == "periodic"
+    graph = within_margins(graph, robot, options, T_flange_tip, periodic=periodic)
     try:
         require_no_empty_layer(contour, graph)
     except NoFeasiblePath as empty:

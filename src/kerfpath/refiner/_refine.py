@@ -17,6 +17,7 @@ from kerfpath.plans import Plan, Proof, on_turns, path_cost
 from kerfpath.refiner._curves import JointCurves
 from kerfpath.refiner._descent import Descent, MotionState
 from kerfpath.refiner._rates import RateLimits
+from kerfpath.refiner._room import room_at_ends
 from kerfpath.search import rotation_limits
 
 __all__ = ["Binding", "Refinement", "ease", "promise", "quicken", "refine"]
@@ -123,6 +124,7 @@ def refine(
         return _unrefined(plan, "what clearance costs is known on the grid only")
     descent, start = _descent(asked)
     low, high = within or (-np.inf, np.inf)
+    low, high = np.maximum(low, descent.gamma_low), np.minimum(high, descent.gamma_high)
     descent = replace(descent, first=first, gamma_low=low, gamma_high=high)
     begun, before = descent.admitted(start)
     if not begun.admitted:
@@ -221,6 +223,7 @@ def _unrefined(plan: Plan, why: str) -> Refinement:
 def _descent(plan: Plan) -> tuple[Descent, MotionState]:
     """Return the task of refining a plan, and where it stands."""
     settings, comfort = plan.settings, plan.settings.comfort
+    low, high = room_at_ends(plan)
     descent = Descent(
         curves=JointCurves(plan.robot, plan.frames, plan.T_flange_tip, plan.posture),
         rates=RateLimits(
@@ -237,6 +240,8 @@ def _descent(plan: Plan) -> tuple[Descent, MotionState]:
         objective=settings.objective,
         node_cost=plan.node_cost,
         radius=FIRST_STEPS * settings.gamma_step,
+        gamma_low=low,
+        gamma_high=high,
     )
     return descent, descent.stand(plan.gamma, plan.unwrapped)
 

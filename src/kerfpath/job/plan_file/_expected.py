@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from kerfpath._arrays import Array
-from kerfpath.auditor import Check
+from kerfpath.auditor import Check, retract_checks
 from kerfpath.contour import Contour
 from kerfpath.job.format import Candidate, Job, PreparedJob, divide_nodes
 from kerfpath.job.plan_file._checks import check, count
@@ -179,7 +179,9 @@ def _expected(
     if job.options.feed == "dip" and made.feed is not None and not picked:
         plan = _dipping(plan, whole.dt, made.time)
     plan = recompute(plan)
-    rows = (place, *_postures(job, plan))
+    asked = job.options.retract
+    room = retract_checks(plan, None if asked == made.settings.retract else asked)
+    rows = (place, *_postures(job, plan), *room)
     return ExpectedPlan(name=made.name, number=number, plan=plan, path=own.path, checks=rows)
 
 
@@ -191,7 +193,8 @@ def _parts(candidate: Candidate, nodes: Contour, parts: int) -> int:
 
 def _options(job: Job, dt: float, said: PlanOptions, *, picked: bool) -> PlanOptions:
     """Return how the job asks for a plan; one that was picked may aim at less than the limits."""
-    options = job.options.resolve(job.robot, dt)
+    # [program] may have been edited since: the retract of now has a check of its own.
+    options = replace(job.options.resolve(job.robot, dt), retract=said.retract)
     if not picked:
         return options
     return replace(
