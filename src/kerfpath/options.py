@@ -46,7 +46,6 @@ class GraphKeywords(TypedDict, total=False):
     tilt: Tilt | None
     postures: Sequence[int] | None
     comfort: Comfort | None
-    retract: float | None
 
 
 class PlanKeywords(GraphKeywords, total=False):

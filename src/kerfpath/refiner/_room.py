@@ -33,9 +33,10 @@ def room_at_ends(plan: Plan) -> tuple[Array, Array]:
             curves = JointCurves(plan.robot, H, plan.T_flange_tip, posture)
             near = np.broadcast_to(q[end], (len(AWAY), n))
             there = curves.at(plan.gamma[end] + sign * AWAY, near)
-            reached = np.isfinite(there).all(axis=1)
+            reached = np.asarray(np.isfinite(there).all(axis=1))
             there = np.where(reached[:, None], there, near)
-            room = reached & has_room(plan.settings, plan.robot, there, posture, plan.T_flange_tip)
+            tool = plan.T_flange_tip
+            room = has_room(plan.settings, plan.robot, there, posture, tool) & reached
             if room[0] and not room.all():
                 bound[end] = plan.gamma[end] + sign * AWAY[np.argmin(room) - 1]
     return low, high

@@ -33,9 +33,10 @@ def can_back_off(
     T[:, :3, 3] -= retract * T[:, :3, 2]
     back = arm.follow(T @ np.linalg.inv(tool), q, posture)
     limits = arm.joint_limits()
-    reached = np.isfinite(back).all(axis=1)
+    reached = np.asarray(np.isfinite(back).all(axis=1))
     back = np.where(reached[:, None], back, q)
-    room = np.minimum(back - limits.lower, limits.upper - back) >= margin
+    room = np.minimum(back - limits.lower, limits.upper - back)
     sums = back @ limits.rows.T
-    sums = np.minimum(sums - limits.row_lower, limits.row_upper - sums) >= margin
-    return np.asarray(reached & (room | limits.endless).all(axis=1) & sums.all(axis=1))
+    coupled = np.minimum(sums - limits.row_lower, limits.row_upper - sums)
+    held = ((room >= margin) | limits.endless).all(axis=1) & (coupled >= margin).all(axis=1)
+    return np.asarray(reached & held)
