@@ -36,6 +36,7 @@ class Loss(IntEnum):
     VELOCITY = 12, "velocity, joint {}"
     ACCELERATION = 13, "acceleration, joint {}"
     NO_ROOM = 14, "no room to back off by {}"
+    FLOOR = 15, "below the floor"
 
 
 class Reason(str):

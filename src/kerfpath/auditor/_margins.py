@@ -18,6 +18,8 @@ from kerfpath.plans import Plan
 
 __all__ = ["margins"]
 
+ELBOW = 2
+"""The joint, from 0, that is the elbow's."""
 SLACK = 1e-8
 """rad, m or m^3: rounding of two kinematics in double precision."""
 
@@ -48,7 +50,28 @@ def margins(plan: Plan, chain: JointChain, rounding: Rounding | None = None) -> 
                 node=node,
             )
         )
-    return checks
+    return [*checks, *_above_floor(plan, chain)]
+
+
+def _above_floor(plan: Plan, chain: JointChain) -> list[Check]:
+    """Return the check of the floor that the plan was asked to stay above, if it was."""
+    floor = plan.settings.floor
+    if floor is None:
+        return []
+    heights = [T[:, 2, 3] for T in (*chain.joints(plan.q)[ELBOW:], chain.forward(plan.q))]
+    deep = floor - np.min(heights, axis=0)
+    node = int(np.argmax(deep))
+    return [
+        Check(
+            code="floor",
+            title="depth of elbow, wrist or flange below the floor at the nodes",
+            value=float(deep[node]),
+            limit=SLACK,
+            unit="m",
+            node=node,
+            advice="write floor_mm in [robot] where the floor is lower, or none",
+        )
+    ]
 
 
 def _lines(plan: Plan, chain: JointChain) -> tuple[list[Array], list[Array]]:

@@ -16,7 +16,7 @@ from kerfpath.graph import LayeredGraph, build, gamma_grid
 from kerfpath.losses import Loss, Reason
 from kerfpath.options import GraphKeywords, PlanOptions, with_keywords
 from kerfpath.plans import has_room
-from kerfpath.robots import Robot
+from kerfpath.robots import Robot, lowest_joint
 from kerfpath.search import GammaSamples
 from kerfpath.tilt import tilt_frames
 
@@ -76,7 +76,7 @@ def layered_graph(
 def within_margins(
     graph: LayeredGraph, robot: Robot, options: PlanOptions, tool: Array, *, periodic: bool = False
 ) -> LayeredGraph:
-    """Return the graph without the vertices that break a hard margin, counted by margin.
+    """Return the graph without the vertices that break a hard margin or the floor, counted.
 
     So are those of both ends that the tool cannot back off from, where that is asked for. With a
     `periodic` closure the first layer and the last are the same but for rounding, and are thinned
@@ -84,6 +84,8 @@ def within_margins(
     """
     comfort, retract = options.comfort, options.retract
     near = {} if comfort is None else comfort.too_near(robot, graph.q, tool)
+    if options.floor is not None:
+        near[Reason(Loss.FLOOR)] = lowest_joint(robot, graph.q) < options.floor
     first, last = slice(0, graph.start[1]), slice(graph.start[-2], graph.start[-1])
     if retract is not None:
         here = near[Reason(Loss.NO_ROOM, f"{retract * 1e3:g} mm")] = np.zeros(len(graph.q), bool)

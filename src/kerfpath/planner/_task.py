@@ -177,7 +177,7 @@ def task_of(
             robot,
             tool=T_flange_tip,
             placement=T_base_part,
-            options=replace(options, comfort=None, retract=None),
+            options=replace(options, comfort=None, retract=None, floor=None),
             progress=progress,
         )
     _require_fitting(graph, contour, robot, options.tilt)

@@ -13,11 +13,13 @@ from kerfpath._repr import short_repr
 from kerfpath.contour import Contour
 from kerfpath.errors import InputError
 from kerfpath.kernels.metric import wrap
+from kerfpath.losses import Loss, Reason
 from kerfpath.plans import Plan, Proof, on_turns, path_cost
 from kerfpath.refiner._curves import JointCurves
 from kerfpath.refiner._descent import Descent, MotionState
 from kerfpath.refiner._rates import RateLimits
 from kerfpath.refiner._room import room_at_ends
+from kerfpath.robots import lowest_joint
 from kerfpath.search import rotation_limits
 
 __all__ = ["Binding", "Refinement", "ease", "promise", "quicken", "refine"]
@@ -131,9 +133,11 @@ def refine(
         return _unrefined(plan, _closest(descent, begun))
     found, programs = descent.best(begun)
     refined = _plan_with_motion(asked, found)
-    broken = comfort and comfort.broken(plan.robot, refined.q, plan.T_flange_tip)
+    broken = [] if comfort is None else [*comfort.broken(plan.robot, refined.q, plan.T_flange_tip)]
+    if settings.floor is not None and (lowest_joint(plan.robot, refined.q) < settings.floor).any():
+        broken.append(Reason(Loss.FLOOR))
     if broken:
-        return _unrefined(plan, f"off the grid it would break the {' and the '.join(broken)}")
+        return _unrefined(plan, f"off the grid it would break: {' and '.join(broken)}")
     grid_cost = plan.proof.grid_cost
     if grid_cost is None and start.admitted and plan.settings.method != "continuous":
         grid_cost = plan.cost

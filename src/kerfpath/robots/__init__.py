@@ -16,6 +16,7 @@ from kerfpath.robots._families import posture_name as posture_name
 from kerfpath.robots._families import postures_named as postures_named
 from kerfpath.robots._library import acceleration_ratios as acceleration_ratios
 from kerfpath.robots._library import robot_ids as robot_ids
+from kerfpath.robots._lowest import lowest_joint as lowest_joint
 from kerfpath.robots._robot import Robot as Robot
 from kerfpath.robots._robot import robot as robot
 from kerfpath.robots._solutions import Solutions as Solutions

@@ -49,7 +49,8 @@ language = "rapid"
 ACCELERATION = "acceleration_deg_s2 = [320, 270, 420, 1300, 1400, 2000]"
 HEAD = 'head = "laser-head-straight"'
 FOR_PROGRAMS = {"comfort": Comfort(limits=Band(margin=0.1 * np.radians(1))), "retract": 0.05}
-"""What every job asks for, so that its plans can be written as programs."""
+FOR_PROGRAMS["floor"] = 0.0
+"""What every job asks for, so that its plans can be run as programs."""
 
 
 @pytest.fixture(scope="session")
@@ -104,6 +105,14 @@ def test_the_margin_of_the_limits_and_the_retract_are_as_the_job_says(read):
     assert read(changed("[program]", own.format(2))).options.comfort.limits.margin == np.radians(2)
     assert read(changed("[program]", own.format(0))).options.comfort is None
     assert read(changed("[program]", own.format(0))).options.retract == 0.02
+
+
+def test_the_floor_is_where_the_job_says(read):
+    model = 'model = "abb_irb4600_60_205"'
+    assert read(changed(model, f"{model}\nfloor_mm = -600")).options.floor == -0.6
+    assert read(changed(model, f"{model}\nfloor = false")).options.floor is None
+    with pytest.raises(InputError, match=r"job\.toml:4: .*floor_mm only with a floor"):
+        read(changed(model, f"{model}\nfloor = false\nfloor_mm = 3"))
 
 
 def test_a_range_without_room_for_the_margin_is_used_up_to_its_limits(read):

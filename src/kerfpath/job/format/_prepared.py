@@ -15,11 +15,16 @@ from kerfpath.front import Subproblem
 from kerfpath.job.format._cell import cell_of_job
 from kerfpath.job.format._contour import ContourSpec
 from kerfpath.job.format._read import Job
+from kerfpath.job.format._refusals import refusal_at
 from kerfpath.options import PlanOptions
 from kerfpath.planner import node_interval
 from kerfpath.sequence import inner_first
 
 __all__ = ["Candidate", "CutRequest", "PreparedJob", "divide_nodes", "prepare"]
+
+
+ON_FLOOR = 1e-6
+"""m: a part that lies on the floor may be below it by rounding."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -159,7 +164,25 @@ def _request(job: Job, task: ContourSpec, part: Part) -> CutRequest:
     candidates = tuple(
         Candidate.at(task.speed, path, task.sample(path)) for path in task.candidates(part, loop)
     )
+    _require_above_floor(job, task.name, [each.nodes for each in candidates])
     return CutRequest(task=task, loop=loop, candidates=candidates, options=job.options)
+
+
+def _require_above_floor(job: Job, name: str, nodes: Sequence[Contour]) -> None:
+    """Raise InputError where a contour lies below the floor."""
+    floor = job.options.floor
+    if floor is None:
+        return
+    up, rise = job.placement[2, :3], job.placement[2, 3]
+    lowest = min(float((each.points @ up).min()) for each in nodes) + rise
+    if lowest < floor - ON_FLOOR:
+        raise refusal_at(
+            job.path,
+            ("part", "xyz_mm"),
+            f"contour {name!r} reaches {(floor - lowest) * 1e3:.4g} mm below the floor, which is "
+            f"at z = {floor * 1e3:g} mm of the robot base; write floor_mm in [robot] where the "
+            "floor is lower, or floor = false where there is none",
+        )
 
 
 def divide_nodes(path: Contour, nodes: Contour, parts: int) -> Contour:

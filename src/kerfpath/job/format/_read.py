@@ -203,7 +203,12 @@ def read_job(path: str | Path) -> Job:
             "in [robot]",
         )
     try:
-        options = file.plan.resolve(robot, *_for_programs(file, robot))
+        options = file.plan.resolve(
+            robot,
+            _comfort(file, robot),
+            retract=file.program.retract_mm / 1000,
+            floor=file.robot.height_of_floor(),
+        )
     except OptionConflict as conflict:
         raise refusal_at(path, *said_in_keys(conflict, file.plan)) from None
     return Job(
@@ -223,8 +228,8 @@ def read_job(path: str | Path) -> Job:
     )
 
 
-def _for_programs(file: JobFile, robot: Robot) -> tuple[Comfort | None, float]:
-    """Return what plans keep away from, and the retract, m, that they leave room for.
+def _comfort(file: JobFile, robot: Robot) -> Comfort | None:
+    """Return what plans keep away from.
 
     Joints keep off their limits, as the digits of a program and what is straight between two nodes
     need; not where a range leaves no room for it.
@@ -232,8 +237,7 @@ def _for_programs(file: JobFile, robot: Robot) -> tuple[Comfort | None, float]:
     limits = robot.joint_limits()
     ranges = (limits.upper - limits.lower)[~limits.endless]
     wide = bool((ranges > np.radians(2 * LIMITS_MARGIN)).all())
-    comfort = file.comfort.resolve({"limits": LIMITS_MARGIN} if wide else None)
-    return comfort, file.program.retract_mm / 1000
+    return file.comfort.resolve({"limits": LIMITS_MARGIN} if wide else None)
 
 
 def _text(path: Path) -> str:

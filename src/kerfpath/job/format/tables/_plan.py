@@ -126,9 +126,14 @@ class PlanTable(Table):
         return self
 
     def resolve(
-        self, robot: Robot, comfort: Comfort | None, retract: float | None = None
+        self,
+        robot: Robot,
+        comfort: Comfort | None,
+        *,
+        retract: float | None = None,
+        floor: float | None = None,
     ) -> PlanOptions:
-        """Return how the table, [comfort] and [program] ask for a plan, in SI.
+        """Return how the table, [comfort], [program] and [robot] ask for a plan, in SI.
 
         Raises
         ------
@@ -156,6 +161,7 @@ class PlanTable(Table):
             least_piece=None if piece is None else piece / 1000,
             comfort=comfort,
             retract=retract,
+            floor=floor,
             certify=self.certified(),
         )
 
