@@ -216,6 +216,9 @@ def _show_cuts(cuts: Sequence[CutResult]) -> None:
             "*: from the path as cut, which is not the drawn one; that was within "
             f"{max(loop.chord_error for loop in loops) * 1e3:.4f} mm of the CAD curve"
         )
+    rounded = [c.value for cut in cuts for c in cut.checks if c.code == "drawing"]
+    if rounded:
+        out.print(f"rounded corners leave the drawing by up to {max(rounded) * 1e3:.4f} mm")
     if any(each.against == "points of the drawing" for each in found + loops):
         out.print("where the drawing has points, the lines through them stand for the CAD curve")
 

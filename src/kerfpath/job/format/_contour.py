@@ -92,6 +92,20 @@ class ContourSpec:
         drawn = self.drawn(part) if drawn is None else drawn
         return shape_contour(self.table, drawn, surface)
 
+    @property
+    def rounded(self) -> float | None:
+        """By how much its corners are rounded, m; None where they are not."""
+        corners = self.table.corners
+        return None if corners is None else _metres(corners.round_mm)
+
+    def unrounded(self, part: Part, drawn: Contour) -> list[Contour]:
+        """Return the same contours with their corners as they were before they were rounded."""
+        corners = self.table.corners
+        assert corners is not None
+        sharp = corners.model_copy(update={"round_mm": None})
+        table = self.table.model_copy(update={"corners": sharp})
+        return replace(self, table=table).candidates(part, drawn)
+
     def evenly_fast(self, part: Part) -> Contour:
         """Return the first of its paths, sampled, without shares of the speed."""
         path = self.candidates(part)[0]

@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from kerfpath._repr import short_repr
+from kerfpath.auditor import Check
 from kerfpath.cad import Part
 from kerfpath.cell import Cell
 from kerfpath.contour import Contour
@@ -16,6 +17,7 @@ from kerfpath.job.format._cell import cell_of_job
 from kerfpath.job.format._contour import ContourSpec
 from kerfpath.job.format._read import Job
 from kerfpath.job.format._refusals import refusal_at
+from kerfpath.operations import edge, nearest
 from kerfpath.options import PlanOptions
 from kerfpath.planner import node_interval
 from kerfpath.sequence import inner_first
@@ -23,8 +25,10 @@ from kerfpath.sequence import inner_first
 __all__ = ["Candidate", "CutRequest", "PreparedJob", "divide_nodes", "prepare"]
 
 
-ON_FLOOR = 1e-6
-"""m: a part that lies on the floor may be below it by rounding."""
+SAME_PLACE = 1e-6
+"""m: what is off by no more is so by rounding."""
+SHORTER = 0.1
+"""Share of a path by which its nodes may be shorter, as chords are, and are still of all of it."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -39,11 +43,14 @@ class Candidate:
         It, sampled as the job says: points, axes, kinds, speed shares and arc lengths.
     speed : float m/s, optional
         Along the path; None where the nodes carry their own times.
+    unrounded : Contour, optional
+        The path before its corners were rounded, where they are.
     """
 
     path: Contour
     nodes: Contour
     speed: float | None = None
+    unrounded: Contour | None = None
 
     __repr__ = short_repr
 
@@ -90,6 +97,39 @@ class CutRequest:
     def leaves_the_loop(self) -> bool:
         """Whether points or tool axes of the cut are other than those of the loop as drawn."""
         return self.touched_up or self.task.table.moves_the_path
+
+    def drawing_checks(self, candidate: Candidate, nodes: Contour, path: float) -> list[Check]:
+        """Return the check of rounded corners against the drawing, where there are any.
+
+        Parameters
+        ----------
+        candidate : Candidate
+            What is cut.
+        nodes : Contour
+            That sample it: all of it, or nothing is checked.
+        path : float m
+            How far chords between nodes may be off the path anyway.
+        """
+        rounded, sharp = self.task.rounded, candidate.unrounded
+        whole = abs(nodes.length - candidate.path.length) <= SHORTER * candidate.path.length
+        if rounded is None or sharp is None or not whole:
+            return []
+        drawn = edge(sharp).points
+        where, k = nearest(edge(nodes), drawn)
+        off = np.linalg.norm(where - drawn, axis=1)
+        worst = int(np.argmax(off))
+        return [
+            Check(
+                code="drawing",
+                title=f"drawing off the chords of the nodes, its corners rounded by "
+                f"{rounded * 1e3:g} mm",
+                value=float(off[worst]),
+                limit=max(rounded, path) + SAME_PLACE,
+                unit="m",
+                node=int(k[worst]),
+                advice="lower round_mm in [contour.corners], or sample the contour more finely",
+            )
+        ]
 
     def picked(self, run: Subproblem, *, refine: bool) -> CutRequest:
         """Return the request for the first candidate, planned as a run of a Pareto set."""
@@ -164,6 +204,11 @@ def _request(job: Job, task: ContourSpec, part: Part) -> CutRequest:
     candidates = tuple(
         Candidate.at(task.speed, path, task.sample(path)) for path in task.candidates(part, loop)
     )
+    if task.rounded is not None:
+        candidates = tuple(
+            replace(each, unrounded=sharp)
+            for each, sharp in zip(candidates, task.unrounded(part, loop), strict=True)
+        )
     _require_above_floor(job, task.name, [each.nodes for each in candidates])
     return CutRequest(task=task, loop=loop, candidates=candidates, options=job.options)
 
@@ -175,7 +220,7 @@ def _require_above_floor(job: Job, name: str, nodes: Sequence[Contour]) -> None:
         return
     up, rise = job.placement[2, :3], job.placement[2, 3]
     lowest = min(float((each.points @ up).min()) for each in nodes) + rise
-    if lowest < floor - ON_FLOOR:
+    if lowest < floor - SAME_PLACE:
         raise refusal_at(
             job.path,
             ("part", "xyz_mm"),

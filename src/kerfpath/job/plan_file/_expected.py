@@ -42,6 +42,8 @@ class ExpectedPlan:
         The path that its nodes were sampled from.
     checks : tuple of Check
         What does not fit: a contour that is not asked for, nodes that are not its nodes, joints.
+    drawing : tuple of Check
+        Of rounded corners, against the drawing; a record of the file.
     """
 
     name: str
@@ -49,6 +51,7 @@ class ExpectedPlan:
     plan: Plan | None = None
     path: Contour | None = None
     checks: tuple[Check, ...] = ()
+    drawing: tuple[Check, ...] = ()
 
 
 def expect_plans(prepared: PreparedJob, file: PlanFile) -> tuple[list[ExpectedPlan], list[Check]]:
@@ -182,7 +185,10 @@ def _expected(
     asked = job.options.retract
     room = retract_checks(plan, None if asked == made.settings.retract else asked)
     rows = (place, *_postures(job, plan), *room)
-    return ExpectedPlan(name=made.name, number=number, plan=plan, path=own.path, checks=rows)
+    drawing = prepared.contours[number].drawing_checks(own, plan.contour, job.tolerances.path)
+    return ExpectedPlan(
+        name=made.name, number=number, plan=plan, path=own.path, checks=rows, drawing=(*drawing,)
+    )
 
 
 def _parts(candidate: Candidate, nodes: Contour, parts: int) -> int:
