@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
@@ -37,9 +37,16 @@ class InputError(KerfpathError, ValueError):
     """Bad input: one line that says what was expected, what came, where, and what to do.
 
     It stays one line, and one that can be read, whatever of a file is quoted in it.
+
+    Parameters
+    ----------
+    message : str
+    others : sequence of str
+        Lines about further faults that were found with it.
     """
 
-    def __init__(self, message: str) -> None:
+    def __init__(self, message: str, others: Sequence[str] = ()) -> None:
+        self.others = tuple(others)
         line = "".join(c if c.isprintable() else repr(c)[1:-1] for c in message)
         if len(line) > LONGEST:
             line = f"{line[:BEGINNING]} ... {line[BEGINNING + 5 - LONGEST :]}"

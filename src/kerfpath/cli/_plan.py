@@ -26,10 +26,12 @@ from kerfpath.cli._show import (
 from kerfpath.job import (
     CutResult,
     JobResult,
+    prepare,
     read_job,
     require_folder,
+    require_foreseen,
     require_language,
-    run_job,
+    run_prepared,
     sequence_entry,
     with_map,
     write_result,
@@ -61,9 +63,11 @@ def plan_job(
     part = drawing_of(job)
     if not as_json:
         show_drawing(part)
+    prepared = prepare(job, part)
     compile_kernels()
+    require_foreseen(prepared)
     with progress_bars() as progress:
-        outcome = run_job(job, part, progress=progress)
+        outcome = run_prepared(prepared, progress=progress)
     finish_run(outcome, part, folder, as_json=as_json, strict=strict)
 
 

@@ -16,6 +16,7 @@ from kerfpath.job.format._program import program_options as program_options
 from kerfpath.job.format._program import tolerances_of as tolerances_of
 from kerfpath.job.format._read import Job as Job
 from kerfpath.job.format._read import read_job as read_job
+from kerfpath.job.format._refusals import all_of as all_of
 from kerfpath.job.format._refusals import refusal_at as refusal_at
 from kerfpath.job.format.tables import VARIABLES as VARIABLES
 from kerfpath.job.format.tables import AuditTable as AuditTable

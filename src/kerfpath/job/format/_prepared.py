@@ -12,11 +12,12 @@ from kerfpath.auditor import Check
 from kerfpath.cad import Part
 from kerfpath.cell import Cell
 from kerfpath.contour import Contour
+from kerfpath.errors import InputError
 from kerfpath.front import Subproblem
 from kerfpath.job.format._cell import cell_of_job
 from kerfpath.job.format._contour import ContourSpec
 from kerfpath.job.format._read import Job
-from kerfpath.job.format._refusals import refusal_at
+from kerfpath.job.format._refusals import all_of, refusal_at
 from kerfpath.operations import edge, nearest
 from kerfpath.options import PlanOptions
 from kerfpath.planner import node_interval
@@ -191,12 +192,24 @@ def prepare(job: Job, part: Part | None = None) -> PreparedJob:
     Raises
     ------
     InputError
-        The drawing or the cell cannot be read, a loop does not exist, a contour cannot be sampled.
+        The drawing or the cell cannot be read, a loop does not exist, contours cannot be sampled;
+        with a line for each of them.
     """
     part = part or job.read_part()
     tasks = job.tasks(part)  # a misspelt name shall not wait for the cell
-    cell = cell_of_job(job, part)
-    return PreparedJob.of(job, part, cell, [_request(job, task, part) for task in tasks])
+    cell, requests, faults = None, list[CutRequest](), list[InputError]()
+    try:
+        cell = cell_of_job(job, part)
+    except InputError as fault:
+        faults.append(fault)
+    for task in tasks:
+        try:
+            requests.append(_request(job, task, part))
+        except InputError as fault:
+            faults.append(fault)
+    if faults:
+        raise all_of(faults)
+    return PreparedJob.of(job, part, cell, requests)
 
 
 def _request(job: Job, task: ContourSpec, part: Part) -> CutRequest:

@@ -28,7 +28,7 @@ from kerfpath.job.format._program import (
     program_options,
     tolerances_of,
 )
-from kerfpath.job.format._refusals import error_at, refusal, refusal_at
+from kerfpath.job.format._refusals import all_of, error_at, refusal, refusal_at
 from kerfpath.job.format.tables import (
     LIMITS_MARGIN,
     CellTable,
@@ -152,12 +152,17 @@ class Job:
             A loop that does not exist, or that is picked twice; an open line with what only a
             closed loop can have.
         """
-        tasks = []
+        tasks, faults = list[ContourSpec](), list[InputError]()
         for number, table in enumerate(self.contours):
-            for task in table.expanded(part):
-                if part.loop(task.pick).kind == "open":
-                    self._require_open(task, number)
-                tasks.append(task)
+            try:
+                for task in table.expanded(part):
+                    if part.loop(task.pick).kind == "open":
+                        self._require_open(task, number)
+                    tasks.append(task)
+            except InputError as fault:
+                faults.append(fault)
+        if faults:
+            raise all_of(faults)
         names = [task.name for task in tasks]
         for name in names:
             if names.count(name) > 1:
