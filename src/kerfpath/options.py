@@ -132,8 +132,8 @@ class PlanOptions:
     comfort : Comfort, optional
         Margins that the nodes keep from singularities and limits, and penalties beside them.
     retract : float m, optional
-        The tool can back off by so much along its axis at both ends, by the joints' limits and the
-        margin from them; None: not asked for.
+        The tool can back off by so much along its axis at both ends, within the joint limits and
+        their margin, where a sample of gamma leaves room for it; the audit says where none does.
     floor : float m, optional
         Height in the robot base below which no node has the elbow, the wrist or the flange; None:
         there is no floor.

@@ -8,7 +8,6 @@ import pytest
 from kerfpath import Band, Comfort, InputError, NoFeasiblePath, PlanOptions, audit
 from kerfpath.auditor import checks
 from kerfpath.contour import Contour
-from kerfpath.losses import Loss
 from kerfpath.planner import plan
 from kerfpath.robots import can_back_off
 from kerfpath.transfer import back_off
@@ -66,11 +65,12 @@ def drawn(arm, tool):
     return found
 
 
-def test_a_plan_that_is_to_back_off_can(drawn):
-    for _, made in drawn:
+def test_a_plan_that_is_to_back_off_can_where_any_does_or_the_audit_says_so(drawn):
+    for free, made in drawn:
         if not isinstance(made, NoFeasiblePath):
-            assert not cannot(made)
-            assert next(row for row in checks(made) if row.code == "retract").ok
+            row = next(row for row in checks(made) if row.code == "retract")
+            assert row.ok != cannot(made)
+            assert row.ok or cannot(free)
 
 
 def test_with_a_margin_the_motion_between_nodes_at_a_limit_keeps_it(arm, tool):
@@ -107,14 +107,16 @@ def test_the_audit_finds_a_plan_that_cannot(drawn):
         assert row.ok != cannot(free)
 
 
-def test_no_end_at_all_is_no_feasible_path_and_says_so(arm, tool, placement):
-    with pytest.raises(NoFeasiblePath, match="no room to back off by 3000 mm") as none:
-        planned(arm, tool, placement, retract=3.0)
-    assert none.value.lost_by(Loss.NO_ROOM)
+def test_no_end_at_all_is_said_by_the_audit(arm, tool, placement):
+    made = planned(arm, tool, placement, retract=3.0)
+    row = next(row for row in checks(made) if row.code == "retract")
+    assert not row.ok
+    assert "no way there" in row.title
+    assert "lower retract_mm" in row.advice
 
 
 def test_the_margin_of_the_limits_is_kept_where_it_has_backed_off_to(arm, tool, placement):
-    margin = np.radians(5)
+    margin = np.radians(2)
     draw = np.random.default_rng(3)
     tried = 0
     for _ in range(8):
@@ -124,6 +126,9 @@ def test_the_margin_of_the_limits_is_kept_where_it_has_backed_off_to(arm, tool, 
             made = planned(robot, tool, placement, retract=RETRACT, comfort=asked)
         except NoFeasiblePath:
             continue
+        at = made.q[[0, -1]], made.posture[[0, -1]]
+        if not can_back_off(robot, *at, tool, RETRACT, margin).all():
+            continue  # no sample of an end leaves room for both
         tried += 1
         for end in ("start", "end"):
             back = back_off(made, end, RETRACT)

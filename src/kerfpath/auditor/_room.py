@@ -59,7 +59,7 @@ def retract_checks(plan: Plan, retract: float | None) -> list[Check]:
             limit=SLACK,
             unit="rad",
             node=int(ends[worst]),
-            advice="lower retract_mm in [program], or move the part",
+            advice="lower retract_mm in [program] or gamma_step_deg in [plan], or move the part",
         )
     ]
 

@@ -99,6 +99,7 @@ def finish_run(
                 "files": [str(f) for f in written.files],
                 "removed": [str(f) for f in written.removed],
                 "notes": list(written.notes),
+                "faults": list(written.faults),
                 **(more or {}),
             }
         )
@@ -116,6 +117,8 @@ def finish_run(
                     out.print(f"[bold]{escape(cut.name)}[/]: {escape(str(check.issue()))}")
         for note in merge_notes(written.notes, [cut.name for cut in outcome.cuts]):
             out.print(f"note: {escape(note)}")
+        for fault in written.faults:
+            out.print(f"[bold red]not to be cut:[/] {escape(fault)}")
         show_files(written.files, written.removed, of="an earlier run")
     if written.stale is not None:
         errors.print(

@@ -78,7 +78,7 @@ def within_margins(
 ) -> LayeredGraph:
     """Return the graph without the vertices that break a hard margin or the floor, counted.
 
-    So are those of both ends that the tool cannot back off from, where that is asked for. With a
+    So are those of both ends that the tool cannot back off from, where it can from others. With a
     `periodic` closure the first layer and the last are the same but for rounding, and are thinned
     alike.
     """
@@ -88,10 +88,13 @@ def within_margins(
         near[Reason(Loss.FLOOR)] = lowest_joint(robot, graph.q) < options.floor
     first, last = slice(0, graph.start[1]), slice(graph.start[-2], graph.start[-1])
     if retract is not None:
+        broken = np.any([*near.values()], axis=0) if near else np.zeros(len(graph.q), bool)
         here = near[Reason(Loss.NO_ROOM, f"{retract * 1e3:g} mm")] = np.zeros(len(graph.q), bool)
         for end in (first, last):
             at = graph.q[end], graph.posture[end].astype(np.int64)
-            here[end] = ~has_room(options, robot, *at, tool)
+            room = has_room(options, robot, *at, tool)
+            # Where no sample has any, a gamma between two may: the motion found is audited.
+            here[end] = ~room & (room & ~broken[end]).any()
     for here in near.values():
         if periodic and len(here[first]) == len(here[last]):
             here[first] |= here[last]

@@ -21,6 +21,8 @@ __all__ = ["foresee", "require_foreseen"]
 
 HALVINGS = 7
 """Times that a length is halved, or an interval of lengths, to say which would do."""
+FINE = np.radians(1.0)
+"""Step of gamma at which poses of both ends are looked at, however coarse that of the job is."""
 SECONDS = 2.0
 """s: how long it may take to find that contours can be put in no order."""
 
@@ -203,7 +205,8 @@ def _retract_faults(prepared: PreparedJob, request: CutRequest) -> Iterator[Inpu
 def _end_poses(job: Job, nodes: Contour) -> list[tuple[Array, Ints]]:
     """Return the admissible joints (B, n) rad of both ends, and their postures (B,)."""
     ends = np.array([0, len(nodes) - 1])
-    graph = job.graph(nodes, replace(job.options, retract=None), only=ends)
+    fine = min(job.options.gamma_step, FINE)
+    graph = job.graph(nodes, replace(job.options, retract=None, gamma_step=fine), only=ends)
     cut = graph.start[1]
     posture = graph.posture.astype(np.int64)
     return [(graph.q[:cut], posture[:cut]), (graph.q[cut:], posture[cut:])]

@@ -13,7 +13,6 @@ from kerfpath.errors import NoFeasiblePath
 from kerfpath.graph import LayeredGraph
 from kerfpath.job.format import Candidate, CutRequest, Job
 from kerfpath.job.run._remedy import Remedy
-from kerfpath.losses import Loss
 from kerfpath.planner import ClearanceMap, FastestSpeed
 from kerfpath.plans import Plan
 from kerfpath.sequence import PartPlan
@@ -111,10 +110,7 @@ class CutResult:
     @property
     def remedy(self) -> str:
         """What would open the way, in words; empty where nothing is known to."""
-        said = [] if self.advice is None else [str(self.advice)]
-        if self.broken is not None and self.broken.lost_by(Loss.NO_ROOM):
-            said.append("lower retract_mm in [program], or move the part")
-        return "; ".join(said)
+        return "" if self.advice is None else str(self.advice)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
