@@ -94,7 +94,7 @@ def test_a_job_in_a_cell_is_planned_audited_and_says_so(planned, folder):
     assert "Collisions are checked along the contours, among 15 bodies" in planned["notes"][0]
     plan = json.loads((folder / "small-plan" / "plan.json").read_text())
     assert "clear in the cell" in plan["contours"][0]["proof"]
-    assert len(plan["cell"]["bodies"]) == 14
+    assert len(plan["cell"]["bodies"]) == 15
     asked = {tuple(p["between"]): p["at_least"] for p in plan["cell"]["near_miss_m"]}
     assert asked["post", "head"] == 0.02
     assert asked["part", "nozzle"] == 0.0005
