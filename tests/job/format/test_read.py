@@ -105,6 +105,8 @@ def test_the_margin_of_the_limits_and_the_retract_are_as_the_job_says(read):
     assert read(changed("[program]", own.format(2))).options.comfort.limits.margin == np.radians(2)
     assert read(changed("[program]", own.format(0))).options.comfort is None
     assert read(changed("[program]", own.format(0))).options.retract == 0.02
+    # Without a program and without moves between contours nothing backs off.
+    assert read(changed('language = "rapid"', 'language = "none"')).options.retract is None
 
 
 def test_the_floor_is_where_the_job_says(read):

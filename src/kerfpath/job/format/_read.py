@@ -208,10 +208,11 @@ def read_job(path: str | Path) -> Job:
             "in [robot]",
         )
     try:
+        moves = file.program.language != "none" or file.sequence is not None
         options = file.plan.resolve(
             robot,
             _comfort(file, robot),
-            retract=file.program.retract_mm / 1000,
+            retract=file.program.retract_mm / 1000 if moves else None,
             floor=file.robot.height_of_floor(),
         )
     except OptionConflict as conflict:
