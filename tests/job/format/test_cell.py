@@ -143,7 +143,7 @@ def test_the_audit_checks_the_cell_again_with_the_job_and_says_so_without(planne
 
 
 def test_a_blocked_contour_says_that_it_is_collision(folder):
-    blocked = with_keys("[cell]", "part = false").replace("spacing_mm = 1", "spacing_mm = 4")
+    blocked = with_keys("[cell]", "part = false").replace("spacing_mm = 1", "spacing_mm = 2")
     blocked = blocked.replace("xyz_mm = [1390, -210, 600]", "xyz_mm = [1225, -130, 700]")
     result = run("plan", job(folder, blocked, "b.toml"), "--json", cwd=folder)
     assert result.returncode == 1
