@@ -91,8 +91,8 @@ class Task:
             options=self.options,
         )
 
-    def planned(self, graph: LayeredGraph) -> Plan | None:
-        """Return the plan on its graph, not certified; None where none is found."""
+    def planned(self, graph: LayeredGraph | None = None) -> Plan | None:
+        """Return the plan, not certified, on its graph if given; None where none is found."""
         with suppress(NoFeasiblePath):
             return plan(
                 self.contour,

@@ -87,7 +87,7 @@ def _measure(nodes: int, way: str, turns: bool, stepping: bool) -> _Run:
 
 def _planned(task: Task, way: str, seconds: float | None) -> tuple[float, str]:
     task = task.on_grid() if way == "grid" else task
-    found = task.made().plan
+    found = task.planned()
     if found is None:
         return np.inf, "no plan"
     if way != "certified":

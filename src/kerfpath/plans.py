@@ -195,7 +195,8 @@ class Plan:
     feed : Feed or None
         Where the speed dips; None at constant speed.
     counts : mapping of str to int
-        Candidates (node, tilt, gamma, posture) of the layered graph by what became of them.
+        Candidates (node, tilt, gamma, posture) of the layered graph that was searched by what
+        became of them; of very many nodes that may be some.
     """
 
     contour: Contour

@@ -4,9 +4,11 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from benchmarks import _arm
 from benchmarks._random_contours import cut
 
 from kerfpath import PlanOptions, plan
+from kerfpath.certifier import _certify as course
 from kerfpath.certifier import certify
 from kerfpath.certifier._cells import CellSet
 from kerfpath.certifier._finer import cells_to_divide
@@ -69,3 +71,22 @@ def test_motions_past_a_wrist_singularity_are_bounded_closely(checkable):
     found = certify(made, gap=0.02, checkable=checkable)
     assert found.done
     assert found.plan.proof.gap <= 0.02
+
+
+def test_joints_that_may_be_anywhere_do_not_make_coarse_cells_worthless(monkeypatch):
+    """Motions past the singularity on every turn: what the widest cells prove, all alike.
+
+    Where potentials slope with a joint that may be anywhere it is -3 times the cost.
+    """
+    first, solve = [], course.solve_stage
+    monkeypatch.setattr(
+        course, "solve_stage", lambda *of, **how: first.append(solve(*of, **how)) or first[-1]
+    )
+    arm = _arm.arm()
+    arm = arm.with_limits(acceleration=3 * arm.speed_limits()[1], endless=np.zeros(6, bool))
+    space = {"tool": _arm.tool(), "placement": _arm.placement(), "speed": 1 / 6}
+    made = plan(_arm.wave(100), arm, certify=None, **space)
+    certify(made, gap=0.9, checkable=False)
+    assert len(first) == 1
+    assert (first[0].cells.spread > 1).any()
+    assert 0.9 * made.cost < first[0].bound <= made.cost

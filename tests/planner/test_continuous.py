@@ -117,6 +117,51 @@ def test_every_few_nodes_are_those_of_the_whole(circle, arm, tool, placement, mo
     assert thin.lifted(replace(some, posture=np.arange(25) % 2)) is None
 
 
+def solved(circle, arm, tool, placement, **options):
+    """Return the plan, or what there is none for, and of how many nodes poses were solved."""
+    nodes = []
+    options = {"gamma_step": STEP, "postures": (0, 1), "speed": 0.1, "certify": None} | options
+    try:
+        made = plan(circle, arm, tool=tool, placement=placement, progress=nodes.append, **options)
+    except NoFeasiblePath as broken:
+        made = broken
+    return made, sum(nodes)
+
+
+def test_poses_of_very_many_nodes_are_solved_only_where_those_of_a_few_do_not_do(
+    circle, arm, tool, placement, monkeypatch
+):
+    space = circle, arm, tool, placement
+    whole, nodes = solved(*space)
+    assert nodes == len(circle) == 121
+    monkeypatch.setattr(_thinned, "MANY", 100)
+    made, nodes = solved(*space)
+    assert nodes == 25
+    assert sum(made.counts.values()) * 121 == sum(whole.counts.values()) * 25
+    monkeypatch.setattr(_thinned.ThinTask, "lifted", lambda *of: None)
+    again, nodes = solved(*space)
+    assert nodes == 25 + 121
+    np.testing.assert_array_equal(again.q, whole.q)
+    assert again.counts == whole.counts
+
+
+def test_a_node_without_a_pose_is_named_among_very_many(circle, arm, tool, placement, monkeypatch):
+    """Node 60 is one of the few that are looked at first, node 62 is not."""
+    space, broken = (arm, tool, placement), []
+    for node in (60, 62):
+        points = circle.points.copy()
+        points[node] += (0, 0, 30)
+        far = replace(circle, points=points)
+        broken.append(solved(far, *space)[0])
+        monkeypatch.setattr(_thinned, "MANY", 100)
+        broken.append(solved(far, *space)[0])
+        monkeypatch.undo()
+    for plain, thinned in (broken[:2], broken[2:]):
+        assert isinstance(plain, NoFeasiblePath)
+        assert str(thinned) == str(plain)
+        assert thinned.node == plain.node
+
+
 @pytest.mark.parametrize(("intervals", "every"), [(104, 4), (105, 5), (111, 3), (103, 5)])
 def test_a_motion_along_some_nodes_is_one_along_all(
     circle, arm, tool, placement, monkeypatch, intervals, every

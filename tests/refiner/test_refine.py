@@ -284,6 +284,17 @@ def test_the_manhattan_program_is_a_linear_program():
         assert _distances(model, found).sum() == pytest.approx(best.fun, abs=1e-6)
 
 
+def test_a_motion_that_costs_hardly_more_than_any_can_is_left_as_it_is(planned):
+    grid = planned()
+    best = refine(grid).plan
+    for least, left in ((best.cost * (1 - 1e-5), True), (best.cost * (1 - 1e-3), False)):
+        again = refine(best, least=least)
+        assert again.done
+        assert (again.programs == 0) == left
+        assert again.cost_after <= best.cost
+    assert refine(grid, least=best.cost).cost_after == best.cost
+
+
 def test_a_cap_holds_every_distance():
     rng = np.random.default_rng(7)
     for metric in METRICS:

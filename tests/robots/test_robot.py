@@ -72,6 +72,24 @@ def test_the_library_has_all_robots_with_sources():
         assert r.acceleration_ratio in acceleration_ratios()
 
 
+@pytest.mark.parametrize("name", IDS)
+def test_a_wrist_turned_over_brings_the_flange_to_the_same_pose(name):
+    """All joints but one by a constant, that one mirrored, from one posture to its neighbour."""
+    r = robot(name)
+    if r.flip is None:
+        assert r.kinematics != "opw"
+        return
+    joint, middle = r.flip
+    q = random_joints(np.random.default_rng(5), 50)
+    found = r.inverse(r.forward(q), within_limits=False)
+    one, other = (found.q[found.posture % 2 == over] for over in (0, 1))
+    assert len(one) == len(other) >= 50
+    image = one + np.pi * np.isin(np.arange(6), (joint - 1, joint + 1))
+    image[:, joint] = 2 * middle - one[:, joint]
+    # Rounding, which the inverse enlarges beside singularities.
+    np.testing.assert_allclose(np.sin((image - other) / 2), 0.0, atol=1e-9)
+
+
 @pytest.mark.equation(3)
 @pytest.mark.parametrize("name", IDS)
 def test_forward_kinematics_agree_with_pinocchio(name):

@@ -76,6 +76,15 @@ class CellSet:
         """About where the joints are, (C, n), in parts of half a turn."""
         return np.rint(self.center * (LIFTS / np.pi)).astype(np.int8)
 
+    def flipped(self, joint: int, middle: float) -> CellSet:
+        """Return the cells with the wrist turned over, see `Robot.flip`, but for constant turns."""
+        center, slope, bend = self.center.copy(), self.slope.copy(), self.bend.copy()
+        center[:, joint] = 2 * middle - center[:, joint]
+        slope[:, joint] *= -1
+        bend[:, joint] *= -1
+        posture = self.posture ^ 1
+        return replace(self, posture=posture, center=center, slope=slope, bend=bend)
+
     def take(self, which: Bools | Ints | slice) -> CellSet:
         """Return some of the cells."""
         return CellSet(**{f.name: getattr(self, f.name)[which] for f in fields(self)})
@@ -101,6 +110,12 @@ class CellMaker:
         The postures that may be used; default all.
     width : float
         How much wider the curvature is taken than it is proved to be.
+
+    Attributes
+    ----------
+    endless : (n,) bool
+    flip : tuple, optional
+        As `Robot.flip`.
     """
 
     def __init__(
@@ -122,6 +137,7 @@ class CellMaker:
         )
         used = range(robot.postures) if postures is None else sorted(postures)
         self._postures, self._width = np.array(used, np.int8), width
+        self.endless, self.flip = robot.endless, robot.flip
 
     def coarsest(self, nodes: Ints) -> CellSet:
         """Return the cells of level 0 at some nodes: postures and turns that ranges admit."""

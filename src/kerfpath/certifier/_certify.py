@@ -13,6 +13,7 @@ from kerfpath._repr import short_repr
 from kerfpath.certificate import ALLOWANCE, Certificate, Stage
 from kerfpath.certifier._cells import CellMaker, CellSet
 from kerfpath.certifier._finer import cells_to_divide
+from kerfpath.certifier._groups import distinct_groups
 from kerfpath.certifier._nodes import between, turning_nodes
 from kerfpath.certifier._parts import DEAREST, NARROW, Parts
 from kerfpath.certifier._prices import limit_prices
@@ -182,6 +183,7 @@ class _Course:
         longest = max(1, int(LONGEST / self.steps.velocity.max()))
         self.nodes = turning_nodes(plan, TURNED, longest)
         self.best, self.pairs, self.count = 0.0, 0, 0
+        self.at_node = 0.0  # cells of level 0
         self.stages: list[Stage] = []
         self.plan, self.checkable = plan, checkable
         self.proved = 0.0  # by the stages that are kept
@@ -190,18 +192,21 @@ class _Course:
     def run(self) -> None:
         """Go from stage to stage until the gap is reached or it is enough."""
         cells = self.maker.coarsest(self.nodes)
+        self.at_node = len(cells) / len(self.nodes)
         fresh = True  # cells that the certificate has to show
         while True:
             result = solve_stage(cells, self.steps, care=CARE * self.cost)
             gained, cells = self._take(result), result.cells
             clearly = self.margin * np.exp2(2.0 * (USUAL_LEVEL - cells.level))
             live = result.through <= self.cost * (1 + clearly)
+            if not self.checkable:
+                live = np.logical_or.reduce(distinct_groups(result, live, self.maker))
             low = result.through < self.target
             which, singular = cells_to_divide(cells, result.through, self.target, self.steps.weight)
             which &= cells.level < DEEPEST
             fine = not singular and low.any() and np.median(cells.level[low]) >= FINE
             slow = bool(fine) and gained < STALLED
-            if fine and self._late(slow) and self._priced:
+            if fine and self._late(slow) and self._fits(self.last + 1) and self._priced:
                 self._divide(cells.take(live))
                 return
             if not low.any() or self._enough(result, float(live.mean() + which.mean())):
@@ -215,8 +220,9 @@ class _Course:
                     self.loose = len(self.stages), result
                 kept = np.ones(len(live), np.bool_)
             which &= kept
-            if len(self.nodes) <= self.last and (slow or not which.any()):
-                self.nodes, fresh = between(self.nodes), True
+            more = between(self.nodes)
+            if (slow or not which.any()) and len(more) > len(self.nodes) and self._fits(len(more)):
+                self.nodes, fresh = more, True
                 cells = self._with_nodes(cells.take(kept))
             elif not which.any():
                 self._finish(result)
@@ -240,6 +246,8 @@ class _Course:
 
     def _prices(self, gamma: Array, posture: int, reach: float, most: float) -> Array | None:
         """Return multipliers of (6) about the motion with gamma (K,) in a posture."""
+        if self._spent(self.pairs):
+            return None
         motion = self.maker.motion(gamma, posture)
         if motion is None:
             return None
@@ -306,6 +314,10 @@ class _Course:
             return True
         return self._spent(self.pairs + result.pairs * left**2)
 
+    def _fits(self, nodes: int) -> bool:
+        """Return whether coarse cells at so many nodes are few enough."""
+        return nodes * self.at_node <= MOST_CELLS
+
     def _spent(self, pairs: float) -> bool:
         """Return whether so many steps, or the time, are all that may go into it."""
         if self.until < np.inf:
@@ -322,6 +334,6 @@ class _Course:
         while True:
             passed = linked(CellSet.join([cells, new]), self.steps)[len(cells) :]
             coarse = passed & (new.level < level)
-            if not coarse.any():
+            if not coarse.any() or len(new) > MOST_CELLS or self._spent(self.pairs):
                 return CellSet.join([cells, new])
             new = self.maker.divided(new, coarse)

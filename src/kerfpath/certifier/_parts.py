@@ -17,14 +17,13 @@ from heapq import heappop, heappush
 from itertools import count
 
 import numpy as np
-from scipy import sparse
-from scipy.sparse.csgraph import connected_components
 
-from kerfpath._arrays import Array, Bools
+from kerfpath._arrays import Array
 from kerfpath._repr import short_repr
 from kerfpath.certificate import cell_bounds
 from kerfpath.certifier._cells import CellMaker, CellSet
 from kerfpath.certifier._finer import cells_to_divide
+from kerfpath.certifier._groups import distinct_groups
 from kerfpath.certifier._stage import StageResult, Steps, solve_stage
 
 __all__ = ["DEAREST", "NARROW", "Parts"]
@@ -124,7 +123,7 @@ class Parts:
             return
         cells = replace(result.cells, floor=through)
         layers = len(np.unique(cells.node))
-        for one in _joined(result, kept):
+        for one in distinct_groups(result, kept, self._maker):
             rest = cells.take(one)
             if len(np.unique(rest.node)) < layers:
                 continue  # no motion all the way along
@@ -203,13 +202,3 @@ class Parts:
         middle = (q[inside].min() + q[inside].max()) / 2
         sides = (~inside | (q <= middle), ~inside | (q > middle))
         return [replace(part, cells=cells.take(side), stalled=0) for side in sides]
-
-
-def _joined(result: StageResult, kept: Bools) -> list[Bools]:
-    """Return the cells that are kept in groups that no step joins, (C,) each."""
-    cell = np.repeat(np.arange(len(kept)), np.diff(result.begin))
-    both = kept[cell] & kept[result.to]
-    size = (len(kept),) * 2
-    steps = sparse.csr_array((np.ones(both.sum()), (cell[both], result.to[both])), shape=size)
-    group = connected_components(steps, directed=False)[1]
-    return [kept & (group == one) for one in np.unique(group[kept])]

@@ -25,7 +25,7 @@ from kerfpath.kernels.reduced import (
     tangent,
     window,
 )
-from kerfpath.kernels.slopes import guess_slopes
+from kerfpath.kernels.slopes import flatten, guess_slopes
 
 __all__ = ["close_cut", "cross_cells", "lay_potential", "link_cells", "reach_cells"]
 
@@ -251,6 +251,8 @@ def lay_potential(
         for m in range(2):
             t = (2 * m - 1) * cells.half[a]
             best = guess_slopes(cells, potential, step, a, t, ahead, D, here, floor, y)
+            if m == 1:
+                flatten(cells, a, y)
             level = -np.inf
             for attempt in range(2):
                 if attempt == 1 and level < flat:

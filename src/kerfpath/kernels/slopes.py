@@ -12,7 +12,7 @@ from kerfpath.kernels._jit import jit_inline
 from kerfpath.kernels.metric import MANHATTAN, extend, finish
 from kerfpath.kernels.reduced import Cells, Potential, Step, tangent
 
-__all__ = ["guess_slopes"]
+__all__ = ["flatten", "guess_slopes"]
 
 PENALTY = 10.0
 """Price of an increment beyond (5), in weights: a guess looks for the way back."""
@@ -20,6 +20,9 @@ STILL = 1e-10
 """rad: a joint that moves less stands still."""
 HALVINGS = 30
 """Steps of the search along a cell for metrics that are not linear."""
+UNSURE = 0.03
+"""rad: a joint known no better on a cell makes a slope worth less than it costs wherever what leads
+to the cell was not laid with the same one."""
 
 
 @jit_inline
@@ -162,3 +165,15 @@ def guess_slopes(
         here[i] = D[to, i] - (cells.slope[a, i] + cells.bend[a, i] * t / 2.0) * t
     _balance(here, cells, potential, step, ahead[to], at, out_y)
     return to
+
+
+@jit_inline
+def flatten(cells: Cells, a: int, out_y: Array) -> None:
+    """Take the slopes (n,) of joints out that are hardly known on cell a.
+
+    Beside a singularity a joint may be almost anywhere on a cell, and a cut that slopes with it
+    lies far below its level somewhere: steps that cannot follow the slope look cheap by as much.
+    """
+    for i in range(len(out_y)):
+        if cells.spread[a, i] > UNSURE:
+            out_y[i] = 0.0

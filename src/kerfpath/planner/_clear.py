@@ -38,11 +38,12 @@ class ClearSearch:
     """How the searches of a task run: as they are or, in a cell, for what is clear in it."""
 
     def __init__(self, task: PlanningTask, cell: Cell | None) -> None:
-        self._cell, self._graph = cell, task.graph
+        self._cell = cell
         self._but = f" ({UNPROVED})" if cell is not None and cell.unproved else ""
         if cell is None:
             return
         _require_same_cell(task, cell)
+        self._graph = task.graph
         asked = task.settings.comfort
         band = Band() if asked is None or asked.clearance is None else asked.clearance
         self._checker = CollisionChecker(

@@ -70,13 +70,19 @@ def clear_motion(
     """Return the best motion found that is clear; None where none is.
 
     The values tell whether a wider search may find a better one; of very many nodes, the motion
-    along some of them does.
+    along some of them does, and the graph of all is built only where that is not enough.
+
+    Raises
+    ------
+    NoFeasiblePath
+        A node has no pose.
     """
     starts = _Starts(task, finder)
     made, least = _from_fewer_nodes(task, finder)
-    starts.start_from(made)
+    starts.start_from(made, least)
     if starts.best is not None and not starts.above(least, ENOUGH):
         return starts.best
+    task = task.whole()
     searched = clear_paths(task, finder, QUICK if starts.best is None else ())
     if searched is None:
         return starts.best
@@ -124,11 +130,11 @@ class _Starts:
         """Return whether the best motion costs more than a value by more than a share of it."""
         return self.best is None or self.best.cost_after > (1 + share) * value
 
-    def start_from(self, made: Plan | None) -> None:
-        """Refine a motion, if there is one, that is close to the best."""
+    def start_from(self, made: Plan | None, least: float) -> None:
+        """Refine a motion, if there is one, that is close to the best, which costs at least so."""
         if made is not None:
             self._tried.append(made)
-            found = refiner.refine(made, first=FIRST_STEP)
+            found = refiner.refine(made, first=FIRST_STEP, least=least)
             self.best = found if found.done and self._finder.is_clear(found.plan) else None
 
     def refine(self, paths: list[ContinuousPath], *, unpromising: bool = False) -> None:

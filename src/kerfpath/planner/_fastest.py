@@ -125,7 +125,7 @@ def fastest_speed(
         speed=1.0,
         graph=graph,
         progress=progress,
-    )
+    ).whole()
     found, nodes = _fastest(task, ClearSearch(task, cell), enough)
     if not ceiling:
         return found

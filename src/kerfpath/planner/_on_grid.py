@@ -31,8 +31,10 @@ def plan_on_grid(
     Raises
     ------
     NoFeasiblePath
-        There is none, slower or off the grid neither where that is asked for.
+        There is none, slower or off the grid neither where that is asked for; or a node has no
+        pose.
     """
+    task = task.whole()
     begin("search")
     try:
         path = finder.find(find_shortest, task.problem)

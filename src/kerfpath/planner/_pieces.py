@@ -89,7 +89,7 @@ def plan_in_pieces(
         speed=speed,
         graph=graph,
         progress=progress,
-    )
+    ).whole()
     finder = ClearSearch(task, cell)
     begin = phase or (lambda what: None)
     begin("search for pieces")

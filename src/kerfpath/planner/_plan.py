@@ -91,7 +91,8 @@ def plan(
     graph : LayeredGraph, optional
         The layered graph of this very task, kept from `layered_graph`.
     progress : callable, optional
-        Called with the number of nodes whose poses have been solved since the last call.
+        Called with the number of nodes whose poses have been solved since the last call. Of very
+        many nodes every few are solved first, and all only where these do not lead to a plan.
     phase : callable, optional
         Called with what begins once the poses are solved: "search", "refinement", "certificate".
 

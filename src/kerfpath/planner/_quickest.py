@@ -116,11 +116,11 @@ def _without_aim(task: PlanningTask) -> PlanningTask:
     problem = replace(
         task.problem.free(), metric="manhattan", objective="sum", weights=settings.weights
     )
-    return replace(task, settings=settings, problem=problem)
+    return replace(task.with_problem(problem), settings=settings)
 
 
 def _at(task: PlanningTask, dt: float) -> PlanningTask:
-    return replace(task, problem=replace(task.problem, dt=dt))
+    return task.with_problem(replace(task.problem, dt=dt))
 
 
 def _claim() -> Proof:

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from functools import cached_property, partial
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from kerfpath._arrays import Array, Ints, as_pose, freeze
+from kerfpath._arrays import Array, Bools, Ints, as_pose, freeze
 from kerfpath._repr import short_repr
 from kerfpath.certifier import closed_node
 from kerfpath.contour import Contour
@@ -28,15 +29,47 @@ from kerfpath.robots import Robot
 from kerfpath.search import ContinuousPath, GammaSamples, SearchProblem
 from kerfpath.tilt import Tilt
 
-__all__ = ["PlanningTask", "task_of"]
+__all__ = ["Layered", "PlanningTask", "task_of"]
 
 MOST_EMPTY = 8
 """Nodes without a pose that are looked at for a proof that they have none at any gamma."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Layered:
+    """A layered graph, and what is asked of a path through it.
+
+    Parameters
+    ----------
+    graph : LayeredGraph
+    problem : SearchProblem
+    """
+
+    graph: LayeredGraph
+    problem: SearchProblem
+
+    __repr__ = short_repr
+
+    def at_nodes(self, nodes: Ints) -> Layered:
+        """Return the layers of some nodes (M,), ascending, and the same asked of them."""
+        kept = np.zeros(len(self.graph.start) - 1, np.bool_)
+        kept[nodes] = True
+        return self._of(self.graph.at_nodes(nodes), np.repeat(kept, np.diff(self.graph.start)))
+
+    def part(self, first: int, last: int) -> Layered:
+        """Return the layers of nodes first to last, and the same asked of them."""
+        vertices = slice(self.graph.start[first], self.graph.start[last + 1])
+        return self._of(self.graph.part(first, last), vertices)
+
+    def _of(self, graph: LayeredGraph, vertices: Bools | slice) -> Layered:
+        cost = self.problem.vertex_cost[vertices]
+        problem = replace(self.problem, q=graph.q, start=graph.start, vertex_cost=cost)
+        return Layered(graph=graph, problem=problem)
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)  # no slots: what is built is kept
 class PlanningTask:
-    """One contour for one robot, its settings and its layered graph.
+    """One contour for one robot, its settings and its layered graph, built when it is asked for.
 
     Parameters
     ----------
@@ -45,10 +78,11 @@ class PlanningTask:
     T_flange_tip, T_base_part : (4, 4) m
     settings : PlanOptions
         With the weights that are used.
-    graph : LayeredGraph
-        No layer of it is empty.
-    problem : SearchProblem
-        What is asked of a path through it, at the speed asked for.
+    dt : float s
+        Time from node to node at the speed asked for.
+    layers : callable
+        Builds the layers of some nodes (M,), or of all where it is given None: then no layer is
+        empty, or it raises NoFeasiblePath.
     """
 
     contour: Contour
@@ -56,15 +90,51 @@ class PlanningTask:
     T_flange_tip: Array
     T_base_part: Array
     settings: PlanOptions
-    graph: LayeredGraph
-    problem: SearchProblem
+    dt: float
+    layers: Callable[[Ints | None], Layered]
 
     __repr__ = short_repr
 
+    @cached_property
+    def built(self) -> Layered:
+        """The layers of all nodes; asking for them raises NoFeasiblePath where one is empty."""
+        return self.layers(None)
+
     @property
-    def dt(self) -> float:
-        """Time from node to node at the speed asked for, s."""
-        return self.problem.dt
+    def graph(self) -> LayeredGraph:
+        """The layered graph of all nodes."""
+        return self.built.graph
+
+    @property
+    def problem(self) -> SearchProblem:
+        """What is asked of a path through it, at the speed asked for."""
+        return self.built.problem
+
+    def whole(self) -> PlanningTask:
+        """Return the task with the layers of all nodes built.
+
+        Raises
+        ------
+        NoFeasiblePath
+            A node has no pose.
+        """
+        return self.on(self.built)
+
+    def with_problem(self, problem: SearchProblem) -> PlanningTask:
+        """Return the task with something else asked of paths through the same graph."""
+        return self.on(Layered(graph=self.graph, problem=problem))
+
+    def on(self, layered: Layered) -> PlanningTask:
+        """Return the task on a graph that is built."""
+
+        def layers(nodes: Ints | None) -> Layered:
+            return layered if nodes is None else layered.at_nodes(nodes)
+
+        return replace(self, dt=layered.problem.dt, layers=layers)
+
+    def at_nodes(self, nodes: Ints) -> Layered:
+        """Return the layers of some nodes (M,), ascending; those of all are not built for it."""
+        return self.built.at_nodes(nodes) if "built" in vars(self) else self.layers(nodes)
 
     @property
     def times(self) -> Array:
@@ -139,19 +209,7 @@ class PlanningTask:
     def part(self, first: int, last: int, name: str) -> PlanningTask:
         """Return the task of nodes first to last alone."""
         part = self.contour.part(first, last, self.settings.frames)
-        vertices = slice(self.graph.start[first], self.graph.start[last + 1])
-        graph = self.graph.part(first, last)
-        return replace(
-            self,
-            contour=replace(part, name=name),
-            graph=graph,
-            problem=replace(
-                self.problem,
-                q=graph.q,
-                start=graph.start,
-                vertex_cost=self.problem.vertex_cost[vertices],
-            ),
-        )
+        return replace(self.on(self.built.part(first, last)), contour=replace(part, name=name))
 
 
 def task_of(
@@ -165,52 +223,91 @@ def task_of(
     graph: LayeredGraph | None = None,
     progress: Callable[[int], None] | None = None,
 ) -> PlanningTask:
-    """Return the task that the arguments of `kerfpath.plan` pose; errors as there."""
+    """Return the task that the arguments of `kerfpath.plan` pose; errors as there.
+
+    Nodes without a pose are found once its graph is built.
+    """
     T_flange_tip, T_base_part = as_pose(tool, "tool"), as_pose(placement, "placement")
     dt = node_interval(contour, speed)
     if options.closure == "periodic" and not contour.closed:
         raise InputError(f"closure: contour {contour.name!r} is open and cannot be periodic")
     options = options.resolve(robot, dt)
-    if graph is None:
-        graph = layered_graph(
-            contour,
-            robot,
-            tool=T_flange_tip,
-            placement=T_base_part,
-            options=replace(options, comfort=None, retract=None, floor=None),
-            progress=progress,
-        )
-    _require_fitting(graph, contour, robot, options.tilt)
-    periodic = options.closure == "periodic"
-    graph = within_margins(graph, robot, options, T_flange_tip, periodic=periodic)
-    try:
-        require_no_empty_layer(contour, graph)
-    except NoFeasiblePath as empty:
-        frames = T_base_part @ contour.frames(options.frames)
-        raise _at_any_gamma(empty, graph, robot, frames, T_flange_tip, options) from None
+    if graph is not None:
+        _require_fitting(graph, contour, robot, options.tilt)
+    layers = partial(
+        _layers,
+        contour=contour,
+        robot=robot,
+        options=options,
+        tool=T_flange_tip,
+        placement=T_base_part,
+        dt=dt,
+        graph=graph,
+        progress=progress,
+    )
     return PlanningTask(
         contour=contour,
         robot=robot,
         T_flange_tip=T_flange_tip,
         T_base_part=T_base_part,
         settings=options,
-        graph=graph,
-        problem=SearchProblem(
-            q=graph.q,
-            start=graph.start,
-            dt=dt,
-            limits=options.limits(robot),
-            endless=robot.endless,
-            vertex_cost=_vertex_cost(graph, options, robot, T_flange_tip),
-            weights=options.weights,
-            metric=options.metric,
-            objective=options.objective,
-            closure=options.closure,
-            rotation=options.rotation,
-            method="exact" if options.method == "continuous" else options.method,
-            posture=graph.posture if options.method == "known" else None,
-        ),
+        dt=dt,
+        layers=layers,
     )
+
+
+def _layers(
+    nodes: Ints | None,
+    *,
+    contour: Contour,
+    robot: Robot,
+    options: PlanOptions,
+    tool: Array,
+    placement: Array,
+    dt: float,
+    graph: LayeredGraph | None,
+    progress: Callable[[int], None] | None,
+) -> Layered:
+    """Build the layers of some nodes (M,) of a task, or of all, from its graph if that is given."""
+    if graph is None:
+        graph = layered_graph(
+            contour,
+            robot,
+            tool=tool,
+            placement=placement,
+            options=replace(options, comfort=None, retract=None, floor=None),
+            nodes=nodes,
+            progress=progress,
+        )
+    elif nodes is not None:
+        graph = graph.at_nodes(nodes)
+    # Of some nodes, the first and the last need not be the ends.
+    whole = nodes is None or (nodes[0] == 0 and nodes[-1] == len(contour) - 1)
+    kept = options if whole else replace(options, retract=None)
+    periodic = options.closure == "periodic"
+    graph = within_margins(graph, robot, kept, tool, periodic=periodic)
+    try:
+        if nodes is None:
+            require_no_empty_layer(contour, graph)
+    except NoFeasiblePath as empty:
+        frames = placement @ contour.frames(options.frames)
+        raise _at_any_gamma(empty, graph, robot, frames, tool, options) from None
+    problem = SearchProblem(
+        q=graph.q,
+        start=graph.start,
+        dt=dt,
+        limits=options.limits(robot),
+        endless=robot.endless,
+        vertex_cost=_vertex_cost(graph, options, robot, tool),
+        weights=options.weights,
+        metric=options.metric,
+        objective=options.objective,
+        closure=options.closure,
+        rotation=options.rotation,
+        method="exact" if options.method == "continuous" else options.method,
+        posture=graph.posture if options.method == "known" else None,
+    )
+    return Layered(graph=graph, problem=problem)
 
 
 def _at_any_gamma(

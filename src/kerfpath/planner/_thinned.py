@@ -70,15 +70,16 @@ class ThinTask:
             settings=task.settings,
             cost=made.cost,
             proof=claim,
-            counts=task.graph.counts(),
+            counts=made.counts,
         )
 
 
 def thinned(task: PlanningTask) -> ThinTask | None:
     """Return the task of every few nodes of one with very many; None of one with fewer.
 
-    None, too, where gamma is not all that varies: with a tilt, or an external axis; and with a
-    periodic closure whose intervals do not come out even.
+    None, too, where gamma is not all that varies: with a tilt, or an external axis; with a periodic
+    closure whose intervals do not come out even; and where one of the few nodes has no pose. The
+    graph of all nodes is not built for it.
     """
     last = len(task.contour) - 1
     if last < MANY or task.settings.tilt is not None or task.robot.external is not None:
@@ -88,8 +89,9 @@ def thinned(task: PlanningTask) -> ThinTask | None:
         return None
     every = (even or EVERY)[0]
     nodes = np.arange(0, last + 1, every)
-    whole, graph, kept = task.contour, task.graph.at_nodes(nodes), np.zeros(last + 1, np.bool_)
-    kept[nodes] = True
+    whole, few = task.contour, task.at_nodes(nodes)
+    if (np.diff(few.graph.start) == 0).any():
+        return None
     contour = Contour(
         whole.points[nodes],
         whole.axes[nodes],
@@ -98,13 +100,5 @@ def thinned(task: PlanningTask) -> ThinTask | None:
         x=whole.frames(task.settings.frames)[nodes, :3, 0],
         name=whole.name,
     )
-    vertices = np.repeat(kept, np.diff(task.graph.start))
-    problem = replace(
-        task.problem,
-        q=graph.q,
-        start=graph.start,
-        dt=every * task.problem.dt,
-        vertex_cost=task.problem.vertex_cost[vertices],
-    )
-    thin = replace(task, contour=contour, graph=graph, problem=problem)
-    return ThinTask(task=thin, whole=task, nodes=nodes)
+    few = replace(few, problem=replace(few.problem, dt=every * task.dt))
+    return ThinTask(task=replace(task.on(few), contour=contour), whole=task, nodes=nodes)

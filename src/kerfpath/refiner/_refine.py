@@ -33,6 +33,9 @@ FIRST_STEPS = 2
 """Grid steps that gamma may move by in the first iteration; what is gained sets it from then on."""
 REPAIR = 0.2
 """Share of the cost by which once a limit beyond the limits is taken to make a motion dearer."""
+CLOSE = 3e-5
+"""Share of what motions cost at least by which one may cost more and is left as it is: a third of
+the gain below which a descent ends."""
 SAME_NODE = 1e-6
 """m: a node of a finer contour counts as one of the plan's up to this distance."""
 
@@ -81,6 +84,7 @@ def refine(
     eta_a: float | None = None,
     first: float | None = None,
     within: tuple[Array, Array] | None = None,
+    least: float = 0.0,
 ) -> Refinement:
     """Return the plan with gamma moved off its grid: better, or within limits the grid cannot meet.
 
@@ -102,6 +106,9 @@ def refine(
         default: two steps of the plan's grid.
     within : two of (K,) rad, optional
         Least and largest gamma of each node, on the turn of the plan's.
+    least : float
+        What motions such as this one are known to cost at least: one that comes to hardly more is
+        not refined any further.
 
     Raises
     ------
@@ -131,7 +138,8 @@ def refine(
     begun, before = descent.admitted(start)
     if not begun.admitted:
         return _unrefined(plan, _closest(descent, begun))
-    found, programs = descent.best(begun)
+    close = begun.cost <= (1 + CLOSE) * least
+    found, programs = (begun, 0) if close else descent.best(begun)
     refined = _plan_with_motion(asked, found)
     broken = [] if comfort is None else [*comfort.broken(plan.robot, refined.q, plan.T_flange_tip)]
     if settings.floor is not None and (lowest_joint(plan.robot, refined.q) < settings.floor).any():

@@ -57,6 +57,9 @@ class Family:
         As `kernels.enclosure.enclose_all`, where a family has proven bounds.
     wrist : str
         The length by which its wrist centre is behind the end; "" without `enclose_all`.
+    flips : int, optional
+        The joint that is mirrored about its offset where the wrist is turned over, from posture
+        2 i to 2 i + 1 or back, while all others turn by a constant; None where there is none.
     poses_at_once : int
         Poses solved per piece of work: large against the overhead, small against the memory.
     free_rotation : bool
@@ -76,6 +79,7 @@ class Family:
     follow_all: Callable[..., None] | None = None
     enclose_all: Callable[..., None] | None = None
     wrist: str = ""
+    flips: int | None = None
     poses_at_once: int = 100_000
     free_rotation: bool = True
 
@@ -102,6 +106,7 @@ FAMILIES = {
             inverse_nodes=kinematics.inverse_nodes,
             enclose_all=enclosure.enclose_all,
             wrist="c4",
+            flips=4,
         ),
         Family(
             name="ur",

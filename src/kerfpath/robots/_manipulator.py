@@ -197,6 +197,20 @@ class Manipulator:
         return q, reach
 
     @property
+    def flip(self) -> tuple[int, float] | None:
+        """The joint, 0-based, and the angle, rad, about which turning the wrist over mirrors it.
+
+        The posture changes from 2 i to 2 i + 1 or back, and every other joint by a constant: a
+        motion and the one with the wrist turned over have increments of the same size. None where
+        a wrist is not spherical.
+        """
+        joint = self.family.flips
+        if joint is None:
+            return None
+        arm = self.arm()
+        return joint, float(arm.sign[joint] * arm.offset[joint])
+
+    @property
     def encloses(self) -> bool:
         """Whether `enclose` proves where its joints are: a closed form, no external axis."""
         return self.family.enclose_all is not None and self.external is None
