@@ -24,7 +24,7 @@ CLOCKS = {
     "read STEP": ("kerfpath.cli._plan", "drawing_of"),
     "graph": ("kerfpath.job.format._read", "layered_graph"),
     "search and refinement": ("kerfpath.planner._continuous", "clear_motion"),
-    "audit": ("kerfpath.job.format._read", "checks"),
+    "audit": ("kerfpath.job.format._program", "checks"),
     "report": ("kerfpath.job.output._files", "report_text"),
 }
 PARTS = ("import", *CLOCKS, "other")

@@ -1,6 +1,7 @@
 """The command, run in this process, and what it leaves."""
 
 import io
+import re
 import sys
 from contextlib import redirect_stderr, redirect_stdout
 from typing import NamedTuple
@@ -32,10 +33,13 @@ def run(*arguments, cwd="."):
 
 
 def assert_refused(result, *words):
-    """Assert bad input: exit code 2, one line on stderr, on stdout at most the drawing's line."""
+    """Assert bad input: exit code 2, a line for each fault, at most the drawing on stdout."""
     assert result.returncode == 2, result.stderr
     assert all("(file in" in line for line in result.stdout.splitlines())
-    assert len(result.stderr.strip().splitlines()) == 1, result.stderr
-    assert result.stderr.startswith("kerfpath: error: ")
+    lines = result.stderr.strip().splitlines()
+    assert all(line.startswith("kerfpath: error: ") for line in lines), result.stderr
+    # The first line says how many more there are.
+    more = re.search(r"\(and (\d+) more\)$", lines[0])
+    assert len(lines) == 1 + (int(more[1]) if more else 0), result.stderr
     for word in words:
         assert word in result.stderr

@@ -32,7 +32,7 @@ EVERY = PlanOptions(
 )
 
 
-PIECES = PlanOptions(interruptions="fewest", least_piece=0.02)
+PIECES = PlanOptions(interruptions="fewest", least_piece=0.02, retract=0.05, floor=-0.6)
 
 
 def test_options_come_back_from_their_data():
@@ -45,7 +45,7 @@ def test_options_come_back_from_their_data():
 def test_every_option_is_in_the_data_and_in_the_keywords():
     names = {field.name for field in fields(PlanOptions)}
     assert len(OptionData.__annotations__) == len(names)
-    only_whole = {"refine_parts", "interruptions", "least_piece"}
+    only_whole = {"refine_parts", "interruptions", "least_piece", "retract", "floor"}
     assert set(PlanKeywords.__annotations__) == names - only_whole
 
 
@@ -95,6 +95,8 @@ def test_a_length_of_pieces_needs_pieces():
         ("feed", "slow"),
         ("interruptions", "some"),
         ("least_piece", 0.0),
+        ("retract", 0.0),
+        ("floor", np.nan),
         ("refine_parts", 0),
         ("weights", [[1.0]]),
         ("rotation", [np.nan]),

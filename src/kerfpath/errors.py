@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
@@ -20,6 +20,7 @@ __all__ = [
     "InputError",
     "KerfpathError",
     "NoFeasiblePath",
+    "OptionConflict",
     "Relaxation",
     "about",
 ]
@@ -36,13 +37,53 @@ class InputError(KerfpathError, ValueError):
     """Bad input: one line that says what was expected, what came, where, and what to do.
 
     It stays one line, and one that can be read, whatever of a file is quoted in it.
+
+    Parameters
+    ----------
+    message : str
+    others : sequence of str
+        Lines about further faults that were found with it.
     """
 
-    def __init__(self, message: str) -> None:
+    def __init__(self, message: str, others: Sequence[str] = ()) -> None:
+        self.others = tuple(others)
         line = "".join(c if c.isprintable() else repr(c)[1:-1] for c in message)
         if len(line) > LONGEST:
             line = f"{line[:BEGINNING]} ... {line[BEGINNING + 5 - LONGEST :]}"
         super().__init__(line)
+
+
+class OptionConflict(InputError):
+    """Two options that do not go together.
+
+    Parameters
+    ----------
+    option : str
+        The one that another forbids.
+    expected, got : object
+        Its only value beside the other (a tuple: any of them), None for none; and its value.
+    beside : mapping of str to object
+        The options that forbid it, with their values.
+    """
+
+    def __init__(
+        self, option: str, expected: object, got: object, beside: Mapping[str, object]
+    ) -> None:
+        self.option, self.expected, self.got, self.beside = option, expected, got, beside
+        said = " and ".join(f"{name} {_value(value)}".strip() for name, value in beside.items())
+        super().__init__(
+            f"{option}: expected {_value(expected) or 'none'} with {said}, got "
+            f"{_value(got) or type(got).__name__}; change one"
+        )
+
+
+def _value(value: object) -> str:
+    """Return a value in a message: text in quotes, numbers; nothing for an object."""
+    if isinstance(value, str):
+        return f'"{value}"'
+    if isinstance(value, tuple):
+        return " or ".join(f'"{one}"' for one in value)
+    return f"{value}" if isinstance(value, int | float) and value is not True else ""
 
 
 class CertificateRefused(InputError):

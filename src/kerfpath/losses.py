@@ -35,6 +35,8 @@ class Loss(IntEnum):
     SHUT = 11, "shut edges"
     VELOCITY = 12, "velocity, joint {}"
     ACCELERATION = 13, "acceleration, joint {}"
+    NO_ROOM = 14, "no room to back off by {}"
+    FLOOR = 15, "below the floor"
 
 
 class Reason(str):

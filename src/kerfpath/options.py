@@ -14,7 +14,7 @@ from kerfpath._repr import short_repr
 from kerfpath.certificate import USUAL, Certify, CertifyData
 from kerfpath.comfort import Band, BandData, Comfort
 from kerfpath.contour import FrameKind
-from kerfpath.errors import InputError
+from kerfpath.errors import InputError, OptionConflict
 from kerfpath.limits import Limits
 from kerfpath.robots import Robot
 from kerfpath.search import Closure, Method, Metric, ObjectiveKind, rotation_limits
@@ -85,31 +85,9 @@ class OptionData(TypedDict):
     refine_parts: int
     interruptions: Interruptions
     least_piece_m: float | None
+    retract_m: float | None
+    floor_m: float | None
     certify: CertifyData | None
-
-
-class OptionConflict(InputError):
-    """Two options that do not go together.
-
-    Parameters
-    ----------
-    option : str
-        The one that another forbids.
-    expected, got : object
-        Its only value beside the other (a tuple: any of them), None for none; and its value.
-    beside : mapping of str to object
-        The options that forbid it, with their values.
-    """
-
-    def __init__(
-        self, option: str, expected: object, got: object, beside: Mapping[str, object]
-    ) -> None:
-        self.option, self.expected, self.got, self.beside = option, expected, got, beside
-        said = " and ".join(f"{name} {_value(value)}".strip() for name, value in beside.items())
-        super().__init__(
-            f"{option}: expected {_value(expected) or 'none'} with {said}, got "
-            f"{_value(got) or type(got).__name__}; change one"
-        )
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -153,6 +131,12 @@ class PlanOptions:
         Length that every such piece has at least.
     comfort : Comfort, optional
         Margins that the nodes keep from singularities and limits, and penalties beside them.
+    retract : float m, optional
+        The tool can back off by so much along its axis at both ends, within the joint limits and
+        their margin, where a sample of gamma leaves room for it; the audit says where none does.
+    floor : float m, optional
+        Height in the robot base below which no node has the elbow, the wrist or the flange; None:
+        there is no floor.
     certify : Certify, optional
         How far it is proved how near the plan is to the best motion; None: not at all.
 
@@ -180,6 +164,8 @@ class PlanOptions:
     interruptions: Interruptions = "none"
     least_piece: float | None = None
     comfort: Comfort | None = None
+    retract: float | None = None
+    floor: float | None = None
     certify: Certify | None = USUAL
 
     __repr__ = short_repr
@@ -198,8 +184,11 @@ class PlanOptions:
             cast["weights"] = floats(self.weights, "weights", (None,))
         if self.rotation is not None:
             cast["rotation"] = floats(self.rotation, "rotation", (None,), infinite=True)
-        if self.least_piece is not None:
-            cast["least_piece"] = scalar(self.least_piece, "least_piece", unit="m", above=0.0)
+        for name in ("least_piece", "retract"):
+            if (length := getattr(self, name)) is not None:
+                cast[name] = scalar(length, name, unit="m", above=0.0)
+        if self.floor is not None:
+            cast["floor"] = scalar(self.floor, "floor", unit="m")
         if not (isinstance(self.refine_parts, int) and self.refine_parts >= 1):
             raise InputError(
                 f"refine_parts: expected a whole number >= 1, got {self.refine_parts!r}"
@@ -280,6 +269,8 @@ _NAMES = {
     "gamma_step_rad": "gamma_step",
     "feed_kind": "feed",
     "least_piece_m": "least_piece",
+    "retract_m": "retract",
+    "floor_m": "floor",
 }
 """Options whose key in JSON has another name, by that key."""
 
@@ -379,12 +370,3 @@ def _is(fact: object, value: object) -> bool:
     if isinstance(value, tuple):
         return fact in value
     return fact == value
-
-
-def _value(value: object) -> str:
-    """Return a value in a message: text in quotes, numbers; nothing for an object."""
-    if isinstance(value, str):
-        return f'"{value}"'
-    if isinstance(value, tuple):
-        return " or ".join(f'"{one}"' for one in value)
-    return f"{value}" if isinstance(value, int | float) and value is not True else ""

@@ -11,7 +11,7 @@ from typing import Any, Literal
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from kerfpath._arrays import Array, Ints, as_pose, floats, freeze, integers, scalar
+from kerfpath._arrays import Array, Bools, Ints, as_pose, floats, freeze, integers, scalar
 from kerfpath._repr import short_repr
 from kerfpath.certificate import Certificate
 from kerfpath.comfort import measures
@@ -20,11 +20,11 @@ from kerfpath.errors import InputError
 from kerfpath.kernels import metric
 from kerfpath.limits import rates_of
 from kerfpath.options import PlanOptions
-from kerfpath.robots import Robot
+from kerfpath.robots import Robot, can_back_off
 from kerfpath.search import METRIC_CODES, Metric, ObjectiveKind
 from kerfpath.tilt import tilt_frames
 
-__all__ = ["Criteria", "Feed", "Plan", "Proof", "on_turns", "path_cost"]
+__all__ = ["Criteria", "Feed", "Plan", "Proof", "has_room", "on_turns", "path_cost"]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -361,3 +361,13 @@ def __getattr__(name: str) -> object:
         "kerfpath.plans.Settings is kerfpath.PlanOptions now", DeprecationWarning, stacklevel=2
     )
     return PlanOptions
+
+
+def has_room(options: PlanOptions, robot: Robot, q: Array, posture: Ints, tool: Array) -> Bools:
+    """Return of which joints (B, n) rad of an end the tool can back off as the options ask for.
+
+    The margin of the joint limits is kept where it has backed off to, too.
+    """
+    limits = None if options.comfort is None else options.comfort.limits
+    margin = 0.0 if limits is None else limits.margin
+    return can_back_off(robot, q, posture, tool, options.retract or 0.0, margin)

@@ -31,7 +31,7 @@ def folder(tmp_path_factory):
     text = SMALL.replace('name = "hole 10"', f'name = "{LONG[0]}"')
     assert text != SMALL
     (folder / "job.toml").write_text(text)
-    tight = text.replace("path_tolerance_mm = 0.1", "path_tolerance_mm = 0.001")
+    tight = text.replace("path_tolerance_mm = 0.1", "axis_tolerance_deg = 0.001")
     (folder / "tight.toml").write_text(tight)
     (folder / "coarse.toml").write_text(text.replace("spacing_mm = 1", "spacing_mm = 3"))
     assert run("plan", "job.toml", "--out", "out", cwd=folder).returncode == 0

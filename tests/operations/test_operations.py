@@ -17,6 +17,7 @@ from kerfpath.operations import (
     lead_out,
     loop_corners,
     micro_joints,
+    nearest,
     offset,
     overlap,
     reverse,
@@ -209,15 +210,54 @@ def test_rounded_corners_keep_the_tolerance_and_turn_gently():
     edge = np.minimum(np.minimum(x, 0.1 - x), np.minimum(y, 0.1 - y))
     assert edge.max() <= 0.0005 + 1e-12
     corner = np.linalg.norm(round_.points - [0.1, 0.1, 0], axis=1).min()
-    assert corner == pytest.approx(0.0005, rel=0.02)  # nodes of the arc may miss its middle
-    assert len(round_.feature_ends) == 2
+    assert corner == pytest.approx(0.0005, rel=1e-6)  # the middle of the arc is a node
+    assert len(round_.corners) == 0
     # One that begins in a corner is rounded there, too.
-    assert len(round_corners(start_at(square(), 0.05), 0.0005).feature_ends) == 2
+    assert len(round_corners(start_at(square(), 0.05), 0.0005).corners) == 0
+
+
+def star(draw, bend):
+    """A closed outline of random corners, its ways bent by a share of their length."""
+    angle = np.sort(draw.uniform(0, 2 * np.pi, 7))
+    corners = draw.uniform(0.02, 0.05, 7)[:, None] * np.c_[np.cos(angle), np.sin(angle)]
+    part = np.linspace(0, 1, 60, endpoint=False)[:, None]
+    sides = []
+    for a, b in pairwise([*corners, corners[0]]):
+        across = np.array([a[1] - b[1], b[0] - a[0]])
+        sides.append(a + part * (b - a) + bend * np.sin(np.pi * part) * across)
+    points = np.vstack(sides)
+    return flat(np.c_[points, np.zeros(len(points))], closed=True, name="star")
+
+
+@pytest.mark.parametrize("spacing", [0.0003, 0.001, 0.004])
+@pytest.mark.parametrize("bend", [0.0, 0.1, -0.1])
+def test_the_nodes_of_rounded_corners_leave_the_drawing_by_no_more_than_was_asked_for(
+    spacing, bend
+):
+    draw, tried = np.random.default_rng(round(1e5 * spacing)), 0
+    for _ in range(12):
+        outline = star(draw, bend)
+        tolerance = draw.uniform(0.05e-3, 0.5e-3)
+        try:
+            made = round_corners(outline, tolerance)
+            nodes = made.resample(spacing=spacing)
+        except InputError:  # straight back, or two corners too near to each other for such steps
+            continue
+        tried += 1
+        # Those that turn by less than 20 deg are no corners, and are left to the chords.
+        drawn = outline.points[outline.corners]
+        where, _ = nearest(nodes, drawn)
+        # 1e-9 m: the sides between corners are chords of themselves; rounding.
+        assert np.linalg.norm(where - drawn, axis=1).max() <= tolerance + 1e-9
+        # And the nodes themselves: none is farther from the outline.
+        where, _ = nearest(outline, nodes.points)
+        assert np.linalg.norm(where - nodes.points, axis=1).max() <= tolerance + 1e-9
+    assert tried > 6
 
 
 def test_corners_too_near_share_their_room():
     tight = round_corners(square(0.001), 0.0005)
-    assert len(tight.feature_ends) == 2
+    assert len(tight.corners) == 0
     assert tight.length < 0.004
 
 

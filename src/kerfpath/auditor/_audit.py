@@ -12,6 +12,7 @@ from kerfpath.auditor._collision import collisions
 from kerfpath.auditor._margins import margins
 from kerfpath.auditor._motion import Interpolation, Motion, joint_increments, motion_of
 from kerfpath.auditor._nominal import axes_asked_for, tilt_turns
+from kerfpath.auditor._room import retract_checks
 from kerfpath.auditor._rounding import MOST_ROUNDED, Rounding
 from kerfpath.auditor._table import Check, Issue, Level, Unit
 from kerfpath.cell import Cell
@@ -121,7 +122,8 @@ def checks(
         *_between_nodes(plan, motion, reached, path, path_tolerance, axis_tolerance),
         *_positions(plan, motion, reached, rounding),
         *_rates(plan, reached, rounding),
-        *margins(plan, chain),
+        *margins(plan, chain, rounding),
+        *retract_checks(plan, plan.settings.retract),
         *([] if cell is None else collisions(cell, motion, chain)),
         *bound_checks(plan),
     ]

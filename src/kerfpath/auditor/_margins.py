@@ -12,17 +12,25 @@ import numpy as np
 
 from kerfpath._arrays import Array
 from kerfpath.auditor._chain import JointChain
+from kerfpath.auditor._rounding import Rounding
 from kerfpath.auditor._table import Check, Unit
 from kerfpath.plans import Plan
 
 __all__ = ["margins"]
 
+ELBOW = 2
+"""The joint, from 0, that is the elbow's."""
 SLACK = 1e-8
 """rad, m or m^3: rounding of two kinematics in double precision."""
 
 
-def margins(plan: Plan, chain: JointChain) -> list[Check]:
-    """Return the check of every hard margin that the plan was asked to keep, at its nodes."""
+def margins(plan: Plan, chain: JointChain, rounding: Rounding | None = None) -> list[Check]:
+    """Return the check of every hard margin that the plan was asked to keep, at its nodes.
+
+    Of a plan that was read from a text, an angle may fall short by what its digits leave of the
+    joints: no joint changes it by more than it turns itself.
+    """
+    left = np.zeros(len(plan.q)) if rounding is None else rounding.q.sum(axis=1)
     comfort = plan.settings.comfort
     checks = []
     for name, band in ({} if comfort is None else comfort.bands).items():
@@ -30,18 +38,40 @@ def margins(plan: Plan, chain: JointChain) -> list[Check]:
             continue
         words, unit, measured = _MEASURES[name]
         short = band.margin - measured(plan, chain)
-        node = int(np.argmax(short))
+        slack = SLACK + (left if unit == "rad" else np.zeros(len(left)))
+        node = int(np.argmax(short - slack))
         checks.append(
             Check(
                 code=f"{name}-margin",
                 title=f"shortfall of the {words} margin at the nodes",
                 value=float(short[node]),
-                limit=SLACK,
+                limit=float(slack[node]),
                 unit=unit,
                 node=node,
             )
         )
-    return checks
+    return [*checks, *_above_floor(plan, chain)]
+
+
+def _above_floor(plan: Plan, chain: JointChain) -> list[Check]:
+    """Return the check of the floor that the plan was asked to stay above, if it was."""
+    floor = plan.settings.floor
+    if floor is None:
+        return []
+    heights = [T[:, 2, 3] for T in (*chain.joints(plan.q)[ELBOW:], chain.forward(plan.q))]
+    deep = floor - np.min(heights, axis=0)
+    node = int(np.argmax(deep))
+    return [
+        Check(
+            code="floor",
+            title="depth of elbow, wrist or flange below the floor at the nodes",
+            value=float(deep[node]),
+            limit=SLACK,
+            unit="m",
+            node=node,
+            advice="write floor_mm in [robot] where the floor is lower, or none",
+        )
+    ]
 
 
 def _lines(plan: Plan, chain: JointChain) -> tuple[list[Array], list[Array]]:

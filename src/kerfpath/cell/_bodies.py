@@ -13,7 +13,7 @@ from kerfpath.cell._shapes import Shape
 
 __all__ = ["Body", "Kind"]
 
-Kind = Literal["robot", "head", "part", "fixture"]
+Kind = Literal["robot", "head", "part", "fixture", "floor"]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -28,7 +28,7 @@ class Body:
         In coordinates of the frame, m.
     frame : int
         0 the robot base, where all that stands still is; i the link that joint i moves.
-    kind : {"robot", "head", "part", "fixture"}
+    kind : {"robot", "head", "part", "fixture", "floor"}
     approximate : bool
         The shape stands in for one that is not known, or is the hull around it.
     holds : bool

@@ -25,7 +25,7 @@ from kerfpath.cell._pairs import (
     stand_still,
 )
 from kerfpath.cell._scene import Scene
-from kerfpath.cell._shapes import Shape
+from kerfpath.cell._shapes import Shape, box_between
 from kerfpath.errors import InputError
 from kerfpath.robots import Robot, chain_of
 from kerfpath.urdf import KinematicChain
@@ -33,6 +33,8 @@ from kerfpath.urdf import KinematicChain
 __all__ = ["Cell", "cell_of"]
 
 Pair = tuple[str, str]
+FLOOR_REACH, THICK = 2.0, 0.5
+"""Of the lengths of the arm, how far a floor reaches to each side; m: how thick it is."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -285,7 +287,7 @@ class Cell:
     def _require_room_for_the_base(self) -> None:
         """Raise InputError where a part or fixture overlaps what stands still of the robot."""
         free = {self._pair(pair, "may_touch") for pair in self.may_touch}
-        still = [body for body in self.bodies if body.frame == 0]
+        still = [body for body in self.bodies if body.frame == 0 and body.kind != "floor"]
         pairs = [
             (a, b)
             for a, b in combinations(range(len(still)), 2)
@@ -317,6 +319,7 @@ def cell_of(
     near_miss: float = 0.0,
     near_miss_of: Mapping[Pair, float] | None = None,
     may_touch: Sequence[Pair] | Mapping[Pair, str] = (),
+    floor: float | None = None,
 ) -> Cell:
     """Return the cell of a robot with a cutting head, a part and what else stands around.
 
@@ -340,6 +343,8 @@ def cell_of(
         Default: `link_bodies(robot)`, the robot's description or else capsules.
     near_miss, near_miss_of, may_touch
         As in `Cell`.
+    floor : float m, optional
+        Height in the robot base of a floor, a body of this name; default: there is none.
     """
     chain = chain_of(robot)
     head = CuttingHead() if head is None else head
@@ -358,9 +363,15 @@ def cell_of(
         Body(name=name, shape=shape, frame=0, kind="fixture")
         for name, shape in (fixtures or {}).items()
     )
+    ground: tuple[Body, ...] = ()
+    if floor is not None:
+        reach = FLOOR_REACH * chain.length
+        slab = box_between([-reach, -reach, floor - THICK], [reach, reach, floor])
+        ground = (Body(name="floor", shape=slab, frame=0, kind="floor"),)
+    links = link_bodies(robot) if links is None else links
     return Cell(
         chain=chain,
-        bodies=(*(link_bodies(robot) if links is None else links), *tool_bodies, *parts, *things),
+        bodies=(*links, *tool_bodies, *parts, *things, *ground),
         near_miss=near_miss,
         near_miss_of=own,
         may_touch=may_touch,

@@ -39,7 +39,8 @@ __all__ = [
 Places = tuple[int, int]
 """Two bodies by their places in the cell, the one in the earlier frame first."""
 
-ARM = {"robot", "head"}
+ARM = {"robot", "head", "floor"}
+"""Kinds of which the design says how near they are: an arm stands on its floor, too."""
 JOINTS = 3
 """Bodies with more joints between them are not near each other by design."""
 POSES, FIRST = 128, 32
@@ -212,7 +213,7 @@ def _touching(
     """Return the design of two bodies that touch often: `apart` (POSES,) m is their distance."""
     touching = apart <= TOUCH
     most, always = float(apart.max()), bool(touching.all())
-    if always and {bodies[i].kind for i in pair} == {"robot"}:
+    if always and {bodies[i].kind for i in pair} <= {"robot", "floor"}:
         return DesignClearance(most=most, judged=False)
 
     def freed(depth: float) -> DesignClearance | None:

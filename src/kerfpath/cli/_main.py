@@ -53,7 +53,8 @@ def run() -> None:
         errors.print(f"kerfpath: {escape(str(error))}")
         sys.exit(1)
     except KerfpathError as error:
-        errors.print(f"[bold red]kerfpath: error:[/] {escape(str(error))}")
+        for line in (str(error), *getattr(error, "others", ())):
+            errors.print(f"[bold red]kerfpath: error:[/] {escape(line)}")
         sys.exit(2)
     except BrokenPipeError:
         # The reader of a pipe has gone, as in `kerfpath robots | head`; leave stdout unflushed.
@@ -124,6 +125,8 @@ def plan(
 def check(job: JobArgument, as_json: Json = False) -> None:
     """Read a job without planning it: the bodies and pairs of its cell, and how contours begin.
 
+    Every fault that is known before planning is listed, with its key; the exit code is then 2.
+
     The column clear counts the poses at the first node that keep every near-miss distance; the
     column clearance has the least distance of the best of them, over the pairs that keep
     near_miss_mm.
@@ -132,7 +135,7 @@ def check(job: JobArgument, as_json: Json = False) -> None:
     """
     from kerfpath.cli._check import show_check
     from kerfpath.cli._drawing import drawing_of, show_drawing
-    from kerfpath.job import check_job, read_job
+    from kerfpath.job import check_job, prepare, read_job, require_foreseen
 
     read = read_job(job)
     part = drawing_of(read)
@@ -142,6 +145,7 @@ def check(job: JobArgument, as_json: Json = False) -> None:
     with busy("looking at the cell"):
         checked = check_job(read, part)
     show_check(checked, as_json=as_json)
+    require_foreseen(prepare(read, part))
 
 
 @app.command()

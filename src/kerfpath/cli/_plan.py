@@ -26,10 +26,12 @@ from kerfpath.cli._show import (
 from kerfpath.job import (
     CutResult,
     JobResult,
+    prepare,
     read_job,
     require_folder,
+    require_foreseen,
     require_language,
-    run_job,
+    run_prepared,
     sequence_entry,
     with_map,
     write_result,
@@ -61,9 +63,11 @@ def plan_job(
     part = drawing_of(job)
     if not as_json:
         show_drawing(part)
+    prepared = prepare(job, part)
     compile_kernels()
+    require_foreseen(prepared)
     with progress_bars() as progress:
-        outcome = run_job(job, part, progress=progress)
+        outcome = run_prepared(prepared, progress=progress)
     finish_run(outcome, part, folder, as_json=as_json, strict=strict)
 
 
@@ -95,6 +99,7 @@ def finish_run(
                 "files": [str(f) for f in written.files],
                 "removed": [str(f) for f in written.removed],
                 "notes": list(written.notes),
+                "faults": list(written.faults),
                 **(more or {}),
             }
         )
@@ -112,6 +117,8 @@ def finish_run(
                     out.print(f"[bold]{escape(cut.name)}[/]: {escape(str(check.issue()))}")
         for note in merge_notes(written.notes, [cut.name for cut in outcome.cuts]):
             out.print(f"note: {escape(note)}")
+        for fault in written.faults:
+            out.print(f"[bold red]not to be cut:[/] {escape(fault)}")
         show_files(written.files, written.removed, of="an earlier run")
     if written.stale is not None:
         errors.print(
@@ -216,6 +223,9 @@ def _show_cuts(cuts: Sequence[CutResult]) -> None:
             "*: from the path as cut, which is not the drawn one; that was within "
             f"{max(loop.chord_error for loop in loops) * 1e3:.4f} mm of the CAD curve"
         )
+    rounded = [c.value for cut in cuts for c in cut.checks if c.code == "drawing"]
+    if rounded:
+        out.print(f"rounded corners leave the drawing by up to {max(rounded) * 1e3:.4f} mm")
     if any(each.against == "points of the drawing" for each in found + loops):
         out.print("where the drawing has points, the lines through them stand for the CAD curve")
 

@@ -25,8 +25,9 @@ REPEATED_POINT = 1e-9
 SAME_PLACE = 1e-6
 """m; a path whose ends are nearer returns to its start."""
 
-KINDS = ("cut", "pierce", "lead-in", "micro joint", "overlap", "lead-out", "loop")
+KINDS = ("cut", "pierce", "lead-in", "micro joint", "overlap", "lead-out", "loop", "corner")
 """What a stretch of a contour is; `Contour.kind` holds places in this tuple."""
+CORNER_KIND = KINDS.index("corner")
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -168,9 +169,19 @@ class Contour:
 
     @property
     def feature_ends(self) -> Ints:
-        """Nodes that sampling by `spacing` or `dt` keeps: ends, corners, and where a kind ends."""
-        ends = np.flatnonzero(np.diff(self._stretch_kind())) + 1
-        return np.unique(np.concatenate([[0], self.corners, ends, [len(self) - 1]]))
+        """Nodes that sampling by `spacing` or `dt` keeps: ends, corners, and where a kind ends.
+
+        Of a rounded corner its middle, which is nearest to the corner that was drawn, and not where
+        it begins and ends.
+        """
+        kind = self._stretch_kind()
+        ends = np.flatnonzero(np.diff(kind)) + 1
+        runs = np.concatenate([[0], ends, [len(kind)]])
+        rounded = np.flatnonzero(kind[runs[:-1]] == CORNER_KIND)
+        first, last = runs[rounded], runs[rounded + 1]
+        plain = np.diff(np.where(kind == CORNER_KIND, KINDS.index("cut"), kind))
+        kept = np.concatenate([self.corners, np.flatnonzero(plain) + 1, (first + last) // 2])
+        return np.unique(np.concatenate([[0], kept, [len(self) - 1]]))
 
     def resample(
         self,

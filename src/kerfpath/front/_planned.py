@@ -63,7 +63,7 @@ def plan_run(
     windowed = run.windowed(robot.endless) if run.continuous else []
     if windowed:
         _require_ranges(asked, windowed)
-        arm, graph = _narrowed(robot, graph, run.window, windowed)
+        arm, graph = _narrowed(robot, graph, run.window, windowed, asked)
         cell = cell and replace(cell, endless=arm.endless)
     made = (best_motion if run.continuous else plan)(
         contour, arm, tool=tool, placement=placement, speed=speed, options=asked, cell=cell,
@@ -78,8 +78,9 @@ def plan_run(
 def _require_ranges(options: PlanOptions, windowed: list[int]) -> None:
     """Raise NoFeasiblePath where windows cannot be ranges of joints, as else more would change."""
     why = ""
-    if options.comfort is not None and options.comfort.limits is not None:
-        why = "margins are kept from the limits of joints, which a window would narrow"
+    comfort = options.comfort
+    if comfort is not None and comfort.limits is not None and comfort.limits.cost:
+        why = "the limits of joints cost something near by, which a window would narrow"
     elif options.rotation is not None and np.isfinite(options.rotation[windowed]).any():
         why = "the rotation of a joint with a window is limited"
     if why:
@@ -87,9 +88,14 @@ def _require_ranges(options: PlanOptions, windowed: list[int]) -> None:
 
 
 def _narrowed(
-    robot: Robot, graph: LayeredGraph, window: Array, windowed: list[int]
+    robot: Robot, graph: LayeredGraph, window: Array, windowed: list[int], options: PlanOptions
 ) -> tuple[Robot, LayeredGraph]:
-    """Return the robot whose joints end where their windows do, and the graph on its turns."""
+    """Return the robot whose joints end where their windows do, and the graph on its turns.
+
+    Where a margin is kept from limits, they lie beyond the windows by so much.
+    """
+    band = None if options.comfort is None else options.comfort.limits
+    margin = 0.0 if band is None else band.margin
     limits = robot.joint_limits()
     lower, upper, endless = limits.lower.copy(), limits.upper.copy(), robot.endless.copy()
     q, turn = graph.q.copy(), graph.turn.copy()
@@ -98,9 +104,10 @@ def _narrowed(
         if endless[joint]:
             q[:, joint] = low + (q[:, joint] - low) % (2 * np.pi)
             turn[:, joint] = turns_of(q[:, joint])
-            lower[joint], upper[joint], endless[joint] = low, high, False
+            lower[joint], upper[joint], endless[joint] = low - margin, high + margin, False
         else:
-            lower[joint], upper[joint] = max(lower[joint], low), min(upper[joint], high)
+            lower[joint] = max(lower[joint], low - margin)
+            upper[joint] = min(upper[joint], high + margin)
     arm = robot.with_limits(lower=lower, upper=upper, endless=endless)
     return arm, replace(graph, q=freeze(q), turn=freeze(turn))
 

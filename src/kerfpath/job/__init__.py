@@ -45,7 +45,9 @@ from kerfpath.job.run import JobResult as JobResult
 from kerfpath.job.run import check_job as check_job
 from kerfpath.job.run import fastest_along as fastest_along
 from kerfpath.job.run import fastest_speeds as fastest_speeds
+from kerfpath.job.run import foresee as foresee
 from kerfpath.job.run import is_compiled as is_compiled
+from kerfpath.job.run import require_foreseen as require_foreseen
 from kerfpath.job.run import run_job as run_job
 from kerfpath.job.run import run_prepared as run_prepared
 from kerfpath.job.run import warm_up as warm_up

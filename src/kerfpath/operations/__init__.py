@@ -23,4 +23,6 @@ from kerfpath.operations._surface import IN_SCRAP as IN_SCRAP
 from kerfpath.operations._surface import Ribbon as Ribbon
 from kerfpath.operations._surface import Side as Side
 from kerfpath.operations._surface import Surface as Surface
+from kerfpath.operations._surface import edge as edge
+from kerfpath.operations._surface import nearest as nearest
 from kerfpath.operations._touch import touched_up as touched_up

@@ -18,6 +18,9 @@ __all__ = ["loop_corners", "round_corners", "slow_corners"]
 STRAIGHT_BACK = np.radians(179)
 ARC_STEP = np.radians(5)
 """Turn between the nodes of an arc."""
+SHRUNK, ROUNDING = 8, 1e-9
+"""Times that an arc is made smaller until it keeps to its measure, and by what share it is taken
+smaller than that for rounding."""
 
 Corner = Callable[[int, Array, Array, float], tuple[float, Array] | None]
 """Node, directions before and behind it, room on both sides (m): what to put there, and how far
@@ -27,8 +30,9 @@ before and behind it (m) the contour is left; None to leave the corner as it is.
 def round_corners(contour: Contour, tolerance: float, *, surface: Surface | None = None) -> Contour:
     """Return the contour with an arc in place of each corner that leaves it by `tolerance` (m).
 
-    The arc is smaller where corners are too near to each other for that. A closed contour that
-    begins in a corner begins at its smoothest place afterwards.
+    The arc is smaller where corners are too near to each other for that, and nowhere farther from
+    the corner, on curved ways neither. Its middle is a node, which sampling keeps, as it keeps
+    corners. A closed contour that begins in a corner begins at its smoothest place afterwards.
 
     Parameters
     ----------
@@ -52,7 +56,7 @@ def round_corners(contour: Contour, tolerance: float, *, surface: Surface | None
         reach = min(radius * np.tan(turn / 2), room)
         return reach, _arc(contour.points[k], t0, t1, reach)
 
-    return _replace_corners(contour, arc, KINDS.index("cut"), surface)
+    return _replace_corners(contour, arc, KINDS.index("corner"), surface, tolerance)
 
 
 def loop_corners(
@@ -147,9 +151,12 @@ def _begin_off_corners(contour: Contour) -> Contour:
 
 
 def _replace_corners(
-    contour: Contour, corner: Corner, kind: int, surface: Surface | None
+    contour: Contour, corner: Corner, kind: int, surface: Surface | None, most: float = np.inf
 ) -> Contour:
-    """Return the contour with what `corner` makes of each corner, all of one kind, in its place."""
+    """Return the contour with what `corner` makes of each corner, all of one kind, in its place.
+
+    Its middle is no farther than `most` (m) from the corner.
+    """
     nodes = contour.corners
     if not nodes.size:
         return contour
@@ -165,21 +172,18 @@ def _replace_corners(
                 f"corners of {contour.name!r}: the path turns straight back at "
                 f"{(contour.points[k] * 1e3).round(2).tolist()} mm; cut it as two contours"
             )
-        made = corner(k, t0, t1, 0.99 * min(room[i], room[i + 1]))
+        free = 0.99 * min(room[i], room[i + 1])
+        for _ in range(SHRUNK):
+            made = corner(k, t0, t1, free)
+            if made is None:
+                break
+            reach, points, axes = _laid(contour, k, *made, surface)
+            off = float(np.linalg.norm(points[len(points) // 2] - contour.points[k]))
+            if off <= most:
+                break
+            free = reach * most / off * (1 - ROUNDING)
         if made is None:
             continue
-        reach, points = made
-        ends, axes = contour.at(s[k] + reach * np.array([-1.0, 1.0]))
-        part = np.linspace(0, 1, len(points))[:, None]
-        # On a curved way an arc that is tangent at the corner begins and ends a little beside it.
-        points = _shift_between(ends, points, part)
-        if surface is None:
-            before, after = (np.tile(axis, (len(part), 1)) for axis in axes)
-        else:
-            points, normals = lay_on(surface, points, contour, "corner")
-            points = _shift_between(ends, points, part)  # the cut may lie beside the surface
-            before, after = (lean_axes(normals, normals[e], axes[e]) for e in (0, -1))
-        axes = slerp(before, after, part)
         share = np.full(len(points), np.interp(s[k], s, contour.speed_share))
         kinds = np.full(len(points), kind)
         pieces += [contour.between(here, s[k] - reach)]
@@ -189,6 +193,23 @@ def _replace_corners(
         return contour
     pieces.append(contour.between(here, s[-1]))
     return join(pieces, closed=contour.closed, name=contour.name)
+
+
+def _laid(
+    contour: Contour, k: int, reach: float, points: Array, surface: Surface | None
+) -> tuple[float, Array, Array]:
+    """Return what is put at corner k, m before and behind it: its points and axes, on a surface."""
+    ends, axes = contour.at(contour.s[k] + reach * np.array([-1.0, 1.0]))
+    part = np.linspace(0, 1, len(points))[:, None]
+    # On a curved way an arc that is tangent at the corner begins and ends a little beside it.
+    points = _shift_between(ends, points, part)
+    if surface is None:
+        before, after = (np.tile(axis, (len(part), 1)) for axis in axes)
+    else:
+        points, normals = lay_on(surface, points, contour, "corner")
+        points = _shift_between(ends, points, part)  # the cut may lie beside the surface
+        before, after = (lean_axes(normals, normals[e], axes[e]) for e in (0, -1))
+    return reach, points, slerp(before, after, part)
 
 
 def _shift_between(ends: Array, points: Array, part: Array) -> Array:
@@ -203,6 +224,6 @@ def _arc(corner: Array, t0: Array, t1: Array, reach: float) -> Array:
     radius = reach / np.tan(turn / 2)
     inwards = t1 - (t1 @ t0) * t0
     inwards /= np.linalg.norm(inwards)
-    swept = np.linspace(0, turn, int(np.ceil(turn / ARC_STEP)) + 1)[:, None]
+    swept = np.linspace(0, turn, 2 * int(np.ceil(turn / ARC_STEP / 2)) + 1)[:, None]
     start = corner - reach * t0
     return np.asarray(start + radius * (np.sin(swept) * t0 + (1 - np.cos(swept)) * inwards))

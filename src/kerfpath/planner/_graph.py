@@ -3,18 +3,20 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 from typing import Unpack
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from kerfpath._arrays import Array, as_pose, scalar
-from kerfpath.comfort import Comfort
 from kerfpath.contour import Contour
 from kerfpath.errors import InputError, NoFeasiblePath
 from kerfpath.graph import LayeredGraph, build, gamma_grid
+from kerfpath.losses import Loss, Reason
 from kerfpath.options import GraphKeywords, PlanOptions, with_keywords
-from kerfpath.robots import Robot
+from kerfpath.plans import has_room
+from kerfpath.robots import Robot, lowest_joint
 from kerfpath.search import GammaSamples
 from kerfpath.tilt import tilt_frames
 
@@ -66,21 +68,33 @@ def layered_graph(
         postures=asked.postures,
         progress=progress,
     )
-    if asked.comfort is None:
-        return graph
-    return within_margins(graph, robot, asked.comfort, T_flange_tip)
+    if nodes is not None:
+        asked = replace(asked, retract=None)  # its first and last layer need not be the ends
+    return within_margins(graph, robot, asked, T_flange_tip)
 
 
 def within_margins(
-    graph: LayeredGraph, robot: Robot, comfort: Comfort, tool: Array, *, periodic: bool = False
+    graph: LayeredGraph, robot: Robot, options: PlanOptions, tool: Array, *, periodic: bool = False
 ) -> LayeredGraph:
-    """Return the graph without the vertices nearer than the hard margins, counted by margin.
+    """Return the graph without the vertices that break a hard margin or the floor, counted.
 
-    With a `periodic` closure the first layer and the last are the same but for rounding, and are
-    thinned alike.
+    So are those of both ends that the tool cannot back off from, where it can from others. With a
+    `periodic` closure the first layer and the last are the same but for rounding, and are thinned
+    alike.
     """
-    near = comfort.too_near(robot, graph.q, tool)
+    comfort, retract = options.comfort, options.retract
+    near = {} if comfort is None else comfort.too_near(robot, graph.q, tool)
+    if options.floor is not None:
+        near[Reason(Loss.FLOOR)] = lowest_joint(robot, graph.q) < options.floor
     first, last = slice(0, graph.start[1]), slice(graph.start[-2], graph.start[-1])
+    if retract is not None:
+        broken = np.any([*near.values()], axis=0) if near else np.zeros(len(graph.q), bool)
+        here = near[Reason(Loss.NO_ROOM, f"{retract * 1e3:g} mm")] = np.zeros(len(graph.q), bool)
+        for end in (first, last):
+            at = graph.q[end], graph.posture[end].astype(np.int64)
+            room = has_room(options, robot, *at, tool)
+            # Where no sample has any, a gamma between two may: the motion found is audited.
+            here[end] = ~room & (room & ~broken[end]).any()
     for here in near.values():
         if periodic and len(here[first]) == len(here[last]):
             here[first] |= here[last]

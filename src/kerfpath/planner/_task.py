@@ -275,15 +275,17 @@ def _layers(
             robot,
             tool=tool,
             placement=placement,
-            options=replace(options, comfort=None),
+            options=replace(options, comfort=None, retract=None, floor=None),
             nodes=nodes,
             progress=progress,
         )
     elif nodes is not None:
         graph = graph.at_nodes(nodes)
-    if options.comfort is not None:
-        periodic = options.closure == "periodic"
-        graph = within_margins(graph, robot, options.comfort, tool, periodic=periodic)
+    # Of some nodes, the first and the last need not be the ends.
+    whole = nodes is None or (nodes[0] == 0 and nodes[-1] == len(contour) - 1)
+    kept = options if whole else replace(options, retract=None)
+    periodic = options.closure == "periodic"
+    graph = within_margins(graph, robot, kept, tool, periodic=periodic)
     try:
         if nodes is None:
             require_no_empty_layer(contour, graph)

@@ -24,6 +24,7 @@ from kerfpath.post._languages import Language as Language
 from kerfpath.post._languages import language as language
 from kerfpath.post._languages import languages as languages
 from kerfpath.post._names import identifier as identifier
+from kerfpath.post._outline import issues_before_planning as issues_before_planning
 from kerfpath.post._preflight import preflight as preflight
 from kerfpath.post._program import PARTNERS as PARTNERS
 from kerfpath.post._program import Await as Await

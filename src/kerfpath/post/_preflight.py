@@ -27,7 +27,7 @@ from kerfpath.post._program import (
 )
 from kerfpath.post._settings import LanguageSettings, Rules, handshakes
 
-__all__ = ["preflight"]
+__all__ = ["foresee", "preflight"]
 
 LARGEST_JOINT_STEP = np.pi
 """From half a turn on (rad), "the short way" no longer says which way a joint turns."""
@@ -70,17 +70,9 @@ def preflight(
             f"settings: expected {chosen.settings.__name__} of language {language!r}, got "
             f"{type(settings).__name__}"
         )
-    rules = chosen.rules(settings)
-    issues = list(_check_robot(program, chosen))
-    numbers = [issue for section in program.sections for issue in _check_numbers(section, rules)]
-    outputs = list(_check_outputs(program, chosen, settings))
+    issues = foresee(program, chosen, settings)
     settings = chosen.completed(settings)
-    outputs += _check_ports(program, chosen, settings)
-    issues += numbers + outputs
-    # Speeds and zones are named by their formatted values: only finite ones can be.
-    unnamed = any(issue.level == "error" for issue in outputs)
-    if not numbers and not unnamed and not chosen.refusal(program.robot):
-        issues += _check_names(program, chosen, rules, settings)
+    rules = chosen.rules(settings)
     for section in program.sections:
         issues += _check_laser(section)
         issues += _check_stays(section)
@@ -99,6 +91,22 @@ def preflight(
                 "program",
             )
         )
+    return issues
+
+
+def foresee(program: Program, chosen: Language, settings: LanguageSettings) -> list[ProgramIssue]:
+    """Return what speaks against a program whatever its targets are: names, numbers, outputs."""
+    rules = chosen.rules(settings)
+    issues = list(_check_robot(program, chosen))
+    numbers = [issue for section in program.sections for issue in _check_numbers(section, rules)]
+    outputs = list(_check_outputs(program, chosen, settings))
+    settings = chosen.completed(settings)
+    outputs += _check_ports(program, chosen, settings)
+    issues += numbers + outputs
+    # Speeds and zones are named by their formatted values: only finite ones can be.
+    unnamed = any(issue.level == "error" for issue in outputs)
+    if not numbers and not unnamed and not chosen.refusal(program.robot):
+        issues += _check_names(program, chosen, rules, settings)
     return issues
 
 

@@ -13,10 +13,13 @@ from kerfpath._repr import short_repr
 from kerfpath.contour import Contour
 from kerfpath.errors import InputError
 from kerfpath.kernels.metric import wrap
+from kerfpath.losses import Loss, Reason
 from kerfpath.plans import Plan, Proof, on_turns, path_cost
 from kerfpath.refiner._curves import JointCurves
 from kerfpath.refiner._descent import Descent, MotionState
 from kerfpath.refiner._rates import RateLimits
+from kerfpath.refiner._room import room_at_ends
+from kerfpath.robots import lowest_joint
 from kerfpath.search import rotation_limits
 
 __all__ = ["Binding", "Refinement", "ease", "promise", "quicken", "refine"]
@@ -130,6 +133,7 @@ def refine(
         return _unrefined(plan, "what clearance costs is known on the grid only")
     descent, start = _descent(asked)
     low, high = within or (-np.inf, np.inf)
+    low, high = np.maximum(low, descent.gamma_low), np.minimum(high, descent.gamma_high)
     descent = replace(descent, first=first, gamma_low=low, gamma_high=high)
     begun, before = descent.admitted(start)
     if not begun.admitted:
@@ -137,9 +141,11 @@ def refine(
     close = begun.cost <= (1 + CLOSE) * least
     found, programs = (begun, 0) if close else descent.best(begun)
     refined = _plan_with_motion(asked, found)
-    broken = comfort and comfort.broken(plan.robot, refined.q, plan.T_flange_tip)
+    broken = [] if comfort is None else [*comfort.broken(plan.robot, refined.q, plan.T_flange_tip)]
+    if settings.floor is not None and (lowest_joint(plan.robot, refined.q) < settings.floor).any():
+        broken.append(Reason(Loss.FLOOR))
     if broken:
-        return _unrefined(plan, f"off the grid it would break the {' and the '.join(broken)}")
+        return _unrefined(plan, f"off the grid it would break: {' and '.join(broken)}")
     grid_cost = plan.proof.grid_cost
     if grid_cost is None and start.admitted and plan.settings.method != "continuous":
         grid_cost = plan.cost
@@ -229,6 +235,7 @@ def _unrefined(plan: Plan, why: str) -> Refinement:
 def _descent(plan: Plan) -> tuple[Descent, MotionState]:
     """Return the task of refining a plan, and where it stands."""
     settings, comfort = plan.settings, plan.settings.comfort
+    low, high = room_at_ends(plan)
     descent = Descent(
         curves=JointCurves(plan.robot, plan.frames, plan.T_flange_tip, plan.posture),
         rates=RateLimits(
@@ -245,6 +252,8 @@ def _descent(plan: Plan) -> tuple[Descent, MotionState]:
         objective=settings.objective,
         node_cost=plan.node_cost,
         radius=FIRST_STEPS * settings.gamma_step,
+        gamma_low=low,
+        gamma_high=high,
     )
     return descent, descent.stand(plan.gamma, plan.unwrapped)
 

@@ -44,7 +44,7 @@ def add_cell(
     """
     T_part_base = np.asarray(np.linalg.inv(T_base_part), dtype=np.float64)
     before = len(figure.data)
-    still = [b for b in cell.bodies if b.frame == 0 and b.kind != "part"]
+    still = [b for b in cell.bodies if b.frame == 0 and b.kind not in ("part", "floor")]
     moving = [b for b in cell.bodies if b.frame != 0]
     for body in still:
         _add_body(figure, body.name, body.kind, _triangles(body.shape), T_part_base, shown=True)

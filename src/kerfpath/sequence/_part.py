@@ -31,7 +31,14 @@ from kerfpath.sequence._moves import HOME, PATIENCE, MoveTimes
 from kerfpath.sequence._order import Order, best_order
 from kerfpath.transfer import TransferMove
 
-__all__ = ["PartPlan", "longest_search", "order_candidates", "order_plans", "plan_part"]
+__all__ = [
+    "PartPlan",
+    "longest_search",
+    "near_each_other",
+    "order_candidates",
+    "order_plans",
+    "plan_part",
+]
 
 T = TypeVar("T")
 
@@ -294,7 +301,7 @@ def order_plans(
     places = reachable(every, cell, retract, further)
     if given_order:
         before = [*before, *((i, i + 1) for i in range(len(every) - 1))]
-    warm = _too_warm([c[0].contour for c in every], heat_spacing)
+    warm = near_each_other([c[0].contour for c in every], heat_spacing)
     air: MoveTimes | None = None
     while True:
         plans = [every[i][c] for i, c in places]
@@ -356,7 +363,7 @@ def _settle_order(
     return air.why_no_order(None)
 
 
-def _too_warm(contours: Sequence[Contour], spacing: float) -> Bools:
+def near_each_other(contours: Sequence[Contour], spacing: float) -> Bools:
     """Say which contours (G, G) are nearer to each other than `spacing` (m)."""
     near = np.zeros((len(contours), len(contours)), bool)
     if spacing <= 0:

@@ -200,7 +200,7 @@ def plan_job(*, path: str, digest_then: str) -> PlannedData:
         "cutting_time": None if None in times else sum(t for t in times if t is not None),
         "program": list(texts.program),
         "reason": _reason(outcome, texts),
-        "notes": list(texts.notes),
+        "notes": [*texts.notes, *texts.faults],
         "files": _pack(texts.files),
     }
 

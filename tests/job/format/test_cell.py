@@ -15,7 +15,7 @@ from tests.urdf.test_urdf import described
 from commands import assert_refused, run
 from kerfpath.cad import read as read_drawing
 from kerfpath.cell import Mesh, box, edges_of, thicken
-from kerfpath.comfort import Band, Comfort
+from kerfpath.comfort import Band
 from kerfpath.errors import InputError
 from kerfpath.graph import LayeredGraph
 from kerfpath.job import (
@@ -91,10 +91,10 @@ def planned(folder):
 
 def test_a_job_in_a_cell_is_planned_audited_and_says_so(planned, folder):
     assert planned["passed"]
-    assert "Collisions are checked along the contours, among 14 bodies" in planned["notes"][0]
+    assert "Collisions are checked along the contours, among 15 bodies" in planned["notes"][0]
     plan = json.loads((folder / "small-plan" / "plan.json").read_text())
     assert "clear in the cell" in plan["contours"][0]["proof"]
-    assert len(plan["cell"]["bodies"]) == 14
+    assert len(plan["cell"]["bodies"]) == 15
     asked = {tuple(p["between"]): p["at_least"] for p in plan["cell"]["near_miss_m"]}
     assert asked["post", "head"] == 0.02
     assert asked["part", "nozzle"] == 0.0005
@@ -143,7 +143,7 @@ def test_the_audit_checks_the_cell_again_with_the_job_and_says_so_without(planne
 
 
 def test_a_blocked_contour_says_that_it_is_collision(folder):
-    blocked = with_keys("[cell]", "part = false").replace("spacing_mm = 1", "spacing_mm = 4")
+    blocked = with_keys("[cell]", "part = false").replace("spacing_mm = 1", "spacing_mm = 2")
     blocked = blocked.replace("xyz_mm = [1390, -210, 600]", "xyz_mm = [1225, -130, 700]")
     result = run("plan", job(folder, blocked, "b.toml"), "--json", cwd=folder)
     assert result.returncode == 1
@@ -185,7 +185,7 @@ def test_a_tilted_cut_in_a_cell_stays_out_of_the_band_of_clearance(folder):
     assert "slot: tool axis tilted by up to 4.00 deg" in result.stdout
     (made,) = read_plan_file(folder / "tilted-plan" / "plan.json").plans
     assert made.proof.optimal
-    assert made.settings.comfort == Comfort(clearance=Band(width=0.03, cost=0.5))
+    assert made.settings.comfort.clearance == Band(width=0.03, cost=0.5)
     np.testing.assert_allclose(made.settings.rotation[made.robot.endless], np.radians(10))
     read = read_job(path)
     cell = cell_of_job(read, read_drawing(read.part_file))
@@ -208,7 +208,7 @@ def test_check_shows_bodies_pairs_and_the_start(folder):
     assert "is its unit right?" not in shown.stdout
     told = json.loads(run("check", "small.toml", "--json", cwd=folder).stdout)
     pairs = len(told["cell"]["judged"]) + len(told["cell"]["not_judged"])
-    assert pairs == 14 * 13 // 2  # every pair is one or the other
+    assert pairs == 15 * 14 // 2  # every pair is one or the other, those of the floor, too
     assert all(entry["why"] for entry in told["cell"]["not_judged"])
     assert {"at_least_m", "asked_m", "overlap_by_design_m"} < set(told["cell"]["judged"][0])
     sizes = {body["name"]: body["size_m"] for body in told["cell"]["bodies"]}

@@ -48,6 +48,9 @@ language = "rapid"
 """
 ACCELERATION = "acceleration_deg_s2 = [320, 270, 420, 1300, 1400, 2000]"
 HEAD = 'head = "laser-head-straight"'
+FOR_PROGRAMS = {"comfort": Comfort(limits=Band(margin=0.1 * np.radians(1))), "retract": 0.05}
+FOR_PROGRAMS["floor"] = 0.0
+"""What every job asks for, so that its plans can be run as programs."""
 
 
 @pytest.fixture(scope="session")
@@ -90,15 +93,40 @@ def test_the_example_is_read_into_si(read, folder):
     assert (task.pick, task.name, task.speed, task.spacing) == ("trim", "trim", 0.15, 0.002)
     assert (task.count, task.tolerance, task.axis_tolerance) == (None, None, None)
     step = float(np.radians(1))
-    assert job.options == PlanOptions(gamma_step=step, eta_v=0.95, eta_a=0.9, refine=True)
+    assert job.options == PlanOptions(
+        gamma_step=step, eta_v=0.95, eta_a=0.9, refine=True, **FOR_PROGRAMS
+    )
     assert json.loads(json.dumps(job.source)) == job.source
     assert job.source["contour"][0] == {"pick": "trim", "speed_m_min": 9, "spacing_mm": 2}
+
+
+def test_the_margin_of_the_limits_and_the_retract_are_as_the_job_says(read):
+    own = "[comfort]\nlimits_margin_deg = {}\n[program]\nretract_mm = 20"
+    assert read(changed("[program]", own.format(2))).options.comfort.limits.margin == np.radians(2)
+    assert read(changed("[program]", own.format(0))).options.comfort is None
+    assert read(changed("[program]", own.format(0))).options.retract == 0.02
+    # Without a program and without moves between contours nothing backs off.
+    assert read(changed('language = "rapid"', 'language = "none"')).options.retract is None
+
+
+def test_the_floor_is_where_the_job_says(read):
+    model = 'model = "abb_irb4600_60_205"'
+    assert read(changed(model, f"{model}\nfloor_mm = -600")).options.floor == -0.6
+    assert read(changed(model, f"{model}\nfloor = false")).options.floor is None
+    with pytest.raises(InputError, match=r"job\.toml:4: .*floor_mm only with a floor"):
+        read(changed(model, f"{model}\nfloor = false\nfloor_mm = 3"))
+
+
+def test_a_range_without_room_for_the_margin_is_used_up_to_its_limits(read):
+    held = ACCELERATION + "\nlower_deg = [-180, -90, -180, -400, -0.1, -400]"
+    held += "\nupper_deg = [180, 150, 75, 400, 0.1, 400]"
+    assert read(changed(ACCELERATION, held)).options.comfort is None
 
 
 @pytest.mark.usefixtures("certified_by_default")
 def test_plan_and_program_may_be_left_out(read):
     job = read(JOB[: JOB.index("[plan]")], "9 side-panel.toml")
-    assert job.options == PlanOptions(refine=True)
+    assert job.options == PlanOptions(refine=True, **FOR_PROGRAMS)
     program = job.program
     assert (program.language, program.name) == ("rapid", "job_9_side_panel")
     assert (program.retract, program.zone, program.lead_time) == (0.05, 0.0003, 0.02)
@@ -636,10 +664,11 @@ manipulability_margin_m3 = 0.02
     assert comfort == Comfort(
         wrist=Band(margin=9 * np.radians(1), width=18 * np.radians(1), cost=2),
         shoulder=Band(margin=50 * 1e-3),
-        limits=Band(width=3 * np.radians(1), cost=0.5),
+        limits=Band(margin=0.1 * np.radians(1), width=3 * np.radians(1), cost=0.5),
         manipulability=Band(margin=0.02),
     )
-    assert read(changed("[program]", "[comfort]\n[program]")).options.comfort is None
+    usual = read(changed("[program]", "[comfort]\n[program]")).options.comfort
+    assert usual == FOR_PROGRAMS["comfort"]
 
 
 def test_every_key_says_what_it_expects():

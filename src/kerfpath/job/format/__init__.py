@@ -10,12 +10,13 @@ from kerfpath.job.format._prepared import CutRequest as CutRequest
 from kerfpath.job.format._prepared import PreparedJob as PreparedJob
 from kerfpath.job.format._prepared import divide_nodes as divide_nodes
 from kerfpath.job.format._prepared import prepare as prepare
+from kerfpath.job.format._program import ProgramOptions as ProgramOptions
+from kerfpath.job.format._program import Tolerances as Tolerances
+from kerfpath.job.format._program import program_options as program_options
+from kerfpath.job.format._program import tolerances_of as tolerances_of
 from kerfpath.job.format._read import Job as Job
-from kerfpath.job.format._read import ProgramOptions as ProgramOptions
-from kerfpath.job.format._read import Tolerances as Tolerances
-from kerfpath.job.format._read import program_options as program_options
 from kerfpath.job.format._read import read_job as read_job
-from kerfpath.job.format._read import tolerances_of as tolerances_of
+from kerfpath.job.format._refusals import all_of as all_of
 from kerfpath.job.format._refusals import refusal_at as refusal_at
 from kerfpath.job.format.tables import VARIABLES as VARIABLES
 from kerfpath.job.format.tables import AuditTable as AuditTable

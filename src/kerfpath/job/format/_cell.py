@@ -72,6 +72,7 @@ def cell_of_job(job: Job, part: Part) -> Cell | None:
             fixtures=fixtures,
             links=link_capsules(job.robot) if table.links == "capsules" else None,
             near_miss=table.near_miss_mm / 1000,
+            floor=None if "floor" in fixtures else job.options.floor,
         )
     for i, pair in enumerate(table.pair):
         _require_known(job, bare, pair.between, ("cell", "pair", i, "between"))

@@ -13,6 +13,7 @@ from kerfpath.errors import InputError
 from kerfpath.job.format._operations import shape_contour
 from kerfpath.job.format._values import MOST_NODES
 from kerfpath.job.format.tables import ContourTable
+from kerfpath.job.format.tables._contour import SAMPLINGS
 
 __all__ = ["ContourSpec", "task_of"]
 
@@ -92,6 +93,20 @@ class ContourSpec:
         drawn = self.drawn(part) if drawn is None else drawn
         return shape_contour(self.table, drawn, surface)
 
+    @property
+    def rounded(self) -> float | None:
+        """By how much its corners are rounded, m; None where they are not."""
+        corners = self.table.corners
+        return None if corners is None else _metres(corners.round_mm)
+
+    def unrounded(self, part: Part, drawn: Contour) -> list[Contour]:
+        """Return the same contours with their corners as they were before they were rounded."""
+        corners = self.table.corners
+        assert corners is not None
+        sharp = corners.model_copy(update={"round_mm": None})
+        table = self.table.model_copy(update={"corners": sharp})
+        return replace(self, table=table).candidates(part, drawn)
+
     def evenly_fast(self, part: Part) -> Contour:
         """Return the first of its paths, sampled, without shares of the speed."""
         path = self.candidates(part)[0]
@@ -121,6 +136,19 @@ class ContourSpec:
             tolerance=self.tolerance,
             axis_tolerance=self.axis_tolerance,
         )
+
+    def finer(self, share: float) -> ContourSpec:
+        """Return the task with its nodes nearer to each other by a share below 1."""
+        given = self.table.model_dump(include={"spacing_mm", "time_step_ms", "tolerance_mm"})
+        update = {key: mm * share for key, mm in given.items() if mm is not None}
+        count = None if self.count is None else int(np.ceil((self.count - 1) / share)) + 1
+        table = self.table.model_copy(update={**update, "count": count})
+        return replace(task_of(table), pick=self.pick, name=self.name)
+
+    @property
+    def sampled_by(self) -> str:
+        """The key of its table that says how finely it is sampled."""
+        return next(key for key in SAMPLINGS if getattr(self.table, key) is not None)
 
     def _require_few(self, contour: Contour, spacing: float, key: str) -> None:
         if contour.length / spacing > MOST_NODES:

@@ -8,18 +8,28 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from kerfpath._repr import short_repr
+from kerfpath.auditor import Check
 from kerfpath.cad import Part
 from kerfpath.cell import Cell
 from kerfpath.contour import Contour
+from kerfpath.errors import InputError
 from kerfpath.front import Subproblem
 from kerfpath.job.format._cell import cell_of_job
 from kerfpath.job.format._contour import ContourSpec
 from kerfpath.job.format._read import Job
+from kerfpath.job.format._refusals import all_of, refusal_at
+from kerfpath.operations import edge, nearest
 from kerfpath.options import PlanOptions
 from kerfpath.planner import node_interval
 from kerfpath.sequence import inner_first
 
 __all__ = ["Candidate", "CutRequest", "PreparedJob", "divide_nodes", "prepare"]
+
+
+SAME_PLACE = 1e-6
+"""m: what is off by no more is so by rounding."""
+SHORTER = 0.1
+"""Share of a path by which its nodes may be shorter, as chords are, and are still of all of it."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -34,11 +44,14 @@ class Candidate:
         It, sampled as the job says: points, axes, kinds, speed shares and arc lengths.
     speed : float m/s, optional
         Along the path; None where the nodes carry their own times.
+    unrounded : Contour, optional
+        The path before its corners were rounded, where they are.
     """
 
     path: Contour
     nodes: Contour
     speed: float | None = None
+    unrounded: Contour | None = None
 
     __repr__ = short_repr
 
@@ -85,6 +98,39 @@ class CutRequest:
     def leaves_the_loop(self) -> bool:
         """Whether points or tool axes of the cut are other than those of the loop as drawn."""
         return self.touched_up or self.task.table.moves_the_path
+
+    def drawing_checks(self, candidate: Candidate, nodes: Contour, path: float) -> list[Check]:
+        """Return the check of rounded corners against the drawing, where there are any.
+
+        Parameters
+        ----------
+        candidate : Candidate
+            What is cut.
+        nodes : Contour
+            That sample it: all of it, or nothing is checked.
+        path : float m
+            How far chords between nodes may be off the path anyway.
+        """
+        rounded, sharp = self.task.rounded, candidate.unrounded
+        whole = abs(nodes.length - candidate.path.length) <= SHORTER * candidate.path.length
+        if rounded is None or sharp is None or not whole:
+            return []
+        drawn = edge(sharp).points
+        where, k = nearest(edge(nodes), drawn)
+        off = np.linalg.norm(where - drawn, axis=1)
+        worst = int(np.argmax(off))
+        return [
+            Check(
+                code="drawing",
+                title=f"drawing off the chords of the nodes, its corners rounded by "
+                f"{rounded * 1e3:g} mm",
+                value=float(off[worst]),
+                limit=max(rounded, path) + SAME_PLACE,
+                unit="m",
+                node=int(k[worst]),
+                advice="lower round_mm in [contour.corners], or sample the contour more finely",
+            )
+        ]
 
     def picked(self, run: Subproblem, *, refine: bool) -> CutRequest:
         """Return the request for the first candidate, planned as a run of a Pareto set."""
@@ -146,12 +192,24 @@ def prepare(job: Job, part: Part | None = None) -> PreparedJob:
     Raises
     ------
     InputError
-        The drawing or the cell cannot be read, a loop does not exist, a contour cannot be sampled.
+        The drawing or the cell cannot be read, a loop does not exist, contours cannot be sampled;
+        with a line for each of them.
     """
     part = part or job.read_part()
     tasks = job.tasks(part)  # a misspelt name shall not wait for the cell
-    cell = cell_of_job(job, part)
-    return PreparedJob.of(job, part, cell, [_request(job, task, part) for task in tasks])
+    cell, requests, faults = None, list[CutRequest](), list[InputError]()
+    try:
+        cell = cell_of_job(job, part)
+    except InputError as fault:
+        faults.append(fault)
+    for task in tasks:
+        try:
+            requests.append(_request(job, task, part))
+        except InputError as fault:
+            faults.append(fault)
+    if faults:
+        raise all_of(faults)
+    return PreparedJob.of(job, part, cell, requests)
 
 
 def _request(job: Job, task: ContourSpec, part: Part) -> CutRequest:
@@ -159,7 +217,30 @@ def _request(job: Job, task: ContourSpec, part: Part) -> CutRequest:
     candidates = tuple(
         Candidate.at(task.speed, path, task.sample(path)) for path in task.candidates(part, loop)
     )
+    if task.rounded is not None:
+        candidates = tuple(
+            replace(each, unrounded=sharp)
+            for each, sharp in zip(candidates, task.unrounded(part, loop), strict=True)
+        )
+    _require_above_floor(job, task.name, [each.nodes for each in candidates])
     return CutRequest(task=task, loop=loop, candidates=candidates, options=job.options)
+
+
+def _require_above_floor(job: Job, name: str, nodes: Sequence[Contour]) -> None:
+    """Raise InputError where a contour lies below the floor."""
+    floor = job.options.floor
+    if floor is None:
+        return
+    up, rise = job.placement[2, :3], job.placement[2, 3]
+    lowest = min(float((each.points @ up).min()) for each in nodes) + rise
+    if lowest < floor - SAME_PLACE:
+        raise refusal_at(
+            job.path,
+            ("part", "xyz_mm"),
+            f"contour {name!r} reaches {(floor - lowest) * 1e3:.4g} mm below the floor, which is "
+            f"at z = {floor * 1e3:g} mm of the robot base; write floor_mm in [robot] where the "
+            "floor is lower, or floor = false where there is none",
+        )
 
 
 def divide_nodes(path: Contour, nodes: Contour, parts: int) -> Contour:

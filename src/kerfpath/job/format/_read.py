@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 import tomllib
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -14,129 +14,38 @@ from pydantic import ValidationError
 
 from kerfpath._arrays import Array, Ints
 from kerfpath._repr import short_repr
-from kerfpath.auditor import Check, Rounding, checks
 from kerfpath.cad import Part
-from kerfpath.cell import Cell
+from kerfpath.comfort import Comfort
 from kerfpath.contour import Contour
 from kerfpath.errors import InputError
 from kerfpath.graph import LayeredGraph
 from kerfpath.job.format._contour import ContourSpec, task_of
 from kerfpath.job.format._drawing import Drawing
 from kerfpath.job.format._operations import keys_of_closed_loops
-from kerfpath.job.format._refusals import error_at, refusal, refusal_at
+from kerfpath.job.format._program import (
+    ProgramOptions,
+    Tolerances,
+    program_options,
+    tolerances_of,
+)
+from kerfpath.job.format._refusals import all_of, error_at, refusal, refusal_at
 from kerfpath.job.format.tables import (
-    AuditTable,
+    LIMITS_MARGIN,
     CellTable,
     JobFile,
     LayoutTable,
-    ProgramTable,
     SequenceTable,
 )
 from kerfpath.job.format.tables._plan import said_in_keys
 from kerfpath.options import OptionConflict, PlanOptions
 from kerfpath.planner import layered_graph
-from kerfpath.plans import Plan
-from kerfpath.post import Handshake, LanguageSettings, Program, build_program
 from kerfpath.robots import Robot
-from kerfpath.transfer import TransferMove
 
-__all__ = ["Job", "ProgramOptions", "Tolerances", "program_options", "read_job", "tolerances_of"]
+__all__ = ["Job", "read_job"]
 
 MOST_TEXT = 10_000_000
 """Characters of a job file: many thousand contours."""
 _DOTTED = re.compile(r"(?<![\w\"'-])(?:[\w\"'-]++[ \t]*+\.[ \t]*+){33}")
-_NAME_LENGTH = 32
-"""Characters that a robot controller takes in a name."""
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class ProgramOptions:
-    """What the robot program needs beyond the plan.
-
-    Parameters
-    ----------
-    language : str
-        Robot language, or "none".
-    settings : LanguageSettings or None
-        Those of the language.
-    name, retract, zone, lead_time, pierce_time, approach_speed, air_speed, arc_tolerance, gas_lead,
-    handshakes
-        As in `kerfpath.post.build_program`.
-    """
-
-    language: str
-    name: str
-    retract: float
-    zone: float
-    settings: LanguageSettings | None
-    lead_time: float
-    pierce_time: float
-    approach_speed: float
-    air_speed: float | None
-    arc_tolerance: float | None
-    gas_lead: float | None
-    handshakes: tuple[Handshake, ...] = ()
-
-    __repr__ = short_repr
-
-    def program(self, plans: Sequence[Plan], moves: Sequence[TransferMove] = ()) -> Program:
-        """Return the neutral program that cuts the plans, see `kerfpath.post.build_program`.
-
-        Raises
-        ------
-        InputError
-            As there.
-        """
-        return build_program(
-            plans,
-            moves=moves,
-            name=self.name,
-            retract=self.retract,
-            zone=self.zone,
-            lead_time=self.lead_time,
-            gas_lead=self.gas_lead,
-            pierce_time=self.pierce_time,
-            approach_speed=self.approach_speed,
-            air_speed=self.air_speed,
-            arc_tolerance=self.arc_tolerance,
-            handshakes=self.handshakes,
-        )
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Tolerances:
-    """What the audit allows between the nodes.
-
-    Parameters
-    ----------
-    path : float m
-        Largest distance of the tool tip from the path.
-    axis : float rad
-        Largest angle of the tool axis from the one asked for.
-    """
-
-    path: float
-    axis: float
-
-    __repr__ = short_repr
-
-    def checks(
-        self,
-        plan: Plan,
-        *,
-        reference: Contour | None = None,
-        cell: Cell | None = None,
-        rounding: Rounding | None = None,
-    ) -> list[Check]:
-        """Return the audit's table of a plan within these tolerances, see `auditor.checks`."""
-        return checks(
-            plan,
-            reference=reference,
-            path_tolerance=self.path,
-            axis_tolerance=self.axis,
-            cell=cell,
-            rounding=rounding,
-        )
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -243,12 +152,17 @@ class Job:
             A loop that does not exist, or that is picked twice; an open line with what only a
             closed loop can have.
         """
-        tasks = []
+        tasks, faults = list[ContourSpec](), list[InputError]()
         for number, table in enumerate(self.contours):
-            for task in table.expanded(part):
-                if part.loop(task.pick).kind == "open":
-                    self._require_open(task, number)
-                tasks.append(task)
+            try:
+                for task in table.expanded(part):
+                    if part.loop(task.pick).kind == "open":
+                        self._require_open(task, number)
+                    tasks.append(task)
+            except InputError as fault:
+                faults.append(fault)
+        if faults:
+            raise all_of(faults)
         names = [task.name for task in tasks]
         for name in names:
             if names.count(name) > 1:
@@ -294,7 +208,13 @@ def read_job(path: str | Path) -> Job:
             "in [robot]",
         )
     try:
-        options = file.plan.resolve(robot, file.comfort.resolve())
+        moves = file.program.language != "none" or file.sequence is not None
+        options = file.plan.resolve(
+            robot,
+            _comfort(file, robot),
+            retract=file.program.retract_mm / 1000 if moves else None,
+            floor=file.robot.height_of_floor(),
+        )
     except OptionConflict as conflict:
         raise refusal_at(path, *said_in_keys(conflict, file.plan)) from None
     drawing = file.part.drawing(path.parent)
@@ -313,6 +233,18 @@ def read_job(path: str | Path) -> Job:
         program=program_options(file.program, path.stem),
         source=source,
     )
+
+
+def _comfort(file: JobFile, robot: Robot) -> Comfort | None:
+    """Return what plans keep away from.
+
+    Joints keep off their limits, as the digits of a program and what is straight between two nodes
+    need; not where a range leaves no room for it.
+    """
+    limits = robot.joint_limits()
+    ranges = (limits.upper - limits.lower)[~limits.endless]
+    wide = bool((ranges > np.radians(2 * LIMITS_MARGIN)).all())
+    return file.comfort.resolve({"limits": LIMITS_MARGIN} if wide else None)
 
 
 def _text(path: Path) -> str:
@@ -362,30 +294,3 @@ def _tables(path: Path, text: str) -> dict[str, Any]:
             path, 1, "expected [robot], [tool], [part] and [[contour]], got an empty file; add them"
         )
     return tables
-
-
-def tolerances_of(table: AuditTable) -> Tolerances:
-    """Return what an [audit] table allows."""
-    return Tolerances(
-        path=table.path_tolerance_mm / 1000, axis=float(np.radians(table.axis_tolerance_deg))
-    )
-
-
-def program_options(table: ProgramTable, stem: str) -> ProgramOptions:
-    """Return the options of a [program] table; `stem` names the program where it does not."""
-    stem = re.sub(r"[^A-Za-z0-9_]", "_", stem)
-    stem = stem if stem[:1].isascii() and stem[:1].isalpha() else f"job_{stem}"
-    return ProgramOptions(
-        language=table.language,
-        name=table.name or stem[:_NAME_LENGTH],
-        retract=table.retract_mm / 1000,
-        zone=table.zone_mm / 1000,
-        settings=table.settings(),
-        lead_time=table.lead_time_s,
-        pierce_time=table.pierce_time_s,
-        approach_speed=table.approach_mm_s / 1000,
-        air_speed=table.air_speed,
-        arc_tolerance=None if table.arcs_mm is None else table.arcs_mm / 1000,
-        gas_lead=table.gas_lead_s,
-        handshakes=table.handshakes(),
-    )

@@ -14,14 +14,14 @@ from kerfpath.job.format._lines import TomlPlaces
 from kerfpath.job.format._values import FAULT, LARGEST, SMALLEST, nearest
 from kerfpath.job.format.tables import REPEATED, TABLES
 
-__all__ = ["error_at", "refusal", "refusal_at"]
+__all__ = ["all_of", "error_at", "refusal", "refusal_at"]
 
 _LONGEST = 60
 """Characters of a wrong value that a message shows."""
 
 
 def refusal(path: Path, text: str, error: ValidationError) -> InputError:
-    """Return the first problem in the file, said in one line."""
+    """Return the first problem in the file, said in one line, and the others in lines of theirs."""
     details = error.errors(include_url=False)
     locs, places = [d["loc"] for d in details], TomlPlaces(text)
     problems = []
@@ -35,9 +35,10 @@ def refusal(path: Path, text: str, error: ValidationError) -> InputError:
         order = detail["type"] == "missing", *places.locate(where)
         key = ".".join(part for part in where if isinstance(part, str))
         problems.append((order, f"{key}: {_problem(detail)}"))
-    (_, *position), said = min(problems)
-    more = f" (and {len(problems) - 1} more)" if len(problems) > 1 else ""
-    return error_at(path, position[0], said + more)
+    (order, said), *rest = sorted(problems)
+    more = f" (and {len(rest)} more)" if rest else ""
+    others = [str(error_at(path, place[1], words)) for place, words in rest]
+    return error_at(path, order[1], said + more, others)
 
 
 def refusal_at(path: Path, where: Sequence[str | int], said: str) -> InputError:
@@ -109,6 +110,15 @@ def _shown(value: object) -> str:
     return text if len(text) <= _LONGEST else f"{text[:_LONGEST]}..."
 
 
-def error_at(path: Path, line: int | None, said: str) -> InputError:
-    """Return the error with its place in front."""
-    return InputError(f"{path}: {said}" if line is None else f"{path}:{line}: {said}")
+def error_at(path: Path, line: int | None, said: str, others: Sequence[str] = ()) -> InputError:
+    """Return the error with its place in front; `others` are lines of further ones."""
+    return InputError(f"{path}: {said}" if line is None else f"{path}:{line}: {said}", others)
+
+
+def all_of(found: Sequence[InputError]) -> InputError:
+    """Return several faults of one job as one error: the first, and lines of the others."""
+    first, *rest = found
+    if not rest:
+        return first
+    others = [*first.others, *(line for one in rest for line in (str(one), *one.others))]
+    return InputError(f"{first} (and {len(others)} more)", others)

@@ -63,12 +63,15 @@ class WrittenFiles:
         The same, but edited since or of unknown origin, and so left.
     notes : tuple of str
         Warnings of the program's preflight, and what nobody has checked.
+    faults : tuple of str
+        Why nothing is to be cut though every contour is planned.
     """
 
     files: tuple[Path, ...]
     removed: tuple[Path, ...]
     stale: Path | None
     notes: tuple[str, ...]
+    faults: tuple[str, ...] = ()
 
     __repr__ = short_repr
 
@@ -89,6 +92,8 @@ class FileTexts:
         Whether that is because the program, as its language says it, fails its audit.
     notes : tuple of str
         Warnings of the program's preflight, and what nobody has checked.
+    faults : tuple of str
+        Why nothing is to be cut though every contour is planned.
     """
 
     files: dict[str, str]
@@ -96,6 +101,7 @@ class FileTexts:
     refused: str
     unsafe: bool
     notes: tuple[str, ...]
+    faults: tuple[str, ...] = ()
 
     __repr__ = short_repr
 
@@ -123,6 +129,7 @@ def write_result(outcome: JobResult, folder: Path, *, strict: bool = False) -> W
         removed=replaced.removed,
         stale=next(iter(replaced.edited), stale),
         notes=texts.notes,
+        faults=texts.faults,
     )
 
 
@@ -155,7 +162,7 @@ def result_texts(outcome: JobResult, *, strict: bool = False) -> FileTexts:
     }
     return FileTexts(
         files=files, program=tuple(program), refused=refused, unsafe=unsafe,
-        notes=(*notes, *faults),
+        notes=tuple(notes), faults=tuple(faults),
     )  # fmt: skip
 
 

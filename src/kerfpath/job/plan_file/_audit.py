@@ -98,6 +98,7 @@ class PlanAudit:
             if each.plan is None:
                 continue
             made = job.tolerances.checks(each.plan, reference=each.path, cell=cell)
+            made += each.drawing
             entry = _entry(each.plan, entries[each.name], made, file)
             judged.append(entry)
             table += made

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from kerfpath._arrays import Array
-from kerfpath.auditor import Check
+from kerfpath.auditor import Check, retract_checks
 from kerfpath.contour import Contour
 from kerfpath.job.format import Candidate, Job, PreparedJob, divide_nodes
 from kerfpath.job.plan_file._checks import check, count
@@ -42,6 +42,8 @@ class ExpectedPlan:
         The path that its nodes were sampled from.
     checks : tuple of Check
         What does not fit: a contour that is not asked for, nodes that are not its nodes, joints.
+    drawing : tuple of Check
+        Of rounded corners, against the drawing; a record of the file.
     """
 
     name: str
@@ -49,6 +51,7 @@ class ExpectedPlan:
     plan: Plan | None = None
     path: Contour | None = None
     checks: tuple[Check, ...] = ()
+    drawing: tuple[Check, ...] = ()
 
 
 def expect_plans(prepared: PreparedJob, file: PlanFile) -> tuple[list[ExpectedPlan], list[Check]]:
@@ -179,8 +182,13 @@ def _expected(
     if job.options.feed == "dip" and made.feed is not None and not picked:
         plan = _dipping(plan, whole.dt, made.time)
     plan = recompute(plan)
-    rows = (place, *_postures(job, plan))
-    return ExpectedPlan(name=made.name, number=number, plan=plan, path=own.path, checks=rows)
+    asked = job.options.retract
+    room = retract_checks(plan, None if asked == made.settings.retract else asked)
+    rows = (place, *_postures(job, plan), *room)
+    drawing = prepared.contours[number].drawing_checks(own, plan.contour, job.tolerances.path)
+    return ExpectedPlan(
+        name=made.name, number=number, plan=plan, path=own.path, checks=rows, drawing=(*drawing,)
+    )
 
 
 def _parts(candidate: Candidate, nodes: Contour, parts: int) -> int:
@@ -191,7 +199,8 @@ def _parts(candidate: Candidate, nodes: Contour, parts: int) -> int:
 
 def _options(job: Job, dt: float, said: PlanOptions, *, picked: bool) -> PlanOptions:
     """Return how the job asks for a plan; one that was picked may aim at less than the limits."""
-    options = job.options.resolve(job.robot, dt)
+    # [program] may have been edited since: the retract of now has a check of its own.
+    options = replace(job.options.resolve(job.robot, dt), retract=said.retract)
     if not picked:
         return options
     return replace(

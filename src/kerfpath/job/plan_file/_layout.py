@@ -18,7 +18,7 @@ __all__ = [
 
 Row = list[float]
 Rows = list[Row]
-Kind = Literal["cut", "pierce", "lead-in", "micro joint", "overlap", "lead-out", "loop"]
+Kind = Literal["cut", "pierce", "lead-in", "micro joint", "overlap", "lead-out", "loop", "corner"]
 
 
 class ChainData(TypedDict):

@@ -1,5 +1,7 @@
 """The run of a job: plan every contour, audit every plan, find the order of cutting."""
 
+from kerfpath.job.run._foresee import foresee as foresee
+from kerfpath.job.run._foresee import require_foreseen as require_foreseen
 from kerfpath.job.run._preview import JobPreview as JobPreview
 from kerfpath.job.run._preview import check_job as check_job
 from kerfpath.job.run._result import CutResult as CutResult

@@ -138,6 +138,7 @@ def _audited(prepared: PreparedJob, whole: CutResult, made: Plan) -> CutResult:
     if job.options.refine_parts > 1:
         made = _divided(made, candidate.path, job.options.refine_parts)
     checks = job.tolerances.checks(made, reference=candidate.path, cell=prepared.cell)
+    checks += whole.request.drawing_checks(candidate, made.contour, job.tolerances.path)
     return replace(whole, candidate=candidate, graph=graph, plan=made, checks=tuple(checks))
 
 

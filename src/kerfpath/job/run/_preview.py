@@ -72,7 +72,7 @@ def check_job(job: Job, part: Part | None = None) -> JobPreview:
     for task in job.tasks(part):
         nodes = task.sample(task.candidates(part)[0])
         first = nodes.part(0, 1, job.options.frames)
-        graph = job.graph(first, replace(job.options, comfort=None))
+        graph = job.graph(first, replace(job.options, comfort=None, retract=None, floor=None))
         q = graph.q[: graph.start[1]]
         starts.append(_start(task.name, len(nodes), q, cell))
     return JobPreview(job=job, part=part, cell=cell, starts=tuple(starts))

@@ -7,6 +7,7 @@ a message about it says was expected and how to write it.
 
 from kerfpath.job.format.tables._cell import CellTable as CellTable
 from kerfpath.job.format.tables._cell import FixtureTable as FixtureTable
+from kerfpath.job.format.tables._comfort import LIMITS_MARGIN as LIMITS_MARGIN
 from kerfpath.job.format.tables._contour import ContourTable as ContourTable
 from kerfpath.job.format.tables._job import REPEATED as REPEATED
 from kerfpath.job.format.tables._job import TABLES as TABLES

@@ -125,8 +125,15 @@ class PlanTable(Table):
                 raise fault(f"tilt_deg with {name}", "none", "add tilt_deg", (name,))
         return self
 
-    def resolve(self, robot: Robot, comfort: Comfort | None) -> PlanOptions:
-        """Return how the table and [comfort] ask for a plan, in SI.
+    def resolve(
+        self,
+        robot: Robot,
+        comfort: Comfort | None,
+        *,
+        retract: float | None = None,
+        floor: float | None = None,
+    ) -> PlanOptions:
+        """Return how the table, [comfort], [program] and [robot] ask for a plan, in SI.
 
         Raises
         ------
@@ -153,6 +160,8 @@ class PlanTable(Table):
             interruptions=self.interruptions,
             least_piece=None if piece is None else piece / 1000,
             comfort=comfort,
+            retract=retract,
+            floor=floor,
             certify=self.certified(),
         )
 

@@ -108,6 +108,10 @@ class RobotTable(Table):
             strict=False,
         ),
     ] = None
+    floor: Annotated[bool, key("true or false", "true")] = True
+    floor_mm: Annotated[Number, key("the height of the floor in the robot base, in mm", "-600")] = (
+        0.0
+    )
     endless: Annotated[
         tuple[Axis, ...] | None, key("axis numbers from 1 to 6, each once", "[4, 6]", strict=False)
     ] = None
@@ -236,6 +240,16 @@ class RobotTable(Table):
                 "give acceleration_deg_s2 instead",
                 ("acceleration_ratio",),
             )
+
+    @model_validator(mode="after")
+    def _one_floor(self) -> RobotTable:
+        if not self.floor and "floor_mm" in self.model_fields_set:
+            raise fault("floor_mm only with a floor", "floor = false", "remove one", ("floor_mm",))
+        return self
+
+    def height_of_floor(self) -> float | None:
+        """Return the height of the floor in the robot base, m; None where there is none."""
+        return self.floor_mm / 1000 if self.floor else None
 
     def resolve(self, folder: Path, *, bodies: bool = False) -> Robot:
         """Return the robot with this table's limits; `bodies`: those of its description, too."""

@@ -1,0 +1,217 @@
+"""What is wrong with a job that need not be planned to be known: every fault, and its key."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import replace
+from itertools import combinations
+
+import numpy as np
+from scipy.spatial import cKDTree
+
+from kerfpath._arrays import Array, Bools, Ints
+from kerfpath.contour import Contour
+from kerfpath.errors import InputError, NoFeasiblePath
+from kerfpath.job.format import Candidate, CutRequest, Job, PreparedJob, all_of, refusal_at
+from kerfpath.plans import has_room
+from kerfpath.post import issues_before_planning
+from kerfpath.sequence import best_order, near_each_other
+
+__all__ = ["foresee", "require_foreseen"]
+
+HALVINGS = 7
+"""Times that a length is halved, or an interval of lengths, to say which would do."""
+FINE = np.radians(1.0)
+"""Step of gamma at which poses of both ends are looked at, however coarse that of the job is."""
+SECONDS = 2.0
+"""s: how long it may take to find that contours can be put in no order."""
+
+
+def require_foreseen(prepared: PreparedJob) -> None:
+    """Refuse a job that cannot lead to a program whatever its plans are.
+
+    Raises
+    ------
+    InputError
+        Every fault that is known before planning, each in a line.
+    """
+    if found := foresee(prepared):
+        raise all_of(found)
+
+
+def foresee(prepared: PreparedJob) -> list[InputError]:
+    """Return the faults of a job that are known before it is planned, each with its key."""
+    return [
+        *_program_faults(prepared),
+        *(fault for request in prepared.contours for fault in _sampling_faults(prepared, request)),
+        *_order_faults(prepared),
+        *(fault for request in prepared.contours for fault in _retract_faults(prepared, request)),
+    ]
+
+
+def _program_faults(prepared: PreparedJob) -> Iterator[InputError]:
+    """Yield what the language of the program refuses by names, numbers and outputs."""
+    job, p = prepared.job, prepared.job.program
+    if p.language == "none":
+        return
+    said = set()
+    for issue in issues_before_planning(
+        [(request.task.name, request.task.speed) for request in prepared.contours],
+        job.robot,
+        p.language,
+        p.settings,
+        name=p.name,
+        zone=p.zone,
+        lead_time=p.lead_time,
+        approach_speed=p.approach_speed,
+        pierce_time=p.pierce_time,
+        gas_lead=p.gas_lead,
+        handshakes=p.handshakes,
+    ):
+        words = issue.message
+        if issue.code.startswith("name-") and issue.place == "a contour":
+            words += " by name in [[contour]]"
+        elif issue.code.startswith("name-") and issue.place == "the program":
+            words += " by name in [program]"
+        if words not in said:
+            said.add(words)
+            yield refusal_at(job.path, ("program",), words)
+
+
+def _sampling_faults(prepared: PreparedJob, request: CutRequest) -> Iterator[InputError]:
+    """Yield that the nodes of a contour leave its path by more than the audit allows."""
+    job, task = prepared.job, request.task
+    if job.options.refine_parts > 1:
+        return
+    allowed = job.tolerances.path
+    candidate = max(request.candidates, key=_chord_error)
+    off = _chord_error(candidate)
+    if off <= allowed:
+        return
+    key = task.sampled_by
+    cure = _finer(request, candidate, allowed)
+    yield refusal_at(
+        job.path,
+        ("contour", _table_of(job, request), key),
+        f"contour {task.name!r}: chords between its nodes leave the path by {off * 1e3:.3g} mm, "
+        f"and path_tolerance_mm in [audit] allows {allowed * 1e3:g} mm; {cure}, or raise "
+        "path_tolerance_mm",
+    )
+
+
+def _finer(request: CutRequest, candidate: Candidate, allowed: float) -> str:
+    """Say which value of the key of a sampling keeps a tolerance."""
+    for power in range(1, HALVINGS):
+        task = request.task.finer(2.0**-power)
+        try:
+            nodes = task.sample(candidate.path)
+        except InputError:
+            break
+        if _chord_error(replace(candidate, nodes=nodes)) <= allowed:
+            return f"write {task.sampled_by} = {getattr(task.table, task.sampled_by):.4g}"
+    return "sample it more finely"
+
+
+def _chord_error(candidate: Candidate) -> float:
+    """Return the largest distance (m) of a path's own nodes from the chords of what samples it."""
+    path, nodes = candidate.path, candidate.nodes
+    k = np.clip(np.searchsorted(nodes.s, path.s, side="right") - 1, 0, len(nodes) - 2)
+    start, chord = nodes.points[k], np.diff(nodes.points, axis=0)[k]
+    along = ((path.points - start) * chord).sum(axis=1) / (chord**2).sum(axis=1)
+    foot = start + np.clip(along, 0.0, 1.0)[:, None] * chord
+    return float(np.linalg.norm(path.points - foot, axis=1).max())
+
+
+def _table_of(job: Job, request: CutRequest) -> int:
+    """Return which [[contour]] table of the job a request is of."""
+    tables = [spec.table for spec in job.contours]
+    return next((i for i, table in enumerate(tables) if table is request.task.table), 0)
+
+
+def _order_faults(prepared: PreparedJob) -> Iterator[InputError]:
+    """Yield that no order of the contours keeps the heat spacing, and up to which one does."""
+    job, sequence = prepared.job, prepared.job.sequence
+    if sequence is None or not sequence.heat_spacing_mm or job.options.interruptions != "none":
+        return
+    loops = [request.candidates[0].nodes for request in prepared.contours]
+    spacing = sequence.heat_spacing_mm / 1000
+    if _has_order(prepared, loops, spacing):
+        return
+    apart = sorted({d for d in _distances(loops) if d < spacing})
+    low, high = 0, len(apart)  # of that many pairs one may follow the other in no order
+    while high - low > 1:
+        middle = (low + high) // 2
+        low, high = (middle, high) if _has_order(prepared, loops, apart[middle]) else (low, middle)
+    most = apart[low] if _has_order(prepared, loops, apart[low]) else 0.0
+    order = "the order given" if sequence.order == "given" else "any order"
+    yield refusal_at(
+        job.path,
+        ("sequence", "heat_spacing_mm"),
+        f"no two contours nearer than {spacing * 1e3:g} mm may follow each other, which {order} "
+        f"breaks; write at most heat_spacing_mm = {np.floor(most * 1e4) / 10:g}"
+        + (', or order = "best"' if sequence.order == "given" else ""),
+    )
+
+
+def _has_order(prepared: PreparedJob, loops: list[Contour], spacing: float) -> bool:
+    """Return whether the contours can be cut in an order that keeps a heat spacing, m."""
+    near, count = near_each_other(loops, spacing), len(loops)
+    assert prepared.job.sequence is not None
+    if prepared.job.sequence.order == "given":
+        return not any(near[i, i + 1] for i in range(count - 1))
+    between = np.where(near, np.inf, 0.0)
+    try:
+        best_order(
+            np.arange(count), np.zeros(count), between,
+            before=prepared.inner_first, seconds=SECONDS,
+        )  # fmt: skip
+    except NoFeasiblePath as none:
+        return not none.proved
+    return True
+
+
+def _distances(loops: list[Contour]) -> list[float]:
+    """Return how far apart each two contours are, m."""
+    trees = [cKDTree(loop.points) for loop in loops]
+    return [
+        float(np.min(trees[i].query(loops[j].points)[0]))
+        for i, j in combinations(range(len(loops)), 2)
+    ]
+
+
+def _retract_faults(prepared: PreparedJob, request: CutRequest) -> Iterator[InputError]:
+    """Yield that no pose of an end of a contour leaves room for the retract."""
+    job, asked = prepared.job, prepared.job.options.retract
+    if asked is None:
+        return
+    ends = [_end_poses(job, each.nodes) for each in request.candidates]
+    shut = [[len(q) and not _room(job, q, mu, asked).any() for q, mu in both] for both in ends]
+    if not all(any(both) for both in shut):
+        return
+    end = int(np.argmax(shut[0]))
+    low, high = 0.0, asked
+    for _ in range(HALVINGS):
+        middle = (low + high) / 2
+        low, high = (middle, high) if _room(job, *ends[0][end], middle).any() else (low, middle)
+    cure = f"write at most retract_mm = {np.floor(low * 1e4) / 10:g}" if low else "move the part"
+    yield refusal_at(
+        job.path,
+        ("program", "retract_mm"),
+        f"contour {request.task.name!r}: at its {('start', 'end')[end]} the tool cannot back off "
+        f"by {asked * 1e3:g} mm from any pose within the joint limits; {cure}",
+    )
+
+
+def _end_poses(job: Job, nodes: Contour) -> list[tuple[Array, Ints]]:
+    """Return the admissible joints (B, n) rad of both ends, and their postures (B,)."""
+    ends = np.array([0, len(nodes) - 1])
+    fine = min(job.options.gamma_step, FINE)
+    graph = job.graph(nodes, replace(job.options, retract=None, gamma_step=fine), only=ends)
+    cut = graph.start[1]
+    posture = graph.posture.astype(np.int64)
+    return [(graph.q[:cut], posture[:cut]), (graph.q[cut:], posture[cut:])]
+
+
+def _room(job: Job, q: Array, posture: Ints, retract: float) -> Bools:
+    options = replace(job.options, retract=retract)
+    return has_room(options, job.robot, q, posture, job.tool)

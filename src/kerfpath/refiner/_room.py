@@ -1,0 +1,42 @@
+"""Where gamma may be at both ends of a plan, so that the tool can back off there."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from kerfpath._arrays import Array
+from kerfpath.plans import Plan, has_room
+from kerfpath.refiner._curves import JointCurves
+
+__all__ = ["room_at_ends"]
+
+STEP = np.radians(1.5)
+"""rad: how finely gamma is looked at, from that of the plan on; up to as much of it is given up."""
+AWAY = STEP * np.arange(61)
+"""rad: how far, either way; where all of it has room, nothing is held."""
+
+
+def room_at_ends(plan: Plan) -> tuple[Array, Array]:
+    """Return the least and the largest gamma (K,) rad with room for the retract of a plan.
+
+    Infinite between the ends, where no retract is asked for, and at an end without room as it is.
+    """
+    K, n = plan.q.shape
+    low, high = np.full(K, -np.inf), np.full(K, np.inf)
+    if plan.settings.retract is None:
+        return low, high
+    frames, q = plan.frames, plan.unwrapped
+    for end in (0, K - 1):
+        for bound, sign in ((low, -1.0), (high, 1.0)):
+            posture = np.full(len(AWAY), plan.posture[end])
+            H = np.broadcast_to(frames[end], (len(AWAY), 4, 4))
+            curves = JointCurves(plan.robot, H, plan.T_flange_tip, posture)
+            near = np.broadcast_to(q[end], (len(AWAY), n))
+            there = curves.at(plan.gamma[end] + sign * AWAY, near)
+            reached = np.asarray(np.isfinite(there).all(axis=1))
+            there = np.where(reached[:, None], there, near)
+            tool = plan.T_flange_tip
+            room = has_room(plan.settings, plan.robot, there, posture, tool) & reached
+            if room[0] and not room.all():
+                bound[end] = plan.gamma[end] + sign * AWAY[np.argmin(room) - 1]
+    return low, high

@@ -1,0 +1,30 @@
+"""How low the joints of an arm are."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from kerfpath._arrays import Array
+from kerfpath.robots._chain import chain_of
+from kerfpath.robots._robot import Robot
+
+__all__ = ["lowest_joint"]
+
+FIRST = 3
+"""The elbow is at axis 3; what comes before is as high as the robot stands."""
+
+
+def lowest_joint(robot: Robot, q: Array) -> Array:
+    """Return the height (B,) m over the robot base of the lowest of elbow, wrist and flange.
+
+    Of joint vectors q (B, n) rad: by the middles of the joints from axis 3 on, and of the flange.
+
+    Raises
+    ------
+    InputError
+        As `chain_of`.
+    """
+    chain = chain_of(robot)
+    frames = chain.frames(q)
+    flange = frames[:, -1] @ chain.end
+    return np.asarray(np.minimum(frames[:, FIRST:, 2, 3].min(axis=1), flange[:, 2, 3]))

@@ -1,0 +1,137 @@
+"""What is known of a job before it is planned: every fault in one run, each with its key."""
+
+import ezdxf
+import pytest
+
+from commands import run
+from jobs import ROBOT_AND_HEAD
+from kerfpath.errors import InputError
+from kerfpath.job import foresee, prepare, read_job, run_job
+
+HEAD = f"""\
+{ROBOT_AND_HEAD}[part]
+file = "holes.dxf"
+xyz_mm = [1200, 0, 500]
+rpy_deg = [0, 0, 0]
+"""
+HOLE = """\
+[[contour]]
+pick = "0/hole{}"
+name = "{}"
+speed_m_min = 1
+spacing_mm = {}
+"""
+PLAN = """\
+[plan]
+gamma_step_deg = 15
+certify = false
+"""
+
+
+def job(folder, holes, more="", name="cut_holes", radius=4.0):
+    """A job of holes (x mm, name, spacing mm) in a row, in a plate."""
+    document = ezdxf.new(units=4)
+    space = document.modelspace()
+    right = max(x for x, _, _ in holes) + 60
+    space.add_lwpolyline([(-60, -60), (right, -60), (right, 60), (-60, 60)], close=True)
+    for x, _, _ in holes:
+        space.add_circle((x, 0), radius)
+    document.saveas(folder / "holes.dxf")
+    text = HEAD + "".join(HOLE.format(i, *hole[1:]) for i, hole in enumerate(holes, 1))
+    (folder / f"{name}.toml").write_text(text + PLAN + more)
+    return read_job(folder / f"{name}.toml")
+
+
+def said(read):
+    return [str(fault) for fault in foresee(prepare(read))]
+
+
+def test_a_sound_job_has_no_faults(tmp_path):
+    assert said(job(tmp_path, [(0, "one", 0.5), (40, "two", 0.5)])) == []
+
+
+@pytest.mark.parametrize("tolerance", [0.02, 0.1])
+def test_a_spacing_too_coarse_is_known_and_the_one_named_passes(tmp_path, tolerance):
+    audit = f"[audit]\npath_tolerance_mm = {tolerance}\n"
+    (fault,) = said(job(tmp_path, [(0, "one", 4)], audit))
+    # The chord of 4 mm in a circle of 4 mm, or a little less: its sagitta.
+    assert "contour.spacing_mm: contour 'one'" in fault
+    cure = float(fault.split("spacing_mm = ")[1].split(",")[0])
+    assert said(job(tmp_path, [(0, "one", cure)], audit)) == []
+    # What was foretold is what the audit would have found.
+    for spacing, passed in ((4, False), (cure, True)):
+        (cut,) = run_job(job(tmp_path, [(0, "one", spacing)], audit)).cuts
+        rows = {row.code: row.ok for row in cut.checks}
+        assert rows["tip-between-nodes"] == passed
+
+
+@pytest.mark.parametrize(("language", "reserved"), [("rapid", "while"), ("krl", "loop")])
+def test_names_that_the_language_reserves_are_known(tmp_path, language, reserved):
+    program = f'[program]\nlanguage = "{language}"\n'
+    laser = "" if language == "rapid" else "[program.krl]\nlaser_output = 1\n"
+    faults = said(job(tmp_path, [(0, reserved, 0.5), (40, "two", 0.5)], program + laser))
+    assert len([f for f in faults if "is reserved" in f and "name in [[contour]]" in f]) == 1
+    assert not said(job(tmp_path, [(0, "one", 0.5), (40, "two", 0.5)], program + laser))
+
+
+def test_a_heat_spacing_without_an_order_is_known_with_the_largest_that_has_one(tmp_path):
+    holes = [(0, "one", 0.5), (20, "two", 0.5), (40, "three", 0.5)]
+    asked = "[sequence]\nheat_spacing_mm = {}\n"
+    (fault,) = said(job(tmp_path, holes, asked.format(20)))
+    assert "sequence.heat_spacing_mm" in fault
+    most = float(fault.split("heat_spacing_mm = ")[1].split(",")[0])
+    assert said(job(tmp_path, holes, asked.format(most))) == []
+    assert said(job(tmp_path, holes, asked.format(most + 0.2)))
+
+
+def test_an_order_given_against_the_heat_spacing_is_known(tmp_path):
+    holes = [(0, "a", 0.5), (20, "b", 0.5), (60, "c", 0.5), (100, "d", 0.5)]
+    given = '[sequence]\nheat_spacing_mm = 15\norder = "given"\n'
+    (fault,) = said(job(tmp_path, holes, given))
+    assert 'or order = "best"' in fault
+    assert said(job(tmp_path, holes, given.replace("given", "best"))) == []
+
+
+def test_a_retract_without_room_is_known_with_one_that_has(tmp_path):
+    asked = "[program]\nretract_mm = {}\n"
+    (fault,) = said(job(tmp_path, [(0, "one", 0.5)], asked.format(3000)))
+    assert "program.retract_mm: contour 'one'" in fault
+    most = float(fault.split("retract_mm = ")[1])
+    assert 100 < most < 3000
+    assert said(job(tmp_path, [(0, "one", 0.5)], asked.format(most))) == []
+
+
+def test_every_fault_is_told_in_one_run_before_anything_is_planned(tmp_path):
+    holes = [(0, "while", 4), (20, "two", 4)]
+    more = "[sequence]\nheat_spacing_mm = 30\n[program]\nretract_mm = 3000\n"
+    job(tmp_path, holes, more)
+    for command in ("plan", "check"):
+        result = run(command, "cut_holes.toml", cwd=tmp_path)
+        assert result.returncode == 2
+        flat = " ".join(result.stderr.split())
+        for words in ("'while' is reserved", "contour 'while': chords", "contour 'two': chords",
+                      "heat_spacing_mm", "contour 'while': at its start", "contour 'two': at its",
+                      "(and 5 more)"):  # fmt: skip
+            assert words in flat
+    assert not (tmp_path / "cut_holes-plan").exists()
+
+
+def test_every_fault_of_the_file_is_told(tmp_path):
+    job(tmp_path, [(0, "one", 0.5)])
+    path = tmp_path / "cut_holes.toml"
+    broken = path.read_text().replace("speed_m_min = 1", "speed = 1").replace("gamma_step", "gama")
+    path.write_text(broken)
+    with pytest.raises(InputError, match=r"\(and 2 more\)$") as found:
+        read_job(path)
+    assert len(found.value.others) == 2
+    result = run("plan", "cut_holes.toml", cwd=tmp_path)
+    assert result.stderr.count("kerfpath: error:") == 3
+
+
+def test_every_loop_that_does_not_exist_is_told(tmp_path):
+    job(tmp_path, [(0, "one", 0.5), (40, "two", 0.5)])
+    path = tmp_path / "cut_holes.toml"
+    path.write_text(path.read_text().replace('"0/hole', '"0/hol'))
+    with pytest.raises(InputError) as found:
+        prepare(read_job(path))
+    assert len(found.value.others) == 1
