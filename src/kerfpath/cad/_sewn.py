@@ -40,7 +40,7 @@ def drawn_of(
     if not (faces or lines):
         raise nothing_drawn(left_out)
     if lines and faces:
-        lost = LeftOut(kind="curve", reason="it bounds no face", count=lines, may_cut=True)
+        lost = LeftOut(kind="curve", reason="it bounds no face", count=lines, may_cut=False)
         left_out = [*left_out, lost]
     solids = list_shapes(shape, TopAbs_ShapeEnum.TopAbs_SOLID)
     if not solids and len(faces) > 1:

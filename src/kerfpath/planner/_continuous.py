@@ -8,6 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from kerfpath import refiner
+from kerfpath.errors import NoFeasiblePath
 from kerfpath.planner._clear import ClearSearch
 from kerfpath.planner._on_grid import plan_on_grid
 from kerfpath.planner._quickest import alike, clear_paths, wide
@@ -31,6 +32,10 @@ OTHERWISE = (0.5, 0.5)
 ENOUGH, POOR = 5e-3, 1e-2
 """Relative gap to what the values promise with which a motion is good; and beyond which (6) binds
 so much that what a path promises says little, and all of them are refined."""
+COARSE_STEP = np.radians(1.5)
+"""rad: step of gamma from which a search that finds nothing is repeated on half of it."""
+NEARLY = 0.95
+"""Share of the speed at which a motion must have been found for that."""
 GAIN = 5e-3
 """What a refinement may take off the cost that a path promises, relative."""
 NARROWED = 6
@@ -45,23 +50,65 @@ def plan_continuous(task: PlanningTask, finder: ClearSearch, begin: Callable[[st
     NoFeasiblePath
         None was found, on the grid neither.
     """
-    reason, found = grid_reason(task), None
-    why = f"planned on the grid: {reason}"
-    if not reason:
-        begin("search")
-        found = clear_motion(task, finder, begin)
-        why = "begun from the grid: the search between its samples found no motion"
-    if found is None:
-        comfort = task.settings.comfort
-        # What the nodes of a slower motion cost is known on the grid only.
-        priced = task.settings.feed == "dip" and comfort is not None and comfort.costs
-        refine = task.robot.family.free_rotation and not priced
-        made = plan_on_grid(task, finder, begin, refine=refine)
-        if not reason and made.feed is None:
-            made = shaken(made, finder)
-        return replace(made, proof=replace(made.proof, statement=f"{why}; {made.proof.statement}"))
+    if reason := grid_reason(task):
+        return _from_grid(task, finder, begin, f"planned on the grid: {reason}")
+    begin("search")
+    found = clear_motion(task, finder, begin)
+    if found is not None:
+        return _claimed(found, finder)
+    why = "begun from the grid: the search between its samples found no motion"
+    try:
+        made = _from_grid(task, finder, begin, why)
+    except NoFeasiblePath as none:
+        finer = _from_more_samples(task, finder, begin, none)
+        if finer is None:
+            raise
+        made = finer
+    return shaken(made, finder) if made.feed is None else made
+
+
+def _claimed(found: Refinement, finder: ClearSearch) -> Plan:
     claim = f"the best motion found over continuous rotation: cost {found.cost_after:.6g}"
     return replace(found.plan, proof=Proof(optimal=False, statement=finder.claimed(claim)))
+
+
+def _from_grid(
+    task: PlanningTask, finder: ClearSearch, begin: Callable[[str], None], why: str
+) -> Plan:
+    """Return the best plan of the grid, refined where that may be; and why it is one of the grid.
+
+    Raises
+    ------
+    NoFeasiblePath
+        There is none.
+    """
+    comfort = task.settings.comfort
+    # What the nodes of a slower motion cost is known on the grid only.
+    priced = task.settings.feed == "dip" and comfort is not None and comfort.costs
+    refine = task.robot.family.free_rotation and not priced
+    made = plan_on_grid(task, finder, begin, refine=refine)
+    return replace(made, proof=replace(made.proof, statement=f"{why}; {made.proof.statement}"))
+
+
+def _from_more_samples(
+    task: PlanningTask, finder: ClearSearch, begin: Callable[[str], None], none: NoFeasiblePath
+) -> Plan | None:
+    """Return a plan found with twice as many samples of gamma, where they may lead to one.
+
+    They may where they are not close as they are, and where a motion nearly as fast was found.
+    """
+    needed, step = none.relaxation, task.settings.gamma_step
+    if step < COARSE_STEP or needed is None or needed.speed < NEARLY or none.closed is not None:
+        return None
+    fine = task.sampled(step / 2)
+    there = finder.of(fine)
+    found = clear_motion(fine, there, begin)
+    why = "begun from a finer grid: the search between its samples found no motion"
+    try:
+        made = _from_grid(fine, there, begin, why) if found is None else _claimed(found, there)
+    except NoFeasiblePath:
+        return None
+    return replace(made, settings=task.settings)
 
 
 def clear_motion(

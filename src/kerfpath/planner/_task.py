@@ -132,6 +132,22 @@ class PlanningTask:
 
         return replace(self, dt=layered.problem.dt, layers=layers)
 
+    def sampled(self, step: float) -> PlanningTask:
+        """Return the task with gamma sampled in other steps, rad; its graph is not built yet."""
+        settings = replace(self.settings, gamma_step=step)
+        layers = partial(
+            _layers,
+            contour=self.contour,
+            robot=self.robot,
+            options=settings,
+            tool=self.T_flange_tip,
+            placement=self.T_base_part,
+            dt=self.dt,
+            graph=None,
+            progress=None,
+        )
+        return replace(self, settings=settings, layers=layers)
+
     def at_nodes(self, nodes: Ints) -> Layered:
         """Return the layers of some nodes (M,), ascending; those of all are not built for it."""
         return self.built.at_nodes(nodes) if "built" in vars(self) else self.layers(nodes)

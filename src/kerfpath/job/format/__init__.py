@@ -18,6 +18,8 @@ from kerfpath.job.format._read import Job as Job
 from kerfpath.job.format._read import read_job as read_job
 from kerfpath.job.format._refusals import all_of as all_of
 from kerfpath.job.format._refusals import refusal_at as refusal_at
+from kerfpath.job.format._sampling import chord_error as chord_error
+from kerfpath.job.format._sampling import closer_nodes as closer_nodes
 from kerfpath.job.format.tables import VARIABLES as VARIABLES
 from kerfpath.job.format.tables import AuditTable as AuditTable
 from kerfpath.job.format.tables import ContourTable as ContourTable

@@ -18,6 +18,7 @@ from kerfpath.job.format._cell import cell_of_job
 from kerfpath.job.format._contour import ContourSpec
 from kerfpath.job.format._read import Job
 from kerfpath.job.format._refusals import all_of, refusal_at
+from kerfpath.job.format._sampling import closer_nodes
 from kerfpath.operations import edge, nearest
 from kerfpath.options import PlanOptions
 from kerfpath.planner import node_interval
@@ -83,6 +84,8 @@ class CutRequest:
         The run of a Pareto set that the plan follows, with its windows and clearance.
     touched_up : bool
         Whether targets of the path were moved by hand.
+    closer : str
+        How its nodes are nearer to each other than the job says, and why; "" where they are not.
     """
 
     task: ContourSpec
@@ -91,6 +94,7 @@ class CutRequest:
     options: PlanOptions
     run: Subproblem | None = None
     touched_up: bool = False
+    closer: str = ""
 
     __repr__ = short_repr
 
@@ -214,16 +218,38 @@ def prepare(job: Job, part: Part | None = None) -> PreparedJob:
 
 def _request(job: Job, task: ContourSpec, part: Part) -> CutRequest:
     loop = task.drawn(part)
-    candidates = tuple(
-        Candidate.at(task.speed, path, task.sample(path)) for path in task.candidates(part, loop)
-    )
+    paths = task.candidates(part, loop)
+    task, closer = _within_tolerances(job, task, paths)
+    candidates = tuple(Candidate.at(task.speed, path, task.sample(path)) for path in paths)
     if task.rounded is not None:
         candidates = tuple(
             replace(each, unrounded=sharp)
             for each, sharp in zip(candidates, task.unrounded(part, loop), strict=True)
         )
     _require_above_floor(job, task.name, [each.nodes for each in candidates])
-    return CutRequest(task=task, loop=loop, candidates=candidates, options=job.options)
+    return CutRequest(
+        task=task, loop=loop, candidates=candidates, options=job.options, closer=closer
+    )
+
+
+def _within_tolerances(
+    job: Job, task: ContourSpec, paths: Sequence[Contour]
+) -> tuple[ContourSpec, str]:
+    """Return the task with nodes as near to each other as the audit asks for, and what changed.
+
+    A number of nodes that the job says is kept, and so are nodes that are divided later.
+    """
+    if task.count is not None or job.options.refine_parts > 1:
+        return task, ""
+    finer = closer_nodes(task, paths, job.tolerances)
+    if finer is None or finer is task:
+        return task, ""
+    key = task.sampled_by
+    asked, used = (getattr(each.table, key) for each in (task, finer))
+    return finer, (
+        f"{key} = {used:.3g} in place of {asked:g}, as what lies between its nodes keeps the "
+        "tolerances of [audit] only so"
+    )
 
 
 def _require_above_floor(job: Job, name: str, nodes: Sequence[Contour]) -> None:

@@ -141,7 +141,7 @@ def result_texts(outcome: JobResult, *, strict: bool = False) -> FileTexts:
     refused, unsafe = "", False
     notes = [collision_note(outcome.cell, moves_too=bool(moves))]
     notes += [] if part is None else [order_note(part)]
-    notes += short_pieces(outcome)
+    notes += closer_sampling(outcome) + short_pieces(outcome)
     faults = [] if outcome.stuck is None else [f"The moves between contours: {outcome.stuck}"]
     faults += [f"The moves between contours: {c.issue()}" for c in outcome.air if not c.ok]
     if outcome.passed and job.program.language != "none":
@@ -218,6 +218,12 @@ def order_note(part: PartPlan) -> str:
         f"{part.air_time:.1f} s, piercing {part.piercing_time:.1f} s; by these candidates and "
         f"moves {proved}."
     )
+
+
+def closer_sampling(outcome: JobResult) -> list[str]:
+    """Say of contours that their nodes are nearer to each other than the job says."""
+    found = {cut.contour: cut.request.closer for cut in outcome.cuts}
+    return [f"{name}: {words}" for name, words in found.items() if words]
 
 
 def short_pieces(outcome: JobResult) -> list[str]:

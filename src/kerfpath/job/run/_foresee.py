@@ -12,7 +12,15 @@ from scipy.spatial import cKDTree
 from kerfpath._arrays import Array, Bools, Ints
 from kerfpath.contour import Contour
 from kerfpath.errors import InputError, NoFeasiblePath
-from kerfpath.job.format import Candidate, CutRequest, Job, PreparedJob, all_of, refusal_at
+from kerfpath.job.format import (
+    CutRequest,
+    Job,
+    PreparedJob,
+    all_of,
+    chord_error,
+    closer_nodes,
+    refusal_at,
+)
 from kerfpath.plans import has_room
 from kerfpath.post import issues_before_planning
 from kerfpath.sequence import best_order, near_each_other
@@ -84,12 +92,14 @@ def _sampling_faults(prepared: PreparedJob, request: CutRequest) -> Iterator[Inp
     if job.options.refine_parts > 1:
         return
     allowed = job.tolerances.path
-    candidate = max(request.candidates, key=_chord_error)
-    off = _chord_error(candidate)
+    off = max(chord_error(each.path, each.nodes) for each in request.candidates)
     if off <= allowed:
         return
     key = task.sampled_by
-    cure = _finer(request, candidate, allowed)
+    finer = closer_nodes(task, [each.path for each in request.candidates], job.tolerances)
+    cure = "sample it more finely"
+    if finer is not None:
+        cure = f"write {key} = {getattr(finer.table, key):.4g}"
     yield refusal_at(
         job.path,
         ("contour", _table_of(job, request), key),
@@ -97,29 +107,6 @@ def _sampling_faults(prepared: PreparedJob, request: CutRequest) -> Iterator[Inp
         f"and path_tolerance_mm in [audit] allows {allowed * 1e3:g} mm; {cure}, or raise "
         "path_tolerance_mm",
     )
-
-
-def _finer(request: CutRequest, candidate: Candidate, allowed: float) -> str:
-    """Say which value of the key of a sampling keeps a tolerance."""
-    for power in range(1, HALVINGS):
-        task = request.task.finer(2.0**-power)
-        try:
-            nodes = task.sample(candidate.path)
-        except InputError:
-            break
-        if _chord_error(replace(candidate, nodes=nodes)) <= allowed:
-            return f"write {task.sampled_by} = {getattr(task.table, task.sampled_by):.4g}"
-    return "sample it more finely"
-
-
-def _chord_error(candidate: Candidate) -> float:
-    """Return the largest distance (m) of a path's own nodes from the chords of what samples it."""
-    path, nodes = candidate.path, candidate.nodes
-    k = np.clip(np.searchsorted(nodes.s, path.s, side="right") - 1, 0, len(nodes) - 2)
-    start, chord = nodes.points[k], np.diff(nodes.points, axis=0)[k]
-    along = ((path.points - start) * chord).sum(axis=1) / (chord**2).sum(axis=1)
-    foot = start + np.clip(along, 0.0, 1.0)[:, None] * chord
-    return float(np.linalg.norm(path.points - foot, axis=1).max())
 
 
 def _table_of(job: Job, request: CutRequest) -> int:
