@@ -1,12 +1,13 @@
 """What is known of a job before it is planned: every fault in one run, each with its key."""
 
 import ezdxf
+import numpy as np
 import pytest
 
 from commands import run
 from jobs import ROBOT_AND_HEAD
 from kerfpath.errors import InputError
-from kerfpath.job import foresee, prepare, read_job, run_job
+from kerfpath.job import foresee, prepare, read_job, result_texts, run_job
 
 HEAD = f"""\
 {ROBOT_AND_HEAD}[part]
@@ -19,7 +20,7 @@ HOLE = """\
 pick = "0/hole{}"
 name = "{}"
 speed_m_min = 1
-spacing_mm = {}
+{}
 """
 PLAN = """\
 [plan]
@@ -29,7 +30,7 @@ certify = false
 
 
 def job(folder, holes, more="", name="cut_holes", radius=4.0):
-    """A job of holes (x mm, name, spacing mm) in a row, in a plate."""
+    """A job of holes (x mm, name, spacing mm or else a key) in a row, in a plate."""
     document = ezdxf.new(units=4)
     space = document.modelspace()
     right = max(x for x, _, _ in holes) + 60
@@ -37,9 +38,13 @@ def job(folder, holes, more="", name="cut_holes", radius=4.0):
     for x, _, _ in holes:
         space.add_circle((x, 0), radius)
     document.saveas(folder / "holes.dxf")
-    text = HEAD + "".join(HOLE.format(i, *hole[1:]) for i, hole in enumerate(holes, 1))
+    text = HEAD + "".join(HOLE.format(i, *_keys(*hole[1:])) for i, hole in enumerate(holes, 1))
     (folder / f"{name}.toml").write_text(text + PLAN + more)
     return read_job(folder / f"{name}.toml")
+
+
+def _keys(name, sampling):
+    return name, sampling if isinstance(sampling, str) else f"spacing_mm = {sampling}"
 
 
 def said(read):
@@ -51,18 +56,45 @@ def test_a_sound_job_has_no_faults(tmp_path):
 
 
 @pytest.mark.parametrize("tolerance", [0.02, 0.1])
-def test_a_spacing_too_coarse_is_known_and_the_one_named_passes(tmp_path, tolerance):
+def test_too_few_nodes_are_known_and_the_number_named_passes(tmp_path, tolerance):
     audit = f"[audit]\npath_tolerance_mm = {tolerance}\n"
-    (fault,) = said(job(tmp_path, [(0, "one", 4)], audit))
-    # The chord of 4 mm in a circle of 4 mm, or a little less: its sagitta.
-    assert "contour.spacing_mm: contour 'one'" in fault
-    cure = float(fault.split("spacing_mm = ")[1].split(",")[0])
-    assert said(job(tmp_path, [(0, "one", cure)], audit)) == []
+    (fault,) = said(job(tmp_path, [(0, "one", "count = 8")], audit))
+    assert "contour.count: contour 'one'" in fault
+    cure = int(fault.split("count = ")[1].split(",")[0])
+    assert said(job(tmp_path, [(0, "one", f"count = {cure}")], audit)) == []
     # What was foretold is what the audit would have found.
-    for spacing, passed in ((4, False), (cure, True)):
-        (cut,) = run_job(job(tmp_path, [(0, "one", spacing)], audit)).cuts
+    for count, passed in ((8, False), (cure, True)):
+        (cut,) = run_job(job(tmp_path, [(0, "one", f"count = {count}")], audit)).cuts
         rows = {row.code: row.ok for row in cut.checks}
         assert rows["tip-between-nodes"] == passed
+
+
+@pytest.mark.parametrize("key", ["spacing_mm = 4", "time_step_ms = 240", "tolerance_mm = 0.5"])
+@pytest.mark.parametrize("tolerance", [0.02, 0.1])
+def test_nodes_come_as_close_as_the_audit_asks_for_and_no_closer(tmp_path, key, tolerance):
+    audit = f"[audit]\npath_tolerance_mm = {tolerance}\n"
+    outcome = run_job(job(tmp_path, [(0, "one", key)], audit))
+    (cut,) = outcome.cuts
+    (row,) = [row for row in cut.checks if row.code == "tip-between-nodes"]
+    assert row.ok
+    assert row.value > 0.5 * tolerance * 1e-3
+    nodes = cut.plan.contour
+    assert np.diff(nodes.s).max() < 1.05 * np.diff(nodes.s).min()  # evenly in time
+    assert any(key.split(" =")[0] in note for note in result_texts(outcome).notes)
+
+
+def test_small_arcs_of_leads_are_sampled_as_finely_as_they_need(tmp_path):
+    """A lead of 1.5 mm at 2 mm between nodes: chords that leave it, unless there are more."""
+    lead = 'spacing_mm = 2\n[contour.lead_in]\nlength_mm = 1.5\nshape = "arc"'
+    (cut,) = run_job(job(tmp_path, [(0, "one", lead)])).cuts
+    assert all(row.ok for row in cut.checks if row.code.endswith("between-nodes"))
+
+
+def test_nodes_that_are_close_enough_are_left_as_asked_for(tmp_path):
+    prepared = prepare(job(tmp_path, [(0, "one", 0.5)]))
+    (request,) = prepared.contours
+    assert not request.closer
+    assert request.task.table.spacing_mm == 0.5
 
 
 @pytest.mark.parametrize(("language", "reserved"), [("rapid", "while"), ("krl", "loop")])
@@ -102,7 +134,7 @@ def test_a_retract_without_room_is_known_with_one_that_has(tmp_path):
 
 
 def test_every_fault_is_told_in_one_run_before_anything_is_planned(tmp_path):
-    holes = [(0, "while", 4), (20, "two", 4)]
+    holes = [(0, "while", "count = 8"), (20, "two", "count = 8")]
     more = "[sequence]\nheat_spacing_mm = 30\n[program]\nretract_mm = 3000\n"
     job(tmp_path, holes, more)
     for command in ("plan", "check"):
