@@ -58,6 +58,11 @@ class ClearSearch:
             around=_gamma_neighbours(task.graph),
         )
 
+    @property
+    def is_free(self) -> bool:
+        """Whether there is no cell, so that other samples of gamma need no test for collisions."""
+        return self._cell is None
+
     def of(self, task: PlanningTask) -> ClearSearch:
         """Return how the searches of another task run in the same cell."""
         return ClearSearch(task, self._cell)

@@ -12,12 +12,13 @@ from kerfpath.errors import NoFeasiblePath
 from kerfpath.planner._clear import ClearSearch
 from kerfpath.planner._on_grid import plan_on_grid
 from kerfpath.planner._quickest import alike, clear_paths, wide
+from kerfpath.planner._refined import plan_off_grid
 from kerfpath.planner._shaken import shaken
 from kerfpath.planner._task import PlanningTask
 from kerfpath.planner._thinned import thinned
 from kerfpath.plans import Plan, Proof
 from kerfpath.refiner import Refinement
-from kerfpath.search import ContinuousPath, Effort
+from kerfpath.search import ContinuousPath, Effort, find_shortest
 
 __all__ = ["clear_motion", "grid_reason", "plan_continuous"]
 
@@ -141,7 +142,10 @@ def clear_motion(
     if starts.above(search.value, ENOUGH):
         paths += search.paths(wide(task))
         starts.refine(paths)
+        starts.refine_from_grid(task)
     if starts.best is not None and starts.above(search.value, POOR):
+        if finder.is_free and task.settings.gamma_step >= COARSE_STEP:
+            starts.refine_from_grid(task.sampled(task.settings.gamma_step / 2))
         width, _, ways = wide(task)
         paths += search.paths(Effort(width, OTHERWISE, ways))
         starts.refine(paths, unpromising=True)
@@ -202,6 +206,25 @@ class _Starts:
                 self._tried.append(made)
                 found = _refine_path(self._task, self._finder, paths[i], made)
                 self.best = _better(best, found)
+
+    def refine_from_grid(self, task: PlanningTask) -> None:
+        """Refine the best path on the grid of a task, where there is a motion that it may better.
+
+        It leads into other valleys than paths between the samples do.
+        """
+        if self.best is None:
+            return
+        found: Refinement | None
+        try:
+            path = self._finder.find(find_shortest, task.problem)
+        except NoFeasiblePath:
+            found = plan_off_grid(task, self._finder) if task.settings.closure == "free" else None
+        else:
+            claim = Proof(optimal=False, statement="begun from the grid")
+            found = refiner.refine(task.plan(path.index, path.cost, claim))
+        if found is not None and found.done and self._finder.is_clear(found.plan):
+            own = replace(found.plan, settings=self._task.settings)
+            self.best = _better(self.best, replace(found, plan=own))
 
 
 def _refine_path(
