@@ -23,6 +23,7 @@ NAMES = (
     "cad",
     "corpus",
     "large_drawings",
+    "first_runs",
     "kerf",
     "part",
     "programs",
@@ -78,6 +79,10 @@ def _run(name: str, *, quick: bool) -> list[Report]:
 
         modules = (kinematics, _families, _enclosures)
         return [module.run(quick=quick) for module in modules]
+    if name == "first_runs":
+        from benchmarks import first_runs
+
+        return [first_runs.run(quick=quick)]
     if name == "corpus":
         from benchmarks import corpus
 
