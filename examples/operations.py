@@ -88,6 +88,7 @@ class Picture:
         code = contour.kind[:-1].copy()
         if contour.kind[0] == KINDS.index("pierce"):
             code[0] = contour.kind[1]
+        code[code == KINDS.index("corner")] = KINDS.index("cut")
         ends = [0, *(np.flatnonzero(np.diff(code)) + 1).tolist(), len(code)]
         for a, b in pairwise(ends):
             word = KINDS[code[a]]

@@ -136,7 +136,7 @@ def test_the_audit_measures_the_same(name):
     found = measures(arm, q, tool=TOOL)
     for k, row in enumerate(q):
         asked = Comfort(**{name: Band(margin=1e-3) for name in found})
-        settings = SimpleNamespace(comfort=asked)
+        settings = SimpleNamespace(comfort=asked, floor=None)
         one = SimpleNamespace(robot=arm, q=row[None], T_flange_tip=TOOL, settings=settings)
         told = {c.code: 1e-3 - c.value for c in margins(one, chain_of(arm))}
         for measured, value in found.items():

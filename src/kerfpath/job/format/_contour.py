@@ -139,8 +139,10 @@ class ContourSpec:
 
     def finer(self, share: float) -> ContourSpec:
         """Return the task with its nodes nearer to each other by a share below 1."""
-        given = self.table.model_dump(include={"spacing_mm", "time_step_ms", "tolerance_mm"})
-        update = {key: mm * share for key, mm in given.items() if mm is not None}
+        # What chords leave out grows with the square of their length.
+        power = {"spacing_mm": 1, "time_step_ms": 1, "tolerance_mm": 2}
+        given = self.table.model_dump(include=set(power), exclude_none=True)
+        update = {key: value * share ** power[key] for key, value in given.items()}
         count = None if self.count is None else int(np.ceil((self.count - 1) / share)) + 1
         table = self.table.model_copy(update={**update, "count": count})
         return replace(task_of(table), pick=self.pick, name=self.name)

@@ -15,7 +15,7 @@ from kerfpath.job.format._program import Tolerances
 
 __all__ = ["chord_error", "closer_nodes"]
 
-MOST_TIMES = 20
+MOST_TIMES = 8
 """How many times as many nodes there may be as were asked for."""
 KEPT = 0.9
 """Share of a tolerance that a finer sampling is to keep: what is drawn does not bend evenly."""
