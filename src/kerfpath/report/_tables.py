@@ -88,6 +88,8 @@ def summary_table(sections: Sequence[ContourSection]) -> str:
 
 
 def _proof(plan: Plan) -> str:
+    if plan.proof.gap is not None and not plan.proof.optimal:
+        return f"within {plan.proof.gap_shown} % of the best"
     if plan.proof.grid_cost is None:
         return "best on this graph" if plan.proof.optimal else "not proved"
     whole = "the best" if plan.proof.optimal else "a path"

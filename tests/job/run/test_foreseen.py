@@ -148,6 +148,22 @@ def test_every_fault_is_told_in_one_run_before_anything_is_planned(tmp_path):
     assert not (tmp_path / "cut_holes-plan").exists()
 
 
+def test_contours_below_the_floor_are_one_fault_that_names_the_lowest(tmp_path):
+    read = job(tmp_path, [(0, "one", 0.5), (40, "two", 0.5)])
+    path = read.path
+    low = path.read_text().replace("xyz_mm = [1200, 0, 500]", "xyz_mm = [1200, 0, -20]")
+    path.write_text(low)
+    with pytest.raises(
+        InputError, match=r"reaches 20 mm below the floor.* \(2 of 2 contours"
+    ) as found:
+        prepare(read_job(path))
+    assert not found.value.others
+    path.write_text(low.replace("[robot]\n", "[robot]\nfloor_mm = -20\n"))
+    assert len(prepare(read_job(path)).contours) == 2
+    path.write_text(low.replace("[robot]\n", "[robot]\nfloor = false\n"))
+    assert len(prepare(read_job(path)).contours) == 2
+
+
 def test_every_fault_of_the_file_is_told(tmp_path):
     job(tmp_path, [(0, "one", 0.5)])
     path = tmp_path / "cut_holes.toml"

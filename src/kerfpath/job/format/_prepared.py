@@ -211,6 +211,10 @@ def prepare(job: Job, part: Part | None = None) -> PreparedJob:
             requests.append(_request(job, task, part))
         except InputError as fault:
             faults.append(fault)
+    try:
+        _require_above_floor(job, requests)
+    except InputError as fault:
+        faults.append(fault)
     if faults:
         raise all_of(faults)
     return PreparedJob.of(job, part, cell, requests)
@@ -226,7 +230,6 @@ def _request(job: Job, task: ContourSpec, part: Part) -> CutRequest:
             replace(each, unrounded=sharp)
             for each, sharp in zip(candidates, task.unrounded(part, loop), strict=True)
         )
-    _require_above_floor(job, task.name, [each.nodes for each in candidates])
     return CutRequest(
         task=task, loop=loop, candidates=candidates, options=job.options, closer=closer
     )
@@ -252,20 +255,25 @@ def _within_tolerances(
     )
 
 
-def _require_above_floor(job: Job, name: str, nodes: Sequence[Contour]) -> None:
-    """Raise InputError where a contour lies below the floor."""
+def _require_above_floor(job: Job, requests: Sequence[CutRequest]) -> None:
+    """Raise InputError where a contour lies below the floor; it names the lowest."""
     floor = job.options.floor
-    if floor is None:
+    if floor is None or not requests:
         return
     up, rise = job.placement[2, :3], job.placement[2, 3]
-    lowest = min(float((each.points @ up).min()) for each in nodes) + rise
-    if lowest < floor - SAME_PLACE:
+    lowest = [
+        min(float((each.nodes.points @ up).min()) for each in request.candidates) + rise
+        for request in requests
+    ]
+    worst, below = int(np.argmin(lowest)), sum(z < floor - SAME_PLACE for z in lowest)
+    if below:
         raise refusal_at(
             job.path,
             ("part", "xyz_mm"),
-            f"contour {name!r} reaches {(floor - lowest) * 1e3:.4g} mm below the floor, which is "
-            f"at z = {floor * 1e3:g} mm of the robot base; write floor_mm in [robot] where the "
-            "floor is lower, or floor = false where there is none",
+            f"contour {requests[worst].task.name!r} reaches {(floor - lowest[worst]) * 1e3:.4g} mm "
+            f"below the floor, which is at z = {floor * 1e3:g} mm of the robot base ({below} of "
+            f"{len(requests)} contours reach below it); write floor_mm in [robot] where the floor "
+            "is lower, or floor = false where there is none",
         )
 
 
