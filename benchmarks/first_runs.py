@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import tempfile
 from collections import Counter
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from itertools import islice
 from pathlib import Path
 
@@ -65,9 +65,9 @@ def run(*, quick: bool = False) -> Report:
     count = 6 if quick else JOBS
     tried, written, reasons = Counter[str](), Counter[str](), list[str]()
     with tempfile.TemporaryDirectory() as folder:
-        for known in islice(_in_turn(Path(folder)), count):
+        for known, loops in islice(_in_turn(Path(folder)), count):
             tried[known.family] += 1
-            reason = _reason(known)
+            reason = _reason(known, loops)
             written[known.family] += not reason
             if reason:
                 reasons.append(f"{known.path.name}: {' '.join(reason.split())[:200]}")
@@ -82,22 +82,21 @@ def run(*, quick: bool = False) -> Report:
     return report
 
 
-def _in_turn(folder: Path) -> Iterator[Known]:
-    """Yield drawings that are no larger than a robot reaches."""
+def _in_turn(folder: Path) -> Iterator[tuple[Known, list[str]]]:
+    """Yield drawings that are no larger than a robot reaches, and which loops are cut."""
     for known in corpus(folder, 8):
         part = read(known.path, **known.options)
-        if np.ptp(part.bounding_box, axis=0).max() < LARGEST and _loops(part):
-            yield known
+        if np.ptp(part.bounding_box, axis=0).max() < LARGEST and (loops := _loops(part)):
+            yield known, loops
 
 
-def _reason(known: Known) -> str:
+def _reason(known: Known, loops: Sequence[str]) -> str:
     """Return why a job does not become a program at its first run, "" if it does."""
-    part = read(known.path, **known.options)
     path = known.path.with_suffix(".toml")
     options = "".join(f"{key} = {_toml(value)}\n" for key, value in known.options.items())
     path.write_text(
         TEMPLATE.format(file=known.path.name, options=options)
-        + "".join(CONTOUR.format(loop=name) for name in _loops(part))
+        + "".join(CONTOUR.format(loop=name) for name in loops)
     )
     try:
         prepared = prepare(read_job(path))

@@ -145,7 +145,7 @@ def check(job: JobArgument, as_json: Json = False) -> None:
     with busy("looking at the cell"):
         checked = check_job(read, part)
     show_check(checked, as_json=as_json)
-    require_foreseen(prepare(read, part))
+    require_foreseen(prepare(read, part, checked.cell))
 
 
 @app.command()

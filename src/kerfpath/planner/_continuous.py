@@ -98,10 +98,9 @@ def _from_more_samples(
 
     They may where they are not close as they are, and where a motion nearly as fast was found.
     """
-    needed, step = none.relaxation, task.settings.gamma_step
-    if step < COARSE_STEP or needed is None or needed.speed < NEARLY or none.closed is not None:
+    needed, fine = none.relaxation, _finer(task)
+    if fine is None or needed is None or needed.speed < NEARLY or none.closed is not None:
         return None
-    fine = task.sampled(step / 2)
     there = finder.of(fine)
     found = clear_motion(fine, there, begin)
     why = "begun from a finer grid: the search between its samples found no motion"
@@ -110,6 +109,15 @@ def _from_more_samples(
     except NoFeasiblePath:
         return None
     return replace(made, settings=task.settings)
+
+
+def _finer(task: PlanningTask) -> PlanningTask | None:
+    """Return the task with twice as many samples of gamma; None where they are close as they are.
+
+    Its graph is built when it is asked for.
+    """
+    step = task.settings.gamma_step
+    return task.sampled(step / 2) if step >= COARSE_STEP else None
 
 
 def clear_motion(
@@ -144,8 +152,9 @@ def clear_motion(
         starts.refine(paths)
         starts.refine_from_grid(task)
     if starts.best is not None and starts.above(search.value, POOR):
-        if finder.is_free and task.settings.gamma_step >= COARSE_STEP:
-            starts.refine_from_grid(task.sampled(task.settings.gamma_step / 2))
+        fine = _finer(task) if finder.is_free else None
+        if fine is not None:
+            starts.refine_from_grid(fine)
         width, _, ways = wide(task)
         paths += search.paths(Effort(width, OTHERWISE, ways))
         starts.refine(paths, unpromising=True)

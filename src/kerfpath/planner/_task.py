@@ -81,8 +81,8 @@ class PlanningTask:
     dt : float s
         Time from node to node at the speed asked for.
     layers : callable
-        Builds the layers of some nodes (M,), or of all where it is given None: then no layer is
-        empty, or it raises NoFeasiblePath.
+        Builds the layers of some nodes (M,) of a task, or of all where it is given None: then no
+        layer is empty, or it raises NoFeasiblePath.
     """
 
     contour: Contour
@@ -91,14 +91,14 @@ class PlanningTask:
     T_base_part: Array
     settings: PlanOptions
     dt: float
-    layers: Callable[[Ints | None], Layered]
+    layers: Callable[[PlanningTask, Ints | None], Layered]
 
     __repr__ = short_repr
 
     @cached_property
     def built(self) -> Layered:
         """The layers of all nodes; asking for them raises NoFeasiblePath where one is empty."""
-        return self.layers(None)
+        return self.layers(self, None)
 
     @property
     def graph(self) -> LayeredGraph:
@@ -127,30 +127,18 @@ class PlanningTask:
     def on(self, layered: Layered) -> PlanningTask:
         """Return the task on a graph that is built."""
 
-        def layers(nodes: Ints | None) -> Layered:
+        def layers(task: PlanningTask, nodes: Ints | None) -> Layered:
             return layered if nodes is None else layered.at_nodes(nodes)
 
         return replace(self, dt=layered.problem.dt, layers=layers)
 
     def sampled(self, step: float) -> PlanningTask:
         """Return the task with gamma sampled in other steps, rad; its graph is not built yet."""
-        settings = replace(self.settings, gamma_step=step)
-        layers = partial(
-            _layers,
-            contour=self.contour,
-            robot=self.robot,
-            options=settings,
-            tool=self.T_flange_tip,
-            placement=self.T_base_part,
-            dt=self.dt,
-            graph=None,
-            progress=None,
-        )
-        return replace(self, settings=settings, layers=layers)
+        return replace(self, settings=replace(self.settings, gamma_step=step), layers=_layers)
 
     def at_nodes(self, nodes: Ints) -> Layered:
         """Return the layers of some nodes (M,), ascending; those of all are not built for it."""
-        return self.built.at_nodes(nodes) if "built" in vars(self) else self.layers(nodes)
+        return self.built.at_nodes(nodes) if "built" in vars(self) else self.layers(self, nodes)
 
     @property
     def times(self) -> Array:
@@ -250,17 +238,6 @@ def task_of(
     options = options.resolve(robot, dt)
     if graph is not None:
         _require_fitting(graph, contour, robot, options.tilt)
-    layers = partial(
-        _layers,
-        contour=contour,
-        robot=robot,
-        options=options,
-        tool=T_flange_tip,
-        placement=T_base_part,
-        dt=dt,
-        graph=graph,
-        progress=progress,
-    )
     return PlanningTask(
         contour=contour,
         robot=robot,
@@ -268,29 +245,24 @@ def task_of(
         T_base_part=T_base_part,
         settings=options,
         dt=dt,
-        layers=layers,
+        layers=partial(_layers, graph=graph, progress=progress),
     )
 
 
 def _layers(
+    task: PlanningTask,
     nodes: Ints | None,
-    *,
-    contour: Contour,
-    robot: Robot,
-    options: PlanOptions,
-    tool: Array,
-    placement: Array,
-    dt: float,
-    graph: LayeredGraph | None,
-    progress: Callable[[int], None] | None,
+    graph: LayeredGraph | None = None,
+    progress: Callable[[int], None] | None = None,
 ) -> Layered:
     """Build the layers of some nodes (M,) of a task, or of all, from its graph if that is given."""
+    contour, robot, options, tool = task.contour, task.robot, task.settings, task.T_flange_tip
     if graph is None:
         graph = layered_graph(
             contour,
             robot,
             tool=tool,
-            placement=placement,
+            placement=task.T_base_part,
             options=replace(options, comfort=None, retract=None, floor=None),
             nodes=nodes,
             progress=progress,
@@ -306,12 +278,12 @@ def _layers(
         if nodes is None:
             require_no_empty_layer(contour, graph)
     except NoFeasiblePath as empty:
-        frames = placement @ contour.frames(options.frames)
+        frames = task.T_base_part @ contour.frames(options.frames)
         raise _at_any_gamma(empty, graph, robot, frames, tool, options) from None
     problem = SearchProblem(
         q=graph.q,
         start=graph.start,
-        dt=dt,
+        dt=task.dt,
         limits=options.limits(robot),
         endless=robot.endless,
         vertex_cost=_vertex_cost(graph, options, robot, tool),

@@ -4,8 +4,8 @@ from kerfpath.sequence._inner import inner_first as inner_first
 from kerfpath.sequence._order import Order as Order
 from kerfpath.sequence._order import best_order as best_order
 from kerfpath.sequence._part import PartPlan as PartPlan
+from kerfpath.sequence._part import distances_between as distances_between
 from kerfpath.sequence._part import longest_search as longest_search
-from kerfpath.sequence._part import near_each_other as near_each_other
 from kerfpath.sequence._part import order_candidates as order_candidates
 from kerfpath.sequence._part import order_plans as order_plans
 from kerfpath.sequence._part import plan_part as plan_part

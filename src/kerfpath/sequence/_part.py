@@ -33,8 +33,8 @@ from kerfpath.transfer import TransferMove
 
 __all__ = [
     "PartPlan",
+    "distances_between",
     "longest_search",
-    "near_each_other",
     "order_candidates",
     "order_plans",
     "plan_part",
@@ -301,7 +301,7 @@ def order_plans(
     places = reachable(every, cell, retract, further)
     if given_order:
         before = [*before, *((i, i + 1) for i in range(len(every) - 1))]
-    warm = near_each_other([c[0].contour for c in every], heat_spacing)
+    warm = _too_warm([c[0].contour for c in every], heat_spacing)
     air: MoveTimes | None = None
     while True:
         plans = [every[i][c] for i, c in places]
@@ -363,12 +363,17 @@ def _settle_order(
     return air.why_no_order(None)
 
 
-def near_each_other(contours: Sequence[Contour], spacing: float) -> Bools:
+def _too_warm(contours: Sequence[Contour], spacing: float) -> Bools:
     """Say which contours (G, G) are nearer to each other than `spacing` (m)."""
-    near = np.zeros((len(contours), len(contours)), bool)
     if spacing <= 0:
-        return near
+        return np.zeros((len(contours), len(contours)), bool)
+    return distances_between(contours) < spacing
+
+
+def distances_between(contours: Sequence[Contour]) -> Array:
+    """Return how far apart the nodes of each two contours are, (G, G) m; infinite of one alone."""
+    apart = np.full((len(contours), len(contours)), np.inf)
+    trees = [cKDTree(contour.points) for contour in contours]
     for i, j in combinations(range(len(contours)), 2):
-        apart, _ = cKDTree(contours[i].points).query(contours[j].points)
-        near[i, j] = near[j, i] = np.asarray(apart).min() < spacing
-    return near
+        apart[i, j] = apart[j, i] = np.min(trees[i].query(contours[j].points)[0])
+    return apart

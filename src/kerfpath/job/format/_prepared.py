@@ -190,8 +190,8 @@ class PreparedJob:
         return [contour.task.name for contour in self.contours]
 
 
-def prepare(job: Job, part: Part | None = None) -> PreparedJob:
-    """Return a job with its drawing and cell read; `part` if the drawing is read already.
+def prepare(job: Job, part: Part | None = None, cell: Cell | None = None) -> PreparedJob:
+    """Return a job with its drawing and cell read; `part`, `cell` where they are already.
 
     Raises
     ------
@@ -201,9 +201,9 @@ def prepare(job: Job, part: Part | None = None) -> PreparedJob:
     """
     part = part or job.read_part()
     tasks = job.tasks(part)  # a misspelt name shall not wait for the cell
-    cell, requests, faults = None, list[CutRequest](), list[InputError]()
+    requests, faults = list[CutRequest](), list[InputError]()
     try:
-        cell = cell_of_job(job, part)
+        cell = cell_of_job(job, part) if cell is None else cell
     except InputError as fault:
         faults.append(fault)
     for task in tasks:

@@ -14,7 +14,15 @@ from kerfpath.cell import Cell
 from kerfpath.contour import Contour
 from kerfpath.job.format.tables import AuditTable, ProgramTable
 from kerfpath.plans import Plan
-from kerfpath.post import Handshake, LanguageSettings, Program, build_program
+from kerfpath.post import (
+    Handshake,
+    LanguageSettings,
+    Program,
+    ProgramIssue,
+    build_program,
+    issues_before_planning,
+)
+from kerfpath.robots import Robot
 from kerfpath.transfer import TransferMove
 
 __all__ = ["ProgramOptions", "Tolerances", "program_options", "tolerances_of"]
@@ -73,6 +81,22 @@ class ProgramOptions:
             approach_speed=self.approach_speed,
             air_speed=self.air_speed,
             arc_tolerance=self.arc_tolerance,
+            handshakes=self.handshakes,
+        )
+
+    def issues(self, cuts: Sequence[tuple[str, float]], robot: Robot) -> list[ProgramIssue]:
+        """Return what the language refuses of cuts, see `kerfpath.post.issues_before_planning`."""
+        return issues_before_planning(
+            cuts,
+            robot,
+            self.language,
+            self.settings,
+            name=self.name,
+            zone=self.zone,
+            lead_time=self.lead_time,
+            gas_lead=self.gas_lead,
+            pierce_time=self.pierce_time,
+            approach_speed=self.approach_speed,
             handshakes=self.handshakes,
         )
 

@@ -35,10 +35,7 @@ def refusal(path: Path, text: str, error: ValidationError) -> InputError:
         order = detail["type"] == "missing", *places.locate(where)
         key = ".".join(part for part in where if isinstance(part, str))
         problems.append((order, f"{key}: {_problem(detail)}"))
-    (order, said), *rest = sorted(problems)
-    more = f" (and {len(rest)} more)" if rest else ""
-    others = [str(error_at(path, place[1], words)) for place, words in rest]
-    return error_at(path, order[1], said + more, others)
+    return all_of([error_at(path, place[1], said) for place, said in sorted(problems)])
 
 
 def refusal_at(path: Path, where: Sequence[str | int], said: str) -> InputError:
@@ -110,9 +107,9 @@ def _shown(value: object) -> str:
     return text if len(text) <= _LONGEST else f"{text[:_LONGEST]}..."
 
 
-def error_at(path: Path, line: int | None, said: str, others: Sequence[str] = ()) -> InputError:
-    """Return the error with its place in front; `others` are lines of further ones."""
-    return InputError(f"{path}: {said}" if line is None else f"{path}:{line}: {said}", others)
+def error_at(path: Path, line: int | None, said: str) -> InputError:
+    """Return the error with its place in front."""
+    return InputError(f"{path}: {said}" if line is None else f"{path}:{line}: {said}")
 
 
 def all_of(found: Sequence[InputError]) -> InputError:

@@ -7,7 +7,6 @@ from dataclasses import replace
 
 import numpy as np
 
-from kerfpath._arrays import Array
 from kerfpath.contour import Contour
 from kerfpath.errors import InputError
 from kerfpath.job.format._contour import ContourSpec
@@ -79,10 +78,7 @@ def _between(path: Contour, nodes: Contour) -> tuple[float, float]:
     part = ((path.points - start) * chord).sum(axis=1) / (chord**2).sum(axis=1)
     part = np.clip(part, 0.0, 1.0)[:, None]
     off = np.linalg.norm(path.points - start - part * chord, axis=1)
-    axes = _unit((1 - part) * nodes.axes[k] + part * nodes.axes[k + 1])
-    turned = 2 * np.arcsin(np.clip(np.linalg.norm(axes - _unit(path.axes), axis=1) / 2, 0.0, 1.0))
+    axes = (1 - part) * nodes.axes[k] + part * nodes.axes[k + 1]
+    axes /= np.linalg.norm(axes, axis=1, keepdims=True)
+    turned = 2 * np.arcsin(np.clip(np.linalg.norm(axes - path.axes, axis=1) / 2, 0.0, 1.0))
     return float(off.max()), float(turned.max())
-
-
-def _unit(vectors: Array) -> Array:
-    return np.asarray(vectors / np.linalg.norm(vectors, axis=1, keepdims=True))

@@ -4,10 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import replace
-from itertools import combinations
 
 import numpy as np
-from scipy.spatial import cKDTree
 
 from kerfpath._arrays import Array, Bools, Ints
 from kerfpath.contour import Contour
@@ -22,8 +20,7 @@ from kerfpath.job.format import (
     refusal_at,
 )
 from kerfpath.plans import has_room
-from kerfpath.post import issues_before_planning
-from kerfpath.sequence import best_order, near_each_other
+from kerfpath.sequence import best_order, distances_between
 
 __all__ = ["foresee", "require_foreseen"]
 
@@ -63,19 +60,8 @@ def _program_faults(prepared: PreparedJob) -> Iterator[InputError]:
     if p.language == "none":
         return
     said = set()
-    for issue in issues_before_planning(
-        [(request.task.name, request.task.speed) for request in prepared.contours],
-        job.robot,
-        p.language,
-        p.settings,
-        name=p.name,
-        zone=p.zone,
-        lead_time=p.lead_time,
-        approach_speed=p.approach_speed,
-        pierce_time=p.pierce_time,
-        gas_lead=p.gas_lead,
-        handshakes=p.handshakes,
-    ):
+    cuts = [(request.task.name, request.task.speed) for request in prepared.contours]
+    for issue in p.issues(cuts, job.robot):
         words = issue.message
         if issue.code.startswith("name-") and issue.place == "a contour":
             words += " by name in [[contour]]"
@@ -120,16 +106,17 @@ def _order_faults(prepared: PreparedJob) -> Iterator[InputError]:
     job, sequence = prepared.job, prepared.job.sequence
     if sequence is None or not sequence.heat_spacing_mm or job.options.interruptions != "none":
         return
-    loops = [request.candidates[0].nodes for request in prepared.contours]
+    between = distances_between([request.candidates[0].nodes for request in prepared.contours])
     spacing = sequence.heat_spacing_mm / 1000
-    if _has_order(prepared, loops, spacing):
+    if _has_order(prepared, between < spacing):
         return
-    apart = sorted({d for d in _distances(loops) if d < spacing})
+    apart = np.unique(between[between < spacing])
     low, high = 0, len(apart)  # of that many pairs one may follow the other in no order
     while high - low > 1:
         middle = (low + high) // 2
-        low, high = (middle, high) if _has_order(prepared, loops, apart[middle]) else (low, middle)
-    most = apart[low] if _has_order(prepared, loops, apart[low]) else 0.0
+        possible = _has_order(prepared, between < apart[middle])
+        low, high = (middle, high) if possible else (low, middle)
+    most = apart[low] if _has_order(prepared, between < apart[low]) else 0.0
     order = "the order given" if sequence.order == "given" else "any order"
     yield refusal_at(
         job.path,
@@ -140,9 +127,9 @@ def _order_faults(prepared: PreparedJob) -> Iterator[InputError]:
     )
 
 
-def _has_order(prepared: PreparedJob, loops: list[Contour], spacing: float) -> bool:
-    """Return whether the contours can be cut in an order that keeps a heat spacing, m."""
-    near, count = near_each_other(loops, spacing), len(loops)
+def _has_order(prepared: PreparedJob, near: Bools) -> bool:
+    """Return whether contours can be cut in an order in which none follows one near it, (G, G)."""
+    count = len(near)
     assert prepared.job.sequence is not None
     if prepared.job.sequence.order == "given":
         return not any(near[i, i + 1] for i in range(count - 1))
@@ -155,15 +142,6 @@ def _has_order(prepared: PreparedJob, loops: list[Contour], spacing: float) -> b
     except NoFeasiblePath as none:
         return not none.proved
     return True
-
-
-def _distances(loops: list[Contour]) -> list[float]:
-    """Return how far apart each two contours are, m."""
-    trees = [cKDTree(loop.points) for loop in loops]
-    return [
-        float(np.min(trees[i].query(loops[j].points)[0]))
-        for i, j in combinations(range(len(loops)), 2)
-    ]
 
 
 def _retract_faults(prepared: PreparedJob, request: CutRequest) -> Iterator[InputError]:
