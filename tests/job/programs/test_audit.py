@@ -375,3 +375,41 @@ def test_bad_arguments_are_refused(folder, written):
     (folder / "x.foo").write_text("")
     said = refused("audit", str(folder / "x.foo"), "--job", str(folder / "job.toml"))
     assert "expected a program (" in said
+
+
+ZIGZAG = """
+[robot]
+model = "abb_irb4600_60_205"
+acceleration_ratio = "cybertech_8_to_20kg"
+[tool]
+head = "laser-head-45"
+[part]
+file = "line.csv"
+placed_by = "centre"
+xyz_mm = [1300, 0, 700]
+rpy_deg = [0, 0, 0]
+unit = "mm"
+axis = [0, 0, -1]
+[program]
+language = "rapid"
+[plan]
+certify = false
+[[contour]]
+pick = "contour"
+speed_m_min = 1
+spacing_mm = 2
+"""
+
+
+@pytest.mark.parametrize("turn", [120.0, 150.0, 170.0])
+def test_a_line_of_few_points_with_sharp_corners_is_no_way_back(tmp_path, turn):
+    """Near a corner both legs are close to a target: it stands on the one that it came by."""
+    way = np.radians([0.0, 180.0 - turn, 0.0, 180.0 - turn])
+    legs = 90.0 * np.c_[np.cos(way) * [1, -1, 1, -1], np.sin(way), 0 * way]
+    points = np.vstack([np.zeros(3), np.cumsum(legs, axis=0)])
+    rows = "\n".join(",".join(f"{x:.6f}" for x in point) for point in points)
+    (tmp_path / "line.csv").write_text(rows)
+    (tmp_path / "job.toml").write_text(ZIGZAG)
+    result = run("plan", tmp_path / "job.toml", "--out", tmp_path / "out")
+    assert result.returncode == 0, result.stderr
+    assert run("audit", tmp_path / "out/job.mod", "--job", tmp_path / "job.toml").returncode == 0

@@ -71,7 +71,8 @@ def _along(cut: ReadCut, reference: Contour) -> tuple[Array, Array]:
     points = cut.T_part_tip[:, :3, 3]
     way = np.append(0.0, np.cumsum(np.linalg.norm(np.diff(points, axis=0), axis=1)))
     guess = reference.s[0] + way / way[-1] * reference.length
-    fine = np.linspace(reference.s[0], reference.s[-1], 8 * len(reference))
+    # A drawn line of a few corners needs samples as close as the nodes that are cut along it.
+    fine = np.linspace(reference.s[0], reference.s[-1], 8 * max(len(reference), len(points)))
     at = np.unique(np.concatenate([reference.s, fine]))
     tree = cKDTree(np.c_[reference.at(at)[0], CLIMB * at])
     near = np.asarray(tree.query(np.c_[points, CLIMB * guess])[1])
