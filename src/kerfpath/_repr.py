@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-__all__ = ["short_repr"]
+__all__ = ["counted", "short_repr"]
 
 LONGEST = 240
 """Characters of a line; what does not fit is left out."""
@@ -17,6 +17,11 @@ FEW = 6
 """Numbers and things up to which all are shown."""
 SHORT = 40
 """Characters of a text or of several things that are shown."""
+
+
+def counted(number: int, noun: str) -> str:
+    """Return how many there are, with the noun in singular or plural: "1 face", "2 faces"."""
+    return f"{number} {noun}{'' if number == 1 else 's'}"
 
 
 def short_repr(thing: Any) -> str:

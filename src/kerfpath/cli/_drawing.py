@@ -7,6 +7,7 @@ from pathlib import Path
 
 from rich.markup import escape
 
+from kerfpath._repr import counted
 from kerfpath.cad import Part
 from kerfpath.cad import read as read_drawing
 from kerfpath.cli._show import busy, out, progress_bars
@@ -69,7 +70,7 @@ def summary(part: Part) -> str:
     size = (part.bounding_box[1] - part.bounding_box[0]) * 1000
     lengths = [loop.length * 1000 for loop in part.loops]
     return (
-        f"{part.faces} faces, {len(part.loops)} loops"
+        f"{counted(part.faces, 'face')}, {counted(len(part.loops), 'loop')}"
         f"{f' of {min(lengths):.1f} to {max(lengths):.1f} mm' if lengths else ''}, "
         f"{' x '.join(f'{v:.1f}' for v in size)} mm (file in {part.unit}); "
         f"largest gap {part.largest_gap * 1000:.4f} mm, "

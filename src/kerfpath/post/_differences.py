@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from kerfpath._repr import short_repr
+from kerfpath._repr import counted, short_repr
 from kerfpath.post._compare import (
     ANGLE,
     FRAME,
@@ -174,7 +174,7 @@ def _name_contours(
     alone = [group for k, group in enumerate(groups) if k not in known]
     if alone:
         names = ", ".join(group.name for group in alone)
-        message = f"{_count(len(alone), 'contour')} {words}: {names}"
+        message = f"{counted(len(alone), 'contour')} {words}: {names}"
         first = [*alone[0].joint, *alone[0].path][:1] if code == "added" else []
         places = tuple(move.place for move in first)
         yield Difference(code=code, count=len(alone), message=message, places=places)
@@ -190,10 +190,6 @@ def _compare_order(
         yield Difference(code="order", count=1, message=message)
 
 
-def _count(number: int, word: str) -> str:
-    return f"{number} {word}{'' if number == 1 else 's'}"
-
-
 def _name_moves(pairs: Sequence[MovePair], names: Names) -> Iterator[Difference]:
     """Find moves that only one of the programs has; one left out, before which of the other."""
     for side, code, words in (
@@ -207,7 +203,7 @@ def _name_moves(pairs: Sequence[MovePair], names: Names) -> Iterator[Difference]
         yield Difference(
             code=code,
             count=len(alone),
-            message=f"{_count(len(alone), 'move')} {words}, the first",
+            message=f"{counted(len(alone), 'move')} {words}, the first",
             places=pairs[alone[0]].places,
             near=near[0] if side == 1 and near else "",
         )
@@ -293,7 +289,7 @@ def _compare_values(both: Both, digits: _Digits, names: Names) -> Iterator[Diffe
         if moved.size:
             a, b = both[int(moved[np.argmax(off[moved])])]
             said = f"{words(a)} in {names[0]} and {words(b)} in {names[1]}"
-            message = f"{_count(len(moved), 'move')}, {said}"
+            message = f"{counted(len(moved), 'move')}, {said}"
             places = tuple((code == "waits" and s.waits_at) or s.move.place for s in (a, b))
             said_at = b.move.elsewhere.get(SAID[code], "") if code in SAID else ""
             yield Difference(
@@ -308,7 +304,7 @@ def _find_unsaid(both: Both, names: Names) -> Iterator[Difference]:
         if alone := [k for k, (one, two) in enumerate(said) if one != two]:
             a, b = both[alone[0]]
             where = names[0] if said[alone[0]][0] else names[1]
-            message = f"{_count(len(alone), 'move')}, said in {where} alone"
+            message = f"{counted(len(alone), 'move')}, said in {where} alone"
             places = (a.move.place, b.move.place)
             yield Difference(code=code, count=len(alone), message=message, places=places)
 
@@ -324,7 +320,7 @@ def _compare_handshakes(
             ", ".join(handshake_in_words(h.what) for _, h in group.handshakes) or "none"
             for group in differ[0]
         )
-        message = f"{_count(len(differ), 'contour')}, {one} in {names[0]}, {two} in {names[1]}"
+        message = f"{counted(len(differ), 'contour')}, {one} in {names[0]}, {two} in {names[1]}"
         there = [h.place for _, h in differ[0][1].handshakes]
         near = [move.place for move in (*differ[0][1].path, *differ[0][1].joint)]
         yield Difference(

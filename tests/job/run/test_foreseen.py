@@ -7,7 +7,7 @@ import pytest
 from commands import run
 from jobs import ROBOT_AND_HEAD
 from kerfpath.errors import InputError
-from kerfpath.job import foresee, prepare, read_job, result_texts, run_job
+from kerfpath.job import foresee, prepare, read_job, result_texts, run_job, run_prepared
 
 HEAD = f"""\
 {ROBOT_AND_HEAD}[part]
@@ -64,7 +64,8 @@ def test_too_few_nodes_are_known_and_the_number_named_passes(tmp_path, tolerance
     assert said(job(tmp_path, [(0, "one", f"count = {cure}")], audit)) == []
     # What was foretold is what the audit would have found.
     for count, passed in ((8, False), (cure, True)):
-        (cut,) = run_job(job(tmp_path, [(0, "one", f"count = {count}")], audit)).cuts
+        asked = job(tmp_path, [(0, "one", f"count = {count}")], audit)
+        (cut,) = run_prepared(prepare(asked)).cuts
         rows = {row.code: row.ok for row in cut.checks}
         assert rows["tip-between-nodes"] == passed
 
@@ -156,12 +157,20 @@ def test_contours_below_the_floor_are_one_fault_that_names_the_lowest(tmp_path):
     with pytest.raises(
         InputError, match=r"reaches 20 mm below the floor.* \(2 of 2 contours"
     ) as found:
-        prepare(read_job(path))
+        run_job(read_job(path))
     assert not found.value.others
+    path.write_text(
+        low.replace('"one"', '"while"').replace("[plan]", '[program]\nlanguage = "rapid"\n[plan]')
+    )
+    faults = foresee(prepare(read_job(path)))
+    assert [("reserved" in str(f), "the floor" in str(f)) for f in faults] == [
+        (True, False),
+        (False, True),
+    ]
     path.write_text(low.replace("[robot]\n", "[robot]\nfloor_mm = -20\n"))
-    assert len(prepare(read_job(path)).contours) == 2
+    assert not foresee(prepare(read_job(path)))
     path.write_text(low.replace("[robot]\n", "[robot]\nfloor = false\n"))
-    assert len(prepare(read_job(path)).contours) == 2
+    assert not foresee(prepare(read_job(path)))
 
 
 def test_every_fault_of_the_file_is_told(tmp_path):

@@ -17,7 +17,7 @@ from kerfpath.front import Subproblem
 from kerfpath.job.format._cell import cell_of_job
 from kerfpath.job.format._contour import ContourSpec
 from kerfpath.job.format._read import Job
-from kerfpath.job.format._refusals import all_of, refusal_at
+from kerfpath.job.format._refusals import all_of
 from kerfpath.job.format._sampling import closer_nodes
 from kerfpath.operations import edge, nearest
 from kerfpath.options import PlanOptions
@@ -211,10 +211,6 @@ def prepare(job: Job, part: Part | None = None, cell: Cell | None = None) -> Pre
             requests.append(_request(job, task, part))
         except InputError as fault:
             faults.append(fault)
-    try:
-        _require_above_floor(job, requests)
-    except InputError as fault:
-        faults.append(fault)
     if faults:
         raise all_of(faults)
     return PreparedJob.of(job, part, cell, requests)
@@ -253,28 +249,6 @@ def _within_tolerances(
         f"{key} = {used:.3g} in place of {asked:g}, as what lies between its nodes keeps the "
         "tolerances of [audit] only so"
     )
-
-
-def _require_above_floor(job: Job, requests: Sequence[CutRequest]) -> None:
-    """Raise InputError where a contour lies below the floor; it names the lowest."""
-    floor = job.options.floor
-    if floor is None or not requests:
-        return
-    up, rise = job.placement[2, :3], job.placement[2, 3]
-    lowest = [
-        min(float((each.nodes.points @ up).min()) for each in request.candidates) + rise
-        for request in requests
-    ]
-    worst, below = int(np.argmin(lowest)), sum(z < floor - SAME_PLACE for z in lowest)
-    if below:
-        raise refusal_at(
-            job.path,
-            ("part", "xyz_mm"),
-            f"contour {requests[worst].task.name!r} reaches {(floor - lowest[worst]) * 1e3:.4g} mm "
-            f"below the floor, which is at z = {floor * 1e3:g} mm of the robot base ({below} of "
-            f"{len(requests)} contours reach below it); write floor_mm in [robot] where the floor "
-            "is lower, or floor = false where there is none",
-        )
 
 
 def divide_nodes(path: Contour, nodes: Contour, parts: int) -> Contour:

@@ -28,6 +28,8 @@ HALVINGS = 7
 """Times that a length is halved, or an interval of lengths, to say which would do."""
 FINE = np.radians(1.0)
 """Step of gamma at which poses of both ends are looked at, however coarse that of the job is."""
+SAME_PLACE = 1e-6
+"""m: what is below the floor by no more is so by rounding."""
 SECONDS = 2.0
 """s: how long it may take to find that contours can be put in no order."""
 
@@ -48,6 +50,7 @@ def foresee(prepared: PreparedJob) -> list[InputError]:
     """Return the faults of a job that are known before it is planned, each with its key."""
     return [
         *_program_faults(prepared),
+        *_floor_faults(prepared),
         *(fault for request in prepared.contours for fault in _sampling_faults(prepared, request)),
         *_order_faults(prepared),
         *(fault for request in prepared.contours for fault in _retract_faults(prepared, request)),
@@ -70,6 +73,28 @@ def _program_faults(prepared: PreparedJob) -> Iterator[InputError]:
         if words not in said:
             said.add(words)
             yield refusal_at(job.path, ("program",), words)
+
+
+def _floor_faults(prepared: PreparedJob) -> Iterator[InputError]:
+    """Yield that contours reach below the floor; the fault names the lowest."""
+    job, floor = prepared.job, prepared.job.options.floor
+    if floor is None:
+        return
+    up, rise = job.placement[2, :3], job.placement[2, 3]
+    lowest = [
+        min(float((each.nodes.points @ up).min()) for each in request.candidates) + rise
+        for request in prepared.contours
+    ]
+    worst, below = int(np.argmin(lowest)), sum(z < floor - SAME_PLACE for z in lowest)
+    if below:
+        yield refusal_at(
+            job.path,
+            ("part", "xyz_mm"),
+            f"contour {prepared.names[worst]!r} reaches {(floor - lowest[worst]) * 1e3:.4g} mm "
+            f"below the floor, which is at z = {floor * 1e3:g} mm of the robot base ({below} of "
+            f"{len(lowest)} contours reach below it); write floor_mm in [robot] where the floor "
+            "is lower, or floor = false where there is none",
+        )
 
 
 def _sampling_faults(prepared: PreparedJob, request: CutRequest) -> Iterator[InputError]:

@@ -8,6 +8,7 @@ from kerfpath.auditor import bound_checks
 from kerfpath.cad import Part
 from kerfpath.job.format import Job, PreparedJob, prepare
 from kerfpath.job.run._contour import cut_candidate
+from kerfpath.job.run._foresee import require_foreseen
 from kerfpath.job.run._order import order_cuts
 from kerfpath.job.run._result import CutResult, JobResult
 from kerfpath.planner import with_bound
@@ -26,9 +27,12 @@ def run_job(job: Job, part: Part | None = None, *, progress: Progress = no_progr
     Raises
     ------
     InputError
-        The part cannot be read, a loop does not exist, a contour cannot be sampled.
+        The part cannot be read, a loop does not exist, a contour cannot be sampled; or a fault is
+        known before planning, as a contour below the floor or a name that the language reserves.
     """
-    return run_prepared(prepare(job, part), progress=progress)
+    prepared = prepare(job, part)
+    require_foreseen(prepared)
+    return run_prepared(prepared, progress=progress)
 
 
 def run_prepared(prepared: PreparedJob, *, progress: Progress = no_progress) -> JobResult:
