@@ -360,3 +360,15 @@ def test_files_that_are_no_dxf_are_refused(tmp_path: Path, content: bytes) -> No
     with pytest.raises(InputError, match=r"bad\.dxf: ") as caught:
         read(tmp_path / "bad.dxf")
     assert "\n" not in str(caught.value)
+
+
+def test_user_coordinate_systems_are_those_of_the_part(tmp_path: Path) -> None:
+    document = new(units=1)
+    document.modelspace().add_circle((0, 0), 2)
+    document.ucs.new(
+        "BENCH", dxfattribs={"origin": (1, 2, 0), "xaxis": (0, 1, 0), "yaxis": (-1, 0, 0)}
+    )
+    document.saveas(tmp_path / "disc.dxf")
+    frame = read(tmp_path / "disc.dxf").frame("BENCH")
+    expected = [[0, -1, 0, 0.0254], [1, 0, 0, 0.0508], [0, 0, 1, 0], [0, 0, 0, 1]]
+    np.testing.assert_allclose(frame, expected, atol=1e-12)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 
 import numpy as np
@@ -202,3 +203,50 @@ def test_parts_of_several_products_keep_their_names(tmp_path: Path) -> None:
     rods = [name for name in counts if name.startswith("Stab")]
     assert len(rods) == 2
     assert sum(n for name, n in counts.items() if name.startswith("pair")) == 12
+
+
+def with_frames(path, name, items=("#9004",)):
+    """Put a placement at (10, 20, 30), z along x and x along y, among the items of a shape."""
+    text = path.read_text()
+    pattern = rf"({name}\('[^']*',\()"
+    text, count = re.subn(pattern, rf"\g<1>{','.join(items)},", text)
+    assert count
+    frame = (
+        "#9001=CARTESIAN_POINT('',(10.,20.,30.));#9002=DIRECTION('',(1.,0.,0.));"
+        "#9003=DIRECTION('',(1.,2.,0.));#9004=AXIS2_PLACEMENT_3D('FIXTURE',#9001,#9002,#9003);"
+        "#9005=AXIS2_PLACEMENT_3D('FIXTURE',#9001,$,$);"
+    )
+    path.write_text(text.replace("ENDSEC;\nEND-ISO", f"{frame}\nENDSEC;\nEND-ISO"))
+    return path
+
+
+@pytest.mark.parametrize(("unit", "mm"), [("MM", 1.0), ("INCH", 25.4)])
+def test_named_placements_are_coordinate_systems_of_the_part(tmp_path, unit, mm):
+    model = Model()
+    model.shapes.AddShape(BRepPrimAPI_MakeBox(100.0, 50.0, 20.0).Shape(), False)
+    path = model.write(tmp_path / "box.step", unit=unit)
+    assert not read(path).frames
+    part = read(with_frames(path, "ADVANCED_BREP_SHAPE_REPRESENTATION", ("#9004", "#9005")))
+    assert list(part.frames) == ["FIXTURE", "FIXTURE-2"]
+    size = np.array([100, 50, 20]) / 1000  # of the shape that OCCT writes in either unit
+    np.testing.assert_allclose(part.bounding_box, [[0, 0, 0], size], atol=EXACT)
+    expected = np.eye(4)
+    expected[:3, :3] = np.array([[0, 1, 0], [0, 0, 1], [1, 0, 0]]).T  # x' = y, y' = z, z' = x
+    expected[:3, 3] = np.array([10, 20, 30]) * mm / 1000
+    np.testing.assert_allclose(part.frame("FIXTURE"), expected, atol=1e-12)
+    expected[:3, :3] = np.eye(3)
+    np.testing.assert_allclose(part.frame("FIXTURE-2"), expected, atol=1e-12)
+    with pytest.raises(InputError, match=r"got 'TABLE'; it names 'FIXTURE', 'FIXTURE-2'"):
+        part.frame("TABLE")
+
+
+@pytest.mark.parametrize(
+    ("representation", "frames"),
+    [("[^_]SHAPE_REPRESENTATION", ["FIXTURE"]), ("ADVANCED_BREP_SHAPE_REPRESENTATION", [])],
+)
+def test_of_an_assembly_the_coordinate_systems_of_the_whole_count(tmp_path, representation, frames):
+    model = Model()
+    box = named(model.shapes.AddShape(BRepPrimAPI_MakeBox(100.0, 50.0, 20.0).Shape(), False), "box")
+    model.assembly("whole", (box, ALONG), (box, QUARTER))
+    path = model.write(tmp_path / "two.step")
+    assert list(read(with_frames(path, representation)).frames) == frames

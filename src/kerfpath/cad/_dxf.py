@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Iterable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from itertools import product
 from pathlib import Path
 
@@ -16,17 +16,18 @@ from ezdxf.colors import BYBLOCK, BYLAYER, int2rgb
 from ezdxf.document import Drawing
 from ezdxf.entities.dxfgfx import DXFGraphic
 from ezdxf.entities.insert import Insert
+from ezdxf.entities.ucs import UCSTableEntry
 from ezdxf.math import Vec3
 from ezdxf.xclip import XClip
 
-from kerfpath._arrays import Array
+from kerfpath._arrays import Array, freeze
 from kerfpath.cad._chains import Look, Stroke, loops_in
 from kerfpath.cad._curves import Curve
 from kerfpath.cad._dxf_document import DAMAGED, document_of
 from kerfpath.cad._dxf_entities import curves_of
 from kerfpath.cad._left_out import LeftOut
 from kerfpath.cad._part import Part
-from kerfpath.cad._units import LARGEST, UNITS_MM
+from kerfpath.cad._units import LARGEST, MM, UNITS_MM
 from kerfpath.errors import InputError
 
 __all__ = ["read_dxf"]
@@ -97,10 +98,18 @@ def read_dxf(
     except DAMAGED as error:
         raise InputError(f"{path}: damaged ({_reason(error)}); repair it in CAD") from None
     sheet.left_out.update(lost)
-    return loops_in(
+    part = loops_in(
         path, unit or declared, sheet.strokes, gap=gap, notes=notes, left_out=sheet.summed(),
         axis=axis,
     )  # fmt: skip
+    return replace(part, frames={str(ucs.dxf.name): _frame(ucs, scale) for ucs in document.ucs})
+
+
+def _frame(ucs: UCSTableEntry, scale: float) -> Array:
+    """Return T_part_frame (4, 4) m of a user coordinate system of a drawing."""
+    T = np.array(list(ucs.ucs().matrix.columns()))
+    T[:3, 3] *= scale * MM
+    return freeze(T)
 
 
 def _reason(error: Exception) -> str:

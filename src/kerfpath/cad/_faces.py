@@ -78,6 +78,7 @@ def part_of(
         loops=tuple(loops),
         notes=(*drawn.notes, *map(str, left_out), *_doubts(skins, skin_names, names)),
         left_out=left_out,
+        frames=drawn.frames,
         _gap=gap,
         _triangulate=lru_cache(MESHES)(partial(triangulate, drawn.shape)),
     )

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import difflib
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Literal
@@ -120,6 +120,8 @@ class Part:
         What was assumed, repaired or left out in reading.
     left_out : tuple of LeftOut
         What was left out, by kind and reason; in the notes, too.
+    frames : mapping of str to (4, 4) m
+        T_part_frame of the coordinate systems that a STEP or DXF file names.
     """
 
     path: Path
@@ -129,8 +131,25 @@ class Part:
     loops: tuple[Loop, ...]
     notes: tuple[str, ...] = ()
     left_out: tuple[LeftOut, ...] = ()
+    frames: Mapping[str, Array] = field(default_factory=dict, repr=False)
     _gap: float = field(repr=False)
     _triangulate: Callable[[float], tuple[Array, Ints]] | None = field(default=None, repr=False)
+
+    def frame(self, name: str) -> Array:
+        """Return T_part_frame (4, 4) m of a coordinate system that the drawing names.
+
+        Raises
+        ------
+        InputError
+            There is none of that name.
+        """
+        if name not in self.frames:
+            known = ", ".join(map(repr, self.frames)) or "none"
+            raise InputError(
+                f"{self.path}: expected the name of a coordinate system of the drawing, got "
+                f"{name!r}; it names {known}"
+            )
+        return self.frames[name]
 
     def __repr__(self) -> str:
         size = (self.bounding_box[1] - self.bounding_box[0]) * 1e3

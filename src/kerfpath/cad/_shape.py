@@ -8,9 +8,9 @@ all that the process has to import.
 from __future__ import annotations
 
 import gc
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from io import BytesIO
 from typing import Any
 
@@ -23,6 +23,7 @@ from OCP.TopAbs import TopAbs_ShapeEnum
 from OCP.TopExp import TopExp_Explorer
 from OCP.TopoDS import TopoDS, TopoDS_Compound, TopoDS_Face, TopoDS_Iterator, TopoDS_Shape
 
+from kerfpath._arrays import Array
 from kerfpath._repr import short_repr
 from kerfpath.cad._left_out import LeftOut
 from kerfpath.errors import InputError
@@ -76,6 +77,8 @@ class NamedShape:
     notes : sequence of str
     left_out : sequence of LeftOut
         What is in the file and not in the shape.
+    frames : mapping of str to (4, 4) m
+        T_part_frame of the coordinate systems that the file names.
     """
 
     unit: str
@@ -83,6 +86,7 @@ class NamedShape:
     faces: Sequence[NamedFace]
     notes: Sequence[str]
     left_out: Sequence[LeftOut] = ()
+    frames: Mapping[str, Array] = field(default_factory=dict)
 
     def __reduce__(self) -> tuple[Any, ...]:
         """Return what to make it of again, in another process."""
@@ -96,7 +100,7 @@ class NamedShape:
         stream = BytesIO()
         BinTools.Write_s(both, stream)
         names = [(n.name, n.component, n.layer, n.colour) for n in self.faces]
-        said = tuple(self.notes), tuple(self.left_out)
+        said = tuple(self.notes), tuple(self.left_out), dict(self.frames)
         return _copy_with_names, (self.unit, stream.getvalue(), names, *said)
 
 
@@ -106,6 +110,7 @@ def _copy_with_names(
     names: Sequence[tuple[str, str, str, str]],
     notes: Sequence[str],
     left_out: Sequence[LeftOut],
+    frames: Mapping[str, Array],
 ) -> NamedShape:
     both = TopoDS_Shape()
     BinTools.Read_s(both, BytesIO(stream))
@@ -116,7 +121,9 @@ def _copy_with_names(
         )
         for face, (name, component, layer, colour) in zip(children(faces), names, strict=True)
     ]
-    return NamedShape(unit=unit, shape=shape, faces=named, notes=notes, left_out=left_out)
+    return NamedShape(
+        unit=unit, shape=shape, faces=named, notes=notes, left_out=left_out, frames=frames
+    )
 
 
 def children(shape: TopoDS_Shape) -> list[TopoDS_Shape]:

@@ -9,12 +9,13 @@ from pathlib import Path
 
 from OCP.collections import Sequence_TCollection_AsciiString
 from OCP.IFSelect import IFSelect_ReturnStatus
+from OCP.Interface import Interface_Static
 from OCP.StepBasic import StepBasic_ProductDefinition
 from OCP.STEPControl import STEPControl_Reader
-from OCP.StepRepr import StepRepr_RepresentationItem
 from OCP.TopAbs import TopAbs_ShapeEnum
 from OCP.TopoDS import TopoDS, TopoDS_Shape
 
+from kerfpath.cad._frames import step_frames
 from kerfpath.cad._left_out import nothing_drawn
 from kerfpath.cad._part21 import require_grammar
 from kerfpath.cad._sewn import drawn_of
@@ -24,6 +25,7 @@ from kerfpath.cad._step_model import (
     Origins,
     damaged,
     lost_faces,
+    name_of,
     require_drawable,
 )
 from kerfpath.cad._styles import styles_in
@@ -47,8 +49,6 @@ HEADER_UNITS = {
 
 STARTS = re.compile(rb"#\d+\s*=")
 """How entities start."""
-UNNAMED = ("", "none")
-"""What CAD systems write for a face without a name, in lower case."""
 
 
 def read_step(path: Path, unit: str | None, gap: float) -> NamedShape:
@@ -81,6 +81,8 @@ def _require_whole(text: bytes) -> None:
 
 def _read(path: Path, content: bytes, unit: str | None, gap: float) -> NamedShape:
     reader = STEPControl_Reader()
+    # Else OCCT moves the part by a coordinate system that stands beside its solids.
+    Interface_Static.SetIVal_s("read.step.root.transformation", 0)
     if reader.ReadFile(str(path)) != IFSelect_ReturnStatus.IFSelect_RetDone:
         raise InputError("the file cannot be parsed; export the part as STEP again")
     model = reader.WS().Model()
@@ -108,7 +110,8 @@ def _read(path: Path, content: bytes, unit: str | None, gap: float) -> NamedShap
         raise nothing_drawn(left_out)
     styles = styles_in(entities) if has_styles else ({}, {})
     faces = list(_faces(Origins(reader, entities), shape, *styles))
-    return drawn_of(unit or header, shape, faces, gap=gap, notes=notes, left_out=left_out)
+    drawn = drawn_of(unit or header, shape, faces, gap=gap, notes=notes, left_out=left_out)
+    return replace(drawn, frames=step_frames(entities, UNITS_MM[unit or header]))
 
 
 def _faces(
@@ -128,7 +131,7 @@ def _faces(
         entity = origins.of(shape)
         layer, colour = layers.get(entity, layer), colours.get(entity, colour)
         if shape.ShapeType() == TopAbs_ShapeEnum.TopAbs_FACE:
-            face, name = TopoDS.Face(shape), _name(entity)
+            face, name = TopoDS.Face(shape), name_of(entity)
             into.append(NamedFace(face=face, name=name, layer=layer, colour=colour))
             return
         if (product := origins.product_of(shape)) is not None:
@@ -159,11 +162,3 @@ def _header_unit(reader: STEPControl_Reader) -> str:
     reader.FileUnits(lengths, angles, solid_angles)
     names = dict.fromkeys(length.ToCString().lower() for length in lengths)
     return " and ".join(HEADER_UNITS.get(name, name) for name in names)
-
-
-def _name(entity: object) -> str:
-    """Return the name of the entity that a face was read from, "" if it has none."""
-    if not isinstance(entity, StepRepr_RepresentationItem) or entity.Name() is None:
-        return ""
-    name = entity.Name().ToCString().strip()
-    return "" if name.lower() in UNNAMED else name

@@ -42,11 +42,21 @@ from kerfpath.cad._shape import failures
 from kerfpath.cad._units import LARGEST
 from kerfpath.errors import InputError
 
-__all__ = ["Entities", "Origins", "damaged", "lost_faces", "require_drawable"]
+__all__ = [
+    "Entities",
+    "Origins",
+    "damaged",
+    "lost_faces",
+    "name_of",
+    "outside_components",
+    "require_drawable",
+]
 
 ALONE = (TopAbs_ShapeEnum.TopAbs_FACE, TopAbs_ShapeEnum.TopAbs_SHELL)
 """What no component of an assembly is."""
 STYLES = "StepVisual"
+UNNAMED = ("", "none")
+"""What CAD systems write for an item without a name, in lower case."""
 DRAWN = ("StepGeom", "StepShape")
 """How the names of OCCT's classes begin, by what entities are for."""
 E = TypeVar("E", bound=Standard_Transient)
@@ -130,6 +140,25 @@ def lost_faces(reader: STEPControl_Reader, entities: Entities) -> list[LeftOut]:
     return counted(found)
 
 
+def name_of(entity: object) -> str:
+    """Return the name of an item that something was read from, "" if it has none."""
+    if not isinstance(entity, StepRepr_RepresentationItem) or entity.Name() is None:
+        return ""
+    name = entity.Name().ToCString().strip()
+    return "" if name.lower() in UNNAMED else name
+
+
+def outside_components(entities: Entities) -> Iterator[StepRepr_Representation]:
+    """Yield the representations that lie in the part's own frame: not those of its components."""
+    uses = list(entities.of(StepRepr_NextAssemblyUsageOccurrence))
+    components = {use.RelatedProductDefinition() for use in uses}
+    drawn = _representations(entities)
+    for representation in entities.of(StepRepr_Representation):
+        product = drawn.get(representation)
+        if not uses or (product is not None and product not in components):
+            yield representation
+
+
 class Origins:
     """Which entity each shape was made of.
 
@@ -183,6 +212,22 @@ def _products(
     entities: Entities,
 ) -> dict[Standard_Transient | None, StepBasic_ProductDefinition]:
     """Return the products of an assembly by what alone makes up the shape of each."""
+    found: dict[Standard_Transient | None, StepBasic_ProductDefinition] = {}
+    for representation, product in _representations(entities).items():
+        numbers = range(1, representation.NbItems() + 1)
+        items = [representation.ItemsValue(k) for k in numbers]
+        solids = [item for item in items if isinstance(item, StepShape_SolidModel)]
+        if len(solids) == 1 and all(
+            isinstance(i, (StepShape_SolidModel, StepGeom_Axis2Placement3d)) for i in items
+        ):
+            found[solids[0]] = product
+    return found
+
+
+def _representations(
+    entities: Entities,
+) -> dict[StepRepr_Representation, StepBasic_ProductDefinition]:
+    """Return the products of a file by the representations that draw them."""
     drawn: dict[StepRepr_Representation, StepBasic_ProductDefinition] = {}
     for shape in entities.of(StepShape_ShapeDefinitionRepresentation):
         defined = shape.Definition().PropertyDefinition()
@@ -195,16 +240,7 @@ def _products(
         for one, other in ((same.Rep1(), same.Rep2()), (same.Rep2(), same.Rep1())):
             if one in drawn and other is not None:
                 drawn.setdefault(other, drawn[one])
-    found: dict[Standard_Transient | None, StepBasic_ProductDefinition] = {}
-    for representation, product in drawn.items():
-        numbers = range(1, representation.NbItems() + 1)
-        items = [representation.ItemsValue(k) for k in numbers]
-        solids = [item for item in items if isinstance(item, StepShape_SolidModel)]
-        if len(solids) == 1 and all(
-            isinstance(i, (StepShape_SolidModel, StepGeom_Axis2Placement3d)) for i in items
-        ):
-            found[solids[0]] = product
-    return found
+    return drawn
 
 
 def _unplaced(shape: TopoDS_Shape) -> TopoDS_Shape:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -46,10 +47,11 @@ def part_of_wires(path: Path, drawn: NamedShape, gap: float, axis: Array) -> Par
         edges.Add(edge)
     numbers = range(1, edges.Extent() + 1)
     strokes = [(_curve(TopoDS.Edge(edges.FindKey(number))),) for number in numbers]
-    return loops_in(
+    part = loops_in(
         path, drawn.unit, {LOOK: strokes}, gap=gap, notes=drawn.notes, left_out=drawn.left_out,
         axis=axis,
     )  # fmt: skip
+    return replace(part, frames=drawn.frames)
 
 
 def _curve(edge: TopoDS_Edge) -> Curve:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import csv
 from dataclasses import asdict
 from pathlib import Path
 
@@ -45,7 +46,8 @@ def drawing_in(
 
 
 def _columns(text: str) -> dict[str, str] | list[str]:
-    parts = [part.strip() for part in text.split(",")]
+    """Return the columns of a table; an item with a comma in it stands in double quotes."""
+    parts = [part.strip() for part in next(csv.reader([text], skipinitialspace=True), [])]
     if not any("=" in part for part in parts):
         return parts
     return {name.strip(): own.strip() for name, _, own in (part.partition("=") for part in parts)}
@@ -83,6 +85,8 @@ def show_drawing(part: Part) -> None:
     out.print(escape(f"{part.path}: {summary(part)}"))
     for note in part.notes:
         out.print(escape(f"note: {note}"))
+    if part.frames:
+        out.print(escape(f"coordinate systems: {', '.join(map(repr, part.frames))}"))
 
 
 def drawing_entry(part: Part) -> dict[str, object]:
@@ -92,6 +96,7 @@ def drawing_entry(part: Part) -> dict[str, object]:
         "unit": part.unit,
         "bounding_box_m": part.bounding_box.tolist(),
         "faces": part.faces,
+        "frames": {name: T.tolist() for name, T in part.frames.items()},
         "largest_gap_m": part.largest_gap,
         "shortest_edge_m": part.shortest_edge,
         "notes": list(part.notes),

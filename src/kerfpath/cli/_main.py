@@ -344,7 +344,7 @@ def contours(
     ] = None,
     columns: Annotated[
         str | None,
-        typer.Option(help="Columns of a table: x,y,z,-,nx,ny,nz in order, or x=NAME,y=NAME,..."),
+        typer.Option(help='Columns of a table: x,y,z,-,nx,... in order, or x=NAME,"y=A, B",...'),
     ] = None,
     html: Annotated[
         Path | None,

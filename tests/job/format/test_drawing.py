@@ -84,6 +84,31 @@ def test_a_part_is_placed_by_its_centre(tmp_path: Path) -> None:
     np.testing.assert_array_equal(read_job(path).placement[:3, :3], job.placement[:3, :3])
 
 
+def test_a_part_is_placed_by_a_coordinate_system_of_its_drawing(tmp_path: Path) -> None:
+    document = new(units=4)
+    document.modelspace().add_circle((70, -30), 20)
+    document.ucs.new(
+        "BENCH", dxfattribs={"origin": (50, 0, 0), "xaxis": (0, 1, 0), "yaxis": (-1, 0, 0)}
+    )
+    document.saveas(tmp_path / "blank.dxf")
+    path = tmp_path / "job.toml"
+    text = JOB.replace("rpy_deg = [0, 0, 0]\n{more}", "rpy_deg = [10, 20, 30]\n{more}")
+    path.write_text(text.format(more=""))
+    pose = read_job(path).placement
+    path.write_text(text.format(more='frame = "BENCH"'))
+    job = read_job(path)
+    np.testing.assert_allclose(job.placement @ job.read_part().frame("BENCH"), pose, atol=1e-12)
+    for wrong, words in (
+        ('frame = "FLOOR"', "got 'FLOOR'; it names 'BENCH'"),
+        ('frame = "BENCH"\nplaced_by = "centre"', "expected frame, or placed_by, got both"),
+        ("frame = 1", "part.frame: expected the coordinate system"),
+    ):
+        path.write_text(text.format(more=wrong))
+        with pytest.raises(InputError, match=words) as refused:
+            read_job(path)
+        assert "\n" not in str(refused.value)
+
+
 def test_a_job_says_axis_and_columns_where_the_drawing_does_not(tmp_path: Path) -> None:
     (tmp_path / "line.csv").write_text("Pos X,Pos Y,Pos Z\n0,0,0\n30,0,0\n30,5,1\n")
     path = tmp_path / "job.toml"

@@ -159,7 +159,8 @@ def placed_text(job: Job, numbers: Numbers, folder: Path, remark: str) -> str:
         if where[0] == "tool":
             table.pop("head", None)
         if where[0] == "part":
-            table.pop("placed_by", None)  # the numbers are of its origin
+            for key in ("placed_by", "frame"):
+                table.pop(key, None)  # the numbers are of its origin
         table[where[-1]] = value
     for table, name in _named_files(file):
         table[name] = os.path.relpath(job.path.parent / str(table[name]), folder)

@@ -6,13 +6,13 @@ from pathlib import Path
 from typing import Annotated, Literal
 
 import numpy as np
-from pydantic import AfterValidator
+from pydantic import AfterValidator, model_validator
 
 from kerfpath._arrays import Array, freeze
 from kerfpath.cad import GAP, UNITS_MM
 from kerfpath.job.format._drawing import Drawing
 from kerfpath.job.format._poses import pose
-from kerfpath.job.format._values import Positive, Text, Three, existing, key, one_of
+from kerfpath.job.format._values import Positive, Text, Three, existing, fault, key, one_of
 from kerfpath.job.format.tables._table import Table
 
 __all__ = ["PartTable"]
@@ -57,6 +57,10 @@ class PartTable(Table):
         Literal["origin", "centre"],
         key("what of the part xyz_mm says: its origin, or the middle of its box", '"centre"'),
     ] = "origin"
+    frame: Annotated[
+        Text | None,
+        key("the coordinate system of the drawing that xyz_mm and rpy_deg place", '"FIXTURE"'),
+    ] = None
     xyz_mm: Annotated[
         Three, key("3 numbers, the part's position in the robot base in mm", "[1450, -600, 450]")
     ]
@@ -64,6 +68,12 @@ class PartTable(Table):
         Three,
         key("3 numbers, the part's roll, pitch and yaw in the robot base in deg", "[0, 0, 90]"),
     ]
+
+    @model_validator(mode="after")
+    def _one_place(self) -> PartTable:
+        if self.frame is not None and self.placed_by == "centre":
+            raise fault("frame, or placed_by", "both", "leave one of them out", ("placed_by",))
+        return self
 
     def drawing(self, folder: Path) -> Drawing:
         """Return the drawing, its path taken from a folder."""
@@ -78,19 +88,22 @@ class PartTable(Table):
         )
 
     def resolve(self, drawing: Drawing) -> Array:
-        """Return T_base_part, (4, 4), m; the drawing is read where its middle is placed.
+        """Return T_base_part, (4, 4), m; the drawing is read where not its origin is placed.
 
         Raises
         ------
         InputError
-            The drawing cannot be read.
+            The drawing cannot be read, or names no such coordinate system.
         """
-        T_base_part = pose(self.xyz_mm, self.rpy_deg)
-        if self.placed_by == "origin":
-            return T_base_part
-        T_centre_part = np.eye(4)
-        T_centre_part[:3, 3] = -drawing.read().bounding_box.mean(axis=0)
-        return freeze(T_base_part @ T_centre_part)
+        placed = pose(self.xyz_mm, self.rpy_deg)
+        if self.frame is not None:
+            T_part_placed = drawing.read().frame(self.frame)
+        elif self.placed_by == "centre":
+            T_part_placed = np.eye(4)
+            T_part_placed[:3, 3] = drawing.read().bounding_box.mean(axis=0)
+        else:
+            return placed
+        return freeze(placed @ np.linalg.inv(T_part_placed))
 
 
 def _direction(value: tuple[float, ...] | None) -> Array | None:
