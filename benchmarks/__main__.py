@@ -35,6 +35,7 @@ NAMES = (
     "continuum",
     "continuum_random",
     "continuum_bounds",
+    "continuum_infeasible",
     "certificate_audits",
 )
 
@@ -151,6 +152,10 @@ def _run(name: str, *, quick: bool) -> list[Report]:
         from benchmarks import continuum_bounds
 
         return continuum_bounds.run(quick=quick)
+    if name == "continuum_infeasible":
+        from benchmarks import continuum_infeasible
+
+        return continuum_infeasible.run(quick=quick)
     if name == "certificate_audits":
         from benchmarks import certificate_audits
 

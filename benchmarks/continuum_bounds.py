@@ -16,7 +16,7 @@ from benchmarks._random_contours import ROBOTS, cut
 from benchmarks._starts import GRIDS, SHAKES, from_grids, shaken
 from kerfpath import PlanOptions, fastest_speed
 
-__all__ = ["run"]
+__all__ = ["Fast", "bounds", "near_fastest", "run", "try_fast"]
 
 SHARE = 0.97
 """Share of the fastest speed that is asked for."""
@@ -81,7 +81,7 @@ cost that is known."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class _Fast:
+class Fast:
     """What came of one task near the fastest speed."""
 
     name: str
@@ -109,12 +109,16 @@ class _Fast:
 
 def run(*, quick: bool) -> list[Report]:
     """Measure both."""
-    return [_near_fastest(1 if quick else TASKS), _bounds(12 if quick else INSTANCES)]
+    tasks, instances = (1, 12) if quick else (TASKS, INSTANCES)
+    keys = [(name, i) for name in ROBOTS for i in range(tasks)]
+    return [
+        near_fastest(in_processes(try_fast, keys, min(PROCESSES, tasks))),
+        bounds(in_processes(try_narrow, range(instances), PROCESSES)),
+    ]
 
 
-def _near_fastest(count: int) -> Report:
-    keys = [(name, i) for name in ROBOTS for i in range(count)]
-    made = in_processes(try_fast, keys, min(PROCESSES, count))
+def near_fastest(made: Sequence[Fast]) -> Report:
+    """Return what came of tasks near the fastest speed as a table."""
     rows = [_fast_row(w) for w in made]
     planned = [w for w in made if w.excess is not None]
     excess = [100 * w.excess for w in planned if w.excess is not None]
@@ -133,14 +137,14 @@ def _near_fastest(count: int) -> Report:
             f"{median(gaps):.2f} %, worst {max(gaps):.2f} %"
         )
     return Report(
-        title=f"Continuous gamma: {len(keys)} contours near the fastest speed",
+        title=f"Continuous gamma: {len(made)} contours near the fastest speed",
         how=HOW_FAST,
         sheets=[Sheet(columns=FAST, rows=rows)],
         findings=findings,
     )
 
 
-def try_fast(key: tuple[str, int]) -> _Fast:
+def try_fast(key: tuple[str, int]) -> Fast:
     """Plan one cut near the fastest speed, and from many starts."""
     drawn = cut(*key)
     fastest = fastest_speed(
@@ -161,7 +165,7 @@ def try_fast(key: tuple[str, int]) -> _Fast:
     begun = min([*found, *([here] if here else [])], key=lambda p: p.cost, default=None)
     if begun is not None:
         found += shaken(begun, np.random.default_rng([9, key[1]]))
-    return _Fast(
+    return Fast(
         name=key[0],
         index=key[1],
         cost=weighed.cost,
@@ -176,7 +180,7 @@ def try_fast(key: tuple[str, int]) -> _Fast:
     )
 
 
-def _fast_row(w: _Fast) -> tuple[str, ...]:
+def _fast_row(w: Fast) -> tuple[str, ...]:
     costs = (w.cost, w.grid_cost, w.best)
     return (
         w.name,
@@ -195,8 +199,8 @@ def _is_above(bound: float | None, *costs: float | None) -> bool:
     return bound is not None and any(cost is not None and bound > cost for cost in costs)
 
 
-def _bounds(count: int) -> Report:
-    tried = in_processes(try_narrow, range(count), PROCESSES)
+def bounds(tried: Sequence[Narrow | None]) -> Report:
+    """Return what came of narrow pieces, None of those without a motion, as a table."""
     made = [one for one in tried if one is not None]
     families = {name: [m for m in made if m.robot == name] for name in {m.robot: 0 for m in made}}
     rows = [_bound_row(name, of) for name, of in (families | {"all": made}).items()]
@@ -207,7 +211,7 @@ def _bounds(count: int) -> Report:
         how=HOW_BOUND,
         sheets=[Sheet(columns=BOUND, rows=rows)],
         findings=[
-            f"{count - len(made)} of {count} pieces have no motion to begin with",
+            f"{len(tried) - len(made)} of {len(tried)} pieces have no motion to begin with",
             f"bounds above a cost: {len(above)}" + "".join(f"; {m}" for m in above[:NAMED]),
             f"plans over 0.1 % dearer than the least cost known: {len(dearer)}"
             + "".join(f"; {m}" for m in dearer[:NAMED]),

@@ -12,7 +12,7 @@ from benchmarks._figures import Report, Sheet
 from benchmarks._random_contours import ROBOTS, cut
 from kerfpath import PlanOptions
 
-__all__ = ["run", "weigh_cut"]
+__all__ = ["report", "run", "weigh_cut"]
 
 COUNTS = (134, 133, 133)
 """Cuts of each robot."""
@@ -66,20 +66,22 @@ def run(*, quick: bool) -> list[Report]:
     """Measure them."""
     counts = (2, 2, 2) if quick else COUNTS
     keys = [(name, i) for name, count in zip(ROBOTS, counts, strict=True) for i in range(count)]
-    made = in_processes(weigh_cut, keys, 1 if quick else PROCESSES)
+    return [report(in_processes(weigh_cut, keys, 1 if quick else PROCESSES))]
+
+
+def report(made: Sequence[Weighed]) -> Report:
+    """Return what became of cuts as tables, those named that ask for a look."""
     robots = {name: [w for w in made if w.name == name] for name in ROBOTS}
     rows = [_row(name, weighed) for name, weighed in (robots | {"all": made}).items()]
-    return [
-        Report(
-            title=f"Continuous gamma: {len(keys)} random contours",
-            how=HOW,
-            sheets=[
-                Sheet(columns=COSTS, rows=[row[: len(COSTS)] for row in rows]),
-                Sheet(columns=PROVED, rows=[(row[0], *row[len(COSTS) :]) for row in rows]),
-            ],
-            findings=list(_findings(made)),
-        )
-    ]
+    return Report(
+        title=f"Continuous gamma: {len(made)} random contours",
+        how=HOW,
+        sheets=[
+            Sheet(columns=COSTS, rows=[row[: len(COSTS)] for row in rows]),
+            Sheet(columns=PROVED, rows=[(row[0], *row[len(COSTS) :]) for row in rows]),
+        ],
+        findings=_findings(made),
+    )
 
 
 def weigh_cut(key: tuple[str, int]) -> Weighed:

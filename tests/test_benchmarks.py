@@ -16,6 +16,7 @@ from benchmarks import (
     _random_contours,
     _starts,
     _tally,
+    continuum_infeasible,
     continuum_random,
     part,
 )
@@ -312,3 +313,32 @@ def test_the_findings_name_what_asks_for_a_look():
     assert counts == ["1", "2", "1", "1", "1"]
     row = continuum_random._row("all", made)
     assert row[1:7] == ("4", "3", "3", "1", "1", "2")
+
+
+def test_a_plan_above_the_ceiling_is_told_apart_from_one_below():
+    def refused(index, verdict, ceiling=None):
+        return continuum_infeasible.Refused(
+            name="abb_irb2400_155",
+            index=index,
+            verdict=verdict,
+            where="node 3" if verdict == "every gamma" else "",
+            speed=1.0,
+            ceiling=ceiling,
+            seconds=2.0,
+            fastest_seconds=1.0,
+        )
+
+    made = [
+        refused(0, "every gamma"),
+        refused(1, "grid"),
+        refused(2, "grid", 1.4),
+        refused(3, "undecided", 1.6),
+        refused(4, "planned", 1.6),
+        refused(5, "planned", 1.5),
+        refused(6, "planned"),
+    ]
+    report = continuum_infeasible.report(made)
+    counts = [text.split(": ")[1].partition(";")[0] for text in report.findings]
+    assert counts == ["1 of 4 (25.0 %) of those without a plan", "3", "3", "1", "1"]
+    assert report.sheets[0].rows[-1] == ("all", "7", "1", "2", "1", "3", "2", "1")
+    assert report.sheets[0].rows[1] == ("kuka_kr16_r1610_2", *("0",) * 5, "-", "-")
