@@ -7,7 +7,7 @@ import pytest
 
 from commands import run
 from jobs import SLIT_JOB, SLITS
-from kerfpath.job import read_job, run_job
+from kerfpath.job import prepare, read_job, run_prepared
 from kerfpath.job.output import result_texts
 
 FREE = SLIT_JOB.replace("[plan]", "[plan]\ncertify = false").replace(
@@ -20,7 +20,9 @@ def reach(tmp_path_factory):
     """Give the least and the largest joints, deg, of the best motions within wide ranges."""
     folder = tmp_path_factory.mktemp("free")
     write(folder, FREE)
-    joints = np.degrees([cut.plan.q for cut in run_job(read_job(folder / "slits.toml")).cuts])
+    joints = np.degrees(
+        [cut.plan.q for cut in run_prepared(prepare(read_job(folder / "slits.toml"))).cuts]
+    )
     return joints.min(axis=(0, 1)), joints.max(axis=(0, 1))
 
 
@@ -44,7 +46,7 @@ def narrow(folder, reach, seed, more=""):
 def test_what_passes_is_written(tmp_path, reach, seed, language):
     laser = "[program.krl]\nlaser_output = 1\n" if language == "krl" else ""
     more = f'[program]\nlanguage = "{language}"\n{laser}'
-    result = run_job(read_job(narrow(tmp_path, reach, seed, more)))
+    result = run_prepared(prepare(read_job(narrow(tmp_path, reach, seed, more))))
     texts = result_texts(result)
     assert bool(texts.program) == result.passed
     assert not texts.refused
@@ -55,10 +57,10 @@ def test_what_can_be_written_without_regard_to_retract_and_limits_still_is(tmp_p
     for seed in range(8):
         job = read_job(narrow(tmp_path, reach, seed))
         blind = replace(job, options=replace(job.options, retract=None, comfort=None))
-        texts = result_texts(run_job(blind))
+        texts = result_texts(run_prepared(prepare(blind)))
         refused += bool(texts.refused)
         if texts.program:
-            assert result_texts(run_job(job)).program
+            assert result_texts(run_prepared(prepare(job))).program
     assert refused  # else ranges would be too wide to try anything
 
 
@@ -68,7 +70,7 @@ def test_what_cannot_back_off_is_no_plan_in_exit_code_message_and_report(tmp_pat
     shown = run("plan", path, cwd=tmp_path)
     assert shown.returncode == 2
     assert "retract_mm" in shown.stderr
-    result = run_job(read_job(path))
+    result = run_prepared(prepare(read_job(path)))
     assert not result.passed
     for cut in result.cuts:
         row = next(row for row in cut.checks if row.code == "retract")
