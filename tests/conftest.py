@@ -14,7 +14,7 @@ from hypothesis import settings
 
 from kerfpath import apart
 from kerfpath.certificate import USUAL
-from kerfpath.certifier import _certify, _nopath
+from kerfpath.certifier import _certify, _largest, _nopath
 from kerfpath.contour import Contour
 from kerfpath.options import PlanOptions
 from kerfpath.planner import _closed, _quickest
@@ -46,6 +46,7 @@ _certify.MOST_PAIRS, _certify.MOST_PER_NODE = 1_500_000, 0
 # So does the search for the quickest motion, which takes seconds a contour, and its ceiling.
 USUAL_RUNGS, _quickest.RUNGS = _quickest.RUNGS, ()
 _closed.MOST_BINDING = 2
+_largest.FAILED = 2
 USUAL_CEILING = _nopath.MOST_STEPS, _nopath.MOST_PAIRS
 _nopath.MOST_STEPS, _nopath.MOST_PAIRS = 200_000, 3_000_000
 

@@ -14,6 +14,7 @@ from kerfpath.certificate import ALLOWANCE, Certificate, Stage
 from kerfpath.certifier._cells import CellMaker, CellSet
 from kerfpath.certifier._finer import cells_to_divide
 from kerfpath.certifier._groups import distinct_groups
+from kerfpath.certifier._largest import largest_step_bound
 from kerfpath.certifier._nodes import between, turning_nodes
 from kerfpath.certifier._parts import DEAREST, NARROW, Parts
 from kerfpath.certifier._prices import limit_prices
@@ -51,6 +52,7 @@ where it drops out, four times as much a level coarser: whoever checks the certi
 enclosures of his own, and may find less. The curvature is taken so much wider, too. Where nobody
 does: `SAME`, rounding."""
 SAME = 1e-9
+NOT_KEPT = 'a bound of the objective "max" has no certificate to keep'
 AT_LIMIT = 0.98
 """Share of what (6) allows from which it may be what keeps the plan from costing less."""
 EARLY, COARSE = 0.3, 1
@@ -71,7 +73,8 @@ class Certified:
     statement : str
         What is proved, or why nothing can be.
     stages, pairs : int
-        Stages, and steps from cell to cell looked at in all of them.
+        Stages, and steps from cell to cell looked at in all of them; of the objective "max" the
+        costs that were tried.
     """
 
     plan: Plan
@@ -123,22 +126,31 @@ def certify(
     why = _why_not(plan)
     if why:
         return Certified(plan=plan, done=False, statement=f"no bound is proved: {why}")
-    course = _Course(plan, gap, until, checkable, progress)
+    steps = _steps_of(plan)
+    if plan.settings.objective == "max":
+        best, tests = largest_step_bound(plan, steps, gap, lambda: monotonic() > until, progress)
+        found = _certified(plan, best, gap, None, tests, 0)
+        return replace(found, statement=f"{found.statement}; {NOT_KEPT}") if checkable else found
+    course = _Course(plan, steps, gap, until, checkable, progress)
     course.run()
-    bound = max(course.best - ALLOWANCE * plan.cost, 0.0)
+    stages = tuple(course.stages) if checkable else None
+    return _certified(plan, course.best, gap, stages, course.count, course.pairs)
+
+
+def _certified(
+    plan: Plan, best: float, gap: float, kept: tuple[Stage, ...] | None, stages: int, pairs: int
+) -> Certified:
+    """Return the plan with what is proved of its cost, and the stages to keep where there are."""
+    bound = max(best - ALLOWANCE * plan.cost, 0.0)
     reached = (plan.cost - bound) / plan.cost
-    proof = replace(
-        plan.proof,
-        bound=bound,
-        gap=reached,
-        certificate=Certificate(bound=bound, stages=tuple(course.stages)) if checkable else None,
-    )
+    certificate = None if kept is None else Certificate(bound=bound, stages=kept)
+    proof = replace(plan.proof, bound=bound, gap=reached, certificate=certificate)
     return Certified(
         plan=replace(plan, proof=proof),
         done=reached <= gap,
         statement=proof.bound_claim,
-        stages=course.count,
-        pairs=course.pairs,
+        stages=stages,
+        pairs=pairs,
     )
 
 
@@ -153,28 +165,38 @@ def _why_not(plan: Plan) -> str:
         return "the tool axis may tilt"
     if plan.feed is not None:
         return "the feed is reduced"
-    if asked.objective != "sum":
-        return f'the objective is "{asked.objective}"'
     if not plan.cost > 0:
         return "its cost is not above 0"
     return ""
+
+
+def _steps_of(plan: Plan) -> Steps:
+    """Return what the steps of motions along the contour of a plan cost and may be."""
+    asked, dt = plan.settings, float(np.diff(plan.time).max())
+    limits = asked.limits(plan.robot)
+    return Steps(
+        weight=asked.weights,
+        velocity=limits.velocity.per_interval(dt) + 2 * LIMIT_TOLERANCE,
+        acceleration=limits.acceleration.per_interval(dt) + 2 * LIMIT_TOLERANCE,
+        metric=METRIC_CODES[asked.metric],
+        endless=plan.robot.endless,
+    )
 
 
 class _Course:
     """The stages of one certificate, from coarse cells at a few nodes to fine ones at more."""
 
     def __init__(
-        self, plan: Plan, gap: float, until: float, checkable: bool, progress: Progress
+        self,
+        plan: Plan,
+        steps: Steps,
+        gap: float,
+        until: float,
+        checkable: bool,
+        progress: Progress,
     ) -> None:
-        robot, asked, dt = plan.robot, plan.settings, float(np.diff(plan.time).max())
-        limits = asked.limits(robot)
-        self.steps = Steps(
-            weight=asked.weights,
-            velocity=limits.velocity.per_interval(dt) + 2 * LIMIT_TOLERANCE,
-            acceleration=limits.acceleration.per_interval(dt) + 2 * LIMIT_TOLERANCE,
-            metric=METRIC_CODES[asked.metric],
-            endless=robot.endless,
-        )
+        robot, asked = plan.robot, plan.settings
+        self.steps = steps
         self.margin, width = (CLEARLY, WIDER) if checkable else (SAME, 1.0)
         self.maker = CellMaker(robot, plan.frames, plan.T_flange_tip, asked.postures, width)
         self.cost, self.until, self.progress = plan.cost, until, progress

@@ -116,6 +116,15 @@ class MotionTest:
             metric=MANHATTAN,
             endless=self._endless,
         )
+        return self.closed_to(steps, around)
+
+    def closed_to(
+        self, steps: Steps, around: int | None = None, most_pairs: int = MOST_PAIRS
+    ) -> Closed | None:
+        """Return the same of motions of such steps: bounds (5) and (6), and the most they cost.
+
+        It is left at that after so many pairs of steps.
+        """
         first, last = 0, self._count - 1
         if around is not None:
             first, last = max(first, around - ABOUT), min(last, around + ABOUT)
@@ -130,7 +139,7 @@ class MotionTest:
             if found is not None:
                 return replace(found, node=first + found.node)
             work += one.pairs
-            if one.left or work > MOST_PAIRS:
+            if one.left or work > most_pairs:
                 return None
             cells = self._maker.halves(one.cells.take(one.backward()))
         return None

@@ -36,6 +36,8 @@ class Steps:
         Bounds (5) and (6) on an increment and on its change, tolerance included.
     metric : int
     endless : (n,) bool
+    most : float
+        What a step may cost at most; infinite where it may cost anything.
     """
 
     weight: Array
@@ -43,13 +45,15 @@ class Steps:
     acceleration: Array
     metric: int
     endless: Bools
+    most: float = np.inf
 
     __repr__ = short_repr
 
     def over(self, intervals: int) -> Step:
         """Return the step over several intervals: no shorter than all of them together (14)."""
         velocity = intervals * self.velocity
-        return Step(self.weight, np.zeros_like(velocity), velocity, self.metric, self.endless)
+        tilt, most = np.zeros_like(velocity), intervals * self.most
+        return Step(self.weight, tilt, velocity, self.metric, self.endless, most)
 
     def tilted(self, multipliers: Array | None, k: int) -> Step:
         """Return the step from node k to the next, tilted by the multipliers (K, n) of (6)."""

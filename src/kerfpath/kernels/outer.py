@@ -16,13 +16,13 @@ is not known of gamma drops out but for curvature: they tell what no choice of g
 
 from __future__ import annotations
 
-from math import pi
+from math import inf, pi
 
 import numpy as np
 
 from kerfpath._arrays import Array, Bools, Ints
 from kerfpath.kernels._jit import jit, jit_inline
-from kerfpath.kernels.metric import increment
+from kerfpath.kernels.metric import extend, finish, increment
 from kerfpath.kernels.reduced import SLACK, Cells, Step, near, window
 
 __all__ = ["blame_bends", "blame_steps", "count_steps", "keep_back", "keep_on", "list_steps"]
@@ -46,11 +46,25 @@ def _factor(cells: Cells, b: int, i: int, r: int) -> float:
 
 
 @jit_inline
+def _dear(cells: Cells, step: Step, a: int, b: int, D: Array) -> bool:
+    """Return whether every step from cell a to b, D from centre to centre, costs more than most."""
+    if step.most == inf:
+        return False
+    total = 0.0
+    for i in range(len(D)):
+        least = max(abs(D[i]) - cells.box[a, i] - cells.box[b, i], 0.0)
+        total = extend(total, step.weight[i] * least, step.metric)
+    return finish(total, step.metric) * (1.0 - SLACK) > step.most
+
+
+@jit_inline
 def _steps(cells: Cells, step: Step, lead: Ints, a: int, b: int, out_D: Array) -> bool:
-    """Fill D; return whether a step from cell a to b may keep (5)."""
+    """Fill D; return whether a step from cell a to b may keep (5) and cost no more than it may."""
     status = near(cells, step, a, b, out_D)
     if status != 1:
         return status > 0
+    if _dear(cells, step, a, b, out_D):
+        return False
     r = lead[b]
     for i in range(len(out_D)):
         f = _factor(cells, b, i, r)

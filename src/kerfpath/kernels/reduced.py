@@ -74,13 +74,17 @@ class Potential(NamedTuple):
 
 
 class Step(NamedTuple):
-    """What a step costs and may be: weights, tilt mu, velocity bound v (n,), metric, endless."""
+    """What a step costs and may be: weights, tilt mu, velocity bound v (n,), metric, endless.
+
+    ``most``: what it may cost, infinite where there is no such limit.
+    """
 
     weight: Array
     tilt: Array
     velocity: Array
     metric: int
     endless: Bools
+    most: float
 
 
 @jit_inline

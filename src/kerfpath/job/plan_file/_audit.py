@@ -182,7 +182,7 @@ def _list_claims(file: PlanFile, tables: Mapping[str, Sequence[Check]]) -> str:
         claims.append("that no order takes less")
     if claims:
         said.append(f"Claimed, not verified: {' and '.join(claims)}.")
-    if bounded:
+    if any(p.name in bounded and p.settings.objective == "sum" for p in file.plans):
         said.append("plan.json keeps what proves a bound with certificate = true in [plan].")
     return " ".join(said)
 
