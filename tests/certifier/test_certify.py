@@ -14,6 +14,7 @@ from kerfpath.certifier import _certify as course
 from kerfpath.certifier import _stage as stages
 from kerfpath.certifier._cells import CellMaker
 from kerfpath.certifier._nodes import between, turning_nodes
+from kerfpath.certifier._steps import Steps
 from kerfpath.job import read_job
 from kerfpath.kernels.metric import rho
 from kerfpath.refiner._curves import JointCurves
@@ -40,7 +41,7 @@ def made(arc, arm, tool, placement):
 
 def steps_of(one):
     limits, dt = one.settings.limits(one.robot), one.dt
-    return stages.Steps(
+    return Steps(
         weight=one.settings.weights,
         velocity=limits.velocity.per_interval(dt) + 1e-9,
         acceleration=limits.acceleration.per_interval(dt) + 1e-9,

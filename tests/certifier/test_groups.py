@@ -9,7 +9,8 @@ from kerfpath.certifier import _certify as course
 from kerfpath.certifier import _parts, certify
 from kerfpath.certifier._cells import CellMaker
 from kerfpath.certifier._groups import distinct_groups
-from kerfpath.certifier._stage import Steps, solve_stage
+from kerfpath.certifier._stage import solve_stage
+from kerfpath.certifier._steps import Steps
 from kerfpath.kernels.metric import MANHATTAN
 
 RANGE = np.radians([180, 95, 70, 250, 115, 350])

@@ -6,11 +6,16 @@ import numpy as np
 import pytest
 
 from kerfpath import plan
+from kerfpath.certificate import cell_bounds
 from kerfpath.certifier import _certify as course
-from kerfpath.certifier import certify
+from kerfpath.certifier import _stage, certify
+from kerfpath.certifier._bends import cross_bends
 from kerfpath.certifier._prices import limit_prices
-from kerfpath.certifier._stage import Steps, solve_stage
+from kerfpath.certifier._stage import solve_stage
+from kerfpath.certifier._steps import Steps
+from kerfpath.kernels.limits import LIMIT_TOLERANCE
 from kerfpath.kernels.metric import MANHATTAN
+from kerfpath.kernels.outer import bent_by
 
 METRICS = ("manhattan", "euclid", "chebychev")
 SPEED = 0.96
@@ -35,6 +40,10 @@ def others(planned):
         m: [planned(metric=m, gamma_step=np.radians(step)).cost for step in (1.0, 3.0, 7.0)]
         for m in METRICS
     }
+
+
+def course_of(one, gap=0.1):
+    return course._Course(one, course._steps_of(one), gap, np.inf, False, lambda *_: None)
 
 
 @pytest.mark.parametrize("metric", METRICS)
@@ -67,7 +76,9 @@ def test_the_multipliers_of_a_plan_bound_it_closer(metric, planned, others, monk
 
 def test_the_cheapest_cells_are_joined_by_steps(planned):
     """They stand for a motion: prices about it show where it breaks (6)."""
-    one = course._Course(planned(), 0.1, np.inf, False, lambda *_: None)
+    one = course._Course(
+        planned(), course._steps_of(planned()), 0.1, np.inf, False, lambda *_: None
+    )
     result = solve_stage(one.maker.coarsest(np.arange(one.last + 1)), one.steps)
     motion = result.cheapest()
     assert result.cells.node[motion].tolist() == list(range(one.last + 1))
@@ -84,7 +95,14 @@ def test_a_certificate_is_there_for_those_who_check_it_only(planned):
 
 
 def test_multipliers_ask_for_cells_at_every_node(planned):
-    one = course._Course(planned(speed=0.3), 0.1, np.inf, False, lambda *_: None)
+    one = course._Course(
+        planned(speed=0.3),
+        course._steps_of(planned(speed=0.3)),
+        0.1,
+        np.inf,
+        False,
+        lambda *_: None,
+    )
     cells = one.maker.coarsest(one.nodes)
     with pytest.raises(ValueError, match="every node"):
         solve_stage(cells, one.steps, np.zeros((one.last + 1, 6)))
@@ -123,10 +141,74 @@ def test_no_prices_where_nothing_near_breaks_the_limit():
 
 @pytest.mark.parametrize("metric", ["manhattan", "euclid"])
 def test_a_plan_at_the_limit_has_prices(metric, planned):
-    one = course._Course(planned(metric=metric), 0.005, np.inf, False, lambda *_: None)
+    one = course_of(planned(metric=metric), 0.005)
     posture = int(one.plan.posture[0])
     assert one._priced
     for most in course.DEAREST:
         prices = one._prices(one.plan.gamma, posture, course.NARROW, most)
         assert one.steps.price(prices) > 0
         assert (np.abs(prices) <= most * one.steps.weight * (1 + 1e-6)).all()
+
+
+def through_pairs(packed, steps, result, most):
+    """Slow and obvious: every pair of steps is tested, and every state kept."""
+    bound, step = steps.acceleration + 2 * LIMIT_TOLERANCE, steps.over(1)
+    lead = np.argmax(np.abs(packed.slope) / bound, axis=1)
+    begin, to, cost, behind = result
+    onward = [list(range(begin[a], begin[a + 1])) for a in range(len(packed.half))]
+    ending = [np.flatnonzero(to == a) for a in range(len(packed.half))]
+    origin = np.repeat(np.arange(len(packed.half)), np.diff(begin))
+    first, last = packed.start[1], packed.start[-2]
+    D = np.empty((2, len(bound)))
+
+    def follows(e, f):
+        return bent_by(packed, step, bound, lead, origin[e], to[e], to[f], D) < 0
+
+    until = {e: behind[origin[e]] + cost[e] for a in range(first) for e in onward[a]}
+    for a in range(first, last):
+        for f in onward[a]:
+            here = [until[e] for e in ending[a] if follows(e, f)]
+            until[f] = min(here, default=np.inf) + cost[f]
+    rest = {e: 0.0 for e in until if to[e] >= last}
+    for a in range(last - 1, -1, -1):
+        for e in onward[a]:
+            if e not in rest:
+                here = [cost[f] + rest[f] for f in onward[to[e]] if follows(e, f)]
+                rest[e] = min(here, default=np.inf)
+    found = np.full(len(packed.half), np.inf)
+    for e in until:
+        whole = until[e] + rest[e]
+        for cell in (origin[e], to[e]):
+            if whole <= most and (cell == origin[e] or cell >= last):
+                found[cell] = min(found[cell], whole)
+    return found
+
+
+def test_steps_that_may_not_follow_each_other_are_left_out(planned, monkeypatch):
+    """As trying all pairs says; and no cell that the plan passes costs more than the plan."""
+    best = planned()
+    one = course_of(best)
+    cells = one.maker.coarsest(np.arange(one.last + 1))
+    for _ in range(3):
+        cells = one.maker.halves(cells)
+    near = np.abs(np.angle(np.exp(1j * (cell_bounds(cells.level, cells.index)[0]
+                                        - best.gamma[cells.node])))) < 0.25  # fmt: skip
+    cells = cells.take(near & (cells.posture == best.posture[0]) & (cells.node < 9))
+    seen = []
+
+    def kept(packed, steps, begin, to, cost, behind, ahead, most):
+        found = cross_bends(packed, steps, begin, to, cost, behind, ahead, most)
+        seen.append((packed, (begin, to, cost, behind.copy()), most, found[0]))
+        return found
+
+    monkeypatch.setattr(_stage, "cross_bends", kept)
+    plain = solve_stage(cells, one.steps)
+    result = solve_stage(cells, one.steps, most=best.cost * 1.2)
+    (packed, steps_in, most, found) = seen[0]
+    slow = through_pairs(packed, one.steps, steps_in, most)
+    np.testing.assert_allclose(found, slow, rtol=1e-12)  # the same sums
+    assert (result.through >= plain.through * (1 - 1e-12)).all()
+    assert (result.through > plain.through * (1 + 1e-3)).any()
+    gamma, half = cell_bounds(result.cells.level, result.cells.index)
+    away = np.abs(np.angle(np.exp(1j * (gamma - best.gamma[result.cells.node]))))
+    assert (result.through[away <= half] <= best.cost).all()

@@ -18,7 +18,8 @@ from kerfpath.certifier._largest import largest_step_bound
 from kerfpath.certifier._nodes import between, turning_nodes
 from kerfpath.certifier._parts import DEAREST, NARROW, Parts
 from kerfpath.certifier._prices import limit_prices
-from kerfpath.certifier._stage import StageResult, Steps, linked, solve_stage
+from kerfpath.certifier._stage import StageResult, linked, solve_stage
+from kerfpath.certifier._steps import Steps
 from kerfpath.kernels.limits import LIMIT_TOLERANCE
 from kerfpath.kernels.metric import CHEBYCHEV
 from kerfpath.plans import Plan

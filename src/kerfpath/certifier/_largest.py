@@ -14,7 +14,7 @@ import numpy as np
 
 from kerfpath._arrays import Array
 from kerfpath.certifier._nopath import MotionTest
-from kerfpath.certifier._stage import Steps
+from kerfpath.certifier._steps import Steps
 from kerfpath.kernels.metric import rho
 from kerfpath.plans import Plan
 from kerfpath.progress import Progress

@@ -10,7 +10,8 @@ import numpy as np
 from kerfpath._arrays import Array, Bools, Ints, freeze
 from kerfpath._repr import short_repr
 from kerfpath.certifier._cells import CellMaker, CellSet
-from kerfpath.certifier._stage import Steps, arranged
+from kerfpath.certifier._stage import arranged
+from kerfpath.certifier._steps import Steps
 from kerfpath.errors import Closed
 from kerfpath.kernels.limits import LIMIT_TOLERANCE
 from kerfpath.kernels.metric import MANHATTAN

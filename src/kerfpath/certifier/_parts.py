@@ -24,7 +24,8 @@ from kerfpath.certificate import cell_bounds
 from kerfpath.certifier._cells import CellMaker, CellSet
 from kerfpath.certifier._finer import cells_to_divide
 from kerfpath.certifier._groups import distinct_groups
-from kerfpath.certifier._stage import StageResult, Steps, solve_stage
+from kerfpath.certifier._stage import StageResult, solve_stage
+from kerfpath.certifier._steps import Steps
 
 __all__ = ["DEAREST", "NARROW", "Parts"]
 
@@ -174,7 +175,8 @@ class Parts:
         return through, result, best.multipliers
 
     def _stage(self, cells: CellSet, prices: Array | None) -> StageResult:
-        result = solve_stage(cells, self._steps, prices, care=CARE * self._cost)
+        most = self._cost * (1 + SAME)
+        result = solve_stage(cells, self._steps, prices, care=CARE * self._cost, most=most)
         self.pairs += result.pairs
         return result
 

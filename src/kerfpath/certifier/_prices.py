@@ -13,7 +13,7 @@ import numpy as np
 from scipy import sparse
 
 from kerfpath._arrays import Array
-from kerfpath.certifier._stage import Steps
+from kerfpath.certifier._steps import Steps
 from kerfpath.kernels.metric import MANHATTAN, rho
 from kerfpath.kernels.reduced import tangent
 

@@ -13,60 +13,18 @@ import numpy as np
 from kerfpath._arrays import Array, Bools, Ints
 from kerfpath._repr import short_repr
 from kerfpath.certificate import Stage
+from kerfpath.certifier._bends import cross_bends
 from kerfpath.certifier._cells import CellSet
+from kerfpath.certifier._steps import ROUNDED, Steps
 from kerfpath.kernels.potentials import cross_cells, lay_potential, link_cells, reach_cells
-from kerfpath.kernels.reduced import Cells, Potential, Step
+from kerfpath.kernels.reduced import Cells, Potential
 
-__all__ = ["StageResult", "Steps", "arranged", "linked", "solve_stage"]
+__all__ = ["StageResult", "arranged", "linked", "solve_stage"]
 
+TESTS = 50
+"""Pairs of steps whose test by (6) takes as long as to bound one step."""
 IN_ONE = 64
 """Cells of a layer below which a second thread costs more than it brings."""
-ROUNDED = 1e-14
-"""Share of the largest term that a sum of one more may cost."""
-
-
-@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class Steps:
-    """What the steps of a motion cost and may be.
-
-    Parameters
-    ----------
-    weight : (n,) 1/rad
-    velocity, acceleration : (n,) rad
-        Bounds (5) and (6) on an increment and on its change, tolerance included.
-    metric : int
-    endless : (n,) bool
-    most : float
-        What a step may cost at most; infinite where it may cost anything.
-    """
-
-    weight: Array
-    velocity: Array
-    acceleration: Array
-    metric: int
-    endless: Bools
-    most: float = np.inf
-
-    __repr__ = short_repr
-
-    def over(self, intervals: int) -> Step:
-        """Return the step over several intervals: no shorter than all of them together (14)."""
-        velocity = intervals * self.velocity
-        tilt, most = np.zeros_like(velocity), intervals * self.most
-        return Step(self.weight, tilt, velocity, self.metric, self.endless, most)
-
-    def tilted(self, multipliers: Array | None, k: int) -> Step:
-        """Return the step from node k to the next, tilted by the multipliers (K, n) of (6)."""
-        step = self.over(1)
-        if multipliers is None:
-            return step
-        return step._replace(tilt=multipliers[k] - multipliers[k + 1])
-
-    def price(self, multipliers: Array | None) -> float:
-        """Return what the multipliers (K, n) take off: the most that they add where (6) holds."""
-        if multipliers is None:
-            return 0.0
-        return float((np.abs(multipliers) @ self.acceleration).sum()) * (1 + ROUNDED)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -84,6 +42,8 @@ class StageResult:
     multipliers : (K, n), optional
     begin, to : (C + 1,), (E,)
         The steps of cell a are begin[a]..begin[a+1]-1, each to a cell.
+    tests : int
+        Of pairs of steps.
     """
 
     cells: CellSet
@@ -93,13 +53,14 @@ class StageResult:
     multipliers: Array | None
     begin: Ints
     to: Ints
+    tests: int = 0
 
     __repr__ = short_repr
 
     @property
     def pairs(self) -> int:
-        """Steps from cell to cell that were looked at."""
-        return len(self.to)
+        """Steps from cell to cell that were looked at, the tests of pairs of them included."""
+        return len(self.to) + self.tests // TESTS
 
     @property
     def bound(self) -> float:
@@ -132,7 +93,11 @@ class StageResult:
 
 
 def solve_stage(
-    cells: CellSet, steps: Steps, multipliers: Array | None = None, care: float = np.inf
+    cells: CellSet,
+    steps: Steps,
+    multipliers: Array | None = None,
+    care: float = np.inf,
+    most: float | None = None,
 ) -> StageResult:
     """Return what the cells prove of every motion through them.
 
@@ -145,6 +110,9 @@ def solve_stage(
         Of (6), zero at the first node and the last; the cells are of all nodes then.
     care : float
         Cost beyond the cheapest step of a cell up to which steps are bounded with care.
+    most : float, optional
+        Pairs of steps that break (6) are left out as well, of motions that cost no more than that;
+        the cells are of all nodes then.
     """
     cells, packed, nodes, _ = arranged(cells, steps)
     if multipliers is not None and len(nodes) < len(multipliers):
@@ -164,7 +132,11 @@ def solve_stage(
     first = slice(start[0], start[1])
     behind[first] = _least_at_first(cells.take(first), potential, first)
     cross_cells(start, begin, to, cost, ahead, behind)
-    through = ahead + behind - steps.price(multipliers)
+    through, price = ahead + behind, steps.price(multipliers)
+    tests = 0
+    if most is not None and len(start) > 2 and np.isfinite(through).any():
+        through, tests = cross_bends(packed, steps, begin, to, cost, behind, ahead, most + price)
+    through -= price
     finite = np.isfinite(through)
     largest = np.abs(potential.level[np.isfinite(potential.level)]).max(initial=0.0)
     through[finite] -= ROUNDED * len(nodes) * (largest + np.abs(through[finite]))
@@ -176,6 +148,7 @@ def solve_stage(
         multipliers=multipliers,
         begin=begin,
         to=to,
+        tests=tests,
     )
 
 

@@ -25,7 +25,15 @@ from kerfpath.kernels._jit import jit, jit_inline
 from kerfpath.kernels.metric import extend, finish, increment
 from kerfpath.kernels.reduced import SLACK, Cells, Step, near, window
 
-__all__ = ["blame_bends", "blame_steps", "count_steps", "keep_back", "keep_on", "list_steps"]
+__all__ = [
+    "bent_by",
+    "blame_bends",
+    "blame_steps",
+    "count_steps",
+    "keep_back",
+    "keep_on",
+    "list_steps",
+]
 
 
 @jit_inline
@@ -85,7 +93,7 @@ def _increment(cells: Cells, step: Step, a: int, b: int, i: int) -> tuple[float,
 
 
 @jit_inline
-def _bent_by(
+def bent_by(
     cells: Cells, step: Step, bound: Array, lead: Ints, a: int, b: int, c: int, D: Array
 ) -> int:
     """Return a joint that keeps two steps from cell a over b to c from (6); -1 where none does.
@@ -165,7 +173,7 @@ def keep_on(
             for e in range(begin_on[b - second], begin_on[b - second + 1]):
                 if not out_kept[e]:
                     tests += 1
-                    if _bent_by(cells, step, bound, lead, a, b, to_on[e], D) < 0:
+                    if bent_by(cells, step, bound, lead, a, b, to_on[e], D) < 0:
                         out_kept[e] = True
                         missing[b - second] -= 1
     return tests
@@ -187,7 +195,7 @@ def keep_back(
             for e in range(begin_on[b - second], begin_on[b - second + 1]):
                 if kept_on[e]:
                     tests += 1
-                    if _bent_by(cells, step, bound, lead, a, b, to_on[e], D) < 0:
+                    if bent_by(cells, step, bound, lead, a, b, to_on[e], D) < 0:
                         goes = True
                         break
             out_kept[p] = goes
@@ -224,6 +232,6 @@ def blame_bends(
             if kept[p]:
                 b = to[p]
                 for e in range(begin_on[b - second], begin_on[b - second + 1]):
-                    joint = _bent_by(cells, step, bound, lead, a, b, to_on[e], D)
+                    joint = bent_by(cells, step, bound, lead, a, b, to_on[e], D)
                     if joint >= 0:
                         out_blame[joint] += 1

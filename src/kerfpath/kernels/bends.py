@@ -1,0 +1,71 @@
+"""The least that motions cost through each step from cell to cell, of pairs of steps that keep (6).
+
+The state is the step: what is known of it up to its end is the least over the steps before that may
+precede it by (6). Those are looked at in the order of what they cost, until the first that may.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from kerfpath._arrays import Array, Ints
+from kerfpath.kernels._jit import jit
+from kerfpath.kernels.outer import bent_by
+from kerfpath.kernels.reduced import Cells, Step
+
+__all__ = ["cross_back", "cross_on"]
+
+
+@jit
+def cross_on(
+    cells: Cells, step: Step, bound: Array, lead: Ints, first: int, last: int,
+    begin: Ints, to: Ints, origin: Ints, sorted_in: Ints, in_begin: Ints,
+    cost: Array, rest: Array, most: float, out_behind: Array,
+) -> int:  # fmt: skip
+    """Fill what motions cost up to the end of each step from cells first..last-1; count the tests.
+
+    The steps that end in cell b are sorted_in[in_begin[b - first]..], cheapest first, by
+    ``out_behind`` (E,), which is known of them. Steps that cost over ``most`` with the
+    ``rest`` (C,) get infinity.
+    """
+    D, tests = np.empty((2, len(bound))), 0
+    for b in range(first, last):
+        for e in range(begin[b], begin[b + 1]):
+            out_behind[e] = np.inf
+            for p in range(in_begin[b - first], in_begin[b - first + 1]):
+                i = sorted_in[p]
+                total = out_behind[i] + cost[e]
+                if not total + rest[to[e]] <= most:
+                    break
+                tests += 1
+                if bent_by(cells, step, bound, lead, origin[i], b, to[e], D) < 0:
+                    out_behind[e] = total
+                    break
+    return tests
+
+
+@jit
+def cross_back(
+    cells: Cells, step: Step, bound: Array, lead: Ints, first: int, last: int,
+    to: Ints, origin: Ints, sorted_on: Ints, on_begin: Ints, steps_in: Ints,
+    cost: Array, behind: Array, most: float, out_ahead: Array,
+) -> int:  # fmt: skip
+    """Fill what motions cost from the end of each of the ``steps_in`` on; count the tests.
+
+    The steps that begin in cell b are sorted_on[on_begin[b - first]..], cheapest first by cost and
+    ``out_ahead`` (E,), which is known of them.
+    """
+    D, tests = np.empty((2, len(bound))), 0
+    for i in steps_in:
+        b = to[i]
+        out_ahead[i] = np.inf
+        for p in range(on_begin[b - first], on_begin[b - first + 1]):
+            e = sorted_on[p]
+            total = cost[e] + out_ahead[e]
+            if not behind[i] + total <= most:
+                break
+            tests += 1
+            if bent_by(cells, step, bound, lead, origin[i], b, to[e], D) < 0:
+                out_ahead[i] = total
+                break
+    return tests
