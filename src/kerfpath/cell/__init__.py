@@ -22,6 +22,7 @@ from kerfpath.cell._shapes import Shape as Shape
 from kerfpath.cell._shapes import box as box
 from kerfpath.cell._shapes import box_between as box_between
 from kerfpath.cell._shapes import frustum as frustum
+from kerfpath.cell._shapes import surface as surface
 from kerfpath.cell._sheet import edges_of as edges_of
 from kerfpath.cell._sheet import thicken as thicken
 from kerfpath.cell._stl import read_stl as read_stl

@@ -14,7 +14,7 @@ from kerfpath._repr import short_repr
 from kerfpath.cell._mesh import Mesh
 from kerfpath.errors import InputError
 
-__all__ = ["Capsule", "Hull", "Shape", "box", "box_between", "frustum"]
+__all__ = ["Capsule", "Hull", "Shape", "box", "box_between", "frustum", "surface"]
 
 RING = 24
 """Corners of the polygon drawn around a circle; it juts out by less than 1 % of the radius."""
@@ -26,6 +26,8 @@ MOST_NEIGHBOURS = 254
 CORNERS = 64
 """A hull of more corners is followed along motions by those of the box around it: far fewer, and
 hardly farther out."""
+BALL = 48
+"""Number of points on a ball, of which a capsule is drawn."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -128,6 +130,19 @@ class Hull:
 
 
 Shape = Capsule | Hull | Mesh
+
+
+def surface(shape: Shape) -> tuple[Array, Ints]:
+    """Return vertices (V, 3) m and triangles (F, 3) to draw a shape by; balls have few corners."""
+    if isinstance(shape, Mesh):
+        return shape.vertices, shape.triangles
+    if isinstance(shape, Capsule):
+        k = np.arange(BALL) + 0.5
+        z, turn = 1 - 2 * k / BALL, np.pi * (1 + np.sqrt(5)) * k  # evenly spread, by Fibonacci
+        ring = np.sqrt(1 - z**2)
+        ball = shape.radius * np.c_[ring * np.cos(turn), ring * np.sin(turn), z]
+        shape = Hull(np.vstack([shape.start + ball, shape.end + ball]))
+    return shape.points, shape.triangles
 
 
 def box(size: ArrayLike, T: ArrayLike | None = None) -> Hull:

@@ -53,6 +53,7 @@ from kerfpath.post._read import with_tips as with_tips
 from kerfpath.post._settings import LanguageSettings as LanguageSettings
 from kerfpath.post._settings import Rules as Rules
 from kerfpath.post._settings import setting as setting
+from kerfpath.post._times import timetable as timetable
 from kerfpath.post._writer import ProgramText as ProgramText
 from kerfpath.post._writer import post as post
 from kerfpath.post._writer import post_and_read as post_and_read

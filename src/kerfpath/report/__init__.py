@@ -6,7 +6,8 @@ from kerfpath.report._front_page import render_front
 from kerfpath.report._html import with_library, without_library
 from kerfpath.report._layout import render_layout
 from kerfpath.report._layout_entry import LayoutEntry
-from kerfpath.report._map import feasibility_map
+from kerfpath.report._look import reason_colours
+from kerfpath.report._map import feasibility_map, hidden_postures, shown_postures
 from kerfpath.report._page import render
 from kerfpath.report._section import ContourSection
 from kerfpath.report._table_page import render_table
@@ -18,11 +19,14 @@ __all__ = [
     "FrontPlan",
     "LayoutEntry",
     "feasibility_map",
+    "hidden_postures",
+    "reason_colours",
     "render",
     "render_drawing",
     "render_front",
     "render_layout",
     "render_table",
+    "shown_postures",
     "with_library",
     "without_library",
 ]

@@ -10,7 +10,7 @@ import numpy as np
 import plotly.graph_objects as go
 
 from kerfpath._arrays import Array
-from kerfpath.cell import Capsule, Cell, Hull, Mesh, Shape
+from kerfpath.cell import Cell, surface
 from kerfpath.plans import Plan
 from kerfpath.report._look import INK
 
@@ -23,8 +23,6 @@ FILL = 1.35
 """Factor on the size at which plotly would draw the scene."""
 MOST = 12
 """Number of poses to choose from."""
-BALL = 48
-"""Number of points on a ball, of which a capsule is drawn."""
 
 
 def poses_shown(plans: Sequence[Plan]) -> list[tuple[str, Array]]:
@@ -47,8 +45,8 @@ def add_cell(
     still = [b for b in cell.bodies if b.frame == 0 and b.kind not in ("part", "floor")]
     moving = [b for b in cell.bodies if b.frame != 0]
     for body in still:
-        _add_body(figure, body.name, body.kind, _triangles(body.shape), T_part_base, shown=True)
-    drawn = {body.name: _triangles(body.shape) for body in moving}
+        _add_body(figure, body.name, body.kind, surface(body.shape), T_part_base, shown=True)
+    drawn = {body.name: surface(body.shape) for body in moving}
     for i, (_, q) in enumerate(poses):
         frames = cell.frames(q[None])[0]
         for body in moving:
@@ -112,15 +110,3 @@ def _add_body(
         hovertemplate="%{fullData.name}<extra></extra>",
         visible=shown,
     )
-
-
-def _triangles(shape: Shape) -> tuple[Array, Any]:
-    if isinstance(shape, Mesh):
-        return shape.vertices, shape.triangles
-    if isinstance(shape, Capsule):
-        k = np.arange(BALL) + 0.5
-        z, turn = 1 - 2 * k / BALL, np.pi * (1 + np.sqrt(5)) * k  # evenly spread, by Fibonacci
-        ring = np.sqrt(1 - z**2)
-        ball = shape.radius * np.c_[ring * np.cos(turn), ring * np.sin(turn), z]
-        shape = Hull(np.vstack([shape.start + ball, shape.end + ball]))
-    return shape.points, shape.triangles

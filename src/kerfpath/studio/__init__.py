@@ -1,0 +1,1 @@
+"""The studio: a job seen, decided and watched in a browser; the library does all the work."""

@@ -1,0 +1,120 @@
+"""What a page may say to the server, see README.md beside this file."""
+
+from __future__ import annotations
+
+from typing import Annotated, Literal
+
+from pydantic import BaseModel, ConfigDict, Field, TypeAdapter
+
+__all__ = [
+    "Ask",
+    "Edit",
+    "OfContour",
+    "Plain",
+    "ReasonOf",
+    "Relax",
+    "Save",
+    "Text",
+    "TextOf",
+    "parse",
+]
+
+MOST_KEYS = 6
+"""Parts of the path of a key: no job nests deeper."""
+MOST_WORDS = 200
+"""Characters of a name that a page sends: no contour is called by more."""
+MOST_TEXT = 10_000_000
+"""Characters of a job, as its reader takes them."""
+
+
+class _Strict(BaseModel):
+    """A table of a message: nothing in it that is not meant, nothing changed in it."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True, strict=True, allow_inf_nan=False)
+
+
+Words = Annotated[str, Field(max_length=MOST_WORDS)]
+Index = Annotated[int, Field(ge=0, lt=1_000_000)]
+Path = Annotated[
+    tuple[Words | Index, ...], Field(min_length=1, max_length=MOST_KEYS, strict=False)
+]
+Scalar = Annotated[str, Field(max_length=10_000)] | bool | int | float
+Value = Scalar | Annotated[list["Value"], Field(max_length=1000)] | dict[Words, "Value"]
+
+
+class Edit(_Strict):
+    """Set one key of the job; null removes it."""
+
+    type: Literal["edit"]
+    path: Path
+    value: Value | None
+    gesture: Words | None = None
+
+
+class Text(_Strict):
+    """Replace the whole job."""
+
+    type: Literal["text"]
+    text: Annotated[str, Field(max_length=MOST_TEXT)]
+
+
+class Plain(_Strict):
+    """What needs no more words: a step back or forward, plan again, stop."""
+
+    type: Literal["undo", "redo", "plan", "cancel"]
+
+
+class Save(_Strict):
+    """Write the job file."""
+
+    type: Literal["save"]
+    over: bool = False
+
+
+class OfContour(_Strict):
+    """What is asked of one contour."""
+
+    type: Literal["focus", "map", "fastest"]
+    contour: Words
+
+
+class ReasonOf(_Strict):
+    """Where the robot is at a node and gamma, and why it may not be."""
+
+    type: Literal["reason"]
+    contour: Words
+    node: Index
+    gamma: float
+    posture: Annotated[int, Field(ge=0, lt=64)]
+
+
+class Relax(_Strict):
+    """Make the edits of a relaxation."""
+
+    type: Literal["relax"]
+    contour: Words
+    index: Index
+
+
+class TextOf(_Strict):
+    """The program as text."""
+
+    type: Literal["program"]
+    language: Words | None = None
+
+
+Ask = Edit | Text | Plain | Save | OfContour | ReasonOf | Relax | TextOf
+"""What a page may say."""
+
+_ASK: TypeAdapter[Ask] = TypeAdapter(Annotated[Ask, Field(discriminator="type")])
+
+
+def parse(text: str) -> Ask:
+    """Return what a page says.
+
+    Raises
+    ------
+    pydantic.ValidationError
+        It is not one of the messages.
+    """
+    return _ASK.validate_json(text)

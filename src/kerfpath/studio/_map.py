@@ -1,0 +1,151 @@
+"""The map of a contour: what became of every pose, and one pose of it in detail."""
+
+from __future__ import annotations
+
+import base64
+import hashlib
+from collections.abc import Sequence
+
+import numpy as np
+
+from kerfpath._arrays import Array
+from kerfpath.contour import Contour
+from kerfpath.graph import LayeredGraph
+from kerfpath.job import Job
+from kerfpath.losses import Loss, Reason
+from kerfpath.plans import Plan
+from kerfpath.robots import posture_name
+from kerfpath.studio._messages import CodeLayer, CourseEntry, MapMessage, PoseMessage, flat
+
+__all__ = ["map_id", "map_message", "pose_message"]
+
+KINDS = {
+    Loss.ADMITTED: "admitted",
+    Loss.UNREACHABLE: "reach",
+    Loss.LOW: "joint",
+    Loss.HIGH: "joint",
+    Loss.UNWANTED: "unwanted",
+    Loss.MARGIN: "margin",
+    Loss.SPARE: "admitted",
+    Loss.COLLISION: "cell",
+    Loss.NO_ROOM: "margin",
+    Loss.FLOOR: "cell",
+}
+"""What a loss is coloured by; others are "other"."""
+
+
+def map_id(graph: LayeredGraph) -> str:
+    """Return the id of a graph's map: the same for the same map."""
+    digest = hashlib.sha256("\n".join(graph.reasons).encode())
+    digest.update(np.array(graph.reason.shape).tobytes() + graph.gamma.tobytes())
+    digest.update(np.ascontiguousarray(graph.reason))
+    return digest.hexdigest()[:16]
+
+
+def map_message(
+    contour: str,
+    nodes: Contour,
+    graph: LayeredGraph,
+    plans: Sequence[Plan],
+    *,
+    revision: int,
+) -> MapMessage:
+    """Return the map of a contour with the course of its plans, as the report draws it.
+
+    Parameters
+    ----------
+    contour : str
+    nodes : Contour
+    graph : LayeredGraph
+    plans : sequence of Plan
+        Its plan, or those of its pieces.
+    revision : int
+    """
+    from kerfpath.report import hidden_postures, reason_colours, shown_postures
+
+    codes, first = graph.reason_by_gamma, float(nodes.s[0])
+    return MapMessage(
+        revision=revision,
+        contour=contour,
+        graph=map_id(graph),
+        s=flat(nodes.s - first),
+        gamma=flat(graph.gamma),
+        nodes=len(nodes),
+        reasons=list(map(str, graph.reasons)),
+        kinds=[KINDS.get(why.loss, "other") for why in graph.reasons],
+        colours=list(reason_colours(graph.reasons)),
+        layers=[
+            CodeLayer(
+                posture=mu,
+                name=posture_name(mu),
+                codes=base64.b64encode(np.ascontiguousarray(codes[:, :, mu])).decode(),
+            )
+            for mu in shown_postures(graph)
+        ],
+        hidden=hidden_postures(graph),
+        course=[
+            CourseEntry(
+                name=made.name,
+                s=flat(made.contour.s - first),
+                gamma=flat(made.gamma),
+                posture=made.posture.tolist(),
+            )
+            for made in plans
+        ],
+    )
+
+
+def pose_message(
+    contour: str,
+    job: Job,
+    nodes: Contour,
+    graph: LayeredGraph,
+    *,
+    node: int,
+    gamma: float,
+    posture: int,
+) -> PoseMessage:
+    """Return where the robot is at a place of the map, and what became of that pose.
+
+    Gamma is taken to the nearest sample of the map. With a tolerance of the tool axis the joints
+    are those of the nominal axis.
+
+    Raises
+    ------
+    IndexError
+        A node or posture that the map has not.
+    """
+    codes = graph.reason_by_gamma
+    off = np.angle(np.exp(1j * (graph.gamma - gamma)))
+    sample = int(np.argmin(np.abs(off)))
+    why = graph.reasons[int(codes[node, sample, posture])]
+    arm = job.robot.alone()
+    H = job.placement @ nodes.frames(job.options.frames)[node : node + 1]
+    solved, reach = arm.inverse_nodes(
+        np.ascontiguousarray(H), np.ascontiguousarray(graph.gamma[[sample]]), job.tool
+    )
+    q = solved[0, 0, posture] if reach[0, 0, posture] else None
+    admitted = KINDS.get(why.loss) == "admitted"
+    return PoseMessage(
+        contour=contour,
+        node=node,
+        gamma=float(graph.gamma[sample]),
+        posture=posture,
+        q=None if q is None else flat(q),
+        admitted=admitted,
+        reason=_in_numbers(job, why, q),
+    )
+
+
+def _in_numbers(job: Job, why: Reason, q: Array | None) -> str:
+    """Say what became of a pose, with the joint and its limit where that is why."""
+    if q is None or why.loss not in (Loss.LOW, Loss.HIGH):
+        return str(why)
+    name = str(why.which)
+    if not name.startswith("joint "):
+        return str(why)
+    i, limits = int(name.removeprefix("joint ")) - 1, job.robot.joint_limits()
+    return (
+        f"{why}: at {np.degrees(q[i]):.1f} deg, it goes from {np.degrees(limits.lower[i]):g} to "
+        f"{np.degrees(limits.upper[i]):g} deg"
+    )

@@ -1,0 +1,416 @@
+"""What the server says to its pages, see README.md beside this file."""
+
+from __future__ import annotations
+
+from typing import Literal
+
+import numpy as np
+from numpy.typing import ArrayLike
+from pydantic import BaseModel, ConfigDict
+
+__all__ = [
+    "BodyEntry",
+    "CheckEntry",
+    "CodeLayer",
+    "ContourEntry",
+    "ContourName",
+    "CourseEntry",
+    "CriteriaEntry",
+    "Cycle",
+    "EditEntry",
+    "ErrorMessage",
+    "Export",
+    "FastestMessage",
+    "Fault",
+    "FileEntry",
+    "JobMessage",
+    "JointEntry",
+    "LossEntry",
+    "MapMessage",
+    "Message",
+    "NearestEntry",
+    "NoPathMessage",
+    "Numbers",
+    "Option",
+    "OutcomeMessage",
+    "PlanMessage",
+    "PoseMessage",
+    "ProgramMessage",
+    "ProgramTextMessage",
+    "ProgressMessage",
+    "RobotEntry",
+    "SampleEntry",
+    "SceneMessage",
+    "Segment",
+    "flat",
+]
+
+Numbers = list[float | None]
+"""Numbers in a message; null for infinity."""
+
+
+def flat(values: ArrayLike, digits: int = 9) -> Numbers:
+    """Return numbers in one row, row-major; None for what is not finite.
+
+    They are rounded to `digits` places, a nanometre or less, so that they are short.
+    """
+    row = np.round(np.asarray(values, dtype=np.float64).ravel(), digits)
+    if np.isfinite(row).all():
+        return row.tolist()
+    return [value if np.isfinite(value) else None for value in row.tolist()]
+
+
+class Message(BaseModel):
+    """What the server says, one line of JSON each; README.md has what the keys mean."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+
+class ContourName(Message):
+    """A contour of the job, and which table it is of."""
+
+    name: str
+    index: int
+
+
+class Fault(Message):
+    """What is wrong with the job, and where."""
+
+    key: list[str | int]
+    message: str
+
+
+class JobMessage(Message):
+    """The job as it is."""
+
+    type: Literal["job"] = "job"
+    revision: int
+    name: str
+    text: str
+    values: dict[str, object] | None
+    contours: list[ContourName]
+    undo: bool
+    redo: bool
+    saved: bool
+    faults: list[Fault]
+    choices: dict[str, list[str]]
+    weights: Numbers
+
+
+class JointEntry(Message):
+    """One joint of the robot."""
+
+    T: Numbers
+    axis: Numbers
+    lower: float | None
+    upper: float | None
+    endless: bool
+    velocity: float
+    acceleration: float
+
+
+class RobotEntry(Message):
+    """The chain of the robot, to the tip of its tool."""
+
+    id: str
+    joints: list[JointEntry]
+    T_flange: Numbers
+    T_tool: Numbers
+
+
+class SampleEntry(Message):
+    """Joints, and the pose of the tip there."""
+
+    q: Numbers
+    T: Numbers
+
+
+class BodyEntry(Message):
+    """A body of the scene, and the frame that it moves with."""
+
+    name: str
+    kind: Literal["robot", "head", "part", "fixture", "floor"]
+    frame: int
+    mesh: str
+    approximate: bool
+
+
+class ContourEntry(Message):
+    """A contour of the scene, as it is cut."""
+
+    name: str
+    index: int
+    closed: bool
+    points: Numbers
+    axes: Numbers
+    s: Numbers
+    kind: list[str]
+    speed_m_min: float
+
+
+class SceneMessage(Message):
+    """What stands and moves in the cell."""
+
+    type: Literal["scene"] = "scene"
+    revision: int
+    robot: RobotEntry
+    sample: SampleEntry
+    bodies: list[BodyEntry]
+    T_part: Numbers
+    contours: list[ContourEntry]
+    cell: bool
+
+
+class ProgressMessage(Message):
+    """How far the server is."""
+
+    type: Literal["progress"] = "progress"
+    busy: bool
+    label: str = ""
+    done: int = 0
+    total: int = 0
+
+
+class NearestEntry(Message):
+    """The least of a measure of comfort, and where."""
+
+    name: str
+    value: float
+    unit: str
+    node: int
+
+
+class CriteriaEntry(Message):
+    """The criteria of a plan, joint by joint."""
+
+    displacement: Numbers
+    largest_increment: Numbers
+    range: Numbers
+    peak_velocity: Numbers
+    peak_acceleration: Numbers
+    nearest: list[NearestEntry]
+
+
+class CheckEntry(Message):
+    """One line of the audit."""
+
+    code: str
+    title: str
+    value: float | None
+    limit: float | None
+    unit: str
+    level: str
+    ok: bool
+    node: int | None
+
+
+class PlanMessage(Message):
+    """One motion along a contour, or along a piece of one."""
+
+    type: Literal["plan"] = "plan"
+    revision: int
+    contour: str
+    name: str
+    pieces: int
+    graph: str
+    s: Numbers
+    time: Numbers
+    q: Numbers
+    gamma: Numbers
+    posture: list[int]
+    points: Numbers
+    kind: list[str]
+    speed: Numbers
+    cost: float
+    bound: float | None
+    gap: float | None
+    settled: bool
+    optimal: bool
+    statement: str
+    method: str
+    weights: Numbers
+    previous_cost: float | None
+    criteria: CriteriaEntry
+    velocity_share: Numbers
+    acceleration_share: Numbers
+    joint_load: Numbers
+    checks: list[CheckEntry] | None
+    passed: bool | None
+    feed: str | None
+    seconds: float
+
+
+class LossEntry(Message):
+    """What was lost, and how often."""
+
+    name: str
+    count: int
+
+
+class EditEntry(Message):
+    """One key of the job and its new value."""
+
+    path: list[str | int]
+    value: object
+
+
+class Option(Message):
+    """A way out, as edits of the job."""
+
+    label: str
+    edits: list[EditEntry]
+
+
+class NoPathMessage(Message):
+    """Why a contour has no plan, and what would open the way."""
+
+    type: Literal["nopath"] = "nopath"
+    revision: int
+    contour: str
+    node: int
+    back: int | None
+    s: float
+    point: Numbers
+    statement: str
+    scope: str
+    reasons: list[LossEntry]
+    graph: str
+    relaxations: list[Option] | None
+    remedy: str
+
+
+class Segment(Message):
+    """A stretch of the program."""
+
+    kind: Literal["move", "approach", "pierce", "cut", "retract"]
+    begin: float
+    end: float
+    contour: str | None = None
+    plan: str | None = None
+    time: Numbers | None = None
+    q: Numbers | None = None
+
+
+class ProgramMessage(Message):
+    """What the robot does, in the order of the program, with its clock."""
+
+    type: Literal["program"] = "program"
+    revision: int
+    total: float
+    segments: list[Segment]
+    checked: bool
+    notes: list[str]
+
+
+class Export(Message):
+    """Something to take along."""
+
+    name: str
+    href: str
+    ready: bool
+    why: str = ""
+
+
+class Cycle(Message):
+    """Where the time of a program goes, s."""
+
+    cutting: float
+    air: float
+    piercing: float
+    total: float
+
+
+class OutcomeMessage(Message):
+    """What a run of the job comes to."""
+
+    type: Literal["outcome"] = "outcome"
+    revision: int
+    passed: bool
+    exports: list[Export]
+    cycle: Cycle | None
+    notes: list[str]
+
+
+class CodeLayer(Message):
+    """The map of one posture."""
+
+    posture: int
+    name: str
+    codes: str
+
+
+class CourseEntry(Message):
+    """How gamma of a plan runs over the map."""
+
+    name: str
+    s: Numbers
+    gamma: Numbers
+    posture: list[int]
+
+
+class MapMessage(Message):
+    """What became of every pose of a contour."""
+
+    type: Literal["map"] = "map"
+    revision: int
+    contour: str
+    graph: str
+    s: Numbers
+    gamma: Numbers
+    nodes: int
+    reasons: list[str]
+    kinds: list[str]
+    colours: list[str]
+    layers: list[CodeLayer]
+    hidden: list[str]
+    course: list[CourseEntry]
+
+
+class PoseMessage(Message):
+    """Where the robot is at one place of the map, and why it may not be."""
+
+    type: Literal["pose"] = "pose"
+    contour: str
+    node: int
+    gamma: float
+    posture: int
+    q: Numbers | None
+    admitted: bool
+    reason: str
+
+
+class FastestMessage(Message):
+    """The fastest constant speed of a contour."""
+
+    type: Literal["fastest"] = "fastest"
+    revision: int
+    contour: str
+    speed_m_min: float
+    on_grid_m_min: float | None
+    binds: str
+    edits: list[EditEntry]
+
+
+class FileEntry(Message):
+    """A file and its text."""
+
+    name: str
+    text: str
+
+
+class ProgramTextMessage(Message):
+    """The program in a robot's language."""
+
+    type: Literal["program_text"] = "program_text"
+    language: str
+    files: list[FileEntry]
+    notes: list[str]
+    faults: list[str]
+
+
+class ErrorMessage(Message):
+    """What went wrong, in one line."""
+
+    type: Literal["error"] = "error"
+    message: str
+    about: str | None = None
