@@ -1,0 +1,77 @@
+/** The desk itself: its theme, and how high its lower part is. Both are remembered. */
+
+import { byId } from "./dom.js";
+
+/**
+ * Light or dark as the system says, until the button says otherwise.
+ * @param {HTMLElement} button
+ * @param {(name: string) => SVGElement} icon
+ * @param {() => void} changed
+ */
+export function theme(button, icon, changed) {
+  const system = matchMedia("(prefers-color-scheme: dark)");
+  const set = () => {
+    const dark = (remembered("theme") ?? (system.matches ? "dark" : "light")) === "dark";
+    document.documentElement.dataset.theme = dark ? "dark" : "light";
+    button.replaceChildren(icon(dark ? "sun" : "moon"));
+    button.setAttribute("aria-label", dark ? "Use the light theme" : "Use the dark theme");
+    changed();
+  };
+  system.addEventListener("change", set);
+  button.addEventListener("click", () => {
+    const next = document.documentElement.dataset.theme === "dark" ? "light" : "dark";
+    remember("theme", next === (system.matches ? "dark" : "light") ? null : next);
+    set();
+  });
+  set();
+}
+
+/** Let the line between scene and map be moved, by pointer and by keys. */
+export function splitter() {
+  const [desk, line] = [byId("desk"), byId("split")];
+  const set = (/** @type {number} */ share) => {
+    const percent = Math.round(Math.min(70, Math.max(20, share)));
+    desk.style.setProperty("--lower", `${percent}%`);
+    line.setAttribute("aria-valuenow", String(percent));
+    remember("lower", String(percent));
+  };
+  const known = Number(remembered("lower"));
+  if (known) set(known);
+  line.addEventListener("pointerdown", (event) => {
+    line.setPointerCapture(event.pointerId);
+    event.preventDefault();
+  });
+  line.addEventListener("pointermove", (event) => {
+    if (!line.hasPointerCapture(event.pointerId)) return;
+    const { bottom, height } = desk.getBoundingClientRect();
+    set((100 * (bottom - event.clientY)) / height);
+  });
+  line.addEventListener("keydown", (event) => {
+    const by = { ArrowUp: 2, ArrowDown: -2 }[event.key];
+    if (!by) return;
+    set(Number(line.getAttribute("aria-valuenow")) + by);
+    event.preventDefault();
+  });
+}
+
+/** @param {string} name */
+function remembered(name) {
+  try {
+    return localStorage.getItem(`kerfpath.${name}`);
+  } catch {
+    return null; // a browser that keeps nothing
+  }
+}
+
+/**
+ * @param {string} name
+ * @param {string | null} value
+ */
+function remember(name, value) {
+  try {
+    if (value === null) localStorage.removeItem(`kerfpath.${name}`);
+    else localStorage.setItem(`kerfpath.${name}`, value);
+  } catch {
+    // The next visit begins afresh.
+  }
+}

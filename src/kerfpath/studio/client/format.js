@@ -1,0 +1,67 @@
+/** Numbers as people read them: SI in, units of the trade out. */
+
+const DEG = 180 / Math.PI;
+const MINUS = "\u2212";
+
+/**
+ * @param {number} value
+ * @param {number} [places]
+ */
+export function fixed(value, places = 1) {
+  const text = Math.abs(value).toFixed(places);
+  return value < 0 && Number(text) !== 0 ? MINUS + text : text;
+}
+
+/**
+ * Return a number with about so many digits that count, without an exponent.
+ * @param {number} value
+ * @param {number} [digits]
+ */
+export function digits(value, digits = 3) {
+  if (value === 0) return "0";
+  const before = Math.floor(Math.log10(Math.abs(value))) + 1;
+  return fixed(value, Math.min(6, Math.max(0, digits - before)));
+}
+
+/** @param {number} radians */
+export const deg = (radians) => radians * DEG;
+
+/** @param {number} radians */
+export const degrees = (radians, places = 1) => `${fixed(deg(radians), places)} deg`;
+
+/** @param {number} metres */
+export const millimetres = (metres, places = 1) => `${fixed(metres * 1e3, places)} mm`;
+
+/** @param {number} fraction */
+export const percent = (fraction, places = 0) => `${fixed(fraction * 100, places)} %`;
+
+/**
+ * Return a time as a clock shows it, 1:02.3.
+ * @param {number} seconds
+ */
+export function clock(seconds, places = 1) {
+  const unit = 10 ** places;
+  const rounded = Math.round(seconds * unit) / unit;
+  const minutes = Math.floor(rounded / 60);
+  const rest = (rounded - minutes * 60).toFixed(places);
+  return `${minutes}:${rest.padStart(places ? places + 3 : 2, "0")}`;
+}
+
+/**
+ * Return a change in per cent with its sign.
+ * @param {number} now
+ * @param {number} before
+ */
+export function change(now, before) {
+  if (before === 0) return "";
+  const share = (now - before) / Math.abs(before);
+  if (Math.abs(share) < 5e-4) return "same";
+  return `${share > 0 ? "+" : MINUS}${digits(Math.abs(share) * 100, 2)} %`;
+}
+
+/**
+ * Return "1 node" or "3 nodes".
+ * @param {number} count
+ * @param {string} word
+ */
+export const counted = (count, word) => `${count} ${word}${count === 1 ? "" : "s"}`;

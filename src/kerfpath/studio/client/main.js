@@ -1,0 +1,110 @@
+/** The page, put together: one store, one connection, one player, and the views that follow them. */
+
+import { Connection } from "./connection.js";
+import { byId, icon } from "./dom.js";
+import { MapView } from "./map/view.js";
+import { foot, notices, topBar } from "./panels/bar.js";
+import { contourList } from "./panels/contours.js";
+import { jointsPanel } from "./panels/joints.js";
+import { optionsPanel } from "./panels/options.js";
+import { resultPanel } from "./panels/result.js";
+import { sheets } from "./panels/sheets.js";
+import { Track } from "./panels/track.js";
+import { Player } from "./player.js";
+import { Plots } from "./plots.js";
+import { SceneView } from "./scene/view.js";
+import { Store } from "./store.js";
+import { splitter, theme } from "./desk.js";
+import { timelineOf } from "./timeline.js";
+
+const store = new Store();
+const player = new Player();
+const connection = new Connection(
+  (message) => store.take(message),
+  (status, retryAt) => store.connected(status, retryAt),
+);
+
+// The timeline is put together before the views are called, which follow it.
+let loading = false;
+store.on(["plan", "program", "scene"], () => {
+  if (loading) return;
+  loading = true;
+  queueMicrotask(() => {
+    loading = false;
+    const joints = store.scene?.robot.joints.length ?? 0;
+    player.load(timelineOf(store.program, store.plans, store.contours(), joints));
+  });
+});
+
+const view = new SceneView(store, player);
+const map = new MapView(store, player, connection, (q, admitted) => view.haunt(q, admitted));
+const plots = new Plots(store, player);
+new Track(player, store);
+topBar(store, connection);
+foot(store, connection);
+notices(store, connection);
+contourList(store);
+resultPanel(store, connection, view);
+jointsPanel(store, connection);
+optionsPanel(store, connection);
+sheets(store, connection);
+splitter();
+theme(byId("theme"), icon, () => {
+  view.paint();
+  map.paint();
+  plots.invalidate();
+});
+
+// Whoever watches sees the contour that is being cut; whoever chooses one goes there.
+let followed = "";
+player.on((moment) => {
+  const contour = moment?.span.contour ?? null;
+  if (!contour || contour === followed) return;
+  followed = contour;
+  if (player.playing || document.activeElement?.id === "scrub") store.select(contour);
+});
+store.on(["selected"], () => {
+  const { selected } = store;
+  if (!selected) return;
+  connection.send({ type: "focus", contour: selected });
+  if (player.playing || player.moment?.span.contour === selected) return;
+  const begin = player.timeline.begin(selected);
+  if (begin !== null && document.activeElement?.id !== "scrub") player.seek(begin);
+});
+
+document.addEventListener("keydown", (event) => {
+  const target = /** @type {HTMLElement} */ (event.target);
+  const typing = target.closest("textarea, select, dialog, input:not([type=range])") !== null;
+  const [command, { key }] = [event.ctrlKey || event.metaKey, event];
+  if (command && key.toLowerCase() === "z" && !typing) {
+    connection.send({ type: event.shiftKey ? "redo" : "undo" });
+    event.preventDefault();
+  } else if (command && key.toLowerCase() === "y" && !typing) {
+    connection.send({ type: "redo" });
+    event.preventDefault();
+  } else if (command && key.toLowerCase() === "s") {
+    connection.send({ type: "save" });
+    event.preventDefault();
+  } else if (command || typing || event.altKey) return;
+  else if (
+    key === " " &&
+    !(target instanceof HTMLButtonElement && target.id !== "toggle") &&
+    target.tagName !== "SUMMARY"
+  ) {
+    player.toggle();
+    event.preventDefault();
+  } else if (
+    (key === "ArrowLeft" || key === "ArrowRight") &&
+    !target.closest("input, canvas, [role=separator]")
+  ) {
+    const direction = key === "ArrowRight" ? 1 : -1;
+    if (event.shiftKey) player.skip(direction);
+    else player.step(direction);
+    event.preventDefault();
+  } else if (key === "f" && target === document.body) view.look("fit");
+});
+
+connection.open();
+
+// For whoever looks into the page from outside: tests and the console.
+Object.assign(window, { studio: { store, player, connection, view, map, plots } });

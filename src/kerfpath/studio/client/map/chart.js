@@ -1,0 +1,261 @@
+/** The drawing of a map on its canvas: cells, axes, courses, cursors. */
+
+import { fitCanvas, textSize, themeColour } from "../dom.js";
+import { fixed } from "../format.js";
+import { wrapped } from "./grid.js";
+import { inks, pixels } from "./paint.js";
+
+/** @typedef {import("../messages.js").PlanMessage} PlanMessage */
+/** @typedef {import("./grid.js").Grid} Grid */
+/** @typedef {{left: number, top: number, width: number, height: number, em: number}} Frame CSS px */
+
+/**
+ * @typedef {object} Drawn
+ * @property {PlanMessage[]} plans
+ * @property {PlanMessage[]} before
+ * @property {boolean} stale
+ * @property {number | null} broken  m, where no path goes on
+ * @property {{s: number, gamma: number} | null} now
+ * @property {{node: number, sample: number} | null} hover
+ */
+
+const STEPS = [1, 2, 5, 10, 20, 50, 100, 200, 500, 1000, 2000, 5000, 10000]; // mm
+
+export class Chart {
+  /** @param {HTMLCanvasElement} canvas */
+  constructor(canvas) {
+    this.canvas = canvas;
+    /** @type {Grid | null} */
+    this.grid = null;
+    this.layer = 0;
+    /** @type {HTMLCanvasElement} the cells alone, painted when they change */
+    this.back = document.createElement("canvas");
+    this.painted = "";
+    this.font = getComputedStyle(document.body).fontFamily;
+  }
+
+  dark() {
+    return document.documentElement.dataset.theme === "dark";
+  }
+
+  inks() {
+    const { message } = /** @type {Grid} */ (this.grid);
+    return inks(message, this.dark(), themeColour("--free"));
+  }
+
+  /**
+   * Return where the cells are on the canvas.
+   * @returns {Frame}
+   */
+  frame() {
+    const em = textSize();
+    const { clientWidth, clientHeight } = this.canvas;
+    const [left, top] = [3.1 * em, 0.4 * em];
+    return {
+      ...{ left, top, em },
+      width: Math.max(1, clientWidth - left - 0.6 * em),
+      height: Math.max(1, clientHeight - top - 2.5 * em),
+    };
+  }
+
+  /** @param {Drawn} drawn */
+  draw({ plans, before, stale, broken, now, hover }) {
+    const { width, height, ratio } = fitCanvas(this.canvas);
+    const context = this.canvas.getContext("2d");
+    if (!context || !width || !height) return;
+    context.setTransform(ratio, 0, 0, ratio, 0, 0);
+    context.clearRect(0, 0, width, height);
+    if (!this.grid?.layers.length) return;
+    const frame = this.frame();
+    const scale = frame.em / 13;
+    this.cells(ratio, frame);
+    context.drawImage(this.back, frame.left, frame.top, frame.width, frame.height);
+    this.axes(context, frame);
+    context.save();
+    context.beginPath();
+    context.rect(frame.left, frame.top, frame.width, frame.height);
+    context.clip();
+    context.setLineDash([5 * scale, 4 * scale]);
+    for (const plan of before) this.course(context, plan, frame, "--quiet", 1.5 * scale);
+    context.setLineDash([]);
+    context.globalAlpha = stale ? 0.55 : 1;
+    for (const plan of plans) this.course(context, plan, frame, "--course", 2.2 * scale);
+    context.globalAlpha = 1;
+    if (broken !== null) this.breakAt(context, broken, frame);
+    if (now) this.cursor(context, now, frame);
+    if (hover) this.crosshair(context, hover, frame);
+    context.restore();
+  }
+
+  /**
+   * Paint the cells where they, their size or the theme have changed.
+   * @param {number} ratio
+   * @param {Frame} frame
+   */
+  cells(ratio, frame) {
+    const grid = /** @type {Grid} */ (this.grid);
+    const [w, h] = [Math.round(frame.width * ratio), Math.round(frame.height * ratio)];
+    const key = [grid.message.graph, grid.message.contour, this.layer, w, h, this.dark()].join(" ");
+    if (key === this.painted) return;
+    this.painted = key;
+    Object.assign(this.back, { width: w, height: h });
+    const image = pixels(grid, this.layer, this.inks(), w, h, Math.round(8 * ratio));
+    this.back.getContext("2d")?.putImageData(image, 0, 0);
+  }
+
+  /**
+   * @param {number} s  m
+   * @param {Frame} frame
+   */
+  x(s, frame) {
+    const { message, length } = /** @type {Grid} */ (this.grid);
+    return frame.left + ((s - message.s[0]) / length) * frame.width;
+  }
+
+  /**
+   * @param {number} gamma  rad
+   * @param {Frame} frame
+   */
+  y(gamma, frame) {
+    return frame.top + (0.5 - wrapped(gamma) / (2 * Math.PI)) * frame.height;
+  }
+
+  /**
+   * @param {CanvasRenderingContext2D} context
+   * @param {Frame} frame
+   */
+  axes(context, frame) {
+    const { length, message } = /** @type {Grid} */ (this.grid);
+    const { left, top, width, height, em } = frame;
+    context.font = `${0.82 * em}px ${this.font}`;
+    context.fillStyle = themeColour("--quiet");
+    context.strokeStyle = themeColour("--rule");
+    context.lineWidth = 1;
+    context.strokeRect(left - 0.5, top - 0.5, width + 1, height + 1);
+    context.textAlign = "right";
+    context.textBaseline = "middle";
+    for (const gamma of [-180, -90, 0, 90, 180]) {
+      const y = top + (0.5 - gamma / 360) * height;
+      context.fillRect(left - 4, Math.round(y), 4, 1);
+      const edge = gamma === 180 ? 0.3 * em : gamma === -180 ? -0.3 * em : 0;
+      context.fillText(fixed(gamma, 0), left - 0.5 * em, y + edge);
+    }
+    context.save();
+    context.translate(0.55 * em, top + height / 2);
+    context.rotate(-Math.PI / 2);
+    context.textAlign = "center";
+    context.fillText("gamma, deg", 0, 0);
+    context.restore();
+    context.textBaseline = "top";
+    const mm = length * 1e3;
+    const step = STEPS.find((each) => mm / each <= width / (4 * em)) ?? 2e4;
+    for (let at = 0; at <= mm + 1e-9; at += step) {
+      const x = this.x(message.s[0] + at / 1e3, frame);
+      context.fillRect(Math.round(x), top + height, 1, 4);
+      context.textAlign = at === 0 ? "left" : x > left + width - em ? "right" : "center";
+      context.fillText(fixed(at, 0), x, top + height + 0.4 * em);
+    }
+    context.textAlign = "center";
+    context.fillText("path length, mm", left + width / 2, top + height + 1.4 * em);
+  }
+
+  /**
+   * Draw a course with a halo.
+   * @param {CanvasRenderingContext2D} context
+   * @param {PlanMessage} plan
+   * @param {Frame} frame
+   * @param {string} colour
+   * @param {number} width
+   */
+  course(context, plan, frame, colour, width) {
+    this.stroke(context, plan, frame, themeColour("--course-halo"), 2.2 * width);
+    this.stroke(context, plan, frame, themeColour(colour), width);
+  }
+
+  /**
+   * Draw a course; faint where it is in another posture than the one that is shown.
+   * @param {CanvasRenderingContext2D} context
+   * @param {PlanMessage} plan
+   * @param {Frame} frame
+   * @param {string} colour
+   * @param {number} width
+   */
+  stroke(context, plan, frame, colour, width) {
+    const posture = this.grid?.layers[this.layer].posture;
+    context.strokeStyle = colour;
+    context.lineWidth = width;
+    context.lineJoin = "round";
+    const alpha = context.globalAlpha;
+    for (const here of [true, false]) {
+      context.globalAlpha = here ? alpha : 0.3 * alpha;
+      context.beginPath();
+      for (let k = 0; k + 1 < plan.s.length; k++) {
+        if ((plan.posture[k] === posture) !== here) continue;
+        const [from, to] = [this.y(plan.gamma[k], frame), this.y(plan.gamma[k + 1], frame)];
+        if (Math.abs(from - to) > frame.height / 2) continue; // over the edge of the map
+        context.moveTo(this.x(plan.s[k], frame), from);
+        context.lineTo(this.x(plan.s[k + 1], frame), to);
+      }
+      context.stroke();
+    }
+    context.globalAlpha = alpha;
+  }
+
+  /**
+   * Draw where no path goes on.
+   * @param {CanvasRenderingContext2D} context
+   * @param {number} s  m
+   * @param {Frame} frame
+   */
+  breakAt(context, s, frame) {
+    const x = this.x(s, frame);
+    const width = (2 * frame.em) / 13;
+    context.fillStyle = themeColour("--alert");
+    context.fillRect(x - width / 2, frame.top, width, frame.height);
+    context.font = `600 ${0.86 * frame.em}px ${this.font}`;
+    context.textBaseline = "top";
+    const right = x > frame.left + 0.7 * frame.width;
+    context.textAlign = right ? "right" : "left";
+    context.strokeStyle = themeColour("--course-halo");
+    context.lineWidth = 4;
+    const at = /** @type {const} */ ([x + (right ? -6 : 6), frame.top + 6]);
+    context.strokeText("no path goes on from here", ...at);
+    context.fillText("no path goes on from here", ...at);
+  }
+
+  /**
+   * Draw where the player is.
+   * @param {CanvasRenderingContext2D} context
+   * @param {{s: number, gamma: number}} now
+   * @param {Frame} frame
+   */
+  cursor(context, now, frame) {
+    const scale = frame.em / 13;
+    const [x, y] = [this.x(now.s, frame), this.y(now.gamma, frame)];
+    context.fillStyle = themeColour("--kerf");
+    context.fillRect(x - 0.75 * scale, frame.top, 1.5 * scale, frame.height);
+    context.beginPath();
+    context.arc(x, y, 4.5 * scale, 0, 7);
+    context.fill();
+    context.lineWidth = 1.5 * scale;
+    context.strokeStyle = themeColour("--course-halo");
+    context.stroke();
+  }
+
+  /**
+   * Draw where the pointer is.
+   * @param {CanvasRenderingContext2D} context
+   * @param {{node: number, sample: number}} hover
+   * @param {Frame} frame
+   */
+  crosshair(context, hover, frame) {
+    const { message } = /** @type {Grid} */ (this.grid);
+    const x = Math.round(this.x(message.s[hover.node], frame));
+    const y = Math.round(this.y(message.gamma[hover.sample], frame));
+    context.fillStyle = themeColour("--ink");
+    context.globalAlpha = 0.5;
+    context.fillRect(frame.left, y, frame.width, 1);
+    context.fillRect(x, frame.top, 1, frame.height);
+    context.globalAlpha = 1;
+  }
+}

@@ -1,0 +1,117 @@
+/** What a map message holds, unpacked: codes of all poses, their joints, and where a place falls. */
+
+/** @typedef {import("../messages.js").MapMessage} MapMessage */
+
+export class Grid {
+  /** @param {MapMessage} message */
+  constructor(message) {
+    this.message = message;
+    this.nodes = message.nodes;
+    this.samples = message.gamma.length;
+    this.step = this.samples > 1 ? message.gamma[1] - message.gamma[0] : 2 * Math.PI;
+    this.layers = message.layers.map((layer) => ({ ...layer, codes: bytes(layer.codes) }));
+    this.length = message.s[message.s.length - 1] - message.s[0] || 1;
+    /** @type {Float32Array | null} layers K m n, rad */
+    this.candidates = null;
+    this.joints = 0;
+  }
+
+  /**
+   * Fetch the joints of all poses, so that ghosts need no server.
+   * @param {number} joints  n
+   */
+  async fetch(joints) {
+    const { candidates } = this.message;
+    if (!candidates || this.candidates) return;
+    const answer = await fetch(candidates.replace(/^\//, "") + location.search);
+    if (!answer.ok) return;
+    const found = new Float32Array(await answer.arrayBuffer());
+    if (found.length !== this.layers.length * this.nodes * this.samples * joints) return;
+    this.joints = joints;
+    this.candidates = found;
+  }
+
+  /**
+   * Return the joints of a pose, null where there are none or they are not known here.
+   * @param {number} layer
+   * @param {number} node
+   * @param {number} sample
+   */
+  q(layer, node, sample) {
+    if (!this.candidates) return null;
+    const begin = ((layer * this.nodes + node) * this.samples + sample) * this.joints;
+    const q = this.candidates.subarray(begin, begin + this.joints);
+    return Number.isNaN(q[0]) ? null : q;
+  }
+
+  /**
+   * @param {number} layer
+   * @param {number} node
+   * @param {number} sample
+   */
+  code(layer, node, sample) {
+    return this.layers[layer].codes[node * this.samples + sample];
+  }
+
+  /**
+   * Return the node nearest to a path length.
+   * @param {number} s  m
+   */
+  nodeAt(s) {
+    const list = this.message.s;
+    let [low, high] = [0, list.length - 1];
+    while (high - low > 1) {
+      const middle = (low + high) >> 1;
+      if (list[middle] <= s) low = middle;
+      else high = middle;
+    }
+    return s - list[low] <= list[high] - s ? low : high;
+  }
+
+  /**
+   * Return the sample nearest to a rotation.
+   * @param {number} gamma  rad
+   */
+  sampleAt(gamma) {
+    const at = Math.round((gamma - this.message.gamma[0]) / this.step);
+    return ((at % this.samples) + this.samples) % this.samples;
+  }
+
+  /**
+   * Return how many poses of a layer have each code.
+   * @param {number} layer
+   */
+  counts(layer) {
+    const found = new Array(this.message.reasons.length).fill(0);
+    for (const code of this.layers[layer].codes) found[code]++;
+    return found;
+  }
+
+  /**
+   * Return the layer of a posture, -1 where it has none.
+   * @param {number} posture
+   */
+  layerOf(posture) {
+    return this.layers.findIndex((layer) => layer.posture === posture);
+  }
+}
+
+/**
+ * @param {string} base64
+ * @returns {Uint8Array}
+ */
+function bytes(base64) {
+  const text = atob(base64);
+  const out = new Uint8Array(text.length);
+  for (let i = 0; i < text.length; i++) out[i] = text.charCodeAt(i);
+  return out;
+}
+
+/**
+ * Return a rotation in (-pi, pi].
+ * @param {number} angle
+ */
+export const wrapped = (angle) => {
+  const turned = angle - 2 * Math.PI * Math.floor((angle + Math.PI) / (2 * Math.PI));
+  return turned === -Math.PI ? Math.PI : turned;
+};

@@ -1,0 +1,64 @@
+/** What the colours and patterns of a map mean, and how much of it each one is. */
+
+import { el } from "../dom.js";
+import { percent } from "../format.js";
+import { Grid } from "./grid.js";
+import { pixels } from "./paint.js";
+
+const SWATCH = 28; // px, drawn at half that size
+
+/**
+ * Return the legend of a layer: what is free first, then by how much is lost.
+ * @param {Grid} grid
+ * @param {number} layer
+ * @param {import("./paint.js").Ink[]} ink
+ * @param {{course: boolean, before: boolean}} lines
+ * @returns {Node[]}
+ */
+export function legend(grid, layer, ink, lines) {
+  const { message } = grid;
+  const total = grid.nodes * grid.samples;
+  const found = grid.counts(layer).map((count, code) => ({ count, code }));
+  const order = found.filter(({ count }) => count > 0);
+  order.sort((a, b) => Number(b.code === 0) - Number(a.code === 0) || b.count - a.count);
+  const rows = order.map(({ count, code }) => {
+    const share = count / total;
+    return el(
+      "li",
+      {},
+      swatch(message, ink[code]),
+      el("span", {}, code === 0 ? "free" : message.reasons[code]),
+      el("b", {}, share < 0.005 ? "< 1 %" : percent(share)),
+    );
+  });
+  const line = (/** @type {string} */ kind, /** @type {string} */ words) =>
+    el("li", {}, el("i", { class: `line ${kind}` }), el("span", {}, words));
+  const keys = el(
+    "ul",
+    { class: "lines" },
+    lines.course ? line("course", "course") : null,
+    lines.before ? line("before", "course before") : null,
+  );
+  const hidden = message.hidden.map((each) => el("p", {}, each));
+  return [
+    el("ul", {}, ...rows),
+    ...(keys.childElementCount ? [keys] : []),
+    ...(hidden.length
+      ? [el("details", {}, el("summary", {}, "Postures not shown"), ...hidden)]
+      : []),
+  ];
+}
+
+/**
+ * @param {import("../messages.js").MapMessage} message
+ * @param {import("./paint.js").Ink} ink
+ */
+function swatch(message, ink) {
+  const canvas = el("canvas", { class: "swatch", width: SWATCH, height: SWATCH });
+  const one = new Grid({
+    ...message,
+    ...{ nodes: 1, s: [0], gamma: [0], layers: [{ posture: 0, name: "", codes: "AA==" }] },
+  });
+  canvas.getContext("2d")?.putImageData(pixels(one, 0, [ink], SWATCH, SWATCH, 12), 0, 0);
+  return canvas;
+}

@@ -1,0 +1,250 @@
+/**
+ * What the server and the page say to each other: the types of README.md, and nothing else.
+ * Values are in m, rad and s in the robot's base frame unless a key carries its unit; arrays of
+ * vectors are flat and row-major; a pose is 16 numbers, row-major.
+ */
+
+/** @typedef {(string | number)[]} Path a key of the job, as ["contour", 0, "speed_m_min"] */
+/** @typedef {{key: Path, message: string}} Fault */
+/** @typedef {{path: Path, value: unknown}} Edit */
+
+/**
+ * @typedef {object} JobMessage
+ * @property {"job"} type
+ * @property {number} revision
+ * @property {string} name
+ * @property {string} text
+ * @property {Record<string, any> | null} values
+ * @property {{name: string, index: number}[]} contours
+ * @property {boolean} undo
+ * @property {boolean} redo
+ * @property {boolean} saved
+ * @property {Fault[]} faults
+ * @property {Record<string, string[]>} choices
+ * @property {number[] | null} weights  1/rad, those that hold where the job has none
+ */
+
+/**
+ * @typedef {object} Joint
+ * @property {number[]} T  16, its frame at angle 0 in the frame of the joint before it
+ * @property {number[]} axis  3, unit vector in its own frame
+ * @property {number | null} lower
+ * @property {number | null} upper
+ * @property {boolean} endless
+ * @property {number} velocity  rad/s
+ * @property {number} acceleration  rad/s2
+ */
+
+/**
+ * @typedef {object} RobotModel
+ * @property {string} id
+ * @property {Joint[]} joints
+ * @property {number[]} T_flange  16, in the last joint's frame
+ * @property {number[]} T_tool  16, the tip in the flange
+ */
+
+/**
+ * @typedef {object} Body
+ * @property {string} name
+ * @property {"robot" | "head" | "part" | "fixture" | "floor"} kind
+ * @property {number} frame  0 stands still, i moves with joint i
+ * @property {string} mesh
+ * @property {boolean} approximate
+ */
+
+/**
+ * @typedef {object} ContourShape
+ * @property {string} name
+ * @property {number} index
+ * @property {boolean} closed
+ * @property {number[]} points
+ * @property {number[]} axes
+ * @property {number[]} s
+ * @property {string[]} kind
+ * @property {number} speed_m_min
+ */
+
+/**
+ * @typedef {object} SceneMessage
+ * @property {"scene"} type
+ * @property {number} revision
+ * @property {RobotModel} robot
+ * @property {{q: number[], T: number[]}} sample
+ * @property {Body[]} bodies
+ * @property {number[]} T_part
+ * @property {ContourShape[]} contours
+ * @property {boolean} cell
+ */
+
+/** @typedef {{type: "progress", busy: boolean, label: string, done: number, total: number}} ProgressMessage */
+
+/**
+ * @typedef {object} Check
+ * @property {string} code
+ * @property {string} title
+ * @property {number | null} value
+ * @property {number | null} limit
+ * @property {string} unit
+ * @property {string} level
+ * @property {boolean} ok
+ * @property {number | null} node
+ */
+
+/**
+ * @typedef {object} Criteria
+ * @property {number[]} displacement
+ * @property {number[]} largest_increment
+ * @property {number[]} range
+ * @property {number[]} peak_velocity
+ * @property {number[]} peak_acceleration
+ * @property {{name: string, value: number | null, unit: string, node: number}[]} nearest
+ */
+
+/**
+ * @typedef {object} PlanMessage
+ * @property {"plan"} type
+ * @property {number} revision
+ * @property {string} contour
+ * @property {string} name
+ * @property {number} pieces
+ * @property {string} graph
+ * @property {number[]} s
+ * @property {number[]} time
+ * @property {number[]} q
+ * @property {number[]} gamma
+ * @property {number[]} posture
+ * @property {number[]} points
+ * @property {string[]} kind
+ * @property {number[]} speed
+ * @property {number} cost
+ * @property {number | null} bound
+ * @property {number | null} gap
+ * @property {boolean} settled
+ * @property {boolean} optimal
+ * @property {string} statement
+ * @property {string} method
+ * @property {number[]} weights
+ * @property {number | null} previous_cost
+ * @property {Criteria} criteria
+ * @property {number[]} velocity_share
+ * @property {number[]} acceleration_share
+ * @property {number[]} joint_load
+ * @property {Check[] | null} checks
+ * @property {boolean | null} passed
+ * @property {string | null} feed
+ * @property {number} seconds
+ */
+
+/** @typedef {{label: string, edits: Edit[]}} Relaxation */
+
+/**
+ * @typedef {object} NoPathMessage
+ * @property {"nopath"} type
+ * @property {number} revision
+ * @property {string} contour
+ * @property {number} node
+ * @property {number | null} back
+ * @property {number | null} s
+ * @property {number[] | null} point
+ * @property {string} statement
+ * @property {"every gamma" | "grid" | "undecided"} scope
+ * @property {{name: string, count: number}[]} reasons
+ * @property {string | null} graph
+ * @property {Relaxation[] | null} relaxations
+ * @property {string | null} remedy
+ */
+
+/**
+ * @typedef {object} Segment
+ * @property {"move" | "approach" | "pierce" | "cut" | "retract"} kind
+ * @property {number} begin
+ * @property {number} end
+ * @property {string | null} contour
+ * @property {string | null} [plan]
+ * @property {number[] | null} time
+ * @property {number[] | null} q
+ */
+
+/**
+ * @typedef {object} ProgramMessage
+ * @property {"program"} type
+ * @property {number} revision
+ * @property {number} total
+ * @property {Segment[]} segments
+ * @property {boolean} checked
+ * @property {string[]} notes
+ */
+
+/** @typedef {{name: string, href: string, ready: boolean, why: string | null}} Export */
+
+/**
+ * @typedef {object} OutcomeMessage
+ * @property {"outcome"} type
+ * @property {number} revision
+ * @property {boolean | null} passed
+ * @property {Export[]} exports
+ * @property {{cutting: number, air: number, piercing: number, total: number} | null} cycle
+ * @property {string[]} notes
+ */
+
+/**
+ * @typedef {object} MapMessage
+ * @property {"map"} type
+ * @property {number} revision
+ * @property {string} contour
+ * @property {string} graph
+ * @property {number[]} s
+ * @property {number[]} gamma
+ * @property {number} nodes
+ * @property {string[]} reasons
+ * @property {string[]} kinds
+ * @property {string[]} colours
+ * @property {string | null} [candidates]
+ * @property {{posture: number, name: string, codes: string}[]} layers
+ * @property {string[]} hidden
+ * @property {{name: string, s: number[], gamma: number[], posture: number[]}[]} course
+ */
+
+/**
+ * @typedef {object} PoseMessage
+ * @property {"pose"} type
+ * @property {string} contour
+ * @property {number} node
+ * @property {number} gamma
+ * @property {number} posture
+ * @property {number[] | null} q
+ * @property {boolean} admitted
+ * @property {string} reason
+ */
+
+/**
+ * @typedef {object} FastestMessage
+ * @property {"fastest"} type
+ * @property {number} revision
+ * @property {string} contour
+ * @property {number | null} speed_m_min
+ * @property {number | null} on_grid_m_min
+ * @property {string} binds
+ * @property {Edit[]} edits
+ */
+
+/**
+ * @typedef {object} ProgramTextMessage
+ * @property {"program_text"} type
+ * @property {string} language
+ * @property {{name: string, text: string}[]} files
+ * @property {string[]} notes
+ * @property {string[]} faults
+ */
+
+/** @typedef {{type: "error", message: string, about: string | null}} ErrorMessage */
+
+/**
+ * @typedef {JobMessage | SceneMessage | ProgressMessage | PlanMessage | NoPathMessage
+ *   | ProgramMessage | OutcomeMessage | MapMessage | PoseMessage | FastestMessage
+ *   | ProgramTextMessage | ErrorMessage} ServerMessage
+ */
+
+/** @typedef {{type: string} & Record<string, unknown>} ClientMessage */
+
+export {};

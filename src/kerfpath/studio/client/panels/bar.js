@@ -1,0 +1,231 @@
+/** The top of the page and its foot: the job, undo and redo, files, theme, progress, notices. */
+
+import { byId, el, icon } from "../dom.js";
+
+/** @typedef {import("../store.js").Store} Store */
+/** @typedef {{send: (message: any) => boolean, open: () => void}} Link */
+
+/**
+ * @param {Store} store
+ * @param {Link} connection
+ */
+export function topBar(store, connection) {
+  const send = (/** @type {string} */ type) => () => void connection.send({ type });
+  const buttons = /** @type {const} */ ([
+    ["undo", "undo", ""],
+    ["redo", "redo", ""],
+    ["save", "save", "Save job"],
+  ]);
+  for (const [id, name, text] of buttons) {
+    byId(id).append(icon(name), ...(text ? [text] : []));
+    byId(id).addEventListener("click", send(id));
+  }
+  byId("export").append(icon("export"), "Export");
+  byId("open-text").append(icon("file"), "Job file");
+  byId("open-program").append(icon("file"), "Program");
+  menu(store);
+  store.on(["job", "connection", "outcome"], draw);
+  draw();
+
+  function draw() {
+    const { job } = store;
+    const live = store.connection === "open" && job !== null;
+    const set = (/** @type {string} */ id, /** @type {boolean} */ on) =>
+      (byId(id, HTMLButtonElement).disabled = !on);
+    set("undo", live && Boolean(job?.undo));
+    set("redo", live && Boolean(job?.redo));
+    set("save", live && !job?.saved && job?.faults.length === 0);
+    set("open-text", live);
+    set("open-program", live);
+    set("export", live);
+    byId("file").textContent = job?.name ?? "Opening the job";
+    byId("saved").textContent = !job ? "" : job.saved ? "saved" : "changed, kept beside the job";
+    document.title = job
+      ? `${job.saved ? "" : "• "}${job.name} – kerfpath studio`
+      : "kerfpath studio";
+  }
+}
+
+/** @param {Store} store */
+function menu(store) {
+  const [button, list] = [byId("export"), byId("export-menu")];
+  const show = (/** @type {boolean} */ open) => {
+    list.hidden = !open;
+    button.setAttribute("aria-expanded", String(open));
+    if (!open) return;
+    const { search } = location;
+    const entries = store.outcome?.exports ?? [];
+    const href = (/** @type {string} */ path) =>
+      path.replace(/^\//, "") +
+      (search ? (path.includes("?") ? `&${search.slice(1)}` : search) : "");
+    list.replaceChildren(
+      ...entries.map(({ name, href: path, ready, why }) =>
+        ready
+          ? el(
+              "a",
+              {
+                href: href(path),
+                download: path.startsWith("/report") ? false : true,
+                target: path.startsWith("/report") ? "_blank" : null,
+              },
+              name,
+              el("small", {}, why || describe(path)),
+            )
+          : el("div", { class: "off" }, name, el("small", {}, why)),
+      ),
+      ...(entries.length
+        ? []
+        : [
+            el(
+              "div",
+              { class: "off" },
+              "Nothing yet",
+              el("small", {}, "Files can be taken along once every contour is planned."),
+            ),
+          ]),
+    );
+    /** @type {HTMLElement | null} */ (list.querySelector("a"))?.focus();
+  };
+  button.addEventListener("click", () => show(Boolean(list.hidden)));
+  document.addEventListener("pointerdown", (event) => {
+    if (!list.hidden && !(/** @type {Node} */ (event.target).parentElement?.closest(".menu")))
+      show(false);
+  });
+  list.addEventListener("keydown", (event) => {
+    if (event.key === "Escape") {
+      show(false);
+      button.focus();
+    }
+    const links = [...list.querySelectorAll("a")];
+    const at = links.indexOf(/** @type {HTMLAnchorElement} */ (document.activeElement));
+    const to = { ArrowDown: at + 1, ArrowUp: at - 1 }[event.key];
+    if (to !== undefined) {
+      links[(to + links.length) % links.length]?.focus();
+      event.preventDefault();
+    }
+  });
+  list.addEventListener("click", () => show(false));
+}
+
+/** @param {string} path */
+const describe = (path) =>
+  path.includes("job")
+    ? "the job file, comments kept"
+    : path.includes("program")
+      ? "in the language of the job"
+      : path.includes("trajectory")
+        ? "one row for each node"
+        : path.includes("report")
+          ? "a page of its own"
+          : "";
+
+/**
+ * @param {Store} store
+ * @param {Link} connection
+ */
+export function foot(store, connection) {
+  const [link, doing, cancel] = [byId("link"), byId("doing"), byId("cancel")];
+  const bar = byId("bar", HTMLProgressElement);
+  cancel.addEventListener("click", () => void connection.send({ type: "cancel" }));
+  byId("hint").textContent = "Space plays, arrow keys step, F fits the view";
+  store.on(["connection", "progress", "job"], draw);
+  draw();
+
+  function draw() {
+    const { progress, connection: status } = store;
+    const open = status === "open";
+    link.replaceChildren(
+      el("i", { class: `dot ${open ? "done" : "none"}` }),
+      open ? "connected" : status === "lost" ? "not connected" : "connecting",
+    );
+    const busy = open && progress.busy;
+    doing.textContent = busy ? progress.label || "planning" : open && store.job ? "ready" : "";
+    bar.hidden = cancel.hidden = !busy;
+    if (progress.total > 0) bar.value = progress.done / progress.total;
+    else bar.removeAttribute("value");
+  }
+}
+
+/**
+ * Show what went wrong, and what to do about it, above the desk.
+ * @param {Store} store
+ * @param {Link} connection
+ */
+export function notices(store, connection) {
+  const host = byId("notices");
+  /** @type {{message: string, timer: number}[]} */
+  const errors = [];
+  let wasOpen = false;
+  store.on(["connection", "job"], draw);
+  store.on(["error"], (error) => {
+    if (errors.some(({ message }) => message === error.message)) return;
+    const entry = { message: error.message, timer: window.setTimeout(() => drop(entry), 12000) };
+    errors.push(entry);
+    if (errors.length > 3) drop(errors[0]);
+    draw();
+  });
+  window.setInterval(() => store.connection === "lost" && draw(), 1000);
+  draw();
+
+  /** @param {{message: string, timer: number}} entry */
+  function drop(entry) {
+    clearTimeout(entry.timer);
+    errors.splice(errors.indexOf(entry), 1);
+    draw();
+  }
+
+  function draw() {
+    if (store.connection === "open") wasOpen = true;
+    const rows = [];
+    if (store.connection === "lost") {
+      const seconds = Math.max(1, Math.ceil(((store.retryAt ?? 0) - Date.now()) / 1000));
+      rows.push(
+        notice(
+          true,
+          wasOpen
+            ? `The studio's server has stopped or cannot be reached. Every change up to now is kept beside the job; start "kerfpath studio" again to go on. Next try in ${seconds} s.`
+            : `The studio's server does not answer. Next try in ${seconds} s.`,
+          el("button", { class: "plain", onclick: () => connection.open() }, "Try now"),
+        ),
+      );
+    }
+    for (const { key, message } of store.job?.faults ?? [])
+      rows.push(
+        notice(
+          true,
+          `${key.length ? `${key.join(".")}: ` : ""}${message}`,
+          el(
+            "button",
+            {
+              class: "plain",
+              disabled: !store.job?.undo,
+              onclick: () => void connection.send({ type: "undo" }),
+            },
+            icon("undo"),
+            "Undo",
+          ),
+        ),
+      );
+    for (const entry of errors)
+      rows.push(
+        notice(
+          false,
+          entry.message,
+          el(
+            "button",
+            { class: "tool", "aria-label": "Dismiss", onclick: () => drop(entry) },
+            icon("close"),
+          ),
+        ),
+      );
+    host.replaceChildren(...rows);
+  }
+}
+
+/**
+ * @param {boolean} bad
+ * @param {string} text
+ * @param {HTMLElement} button
+ */
+const notice = (bad, text, button) =>
+  el("div", { class: `notice ${bad ? "bad" : ""}` }, icon("warning"), el("p", {}, text), button);

@@ -1,0 +1,148 @@
+/** The joints of the robot: the weight of each, to drag, and beside it how much the joint does. */
+
+import { byId, el, icon } from "../dom.js";
+import { deg, digits, fixed } from "../format.js";
+import { gesture, weight } from "./fields.js";
+
+/** @typedef {import("../store.js").Store} Store */
+/** @typedef {import("../messages.js").PlanMessage} PlanMessage */
+
+/**
+ * @param {Store} store
+ * @param {{send: (message: any) => boolean}} connection
+ */
+export function jointsPanel(store, connection) {
+  const host = byId("joints");
+  const send = (/** @type {number[] | null} */ value, /** @type {string} */ drag) =>
+    void connection.send({ type: "edit", path: ["plan", "weights"], value, gesture: drag });
+  const usual = el(
+    "button",
+    {
+      class: "text",
+      title: "Take the weights out of the job: each joint by its own speed limit",
+      onclick: () => send(null, gesture()),
+    },
+    icon("reset"),
+    "Usual weights",
+  );
+  const body = el("tbody");
+  const table = el(
+    "table",
+    { class: "joints" },
+    el(
+      "thead",
+      {},
+      el(
+        "tr",
+        {},
+        ...[
+          ["", ""],
+          ["weight", "× usual"],
+          ["moves", "deg"],
+          ["speed", "% limit"],
+          ["accel.", "% limit"],
+        ].map(([name, unit]) => el("th", { scope: "col" }, name, el("small", {}, unit))),
+      ),
+    ),
+    body,
+  );
+  host.replaceChildren(
+    el(
+      "section",
+      { class: "card" },
+      el("header", {}, el("h2", {}, "Joints"), el("span", { class: "grow" }), usual),
+      table,
+    ),
+  );
+  /** @type {{slider: ReturnType<typeof weight>, moves: HTMLElement, shares: {set: (value: number | null) => void}[]}[]} */
+  let rows = [];
+  store.on(["job", "selected", "plan", "connection"], draw);
+  draw();
+
+  /** @param {number} count */
+  function build(count) {
+    rows = Array.from({ length: count }, (_, j) => {
+      const slider = weight(j, (ratio, drag) => set(j, ratio, drag));
+      const key = el("i", { class: "key" });
+      key.style.background = `var(--joint-${(j % 7) + 1})`;
+      return { slider, key, moves: el("td"), shares: [share(), share()] };
+    }).map(({ slider, key, moves, shares }, j) => {
+      body.append(
+        el(
+          "tr",
+          {},
+          el("th", { scope: "row" }, el("label", { for: slider.id }, key, `J${j + 1}`)),
+          el("td", {}, slider.element),
+          moves,
+          ...shares.map(({ element }) => element),
+        ),
+      );
+      return { slider, moves, shares };
+    });
+  }
+
+  /**
+   * Send the weights with one of them changed.
+   * @param {number} joint
+   * @param {number} ratio  of its usual weight
+   * @param {string} drag
+   */
+  function set(joint, ratio, drag) {
+    const base = store.job?.weights ?? [];
+    const to = [.../** @type {number[]} */ (store.job?.values?.plan?.weights ?? base)];
+    to[joint] = ratio * base[joint];
+    send(
+      to.map((each) => Number(each.toPrecision(4))),
+      drag,
+    );
+  }
+
+  function draw() {
+    const { job, selected } = store;
+    const base = job?.weights ?? [];
+    host.hidden = !base.length;
+    if (rows.length !== base.length) {
+      body.replaceChildren();
+      build(base.length);
+    }
+    const disabled = store.connection !== "open" || !job?.values;
+    const given = /** @type {number[] | null} */ (job?.values?.plan?.weights ?? null);
+    usual.disabled = disabled || !given;
+    const plans = (selected && store.plans.get(selected)) || [];
+    table.classList.toggle(
+      "stale",
+      plans.some((plan) => store.stale(plan)),
+    );
+    rows.forEach(({ slider, moves, shares }, j) => {
+      slider.show(
+        given ? given[j] / base[j] : 1,
+        `${digits((given ?? base)[j], 3)} per rad`,
+        disabled,
+      );
+      const moved = plans.reduce((sum, { criteria }) => sum + criteria.displacement[j], 0);
+      moves.textContent = plans.length ? fixed(deg(moved), 1) : "";
+      for (const [i, name] of /** @type {const} */ ([
+        "peak_velocity",
+        "peak_acceleration",
+      ]).entries())
+        shares[i].set(
+          plans.length ? Math.max(...plans.map(({ criteria }) => criteria[name][j])) : null,
+        );
+    });
+  }
+}
+
+/** Return a cell with a share of a limit, as a number and as a bar. */
+function share() {
+  const [number, bar] = [el("span"), el("i")];
+  const element = el("td", {}, number, el("span", { class: "share" }, bar));
+  return {
+    element,
+    /** @param {number | null} value */
+    set(value) {
+      number.textContent = value === null ? "" : fixed(100 * value, 0);
+      bar.style.width = `${Math.min(100, 100 * (value ?? 0))}%`;
+      bar.classList.toggle("high", (value ?? 0) > 0.9);
+    },
+  };
+}

@@ -1,0 +1,327 @@
+/** The joints of the chosen contour against time: speed, acceleration, angle; the cursor is the player's. */
+
+import UPlot from "uplot";
+
+import { byId, el, textSize, themeColour } from "./dom.js";
+import { deg, fixed } from "./format.js";
+
+/** @typedef {import("./store.js").Store} Store */
+/** @typedef {import("./player.js").Player} Player */
+/** @typedef {import("./messages.js").PlanMessage} PlanMessage */
+/** @typedef {"speed" | "acceleration" | "angle"} Kind */
+
+/** @type {Record<Kind, {title: string, label: string}>} */
+const KINDS = {
+  speed: { title: "Speed", label: "joint speed, % of limit" },
+  acceleration: { title: "Accel.", label: "joint acceleration, % of limit" },
+  angle: { title: "Angle", label: "joint angle, deg" },
+};
+
+/** @param {number} joint  0-based */
+export const jointColour = (joint) => themeColour(`--joint-${(joint % 7) + 1}`);
+
+export class Plots {
+  /**
+   * @param {Store} store
+   * @param {Player} player
+   */
+  constructor(store, player) {
+    this.store = store;
+    this.player = player;
+    this.host = byId("plot");
+    this.said = byId("plot-state");
+    this.line = el("div", { class: "plot-line", hidden: true });
+    this.tip = el("div", { class: "tip plot-tip", hidden: true });
+    /** @type {Kind} */
+    this.kind = "speed";
+    /** @type {Set<number>} joints that are not shown */
+    this.off = new Set();
+    /** @type {UPlot | null} */
+    this.plot = null;
+    this.waiting = false;
+    const tabs = byId("plot-kind");
+    tabs.replaceChildren(
+      ...Object.entries(KINDS).map(([kind, { title }]) =>
+        el(
+          "button",
+          { "data-kind": kind, onclick: () => this.choose(/** @type {Kind} */ (kind)) },
+          title,
+        ),
+      ),
+    );
+    this.choose("speed");
+    store.on(["selected", "plan", "scene", "progress"], () => this.invalidate());
+    store.on(["job"], () => this.invalidate());
+    player.on(() => this.follow());
+    new ResizeObserver(() => this.resize()).observe(this.host);
+  }
+
+  /** @param {Kind} kind */
+  choose(kind) {
+    this.kind = kind;
+    for (const tab of byId("plot-kind").children)
+      tab.setAttribute(
+        "aria-pressed",
+        String(/** @type {HTMLElement} */ (tab).dataset.kind === kind),
+      );
+    this.invalidate();
+  }
+
+  invalidate() {
+    if (this.waiting) return;
+    this.waiting = true;
+    requestAnimationFrame(() => {
+      this.waiting = false;
+      this.draw();
+    });
+  }
+
+  /** The plans that are shown, and how many joints they have. */
+  shown() {
+    const plans = this.store.plans.get(this.store.selected ?? "") ?? [];
+    return { plans, joints: this.store.scene?.robot.joints.length ?? 0 };
+  }
+
+  /**
+   * Return the columns to plot: time, then one per joint; pieces are apart by a gap.
+   * @returns {(number | null)[][]}
+   */
+  columns() {
+    const { plans, joints } = this.shown();
+    /** @type {(number | null)[][]} */
+    const out = Array.from({ length: joints + 1 }, () => []);
+    let begin = 0;
+    for (const { time, q, velocity_share, acceleration_share } of plans) {
+      const [rows, offset, count] = {
+        speed: /** @type {const} */ ([velocity_share, 0.5, time.length - 1]),
+        acceleration: /** @type {const} */ ([acceleration_share, 1, time.length - 2]),
+        angle: /** @type {const} */ ([q, 0, time.length]),
+      }[this.kind];
+      if (begin > 0) out.forEach((column, j) => column.push(j === 0 ? begin : null));
+      for (let k = 0; k < count; k++) {
+        const [low, high] = [time[Math.floor(k + offset)], time[Math.ceil(k + offset)]];
+        out[0].push(begin + (low + high) / 2);
+        for (let j = 0; j < joints; j++) {
+          const value = rows[k * joints + j];
+          out[j + 1].push(this.kind === "angle" ? deg(value) : 100 * value);
+        }
+      }
+      begin += time[time.length - 1];
+    }
+    return out;
+  }
+
+  draw() {
+    const { plans, joints } = this.shown();
+    this.plot?.destroy();
+    this.plot = null;
+    this.legend(plans.length ? joints : 0);
+    const nopath = this.store.nopaths.has(this.store.selected ?? "");
+    this.said.replaceChildren(
+      ...(plans.length
+        ? []
+        : [
+            el(
+              "p",
+              {},
+              nopath
+                ? "No motion to plot: this contour has no path."
+                : "Speeds and accelerations appear with the plan.",
+            ),
+          ]),
+    );
+    this.host.replaceChildren();
+    this.host.dataset.contour = this.store.selected ?? "";
+    if (!plans.length || !this.host.clientHeight) return;
+    const em = textSize();
+    const font = `${0.82 * em}px ${getComputedStyle(document.body).fontFamily}`;
+    const [quiet, line, rule] = ["--quiet", "--line", "--rule"].map(themeColour);
+    const axis = { stroke: quiet, font, labelFont: font, labelGap: 0, labelSize: 1.3 * em };
+    const grid = { stroke: line, width: 1 };
+    const ticks = { stroke: rule, width: 1, size: 4 };
+    this.plot = new UPlot(
+      {
+        width: this.host.clientWidth,
+        height: this.host.clientHeight,
+        legend: { show: false },
+        padding: [0.4 * em, 0.8 * em, 0, 0],
+        scales: { x: { time: false }, y: { range: (_, low, high) => this.range(low, high) } },
+        cursor: { y: false, points: { size: 0.45 * em }, drag: { x: false, y: false } },
+        axes: [
+          {
+            ...axis,
+            grid: { show: false },
+            ticks,
+            label: "time in the cut, s",
+            size: 1.6 * em,
+            gap: 3,
+            space: 4 * em,
+          },
+          {
+            ...axis,
+            grid,
+            ticks,
+            label: KINDS[this.kind].label,
+            size: 2.9 * em,
+            gap: 3,
+            space: 2 * em,
+          },
+        ],
+        series: [
+          {},
+          ...Array.from({ length: joints }, (_, j) => ({
+            stroke: jointColour(j),
+            width: Math.max(1.5, em / 9),
+            points: { show: false },
+            show: !this.off.has(j),
+          })),
+        ],
+        hooks: {
+          draw: [(plot) => this.limits(plot)],
+          setCursor: [(plot) => this.say(plot)],
+        },
+      },
+      /** @type {any} */ (this.columns()),
+      this.host,
+    );
+    this.plot.over.append(this.line);
+    this.host.append(this.tip);
+    this.plot.over.addEventListener("click", (event) => {
+      if (this.plot) this.go(this.plot.posToVal(event.offsetX, "x"));
+    });
+    this.follow();
+  }
+
+  /**
+   * @param {number} low
+   * @param {number} high
+   * @returns {[number, number]}
+   */
+  range(low, high) {
+    if (this.kind === "angle") {
+      const room = Math.max(2, 0.06 * (high - low));
+      return [low - room, high + room];
+    }
+    const most = Math.max(Math.abs(low), Math.abs(high), 20) * 1.12;
+    return [-most, most];
+  }
+
+  /**
+   * Draw the limits: what the job allows, and what the maker does.
+   * @param {UPlot} plot
+   */
+  limits(plot) {
+    if (this.kind === "angle") return;
+    const options = this.store.job?.values?.plan;
+    const eta = (this.kind === "speed" ? options?.eta_velocity : options?.eta_acceleration) ?? 1;
+    const { ctx: context, bbox } = plot;
+    context.save();
+    context.beginPath();
+    context.rect(bbox.left, bbox.top, bbox.width, bbox.height);
+    context.clip();
+    const ratio = window.devicePixelRatio || 1;
+    for (const [share, colour, dash] of /** @type {[number, string, number[]][]} */ ([
+      [1, "--alert", []],
+      [eta, "--caution-line", [5, 4]],
+    ]))
+      for (const sign of [-1, 1]) {
+        const y = plot.valToPos(sign * share * 100, "y", true);
+        context.strokeStyle = themeColour(colour);
+        context.lineWidth = 1.2 * ratio;
+        context.setLineDash(dash.map((each) => each * ratio));
+        context.beginPath();
+        context.moveTo(bbox.left, y);
+        context.lineTo(bbox.left + bbox.width, y);
+        context.stroke();
+      }
+    context.restore();
+  }
+
+  /** @param {number} joints */
+  legend(joints) {
+    byId("plot-legend").replaceChildren(
+      ...Array.from({ length: joints }, (_, j) => {
+        const key = el("i", { class: "key" });
+        key.style.background = jointColour(j);
+        const toggle = () => {
+          if (!this.off.delete(j)) this.off.add(j);
+          this.plot?.setSeries(j + 1, { show: !this.off.has(j) });
+          button.setAttribute("aria-pressed", String(!this.off.has(j)));
+        };
+        const button = el(
+          "button",
+          {
+            class: "joint",
+            "aria-pressed": String(!this.off.has(j)),
+            title: `Show or hide joint ${j + 1}`,
+            onclick: toggle,
+          },
+          key,
+          `J${j + 1}`,
+        );
+        return button;
+      }),
+    );
+  }
+
+  /**
+   * Say the values under the pointer.
+   * @param {UPlot} plot
+   */
+  say(plot) {
+    const { idx, left = -1 } = plot.cursor;
+    this.tip.hidden = idx === null || idx === undefined || left < 0;
+    if (this.tip.hidden || idx === null || idx === undefined) return;
+    const unit = this.kind === "angle" ? "deg" : "%";
+    const rows = plot.data.slice(1).flatMap((column, j) => {
+      const value = column[idx];
+      if (this.off.has(j) || value === null || value === undefined) return [];
+      const key = el("i", { class: "key" });
+      key.style.background = jointColour(j);
+      return [el("span", {}, key, `J${j + 1} `, el("b", {}, `${fixed(value, 1)} ${unit}`))];
+    });
+    this.tip.replaceChildren(
+      el("span", { class: "quiet" }, `${fixed(plot.data[0][idx], 3)} s`),
+      ...rows,
+    );
+    const x = left + plot.over.offsetLeft;
+    const right = x + 14 + this.tip.offsetWidth > this.host.clientWidth;
+    this.tip.style.transform = `translate(${right ? x - 14 - this.tip.offsetWidth : x + 14}px, 6px)`;
+  }
+
+  /**
+   * Go to a time of the cut.
+   * @param {number} t  s from where its first piece begins
+   */
+  go(t) {
+    let rest = t;
+    const { plans } = this.shown();
+    for (const plan of plans) {
+      const length = plan.time[plan.time.length - 1];
+      if (rest <= length || plan === plans[plans.length - 1]) {
+        const begin = this.player.timeline.when(plan, 0);
+        if (begin !== null) this.player.seek(begin + Math.min(Math.max(rest, 0), length));
+        return;
+      }
+      rest -= length;
+    }
+  }
+
+  /** Put the line where the player is. */
+  follow() {
+    const { moment } = this.player;
+    const { plans } = this.shown();
+    const index = plans.findIndex((plan) => plan.name === moment?.span.plan?.name);
+    this.line.hidden = !this.plot || !moment || index < 0;
+    if (this.line.hidden || !this.plot || !moment) return;
+    const before = plans.slice(0, index).reduce((sum, { time }) => sum + time[time.length - 1], 0);
+    this.line.style.transform = `translateX(${this.plot.valToPos(before + moment.local, "x")}px)`;
+  }
+
+  resize() {
+    const { clientWidth: width, clientHeight: height } = this.host;
+    if (!this.plot && height) return this.invalidate();
+    if (this.plot && height) this.plot.setSize({ width, height });
+    this.follow();
+  }
+}

@@ -1,0 +1,330 @@
+/** The view of the cell: follows the store and the player, and lets contours be pointed at. */
+
+import { Box3, Vector3 } from "three";
+
+import { byId, el, icon } from "../dom.js";
+import { fixed, percent } from "../format.js";
+import { Machine, matrix } from "./machine.js";
+import { Paths } from "./paths.js";
+import { SCALE_GRADIENT } from "./scale.js";
+import { Stage } from "./stage.js";
+
+/** @typedef {import("../store.js").Store} Store */
+/** @typedef {import("../player.js").Player} Player */
+/** @typedef {import("../timeline.js").Moment} Moment */
+
+const REACH = 14; // px within which a contour is pointed at
+
+export class SceneView {
+  /**
+   * @param {Store} store
+   * @param {Player} player
+   */
+  constructor(store, player) {
+    this.store = store;
+    this.player = player;
+    this.canvas = byId("scene", HTMLCanvasElement);
+    this.label = byId("scene-label");
+    this.said = byId("scene-state");
+    this.stage = new Stage(this.canvas);
+    this.machine = new Machine();
+    this.paths = new Paths();
+    this.stage.scene.add(this.machine.group, this.machine.ghost, this.paths.group);
+    this.built = "";
+    this.ready = false;
+    this.follow = false;
+    this.trouble = "";
+    /** @type {Vector3 | null} where the tip was that the camera follows */
+    this.carried = null;
+    this.paths.paint();
+    this.bind();
+    this.state();
+  }
+
+  bind() {
+    const { store, player, canvas } = this;
+    store.on(["scene"], () => this.build());
+    store.on(["scene", "plan"], () => this.draw());
+    store.on(["selected", "plan"], () => this.mark());
+    store.on(["connection", "job", "progress"], () => this.state());
+    player.on((moment) => this.show(moment));
+    let [x, y] = [0, 0];
+    canvas.addEventListener("pointerdown", (event) => ([x, y] = [event.offsetX, event.offsetY]));
+    canvas.addEventListener("pointerup", (event) => {
+      if (Math.hypot(event.offsetX - x, event.offsetY - y) > 4) return;
+      const found = this.pointed(event.offsetX, event.offsetY);
+      if (found) this.chosen(found.contour, found.node);
+    });
+    canvas.addEventListener("pointermove", (event) => {
+      if (event.buttons === 0) this.point(event.offsetX, event.offsetY);
+    });
+    canvas.addEventListener("pointerleave", () => (this.label.hidden = true));
+    canvas.addEventListener("keydown", (event) => event.key === "f" && this.look("fit"));
+    for (const button of document.querySelectorAll("[data-view]")) {
+      const { view } = /** @type {HTMLElement} */ (button).dataset;
+      if (view === "fit") button.append(icon("fit"));
+      button.addEventListener("click", () => this.look(view ?? "fit"));
+    }
+    const follow = byId("follow");
+    follow.append(icon("follow"));
+    follow.addEventListener("click", () => {
+      this.follow = !this.follow;
+      this.carried = null;
+      follow.setAttribute("aria-pressed", String(this.follow));
+      if (this.follow) this.look("head");
+    });
+    const by = byId("colour-by", HTMLSelectElement);
+    by.addEventListener("change", () => {
+      this.paths.colour(/** @type {import("./paths.js").ColourBy} */ (by.value));
+      this.scale();
+      this.stage.invalidate();
+    });
+  }
+
+  /**
+   * Choose what was clicked, and go there.
+   * @param {string} contour
+   * @param {number} node
+   */
+  chosen(contour, node) {
+    this.store.select(contour);
+    const plan = this.store.plans.get(contour)?.[0];
+    const when = plan && this.player.timeline.when(plan, Math.min(node, plan.time.length - 1));
+    if (when !== null && when !== undefined) this.player.seek(when);
+  }
+
+  /** Build the bodies where they are not those that are shown. */
+  async build() {
+    const { scene } = this.store;
+    if (!scene) return;
+    const key = JSON.stringify([scene.robot, scene.bodies]);
+    if (key === this.built) return;
+    const first = this.built === "";
+    this.built = key;
+    try {
+      await this.machine.build(scene);
+      this.trouble = "";
+    } catch (fault) {
+      this.trouble = fault instanceof Error ? fault.message : String(fault);
+      this.built = "";
+    }
+    if (key !== this.built && this.built) return;
+    this.ready = true;
+    this.lay();
+    this.note();
+    this.show(this.player.moment);
+    if (first) this.look("fit");
+    this.state();
+  }
+
+  /** Lay the floor under what stands in the cell. */
+  lay() {
+    const { scene } = this.store;
+    if (!scene || !this.ready || scene.bodies.some(({ kind }) => kind === "floor")) return;
+    const box = new Box3();
+    for (const body of this.machine.frames[0].children) box.expandByObject(body);
+    this.stage.layFloor(box.expandByScalar(0.5), -0.001);
+  }
+
+  /** Draw the contours again. */
+  draw() {
+    const { scene, plans } = this.store;
+    /** @type {import("./paths.js").Track[]} */
+    const tracks = [];
+    for (const { name: contour, points, kind } of scene?.contours ?? []) {
+      const found = plans.get(contour) ?? [];
+      for (const plan of found)
+        tracks.push({ contour, plan, points: plan.points, kind: plan.kind });
+      if (!found.length) tracks.push({ contour, plan: null, points, kind });
+    }
+    this.paths.load(tracks);
+    this.paths.prepare(this.player.timeline);
+    this.paths.choose(this.store.selected);
+    this.scale();
+    this.stage.invalidate();
+  }
+
+  /** Mark the chosen contour, and where it has no path. */
+  mark() {
+    const { selected, nopaths } = this.store;
+    this.paths.choose(selected);
+    this.paths.markAt((selected && nopaths.get(selected)?.point) || null);
+    this.stage.invalidate();
+  }
+
+  /** @param {Moment | null} moment */
+  show(moment) {
+    const { scene } = this.store;
+    if (!scene || !this.ready) return;
+    const q = moment?.q ?? scene.sample.q;
+    const tip = this.machine.pose(scene.robot, q);
+    const cutting = moment?.span.kind === "cut" || moment?.span.kind === "pierce";
+    this.paths.shine(cutting ? tip : null);
+    this.paths.cutUntil(moment?.t ?? 0);
+    const at = new Vector3(tip[3], tip[7], tip[11]);
+    if (this.follow && moment) {
+      if (this.carried) this.stage.carry(at.clone().sub(this.carried));
+      this.carried = at;
+    }
+    this.stage.invalidate();
+  }
+
+  /**
+   * Show the robot elsewhere as a ghost; null takes it away.
+   * @param {ArrayLike<number> | null} q
+   * @param {boolean} [admitted]
+   */
+  haunt(q, admitted = true) {
+    const { scene } = this.store;
+    this.machine.ghost.visible = q !== null;
+    if (q && scene) {
+      this.machine.pose(scene.robot, q, true);
+      this.machine.haunt(admitted);
+    }
+    this.stage.invalidate();
+  }
+
+  /** @param {string} view */
+  look(view) {
+    const { scene } = this.store;
+    if (!scene) return;
+    const box = new Box3();
+    const shapes = scene.contours;
+    for (const { points } of shapes)
+      for (let i = 0; i < points.length; i += 3)
+        box.expandByPoint(new Vector3(points[i], points[i + 1], points[i + 2]));
+    const marked = this.store.nopaths.get(this.store.selected ?? "")?.point;
+    if (view === "head" || (view === "mark" && marked)) {
+      const { moment } = this.player;
+      const tip = this.machine.pose(scene.robot, moment?.q ?? scene.sample.q);
+      const at = new Vector3(tip[3], tip[7], tip[11]);
+      if (view === "head") this.carried = at.clone();
+      else at.fromArray(marked ?? []);
+      this.stage.look("part", new Box3().setFromCenterAndSize(at, new Vector3(0.35, 0.35, 0.35)));
+      return;
+    }
+    if (view !== "part") {
+      this.machine.group.updateMatrixWorld(true);
+      box.union(new Box3().setFromObject(this.machine.group));
+    }
+    if (!box.isEmpty()) this.stage.look(view, box);
+  }
+
+  /**
+   * Return the contour and node under a place of the canvas, or null.
+   * @param {number} x  px
+   * @param {number} y  px
+   */
+  pointed(x, y) {
+    const point = new Vector3();
+    let [best, found] = [REACH, /** @type {{contour: string, node: number} | null} */ (null)];
+    for (const { contour, points } of this.paths.tracks)
+      for (let k = 0; k < points.length / 3; k++) {
+        const seen = this.stage.project(point.fromArray(points, 3 * k));
+        const away = Math.hypot(seen.x - x, seen.y - y);
+        if (away < best && seen.z < 1) [best, found] = [away, { contour, node: k }];
+      }
+    return found;
+  }
+
+  /**
+   * Name the contour under the pointer.
+   * @param {number} x
+   * @param {number} y
+   */
+  point(x, y) {
+    const found = this.pointed(x, y);
+    this.canvas.style.cursor = found ? "pointer" : "";
+    this.label.hidden = !found;
+    if (!found) return;
+    const plan = this.store.plans.get(found.contour)?.[0];
+    const node = Math.min(found.node, (plan?.time.length ?? 1) - 1);
+    const speed = plan && plan.speed[Math.min(node, plan.speed.length - 1)] * 60;
+    this.label.replaceChildren(
+      el("strong", {}, found.contour),
+      ...(plan && speed !== undefined
+        ? [
+            ` ${fixed(plan.s[node] * 1e3)} mm, ${fixed(speed, 2)} m/min, joint load ${percent(plan.joint_load[node])}`,
+          ]
+        : []),
+    );
+    const right = Math.min(x + 14, this.canvas.clientWidth - this.label.offsetWidth - 8);
+    this.label.style.transform = `translate(${right}px, ${Math.max(4, y - 40)}px)`;
+  }
+
+  /** Say what the colours of the contours mean. */
+  scale() {
+    const { by, range } = this.paths;
+    const key = (/** @type {string} */ colour, /** @type {string} */ text) => {
+      const chip = el("i", { class: "key" });
+      chip.style.background = `var(${colour})`;
+      return el("span", { class: "chip" }, chip, text);
+    };
+    const kinds = new Set(this.paths.tracks.flatMap(({ plan, kind }) => (plan ? kind : [])));
+    const shown = [key("--kerf", "cut so far")];
+    if (by === "kind") {
+      if ([...kinds].some((kind) => kind.startsWith("lead"))) shown.unshift(key("--lead", "lead"));
+      if ([...kinds].some((kind) => kind !== "cut" && !kind.startsWith("lead")))
+        shown.unshift(key("--other", "other"));
+      shown.unshift(key("--cut", "cut"));
+    } else {
+      const strip = el("i", { class: "ramp" });
+      strip.style.background = SCALE_GRADIENT;
+      const [low, high] =
+        by === "load" ? ["0", "100 % of limit"] : range.map((each) => fixed(each * 60, 1));
+      if (Number.isFinite(range[0]))
+        shown.unshift(
+          el("span", { class: "chip" }, low, strip, by === "load" ? high : `${high} m/min`),
+        );
+    }
+    byId("scale").replaceChildren(...shown);
+  }
+
+  /** Say what is going on while there is nothing to see. */
+  state() {
+    const { job, scene, connection, progress } = this.store;
+    byId("view").classList.toggle("ready", this.ready);
+    if (this.ready && !this.trouble) return this.said.replaceChildren();
+    if (this.trouble)
+      return this.said.replaceChildren(
+        el("strong", {}, "The cell cannot be drawn"),
+        el("p", {}, `${this.trouble}. Reload the page to try again; planning goes on meanwhile.`),
+      );
+    if (job?.faults.length && !scene)
+      return this.said.replaceChildren(
+        el("strong", {}, "The job has a fault"),
+        el("p", {}, job.faults[0].message),
+        el("p", {}, "Correct it under Job file, at the top of the page."),
+      );
+    this.said.replaceChildren(
+      el("div", { class: "spinner" }),
+      el(
+        "strong",
+        {},
+        connection === "open" ? "Reading the cell" : "Waiting for the studio's server",
+      ),
+      el("p", {}, progress.label || "Robot, head and part appear here as soon as they are read."),
+    );
+  }
+
+  /** Say which shapes are only roughly so. */
+  note() {
+    const rough = new Set(
+      this.store.scene?.bodies.filter((body) => body.approximate).map(({ kind }) => kind),
+    );
+    byId("scene-note").textContent = rough.size
+      ? `approximate shapes: ${[...rough].join(", ")}`
+      : "";
+  }
+
+  /** Take the colours of the theme. */
+  paint() {
+    this.machine.paint();
+    this.paths.paint();
+    this.lay();
+    this.scale();
+    this.stage.invalidate();
+  }
+}
+
+export { matrix };

@@ -1,0 +1,179 @@
+/** What the page knows: the newest messages, what is chosen, and who wants to hear of changes. */
+
+/** @typedef {import("./messages.js").ServerMessage} ServerMessage */
+/** @typedef {import("./messages.js").PlanMessage} PlanMessage */
+/** @typedef {import("./messages.js").NoPathMessage} NoPathMessage */
+/** @typedef {import("./messages.js").MapMessage} MapMessage */
+
+/**
+ * @typedef {"connection" | "job" | "scene" | "plan" | "program" | "outcome" | "progress" | "map"
+ *   | "pose" | "fastest" | "program_text" | "error" | "selected"} Topic
+ */
+
+/** The state of the page. One message changes it, then those who listen to its topic are called. */
+export class Store {
+  constructor() {
+    /** @type {import("./connection.js").Status} */
+    this.connection = "connecting";
+    /** @type {number | null} ms, when the next try is */
+    this.retryAt = null;
+    /** @type {import("./messages.js").JobMessage | null} */
+    this.job = null;
+    /** @type {import("./messages.js").SceneMessage | null} */
+    this.scene = null;
+    /** @type {import("./messages.js").ProgramMessage | null} */
+    this.program = null;
+    /** @type {import("./messages.js").OutcomeMessage | null} */
+    this.outcome = null;
+    /** @type {import("./messages.js").ProgressMessage} */
+    this.progress = { type: "progress", busy: false, label: "", done: 0, total: 0 };
+    /** @type {import("./messages.js").FastestMessage | null} */
+    this.fastest = null;
+    /** @type {import("./messages.js").PoseMessage | null} */
+    this.pose = null;
+    /** @type {import("./messages.js").ProgramTextMessage | null} */
+    this.programText = null;
+    /** @type {import("./messages.js").ErrorMessage | null} */
+    this.error = null;
+    /** @type {Map<string, PlanMessage[]>} by contour, its pieces in order */
+    this.plans = new Map();
+    /** @type {Map<string, PlanMessage[]>} by contour, what held before its last change */
+    this.before = new Map();
+    /** @type {Map<string, NoPathMessage>} */
+    this.nopaths = new Map();
+    /** @type {Map<string, MapMessage>} */
+    this.maps = new Map();
+    /** @type {string | null} the chosen contour */
+    this.selected = null;
+    /** @type {Map<string, Set<(about: any) => void>>} */
+    this.listeners = new Map();
+  }
+
+  /**
+   * Call `listener` after each change of a topic.
+   * @param {Topic[]} topics
+   * @param {(about: any) => void} listener
+   */
+  on(topics, listener) {
+    for (const topic of topics) {
+      const known = this.listeners.get(topic) ?? new Set();
+      this.listeners.set(topic, known.add(listener));
+    }
+  }
+
+  /**
+   * @param {Topic} topic
+   * @param {unknown} [about]
+   */
+  emit(topic, about) {
+    for (const listener of this.listeners.get(topic) ?? []) listener(about);
+  }
+
+  /**
+   * @param {import("./connection.js").Status} status
+   * @param {number | null} retryAt
+   */
+  connected(status, retryAt) {
+    this.connection = status;
+    this.retryAt = retryAt;
+    this.emit("connection");
+  }
+
+  /** @param {string | null} contour */
+  select(contour) {
+    if (contour === this.selected) return;
+    this.selected = contour;
+    this.emit("selected");
+  }
+
+  /** The names of all contours, in the order of the job. */
+  contours() {
+    return (this.scene?.contours ?? this.job?.contours ?? []).map((each) => each.name);
+  }
+
+  /**
+   * Whether what was computed of a revision is out of date.
+   * @param {{revision: number}} message
+   */
+  stale(message) {
+    return message.revision < (this.job?.revision ?? 0);
+  }
+
+  /** @param {ServerMessage} message */
+  take(message) {
+    switch (message.type) {
+      case "job":
+        this.job = message;
+        break;
+      case "scene":
+        this.scene = message;
+        this.dropMissing();
+        break;
+      case "plan":
+        this.takePlan(message);
+        break;
+      case "nopath":
+        this.takeNoPath(message);
+        return;
+      case "map":
+        this.maps.set(message.contour, message);
+        break;
+      case "program":
+        this.program = message;
+        break;
+      case "outcome":
+        this.outcome = message;
+        break;
+      case "progress":
+        this.progress = message;
+        break;
+      case "pose":
+        this.pose = message;
+        break;
+      case "fastest":
+        this.fastest = message;
+        break;
+      case "program_text":
+        this.programText = message;
+        break;
+      case "error":
+        this.error = message;
+        break;
+    }
+    this.emit(message.type, message);
+  }
+
+  /** @param {PlanMessage} plan */
+  takePlan(plan) {
+    const held = this.plans.get(plan.contour) ?? [];
+    if (held.length && held[0].revision < plan.revision) {
+      this.before.set(plan.contour, held);
+      this.plans.set(plan.contour, [plan]);
+    } else {
+      const others = held.filter((each) => each.name !== plan.name);
+      this.plans.set(
+        plan.contour,
+        [...others, plan].sort((a, b) => a.s[0] - b.s[0]),
+      );
+    }
+    this.nopaths.delete(plan.contour);
+  }
+
+  /** @param {NoPathMessage} answer */
+  takeNoPath(answer) {
+    const held = this.plans.get(answer.contour);
+    if (held) this.before.set(answer.contour, held);
+    this.plans.delete(answer.contour);
+    this.nopaths.set(answer.contour, answer);
+    this.emit("plan", answer);
+  }
+
+  /** Forget what belongs to contours that the job no longer has, and choose one that it has. */
+  dropMissing() {
+    const names = new Set(this.contours());
+    for (const known of [this.plans, this.before, this.nopaths, this.maps])
+      for (const name of [...known.keys()]) if (!names.has(name)) known.delete(name);
+    if (this.selected === null || !names.has(this.selected))
+      this.select(this.contours()[0] ?? null);
+  }
+}
