@@ -47,6 +47,9 @@ class LayeredGraph:
         What became of each candidate: an index into `reasons`; all gamma of a variant in a row.
     reasons : tuple of Reason
         What the codes mean; code 0 is admitted.
+    kept : object
+        The margins that all its vertices are known to keep, by whoever thinned it for them; None:
+        nothing is known.
     """
 
     q: Array
@@ -60,6 +63,7 @@ class LayeredGraph:
     turn: NDArray[np.int8]
     reason: NDArray[np.uint8]
     reasons: tuple[Reason, ...]
+    kept: object = None
 
     def __repr__(self) -> str:
         return (
@@ -144,6 +148,7 @@ class LayeredGraph:
             turn=freeze(self.turn[vertices]),
             reason=freeze(reason),
             reasons=reasons,
+            kept=None,
         )
 
 

@@ -10,7 +10,7 @@ import typer
 from kerfpath.cli._main import JobArgument, Json, Out, Strict, app
 from kerfpath.errors import InputError
 
-__all__ = ["batch", "layout", "pareto"]
+__all__ = ["batch", "layout", "pareto", "studio"]
 
 Scheduler = Annotated[
     str | None,
@@ -219,3 +219,36 @@ def layout(
         )  # fmt: skip
     if not found:
         raise typer.Exit(1)
+
+
+@app.command()
+def studio(
+    job: Annotated[
+        Path | None,
+        typer.Argument(metavar="[JOB.toml]", help="The job file; default: a copy of the demo's."),
+    ] = None,
+    port: Annotated[
+        int, typer.Option(help="Port to listen at; 0: any that is free.", min=0, max=65535)
+    ] = 8087,
+    host: Annotated[
+        str,
+        typer.Option(
+            help="Address to listen at. At any but this machine's own, whoever opens it needs the "
+            "token in the address that is printed; what is sent can be read on the way."
+        ),
+    ] = "127.0.0.1",
+    browser: Annotated[
+        bool, typer.Option("--browser/--no-browser", help="Open the browser.")
+    ] = True,
+) -> None:
+    """See a job in the browser, change it, watch it cut, and export it.
+
+    The plan follows every change. Changes are kept in JOB.studio.toml beside the job until they are
+    saved to it; the same command finds them again. Without a job, the shipped one is copied to the
+    folder kerfpath-studio.
+
+    Example: kerfpath studio door.toml
+    """
+    from kerfpath.cli._studio import open_studio
+
+    open_studio(job, host=host, port=port, browser=browser)

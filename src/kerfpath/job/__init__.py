@@ -2,11 +2,14 @@
 
 from kerfpath.job.format import VARIABLES as VARIABLES
 from kerfpath.job.format import ContourSpec as ContourSpec
+from kerfpath.job.format import Candidate as Candidate
 from kerfpath.job.format import CutRequest as CutRequest
 from kerfpath.job.format import Goal as Goal
 from kerfpath.job.format import Job as Job
+from kerfpath.job.format import JobFile as JobFile
 from kerfpath.job.format import PreparedJob as PreparedJob
 from kerfpath.job.format import ProgramOptions as ProgramOptions
+from kerfpath.job.format import ProgramTable as ProgramTable
 from kerfpath.job.format import cell_of_job as cell_of_job
 from kerfpath.job.format import pose as pose
 from kerfpath.job.format import prepare as prepare
@@ -42,11 +45,16 @@ from kerfpath.job.programs import touch_up as touch_up
 from kerfpath.job.run import CutResult as CutResult
 from kerfpath.job.run import JobPreview as JobPreview
 from kerfpath.job.run import JobResult as JobResult
+from kerfpath.job.run import advised as advised
+from kerfpath.job.run import certified as certified
 from kerfpath.job.run import check_job as check_job
+from kerfpath.job.run import cut_candidate as cut_candidate
 from kerfpath.job.run import fastest_along as fastest_along
 from kerfpath.job.run import fastest_speeds as fastest_speeds
 from kerfpath.job.run import foresee as foresee
 from kerfpath.job.run import is_compiled as is_compiled
+from kerfpath.job.run import measured as measured
+from kerfpath.job.run import order_cuts as order_cuts
 from kerfpath.job.run import require_foreseen as require_foreseen
 from kerfpath.job.run import run_job as run_job
 from kerfpath.job.run import run_prepared as run_prepared

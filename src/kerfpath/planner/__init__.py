@@ -2,6 +2,7 @@
 
 from kerfpath.planner._best import best_motion as best_motion
 from kerfpath.planner._certified import with_bound as with_bound
+from kerfpath.planner._draft import draft as draft
 from kerfpath.planner._fastest import FastestSpeed as FastestSpeed
 from kerfpath.planner._fastest import fastest_speed as fastest_speed
 from kerfpath.planner._fastest import relaxations as relaxations

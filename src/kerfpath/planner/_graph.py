@@ -80,9 +80,12 @@ def within_margins(
 
     So are those of both ends that the tool cannot back off from, where it can from others. With a
     `periodic` closure the first layer and the last are the same but for rounding, and are thinned
-    alike.
+    alike. A graph that has been thinned for the same is returned as it is.
     """
     comfort, retract = options.comfort, options.retract
+    asked = (robot.id, None if comfort is None else comfort.hard, retract, options.floor, periodic)
+    if graph.kept == asked:
+        return graph
     near = {} if comfort is None else comfort.too_near(robot, graph.q, tool)
     if options.floor is not None:
         near[Reason(Loss.FLOOR)] = lowest_joint(robot, graph.q) < options.floor
@@ -99,7 +102,7 @@ def within_margins(
         if periodic and len(here[first]) == len(here[last]):
             here[first] |= here[last]
             here[last] = here[first]
-    return graph.without(near) if near else graph
+    return replace(graph.without(near) if near else graph, kept=asked)
 
 
 def samples_of(graph: LayeredGraph) -> GammaSamples:

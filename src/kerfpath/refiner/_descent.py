@@ -111,6 +111,8 @@ class Descent:
         What each node costs, taken as fixed; what it comes to once gamma has moved is found after.
     cap : float
         Largest distance that is allowed.
+    most : int
+        Programs after which a descent ends.
     """
 
     curves: JointCurves
@@ -126,6 +128,7 @@ class Descent:
     gamma_high: Array | float = np.inf
     node_cost: Array | None = None
     cap: float = np.inf
+    most: int = MOST_PROGRAMS
 
     __repr__ = short_repr
 
@@ -204,7 +207,7 @@ class Descent:
     ) -> tuple[MotionState, int]:
         """Go down in steps of at most a radius, which grows and shrinks as the model proves."""
         radius, programs, failed = self.first or self.radius, 0, np.inf
-        while radius > SMALLEST_RADIUS and programs < MOST_PROGRAMS:
+        while radius > SMALLEST_RADIUS and programs < self.most:
             step = self._step(at, radius, target)
             programs += step.programs
             gained = 0.0 if step.to is None else at.value(target) - step.to.value(target)

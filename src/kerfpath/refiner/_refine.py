@@ -85,6 +85,7 @@ def refine(
     first: float | None = None,
     within: tuple[Array, Array] | None = None,
     least: float = 0.0,
+    most: int | None = None,
 ) -> Refinement:
     """Return the plan with gamma moved off its grid: better, or within limits the grid cannot meet.
 
@@ -109,6 +110,9 @@ def refine(
     least : float
         What motions such as this one are known to cost at least: one that comes to hardly more is
         not refined any further.
+    most : int, optional
+        Convex programs after which a descent ends: soon, and not yet where it leads to. Default:
+        when it has converged.
 
     Raises
     ------
@@ -135,6 +139,7 @@ def refine(
     low, high = within or (-np.inf, np.inf)
     low, high = np.maximum(low, descent.gamma_low), np.minimum(high, descent.gamma_high)
     descent = replace(descent, first=first, gamma_low=low, gamma_high=high)
+    descent = descent if most is None else replace(descent, most=most)
     begun, before = descent.admitted(start)
     if not begun.admitted:
         return _unrefined(plan, _closest(descent, begun))

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Annotated, Literal
 
-from pydantic import BaseModel, ConfigDict, Field, TypeAdapter
+from pydantic import BaseModel, ConfigDict, Field, JsonValue, TypeAdapter
 
 __all__ = [
     "Ask",
@@ -38,16 +38,13 @@ Index = Annotated[int, Field(ge=0, lt=1_000_000)]
 Path = Annotated[
     tuple[Words | Index, ...], Field(min_length=1, max_length=MOST_KEYS, strict=False)
 ]
-Scalar = Annotated[str, Field(max_length=10_000)] | bool | int | float
-Value = Scalar | Annotated[list["Value"], Field(max_length=1000)] | dict[Words, "Value"]
-
 
 class Edit(_Strict):
     """Set one key of the job; null removes it."""
 
     type: Literal["edit"]
     path: Path
-    value: Value | None
+    value: JsonValue
     gesture: Words | None = None
 
 

@@ -34,7 +34,6 @@ def plan_message(
     pieces: int,
     settled: bool,
     audited: bool,
-    previous: float | None,
     seconds: float,
 ) -> PlanMessage:
     """Return the motion of a cut.
@@ -54,8 +53,6 @@ def plan_message(
         Whether nothing more is to be proved of it.
     audited : bool
         Whether the checks of the cut are all of them.
-    previous : float or None
-        What the contour cost before.
     seconds : float
         That it took to find.
     """
@@ -84,7 +81,7 @@ def plan_message(
         statement=proof.statement,
         method=made.settings.method,
         weights=flat(np.asarray(made.settings.weights)),
-        previous_cost=previous,
+        previous_cost=None,
         criteria=_criteria(made),
         velocity_share=flat(velocity, 6),
         acceleration_share=flat(acceleration, 6),

@@ -80,6 +80,8 @@ class Job:
         For the robot program.
     source : mapping
         The whole file as read: tables, keys and values that JSON can hold.
+    text : str
+        The same as it was written, with its comments.
     """
 
     path: Path
@@ -95,6 +97,7 @@ class Job:
     tolerances: Tolerances
     program: ProgramOptions
     source: Mapping[str, Any]
+    text: str = ""
 
     __repr__ = short_repr
 
@@ -182,8 +185,10 @@ class Job:
             raise refusal_at(self.path, ("plan", "closure"), said)
 
 
-def read_job(path: str | Path) -> Job:
+def read_job(path: str | Path, *, copy_of: Path | None = None) -> Job:
     """Return the job of a TOML file.
+
+    Of a copy that lies beside the job itself, `copy_of` gives the program its name.
 
     Raises
     ------
@@ -230,8 +235,9 @@ def read_job(path: str | Path) -> Job:
         sequence=file.sequence,
         layout=file.layout,
         tolerances=tolerances_of(file.audit),
-        program=program_options(file.program, path.stem),
+        program=program_options(file.program, (copy_of or path).stem),
         source=source,
+        text=text,
     )
 
 

@@ -68,7 +68,7 @@ def report_text(outcome: JobResult, notes: Sequence[str], faults: Sequence[str] 
         facts=facts,
         faults=faults,
         notes=notes,
-        job_text=job.path.read_text(encoding="utf-8-sig"),
+        job_text=job.text,
     )
 
 

@@ -8,7 +8,6 @@ from typing import TypeVar
 
 import numpy as np
 
-from kerfpath.cell import Cell
 from kerfpath.contour import Contour
 from kerfpath.errors import NoFeasiblePath
 from kerfpath.front import Subproblem, plan_run
@@ -21,9 +20,15 @@ from kerfpath.plans import Plan
 from kerfpath.progress import Progress
 from kerfpath.refiner import refine
 
-__all__ = ["cut_candidate", "cut_in_posture"]
+__all__ = ["GraphOf", "advised", "cut_candidate", "cut_in_posture"]
 
 _T = TypeVar("_T")
+GraphOf = Callable[[Job, Contour, Callable[[int], None]], LayeredGraph]
+"""Returns the graph of a job's nodes, and calls with the number of nodes solved."""
+
+
+def _build(job: Job, nodes: Contour, solved: Callable[[int], None]) -> LayeredGraph:
+    return job.graph(nodes, progress=solved)
 
 
 def cut_candidate(
@@ -31,10 +36,14 @@ def cut_candidate(
     request: CutRequest,
     candidate: Candidate,
     progress: Progress,
+    *,
+    graph_of: GraphOf = _build,
 ) -> tuple[CutResult, ...]:
     """Return what came of a candidate: one cut, or several where it is interrupted.
 
-    Nothing is certified yet: of all candidates one is chosen first.
+    Nothing is certified yet: of all candidates one is chosen first. Nor is it known yet what would
+    open the way of one without a plan, see `advised`. A graph that is kept may be had by
+    `graph_of`.
     """
     options = replace(request.options, certify=None)
     job, cell = replace(prepared.job, options=options), prepared.cell
@@ -49,7 +58,7 @@ def cut_candidate(
         progress(f"{name}: {what}", 0, 0)
 
     progress(name, 0, total)
-    graph = job.graph(candidate.nodes, progress=solved)
+    graph = graph_of(job, candidate.nodes, solved)
     clearance = None
     if cell is not None and job.cell is not None and job.cell.map:
         begin("map of the cell")
@@ -79,8 +88,7 @@ def cut_candidate(
                 raise
             plans = planned(plan_in_pieces)
     except NoFeasiblePath as broken:
-        without = replace(whole, broken=broken)
-        return (_with_remedy(without, job, kept, graph, begin),)
+        return (replace(whole, broken=broken),)
     begin("audit")
     return tuple(_audited(prepared, whole, made) for made in plans)
 
@@ -104,24 +112,25 @@ def cut_in_posture(prepared: PreparedJob, request: CutRequest, posture: int) -> 
     return cut if cut.passed else None
 
 
-def _with_remedy(
-    without: CutResult, job: Job, cell: Cell | None, graph: LayeredGraph,
-    begin: Callable[[str], None],
-) -> CutResult:  # fmt: skip
-    """Return a cut without a plan, and where that is known the speed and the limits that would do.
+def advised(prepared: PreparedJob, cut: CutResult, progress: Progress) -> CutResult:
+    """Return a cut with what would open its way, where it has no plan and that is known.
 
-    With poses everywhere slower would do; for a loop that cannot close, or an axis that may not
-    turn as far, it need not, and a reduced feed has tried.
+    That is the speed and the limits that would do. With poses everywhere slower would do; for a
+    loop that cannot close, or an axis that may not turn as far, it need not, and a reduced feed has
+    tried.
     """
-    options = job.options
+    options, graph = replace(cut.request.options, certify=None), cut.graph
+    job, cell, run = replace(prepared.job, options=options), prepared.cell, cut.request.run
+    if run is not None:
+        graph, cell = run.graph(graph, job.robot.endless), run.cell(cell)
     plain = options.closure == "free" and options.rotation is None
-    constant = options.feed == "constant" and without.candidate.nodes.time is None
-    if not (np.diff(graph.start).all() and plain and constant):
-        return without
-    begin("what would open the way")
-    needed = None if without.broken is None else without.broken.relaxation
-    found = find_remedy(job, without.request, without.candidate, graph, cell, needed)
-    return without if found is None else replace(without, advice=found[0], fastest=found[1])
+    constant = options.feed == "constant" and cut.candidate.nodes.time is None
+    if cut.broken is None or not (np.diff(graph.start).all() and plain and constant):
+        return cut
+    progress(f"{cut.request.task.name}: what would open the way", 0, 0)
+    needed = cut.broken.relaxation
+    found = find_remedy(job, cut.request, cut.candidate, graph, cell, needed)
+    return cut if found is None else replace(cut, advice=found[0], fastest=found[1])
 
 
 def _audited(prepared: PreparedJob, whole: CutResult, made: Plan) -> CutResult:

@@ -15,7 +15,7 @@ from kerfpath.job.run._contour import cut_in_posture
 from kerfpath.job.run._result import CutResult, JobResult
 from kerfpath.plans import Plan
 from kerfpath.progress import Progress
-from kerfpath.sequence import order_candidates
+from kerfpath.sequence import longest_search, order_candidates
 
 __all__ = ["order_cuts"]
 
@@ -44,6 +44,8 @@ def order_cuts(
         return replace(result, cuts=tuple(cut for cuts in first for cut in cuts))
     units, owner, before = _units(passed, prepared.inner_first)
 
+    longest = longest_search(job.sequence.seconds)
+    progress(f"order and moves, {longest:g} s at most without a way", 0, 0)
     requests = [prepared.contours[i] for i in owner]
     # A plan that was picked is settled, and a piece follows another in its posture.
     others = [

@@ -136,6 +136,13 @@ class JobResult:
         moves = self.stuck is None and all(check.ok for check in self.air)
         return moves and all(cut.passed for cut in self.cuts)
 
+    def with_cuts(self, cuts: tuple[CutResult, ...]) -> JobResult:
+        """Return the same with other results of its cuts, in the same order."""
+        if self.part is None:
+            return replace(self, cuts=cuts)
+        plans = tuple(cut.plan for cut in cuts if cut.plan is not None)
+        return replace(self, cuts=cuts, part=replace(self.part, plans=plans))
+
     @property
     def plans(self) -> tuple[Plan, ...]:
         """The plans there are, in the order of cutting."""

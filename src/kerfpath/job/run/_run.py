@@ -7,15 +7,14 @@ from dataclasses import replace
 from kerfpath.auditor import bound_checks
 from kerfpath.cad import Part
 from kerfpath.job.format import Job, PreparedJob, prepare
-from kerfpath.job.run._contour import cut_candidate
+from kerfpath.job.run._contour import advised, cut_candidate
 from kerfpath.job.run._foresee import require_foreseen
 from kerfpath.job.run._order import order_cuts
 from kerfpath.job.run._result import CutResult, JobResult
 from kerfpath.planner import with_bound
 from kerfpath.progress import Progress, no_progress
-from kerfpath.sequence import longest_search
 
-__all__ = ["run_job", "run_prepared"]
+__all__ = ["certified", "measured", "run_job", "run_prepared"]
 
 
 def run_job(job: Job, part: Part | None = None, *, progress: Progress = no_progress) -> JobResult:
@@ -41,35 +40,39 @@ def run_prepared(prepared: PreparedJob, *, progress: Progress = no_progress) -> 
     Its contours are all that is asked for: a touch-up has other paths in them, a plan picked from
     a Pareto set other options.
     """
-    job, part = prepared.job, prepared.part
     tried = [
-        [cut_candidate(prepared, contour, candidate, progress) for candidate in contour.candidates]
+        [
+            tuple(
+                advised(prepared, cut, progress)
+                for cut in cut_candidate(prepared, contour, candidate, progress)
+            )
+            for candidate in contour.candidates
+        ]
         for contour in prepared.contours
     ]
-    if job.sequence is not None:
-        longest = longest_search(job.sequence.seconds)
-        progress(f"order and moves, {longest:g} s at most without a way", 0, 0)
-    result = _certified(order_cuts(prepared, tried, progress), progress)
+    result = order_cuts(prepared, tried, progress)
+    cuts = tuple(certified(cut, progress) for cut in result.cuts)
+    return measured(prepared, result.with_cuts(cuts))
+
+
+def measured(prepared: PreparedJob, result: JobResult) -> JobResult:
+    """Return a result that says how far its nodes leave the CAD curves."""
+    part = prepared.part
     moved = {
         contour.task.name: part.departure(contour.task.pick, contour.loop)
         for contour in prepared.contours
         if contour.leaves_the_loop
     }
-    measured = tuple(cut.measured(part, moved.get(cut.contour)) for cut in result.cuts)
-    return replace(result, cuts=measured)
+    return replace(
+        result, cuts=tuple(cut.measured(part, moved.get(cut.contour)) for cut in result.cuts)
+    )
 
 
-def _certified(result: JobResult, progress: Progress) -> JobResult:
-    """Return the result with the bounds of its plans, as far as they are asked for."""
-    cuts = tuple(_with_bound(cut, progress) for cut in result.cuts)
-    if result.part is None:
-        return replace(result, cuts=cuts)
-    plans = tuple(cut.plan for cut in cuts if cut.plan is not None)
-    return replace(result, cuts=cuts, part=replace(result.part, plans=plans))
+def certified(cut: CutResult, progress: Progress) -> CutResult:
+    """Return a cut with the bound of its plan, as far as one is asked for.
 
-
-def _with_bound(cut: CutResult, progress: Progress) -> CutResult:
-    """Return the cut with the bound of its plan, audited where plan.json is to carry its proof."""
+    It is audited where plan.json is to carry what proves it.
+    """
     asked = cut.request.options.certify
     if cut.plan is None or asked is None:
         return cut

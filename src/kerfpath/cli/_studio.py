@@ -1,0 +1,65 @@
+"""`kerfpath studio`: a job in the browser."""
+
+from __future__ import annotations
+
+from importlib.resources import as_file, files
+from importlib.util import find_spec
+from pathlib import Path
+
+from rich.markup import escape
+
+from kerfpath._writing import write_whole
+from kerfpath.cli._show import out
+from kerfpath.errors import InputError
+
+__all__ = ["open_studio"]
+
+NEEDED = ("starlette", "uvicorn", "websockets")
+SHIPPED = ("b_pillar.toml", "b_pillar.step")
+"""The demo job and its part, which are copied so that they can be changed."""
+DRAWINGS = (".step", ".stp", ".iges", ".igs", ".dxf", ".csv")
+
+
+def open_studio(job: Path | None, *, host: str, port: int, browser: bool) -> None:
+    """Serve a job to the browser until the command is stopped; without one, a copy of the demo's.
+
+    Raises
+    ------
+    InputError
+        What the studio needs is not installed; no job; a port in use.
+    """
+    missing = [name for name in NEEDED if find_spec(name) is None]
+    if missing:
+        raise InputError(
+            f"studio: needs {', '.join(missing)}, which are not installed; "
+            "run pip install 'kerfpath[studio]'"
+        )
+    if job is not None and job.suffix.lower() in DRAWINGS:
+        raise InputError(
+            f"{job}: expected a job, got a drawing; write a job for it, as the one that kerfpath "
+            "studio copies where it is given none, with its name as file in [part]"
+        )
+    path = _copy_of_demo() if job is None else job
+    from kerfpath.studio import serve
+
+    def show(address: str) -> None:
+        out.print(f"{escape(str(path))} at [bold]{escape(address)}[/] (stop with Ctrl-C)")
+
+    serve(path, host=host, port=port, browser=browser, show=show)
+
+
+def _copy_of_demo() -> Path:
+    """Return the demo job in a folder of its own in this one, copied there unless it is."""
+    folder = Path("kerfpath-studio")
+    absent = [name for name in SHIPPED if not (folder / name).exists()]
+    with as_file(files("kerfpath").joinpath("demo")) as source:
+        texts = {folder / name: (source / name).read_bytes() for name in absent}
+    try:
+        folder.mkdir(exist_ok=True)
+        write_whole(texts)
+    except OSError as error:
+        raise InputError(
+            f"{folder}: the demo job cannot be copied there ({error.strerror}); run kerfpath "
+            "studio in a folder that can be written to, or give a job"
+        ) from None
+    return folder / SHIPPED[0]

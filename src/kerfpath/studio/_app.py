@@ -1,0 +1,187 @@
+"""The web application: one WebSocket, the page's own files, meshes, and files to take along."""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import AsyncIterator, Iterable
+from contextlib import asynccontextmanager, suppress
+from pathlib import Path
+from urllib.parse import quote
+
+from pydantic import ValidationError
+from starlette.applications import Starlette
+from starlette.middleware import Middleware
+from starlette.requests import Request
+from starlette.responses import FileResponse, PlainTextResponse, Response
+from starlette.routing import Route, WebSocketRoute
+from starlette.websockets import WebSocket, WebSocketDisconnect
+
+from kerfpath.errors import KerfpathError
+from kerfpath.studio._asks import parse
+from kerfpath.studio._exports import File, zipped
+from kerfpath.studio._guard import Guard
+from kerfpath.studio._hub import Page
+from kerfpath.studio._messages import ErrorMessage
+from kerfpath.studio._session import Session
+
+__all__ = ["LONGEST", "application"]
+
+CLIENT = Path(__file__).parent / "client"
+KINDS = {
+    ".html": "text/html; charset=utf-8",
+    ".js": "text/javascript; charset=utf-8",
+    ".css": "text/css; charset=utf-8",
+    ".svg": "image/svg+xml",
+    ".woff2": "font/woff2",
+    ".txt": "text/plain; charset=utf-8",
+}
+"""The kinds of files of the page that are served, by their suffixes."""
+LONGEST = 12_000_000
+"""Bytes of a message: a job of the largest size, quoted."""
+REPORT_POLICY = (
+    "sandbox allow-scripts allow-downloads; default-src 'none'; script-src 'unsafe-inline'; "
+    "style-src 'unsafe-inline'; img-src data: blob:; font-src data:"
+)
+"""A report has its scripts in it: it is shown as a page from nowhere, which reaches nothing."""
+
+
+def application(path: Path, *, hosts: Iterable[str], token: str | None = None) -> Starlette:
+    """Return the application that serves one job.
+
+    Parameters
+    ----------
+    path : Path
+        The job.
+    hosts : iterable of str
+        Names, with ports, by which it may be asked for.
+    token : str, optional
+        That whoever asks must bring.
+
+    Raises
+    ------
+    InputError
+        The job cannot be read.
+    """
+    session = Session(path)
+
+    @asynccontextmanager
+    async def at_work(app: Starlette) -> AsyncIterator[None]:
+        work = asyncio.create_task(session.work())
+        try:
+            yield
+        finally:
+            work.cancel()
+            with suppress(asyncio.CancelledError):
+                await work
+
+    app = Starlette(
+        routes=[
+            Route("/", _index),
+            Route("/client/{name:path}", _client),
+            Route("/mesh/{name}", _mesh),
+            Route("/export/{name}", _export),
+            Route("/report", _report),
+            WebSocketRoute("/ws", _socket),
+        ],
+        middleware=[Middleware(Guard, hosts=tuple(hosts), token=token)],
+        lifespan=at_work,
+    )
+    app.state.session = session
+    return app
+
+
+async def _index(request: Request) -> Response:
+    return _own_file("index.html")
+
+
+async def _client(request: Request) -> Response:
+    return _own_file(request.path_params["name"])
+
+
+def _own_file(name: str) -> Response:
+    """Return a file of the page, and no other file of this machine."""
+    place = (CLIENT / name).resolve()
+    kind = KINDS.get(place.suffix)
+    if kind is None or not place.is_relative_to(CLIENT.resolve()) or not place.is_file():
+        return PlainTextResponse("there is no such file\n", status_code=404)
+    return FileResponse(place, media_type=kind, headers={"cache-control": "no-cache"})
+
+
+async def _mesh(request: Request) -> Response:
+    session: Session = request.app.state.session
+    data = session.meshes.get(request.path_params["name"])
+    if data is None:
+        return PlainTextResponse("there is no such mesh\n", status_code=404)
+    kept = {"cache-control": "private, max-age=31536000, immutable"}
+    return Response(data, media_type="application/octet-stream", headers=kept)
+
+
+async def _export(request: Request) -> Response:
+    session: Session = request.app.state.session
+    name, language = request.path_params["name"], request.query_params.get("language")
+    if name == "job":
+        document = session.document
+        return _download(File(document.path.name, "text/plain", document.text.encode()))
+    if name not in ("program", "plan.json", "trajectory.csv"):
+        return PlainTextResponse("there is nothing of this name\n", status_code=404)
+    try:
+        result, texts = await session.texts(language if name == "program" else None)
+        if name == "program":
+            return _download(zipped(result.job.program.name, texts))
+    except KerfpathError as error:
+        return PlainTextResponse(f"{error}\n", status_code=409)
+    kind = "application/json" if name == "plan.json" else "text/csv"
+    return _download(File(name, kind, texts.files[name].encode()))
+
+
+async def _report(request: Request) -> Response:
+    session: Session = request.app.state.session
+    try:
+        _, texts = await session.texts(None)
+    except KerfpathError as error:
+        return PlainTextResponse(f"{error}\n", status_code=409)
+    own = {"content-security-policy": REPORT_POLICY, "cache-control": "no-store"}
+    return Response(texts.files["report.html"], media_type="text/html", headers=own)
+
+
+def _download(file: File) -> Response:
+    named = {
+        "content-disposition": f"attachment; filename*=UTF-8''{quote(file.name)}",
+        "cache-control": "no-store",
+    }
+    return Response(file.content, media_type=file.kind, headers=named)
+
+
+async def _socket(socket: WebSocket) -> None:
+    session: Session = socket.app.state.session
+    await socket.accept()
+    page = session.hub.open()
+    sending = asyncio.create_task(_send(socket, page))
+    try:
+        while True:
+            text = await socket.receive_text()
+            try:
+                ask = parse(text)
+            except ValidationError as error:
+                page.say(ErrorMessage(message=_not_understood(error)))
+                continue
+            await session.hear(ask, page)
+    except (WebSocketDisconnect, KeyError):  # KeyError: bytes in place of a text
+        pass
+    finally:
+        session.hub.close(page)
+        sending.cancel()
+        with suppress(asyncio.CancelledError, WebSocketDisconnect, RuntimeError):
+            await sending
+
+
+async def _send(socket: WebSocket, page: Page) -> None:
+    while True:
+        await socket.send_text(await page.next())
+
+
+def _not_understood(error: ValidationError) -> str:
+    """Say in one line what was wrong with a message, nothing of it quoted."""
+    first = error.errors(include_url=False, include_input=False)[0]
+    where = ".".join(str(part) for part in first["loc"])
+    return f"a message was not understood: {where + ': ' if where else ''}{first['msg']}"[:300]

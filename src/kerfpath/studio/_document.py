@@ -1,0 +1,235 @@
+"""The job as text: edited key by key with its comments kept, undone, redone, saved."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from contextlib import suppress
+from pathlib import Path
+from typing import Any
+
+import tomlkit
+from tomlkit.exceptions import TOMLKitError
+
+from kerfpath._writing import write_whole
+from kerfpath.errors import InputError
+
+__all__ = ["Change", "Document", "Key", "with_values"]
+
+Key = tuple[str | int, ...]
+"""Where a value stands: names of tables and keys, and numbers of tables and elements."""
+Change = tuple[Key, object]
+"""A key and its new value; None removes it."""
+
+MOST_STEPS = 300
+"""Steps that can be undone."""
+DIGITS = 12
+"""Significant digits of a number that is written: sliders say 0.30000000000000004."""
+
+
+class Document:
+    """The text of a job, with the texts before and after it, beside the file that it is of.
+
+    Every change is kept in a file beside the job at once, and found again there.
+
+    Parameters
+    ----------
+    path : Path
+        The job.
+
+    Attributes
+    ----------
+    revision : int
+        Grows with each change.
+
+    Raises
+    ------
+    InputError
+        The job cannot be read.
+    """
+
+    def __init__(self, path: Path) -> None:
+        self.path = path
+        self.beside = path.with_name(f"{path.stem}.studio.toml")
+        self._on_disk = self.text = _read(path)
+        self._before: list[str] = []
+        self._after: list[str] = []
+        self._gesture: tuple[str, Key] | None = None
+        self.revision = 1
+        if self.beside.is_file() and (kept := _read(self.beside)) != self.text:
+            self._before, self.text = [self.text], kept
+
+    @property
+    def saved(self) -> bool:
+        """Whether the job file has this text."""
+        return self.text == self._on_disk
+
+    @property
+    def file(self) -> Path:
+        """The file that has this text: the job, or what is kept beside it."""
+        return self.path if self.saved else self.beside
+
+    @property
+    def can_undo(self) -> bool:
+        """Whether there is a step back."""
+        return bool(self._before)
+
+    @property
+    def can_redo(self) -> bool:
+        """Whether there is a step forward."""
+        return bool(self._after)
+
+    def change(self, changes: Sequence[Change], gesture: str | None = None) -> None:
+        """Make changes, one step of undo; those of one key by one gesture are one step together.
+
+        Raises
+        ------
+        InputError
+            A key that cannot be there, a text that is no TOML, a folder that cannot be written to.
+        """
+        same = None if gesture is None else (gesture, changes[0][0])
+        made = with_values(self.text, changes)
+        self._step_to(made, merge=same is not None and same == self._gesture)
+        self._gesture = same
+
+    def replace(self, text: str) -> None:
+        """Take another text.
+
+        Raises
+        ------
+        InputError
+            A folder that cannot be written to.
+        """
+        self._step_to(text)
+
+    def undo(self) -> None:
+        """Go one step back, if there is one."""
+        self._shift(self._before, self._after)
+
+    def redo(self) -> None:
+        """Go one step forward, if there is one."""
+        self._shift(self._after, self._before)
+
+    def save(self, *, over: bool = False) -> None:
+        """Write the job.
+
+        Raises
+        ------
+        InputError
+            It has been changed by something else since it was read, and it is not to be written
+            `over`; it cannot be written.
+        """
+        if not over and self.path.exists() and _read(self.path) != self._on_disk:
+            raise InputError(
+                f"{self.path}: has been changed since it was read; save over it, or take a copy "
+                "and open the job again"
+            )
+        _write(self.path, self.text)
+        self._on_disk = self.text
+        self._keep()
+
+    def _step_to(self, text: str, *, merge: bool = False) -> None:
+        if text == self.text:
+            return
+        if not merge or not self._before:
+            self._before = [*self._before[1 - MOST_STEPS :], self.text]
+        self._after.clear()
+        self._take(text)
+
+    def _shift(self, back: list[str], forth: list[str]) -> None:
+        if back:
+            forth.append(self.text)
+            self._take(back.pop())
+
+    def _take(self, text: str) -> None:
+        self._gesture = None
+        self.text = text
+        self.revision += 1
+        self._keep()
+
+    def _keep(self) -> None:
+        """Have the text beside the job where the job has another one, and nothing where not."""
+        if not self.saved:
+            _write(self.beside, self.text)
+            return
+        with suppress(OSError):
+            self.beside.unlink(missing_ok=True)
+
+
+def with_values(text: str, changes: Sequence[Change]) -> str:
+    """Return a TOML text with values changed, its comments and its other lines as they were.
+
+    Parameters
+    ----------
+    text : str
+    changes : sequence of (key, value)
+        None removes a key; tables on the way to one that are not there are made.
+
+    Raises
+    ------
+    InputError
+        A text that is no TOML, a key that leads through a value or to a table that is not there.
+    """
+    try:
+        tables = tomlkit.parse(text)
+    except TOMLKitError as error:
+        raise InputError(f"job: not valid TOML: {error}; correct the text, or undo") from None
+    for key, value in changes:
+        try:
+            _set(tables, key, value)
+        except (LookupError, TypeError, AttributeError, ValueError, TOMLKitError):
+            raise InputError(f"job: expected a key of a table, got {_dotted(key)}") from None
+    return tomlkit.dumps(tables)
+
+
+def _set(tables: Any, key: Key, value: object) -> None:
+    *way, last = key
+    node = tables
+    for name in way:
+        if isinstance(name, str) and name not in node:
+            if value is None:
+                return
+            node[name] = tomlkit.table()
+        node = node[name]
+    if value is None:
+        if isinstance(last, int) or last in node:
+            del node[last]
+        return
+    if isinstance(last, int) and not 0 <= last < len(node):
+        raise LookupError(last)
+    node[last] = _short(value)
+
+
+def _short(value: object) -> Any:
+    """Return a value as it is written: numbers to as many digits as they are meant with."""
+    if isinstance(value, float):
+        return float(f"{value:.{DIGITS}g}")
+    if isinstance(value, list):
+        return [_short(one) for one in value]
+    if isinstance(value, dict):
+        return {name: _short(one) for name, one in value.items()}
+    return value
+
+
+def _dotted(key: Key) -> str:
+    return ".".join(str(part) for part in key)
+
+
+def _read(path: Path) -> str:
+    try:
+        return path.read_bytes().decode("utf-8-sig")
+    except FileNotFoundError:
+        raise InputError(f"{path}: no such file; give the path of a job file") from None
+    except UnicodeDecodeError:
+        raise InputError(f"{path}: expected UTF-8 text; save the file as UTF-8") from None
+    except OSError as error:
+        raise InputError(f"{path}: cannot be read ({error.strerror}); give another job") from None
+
+
+def _write(path: Path, text: str) -> None:
+    try:
+        write_whole({path: text.encode()})
+    except OSError as error:
+        raise InputError(
+            f"{path}: cannot be written ({error.strerror}); changes are kept beside the job: open "
+            "one in a folder that can be written to"
+        ) from None

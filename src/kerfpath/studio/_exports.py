@@ -1,0 +1,113 @@
+"""What can be taken along: the job, the program in a language, plan, trajectory and report."""
+
+from __future__ import annotations
+
+import io
+import zipfile
+from collections.abc import Mapping
+from dataclasses import replace
+from typing import Any, NamedTuple
+
+from pydantic import ValidationError
+
+from kerfpath.errors import InputError
+from kerfpath.job import (
+    FileTexts,
+    JobResult,
+    ProgramTable,
+    program_options,
+)
+from kerfpath.post import languages
+from kerfpath.studio._messages import Export, FileEntry, ProgramTextMessage
+
+__all__ = ["File", "exports_of", "in_language", "program_text", "zipped"]
+
+
+class File(NamedTuple):
+    """A file to take along: its name, what it is, and its content."""
+
+    name: str
+    kind: str
+    content: bytes
+
+
+def exports_of(result: JobResult | None) -> list[Export]:
+    """Return what can be taken along of a result, and why the rest cannot; None: of none."""
+    no_plan = "" if result is not None and result.plans else "no contour has a plan yet"
+    if result is None:
+        program = "not planned yet"
+    elif not result.passed:
+        program = "a contour has no plan that passes its audit, or no way leads to the next one"
+    elif result.job.program.language == "none":
+        program = 'the job asks for none: language = "none" in [program]; ask for one by name'
+    else:
+        program = ""
+    return [
+        Export(name="job", href="/export/job", ready=True),
+        Export(name="program", href="/export/program", ready=not program, why=program),
+        Export(name="plan.json", href="/export/plan.json", ready=not no_plan, why=no_plan),
+        Export(
+            name="trajectory.csv", href="/export/trajectory.csv", ready=not no_plan, why=no_plan
+        ),
+        Export(name="report", href="/report", ready=result is not None, why=""),
+    ]
+
+
+def in_language(result: JobResult, language: str | None) -> JobResult:
+    """Return a result whose job asks for a program in another language; None: in its own.
+
+    Raises
+    ------
+    InputError
+        An unknown language, settings that do not fit it.
+    """
+    if language is None:
+        return result
+    if language not in languages():
+        raise InputError(
+            f"language {language!r:.40} is not known; expected {', '.join(sorted(languages()))}"
+        )
+    table: Mapping[str, Any] = {**result.job.source.get("program", {}), "language": language}
+    try:
+        asked = ProgramTable.model_validate(table)
+    except ValidationError as error:
+        said = error.errors(include_url=False)[0]["msg"]
+        raise InputError(f"program in {language}: {said}; correct [program]") from None
+    # The name is the job's, whatever the copy of it is called that was read.
+    options = replace(program_options(asked, result.job.program.name), language=language)
+    return replace(result, job=replace(result.job, program=options))
+
+
+def program_text(result: JobResult, texts: FileTexts) -> ProgramTextMessage:
+    """Return the program of a result as its files say it."""
+    faults = list(texts.faults)
+    if not texts.program and not faults:
+        faults = ["there is no program: a contour has no plan that passes its audit"]
+    return ProgramTextMessage(
+        language=result.job.program.language,
+        files=[FileEntry(name=name, text=texts.files[name]) for name in texts.program],
+        notes=list(texts.notes),
+        faults=faults,
+    )
+
+
+def zipped(name: str, texts: FileTexts) -> File:
+    """Return the program as one file: as it is, or several in an archive.
+
+    Raises
+    ------
+    InputError
+        There is none.
+    """
+    if not texts.program:
+        why = "; ".join(texts.faults) or "a contour has no plan that passes its audit"
+        raise InputError(f"no program: {why}")
+    if len(texts.program) == 1:
+        (only,) = texts.program
+        return File(only.rsplit("/", 1)[-1], "text/plain", texts.files[only].encode())
+    packed = io.BytesIO()
+    with zipfile.ZipFile(packed, "w", zipfile.ZIP_DEFLATED) as archive:
+        for each in texts.program:
+            # The same program is the same archive: it has no time of its own.
+            archive.writestr(zipfile.ZipInfo(each), texts.files[each])
+    return File(f"{name}.zip", "application/zip", packed.getvalue())

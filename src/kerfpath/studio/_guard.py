@@ -1,0 +1,117 @@
+"""Who may talk to the server: from which host, from which page, and with which token."""
+
+from __future__ import annotations
+
+import hmac
+from collections.abc import Iterable
+from http.cookies import CookieError, SimpleCookie
+from urllib.parse import parse_qs
+
+from starlette.datastructures import Headers, MutableHeaders
+from starlette.responses import PlainTextResponse, RedirectResponse
+from starlette.types import ASGIApp, Message, Receive, Scope, Send
+
+
+__all__ = ["LOOPBACK", "POLICY", "Guard"]
+
+LOOPBACK = ("127.0.0.1", "localhost", "[::1]")
+"""Names of this machine for itself."""
+POLICY = (
+    "default-src 'none'; script-src 'self'; style-src 'self'; img-src 'self' data: blob:; "
+    "font-src 'self'; connect-src 'self'; media-src blob:; worker-src 'self'; base-uri 'none'; "
+    "form-action 'none'; frame-ancestors 'none'"
+)
+"""What a page may load: what this server serves, nothing inline and nothing evaluated."""
+HEADERS = {
+    "content-security-policy": POLICY,
+    "x-content-type-options": "nosniff",
+    "x-frame-options": "DENY",
+    "referrer-policy": "no-referrer",
+    "cross-origin-opener-policy": "same-origin",
+    "cross-origin-resource-policy": "same-origin",
+}
+REFUSED = 4403
+"""Code by which a WebSocket is closed that is refused."""
+
+
+class Guard:
+    """Refuses requests for another host, from other sites, and without the token.
+
+    A page of another site cannot read what is served here, but a browser would send its requests
+    all the same, and open a WebSocket for it.
+
+    Parameters
+    ----------
+    app : ASGI application
+    hosts : iterable of str
+        Names, with ports, by which the server is asked for.
+    token : str or None
+        A request must bring it: in its query, once, or in a cookie. None: none is needed.
+    """
+
+    def __init__(self, app: ASGIApp, *, hosts: Iterable[str], token: str | None) -> None:
+        self._app, self._hosts, self._token = app, frozenset(hosts), token
+        port = next(iter(self._hosts)).rpartition(":")[2]
+        self._cookie = f"kerfpath-studio-{port}"
+
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        """Serve a request, or refuse it."""
+        if scope["type"] not in ("http", "websocket"):
+            await self._app(scope, receive, send)
+            return
+        headers = Headers(scope=scope)
+        if why := self._refusal(headers):
+            await self._refuse(scope, receive, send, why)
+            return
+        if not self._knows_token(headers):
+            asked = parse_qs(scope["query_string"].decode("latin-1")).get("token", [""])[0]
+            if scope["type"] == "http" and scope["path"] == "/" and self._is_token(asked):
+                # From now on the browser knows it, and the address does not show it any more.
+                answer = RedirectResponse("/", status_code=303, headers=HEADERS)
+                answer.set_cookie(self._cookie, asked, httponly=True, samesite="strict")
+                await answer(scope, receive, send)
+                return
+            why = "a token is needed: open the address that kerfpath studio has printed"
+            await self._refuse(scope, receive, send, why)
+            return
+
+        async def send_with_headers(message: Message) -> None:
+            if message["type"] == "http.response.start":
+                own = MutableHeaders(scope=message)
+                for name, value in HEADERS.items():
+                    own.setdefault(name, value)
+            await send(message)
+
+        await self._app(scope, receive, send_with_headers)
+
+    def _refusal(self, headers: Headers) -> str:
+        """Return why a request is refused by its headers; "" where it is not."""
+        host = headers.get("host", "")
+        if host not in self._hosts:
+            return f"this server is not {host!r:.60}"
+        origin = headers.get("origin")
+        if origin is not None and origin != f"http://{host}":
+            return f"requests from {origin!r:.60} are not answered"
+        if headers.get("sec-fetch-site", "none") not in ("none", "same-origin"):
+            return "requests from other sites are not answered"
+        return ""
+
+    def _knows_token(self, headers: Headers) -> bool:
+        if self._token is None:
+            return True
+        try:
+            cookie = SimpleCookie(headers.get("cookie", "")).get(self._cookie)
+        except CookieError:
+            return False
+        return cookie is not None and self._is_token(cookie.value)
+
+    def _is_token(self, text: str) -> bool:
+        return self._token is not None and hmac.compare_digest(text.encode(), self._token.encode())
+
+    async def _refuse(self, scope: Scope, receive: Receive, send: Send, why: str) -> None:
+        if scope["type"] == "websocket":
+            await receive()  # it asks to be connected
+            await send({"type": "websocket.close", "code": REFUSED, "reason": why})
+            return
+        answer = PlainTextResponse(f"kerfpath: {why}\n", status_code=403, headers=HEADERS)
+        await answer(scope, receive, send)

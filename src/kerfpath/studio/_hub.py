@@ -1,0 +1,98 @@
+"""The pages that are open: each gets what is said, the newest of its kind at once."""
+
+from __future__ import annotations
+
+import asyncio
+from collections import OrderedDict
+
+from kerfpath.studio._messages import Message
+
+__all__ = ["Hub", "Page"]
+
+LAST = ("job", "scene", "program", "outcome", "progress")
+"""Kinds of messages of which a new page gets the last one; of plans the last of each contour."""
+
+
+class Page:
+    """One open page: what it has yet to be sent, of each kind no more than the newest.
+
+    A page that is asleep costs no more memory than one picture of it all.
+    """
+
+    def __init__(self) -> None:
+        self._waiting: OrderedDict[object, str] = OrderedDict()
+        self._there = asyncio.Event()
+
+    def put(self, key: object, text: str) -> None:
+        """Have a message sent, in place of one by the same key."""
+        self._waiting[key] = text
+        self._waiting.move_to_end(key)
+        self._there.set()
+
+    def say(self, message: Message) -> None:
+        """Send an answer, which is one of its kind."""
+        text = message.model_dump_json()
+        self.put((getattr(message, "type", ""), getattr(message, "about", None)), text)
+
+    async def next(self) -> str:
+        """Return the next message, once there is one."""
+        while not self._waiting:
+            self._there.clear()
+            await self._there.wait()
+        _, text = self._waiting.popitem(last=False)
+        return text
+
+
+class Hub:
+    """All open pages, and what the next one is told at first."""
+
+    def __init__(self) -> None:
+        self._pages: set[Page] = set()
+        self._last: dict[str, str] = {}
+        self._of_contour: dict[str, OrderedDict[str, str]] = {}
+
+    def __len__(self) -> int:
+        return len(self._pages)
+
+    def open(self) -> Page:
+        """Return a new page, which is told all that there is."""
+        page = Page()
+        for kind in LAST:
+            if kind in self._last:
+                page.put(kind, self._last[kind])
+        for contour, said in self._of_contour.items():
+            for name, text in said.items():
+                page.put((contour, name), text)
+        self._pages.add(page)
+        return page
+
+    def close(self, page: Page) -> None:
+        """Forget a page."""
+        self._pages.discard(page)
+
+    def say(self, message: Message) -> None:
+        """Tell every page, and the ones to come."""
+        kind, text = str(getattr(message, "type", "")), message.model_dump_json()
+        contour = getattr(message, "contour", None)
+        key: object = kind
+        if kind in ("plan", "nopath"):
+            key = self._keep(str(contour), kind, message, text)
+        else:
+            self._last[kind] = text
+        for page in self._pages:
+            page.put(key, text)
+
+    def keep_only(self, contours: list[str]) -> None:
+        """Forget what was said of contours that there are no more."""
+        for gone in self._of_contour.keys() - set(contours):
+            del self._of_contour[gone]
+
+    def _keep(self, contour: str, kind: str, message: Message, text: str) -> object:
+        """Keep what is said of a contour: its plan or those of its pieces, or why it has none."""
+        name = kind if kind == "nopath" else f"plan {getattr(message, 'name', '')}"
+        said = self._of_contour.setdefault(contour, OrderedDict())
+        alone = kind == "nopath" or getattr(message, "pieces", 1) == 1 or "nopath" in said
+        if alone:
+            said.clear()
+        said[name] = text
+        return contour, name

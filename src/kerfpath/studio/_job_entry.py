@@ -1,0 +1,126 @@
+"""The job as a message: its text, its values with defaults, what they may be, what is wrong."""
+
+from __future__ import annotations
+
+import re
+from functools import cache
+from typing import Any, get_args
+
+import numpy as np
+from pydantic import BaseModel
+
+from kerfpath.errors import InputError
+from kerfpath.job import Job, JobFile
+from kerfpath.post import languages
+from kerfpath.robots import Robot
+from kerfpath.studio._document import Document
+from kerfpath.studio._messages import ContourName, Fault, JobMessage, flat
+
+__all__ = ["faults_of", "job_message"]
+
+_PLACE = re.compile(r"^.*?\.toml:(?:(\d+):)? ?(?:([a-z_][\w.]*): )?(.*)$", re.DOTALL)
+"""File, line, key and words of a message about a job."""
+_TABLE = re.compile(r"^[ \t]*\[\[[ \t]*contour[ \t]*\]\]")
+
+
+def job_message(
+    document: Document,
+    job: Job | None,
+    contours: list[ContourName],
+    faults: list[Fault],
+    *,
+    interval: float,
+) -> JobMessage:
+    """Return the job as it is.
+
+    Parameters
+    ----------
+    document : Document
+    job : Job or None
+        What its text says; None where that is not valid.
+    contours : list of ContourName
+        Those that are cut.
+    faults : list of Fault
+    interval : float s
+        From node to node of the first of them: what weights by default are of.
+    """
+    weights = None
+    if job is not None:
+        weights = 1 / (job.robot.speed_limits()[0] * interval)
+        if job.options.weights is not None:
+            weights = np.asarray(job.options.weights)
+    return JobMessage(
+        revision=document.revision,
+        name=document.path.name,
+        text=document.text,
+        values=None if job is None else _values(job),
+        contours=contours,
+        undo=document.can_undo,
+        redo=document.can_redo,
+        saved=document.saved,
+        faults=faults,
+        choices=_choices() | ({} if job is None else {"plan.posture": _postures(job.robot)}),
+        weights=[] if weights is None else flat(weights),
+    )
+
+
+def faults_of(error: InputError, text: str) -> list[Fault]:
+    """Return what is wrong with a job, each with its key where the message has one."""
+    lines = text.splitlines()
+    return [_fault(said, lines) for said in (str(error), *error.others)]
+
+
+def _fault(said: str, lines: list[str]) -> Fault:
+    found = _PLACE.match(said)
+    if found is None:
+        return Fault(key=[], message=said)
+    line, key, words = found.groups()
+    way: list[str | int] = [] if key is None else list(key.split("."))
+    if line is not None and way[:1] == ["contour"]:
+        number = sum(map(bool, map(_TABLE.match, lines[: int(line)]))) - 1
+        way[1:1] = [max(number, 0)]
+    return Fault(key=way, message=words)
+
+
+def _values(job: Job) -> dict[str, object]:
+    file = JobFile.model_validate(dict(job.source), context={"folder": job.path.parent})
+    return file.model_dump(mode="json")
+
+
+@cache
+def _choices() -> dict[str, list[str]]:
+    """Return the words that each key takes which takes some of a few."""
+    found: dict[str, list[str]] = {}
+    _gather(JobFile, (), found)
+    found["program.language"] = [*sorted(languages()), "none"]
+    return found
+
+
+def _gather(table: type[BaseModel], way: tuple[str, ...], found: dict[str, list[str]]) -> None:
+    for name, field in table.model_fields.items():
+        words, tables = _words(field.annotation)
+        if words:
+            found[".".join((*way, name))] = words
+        for inner in tables:
+            _gather(inner, (*way, name), found)
+
+
+def _words(annotation: Any) -> tuple[list[str], list[type[BaseModel]]]:
+    """Return the words that a type admits, and the tables in it."""
+    if isinstance(annotation, type) and issubclass(annotation, BaseModel):
+        return [], [annotation]
+    words, tables = list[str](), list[type[BaseModel]]()
+    for part in get_args(annotation):
+        if isinstance(part, str):
+            words.append(part)
+        else:
+            more, inner = _words(part)
+            words += more
+            tables += inner
+    return words, tables
+
+
+def _postures(robot: Robot) -> list[str]:
+    """Return the words by which postures may be asked for, the widest first."""
+    names = [name.split("/") for name in robot.family.postures]
+    return list(dict.fromkeys("/".join(name[:n]) for n in (1, 2, 3) for name in names))

@@ -1,0 +1,105 @@
+"""What a plan depends on, said in short keys: what is kept from one plan to the next."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from collections.abc import Iterable, Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from kerfpath.contour import Contour
+from kerfpath.job import CutRequest, Job
+
+__all__ = ["PROVING", "cut_key", "graph_key", "motion_key", "part_key", "setup_key"]
+
+LIGHT = frozenset(
+    "weights eta_velocity eta_acceleration metric objective method feed refine interruptions "
+    "least_piece_mm certify certify_gap_percent certify_seconds certificate".split()
+)
+"""Keys of [plan] that neither the nodes nor the layered graph depend on."""
+GRAPH = frozenset("gamma_step_deg frames tilt_deg tilt_steps posture".split())
+"""Keys of [plan] that the layered graph depends on."""
+PROVING = frozenset("certify certify_gap_percent certify_seconds certificate".split())
+"""Keys of [plan] that say what is proved of a motion that is found."""
+
+
+def part_key(job: Job) -> str:
+    """Return the key of what a job's drawing holds."""
+    read = {k: v for k, v in job.source["part"].items() if k not in ("xyz_mm", "rpy_deg")}
+    return _digest(read, _stamp(job.part_file))
+
+
+def setup_key(job: Job) -> str:
+    """Return the key of all that a job is prepared from: everything but `LIGHT` keys."""
+    source = dict(job.source)
+    source["plan"] = _but(source.get("plan", {}), LIGHT)
+    return _digest(source, _stamps(job))
+
+
+def motion_key(job: Job) -> str:
+    """Return the key of all that a motion before must share with one that may begin from it."""
+    source = dict(job.source)
+    source["plan"] = _but(source.get("plan", {}), LIGHT)
+    # Where nodes are laid by time, a speed makes other nodes.
+    source["contour"] = [
+        table if "time_step_ms" in table else _but(table, ("speed_m_min",))
+        for table in source["contour"]
+    ]
+    for name in ("sequence", "layout", "program", "audit"):
+        source.pop(name, None)
+    return _digest(source, _stamps(job))
+
+
+def graph_key(job: Job, nodes: Contour) -> str:
+    """Return the key of the layered graph of some nodes."""
+    source, options = job.source, job.options
+    plan = {k: v for k, v in source.get("plan", {}).items() if k in GRAPH}
+    tables = [source.get(name) for name in ("robot", "tool", "comfort")]
+    arrays = [nodes.points, nodes.axes, nodes.s, job.placement]
+    if nodes.x is not None:
+        arrays.append(nodes.x)
+    digest = hashlib.sha256()
+    for array in arrays:
+        digest.update(np.ascontiguousarray(array))
+    kept = [plan, tables, nodes.closed, options.retract, options.floor]
+    return _digest(kept, digest.hexdigest(), _stamps(job))
+
+
+def cut_key(job: Job, request: CutRequest) -> str:
+    """Return the key of what comes of a contour, but for the bound of its plan."""
+    source = dict(job.source)
+    for name in ("contour", "sequence", "layout", "program"):
+        source.pop(name, None)
+    source["plan"] = _but(source.get("plan", {}), PROVING)
+    # A table that picks several loops is asked for each of them by its name.
+    own = [request.task.name, request.task.pick, request.task.table.model_dump(mode="json")]
+    return _digest(source, own, job.options.retract, _stamps(job))
+
+
+def _stamps(job: Job) -> list[object]:
+    """Return what tells another content of the files that a job names from the one before."""
+    folder, source = job.path.parent, job.source
+    cell = source.get("cell", {})
+    named = [source["robot"].get("urdf"), cell.get("head", {}).get("file")]
+    named += [fixture.get("file") for fixture in cell.get("fixture", [])]
+    return [_stamp(job.part_file), *(_stamp(folder / name) for name in named if name)]
+
+
+def _stamp(path: Path) -> list[object]:
+    try:
+        found = path.stat()
+    except OSError:
+        return [str(path)]
+    return [str(path), found.st_mtime_ns, found.st_size]
+
+
+def _but(table: Mapping[str, Any], keys: Iterable[str]) -> dict[str, Any]:
+    return {k: v for k, v in table.items() if k not in keys}
+
+
+def _digest(*parts: object) -> str:
+    text = json.dumps(parts, sort_keys=True, default=str)
+    return hashlib.sha256(text.encode()).hexdigest()

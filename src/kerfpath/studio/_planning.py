@@ -1,0 +1,210 @@
+"""The planning of a session, in threads of its own: soon a draft, then all that a run does."""
+
+from __future__ import annotations
+
+import logging
+from collections.abc import Callable
+from functools import partial
+from threading import Event
+
+from kerfpath.errors import InputError, KerfpathError
+from kerfpath.job import CutResult, Job, JobResult, PreparedJob, is_compiled, warm_up
+from kerfpath.plans import Plan
+from kerfpath.studio._bench import Bench
+from kerfpath.studio._clock import cycle_of, program_message
+from kerfpath.studio._exports import exports_of
+from kerfpath.studio._fastest import fastest_message
+from kerfpath.studio._keys import motion_key, setup_key
+from kerfpath.studio._messages import ErrorMessage, Message, OutcomeMessage, ProgressMessage
+from kerfpath.studio._run import Run, drafts_of
+from kerfpath.studio._scene import Meshes, scene_of, tables_of
+from kerfpath.studio._work import Newest, Stop
+
+__all__ = ["Planning"]
+
+PATIENCE = 0.3
+"""s: where a draft shows what a change does, a run begins once nothing has changed for so long."""
+log = logging.getLogger("kerfpath.studio")
+
+
+class Planning:
+    """Plans the newest job, and keeps what may serve the next one.
+
+    Parameters
+    ----------
+    say : callable
+        Takes messages, from any thread.
+    ready : callable
+        Takes each job that has been prepared, and its revision; from any thread.
+    refused : callable
+        Takes what is wrong with a job that cannot be, and its revision; from any thread.
+
+    Attributes
+    ----------
+    meshes : Meshes
+        Those of the scene.
+    cuts : dict of str to tuple of CutResult
+        What came of each contour, by its name.
+    result : JobResult or None
+        What the newest job comes to, as far as it is known.
+    """
+
+    def __init__(
+        self,
+        say: Callable[[Message], None],
+        ready: Callable[[PreparedJob, int], None],
+        refused: Callable[[InputError, int], None],
+    ) -> None:
+        self._say, self._ready, self._refused = say, ready, refused
+        self._bench = Bench()
+        self._runs = Newest("run", self._failed)
+        self._drafts = Newest("draft", self._failed)
+        self._speeds = Newest("speed", self._failed)
+        self._before: tuple[str, dict[str, Plan]] = ("", {})
+        """What drafts begin from: the motions of contours, and what they share."""
+        self._scene = ""
+        self.meshes = Meshes()
+        self.prepared: PreparedJob | None = None
+        self.cuts: dict[str, tuple[CutResult, ...]] = {}
+        self.result: JobResult | None = None
+
+    def take(self, job: Job, revision: int, first: str | None) -> None:
+        """Plan a job in place of any other, one of its contours first."""
+        hurry = Event()
+        if first is not None and motion_key(job) == self._before[0] and first in self._before[1]:
+            self._drafts.ask(partial(self._draft, job, revision, first, hurry))
+        else:
+            self._drafts.cancel()
+            hurry.set()
+        self._runs.ask(partial(self._run, job, revision, first, hurry))
+
+    def fastest(self, contour: str, revision: int) -> None:
+        """Look for the fastest speed of a contour.
+
+        Raises
+        ------
+        InputError
+            There is no such contour.
+        """
+        prepared = self.prepared
+        if prepared is None or contour not in prepared.names:
+            raise InputError(f"contour {contour!r:.60} is not known; wait for the job to be read")
+        index = tables_of(prepared)[prepared.names.index(contour)]
+
+        def work(stop: Stop) -> None:
+            self._say(ProgressMessage(busy=True, label=f"{contour}: fastest speed"))
+            found = fastest_message(prepared, contour, index, revision)
+            stop.check()
+            self._say(found)
+            self._say(ProgressMessage(busy=False))
+
+        self._speeds.ask(work)
+
+    def cancel(self) -> None:
+        """Stop whatever is being done."""
+        for each in (self._drafts, self._runs, self._speeds):
+            each.cancel()
+        self._say(ProgressMessage(busy=False))
+
+    def close(self) -> None:
+        """Stop for good."""
+        for each in (self._drafts, self._runs, self._speeds):
+            each.close()
+
+    def _draft(
+        self, job: Job, revision: int, contour: str, hurry: Event, stop: Stop
+    ) -> None:
+        """Say a motion near the one before, if there is one."""
+        key, plans = self._before
+        found = drafts_of(job, self.cuts[contour][0], plans[contour], revision)
+        stop.check()
+        if found is None or not self._is_clear(found[0]):
+            hurry.set()
+            return
+        made, message = found
+        if self._before[0] == key:
+            plans[contour] = made
+        self._say(message)
+
+    def _is_clear(self, made: Plan) -> bool:
+        """Return whether a motion is clear where a cell says what that is."""
+        cell = None if self.prepared is None else self.prepared.cell
+        return cell is None or bool(cell.clear_through(made.unwrapped))
+
+    def _run(
+        self, job: Job, revision: int, first: str | None, hurry: Event, stop: Stop
+    ) -> None:
+        """Plan a job from its drawing to what is proved of its plans."""
+        waited = 0.0
+        while waited < PATIENCE and not hurry.is_set():
+            stop.rest(PATIENCE / 20)
+            waited += PATIENCE / 20
+        self._say(ProgressMessage(busy=True, label="reading the drawing"))
+        try:
+            prepared = self._bench.prepared(job)
+        except InputError as fault:
+            self._refused(fault, revision)
+            self._say(ProgressMessage(busy=False))
+            return
+        stop.check()
+        self.prepared, self.result = prepared, None
+        self._show_scene(prepared, revision)
+        self._ready(prepared, revision)
+        if not is_compiled():
+            self._say(ProgressMessage(busy=True, label="compiling the kernels, first run only"))
+            warm_up()
+        run = Run(self._bench, prepared, revision, self._say, stop)
+        tried = run.contours(first, partial(self._took, motion_key(job)))
+        result = run.ordered(tried)
+        self.result = result
+        self._say(_outcome(result, revision))
+        self.result = run.settled(result, first)
+        self._say(_outcome(self.result, revision))
+        self._say(ProgressMessage(busy=False))
+
+    def _took(self, key: str, contour: str, cuts: tuple[CutResult, ...]) -> None:
+        """Keep what came of a contour."""
+        if self._before[0] != key:
+            self._before = key, {}
+        self.cuts[contour] = cuts
+        made = cuts[0].plan
+        if len(cuts) == 1 and made is not None:
+            self._before[1][contour] = made
+        else:
+            self._before[1].pop(contour, None)
+
+    def _show_scene(self, prepared: PreparedJob, revision: int) -> None:
+        """Say the scene, unless it is as it was."""
+        setup = setup_key(prepared.job)
+        if setup == self._scene:
+            return
+        message, meshes = scene_of(prepared, revision)
+        self.meshes = Meshes({**self.meshes, **meshes})
+        self._say(message)
+        self.meshes = meshes
+        self._scene = setup
+        known = set(prepared.names)
+        self.cuts = {name: cuts for name, cuts in self.cuts.items() if name in known}
+
+    def _failed(self, error: BaseException) -> None:
+        """Say what went wrong in a thread."""
+        if isinstance(error, KerfpathError):
+            message = str(error)
+        else:
+            log.error("the studio's planning failed", exc_info=error)
+            message = f"a fault in kerfpath, {type(error).__name__}: {error}; the terminal has more"
+        self._say(ErrorMessage(message=message))
+        self._say(ProgressMessage(busy=False))
+
+
+def _outcome(result: JobResult, revision: int) -> OutcomeMessage:
+    """Return what a run comes to."""
+    notes = [] if result.stuck is None else [f"The moves between contours: {result.stuck}"]
+    notes += [f"The moves between contours: {c.issue()}" for c in result.air if not c.ok]
+    return OutcomeMessage(
+        revision=revision,
+        passed=result.passed,
+        exports=exports_of(result),
+        cycle=cycle_of(program_message(result, revision)),
+        notes=notes,
+    )

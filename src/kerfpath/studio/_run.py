@@ -1,0 +1,233 @@
+"""The run of a job in the studio: contour after contour, shown as it comes, and stopped at will."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from time import perf_counter
+
+from kerfpath.job import (
+    Candidate,
+    CutRequest,
+    CutResult,
+    Job,
+    JobResult,
+    PreparedJob,
+    advised,
+    certified,
+    cut_candidate,
+    measured,
+    order_cuts,
+)
+from kerfpath.planner import draft
+from kerfpath.plans import Plan
+from kerfpath.studio._bench import Bench
+from kerfpath.studio._clock import program_message
+from kerfpath.studio._keys import PROVING, cut_key
+from kerfpath.studio._map import map_id
+from kerfpath.studio._messages import Message, PlanMessage, ProgressMessage
+from kerfpath.studio._plan_entry import no_path_message, plan_message
+from kerfpath.studio._scene import tables_of
+from kerfpath.studio._ways import ways_of
+from kerfpath.studio._work import Seldom, Stop
+
+__all__ = ["Run", "drafts_of"]
+
+Say = Callable[[Message], None]
+SHOWN_EVERY = 0.1
+"""s: how often a page hears how far the work is."""
+
+
+class Run:
+    """One run of a job; what comes of it is said as it comes, and kept.
+
+    Parameters
+    ----------
+    bench : Bench
+    prepared : PreparedJob
+    revision : int
+        Of the job.
+    say : callable
+        Takes messages.
+    stop : Stop
+    """
+
+    def __init__(
+        self, bench: Bench, prepared: PreparedJob, revision: int, say: Say, stop: Stop
+    ) -> None:
+        self._bench, self._prepared, self._revision = bench, prepared, revision
+        self._say, self._stop, self._seldom = say, stop, Seldom(SHOWN_EVERY)
+        self._tables = dict(zip(prepared.names, tables_of(prepared), strict=True))
+        self._seconds: dict[str, float] = {}
+
+    def progress(self, what: str, done: int, total: int, /) -> None:
+        """Take how far the work is, and stop it where that is asked for.
+
+        Raises
+        ------
+        Superseded
+            It is.
+        """
+        self._stop.check()
+        if self._seldom.may():
+            self._say(ProgressMessage(busy=True, label=what, done=done, total=total))
+
+    def contours(
+        self, first: str | None, took: Callable[[str, tuple[CutResult, ...]], None]
+    ) -> list[list[tuple[CutResult, ...]]]:
+        """Plan and audit every contour, one of them first; return what came of each candidate.
+
+        `took` takes each contour's name and the cuts that are shown of it.
+
+        Raises
+        ------
+        Superseded
+            Meanwhile something else was asked for.
+        """
+        requests = list(self._prepared.contours)
+        tried: dict[str, list[tuple[CutResult, ...]]] = {}
+        for request in sorted(requests, key=lambda each: each.task.name != first):
+            begun, name = perf_counter(), request.task.name
+            tried[name] = [
+                self._candidate(request, number, candidate)
+                for number, candidate in enumerate(request.candidates)
+            ]
+            self._seconds[name] = perf_counter() - begun
+            shown = next((c for c in tried[name] if all(cut.passed for cut in c)), tried[name][0])
+            self._show(shown)
+            took(name, shown)
+        return [tried[request.task.name] for request in requests]
+
+    def ordered(self, tried: Sequence[Sequence[tuple[CutResult, ...]]]) -> JobResult:
+        """Put the cuts in order, with the moves between them, and say their program.
+
+        Raises
+        ------
+        Superseded
+            Meanwhile something else was asked for.
+        """
+        result = order_cuts(self._prepared, tried, self.progress)
+        self._stop.check()
+        if result.part is not None:  # joints that turn on, and other candidates
+            self._show(result.cuts)
+        self._say(program_message(result, self._revision))
+        return result
+
+    def settled(self, result: JobResult, first: str | None) -> JobResult:
+        """Prove what is asked for of each plan, and look for what would open closed ways.
+
+        Raises
+        ------
+        Superseded
+            Meanwhile something else was asked for.
+        """
+        cuts = list(result.cuts)
+        for i in sorted(range(len(cuts)), key=lambda i: cuts[i].contour != first):
+            if cuts[i].plan is None:
+                cuts[i] = advised(self._prepared, cuts[i], self.progress)
+                self._broken(cuts[i], settled=True)
+            elif cuts[i].request.options.certify is not None:
+                cuts[i] = self._proved(cuts[i])
+                self._plan(cuts[i], _pieces(cuts, cuts[i]), settled=True)
+        self._stop.check()
+        return measured(self._prepared, result.with_cuts(tuple(cuts)))
+
+    def _candidate(
+        self, request: CutRequest, number: int, candidate: Candidate
+    ) -> tuple[CutResult, ...]:
+        key = f"{cut_key(self._prepared.job, request)} {number}"
+        found = self._bench.cuts.get(key)
+        if found is None:
+            found = cut_candidate(
+                self._prepared, request, candidate, self.progress, graph_of=self._bench.graph
+            )
+            self._bench.cuts.put(key, found)
+        self._stop.check()
+        # What is proved of them, and where their table stands, may have changed.
+        return tuple(replace(cut, request=request) for cut in found)
+
+    def _proved(self, cut: CutResult) -> CutResult:
+        made = cut.plan
+        assert made is not None
+        source = self._prepared.job.source.get("plan", {})
+        asked = sorted((k, source[k]) for k in PROVING if k in source)
+        key = f"{cut_key(self._prepared.job, cut.request)} {asked} {hash(made.q.tobytes())}"
+        found = self._bench.proved.get(key)
+        if found is None:
+            found = certified(cut, self.progress)
+            self._bench.proved.put(key, found)
+        return replace(found, request=cut.request)
+
+    def _show(self, cuts: Sequence[CutResult]) -> None:
+        for cut in cuts:
+            if cut.plan is None:
+                self._broken(cut, settled=False)
+            else:
+                done = cut.request.options.certify is None
+                self._plan(cut, _pieces(cuts, cut), settled=done)
+
+    def _plan(self, cut: CutResult, pieces: int, *, settled: bool) -> None:
+        assert cut.plan is not None
+        self._say(
+            plan_message(
+                cut,
+                cut.plan,
+                revision=self._revision,
+                graph=map_id(cut.graph),
+                pieces=pieces,
+                settled=settled,
+                audited=True,
+                seconds=self._seconds.get(cut.contour, 0.0),
+            )
+        )
+
+    def _broken(self, cut: CutResult, *, settled: bool) -> None:
+        ways = ways_of(cut, self._tables[cut.contour]) if settled else None
+        self._say(
+            no_path_message(
+                cut,
+                self._prepared.job.placement,
+                revision=self._revision,
+                graph=map_id(cut.graph),
+                ways=ways,
+            )
+        )
+
+
+def _pieces(cuts: Sequence[CutResult], cut: CutResult) -> int:
+    return sum(other.contour == cut.contour for other in cuts)
+
+
+def drafts_of(
+    job: Job, cut: CutResult, before: Plan, revision: int
+) -> tuple[Plan, PlanMessage] | None:
+    """Return a motion near the one before that keeps what a job asks for now; None if none is.
+
+    Parameters
+    ----------
+    job : Job
+        Of which a contour has other weights, limits, metric, objective or speed than before.
+    cut : CutResult
+        What came of it before, as it was asked for then.
+    before : Plan
+        The motion to begin from: that of the cut, or a draft after it.
+    revision : int
+        Of the job.
+    """
+    begun, task = perf_counter(), cut.request.task
+    speeds = {spec.name: spec.speed for spec in job.contours if spec.table.pick_all is None}
+    slower = task.speed / speeds.get(task.name, task.speed)
+    made = draft(before, job.options, dt=cut.candidate.dt * slower)
+    if made is None:
+        return None
+    message = plan_message(
+        replace(cut, plan=made),
+        made,
+        revision=revision,
+        graph=map_id(cut.graph),
+        pieces=1,
+        settled=False,
+        audited=False,
+        seconds=perf_counter() - begun,
+    )
+    return made, message

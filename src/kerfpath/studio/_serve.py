@@ -1,0 +1,112 @@
+"""The server on its port, and the browser that is opened on it."""
+
+from __future__ import annotations
+
+import secrets
+import socket
+import webbrowser
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from threading import Thread
+
+import uvicorn
+
+from kerfpath.errors import InputError
+from kerfpath.studio._app import LONGEST, application
+from kerfpath.studio._guard import LOOPBACK
+
+__all__ = ["serve"]
+
+HERE = ("127.0.0.1", "localhost", "::1")
+"""Addresses that only this machine can reach."""
+
+
+def serve(
+    path: Path, *, host: str, port: int, browser: bool, show: Callable[[str], None]
+) -> None:
+    """Serve one job until the process is stopped.
+
+    Parameters
+    ----------
+    path : Path
+        The job.
+    host : str
+        Address to listen at. At any but `HERE` a token is asked for, which is in the address shown.
+    port : int
+        0: one that is free.
+    browser : bool
+        Whether to open one.
+    show : callable
+        Takes the address once the server listens there.
+
+    Raises
+    ------
+    InputError
+        The job cannot be read; the port is in use or the address is not of this machine.
+    """
+    listener = _listener(host, port)
+    number = listener.getsockname()[1]
+    alone = host in HERE
+    names = LOOPBACK if alone else (*LOOPBACK, _in_url(host), *_names_of_machine())
+    token = None if alone else secrets.token_urlsafe(24)
+    app = application(path, hosts=[f"{name}:{number}" for name in names], token=token)
+    config = uvicorn.Config(
+        app,
+        log_level="warning",
+        lifespan="on",
+        ws="websockets-sansio",
+        ws_max_size=LONGEST,
+        ws_per_message_deflate=False,
+        server_header=False,
+        timeout_graceful_shutdown=1,
+    )
+    reached = socket.gethostname() if host in ("0.0.0.0", "::") else host
+    address = f"http://{_in_url(reached)}:{number}/"
+    if token is not None:
+        address += f"?token={token}"
+    show(address)
+    if browser:
+        # The listener is there: the browser waits for the rest.
+        Thread(target=webbrowser.open, args=(address,), daemon=True).start()
+    _Server(config).run(sockets=[listener])
+
+
+class _Server(uvicorn.Server):
+    """A server that leaves Ctrl-C to the command that it is part of."""
+
+    @contextmanager
+    def capture_signals(self) -> Iterator[None]:
+        """Capture none."""
+        yield
+
+
+def _listener(host: str, port: int) -> socket.socket:
+    family = socket.AF_INET6 if ":" in host else socket.AF_INET
+    listener = socket.socket(family, socket.SOCK_STREAM)
+    listener.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+    try:
+        listener.bind((host, port))
+        listener.listen(128)
+    except OSError as error:
+        listener.close()
+        raise InputError(
+            f"studio: cannot listen at {host} port {port} ({error.strerror or error}); give "
+            "another --port, or 0 for any that is free"
+        ) from None
+    return listener
+
+
+def _names_of_machine() -> list[str]:
+    """Return by what names others may ask for this machine."""
+    own = socket.gethostname()
+    found = {own, socket.getfqdn()}
+    try:
+        found |= {str(entry[4][0]) for entry in socket.getaddrinfo(own, None)}
+    except OSError:
+        pass
+    return [_in_url(name) for name in sorted(found)]
+
+
+def _in_url(host: str) -> str:
+    return f"[{host}]" if ":" in host else host

@@ -1,0 +1,247 @@
+"""A session: one job, edited, planned and shown; every page that is open sees the same."""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import Sequence
+from pathlib import Path
+
+from kerfpath.errors import InputError, KerfpathError
+from kerfpath.job import FileTexts, Job, JobResult, PreparedJob, read_job, result_texts
+from kerfpath.studio._asks import Ask, Edit, OfContour, Plain, ReasonOf, Relax, Save, Text, TextOf
+from kerfpath.studio._document import Change, Document
+from kerfpath.studio._exports import in_language, program_text
+from kerfpath.studio._hub import Hub, Page
+from kerfpath.studio._job_entry import faults_of, job_message
+from kerfpath.studio._map import map_message, pose_message
+from kerfpath.studio._messages import (
+    ContourName,
+    ErrorMessage,
+    Fault,
+    Message,
+    NoPathMessage,
+    PlanMessage,
+    SceneMessage,
+)
+from kerfpath.studio._newer import Newer
+from kerfpath.studio._planning import Planning
+from kerfpath.studio._scene import tables_of
+
+__all__ = ["Session"]
+
+
+class Session:
+    """One job that is worked on; all of it but the planning happens in the thread of the server.
+
+    Parameters
+    ----------
+    path : Path
+        The job.
+
+    Raises
+    ------
+    InputError
+        The file cannot be read.
+    """
+
+    def __init__(self, path: Path) -> None:
+        self.document = Document(path)
+        self.hub = Hub()
+        self._planning = Planning(self._from_thread, self._prepared_there, self._refused_there)
+        self._newer = Newer()
+        self._job: Job | None = None
+        self._faults: list[Fault] = []
+        self._contours: list[ContourName] = []
+        self._interval = 1.0
+        self._first: str | None = None
+        self._ways: dict[str, NoPathMessage] = {}
+        self._changed = asyncio.Event()
+        self._texts: tuple[JobResult, FileTexts] | None = None
+        self._loop: asyncio.AbstractEventLoop | None = None
+
+    async def work(self) -> None:
+        """Read and plan the job whenever it has changed, until this is cancelled."""
+        self._loop = asyncio.get_running_loop()
+        self._changed.set()
+        try:
+            while True:
+                await self._changed.wait()
+                self._changed.clear()
+                await self._read()
+        finally:
+            self._planning.close()
+
+    @property
+    def meshes(self) -> dict[str, bytes]:
+        """The meshes of the scene, by their ids."""
+        return self._planning.meshes
+
+    @property
+    def result(self) -> JobResult | None:
+        """What the newest job comes to, as far as it is known."""
+        return self._planning.result
+
+    async def hear(self, ask: Ask, page: Page) -> None:
+        """Do what a page asks for; an error is an answer."""
+        try:
+            await self._do(ask, page)
+        except KerfpathError as error:
+            page.say(ErrorMessage(message=str(error), about=ask.type))
+
+    async def texts(self, language: str | None) -> tuple[JobResult, FileTexts]:
+        """Return the result, its program in a language, and the files of both.
+
+        Raises
+        ------
+        InputError
+            Nothing is planned yet, an unknown language.
+        """
+        planned = self.result
+        if planned is None:
+            raise InputError("the job is not planned yet; wait until it is")
+        result = in_language(planned, language)
+        if language is None and self._texts is not None and self._texts[0] is result:
+            return self._texts
+        files = await asyncio.to_thread(result_texts, result)
+        if language is None:
+            self._texts = result, files
+        return result, files
+
+    async def _do(self, ask: Ask, page: Page) -> None:
+        match ask:
+            case Edit():
+                self._change([(ask.path, ask.value)], ask.gesture)
+            case Text():
+                self.document.replace(ask.text)
+                self._changed.set()
+            case Plain(type="undo"):
+                self.document.undo()
+                self._changed.set()
+            case Plain(type="redo"):
+                self.document.redo()
+                self._changed.set()
+            case Plain(type="cancel"):
+                self._planning.cancel()
+            case Plain():
+                self._changed.set()
+            case Save():
+                self.document.save(over=ask.over)
+                self._say_job()
+            case OfContour(type="focus"):
+                self._first = ask.contour
+            case OfContour(type="fastest"):
+                self._planning.fastest(ask.contour, self.document.revision)
+            case OfContour():
+                page.say(await asyncio.to_thread(self._map, ask.contour))
+            case ReasonOf():
+                page.say(await asyncio.to_thread(self._pose, ask))
+            case Relax():
+                self._relax(ask)
+            case TextOf():
+                result, files = await self.texts(ask.language)
+                page.say(program_text(result, files))
+
+    def _change(self, changes: Sequence[Change], gesture: str | None = None) -> None:
+        self.document.change(changes, gesture)
+        self._changed.set()
+
+    def _relax(self, ask: Relax) -> None:
+        known = self._ways.get(ask.contour)
+        ways = [] if known is None else known.relaxations or []
+        if ask.index >= len(ways):
+            raise InputError(f"contour {ask.contour!r:.60} has no relaxation {ask.index}")
+        self._change([(tuple(one.path), one.value) for one in ways[ask.index].edits])
+
+    def _map(self, contour: str) -> Message:
+        cuts = self._planning.cuts.get(contour)
+        if cuts is None:
+            raise InputError(f"contour {contour!r:.60} is not planned yet; wait until it is")
+        whole, graph = cuts[0].request.candidates[0].nodes, cuts[0].graph
+        nodes = whole if len(graph.reason) == len(whole) else cuts[0].candidate.nodes
+        plans = [cut.plan for cut in cuts if cut.plan is not None]
+        return map_message(contour, nodes, graph, plans, revision=self.document.revision)
+
+    def _pose(self, ask: ReasonOf) -> Message:
+        cuts, prepared = self._planning.cuts.get(ask.contour), self._planning.prepared
+        if cuts is None or prepared is None:
+            raise InputError(f"contour {ask.contour!r:.60} is not planned yet; wait until it is")
+        nodes, graph = cuts[0].candidate.nodes, cuts[0].graph
+        K, _, postures = graph.reason.shape
+        if not (ask.node < K and ask.posture < postures):
+            raise InputError(
+                f"reason: expected a node below {K} and a posture below {postures}, got "
+                f"{ask.node} and {ask.posture}"
+            )
+        return pose_message(
+            ask.contour, prepared.job, nodes, graph,
+            node=ask.node, gamma=ask.gamma, posture=ask.posture,
+        )  # fmt: skip
+
+    async def _read(self) -> None:
+        """Read the job as it is now, and have it planned."""
+        document = self.document
+        revision = document.revision
+        try:
+            job = await asyncio.to_thread(read_job, document.file, copy_of=document.path)
+        except InputError as error:
+            self._job, self._faults = None, faults_of(error, document.text)
+            self._planning.cancel()
+            self._say_job()
+            return
+        if document.revision != revision:
+            return  # another reading is to come
+        self._job, self._faults = job, []
+        self._say_job()
+        self._planning.take(job, revision, self._first or self._default_first())
+
+    def _default_first(self) -> str | None:
+        return self._contours[0].name if self._contours else None
+
+    def _say_job(self) -> None:
+        self.hub.say(
+            job_message(
+                self.document, self._job, self._contours, self._faults, interval=self._interval
+            )
+        )
+
+    def _from_thread(self, message: Message) -> None:
+        """Take a message from any thread."""
+        assert self._loop is not None
+        self._loop.call_soon_threadsafe(self._say, message)
+
+    def _say(self, message: Message) -> None:
+        newer = self._newer.of(message)
+        if newer is None:
+            return
+        if isinstance(newer, NoPathMessage):
+            self._ways[newer.contour] = newer
+        elif isinstance(newer, PlanMessage):
+            self._ways.pop(newer.contour, None)
+        elif isinstance(newer, SceneMessage):
+            names = [contour.name for contour in newer.contours]
+            self.hub.keep_only(names)
+            self._newer.keep_only(names)
+        self.hub.say(newer)
+
+    def _prepared_there(self, prepared: PreparedJob, revision: int) -> None:
+        assert self._loop is not None
+        self._loop.call_soon_threadsafe(self._prepared, prepared, revision)
+
+    def _prepared(self, prepared: PreparedJob, revision: int) -> None:
+        """Take what the contours of the job are called, once its drawing has been read."""
+        pairs = zip(prepared.names, tables_of(prepared), strict=True)
+        contours = [ContourName(name=name, index=index) for name, index in pairs]
+        interval = prepared.contours[0].candidates[0].dt if prepared.contours else 1.0
+        if (contours, interval) != (self._contours, self._interval):
+            self._contours, self._interval = contours, interval
+            self._say_job()
+
+    def _refused_there(self, error: InputError, revision: int) -> None:
+        assert self._loop is not None
+        self._loop.call_soon_threadsafe(self._refused, error, revision)
+
+    def _refused(self, error: InputError, revision: int) -> None:
+        """Take what is wrong with a job that its drawing and cell show."""
+        if revision == self.document.revision:
+            self._faults = faults_of(error, self.document.text)
+            self._say_job()
