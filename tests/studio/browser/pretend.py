@@ -32,7 +32,7 @@ class Pretend:
 
     def __init__(self, page, *, files=None):
         self.page, self.sent, self.socket, self.refusing = page, [], None, False
-        self.files = files or {}
+        self.files, self.tries = files or {}, 0
         self.elsewhere, self.errors = [], []
         page.on("console", lambda m: m.type in ("error", "warning") and self.errors.append(m.text))
         page.on("pageerror", lambda fault: self.errors.append(str(fault)))
@@ -60,6 +60,7 @@ class Pretend:
             route.fulfill(status=404, body=b"")
 
     def _connect(self, socket):
+        self.tries += 1
         if self.refusing:
             socket.close()
             return

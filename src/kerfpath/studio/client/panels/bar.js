@@ -153,21 +153,32 @@ export function foot(store, connection) {
  */
 export function notices(store, connection) {
   const host = byId("notices");
-  /** @type {{message: string, timer: number}[]} */
+  /** @typedef {{message: string, timer: number, row: HTMLElement}} Entry */
+  /** @type {Entry[]} */
   const errors = [];
   let wasOpen = false;
+  let broken = false;
+  const send = (/** @type {string} */ type) => () => void connection.send({ type });
+  const again = { class: "plain", onclick: () => connection.open() };
+  const lost = notice(true, "", el("button", again, "Try now"));
   store.on(["connection", "job"], draw);
   store.on(["error"], (error) => {
     if (errors.some(({ message }) => message === error.message)) return;
-    const entry = { message: error.message, timer: window.setTimeout(() => drop(entry), 12000) };
+    const close = { class: "tool", "aria-label": "Dismiss", onclick: () => drop(entry) };
+    /** @type {Entry} */
+    const entry = {
+      message: error.message,
+      timer: window.setTimeout(() => drop(entry), 12000),
+      row: notice(false, error.message, el("button", close, icon("close"))),
+    };
     errors.push(entry);
     if (errors.length > 3) drop(errors[0]);
     draw();
   });
-  window.setInterval(() => store.connection === "lost" && draw(), 1000);
+  window.setInterval(count, 500);
   draw();
 
-  /** @param {{message: string, timer: number}} entry */
+  /** @param {Entry} entry */
   function drop(entry) {
     clearTimeout(entry.timer);
     errors.splice(errors.indexOf(entry), 1);
@@ -177,48 +188,36 @@ export function notices(store, connection) {
   function draw() {
     if (store.connection === "open") wasOpen = true;
     const rows = [];
-    if (store.connection === "lost") {
-      const seconds = Math.max(1, Math.ceil(((store.retryAt ?? 0) - Date.now()) / 1000));
-      rows.push(
-        notice(
-          true,
-          wasOpen
-            ? `The studio's server has stopped or cannot be reached. Every change up to now is kept beside the job; start "kerfpath studio" again to go on. Next try in ${seconds} s.`
-            : `The studio's server does not answer. Next try in ${seconds} s.`,
-          el("button", { class: "plain", onclick: () => connection.open() }, "Try now"),
-        ),
-      );
+    if (store.connection !== "open" && lostOnce()) rows.push(lost);
+    for (const { key, message } of store.job?.faults ?? []) {
+      const undo = { class: "plain", disabled: !store.job?.undo, onclick: send("undo") };
+      const text = `${key.length ? `${key.join(".")}: ` : ""}${message}`;
+      rows.push(notice(true, text, el("button", undo, icon("undo"), "Undo")));
     }
-    for (const { key, message } of store.job?.faults ?? [])
-      rows.push(
-        notice(
-          true,
-          `${key.length ? `${key.join(".")}: ` : ""}${message}`,
-          el(
-            "button",
-            {
-              class: "plain",
-              disabled: !store.job?.undo,
-              onclick: () => void connection.send({ type: "undo" }),
-            },
-            icon("undo"),
-            "Undo",
-          ),
-        ),
-      );
-    for (const entry of errors)
-      rows.push(
-        notice(
-          false,
-          entry.message,
-          el(
-            "button",
-            { class: "tool", "aria-label": "Dismiss", onclick: () => drop(entry) },
-            icon("close"),
-          ),
-        ),
-      );
-    host.replaceChildren(...rows);
+    for (const entry of errors) rows.push(entry.row);
+    const same =
+      rows.length === host.children.length && rows.every((row, i) => row === host.children[i]);
+    if (!same) host.replaceChildren(...rows);
+    count();
+  }
+
+  /** Whether the connection has been lost since it was last there. */
+  function lostOnce() {
+    if (store.connection === "lost") broken = true;
+    return broken;
+  }
+
+  /** Count down to the next try. */
+  function count() {
+    if (store.connection === "open") broken = false;
+    if (!broken) return;
+    const seconds = Math.max(1, Math.ceil(((store.retryAt ?? 0) - Date.now()) / 1000));
+    const when = store.connection === "lost" ? `Next try in ${seconds} s.` : "Trying now.";
+    const text = wasOpen
+      ? `The studio's server has stopped or cannot be reached. Every change up to now is kept beside the job; start "kerfpath studio" again to go on. ${when}`
+      : `The studio's server does not answer. ${when}`;
+    const said = lost.querySelector("p");
+    if (said && said.textContent !== text) said.textContent = text;
   }
 }
 

@@ -84,6 +84,7 @@ export function sheets(store, connection) {
     );
     text.focus();
     text.setSelectionRange(0, 0);
+    text.scrollTop = 0;
   }
 
   /** @param {string} wanted */

@@ -11,6 +11,7 @@ import {
   Mesh,
   MeshBasicMaterial,
   MeshStandardMaterial,
+  Vector3,
 } from "three";
 
 import { themeColour } from "../dom.js";
@@ -154,6 +155,21 @@ export class Machine {
       group.matrixWorldNeedsUpdate = true;
     });
     return found[found.length - 1];
+  }
+
+  /** Return points all over the bodies, in the base: enough to see how far they reach. */
+  outline() {
+    this.group.updateMatrixWorld(true);
+    /** @type {Vector3[]} */
+    const found = [];
+    this.group.traverse((each) => {
+      if (!(each instanceof Mesh)) return;
+      const at = each.geometry.getAttribute("position");
+      const stride = Math.max(1, Math.floor(at.count / 600));
+      for (let i = 0; i < at.count; i += stride)
+        found.push(new Vector3().fromBufferAttribute(at, i).applyMatrix4(each.matrixWorld));
+    });
+    return found;
   }
 
   /**

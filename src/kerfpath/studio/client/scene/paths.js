@@ -30,7 +30,14 @@ const colourOfKind = (kind) =>
  * @param {object} [more]
  */
 function line(width, more = {}) {
-  const material = new LineMaterial({ linewidth: width, transparent: true, ...more });
+  // Nearer than the surface that they are drawn on; among lines the later is over the earlier.
+  const nearer = {
+    depthWrite: false,
+    polygonOffset: true,
+    polygonOffsetFactor: -2,
+    polygonOffsetUnits: -12,
+  };
+  const material = new LineMaterial({ linewidth: width, transparent: true, ...nearer, ...more });
   const made = new LineSegments2(new LineSegmentsGeometry(), material);
   made.frustumCulled = false;
   made.visible = false;
@@ -41,10 +48,10 @@ function line(width, more = {}) {
 export class Paths {
   constructor() {
     this.group = new Group();
-    this.all = line(2.2, { vertexColors: true });
-    this.chosen = line(7, { opacity: 0.5 });
+    this.all = line(2.6, { vertexColors: true });
+    this.chosen = line(8);
     this.through = line(1.6, { opacity: 0.35, depthTest: false });
-    this.kerf = line(3.4);
+    this.kerf = line(3.8);
     this.beam = line(2.6, { opacity: 0.9 });
     this.mark = line(7, { depthTest: false });
     this.chosen.renderOrder = this.through.renderOrder = 1;
@@ -68,7 +75,7 @@ export class Paths {
   paint() {
     const scale = textSize() / 13;
     for (const each of this.lines) each.material.linewidth = each.userData.width * scale;
-    this.chosen.material.color.set(themeColour("--accent"));
+    this.chosen.material.color.set(themeColour("--chosen"));
     this.through.material.color.set(themeColour("--accent"));
     this.kerf.material.color.set(themeColour("--kerf"));
     this.beam.material.color.set(themeColour("--beam"));
@@ -158,7 +165,7 @@ export class Paths {
       } else break;
     }
     this.kerf.geometry.instanceCount = shown;
-    this.kerf.visible = shown > 0;
+    this.kerf.visible = shown > 0 && this.by === "kind"; // else it would hide the values
   }
 
   /**

@@ -47,11 +47,10 @@ export class Stage {
     this.cost = 0;
     /** @type {GridHelper | null} */
     this.floor = null;
-    this.bounds = new Box3(new Vector3(-1, -1, 0), new Vector3(2, 1, 2));
     new ResizeObserver(() => this.resize()).observe(canvas);
     canvas.addEventListener("keydown", (event) => this.key(event));
     canvas.addEventListener("webglcontextrestored", () => this.invalidate());
-    this.look("fit", this.bounds);
+    this.look("fit", [new Vector3(-1, -1, 0), new Vector3(2, 1, 2)]);
     this.resize();
   }
 
@@ -110,11 +109,12 @@ export class Stage {
   }
 
   /**
-   * Look at a box from one of the views.
+   * Look at points from one of the views, as near as all of them stay in the picture.
    * @param {keyof typeof VIEWS | string} name
-   * @param {Box3} box
+   * @param {Vector3[]} points
    */
-  look(name, box) {
+  look(name, points) {
+    const box = new Box3().setFromPoints(points);
     const direction = (VIEWS[/** @type {keyof typeof VIEWS} */ (name)] ?? VIEWS.fit)
       .clone()
       .normalize();
@@ -122,18 +122,12 @@ export class Stage {
     this.camera.position.copy(middle).add(direction);
     this.camera.lookAt(middle);
     this.camera.updateMatrixWorld();
-    // As near as all corners of the box stay in the picture.
     const inverse = this.camera.matrixWorld.clone().setPosition(0, 0, 0).invert();
-    const up = Math.tan((this.camera.fov * Math.PI) / 360) * 0.94;
+    const up = Math.tan((this.camera.fov * Math.PI) / 360) * 0.88;
     const across = up * this.camera.aspect;
     let distance = 0.05;
-    for (let i = 0; i < 8; i++) {
-      const corner = new Vector3(
-        i & 1 ? box.max.x : box.min.x,
-        i & 2 ? box.max.y : box.min.y,
-        i & 4 ? box.max.z : box.min.z,
-      );
-      corner.sub(middle).applyMatrix4(inverse);
+    for (const point of points) {
+      const corner = point.clone().sub(middle).applyMatrix4(inverse);
       distance = Math.max(
         distance,
         corner.z + Math.abs(corner.x) / across,

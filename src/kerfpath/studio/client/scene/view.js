@@ -4,7 +4,7 @@ import { Box3, Vector3 } from "three";
 
 import { byId, el, icon } from "../dom.js";
 import { fixed, percent } from "../format.js";
-import { Machine, matrix } from "./machine.js";
+import { Machine } from "./machine.js";
 import { Paths } from "./paths.js";
 import { SCALE_GRADIENT } from "./scale.js";
 import { Stage } from "./stage.js";
@@ -33,6 +33,8 @@ export class SceneView {
     this.built = "";
     this.ready = false;
     this.follow = false;
+    /** @type {import("../timeline.js").Timeline | null} whose kerf is drawn */
+    this.prepared = null;
     this.trouble = "";
     /** @type {Vector3 | null} where the tip was that the camera follows */
     this.carried = null;
@@ -77,7 +79,7 @@ export class SceneView {
     by.addEventListener("change", () => {
       this.paths.colour(/** @type {import("./paths.js").ColourBy} */ (by.value));
       this.scale();
-      this.stage.invalidate();
+      this.show(this.player.moment);
     });
   }
 
@@ -138,7 +140,6 @@ export class SceneView {
       if (!found.length) tracks.push({ contour, plan: null, points, kind });
     }
     this.paths.load(tracks);
-    this.paths.prepare(this.player.timeline);
     this.paths.choose(this.store.selected);
     this.scale();
     this.stage.invalidate();
@@ -156,6 +157,10 @@ export class SceneView {
   show(moment) {
     const { scene } = this.store;
     if (!scene || !this.ready) return;
+    if (this.prepared !== this.player.timeline) {
+      this.prepared = this.player.timeline;
+      this.paths.prepare(this.prepared);
+    }
     const q = moment?.q ?? scene.sample.q;
     const tip = this.machine.pose(scene.robot, q);
     const cutting = moment?.span.kind === "cut" || moment?.span.kind === "pierce";
@@ -184,30 +189,27 @@ export class SceneView {
     this.stage.invalidate();
   }
 
-  /** @param {string} view */
+  /** @param {string} view  "fit", "part", "top", ..., "head", or "mark", where no path goes on */
   look(view) {
-    const { scene } = this.store;
-    if (!scene) return;
-    const box = new Box3();
-    const shapes = scene.contours;
-    for (const { points } of shapes)
-      for (let i = 0; i < points.length; i += 3)
-        box.expandByPoint(new Vector3(points[i], points[i + 1], points[i + 2]));
-    const marked = this.store.nopaths.get(this.store.selected ?? "")?.point;
-    if (view === "head" || (view === "mark" && marked)) {
-      const { moment } = this.player;
-      const tip = this.machine.pose(scene.robot, moment?.q ?? scene.sample.q);
-      const at = new Vector3(tip[3], tip[7], tip[11]);
-      if (view === "head") this.carried = at.clone();
-      else at.fromArray(marked ?? []);
-      this.stage.look("part", new Box3().setFromCenterAndSize(at, new Vector3(0.35, 0.35, 0.35)));
+    const { scene, nopaths, selected } = this.store;
+    if (!scene || !this.ready) return;
+    const { moment } = this.player;
+    const tip = this.machine.pose(scene.robot, moment?.q ?? scene.sample.q);
+    const head = [tip[3], tip[7], tip[11]];
+    const mark = nopaths.get(selected ?? "")?.point;
+    if (view === "head") this.carried = new Vector3().fromArray(head);
+    if (view === "head" || (view === "mark" && mark)) {
+      const at = new Vector3().fromArray((view === "mark" && mark) || head);
+      const around = [-1, 1].map((sign) => at.clone().addScalar(0.16 * sign));
+      this.stage.look("part", around);
       return;
     }
-    if (view !== "part") {
-      this.machine.group.updateMatrixWorld(true);
-      box.union(new Box3().setFromObject(this.machine.group));
-    }
-    if (!box.isEmpty()) this.stage.look(view, box);
+    /** @type {Vector3[]} */
+    const points = [];
+    for (const { points: xyz } of scene.contours)
+      for (let i = 0; i < xyz.length; i += 3) points.push(new Vector3().fromArray(xyz, i));
+    if (view !== "part") points.push(...this.machine.outline());
+    if (points.length) this.stage.look(view, points);
   }
 
   /**
@@ -261,8 +263,9 @@ export class SceneView {
       return el("span", { class: "chip" }, chip, text);
     };
     const kinds = new Set(this.paths.tracks.flatMap(({ plan, kind }) => (plan ? kind : [])));
-    const shown = [key("--kerf", "cut so far")];
+    const shown = [];
     if (by === "kind") {
+      shown.push(key("--kerf", "cut so far"));
       if ([...kinds].some((kind) => kind.startsWith("lead"))) shown.unshift(key("--lead", "lead"));
       if ([...kinds].some((kind) => kind !== "cut" && !kind.startsWith("lead")))
         shown.unshift(key("--other", "other"));
@@ -326,5 +329,3 @@ export class SceneView {
     this.stage.invalidate();
   }
 }
-
-export { matrix };

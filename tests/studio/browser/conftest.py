@@ -1,0 +1,83 @@
+"""A real browser, and pages in it, served by the pretended server."""
+
+import json
+import struct
+
+import pytest
+
+from browser import CHROMIUM
+from studio.browser.pretend import SAMPLE, Pretend
+
+SWITCHES = [
+    *("--no-sandbox", "--no-first-run", "--disable-background-networking", "--disable-sync"),
+    *("--use-gl=angle", "--use-angle=swiftshader", "--enable-unsafe-swiftshader"),
+    "--ignore-gpu-blocklist",
+]
+# A tetrahedron of 0.2 m stands in for every mesh.
+CORNERS = [(0, 0, 0), (0.2, 0, 0), (0, 0.2, 0), (0, 0, 0.2)]
+FACES = [(0, 2, 1), (0, 1, 3), (1, 2, 3), (0, 3, 2)]
+MESH = (
+    struct.pack("<2I", len(CORNERS), len(FACES))
+    + b"".join(struct.pack("<3f", *corner) for corner in CORNERS)
+    + b"".join(struct.pack("<3I", *face) for face in FACES)
+)
+
+
+@pytest.fixture(scope="session")
+def chromium():
+    if not CHROMIUM.exists():
+        pytest.skip("needs the Chromium browser at /usr/bin/chromium")
+    from playwright.sync_api import sync_playwright
+
+    with sync_playwright() as playwright:
+        browser = playwright.chromium.launch(executable_path=CHROMIUM, args=SWITCHES)
+        yield browser
+        browser.close()
+
+
+@pytest.fixture
+def page(chromium, request):
+    """A page of its own; a test asks for another size or theme by indirect parameters."""
+    theme, width, height = getattr(request, "param", ("light", 1280, 720))
+    context = chromium.new_context(
+        viewport={"width": width, "height": height}, color_scheme=theme, accept_downloads=True
+    )
+    context.set_default_timeout(30_000)
+    yield context.new_page()
+    context.close()
+
+
+@pytest.fixture(scope="session")
+def messages():
+    """What the server says of two contours of the demo, by type."""
+    found = {}
+    for message in json.loads(SAMPLE.read_text()):
+        found.setdefault(message["type"], []).append(message)
+    return found
+
+
+@pytest.fixture
+def first(messages):
+    """The messages that greet a page once everything is planned."""
+    names = [contour["name"] for contour in messages["scene"][0]["contours"]]
+    job = messages["job"][0]
+    job = job | {"contours": [each for each in job["contours"] if each["name"] in names]}
+    kinds = ("scene", "plan", "program", "outcome", "progress")
+    return [job, *(message for kind in kinds for message in messages[kind])]
+
+
+@pytest.fixture
+def studio(page, messages):
+    """The pretended server of a page; after the test nothing may have gone wrong in the page."""
+    meshes = {f"mesh/{body['mesh']}": MESH for body in messages["scene"][0]["bodies"]}
+    server = Pretend(page, files=meshes)
+    (known,) = messages["map"]
+
+    def react(message):
+        if message["type"] == "map" and message["contour"] == known["contour"]:
+            server.say(known)
+
+    server.react = react
+    yield server
+    assert server.errors == []
+    assert server.elsewhere == []
