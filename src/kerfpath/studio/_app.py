@@ -38,6 +38,10 @@ KINDS = {
 """The kinds of files of the page that are served, by their suffixes."""
 LONGEST = 12_000_000
 """Bytes of a message: a job of the largest size, quoted."""
+MOST_SAID = 300
+"""Characters of what is said of a message that was not understood."""
+NO_TEXT = 1003
+"""Code by which a connection is closed that sends anything but text."""
 REPORT_POLICY = (
     "sandbox allow-scripts allow-downloads; default-src 'none'; script-src 'unsafe-inline'; "
     "style-src 'unsafe-inline'; img-src data: blob:; font-src data:"
@@ -100,10 +104,13 @@ async def _client(request: Request) -> Response:
 
 def _own_file(name: str) -> Response:
     """Return a file of the page, and no other file of this machine."""
+    none = PlainTextResponse("there is no such file\n", status_code=404)
+    if "\0" in name:
+        return none
     place = (CLIENT / name).resolve()
     kind = KINDS.get(place.suffix)
     if kind is None or not place.is_relative_to(CLIENT.resolve()) or not place.is_file():
-        return PlainTextResponse("there is no such file\n", status_code=404)
+        return none
     return FileResponse(place, media_type=kind, headers={"cache-control": "no-cache"})
 
 
@@ -158,19 +165,21 @@ async def _socket(socket: WebSocket) -> None:
     page = session.hub.open()
     sending = asyncio.create_task(_send(socket, page))
     try:
-        while True:
-            text = await socket.receive_text()
+        while (received := await socket.receive())["type"] == "websocket.receive":
+            text = received.get("text")
+            if text is None:
+                await socket.close(NO_TEXT, "expected text")
+                break
             try:
                 ask = parse(text)
             except ValidationError as error:
                 page.say(ErrorMessage(message=_not_understood(error)))
                 continue
             await session.hear(ask, page)
-    except (WebSocketDisconnect, KeyError):  # KeyError: bytes in place of a text
-        pass
     finally:
         session.hub.close(page)
         sending.cancel()
+        # Where the page has gone in the middle of a message, that is all there is to say.
         with suppress(asyncio.CancelledError, WebSocketDisconnect, RuntimeError):
             await sending
 
@@ -183,5 +192,7 @@ async def _send(socket: WebSocket, page: Page) -> None:
 def _not_understood(error: ValidationError) -> str:
     """Say in one line what was wrong with a message, nothing of it quoted."""
     first = error.errors(include_url=False, include_input=False)[0]
-    where = ".".join(str(part) for part in first["loc"])
-    return f"a message was not understood: {where + ': ' if where else ''}{first['msg']}"[:300]
+    if first["type"].startswith("union_tag"):
+        return "a message was not understood: there is none of its type"
+    where = "".join(f"{part}: " for part in first["loc"])
+    return f"a message was not understood: {where}{first['msg']}"[:MOST_SAID]

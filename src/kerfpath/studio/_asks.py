@@ -35,9 +35,8 @@ class _Strict(BaseModel):
 
 Words = Annotated[str, Field(max_length=MOST_WORDS)]
 Index = Annotated[int, Field(ge=0, lt=1_000_000)]
-Path = Annotated[
-    tuple[Words | Index, ...], Field(min_length=1, max_length=MOST_KEYS, strict=False)
-]
+Path = Annotated[tuple[Words | Index, ...], Field(min_length=1, max_length=MOST_KEYS, strict=False)]
+
 
 class Edit(_Strict):
     """Set one key of the job; null removes it."""

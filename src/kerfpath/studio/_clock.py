@@ -16,7 +16,8 @@ from kerfpath.job import CutResult, JobResult
 from kerfpath.plans import Plan
 from kerfpath.post import JointMove, LinearMove, Program, Wait, timetable
 from kerfpath.robots import Robot
-from kerfpath.studio._messages import Cycle, ProgramMessage, Segment, flat
+from kerfpath.studio._messages import Cycle, ProgramMessage, Segment
+from kerfpath.studio._numbers import flat
 
 __all__ = ["cycle_of", "program_message"]
 
@@ -116,7 +117,9 @@ def _segments(program: Program, cuts: Sequence[CutResult]) -> Iterator[Segment]:
                 yield rest.model_copy(update=whose)
             elif isinstance(step, JointMove):
                 if end > begin:
-                    yield _stretch("move", begin, end, *_from_stop_to_stop(robot, here, step.q, end - begin))
+                    yield _stretch(
+                        "move", begin, end, *_from_stop_to_stop(robot, here, step.q, end - begin)
+                    )
                 here = step.q
             elif step is into or step is out:
                 kind: Literal["approach", "retract"] = "approach" if step is into else "retract"

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-
 from kerfpath.errors import NoFeasiblePath
 from kerfpath.job import PreparedJob, fastest_along
 from kerfpath.planner import at_most

@@ -11,7 +11,6 @@ from starlette.datastructures import Headers, MutableHeaders
 from starlette.responses import PlainTextResponse, RedirectResponse
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
-
 __all__ = ["LOOPBACK", "POLICY", "Guard"]
 
 LOOPBACK = ("127.0.0.1", "localhost", "[::1]")

@@ -5,7 +5,7 @@ from __future__ import annotations
 import asyncio
 from collections import OrderedDict
 
-from kerfpath.studio._messages import Message
+from kerfpath.studio._numbers import Message
 
 __all__ = ["Hub", "Page"]
 

@@ -14,7 +14,8 @@ from kerfpath.job import Job, JobFile
 from kerfpath.post import languages
 from kerfpath.robots import Robot
 from kerfpath.studio._document import Document
-from kerfpath.studio._messages import ContourName, Fault, JobMessage, flat
+from kerfpath.studio._messages import ContourName, Fault, JobMessage
+from kerfpath.studio._numbers import flat
 
 __all__ = ["faults_of", "job_message"]
 

@@ -8,22 +8,20 @@ from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
 from kerfpath.contour import Contour
 from kerfpath.job import CutRequest, Job
 
 __all__ = ["PROVING", "cut_key", "graph_key", "motion_key", "part_key", "setup_key"]
 
-LIGHT = frozenset(
-    "weights eta_velocity eta_acceleration metric objective method feed refine interruptions "
-    "least_piece_mm certify certify_gap_percent certify_seconds certificate".split()
-)
-"""Keys of [plan] that neither the nodes nor the layered graph depend on."""
-GRAPH = frozenset("gamma_step_deg frames tilt_deg tilt_steps posture".split())
-"""Keys of [plan] that the layered graph depends on."""
-PROVING = frozenset("certify certify_gap_percent certify_seconds certificate".split())
+PROVING = frozenset(("certify", "certify_gap_percent", "certify_seconds", "certificate"))
 """Keys of [plan] that say what is proved of a motion that is found."""
+LIGHT = PROVING | {
+    "weights", "eta_velocity", "eta_acceleration", "metric", "objective", "method", "feed",
+    "refine", "interruptions", "least_piece_mm",
+}  # fmt: skip
+"""Keys of [plan] that neither the nodes nor the layered graph depend on."""
+GRAPH = frozenset(["gamma_step_deg", "frames", "tilt_deg", "tilt_steps", "posture"])
+"""Keys of [plan] that the layered graph depends on."""
 
 
 def part_key(job: Job) -> str:
@@ -63,7 +61,7 @@ def graph_key(job: Job, nodes: Contour) -> str:
         arrays.append(nodes.x)
     digest = hashlib.sha256()
     for array in arrays:
-        digest.update(np.ascontiguousarray(array))
+        digest.update(array.tobytes())
     kept = [plan, tables, nodes.closed, options.retract, options.floor]
     return _digest(kept, digest.hexdigest(), _stamps(job))
 

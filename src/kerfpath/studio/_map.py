@@ -15,7 +15,8 @@ from kerfpath.job import Job
 from kerfpath.losses import Loss, Reason
 from kerfpath.plans import Plan
 from kerfpath.robots import posture_name
-from kerfpath.studio._messages import CodeLayer, CourseEntry, MapMessage, PoseMessage, flat
+from kerfpath.studio._messages import CodeLayer, CourseEntry, MapMessage, PoseMessage
+from kerfpath.studio._numbers import flat
 
 __all__ = ["map_id", "map_message", "pose_message"]
 
@@ -38,7 +39,7 @@ def map_id(graph: LayeredGraph) -> str:
     """Return the id of a graph's map: the same for the same map."""
     digest = hashlib.sha256("\n".join(graph.reasons).encode())
     digest.update(np.array(graph.reason.shape).tobytes() + graph.gamma.tobytes())
-    digest.update(np.ascontiguousarray(graph.reason))
+    digest.update(graph.reason.tobytes())
     return digest.hexdigest()[:16]
 
 
@@ -78,7 +79,7 @@ def map_message(
             CodeLayer(
                 posture=mu,
                 name=posture_name(mu),
-                codes=base64.b64encode(np.ascontiguousarray(codes[:, :, mu])).decode(),
+                codes=base64.b64encode(codes[:, :, mu].tobytes()).decode(),
             )
             for mu in shown_postures(graph)
         ],

@@ -4,9 +4,7 @@ from __future__ import annotations
 
 from typing import Literal
 
-import numpy as np
-from numpy.typing import ArrayLike
-from pydantic import BaseModel, ConfigDict
+from kerfpath.studio._numbers import Message, Numbers
 
 __all__ = [
     "BodyEntry",
@@ -27,10 +25,8 @@ __all__ = [
     "JointEntry",
     "LossEntry",
     "MapMessage",
-    "Message",
     "NearestEntry",
     "NoPathMessage",
-    "Numbers",
     "Option",
     "OutcomeMessage",
     "PlanMessage",
@@ -42,28 +38,7 @@ __all__ = [
     "SampleEntry",
     "SceneMessage",
     "Segment",
-    "flat",
 ]
-
-Numbers = list[float | None]
-"""Numbers in a message; null for infinity."""
-
-
-def flat(values: ArrayLike, digits: int = 9) -> Numbers:
-    """Return numbers in one row, row-major; None for what is not finite.
-
-    They are rounded to `digits` places, a nanometre or less, so that they are short.
-    """
-    row = np.round(np.asarray(values, dtype=np.float64).ravel(), digits)
-    if np.isfinite(row).all():
-        return row.tolist()
-    return [value if np.isfinite(value) else None for value in row.tolist()]
-
-
-class Message(BaseModel):
-    """What the server says, one line of JSON each; README.md has what the keys mean."""
-
-    model_config = ConfigDict(extra="forbid", frozen=True)
 
 
 class ContourName(Message):

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from kerfpath.studio._messages import Message, NoPathMessage, PlanMessage
+from kerfpath.studio._messages import NoPathMessage, PlanMessage
+from kerfpath.studio._numbers import Message
 
 __all__ = ["Newer"]
 

@@ -19,8 +19,8 @@ from kerfpath.studio._messages import (
     NoPathMessage,
     Option,
     PlanMessage,
-    flat,
 )
+from kerfpath.studio._numbers import flat
 
 __all__ = ["check_entries", "no_path_message", "plan_message"]
 

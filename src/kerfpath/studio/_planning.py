@@ -15,7 +15,8 @@ from kerfpath.studio._clock import cycle_of, program_message
 from kerfpath.studio._exports import exports_of
 from kerfpath.studio._fastest import fastest_message
 from kerfpath.studio._keys import motion_key, setup_key
-from kerfpath.studio._messages import ErrorMessage, Message, OutcomeMessage, ProgressMessage
+from kerfpath.studio._messages import ErrorMessage, OutcomeMessage, ProgressMessage
+from kerfpath.studio._numbers import Message
 from kerfpath.studio._run import Run, drafts_of
 from kerfpath.studio._scene import Meshes, scene_of, tables_of
 from kerfpath.studio._work import Newest, Stop
@@ -111,9 +112,7 @@ class Planning:
         for each in (self._drafts, self._runs, self._speeds):
             each.close()
 
-    def _draft(
-        self, job: Job, revision: int, contour: str, hurry: Event, stop: Stop
-    ) -> None:
+    def _draft(self, job: Job, revision: int, contour: str, hurry: Event, stop: Stop) -> None:
         """Say a motion near the one before, if there is one."""
         key, plans = self._before
         found = drafts_of(job, self.cuts[contour][0], plans[contour], revision)
@@ -131,9 +130,7 @@ class Planning:
         cell = None if self.prepared is None else self.prepared.cell
         return cell is None or bool(cell.clear_through(made.unwrapped))
 
-    def _run(
-        self, job: Job, revision: int, first: str | None, hurry: Event, stop: Stop
-    ) -> None:
+    def _run(self, job: Job, revision: int, first: str | None, hurry: Event, stop: Stop) -> None:
         """Plan a job from its drawing to what is proved of its plans."""
         waited = 0.0
         while waited < PATIENCE and not hurry.is_set():

@@ -25,7 +25,8 @@ from kerfpath.studio._bench import Bench
 from kerfpath.studio._clock import program_message
 from kerfpath.studio._keys import PROVING, cut_key
 from kerfpath.studio._map import map_id
-from kerfpath.studio._messages import Message, PlanMessage, ProgressMessage
+from kerfpath.studio._messages import PlanMessage, ProgressMessage
+from kerfpath.studio._numbers import Message
 from kerfpath.studio._plan_entry import no_path_message, plan_message
 from kerfpath.studio._scene import tables_of
 from kerfpath.studio._ways import ways_of

@@ -20,8 +20,8 @@ from kerfpath.studio._messages import (
     RobotEntry,
     SampleEntry,
     SceneMessage,
-    flat,
 )
+from kerfpath.studio._numbers import flat
 
 __all__ = ["Meshes", "scene_of"]
 

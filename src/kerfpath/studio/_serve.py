@@ -6,7 +6,7 @@ import secrets
 import socket
 import webbrowser
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from threading import Thread
 
@@ -22,9 +22,7 @@ HERE = ("127.0.0.1", "localhost", "::1")
 """Addresses that only this machine can reach."""
 
 
-def serve(
-    path: Path, *, host: str, port: int, browser: bool, show: Callable[[str], None]
-) -> None:
+def serve(path: Path, *, host: str, port: int, browser: bool, show: Callable[[str], None]) -> None:
     """Serve one job until the process is stopped.
 
     Parameters
@@ -101,10 +99,8 @@ def _names_of_machine() -> list[str]:
     """Return by what names others may ask for this machine."""
     own = socket.gethostname()
     found = {own, socket.getfqdn()}
-    try:
+    with suppress(OSError):
         found |= {str(entry[4][0]) for entry in socket.getaddrinfo(own, None)}
-    except OSError:
-        pass
     return [_in_url(name) for name in sorted(found)]
 
 

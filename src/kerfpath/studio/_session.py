@@ -18,12 +18,12 @@ from kerfpath.studio._messages import (
     ContourName,
     ErrorMessage,
     Fault,
-    Message,
     NoPathMessage,
     PlanMessage,
     SceneMessage,
 )
 from kerfpath.studio._newer import Newer
+from kerfpath.studio._numbers import Message
 from kerfpath.studio._planning import Planning
 from kerfpath.studio._scene import tables_of
 

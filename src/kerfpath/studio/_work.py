@@ -10,7 +10,7 @@ from time import monotonic
 __all__ = ["Newest", "Seldom", "Stop", "Superseded"]
 
 
-class Superseded(Exception):  # noqa: N818  # it says what has happened, and is no error
+class Superseded(Exception):  # it says what has happened, and is no error
     """Raised inside work that nobody waits for any more."""
 
 
