@@ -7,6 +7,7 @@ DEMO_OUT ?= demo-out
 
 demo: .venv/run.stamp
 	$(BIN)/kerfpath demo --out $(DEMO_OUT)
+	@echo 'To see it cut and to change it, in the browser: $(BIN)/kerfpath studio'
 
 test: .venv/dev.stamp
 	$(BIN)/pytest -n auto --dist worksteal
@@ -51,7 +52,7 @@ lock: .venv/tools.stamp
 	$(LOCK) requirements/build.in -o requirements/build.txt
 	$(LOCK) requirements/outside.in -o requirements/outside.txt
 	$(LOCK) --extra dev pyproject.toml -c requirements/build.txt -o requirements/dev.txt
-	$(LOCK) pyproject.toml -c requirements/dev.txt -o requirements/run.txt
+	$(LOCK) --extra studio pyproject.toml -c requirements/dev.txt -o requirements/run.txt
 	$(LOCK) --extra bench pyproject.toml -c requirements/dev.txt -o requirements/bench.txt
 
 clean:
