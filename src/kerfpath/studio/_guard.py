@@ -3,8 +3,12 @@
 from __future__ import annotations
 
 import hmac
+import re
+from base64 import b64encode
 from collections.abc import Iterable
+from hashlib import sha256
 from http.cookies import CookieError, SimpleCookie
+from pathlib import Path
 from urllib.parse import parse_qs
 
 from starlette.datastructures import Headers, MutableHeaders
@@ -15,12 +19,22 @@ __all__ = ["LOOPBACK", "POLICY", "Guard"]
 
 LOOPBACK = ("127.0.0.1", "localhost", "[::1]")
 """Names of this machine for itself."""
+PAGE = Path(__file__).parent / "client" / "index.html"
+
+
+def _import_map(page: bytes) -> str:
+    """Return the hash of the import map of a page, its one script that is in line."""
+    (text,) = re.findall(rb'<script type="importmap">(.*?)</script>', page, re.DOTALL)
+    return f"'sha256-{b64encode(sha256(text).digest()).decode()}'"
+
+
 POLICY = (
-    "default-src 'none'; script-src 'self'; style-src 'self'; img-src 'self' data: blob:; "
+    f"default-src 'none'; script-src 'self' {_import_map(PAGE.read_bytes())}; "
+    "style-src 'self'; img-src 'self' data: blob:; "
     "font-src 'self'; connect-src 'self'; media-src blob:; worker-src 'self'; base-uri 'none'; "
     "form-action 'none'; frame-ancestors 'none'"
 )
-"""What a page may load: what this server serves, nothing inline and nothing evaluated."""
+"""What a page may load: what this server serves, nothing else inline and nothing evaluated."""
 HEADERS = {
     "content-security-policy": POLICY,
     "x-content-type-options": "nosniff",

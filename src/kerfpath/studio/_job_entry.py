@@ -6,7 +6,6 @@ import re
 from functools import cache
 from typing import Any, get_args
 
-import numpy as np
 from pydantic import BaseModel
 
 from kerfpath.errors import InputError
@@ -48,8 +47,6 @@ def job_message(
     weights = None
     if job is not None:
         weights = 1 / (job.robot.speed_limits()[0] * interval)
-        if job.options.weights is not None:
-            weights = np.asarray(job.options.weights)
     return JobMessage(
         revision=document.revision,
         name=document.path.name,
