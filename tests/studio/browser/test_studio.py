@@ -1,0 +1,224 @@
+"""The studio as a whole: a browser on one side, the server with its planner on the other."""
+
+import re
+import shutil
+import subprocess
+import sys
+import tomllib
+from pathlib import Path
+
+import pytest
+
+from jobs import DEMO, SMALL
+from studio.browser.test_page import serious, until
+
+# Two small contours of the shipped example, of which nothing is proved: that takes seconds.
+JOB = SMALL.replace("[plan]", "[plan]\ncertify = false")
+
+
+class Server:
+    """`kerfpath studio` in a process of its own, as a user starts it."""
+
+    def __init__(self, job, port=0):
+        command = [sys.executable, "-m", "kerfpath", "studio", str(job), "--no-browser"]
+        self.process = subprocess.Popen(
+            [*command, "--port", str(port)],
+            stdout=subprocess.PIPE,
+            stderr=subprocess.STDOUT,
+            text=True,
+        )
+        line = self.process.stdout.readline()
+        found = re.search(r"http://127\.0\.0\.1:(\d+)/", line)
+        assert found, line
+        self.url, self.port = found[0], int(found[1])
+
+    def stop(self):
+        self.process.terminate()
+        self.process.wait(timeout=30)
+        self.process.stdout.close()
+
+
+@pytest.fixture(scope="module")
+def job(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("job")
+    shutil.copy(DEMO / "b_pillar.step", folder)
+    path = folder / "holes.toml"
+    path.write_text(JOB)
+    return path
+
+
+@pytest.fixture(scope="module")
+def servers(job):
+    """The server of this module, in a list, so that a test may put another one in its place."""
+    running = [Server(job)]
+    yield running
+    running[0].stop()
+
+
+@pytest.fixture
+def server(servers):
+    return servers[0]
+
+
+@pytest.fixture
+def opened(page, server):
+    """A page on the studio with everything planned; nothing may go wrong in it."""
+    wrong, elsewhere = [], []
+    page.on("console", lambda m: m.type in ("error", "warning") and wrong.append(m.text))
+    page.on("pageerror", lambda fault: wrong.append(str(fault)))
+    page.on("request", lambda r: r.url.startswith(server.url) or elsewhere.append(r.url))
+    page.goto(server.url)
+    settled(page)
+    before = page.evaluate(REVISION)
+    if page.evaluate("() => studio.store.job.text") != JOB:  # what another test has left
+        page.evaluate("(text) => studio.connection.send({ type: 'text', text })", JOB)
+        settled(page, before)
+    yield page
+    assert wrong == []
+    assert elsewhere == []
+
+
+NEWEST = """() => {
+    if (!window.studio) return false;
+    const { job, plans, nopaths, progress } = studio.store;
+    if (!job || progress.busy || !studio.view.ready) return false;
+    const found = [...plans.values()].flat().concat([...nopaths.values()]);
+    return found.length > 0 && found.every((each) => each.revision >= job.revision);
+}"""
+REVISION = "() => window.studio?.store.job?.revision ?? 0"
+COURSE = "() => studio.store.plans.get(studio.store.selected)?.[0].gamma ?? null"
+
+
+def settled(page, after=-1):
+    """Wait until all of the newest job is planned, and it is newer than a revision."""
+    until(page, lambda: page.evaluate(REVISION) > after and page.evaluate(NEWEST), seconds=240)
+
+
+def cost(page):
+    return float(page.locator("#cost").inner_text())
+
+
+def drag(page, slider, share):
+    """Move a slider to a share of its way, as a hand does; return the revision before."""
+    before = page.evaluate(REVISION)
+    box = page.locator(slider).bounding_box()
+    y = box["y"] + box["height"] / 2
+    page.mouse.move(box["x"] + box["width"] / 2, y)
+    page.mouse.down()
+    page.mouse.move(box["x"] + share * box["width"], y, steps=4)
+    page.mouse.up()
+    return before
+
+
+@pytest.mark.slow
+def test_a_job_is_planned_and_shown(opened):
+    page = opened
+    assert page.locator("#file").inner_text() == "holes.toml"
+    assert page.locator("#contours button").count() == 2
+    assert cost(page) > 0
+    until(page, lambda: page.locator("#legend li").count() > 0)
+    scene = page.evaluate("() => studio.store.scene")
+    assert {body["kind"] for body in scene["bodies"]} >= {"robot", "head", "part"}
+    assert page.evaluate("() => studio.view.stage.renderer.info.render.calls") <= 60
+    assert serious(page) == []
+
+
+@pytest.mark.slow
+def test_a_slider_changes_cost_and_course_and_undo_brings_them_back(opened):
+    page = opened
+    first, course = cost(page), page.evaluate(COURSE)
+    settled(page, drag(page, "#weight-6", 0.9))
+    assert cost(page) != first
+    assert page.evaluate(COURSE) != course
+    assert page.locator("#saved").inner_text().startswith("changed")
+    before = page.evaluate(REVISION)
+    page.locator("#undo").click()
+    settled(page, before)
+    # One drag is one step: the job is again as it was opened.
+    assert page.locator("#saved").inner_text() == "saved"
+    assert cost(page) == pytest.approx(first, rel=1e-3)  # four digits are shown
+    assert page.evaluate(COURSE) == pytest.approx(course, abs=1e-6)  # sent to 1e-9
+    before = page.evaluate(REVISION)
+    page.keyboard.press("Control+Shift+Z")
+    settled(page, before)
+    assert cost(page) != first
+
+
+@pytest.mark.slow
+def test_playing_shows_the_program_and_a_click_on_the_map_goes_there(opened):
+    page = opened
+    until(page, lambda: page.evaluate("() => studio.player.timeline.whole"))
+    pose = "() => studio.view.machine.frames.map((frame) => [...frame.matrix.elements])"
+    before = page.evaluate(pose)
+    page.locator("#toggle").click()
+    until(page, lambda: page.evaluate(pose) != before)
+    page.locator("#toggle").click()
+    box = page.locator("#map-canvas").bounding_box()
+    page.mouse.click(box["x"] + 0.6 * box["width"], box["y"] + 0.4 * box["height"])
+    span = page.evaluate("() => studio.player.moment.span.kind")
+    assert span == "cut"
+
+
+@pytest.mark.slow
+def test_without_a_path_a_relaxation_makes_one(opened):
+    page = opened
+    before = page.evaluate(REVISION)
+    field = page.locator("#speed-number")
+    field.fill("90")
+    field.press("Enter")
+    page.get_by_text("No feasible path").wait_for(timeout=240_000)
+    settled(page, before)
+    remedy = page.locator(".remedy").first
+    remedy.wait_for(timeout=240_000)
+    before = page.evaluate(REVISION)
+    remedy.click()
+    until(page, lambda: page.evaluate(REVISION) > before)
+    page.locator("#cost").wait_for(timeout=240_000)
+    assert cost(page) > 0
+
+
+@pytest.mark.slow
+def test_files_are_exported_with_their_comments(opened, tmp_path):
+    page = opened
+    before = page.evaluate(REVISION)
+    field = page.locator("#speed-number")
+    field.fill("2.5")
+    field.press("Enter")
+    settled(page, before)
+    page.locator("#export").click()
+    with page.expect_download() as download:
+        page.locator("#export-menu a[href*='export/job']").click()
+    text = Path(download.value.path()).read_text()
+    assert "# assumed: the maker publishes none" in text
+    assert tomllib.loads(text)["contour"][0]["speed_m_min"] == 2.5
+    page.locator("#export").click()
+    with page.expect_download() as download:
+        page.locator("#export-menu a[href*='export/program']").click()
+    assert "MODULE" in Path(download.value.path()).read_text(errors="replace")
+    page.locator("#open-program").click()
+    page.locator("dialog pre", has_text="MODULE").wait_for()
+
+
+@pytest.mark.slow
+def test_two_pages_see_the_same_and_a_new_server_finds_the_work(opened, servers, job, chromium):
+    page = opened
+    context = chromium.new_context(viewport={"width": 1280, "height": 720})
+    other = context.new_page()
+    other.goto(servers[0].url)
+    settled(other)
+    before = drag(page, "#weight-6", 0.85)
+    settled(page, before)
+    settled(other, before)
+    assert cost(other) == cost(page)
+    shown = cost(page)
+    context.close()
+    page.reload()
+    settled(page)
+    assert cost(page) == shown
+    page.goto("about:blank")  # its messages about a server that is gone would be faults
+    servers[0].stop()
+    servers[0] = Server(job, servers[0].port)
+    page.goto(servers[0].url)
+    settled(page)
+    assert cost(page) == pytest.approx(shown, rel=1e-3)  # four digits are shown
+    assert page.locator("#saved").inner_text().startswith("changed")
