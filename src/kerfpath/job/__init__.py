@@ -1,8 +1,8 @@
 """The job: one file that says what to cut and how, its run, and the files the run leaves."""
 
 from kerfpath.job.format import VARIABLES as VARIABLES
-from kerfpath.job.format import ContourSpec as ContourSpec
 from kerfpath.job.format import Candidate as Candidate
+from kerfpath.job.format import ContourSpec as ContourSpec
 from kerfpath.job.format import CutRequest as CutRequest
 from kerfpath.job.format import Goal as Goal
 from kerfpath.job.format import Job as Job
@@ -10,6 +10,7 @@ from kerfpath.job.format import JobFile as JobFile
 from kerfpath.job.format import PreparedJob as PreparedJob
 from kerfpath.job.format import ProgramOptions as ProgramOptions
 from kerfpath.job.format import ProgramTable as ProgramTable
+from kerfpath.job.format import all_of as all_of
 from kerfpath.job.format import cell_of_job as cell_of_job
 from kerfpath.job.format import pose as pose
 from kerfpath.job.format import prepare as prepare

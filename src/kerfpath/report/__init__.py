@@ -9,7 +9,7 @@ from kerfpath.report._layout_entry import LayoutEntry
 from kerfpath.report._look import reason_colours
 from kerfpath.report._map import feasibility_map, hidden_postures, shown_postures
 from kerfpath.report._page import render
-from kerfpath.report._section import ContourSection
+from kerfpath.report._section import ContourSection, add_clearance
 from kerfpath.report._table_page import render_table
 
 __all__ = [
@@ -18,6 +18,7 @@ __all__ = [
     "FrontAxis",
     "FrontPlan",
     "LayoutEntry",
+    "add_clearance",
     "feasibility_map",
     "hidden_postures",
     "reason_colours",

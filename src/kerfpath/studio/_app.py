@@ -132,9 +132,10 @@ async def _export(request: Request) -> Response:
     if name not in ("program", "plan.json", "trajectory.csv"):
         return PlainTextResponse("there is nothing of this name\n", status_code=404)
     try:
-        result, texts = await session.texts(language if name == "program" else None)
         if name == "program":
+            result, texts = await session.texts(language)
             return _download(zipped(result.job.program.name, texts))
+        _, texts = await session.texts(proved=True)
     except KerfpathError as error:
         return PlainTextResponse(f"{error}\n", status_code=409)
     kind = "application/json" if name == "plan.json" else "text/csv"
@@ -144,7 +145,7 @@ async def _export(request: Request) -> Response:
 async def _report(request: Request) -> Response:
     session: Session = request.app.state.session
     try:
-        _, texts = await session.texts(None)
+        _, texts = await session.texts(proved=True)
     except KerfpathError as error:
         return PlainTextResponse(f"{error}\n", status_code=409)
     own = {"content-security-policy": REPORT_POLICY, "cache-control": "no-store"}

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import OrderedDict
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from threading import Lock
 from typing import Generic, TypeVar
@@ -16,45 +16,65 @@ from kerfpath.studio._keys import graph_key, part_key, setup_key
 
 __all__ = ["Bench", "Kept"]
 
-MOST_VERTICES = 4_000_000
-"""Vertices of all graphs that are kept together: some 300 MB of an arm with six joints."""
+MOST_VERTICES = 3_000_000
+"""Vertices of the graphs that are kept beyond those of the last two runs: some 200 MB."""
 _T = TypeVar("_T")
 
 
+class _Used(Generic[_T]):
+    """A thing that is kept, and the round in which it was asked for last."""
+
+    def __init__(self, thing: _T, last: int) -> None:
+        self.thing, self.last = thing, last
+
+
 class Kept(Generic[_T]):
-    """Things by their keys, of which those not asked for longest are let go of.
+    """Things by their keys; where they are many, those of early rounds are let go of.
+
+    What the round that is on or the one before has asked for is kept in any case: a run asks for
+    the same things one after the other, and would find none of them if the eldest went.
 
     Parameters
     ----------
     size : callable
         Of one of them.
     most : int
-        Of all together; the newest is kept whatever its size.
+        Of all together, beyond which the eldest go.
     """
 
     def __init__(self, size: Callable[[_T], int], most: int) -> None:
-        self._size, self._most, self._lock = size, most, Lock()
-        self._things: OrderedDict[str, _T] = OrderedDict()
+        self._size, self._most, self._lock, self._round = size, most, Lock(), 0
+        self._things: OrderedDict[str, _Used[_T]] = OrderedDict()
 
     def __len__(self) -> int:
         return len(self._things)
 
+    def begin(self) -> None:
+        """Begin a round."""
+        with self._lock:
+            self._round += 1
+
     def get(self, key: str) -> _T | None:
         """Return a thing that is kept."""
         with self._lock:
-            if key in self._things:
-                self._things.move_to_end(key)
-            return self._things.get(key)
+            found = self._things.get(key)
+            if found is None:
+                return None
+            found.last = self._round
+            self._things.move_to_end(key)
+            return found.thing
 
     def put(self, key: str, thing: _T) -> None:
         """Keep a thing."""
         with self._lock:
-            self._things[key] = thing
+            self._things[key] = _Used(thing, self._round)
             self._things.move_to_end(key)
-            total = sum(map(self._size, self._things.values()))
-            while total > self._most and len(self._things) > 1:
-                _, gone = self._things.popitem(last=False)
-                total -= self._size(gone)
+            total = sum(self._size(used.thing) for used in self._things.values())
+            while total > self._most:
+                eldest = next(iter(self._things))
+                if self._things[eldest].last >= self._round - 1:
+                    break
+                total -= self._size(self._things.pop(eldest).thing)
 
 
 class Bench:
@@ -68,6 +88,11 @@ class Bench:
         """What came of contours, by `cut_key` and candidate."""
         self.proved: Kept[CutResult] = Kept(lambda cut: len(cut.graph.q), MOST_VERTICES)
         """The same with their bounds."""
+
+    def begin(self) -> None:
+        """Begin a run: what the ones before the last have used may go."""
+        for kept in (self._graphs, self.cuts, self.proved):
+            kept.begin()
 
     def prepared(self, job: Job) -> PreparedJob:
         """Return a job with its drawing and cell read, of which what has not changed is kept.
@@ -107,6 +132,14 @@ class Bench:
             found = job.graph(nodes, progress=solved)
             self._graphs.put(key, found)
         return found
+
+    def whole(self, job: Job, cuts: Sequence[CutResult]) -> tuple[Contour, LayeredGraph]:
+        """Return the nodes and the graph of a contour, of which cuts are pieces or which is one."""
+        one = cuts[0]
+        if len(cuts) == 1:
+            return one.candidate.nodes, one.graph
+        nodes = one.request.candidates[0].nodes
+        return nodes, self.graph(job, nodes, lambda count: None)
 
 
 def _vertices(cuts: tuple[CutResult, ...]) -> int:

@@ -20,7 +20,10 @@ from kerfpath.job import (
 from kerfpath.post import languages
 from kerfpath.studio._messages import Export, FileEntry, ProgramTextMessage
 
-__all__ = ["File", "exports_of", "in_language", "program_text", "zipped"]
+__all__ = ["WAIT", "File", "exports_of", "in_language", "program_text", "zipped"]
+
+
+WAIT = "what is proved of the plans is still to come"
 
 
 class File(NamedTuple):
@@ -31,25 +34,27 @@ class File(NamedTuple):
     content: bytes
 
 
-def exports_of(result: JobResult | None) -> list[Export]:
-    """Return what can be taken along of a result, and why the rest cannot; None: of none."""
-    no_plan = "" if result is not None and result.plans else "no contour has a plan yet"
-    if result is None:
-        program = "not planned yet"
-    elif not result.passed:
+def exports_of(result: JobResult, *, settled: bool) -> list[Export]:
+    """Return what can be taken along of a result, and why the rest cannot.
+
+    Parameters
+    ----------
+    result : JobResult
+    settled : bool
+        Whether nothing more is to be proved of its plans.
+    """
+    program = ""
+    if not result.passed:
         program = "a contour has no plan that passes its audit, or no way leads to the next one"
     elif result.job.program.language == "none":
         program = 'the job asks for none: language = "none" in [program]; ask for one by name'
-    else:
-        program = ""
+    files = "" if settled else WAIT
     return [
         Export(name="job", href="/export/job", ready=True),
         Export(name="program", href="/export/program", ready=not program, why=program),
-        Export(name="plan.json", href="/export/plan.json", ready=not no_plan, why=no_plan),
-        Export(
-            name="trajectory.csv", href="/export/trajectory.csv", ready=not no_plan, why=no_plan
-        ),
-        Export(name="report", href="/report", ready=result is not None, why=""),
+        Export(name="plan.json", href="/export/plan.json", ready=settled, why=files),
+        Export(name="trajectory.csv", href="/export/trajectory.csv", ready=settled, why=files),
+        Export(name="report", href="/report", ready=settled, why=files),
     ]
 
 

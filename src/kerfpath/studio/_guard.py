@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 import hmac
 import re
 from base64 import b64encode
@@ -64,8 +65,9 @@ class Guard:
 
     def __init__(self, app: ASGIApp, *, hosts: Iterable[str], token: str | None) -> None:
         self._app, self._hosts, self._token = app, frozenset(hosts), token
-        port = next(iter(self._hosts)).rpartition(":")[2]
-        self._cookie = f"kerfpath-studio-{port}"
+        # Cookies know no ports: each server has one of its own.
+        own = "" if token is None else hashlib.sha256(token.encode()).hexdigest()[:8]
+        self._cookie = f"kerfpath-studio-{own}"
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         """Serve a request, or refuse it."""

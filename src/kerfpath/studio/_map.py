@@ -11,9 +11,8 @@ import numpy as np
 from kerfpath._arrays import Array
 from kerfpath.contour import Contour
 from kerfpath.graph import LayeredGraph
-from kerfpath.job import Job
+from kerfpath.job import CutResult, Job
 from kerfpath.losses import Loss, Reason
-from kerfpath.plans import Plan
 from kerfpath.robots import posture_name
 from kerfpath.studio._messages import CodeLayer, CourseEntry, MapMessage, PoseMessage
 from kerfpath.studio._numbers import flat
@@ -44,31 +43,30 @@ def map_id(graph: LayeredGraph) -> str:
 
 
 def map_message(
-    contour: str,
-    nodes: Contour,
-    graph: LayeredGraph,
-    plans: Sequence[Plan],
-    *,
-    revision: int,
+    cuts: Sequence[CutResult], nodes: Contour, graph: LayeredGraph, *, revision: int
 ) -> MapMessage:
     """Return the map of a contour with the course of its plans, as the report draws it.
 
     Parameters
     ----------
-    contour : str
+    cuts : sequence of CutResult
+        What came of the contour, or of its pieces.
     nodes : Contour
     graph : LayeredGraph
-    plans : sequence of Plan
-        Its plan, or those of its pieces.
+        Of the whole of it.
     revision : int
+        Of the job.
     """
-    from kerfpath.report import hidden_postures, reason_colours, shown_postures
+    from kerfpath.report import add_clearance, hidden_postures, reason_colours, shown_postures
 
-    codes, first = graph.reason_by_gamma, float(nodes.s[0])
+    name, clearance, first = map_id(graph), cuts[0].clearance, float(nodes.s[0])
+    if clearance is not None and len(clearance.clear) == len(graph.q):
+        graph = add_clearance(graph, clearance)
+    codes = graph.reason_by_gamma
     return MapMessage(
         revision=revision,
-        contour=contour,
-        graph=map_id(graph),
+        contour=cuts[0].contour,
+        graph=name,
         s=flat(nodes.s - first),
         gamma=flat(graph.gamma),
         nodes=len(nodes),
@@ -86,12 +84,13 @@ def map_message(
         hidden=hidden_postures(graph),
         course=[
             CourseEntry(
-                name=made.name,
-                s=flat(made.contour.s - first),
-                gamma=flat(made.gamma),
-                posture=made.posture.tolist(),
+                name=cut.plan.name,
+                s=flat(cut.plan.contour.s - first),
+                gamma=flat(cut.plan.gamma),
+                posture=cut.plan.posture.tolist(),
             )
-            for made in plans
+            for cut in cuts
+            if cut.plan is not None
         ],
     )
 

@@ -6,9 +6,21 @@ import logging
 from collections.abc import Callable
 from functools import partial
 from threading import Event
+from typing import NamedTuple
 
+from kerfpath.contour import Contour
 from kerfpath.errors import InputError, KerfpathError
-from kerfpath.job import CutResult, Job, JobResult, PreparedJob, is_compiled, warm_up
+from kerfpath.graph import LayeredGraph
+from kerfpath.job import (
+    CutResult,
+    Job,
+    JobResult,
+    PreparedJob,
+    all_of,
+    foresee,
+    is_compiled,
+    warm_up,
+)
 from kerfpath.plans import Plan
 from kerfpath.studio._bench import Bench
 from kerfpath.studio._clock import cycle_of, program_message
@@ -21,11 +33,19 @@ from kerfpath.studio._run import Run, drafts_of
 from kerfpath.studio._scene import Meshes, scene_of, tables_of
 from kerfpath.studio._work import Newest, Stop
 
-__all__ = ["Planning"]
+__all__ = ["Outcome", "Planning"]
 
 PATIENCE = 0.3
 """s: where a draft shows what a change does, a run begins once nothing has changed for so long."""
 log = logging.getLogger("kerfpath.studio")
+
+
+class Outcome(NamedTuple):
+    """What a revision of the job comes to, and whether nothing more is to be proved of it."""
+
+    revision: int
+    result: JobResult
+    settled: bool
 
 
 class Planning:
@@ -46,8 +66,8 @@ class Planning:
         Those of the scene.
     cuts : dict of str to tuple of CutResult
         What came of each contour, by its name.
-    result : JobResult or None
-        What the newest job comes to, as far as it is known.
+    result : Outcome or None
+        What the job that was planned last comes to.
     """
 
     def __init__(
@@ -63,11 +83,11 @@ class Planning:
         self._speeds = Newest("speed", self._failed)
         self._before: tuple[str, dict[str, Plan]] = ("", {})
         """What drafts begin from: the motions of contours, and what they share."""
-        self._scene = ""
-        self.meshes = Meshes()
+        self._scene, self._looked = "", ""
+        self.meshes = self._shown = Meshes()
         self.prepared: PreparedJob | None = None
         self.cuts: dict[str, tuple[CutResult, ...]] = {}
-        self.result: JobResult | None = None
+        self.result: Outcome | None = None
 
     def take(self, job: Job, revision: int, first: str | None) -> None:
         """Plan a job in place of any other, one of its contours first."""
@@ -78,6 +98,21 @@ class Planning:
             self._drafts.cancel()
             hurry.set()
         self._runs.ask(partial(self._run, job, revision, first, hurry))
+
+    def whole(
+        self, contour: str
+    ) -> tuple[PreparedJob, tuple[CutResult, ...], Contour, LayeredGraph]:
+        """Return what came of a contour, with the nodes and the graph of the whole of it.
+
+        Raises
+        ------
+        InputError
+            It is not planned yet.
+        """
+        cuts, prepared = self.cuts.get(contour), self.prepared
+        if cuts is None or prepared is None:
+            raise InputError(f"contour {contour!r:.60} is not planned yet; wait until it is")
+        return prepared, cuts, *self._bench.whole(prepared.job, cuts)
 
     def fastest(self, contour: str, revision: int) -> None:
         """Look for the fastest speed of a contour.
@@ -144,7 +179,8 @@ class Planning:
             self._say(ProgressMessage(busy=False))
             return
         stop.check()
-        self.prepared, self.result = prepared, None
+        self._bench.begin()
+        self.prepared = prepared
         self._show_scene(prepared, revision)
         self._ready(prepared, revision)
         if not is_compiled():
@@ -152,12 +188,26 @@ class Planning:
             warm_up()
         run = Run(self._bench, prepared, revision, self._say, stop)
         tried = run.contours(first, partial(self._took, motion_key(job)))
-        result = run.ordered(tried)
-        self.result = result
-        self._say(_outcome(result, revision))
-        self.result = run.settled(result, first)
-        self._say(_outcome(self.result, revision))
+        self._look_ahead(prepared, revision, run)
+        self._settle(run.ordered(tried), revision, settled=False)
+        assert self.result is not None
+        self._settle(run.settled(self.result.result, first), revision, settled=True)
         self._say(ProgressMessage(busy=False))
+
+    def _settle(self, result: JobResult, revision: int, *, settled: bool) -> None:
+        """Keep and say what a revision comes to."""
+        self.result = Outcome(revision, result, settled)
+        self._say(_outcome(result, revision, settled=settled))
+
+    def _look_ahead(self, prepared: PreparedJob, revision: int, run: Run) -> None:
+        """Say what forbids a program whatever the plans are, once for each job."""
+        setup = setup_key(prepared.job)
+        if setup == self._looked:
+            return
+        run.progress("whether there can be a program", 0, 0)
+        if found := foresee(prepared):
+            self._refused(all_of(found), revision)
+        self._looked = setup
 
     def _took(self, key: str, contour: str, cuts: tuple[CutResult, ...]) -> None:
         """Keep what came of a contour."""
@@ -176,10 +226,10 @@ class Planning:
         if setup == self._scene:
             return
         message, meshes = scene_of(prepared, revision)
-        self.meshes = Meshes({**self.meshes, **meshes})
+        # A page may still ask for what stood there before.
+        self.meshes = Meshes({**self._shown, **meshes})
+        self._shown, self._scene = meshes, setup
         self._say(message)
-        self.meshes = meshes
-        self._scene = setup
         known = set(prepared.names)
         self.cuts = {name: cuts for name, cuts in self.cuts.items() if name in known}
 
@@ -194,14 +244,14 @@ class Planning:
         self._say(ProgressMessage(busy=False))
 
 
-def _outcome(result: JobResult, revision: int) -> OutcomeMessage:
+def _outcome(result: JobResult, revision: int, *, settled: bool) -> OutcomeMessage:
     """Return what a run comes to."""
     notes = [] if result.stuck is None else [f"The moves between contours: {result.stuck}"]
     notes += [f"The moves between contours: {c.issue()}" for c in result.air if not c.ok]
     return OutcomeMessage(
         revision=revision,
         passed=result.passed,
-        exports=exports_of(result),
+        exports=exports_of(result, settled=settled),
         cycle=cycle_of(program_message(result, revision)),
         notes=notes,
     )

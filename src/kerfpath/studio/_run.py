@@ -129,7 +129,7 @@ class Run:
                 self._broken(cuts[i], settled=True)
             elif cuts[i].request.options.certify is not None:
                 cuts[i] = self._proved(cuts[i])
-                self._plan(cuts[i], _pieces(cuts, cuts[i]), settled=True)
+                self._plan(cuts[i], _of_same(cuts, cuts[i]), settled=True)
         self._stop.check()
         return measured(self._prepared, result.with_cuts(tuple(cuts)))
 
@@ -165,17 +165,18 @@ class Run:
                 self._broken(cut, settled=False)
             else:
                 done = cut.request.options.certify is None
-                self._plan(cut, _pieces(cuts, cut), settled=done)
+                self._plan(cut, _of_same(cuts, cut), settled=done)
 
-    def _plan(self, cut: CutResult, pieces: int, *, settled: bool) -> None:
+    def _plan(self, cut: CutResult, pieces: Sequence[CutResult], *, settled: bool) -> None:
         assert cut.plan is not None
+        _, graph = self._bench.whole(self._prepared.job, pieces)
         self._say(
             plan_message(
                 cut,
                 cut.plan,
                 revision=self._revision,
-                graph=map_id(cut.graph),
-                pieces=pieces,
+                graph=map_id(graph),
+                pieces=len(pieces),
                 settled=settled,
                 audited=True,
                 seconds=self._seconds.get(cut.contour, 0.0),
@@ -195,8 +196,9 @@ class Run:
         )
 
 
-def _pieces(cuts: Sequence[CutResult], cut: CutResult) -> int:
-    return sum(other.contour == cut.contour for other in cuts)
+def _of_same(cuts: Sequence[CutResult], cut: CutResult) -> list[CutResult]:
+    """Return the cuts of one contour."""
+    return [other for other in cuts if other.contour == cut.contour]
 
 
 def drafts_of(

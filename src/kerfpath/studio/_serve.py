@@ -21,6 +21,9 @@ __all__ = ["serve"]
 HERE = ("127.0.0.1", "localhost", "::1")
 """Addresses that only this machine can reach."""
 
+WITHOUT_PORT = 80
+"""The port that addresses do not say."""
+
 
 def serve(path: Path, *, host: str, port: int, browser: bool, show: Callable[[str], None]) -> None:
     """Serve one job until the process is stopped.
@@ -48,7 +51,9 @@ def serve(path: Path, *, host: str, port: int, browser: bool, show: Callable[[st
     alone = host in HERE
     names = LOOPBACK if alone else (*LOOPBACK, _in_url(host), *_names_of_machine())
     token = None if alone else secrets.token_urlsafe(24)
-    app = application(path, hosts=[f"{name}:{number}" for name in names], token=token)
+    hosts = [f"{name}:{number}" for name in names]
+    hosts += names if number == WITHOUT_PORT else ()
+    app = application(path, hosts=hosts, token=token)
     config = uvicorn.Config(
         app,
         log_level="warning",

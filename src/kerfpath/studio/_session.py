@@ -10,7 +10,7 @@ from kerfpath.errors import InputError, KerfpathError
 from kerfpath.job import FileTexts, Job, JobResult, PreparedJob, read_job, result_texts
 from kerfpath.studio._asks import Ask, Edit, OfContour, Plain, ReasonOf, Relax, Save, Text, TextOf
 from kerfpath.studio._document import Change, Document
-from kerfpath.studio._exports import in_language, program_text
+from kerfpath.studio._exports import WAIT, in_language, program_text
 from kerfpath.studio._hub import Hub, Page
 from kerfpath.studio._job_entry import faults_of, job_message
 from kerfpath.studio._map import map_message, pose_message
@@ -76,11 +76,6 @@ class Session:
         """The meshes of the scene, by their ids."""
         return self._planning.meshes
 
-    @property
-    def result(self) -> JobResult | None:
-        """What the newest job comes to, as far as it is known."""
-        return self._planning.result
-
     async def hear(self, ask: Ask, page: Page) -> None:
         """Do what a page asks for; an error is an answer."""
         try:
@@ -88,19 +83,24 @@ class Session:
         except KerfpathError as error:
             page.say(ErrorMessage(message=str(error), about=ask.type))
 
-    async def texts(self, language: str | None) -> tuple[JobResult, FileTexts]:
-        """Return the result, its program in a language, and the files of both.
+    async def texts(
+        self, language: str | None = None, *, proved: bool = False
+    ) -> tuple[JobResult, FileTexts]:
+        """Return what the job comes to, its program in a language, and the files of both.
 
         Raises
         ------
         InputError
-            Nothing is planned yet, an unknown language.
+            The job as it is now is not planned yet, or what is `proved` of it is still to come; an
+            unknown language.
         """
-        planned = self.result
-        if planned is None:
-            raise InputError("the job is not planned yet; wait until it is")
-        result = in_language(planned, language)
-        if language is None and self._texts is not None and self._texts[0] is result:
+        planned = self._planning.result
+        if planned is None or planned.revision != self.document.revision:
+            raise InputError("the job as it is now is not planned yet; wait until it is")
+        if proved and not planned.settled:
+            raise InputError(f"{WAIT}; wait for it")
+        result = in_language(planned.result, language)
+        if self._texts is not None and self._texts[0] is result:
             return self._texts
         files = await asyncio.to_thread(result_texts, result)
         if language is None:
@@ -153,19 +153,11 @@ class Session:
         self._change([(tuple(one.path), one.value) for one in ways[ask.index].edits])
 
     def _map(self, contour: str) -> Message:
-        cuts = self._planning.cuts.get(contour)
-        if cuts is None:
-            raise InputError(f"contour {contour!r:.60} is not planned yet; wait until it is")
-        whole, graph = cuts[0].request.candidates[0].nodes, cuts[0].graph
-        nodes = whole if len(graph.reason) == len(whole) else cuts[0].candidate.nodes
-        plans = [cut.plan for cut in cuts if cut.plan is not None]
-        return map_message(contour, nodes, graph, plans, revision=self.document.revision)
+        _, cuts, nodes, graph = self._planning.whole(contour)
+        return map_message(cuts, nodes, graph, revision=self.document.revision)
 
     def _pose(self, ask: ReasonOf) -> Message:
-        cuts, prepared = self._planning.cuts.get(ask.contour), self._planning.prepared
-        if cuts is None or prepared is None:
-            raise InputError(f"contour {ask.contour!r:.60} is not planned yet; wait until it is")
-        nodes, graph = cuts[0].candidate.nodes, cuts[0].graph
+        prepared, _, nodes, graph = self._planning.whole(ask.contour)
         K, _, postures = graph.reason.shape
         if not (ask.node < K and ask.posture < postures):
             raise InputError(
