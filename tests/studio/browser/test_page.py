@@ -160,7 +160,9 @@ def test_a_fault_of_the_job_and_an_error_are_said(page, studio, first):
         {"type": "error", "message": "the file has changed since it was read", "about": "save"}
     )
     page.get_by_text("the file has changed since it was read").wait_for()
-    page.get_by_role("button", name="Dismiss").click()
+    page.get_by_role("button", name="Save over it").click()
+    until(page, lambda: sent(studio, "save"))
+    assert sent(studio, "save") == [{"type": "save", "over": True}]
     assert page.get_by_text("the file has changed since it was read").count() == 0
     assert serious(page) == []
 
@@ -242,7 +244,7 @@ def test_what_is_out_of_date_is_marked_until_its_plan_comes(page, studio, first,
     studio.say(first[0] | {"revision": 2})
     studio.say({"type": "progress", "busy": True, "label": "planning slot", "done": 0, "total": 2})
     page.locator(".result.stale").wait_for()
-    assert page.get_by_text("planning again").first.is_visible()
+    assert page.locator(".badge", has_text="planning again").is_visible()
     page.get_by_role("button", name="Cancel").click()
     until(page, lambda: sent(studio, "cancel"))
     plan = messages["plan"][0]

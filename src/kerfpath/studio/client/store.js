@@ -39,6 +39,8 @@ export class Store {
     this.plans = new Map();
     /** @type {Map<string, PlanMessage[]>} by contour, what held before its last change */
     this.before = new Map();
+    /** @type {WeakMap<PlanMessage, string>} what each plan was asked for */
+    this.asked = new WeakMap();
     /** @type {Map<string, NoPathMessage>} */
     this.nopaths = new Map();
     /** @type {Map<string, MapMessage>} */
@@ -146,8 +148,9 @@ export class Store {
   /** @param {PlanMessage} plan */
   takePlan(plan) {
     const held = this.plans.get(plan.contour) ?? [];
+    this.asked.set(plan, this.question(plan));
     if (held.length && held[0].revision < plan.revision) {
-      this.before.set(plan.contour, held);
+      this.remember(plan.contour, held);
       this.plans.set(plan.contour, [plan]);
     } else {
       const others = held.filter((each) => each.name !== plan.name);
@@ -159,10 +162,39 @@ export class Store {
     this.nopaths.delete(plan.contour);
   }
 
+  /**
+   * Keep what held before a change, to compare; of a drag the motion before it, not its drafts.
+   * @param {string} contour
+   * @param {PlanMessage[]} held
+   */
+  remember(contour, held) {
+    if (held.every(({ passed }) => passed !== null) || !this.before.has(contour))
+      this.before.set(contour, held);
+  }
+
+  /**
+   * What a plan was asked for, as far as it decides what its cost means.
+   * @param {PlanMessage} plan
+   */
+  question(plan) {
+    const { metric, objective } = this.job?.values?.plan ?? {};
+    return `${metric} ${objective} ${plan.weights.map((weight) => weight.toPrecision(6))}`;
+  }
+
+  /**
+   * Whether the costs of a contour now and before are of the same kind.
+   * @param {string} contour
+   */
+  comparable(contour) {
+    const both = [this.plans.get(contour)?.[0], this.before.get(contour)?.[0]];
+    const [now, before] = both.map((plan) => plan && this.asked.get(plan));
+    return now !== undefined && now === before;
+  }
+
   /** @param {NoPathMessage} answer */
   takeNoPath(answer) {
     const held = this.plans.get(answer.contour);
-    if (held) this.before.set(answer.contour, held);
+    if (held) this.remember(answer.contour, held);
     this.plans.delete(answer.contour);
     this.nopaths.set(answer.contour, answer);
     this.emit("plan", answer);

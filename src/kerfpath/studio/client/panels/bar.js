@@ -165,11 +165,17 @@ export function notices(store, connection) {
   store.on(["error"], (error) => {
     if (errors.some(({ message }) => message === error.message)) return;
     const close = { class: "tool", "aria-label": "Dismiss", onclick: () => drop(entry) };
+    const force = () => {
+      connection.send({ type: "save", over: true });
+      drop(entry);
+    };
+    const conflict = error.about === "save" && error.message.includes("changed since");
+    const over = conflict ? [el("button", { class: "plain", onclick: force }, "Save over it")] : [];
     /** @type {Entry} */
     const entry = {
       message: error.message,
       timer: window.setTimeout(() => drop(entry), 12000),
-      row: notice(false, error.message, el("button", close, icon("close"))),
+      row: notice(false, error.message, ...over, el("button", close, icon("close"))),
     };
     errors.push(entry);
     if (errors.length > 3) drop(errors[0]);
@@ -224,7 +230,13 @@ export function notices(store, connection) {
 /**
  * @param {boolean} bad
  * @param {string} text
- * @param {HTMLElement} button
+ * @param {...HTMLElement} buttons
  */
-const notice = (bad, text, button) =>
-  el("div", { class: `notice ${bad ? "bad" : ""}` }, icon("warning"), el("p", {}, text), button);
+const notice = (bad, text, ...buttons) =>
+  el(
+    "div",
+    { class: `notice ${bad ? "bad" : ""}` },
+    icon("warning"),
+    el("p", {}, text),
+    ...buttons,
+  );

@@ -23,7 +23,10 @@ export function standing(store, name) {
       ? { dot: "busy", words: plans ? "planning again" : "planning" }
       : { dot: "open", words: plans ? "out of date" : "not planned" };
   if (plans.some((plan) => plan.passed === false)) return { dot: "warn", words: "fails its audit" };
-  if (plans.some((plan) => plan.passed === null)) return { dot: "done", words: "planned" };
+  if (plans.some((plan) => plan.passed === null))
+    return store.progress.busy
+      ? { dot: "busy", words: "being refined" }
+      : { dot: "done", words: "planned" };
   return { dot: "done", words: "audited" };
 }
 

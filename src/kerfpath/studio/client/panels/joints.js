@@ -109,6 +109,7 @@ export function jointsPanel(store, connection) {
     const given = /** @type {number[] | null} */ (job?.values?.plan?.weights ?? null);
     usual.disabled = disabled || !given;
     const plans = (selected && store.plans.get(selected)) || [];
+    const held = (selected && store.before.get(selected)) || [];
     table.classList.toggle(
       "stale",
       plans.some((plan) => store.stale(plan)),
@@ -119,8 +120,8 @@ export function jointsPanel(store, connection) {
         `${digits((given ?? base)[j], 3)} per rad`,
         disabled,
       );
-      const moved = plans.reduce((sum, { criteria }) => sum + criteria.displacement[j], 0);
-      moves.textContent = plans.length ? fixed(deg(moved), 1) : "";
+      const moved = total(plans, j);
+      moves.replaceChildren(...(plans.length ? amount(deg(moved), deg(total(held, j))) : []));
       for (const [i, name] of /** @type {const} */ ([
         "peak_velocity",
         "peak_acceleration",
@@ -130,6 +131,31 @@ export function jointsPanel(store, connection) {
         );
     });
   }
+}
+
+/**
+ * @param {PlanMessage[]} plans
+ * @param {number} joint
+ */
+const total = (plans, joint) =>
+  plans.reduce((sum, { criteria }) => sum + criteria.displacement[joint], 0);
+
+/**
+ * Return how far a joint moves, with an arrow where that is more or less than before.
+ * @param {number} now  deg
+ * @param {number} before  deg, 0: not known
+ */
+function amount(now, before) {
+  const text = fixed(now, 1);
+  if (!before || Math.abs(now - before) < 0.02 * before) return [text];
+  const more = now > before;
+  const said = `${more ? "more" : "less"} than before: ${fixed(before, 1)} deg`;
+  const arrow = el(
+    "span",
+    { class: more ? "up" : "down", title: said },
+    more ? "\u25b4" : "\u25be",
+  );
+  return [text, arrow, el("span", { class: "unseen" }, said)];
 }
 
 /** Return a cell with a share of a limit, as a number and as a bar. */

@@ -47,6 +47,10 @@ export function optionsPanel(store, connection) {
     "Find the fastest",
   );
   const answer = el("div", { class: "answer", "aria-live": "polite" });
+  const posture = el("select", {
+    id: "posture",
+    onchange: () => send(["plan", "posture"], posture.value || null, gesture()),
+  });
   const shared = el("p", { class: "quiet small" });
   const etas = /** @type {const} */ ([
     ["eta_velocity", "Speed limits used"],
@@ -83,6 +87,7 @@ export function optionsPanel(store, connection) {
       { class: "card" },
       el("h2", {}, "What is best"),
       ...choices.map(({ field }) => field.element),
+      el("div", { class: "field row" }, el("label", { for: "posture" }, "Posture"), posture),
       ...etas.map(({ field }) => field.element),
     ),
   );
@@ -128,6 +133,7 @@ export function optionsPanel(store, connection) {
     fastest.disabled = disabled || looking;
     for (const { key, field } of etas)
       field.show(100 * (values?.plan?.[key] ?? 1), { disabled, fault: faultOf(`plan.${key}`) });
+    drawPosture(disabled);
     for (const { key, field } of choices) {
       const words = job?.choices[`plan.${key}`] ?? [];
       field.show(
@@ -136,6 +142,20 @@ export function optionsPanel(store, connection) {
         disabled,
       );
     }
+  }
+
+  /** @param {boolean} disabled */
+  function drawPosture(disabled) {
+    const { job } = store;
+    const held = job?.values?.plan?.posture ?? "";
+    const words = job?.choices["plan.posture"] ?? (held ? [held] : []);
+    const key = [held, ...words].join(" ");
+    posture.disabled = disabled;
+    if (posture.dataset.key === key) return;
+    posture.dataset.key = key;
+    const one = (/** @type {string} */ value, /** @type {string} */ text) =>
+      el("option", { value, selected: value === held }, text);
+    posture.replaceChildren(one("", "any"), ...words.map((word) => one(word, word)));
   }
 
   function find() {

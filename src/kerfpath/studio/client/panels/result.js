@@ -83,7 +83,7 @@ export function resultPanel(store, connection, view) {
     const held = store.before.get(plans[0].contour) ?? [];
     const before = held.reduce((sum, plan) => sum + plan.cost, 0);
     const seconds = plans.reduce((sum, { time }) => sum + time[time.length - 1], 0);
-    const changed = held.length ? change(cost, before) : "";
+    const changed = store.comparable(plans[0].contour) ? change(cost, before) : "";
     const worse = cost > before;
     return [
       el(
