@@ -21,6 +21,8 @@ __all__ = ["serve"]
 HERE = ("127.0.0.1", "localhost", "::1")
 """Addresses that only this machine can reach."""
 
+EVERYWHERE = ("0.0.0.0", "::")
+"""Addresses at which every one of this machine is listened at."""
 WITHOUT_PORT = 80
 """The port that addresses do not say."""
 
@@ -46,33 +48,32 @@ def serve(path: Path, *, host: str, port: int, browser: bool, show: Callable[[st
     InputError
         The job cannot be read; the port is in use or the address is not of this machine.
     """
-    listener = _listener(host, port)
-    number = listener.getsockname()[1]
-    alone = host in HERE
-    names = LOOPBACK if alone else (*LOOPBACK, _in_url(host), *_names_of_machine())
-    token = None if alone else secrets.token_urlsafe(24)
-    hosts = [f"{name}:{number}" for name in names]
-    hosts += names if number == WITHOUT_PORT else ()
-    app = application(path, hosts=hosts, token=token)
-    config = uvicorn.Config(
-        app,
-        log_level="warning",
-        lifespan="on",
-        ws="websockets-sansio",
-        ws_max_size=LONGEST,
-        ws_per_message_deflate=False,
-        server_header=False,
-        timeout_graceful_shutdown=1,
-    )
-    reached = socket.gethostname() if host in ("0.0.0.0", "::") else host
-    address = f"http://{_in_url(reached)}:{number}/"
-    if token is not None:
-        address += f"?token={token}"
-    show(address)
-    if browser:
-        # The listener is there: the browser waits for the rest.
-        Thread(target=webbrowser.open, args=(address,), daemon=True).start()
-    _Server(config).run(sockets=[listener])
+    with _listener(host, port) as listener:
+        number = listener.getsockname()[1]
+        alone = host in HERE
+        token = None if alone else secrets.token_urlsafe(24)
+        names = LOOPBACK if alone else (*LOOPBACK, _in_url(host), *_names_of_machine())
+        hosts = [f"{name}:{number}" for name in names]
+        hosts += names if number == WITHOUT_PORT else ()
+        config = uvicorn.Config(
+            application(path, hosts=hosts, token=token),
+            log_level="warning",
+            lifespan="on",
+            ws="websockets-sansio",
+            ws_max_size=LONGEST,
+            ws_per_message_deflate=False,
+            server_header=False,
+            timeout_graceful_shutdown=1,
+        )
+        reached = socket.gethostname() if host in EVERYWHERE else host
+        address = f"http://{_in_url(reached)}:{number}/"
+        if token is not None:
+            address += f"?token={token}"
+        show(address)
+        if browser:
+            # The listener is there: the browser waits for the rest.
+            Thread(target=webbrowser.open, args=(address,), daemon=True).start()
+        _Server(config).run(sockets=[listener])
 
 
 class _Server(uvicorn.Server):

@@ -1,0 +1,97 @@
+"""`kerfpath studio`: a job in the browser, as a process of its own."""
+
+import re
+import signal
+import socket
+import subprocess
+import sys
+import urllib.request
+
+import pytest
+
+from commands import assert_refused, run
+from studio.talk import write_job
+
+
+@pytest.fixture
+def started(tmp_path):
+    """Start the command, and return its process and the address that it prints."""
+    processes = []
+
+    def start(*arguments):
+        command = [sys.executable, "-m", "kerfpath", "studio", *map(str, arguments)]
+        process = subprocess.Popen(
+            [*command, "--no-browser"], stdout=subprocess.PIPE, stderr=subprocess.PIPE,
+            text=True, cwd=tmp_path,
+        )  # fmt: skip
+        processes.append(process)
+        line = process.stdout.readline()
+        return process, re.search(r"http://\S+", line)[0], line
+
+    yield start
+    for process in processes:
+        process.kill()
+        process.communicate()
+
+
+def get(address):
+    opener = urllib.request.build_opener(
+        urllib.request.ProxyHandler({}), urllib.request.HTTPCookieProcessor()
+    )
+    with opener.open(address, timeout=30) as answer:
+        return answer.read().decode()
+
+
+def test_a_job_is_served_until_ctrl_c(started, tmp_path):
+    job = write_job(tmp_path)
+    process, address, line = started(job, "--port", 0)
+    assert line.startswith(f"{job} at http://127.0.0.1:")
+    assert "<html" in get(address)
+    assert get(f"{address}export/job") == job.read_text()
+    process.send_signal(signal.SIGINT)
+    assert process.wait(timeout=30) == 130
+    assert process.stderr.read() == "kerfpath: stopped\n"
+
+
+def test_without_a_job_a_copy_of_the_demo_is_opened_and_found_again(started, tmp_path):
+    process, address, _ = started("--port", 0)
+    copied = tmp_path / "kerfpath-studio" / "b_pillar.toml"
+    assert get(f"{address}export/job") == copied.read_text()
+    assert (copied.parent / "b_pillar.step").exists()
+    process.kill()
+    process.wait()
+    copied.write_text("# mine\n" + copied.read_text())
+    _, address, _ = started("--port", 0)
+    assert get(f"{address}export/job").startswith("# mine")
+
+
+def test_another_address_than_this_machines_needs_the_token(started, tmp_path):
+    _, address, _ = started(write_job(tmp_path), "--port", 0, "--host", "0.0.0.0")
+    found = re.fullmatch(r"http://[^/]+:(\d+)/\?token=([\w-]{32})", address)
+    port, token = found.groups()
+    with pytest.raises(urllib.error.HTTPError, match="403"):
+        get(f"http://127.0.0.1:{port}/")
+    assert "<html" in get(f"http://127.0.0.1:{port}/?token={token}")
+
+
+def test_a_port_in_use_is_refused(tmp_path):
+    with socket.socket() as other:
+        other.bind(("127.0.0.1", 0))
+        other.listen()
+        port = other.getsockname()[1]
+        result = run("studio", write_job(tmp_path), "--port", port, "--no-browser")
+    assert_refused(result, f"port {port}", "--port")
+
+
+def test_what_is_no_job_is_refused(tmp_path):
+    job = write_job(tmp_path)
+    drawing = job.with_name("b_pillar.step")
+    assert_refused(run("studio", drawing, "--no-browser"), "expected a job, got a drawing")
+    none = tmp_path / "none.toml"
+    assert_refused(run("studio", none, "--port", 0, "--no-browser"), "no such file")
+
+
+def test_what_is_not_installed_is_said_in_one_line(tmp_path, monkeypatch):
+    monkeypatch.setattr("kerfpath.cli._studio.find_spec", lambda name: None)
+    result = run("studio", write_job(tmp_path), "--no-browser")
+    assert_refused(result, "starlette, uvicorn, websockets", "pip install 'kerfpath[studio]'")
