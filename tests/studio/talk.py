@@ -8,6 +8,7 @@ from starlette.testclient import TestClient
 
 from jobs import DEMO, SMALL
 from kerfpath.studio._app import application
+from kerfpath.studio._document import Document
 
 HOST = "127.0.0.1:8087"
 SOCKET = f"ws://{HOST}/ws"
@@ -27,7 +28,7 @@ def write_job(folder, text=QUICK, name="job.toml"):
 @contextmanager
 def serving(path, **more):
     """A client of the studio at work on a job."""
-    app = application(path, hosts=[HOST], **more)
+    app = application(Document(path), hosts=[HOST], **more)
     with TestClient(app, base_url=f"http://{HOST}") as client:
         yield client
 

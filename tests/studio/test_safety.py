@@ -7,6 +7,7 @@ from starlette.testclient import TestClient
 from starlette.websockets import WebSocketDisconnect
 
 from kerfpath.studio._app import LONGEST, application
+from kerfpath.studio._document import Document
 from kerfpath.studio._guard import POLICY
 from studio.talk import HOST, SOCKET, talking, write_job
 
@@ -21,13 +22,13 @@ def job(tmp_path_factory):
 @pytest.fixture
 def client(job):
     """A client of a studio that is not at work."""
-    return TestClient(application(job, hosts=[HOST]), base_url=f"http://{HOST}")
+    return TestClient(application(Document(job), hosts=[HOST]), base_url=f"http://{HOST}")
 
 
 @pytest.fixture
 def guarded(job):
     """The same with a token."""
-    app = application(job, hosts=[HOST], token=TOKEN)
+    app = application(Document(job), hosts=[HOST], token=TOKEN)
     return TestClient(app, base_url=f"http://{HOST}", follow_redirects=False)
 
 

@@ -7,7 +7,7 @@ import tomllib
 import numpy as np
 import pytest
 
-from kerfpath.job import read_job, run_job, write_result
+from kerfpath.job import Job, read_job, run_job, write_result
 from kerfpath.kernels.metric import wrap
 from studio.talk import QUICK, serving, talking, write_job
 
@@ -28,10 +28,6 @@ def planned(folder):
     with serving(write_job(folder, name="planned.toml")) as client, talking(client) as page:
         page.done(1)
         yield client, page, page.heard[:]
-
-
-def first(heard, kind):
-    return next(message for message in heard if message["type"] == kind)
 
 
 def last(heard, kind, **keys):
@@ -57,7 +53,7 @@ def forward(robot, q):
 
 def test_the_scene_says_the_robot_so_that_a_page_finds_its_poses(planned):
     _, _, heard = planned
-    scene = first(heard, "scene")
+    scene = last(heard, "scene")
     found = forward(scene["robot"], scene["sample"]["q"])
     # Products of six matrices of numbers of order one, in double precision.
     assert found == pytest.approx(matrix(scene["sample"]["T"]), abs=1e-12)
@@ -65,7 +61,7 @@ def test_the_scene_says_the_robot_so_that_a_page_finds_its_poses(planned):
 
 def test_plans_lead_the_tip_along_their_contours_in_the_scene(planned):
     _, _, heard = planned
-    scene = first(heard, "scene")
+    scene = last(heard, "scene")
     for contour in scene["contours"]:
         made = last(heard, "plan", contour=contour["name"])
         points = np.array(made["points"]).reshape(-1, 3)
@@ -85,9 +81,18 @@ def test_plans_lead_the_tip_along_their_contours_in_the_scene(planned):
         assert max(made["joint_load"]) == pytest.approx(max(s.max() for s in shares), abs=1e-6)
 
 
+def test_robot_and_head_are_seen_before_the_drawing_has_been_read(planned):
+    _, _, heard = planned
+    soon, scene = (message for message in heard if message["type"] == "scene")
+    assert {body["kind"] for body in soon["bodies"]} == {"robot", "head"}
+    assert soon["contours"] == []
+    assert soon["robot"] == scene["robot"]
+    assert [body for body in scene["bodies"] if body["kind"] != "part"] == soon["bodies"]
+
+
 def test_meshes_are_those_of_the_bodies_and_never_change(planned):
     client, _, heard = planned
-    scene = first(heard, "scene")
+    scene = last(heard, "scene")
     kinds = {body["kind"] for body in scene["bodies"]}
     assert kinds >= {"robot", "head", "part"}
     assert not scene["cell"]
@@ -130,7 +135,7 @@ def test_the_program_is_played_in_its_order_without_a_gap(planned):
     move = segments[3]
     q, time = np.array(move["q"]).reshape(-1, 6), np.array(move["time"])
     speed = np.diff(q, axis=0) / np.diff(time)[:, None]
-    scene = first(heard, "scene")
+    scene = last(heard, "scene")
     limits = np.array([joint["velocity"] for joint in scene["robot"]["joints"]])
     assert (np.abs(speed) <= limits * (1 + 1e-6)).all()  # of numbers to a nanoradian
     assert np.abs(speed[0]).max() < np.abs(speed[len(speed) // 2]).max() / 5  # it gains speed
@@ -204,7 +209,7 @@ def test_the_map_says_what_became_of_every_pose(planned):
 def test_a_place_of_the_map_says_the_pose_and_its_reason(planned):
     _, page, heard = planned
     page.say("map", contour="slot")
-    found, scene = page.until("map"), first(heard, "scene")
+    found, scene = page.until("map"), last(heard, "scene")
     codes = np.frombuffer(base64.b64decode(found["layers"][0]["codes"]), np.uint8)
     codes = codes.reshape(found["nodes"], -1)
     seen = set()
@@ -285,15 +290,14 @@ def test_an_edit_is_planned_again_at_once_and_undone(studio):
 
 def test_what_has_not_changed_is_not_planned_again(studio, monkeypatch):
     _, page, _ = studio
-    asked = []
-    from kerfpath.job import Job
+    asked, real = [], Job.graph
 
-    real = Job.graph
-    monkeypatch.setattr(
-        Job,
-        "graph",
-        lambda self, nodes, *a, **k: asked.append(nodes.name) or real(self, nodes, *a, **k),
-    )
+    def graph(job, nodes, *rest, only=None, **more):
+        if only is None:  # what is foreseen looks at the ends alone
+            asked.append(nodes.name)
+        return real(job, nodes, *rest, only=only, **more)
+
+    monkeypatch.setattr(Job, "graph", graph)
     page.say("edit", path=["contour", 1, "speed_m_min"], value=2.5)
     page.done(2)
     assert asked == []  # the nodes are where they were
@@ -418,7 +422,7 @@ def test_work_is_found_again_after_the_server_has_gone(folder):
 
 def test_cancel_stops_and_plan_goes_on(folder):
     with serving(write_job(folder, name="cancel.toml")) as client, talking(client) as page:
-        page.until("scene")
+        page.until("scene", lambda message: message["contours"])
         page.say("cancel")
         page.until("progress", busy=False)
         page.say("plan")

@@ -18,6 +18,7 @@ from starlette.websockets import WebSocket, WebSocketDisconnect
 
 from kerfpath.errors import KerfpathError
 from kerfpath.studio._asks import parse
+from kerfpath.studio._document import Document
 from kerfpath.studio._exports import File, zipped
 from kerfpath.studio._guard import Guard
 from kerfpath.studio._hub import Page
@@ -49,24 +50,19 @@ REPORT_POLICY = (
 """A report has its scripts in it: it is shown as a page from nowhere, which reaches nothing."""
 
 
-def application(path: Path, *, hosts: Iterable[str], token: str | None = None) -> Starlette:
+def application(document: Document, *, hosts: Iterable[str], token: str | None = None) -> Starlette:
     """Return the application that serves one job.
 
     Parameters
     ----------
-    path : Path
+    document : Document
         The job.
     hosts : iterable of str
         Names, with ports, by which it may be asked for.
     token : str, optional
         That whoever asks must bring.
-
-    Raises
-    ------
-    InputError
-        The job cannot be read.
     """
-    session = Session(path)
+    session = Session(document)
 
     @asynccontextmanager
     async def at_work(app: Starlette) -> AsyncIterator[None]:

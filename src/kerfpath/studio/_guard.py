@@ -16,10 +16,8 @@ from starlette.datastructures import Headers, MutableHeaders
 from starlette.responses import PlainTextResponse, RedirectResponse
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
-__all__ = ["LOOPBACK", "POLICY", "Guard"]
+__all__ = ["POLICY", "Guard"]
 
-LOOPBACK = ("127.0.0.1", "localhost", "[::1]")
-"""Names of this machine for itself."""
 PAGE = Path(__file__).parent / "client" / "index.html"
 
 

@@ -27,10 +27,15 @@ from kerfpath.studio._clock import cycle_of, program_message
 from kerfpath.studio._exports import exports_of
 from kerfpath.studio._fastest import fastest_message
 from kerfpath.studio._keys import motion_key, setup_key
-from kerfpath.studio._messages import ErrorMessage, OutcomeMessage, ProgressMessage
+from kerfpath.studio._messages import (
+    ErrorMessage,
+    OutcomeMessage,
+    ProgressMessage,
+    SceneMessage,
+)
 from kerfpath.studio._numbers import Message
 from kerfpath.studio._run import Run, drafts_of
-from kerfpath.studio._scene import Meshes, scene_of, tables_of
+from kerfpath.studio._scene import Meshes, scene_of, scene_of_robot, tables_of
 from kerfpath.studio._work import Newest, Stop
 
 __all__ = ["Outcome", "Planning"]
@@ -173,6 +178,8 @@ class Planning:
             waited += PATIENCE / 20
         self._say(ProgressMessage(busy=True, label="reading the drawing"))
         try:
+            if self.prepared is None:
+                self._show(*scene_of_robot(job, revision))
             prepared = self._bench.prepared(job)
         except InputError as fault:
             self._refused(fault, revision)
@@ -225,13 +232,16 @@ class Planning:
         setup = setup_key(prepared.job)
         if setup == self._scene:
             return
-        message, meshes = scene_of(prepared, revision)
-        # A page may still ask for what stood there before.
-        self.meshes = Meshes({**self._shown, **meshes})
-        self._shown, self._scene = meshes, setup
-        self._say(message)
+        self._show(*scene_of(prepared, revision))
+        self._scene = setup
         known = set(prepared.names)
         self.cuts = {name: cuts for name, cuts in self.cuts.items() if name in known}
+
+    def _show(self, message: SceneMessage, meshes: Meshes) -> None:
+        # A page may still ask for what stood there before.
+        self.meshes = Meshes({**self._shown, **meshes})
+        self._shown = meshes
+        self._say(message)
 
     def _failed(self, error: BaseException) -> None:
         """Say what went wrong in a thread."""

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import hashlib
 from collections.abc import Sequence
-from typing import Literal
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -23,9 +22,8 @@ from kerfpath.studio._messages import (
 )
 from kerfpath.studio._numbers import flat
 
-__all__ = ["Meshes", "scene_of"]
+__all__ = ["Meshes", "scene_of", "scene_of_robot", "tables_of"]
 
-Kind = Literal["robot", "head", "part", "fixture", "floor"]
 SAMPLE = 0.3
 """rad: every joint of the sample pose, from the middle of its range; anything but zero will do."""
 
@@ -47,36 +45,53 @@ class Meshes(dict[str, bytes]):
 def scene_of(prepared: PreparedJob, revision: int) -> tuple[SceneMessage, Meshes]:
     """Return what there is to see of a job, and its meshes.
 
-    Without a [cell] the robot's links are those of its description, or capsules, and the head is
-    a generic one: to look at, and nothing is kept clear of them.
-
     Raises
     ------
     InputError
         A robot whose joints nothing says the places of.
     """
     job, meshes = prepared.job, Meshes()
-    bodies = [
-        _entry(body.name, body.kind, body.frame, meshes.add(*surface(body.shape)), body.approximate)
-        for body in _bodies(prepared)
-    ]
+    if prepared.cell is None:
+        bodies = _own_bodies(job)
+    else:  # the part is drawn as the drawing has it
+        bodies = [body for body in prepared.cell.bodies if body.kind != "part"]
+    entries = [_body(body, meshes) for body in bodies]
     vertices, triangles = prepared.part.mesh()
     if len(triangles):
-        placed = _placed(vertices, job.placement)
-        bodies.append(_entry("part", "part", 0, meshes.add(placed, triangles), False))
-    message = SceneMessage(
+        mesh = meshes.add(_placed(vertices, job.placement), triangles)
+        entries.append(BodyEntry(name="part", kind="part", frame=0, mesh=mesh, approximate=False))
+    contours = [
+        _contour(request, index, job.placement)
+        for request, index in zip(prepared.contours, tables_of(prepared), strict=True)
+    ]
+    return _scene(job, revision, entries, contours), meshes
+
+
+def scene_of_robot(job: Job, revision: int) -> tuple[SceneMessage, Meshes]:
+    """Return what there is to see before the drawing has been read: the robot and its head.
+
+    Raises
+    ------
+    InputError
+        As `scene_of`.
+    """
+    meshes = Meshes()
+    entries = [_body(body, meshes) for body in _own_bodies(job)]
+    return _scene(job, revision, entries, []), meshes
+
+
+def _scene(
+    job: Job, revision: int, bodies: list[BodyEntry], contours: list[ContourEntry]
+) -> SceneMessage:
+    return SceneMessage(
         revision=revision,
         robot=_robot(job),
         sample=_sample(job),
         bodies=bodies,
         T_part=flat(job.placement),
-        contours=[
-            _contour(request, index, job.placement)
-            for request, index in zip(prepared.contours, tables_of(prepared), strict=True)
-        ],
+        contours=contours,
         cell=job.cell is not None,
     )
-    return message, meshes
 
 
 def tables_of(prepared: PreparedJob) -> list[int]:
@@ -98,17 +113,22 @@ def _picking(tables: Sequence[object], request: CutRequest) -> list[int]:
     return [i for i, one in enumerate(tables) if getattr(one, "pick_all", None) == pick]
 
 
-def _bodies(prepared: PreparedJob) -> Sequence[Body]:
-    """Return what stands and moves beside the part, which is drawn as the drawing has it."""
-    job = prepared.job
-    if prepared.cell is not None:
-        return [body for body in prepared.cell.bodies if body.kind != "part"]
-    chain = chain_of(job.robot)
-    return [*link_bodies(job.robot), *CuttingHead().bodies(chain, job.tool)]
+def _own_bodies(job: Job) -> Sequence[Body]:
+    """Return the links of the robot's description, or capsules, and a generic head.
+
+    They are something to look at: nothing is kept clear of them.
+    """
+    return [*link_bodies(job.robot), *CuttingHead().bodies(chain_of(job.robot), job.tool)]
 
 
-def _entry(name: str, kind: Kind, frame: int, mesh: str, approximate: bool) -> BodyEntry:
-    return BodyEntry(name=name, kind=kind, frame=frame, mesh=mesh, approximate=approximate)
+def _body(body: Body, meshes: Meshes) -> BodyEntry:
+    return BodyEntry(
+        name=body.name,
+        kind=body.kind,
+        frame=body.frame,
+        mesh=meshes.add(*surface(body.shape)),
+        approximate=body.approximate,
+    )
 
 
 def _placed(points: Array, T: Array) -> Array:

@@ -5,21 +5,21 @@ from __future__ import annotations
 import secrets
 import socket
 import webbrowser
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager, suppress
 from pathlib import Path
 from threading import Thread
 
-import uvicorn
-
+from kerfpath.apart import stand_by
 from kerfpath.errors import InputError
-from kerfpath.studio._app import LONGEST, application
-from kerfpath.studio._guard import LOOPBACK
+from kerfpath.studio._document import Document
 
 __all__ = ["serve"]
 
 HERE = ("127.0.0.1", "localhost", "::1")
 """Addresses that only this machine can reach."""
+LOOPBACK = ("127.0.0.1", "localhost", "[::1]")
+"""Names of this machine for itself, in addresses."""
 
 EVERYWHERE = ("0.0.0.0", "::")
 """Addresses at which every one of this machine is listened at."""
@@ -48,6 +48,8 @@ def serve(path: Path, *, host: str, port: int, browser: bool, show: Callable[[st
     InputError
         The job cannot be read; the port is in use or the address is not of this machine.
     """
+    stand_by()  # the process that reads drawings starts while this one imports
+    document = Document(path)
     with _listener(host, port) as listener:
         number = listener.getsockname()[1]
         alone = host in HERE
@@ -55,34 +57,44 @@ def serve(path: Path, *, host: str, port: int, browser: bool, show: Callable[[st
         names = LOOPBACK if alone else (*LOOPBACK, _in_url(host), *_names_of_machine())
         hosts = [f"{name}:{number}" for name in names]
         hosts += names if number == WITHOUT_PORT else ()
-        config = uvicorn.Config(
-            application(path, hosts=hosts, token=token),
-            log_level="warning",
-            lifespan="on",
-            ws="websockets-sansio",
-            ws_max_size=LONGEST,
-            ws_per_message_deflate=False,
-            server_header=False,
-            timeout_graceful_shutdown=1,
-        )
         reached = socket.gethostname() if host in EVERYWHERE else host
         address = f"http://{_in_url(reached)}:{number}/"
         if token is not None:
             address += f"?token={token}"
         show(address)
         if browser:
-            # The listener is there: the browser waits for the rest.
+            # The listener is there: the browser starts, and waits for the rest.
             Thread(target=webbrowser.open, args=(address,), daemon=True).start()
-        _Server(config).run(sockets=[listener])
+        _run(document, hosts, token, listener)
 
 
-class _Server(uvicorn.Server):
-    """A server that leaves Ctrl-C to the command that it is part of."""
+def _run(
+    document: Document, hosts: Sequence[str], token: str | None, listener: socket.socket
+) -> None:
+    """Serve a document, with all that takes a second to be imported."""
+    import uvicorn
 
-    @contextmanager
-    def capture_signals(self) -> Iterator[None]:
-        """Capture none."""
-        yield
+    from kerfpath.studio._app import LONGEST, application
+
+    class Server(uvicorn.Server):
+        """A server that leaves Ctrl-C to the command that it is part of."""
+
+        @contextmanager
+        def capture_signals(self) -> Iterator[None]:
+            """Capture none."""
+            yield
+
+    config = uvicorn.Config(
+        application(document, hosts=hosts, token=token),
+        log_level="warning",
+        lifespan="on",
+        ws="websockets-sansio",
+        ws_max_size=LONGEST,
+        ws_per_message_deflate=False,
+        server_header=False,
+        timeout_graceful_shutdown=1,
+    )
+    Server(config).run(sockets=[listener])
 
 
 def _listener(host: str, port: int) -> socket.socket:

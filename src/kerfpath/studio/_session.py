@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import asyncio
-from collections.abc import Sequence
-from pathlib import Path
+from collections.abc import Callable, Sequence
+from contextlib import suppress
+from typing import TypeVarTuple
 
 from kerfpath.errors import InputError, KerfpathError
 from kerfpath.job import FileTexts, Job, JobResult, PreparedJob, read_job, result_texts
@@ -29,23 +30,20 @@ from kerfpath.studio._scene import tables_of
 
 __all__ = ["Session"]
 
+_Ts = TypeVarTuple("_Ts")
+
 
 class Session:
     """One job that is worked on; all of it but the planning happens in the thread of the server.
 
     Parameters
     ----------
-    path : Path
+    document : Document
         The job.
-
-    Raises
-    ------
-    InputError
-        The file cannot be read.
     """
 
-    def __init__(self, path: Path) -> None:
-        self.document = Document(path)
+    def __init__(self, document: Document) -> None:
+        self.document = document
         self.hub = Hub()
         self._planning = Planning(self._from_thread, self._prepared_there, self._refused_there)
         self._newer = Newer()
@@ -198,8 +196,13 @@ class Session:
 
     def _from_thread(self, message: Message) -> None:
         """Take a message from any thread."""
+        self._soon(self._say, message)
+
+    def _soon(self, take: Callable[[*_Ts], None], *what: *_Ts) -> None:
+        """Have something taken in the thread of the server, unless that has ended."""
         assert self._loop is not None
-        self._loop.call_soon_threadsafe(self._say, message)
+        with suppress(RuntimeError):  # the loop is closed: nobody hears any more
+            self._loop.call_soon_threadsafe(take, *what)
 
     def _say(self, message: Message) -> None:
         newer = self._newer.of(message)
@@ -216,8 +219,7 @@ class Session:
         self.hub.say(newer)
 
     def _prepared_there(self, prepared: PreparedJob, revision: int) -> None:
-        assert self._loop is not None
-        self._loop.call_soon_threadsafe(self._prepared, prepared, revision)
+        self._soon(self._prepared, prepared, revision)
 
     def _prepared(self, prepared: PreparedJob, revision: int) -> None:
         """Take what the contours of the job are called, once its drawing has been read."""
@@ -229,8 +231,7 @@ class Session:
             self._say_job()
 
     def _refused_there(self, error: InputError, revision: int) -> None:
-        assert self._loop is not None
-        self._loop.call_soon_threadsafe(self._refused, error, revision)
+        self._soon(self._refused, error, revision)
 
     def _refused(self, error: InputError, revision: int) -> None:
         """Take what is wrong with a job that its drawing and cell show."""
