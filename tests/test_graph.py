@@ -7,8 +7,11 @@ from unittest.mock import Mock
 import numpy as np
 import pytest
 
-from kerfpath import InputError, robot
+from kerfpath import Band, Comfort, InputError, robot
 from kerfpath.graph import build, gamma_grid
+from kerfpath.options import PlanOptions
+from kerfpath.planner import layered_graph
+from kerfpath.planner._graph import within_margins
 from kerfpath.robots import FAMILIES
 
 
@@ -97,3 +100,31 @@ def test_a_bad_step_is_refused(step):
 def test_without_limits_nothing_is_admitted(frames, tool):
     with pytest.raises(InputError, match="joint limits are not known"):
         build(frames, robot("kuka_kr120_r2500_pro"), T_flange_tip=tool, gamma=gamma_grid(1.0))
+
+
+def test_a_graph_is_thinned_once_for_the_same_margins(circle, arm, tool, placement):
+    given = {"tool": tool, "placement": placement}
+    options = PlanOptions(
+        gamma_step=np.radians(10), comfort=Comfort(limits=Band(margin=0.2)), retract=0.05, floor=0.3
+    )
+    graph = layered_graph(circle, arm, options=options, **given)
+    assert 0 < len(graph.q) < len(build_all(circle, arm, tool, placement).q)
+    assert within_margins(graph, arm, options, tool) is graph
+    # What asks for anything else is looked at again, and finds what it would find by itself.
+    for other in (
+        replace(options, comfort=Comfort(limits=Band(margin=0.4))),
+        replace(options, floor=0.5),
+        replace(options, retract=0.2),
+    ):
+        again = within_margins(graph, arm, other, tool)
+        alone = layered_graph(circle, arm, options=other, **given)
+        assert again.kept == alone.kept != graph.kept
+        np.testing.assert_array_equal(again.q, alone.q)
+    narrow = arm.with_limits(upper=arm.upper - 0.3)
+    assert within_margins(graph, narrow, options, tool) is not graph
+    assert within_margins(graph, arm, options, tool, periodic=True) is not graph
+    assert graph.part(3, 9).kept is None
+
+
+def build_all(circle, arm, tool, placement):
+    return layered_graph(circle, arm, tool=tool, placement=placement, gamma_step=np.radians(10))

@@ -319,3 +319,16 @@ def test_the_largest_share_is_brought_down_where_limits_are_broken():
     found = solve(model, tight, "excess")
     after = np.diff(model.q + model.slope * found[:, None], axis=0)
     assert tight.excess(after) < tight.excess(dq)
+
+
+def test_a_refinement_that_is_cut_short_keeps_every_limit_and_is_on_the_way(planned):
+    coarse = planned(metric="euclid", gamma_step=np.radians(8))
+    whole = refine(coarse)
+    costs = [refine(coarse, most=most).plan.cost for most in (1, 3, 8)]
+    assert coarse.cost >= costs[0] >= costs[1] >= costs[2] >= whole.plan.cost
+    assert costs[0] < coarse.cost
+    short = refine(coarse, most=3)
+    # A step that is begun is finished: it may be laid on three times more.
+    assert short.programs <= 3 + 3
+    assert audit(short.plan) == []
+    assert whole.programs > short.programs

@@ -83,7 +83,9 @@ def within_margins(
     alike. A graph that has been thinned for the same is returned as it is.
     """
     comfort, retract = options.comfort, options.retract
-    asked = (robot.id, None if comfort is None else comfort.hard, retract, options.floor, periodic)
+    hard, limits = None if comfort is None else comfort.hard, robot.joint_limits()
+    arrays = limits.lower, limits.upper, limits.endless, tool
+    asked = robot.id, [a.tobytes() for a in arrays], hard, retract, options.floor, periodic
     if graph.kept == asked:
         return graph
     near = {} if comfort is None else comfort.too_near(robot, graph.q, tool)
