@@ -12,6 +12,7 @@ from kerfpath._arrays import Array
 from kerfpath._repr import short_repr
 from kerfpath.kernels.turns import JointLimits
 from kerfpath.plans import path_cost
+from kerfpath.progress import may_stop
 from kerfpath.refiner._curves import JointCurves
 from kerfpath.refiner._program import MARGIN, PRICE, LinearModel, Target, solve
 from kerfpath.refiner._rates import RateLimits
@@ -230,6 +231,7 @@ class Descent:
         """Solve the model, and again laid on where it led, until the true motion is admissible."""
         model, promised, longest = self._model(at, radius), 0.0, radius
         for programs in range(1, 2 + CORRECTIONS):
+            may_stop()
             delta = solve(model, self.rates, target)
             if delta is None:
                 break

@@ -19,6 +19,7 @@ from kerfpath._arrays import Array, Bools, Ints, integers
 from kerfpath.errors import InputError, NoFeasiblePath
 from kerfpath.kernels.metric import increments_between
 from kerfpath.losses import Loss, Reason
+from kerfpath.progress import may_stop
 from kerfpath.search._fastest import LeastInterval
 from kerfpath.search._interrupted import InterruptedPath
 from kerfpath.search._problem import SearchProblem, offsets
@@ -168,6 +169,7 @@ class CheckedEdges:
 
     def _ask(self, vertices: Ints) -> Ints:
         """Learn the price of vertices; returns those now known to cost something."""
+        may_stop()
         new = np.unique(vertices[~self._asked[vertices]])
         if not new.size:
             return new
@@ -300,6 +302,7 @@ def find_clear(
     if problem.method != "exact":
         raise InputError(f'method: only "exact" finds the best clear path, got {problem.method!r}')
     while True:
+        may_stop()
         cost, shut = problem.vertex_cost + known.cost, np.vstack([problem.shut, known.shut])
         try:
             found = search(replace(problem, vertex_cost=cost, shut=shut))

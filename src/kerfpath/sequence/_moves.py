@@ -13,6 +13,7 @@ from kerfpath.cell import Cell
 from kerfpath.errors import NoFeasiblePath
 from kerfpath.kernels.metric import increments_between
 from kerfpath.plans import Plan
+from kerfpath.progress import may_stop
 from kerfpath.robots import posture_name
 from kerfpath.transfer import TransferMove, back_off, least_time, transfer_move
 
@@ -102,6 +103,7 @@ class MoveTimes:
         for leg in self._legs(candidates):
             if leg in self._moves:
                 continue
+            may_stop()
             a, b = leg
             one = self._home if a == HOME else self._ends[a]
             two = self._home if b == HOME else self._starts[b]

@@ -7,6 +7,8 @@ from concurrent.futures import Future, ThreadPoolExecutor
 from threading import Event, Lock
 from time import monotonic
 
+from kerfpath.progress import stopped_by
+
 __all__ = ["Newest", "Seldom", "Stop", "Superseded"]
 
 
@@ -73,7 +75,7 @@ class Newest:
         with self._lock:
             self._stop.set()
             stop = self._stop = Stop()
-            future = self._pool.submit(lambda: None if stop.asked else work(stop))
+            future = self._pool.submit(_do, work, stop)
         future.add_done_callback(self._done)
 
     def cancel(self) -> None:
@@ -92,6 +94,12 @@ class Newest:
         error = future.exception()
         if error is not None and not isinstance(error, Superseded):
             self._failed(error)
+
+
+def _do(work: Callable[[Stop], None], stop: Stop) -> None:
+    stop.check()
+    with stopped_by(stop.check):
+        work(stop)
 
 
 class Seldom:
