@@ -10,7 +10,7 @@ from studio.browser.pretend import ROOT
 AXE = ROOT / "tests" / "studio" / "browser" / "vendor" / "axe-core" / "axe.min.js"
 THEMES = pytest.mark.parametrize(
     "page",
-    [(theme, *size) for theme in ("light", "dark") for size in ((1280, 720), (2560, 1440))],
+    [("light", 1280, 720), ("dark", 2560, 1440)],
     indirect=True,
     ids=lambda value: f"{value[0]}-{value[1]}",
 )
@@ -280,36 +280,48 @@ def test_names_are_text_and_never_markup(page, studio, first):
     assert page.locator("img[src=x]").count() == 0
 
 
+def test_the_tool_turned_about_its_beam_stays_at_its_tip(page, studio, first, messages):
+    studio.open(*first)
+    (scene,), plan = messages["scene"], messages["plan"][0]
+    q = plan["q"][: len(scene["robot"]["joints"])]
+
+    def tip(joints):
+        return page.evaluate(MODULE, ["kinematics", "frames", scene["robot"], joints])[-1]
+
+    before = tip(q)
+    for angle in (-2.5, 0.02, 1.0, 3.0):
+        turned = page.evaluate(MODULE, ["inverse", "turnedAbout", scene["robot"], q, angle])
+        after = tip(turned)
+        c, s = math.cos(angle), math.sin(angle)
+        for row in (0, 4, 8):
+            x, y, z, place = before[row : row + 4]
+            expected = [c * x + s * y, c * y - s * x, z, place]
+            # Newton ends below 1e-7; the arm is about 2 m long.
+            assert after[row : row + 4] == pytest.approx(expected, abs=1e-6)
+    assert page.evaluate(MODULE, ["inverse", "turnedAbout", scene["robot"], q, 0]) == q
+
+
 def test_hovering_the_map_says_why_and_shows_a_ghost_without_the_server(
     page, studio, first, messages
 ):
-    import struct
-
     (known,) = messages["map"]
-    (scene,) = messages["scene"]
-    n, cells = len(scene["robot"]["joints"]), known["nodes"] * len(known["gamma"])
-    q = scene["sample"]["q"]
-    joints = struct.pack(f"<{n}f", *q) * cells * len(known["layers"])
-    studio.files["candidates/here"] = joints
-
-    def react(message):
-        if message["type"] == "map" and message["contour"] == known["contour"]:
-            studio.say(known | {"candidates": "/candidates/here"})
-
-    studio.react = react
     studio.open(*first)
     ready(page)
     page.locator("#contours button", has_text=known["contour"]).click()
-    until(page, lambda: page.evaluate("() => Boolean(studio.map.grid?.candidates)"))
+    until(page, lambda: page.evaluate("() => studio.map.grid !== null"))
+    (plan,) = (each for each in messages["plan"] if each["contour"] == known["contour"])
+    gamma, layer = plan["gamma"][len(plan["s"]) // 2], plan["posture"][0]
+    assert page.evaluate("() => studio.map.grid.layers[studio.map.layer].posture") == layer
     box = page.locator("#map-canvas").bounding_box()
+    frame = page.evaluate("() => studio.map.chart.frame()")
+    x = box["x"] + frame["left"] + 0.5 * frame["width"]
+    y = box["y"] + frame["top"] + (0.45 - gamma / math.tau) * frame["height"]
     asked = len(sent(studio, "reason"))
-    page.mouse.move(box["x"] + 0.5 * box["width"], box["y"] + 0.4 * box["height"])
-    page.locator("#map-tip").wait_for()
+    page.mouse.move(x, y)
     assert page.evaluate("() => studio.view.machine.ghost.visible")
+    assert page.locator("#map-tip").inner_text().startswith("Free")
+    assert "nearest limit" in page.locator("#map-tip").inner_text()
     assert len(sent(studio, "reason")) == asked
-    tip = page.locator("#map-tip").inner_text()
-    assert tip.startswith("Free")
-    assert "gamma" in tip
     page.mouse.move(box["x"] - 40, box["y"])
     assert not page.evaluate("() => studio.view.machine.ghost.visible")
     page.locator("#map-canvas").focus()

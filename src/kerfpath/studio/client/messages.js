@@ -199,7 +199,6 @@
  * @property {string[]} reasons
  * @property {string[]} kinds
  * @property {string[]} colours
- * @property {string | null} [candidates]
  * @property {{posture: number, name: string, codes: string}[]} layers
  * @property {string[]} hidden
  * @property {{name: string, s: number[], gamma: number[], posture: number[]}[]} course

@@ -76,7 +76,8 @@ export class Chart {
     context.rect(frame.left, frame.top, frame.width, frame.height);
     context.clip();
     context.setLineDash([5 * scale, 4 * scale]);
-    for (const plan of before) this.course(context, plan, frame, "--quiet", 1.5 * scale);
+    for (const plan of before)
+      this.stroke(context, plan, frame, themeColour("--quiet"), 1.6 * scale);
     context.setLineDash([]);
     context.globalAlpha = stale ? 0.55 : 1;
     for (const plan of plans) this.course(context, plan, frame, "--course", 2.2 * scale);

@@ -11,37 +11,6 @@ export class Grid {
     this.step = this.samples > 1 ? message.gamma[1] - message.gamma[0] : 2 * Math.PI;
     this.layers = message.layers.map((layer) => ({ ...layer, codes: bytes(layer.codes) }));
     this.length = message.s[message.s.length - 1] - message.s[0] || 1;
-    /** @type {Float32Array | null} layers K m n, rad */
-    this.candidates = null;
-    this.joints = 0;
-  }
-
-  /**
-   * Fetch the joints of all poses, so that ghosts need no server.
-   * @param {number} joints  n
-   */
-  async fetch(joints) {
-    const { candidates } = this.message;
-    if (!candidates || this.candidates) return;
-    const answer = await fetch(candidates.replace(/^\//, "") + location.search);
-    if (!answer.ok) return;
-    const found = new Float32Array(await answer.arrayBuffer());
-    if (found.length !== this.layers.length * this.nodes * this.samples * joints) return;
-    this.joints = joints;
-    this.candidates = found;
-  }
-
-  /**
-   * Return the joints of a pose, null where there are none or they are not known here.
-   * @param {number} layer
-   * @param {number} node
-   * @param {number} sample
-   */
-  q(layer, node, sample) {
-    if (!this.candidates) return null;
-    const begin = ((layer * this.nodes + node) * this.samples + sample) * this.joints;
-    const q = this.candidates.subarray(begin, begin + this.joints);
-    return Number.isNaN(q[0]) ? null : q;
   }
 
   /**

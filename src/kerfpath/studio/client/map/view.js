@@ -3,7 +3,8 @@
 import { byId, el } from "../dom.js";
 import { deg, degrees, fixed } from "../format.js";
 import { Chart } from "./chart.js";
-import { Grid } from "./grid.js";
+import { turnedAbout } from "../inverse.js";
+import { Grid, wrapped } from "./grid.js";
 import { legend } from "./legend.js";
 
 /** @typedef {import("../store.js").Store} Store */
@@ -90,11 +91,7 @@ export class MapView {
     }
     if (map && this.grid?.message !== map) {
       this.grid = new Grid(map);
-      const grid = this.grid;
-      void grid
-        .fetch(store.scene?.robot.joints.length ?? 6)
-        .then(() => this.hover && this.enter(this.hover));
-      this.layer = Math.min(this.layer, Math.max(0, grid.layers.length - 1));
+      this.layer = Math.min(this.layer, Math.max(0, this.grid.layers.length - 1));
     } else if (!map) this.grid = null;
     if (this.grid && !this.picked) {
       const wanted = this.grid.layerOf(plans[0]?.posture[0] ?? -1);
@@ -212,7 +209,7 @@ export class MapView {
     this.hover = cell;
     const code = grid.code(this.layer, cell.node, cell.sample);
     const admitted = grid.message.kinds[code] === "admitted";
-    const q = grid.q(this.layer, cell.node, cell.sample);
+    const q = this.turned(cell);
     this.haunt(q, admitted);
     this.say(
       admitted ? "free" : `lost: ${grid.message.reasons[code]}`,
@@ -226,6 +223,26 @@ export class MapView {
       const { contour } = grid.message;
       this.connection.send({ type: "reason", contour, node: cell.node, gamma, posture });
     }, ASK_AFTER);
+  }
+
+  /**
+   * Return the joints of a pose by turning the plan's at its node about the beam; null where the
+   * plan is in another posture or the robot cannot follow: then the server's answer shows it.
+   * @param {Cell} cell
+   */
+  turned({ node, sample }) {
+    const { scene, plans } = this.store;
+    const grid = /** @type {Grid} */ (this.grid);
+    const { s, gamma, contour } = grid.message;
+    const { posture } = grid.layers[this.layer];
+    for (const plan of scene ? (plans.get(contour) ?? []) : []) {
+      const k = plan.s.findIndex((each) => Math.abs(each - s[node]) < 1e-7);
+      if (k < 0 || plan.posture[k] !== posture || !scene) continue;
+      const n = scene.robot.joints.length;
+      const angle = wrapped(gamma[sample] - plan.gamma[k]);
+      return turnedAbout(scene.robot, plan.q.slice(k * n, (k + 1) * n), angle);
+    }
+    return null;
   }
 
   /**
@@ -295,7 +312,7 @@ export class MapView {
       pose.posture !== grid.layers[this.layer].posture
     )
       return;
-    if (!grid.q(this.layer, hover.node, hover.sample)) this.haunt(pose.q, pose.admitted);
+    this.haunt(pose.q, pose.admitted);
     const [head, rest] = pose.reason.split(/: (.*)/s);
     const numbers = rest ?? this.numbers(head, pose.q);
     this.say(pose.admitted ? "free" : `lost: ${head}`, numbers);

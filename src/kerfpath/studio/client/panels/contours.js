@@ -67,7 +67,7 @@ export function contourList(store) {
           el("i", { class: `dot ${dot}` }),
           el("span", { class: "name" }, shape.name),
           el("span", { class: "time" }, seconds ? `${fixed(seconds, 1)} s` : ""),
-          dot === "done" ? null : el("span", { class: "more" }, words),
+          dot === "none" || dot === "warn" ? el("span", { class: "more" }, words) : null,
         ),
       ),
     );

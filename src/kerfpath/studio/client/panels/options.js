@@ -120,10 +120,8 @@ export function optionsPanel(store, connection) {
     const disabled = store.connection !== "open" || !values || !selected;
     const shape = scene?.contours.find(({ name }) => name === selected);
     const now = values?.contour?.[table()]?.speed_m_min ?? shape?.speed_m_min ?? 1;
-    const most = Math.max(
-      reach.get(selected ?? "") ?? 0,
-      now > (reach.get(selected ?? "") ?? 0) ? nice(2 * now) : 0,
-    );
+    const held = reach.get(selected ?? "") ?? 0;
+    const most = now > held || now < held / 5 ? nice(2 * now) : held;
     reach.set(selected ?? "", most);
     speed.show(now, { max: most, disabled, fault: faultOf(`contour.${table()}.speed_m_min`) });
     const alike = (job?.contours ?? []).filter(({ index }) => index === table()).length;
@@ -183,7 +181,7 @@ export function optionsPanel(store, connection) {
         best === null
           ? "No speed was found at which it can be cut. "
           : `Fastest: ${fixed(best, 2)} m/min. `,
-        el("span", { class: "quiet" }, binds),
+        el("span", { class: "quiet" }, binds && `What binds: ${binds}`),
       ),
       ...(edits.length
         ? [

@@ -18,6 +18,9 @@ export function sheets(store, connection) {
     ask(language || (store.job?.values?.program?.language ?? "")),
   );
   store.on(["program_text"], () => shown === "program" && programSheet());
+  store.on(["error"], ({ about, message }) => {
+    if (shown === "program" && about === "program") none(message);
+  });
   sheet.addEventListener("close", () => (shown = null));
   sheet.addEventListener("click", (event) => event.target === sheet && sheet.close());
 
@@ -115,6 +118,15 @@ export function sheets(store, connection) {
       ...words.map((word) => el("option", { value: word, selected: word === language }, word)),
     );
     return select;
+  }
+
+  /** @param {string} why */
+  function none(why) {
+    show(
+      "Program",
+      [languages()],
+      [el("div", { class: "state still" }, el("strong", {}, "No program"), el("p", {}, why))],
+    );
   }
 
   function programSheet() {

@@ -1,0 +1,110 @@
+/** Poses near a known one: the tool turned about its beam, by Newton's method on the kinematics. */
+
+import { frames, multiply, rotation } from "./kinematics.js";
+
+/** @typedef {import("./messages.js").RobotModel} RobotModel */
+
+const STRIDE = 0.1; // rad of the beam's rotation from one solution to the next
+const FAR = 0.6; // rad that a joint may move in one stride: beyond, it is near a singularity
+const ENOUGH = 1e-7; // m and rad: far below what a picture shows
+
+/**
+ * Return the joints with the tool turned about its beam, the tip held: Newton's method in strides,
+ * so that the posture stays. Null where it does not come through.
+ * @param {RobotModel} robot  of six joints
+ * @param {ArrayLike<number>} from  rad
+ * @param {number} angle  rad
+ * @returns {number[] | null}
+ */
+export function turnedAbout(robot, from, angle) {
+  const n = robot.joints.length;
+  if (n !== 6) return null;
+  let q = Array.from(from);
+  const tip = frames(robot, q)[n + 1];
+  const strides = Math.max(1, Math.ceil(Math.abs(angle) / STRIDE));
+  for (let i = 1; i <= strides; i++) {
+    const next = newton(robot, q, multiply(tip, rotation([0, 0, 1], (angle * i) / strides)));
+    if (!next || next.some((each, j) => Math.abs(each - q[j]) > FAR)) return null;
+    q = next;
+  }
+  return q;
+}
+
+/**
+ * Return joints that reach a pose of the tip, from joints near by, or null.
+ * @param {RobotModel} robot
+ * @param {number[]} from
+ * @param {number[]} goal  16
+ */
+function newton(robot, from, goal) {
+  const q = [...from];
+  for (let turn = 0; turn < 8; turn++) {
+    const found = frames(robot, q);
+    const tip = found[found.length - 1];
+    const error = difference(tip, goal);
+    if (Math.max(...error.map(Math.abs)) < ENOUGH) return q;
+    const columns = robot.joints.map(({ axis }, i) => {
+      const frame = found[i + 1];
+      const z = [0, 4, 8].map(
+        (r) => frame[r] * axis[0] + frame[r + 1] * axis[1] + frame[r + 2] * axis[2],
+      );
+      return [...cross(z, [tip[3] - frame[3], tip[7] - frame[7], tip[11] - frame[11]]), ...z];
+    });
+    const step = solved(columns, error);
+    if (!step) return null;
+    step.forEach((each, j) => (q[j] += each));
+  }
+  return null;
+}
+
+/**
+ * Return how far one pose is from another: m along the axes, rad about them.
+ * @param {number[]} from
+ * @param {number[]} to
+ */
+function difference(from, to) {
+  const turn = [0, 0, 0];
+  for (let c = 0; c < 3; c++) {
+    const [a, b] = [from, to].map((pose) => [pose[c], pose[4 + c], pose[8 + c]]);
+    cross(a, b).forEach((each, r) => (turn[r] += each / 2));
+  }
+  return [to[3] - from[3], to[7] - from[7], to[11] - from[11], ...turn];
+}
+
+/**
+ * @param {number[]} a
+ * @param {number[]} b
+ */
+const cross = (a, b) => [
+  a[1] * b[2] - a[2] * b[1],
+  a[2] * b[0] - a[0] * b[2],
+  a[0] * b[1] - a[1] * b[0],
+];
+
+/**
+ * Return x of the sum of columns x = right, by elimination with pivots; null where it is singular.
+ * @param {number[][]} columns
+ * @param {number[]} right
+ * @returns {number[] | null}
+ */
+function solved(columns, right) {
+  const n = right.length;
+  const rows = right.map((value, r) => [...columns.map((column) => column[r]), value]);
+  for (let i = 0; i < n; i++) {
+    let pivot = i;
+    for (let r = i + 1; r < n; r++) if (Math.abs(rows[r][i]) > Math.abs(rows[pivot][i])) pivot = r;
+    if (Math.abs(rows[pivot][i]) < 1e-9) return null;
+    [rows[i], rows[pivot]] = [rows[pivot], rows[i]];
+    for (let r = i + 1; r < n; r++) {
+      const share = rows[r][i] / rows[i][i];
+      for (let c = i; c <= n; c++) rows[r][c] -= share * rows[i][c];
+    }
+  }
+  const x = new Array(n).fill(0);
+  for (let i = n - 1; i >= 0; i--) {
+    let sum = rows[i][n];
+    for (let c = i + 1; c < n; c++) sum -= rows[i][c] * x[c];
+    x[i] = sum / rows[i][i];
+  }
+  return x;
+}
