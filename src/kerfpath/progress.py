@@ -1,4 +1,4 @@
-"""Progress: how a long call says what it is doing and how far it is, and where it may be stopped."""
+"""Progress: how a long call says how far it is, and where it may be stopped."""
 
 from __future__ import annotations
 
