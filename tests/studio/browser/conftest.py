@@ -48,6 +48,16 @@ def page(chromium, request):
 
 
 @pytest.fixture(scope="session")
+def modules(chromium):
+    """A page without a job, whose modules can be called."""
+    context = chromium.new_context()
+    page = context.new_page()
+    Pretend(page).open()
+    yield page
+    context.close()
+
+
+@pytest.fixture(scope="session")
 def messages():
     """What the server says of two contours of the demo, by type."""
     found = {}
