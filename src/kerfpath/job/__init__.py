@@ -21,6 +21,7 @@ from kerfpath.job.output import FileTexts as FileTexts
 from kerfpath.job.output import WrittenFiles as WrittenFiles
 from kerfpath.job.output import make_folder as make_folder
 from kerfpath.job.output import plan_file_text as plan_file_text
+from kerfpath.job.output import program_texts as program_texts
 from kerfpath.job.output import require_folder as require_folder
 from kerfpath.job.output import require_language as require_language
 from kerfpath.job.output import result_texts as result_texts

@@ -17,7 +17,7 @@ from starlette.routing import Route, WebSocketRoute
 from starlette.websockets import WebSocket, WebSocketDisconnect
 
 from kerfpath.errors import KerfpathError
-from kerfpath.studio._asks import parse
+from kerfpath.studio._asks import OfContour, ReasonOf, TextOf, parse
 from kerfpath.studio._document import Document
 from kerfpath.studio._exports import File, zipped
 from kerfpath.studio._guard import Guard
@@ -39,6 +39,8 @@ KINDS = {
 """The kinds of files of the page that are served, by their suffixes."""
 LONGEST = 12_000_000
 """Bytes of a message: a job of the largest size, quoted."""
+MOST_LOOKS = 8
+"""Questions of a page that are answered at the same time; further ones wait."""
 MOST_SAID = 300
 """Characters of what is said of a message that was not understood."""
 NO_TEXT = 1003
@@ -129,9 +131,9 @@ async def _export(request: Request) -> Response:
         return PlainTextResponse("there is nothing of this name\n", status_code=404)
     try:
         if name == "program":
-            result, texts = await session.texts(language)
+            result, texts = await session.program(language)
             return _download(zipped(result.job.program.name, texts))
-        _, texts = await session.texts(proved=True)
+        texts = await session.files()
     except KerfpathError as error:
         return PlainTextResponse(f"{error}\n", status_code=409)
     kind = "application/json" if name == "plan.json" else "text/csv"
@@ -141,7 +143,7 @@ async def _export(request: Request) -> Response:
 async def _report(request: Request) -> Response:
     session: Session = request.app.state.session
     try:
-        _, texts = await session.texts(proved=True)
+        texts = await session.files()
     except KerfpathError as error:
         return PlainTextResponse(f"{error}\n", status_code=409)
     own = {"content-security-policy": REPORT_POLICY, "cache-control": "no-store"}
@@ -160,7 +162,7 @@ async def _socket(socket: WebSocket) -> None:
     session: Session = socket.app.state.session
     await socket.accept()
     page = session.hub.open()
-    sending = asyncio.create_task(_send(socket, page))
+    sending, looking = asyncio.create_task(_send(socket, page)), set[asyncio.Task[None]]()
     try:
         while (received := await socket.receive())["type"] == "websocket.receive":
             text = received.get("text")
@@ -172,9 +174,17 @@ async def _socket(socket: WebSocket) -> None:
             except ValidationError as error:
                 page.say(ErrorMessage(message=_not_understood(error)))
                 continue
-            await session.hear(ask, page)
+            if isinstance(ask, OfContour | ReasonOf | TextOf) and len(looking) < MOST_LOOKS:
+                # What takes a while and changes nothing does not keep changes waiting.
+                look = asyncio.create_task(session.hear(ask, page))
+                looking.add(look)
+                look.add_done_callback(looking.discard)
+            else:
+                await session.hear(ask, page)
     finally:
         session.hub.close(page)
+        for look in looking:
+            look.cancel()
         sending.cancel()
         # Where the page has gone in the middle of a message, that is all there is to say.
         with suppress(asyncio.CancelledError, WebSocketDisconnect, RuntimeError):

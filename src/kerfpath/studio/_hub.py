@@ -30,9 +30,9 @@ class Page:
         self._there.set()
 
     def say(self, message: Message) -> None:
-        """Send an answer, which is one of its kind."""
-        text = message.model_dump_json()
-        self.put((getattr(message, "type", ""), getattr(message, "about", None)), text)
+        """Send an answer, in place of one of its kind about the same that has not been sent yet."""
+        about = [getattr(message, name, None) for name in ("type", "contour", "about")]
+        self.put(tuple(about), message.model_dump_json())
 
     async def next(self) -> str:
         """Return the next message, once there is one."""

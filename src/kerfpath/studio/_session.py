@@ -8,7 +8,15 @@ from contextlib import suppress
 from typing import TypeVarTuple
 
 from kerfpath.errors import InputError, KerfpathError
-from kerfpath.job import FileTexts, Job, JobResult, PreparedJob, read_job, result_texts
+from kerfpath.job import (
+    FileTexts,
+    Job,
+    JobResult,
+    PreparedJob,
+    program_texts,
+    read_job,
+    result_texts,
+)
 from kerfpath.studio._asks import Ask, Edit, OfContour, Plain, ReasonOf, Relax, Save, Text, TextOf
 from kerfpath.studio._document import Change, Document
 from kerfpath.studio._exports import WAIT, in_language, program_text
@@ -25,7 +33,7 @@ from kerfpath.studio._messages import (
 )
 from kerfpath.studio._newer import Newer
 from kerfpath.studio._numbers import Message
-from kerfpath.studio._planning import Planning
+from kerfpath.studio._planning import Outcome, Planning
 from kerfpath.studio._scene import tables_of
 
 __all__ = ["Session"]
@@ -54,7 +62,7 @@ class Session:
         self._first: str | None = None
         self._ways: dict[str, NoPathMessage] = {}
         self._changed = asyncio.Event()
-        self._texts: tuple[JobResult, FileTexts] | None = None
+        self._files: tuple[JobResult, FileTexts] | None = None
         self._loop: asyncio.AbstractEventLoop | None = None
 
     async def work(self) -> None:
@@ -81,29 +89,37 @@ class Session:
         except KerfpathError as error:
             page.say(ErrorMessage(message=str(error), about=ask.type))
 
-    async def texts(
-        self, language: str | None = None, *, proved: bool = False
-    ) -> tuple[JobResult, FileTexts]:
-        """Return what the job comes to, its program in a language, and the files of both.
+    async def program(self, language: str | None) -> tuple[JobResult, FileTexts]:
+        """Return what the job comes to, asked for in a language, and its program.
 
         Raises
         ------
         InputError
-            The job as it is now is not planned yet, or what is `proved` of it is still to come; an
-            unknown language.
+            The job as it is now is not planned yet; an unknown language.
         """
+        result = in_language(self._planned().result, language)
+        return result, await asyncio.to_thread(program_texts, result)
+
+    async def files(self) -> FileTexts:
+        """Return all files that the job comes to.
+
+        Raises
+        ------
+        InputError
+            The job as it is now is not planned yet, or what is proved of it is still to come.
+        """
+        planned = self._planned()
+        if not planned.settled:
+            raise InputError(f"{WAIT}; wait for it")
+        if self._files is None or self._files[0] is not planned.result:
+            self._files = planned.result, await asyncio.to_thread(result_texts, planned.result)
+        return self._files[1]
+
+    def _planned(self) -> Outcome:
         planned = self._planning.result
         if planned is None or planned.revision != self.document.revision:
             raise InputError("the job as it is now is not planned yet; wait until it is")
-        if proved and not planned.settled:
-            raise InputError(f"{WAIT}; wait for it")
-        result = in_language(planned.result, language)
-        if self._texts is not None and self._texts[0] is result:
-            return self._texts
-        files = await asyncio.to_thread(result_texts, result)
-        if language is None:
-            self._texts = result, files
-        return result, files
+        return planned
 
     async def _do(self, ask: Ask, page: Page) -> None:
         match ask:
@@ -136,8 +152,7 @@ class Session:
             case Relax():
                 self._relax(ask)
             case TextOf():
-                result, files = await self.texts(ask.language)
-                page.say(program_text(result, files))
+                page.say(program_text(*await self.program(ask.language)))
 
     def _change(self, changes: Sequence[Change], gesture: str | None = None) -> None:
         self.document.change(changes, gesture)

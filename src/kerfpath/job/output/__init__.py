@@ -4,6 +4,7 @@ from kerfpath.job.output._files import FileTexts as FileTexts
 from kerfpath.job.output._files import WrittenFiles as WrittenFiles
 from kerfpath.job.output._files import make_folder as make_folder
 from kerfpath.job.output._files import plan_file_text as plan_file_text
+from kerfpath.job.output._files import program_texts as program_texts
 from kerfpath.job.output._files import require_folder as require_folder
 from kerfpath.job.output._files import require_language as require_language
 from kerfpath.job.output._files import result_texts as result_texts

@@ -5,7 +5,7 @@ from __future__ import annotations
 import csv
 import io
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -35,6 +35,7 @@ __all__ = [
     "WrittenFiles",
     "make_folder",
     "plan_file_text",
+    "program_texts",
     "require_folder",
     "require_language",
     "result_texts",
@@ -135,8 +136,21 @@ def write_result(outcome: JobResult, folder: Path, *, strict: bool = False) -> W
 
 def result_texts(outcome: JobResult, *, strict: bool = False) -> FileTexts:
     """Return the files of a run as text; the program only if every audit has passed."""
-    job = outcome.job
-    part, moves = outcome.part, () if outcome.part is None else outcome.part.moves
+    moves = () if outcome.part is None else outcome.part.moves
+    made = program_texts(outcome, strict=strict)
+    files = {
+        **made.files,
+        "plan.json": plan_file_text(outcome),
+        "trajectory.csv": trajectory_text(outcome.plans, moves),
+        "report.html": report_text(outcome, made.notes, made.faults),
+    }
+    return replace(made, files=files)
+
+
+def program_texts(outcome: JobResult, *, strict: bool = False) -> FileTexts:
+    """Return the files of a run's program alone, none unless every audit has passed."""
+    job, part = outcome.job, outcome.part
+    moves = () if part is None else part.moves
     program: dict[str, str] = {}
     refused, unsafe = "", False
     notes = [collision_note(outcome.cell, moves_too=bool(moves))]
@@ -154,14 +168,8 @@ def result_texts(outcome: JobResult, *, strict: bool = False) -> FileTexts:
         except (InputError, AuditFailed) as error:
             refused, unsafe = str(error), isinstance(error, AuditFailed)
             faults.append(refused if unsafe else f"no program was written: {error}")
-    files = {
-        **program,
-        "plan.json": plan_file_text(outcome),
-        "trajectory.csv": trajectory_text(outcome.plans, moves),
-        "report.html": report_text(outcome, notes, faults),
-    }
     return FileTexts(
-        files=files, program=tuple(program), refused=refused, unsafe=unsafe,
+        files=program, program=tuple(program), refused=refused, unsafe=unsafe,
         notes=tuple(notes), faults=tuple(faults),
     )  # fmt: skip
 
