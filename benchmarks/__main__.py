@@ -37,6 +37,7 @@ NAMES = (
     "continuum_bounds",
     "continuum_infeasible",
     "certificate_audits",
+    "studio",
 )
 
 
@@ -168,6 +169,10 @@ def _run(name: str, *, quick: bool) -> list[Report]:
         from benchmarks import cad
 
         return [cad.run(quick=quick)]
+    if name == "studio":
+        from benchmarks import studio
+
+        return [studio.run(quick=quick)]
     if name == "part":
         from benchmarks import part
 
