@@ -7,9 +7,12 @@ import subprocess
 import sys
 import urllib.request
 
+import numpy as np
 import pytest
 
 from commands import assert_refused, run
+from kerfpath.cli._first_job import first_job
+from kerfpath.job import foresee, prepare, read_job, run_prepared
 from studio.talk import write_job
 
 
@@ -84,9 +87,6 @@ def test_a_port_in_use_is_refused(tmp_path):
 
 
 def test_what_is_no_job_is_refused(tmp_path):
-    job = write_job(tmp_path)
-    drawing = job.with_name("b_pillar.step")
-    assert_refused(run("studio", drawing, "--no-browser"), "expected a job, got a drawing")
     none = tmp_path / "none.toml"
     assert_refused(run("studio", none, "--port", 0, "--no-browser"), "no such file")
 
@@ -95,3 +95,31 @@ def test_what_is_not_installed_is_said_in_one_line(tmp_path, monkeypatch):
     monkeypatch.setattr("kerfpath.cli._studio.find_spec", lambda name: None)
     result = run("studio", write_job(tmp_path), "--no-browser")
     assert_refused(result, "starlette, uvicorn, websockets", "pip install 'kerfpath[studio]'")
+
+
+def test_a_drawing_gets_a_job_to_begin_with_that_can_be_planned(started, tmp_path):
+    write_job(tmp_path)  # the part beside it
+    _, address, line = started(tmp_path / "b_pillar.step", "--port", 0)
+    written = tmp_path / "b_pillar.toml"
+    assert line.startswith(str(written))
+    text = get(f"{address}export/job")
+    assert text == written.read_text()
+    assert text.count("[[contour]]") == 8
+    written.write_text("# mine\n" + text)
+    assert first_job(tmp_path / "b_pillar.step").read_text().startswith("# mine")
+    prepared = prepare(read_job(written))
+    assert not foresee(prepared)
+    up = prepared.job.placement[:3, :3] @ prepared.contours[0].loop.axes.mean(axis=0)
+    assert up[2] < -0.5  # the beam comes from above
+    low = prepared.job.placement @ np.append(prepared.part.bounding_box.mean(axis=0), 1.0)
+    assert low[:2] == pytest.approx([1.3, 0.0], abs=1e-4)  # to a tenth of a millimetre
+    made = run_prepared(prepared.with_contours(prepared.contours[:1]))
+    assert made.passed
+
+
+def test_a_drawing_without_a_closed_loop_gets_none(tmp_path):
+    lines = tmp_path / "lines.csv"
+    lines.write_text("x,y,z,nx,ny,nz\n" + "".join(f"{i},0,0,0,0,1\n" for i in range(9)))
+    result = run("studio", lines, "--no-browser")
+    assert_refused(result, "lines.csv")
+    assert not lines.with_suffix(".toml").exists()

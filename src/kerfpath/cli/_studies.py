@@ -225,7 +225,10 @@ def layout(
 def studio(
     job: Annotated[
         Path | None,
-        typer.Argument(metavar="[JOB.toml]", help="The job file; default: a copy of the demo's."),
+        typer.Argument(
+            metavar="[JOB.toml|DRAWING]",
+            help="The job, or a drawing; default: a copy of the demo's.",
+        ),
     ] = None,
     port: Annotated[
         int, typer.Option(help="Port to listen at; 0: any that is free.", min=0, max=65535)
@@ -244,8 +247,9 @@ def studio(
     """See a job in the browser, change it, watch it cut, and export it.
 
     The plan follows every change. Changes are kept in JOB.studio.toml beside the job until they are
-    saved to it; the same command finds them again. Without a job, the shipped one is copied to the
-    folder kerfpath-studio.
+    saved to it; the same command finds them again. For a drawing a job is written beside it, under
+    its name, unless there is one. Without either, the shipped job is copied to the folder
+    kerfpath-studio.
 
     Example: kerfpath studio door.toml
     """

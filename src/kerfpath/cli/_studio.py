@@ -17,11 +17,13 @@ __all__ = ["open_studio"]
 NEEDED = ("starlette", "uvicorn", "websockets")
 SHIPPED = ("b_pillar.toml", "b_pillar.step")
 """The demo job and its part, which are copied so that they can be changed."""
-DRAWINGS = (".step", ".stp", ".iges", ".igs", ".dxf", ".csv")
+DRAWINGS = (".step", ".stp", ".iges", ".igs", ".dxf", ".csv", ".tsv", ".txt")
 
 
 def open_studio(job: Path | None, *, host: str, port: int, browser: bool) -> None:
     """Serve a job to the browser until the command is stopped; without one, a copy of the demo's.
+
+    Of a drawing the job beside it that has its name; where there is none, one is written.
 
     Raises
     ------
@@ -34,12 +36,14 @@ def open_studio(job: Path | None, *, host: str, port: int, browser: bool) -> Non
             f"studio: needs {', '.join(missing)}, which are not installed; "
             "run pip install 'kerfpath[studio]'"
         )
-    if job is not None and job.suffix.lower() in DRAWINGS:
-        raise InputError(
-            f"{job}: expected a job, got a drawing; write a job for it, as the one that kerfpath "
-            "studio copies where it is given none, with its name as file in [part]"
-        )
-    path = _copy_of_demo() if job is None else job
+    if job is None:
+        path = _copy_of_demo()
+    elif job.suffix.lower() in DRAWINGS:
+        from kerfpath.cli._first_job import first_job
+
+        path = first_job(job)
+    else:
+        path = job
     from kerfpath.studio import serve
 
     def show(address: str) -> None:
