@@ -25,7 +25,7 @@ SPACING = 2.0
 TURNS = ((0, 0, 0), (180, 0, 0), (90, 0, 0), (-90, 0, 0), (0, 90, 0), (0, -90, 0))
 """deg, roll, pitch and yaw: ways to lay a part down, the first that serves best."""
 PLACE = (1300.0, 0.0, 500.0)
-"""mm, in the robot base: middle of the part, and its lowest point; within the reach of the robot."""
+"""mm, in the robot base: middle of the part, and its lowest point; within reach."""
 HEAD = """\
 # A job to begin with, for {drawing}: robot, head, place, loops and speed are guesses to be changed.
 
