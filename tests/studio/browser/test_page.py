@@ -198,6 +198,21 @@ def test_space_plays_and_arrows_step(page, studio, first):
     assert nodes[2] == nodes[0]
 
 
+def test_a_button_that_was_clicked_leaves_the_space_bar_to_the_player(page, studio, first):
+    studio.open(*first)
+    ready(page)
+    page.locator("#contours button").first.click()
+    page.keyboard.press("Space")
+    assert page.evaluate("() => studio.player.playing")
+    page.keyboard.press("Space")
+    # Who goes by keys presses the button that has the focus.
+    page.locator("#theme").focus()
+    before = page.evaluate("() => document.documentElement.dataset.theme")
+    page.keyboard.press("Space")
+    assert page.evaluate("() => document.documentElement.dataset.theme") != before
+    assert not page.evaluate("() => studio.player.playing")
+
+
 def test_playing_moves_the_robot_and_its_clock(page, studio, first):
     studio.open(*first)
     ready(page)

@@ -72,6 +72,13 @@ store.on(["selected"], () => {
   if (begin !== null && document.activeElement?.id !== "scrub") player.seek(begin);
 });
 
+// A button that was clicked gives the keyboard back: the space bar then plays.
+document.addEventListener("click", (event) => {
+  const button = /** @type {HTMLElement} */ (event.target).closest("button");
+  const clicked = event.detail > 0 && button === document.activeElement;
+  if (button && clicked && !button.closest("dialog")) button.blur();
+});
+
 document.addEventListener("keydown", (event) => {
   const target = /** @type {HTMLElement} */ (event.target);
   const typing = target.closest("textarea, select, dialog, input:not([type=range])") !== null;
