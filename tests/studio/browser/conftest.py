@@ -1,4 +1,8 @@
-"""A real browser, and pages in it, served by the pretended server."""
+"""A real browser, and pages in it, served by the pretended server.
+
+It closes with each module: a page that waits turns its spinner, which takes most of a core without
+a graphics card.
+"""
 
 import json
 import struct
@@ -23,7 +27,7 @@ MESH = (
 )
 
 
-@pytest.fixture(scope="session")
+@pytest.fixture(scope="module")
 def chromium():
     if not CHROMIUM.exists():
         pytest.skip("needs the Chromium browser at /usr/bin/chromium")
@@ -47,7 +51,7 @@ def page(chromium, request):
     context.close()
 
 
-@pytest.fixture(scope="session")
+@pytest.fixture(scope="module")
 def modules(chromium):
     """A page without a job, whose modules can be called."""
     context = chromium.new_context()
