@@ -10,8 +10,10 @@ from pathlib import Path
 
 import numpy as np
 from OCP.BRepAdaptor import BRepAdaptor_Surface
+from OCP.collections import IndexedMap_TopoDS_Shape_TopTools_ShapeMapHasher as ShapeMap
 from OCP.GeomAbs import GeomAbs_SurfaceType
 from OCP.Standard import Standard_Failure
+from OCP.TopAbs import TopAbs_ShapeEnum
 
 from kerfpath._arrays import freeze
 from kerfpath.cad._build import named_loops
@@ -19,7 +21,7 @@ from kerfpath.cad._left_out import LeftOut, counted, nothing_drawn
 from kerfpath.cad._loops import FaceLoop, bounds_of, loops_of
 from kerfpath.cad._mesh import triangulate
 from kerfpath.cad._part import Loop, Part
-from kerfpath.cad._shape import NamedFace, NamedShape, unique
+from kerfpath.cad._shape import NamedFace, NamedShape, list_shapes, unique
 from kerfpath.cad._skins import Skin, skins_of
 from kerfpath.cad._units import MM
 from kerfpath.errors import InputError
@@ -81,7 +83,20 @@ def part_of(
         frames=drawn.frames,
         _gap=gap,
         _triangulate=lru_cache(MESHES)(partial(triangulate, drawn.shape)),
+        _face_names=_in_order(drawn, faces, [piece_of[f] or name for f, name in enumerate(names)]),
     )
+
+
+def _in_order(
+    drawn: NamedShape, faces: Sequence[NamedFace], names: Sequence[str]
+) -> tuple[str, ...]:
+    """Return the names of faces in the order in which they are meshed, "" for what is left out."""
+    numbered = ShapeMap()
+    for named in faces:
+        numbered.Add(named.face)
+    meshed = list_shapes(drawn.shape, TopAbs_ShapeEnum.TopAbs_FACE)
+    found = [numbered.FindIndex(face) for face in meshed]  # from 1 on, 0: not there
+    return tuple(names[number - 1] if number else "" for number in found)
 
 
 def _readable(

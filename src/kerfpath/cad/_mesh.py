@@ -19,15 +19,20 @@ ANGLE = 0.35
 """Largest angle (rad) between neighbouring triangles: small holes still look round."""
 
 
-def triangulate(shape: TopoDS_Shape, deflection: float) -> tuple[Array, Ints]:
-    """Return vertices (V, 3) mm and outward triangles (F, 3), within `deflection` mm."""
+def triangulate(shape: TopoDS_Shape, deflection: float) -> tuple[Array, Ints, Ints]:
+    """Return vertices (V, 3) mm and outward triangles (F, 3), within `deflection` mm.
+
+    The third answer (f,) says how many of the triangles are of each face, in their order.
+    """
     # OCCT keeps the finest mesh so far on the shape; the answer must not depend on that.
     BRepTools.Clean_s(shape)
     BRepMesh_IncrementalMesh(shape, deflection, False, ANGLE, False)
     vertices, triangles, count = [np.empty((0, 3))], [np.empty((0, 3), dtype=np.int64)], 0
+    sizes: list[int] = []
     for found in list_shapes(shape, TopAbs_ShapeEnum.TopAbs_FACE):
         face, location = TopoDS.Face(found), TopLoc_Location()
         mesh = BRep_Tool.Triangulation_s(face, location)
+        sizes.append(0 if mesh is None else mesh.NbTriangles())
         if mesh is None:
             continue
         placed = location.Transformation()
@@ -38,4 +43,8 @@ def triangulate(shape: TopoDS_Shape, deflection: float) -> tuple[Array, Ints]:
         vertices.append(np.array([[p.X(), p.Y(), p.Z()] for p in nodes]))
         triangles.append(corners.astype(np.int64) - 1 + count)
         count += len(nodes)
-    return np.vstack(vertices), np.ascontiguousarray(np.vstack(triangles))
+    return (
+        np.vstack(vertices),
+        np.ascontiguousarray(np.vstack(triangles)),
+        np.array(sizes, dtype=np.int64),
+    )

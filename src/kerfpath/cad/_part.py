@@ -133,7 +133,10 @@ class Part:
     left_out: tuple[LeftOut, ...] = ()
     frames: Mapping[str, Array] = field(default_factory=dict, repr=False)
     _gap: float = field(repr=False)
-    _triangulate: Callable[[float], tuple[Array, Ints]] | None = field(default=None, repr=False)
+    _triangulate: Callable[[float], tuple[Array, Ints, Ints]] | None = field(
+        default=None, repr=False
+    )
+    _face_names: tuple[str, ...] = field(default=(), repr=False)
 
     def frame(self, name: str) -> Array:
         """Return T_part_frame (4, 4) m of a coordinate system that the drawing names.
@@ -361,8 +364,25 @@ class Part:
         size = scalar(deflection, "deflection", unit="m", above=0.0)
         if self._triangulate is None:
             return freeze(np.empty((0, 3))), freeze(np.empty((0, 3), dtype=np.int64))
-        vertices, triangles = self._triangulate(size / MM)
+        vertices, triangles, _ = self._triangulate(size / MM)
         return freeze(vertices * MM), freeze(triangles)
+
+    def mesh_faces(self, deflection: float = 5e-4) -> tuple[tuple[str, int], ...]:
+        """Return whose the triangles of `mesh` are: runs of them in their order.
+
+        Each run has the name of a face, or of the skin that the face is a piece of, and the number
+        of its triangles. A face that could not be read is called "".
+
+        Parameters
+        ----------
+        deflection : float m
+            That of the mesh.
+        """
+        size = scalar(deflection, "deflection", unit="m", above=0.0)
+        if self._triangulate is None:
+            return ()
+        counts = self._triangulate(size / MM)[2].tolist()
+        return tuple(zip(self._face_names, counts, strict=True))
 
 
 def _range(value: tuple[float, float] | None, name: str) -> tuple[float, float] | None:

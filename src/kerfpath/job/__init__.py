@@ -16,7 +16,9 @@ from kerfpath.job.format import pose as pose
 from kerfpath.job.format import prepare as prepare
 from kerfpath.job.format import program_options as program_options
 from kerfpath.job.format import read_job as read_job
+from kerfpath.job.format import with_loops as with_loops
 from kerfpath.job.format import with_map as with_map
+from kerfpath.job.format import without_contour as without_contour
 from kerfpath.job.output import FileTexts as FileTexts
 from kerfpath.job.output import WrittenFiles as WrittenFiles
 from kerfpath.job.output import make_folder as make_folder

@@ -8,7 +8,9 @@ from pydantic import BaseModel, ConfigDict, Field, JsonValue, TypeAdapter
 
 __all__ = [
     "Ask",
+    "Cut",
     "Edit",
+    "Leave",
     "OfContour",
     "Plain",
     "ReasonOf",
@@ -23,6 +25,8 @@ MOST_KEYS = 6
 """Parts of the path of a key: no job nests deeper."""
 MOST_WORDS = 200
 """Characters of a name that a page sends: no contour is called by more."""
+MOST_LOOPS = 500
+"""Loops that are added at once."""
 MOST_TEXT = 10_000_000
 """Characters of a job, as its reader takes them."""
 
@@ -92,6 +96,20 @@ class Relax(_Strict):
     index: Index
 
 
+class Cut(_Strict):
+    """Loops of the part become contours of the job."""
+
+    type: Literal["cut"]
+    loops: Annotated[tuple[Words, ...], Field(min_length=1, max_length=MOST_LOOPS, strict=False)]
+
+
+class Leave(_Strict):
+    """A table of the job's contours is taken out of it."""
+
+    type: Literal["leave"]
+    index: Index
+
+
 class TextOf(_Strict):
     """The program as text."""
 
@@ -99,7 +117,7 @@ class TextOf(_Strict):
     language: Words | None = None
 
 
-Ask = Edit | Text | Plain | Save | OfContour | ReasonOf | Relax | TextOf
+Ask = Edit | Text | Plain | Save | OfContour | ReasonOf | Relax | Cut | Leave | TextOf
 """What a page may say."""
 
 _ASK: TypeAdapter[Ask] = TypeAdapter(Annotated[Ask, Field(discriminator="type")])

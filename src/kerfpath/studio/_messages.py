@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import Literal
 
 from kerfpath.studio._numbers import Message, Numbers
+from kerfpath.studio._part_messages import FaceEntry, LoopEntry, PartMessage
 
 __all__ = [
     "BodyEntry",
@@ -18,17 +19,20 @@ __all__ = [
     "EditEntry",
     "ErrorMessage",
     "Export",
+    "FaceEntry",
     "FastestMessage",
     "Fault",
     "FileEntry",
     "JobMessage",
     "JointEntry",
+    "LoopEntry",
     "LossEntry",
     "MapMessage",
     "NearestEntry",
     "NoPathMessage",
     "Option",
     "OutcomeMessage",
+    "PartMessage",
     "PlanMessage",
     "PoseMessage",
     "ProgramMessage",
@@ -115,6 +119,7 @@ class ContourEntry(Message):
 
     name: str
     index: int
+    loop: str
     closed: bool
     points: Numbers
     axes: Numbers

@@ -8,6 +8,7 @@ from functools import partial
 from threading import Event
 from typing import NamedTuple
 
+from kerfpath.cad import Part
 from kerfpath.contour import Contour
 from kerfpath.errors import InputError, KerfpathError
 from kerfpath.graph import LayeredGraph
@@ -26,7 +27,8 @@ from kerfpath.studio._bench import Bench
 from kerfpath.studio._clock import cycle_of, program_message
 from kerfpath.studio._exports import exports_of
 from kerfpath.studio._fastest import fastest_message
-from kerfpath.studio._keys import motion_key, setup_key
+from kerfpath.studio._keys import motion_key, part_key, setup_key
+from kerfpath.studio._loops import part_message
 from kerfpath.studio._messages import (
     ErrorMessage,
     OutcomeMessage,
@@ -89,6 +91,7 @@ class Planning:
         self._before: tuple[str, dict[str, Plan]] = ("", {})
         """What drafts begin from: the motions of contours, and what they share."""
         self._scene, self._looked = "", ""
+        self._part: tuple[str, Part] | None = None
         self.meshes = self._shown = Meshes()
         self.prepared: PreparedJob | None = None
         self.cuts: dict[str, tuple[CutResult, ...]] = {}
@@ -180,6 +183,7 @@ class Planning:
         try:
             if self.prepared is None:
                 self._show(*scene_of_robot(job, revision))
+            self._show_part(job, revision)
             prepared = self._bench.prepared(job)
         except InputError as fault:
             self._refused(fault, revision)
@@ -236,6 +240,26 @@ class Planning:
         self._scene = setup
         known = set(prepared.names)
         self.cuts = {name: cuts for name, cuts in self.cuts.items() if name in known}
+
+    def _show_part(self, job: Job, revision: int) -> None:
+        """Say what can be picked of the drawing, unless it is as it was."""
+        part = self._bench.part(job)
+        key = f"{part_key(job)} {job.placement.tolist()}"
+        if self._part is None or self._part[0] != key:
+            self._say(part_message(job, part, revision))
+        self._part = key, part
+
+    def known_part(self) -> Part:
+        """Return what the drawing holds.
+
+        Raises
+        ------
+        InputError
+            It is not read yet.
+        """
+        if self._part is None:
+            raise InputError("the drawing is not read yet; wait until its loops are shown")
+        return self._part[1]
 
     def _show(self, message: SceneMessage, meshes: Meshes) -> None:
         # A page may still ask for what stood there before.

@@ -140,6 +140,7 @@ def _contour(request: CutRequest, index: int, placement: Array) -> ContourEntry:
     return ContourEntry(
         name=request.task.name,
         index=index,
+        loop=request.task.pick,
         closed=nodes.closed,
         points=flat(_placed(nodes.points, placement)),
         axes=flat(nodes.axes @ placement[:3, :3].T),

@@ -16,8 +16,22 @@ from kerfpath.job import (
     program_texts,
     read_job,
     result_texts,
+    with_loops,
+    without_contour,
 )
-from kerfpath.studio._asks import Ask, Edit, OfContour, Plain, ReasonOf, Relax, Save, Text, TextOf
+from kerfpath.studio._asks import (
+    Ask,
+    Cut,
+    Edit,
+    Leave,
+    OfContour,
+    Plain,
+    ReasonOf,
+    Relax,
+    Save,
+    Text,
+    TextOf,
+)
 from kerfpath.studio._document import Change, Document
 from kerfpath.studio._exports import WAIT, in_language, program_text
 from kerfpath.studio._hub import Hub, Page
@@ -126,8 +140,7 @@ class Session:
             case Edit():
                 self._change([(ask.path, ask.value)], ask.gesture)
             case Text():
-                self.document.replace(ask.text)
-                self._changed.set()
+                self._replace(ask.text)
             case Plain(type="undo"):
                 self.document.undo()
                 self._changed.set()
@@ -151,12 +164,34 @@ class Session:
                 page.say(await asyncio.to_thread(self._pose, ask))
             case Relax():
                 self._relax(ask)
+            case Cut():
+                part = self._planning.known_part()
+                self._replace(with_loops(await self._job_now(), part, ask.loops))
+            case Leave():
+                self._replace(without_contour(await self._job_now(), ask.index))
             case TextOf():
                 page.say(program_text(*await self.program(ask.language)))
 
     def _change(self, changes: Sequence[Change], gesture: str | None = None) -> None:
         self.document.change(changes, gesture)
         self._changed.set()
+
+    def _replace(self, text: str) -> None:
+        self.document.replace(text)
+        self._changed.set()
+
+    async def _job_now(self) -> Job:
+        """Return the job of the newest text.
+
+        Raises
+        ------
+        InputError
+            It is no valid job.
+        """
+        document = self.document
+        if self._job is None or self._job.text != document.text:
+            return await asyncio.to_thread(read_job, document.file, copy_of=document.path)
+        return self._job
 
     def _relax(self, ask: Relax) -> None:
         known = self._ways.get(ask.contour)

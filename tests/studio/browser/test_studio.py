@@ -10,6 +10,7 @@ from pathlib import Path
 import pytest
 
 from jobs import DEMO, SMALL
+from studio.browser.test_loops import DRAWN, PLACE
 from studio.browser.test_page import serious, until
 
 # One small contour of the shipped example, of which nothing is proved: that takes a second.
@@ -193,6 +194,26 @@ def test_without_a_path_a_relaxation_makes_one(opened):
     until(page, lambda: page.evaluate(REVISION) > before)
     page.locator("#cost").wait_for(timeout=240_000)
     assert cost(page) > 0
+
+
+@pytest.mark.slow
+def test_a_hole_that_is_clicked_is_planned_and_undo_takes_it_back(opened):
+    page = opened
+    page.locator("[data-view=part]").click()
+    page.evaluate(DRAWN)
+    page.mouse.click(*page.evaluate(PLACE, "skin/hole2"))
+    before = page.evaluate(REVISION)
+    page.get_by_role("button", name="Cut this loop").click()
+    settled(page, before)
+    assert page.locator("#contours button").count() == 2
+    assert page.evaluate("() => studio.store.selected") == "skin/hole2"
+    assert page.evaluate("() => studio.store.plans.get('skin/hole2')[0].passed")
+    until(page, lambda: page.evaluate("() => studio.player.timeline.whole"))
+    before = page.evaluate(REVISION)
+    page.locator("#undo").click()
+    settled(page, before)
+    assert page.locator("#contours button").count() == 1
+    assert page.locator("#saved").inner_text() == "saved"
 
 
 @pytest.mark.slow

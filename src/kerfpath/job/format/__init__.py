@@ -4,6 +4,8 @@ from kerfpath.job.format._cell import cell_of_job as cell_of_job
 from kerfpath.job.format._cell import with_map as with_map
 from kerfpath.job.format._contour import ContourSpec as ContourSpec
 from kerfpath.job.format._drawing import Drawing as Drawing
+from kerfpath.job.format._more_contours import with_loops as with_loops
+from kerfpath.job.format._more_contours import without_contour as without_contour
 from kerfpath.job.format._poses import pose as pose
 from kerfpath.job.format._prepared import Candidate as Candidate
 from kerfpath.job.format._prepared import CutRequest as CutRequest

@@ -8,6 +8,7 @@ import { contourList } from "./panels/contours.js";
 import { jointsPanel } from "./panels/joints.js";
 import { optionsPanel } from "./panels/options.js";
 import { resultPanel } from "./panels/result.js";
+import { loopsSheet } from "./panels/loops.js";
 import { sheets } from "./panels/sheets.js";
 import { Track } from "./panels/track.js";
 import { Player } from "./player.js";
@@ -36,7 +37,7 @@ store.on(["plan", "program", "scene"], () => {
   });
 });
 
-const view = new SceneView(store, player);
+const view = new SceneView(store, player, connection);
 const map = new MapView(store, player, connection, (q, admitted) => view.haunt(q, admitted));
 const plots = new Plots(store, player);
 new Track(player, store);
@@ -48,6 +49,7 @@ resultPanel(store, connection, view);
 jointsPanel(store, connection);
 optionsPanel(store, connection);
 sheets(store, connection);
+loopsSheet(store, connection);
 splitter();
 theme(byId("theme"), icon, () => {
   view.paint();
@@ -81,7 +83,8 @@ document.addEventListener("click", (event) => {
 
 document.addEventListener("keydown", (event) => {
   const target = /** @type {HTMLElement} */ (event.target);
-  const typing = target.closest("textarea, select, dialog, input:not([type=range])") !== null;
+  const typing =
+    target.closest("textarea, select, dialog:not(.docked), input:not([type=range])") !== null;
   const [command, { key }] = [event.ctrlKey || event.metaKey, event];
   if (command && key.toLowerCase() === "z" && !typing) {
     connection.send({ type: event.shiftKey ? "redo" : "undo" });

@@ -56,6 +56,7 @@
  * @typedef {object} ContourShape
  * @property {string} name
  * @property {number} index
+ * @property {string} loop
  * @property {boolean} closed
  * @property {number[]} points
  * @property {number[]} axes
@@ -74,6 +75,28 @@
  * @property {number[]} T_part
  * @property {ContourShape[]} contours
  * @property {boolean} cell
+ */
+
+/**
+ * @typedef {object} Loop  of the part, in the base
+ * @property {string} name
+ * @property {string} face
+ * @property {"outer" | "inner" | "open"} kind
+ * @property {"outer" | "inner" | "edge" | ""} side
+ * @property {boolean} closed
+ * @property {number} length
+ * @property {number | null} diameter
+ * @property {number} gap
+ * @property {number[]} points
+ */
+
+/**
+ * @typedef {object} PartMessage
+ * @property {"part"} type
+ * @property {number} revision
+ * @property {Loop[]} loops
+ * @property {{name: string, triangles: number}[]} faces
+ * @property {number} left_out
  */
 
 /** @typedef {{type: "progress", busy: boolean, label: string, done: number, total: number}} ProgressMessage */
@@ -239,7 +262,7 @@
 /** @typedef {{type: "error", message: string, about: string | null}} ErrorMessage */
 
 /**
- * @typedef {JobMessage | SceneMessage | ProgressMessage | PlanMessage | NoPathMessage
+ * @typedef {JobMessage | PartMessage | SceneMessage | ProgressMessage | PlanMessage | NoPathMessage
  *   | ProgramMessage | OutcomeMessage | MapMessage | PoseMessage | FastestMessage
  *   | ProgramTextMessage | ErrorMessage} ServerMessage
  */

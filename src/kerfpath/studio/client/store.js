@@ -6,7 +6,7 @@
 /** @typedef {import("./messages.js").MapMessage} MapMessage */
 
 /**
- * @typedef {"connection" | "job" | "scene" | "plan" | "program" | "outcome" | "progress" | "map"
+ * @typedef {"connection" | "job" | "part" | "pointed" | "scene" | "plan" | "program" | "outcome" | "progress" | "map"
  *   | "pose" | "fastest" | "program_text" | "error" | "selected"} Topic
  */
 
@@ -19,6 +19,8 @@ export class Store {
     this.retryAt = null;
     /** @type {import("./messages.js").JobMessage | null} */
     this.job = null;
+    /** @type {import("./messages.js").PartMessage | null} */
+    this.part = null;
     /** @type {import("./messages.js").SceneMessage | null} */
     this.scene = null;
     /** @type {import("./messages.js").ProgramMessage | null} */
@@ -45,6 +47,8 @@ export class Store {
     this.nopaths = new Map();
     /** @type {Map<string, MapMessage>} */
     this.maps = new Map();
+    /** @type {string | null} the loop whose contour is chosen once there is one */
+    this.awaited = null;
     /** @type {string | null} the chosen contour */
     this.selected = null;
     /** @type {Map<string, Set<(about: any) => void>>} */
@@ -106,6 +110,9 @@ export class Store {
     switch (message.type) {
       case "job":
         this.job = message;
+        break;
+      case "part":
+        this.part = message;
         break;
       case "scene":
         this.scene = message;
@@ -207,5 +214,10 @@ export class Store {
       for (const name of [...known.keys()]) if (!names.has(name)) known.delete(name);
     if (this.selected === null || !names.has(this.selected))
       this.select(this.contours()[0] ?? null);
+    const come = this.scene?.contours.find(({ loop }) => loop === this.awaited);
+    if (come) {
+      this.awaited = null;
+      this.select(come.name);
+    }
   }
 }

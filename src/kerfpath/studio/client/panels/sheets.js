@@ -1,6 +1,7 @@
 /** Sheets over the page: the text of the job, to read and to change, and that of the program. */
 
-import { byId, el, icon } from "../dom.js";
+import { byId, el } from "../dom.js";
+import { sheetShown, showSheet } from "./sheet.js";
 
 /** @typedef {import("../store.js").Store} Store */
 
@@ -10,47 +11,17 @@ import { byId, el, icon } from "../dom.js";
  */
 export function sheets(store, connection) {
   const sheet = byId("sheet", HTMLDialogElement);
-  /** @type {"job" | "program" | null} */
-  let shown = null;
   let language = "";
   byId("open-text").addEventListener("click", jobSheet);
   byId("open-program").addEventListener("click", () =>
     ask(language || (store.job?.values?.program?.language ?? "")),
   );
-  store.on(["program_text"], () => shown === "program" && programSheet());
+  store.on(["program_text"], () => sheetShown() === "program" && programSheet());
   store.on(["error"], ({ about, message }) => {
-    if (shown === "program" && about === "program") none(message);
+    if (sheetShown() === "program" && about === "program") none(message);
   });
-  sheet.addEventListener("close", () => (shown = null));
-  sheet.addEventListener("click", (event) => event.target === sheet && sheet.close());
-
-  /**
-   * @param {string} title
-   * @param {(Node | null)[]} tools
-   * @param {(Node | null)[]} body
-   */
-  function show(title, tools, body) {
-    const close = el(
-      "button",
-      { class: "tool", "aria-label": "Close", onclick: () => sheet.close() },
-      icon("close"),
-    );
-    sheet.replaceChildren(
-      el(
-        "header",
-        {},
-        el("h2", { id: "sheet-title" }, title),
-        el("span", { class: "grow" }),
-        ...tools.filter((each) => each !== null),
-        close,
-      ),
-      ...body.filter((each) => each !== null),
-    );
-    if (!sheet.open) sheet.showModal();
-  }
 
   function jobSheet() {
-    shown = "job";
     const text = el("textarea", { spellcheck: "false", "aria-label": "Text of the job" });
     text.value = store.job?.text ?? "";
     const apply = el(
@@ -66,7 +37,8 @@ export function sheets(store, connection) {
       "Apply",
     );
     text.addEventListener("input", () => (apply.disabled = text.value === store.job?.text));
-    show(
+    showSheet(
+      "job",
       store.job?.name ?? "Job",
       [],
       [
@@ -92,10 +64,10 @@ export function sheets(store, connection) {
 
   /** @param {string} wanted */
   function ask(wanted) {
-    shown = "program";
     language = wanted;
     connection.send(wanted ? { type: "program", language: wanted } : { type: "program" });
-    show(
+    showSheet(
+      "program",
       "Program",
       [languages()],
       [
@@ -122,7 +94,8 @@ export function sheets(store, connection) {
 
   /** @param {string} why */
   function none(why) {
-    show(
+    showSheet(
+      "program",
       "Program",
       [languages()],
       [el("div", { class: "state still" }, el("strong", {}, "No program"), el("p", {}, why))],
@@ -149,7 +122,8 @@ export function sheets(store, connection) {
       ...answer.faults.map((each) => el("li", { class: "fault" }, each)),
       ...answer.notes.map((each) => el("li", {}, each)),
     ];
-    show(
+    showSheet(
+      "program",
       answer.files.length === 1 ? answer.files[0].name : "Program",
       [tabs, languages()],
       [

@@ -29,7 +29,7 @@ const colourOfKind = (kind) =>
  * @param {number} width  of the usual text size
  * @param {object} [more]
  */
-function line(width, more = {}) {
+export function line(width, more = {}) {
   // Nearer than the surface that they are drawn on; among lines the later is over the earlier.
   const nearer = {
     depthWrite: false,
@@ -210,7 +210,7 @@ const valuesOf = (plan, by) => (by === "speed" ? plan.speed : plan.joint_load);
  * @param {number[]} points  K 3
  * @returns {number[]} (K-1) 6
  */
-function pairs(points) {
+export function pairs(points) {
   /** @type {number[]} */
   const out = [];
   for (let i = 0; i + 5 < points.length; i += 3)
@@ -222,7 +222,7 @@ function pairs(points) {
  * @param {LineSegments2} target
  * @param {number[]} points
  */
-function fill(target, points) {
+export function fill(target, points) {
   target.visible = points.length > 0;
   if (!points.length) return;
   target.geometry.dispose();

@@ -5,6 +5,7 @@ import { Box3, Vector3 } from "three";
 import { byId, el, icon } from "../dom.js";
 import { fixed, percent } from "../format.js";
 import { Machine } from "./machine.js";
+import { Picking } from "./picking.js";
 import { Paths } from "./paths.js";
 import { SCALE_GRADIENT } from "./scale.js";
 import { Stage } from "./stage.js";
@@ -19,8 +20,9 @@ export class SceneView {
   /**
    * @param {Store} store
    * @param {Player} player
+   * @param {import("./picking.js").Link} connection
    */
-  constructor(store, player) {
+  constructor(store, player, connection) {
     this.store = store;
     this.player = player;
     this.canvas = byId("scene", HTMLCanvasElement);
@@ -30,6 +32,7 @@ export class SceneView {
     this.machine = new Machine();
     this.paths = new Paths();
     this.stage.scene.add(this.machine.group, this.machine.ghost, this.paths.group);
+    this.picking = new Picking(this, connection);
     this.built = "";
     this.ready = false;
     this.follow = false;
@@ -54,13 +57,15 @@ export class SceneView {
     canvas.addEventListener("pointerdown", (event) => ([x, y] = [event.offsetX, event.offsetY]));
     canvas.addEventListener("pointerup", (event) => {
       if (Math.hypot(event.offsetX - x, event.offsetY - y) > 4) return;
-      const found = this.pointed(event.offsetX, event.offsetY);
-      if (found) this.chosen(found.contour, found.node);
+      this.clicked(event.offsetX, event.offsetY, event.button === 2);
     });
     canvas.addEventListener("pointermove", (event) => {
       if (event.buttons === 0) this.point(event.offsetX, event.offsetY);
     });
-    canvas.addEventListener("pointerleave", () => (this.label.hidden = true));
+    canvas.addEventListener("pointerleave", () => {
+      this.label.hidden = true;
+      if (this.picking.menu.hidden) this.picking.hover(null);
+    });
     canvas.addEventListener("keydown", (event) => event.key === "f" && this.look("fit"));
     for (const button of document.querySelectorAll("[data-view]")) {
       const { view } = /** @type {HTMLElement} */ (button).dataset;
@@ -81,6 +86,19 @@ export class SceneView {
       this.scale();
       this.show(this.player.moment);
     });
+  }
+
+  /**
+   * Choose the contour that was clicked, or offer what the loop, the face or the contour may become.
+   * @param {number} x  px
+   * @param {number} y  px
+   * @param {boolean} right  whether it was the other button
+   */
+  clicked(x, y, right) {
+    const [found, loop] = [this.pointed(x, y), this.picking.pointed(x, y)];
+    if (found && right) this.picking.asked(x, y, found.contour);
+    else if (found && !(loop && loop.away < found.away)) this.chosen(found.contour, found.node);
+    else this.picking.clicked(x, y, loop?.loop ?? null);
   }
 
   /**
@@ -206,7 +224,7 @@ export class SceneView {
     }
     /** @type {Vector3[]} */
     const points = [];
-    for (const { points: xyz } of scene.contours)
+    for (const { points: xyz } of [...scene.contours, ...(this.store.part?.loops ?? [])])
       for (let i = 0; i < xyz.length; i += 3) points.push(new Vector3().fromArray(xyz, i));
     if (view !== "part") points.push(...this.machine.outline());
     if (points.length) this.stage.look(view, points);
@@ -219,12 +237,17 @@ export class SceneView {
    */
   pointed(x, y) {
     const point = new Vector3();
-    let [best, found] = [REACH, /** @type {{contour: string, node: number} | null} */ (null)];
+    let best = REACH;
+    /** @type {{contour: string, node: number, away: number} | null} */
+    let found = null;
     for (const { contour, points } of this.paths.tracks)
       for (let k = 0; k < points.length / 3; k++) {
         const seen = this.stage.project(point.fromArray(points, 3 * k));
         const away = Math.hypot(seen.x - x, seen.y - y);
-        if (away < best && seen.z < 1) [best, found] = [away, { contour, node: k }];
+        if (away < best && seen.z < 1) {
+          best = away;
+          found = { contour, node: k, away };
+        }
       }
     return found;
   }
@@ -235,10 +258,24 @@ export class SceneView {
    * @param {number} y
    */
   point(x, y) {
-    const found = this.pointed(x, y);
-    this.canvas.style.cursor = found ? "pointer" : "";
-    this.label.hidden = !found;
-    if (!found) return;
+    const near = this.pointed(x, y);
+    const loop = this.picking.pointed(x, y);
+    const found = loop && loop.away < (near?.away ?? Infinity) ? null : near;
+    this.canvas.style.cursor = found || loop ? "pointer" : "";
+    if (this.picking.menu.hidden && !found) this.picking.hover(loop?.loop ?? null);
+    this.label.hidden = !(found || loop) || !this.picking.menu.hidden;
+    if (this.label.hidden) return;
+    if (found) this.describe(found);
+    else if (loop) this.label.replaceChildren(...this.picking.words(loop.loop));
+    const right = Math.min(x + 14, this.canvas.clientWidth - this.label.offsetWidth - 8);
+    this.label.style.transform = `translate(${right}px, ${Math.max(4, y - 40)}px)`;
+  }
+
+  /**
+   * Say what a contour is at a node.
+   * @param {{contour: string, node: number}} found
+   */
+  describe(found) {
     const plan = this.store.plans.get(found.contour)?.[0];
     const node = Math.min(found.node, (plan?.time.length ?? 1) - 1);
     const speed = plan && plan.speed[Math.min(node, plan.speed.length - 1)] * 60;
@@ -250,8 +287,6 @@ export class SceneView {
           ]
         : []),
     );
-    const right = Math.min(x + 14, this.canvas.clientWidth - this.label.offsetWidth - 8);
-    this.label.style.transform = `translate(${right}px, ${Math.max(4, y - 40)}px)`;
   }
 
   /** Say what the colours of the contours mean. */
@@ -324,6 +359,7 @@ export class SceneView {
   paint() {
     this.machine.paint();
     this.paths.paint();
+    this.picking.loops.paint();
     this.lay();
     this.scale();
     this.stage.invalidate();

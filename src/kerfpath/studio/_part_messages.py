@@ -1,0 +1,40 @@
+"""What the server says of the part that is cut, see README.md beside this file."""
+
+from __future__ import annotations
+
+from typing import Literal
+
+from kerfpath.studio._numbers import Message, Numbers
+
+__all__ = ["FaceEntry", "LoopEntry", "PartMessage"]
+
+
+class LoopEntry(Message):
+    """A loop of the part, whether or not it is cut."""
+
+    name: str
+    face: str
+    kind: Literal["outer", "inner", "open"]
+    side: Literal["outer", "inner", "edge", ""]
+    closed: bool
+    length: float
+    diameter: float | None
+    gap: float
+    points: Numbers
+
+
+class FaceEntry(Message):
+    """A run of triangles of the part's mesh, and the face that they are of."""
+
+    name: str
+    triangles: int
+
+
+class PartMessage(Message):
+    """What can be picked of the drawing."""
+
+    type: Literal["part"] = "part"
+    revision: int
+    loops: list[LoopEntry]
+    faces: list[FaceEntry]
+    left_out: int
