@@ -81,6 +81,7 @@ def application(document: Document, *, hosts: Iterable[str], token: str | None =
             Route("/", _index),
             Route("/client/{name:path}", _client),
             Route("/mesh/{name}", _mesh),
+            Route("/kept/{number:int}", _kept),
             Route("/export/{name}", _export),
             Route("/report", _report),
             WebSocketRoute("/ws", _socket),
@@ -119,6 +120,15 @@ async def _mesh(request: Request) -> Response:
         return PlainTextResponse("there is no such mesh\n", status_code=404)
     kept = {"cache-control": "private, max-age=31536000, immutable"}
     return Response(data, media_type="application/octet-stream", headers=kept)
+
+
+async def _kept(request: Request) -> Response:
+    session: Session = request.app.state.session
+    try:
+        text = session.kept.plans(request.path_params["number"])
+    except KerfpathError as error:
+        return PlainTextResponse(f"{error}\n", status_code=404)
+    return Response(text, media_type="application/json", headers={"cache-control": "no-store"})
 
 
 async def _export(request: Request) -> Response:

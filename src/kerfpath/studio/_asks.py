@@ -10,11 +10,14 @@ __all__ = [
     "Ask",
     "Cut",
     "Edit",
+    "Keep",
     "Leave",
     "OfContour",
+    "OfKept",
     "Plain",
     "ReasonOf",
     "Relax",
+    "Rename",
     "Save",
     "Text",
     "TextOf",
@@ -110,6 +113,28 @@ class Leave(_Strict):
     index: Index
 
 
+class Keep(_Strict):
+    """Keep the job as it is, with its plans, to compare it later."""
+
+    type: Literal["keep"]
+    name: Words | None = None
+
+
+class Rename(_Strict):
+    """Call what is kept by another name."""
+
+    type: Literal["rename"]
+    id: Index
+    name: Words
+
+
+class OfKept(_Strict):
+    """Go back to what is kept, or forget it."""
+
+    type: Literal["restore", "forget"]
+    id: Index
+
+
 class TextOf(_Strict):
     """The program as text."""
 
@@ -117,7 +142,21 @@ class TextOf(_Strict):
     language: Words | None = None
 
 
-Ask = Edit | Text | Plain | Save | OfContour | ReasonOf | Relax | Cut | Leave | TextOf
+Ask = (
+    Edit
+    | Text
+    | Plain
+    | Save
+    | OfContour
+    | ReasonOf
+    | Relax
+    | Cut
+    | Leave
+    | Keep
+    | Rename
+    | OfKept
+    | TextOf
+)
 """What a page may say."""
 
 _ASK: TypeAdapter[Ask] = TypeAdapter(Annotated[Ask, Field(discriminator="type")])

@@ -23,11 +23,14 @@ from kerfpath.studio._asks import (
     Ask,
     Cut,
     Edit,
+    Keep,
     Leave,
     OfContour,
+    OfKept,
     Plain,
     ReasonOf,
     Relax,
+    Rename,
     Save,
     Text,
     TextOf,
@@ -36,6 +39,7 @@ from kerfpath.studio._document import Change, Document
 from kerfpath.studio._exports import WAIT, in_language, program_text
 from kerfpath.studio._hub import Hub, Page
 from kerfpath.studio._job_entry import faults_of, job_message
+from kerfpath.studio._kept import Kept
 from kerfpath.studio._map import map_message, pose_message
 from kerfpath.studio._messages import (
     ContourName,
@@ -67,6 +71,7 @@ class Session:
     def __init__(self, document: Document) -> None:
         self.document = document
         self.hub = Hub()
+        self.kept = Kept()
         self._planning = Planning(self._from_thread, self._prepared_there, self._refused_there)
         self._newer = Newer()
         self._job: Job | None = None
@@ -169,6 +174,8 @@ class Session:
                 self._replace(with_loops(await self._job_now(), part, ask.loops))
             case Leave():
                 self._replace(without_contour(await self._job_now(), ask.index))
+            case Keep() | Rename() | OfKept():
+                self._keep(ask)
             case TextOf():
                 page.say(program_text(*await self.program(ask.language)))
 
@@ -199,6 +206,23 @@ class Session:
         if ask.index >= len(ways):
             raise InputError(f"contour {ask.contour!r:.60} has no relaxation {ask.index}")
         self._change([(tuple(one.path), one.value) for one in ways[ask.index].edits])
+
+    def _keep(self, ask: Keep | Rename | OfKept) -> None:
+        """Keep the job, or do something with one that is kept."""
+        match ask:
+            case Keep():
+                asked = None if self._job is None else self._job.options
+                if asked is None:
+                    raise InputError("keep: the job is not planned yet; wait, or correct its fault")
+                self.kept.keep(self.document, ask.name, asked.metric, asked.objective)
+            case Rename():
+                self.kept.rename(ask.id, ask.name)
+            case OfKept(type="forget"):
+                self.kept.forget(ask.id)
+            case OfKept():
+                self.document.replace(self.kept.text(ask.id))
+                self._changed.set()
+        self.hub.say(self.kept.message())
 
     def _map(self, contour: str) -> Message:
         _, cuts, nodes, graph = self._planning.whole(contour)
@@ -266,7 +290,10 @@ class Session:
             names = [contour.name for contour in newer.contours]
             self.hub.keep_only(names)
             self._newer.keep_only(names)
+            self.kept.keep_only(names)
         self.hub.say(newer)
+        if self.kept.take(newer):
+            self.hub.say(self.kept.message())
 
     def _prepared_there(self, prepared: PreparedJob, revision: int) -> None:
         self._soon(self._prepared, prepared, revision)

@@ -211,6 +211,20 @@
  */
 
 /**
+ * @typedef {object} KeptEntry
+ * @property {number} id
+ * @property {string} name
+ * @property {number} revision
+ * @property {string} metric
+ * @property {string} objective
+ * @property {string[]} contours
+ * @property {{cutting: number, air: number, piercing: number, total: number} | null} cycle
+ * @property {boolean} settled
+ */
+
+/** @typedef {{type: "kept", plans: KeptEntry[]}} KeptMessage */
+
+/**
  * @typedef {object} MapMessage
  * @property {"map"} type
  * @property {number} revision
@@ -264,7 +278,7 @@
 /**
  * @typedef {JobMessage | PartMessage | SceneMessage | ProgressMessage | PlanMessage | NoPathMessage
  *   | ProgramMessage | OutcomeMessage | MapMessage | PoseMessage | FastestMessage
- *   | ProgramTextMessage | ErrorMessage} ServerMessage
+ *   | ProgramTextMessage | KeptMessage | ErrorMessage} ServerMessage
  */
 
 /** @typedef {{type: string} & Record<string, unknown>} ClientMessage */

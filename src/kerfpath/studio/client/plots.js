@@ -2,13 +2,13 @@
 
 import UPlot from "uplot";
 
+import { columns, dashed, jointColour, span } from "./curves.js";
 import { byId, el, textSize, themeColour } from "./dom.js";
-import { deg, fixed } from "./format.js";
+import { fixed } from "./format.js";
 
 /** @typedef {import("./store.js").Store} Store */
 /** @typedef {import("./player.js").Player} Player */
-/** @typedef {import("./messages.js").PlanMessage} PlanMessage */
-/** @typedef {"speed" | "acceleration" | "angle"} Kind */
+/** @typedef {import("./curves.js").Kind} Kind */
 
 /** @type {Record<Kind, {title: string, label: string}>} */
 const KINDS = {
@@ -16,9 +16,6 @@ const KINDS = {
   acceleration: { title: "Accel.", label: "joint acceleration, % of limit" },
   angle: { title: "Angle", label: "joint angle, deg" },
 };
-
-/** @param {number} joint  0-based */
-export const jointColour = (joint) => themeColour(`--joint-${(joint % 7) + 1}`);
 
 export class Plots {
   /**
@@ -38,6 +35,8 @@ export class Plots {
     this.off = new Set();
     /** @type {UPlot | null} */
     this.plot = null;
+    /** @type {(number | null)[][]} the curves of the plan to compare with */
+    this.beside = [];
     this.waiting = false;
     const tabs = byId("plot-kind");
     tabs.replaceChildren(
@@ -51,7 +50,7 @@ export class Plots {
     );
     this.choose("speed");
     store.on(["selected", "plan", "scene", "progress"], () => this.invalidate());
-    store.on(["job"], () => this.invalidate());
+    store.on(["job", "compare"], () => this.invalidate());
     player.on(() => this.follow());
     new ResizeObserver(() => this.resize()).observe(this.host);
   }
@@ -82,35 +81,6 @@ export class Plots {
     return { plans, joints: this.store.scene?.robot.joints.length ?? 0 };
   }
 
-  /**
-   * Return the columns to plot: time, then one per joint; pieces are apart by a gap.
-   * @returns {(number | null)[][]}
-   */
-  columns() {
-    const { plans, joints } = this.shown();
-    /** @type {(number | null)[][]} */
-    const out = Array.from({ length: joints + 1 }, () => []);
-    let begin = 0;
-    for (const { time, q, velocity_share, acceleration_share } of plans) {
-      const [rows, offset, count] = {
-        speed: /** @type {const} */ ([velocity_share, 0.5, time.length - 1]),
-        acceleration: /** @type {const} */ ([acceleration_share, 1, time.length - 2]),
-        angle: /** @type {const} */ ([q, 0, time.length]),
-      }[this.kind];
-      if (begin > 0) out.forEach((column, j) => column.push(j === 0 ? begin : null));
-      for (let k = 0; k < count; k++) {
-        const [low, high] = [time[Math.floor(k + offset)], time[Math.ceil(k + offset)]];
-        out[0].push(begin + (low + high) / 2);
-        for (let j = 0; j < joints; j++) {
-          const value = rows[k * joints + j];
-          out[j + 1].push(this.kind === "angle" ? deg(value) : 100 * value);
-        }
-      }
-      begin += time[time.length - 1];
-    }
-    return out;
-  }
-
   draw() {
     const { plans, joints } = this.shown();
     this.plot?.destroy();
@@ -133,6 +103,8 @@ export class Plots {
     this.host.replaceChildren();
     this.host.dataset.contour = this.store.selected ?? "";
     if (!plans.length || !this.host.clientHeight) return;
+    const against = this.store.against?.plans.get(this.store.selected ?? "") ?? [];
+    this.beside = against.length ? columns(against, joints, this.kind) : [];
     const em = textSize();
     const font = `${0.82 * em}px ${getComputedStyle(document.body).fontFamily}`;
     const [quiet, line, rule] = ["--quiet", "--line", "--rule"].map(themeColour);
@@ -145,7 +117,10 @@ export class Plots {
         height: this.host.clientHeight,
         legend: { show: false },
         padding: [0.4 * em, 0.8 * em, 0, 0],
-        scales: { x: { time: false }, y: { range: (_, low, high) => this.range(low, high) } },
+        scales: {
+          x: { time: false, range: (_, low, high) => this.until(low, high) },
+          y: { range: (_, low, high) => this.range(low, high) },
+        },
         cursor: { y: false, points: { size: 0.45 * em }, drag: { x: false, y: false } },
         axes: [
           {
@@ -177,11 +152,12 @@ export class Plots {
           })),
         ],
         hooks: {
+          drawAxes: [(plot) => dashed(plot, this.beside, (joint) => !this.off.has(joint))],
           draw: [(plot) => this.limits(plot)],
           setCursor: [(plot) => this.say(plot)],
         },
       },
-      /** @type {any} */ (this.columns()),
+      /** @type {any} */ (columns(plans, joints, this.kind)),
       this.host,
     );
     this.plot.over.append(this.line);
@@ -193,17 +169,29 @@ export class Plots {
   }
 
   /**
-   * @param {number} low
-   * @param {number} high
+   * @param {number} first
+   * @param {number} last
+   * @returns {[number, number]} with the whole of what is compared
+   */
+  until(first, last) {
+    const times = this.beside[0] ?? [];
+    return [first, Math.max(last, times[times.length - 1] ?? last)];
+  }
+
+  /**
+   * @param {number} least
+   * @param {number} most
    * @returns {[number, number]}
    */
-  range(low, high) {
+  range(least, most) {
+    const [other, others] = span(this.beside.slice(1).filter((_, j) => !this.off.has(j)));
+    const [low, high] = [Math.min(least, other), Math.max(most, others)];
     if (this.kind === "angle") {
       const room = Math.max(2, 0.06 * (high - low));
       return [low - room, high + room];
     }
-    const most = Math.max(Math.abs(low), Math.abs(high), 20) * 1.12;
-    return [-most, most];
+    const reach = Math.max(Math.abs(low), Math.abs(high), 20) * 1.12;
+    return [-reach, reach];
   }
 
   /**

@@ -7,8 +7,12 @@
 
 /**
  * @typedef {"connection" | "job" | "part" | "pointed" | "scene" | "plan" | "program" | "outcome" | "progress" | "map"
- *   | "pose" | "fastest" | "program_text" | "error" | "selected"} Topic
+ *   | "pose" | "fastest" | "program_text" | "error" | "selected" | "kept" | "compare"} Topic
  */
+
+/** @typedef {import("./messages.js").KeptEntry} KeptEntry */
+/** @typedef {{entry: KeptEntry, plans: Map<string, PlanMessage[]>}} Against */
+/** @typedef {{name: string, s: number[], gamma: number[], posture: number[]}} Course */
 
 /** The state of the page. One message changes it, then those who listen to its topic are called. */
 export class Store {
@@ -49,6 +53,12 @@ export class Store {
     this.maps = new Map();
     /** @type {string | null} the loop whose contour is chosen once there is one */
     this.awaited = null;
+    /** @type {KeptEntry[]} jobs that are kept to be compared */
+    this.kept = [];
+    /** @type {Against | null} the one of them that is compared */
+    this.against = null;
+    /** @type {Course[]} of the chosen contour, to compare its own with */
+    this.compare = [];
     /** @type {string | null} the chosen contour */
     this.selected = null;
     /** @type {Map<string, Set<(about: any) => void>>} */
@@ -89,7 +99,25 @@ export class Store {
   select(contour) {
     if (contour === this.selected) return;
     this.selected = contour;
+    this.gather();
     this.emit("selected");
+  }
+
+  /**
+   * Compare with a job that is kept; null: with none.
+   * @param {Against | null} against
+   */
+  compareWith(against) {
+    this.against = against;
+    this.gather();
+    this.emit("compare");
+  }
+
+  /** Take the courses that are compared. */
+  gather() {
+    const plans = this.against?.plans.get(this.selected ?? "") ?? [];
+    const name = this.against?.entry.name ?? "";
+    this.compare = plans.map(({ s, gamma, posture }) => ({ name, s, gamma, posture }));
   }
 
   /** The names of all contours, in the order of the job. */
@@ -144,6 +172,9 @@ export class Store {
         break;
       case "program_text":
         this.programText = message;
+        break;
+      case "kept":
+        this.kept = message.plans;
         break;
       case "error":
         this.error = message;

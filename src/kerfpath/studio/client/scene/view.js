@@ -39,6 +39,9 @@ export class SceneView {
     /** @type {import("../timeline.js").Timeline | null} whose kerf is drawn */
     this.prepared = null;
     this.trouble = "";
+    /** @type {ArrayLike<number> | null} where the robot of the plan to compare with is */
+    this.other = null;
+    this.haunted = false;
     /** @type {Vector3 | null} where the tip was that the camera follows */
     this.carried = null;
     this.paths.paint();
@@ -199,12 +202,23 @@ export class SceneView {
    */
   haunt(q, admitted = true) {
     const { scene } = this.store;
-    this.machine.ghost.visible = q !== null;
-    if (q && scene) {
-      this.machine.pose(scene.robot, q, true);
-      this.machine.haunt(admitted);
+    this.haunted = q !== null;
+    const at = q ?? this.other;
+    this.machine.ghost.visible = at !== null;
+    if (at && scene) {
+      this.machine.pose(scene.robot, at, true);
+      this.machine.haunt(q ? admitted : true);
     }
     this.stage.invalidate();
+  }
+
+  /**
+   * Show the robot of another plan as a ghost, wherever none is pointed at; null takes it away.
+   * @param {ArrayLike<number> | null} q
+   */
+  accompany(q) {
+    this.other = q;
+    if (!this.haunted) this.haunt(null);
   }
 
   /** @param {string} view  "fit", "part", "top", ..., "head", or "mark", where no path goes on */

@@ -1,0 +1,65 @@
+"""What one decides with: plans side by side."""
+
+import json
+
+from studio.browser.test_page import ready, sent, serious, until
+
+
+def slower(plan):
+    """The plan of a job that was kept: twice as long, and half the gap away."""
+    return plan | {"time": [2 * t for t in plan["time"]], "gap": 0.5, "revision": 1}
+
+
+def entry(**more):
+    known = {"id": 3, "name": "A", "revision": 1, "metric": "manhattan", "objective": "sum"}
+    return known | {"contours": ["slot"], "cycle": None, "settled": True} | more
+
+
+def test_a_plan_that_is_kept_is_compared_with_the_one_that_is_shown(page, studio, first, messages):
+    plan = next(each for each in messages["plan"] if each["contour"] == "slot")
+    studio.files["kept/3"] = json.dumps([slower(plan)]).encode()
+
+    def react(message):
+        if message["type"] == "keep":
+            studio.say({"type": "kept", "plans": [entry()]})
+
+    studio.react = react
+    studio.open(*first)
+    ready(page)
+    page.locator("#contours button", has_text="slot").click()
+    page.get_by_role("button", name="Keep to compare").click()
+    table = page.locator("#compare table").first
+    table.wait_for()
+    seconds = plan["time"][-1]
+    row = table.locator("tr", has_text="Time of the cut").locator("td").all_inner_texts()
+    assert [float(each) for each in row[:2]] == [round(2 * seconds, 2), round(seconds, 2)]
+    assert "better" in row[2]
+    # Its course is there for the map, its curves for the plot, and its robot in the scene.
+    (course,) = page.evaluate("() => studio.store.compare")
+    assert course["gamma"] == plan["gamma"]
+    until(page, lambda: page.evaluate("() => studio.plots.beside.length") == 7)
+    assert page.evaluate("() => studio.plots.plot.scales.x.max") >= 1.9 * seconds
+    page.evaluate("() => studio.player.seek(studio.player.timeline.begin('slot') + 0.1)")
+    until(page, lambda: page.evaluate("() => studio.view.machine.ghost.visible"))
+    assert serious(page) == []
+    page.get_by_role("button", name="Go back to A").click()
+    until(page, lambda: sent(studio, "restore"))
+    assert sent(studio, "restore") == [{"type": "restore", "id": 3}]
+    page.get_by_label("Name of the plan that is kept").fill("slow")
+    page.keyboard.press("Enter")
+    until(page, lambda: sent(studio, "rename"))
+    # A page that is told that it is gone compares with nothing.
+    studio.say({"type": "kept", "plans": []})
+    until(page, lambda: page.evaluate("() => studio.store.against === null"))
+    assert not page.evaluate("() => studio.view.machine.ghost.visible")
+
+
+def test_another_page_chooses_what_it_compares_with(page, studio, first):
+    studio.open(*first, {"type": "kept", "plans": [entry(contours=[])]})
+    studio.files["kept/3"] = b"[]"
+    ready(page)
+    assert page.locator("#compare table").count() == 0
+    page.locator(".kept button", has_text="A").click()
+    page.get_by_text("A has no plan of this contour.").wait_for()
+    page.locator(".kept button", has_text="A").click()
+    until(page, lambda: page.locator("#compare .actions").count() == 0)
