@@ -214,3 +214,17 @@ def test_a_folder_that_cannot_be_written_to_is_said(document, monkeypatch):
     monkeypatch.setattr("kerfpath.studio._document.write_whole", refuse)
     with pytest.raises(InputError, match=r"cannot be written .Read-only"):
         document.change([(("plan", "metric"), "euclid")])
+
+
+def test_tables_are_made_inside_a_contour_and_taken_out_again():
+    text = '[[contour]]\npick = "a"   # the first\n\n[[contour]]\npick = "b"\n\n[plan]\n'
+    lead = [(("contour", 0, "lead_in", "length_mm"), 4), (("sequence",), {})]
+    made = with_values(text, lead)
+    assert tomllib.loads(made) == {
+        "contour": [{"pick": "a", "lead_in": {"length_mm": 4}}, {"pick": "b"}],
+        "plan": {},
+        "sequence": {},
+    }
+    assert "# the first" in made
+    back = with_values(made, [(("contour", 0, "lead_in"), None), (("sequence",), None)])
+    assert tomllib.loads(back) == tomllib.loads(text)

@@ -10,6 +10,7 @@ __all__ = [
     "Ask",
     "Cut",
     "Edit",
+    "Edits",
     "Keep",
     "Leave",
     "OfContour",
@@ -26,6 +27,8 @@ __all__ = [
 
 MOST_KEYS = 6
 """Parts of the path of a key: no job nests deeper."""
+MOST_EDITS = 50
+"""Keys that change in one step: no table of a job has more."""
 MOST_WORDS = 200
 """Characters of a name that a page sends: no contour is called by more."""
 MOST_LOOPS = 500
@@ -52,6 +55,20 @@ class Edit(_Strict):
     path: Path
     value: JsonValue
     gesture: Words | None = None
+
+
+class Change(_Strict):
+    """One key of the job and its new value; null removes it."""
+
+    path: Path
+    value: JsonValue
+
+
+class Edits(_Strict):
+    """Set some keys of the job, in one step."""
+
+    type: Literal["edits"]
+    edits: Annotated[tuple[Change, ...], Field(min_length=1, max_length=MOST_EDITS, strict=False)]
 
 
 class Text(_Strict):
@@ -144,6 +161,7 @@ class TextOf(_Strict):
 
 Ask = (
     Edit
+    | Edits
     | Text
     | Plain
     | Save

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Iterator, Mapping
 from functools import cache
 from typing import Any, get_args
 
@@ -52,6 +53,7 @@ def job_message(
         name=document.path.name,
         text=document.text,
         values=None if job is None else _values(job),
+        given=[] if job is None else list(_given(job.source)),
         contours=contours,
         undo=document.can_undo,
         redo=document.can_redo,
@@ -83,6 +85,19 @@ def _fault(said: str, lines: list[str]) -> Fault:
 def _values(job: Job) -> dict[str, object]:
     file = JobFile.model_validate(dict(job.source), context={"folder": job.path.parent})
     return file.model_dump(mode="json")
+
+
+def _given(value: object, way: str = "") -> Iterator[str]:
+    """Yield the dotted keys of a job, tables before what is in them."""
+    if way:
+        yield way
+    entries = list[tuple[object, object]]()
+    if isinstance(value, Mapping):
+        entries = list(value.items())
+    elif isinstance(value, list) and all(isinstance(one, Mapping) for one in value):
+        entries = list(enumerate(value))
+    for name, inner in entries:
+        yield from _given(inner, f"{way}.{name}" if way else str(name))
 
 
 @cache

@@ -67,6 +67,7 @@ class JobMessage(Message):
     name: str
     text: str
     values: dict[str, object] | None
+    given: list[str]
     contours: list[ContourName]
     undo: bool
     redo: bool

@@ -23,6 +23,7 @@ from kerfpath.studio._asks import (
     Ask,
     Cut,
     Edit,
+    Edits,
     Keep,
     Leave,
     OfContour,
@@ -144,6 +145,8 @@ class Session:
         match ask:
             case Edit():
                 self._change([(ask.path, ask.value)], ask.gesture)
+            case Edits():
+                self._change([(one.path, one.value) for one in ask.edits])
             case Text():
                 self._replace(ask.text)
             case Plain(type="undo"):

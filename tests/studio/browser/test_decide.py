@@ -1,7 +1,9 @@
-"""What one decides with: plans side by side."""
+"""What one decides with: plans side by side, and a control for every option."""
 
 import json
 
+from kerfpath.job.format.tables._cut import CornersTable, LeadTable, MicroJointsTable
+from kerfpath.job.format.tables._sequence import SequenceTable
 from studio.browser.test_page import ready, sent, serious, until
 
 
@@ -63,3 +65,60 @@ def test_another_page_chooses_what_it_compares_with(page, studio, first):
     page.get_by_text("A has no plan of this contour.").wait_for()
     page.locator(".kept button", has_text="A").click()
     until(page, lambda: page.locator("#compare .actions").count() == 0)
+
+
+def test_every_option_has_a_control_and_is_found_by_its_name(page, studio, first):
+    studio.open(*first)
+    ready(page)
+    page.locator("#contours button", has_text="slot").click()
+    page.get_by_label("Find an option").fill("lead-in")
+    length = page.get_by_label("Lead-in, length", exact=True)
+    assert page.get_by_label("Lead-in, shape", exact=True).is_disabled()  # there is no lead yet
+    assert page.get_by_label("Step of gamma", exact=True).is_hidden()
+    length.fill("4")
+    length.press("Enter")
+    until(page, lambda: sent(studio, "edits"))
+    path = ["contour", 2, "lead_in", "length_mm"]
+    assert sent(studio, "edits")[-1]["edits"] == [{"path": path, "value": 4}]
+    page.get_by_label("Find an option").fill("wrist costs")
+    width = page.get_by_label("Wrist singularity, costs below", exact=True)
+    width.fill("20")
+    width.press("Enter")
+    until(page, lambda: len(sent(studio, "edits")) == 2)
+    assert sent(studio, "edits")[-1]["edits"] == [
+        {"path": ["comfort", "wrist_band_deg"], "value": 20},
+        {"path": ["comfort", "wrist_cost"], "value": 1},  # which it may not be without
+    ]
+    page.get_by_label("Find an option").fill("nodes by")
+    page.get_by_label("Nodes by", exact=True).first.select_option("count")
+    until(page, lambda: len(sent(studio, "edits")) == 3)
+    assert sent(studio, "edits")[-1]["edits"] == [
+        {"path": ["contour", 2, "spacing_mm"], "value": None},
+        {"path": ["contour", 2, "count"], "value": 200},
+    ]
+    page.get_by_label("Find an option").fill("gamma")
+    page.get_by_label("Step of gamma: as it is by default").click()
+    until(page, lambda: len(sent(studio, "edits")) == 4)
+    step = {"path": ["plan", "gamma_step_deg"], "value": None}
+    assert sent(studio, "edits")[-1]["edits"] == [step]
+    assert serious(page) == []
+    page.get_by_label("Find an option").fill("nonsense")
+    page.get_by_text("No option is called so.").wait_for()
+
+
+def test_the_keys_of_the_controls_are_keys_of_the_job(page, studio, first, messages):
+    values = messages["job"][0]["values"]
+    studio.open(*first)
+    ready(page)
+    groups = page.evaluate("async () => (await import('/client/panels/keys.js')).GROUPS")
+    tables = {"sequence": SequenceTable, "lead_in": LeadTable, "lead_out": LeadTable}
+    tables |= {"micro_joints": MicroJointsTable, "corners": CornersTable}
+    for key in (each["key"] for group in groups for each in group["keys"]):
+        *way, last = key.split(".")
+        if way and way[-1] in tables:
+            assert last in tables[way[-1]].model_fields, key
+        else:
+            table = values["contour"][0] if way == ["contour"] else values
+            for part in way if way != ["contour"] else []:
+                table = table[part]
+            assert last in table, key

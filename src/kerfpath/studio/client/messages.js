@@ -15,6 +15,7 @@
  * @property {string} name
  * @property {string} text
  * @property {Record<string, any> | null} values
+ * @property {string[]} given  dotted keys that are in the text
  * @property {{name: string, index: number}[]} contours
  * @property {boolean} undo
  * @property {boolean} redo

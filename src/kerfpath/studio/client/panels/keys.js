@@ -1,0 +1,178 @@
+/** The keys of the job that have a control of their own under "All options", grouped by meaning. */
+
+/**
+ * @typedef {object} Key
+ * @property {string} key  dotted; "contour.x" is x of the chosen contour's table
+ * @property {string} label
+ * @property {"number" | "words" | "switch" | "table" | "joints"} kind
+ * @property {string} [unit]
+ * @property {string} [hint]
+ * @property {string} [needs]  a key without which this one may not be
+ * @property {string} [table]  taken out of the job with this key, which it cannot be without
+ * @property {[string, number]} [beside]  a key that this one must not be without, and its value
+ */
+
+/** @type {(key: string, label: string, unit?: string, more?: Partial<Key>) => Key} */
+const number = (key, label, unit = "", more = {}) => ({
+  key,
+  label,
+  unit,
+  kind: "number",
+  ...more,
+});
+
+/** @type {(key: string, label: string, more?: Partial<Key>) => Key} */
+const words = (key, label, more = {}) => ({ key, label, kind: "words", ...more });
+
+/** @type {(key: string, label: string, more?: Partial<Key>) => Key} */
+const yes = (key, label, more = {}) => ({ key, label, kind: "switch", ...more });
+
+/**
+ * @param {string} which
+ * @param {string} name
+ * @returns {Key[]}
+ */
+const lead = (which, name) => {
+  const needs = `contour.${which}.length_mm`;
+  return [
+    number(needs, `${name}, length`, "mm", { table: `contour.${which}` }),
+    words(`contour.${which}.shape`, `${name}, shape`, { needs }),
+    number(`contour.${which}.angle_deg`, `${name}, angle`, "deg", { needs }),
+    number(`contour.${which}.fan_mm`, `${name}, fan`, "mm", { needs }),
+    number(`contour.${which}.speed_share`, `${name}, share of the speed`, "", { needs }),
+  ];
+};
+
+/**
+ * @param {string} name
+ * @param {string} label
+ * @param {string} unit
+ * @param {string} [suffix]
+ * @returns {Key[]}
+ */
+const band = (name, label, unit, suffix = unit) => {
+  const [width, cost] = [`comfort.${name}_band_${suffix}`, `comfort.${name}_cost`];
+  return [
+    ...(name === "clearance"
+      ? []
+      : [number(`comfort.${name}_margin_${suffix}`, `${label}, kept away by`, unit)]),
+    number(width, `${label}, costs below`, unit, { beside: [cost, 1] }),
+    number(cost, `${label}, cost`, "", { needs: width, beside: [width, 0] }),
+  ];
+};
+
+/** @type {{title: string, contour?: boolean, keys: Key[]}[]} */
+export const GROUPS = [
+  {
+    title: "What is best",
+    keys: [
+      words("plan.objective", "Objective"),
+      words("plan.metric", "Metric"),
+      words("plan.posture", "Posture"),
+      number("plan.eta_velocity", "Share of the speed limits"),
+      number("plan.eta_acceleration", "Share of the acceleration limits"),
+    ],
+  },
+  {
+    title: "How it is searched",
+    keys: [
+      words("plan.method", "Method", { hint: "continuous: gamma off its grid, too" }),
+      number("plan.gamma_step_deg", "Step of gamma", "deg"),
+      words("plan.closure", "Closed contours", { hint: "periodic: end as it began" }),
+      number("plan.rotation_deg", "Turned on at most", "deg"),
+      words("plan.frames", "Frames"),
+      { key: "plan.refine", label: "Refined off the grid", kind: "switch" },
+      number("plan.refine_parts", "Parts of the refinement"),
+    ],
+  },
+  {
+    title: "Where the speed cannot be kept",
+    keys: [
+      words("plan.feed", "Feed", { hint: "dip: slow down where it must" }),
+      words("plan.interruptions", "Interruptions", { hint: "fewest: cut in pieces" }),
+      number("plan.least_piece_mm", "Shortest piece", "mm"),
+    ],
+  },
+  {
+    title: "Tolerance of the tool axis",
+    keys: [
+      number("plan.tilt_deg", "Tilt, at most", "deg"),
+      number("plan.tilt_steps", "Steps of the tilt", "", { needs: "plan.tilt_deg" }),
+      number("plan.tilt_cost_per_deg", "Cost of the tilt", "per deg", { needs: "plan.tilt_deg" }),
+    ],
+  },
+  {
+    title: "Margins",
+    keys: [
+      ...band("limits", "Joint limits", "deg"),
+      ...band("wrist", "Wrist singularity", "deg"),
+      ...band("elbow", "Elbow singularity", "deg"),
+      ...band("shoulder", "Shoulder singularity", "mm"),
+      ...band("manipulability", "Manipulability", "m\u00b3", "m3"),
+      ...band("clearance", "Clearance", "mm"),
+    ],
+  },
+  {
+    title: "What is proved",
+    keys: [
+      yes("plan.certify", "Bound of the cost"),
+      number("plan.certify_gap_percent", "Gap that is enough", "%", { needs: "plan.certify" }),
+      number("plan.certify_seconds", "Time for it", "s", { needs: "plan.certify" }),
+    ],
+  },
+  {
+    title: "Order and moves",
+    keys: [
+      { key: "sequence", label: "Moves between contours are planned", kind: "table" },
+      words("sequence.order", "Order", { needs: "sequence" }),
+      yes("sequence.inner_first", "Inner contours first", { needs: "sequence" }),
+      number("sequence.heat_spacing_mm", "Heat spacing", "mm", { needs: "sequence" }),
+      number("sequence.seconds", "Time for the order", "s", { needs: "sequence" }),
+      { key: "sequence.home_deg", label: "Home", unit: "deg", kind: "joints", needs: "sequence" },
+    ],
+  },
+  {
+    title: "The cut",
+    contour: true,
+    keys: [
+      words("contour.start", "Start"),
+      number("contour.start_mm", "Start at", "mm"),
+      words("contour.direction", "Direction"),
+      number("contour.candidates", "Starts that are tried"),
+      words("contour.scrap", "Scrap side"),
+      number("contour.kerf_mm", "Kerf", "mm"),
+      number("contour.bevel_deg", "Bevel", "deg"),
+      number("contour.overlap_mm", "Overlap", "mm"),
+    ],
+  },
+  {
+    title: "Leads",
+    contour: true,
+    keys: [...lead("lead_in", "Lead-in"), ...lead("lead_out", "Lead-out")],
+  },
+  {
+    title: "Micro joints and corners",
+    contour: true,
+    keys: [
+      number("contour.micro_joints.count", "Micro joints", "", {
+        table: "contour.micro_joints",
+        beside: ["contour.micro_joints.width_mm", 0.4],
+      }),
+      number("contour.micro_joints.width_mm", "Width of a micro joint", "mm", {
+        needs: "contour.micro_joints.count",
+        table: "contour.micro_joints",
+      }),
+      number("contour.corners.round_mm", "Corners rounded by", "mm"),
+      number("contour.corners.loop_mm", "Corners run around, radius", "mm"),
+      number("contour.corners.slow_share", "Share of the speed at corners"),
+    ],
+  },
+];
+
+/** How nodes may be laid on a contour: exactly one of these keys is in its table. */
+export const SAMPLINGS = {
+  spacing_mm: { label: "spacing", unit: "mm", usual: 2 },
+  time_step_ms: { label: "time step", unit: "ms", usual: 20 },
+  tolerance_mm: { label: "tolerance", unit: "mm", usual: 0.05 },
+  count: { label: "count", unit: "", usual: 200 },
+};
