@@ -20,9 +20,11 @@ from kerfpath.job.format import with_loops as with_loops
 from kerfpath.job.format import with_map as with_map
 from kerfpath.job.format import without_contour as without_contour
 from kerfpath.job.output import FileTexts as FileTexts
+from kerfpath.job.output import ProgramPlaces as ProgramPlaces
 from kerfpath.job.output import WrittenFiles as WrittenFiles
 from kerfpath.job.output import make_folder as make_folder
 from kerfpath.job.output import plan_file_text as plan_file_text
+from kerfpath.job.output import program_places as program_places
 from kerfpath.job.output import program_texts as program_texts
 from kerfpath.job.output import require_folder as require_folder
 from kerfpath.job.output import require_language as require_language

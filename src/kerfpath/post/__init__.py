@@ -25,6 +25,10 @@ from kerfpath.post._languages import language as language
 from kerfpath.post._languages import languages as languages
 from kerfpath.post._names import identifier as identifier
 from kerfpath.post._outline import issues_before_planning as issues_before_planning
+from kerfpath.post._places import Line as Line
+from kerfpath.post._places import TimedLine as TimedLine
+from kerfpath.post._places import issue_lines as issue_lines
+from kerfpath.post._places import timed_lines as timed_lines
 from kerfpath.post._preflight import preflight as preflight
 from kerfpath.post._program import PARTNERS as PARTNERS
 from kerfpath.post._program import Await as Await

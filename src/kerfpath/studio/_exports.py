@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import io
 import zipfile
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import Any, NamedTuple
 
@@ -16,9 +16,11 @@ from kerfpath.job import (
     JobResult,
     ProgramTable,
     program_options,
+    program_places,
 )
-from kerfpath.post import languages
-from kerfpath.studio._messages import Export, FileEntry, ProgramTextMessage
+from kerfpath.post import Line, ProgramIssue, TimedLine, languages
+from kerfpath.studio._messages import Export, FileEntry, FindingEntry, ProgramTextMessage
+from kerfpath.studio._numbers import flat
 
 __all__ = ["WAIT", "File", "exports_of", "in_language", "program_text", "zipped"]
 
@@ -83,16 +85,41 @@ def in_language(result: JobResult, language: str | None) -> JobResult:
     return replace(result, job=replace(result.job, program=options))
 
 
-def program_text(result: JobResult, texts: FileTexts) -> ProgramTextMessage:
-    """Return the program of a result as its files say it."""
+def program_text(result: JobResult, texts: FileTexts, revision: int) -> ProgramTextMessage:
+    """Return the program of a result as its files say it, and what each line does when."""
     faults = list(texts.faults)
     if not texts.program and not faults:
         faults = ["there is no program: a contour has no plan that passes its audit"]
+    places = program_places(result, {name: texts.files[name] for name in texts.program})
+    said = {str(issue) for issue, _ in places.findings}
     return ProgramTextMessage(
         language=result.job.program.language,
-        files=[FileEntry(name=name, text=texts.files[name]) for name in texts.program],
-        notes=list(texts.notes),
+        revision=revision,
+        files=[_file(name, texts.files[name], places.lines) for name in texts.program],
+        findings=[_finding(*found) for found in places.findings],
+        notes=[note for note in texts.notes if note not in said],
         faults=faults,
+    )
+
+
+def _file(name: str, text: str, lines: Sequence[TimedLine]) -> FileEntry:
+    mine = [each for each in lines if each.line.file == name]
+    return FileEntry(
+        name=name,
+        text=text,
+        lines=[each.line.number for each in mine],
+        begin=flat([each.begin for each in mine], 6),
+        end=flat([each.end for each in mine], 6),
+    )
+
+
+def _finding(issue: ProgramIssue, line: Line | None) -> FindingEntry:
+    return FindingEntry(
+        level=issue.level,
+        message=issue.message,
+        place=issue.place,
+        file=None if line is None else line.file,
+        line=None if line is None else line.number,
     )
 
 

@@ -6,6 +6,7 @@ from typing import Literal
 
 from kerfpath.studio._numbers import Message, Numbers
 from kerfpath.studio._part_messages import FaceEntry, LoopEntry, PartMessage
+from kerfpath.studio._program_messages import FileEntry, FindingEntry, ProgramTextMessage
 
 __all__ = [
     "BodyEntry",
@@ -23,6 +24,7 @@ __all__ = [
     "FastestMessage",
     "Fault",
     "FileEntry",
+    "FindingEntry",
     "JobMessage",
     "JointEntry",
     "LoopEntry",
@@ -370,23 +372,6 @@ class FastestMessage(Message):
     on_grid_m_min: float | None
     binds: str
     edits: list[EditEntry]
-
-
-class FileEntry(Message):
-    """A file and its text."""
-
-    name: str
-    text: str
-
-
-class ProgramTextMessage(Message):
-    """The program in a robot's language."""
-
-    type: Literal["program_text"] = "program_text"
-    language: str
-    files: list[FileEntry]
-    notes: list[str]
-    faults: list[str]
 
 
 class ErrorMessage(Message):

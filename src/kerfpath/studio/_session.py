@@ -180,7 +180,9 @@ class Session:
             case Keep() | Rename() | OfKept():
                 self._keep(ask)
             case TextOf():
-                page.say(program_text(*await self.program(ask.language)))
+                revision = self.document.revision
+                result, texts = await self.program(ask.language)
+                page.say(await asyncio.to_thread(program_text, result, texts, revision))
 
     def _change(self, changes: Sequence[Change], gesture: str | None = None) -> None:
         self.document.change(changes, gesture)

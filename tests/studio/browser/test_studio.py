@@ -235,7 +235,7 @@ def test_files_are_exported_with_their_comments(opened, tmp_path):
         page.locator("#export-menu a[href*='export/program']").click()
     assert "MODULE" in Path(download.value.path()).read_text(errors="replace")
     page.locator("#open-program").click()
-    page.locator("dialog pre", has_text="MODULE").wait_for()
+    page.locator("dialog .code", has_text="MODULE").wait_for()
 
 
 @pytest.mark.slow

@@ -10,3 +10,5 @@ from kerfpath.job.output._files import require_language as require_language
 from kerfpath.job.output._files import result_texts as result_texts
 from kerfpath.job.output._files import stale_program as stale_program
 from kerfpath.job.output._files import write_result as write_result
+from kerfpath.job.output._places import ProgramPlaces as ProgramPlaces
+from kerfpath.job.output._places import program_places as program_places

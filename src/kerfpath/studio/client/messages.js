@@ -266,10 +266,23 @@
  */
 
 /**
+ * @typedef {object} ProgramFile  its lines that move or wait, and when
+ * @property {string} name
+ * @property {string} text
+ * @property {number[]} lines
+ * @property {number[]} begin
+ * @property {number[]} end
+ */
+
+/** @typedef {{level: string, message: string, place: string, file: string | null, line: number | null}} Finding */
+
+/**
  * @typedef {object} ProgramTextMessage
  * @property {"program_text"} type
  * @property {string} language
- * @property {{name: string, text: string}[]} files
+ * @property {number} revision
+ * @property {ProgramFile[]} files
+ * @property {Finding[]} findings
  * @property {string[]} notes
  * @property {string[]} faults
  */

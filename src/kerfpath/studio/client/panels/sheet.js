@@ -56,7 +56,7 @@ function prepare(sheet) {
   sheet.addEventListener("click", (event) => {
     if (event.target === sheet && !sheet.classList.contains("docked")) sheet.close();
   });
-  sheet.addEventListener("keydown", (event) => {
-    if (event.key === "Escape" && sheet.classList.contains("docked")) sheet.close();
+  document.addEventListener("keydown", (event) => {
+    if (event.key === "Escape" && sheet.open && sheet.classList.contains("docked")) sheet.close();
   });
 }
